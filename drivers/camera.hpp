@@ -150,7 +150,7 @@ class CameraDriver {
   virtual ~CameraDriver() = default;
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
   /// `serial` empty: the first. Null: *status says why. → ok, not_found, no_permission, busy,
-  /// failed
+  /// unsupported (it is no such camera), failed
   [[nodiscard]] virtual std::unique_ptr<CameraDevice> open(std::string_view serial,
                                                            DeviceStatus* status) = 0;
   /// One sentence about the last open() that gave nothing, or enumerate() that found nothing.

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -52,6 +53,16 @@ class Notifier {
  public:
   virtual ~Notifier() = default;
   virtual void notify() noexcept = 0;
+};
+
+/// Sees what a device sends over its line, as it comes: for a record.
+///
+/// Threads  on_bytes() on the device's own, one device each; it does not wait. `arrival`: of the
+///          last of the bytes.
+class ByteObserver {
+ public:
+  virtual ~ByteObserver() = default;
+  virtual void on_bytes(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept = 0;
 };
 
 }  // namespace vergence

@@ -21,7 +21,7 @@ struct SnapRequest {
 /// such command run freely; it says so.
 /// → done, not_usable (pictures are there and no good), device_failed (a camera sent nothing),
 ///   interrupted, terminated
-/// Errors  InputError: configuration, devices that are not there, folder.
+/// Errors  InputError: configuration, folder; DeviceError: devices that are not there.
 [[nodiscard]] ExitCode take_pictures(const SnapRequest& request);
 
 }  // namespace vergence::app

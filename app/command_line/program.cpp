@@ -131,6 +131,9 @@ ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands
     return code;
   } catch (const InputError& error) {
     complain(error.what());
+  } catch (const DeviceError& error) {
+    complain(error.what());
+    return ExitCode::device_failed;
   } catch (const std::bad_alloc&) {
     std::fputs("vergence: not enough memory; close other programs or choose smaller capacities\n",
                stderr);

@@ -74,8 +74,9 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
                    "configuration's; SIGUSR1 asks for a new one during the drive")
       ->type_name("FILE");
   command
-      ->add_option("--record", a->record,
-                   "What is recorded into drive.mcap, e.g. poses,ins,images (docs/recording.md)")
+      ->add_option(
+          "--record", a->record,
+          "What is recorded into drive.mcap, e.g. poses,ins,images,pulses,raw (docs/recording.md)")
       ->type_name("WORDS");
   declare_also(*command, &a->also);
   command->add_flag("--memory", a->memory, "Print what memory is held, by whom");

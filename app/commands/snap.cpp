@@ -57,8 +57,8 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
       ->allow_extra_args(false);
   command->footer(
       "Exit code: 0 done, 1 the pictures are no good (black, white, twice the same, exchanged), 2 "
-      "bad arguments or no such camera,\n"
-      "3 a camera sent nothing.");
+      "bad arguments,\n"
+      "3 a camera is not there or sent nothing.");
   command->callback([a, exit_code] { *exit_code = take_pictures(request_of(*a)); });
 }
 

@@ -289,7 +289,7 @@ std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
         entry.name.starts_with(kGroup) && entry.name.size() > kGroup.size() &&
         entry.name.find_first_not_of("0123456789", kGroup.size()) == std::string::npos;
     if (!item) continue;
-    const std::vector<std::string> words{"poses", "ins", "images"};
+    const std::vector<std::string> words{"poses", "ins", "images", "pulses", "raw"};
     if (!entry.scalar || std::find(words.begin(), words.end(), entry.value) == words.end())
       throw InputError(fmt::format("{}: record lists \"{}\"{}; it takes {}", entry.origin,
                                    entry.value.substr(0, 60), did_you_mean(entry.value, words),

@@ -30,10 +30,14 @@ struct RigSettings {
                             // no state file
 };
 
+/// Which part of a camera's picture an entry of `cameras:` is.
+enum class PictureHalf : std::uint8_t { whole, left, right };
+
 /// One entry of `cameras:`. Without a driver there is no such camera.
 struct CameraSettings {
   std::string name{}, driver{}, serial{};
-  int width = 640, height = 480;   // px
+  PictureHalf half = PictureHalf::whole;
+  int width = 640, height = 480;   // px, of this entry's image
   int offset_x = 0, offset_y = 0;  // px, of the region on the sensor
   std::string pixel_format{};
   CameraTrigger trigger = CameraTrigger::hardware;
@@ -136,13 +140,13 @@ struct MockSettings {
 
 /// `record:` what goes into drive.mcap of a session (docs/recording.md).
 struct RecordSettings {
-  int poses = 0, ins = 0, images = 0;  // 1: recorded
-  double keep_s = 0;                   // 0: everything
-  int roll_mb = 0;                     // 0: one file
-  double roll_s = 0;                   // 0: one file
-  int memory_mb = 0;                   // 0: as much as six seconds take, and keep_s
+  int poses = 0, ins = 0, images = 0, pulses = 0, raw = 0;  // 1: recorded
+  double keep_s = 0;                                        // 0: everything
+  int roll_mb = 0;                                          // 0: one file
+  double roll_s = 0;                                        // 0: one file
+  int memory_mb = 0;  // 0: as much as six seconds take, and keep_s
 
-  [[nodiscard]] bool any() const noexcept { return poses + ins + images > 0; }
+  [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses + raw > 0; }
 };
 
 /// `sessions:` the folders that drives leave side by side.

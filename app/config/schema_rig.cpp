@@ -15,8 +15,9 @@ std::vector<std::pair<std::string, trigger_board::Edge>> edges() {
 
 std::vector<std::pair<std::string, SyncMode>> sync_modes() {
   std::vector<std::pair<std::string, SyncMode>> modes;
-  for (const SyncMode mode : {SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe,
-                              SyncMode::bus, SyncMode::ptp, SyncMode::counter, SyncMode::software})
+  for (const SyncMode mode :
+       {SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe, SyncMode::bus,
+        SyncMode::ptp, SyncMode::one_picture, SyncMode::counter, SyncMode::software})
     modes.emplace_back(to_string(mode), mode);
   return modes;
 }
@@ -57,6 +58,13 @@ Group cameras() {
             .text("name", &C::name, 32, "How it is called in messages and in calibration.yaml.")
             .text("serial", &C::serial, 64,
                   "Which one, where there are several; empty: the next one. GigE: or its address.")
+            .choice<PictureHalf>(
+                "half", &C::half,
+                {{"whole", PictureHalf::whole},
+                 {"left", PictureHalf::left},
+                 {"right", PictureHalf::right}},
+                "Of a camera that gives both images side by side in one picture: which one this "
+                "is. Two entries with one `serial` then are one camera of twice the `size.0`.")
             .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
             .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
             .integer("offset.0", &C::offset_x, 0, 16384, "px",
@@ -199,13 +207,15 @@ Group sync() {
           "trigger board's pulses; `ins_syncout`, by "
           "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE "
           "1394 cycle timer; `ptp`, stamps of one PTP "
-          "clock. Not proven: `counter`, exposure n of every camera belongs together; "
+          "clock; `one_picture`, both images come in one (`cameras.N.half`). Not proven: "
+          "`counter`, exposure n of every camera belongs together; "
           "`software`, what was exposed within "
           "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
       .number("hold_ms", &S::hold_ms, 1, 10000, "ms",
               "How long the images of a pulse wait for one that is late.")
       .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
-              "With `software`, `bus` and `ptp`: the farthest that exposures of one set are apart.")
+              "With `software`, `bus`, `ptp` and `one_picture`: the farthest that exposures of one "
+              "set are apart.")
       .done();
 }
 

@@ -44,6 +44,11 @@ Group record() {
       .choice("images", &R::images, off_on,
               "All images that the estimator was given, not packed, with their cameras: what "
               "`replay --format session` needs.")
+      .choice("pulses", &R::pulses, off_on,
+              "Of a live drive: the trigger board's pulses and the cameras' frames by their own "
+              "counters and clocks, before they are paired.")
+      .choice("raw", &R::raw, off_on,
+              "Of a live drive: the bytes that came over the lines of INS and trigger board.")
       .number("keep_s", &R::keep_s, 0, 3600, "s",
               "0: everything; else only what was so long before an event and so long after it.")
       .integer("roll_mb", &R::roll_mb, 0, 10'000'000, "MB",

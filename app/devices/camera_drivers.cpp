@@ -10,6 +10,7 @@
 #include "app/devices/device_sentences.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "drivers/common/side_by_side_camera.hpp"
 #include "drivers/gige/gige.hpp"
 #include "drivers/iidc/iidc.hpp"
 #include "drivers/v4l2/v4l2.hpp"
@@ -57,11 +58,41 @@ std::string refusal(const CameraRequest& request, const std::string& serial,
   }
 }
 
+bool are_one_camera(const CameraRequest& a, const CameraRequest& b) {
+  return a.half != PictureHalf::whole && b.half != PictureHalf::whole && a.half != b.half &&
+         a.driver == b.driver && a.serial == b.serial;
+}
+
+/// A half needs its other one, asked for in the same way.
+void check_half(const CameraRequest& request, const std::vector<CameraRequest>& requests) {
+  if (request.half == PictureHalf::whole) return;
+  const auto other = std::find_if(requests.begin(), requests.end(), [&](const CameraRequest& r) {
+    return are_one_camera(r, request);
+  });
+  const bool left = request.half == PictureHalf::left;
+  if (other == requests.end())
+    throw InputError(fmt::format(
+        "{}.half is {}, and no other entry is the {} half of the same picture: give one the same "
+        "driver and serial, and half: {}",
+        request.key, left ? "left" : "right", left ? "right" : "left", left ? "right" : "left"));
+  const CameraConfiguration& a = request.configuration;
+  const CameraConfiguration& b = other->configuration;
+  if (a.exposure != b.exposure || a.gain_db != b.gain_db || a.pixel_format != b.pixel_format ||
+      a.offset_x != b.offset_x || a.offset_y != b.offset_y ||
+      options_text(a.options) != options_text(b.options))
+    throw InputError(fmt::format(
+        "{} and {} are halves of one camera's picture and differ: exposure_us, gain_db, "
+        "pixel_format, offset and options are that camera's, give both the same",
+        request.key, other->key));
+}
+
 /// The drivers in use, and who is taken.
 class Openings {
  public:
   explicit Openings(const std::vector<CameraRequest>& requests) {
     for (const CameraRequest& r : requests) {
+      check_half(r, requests);
+      if (r.half == PictureHalf::right) continue;  // its left half stands for the camera
       ++sharing_[r.driver];
       if (!r.serial.empty()) taken_.emplace_back(r.driver, r.serial);
     }
@@ -72,24 +103,44 @@ class Openings {
   }
 
   OpenedCamera open(const CameraRequest& request) {
-    const CameraDriverRow& row = row_of(request);
-    std::unique_ptr<CameraDriver>& driver = drivers_[request.driver];
-    if (driver == nullptr) driver = row.make();
-    std::string serial = request.serial;
-    if (serial.empty()) serial = next(request, *driver);
-    DeviceStatus status = DeviceStatus::ok;
     OpenedCamera opened;
-    opened.device = driver->open(serial, &status);
-    if (opened.device == nullptr) throw InputError(refusal(request, serial, row, *driver, status));
+    opened.device = request.half == PictureHalf::whole ? open_device(request) : open_half(request);
     CameraConfiguration requested = request.configuration;
     requested.sharing = sharing_[request.driver];
-    status = opened.device->configure(requested, &opened.actual);
+    const DeviceStatus status = opened.device->configure(requested, &opened.actual);
     require_configured(camera_title(request.key, opened.device->info()), status,
                        opened.device->last_error());
     return opened;
   }
 
  private:
+  struct OpenHalf {
+    const CameraRequest* of;
+    std::unique_ptr<CameraDevice> device;
+  };
+
+  /// The camera behind two entries is opened with the first of them.
+  std::unique_ptr<CameraDevice> open_half(const CameraRequest& request) {
+    for (OpenHalf& h : halves_)
+      if (are_one_camera(*h.of, request) && h.device != nullptr) return std::move(h.device);
+    auto [left, right] = split_side_by_side(open_device(request));
+    const bool is_left = request.half == PictureHalf::left;
+    halves_.push_back({&request, is_left ? std::move(right) : std::move(left)});
+    return is_left ? std::move(left) : std::move(right);
+  }
+
+  std::unique_ptr<CameraDevice> open_device(const CameraRequest& request) {
+    const CameraDriverRow& row = row_of(request);
+    std::unique_ptr<CameraDriver>& driver = drivers_[request.driver];
+    if (driver == nullptr) driver = row.make();
+    std::string serial = request.serial;
+    if (serial.empty()) serial = next(request, *driver);
+    DeviceStatus status = DeviceStatus::ok;
+    auto device = driver->open(serial, &status);
+    if (device == nullptr) refuse_device(status, refusal(request, serial, row, *driver, status));
+    return device;
+  }
+
   /// The serial of the next camera that nobody has or names.
   std::string next(const CameraRequest& request, CameraDriver& driver) {
     const std::vector<DeviceInfo> found = driver.enumerate();
@@ -100,13 +151,14 @@ class Openings {
       return d.serial;
     }
     const std::string said = driver.last_error();
-    throw InputError(fmt::format("{}: no {} camera is left to be it; {}; check cable and power{}",
-                                 request.key, request.driver, list_of(found),
-                                 said.empty() ? "" : ": " + said));
+    throw DeviceError(fmt::format("{}: no {} camera is left to be it; {}; check cable and power{}",
+                                  request.key, request.driver, list_of(found),
+                                  said.empty() ? "" : ": " + said));
   }
 
   std::map<std::string, std::unique_ptr<CameraDriver>> drivers_;
   std::map<std::string, int> sharing_;
+  std::vector<OpenHalf> halves_;  // opened with the other one, not asked for yet
   std::vector<std::pair<std::string, std::string>> taken_;  // driver, serial
 };
 

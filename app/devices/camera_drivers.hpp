@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "app/config/configuration.hpp"
 #include "drivers/camera.hpp"
 
 namespace vergence::app {
@@ -24,6 +25,7 @@ struct CameraDriverRow {
 struct CameraRequest {
   std::string key;  // `cameras.0`, for sentences
   std::string driver, serial;
+  PictureHalf half = PictureHalf::whole;
   CameraConfiguration configuration;  // `sharing` is filled in: the requests with the same driver
 };
 
@@ -34,10 +36,10 @@ struct OpenedCamera {
 };
 
 /// Opens and configures them in order. An empty serial takes the next camera that no other request
-/// names.
+/// names. A left half and a right one with the same driver and serial are one camera.
 ///
-/// Errors  InputError, one sentence: the key, what was found or what the camera offers, what to do.
-///         Nothing stays open then.
+/// Errors  As refuse_device(), one sentence: the key, what was found or what the camera offers,
+///         what to do. Nothing stays open then.
 /// `remarks`: sentences about what works, but not as well as it should.
 [[nodiscard]] std::vector<OpenedCamera> open_cameras(const std::vector<CameraRequest>& requests,
                                                      std::vector<std::string>* remarks);

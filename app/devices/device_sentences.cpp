@@ -24,11 +24,32 @@ std::string serial_open_error(const std::string& who, DeviceStatus status,
   }
 }
 
+void refuse_device(DeviceStatus status, const std::string& sentence) {
+  switch (status) {
+    case DeviceStatus::unsupported:
+    case DeviceStatus::bad_configuration:
+    case DeviceStatus::no_bandwidth:
+      throw InputError(sentence);
+    case DeviceStatus::ok:
+    case DeviceStatus::timeout:
+    case DeviceStatus::stopped:
+    case DeviceStatus::ended:
+    case DeviceStatus::gone:
+    case DeviceStatus::not_found:
+    case DeviceStatus::no_permission:
+    case DeviceStatus::busy:
+    case DeviceStatus::failed:
+      break;
+  }
+  throw DeviceError(sentence);
+}
+
 void require_configured(const std::string& title, DeviceStatus status, const std::string& error) {
   if (status == DeviceStatus::ok) return;
-  throw InputError(fmt::format(
-      "{}: {}", title,
-      error.empty() ? fmt::format("cannot do what is asked: {}", to_string(status)) : error));
+  refuse_device(status, fmt::format("{}: {}", title,
+                                    error.empty() ? fmt::format("cannot do what is asked: {}",
+                                                                to_string(status))
+                                                  : error));
 }
 
 }  // namespace vergence::app

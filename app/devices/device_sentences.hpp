@@ -11,7 +11,11 @@ namespace vergence::app {
 [[nodiscard]] std::string serial_open_error(const std::string& who, DeviceStatus status,
                                             const std::string& error);
 
-/// Throws InputError unless `ok`: the device's title, and its sentence or the status.
+/// Throws: InputError where the request is at fault (a device cannot do it, nonsense is asked, one
+/// of several is not named), DeviceError where the device is: the same may succeed later.
+[[noreturn]] void refuse_device(DeviceStatus status, const std::string& sentence);
+
+/// refuse_device() unless `ok`: the device's title, and its sentence or the status.
 void require_configured(const std::string& title, DeviceStatus status, const std::string& error);
 
 }  // namespace vergence::app

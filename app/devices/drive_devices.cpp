@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "app/devices/device_sentences.hpp"
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/exposure_settings.hpp"
 #include "app/devices/simulated_board.hpp"
@@ -61,6 +62,7 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
     r.key = key;
     r.driver = s.driver;
     r.serial = s.serial;
+    r.half = s.half;
     const ExposureSetting start = starting_exposure(c, static_cast<std::size_t>(k));
     r.configuration = {s.width, s.height, c.trigger.rate, start.exposure, start.gain_db, s.trigger};
     r.configuration.offset_x = s.offset_x;
@@ -95,15 +97,15 @@ InsRequest ins_request(const InsSettings& s) {
 
 }  // namespace
 
-void start_acquisition(Acquisition* acquisition) {
-  const auto failure = acquisition->start();
+void start_acquisition(Acquisition* acquisition, AcquisitionObserver* observer) {
+  const auto failure = acquisition->start(observer);
   if (!failure) return;
   const std::string why = failure->message.empty()
                               ? std::string(to_string(failure->status)) +
                                     "; check its cable and its section of the configuration"
                               : failure->message;
-  throw InputError(failure->device.driver + " " + failure->device.serial +
-                   " cannot be started: " + why);
+  refuse_device(failure->status, failure->device.driver + " " + failure->device.serial +
+                                     " cannot be started: " + why);
 }
 
 DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string>& faults,

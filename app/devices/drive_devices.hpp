@@ -21,7 +21,8 @@ namespace vergence::app {
 ///            Threads: one caller.
 class DriveDevices {
  public:
-  /// InputError names the key, or the device and what it offers. `fast`: virtual time, mock only.
+  /// InputError names the key, or the device and what it offers; DeviceError a device that is not
+  /// there or does not answer. `fast`: virtual time, mock only.
   DriveDevices(const Configuration& configuration, const std::vector<std::string>& faults,
                bool fast, std::optional<double> duration_s);
 
@@ -76,7 +77,7 @@ class DriveDevices {
   HostStamp start_{};
 };
 
-/// Acquisition::start(); InputError names the device that cannot be started.
-void start_acquisition(Acquisition* acquisition);
+/// Acquisition::start(); refuse_device() names the device that cannot be started.
+void start_acquisition(Acquisition* acquisition, AcquisitionObserver* observer = nullptr);
 
 }  // namespace vergence::app

@@ -89,6 +89,15 @@ void check_ptp(const Configuration& c, int cameras) {
   });
 }
 
+void check_one_picture(const Configuration& c, int cameras) {
+  for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
+    if (s.half == PictureHalf::whole)
+      refuse(c, fmt::format("cameras.{}.half is whole, so it has a picture of its own; with both "
+                            "images in one picture it is left or right",
+                            k));
+  });
+}
+
 void check_mode(const Configuration& c, int cameras) {
   switch (c.sync.mode) {
     case SyncMode::board:
@@ -101,12 +110,14 @@ void check_mode(const Configuration& c, int cameras) {
       return check_bus(c, cameras);
     case SyncMode::ptp:
       return check_ptp(c, cameras);
+    case SyncMode::one_picture:
+      return check_one_picture(c, cameras);
     case SyncMode::counter:
       if (c.cameras[0].trigger == CameraTrigger::free)
         throw InputError(
             "cameras[].trigger is free: nothing makes the cameras expose together, so their "
             "counters cannot pair the images; "
-            "trigger them, or set sync.mode to software");
+            "trigger them, or set sync.mode to software (both in one picture: one_picture)");
       return;
     case SyncMode::software:
       return;
@@ -204,6 +215,8 @@ const char* proof_sentence(SyncMode mode) noexcept {
       return "pairs are proven by stamps of the bus's one clock";
     case SyncMode::ptp:
       return "pairs are proven by stamps of one PTP clock";
+    case SyncMode::one_picture:
+      return "pairs are proven: both images come in one picture";
     case SyncMode::counter:
       return "nothing proves that paired images were exposed together: sync.mode is counter, they "
              "are counted and their stamps compared";

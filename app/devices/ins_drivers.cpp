@@ -67,10 +67,10 @@ std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::
   DeviceStatus status = DeviceStatus::ok;
   std::unique_ptr<InsDevice> device = driver->open(request.port, &status);
   if (device == nullptr)
-    throw InputError(
-        serial_open_error(fmt::format("ins: the {} INS{}", row.name,
-                                      request.port.empty() ? "" : " on " + request.port),
-                          status, driver->last_error()));
+    refuse_device(status,
+                  serial_open_error(fmt::format("ins: the {} INS{}", row.name,
+                                                request.port.empty() ? "" : " on " + request.port),
+                                    status, driver->last_error()));
   status = device->configure(request.rate_hz, nullptr);
   require_configured(ins_title(device->info()), status, device->last_error());
   if (const std::string remark = device->remark(); !remark.empty())

@@ -34,7 +34,8 @@ struct InsDriverRow {
 
 /// Opens and configures it; null for `none`.
 ///
-/// Errors  InputError, one sentence: the key, what was found, what to do. Nothing stays open then.
+/// Errors  As refuse_device(), one sentence: the key, what was found, what to do. Nothing
+///         stays open then.
 /// `remarks`: sentences about what works, but not as asked.
 [[nodiscard]] std::unique_ptr<InsDevice> open_ins(const InsRequest& request,
                                                   std::vector<std::string>* remarks);

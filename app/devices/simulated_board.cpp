@@ -47,6 +47,9 @@ class SimulatedBoard final : public TriggerDevice {
     rig_->end_feed();
     rig_->trigger().stop();
   }
+  bool observe_bytes(ByteObserver* observer) noexcept override {
+    return board_->observe_bytes(observer);
+  }
   std::string last_error() const override { return board_->last_error(); }
   std::string remark() const override { return board_->remark(); }
   TriggerStatistics statistics() const noexcept override { return board_->statistics(); }

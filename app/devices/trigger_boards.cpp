@@ -26,9 +26,10 @@ std::unique_ptr<trigger_board::Device> open_trigger_board(const TriggerSettings&
   DeviceStatus status = DeviceStatus::ok;
   std::unique_ptr<trigger_board::Device> board = driver.open_board(settings.port, &status);
   if (board == nullptr)
-    throw InputError(serial_open_error(
-        "trigger: the board" + (settings.port.empty() ? "" : " on " + settings.port), status,
-        driver.last_error()));
+    refuse_device(status,
+                  serial_open_error(
+                      "trigger: the board" + (settings.port.empty() ? "" : " on " + settings.port),
+                      status, driver.last_error()));
   status = board->configure(pulses, nullptr);
   require_configured(board_title(board->info()), status, board->last_error());
   if (const std::string remark = board->remark(); !remark.empty())

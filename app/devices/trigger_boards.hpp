@@ -10,7 +10,8 @@ namespace vergence::app {
 
 /// Opens the trigger board and configures it; from then on it makes no pulse until it is started.
 ///
-/// Errors  InputError, one sentence: the key, what was found, what to do. Nothing stays open then.
+/// Errors  As refuse_device(), one sentence: the key, what was found, what to do. Nothing
+///         stays open then.
 /// `remarks`: sentences about what works, but not as asked.
 [[nodiscard]] std::unique_ptr<trigger_board::Device> open_trigger_board(
     const TriggerSettings& settings, const TriggerConfiguration& pulses,

@@ -51,41 +51,23 @@ LivePage::~LivePage() {
 // ---- the session's threads
 
 void LivePage::on_start(const SessionStart& start) noexcept {
-  tie_ = start.tie;
+  builder_.begin(start.tie);
   start_ = start;
   images_.reserve(start.image_bytes);
   started_.store(true, std::memory_order_release);
 }
 
 void LivePage::on_frame(const RigFrame& frame) noexcept {
-  frame_ = frame;
+  builder_.add(frame);
   images_.take_images(frame);
-  if (any_ && frame.number > last_number_ + 1) now_.missing += frame.number - last_number_ - 1;
-  any_ = true;
-  last_number_ = frame.number;
 }
 
 void LivePage::on_pose(const PoseSample& sample) noexcept {
-  const HostStamp out = monotonic_now();
-  now_.pose = PublishedPose::of(sample, out);
-  ++now_.read;
-  ++(sample.status == PoseStatus::ok         ? now_.ok
-     : sample.status == PoseStatus::degraded ? now_.degraded
-                                             : now_.lost);
-  if (sample.status != PoseStatus::lost) {
-    if (posed_) now_.path_m += (sample.T_world_left.t - last_position_).norm();
-    last_position_ = sample.T_world_left.t;
-    posed_ = true;
-  }
-  now_.stamp_error = frame_.stamp_error;
-  now_.spread = frame_.spread;
-  now_.pairing = frame_.pairing;
-  now_.age_ms = tie_ ? (tie_->stamp_at(out) - sample.stamp).to_seconds() * 1e3 : -1;
-  push(&frames_, now_);
+  push(&frames_, builder_.add(sample, monotonic_now()));
 }
 
 void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
-  images_.take_points(frame_, tracks);
+  images_.take_points(builder_.frame(), tracks);
 }
 
 void LivePage::on_placement(const Placement& placement, const Geodetic& origin) noexcept {

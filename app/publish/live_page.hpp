@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "app/publish/http_server.hpp"
+#include "app/publish/live_frame_builder.hpp"
 #include "app/publish/live_images.hpp"
 #include "app/publish/live_state.hpp"
 #include "app/session/session_observer.hpp"
@@ -67,13 +68,7 @@ class LivePage final : public SessionObserver {
   SessionRequests* requests_;
   std::function<double()> line_age_ms_;
 
-  // Of the estimator's thread.
-  std::optional<ClockTie> tie_{};
-  RigFrame frame_{};  // the one in hand; its images only until on_tracks()
-  LiveFrame now_{};
-  Vec3 last_position_ = Vec3::Zero();
-  bool any_ = false, posed_ = false;
-  std::uint64_t last_number_ = 0;
+  LiveFrameBuilder builder_;  // of the estimator's thread
 
   // From it to the page's.
   Ring<LiveFrame, 256> frames_;

@@ -83,22 +83,33 @@ void LiveState::add(const PoseRecord& compared) {
   Place place;
   for (std::size_t i = 0; i < 3; ++i) place.world[i] = static_cast<float>(compared.world_left.t[i]);
   place.status = static_cast<std::uint8_t>(compared.status);
-  if (compared.status == PoseStatus::lost && !trail_.empty()) place.world = trail_.back().world;
+  if (compared.status == PoseStatus::lost && !trail_.places().empty())
+    place.world = trail_.places().back().world;
   if (compared.ins_valid)
     place.ins = {static_cast<float>(compared.ins.enu[0]), static_cast<float>(compared.ins.enu[1])};
-  if (!trail_.empty()) {
-    const Place& last = trail_.back();
+  trail_.add(place);
+}
+
+void LiveState::Trail::add(const Place& place) {
+  if (!places_.empty()) {
+    const Place& last = places_.back();
     const float moved = std::hypot(place.world[0] - last.world[0], place.world[1] - last.world[1],
                                    place.world[2] - last.world[2]);
     if (moved < least_step_m_ && place.status == last.status) return;
   }
-  if (trail_.size() == kTrail) {
-    for (std::size_t i = 0; i < kTrail / 2; ++i) trail_[i] = trail_[2 * i];
-    trail_.resize(kTrail / 2);
+  if (places_.size() == kTrail) {
+    for (std::size_t i = 0; i < kTrail / 2; ++i) places_[i] = places_[2 * i];
+    places_.resize(kTrail / 2);
     least_step_m_ *= 2;
     thinned_ = true;
   }
-  trail_.push_back(place);
+  places_.push_back(place);
+}
+
+std::size_t LiveState::Trail::take_new(bool* thinned) noexcept {
+  *thinned = std::exchange(thinned_, false);
+  const std::size_t shown = std::exchange(shown_, places_.size());
+  return *thinned ? 0 : shown;
 }
 
 void LiveState::add(const EventRecord& event) {
@@ -231,7 +242,7 @@ std::string LiveState::hello() const {
            {"recording", start_.recording},
            {"ended", ended_}};
   json& trail = out["trail"] = json::array();
-  for (const Place& p : trail_) trail.push_back(place_json(p));
+  for (const Place& p : trail_.places()) trail.push_back(place_json(p));
   json& events = out["events"] = json::array();
   for (const EventRecord& event : events_) events.push_back(event_json(event, start_.first));
   out["calibration"] = calibration_json();
@@ -246,12 +257,12 @@ std::string LiveState::update(double line_age_ms) {
   if (any_)
     out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
   // Thinned, the places are others than those that were shown: all of them anew.
-  if (std::exchange(thinned_, false)) {
-    shown_ = 0;
-    out["trail_anew"] = true;
-  }
+  bool thinned = false;
+  const std::size_t first = trail_.take_new(&thinned);
+  if (thinned) out["trail_anew"] = true;
   json& trail = out["trail"] = json::array();
-  for (; shown_ < trail_.size(); ++shown_) trail.push_back(place_json(trail_[shown_]));
+  const std::vector<Place>& places = trail_.places();
+  for (std::size_t i = first; i < places.size(); ++i) trail.push_back(place_json(places[i]));
   json& events = out["events"] = json::array();
   const auto fresh = std::min<std::uint64_t>(events_seen_ - events_shown_, events_.size());
   for (auto i = events_.size() - static_cast<std::size_t>(fresh); i < events_.size(); ++i)

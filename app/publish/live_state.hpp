@@ -60,6 +60,21 @@ class LiveState {
     std::uint8_t status = 0;
   };
 
+  /// The points of the map, farther apart as the drive grows longer.
+  class Trail {
+   public:
+    void add(const Place& place);
+    [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
+    /// Where the places begin that the last call has not had; *thinned: it has to forget those.
+    [[nodiscard]] std::size_t take_new(bool* thinned) noexcept;
+
+   private:
+    std::vector<Place> places_{};
+    float least_step_m_ = 0.5F;
+    std::size_t shown_ = 0;  // places that the last take_new() had
+    bool thinned_ = false;   // since then
+  };
+
   [[nodiscard]] static nlohmann::json place_json(const Place& place);
   [[nodiscard]] nlohmann::json frame_json() const;
   [[nodiscard]] nlohmann::json calibration_json() const;
@@ -69,10 +84,7 @@ class LiveState {
   bool any_ = false, ended_ = false;
   TimeHistogram estimate_;
   std::optional<PoseRecord> compared_{};
-  std::vector<Place> trail_{};
-  float least_step_m_ = 0.5F;
-  std::size_t shown_ = 0;  // places that the last update had
-  bool thinned_ = false;   // since then
+  Trail trail_;
   std::deque<EventRecord> events_{};
   std::uint64_t events_seen_ = 0, events_shown_ = 0;
   std::deque<CalibrationRecord> calibrations_{};

@@ -2,20 +2,18 @@
 #include <array>
 #include <atomic>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <vector>
 
 #include "app/recorder/calibration_keeper.hpp"
-#include "app/recorder/histogram.hpp"
 #include "app/recorder/ins_file.hpp"
 #include "app/recorder/records.hpp"
+#include "app/recorder/session_folder.hpp"
+#include "app/recorder/session_totals.hpp"
 #include "core/memory/ring.hpp"
 #include "drivers/common/wake_event.hpp"
 
@@ -23,12 +21,6 @@ namespace vergence::app {
 
 class LineFile;
 
-/// What poses.csv has, in this order (DESIGN §6).
-inline constexpr const char* kPosesHeader =
-    "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,east,north,up,latitude_deg,longitude_deg,"
-    "height_m,heading_deg,"
-    "ins_east,ins_north,ins_up,ins_latitude_deg,ins_longitude_deg,ins_height_m,ins_heading_deg,"
-    "error_east_m,error_north_m,error_up_m,error_heading_deg,inliers,reprojection_px,estimate_ms";
 /// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
 /// noise alone, `wide_` with uncertain intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 … k4 of
 /// an equidistant lens. Latency in frames since the alarm, the request or the start; held-out
@@ -43,61 +35,6 @@ inline constexpr const char* kCalibrationsHeader =
     "d3,"
     "left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_left_d2,sigma_left_d3,"
     "judged_depth_m,depth_sigma_percent,depth_difference_percent,verified,lenses";
-
-/// Makes the folder of a session. InputError: it exists and is not empty, is no folder, or cannot
-/// be made.
-void make_session_folder(const std::filesystem::path& folder);
-
-/// One attempt to calibrate while driving.
-struct CalibrationAttempt {
-  Stamp stamp{};
-  std::string_view cause{}, reason{};  // CalibrationCause's word; why it was rejected: constants
-  bool accepted = false;
-  int latency_frames = 0, frames = 0;
-  double solve_ms = 0;
-};
-
-/// The calibration in use was not that of the rig.
-struct Contradiction {
-  Stamp stamp{};
-  double depth_percent = 0;  // by which its depths were off
-};
-
-/// Frames whose time was over before their work was done (docs/realtime.md), and what was left out.
-struct WorkDropped {
-  std::uint64_t frames = 0, points = 0, keyframes = 0, steps = 0, windows = 0;
-
-  void add(const FrameEffort& effort) noexcept;
-};
-
-/// What a session has come to: for summary.json.
-struct SessionTotals {
-  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
-  TimeHistogram estimate, decode;                          // ms
-  TimeHistogram calibrating;  // ms, of the frames in other states than stereo_odometry and lost
-  std::array<TimeHistogram, kStages> stages;
-  std::vector<CalibrationAttempt> attempts;  // the newest kMostAttempts
-  std::uint64_t accepted = 0, rejected = 0;  // of all of them
-  std::optional<Stamp> confirmed{};  // when the drive first confirmed the calibration in use
-  std::optional<std::uint64_t> confirmed_frame{};  // the frame of that stamp
-  std::optional<Contradiction>
-      contradicted{};                   // the first time that it showed another one than was in use
-  double path_m = 0;                    // sum of the steps between successive poses
-  std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum, read back
-  std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
-  std::vector<PoseStatus> statuses;   // if asked for: of every frame read, as far as there is room;
-                                      // those that are not lost have their pose in trajectory
-  std::uint64_t dropped_records = 0;  // the ring was full (live only)
-  std::uint64_t dropped_readings = 0;  // theirs was
-  std::uint64_t lost_lines = 0;        // the disk took no more
-  WorkDropped work_dropped{};
-  std::size_t ring_high_water = 0;
-  std::vector<std::string> faults;  // a sentence for each file that is not whole
-};
-
-/// Frames whose status SessionTotals keeps where nobody knows the drive's length: 58 h at 20 Hz.
-inline constexpr std::size_t kMostStatuses = std::size_t{1} << 22;
-inline constexpr std::size_t kMostAttempts = 1000;  // in summary.json; calibrations.csv has all
 
 /// Writes trajectory.tum, reference.tum (gone at the end if there was no reference), poses.csv,
 /// calibrations.csv, events.jsonl and, with an INS, ins.csv of a session as it goes on, on a thread
@@ -160,8 +97,15 @@ class Recorder {
   static constexpr std::size_t kRing = 128;       // records: seconds of frames with their events
   static constexpr std::size_t kReadings = 1024;  // 2.5 s of the fastest INS
 
+  /// What waits for the recorder's thread.
   template <class Value, std::size_t N>
-  bool push(Ring<Value, N>* ring, std::atomic<std::uint64_t>* dropped, const Value& value) noexcept;
+  struct Queue {
+    Ring<Value, N> ring{};
+    std::atomic<std::uint64_t> dropped{0};
+    std::size_t high_water = 0;  // the producer's
+  };
+  template <class Value, std::size_t N>
+  void push(Queue<Value, N>* queue, const Value& value) noexcept;
   void work();
   bool take();
   bool take_outcome();
@@ -169,9 +113,6 @@ class Recorder {
   void write(const EventRecord& event);
   void write(const CalibrationRecord& calibration);
   void write(const InsRecord& reading);
-  void note(const CalibrationRecord& calibration);
-  void note(const EventRecord& event);
-  void match_confirmed();
   void flush();
   void reopen_files();
   void pretend(Stamp stamp);
@@ -187,22 +128,17 @@ class Recorder {
   struct Files;
   Options options_;
   std::unique_ptr<Files> files_;
-  std::unique_ptr<SessionTotals> totals_;
-  PoseNumbers last_pose_{};
-  bool have_last_pose_ = false, any_reference_ = false;
+  TotalsBuilder totals_;
   std::string line_;    // being formatted
   std::string folder_;  // for sentences
   std::size_t memory_ = 0;
   Stamp newest_{};  // of the poses
-  std::uint64_t newest_frame_ = 0;
   bool disk_full_ = false, pretended_ = false;
 
-  Ring<Record, kRing> ring_;
-  Ring<InsRecord, kReadings> readings_;
+  Queue<Record, kRing> records_;
+  Queue<InsRecord, kReadings> readings_;
   WakeEvent filled_, freed_;
   std::atomic<bool> stop_{false}, reopen_{false};
-  std::atomic<std::uint64_t> dropped_{0}, dropped_readings_{0};
-  std::size_t high_water_ = 0;                 // the producer's
   Ring<Complaint, 16> complaints_;             // full: the newest are lost
   std::vector<std::string> errors_;            // of close()
   std::unique_ptr<CalibrationKeeper> keeper_;  // null: nothing is kept

@@ -26,6 +26,8 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
       return "calibration_confirmed";
     case EstimatorEvent::Kind::calibration_contradicted:
       return "calibration_contradicted";
+    case EstimatorEvent::Kind::focal_length_contradicted:
+      return "focal_length_contradicted";
     case EstimatorEvent::Kind::calibration_accepted:
       return "calibration_accepted";
     case EstimatorEvent::Kind::calibration_rejected:
@@ -129,6 +131,9 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
       (void)std::snprintf(text.data(), text.size(), "%s: its depths are off by %.1f %%", why,
                           event.value);
+    else if (event.kind == EstimatorEvent::Kind::focal_length_contradicted)
+      (void)std::snprintf(text.data(), text.size(), "%s: the drive measures %.0f px", why,
+                          event.value);
     else
       (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
                           *begin != 0 && *why != 0 ? ": " : "", why);
@@ -209,6 +214,7 @@ CalibrationRecord CalibrationRecord::of(const CalibrationDecision& d) noexcept {
   r.depth_difference_percent = d.depth_difference_percent;
   r.verified = d.verified;
   r.lenses = d.lenses;
+  r.focal = d.focal;
   r.rig = RigNumbers::of(d.calibration);
   return r;
 }

@@ -114,6 +114,7 @@ struct CalibrationRecord {
   double judged_depth_m = 0, depth_sigma_percent = 0,
          depth_difference_percent = 0;  // as CalibrationDecision has them
   bool verified = false, lenses = false;
+  FocalMeasurement focal{};
   RigNumbers rig{};
 
   [[nodiscard]] static CalibrationRecord of(const CalibrationDecision& decision) noexcept;

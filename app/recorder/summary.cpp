@@ -153,6 +153,12 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
                              ? Json{{"stamp_ns", totals.contradicted->stamp.ns()},
                                     {"depth_percent", totals.contradicted->depth_percent}}
                              : Json();
+  json["focal_length"] = totals.focal.measured_px > 0
+                             ? Json{{"given_px", totals.focal.given_px},
+                                    {"measured_px", totals.focal.measured_px},
+                                    {"sigma_px", totals.focal.sigma_px},
+                                    {"contradicted", totals.focal.contradicted}}
+                             : Json();
   json["mistake"] = input.mistake != CalibrationMistake::none
                         ? Json(std::string(to_string(input.mistake)))
                         : Json();

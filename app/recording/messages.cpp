@@ -212,6 +212,13 @@ void write_frame(CdrWriter* out, const FrameRecord& f) noexcept {
   put_crc(out);
 }
 
+void write_device_frame(CdrWriter* out, Stamp stamp, std::string_view name,
+                        const Frame& frame) noexcept {
+  out->header(stamp, name).put(frame.counter).put(frame.exposure_start.ns());
+  out->put(frame.arrival.ns()).put(frame.exposure.ns()).put(frame.gain_db);
+  out->boolean(frame.status == FrameStatus::complete);
+}
+
 void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse) noexcept {
   out->header(stamp, "board").put(pulse.number).put(pulse.boot).put(pulse.edge.ns());
   out->put(pulse.arrival.ns()).boolean(pulse.resumed);

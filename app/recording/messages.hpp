@@ -11,6 +11,7 @@
 #include "core/types/image.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
+#include "drivers/camera.hpp"
 #include "drivers/ins.hpp"
 #include "drivers/trigger.hpp"
 
@@ -90,6 +91,10 @@ struct FrameRecord {
   PoseSample sample{};
 };
 void write_frame(CdrWriter* out, const FrameRecord& frame) noexcept;
+/// A frame as its camera handed it out, `stamp` its arrival.
+void write_device_frame(CdrWriter* out, Stamp stamp, std::string_view name,
+                        const Frame& frame) noexcept;
+/// As the board reported it, `stamp` the arrival of that.
 void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse) noexcept;
 
 }  // namespace vergence::app

@@ -63,6 +63,9 @@ constexpr std::array kDefinitions{
                "std_msgs/Header header\nuint64 number\nuint32 boot\nint64 edge_device_ns\n"
                "int64 arrival_host_ns\nbool resumed\nuint8 exposures_seen\n"
                "int64[] exposure_start_ns\nint64[] exposure_end_ns\n"},
+    Definition{"vergence_msgs/DeviceFrame",
+               "std_msgs/Header header\nuint64 counter\nint64 exposure_start_device_ns\n"
+               "int64 arrival_host_ns\nint64 exposure_ns\nfloat64 gain_db\nbool complete\n"},
     // What those are made of.
     Definition{"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},
     Definition{"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
@@ -106,7 +109,8 @@ constexpr std::array<std::string_view, kRosTypes> kNames{"sensor_msgs/msg/Image"
                                                          "std_msgs/msg/UInt8MultiArray",
                                                          "vergence_msgs/msg/Frame",
                                                          "vergence_msgs/msg/InsReading",
-                                                         "vergence_msgs/msg/Pulse"};
+                                                         "vergence_msgs/msg/Pulse",
+                                                         "vergence_msgs/msg/DeviceFrame"};
 
 const Definition* find(std::string_view name) {
   for (const Definition& d : kDefinitions)

@@ -19,11 +19,12 @@ enum class RosType : std::uint8_t {
   tf,
   text,
   bytes,
-  frame,        // vergence_msgs/msg/Frame
-  ins_reading,  // vergence_msgs/msg/InsReading
-  pulse,        // vergence_msgs/msg/Pulse
+  frame,         // vergence_msgs/msg/Frame
+  ins_reading,   // vergence_msgs/msg/InsReading
+  pulse,         // vergence_msgs/msg/Pulse
+  device_frame,  // vergence_msgs/msg/DeviceFrame
 };
-inline constexpr int kRosTypes = 13;
+inline constexpr int kRosTypes = 14;
 
 /// `sensor_msgs/msg/Image`.
 [[nodiscard]] std::string_view ros_type_name(RosType type) noexcept;

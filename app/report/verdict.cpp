@@ -174,6 +174,29 @@ void judge_lenses(const Session& s, const Analysis& a, Judge* j) {
   j->give_up(grows + ": the lens", kHelp);
 }
 
+/// A focal length that the drive itself measures to be another: all distances are off by as much.
+void judge_focal_length(const Session& s, Judge* j) {
+  if (flag_at(s.summary, "calibration.focal_length.contradicted") != true) return;
+  const auto figure = [&](const char* key) {
+    return number_at(s.summary, std::string("calibration.focal_length.") + key).value_or(0);
+  };
+  const double sigma = figure("sigma_px");
+  const std::string measured =
+      sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", figure("measured_px"), sigma)
+                : fmt::format("{:.0f} px or still farther from it", figure("measured_px"));
+  const std::string reason = fmt::format(
+      "the focal length given, {:.0f} px, is not that of these images: the drive measures {}, and "
+      "its distances are off by as much",
+      figure("given_px"), measured);
+  constexpr const char* kAdvice =
+      "Give the focal length of this lens in pixels of these images (cameras.N.intrinsics, "
+      "--focal): "
+      "of another size of image, a crop or a rectification it is another.";
+  j->find(Grade::bad, reason);
+  j->advise(kAdvice);
+  j->give_up(reason, kAdvice);
+}
+
 /// Whether the drive itself has confirmed what its poses stand on.
 void judge_verification(const Session& s, const Analysis& a, const Usability& use, Judge* j) {
   if (std::none_of(s.calibrations.begin(), s.calibrations.end(),
@@ -371,6 +394,7 @@ Verdict judge(const Session& session, const Analysis& analysis) {
   Judge j;
   const Usability use = usability_of(session, analysis);
   judge_mistake(session, analysis, &j);
+  judge_focal_length(session, &j);
   judge_frames(session, analysis, use, &j);
   if (analysis.source != ErrorSource::none) judge_drift(analysis, &j);
   judge_calibration(session, use, &j);

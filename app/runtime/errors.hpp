@@ -9,8 +9,8 @@ enum class ExitCode : int {
   done = 0,
   not_usable = 1,
   bad_input = 2,
-  device_failed = 3,
-  not_written = 4,  // done, but a file of the result is missing or not whole
+  device_failed = 3,  // not there at the start, or gone and not back
+  not_written = 4,    // done, but a file of the result is missing or not whole
   interrupted = 130,
   terminated = 143
 };
@@ -21,6 +21,14 @@ enum class ExitCode : int {
 class InputError : public std::runtime_error {
  public:
   explicit InputError(const std::string& sentence) : std::runtime_error(sentence) {}
+};
+
+/// A device that the configuration names is not there, does not answer, or is somebody else's. The
+/// text is the whole sentence for the user. Caught in main(), exit code 3: what is asked for is in
+/// order and may be asked again when the device has its power.
+class DeviceError : public std::runtime_error {
+ public:
+  explicit DeviceError(const std::string& sentence) : std::runtime_error(sentence) {}
 };
 
 }  // namespace vergence::app

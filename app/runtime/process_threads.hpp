@@ -15,8 +15,9 @@ struct ProcessThread {
   [[nodiscard]] bool ours() const noexcept { return name.starts_with("vergence"); }
 };
 
-/// All threads of this program, by /proc/self/task; empty where there is none such. A thread that
-/// has just begun may still have its creator's name.
-[[nodiscard]] std::vector<ProcessThread> process_threads();
+/// All threads of this program into `threads`, by /proc/self/task; none where there is none such. A
+/// thread that has just begun may still have its creator's name. Memory: of the vector alone, where
+/// it grows.
+void process_threads(std::vector<ProcessThread>* threads);
 
 }  // namespace vergence::app

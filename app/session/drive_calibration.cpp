@@ -22,7 +22,7 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kMiddleDepth = 2;  // of Agreement::depth_m: 20 m
+constexpr std::size_t kMiddleDepth = 2;  // of Agreement::kDepthM: 20 m
 constexpr int kMoreFeatures = 2,
               kMostFeatures = 1000;     // of a drive's own: nobody waits for a pose here
 constexpr int kObservations = 240'000;  // of a solve that nobody waits for
@@ -228,7 +228,7 @@ std::string describe(const DriveCalibration& found) {
                  "{} stretches solved by themselves: transforms differ by {:.1f} of their sigmas, "
                  "depths at {:g} m by {:.2f} % at most\n",
                  found.stretches.size(), std::sqrt(sigmas),
-                 calibration::Agreement::depth_m[kMiddleDepth], percent);
+                 calibration::Agreement::kDepthM[kMiddleDepth], percent);
   return text;
 }
 

@@ -14,7 +14,11 @@ constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue withou
 constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
 constexpr Duration kHealth = Duration::seconds(1);
 
-/// Topics of a recording. Of a camera there are two, from first_camera_topic on.
+/// Queues of a recording, one for each thread that posts.
+enum Queue : std::size_t { estimator_queue, acquisition_queue, ins_queue, board_queue };
+constexpr std::size_t kDeviceQueue = std::size_t{1} << 20;  // bytes
+
+/// Topics of a recording. Of a camera there are three, from first_camera_topic on.
 enum Topic : std::size_t {
   session_topic,
   frame_topic,
@@ -25,10 +29,13 @@ enum Topic : std::size_t {
   reading_topic,
   fix_topic,
   imu_topic,
+  pulse_topic,
+  ins_raw_topic,
+  board_raw_topic,
   first_camera_topic
 };
 
-std::size_t image_topic(std::size_t camera) { return first_camera_topic + 2 * camera; }
+std::size_t image_topic(std::size_t camera) { return first_camera_topic + 3 * camera; }
 
 std::vector<RecordedTopic> topics(const CalibrationFile& file) {
   std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
@@ -39,10 +46,14 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file) {
                                  {"/diagnostics", RosType::diagnostics, false},
                                  {"/vergence/ins_reading", RosType::ins_reading, false},
                                  {"/ins/fix", RosType::nav_sat_fix, false},
-                                 {"/ins/imu", RosType::imu, false}};
+                                 {"/ins/imu", RosType::imu, false},
+                                 {"/vergence/pulse", RosType::pulse, false},
+                                 {"/ins/raw", RosType::bytes, false},
+                                 {"/trigger_board/raw", RosType::bytes, false}};
   for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
     out.push_back({"/" + file.names[k] + "/image_raw", RosType::image, false});
     out.push_back({"/" + file.names[k] + "/camera_info", RosType::camera_info, false});
+    out.push_back({"/" + file.names[k] + "/device_frame", RosType::device_frame, false});
   }
   return out;
 }
@@ -104,7 +115,7 @@ std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
 Recording::Options options(const Configuration& c, const SourceFacts& facts) {
   Recording::Options o;
   o.topics = topics(facts.begin.file);
-  o.queues = {queue_bytes(c, facts)};
+  o.queues = {queue_bytes(c, facts), kDeviceQueue, kDeviceQueue, kDeviceQueue};
   o.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
   o.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
@@ -138,15 +149,15 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
 /// → CRC-32 of what `write` returns, the bytes of its pixels; 0: dropped.
 template <class Write>
 std::uint32_t DriveRecorder::post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
-                                  const Write& write) noexcept {
-  if (stopped_) return 0;
-  const auto room = recording_.begin(0, topic, stamp, most, bulky);
+                                  const Write& write, std::size_t queue) noexcept {
+  if (stopped_.load(std::memory_order_relaxed)) return 0;
+  const auto room = recording_.begin(queue, topic, stamp, most, bulky);
   if (room.empty()) return 0;
   CdrWriter out(room);
   const std::size_t pixels = write(&out);
   if (!out.ok()) return 0;
   const std::uint32_t crc = pixels > 0 ? crc32_of(out.written().last(pixels)) : 0;
-  recording_.commit(0, out.size());
+  recording_.commit(queue, out.size());
   return crc;
 }
 
@@ -282,6 +293,49 @@ void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcep
   rig_ = calibration.rig.rig();
   calibrated_ = true;
   if (settings_.poses != 0) post_rig(calibration.stamp);
+}
+
+void DriveRecorder::on_device_frame(Stamp arrival, int camera, const Frame& frame) noexcept {
+  if (settings_.pulses == 0) return;
+  const auto k = static_cast<std::size_t>(camera);
+  post(
+      image_topic(k) + 2, arrival, kMessageRoom, false,
+      [&](CdrWriter* out) {
+        write_device_frame(out, arrival, frame_names_[k], frame);
+        return std::size_t{0};
+      },
+      acquisition_queue);
+}
+
+void DriveRecorder::on_pulse(Stamp arrival, const Pulse& pulse) noexcept {
+  if (settings_.pulses == 0) return;
+  post(
+      pulse_topic, arrival, kMessageRoom, false,
+      [&](CdrWriter* out) {
+        write_pulse(out, arrival, pulse);
+        return std::size_t{0};
+      },
+      acquisition_queue);
+}
+
+void DriveRecorder::post_bytes(std::size_t topic, Stamp stamp, std::span<const std::uint8_t> bytes,
+                               std::size_t queue) noexcept {
+  if (settings_.raw == 0) return;
+  post(
+      topic, stamp, kMessageRoom + bytes.size(), false,
+      [&](CdrWriter* out) {
+        write_bytes(out, bytes);
+        return std::size_t{0};
+      },
+      queue);
+}
+
+void DriveRecorder::on_ins_bytes(Stamp arrival, std::span<const std::uint8_t> bytes) noexcept {
+  post_bytes(ins_raw_topic, arrival, bytes, ins_queue);
+}
+
+void DriveRecorder::on_board_bytes(Stamp arrival, std::span<const std::uint8_t> bytes) noexcept {
+  post_bytes(board_raw_topic, arrival, bytes, board_queue);
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> DriveRecorder::counters() {

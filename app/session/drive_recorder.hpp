@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include "app/config/configuration.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/recording.hpp"
+#include "app/session/device_observer.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/solver_watch.hpp"
@@ -18,11 +20,11 @@ namespace vergence::app {
 
 /// `record:` of the configuration: what goes through a session into drive.mcap (docs/recording.md).
 ///
-/// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver. The rest: the
-///            owner's.
+/// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
+///            DeviceObserver, a queue each. The rest: the owner's.
 /// Memory     The recording's queue, at construction.
 /// Errors     The constructor throws InputError: no room, no file. Afterwards sentences.
-class DriveRecorder final : public SessionObserver {
+class DriveRecorder final : public SessionObserver, public DeviceObserver {
  public:
   /// `folder`: of the session, exists. Precondition: configuration.record.any().
   DriveRecorder(const std::filesystem::path& folder, const Configuration& configuration,
@@ -34,6 +36,11 @@ class DriveRecorder final : public SessionObserver {
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
 
+  void on_device_frame(Stamp arrival, int camera, const Frame& frame) noexcept override;
+  void on_pulse(Stamp arrival, const Pulse& pulse) noexcept override;
+  void on_ins_bytes(Stamp arrival, std::span<const std::uint8_t> bytes) noexcept override;
+  void on_board_bytes(Stamp arrival, std::span<const std::uint8_t> bytes) noexcept override;
+
   /// Sentences about the disk, since the last call.
   [[nodiscard]] std::vector<std::string> take_errors() { return recording_.take_errors(); }
   /// The file at hand ends, a new one begins. Any thread.
@@ -41,14 +48,16 @@ class DriveRecorder final : public SessionObserver {
   /// Ends the files.
   void close() noexcept { recording_.close(); }
   /// Nothing more is recorded. The estimator's thread.
-  void stop() noexcept { stopped_ = true; }
+  void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
   [[nodiscard]] std::size_t memory() const noexcept { return recording_.counters().queue_bytes; }
 
  private:
   template <class Write>
   std::uint32_t post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
-                     const Write& write) noexcept;
+                     const Write& write, std::size_t queue = 0) noexcept;
+  void post_bytes(std::size_t topic, Stamp stamp, std::span<const std::uint8_t> bytes,
+                  std::size_t queue) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
   void post_health(const PoseSample& sample) noexcept;
@@ -61,7 +70,8 @@ class DriveRecorder final : public SessionObserver {
 
   // Of the estimator's thread.
   RigCalibration rig_;
-  bool calibrated_ = false, rig_posted_ = false, recalibrate_ = false, stopped_ = false;
+  bool calibrated_ = false, rig_posted_ = false, recalibrate_ = false;
+  std::atomic<bool> stopped_{false};
   FrameRecord frame_{};
   std::uint64_t frames_seen_ = 0;
   Stamp last_health_{};

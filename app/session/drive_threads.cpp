@@ -29,7 +29,10 @@ void say(const std::vector<std::string>& sentences, Progress* progress) {
 }  // namespace
 
 DriveThreads::DriveThreads(const RealtimeSettings& settings)
-    : realtime_(request_of(settings), system_) {}
+    : realtime_(request_of(settings), system_) {
+  constexpr std::size_t kThreads = 64;  // more than a drive has: looking takes no heap then
+  threads_.reserve(kThreads);
+}
 
 void DriveThreads::lock_memory(Progress* progress) { say(realtime_.lock_memory(), progress); }
 
@@ -37,10 +40,10 @@ void DriveThreads::look(Progress* progress) {
   constexpr int kAtFirst = 20, kLater = 20;  // in the first second always, then once a second
   const int look = looks_++;
   if (look >= kAtFirst && look % kLater != 0) return;
-  const std::vector<ProcessThread> threads = process_threads();
-  for (const ProcessThread& thread : threads)
+  process_threads(&threads_);
+  for (const ProcessThread& thread : threads_)
     if (thread.ours()) ours_.insert(thread.name);
-  say(realtime_.apply(threads), progress);
+  say(realtime_.apply(threads_), progress);
 }
 
 ThreadAllocationFigures DriveThreads::figures() const {

@@ -5,6 +5,7 @@
 
 #include "app/config/configuration.hpp"
 #include "app/recorder/summary.hpp"
+#include "app/runtime/process_threads.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/realtime.hpp"
 
@@ -30,6 +31,7 @@ class DriveThreads {
   RealtimeSystem system_;
   RealtimeThreads realtime_;
   int looks_ = 0;
+  std::vector<ProcessThread> threads_;
   std::set<std::string> ours_{};
 };
 

@@ -15,8 +15,9 @@ constexpr int kWholeAgain = 100;  // frames, after which dropped work is news
 bool aloud(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
   return kind == Kind::rig_changed || kind == Kind::calibration_confirmed ||
-         kind == Kind::calibration_contradicted || kind == Kind::calibration_accepted ||
-         kind == Kind::calibration_rejected || kind == Kind::calibration_waits;
+         kind == Kind::calibration_contradicted || kind == Kind::focal_length_contradicted ||
+         kind == Kind::calibration_accepted || kind == Kind::calibration_rejected ||
+         kind == Kind::calibration_waits;
 }
 
 std::string words(std::string_view name) {

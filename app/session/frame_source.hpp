@@ -14,6 +14,7 @@
 #include "app/recorder/summary.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
+#include "app/session/device_observer.hpp"
 #include "app/session/ins_comparison.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
@@ -49,7 +50,7 @@ struct SourceRemark {
 /// The INS of a source and how its readings are compared with.
 struct SourceIns {
   ComparisonOptions options{};
-  InsComparison::Source kind = InsComparison::Source::device;
+  InsSource kind = InsSource::device;
   std::string mount_source{};     // a few words: where the mount of the options is from
   std::size_t reading_bytes = 0;  // held beside the comparison
 };
@@ -84,6 +85,8 @@ class FrameSource {
 
   [[nodiscard]] virtual const SourceFacts& facts() const noexcept = 0;
 
+  /// Before start(): who sees what the devices give; outlives it. Nothing where there are none.
+  virtual void observe_devices(DeviceObserver* /*observer*/) {}
   /// Begins the stream; the session's files are open. What is wrong with a file goes to *faults.
   /// InputError: a device does not start.
   virtual void start(std::vector<std::string>* faults) = 0;

@@ -8,6 +8,7 @@
 
 #include "app/recorder/earth_figures.hpp"
 #include "app/session/event_log.hpp"
+#include "app/session/ins_events.hpp"
 #include "app/session/session_output.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/memory/fixed_vector.hpp"
@@ -24,10 +25,8 @@ class InsComparison {
  public:
   static constexpr std::size_t kMostPlacements = 64;  // that are kept; later ones count
 
-  enum class Source : std::uint8_t { none, device, recording };
-
   /// Without a source poses go through and nothing is said. `journal` outlives it.
-  InsComparison(const ComparisonOptions& options, Source source, Arena& arena, EventLog& journal);
+  InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena, EventLog& journal);
 
   /// Before the first add(). `output` outlives the last one; with a source its recorder takes
   /// readings (Recorder::Options::ins).
@@ -48,29 +47,20 @@ class InsComparison {
 
  private:
   void measure(const ComparedPose& pose) noexcept;
-  void note_placement(Stamp stamp) noexcept;
-  void note_ins(const ComparedPose& pose) noexcept;
-  void note_attitude(const InsSample& sample) noexcept;
-  void note_jump(Stamp stamp) noexcept;
-  void note_scale(const ComparedPose& pose) noexcept;
-
+  void take_placement(Stamp stamp) noexcept;
   const Transform T_ins_left_;
-  const double scale_stretch_m_;
-  const Source source_;
   Comparison comparison_;
   EventLog& journal_;
+  InsEvents events_;
   SessionOutput* output_ = nullptr;
   std::array<float, Comparison::kPending> decode_ms_{};  // of the poses that wait, by their count
   std::uint64_t added_ = 0, drained_ = 0;
-  std::uint64_t matches_ = 0, jumps_ = 0, scale_disagreements_ = 0;
-  bool scale_disagrees_ = false, attitude_noted_ = false;
+  std::uint64_t matches_ = 0, scale_disagreements_ = 0;
   std::uint32_t placement_revision_ = 0;
   FixedVector<PlacementRecord, kMostPlacements> placements_;
   EarthErrors errors_{};  // means and roots are squares' sums until earth()
   bool on_way_ = false;   // last_place_ means something
   Vec3 last_place_ = Vec3::Zero();
-  InsMatch last_match_ = InsMatch::ok;
-  std::uint64_t match_run_ = 0;  // poses in a row with that
   Stamp newest_stamp_{};
 };
 

@@ -22,7 +22,8 @@ struct RunRequest {
 
 /// Drives: the cameras, INS and board of the configuration into a session folder (run_session()).
 ///
-/// Errors   InputError before the session folder is made, for all that can be known by then.
+/// Errors   InputError, DeviceError before the session folder is made, for all that can be known by
+/// then.
 ///          Afterwards sentences on stderr.
 /// → as run_session(); device_failed: a camera was gone at the end
 [[nodiscard]] ExitCode run_drive(const RunRequest& request);

@@ -73,7 +73,8 @@ void LiveSource::make_acquisition() {
         devices_.cameras(), c.width, c.height, masks.views()[0], exposure_options(configuration_),
         starting_exposure(configuration_, 0), request_.fast);
   }
-  if (!request_.fast) facts_.tie = ClockTie{o.tie_stamp, o.tie_host};
+  tie_ = {o.tie_stamp, o.tie_host};
+  if (!request_.fast) facts_.tie = tie_;
   acquisition_ = std::make_unique<Acquisition>(
       exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
   start_ = o.tie_stamp + (devices_.start() - o.tie_host);
@@ -88,7 +89,7 @@ void LiveSource::make_facts() {
   facts_.frames = devices_.frames();
   facts_.expected_frames = devices_.frames();  // 0: nobody knows
   if (devices_.ins() != nullptr)
-    facts_.ins = SourceIns{comparison_options(configuration_), InsComparison::Source::device,
+    facts_.ins = SourceIns{comparison_options(configuration_), InsSource::device,
                            "the configuration", 0};
   const auto is_full = [](const mock::Fault& f) { return f.kind == mock::FaultKind::disk_full; };
   const auto scheduled = devices_.faults();
@@ -112,9 +113,15 @@ void LiveSource::make_facts() {
   facts_.on_request = true;
 }
 
+void LiveSource::observe_devices(DeviceObserver* observer) {
+  tap_ = std::make_unique<DeviceTap>(observer, tie_);
+  if (InsDevice* ins = devices_.ins()) (void)ins->observe_bytes(&tap_->ins_line());
+  if (TriggerDevice* board = devices_.trigger()) (void)board->observe_bytes(&tap_->board_line());
+}
+
 void LiveSource::start(std::vector<std::string>* faults) {
   const HostStamp assumed = devices_.start();
-  start_acquisition(acquisition_.get());
+  start_acquisition(acquisition_.get(), tap_.get());
   begun_ = std::chrono::steady_clock::now();
   start_ = start_ + (devices_.start() - assumed);  // a mock in real time knows it only now
   if (devices_.mock() == nullptr || devices_.board_keeps_own_time()) return;

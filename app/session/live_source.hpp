@@ -7,6 +7,7 @@
 
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/exposure_control.hpp"
+#include "app/session/device_tap.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/live_session.hpp"
 #include "app/session/timing_monitor.hpp"
@@ -18,12 +19,14 @@ namespace vergence::app {
 /// mock's.
 ///
 /// Ownership  Holds the devices. `request` outlives it.
-/// Errors     The constructor throws InputError: configuration, devices that are not there.
+/// Errors     The constructor throws InputError: configuration; DeviceError: devices that are not
+///            there.
 class LiveSource final : public FrameSource {
  public:
   explicit LiveSource(const RunRequest& request);
 
   [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
+  void observe_devices(DeviceObserver* observer) override;
   void start(std::vector<std::string>* faults) override;
   [[nodiscard]] bool next(SourceItem* item) noexcept override;
   void done(const PoseSample& sample) noexcept override;
@@ -52,8 +55,10 @@ class LiveSource final : public FrameSource {
   DriveDevices devices_;
   SourceFacts facts_;
   std::unique_ptr<ExposureControl> exposure_;  // null: exposures are fixed
+  std::unique_ptr<DeviceTap> tap_;             // null: nobody looks
   std::unique_ptr<Acquisition> acquisition_;
-  Stamp start_{};  // of the drive
+  ClockTie tie_{};  // of stamps to the devices' time
+  Stamp start_{};   // of the drive
   std::chrono::steady_clock::time_point begun_{};
   std::vector<StampedPose> truth_;
 

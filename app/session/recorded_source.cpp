@@ -63,7 +63,7 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
   facts_.frames = facts_.expected_frames = count_;
   facts_.first = sequence_.pairs[request.start].stamp;
   if (!ins_.readings.empty())
-    facts_.ins = SourceIns{ins_.options, InsComparison::Source::recording, ins_.mount_source,
+    facts_.ins = SourceIns{ins_.options, InsSource::recording, ins_.mount_source,
                            ins_.readings.capacity() * sizeof(RecordedReading)};
   for (const std::vector<std::string>* remarks : {&sequence_.remarks, &ins_.remarks})
     for (const std::string& sentence : *remarks)

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "app/recorder/recorder.hpp"
+#include "app/recorder/pose_line.hpp"
 
 namespace vergence::app {
 namespace {

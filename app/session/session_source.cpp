@@ -68,8 +68,8 @@ void SessionSource::make_facts(std::optional<StartingCalibration> other) {
   facts_.first = session_.frames()[next_frame_].given.stamp;
   if (d.ins && !session_.readings().empty())
     facts_.ins =
-        SourceIns{comparison_options(request_.configuration), InsComparison::Source::recording,
-                  d.mount_source, session_.readings().capacity() * sizeof(RecordedReading)};
+        SourceIns{comparison_options(request_.configuration), InsSource::recording, d.mount_source,
+                  session_.readings().capacity() * sizeof(RecordedReading)};
   for (const std::string& sentence : session_.remarks())
     facts_.remarks.push_back({sentence, "data", !request_.session.quiet});
   if (!other_ && !session_.complete())

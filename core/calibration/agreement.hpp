@@ -10,7 +10,7 @@ namespace vergence::calibration {
 /// (METHOD §6.5): 1 on average where their sigmas are true, and no truth is needed to see it.
 struct Agreement {
   static constexpr std::size_t kDepths = 4;
-  static constexpr std::array<double, kDepths> depth_m = {5, 10, 20, 50};
+  static constexpr std::array<double, kDepths> kDepthM = {5, 10, 20, 50};
   std::array<double, kDepths>
       depth{};  // mean over the image of (difference / sigma)², of the inverse depth
   std::array<double, kDepths> depth_percent{};  // root mean square difference, percent

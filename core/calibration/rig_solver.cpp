@@ -15,7 +15,8 @@ constexpr int kLeastCandidateMatches =
     40;  // across, of the frame whose own transform begins the solve
 constexpr double kHuber = 2.0, kCauchy = 2.5;  // residual scales
 constexpr double kFirstCut = 6.0,
-                 kLastCut = 4.0;         // residual scales beyond which a observation is left out
+                 kLastCut = 4.0;  // residual scales beyond which a observation is left out
+constexpr int kMostSteps = 60, kMostFocalSteps = 200;  // of the last adjustment
 constexpr double kMedianOfTwo = 1.1774;  // median length of a vector of two standard normal numbers
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
@@ -161,7 +162,8 @@ void RigSolver::drop_outliers(double limit) noexcept {
 
 /// Huber, then Cauchy twice, each time without what lies beyond some scales of the residuals;
 /// covariances with the last.
-BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexcept {
+BundleResult RigSolver::adjust_robustly(BundleOptions how, int most_steps,
+                                        RigSolution* s) noexcept {
   how.loss = BundleLoss::huber;
   how.loss_threshold = kHuber;
   how.max_steps = 12;
@@ -175,7 +177,7 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how, RigSolution* s) noexc
     how.loss = BundleLoss::cauchy;
     how.loss_threshold = kCauchy * scale;
     const bool last = cut == kLastCut;
-    how.max_steps = last ? 60 : 8;
+    how.max_steps = last ? most_steps : 8;
     how.cost_tolerance = last ? 3e-6 : 1e-4;
     how.covariance = how.pose_covariance = last;
     r = adjust(how);
@@ -203,8 +205,14 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   if (points_.size() < static_cast<std::size_t>(kLeastTracks)) return s;
   hold_pieces();
   s.status = RigSolveStatus::not_converged;
-  const BundleResult r = adjust_robustly(options_of(request), &s);
-  if (!r.converged()) return s;
+  // To a focal length that is a quarter off it is a hundred steps and more.
+  const int most_steps =
+      request.freedom == RigFreedom::focal_lengths ? kMostFocalSteps : kMostSteps;
+  const BundleResult r = adjust_robustly(options_of(request), most_steps, &s);
+  if (!r.converged()) {
+    if (r.usable()) s.rig.intrinsics[0] = cameras_[0].intrinsics();  // how far it came
+    return s;
+  }
   describe(&s);
   s.status = r.has_covariance ? RigSolveStatus::ok : RigSolveStatus::not_observable;
   if (s.status == RigSolveStatus::ok) {

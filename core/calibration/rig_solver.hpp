@@ -22,7 +22,10 @@ enum class RigFreedom : std::uint8_t {
                // are
   lenses,  // also further cameras' intrinsics and distortion, and the left one's distortion (METHOD
            // §6.1)
+  focal_lengths,  // as `lenses`, and every focal length by kFocalDoubt: whether they are believed
+                  // rightly
 };
+inline constexpr double kFocalDoubt = 0.1;  // prior sigma of a focal length, a share of it
 
 /// What to solve for and where to begin. `known` and `given` are read during solve() only.
 struct RigSolveRequest {
@@ -96,7 +99,8 @@ class RigSolver {
   void hold_pieces() noexcept;
   [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
   [[nodiscard]] BundleOptions options_of(const RigSolveRequest& request) const noexcept;
-  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, RigSolution* s) noexcept;
+  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, int most_steps,
+                                             RigSolution* s) noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
   [[nodiscard]] double residual_scale() noexcept;
   void drop_outliers(double limit) noexcept;

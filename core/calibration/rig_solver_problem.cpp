@@ -132,7 +132,8 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
   constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111,
                           kFourCoefficients = 0b1111'0000;  // k1 k2 p1 p2, or k1 … k4
   const RigCalibration& rig = request.rig;
-  const bool lenses = request.freedom == RigFreedom::lenses;
+  const bool focal_lengths = request.freedom == RigFreedom::focal_lengths;
+  const bool lenses = request.freedom == RigFreedom::lenses || focal_lengths;
   BundleOptions how;
   how.configuration = BundleConfiguration::stereo_calibration;
   how.shared_errors = kSharedErrors;
@@ -151,6 +152,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
       out.free = lenses                                 ? kPinhole
                  : options_.estimate_focal_lengths != 0 ? kFocal
                                                         : std::uint16_t{0};
+    if (focal_lengths) out.free = static_cast<std::uint16_t>(out.free | kFocal);
     if (lenses) out.free = static_cast<std::uint16_t>(out.free | kFourCoefficients);
     const std::array value = {lens.fx, lens.fy, lens.cx, lens.cy};
     for (std::size_t i = 0; i < 4; ++i) {
@@ -159,7 +161,9 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
                            : lenses && k > 0 ? options_.lens_centre_sigma_px
                                              : options_.principal_point_sigma_px;
       out.prior_mean[i] = value[i];
-      out.prior_sigma[i] = out.held_sigma[i] = lens.sigma[i] > 0 ? lens.sigma[i] : usual;
+      out.prior_sigma[i] = out.held_sigma[i] = focal && focal_lengths ? kFocalDoubt * value[i]
+                                               : lens.sigma[i] > 0    ? lens.sigma[i]
+                                                                      : usual;
     }
     for (std::size_t i = 0; i < 4; ++i) {
       const bool tangential = lens.kind == CameraModelKind::pinhole_radtan && i >= 2;

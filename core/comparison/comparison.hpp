@@ -5,10 +5,11 @@
 #include <span>
 
 #include "core/comparison/geodesy.hpp"
-#include "core/comparison/placement.hpp"
+#include "core/comparison/ins_history.hpp"
+#include "core/comparison/path_ratio.hpp"
+#include "core/comparison/placement_builder.hpp"
 #include "core/math/se3.hpp"
 #include "core/memory/arena.hpp"
-#include "core/memory/fixed_vector.hpp"
 #include "core/types/ins_sample.hpp"
 #include "core/types/pose_sample.hpp"
 
@@ -121,22 +122,24 @@ struct ComparisonCounters {
 /// Threads    One thread calls everything. Rings bring samples and poses to it.
 /// Memory     ins_capacity samples (the oldest goes), kPending poses (the oldest goes out at once,
 ///            counted), a fixed number of placement pairs. An hour or a year makes no difference.
-/// Time       Constant a call, but for the call that fits the placement (linear in kPlacementPairs,
+/// Time       Constant a call, but for the call that fits the placement (linear in
+/// PlacementBuilder::kPairs,
 ///            well under a millisecond).
 /// Frames     `enu` has its origin at the first valid fix. `world` is the odometry's.
 /// Errors     Nothing throws after construction. What is missing is said in each ComparedPose.
 class Comparison {
  public:
   static constexpr std::size_t kPending = 64;
-  static constexpr std::size_t kPlacementPairs = 1024;
 
   /// Precondition: options.validate() == nullptr. Throws std::length_error when the arena is full.
   Comparison(const ComparisonOptions& options, Arena& arena);
+  Comparison(const Comparison&) = delete;  // its parts refer to one another
+  Comparison& operator=(const Comparison&) = delete;
   /// What the arena must have left.
   [[nodiscard]] static std::size_t bytes_needed(const ComparisonOptions& options) noexcept;
 
   /// Samples in order of their stamps; others are refused and counted.
-  void add(const InsSample& sample) noexcept;
+  void add(const InsSample& sample) noexcept { ins_.add(sample); }
   /// Poses in order of their stamps, lost ones too. Precondition: next() was called until false
   /// since the last one, so there is room.
   void add(const PoseSample& pose) noexcept;
@@ -148,74 +151,29 @@ class Comparison {
   void finish() noexcept { finishing_ = true; }
 
   /// revision 0: none yet.
-  [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
+  [[nodiscard]] const Placement& placement() const noexcept { return builder_.placement(); }
   /// Why the last attempt gave none, while the drive is too short or its way does not hold a
   /// heading.
-  [[nodiscard]] PlacementStatus placement_status() const noexcept { return placement_status_; }
-  [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
-  [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return plane_; }
+  [[nodiscard]] PlacementStatus placement_status() const noexcept { return builder_.status(); }
+  [[nodiscard]] bool has_origin() const noexcept { return ins_.has_origin(); }
+  [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return ins_.plane(); }
   [[nodiscard]] const ComparisonCounters& counters() const noexcept { return counters_; }
 
  private:
-  struct Reading {  // an InsSample in enu
-    Stamp stamp{};
-    Duration stamp_error{};
-    bool valid = false;
-    bool jumped = false;  // against the reading before
-    Vec3 p_enu_ins = Vec3::Zero();
-    Mat3 R_enu_ins = Mat3::Identity();
-    double position_sigma = 0, height_sigma = 0, tilt_sigma = 0;
-  };
-  struct Chord {  // a step along both paths
-    double ours = 0, ins = 0;
-  };
-  static constexpr std::size_t kChords = 40;
-
-  [[nodiscard]] const Reading& reading(std::uint64_t i) const noexcept {
-    return readings_[static_cast<std::size_t>(i) & (readings_.size() - 1)];
-  }
   [[nodiscard]] bool ready(const PoseSample& pose) const noexcept;
-  [[nodiscard]] InsMatch reference_at(Stamp stamp, ComparedPose* out,
-                                      Reading* sigmas) const noexcept;
   [[nodiscard]] EarthPose on_earth(const Transform& T_enu_left) const;
-  void collect(const ComparedPose& c, const Reading& sigmas) noexcept;
-  void begin_collecting() noexcept;
-  void place() noexcept;
-  void measure_scale(const Reading& sigmas, ComparedPose* c) noexcept;
+  /// The pose is where the INS says: scale and placement take it in.
+  void take(const ComparedPose& c, const InsHistory::Reference& reference) noexcept;
 
-  ComparisonOptions options_;
-  LocalTangentPlane plane_{};
-  bool has_origin_ = false;
-  std::span<Reading> readings_;
-  std::uint64_t begin_ = 0, end_ = 0;  // numbers of the readings held
-  int backwards_ = 0;                  // refused in a row for their stamps
-
-  double yaw_ = 0;  // rad, the newest of a sample without attitude
-  bool has_yaw_ = false;
+  const ComparisonOptions options_;
+  ComparisonCounters counters_{};
+  InsHistory ins_;
+  PlacementBuilder builder_;
+  PathRatio ratio_;
   std::array<PoseSample, kPending> pending_{};
   std::uint64_t pending_begin_ = 0, pending_end_ = 0;
   bool finishing_ = false;
-
-  BoundedVector<PlacementPair> pairs_;
-  bool collecting_ = true;
-  bool leapt_ = false;  // the INS has, at leapt_at_, and no pose after it has been looked at
-  Stamp leapt_at_{};
   bool restarted_ = false;  // the newest pose was of a restarted scene
-  bool has_last_ = false;   // of a pose with a fix, for the distance driven
-  Vec3 last_world_ = Vec3::Zero();
-  double driven_ = 0;  // m, since collecting began
-  double next_pair_at_ = 0;
-  Placement placement_{};
-  PlacementStatus placement_status_ = PlacementStatus::too_few;
-
-  std::array<Chord, kChords> chords_{};
-  std::uint64_t chord_count_ = 0;
-  bool has_anchor_ = false;
-  Vec3 anchor_ours_ = Vec3::Zero(), anchor_ins_ = Vec3::Zero();
-  double ratio_ = 0;
-  bool disagrees_ = false;
-
-  ComparisonCounters counters_{};
 };
 
 }  // namespace vergence

@@ -7,6 +7,7 @@
 
 #include <Eigen/Dense>
 
+#include "core/comparison/detail/pose_interpolation.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence {
@@ -54,52 +55,6 @@ State moved(const State& s, const Parameters& d) {
   return out;
 }
 
-/// Change an interval from its two neighbours', at one of its ends: the mean weighted so that a
-/// parabola is met.
-Vec3 slope(const Vec3& before, double span_before, const Vec3& after, double span_after) {
-  return (span_after / span_before * before + span_before / span_after * after) /
-         (span_before + span_after);
-}
-
-/// Cubic Hermite from 0 at u = 0 to `whole` at u = 1, with the slopes there, of one interval.
-Vec3 hermite(double u, const Vec3& whole, const Vec3& slope_begin, const Vec3& slope_end) {
-  const double v = 1 - u;
-  return u * v * v * slope_begin - u * u * v * slope_end + u * u * (3 - 2 * u) * whole;
-}
-
-/// The estimate at a time, by cubics through four poses where there are four, else straight:
-/// between poses a tenth of a second apart a car that brakes or turns is some millimetres from the
-/// straight line. False: none there.
-bool estimate_at(std::span<const StampedPose> estimate, Stamp at, Duration max_gap,
-                 Transform* out) {
-  const auto after = std::lower_bound(estimate.begin(), estimate.end(), at,
-                                      [](const StampedPose& e, Stamp t) { return e.stamp < t; });
-  if (after == estimate.end() || after == estimate.begin()) return false;
-  const StampedPose &a = *(after - 1), &b = *after;
-  const Duration span = b.stamp - a.stamp;
-  if (span > max_gap) return false;
-  const double h = span.to_seconds(), u = (at - a.stamp).to_seconds() / h;
-  const Mat3& R_a = a.T_world_body.R;
-  const Vec3 step = b.T_world_body.t - a.T_world_body.t,
-             turn = log_so3(R_a.transpose() * b.T_world_body.R);
-  Vec3 step_begin = step, step_end = step, turn_begin = turn, turn_end = turn;
-  if (after - 1 != estimate.begin() && a.stamp - (after - 2)->stamp <= max_gap) {
-    const StampedPose& p = *(after - 2);
-    const double g = (a.stamp - p.stamp).to_seconds();
-    step_begin = h * slope(a.T_world_body.t - p.T_world_body.t, g, step, h);
-    turn_begin = h * slope(log_so3(p.T_world_body.R.transpose() * R_a), g, turn, h);
-  }
-  if (after + 1 != estimate.end() && (after + 1)->stamp - b.stamp <= max_gap) {
-    const StampedPose& n = *(after + 1);
-    const double g = (n.stamp - b.stamp).to_seconds();
-    step_end = h * slope(step, h, n.T_world_body.t - b.T_world_body.t, g);
-    turn_end = h * slope(turn, h, log_so3(b.T_world_body.R.transpose() * n.T_world_body.R), g);
-  }
-  out->R = R_a * exp_so3(hermite(u, turn, turn_begin, turn_end));
-  out->t = a.T_world_body.t + hermite(u, step, step_begin, step_end);
-  return true;
-}
-
 /// Readings a step apart, with an estimate around each.
 std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
                                std::span<const MountReference> reference, const MountOptions& o) {
@@ -109,9 +64,9 @@ std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
   Stamp next = reference.front().stamp;
   for (const MountReference& r : reference) {
     if (r.stamp < next) continue;
-    if (!estimate_at(estimate, r.stamp - kRoom, o.max_gap, &unused) ||
-        !estimate_at(estimate, r.stamp, o.max_gap, &unused) ||
-        !estimate_at(estimate, r.stamp + kRoom, o.max_gap, &unused))
+    if (!detail::pose_at(estimate, r.stamp - kRoom, o.max_gap, &unused) ||
+        !detail::pose_at(estimate, r.stamp, o.max_gap, &unused) ||
+        !detail::pose_at(estimate, r.stamp + kRoom, o.max_gap, &unused))
       continue;
     moments.push_back(
         {r, !moments.empty() && r.stamp - moments.back().reference.stamp < o.step * 3 / 2});
@@ -164,7 +119,7 @@ class Fit {
   [[nodiscard]] bool all_errors(const State& s, std::vector<Errors>* all) const;
   [[nodiscard]] bool step(Parameters* d);
   void learn_noise(const std::vector<Errors>& all);
-  void tell(const Mat3& nominal, Mount* mount) const;
+  void report(const Mat3& nominal, Mount* mount) const;
 
   std::vector<Moment> moments_;
   std::span<const StampedPose> estimate_;
@@ -180,7 +135,7 @@ bool Fit::errors_at(const State& s, const Moment& m, Errors* e) const {
   constexpr Duration kAround = Duration::milliseconds(50);  // velocity and rate: from both sides
   const Stamp at = m.reference.stamp - Duration::seconds(s.offset);
   Transform here, before, after;
-  if (!estimate_at(estimate_, at, options_.max_gap, &here)) return false;
+  if (!detail::pose_at(estimate_, at, options_.max_gap, &here)) return false;
   const MountReference& r = m.reference;
   const Mat3& R = r.T_enu_ref.R;
   // In the reference's axes: there a tilt stays a tilt when the vehicle turns.
@@ -188,8 +143,8 @@ bool Fit::errors_at(const State& s, const Moment& m, Errors* e) const {
   e->segment<3>(3) = r.T_enu_ref.t + R * s.lever - s.R_enu_world * here.t - s.translation;
   e->segment<3>(6).setZero();
   if (velocity_) {
-    if (!estimate_at(estimate_, at - kAround, options_.max_gap, &before) ||
-        !estimate_at(estimate_, at + kAround, options_.max_gap, &after))
+    if (!detail::pose_at(estimate_, at - kAround, options_.max_gap, &before) ||
+        !detail::pose_at(estimate_, at + kAround, options_.max_gap, &after))
       return false;
     const double span = 2 * kAround.to_seconds();
     const Vec3 velocity = (after.t - before.t) / span,
@@ -215,8 +170,8 @@ bool Fit::start(const Mat3& nominal) {
     const MountReference &r0 = moments_[i - 1].reference, &r1 = moments_[i].reference;
     velocity_ = velocity_ && r0.has_velocity && r1.has_velocity;
     if (!moments_[i].follows) continue;
-    if (!estimate_at(estimate_, r0.stamp, options_.max_gap, &e0) ||
-        !estimate_at(estimate_, r1.stamp, options_.max_gap, &e1))
+    if (!detail::pose_at(estimate_, r0.stamp, options_.max_gap, &e0) ||
+        !detail::pose_at(estimate_, r1.stamp, options_.max_gap, &e1))
       return false;
     const Mat3 R_ref_enu = r0.T_enu_ref.R.transpose();
     const Vec3 turn_ref = log_so3(R_ref_enu * r1.T_enu_ref.R),
@@ -238,12 +193,12 @@ bool Fit::start(const Mat3& nominal) {
   state_.R_m = rotation_of(B + 1e-3 * B.norm() * nominal);
   Mat3 sum = Mat3::Zero();
   for (const Moment& m : moments_) {
-    if (!estimate_at(estimate_, m.reference.stamp, options_.max_gap, &e0)) return false;
+    if (!detail::pose_at(estimate_, m.reference.stamp, options_.max_gap, &e0)) return false;
     sum += m.reference.T_enu_ref.R * state_.R_m * e0.R.transpose();
   }
   state_.R_enu_world = rotation_of(sum);
   for (const Moment& m : moments_) {
-    (void)estimate_at(estimate_, m.reference.stamp, options_.max_gap, &e0);
+    (void)detail::pose_at(estimate_, m.reference.stamp, options_.max_gap, &e0);
     state_.translation += (m.reference.T_enu_ref.t - state_.R_enu_world * e0.t) /
                           static_cast<double>(moments_.size());
   }
@@ -347,7 +302,7 @@ bool Fit::step(Parameters* d) {
   return d->allFinite();
 }
 
-void Fit::tell(const Mat3& nominal, Mount* mount) const {
+void Fit::report(const Mat3& nominal, Mount* mount) const {
   // By the model of the errors, or by how far blocks of the drive disagree, whichever is more: what
   // an estimate drifts by is no Gauss–Markov process.
   const Information covariance = information_.ldlt().solve(Information::Identity());
@@ -395,7 +350,7 @@ MountStatus Fit::run(const Mat3& nominal, Mount* mount) {
     constexpr int kLeastRounds = 6;  // for the correlations
     if (round >= kLeastRounds && d.dot(information_ * d) < kSettled * kSettled) break;
   }
-  tell(nominal, mount);
+  report(nominal, mount);
   return MountStatus::ok;
 }
 

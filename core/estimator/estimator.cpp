@@ -71,10 +71,7 @@ Estimator::Estimator(const EstimatorOptions& options, const RigCalibration& rig,
   parts_ = new (bytes.data()) Parts(options, rig, nominal, arena, runner, solver);
 }
 
-Estimator::~Estimator() {
-  parts_->calibrator.finish();
-  parts_->~Parts();
-}
+Estimator::~Estimator() { parts_->~Parts(); }
 
 PoseSample Estimator::process(const RigFrame& given) noexcept {
   const auto start = std::chrono::steady_clock::now();
@@ -109,9 +106,9 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     if (out.posed) {
       const bool linked = p.odometry.linked() == odometry::Link::linked;
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
-      if (!linked && (p.calibrator.seeking() || p.calibrator.relink_pending()))
+      if (!linked && (p.calibrator.seeking() || p.calibrator.monitor().scene_pending()))
         p.watch_sought(out, frame);
-      p.calibrator.log(p.odometry, out, frame);
+      p.calibrator.frames().take(p.odometry, out, frame);
     }
     p.odometry.rebuild(&out);
     if (out.relinked) p.calibrator.scene_rebuilt(p.odometry);
@@ -131,7 +128,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   // work.
   sample.estimate_ms =
       std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count() -
-      p.calibrator.waited_ms();
+      p.calibrator.solve().waited_ms();
   return sample;
 }
 
@@ -144,7 +141,7 @@ void Estimator::finish() noexcept {
   // then all frames can make better.
   constexpr int kLastSolves = 3;
   for (int attempt = 0; attempt < kLastSolves; ++attempt) {
-    if (!p.calibrator.solving()) {
+    if (!p.calibrator.solve().running()) {
       if (!p.calibrator.start_last_solve()) return;
       if (p.calibrator.seeking()) p.transition(Trigger::frames_enough, p.last);
     }
@@ -166,7 +163,7 @@ const RigCalibration& Estimator::calibration() const noexcept {
 }
 bool Estimator::verified() const noexcept { return parts_->calibrator.verified(); }
 const calibration::TrackLog& Estimator::tracks() const noexcept {
-  return parts_->calibrator.tracks();
+  return parts_->calibrator.frames().log();
 }
 bool Estimator::calibrated() const noexcept { return parts_->calibrator.calibrated(); }
 

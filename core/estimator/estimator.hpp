@@ -57,13 +57,15 @@ struct EstimatorEvent {
     dropped,
     rig_changed,  // the monitor raised; value: frames since the onset, or the lag in frames of
                   // cameras out of step
-    calibration_confirmed,     // the drive has confirmed the calibration in use; value: its depth
-                               // error, %
-    calibration_contradicted,  // the drive has shown that it is not the rig's; value: how far off
-                               // its depths are, %
-    calibration_accepted,      // value: frames it was solved from
-    calibration_rejected,      // why: the reason; value: frames
-    calibration_waits,         // why: what is missing to calibrate
+    calibration_confirmed,      // the drive has confirmed the calibration in use; value: its depth
+                                // error, %
+    calibration_contradicted,   // the drive has shown that it is not the rig's; value: how far off
+                                // its depths are, %
+    focal_length_contradicted,  // the drive measures another focal length than was given; value:
+                                // the one measured, px
+    calibration_accepted,       // value: frames it was solved from
+    calibration_rejected,       // why: the reason; value: frames
+    calibration_waits,          // why: what is missing to calibrate
   } kind = Kind::state;
   State from = State::initialising;
   State to = State::initialising;

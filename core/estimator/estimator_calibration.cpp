@@ -90,7 +90,7 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
 /// What the monitors say of a frame posed with the calibration in use.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorVerdict::Kind;
-  const calibration::MonitorVerdict v = calibrator.watch(odometry, out, frame);
+  const calibration::MonitorVerdict v = calibrator.monitor().update(odometry, out, frame);
   undecided = v.undecided;
   if (v.kind == K::out_of_step) {
     if (out_of_step == 0)
@@ -99,7 +99,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     out_of_step = kInStepAfter;
     // Frames out of step would speak for a lag in the monitor's windows long after its end; those
     // logged for a calibration are dropped with them.
-    calibrator.begin_anew();
+    calibrator.forget_frames();
     return;
   }
   if (out_of_step > 0) {
@@ -108,7 +108,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     if (v.in_step && --out_of_step == 0) {
       note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp,
            "the cameras are in step again", 0);
-      calibrator.begin_anew();
+      calibrator.forget_frames();
     }
     return;
   }
@@ -124,7 +124,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
 /// after do not confirm those before.
 void Estimator::Parts::watch_sought(const odometry::FrameOutcome& out,
                                     const RigFrame& frame) noexcept {
-  const auto onset = calibrator.watch_sought(odometry, out, frame.number);
+  const auto onset = calibrator.monitor().update_unlinked(odometry, out, frame.number);
   if (!onset) return;
   if (!calibrator.seeking()) return doubt(CalibrationCause::knock, *onset, frame);
   note(EstimatorEvent::Kind::rig_changed, frame.stamp,
@@ -180,6 +180,10 @@ void Estimator::Parts::tell_confirmed(Stamp stamp) noexcept {
 
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
   (void)decisions.push(decision);
+  if (decision.focal.contradicted && !std::exchange(focal_contradicted, true))
+    note(EstimatorEvent::Kind::focal_length_contradicted, stamp,
+         "the focal length given is not that of these images", decision.focal.measured_px);
+  focal_contradicted = decision.focal.contradicted;
   if (decision.learnt) return take_learnt(decision, stamp);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",

@@ -32,7 +32,7 @@ std::size_t Odometry::memory_needed(const OdometryOptions& options, const RigCal
   const auto n = static_cast<std::size_t>(options.features);
   return FrontEnd::memory_needed(options, rig, masks) + Map::memory_needed() +
          WindowAdjuster::memory_needed(options, rig) + PoseEstimator::memory_needed() +
-         StereoMlesac::memory_needed(n) + 5 * (n * sizeof(double) + kCacheLine);
+         RigInitialiser::memory_needed(n);
 }
 
 Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bool known,
@@ -45,41 +45,19 @@ Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bo
       map_(static_cast<std::size_t>(options.window_keyframes), arena),
       window_(options, rig_, arena),
       poses_(options, rig_, arena),
-      stereo_(static_cast<std::size_t>(options.features), arena),
-      random_(options.seed) {
-  for (std::span<double>& column : columns_)
-    column = arena.make<double>(static_cast<std::size_t>(options.features), "matches across");
+      initialiser_(static_cast<std::size_t>(options.features), options.seed, arena),
+      motion_(options.max_gap_s) {
   if (known) return;
   unlink();
   reset_extrinsics();
 }
 
-void Odometry::link(const RigCalibration& rig) noexcept {
-  next_rig_ = rig;
-  link_pending_ = true;
-}
+void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = rig; }
 
 void Odometry::unlink() noexcept {
   link_ = Link::unlinked;
-  link_pending_ = false;
+  next_rig_.reset();
   front_end_.set_band(std::max(options_.band_px, kUnlinkedBand));
-}
-
-Transform Odometry::predict(double dt_s) const noexcept {
-  return {normalised(exp_so3(turn_per_s_ * dt_s) * T_left_world_.R),
-          exp_so3(turn_per_s_ * dt_s) * T_left_world_.t + shift_per_s_ * dt_s};
-}
-
-void Odometry::remember(const Transform& T_left_world, Stamp stamp) noexcept {
-  const double dt = (stamp - stamp_).to_seconds();
-  if (any_pose_ && dt > 0 && dt <= options_.max_gap_s) {
-    const Transform step = T_left_world * T_left_world_.inverse();
-    turn_per_s_ = log_so3(step.R) / dt;
-    shift_per_s_ = step.t / dt;
-  }
-  T_left_world_ = T_left_world;
-  stamp_ = stamp;
-  any_pose_ = true;
 }
 
 bool Odometry::wants_keyframe() const noexcept {
@@ -105,13 +83,13 @@ double Odometry::renew_scale(std::size_t slot) noexcept {
   const double factor = rig_.baseline / length;
   const Vec3 here = map_.keyframe(slot).T_left_world.centre();
   map_.scale_about(here, factor);
-  shift_per_s_ *= factor;
+  motion_.scale(factor);
   return factor;
 }
 
 void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
-  const std::size_t slot = map_.make_keyframe(T_left_world_, stamp);
+  const std::size_t slot = map_.make_keyframe(motion_.T_left_world(), stamp);
   map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
   for (MapPoint& p : map_.points())
     if (p.followed()) p.seen[slot] = p.now;
@@ -125,12 +103,12 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
     out->scale = renew_scale(slot);
     rig_.T_camera_left = map_.keyframe(slot).T_camera_left;
   }
-  T_left_world_ = map_.keyframe(slot).T_left_world;
+  motion_.correct(map_.keyframe(slot).T_left_world);
   const auto keyframes = std::min<std::size_t>(map_.order().size(), out->effort.window_keyframes);
   budget_.window_took(static_cast<double>(clock.mark(Stage::window)), static_cast<int>(keyframes),
                       window.steps);
   const StereoCount stereo =
-      front_end_.add_points(map_, T_left_world_, PointStage::candidate, out->effort);
+      front_end_.add_points(map_, motion_.T_left_world(), PointStage::candidate, out->effort);
   // Of all that the left image offers, how much the other cameras confirm.
   stereo_fails_ = stereo.matched + fit.stereo < kConfirmedShare * (stereo.corners + fit.inliers);
   keyframe_points_ = 0;
@@ -186,7 +164,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
 
 void Odometry::try_points() noexcept {
   cursor_before_trial_ = map_.cursor();
-  (void)front_end_.add_points(map_, T_left_world_, PointStage::candidate);
+  (void)front_end_.add_points(map_, motion_.T_left_world(), PointStage::candidate);
   on_trial_ = true;
 }
 
@@ -197,12 +175,12 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const ImageCheck images = front_end_.begin(frame);
   clock.mark(Stage::pyramid);
   out.images_good = weakness(images) == Reason::none;
-  const double dt = any_pose_ ? (frame.stamp - stamp_).to_seconds() : 0.0;
+  const double dt = motion_.any() ? (frame.stamp - motion_.stamp()).to_seconds() : 0.0;
   const Transform predicted =
-      any_pose_ ? predict(std::min(dt, kLongestExtrapolation)) : Transform{};
+      motion_.any() ? motion_.predict(std::min(dt, kLongestExtrapolation)) : Transform{};
 
   if (map_.order().empty()) {
-    if (link_pending_) {
+    if (next_rig_) {
       take_up_link();
       out.relinked = true;
     }
@@ -227,20 +205,20 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   out.reprojection_px = fit.rms_px;
   // The same image again says nothing about motion: the speed stays what it was.
   if (images.repeated)
-    out.T_left_world = T_left_world_;
+    out.T_left_world = motion_.T_left_world();
   else
-    remember(fit.T_left_world, frame.stamp);
-  out.T_left_world = T_left_world_;
+    motion_.update(fit.T_left_world, frame.stamp);
+  out.T_left_world = motion_.T_left_world();
   judge(fit, images, &out);
   const FrameEffort effort =
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
-  if (link_pending_ && weakness(images) == Reason::none) {
+  if (next_rig_ && weakness(images) == Reason::none) {
     out.relink_due = true;
   } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
     out.effort = effort;
     make_keyframe(fit, frame.stamp, &out);
-    out.T_left_world = T_left_world_;
+    out.T_left_world = motion_.T_left_world();
   } else if (frames_untried_ >= kFramesUntilTrial && out.images_good && link_ == Link::linked) {
     out.effort.points_percent = effort.points_percent;
     if (effort.points_percent == 100) try_points();

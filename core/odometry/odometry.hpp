@@ -1,8 +1,11 @@
 #pragma once
-#include "core/geometry/stereo_mlesac.hpp"
+#include <optional>
+
 #include "core/odometry/front_end.hpp"
 #include "core/odometry/map.hpp"
+#include "core/odometry/motion_model.hpp"
 #include "core/odometry/pose_estimator.hpp"
+#include "core/odometry/rig_initialiser.hpp"
 #include "core/odometry/window.hpp"
 #include "core/odometry/work_budget.hpp"
 #include "core/types/pose_sample.hpp"
@@ -89,7 +92,6 @@ class Odometry {
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return poses_.agrees(); }
 
  private:
-  [[nodiscard]] Transform predict(double dt_s) const noexcept;
   [[nodiscard]] PoseFit fit(const Transform& start, bool sample) noexcept;
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured,
                               FrameOutcome* out) noexcept;
@@ -116,30 +118,20 @@ class Odometry {
   /// What is wrong with the images themselves, `none` if nothing.
   [[nodiscard]] Reason weakness(const ImageCheck& images) const noexcept;
   void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept;
-  void remember(const Transform& T_left_world, Stamp stamp) noexcept;
 
   const OdometryOptions& options_;
   RigCalibration rig_;
   Link link_;
-  bool rig_known_;             // rig_ has a transform to begin with
-  bool link_pending_ = false;  // next_rig_ waits for the next pose
-  RigCalibration next_rig_;
+  bool rig_known_;                          // rig_ has a transform to begin with
+  std::optional<RigCalibration> next_rig_;  // waits for the next pose
   FrontEnd front_end_;
   Map map_;
   WindowAdjuster window_;
   WorkBudget budget_;
   PoseEstimator poses_;
-  StereoMlesac stereo_;
-  std::array<std::span<double>, 5>
-      columns_{};  // of the matches given to it: left x, y, right x, y, sigma
-  Random random_;
+  RigInitialiser initialiser_;
+  MotionModel motion_;
 
-  Transform T_left_world_{};  // of the last posed frame
-  Vec3 turn_per_s_ =
-      Vec3::Zero();  // of the last step: rotation vector and translation of T_now_before, a second
-  Vec3 shift_per_s_ = Vec3::Zero();
-  Stamp stamp_{};
-  bool any_pose_ = false;
   int frames_lost_ = 0;        // in a row, with images that show something
   bool stereo_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
   bool scene_moves_ = false;   // the last points made do not fit the motion that the pose follows

@@ -20,8 +20,6 @@ constexpr double kStartShare =
     0.4;  // of the corners that must match: chance across a wrong rig gives a tenth to a quarter
 constexpr int kStartMatches = 30;  // points across to start from
 
-constexpr double kFreeMatchSigma =
-    2.0;  // sigmas of a tracked corner: patches are aligned without their shape being known
 constexpr double kWorstDirection = 0.1;  // rad, of t, to start from
 constexpr double kWorstRotation = 0.01;  // rad
 
@@ -30,22 +28,8 @@ constexpr double kWorstRotation = 0.01;  // rad
 bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   StageClock clock(out);
   const std::span<const FreeMatch> matches = front_end_.match_free(1);
-  const Pinhole left{rig_.intrinsics[0].fx, rig_.intrinsics[0].fy, rig_.intrinsics[0].cx,
-                     rig_.intrinsics[0].cy};
-  const Pinhole right{rig_.intrinsics[1].fx, rig_.intrinsics[1].fy, rig_.intrinsics[1].cx,
-                      rig_.intrinsics[1].cy};
   const std::size_t n = matches.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    columns_[0][i] = (matches[i].left.x() - left.cx) / left.fx;
-    columns_[1][i] = (matches[i].left.y() - left.cy) / left.fy;
-    columns_[2][i] = (matches[i].other.x() - right.cx) / right.fx;
-    columns_[3][i] = (matches[i].other.y() - right.cy) / right.fy;
-    columns_[4][i] = kFreeMatchSigma * matches[i].sigma / left.fx;
-  }
-  const StereoMatches rays{columns_[0].first(n), columns_[1].first(n), columns_[2].first(n),
-                           columns_[3].first(n), columns_[4].first(n)};
-  const StereoEstimate e =
-      stereo_.estimate_stereo_transform(rays, rig_.baseline, StereoMlesacOptions{}, random_);
+  const StereoEstimate e = initialiser_.estimate(matches, rig_);
   clock.mark(Stage::match);
   out->reason =
       n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
@@ -118,7 +102,7 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
     out->status = PoseStatus::degraded;
     out->reason = Reason::uncalibrated;
   }
-  if (any_pose_) {
+  if (motion_.any()) {
     out->restarted = true;
     out->gap_s = dt;
     restart_cooldown_ = kRestartedFrames;
@@ -126,7 +110,7 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
     out->reason = Reason::scene_restarted;
   }
   out->T_left_world = predicted;
-  remember(predicted, frame.stamp);
+  motion_.update(predicted, frame.stamp);
   frames_lost_ = 0;
 }
 
@@ -141,9 +125,9 @@ void Odometry::reset_extrinsics() noexcept {
 }
 
 void Odometry::take_up_link() noexcept {
-  link_pending_ = false;
   link_ = Link::linked;
-  rig_ = next_rig_;
+  rig_ = *next_rig_;
+  next_rig_.reset();
   rig_known_ = true;
   front_end_.rebuild_lenses();
   front_end_.set_band(options_.band_px);
@@ -151,12 +135,12 @@ void Odometry::take_up_link() noexcept {
 }
 
 void Odometry::rebuild(FrameOutcome* out) noexcept {
-  if (!link_pending_ || !out->relink_due) return;
+  if (!next_rig_ || !out->relink_due) return;
   // The scene was made with another rig: it is rebuilt, where the camera now is.
   take_up_link();
   out->relinked = true;
   FrameOutcome built;
-  if (!start_scene(T_left_world_, stamp_, &built)) out->reason = built.reason;
+  if (!start_scene(motion_.T_left_world(), motion_.stamp(), &built)) out->reason = built.reason;
 }
 
 }  // namespace vergence::odometry

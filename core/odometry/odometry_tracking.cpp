@@ -64,7 +64,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   };
   PoseFit best;
   for (const Attempt& a :
-       {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&T_left_world_, 3}}) {
+       {Attempt{&predicted, 2}, Attempt{&predicted, 3}, Attempt{&motion_.T_left_world(), 3}}) {
     front_end_.follow_sample(map_, *a.start, kSample, a.coarsest);
     clock.mark(Stage::track);
     fit = this->fit(*a.start, true);
@@ -127,7 +127,7 @@ PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
   clock.mark(Stage::match);
   PoseFit fit;
   if (candidates < kRelocaliseInliers) return fit;
-  fit = this->fit(T_left_world_, true);
+  fit = this->fit(motion_.T_left_world(), true);
   clock.mark(Stage::pose);
   fit.found = fit.inliers >= kRelocaliseInliers;
   if (!fit.found) return fit;

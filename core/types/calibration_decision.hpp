@@ -20,6 +20,15 @@ enum class CalibrationCause : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(CalibrationCause) noexcept;
 
+/// What a drive itself measures of the focal length, held against the one that it was given.
+struct FocalMeasurement {
+  double given_px = 0;     // fx of the left camera
+  double measured_px = 0;  // 0: it has not been measured
+  double sigma_px = 0;     // 1 sigma, noise only; 0: the measurement is not at its end, and already
+                           // far from the one given
+  bool contradicted = false;  // the one given is certainly not that of the images
+};
+
 /// What became of one attempt to calibrate: a line of calibrations.csv. A value.
 struct CalibrationDecision {
   Stamp stamp{};  // of the frame it was decided at
@@ -39,10 +48,11 @@ struct CalibrationDecision {
       0;  // METHOD §6.4: the depth that the next three are of; 0: nothing was measured
   double depth_sigma_percent = 0;  // predicted depth error of the calibration found, 1 sigma
   double depth_difference_percent =
-      0;                  // how far off the one before was, by the one found; 0: there was none
-  bool verified = false;  // the calibration now in use holds to the tolerated depth error
-  bool lenses = false;    // lenses were part of what was found
-  double solve_ms = 0;    // on the solver's thread
+      0;                     // how far off the one before was, by the one found; 0: there was none
+  bool verified = false;     // the calibration now in use holds to the tolerated depth error
+  bool lenses = false;       // lenses were part of what was found
+  FocalMeasurement focal{};  // the newest of the drive
+  double solve_ms = 0;       // on the solver's thread
 };
 
 }  // namespace vergence

@@ -4,8 +4,10 @@
 
 #include "core/types/ins_sample.hpp"
 #include "core/types/rig_frame.hpp"
+#include "drivers/camera.hpp"
 #include "drivers/ins.hpp"
 #include "drivers/sync/sync_types.hpp"
+#include "drivers/trigger.hpp"
 
 /// What an acquisition gives out: plain values of fixed size that go through rings.
 namespace vergence {
@@ -36,6 +38,16 @@ struct DeviceEvent {
   Stamp stamp{};
   int camera = 0;      // camera_…, acquiring, proven
   double seconds = 0;  // proven: since the first frame that was not
+};
+
+/// Sees what the devices hand out before it is paired: for a record.
+///
+/// Threads  The acquisition's; the calls do not wait.
+class AcquisitionObserver {
+ public:
+  virtual ~AcquisitionObserver() = default;
+  virtual void on_device_frame(int camera, const Frame& frame) noexcept = 0;
+  virtual void on_pulse(const Pulse& pulse) noexcept = 0;
 };
 
 using Acquired = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent>;

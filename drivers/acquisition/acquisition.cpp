@@ -43,7 +43,8 @@ Acquisition::~Acquisition() {
   join();
 }
 
-std::optional<StartFailure> Acquisition::start() {
+std::optional<StartFailure> Acquisition::start(AcquisitionObserver* observer) {
+  if (observer != nullptr) options_.observer = observer;
   std::optional<StartFailure> failure;
   const auto start_device = [&](auto* device) {
     if (device == nullptr || failure) return;
@@ -246,6 +247,7 @@ void Acquisition::take_frame(std::size_t k) {
     push_event(DeviceEvent::Kind::camera_back, head.value.arrival, camera);
   }
   const Frame& frame = head.value;
+  if (options_.observer != nullptr) options_.observer->on_device_frame(camera, frame);
   SyncFrame in;
   in.camera = camera;
   in.slot = frame.slot;

@@ -91,6 +91,8 @@ class Acquisition final : private Notifier {
     bool board_keeps_own_time = false;
     std::uint32_t sync_out_divider =
         0;  // ins_syncout: readings a pulse, where the INS does not mark those that one left with
+    AcquisitionObserver* observer =
+        nullptr;  // sees what the devices hand out; outlives it. Null: nobody
   };
 
   /// `ins` may be null. The cameras in the order of the rig, camera 0 first.
@@ -101,7 +103,8 @@ class Acquisition final : private Notifier {
   /// Who waits for pulses first, who makes them last: the board, the INS with `ins_syncout`, camera
   /// 0 with `master_strobe`.
   /// → the device that could not be started; the stream has not begun then.
-  [[nodiscard]] std::optional<StartFailure> start();
+  /// `observer`, if any, instead of that of the options.
+  [[nodiscard]] std::optional<StartFailure> start(AcquisitionObserver* observer = nullptr);
   /// False: the drive is over, or stop() was called.
   [[nodiscard]] bool next(Acquired* item) noexcept;
   /// Of every AcquiredFrame that next() gave, once.

@@ -24,6 +24,7 @@ void Acquisition::take_board() {
 
 void Acquisition::take_pulse(const Pulse& reported) {
   Pulse pulse = reported;
+  if (options_.observer != nullptr) options_.observer->on_pulse(reported);
   const bool rebooted = any_pulse_ && pulse.boot != boot_;
   if (rebooted && !sync_out_) {
     ++counters_.reboots;

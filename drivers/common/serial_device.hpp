@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "drivers/serial/byte_line.hpp"
+#include "drivers/serial/observed_line.hpp"
 #include "drivers/stream.hpp"
 
 namespace vergence {
@@ -62,6 +63,7 @@ class SerialDevice {
   [[nodiscard]] DeviceStatus open_line(const LineSettings& settings) {
     DeviceStatus status = DeviceStatus::ok;
     auto line = place_->open(settings, &status);
+    if (line != nullptr) line = std::make_unique<ObservedLine>(std::move(line), observer_);
     const std::lock_guard lock(line_mutex_);
     line_ = std::move(line);
     return status;
@@ -108,6 +110,10 @@ class SerialDevice {
     stopping_.store(false, std::memory_order_release);
   }
   [[nodiscard]] bool running() const noexcept { return thread_.joinable(); }
+  /// As InsDevice::observe_bytes().
+  void set_byte_observer(ByteObserver* observer) noexcept {
+    observer_.store(observer, std::memory_order_release);
+  }
 
   // ---- any thread
 
@@ -207,6 +213,7 @@ class SerialDevice {
   std::unique_ptr<LinePlace> place_;
   const char* const thread_name_;
   bool virtual_time_ = false;
+  std::atomic<ByteObserver*> observer_{nullptr};
   std::mutex line_mutex_;  // of the pointer: stop_thread() wakes a line that may be replaced
   std::unique_ptr<ByteLine> line_;
   Stream<Value, kRing> out_;

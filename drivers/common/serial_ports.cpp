@@ -12,10 +12,11 @@ std::vector<DeviceInfo> usb_serial_ports(std::string_view driver) {
   return found;
 }
 
-std::string only_usb_serial_port(std::string_view port, std::string* error) {
+std::string only_usb_serial_port(std::string_view port, DeviceStatus* status, std::string* error) {
   if (!port.empty()) return std::string(port);
   const std::vector<DeviceInfo> ports = usb_serial_ports("");
   if (ports.size() == 1) return ports.front().place;
+  *status = ports.empty() ? DeviceStatus::not_found : DeviceStatus::bad_configuration;
   *error = ports.empty()
                ? "there is no serial port on USB; plug the INS in, or name its port in ins.port"
                : "there is more than one serial port on USB; name the INS's in ins.port";

@@ -35,6 +35,10 @@ class Device final : public InsDevice, private SerialDevice<InsReading, 256> {  
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
   [[nodiscard]] DeviceStatus wait(Duration limit, InsReading* reading) noexcept override;
   void stop() noexcept override;
+  bool observe_bytes(ByteObserver* observer) noexcept override {
+    set_byte_observer(observer);
+    return true;
+  }
   [[nodiscard]] std::string last_error() const override { return last_error_; }
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] bool keeps_own_time() const noexcept override { return virtual_time(); }

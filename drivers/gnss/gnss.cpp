@@ -11,11 +11,8 @@ std::vector<DeviceInfo> Driver::enumerate() {
 }
 
 std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* status) {
-  const std::string name = only_usb_serial_port(port, &last_error_);
-  if (name.empty()) {
-    *status = DeviceStatus::not_found;
-    return nullptr;
-  }
+  const std::string name = only_usb_serial_port(port, status, &last_error_);
+  if (name.empty()) return nullptr;
   auto device = std::make_unique<Device>(std::make_unique<SerialPort>(name), options_);
   *status = device->connect();
   if (*status == DeviceStatus::ok) return device;

@@ -201,6 +201,7 @@ void RigSynchronizer::prove(Open* open, SyncedSet* set) noexcept {
       return;
     case SyncMode::bus:
     case SyncMode::ptp:
+    case SyncMode::one_picture:
       set->proof = SyncProof::common_clock;
       return;
     case SyncMode::board:

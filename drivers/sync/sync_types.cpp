@@ -3,8 +3,6 @@
 #include <cstddef>
 
 namespace vergence {
-namespace {}  // namespace
-
 const char* to_string(SyncMode mode) noexcept {
   switch (mode) {
     case SyncMode::counter:
@@ -21,6 +19,8 @@ const char* to_string(SyncMode mode) noexcept {
       return "bus";
     case SyncMode::ptp:
       return "ptp";
+    case SyncMode::one_picture:
+      return "one_picture";
   }
   return "";
 }

@@ -22,6 +22,8 @@ enum class SyncMode : std::uint8_t {
   bus,  // the stamps are of one IEEE 1394 cycle timer, which wraps after 128 s: within `tolerance`
         // in it
   ptp,  // the stamps are of one PTP clock: within `tolerance` in it
+  one_picture,  // both images come in one picture of one camera (side_by_side_camera.hpp), with one
+                // stamp
 };
 [[nodiscard]] const char* to_string(SyncMode) noexcept;
 /// Frames are tied to pulses that are offered by RigSynchronizer::pulse().
@@ -38,7 +40,8 @@ enum class SyncMode : std::uint8_t {
 }
 /// Frames are paired by their stamps.
 [[nodiscard]] constexpr bool pairs_by_time(SyncMode m) noexcept {
-  return m == SyncMode::software || m == SyncMode::bus || m == SyncMode::ptp;
+  return m == SyncMode::software || m == SyncMode::bus || m == SyncMode::ptp ||
+         m == SyncMode::one_picture;
 }
 
 /// Of one camera, for the modes with pulses.
@@ -61,8 +64,8 @@ struct SyncOptions {
   Duration hold = Duration::milliseconds(
       100);  // a set waits so long, by the arrivals of others, for images and the pulse's report
   SyncMode mode = SyncMode::counter;
-  Duration tolerance =
-      Duration::milliseconds(2);  // software, bus, ptp: between the middles of a set's exposures
+  Duration tolerance = Duration::milliseconds(
+      2);  // modes that pair by time: between the middles of a set's exposures
   /// counter: the pulses may have begun before the cameras, so each camera's first exposure is
   /// given its pulse by its stamp; and again after kUnproven unproven sets in a row.
   bool align_start = false;

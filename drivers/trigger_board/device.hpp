@@ -65,6 +65,10 @@ class Device final : public TriggerDevice,
   [[nodiscard]] DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
   [[nodiscard]] DeviceStatus pause(std::uint32_t pulses) noexcept override;
   void stop() noexcept override;
+  bool observe_bytes(ByteObserver* observer) noexcept override {
+    set_byte_observer(observer);
+    return true;
+  }
   [[nodiscard]] std::string last_error() const override;
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] TriggerStatistics statistics() const noexcept override;

@@ -65,7 +65,7 @@ std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* 
     if (chosen != nullptr) {
       last_error_ =
           "there is more than one trigger board; name one's port or serial number in trigger.port";
-      *status = DeviceStatus::not_found;
+      *status = DeviceStatus::bad_configuration;
       return nullptr;
     }
     chosen = std::move(board);

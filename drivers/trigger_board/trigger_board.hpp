@@ -34,7 +34,8 @@ class Driver final : public TriggerDriver {
   [[nodiscard]] std::vector<DeviceInfo> enumerate() override;
   /// `where`: a port (`/dev/ttyACM0`, a link to one), a board's serial number as enumerate() tells
   /// it, or empty: the only board there is.
-  /// → ok, not_found, no_permission, busy, unsupported, gone, failed
+  /// → ok, not_found, no_permission, busy, unsupported, bad_configuration (more than one may be
+  /// meant), gone, failed
   [[nodiscard]] std::unique_ptr<TriggerDevice> open(std::string_view where,
                                                     DeviceStatus* status) override;
   /// The same, with what a trigger board has beyond other TriggerDevices.

@@ -32,7 +32,6 @@ class Driver final : public CameraDriver {
       case DeviceStatus::unsupported:
         last_error_ =
             name + " is no node that captures and streams; vergence devices lists those that do";
-        *status = DeviceStatus::failed;
         break;
       case DeviceStatus::gone:
         *status = DeviceStatus::not_found;

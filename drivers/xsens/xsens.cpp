@@ -9,11 +9,8 @@ namespace vergence::xsens {
 std::vector<DeviceInfo> Driver::enumerate() { return usb_serial_ports("xsens"); }
 
 std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* status) {
-  const std::string name = only_usb_serial_port(port, &last_error_);
-  if (name.empty()) {
-    *status = DeviceStatus::not_found;
-    return nullptr;
-  }
+  const std::string name = only_usb_serial_port(port, status, &last_error_);
+  if (name.empty()) return nullptr;
   return open_on(std::make_unique<SerialPort>(name), options_, status, &last_error_);
 }
 

@@ -4,6 +4,7 @@
 //   knock                               that rig knocked at frame 60
 //   euroc, kitti                        recorded excerpts, as they are
 //   drives [--only NAME]                every recorded drive: calibration given, wrong, found
+//   focal [--only NAME]                 focal lengths that are off: told or not
 //   stretches [--only NAME]             how far disjoint stretches of a drive agree
 //   jumps [--only NAME]                 how far disparities jump on rigs that nobody touched
 //   learning [--starts N]               a recorded drive N times to and fro: what each solve knows
@@ -349,6 +350,7 @@ int main(int argc, char** argv) {
     if (a.what == "drives") return bench::run_drives(a.set, a.only);
     if (a.what == "learning" && a.only == "mock") return bench::run_mock_learning(a.set, a.frames);
     if (a.what == "learning") return bench::run_learning(a.set, a.starts);
+    if (a.what == "focal") return bench::run_focal_lengths(a.set, a.only);
     if (a.what == "jumps") return bench::run_jumps(a.set, a.only);
     if (a.what == "stretches") return bench::run_stretches(a.set, a.only);
     if (a.what == "euroc" || a.what == "kitti") return run_recorded(a);
@@ -356,9 +358,9 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
     return 2;
   }
-  fmt::print(
-      stderr,
-      "calibration_bench: drives, stretches, jumps, learning, mock, knock, euroc or kitti is "
-      "wanted\n");
+  fmt::print(stderr,
+             "calibration_bench: drives, focal, stretches, jumps, learning, mock, knock, euroc or "
+             "kitti is "
+             "wanted\n");
   return 2;
 }

@@ -47,6 +47,25 @@ void print(const std::string& drive_name, const std::string& what, const DriveOu
   std::fflush(stdout);
 }
 
+/// Whether a focal length that is off is told, and what the drive measures.
+void print_focal_lengths(const RecordedSequence& d, const app::Configuration& c) {
+  const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
+  for (const double factor : {1.0, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25}) {
+    const StartingCalibration begin = test::with_focal_length(given, factor);
+    for (const bool scratch : {false, true}) {
+      const DriveOutcome r = drive_recorded(d, d.sequence, c, scratch ? test::blank(begin) : begin);
+      fmt::print(
+          "{:12s} focal length x {:<4g} {:12s} ok {:3d} of {:3d}, {}: true one measured to "
+          "{:+.1f} % (sigma {:.1f} %)\n",
+          d.name, factor, scratch ? "from scratch" : "given", r.ok, r.frames,
+          r.focal.contradicted ? "contradicted" : "believed",
+          100 * (factor * r.focal.measured_px / r.focal.given_px - 1),
+          100 * r.focal.sigma_px / r.focal.measured_px);
+      std::fflush(stdout);
+    }
+  }
+}
+
 void run_drive(const RecordedSequence& d, const app::Configuration& c) {
   const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
   print(d.name, "from scratch, one pass", drive_recorded(d, d.sequence, c, test::blank(given)));
@@ -132,7 +151,7 @@ void print_stretches(const std::string& name,
   fmt::print("  NEES a dimension: transform {:.2f}, intrinsics {:.2f}, depth", mean.transform / by,
              mean.intrinsics / by);
   for (std::size_t k = 0; k < mean.depth.size(); ++k)
-    fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::Agreement::depth_m[k], mean.depth[k] / by,
+    fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::Agreement::kDepthM[k], mean.depth[k] / by,
                mean.depth_percent[k] / by);
   fmt::print("\n");
   std::fflush(stdout);
@@ -241,6 +260,10 @@ int for_drives(
 
 int run_drives(const std::vector<std::string>& set, const std::string& only) {
   return for_drives(set, only, run_drive);
+}
+
+int run_focal_lengths(const std::vector<std::string>& set, const std::string& only) {
+  return for_drives(set, only, print_focal_lengths);
 }
 
 int run_jumps(const std::vector<std::string>& set, const std::string& only) {

@@ -156,6 +156,12 @@ constexpr std::array kVariants = {
                      if (later(i, n)) warp(r, 0, 0, 0, 1.01);
                    },
                    nullptr},
+    HonestyVariant{"both zoomed by 25 % from the start",
+                   [](M* l, M* r, N, N) {
+                     warp(l, 0, 0, 0, 1.25);
+                     warp(r, 0, 0, 0, 1.25);
+                   },
+                   nullptr},
     HonestyVariant{"knock while covered",
                    [](M* l, M* r, N i, N n) {
                      if (i >= n / 2) warp(r, pixels(*r, 0.5), 0, 0, 1);
@@ -208,12 +214,13 @@ constexpr std::array kVariants = {
                      jpeg(r, 20);
                    },
                    nullptr},
-    HonestyVariant{"blurred",
-                   [](M* l, M* r, N, N) {
-                     cv::GaussianBlur(*l, *l, {}, 2);
-                     cv::GaussianBlur(*r, *r, {}, 2);
-                   },
-                   nullptr},
+    HonestyVariant{
+        "blurred",
+        [](M* l, M* r, N, N) {
+          cv::GaussianBlur(*l, *l, {}, 2);
+          cv::GaussianBlur(*r, *r, {}, 2);
+        },
+        nullptr},
     HonestyVariant{"a wall drives past", occlude, nullptr},
     HonestyVariant{"30 % of the pairs lost", nullptr, drop_some},
     HonestyVariant{"every second pair", nullptr, [](Pairs* p) { keep_every(p, 2); }},

@@ -18,12 +18,16 @@ namespace vergence::test {
 namespace {
 
 constexpr std::uint32_t kBuffers = 4;
-// The frames of 59.94 Hz come 25 ms apart: the kernel of the rig counts time in ticks of 10 ms, of
-// which one or two are rounded up.
-constexpr std::int64_t kFrame_ns = 25'000'000;
+// Frames of 59.94 Hz come 25 ms apart, those of 30 Hz 40 ms: the kernel of the rig counts time in
+// ticks of 10 ms, of which one or two are rounded up.
+constexpr std::int64_t frame_ns(LoopSize size) noexcept {
+  return size == LoopSize::vga ? 25'000'000 : 40'000'000;
+}
 // From a buffer's filling to its time: those before it in the queue, and half a frame of what is
 // not known.
-constexpr std::int64_t kAhead_ns = (kBuffers - 1) * kFrame_ns + kFrame_ns / 2;
+constexpr std::int64_t ahead_ns(LoopSize size) noexcept {
+  return (kBuffers - 1) * frame_ns(size) + frame_ns(size) / 2;
+}
 
 [[noreturn]] void fail(const std::string& node, const std::string& what, int error) {
   throw std::runtime_error(node + ": " + what + ": " + std::strerror(error));
@@ -40,9 +44,11 @@ void must(const std::string& node, int fd, unsigned long request, void* argument
   if (const int error = v4l2::control(fd, request, argument); error != 0) fail(node, what, error);
 }
 
-void set_timings(const std::string& node) {
+void set_timings(const std::string& node, LoopSize size) {
   const v4l2::UniqueFd fd = open_rw(node);
-  v4l2_dv_timings t = V4L2_DV_BT_DMT_640X480P60;
+  v4l2_dv_timings vga = V4L2_DV_BT_DMT_640X480P60;
+  v4l2_dv_timings hd = V4L2_DV_BT_CEA_1280X720P30;
+  v4l2_dv_timings& t = size == LoopSize::vga ? vga : hd;
   must(node, fd.get(), VIDIOC_S_DV_TIMINGS, &t, "timings");
 }
 
@@ -52,13 +58,13 @@ std::int64_t now_ns() {
   return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
 }
 
-v4l2_buffer description(std::uint32_t index) {
+v4l2_buffer description(std::uint32_t index, std::uint32_t bytes) {
   v4l2_buffer b{};
   b.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
   b.memory = V4L2_MEMORY_MMAP;
   b.index = index;
   b.field = V4L2_FIELD_NONE;
-  b.bytesused = VividPlayer::kWidth * VividPlayer::kHeight;
+  b.bytesused = bytes;
   return b;
 }
 
@@ -75,49 +81,53 @@ void set_control(const std::string& node, const std::string& key, std::int64_t v
   if (const int error = v4l2::write(*c, value); error != 0) fail(node, key, error);
 }
 
-void loop(const std::string& capture, const std::string& output) {
-  set_timings(capture);
-  set_timings(output);
+void loop(const std::string& capture, const std::string& output, LoopSize size) {
+  set_timings(capture, size);
+  set_timings(output, size);
   set_control(capture, "loop_video", 1);
   set_control(capture, "osd_text_mode", 2);  // else the frame's number is written over the image
 }
 
 VividPlayer::VividPlayer(const std::vector<std::string>& outputs, std::int64_t interval_ns,
-                         Draw draw)
-    : interval_ns_(interval_ns), draw_(std::move(draw)) {
+                         Draw draw, LoopSize size)
+    : interval_ns_(interval_ns),
+      ahead_ns_(ahead_ns(size)),
+      draw_(std::move(draw)),
+      image_bytes_(static_cast<std::uint32_t>(width_of(size) * height_of(size))) {
+  const auto width = static_cast<std::uint32_t>(width_of(size));
+  const auto height = static_cast<std::uint32_t>(height_of(size));
   for (const std::string& node : outputs) {
     Output out;
     out.fd = open_rw(node);
     v4l2_format f{};
     f.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
-    f.fmt.pix.width = kWidth;
-    f.fmt.pix.height = kHeight;
+    f.fmt.pix.width = width;
+    f.fmt.pix.height = height;
     f.fmt.pix.pixelformat = V4L2_PIX_FMT_GREY;
     f.fmt.pix.field = V4L2_FIELD_NONE;
     must(node, out.fd.get(), VIDIOC_S_FMT, &f, "format");
-    if (f.fmt.pix.width != kWidth || f.fmt.pix.height != kHeight ||
-        f.fmt.pix.bytesperline != kWidth)
-      fail(node, "640 x 480", EINVAL);
+    if (f.fmt.pix.width != width || f.fmt.pix.height != height || f.fmt.pix.bytesperline != width)
+      fail(node, std::to_string(width) + " x " + std::to_string(height), EINVAL);
     v4l2_requestbuffers ask{};
     ask.count = kBuffers;
     ask.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     ask.memory = V4L2_MEMORY_MMAP;
     must(node, out.fd.get(), VIDIOC_REQBUFS, &ask, "buffers");
     for (std::uint32_t i = 0; i < ask.count; ++i) {
-      v4l2_buffer b = description(i);
+      v4l2_buffer b = description(i, image_bytes_);
       must(node, out.fd.get(), VIDIOC_QUERYBUF, &b, "buffer");
       void* at =
           ::mmap(nullptr, b.length, PROT_READ | PROT_WRITE, MAP_SHARED, out.fd.get(), b.m.offset);
       if (at == MAP_FAILED) fail(node, "mmap", errno);
-      out.buffers.push_back(std::span(static_cast<std::uint8_t*>(at), b.length)
-                                .first(static_cast<std::size_t>(kWidth) * kHeight));
+      out.buffers.push_back(
+          std::span(static_cast<std::uint8_t*>(at), b.length).first(image_bytes_));
     }
     outputs_.push_back(std::move(out));
   }
   for (std::size_t k = 0; k < outputs_.size(); ++k) {
     for (std::uint32_t i = 0; i < outputs_[k].buffers.size(); ++i) {
       draw_(k, 0, outputs_[k].buffers[i]);
-      v4l2_buffer b = description(i);
+      v4l2_buffer b = description(i, image_bytes_);
       must(outputs[k], outputs_[k].fd.get(), VIDIOC_QBUF, &b, "queue");
     }
     int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
@@ -139,7 +149,7 @@ void VividPlayer::stop() {
 
 void VividPlayer::feed() {
   const auto due = [this] {
-    return static_cast<std::uint64_t>((now_ns() + kAhead_ns - interval_ns_ / 2) / interval_ns_);
+    return static_cast<std::uint64_t>((now_ns() + ahead_ns_ - interval_ns_ / 2) / interval_ns_);
   };
   const std::uint64_t first = due();
   std::vector<pollfd> looks;
@@ -148,11 +158,11 @@ void VividPlayer::feed() {
     (void)::poll(looks.data(), looks.size(), 100);
     for (std::size_t k = 0; k < outputs_.size(); ++k) {
       Output& out = outputs_[k];
-      v4l2_buffer b = description(0);
+      v4l2_buffer b = description(0, image_bytes_);
       while (v4l2::control(out.fd.get(), VIDIOC_DQBUF, &b) == 0) {
         out.last = due() - first;
         draw_(k, out.last, out.buffers[b.index]);
-        b = description(b.index);
+        b = description(b.index, image_bytes_);
         if (v4l2::control(out.fd.get(), VIDIOC_QBUF, &b) != 0) return;
       }
     }

@@ -90,6 +90,16 @@ StartingCalibration blank(const StartingCalibration& given) {
   return scratch;
 }
 
+StartingCalibration with_focal_length(const StartingCalibration& given, double factor) {
+  StartingCalibration other = given;
+  for (RigCalibration* rig : {&other.file.rig, &other.nominal})
+    for (Intrinsics& lens : rig->intrinsics) {
+      lens.fx *= factor;
+      lens.fy *= factor;
+    }
+  return other;
+}
+
 DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& sequence,
                             const app::Configuration& c, const StartingCalibration& begin,
                             std::size_t knock_at) {
@@ -115,6 +125,7 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
     }
     for (const CalibrationDecision& decision : e.calibrations()) {
       if (knocked && row.told_at >= 0 && decision.accepted && row.mended_at < 0) row.mended_at = at;
+      if (decision.focal.measured_px > 0) row.focal = decision.focal;
       if (decision.held_out_after_px > 0) row.held_out_px = decision.held_out_after_px;
     }
     if (row.verified_at < 0 && s.status == PoseStatus::ok) ++row.ok_before_verified;

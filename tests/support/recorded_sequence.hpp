@@ -32,6 +32,10 @@ inline constexpr std::array kRecordedSequences = {"kitti06_51", "kitti01_51", "k
 [[nodiscard]] app::StereoSequence with_right_mirrored(const RecordedSequence& drive,
                                                       const std::filesystem::path& folder);
 
+/// As given, with all focal lengths `factor` of what they were.
+[[nodiscard]] app::StartingCalibration with_focal_length(const app::StartingCalibration& given,
+                                                         double factor);
+
 /// Of the drive's calibration only lenses and length are read.
 [[nodiscard]] app::StartingCalibration blank(const app::StartingCalibration& given);
 
@@ -46,6 +50,7 @@ struct DriveOutcome {
   double ate_m = 0, ate_scaled_m = 0, scale = 1;  // ate_scaled_m: after one scale
   double segments_percent = -1;                   // −1: too short for segments of 10 to 50 m
   double held_out_px = 0;                         // of the last decision that had frames held out
+  FocalMeasurement focal;                         // the newest
   std::optional<RigCalibration> rig;              // in use at the end
 };
 

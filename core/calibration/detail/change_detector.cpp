@@ -59,9 +59,7 @@ void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance
       continue;
     detector_[window_count_++] = n;
   }
-  count_ = closed_ = 0;
-  open_ = Entry{};
-  total_ = TwoEvidences{};
+  history_.clear();
   lambda_stereo_ = lambda_motion_ = now_fast_ = now_slow_ = life_slow_ = 0;
   residuals_ = 0;
   over_ = 0;
@@ -82,11 +80,11 @@ void ChangeDetector::renew_floor() noexcept {
 /// The block just closed against those before it.
 void ChangeDetector::measure_scatter() noexcept {
   // What may be a change of the rig is no scatter.
-  if (closed_ == 0 || newest_statistic_ > kRelease * options_.threshold) return;
+  if (history_.closed() == 0 || newest_statistic_ > kRelease * options_.threshold) return;
   Evidence past;
-  for (std::size_t i = 0; i < std::min<std::size_t>({closed_, kScatterBlocks, kBlocks}); ++i)
-    past.add(block(i).evidence.stereo);
-  scatter_.add(open_.evidence.stereo, past, lambda_stereo_);
+  for (std::size_t i = 0; i < std::min(history_.blocks(), kScatterBlocks); ++i)
+    past.add(history_.block(i).evidence.stereo);
+  scatter_.add(history_.open().evidence.stereo, past, lambda_stereo_);
   renew_floor();
 }
 
@@ -95,11 +93,11 @@ void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
     const double most = kSpreadOutlier * *mean;
     if (value > -most) *mean += rate * (std::min(value, most) - *mean);  // also refuses NaN
   };
-  if (count_ == 0) {
+  if (history_.frames() == 0) {
     now_fast_ = now_slow_ = e.spread_now;
     life_slow_ = kFirstLife * e.spread_now;
   } else {
-    const double n = static_cast<double>(count_);
+    const double n = static_cast<double>(history_.frames());
     follow(&now_fast_, e.spread_now, kForgetFast);
     follow(&now_slow_, e.spread_now, std::max(kForgetAcross, 1.0 / (n + 1)));
     follow(&life_slow_, e.spread_life, std::max(kForgetAcross, 1.0 / (n + kGuessFrames)));
@@ -120,21 +118,9 @@ void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
 
 void ChangeDetector::push(const FrameEvidence& e) noexcept {
   follow_spread(e);
-  Entry& entry = recent_[count_ % kRecent];
-  entry.frame = e.frame;
-  entry.before = e.before;
-  entry.evidence = e.evidence;
-  if (count_ % kBlock == 0) open_ = Entry{e.frame, 0, {}};
-  open_.evidence.add(e.evidence);
-  ++count_;
-  if (count_ % kBlock == 0) {
-    measure_scatter();
-    if (closed_ >= kBlocks) total_.add(blocks_[closed_ % kBlocks].evidence, -1.0);
-    total_.add(open_.evidence);
-    blocks_[closed_ % kBlocks] = open_;
-    ++closed_;
-    open_ = Entry{};
-  }
+  if (!history_.push({e.frame, e.before, e.evidence})) return;
+  measure_scatter();
+  history_.close_block();
 }
 
 Evidence ChangeDetector::effective(const TwoEvidences& sum) const noexcept {
@@ -158,8 +144,7 @@ double ChangeDetector::statistic(const Evidence& e, const Vec5& mean,
 
 void ChangeDetector::learn(const TwoEvidences& window, Vec5* mean,
                            Mat5* covariance) const noexcept {
-  TwoEvidences past = total_;
-  past.add(open_.evidence);
+  TwoEvidences past = history_.total();
   past.add(window, -1.0);
   // Without the floor: window and past share most of the slow error, and the window's own floor
   // stands for what they do not share.
@@ -193,19 +178,12 @@ void ChangeDetector::single_estimate(const Evidence& stereo, double spread, Vec5
   estimate(e, theta, covariance);
 }
 
-void ChangeDetector::sum_of(std::size_t frames, TwoEvidences* sum) const noexcept {
-  *sum = open_.evidence;
-  const std::size_t open = count_ % kBlock;
-  const std::size_t blocks = std::min<std::size_t>(
-      {(frames - std::min(frames, open) + kBlock - 1) / kBlock, closed_, kBlocks});
-  for (std::size_t i = 0; i < blocks; ++i) sum->add(block(i).evidence);
-}
-
 Decision ChangeDetector::decide() noexcept {
   Decision d;
   d.lag_sigma = d.yaw_sigma = std::numeric_limits<double>::infinity();
-  if (count_ == 0) return d;
-  d.onset = recent(0).frame;
+  const std::size_t count = history_.frames();
+  if (count == 0) return d;
+  d.onset = history_.recent(0).frame;
   bool lagging = false;
   Evidence longest;
   std::size_t window = 0;  // of the largest statistic
@@ -215,16 +193,16 @@ Decision ChangeDetector::decide() noexcept {
   };
   TwoEvidences sum;
   std::size_t summed = 0;
-  for (std::size_t w = 0; w < window_count_ && detector_[w] <= count_; ++w) {
-    if (detector_[w] <= kRecent) {
-      for (; summed < detector_[w]; ++summed) sum.add(recent(summed).evidence);
+  for (std::size_t w = 0; w < window_count_ && detector_[w] <= count; ++w) {
+    if (detector_[w] <= EvidenceHistory::kRecent) {
+      for (; summed < detector_[w]; ++summed) sum.add(history_.recent(summed).evidence);
     } else {
-      sum_of(detector_[w], &sum);
+      history_.sum_of(detector_[w], &sum);
     }
     longest = effective(sum);
     double most = statistic(longest, Vec5::Zero(), covariance_);
     if (detector_[w] >= kLearnWindow && detector_[w] <= kLearnLongest &&
-        count_ >= 2 * detector_[w]) {
+        count >= 2 * detector_[w]) {
       Vec5 learnt;
       Mat5 covariance;
       learn(sum, &learnt, &covariance);
@@ -289,15 +267,16 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
     keep(&found->ramp_stereo, solved(ramp_stereo).fixed_gain(), ramp_stereo);
   };
   // Single frames up to a block's edge, then blocks.
-  const std::size_t open = count_ % kBlock;
-  const std::size_t whole = std::min<std::size_t>((kRecent - open) / kBlock, closed_);
+  constexpr std::size_t kBlock = EvidenceHistory::kBlock;
+  const std::size_t open = history_.open_frames();
+  const std::size_t whole = std::min((EvidenceHistory::kRecent - open) / kBlock, history_.closed());
   const std::size_t singles = open + whole * kBlock;
   for (std::size_t age = 0; age < singles; ++age)
-    take(recent(age), static_cast<double>(age), static_cast<int>(age) + 1, true);
-  for (std::size_t b = whole; b < std::min<std::size_t>(closed_, kBlocks); ++b) {
+    take(history_.recent(age), static_cast<double>(age), static_cast<int>(age) + 1, true);
+  for (std::size_t b = whole; b < history_.blocks(); ++b) {
     const std::size_t oldest = open + (b + 1) * kBlock - 1;
-    take(block(b), static_cast<double>(oldest) - 0.5 * (kBlock - 1), static_cast<int>(oldest) + 1,
-         b < kFineBlocks || b % kCoarse == 0);
+    take(history_.block(b), static_cast<double>(oldest) - 0.5 * (kBlock - 1),
+         static_cast<int>(oldest) + 1, b < kFineBlocks || b % kCoarse == 0);
   }
 }
 
@@ -334,10 +313,10 @@ bool ChangeDetector::lag_is_rival(const Search& found) const noexcept {
 TwoEvidences ChangeDetector::since(const Onset& onset) const noexcept {
   // A look from before the onset to after it compares two rigs: it alarms, but it measures neither.
   TwoEvidences sum = onset.raw;
-  for (std::size_t age = 0;
-       age < std::min<std::size_t>({static_cast<std::size_t>(onset.frames), kRecent, count_});
-       ++age) {
-    const Entry& e = recent(age);
+  const std::size_t frames = std::min<std::size_t>(
+      {static_cast<std::size_t>(onset.frames), EvidenceHistory::kRecent, history_.frames()});
+  for (std::size_t age = 0; age < frames; ++age) {
+    const Entry& e = history_.recent(age);
     if (e.evidence.motion.n > 0 && e.before < onset.frame) sum.motion.add(e.evidence.motion, -1.0);
   }
   return sum;
@@ -347,10 +326,10 @@ void ChangeDetector::attribute(std::size_t window, Decision* d) noexcept {
   // What the rig was before, where that is known: a reference that is a little off is no onset.
   Vec5 mean = Vec5::Zero();
   const std::size_t recent_frames = std::clamp(window, kLearnWindow, kLearnLongest);
-  if (count_ >= 2 * recent_frames) {
+  if (history_.frames() >= 2 * recent_frames) {
     TwoEvidences sum;
     Mat5 covariance;
-    sum_of(recent_frames, &sum);
+    history_.sum_of(recent_frames, &sum);
     learn(sum, &mean, &covariance);
   }
   Search found;

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdint>
 
+#include "core/calibration/detail/evidence_history.hpp"
 #include "core/calibration/detail/monitor_evidence.hpp"
 #include "core/calibration/detail/monitor_scatter.hpp"
 #include "core/calibration/monitor.hpp"
@@ -52,17 +53,10 @@ class ChangeDetector {
 
   [[nodiscard]] double stereo_inflation() const noexcept { return lambda_stereo_; }
   [[nodiscard]] double motion_inflation() const noexcept { return lambda_motion_; }
-  [[nodiscard]] std::uint64_t frames() const noexcept { return count_; }
+  [[nodiscard]] std::uint64_t frames() const noexcept { return history_.frames(); }
 
  private:
-  static constexpr std::size_t kRecent = 64;  // single frames: an onset among them is exact
-  static constexpr std::size_t kBlock = 15;   // frames that older ones are summed by
-  static constexpr std::size_t kBlocks =
-      240;  // two minutes at 30 Hz: how far back a drift is traced
-  struct Entry {
-    std::uint64_t frame = 0, before = 0;
-    TwoEvidences evidence;
-  };
+  using Entry = EvidenceHistory::Entry;
   struct Onset {
     double gain = 0;  // twice the log likelihood ratio against "nothing has changed"
     std::uint64_t frame = 0;
@@ -83,13 +77,6 @@ class ChangeDetector {
                                         const Mat5& covariance) noexcept;
   void learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) const noexcept;
   void estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept;
-  void sum_of(std::size_t frames, TwoEvidences* sum) const noexcept;
-  [[nodiscard]] const Entry& recent(std::size_t age) const noexcept {
-    return recent_[(count_ - 1 - age) % kRecent];
-  }
-  [[nodiscard]] const Entry& block(std::size_t age) const noexcept {
-    return blocks_[(closed_ - 1 - age) % kBlocks];
-  }
   void search(const Vec5& mean, Search* found) const noexcept;
   [[nodiscard]] bool find_lag(const Search& found, Decision* d) const noexcept;
   [[nodiscard]] bool lag_is_rival(const Search& found) const noexcept;
@@ -103,12 +90,7 @@ class ChangeDetector {
   BlockScatter scatter_{};
   std::array<std::size_t, 6> detector_{};
   std::size_t window_count_ = 0;
-  // Frames, full blocks; where indices have 32 bits, 30 Hz for four and a half years.
-  std::size_t count_ = 0, closed_ = 0;
-  std::array<Entry, kRecent> recent_{};
-  std::array<Entry, kBlocks> blocks_{};
-  Entry open_{};          // the block being filled
-  TwoEvidences total_{};  // of the blocks kept
+  EvidenceHistory history_;
   double lambda_stereo_ = 0, lambda_motion_ = 0;
   double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;  // running means of the spreads
   std::uint64_t residuals_ = 0;

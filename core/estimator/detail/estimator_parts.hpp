@@ -60,13 +60,14 @@ struct Estimator::Parts {
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
-  bool unconfirmed;              // the calibration in use is the last drive's
-  bool undecided = false;        // something is wrong with the rig, and not yet told what
-  bool verified = false;         // the calibration in use, as far as has been told
-  double confirmed_percent = 0;  // depth error of the calibration that was confirmed
-  bool relinked = false;         // the frame before took up the calibration that was adopted
-  bool superseded = false;       // poses still are of a calibration that was contradicted
-  int out_of_step = 0;           // frames for which that is still believed
+  bool unconfirmed;                 // the calibration in use is the last drive's
+  bool undecided = false;           // something is wrong with the rig, and not yet told what
+  bool verified = false;            // the calibration in use, as far as has been told
+  double confirmed_percent = 0;     // depth error of the calibration that was confirmed
+  bool relinked = false;            // the frame before took up the calibration that was adopted
+  bool focal_contradicted = false;  // and noted
+  bool superseded = false;          // poses still are of a calibration that was contradicted
+  int out_of_step = 0;              // frames for which that is still believed
   int without_pose = 0;
   bool in_gap = false;       // and the last event has said so
   int unmatched_frames = 0;  // in a row

@@ -120,7 +120,7 @@ class Scheduler final : public PulseListener {
   [[nodiscard]] HostStamp jittered(HostStamp least, std::uint64_t device,
                                    std::uint64_t number) const noexcept;
   [[nodiscard]] HostStamp host_of(std::uint64_t pulse) const noexcept {
-    return start_ + plan_.at(pulse).time;
+    return start_ + plan_.at(static_cast<std::size_t>(pulse)).time;
   }
   [[nodiscard]] bool stopping() const noexcept { return stop_.load(std::memory_order_acquire); }
 

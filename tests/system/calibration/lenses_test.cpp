@@ -56,6 +56,7 @@ TEST_P(RecordedLenses, aDriveCalibratedFromItselfIsRightInScaleAndTellsNoKnock) 
   EXPECT_NEAR(o.scale, 1, reach.scale);
   EXPECT_EQ(o.knocks, 0);
   EXPECT_EQ(o.contradicted_at, -1);
+  EXPECT_FALSE(o.focal.contradicted);
   EXPECT_EQ(o.lost, 0);
   EXPECT_GE(o.verified_at, 0);
   EXPECT_LE(o.verified_at, 60);
@@ -98,6 +99,20 @@ TEST(RecordedClaims, aCameraTurnedFromTheStartIsNoKnock) {
     EXPECT_GE(o.contradicted_at, 0) << degrees.transpose();
     EXPECT_EQ(o.ok_before_verified, 0) << degrees.transpose();
     EXPECT_EQ(o.knocks, 0) << degrees.transpose();
+  }
+}
+
+TEST(RecordedClaims, aFocalLengthThatIsAFifthOffIsNeverOk) {
+  const auto d = open_recorded("kitti06_51");
+  if (!d) GTEST_SKIP() << missing("kitti06_51");
+  const StartingCalibration given = app::replayed_calibration(configuration(), d->sequence, false);
+  for (const double factor : {0.8, 1.25}) {
+    const StartingCalibration wrong = with_focal_length(given, factor);
+    for (const StartingCalibration& begin : {wrong, blank(wrong)}) {
+      const DriveOutcome o = drive_recorded(*d, d->sequence, configuration(), begin);
+      EXPECT_EQ(o.ok, 0) << factor;
+      EXPECT_TRUE(o.focal.contradicted) << factor;
+    }
   }
 }
 

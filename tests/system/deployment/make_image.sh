@@ -73,7 +73,7 @@ done <"$work/order" >"$work/initial/modules/order"
 
 say "writing the disk"
 install -m 755 "$here/first_boot.sh" "$work/root/first_boot"
-mke2fs -q -t ext4 -E root_owner=0:0 -d "$work/root" "$work/image/disk" 3G
+mke2fs -q -t ext4 -E root_owner=0:0 -d "$work/root" "$work/image/disk" 3G >&2 # it names a new file, quiet or not
 rm -rf "$work/root"
 
 say "first boot: packages are installed in the emulated machine"

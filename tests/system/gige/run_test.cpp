@@ -154,15 +154,28 @@ TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
 TEST(GigeRun, whatCannotBeDrivenIsRefusedInASentence) {
   const Wires wires(nullptr);
   const TemporaryFolder folder;
-  const auto refused = [&](const std::string& more, const std::string& word) {
+  const auto ends = [&](int code, const std::string& more, const std::string& word) {
     const Outcome o = run_vergence("run '" + kExample + "' --duration 2 --out '" +
                                    (folder / "s").string() + "'" + wires.settings() + more);
-    EXPECT_EQ(o.code, 2) << more << ": " << o.err;
+    EXPECT_EQ(o.code, code) << more << ": " << o.err;
     EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
     EXPECT_FALSE(std::filesystem::exists(folder / "s")) << more;
   };
-  refused(" --set cameras.1.serial=NOT-HERE",
+  const auto refused = [&](const std::string& more, const std::string& word) {
+    ends(2, more, word);
+  };
+  // What is asked for is in order, and not there.
+  const auto missing = [&](const std::string& more, const std::string& word) {
+    ends(3, more, word);
+  };
+  missing(" --set cameras.1.serial=NOT-HERE",
           "cameras.1: the gige camera \"NOT-HERE\" was not found");
+  missing(" --set ins.driver=xsens --set ins.port=/dev/ttyNotThere --set ins.rate=100",
+          "ins: the xsens INS on /dev/ttyNotThere cannot be used");
+  missing(
+      " --set trigger.driver=board --set sync.mode=board --set trigger.port=/dev/ttyNotThere "
+      "--set cameras.0.trigger=hardware --set cameras.1.trigger=hardware",
+      "trigger: the board on /dev/ttyNotThere cannot be used");
   refused(" --set cameras.0.size=[1600,1200] --set cameras.1.size=[1600,1200]",
           "Width 1600 px is not possible: the camera offers 16 to 640 px");
   refused(" --set cameras.0.options.trigger_line=Line9",
@@ -178,7 +191,7 @@ TEST(GigeRun, whatCannotBeDrivenIsRefusedInASentence) {
       "--set cameras.0.options.link_mbps=1000",
       "trigger.rate");
   wires.cameras[1]->take_control(true);
-  refused("", "is in use by another program");
+  missing("", "is in use by another program");
 }
 
 }  // namespace

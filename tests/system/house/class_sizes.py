@@ -22,16 +22,7 @@ MOST_METHODS = 30
 
 # Those that are over it since before the rule: (members, methods), which may only become fewer; a row goes when its class is split.
 OVER = {
-    ("app/publish/live_page.hpp", "LivePage"): (26, 6),
-    ("app/publish/live_state.hpp", "LiveState"): (21, 9),
-    ("app/recorder/recorder.hpp", "Recorder"): (26, 20),
     ("app/recording/recording.hpp", "Recording"): (37, 23),
-    ("app/session/ins_comparison.hpp", "InsComparison"): (23, 13),
-    ("app/session/session_runner.cpp", "SessionRunner"): (30, 16),
-    ("core/calibration/detail/change_detector.hpp", "ChangeDetector"): (22, 24),
-    ("core/comparison/comparison.hpp", "Comparison"): (32, 17),
-    ("core/estimator/online_calibrator.hpp", "OnlineCalibrator"): (48, 48),
-    ("core/odometry/odometry.hpp", "Odometry"): (27, 31),
     ("drivers/acquisition/acquisition.hpp", "Acquisition"): (29, 23),
     ("drivers/gige/detail/gige_camera.hpp", "GigeCamera"): (37, 18),
     ("drivers/iidc/firewire_bus.hpp", "FirewireBus"): (23, 19),

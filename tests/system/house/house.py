@@ -5,14 +5,12 @@
   cycles    no two folders include from one another, directly or round about
   words     no file in the tree names a place of one machine or a habit the project does not have
   format    every C and C++ file is as clang-format writes it
-  tidy      clang-tidy finds nothing in the files given
   self-test the checks above find what they must, and nothing else
 
 Exit: 0 clean, 1 findings (one line each, file:line first), 77 cannot be checked here (the line says why).
 """
 import argparse
 import concurrent.futures
-import json
 import os
 import re
 import shutil
@@ -232,17 +230,6 @@ def format_files(root):
     return list(first.values()) or said
 
 
-def tidy(root, build, prefixes):
-    names = [n for n in sources(root) if n.startswith(tuple(prefixes)) and n.endswith((".cpp", ".c"))]
-    with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as file:
-        compiled = {os.path.relpath(os.path.realpath(os.path.join(c["directory"], c["file"])), os.path.realpath(root)) for c in json.load(file)}
-    # What only another compiler builds (the board's port) has no command to read it by.
-    names = [n for n in names if n in compiled or not n.startswith(WORLDS_OF_THEIR_OWN)]
-    if not names:
-        return ["no file begins with any of: %s" % " ".join(prefixes)]
-    return run_each(lambda name: ["clang-tidy", "--quiet", "-p", build, os.path.join(root, name)], names, 40)
-
-
 def self_test():
     cases = (  # file, line, found?
         ("core/a/a.cpp", '#include "core/b/b.hpp"', False),
@@ -339,17 +326,14 @@ def self_test():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("check", choices=("arrows", "cycles", "words", "format", "tidy", "self-test"))
+    parser.add_argument("check", choices=("arrows", "cycles", "words", "format", "self-test"))
     parser.add_argument("--root", default=".")
-    parser.add_argument("--build", default="build", help="tidy: folder of compile_commands.json")
-    parser.add_argument("prefixes", nargs="*", help="tidy: folders to look at")
     given = parser.parse_args()
-    needs = {"format": "clang-format", "tidy": "clang-tidy"}.get(given.check)
-    if needs is not None and shutil.which(needs) is None:
-        print("skipped: %s is not installed" % needs)
+    if given.check == "format" and shutil.which("clang-format") is None:
+        print("skipped: clang-format is not installed")
         return SKIPPED
     findings = {"arrows": lambda: arrows(given.root), "cycles": lambda: cycles(given.root), "words": lambda: words(given.root), "format": lambda: format_files(given.root),
-                "tidy": lambda: tidy(given.root, given.build, given.prefixes), "self-test": self_test}[given.check]()
+                "self-test": self_test}[given.check]()
     print("\n".join(findings) if findings else "%s: nothing found" % given.check)
     return 1 if findings else 0
 

@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -235,6 +238,55 @@ TEST(Recorded, aSessionWithoutImagesIsRefused) {
   const Outcome r = replay(folder / "s", folder / "again");
   EXPECT_EQ(r.code, 2);
   EXPECT_NE(r.err.find("without images"), std::string::npos) << r.err;
+}
+
+// What came of the devices before anything was made of it, from simulated lines.
+TEST(RecordedDevices, linesPulsesAndFramesAreRecordedAndTheDriveIsTheSame) {
+  const TemporaryFolder folder;
+  const std::string chain = "run '" + std::string(VERGENCE_SOURCE_DIR) +
+                            "/app/config/mock_chain.yaml' --fast --duration 4" + kSmall;
+  const Outcome plain = run_vergence(chain + " --out '" + (folder / "plain").string() + "'");
+  ASSERT_LE(plain.code, 1) << plain.err;
+  const Outcome o =
+      run_vergence(chain + " --record pulses,raw --out '" + (folder / "recorded").string() + "'");
+  ASSERT_LE(o.code, 1) << o.err;
+  expect_same_poses(folder / "plain", folder / "recorded");
+  const auto summary = summary_of(folder / "recorded");
+  EXPECT_EQ(summary["devices"]["recording_dropped"], 0);
+  EXPECT_EQ(summary["allocations_after_seal"], 0);
+
+  std::map<std::string, int> count;
+  std::string ins, board;
+  std::vector<std::uint64_t> numbers;
+  for (const auto& m : test::read_mcap(folder / "recorded" / "drive.mcap").messages) {
+    ++count[m.topic];
+    // std_msgs/UInt8MultiArray: encapsulation, no dimensions, offset 0, then the bytes by number.
+    if (m.topic == "/ins/raw") ins.append(m.content.substr(16));
+    if (m.topic == "/trigger_board/raw") board.append(m.content.substr(16));
+    if (m.topic == "/vergence/pulse") {
+      // Behind the encapsulation: a stamp of 8 bytes, the text "board" (4 + 6), and then 8-aligned.
+      std::uint64_t number = 0;
+      ASSERT_GE(m.content.size(), 36U);
+      std::memcpy(&number, m.content.data() + 4 + 24, sizeof number);
+      numbers.push_back(number);
+    }
+  }
+  const int frames = summary["frames"]["read"];
+  EXPECT_GE(count["/left/device_frame"], frames);
+  EXPECT_GE(count["/right/device_frame"], frames);
+  EXPECT_EQ(count["/left/image_raw"], 0);
+  EXPECT_EQ(count["/vergence/odometry"], 0);
+  ASSERT_GE(numbers.size(), static_cast<std::size_t>(frames));
+  for (std::size_t i = 1; i < numbers.size(); ++i) EXPECT_EQ(numbers[i], numbers[i - 1] + 1);
+  // XBus and trigger protocol as the devices sent them: the preamble of each is there many times.
+  const auto times = [](const std::string& bytes, const std::string& what) {
+    int n = 0;
+    for (std::size_t at = bytes.find(what); at != std::string::npos; at = bytes.find(what, at + 1))
+      ++n;
+    return n;
+  };
+  EXPECT_GT(times(ins, "\xfa\xff"), 4 * 50) << "readings of 4 s at 120 Hz";
+  EXPECT_GT(board.size(), 4U * 20U * 10U) << "reports of 20 pulses a second";
 }
 
 }  // namespace

@@ -217,12 +217,12 @@ TEST(SnapGige, aCameraThatSendsNothingEndsWithThreeAndItsName) {
       << "the wait is bounded";
 }
 
-TEST(SnapGige, aCameraThatIsNotThereEndsWithTwoAndItsKey) {
+TEST(SnapGige, aCameraThatIsNotThereEndsWithThreeAndItsKey) {
   const Wires wires;
   const TemporaryFolder folder;
   const Outcome o =
       snap(folder, "gige.yaml", wires.settings() + " --set cameras.1.serial=127.77.77.77");
-  EXPECT_EQ(o.code, 2);
+  EXPECT_EQ(o.code, 3);
   EXPECT_TRUE(contains(o.err, "cameras.1")) << o.err;
 }
 

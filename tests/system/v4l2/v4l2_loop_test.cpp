@@ -18,7 +18,8 @@ namespace {
 
 using test::VividPlayer;
 
-constexpr int kWidth = VividPlayer::kWidth, kHeight = VividPlayer::kHeight;
+constexpr int kWidth = test::width_of(test::LoopSize::vga);
+constexpr int kHeight = test::height_of(test::LoopSize::vga);
 constexpr std::int64_t kInterval_ns = 100'000'000;  // of an image: about six frames of the camera
 
 /// The number at the start of every row, with the output's; a level that follows from it elsewhere.

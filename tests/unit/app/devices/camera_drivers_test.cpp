@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ CameraRequest request(const std::string& driver, const std::string& serial) {
   return {"cameras.0",
           driver,
           serial,
+          PictureHalf::whole,
           {320, 240, 30, Duration::milliseconds(2), 0, CameraTrigger::software}};
 }
 
@@ -25,6 +27,8 @@ std::string refusal(const std::vector<CameraRequest>& requests) {
   try {
     (void)open_cameras(requests, &remarks);
   } catch (const InputError& e) {
+    return e.what();
+  } catch (const DeviceError& e) {
     return e.what();
   }
   return "nothing was refused";
@@ -76,6 +80,54 @@ TEST(CameraDrivers, whatACameraRefusesIsSaidWithItsName) {
           "cameras.0 (gige TABLE-0): Width 640 px is not possible: the camera offers 16 to 320 px"),
       std::string::npos)
       << sentence;
+}
+
+CameraRequest half(const std::string& key, PictureHalf which, const std::string& serial) {
+  CameraRequest r = request("gige", serial);
+  r.key = key;
+  r.half = which;
+  r.configuration.width = 160;
+  return r;
+}
+
+TEST(CameraDrivers, aHalfWithoutItsOtherOneIsRefused) {
+  const std::string sentence = refusal(
+      {half("cameras.0", PictureHalf::left, "A"), half("cameras.1", PictureHalf::right, "B")});
+  EXPECT_NE(sentence.find("cameras.0.half is left, and no other entry is the right half"),
+            std::string::npos)
+      << sentence;
+}
+
+TEST(CameraDrivers, halvesThatAreAskedForDifferentlyAreRefused) {
+  CameraRequest right = half("cameras.1", PictureHalf::right, "A");
+  right.configuration.exposure = Duration::milliseconds(1);
+  const std::string sentence = refusal({half("cameras.0", PictureHalf::left, "A"), right});
+  EXPECT_NE(sentence.find("cameras.0 and cameras.1 are halves of one camera's picture and differ"),
+            std::string::npos)
+      << sentence;
+}
+
+TEST(CameraDrivers, twoHalvesAreOneCamera) {
+  const test::GigeCamera simulator(small(3));
+  std::vector<std::string> remarks;
+  const auto cameras = open_cameras({half("cameras.0", PictureHalf::right, small(3).address),
+                                     half("cameras.1", PictureHalf::left, small(3).address)},
+                                    &remarks);
+  ASSERT_EQ(cameras.size(), 2U);
+  EXPECT_NE(cameras[0].device->info().model.find("right half"), std::string::npos);
+  EXPECT_NE(cameras[1].device->info().model.find("left half"), std::string::npos);
+  for (const OpenedCamera& c : cameras) {
+    EXPECT_EQ(c.actual.width, 160);
+    ASSERT_EQ(c.device->start(nullptr), DeviceStatus::ok) << c.device->last_error();
+  }
+  ASSERT_EQ(cameras[1].device->trigger_once(), DeviceStatus::ok);
+  std::array<Frame, 2> frames{};
+  for (std::size_t k : {1U, 0U})
+    ASSERT_EQ(cameras[k].device->wait(Duration::seconds(2), &frames[k]), DeviceStatus::ok);
+  const ImageView right = cameras[0].device->view(frames[0].slot);
+  const ImageView left = cameras[1].device->view(frames[1].slot);
+  EXPECT_EQ(right.data, left.data + 160) << "columns of one picture";
+  for (std::size_t k : {0U, 1U}) cameras[k].device->release(frames[k].slot);
 }
 
 TEST(SoftwareTrigger, everyCameraExposesAtEveryPulse) {

@@ -40,7 +40,7 @@ TEST(DriveSync, everyExampleLoadsAndTheyShowEveryMode) {
     }
   }
   EXPECT_GE(files, 13);
-  EXPECT_EQ(modes.size(), 7U);
+  EXPECT_EQ(modes.size(), 8U);
 }
 
 constexpr const char* kTwoGige =
@@ -83,6 +83,7 @@ INSTANTIATE_TEST_SUITE_P(
             "both are one rate"},
         BadCase{"sync: {mode: bus}", "share its cycle timer"},
         BadCase{"sync: {mode: ptp}", "does not say ptp: on"},
+        BadCase{"sync: {mode: one_picture}", "cameras.0.half is whole"},
         BadCase{"sync: {mode: master_strobe}", "camera 0 triggers the others, so it is free"},
         BadCase{"sync: {mode: master_strobe}\ncameras: [{driver: gige, trigger: free}, {driver: "
                 "gige, trigger: free}]",
@@ -113,7 +114,7 @@ TEST(DriveSync, aCameraThatOnlyTheHostStampsHasTheNoiseOfThat) {
 }
 
 TEST(DriveSync, everyModeSaysWhatProvesItOrThatNothingDoes) {
-  for (int m = 0; m <= static_cast<int>(SyncMode::ptp); ++m) {
+  for (int m = 0; m <= static_cast<int>(SyncMode::one_picture); ++m) {
     const auto mode = static_cast<SyncMode>(m);
     const std::string sentence = proof_sentence(mode);
     EXPECT_EQ(sentence.find("nothing proves") == 0, !proves_pairing(mode)) << sentence;

@@ -17,6 +17,8 @@ std::string refusal(const InsRequest& request) {
     (void)open_ins(request, &remarks);
   } catch (const InputError& e) {
     return e.what();
+  } catch (const DeviceError& e) {
+    return e.what();
   }
   return "nothing was refused";
 }

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/recorder/line_file.hpp"
+#include "app/recorder/pose_line.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/math/so3.hpp"
 #include "core/memory/allocation_guard.hpp"

@@ -227,6 +227,24 @@ TEST(Verdict, aContradictedCalibrationIsTold) {
   EXPECT_TRUE(any_has(c.verdict().advice, "off by 6.1 %"));
 }
 
+TEST(Verdict, aFocalLengthThatTheDriveContradictsMakesItUseless) {
+  Case c;
+  auto& focal = c.session.summary["calibration"]["focal_length"];
+  focal = {{"given_px", 898.6}, {"measured_px", 711.2}, {"sigma_px", 12.0}};
+  focal["contradicted"] = false;
+  EXPECT_EQ(c.verdict().grade, Grade::good);
+  focal["contradicted"] = true;
+  Verdict v = c.verdict();
+  EXPECT_EQ(v.grade, Grade::bad);
+  EXPECT_FALSE(v.usable);
+  EXPECT_TRUE(
+      any_has(v.reasons, "899 px, is not that of these images: the drive measures 711 ± 12"));
+  EXPECT_TRUE(any_has(v.advice, "--focal"));
+  focal["sigma_px"] = 0.0;
+  v = c.verdict();
+  EXPECT_TRUE(any_has(v.reasons, "the drive measures 711 px or still farther from it"));
+}
+
 TEST(Verdict, neverACalibrationSaysHowToGetOne) {
   Case c;
   c.session.calibrations = {attempt(false, "from_scratch", 0, 0.9)};

@@ -150,7 +150,9 @@ TEST(Realtime, theKernelSchedulesAThreadAsAskedFor) {
   request.affinity = parse_cpu_list(std::to_string(first));
   RealtimeSystem system;
   RealtimeThreads threads(request, system);
-  const auto sentences = threads.apply(process_threads());
+  std::vector<ProcessThread> all;
+  process_threads(&all);
+  const auto sentences = threads.apply(all);
   sched_param parameter{};
   const int policy = ::sched_getscheduler(id);
   EXPECT_EQ(::sched_getparam(id, &parameter), 0);

@@ -82,6 +82,7 @@ TEST(Verifying, aTrueCalibrationIsDegradedUntilTheDriveConfirmsIt) {
   ASSERT_GE(confirmed, 36) << c.story;
   EXPECT_EQ(c.first(Kind::calibration_contradicted), -1) << c.story;
   EXPECT_EQ(c.first(Kind::rig_changed), -1) << c.story;
+  EXPECT_EQ(c.first(Kind::focal_length_contradicted), -1) << c.story;
   for (const PoseSample& s : c.samples) {
     if (static_cast<int>(s.frame) < confirmed) {
       EXPECT_EQ(s.status, PoseStatus::degraded) << s.frame;

@@ -1,0 +1,79 @@
+#include "app/recorder/session_totals.hpp"
+
+#include <cmath>
+
+namespace vergence::app {
+
+void WorkDropped::add(const FrameEffort& effort) noexcept {
+  if (effort.whole()) return;
+  ++frames;
+  const bool window = effort.window_keyframes > 0 && effort.window_steps > 0;
+  points += effort.points_percent < 100 ? 1 : 0;
+  keyframes += window && effort.window_keyframes != FrameEffort::kAll ? 1 : 0;
+  steps += window && effort.window_steps != FrameEffort::kAll ? 1 : 0;
+  windows += window ? 0 : 1;
+}
+
+TotalsBuilder::TotalsBuilder(std::size_t statuses) {
+  totals_.statuses.reserve(statuses);
+  totals_.attempts.reserve(kMostAttempts);
+}
+
+std::size_t TotalsBuilder::memory() const noexcept {
+  return totals_.statuses.capacity() * sizeof(PoseStatus) +
+         totals_.attempts.capacity() * sizeof(CalibrationAttempt);
+}
+
+void TotalsBuilder::add(const PoseRecord& p, bool in_trajectory) {
+  newest_ = p.stamp;
+  newest_frame_ = p.frame;
+  ++totals_.read;
+  match_confirmed();
+  ++(p.status == PoseStatus::ok         ? totals_.ok
+     : p.status == PoseStatus::degraded ? totals_.degraded
+                                        : totals_.lost);
+  totals_.estimate.add(static_cast<double>(p.estimate_ms));
+  if (p.state != State::stereo_odometry && p.state != State::lost)
+    totals_.calibrating.add(static_cast<double>(p.estimate_ms));
+  totals_.decode.add(static_cast<double>(p.decode_ms));
+  totals_.work_dropped.add(p.effort);
+  for (std::size_t i = 0; i < p.stage_ms.size(); ++i)
+    totals_.stages[i].add(static_cast<double>(p.stage_ms[i]));
+  if (totals_.statuses.size() < totals_.statuses.capacity())
+    totals_.statuses.push_back(in_trajectory ? p.status : PoseStatus::lost);
+  if (p.status == PoseStatus::lost) return;
+  const auto& t = p.world_left.t;
+  if (last_pose_)
+    totals_.path_m +=
+        std::hypot(t[0] - last_pose_->t[0], t[1] - last_pose_->t[1], t[2] - last_pose_->t[2]);
+  last_pose_ = p.world_left;
+}
+
+/// An event comes before the pose of its frame, or after the last one.
+void TotalsBuilder::match_confirmed() {
+  if (totals_.confirmed == newest_ && !totals_.confirmed_frame && totals_.read > 0)
+    totals_.confirmed_frame = newest_frame_;
+}
+
+void TotalsBuilder::add(const EventRecord& e) {
+  const std::string_view kind = e.kind;
+  if (kind == "calibration_confirmed" && !totals_.confirmed) {
+    totals_.confirmed = e.stamp;
+    match_confirmed();
+  } else if (kind == "calibration_contradicted" && !totals_.contradicted) {
+    const double* percent = std::get_if<double>(&e.fields[0].value);
+    totals_.contradicted = {e.stamp, percent != nullptr ? *percent : 0.0};
+  }
+}
+
+bool TotalsBuilder::add(const CalibrationRecord& c) {
+  if (c.focal.measured_px > 0) totals_.focal = c.focal;
+  if (c.learnt && !c.accepted) return false;  // the drive goes on: nothing was attempted
+  ++(c.accepted ? totals_.accepted : totals_.rejected);
+  if (totals_.attempts.size() == kMostAttempts) totals_.attempts.erase(totals_.attempts.begin());
+  totals_.attempts.push_back(
+      {c.stamp, c.cause, c.reason, c.accepted, c.latency_frames, c.rig.frames, c.solve_ms});
+  return c.accepted;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,115 @@
+#include "app/session/estimation_loop.hpp"
+
+#include <pthread.h>
+
+#include "app/session/drive_threads.hpp"
+#include "app/session/session_files.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "core/memory/thread_allocations.hpp"
+
+namespace vergence::app {
+namespace {
+
+/// What a frame may take: in a live drive the next one does not wait.
+Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime) noexcept {
+  if (facts.frame_interval <= Duration{}) return {};
+  return realtime.frame_budget_ms > 0 ? Duration::seconds(1e-3 * realtime.frame_budget_ms)
+                                      : facts.frame_interval;
+}
+
+}  // namespace
+
+EstimationLoop::EstimationLoop(FrameSource& source, const Configuration& configuration,
+                               const SessionOptions& options)
+    : source_(source),
+      facts_(source.facts()),
+      requests_(options.requests),
+      reference_(facts_.truth),
+      masks_(configuration, facts_.begin.file.rig),
+      options_(estimator_options(configuration, facts_.begin.trust, facts_.adoption, masks_.views(),
+                                 frame_budget(facts_, configuration.realtime))),
+      estimator_arena_(arena_size(Estimator::memory_needed(options_, facts_.begin.file.rig))),
+      comparison_arena_(arena_size(facts_.ins ? Comparison::bytes_needed(facts_.ins->options) : 0)),
+      runner_(make_runner(configuration.threads)),
+      estimator_(std::make_unique<Estimator>(options_, facts_.begin.file.rig, facts_.begin.nominal,
+                                             estimator_arena_, *runner_, watched_solver_)) {
+  if (facts_.ins)
+    comparison_ = std::make_unique<InsComparison>(facts_.ins->options, facts_.ins->kind,
+                                                  comparison_arena_, log_);
+}
+
+void EstimationLoop::open(const SessionOutput& output, DriveRecorder* recording) noexcept {
+  output_ = output;
+  recording_ = recording;
+  log_.open(&output_, facts_.first);
+  if (comparison_) comparison_->open(&output_);
+}
+
+void EstimationLoop::run() noexcept {
+  (void)pthread_setname_np(pthread_self(), "vergence-estim");
+  AllocationGuard::seal_thread();
+  for (SourceItem item; source_.next(&item);) {
+    items_.fetch_add(1, std::memory_order_relaxed);
+    if (const auto* frame = std::get_if<SourceFrame>(&item)) handle(*frame);
+    if (const auto* reading = std::get_if<InsRecord>(&item)) handle(*reading);
+    if (const auto* event = std::get_if<SourceEvent>(&item)) handle(*event);
+    if (comparison_) comparison_->drain();
+  }
+  ThreadAllocations::end();
+  estimator_->finish();
+  log_.note(*estimator_);
+  if (comparison_) comparison_->finish();
+  AllocationGuard::unseal_thread();
+}
+
+void EstimationLoop::handle(const SourceEvent& event) noexcept {
+  if (event.recalibrate) estimator_->request_recalibration();
+  if (event.skipped) log_.note_skipped();
+  if (event.listed) log_.tell(event.record, event.to_user);
+}
+
+void EstimationLoop::request_recalibration(Stamp stamp, const char* sentence) noexcept {
+  estimator_->request_recalibration();
+  log_.tell(stamp, "recalibration_requested", sentence, true);
+}
+
+/// What viewers of the session have asked for.
+void EstimationLoop::take_requests(Stamp stamp) noexcept {
+  if (requests_ == nullptr) return;
+  constexpr auto kOrder = std::memory_order_relaxed;
+  if (requests_->recalibrate.exchange(false, kOrder) && facts_.on_request)
+    request_recalibration(stamp, "a new calibration was asked for on the live page");
+  if (requests_->mark.exchange(false, kOrder))
+    log_.tell(stamp, "mark", "marked on the live page", true);
+  if (requests_->stop_recording.exchange(false, kOrder) && recording_) {
+    log_.tell(stamp, "recording_stopped",
+              "drive.mcap ends here, as asked for on the live page; the drive goes on", true);
+    recording_->stop();
+  }
+}
+
+void EstimationLoop::handle(const SourceFrame& frame) noexcept {
+  if (calibration_asked_.exchange(false, std::memory_order_relaxed))
+    request_recalibration(frame.rig.stamp, "a new calibration was asked for by SIGUSR1");
+  take_requests(frame.rig.stamp);
+  if (!delivering_) ThreadAllocations::begin();
+  delivering_ = true;
+  watched_solver_.begin_frame(frame.solver_idle);
+  output_.post(frame.rig);
+  const PoseSample sample = estimator_->process(frame.rig);
+  source_.done(sample);
+  output_.post(sample);
+  output_.post(estimator_->tracks());
+  log_.note(*estimator_);
+  log_.note(sample);
+  compare(sample, frame.decode_ms);
+}
+
+void EstimationLoop::compare(const PoseSample& sample, float decode_ms) noexcept {
+  if (comparison_)
+    comparison_->add(sample, decode_ms);
+  else
+    output_.post(PoseRecord::of(sample, decode_ms, reference_.at(sample.stamp)));
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,83 @@
+#pragma once
+#include <atomic>
+#include <memory>
+#include <vector>
+
+#include "app/datasets/reference_track.hpp"
+#include "app/devices/camera_masks.hpp"
+#include "app/runtime/background_thread.hpp"
+#include "app/session/drive_recorder.hpp"
+#include "app/session/event_log.hpp"
+#include "app/session/frame_source.hpp"
+#include "app/session/ins_comparison.hpp"
+#include "app/session/memory_figures.hpp"
+#include "app/session/session_output.hpp"
+#include "app/session/session_runner.hpp"
+#include "app/session/solver_watch.hpp"
+#include "core/estimator/estimator.hpp"
+
+namespace vergence::app {
+
+/// What the estimator's thread does: takes what the source delivers, poses it, compares it with
+/// the INS, and hands everything on to the session's output.
+///
+/// Threads  run(): the estimator's, sealed. ask_calibration(), items(): any. Everything else: the
+///          owner's, before run() or after its thread has joined, but for event_log()'s show().
+/// Memory   Arenas, at construction.
+class EstimationLoop {
+ public:
+  /// What is given outlives this.
+  EstimationLoop(FrameSource& source, const Configuration& configuration,
+                 const SessionOptions& options);
+
+  /// Before run(). `recording`: what viewers may stop; null: nothing is recorded.
+  void open(const SessionOutput& output, DriveRecorder* recording) noexcept;
+  /// Until the source has nothing more.
+  void run() noexcept;
+  /// From the next frame on a new calibration is sought.
+  void ask_calibration() noexcept { calibration_asked_.store(true, std::memory_order_relaxed); }
+  /// Items handled so far.
+  [[nodiscard]] std::uint64_t items() const noexcept {
+    return items_.load(std::memory_order_relaxed);
+  }
+
+  [[nodiscard]] EventLog& event_log() noexcept { return log_; }
+  [[nodiscard]] const EventLog& event_log() const noexcept { return log_; }
+  [[nodiscard]] SessionOutput& output() noexcept { return output_; }
+  [[nodiscard]] const Estimator& estimator() const noexcept { return *estimator_; }
+  [[nodiscard]] const EstimatorOptions& options() const noexcept { return options_; }
+  /// Null: there is no INS.
+  [[nodiscard]] const InsComparison* comparison() const noexcept { return comparison_.get(); }
+  [[nodiscard]] const SolverWatch& solver_watch() const noexcept { return watched_solver_; }
+  [[nodiscard]] const Arena& estimator_arena() const noexcept { return estimator_arena_; }
+  [[nodiscard]] const Arena& comparison_arena() const noexcept { return comparison_arena_; }
+
+ private:
+  void handle(const SourceFrame& frame) noexcept;
+  void handle(const InsRecord& reading) noexcept { comparison_->add(reading); }
+  void handle(const SourceEvent& event) noexcept;
+  void compare(const PoseSample& sample, float decode_ms) noexcept;
+  void request_recalibration(Stamp stamp, const char* sentence) noexcept;
+  void take_requests(Stamp stamp) noexcept;
+
+  FrameSource& source_;
+  const SourceFacts& facts_;
+  SessionRequests* const requests_;  // null: nobody can ask
+  const ReferenceTrack reference_;
+  const CameraMasks masks_;
+  const EstimatorOptions options_;
+  Arena estimator_arena_, comparison_arena_;
+  std::unique_ptr<PairRunner> runner_;
+  BackgroundThread solver_;
+  SolverWatch watched_solver_{solver_};
+  std::unique_ptr<Estimator> estimator_;
+  DriveRecorder* recording_ = nullptr;
+  SessionOutput output_;
+  EventLog log_;
+  std::unique_ptr<InsComparison> comparison_;
+  std::atomic<bool> calibration_asked_{false};
+  std::atomic<std::uint64_t> items_{0};
+  bool delivering_ = false;  // a frame has come
+};
+
+}  // namespace vergence::app

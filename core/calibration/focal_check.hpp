@@ -1,0 +1,47 @@
+#pragma once
+#include "core/calibration/rig_solver.hpp"
+#include "core/types/calibration_decision.hpp"
+
+namespace vergence::calibration {
+
+/// Whether the focal length given is that of the images.
+///
+/// A focal length that is off by a share makes all distances off by it, and neither epipolar lines
+/// nor a solve that believes it show that. A solve with every focal length free by kFocalDoubt
+/// (RigFreedom::focal_lengths) does: turns show it, and so does the flow of a straight drive
+/// against the known baseline.
+///
+/// `found`: such a solve. `given`: what the drive began with. Threads pure.
+[[nodiscard]] FocalMeasurement check_focal_length(const RigSolution& found,
+                                                  const RigCalibration& given) noexcept;
+
+/// The measurements of a drive: which solves make one, and what has come of them.
+///
+/// Threads  measure() on the solver's, the others on the estimator's while no solve runs.
+class FocalCheck {
+ public:
+  /// `enabled`: as the options say.
+  explicit FocalCheck(bool enabled) noexcept : enabled_(enabled) {}
+
+  /// Before a solve: whether it measures. A lens keeps its focal length: once it was measured well
+  /// and as it was given, it is not measured again.
+  void begin_solve() noexcept { measures_ = enabled_ && !known_; }
+  /// After `lenses`, a solve of the solver's log with the lenses free that `request` asked for;
+  /// begins with its result. Frames before the log's do not go in: what they say of the rig was
+  /// said with the focal length believed.
+  void measure(RigSolver& solver, RigSolveRequest request, const RigSolution& lenses) noexcept;
+  /// The solve is over, and its frames count. `full`: no solve has more of them.
+  void take(bool full) noexcept;
+
+  [[nodiscard]] const FocalMeasurement& newest() const noexcept { return newest_; }
+  /// Of the solve under way, or the last one.
+  [[nodiscard]] double solve_ms() const noexcept { return solve_ms_; }
+
+ private:
+  bool enabled_, measures_ = false;
+  bool known_ = false;  // well, and as it was given
+  FocalMeasurement newest_{}, solved_{};
+  double solve_ms_ = 0;
+};
+
+}  // namespace vergence::calibration

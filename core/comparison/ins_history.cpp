@@ -1,0 +1,140 @@
+#include "core/comparison/ins_history.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/comparison/comparison.hpp"
+
+namespace vergence {
+namespace {
+
+constexpr double kFastest = 60.0;  // m/s: no vehicle that carries this rig
+// Samples in a row: a second of an INS whose clock has gone back and stays there.
+constexpr int kBackwardsForGood = 120;
+constexpr double kQuaternionLength = 0.1;
+constexpr double kLevelSigma = 0.05;  // rad: slopes and suspension, where nobody measures tilt
+
+bool positive(double v) noexcept { return std::isfinite(v) && v > 0; }
+
+bool attitude_of(const InsSample& s, Mat3* R) noexcept {
+  const Eigen::Quaterniond q(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]);
+  if (!s.attitude_valid || !(std::abs(q.norm() - 1.0) < kQuaternionLength)) return false;
+  *R = q.normalized().toRotationMatrix();
+  return true;
+}
+
+/// A vehicle on a road, at this yaw: level but for its slope, which kLevelSigma covers.
+Mat3 level_at(double yaw) noexcept { return exp_so3({0, 0, yaw}); }
+
+double or_default(double sigma, double fallback) noexcept {
+  return positive(sigma) ? sigma : fallback;
+}
+
+}  // namespace
+
+InsHistory::InsHistory(const ComparisonOptions& options, ComparisonCounters& counters, Arena& arena)
+    : options_(options),
+      counters_(counters),
+      readings_(arena.make<Reading>(options.ins_capacity, "comparison: INS samples")) {}
+
+std::size_t InsHistory::bytes_needed(const ComparisonOptions& options) noexcept {
+  return options.ins_capacity * sizeof(Reading) + kCacheLine;
+}
+
+bool InsHistory::accept_stamp(Stamp stamp) noexcept {
+  if (end_ > begin_ && stamp <= reading(end_ - 1).stamp) {
+    ++counters_.ins_refused;
+    if (++backwards_ < kBackwardsForGood) return false;
+    ++counters_.ins_restarts;
+    begin_ = end_;
+  }
+  backwards_ = 0;
+  return true;
+}
+
+void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {
+  const bool fixed = sample.fix == FixStatus::fix_2d || sample.fix == FixStatus::fix_3d;
+  Mat3 R_local_ins;
+  if (fixed && !sample.position.plausible()) ++counters_.ins_refused;
+  const bool attitude = attitude_of(sample, &R_local_ins);
+  if (!attitude) {
+    ++counters_.ins_without_attitude;
+    if (sample.heading_source != HeadingSource::none && std::isfinite(sample.yaw_enu))
+      yaw_ = sample.yaw_enu;
+    R_local_ins = level_at(yaw_.value_or(0));  // at a standstill the last heading holds
+  }
+  if (!fixed || !sample.position.plausible() || !(attitude || yaw_)) return;
+  if (!has_origin_) {
+    plane_ = LocalTangentPlane(sample.position);
+    has_origin_ = true;
+  }
+  r->valid = true;
+  r->p_enu_ins = plane_.to_enu(sample.position);
+  r->R_enu_ins = plane_.rotation_from(sample.position) * R_local_ins;
+  r->sigmas.position = or_default(sample.position_sigma, options_.position_sigma_m);
+  r->sigmas.height = or_default(sample.height_sigma, options_.height_sigma_m);
+  r->sigmas.tilt = attitude ? or_default(sample.tilt_sigma, options_.tilt_sigma_rad) : kLevelSigma;
+}
+
+void InsHistory::add(const InsSample& sample) noexcept {
+  ++counters_.ins_samples;
+  if (!accept_stamp(sample.stamp)) return;
+  Reading r;
+  r.stamp = sample.stamp;
+  r.stamp_error = sample.stamp_error;
+  locate(sample, &r);
+  if (r.valid && end_ > begin_ && reading(end_ - 1).valid) {
+    const Reading& before = reading(end_ - 1);
+    const double farthest = options_.jump_m + kFastest * (r.stamp - before.stamp).to_seconds();
+    r.jumped = (r.p_enu_ins - before.p_enu_ins).norm() > farthest;
+    if (r.jumped) {
+      ++counters_.jumps;
+      leapt_at_ = r.stamp;
+    }
+  }
+  if (end_ - begin_ == readings_.size()) ++begin_;
+  readings_[static_cast<std::size_t>(end_) & (readings_.size() - 1)] = r;
+  ++end_;
+}
+
+bool InsHistory::reaches(Stamp stamp) const noexcept {
+  return end_ > begin_ && reading(end_ - 1).stamp >= stamp;
+}
+
+bool InsHistory::take_leap(Stamp now) noexcept {
+  if (!leapt_at_ || now < *leapt_at_) return false;
+  leapt_at_.reset();
+  return true;
+}
+
+InsMatch InsHistory::reference_at(Stamp stamp, Reference* out) const noexcept {
+  if (!reaches(stamp) || reading(begin_).stamp > stamp) return InsMatch::none;
+  // The first reading not before the stamp; at most log2(capacity) turns.
+  std::uint64_t low = begin_, high = end_ - 1;
+  while (low < high) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    if (reading(middle).stamp < stamp)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  const Reading& b = reading(low);
+  const Reading& a = b.stamp == stamp || low == begin_ ? b : reading(low - 1);
+  if (b.stamp - a.stamp > options_.max_gap) return InsMatch::gap;
+  if (!a.valid || !b.valid) return InsMatch::no_fix;
+  if (&a != &b && b.jumped) return InsMatch::jump;
+  const Duration interval = b.stamp - a.stamp;
+  const double s = interval.ns() > 0 ? static_cast<double>((stamp - a.stamp).ns()) /
+                                           static_cast<double>(interval.ns())
+                                     : 0.0;
+  const Transform T_enu_ins =
+      interpolate({a.R_enu_ins, a.p_enu_ins}, {b.R_enu_ins, b.p_enu_ins}, s);
+  out->T_enu_left = T_enu_ins * options_.T_ins_left;
+  out->stamp_error = std::max(a.stamp_error, b.stamp_error);
+  out->sigmas.position = std::max(a.sigmas.position, b.sigmas.position);
+  out->sigmas.height = std::max(a.sigmas.height, b.sigmas.height);
+  out->sigmas.tilt = std::max(a.sigmas.tilt, b.sigmas.tilt);
+  return InsMatch::ok;
+}
+
+}  // namespace vergence

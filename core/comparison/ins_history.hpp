@@ -1,0 +1,79 @@
+#pragma once
+#include <optional>
+#include <span>
+
+#include "core/comparison/geodesy.hpp"
+#include "core/math/se3.hpp"
+#include "core/memory/arena.hpp"
+#include "core/types/ins_sample.hpp"
+
+namespace vergence {
+
+struct ComparisonOptions;
+struct ComparisonCounters;
+enum class InsMatch : std::uint8_t;
+
+/// The newest samples of an INS, in `enu`, and what it said at an instant between two of them.
+///
+/// Threads one. Memory from the arena at construction; full: the oldest sample goes.
+class InsHistory {
+ public:
+  /// Sigmas of a sample, m and rad: its own, else those of the options.
+  struct Sigmas {
+    double position = 0, height = 0, tilt = 0;
+  };
+  /// Between two samples.
+  struct Reference {
+    Transform T_enu_left{};
+    Sigmas sigmas{};         // the larger of both
+    Duration stamp_error{};  // the larger of both
+  };
+
+  /// Counts refused samples and jumps in `counters`, which outlive this, as `options` do.
+  InsHistory(const ComparisonOptions& options, ComparisonCounters& counters, Arena& arena);
+  [[nodiscard]] static std::size_t bytes_needed(const ComparisonOptions& options) noexcept;
+
+  /// Samples in order of their stamps; others are refused and counted.
+  void add(const InsSample& sample) noexcept;
+  /// Where the INS has the left camera at this stamp. Not `ok`: *out as it was.
+  [[nodiscard]] InsMatch reference_at(Stamp stamp, Reference* out) const noexcept;
+  /// The newest sample is not older than this.
+  [[nodiscard]] bool reaches(Stamp stamp) const noexcept;
+  /// Whether the position has leapt, by `now` at the latest; once for each leap, or for several
+  /// before one `now`.
+  [[nodiscard]] bool take_leap(Stamp now) noexcept;
+
+  [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
+  [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return plane_; }
+
+ private:
+  struct Reading {  // an InsSample in enu
+    Stamp stamp{};
+    Duration stamp_error{};
+    bool valid = false;
+    bool jumped = false;  // against the reading before
+    Vec3 p_enu_ins = Vec3::Zero();
+    Mat3 R_enu_ins = Mat3::Identity();
+    Sigmas sigmas{};
+  };
+
+  [[nodiscard]] const Reading& reading(std::uint64_t i) const noexcept {
+    return readings_[static_cast<std::size_t>(i) & (readings_.size() - 1)];
+  }
+  /// False: its stamp goes back.
+  [[nodiscard]] bool accept_stamp(Stamp stamp) noexcept;
+  /// The sample's place in enu, if it has one.
+  void locate(const InsSample& sample, Reading* r) noexcept;
+
+  const ComparisonOptions& options_;
+  ComparisonCounters& counters_;
+  LocalTangentPlane plane_{};
+  bool has_origin_ = false;
+  std::span<Reading> readings_;
+  std::uint64_t begin_ = 0, end_ = 0;  // numbers of the readings held
+  int backwards_ = 0;                  // refused in a row for their stamps
+  std::optional<double> yaw_;          // rad, the newest of a sample without attitude
+  std::optional<Stamp> leapt_at_;      // and nobody has taken it
+};
+
+}  // namespace vergence

@@ -1,0 +1,87 @@
+#include "core/estimator/background_solve.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+namespace vergence {
+namespace {
+
+// Frames after a snapshot, for the gates to have frames that were not in it.
+constexpr int kLeastHeldOut = 12;
+
+}  // namespace
+
+BackgroundSolve::BackgroundSolve(const EstimatorOptions& options, const RigCalibration& given,
+                                 std::size_t tracks, Arena& arena, BackgroundRunner& runner)
+    : options_(options),
+      given_(given),
+      solver_(options.calibration, options.monitor, given.cameras, tracks, arena),
+      focal_check_(options.calibration.estimate_lenses != 0),
+      runner_(runner),
+      task_{this} {}
+
+std::size_t BackgroundSolve::memory_needed(const EstimatorOptions& options, int cameras,
+                                           std::size_t tracks) noexcept {
+  return calibration::RigSolver::memory_needed(options.calibration, options.monitor, cameras,
+                                               tracks);
+}
+
+void BackgroundSolve::start(const calibration::TrackLog& log, const Start& start) noexcept {
+  solver_.log().copy(log, log.size());
+  start_ = start;
+  if (start.prior != nullptr) {
+    prior_ = *start.prior;
+    start_.prior = &prior_;
+  }
+  focal_check_.begin_solve();
+  running_ = true;
+  discarded_ = false;
+  frames_since_start_ = 0;
+  next_turn_ = std::min(kLeastHeldOut, options_.calibration.adopt_after);
+  runner_.start(TaskRef(task_));
+}
+
+void BackgroundSolve::run() noexcept {
+  calibration::RigSolveRequest request;
+  request.rig = start_.rig;
+  request.from_rig = start_.from_rig;
+  solved_ = {};
+  if (start_.sought || options_.calibration.estimate_lenses == 0) {
+    solved_.transforms = solver_.solve(request);
+    if (solved_.transforms.status == calibration::RigSolveStatus::ok) {
+      request.rig.T_camera_left = solved_.transforms.rig.T_camera_left;
+      request.from_rig = true;
+    }
+  }
+  if (options_.calibration.estimate_lenses == 0) return;
+  request.freedom = calibration::RigFreedom::lenses;
+  request.given = &given_;  // what the frames have shown since must not be its own witness
+  request.known = start_.prior;
+  solved_.lenses = solver_.solve(request);
+  focal_check_.measure(solver_, request, solved_.lenses);
+}
+
+bool BackgroundSolve::next_frame() noexcept {
+  ++frames_since_start_;
+  if (frames_since_start_ < next_turn_) return false;
+  if (options_.adoption == Adoption::when_ready) return !runner_.busy();
+  const auto begin = std::chrono::steady_clock::now();
+  runner_.wait();
+  waited_ms_ =
+      std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  return true;
+}
+
+bool BackgroundSolve::last_turn() const noexcept {
+  return frames_since_start_ >= options_.calibration.adopt_after;
+}
+
+void BackgroundSolve::postpone() noexcept {
+  next_turn_ = std::min(next_turn_ + kLeastHeldOut, options_.calibration.adopt_after);
+}
+
+void BackgroundSolve::finish() noexcept {
+  if (running_) runner_.wait();
+}
+
+}  // namespace vergence

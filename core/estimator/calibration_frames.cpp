@@ -1,0 +1,113 @@
+#include "core/estimator/calibration_frames.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace vergence {
+namespace {
+
+using odometry::MapPoint;
+
+// px, mean of the tracks since the last frame taken: less repeats the same errors.
+constexpr double kMovedPixels = 1.0;
+// For so long without another frame in the log: the rig stands.
+constexpr int kStillFrames = 15;
+constexpr std::size_t kNewFrames = 5;  // at least, between two solves
+
+double pixels_moved(const odometry::Map& map) noexcept {
+  double sum = 0;
+  int n = 0;
+  for (const MapPoint& p : map.points()) {
+    if (!p.followed() || !p.logged || !p.now.by(0)) continue;
+    sum += static_cast<double>((p.raw[0] - p.logged_at).norm());
+    ++n;
+  }
+  constexpr int kEnough = 10;
+  return n < kEnough ? std::numeric_limits<double>::infinity() : sum / n;
+}
+
+}  // namespace
+
+CalibrationFrames::CalibrationFrames(const calibration::CalibrationOptions& options,
+                                     std::size_t tracks, Arena& arena)
+    : options_(options), log_(static_cast<std::size_t>(options.max_frames), tracks, arena) {}
+
+std::size_t CalibrationFrames::memory_needed(const calibration::CalibrationOptions& options,
+                                             std::size_t tracks) noexcept {
+  return calibration::TrackLog::memory_needed(static_cast<std::size_t>(options.max_frames), tracks);
+}
+
+void CalibrationFrames::take(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
+                             const RigFrame& frame) noexcept {
+  if (outcome.scale != 1.0) log_.scale_about(outcome.T_left_world.centre(), outcome.scale);
+  ++frames_still_;
+  if (!outcome.images_good || pixels_moved(odometry.map()) < kMovedPixels) return;
+  calibration::LoggedFrame f;
+  f.number = frame.number;
+  f.stamp = frame.stamp;
+  f.T_left_world = outcome.T_left_world;
+  f.T_camera_left = odometry.rig().T_camera_left;
+  f.unlinked = odometry.linked() == odometry::Link::unlinked;
+  f.reprojection_px = outcome.reprojection_px;
+  f.stereo = outcome.stereo_inliers;
+  log_.begin(f);
+  for (MapPoint& p : odometry.map().points()) {
+    // A track is taken by what the left camera's pose says of it. Linked, the others' observations
+    // are taken as they were found: the calibration in use must not choose its own witnesses.
+    if (!p.followed() || !p.now.by(0)) continue;
+    calibration::LoggedObservation s;
+    s.track = p.id;
+    s.cameras = f.unlinked ? p.now.cameras : p.in_images;
+    s.sigma = p.now.sigma[0];
+    s.raw = p.raw;
+    log_.push(s);
+    p.logged = true;
+    p.logged_at = p.raw[0];
+  }
+  ++logged_;
+  frames_still_ = 0;
+}
+
+bool CalibrationFrames::standing() const noexcept { return frames_still_ > kStillFrames; }
+
+void CalibrationFrames::begin_segment(std::uint64_t number) noexcept {
+  log_.drop_before(number);
+  begin_segment();
+}
+
+void CalibrationFrames::begin_segment() noexcept {
+  solved_frames_ = 0;
+  logged_ = log_.size();
+  wanted_ = least();
+}
+
+void CalibrationFrames::clear() noexcept {
+  log_.clear();
+  begin_segment();
+}
+
+bool CalibrationFrames::enough() const noexcept { return logged_ >= wanted_ && enough_for_any(); }
+
+bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= least(); }
+
+bool CalibrationFrames::new_since_solve() const noexcept {
+  return log_.size() >= solved_frames_ + kNewFrames;
+}
+
+void CalibrationFrames::want(std::size_t frames) noexcept {
+  wanted_ = std::max(std::min(most(), frames), logged_ + kNewFrames);
+}
+
+void CalibrationFrames::want_more() noexcept {
+  wanted_ = std::min(most(), std::max(solved_frames_ + least(), logged_));
+}
+
+std::size_t CalibrationFrames::most() const noexcept {
+  return static_cast<std::size_t>(options_.max_frames);
+}
+
+std::size_t CalibrationFrames::least() const noexcept {
+  return static_cast<std::size_t>(options_.min_frames);
+}
+
+}  // namespace vergence

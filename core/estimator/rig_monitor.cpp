@@ -1,0 +1,254 @@
+#include "core/estimator/rig_monitor.hpp"
+
+#include <algorithm>
+
+namespace vergence {
+namespace {
+
+using calibration::MonitorVerdict;
+using odometry::MapPoint;
+
+constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
+// Sigmas of the reference while a calibration is a claim: of rotation (rad), and of t in baselines.
+// What is off from the first frame is a calibration that does not fit, no knock; only a change is
+// one.
+constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
+// And of one that the drive has confirmed, until the monitor has measured its own: what the lens
+// model leaves in one stretch.
+constexpr std::array kConfirmed = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
+constexpr double kLearnedCovariance =
+    1.5;                     // times the monitor's own: the scene it was measured in was one
+constexpr int kWitness = 2;  // frames: a point just made was searched for in the band of the
+                             // calibration in use
+constexpr int kGraceFrames =
+    5;  // after a new reference: the monitor does not yet know how far matches spread
+constexpr int kLearnFrames = 45;  // moving, in agreement
+
+Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
+  Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
+  spread.tail<3>() *= baseline;
+  return spread.cwiseAbs2().asDiagonal();
+}
+
+int rank(MonitorVerdict::Kind kind) noexcept {
+  using K = MonitorVerdict::Kind;
+  switch (kind) {
+    case K::quiet:
+      return 0;
+    case K::out_of_step:
+      return 1;
+    case K::drift:
+      return 2;
+    case K::knock:
+      return 3;
+    case K::collapse:
+      return 4;
+  }
+  return 0;
+}
+
+Pinhole pinhole(const RigCalibration& rig, int k) noexcept {
+  const Intrinsics& lens = rig.intrinsics[static_cast<std::size_t>(k)];
+  return {lens.fx, lens.fy, lens.cx, lens.cy};
+}
+
+const Transform& transform(const RigCalibration& rig, int k) noexcept {
+  return rig.T_camera_left[static_cast<std::size_t>(k)];
+}
+
+}  // namespace
+
+std::size_t RigMonitor::memory_needed(const calibration::MonitorOptions& options, int cameras,
+                                      std::size_t capacity) noexcept {
+  return static_cast<std::size_t>(cameras - 1) *
+             (calibration::Monitor::memory_needed(options) +
+              calibration::MotionTrackBuilder::memory_needed(capacity) +
+              calibration::DisparityJumpDetector::memory_needed(capacity)) +
+         capacity * sizeof(calibration::StereoObservation) + kCacheLine;
+}
+
+RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
+                       std::size_t capacity, Arena& arena)
+    : options_(options), cameras_(cameras) {
+  for (int k = 1; k < cameras; ++k)
+    watched_[static_cast<std::size_t>(k)].emplace(options, capacity, arena);
+  stereo_ = BoundedVector<calibration::StereoObservation>(
+      arena.make<calibration::StereoObservation>(capacity, "monitored matches"));
+}
+
+void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
+  rig_ = rig;
+  for (int k = 1; k < cameras_; ++k) {
+    Watched& w = camera(k);
+    w.learning = true;
+    w.monitor.expect_scatter(confirmed ? options_.found_bias_px : options_.claimed_bias_px);
+    const Transform& T = transform(rig_, k);
+    set_monitor_reference(k, T,
+                          reference_covariance(confirmed ? kConfirmed : kClaimed, T.t.norm()));
+  }
+}
+
+void RigMonitor::set_jump_reference(const RigCalibration& rig) noexcept {
+  for (int k = 1; k < cameras_; ++k)
+    camera(k).jumps.set_reference(transform(rig, k), pinhole(rig, 0), pinhole(rig, k));
+}
+
+void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
+                                       const Mat6& covariance) noexcept {
+  Watched& w = camera(k);
+  (void)w.monitor.set_reference(T_camera_left, pinhole(rig_, 0), pinhole(rig_, k), covariance);
+  w.tracks.reset();
+  w.grace = kGraceFrames;
+}
+
+void RigMonitor::learn_reference(int k, const MonitorVerdict& verdict) noexcept {
+  Watched& w = camera(k);
+  if (!w.learning || verdict.kind != MonitorVerdict::Kind::quiet ||
+      w.monitor.frames_agreed() < kLearnFrames)
+    return;
+  w.learning = false;
+  const Transform& T = transform(rig_, k);
+  const double length = T.t.norm();
+  Transform measured = perturbed(T, verdict.offset.head<3>(), verdict.offset.tail<3>());
+  measured.t *= length / measured.t.norm();
+  set_monitor_reference(k, measured, kLearnedCovariance * verdict.covariance);
+}
+
+void RigMonitor::scene_rebuilt(const odometry::Map& map, const RigCalibration& rig,
+                               bool confirmed) noexcept {
+  scene_pending_ = false;
+  watch(rig, confirmed);
+  // Points made in this frame are where the next begins: no frame is between two that are compared.
+  for (int k = 1; k < cameras_; ++k) {
+    (void)collect_stereo(map, k, 1);
+    camera(k).jumps.rebase(transform(rig, k), pinhole(rig, 0), pinhole(rig, k), stereo_.span());
+  }
+}
+
+void RigMonitor::begin_unlinked(const RigCalibration& rig) noexcept {
+  T_left_world_before_.reset();
+  scene_pending_ = false;
+  for (int k = 1; k < cameras_; ++k) camera(k).T_camera_left_before = transform(rig, k);
+  set_jump_reference(rig);
+}
+
+void RigMonitor::reset() noexcept {
+  for (int k = 1; k < cameras_; ++k) camera(k).monitor.reset();
+}
+
+void RigMonitor::scene_lost() noexcept {
+  T_left_world_before_.reset();
+  for (int k = 1; k < cameras_; ++k) {
+    camera(k).monitor.reset();
+    camera(k).tracks.reset();
+    camera(k).jumps.reset();
+  }
+}
+
+int RigMonitor::expected_stereo(const odometry::Odometry& odometry, int k,
+                                const Transform& T_left_world) const noexcept {
+  const Transform T = transform(rig_, k) * T_left_world;
+  const Camera& camera = odometry.front_end().lens(k).raw();
+  int n = 0;
+  for (const MapPoint& p : odometry.map().points()) {
+    Vec2 at;
+    if (p.stage == odometry::PointStage::active && p.now.by(0) &&
+        camera.project(T * p.p_world, &at, nullptr) == ProjectStatus::ok &&
+        camera.inside(at, kImageMargin))
+      ++n;
+  }
+  return n;
+}
+
+Transform RigMonitor::step_to(const Transform& T_left_world) noexcept {
+  Transform step =
+      T_left_world_before_ ? T_left_world * T_left_world_before_->inverse() : Transform{};
+  T_left_world_before_ = T_left_world;
+  return step;
+}
+
+int RigMonitor::collect_stereo(const odometry::Map& map, int k, int least_found) noexcept {
+  const auto c = static_cast<std::size_t>(k);
+  stereo_.clear();
+  int found = 0;
+  for (const MapPoint& p : map.points()) {
+    if (!p.followed() || p.found < least_found || !p.now.by(0)) continue;
+    if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
+    if (p.stage == odometry::PointStage::active) ++found;
+    (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
+                        static_cast<double>(std::max(p.now.sigma[0], p.now.sigma[c])), p.id});
+  }
+  return found;
+}
+
+std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometry& odometry,
+                                                         const odometry::FrameOutcome& outcome,
+                                                         std::uint64_t number) noexcept {
+  std::optional<std::uint64_t> onset;
+  const bool first = outcome.initialised || outcome.restarted;
+  if (first) T_left_world_before_.reset();
+  const Transform step = step_to(outcome.T_left_world);
+  for (int k = 1; k < cameras_; ++k) {
+    Watched& w = camera(k);
+    if (first) w.jumps.reset();
+    (void)collect_stereo(odometry.map(), k, kWitness);
+    w.jumps.set_transform(w.T_camera_left_before);
+    const calibration::DisparityJump jump = w.jumps.next(number, stereo_.span(), step);
+    if (jump.confirmed) onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
+    w.T_camera_left_before = transform(odometry.rig(), k);
+  }
+  return onset;
+}
+
+MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odometry,
+                                           const odometry::FrameOutcome& outcome,
+                                           const RigFrame& frame, int found,
+                                           const Transform& step) noexcept {
+  Watched& w = camera(k);
+  calibration::MonitorFrame f = w.tracks.next(frame.stamp, frame.number, stereo_.span(), step);
+  f.expected_stereo = outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
+  f.found_stereo = found;
+  MonitorVerdict v = w.monitor.look(f);
+  if (w.grace > 0) {
+    --w.grace;
+    v = MonitorVerdict{};
+  }
+  learn_reference(k, v);
+  return v;
+}
+
+MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
+                                  const odometry::FrameOutcome& outcome,
+                                  const RigFrame& frame) noexcept {
+  MonitorVerdict worst;
+  bool in_step = true;
+  const Transform step = step_to(outcome.T_left_world);
+  for (int k = 1; k < cameras_; ++k) {
+    const int found = collect_stereo(odometry.map(), k, kWitness);
+    const calibration::DisparityJump jump =
+        camera(k).jumps.next(frame.number, stereo_.span(), step);
+    if (scene_pending_) {
+      worst.undecided = worst.undecided || jump.suspected;
+      in_step = false;
+      if (jump.confirmed) {
+        worst.kind = MonitorVerdict::Kind::knock;
+        worst.onset_frame = jump.onset_frame;
+      }
+      continue;
+    }
+    MonitorVerdict v = monitor_verdict(k, odometry, outcome, frame, found, step);
+    in_step = in_step && v.in_step;
+    if (jump.confirmed && rank(v.kind) < rank(MonitorVerdict::Kind::knock)) {
+      v.kind = MonitorVerdict::Kind::knock;
+      v.onset_frame = jump.onset_frame;
+    }
+    v.undecided = v.undecided || jump.suspected;
+    if (rank(v.kind) > rank(worst.kind) ||
+        (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic)))
+      worst = v;
+  }
+  worst.in_step = in_step;
+  return worst;
+}
+
+}  // namespace vergence

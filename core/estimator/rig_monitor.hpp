@@ -1,0 +1,99 @@
+#pragma once
+#include <array>
+#include <optional>
+
+#include "core/calibration/disparity_jump.hpp"
+#include "core/calibration/monitor.hpp"
+#include "core/calibration/motion_track_builder.hpp"
+#include "core/odometry/odometry.hpp"
+
+namespace vergence {
+
+/// Watches, frame by frame, whether the rig still is the one that its calibration describes
+/// (METHOD §4): for each further camera a monitor of the epipolar lines and a detector of jumps in
+/// the disparities.
+///
+/// With the cameras linked update() compares a posed frame with the calibration watched. While a
+/// calibration is sought the cameras are not linked, and update_unlinked() looks for jumps alone.
+///
+///     monitor.watch(rig, confirmed);  // a calibration is in use, its scene is there
+///     const auto verdict = monitor.update(odometry, outcome, frame);  // each posed frame
+///
+/// Threads one. Memory from the arena at construction. Errors: the constructor throws as Monitor's.
+class RigMonitor {
+ public:
+  /// `capacity`: tracks of a frame.
+  RigMonitor(const calibration::MonitorOptions& options, int cameras, std::size_t capacity,
+             Arena& arena);
+  [[nodiscard]] static std::size_t memory_needed(const calibration::MonitorOptions& options,
+                                                 int cameras, std::size_t capacity) noexcept;
+
+  /// This calibration is the reference from now on. `confirmed` by the drive: less scatter is
+  /// expected of it.
+  void watch(const RigCalibration& rig, bool confirmed) noexcept;
+  /// The jump detectors compare with this calibration.
+  void set_jump_reference(const RigCalibration& rig) noexcept;
+  /// A calibration is adopted; until scene_rebuilt() only jumps count.
+  void expect_rebuilt_scene() noexcept { scene_pending_ = true; }
+  [[nodiscard]] bool scene_pending() const noexcept { return scene_pending_; }
+  /// The scene of the calibration adopted has just been made; it is watched from here on.
+  void scene_rebuilt(const odometry::Map& map, const RigCalibration& rig, bool confirmed) noexcept;
+  /// The cameras are not linked from now on: a calibration is sought.
+  void begin_unlinked(const RigCalibration& rig) noexcept;
+
+  /// The worst verdict of the further cameras on a posed frame; linked odometry only.
+  [[nodiscard]] calibration::MonitorVerdict update(const odometry::Odometry& odometry,
+                                                   const odometry::FrameOutcome& outcome,
+                                                   const RigFrame& frame) noexcept;
+  /// The same while the cameras are not linked. A value: the rig has changed, from that frame on.
+  [[nodiscard]] std::optional<std::uint64_t> update_unlinked(const odometry::Odometry& odometry,
+                                                             const odometry::FrameOutcome& outcome,
+                                                             std::uint64_t number) noexcept;
+
+  /// Forgets what the monitors have seen; references and jump detectors stay.
+  void reset() noexcept;
+  /// The scene was lost: the next frame is compared with none before it.
+  void scene_lost() noexcept;
+
+ private:
+  /// One further camera.
+  struct Watched {
+    Watched(const calibration::MonitorOptions& options, std::size_t capacity, Arena& arena)
+        : monitor(options, arena), tracks(capacity, arena), jumps(capacity, arena) {}
+    calibration::Monitor monitor;
+    calibration::MotionTrackBuilder tracks;
+    calibration::DisparityJumpDetector jumps;
+    bool learning = false;           // the monitor's reference is a claim, its own not yet measured
+    int grace = 0;                   // frames whose verdict does not count yet
+    Transform T_camera_left_before;  // with the cameras unlinked
+  };
+
+  [[nodiscard]] Watched& camera(int k) noexcept { return *watched_[static_cast<std::size_t>(k)]; }
+  void set_monitor_reference(int k, const Transform& T_camera_left,
+                             const Mat6& covariance) noexcept;
+  /// The verdict of camera k's monitor; a jump is left to the caller.
+  [[nodiscard]] calibration::MonitorVerdict monitor_verdict(int k,
+                                                            const odometry::Odometry& odometry,
+                                                            const odometry::FrameOutcome& outcome,
+                                                            const RigFrame& frame, int found,
+                                                            const Transform& step) noexcept;
+  /// A claim does not say how exact it is; the monitor's own measurement does: what it sees in the
+  /// first frames that agree with each other is what must not change.
+  void learn_reference(int k, const calibration::MonitorVerdict& verdict) noexcept;
+  /// Motion of the left camera since the frame watched before.
+  [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
+  /// Camera k's matches into `stereo_`; how many of them hold poses.
+  int collect_stereo(const odometry::Map& map, int k, int least_found) noexcept;
+  [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
+                                    const Transform& T_left_world) const noexcept;
+
+  const calibration::MonitorOptions& options_;
+  const int cameras_;
+  std::array<std::optional<Watched>, kMaxCameras> watched_;  // [k] of camera k ≥ 1
+  BoundedVector<calibration::StereoObservation> stereo_;
+  RigCalibration rig_{};  // the one watched
+  std::optional<Transform> T_left_world_before_;
+  bool scene_pending_ = false;
+};
+
+}  // namespace vergence

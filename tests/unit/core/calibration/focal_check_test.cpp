@@ -1,0 +1,120 @@
+#include "core/calibration/focal_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/core/calibration/feature_log.hpp"
+
+namespace vergence::test {
+namespace {
+
+using calibration::CalibrationOptions;
+using calibration::check_focal_length;
+using calibration::RigFreedom;
+using calibration::RigSolution;
+using calibration::RigSolveRequest;
+using calibration::RigSolveStatus;
+
+/// The rig of a drive with a focal length that is `factor` of the true one.
+RigCalibration given_rig(const FeatureDriveOptions& drive, double factor) {
+  RigCalibration rig = rig_of(drive, {drive.left, drive.right}, {});
+  for (std::size_t k = 0; k < 2; ++k) {
+    rig.intrinsics[k].fx *= factor;
+    rig.intrinsics[k].fy *= factor;
+  }
+  return rig;
+}
+
+/// As the drive goes: with the lenses free, and from there with the focal lengths.
+RigSolution measure(const FeatureDriveOptions& drive_options, const RigCalibration& given) {
+  CalibrationOptions o;
+  o.max_frames = 60;
+  SolverInArena s(o);
+  FeatureDrive drive(drive_options);
+  log_drive(drive, 60, {2e-3, 0.02, 5e-3, 0.02}, s.solver.log());
+  RigSolveRequest request;
+  request.rig = given;
+  request.freedom = RigFreedom::lenses;
+  request.given = &given;
+  const RigSolution lenses = s.solver.solve(request);
+  EXPECT_EQ(lenses.status, RigSolveStatus::ok);
+  request.freedom = RigFreedom::focal_lengths;
+  request.rig.T_camera_left = lenses.rig.T_camera_left;
+  request.from_rig = true;
+  return s.solver.solve(request);
+}
+
+TEST(FocalCheck, aTrueFocalLengthIsNotContradicted) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    FeatureDriveOptions drive;
+    drive.seed = seed;
+    const RigCalibration given = given_rig(drive, 1);
+    const FocalMeasurement m = check_focal_length(measure(drive, given), given);
+    ASSERT_GT(m.sigma_px, 0);
+    EXPECT_FALSE(m.contradicted) << m.measured_px << " +- " << m.sigma_px;
+    EXPECT_LT(std::abs(m.measured_px - drive.left.fx), 3 * m.sigma_px + 0.04 * drive.left.fx);
+  }
+}
+
+// On a road that winds: two seconds straight on hold the focal length to a seventh only.
+TEST(FocalCheck, oneThatIsAQuarterOffIsContradictedAndTheTrueOneMeasured) {
+  for (const double factor : {0.8, 1.25}) {
+    FeatureDriveOptions drive;
+    drive.rocking = 6;
+    const RigCalibration given = given_rig(drive, factor);
+    const FocalMeasurement m = check_focal_length(measure(drive, given), given);
+    EXPECT_TRUE(m.contradicted) << m.measured_px << " +- " << m.sigma_px;
+    EXPECT_EQ(m.given_px, given.intrinsics[0].fx);
+    ASSERT_GT(m.sigma_px, 0);
+    EXPECT_LT(std::abs(m.measured_px - drive.left.fx), 3 * m.sigma_px + 0.04 * drive.left.fx);
+  }
+}
+
+RigSolution found(RigSolveStatus status, double fx, double sigma) {
+  RigSolution s;
+  s.status = status;
+  s.rig.intrinsics[0].fx = fx;
+  s.rig.intrinsics[0].sigma[0] = sigma;
+  return s;
+}
+
+// 4 % are what measurements are off by on recorded drives, whatever their sigma.
+TEST(FocalCheck, certainIsBeyondFourPercentAndThreeSigmas) {
+  RigCalibration given;
+  given.intrinsics[0].fx = 1000;
+  const auto contradicts = [&](double fx, double sigma) {
+    return check_focal_length(found(RigSolveStatus::ok, fx, sigma), given).contradicted;
+  };
+  EXPECT_FALSE(contradicts(1039, 1e-3));
+  EXPECT_TRUE(contradicts(1041, 1e-3));
+  EXPECT_TRUE(contradicts(959, 1e-3));
+  EXPECT_FALSE(contradicts(1100, 25));
+  EXPECT_TRUE(contradicts(1130, 25));
+}
+
+TEST(FocalCheck, aSolveThatIsStillOnItsWayContradictsOnlyWhenItIsFar) {
+  RigCalibration given;
+  given.intrinsics[0].fx = 1000;
+  const auto at = [&](double fx) {
+    return check_focal_length(found(RigSolveStatus::not_converged, fx, 0), given);
+  };
+  EXPECT_FALSE(at(1050).contradicted);
+  EXPECT_EQ(at(1050).measured_px, 0) << "nothing is known";
+  EXPECT_TRUE(at(1110).contradicted);
+  EXPECT_EQ(at(1110).sigma_px, 0);
+}
+
+TEST(FocalCheck, withoutASolutionNothingIsMeasured) {
+  RigCalibration given;
+  given.intrinsics[0].fx = 1000;
+  for (const RigSolveStatus status : {RigSolveStatus::too_few_tracks, RigSolveStatus::no_candidate,
+                                      RigSolveStatus::not_observable}) {
+    const FocalMeasurement m = check_focal_length(found(status, 500, 1), given);
+    EXPECT_EQ(m.measured_px, 0);
+    EXPECT_FALSE(m.contradicted);
+  }
+}
+
+}  // namespace
+}  // namespace vergence::test

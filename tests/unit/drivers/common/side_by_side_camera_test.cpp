@@ -1,0 +1,251 @@
+#include "drivers/common/side_by_side_camera.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <set>
+#include <thread>
+#include <vector>
+
+namespace vergence {
+namespace {
+
+constexpr int kWidth = 8, kHeight = 2;  // of one image
+
+/// A camera that gives what the test puts into it.
+class ScriptedCamera final : public CameraDevice {
+ public:
+  struct Script {
+    std::deque<DeviceStatus> answers;  // of wait(), then `timeout`
+    std::set<FrameSlot> held;
+    CameraConfiguration configured{};
+    int configures = 0, starts = 0, stops = 0, triggers = 0;
+    DeviceStatus on_start = DeviceStatus::ok;
+    Notifier* ready = nullptr;
+  };
+  explicit ScriptedCamera(Script* script) : script_(script) {
+    for (std::size_t i = 0; i < pixels_.size(); ++i) pixels_[i] = static_cast<std::uint8_t>(i);
+  }
+
+  const DeviceInfo& info() const noexcept override { return info_; }
+  DeviceStatus configure(const CameraConfiguration& requested,
+                         CameraConfiguration* actual) noexcept override {
+    ++script_->configures;
+    if (requested.width > 4 * kWidth) return DeviceStatus::unsupported;
+    script_->configured = requested;
+    if (actual == nullptr) return DeviceStatus::ok;
+    *actual = requested;
+    actual->exposure = Duration::microseconds(4990);
+    return DeviceStatus::ok;
+  }
+  DeviceTiming timing() const noexcept override { return {}; }
+  DeviceStatus start(Notifier* ready) noexcept override {
+    ++script_->starts;
+    script_->ready = ready;
+    return script_->on_start;
+  }
+  DeviceStatus wait(Duration, Frame* frame) noexcept override {
+    if (script_->answers.empty()) return DeviceStatus::timeout;
+    const DeviceStatus status = script_->answers.front();
+    script_->answers.pop_front();
+    frame->arrival = HostStamp(7'000'000);
+    if (status != DeviceStatus::ok) return status;
+    frame->slot = static_cast<FrameSlot>(next_ % 4);
+    frame->counter = next_++;
+    EXPECT_TRUE(script_->held.insert(frame->slot).second) << "a slot that is still held";
+    return status;
+  }
+  ImageView view(FrameSlot) const noexcept override {
+    return {pixels_.data(), 2 * kWidth, kHeight, 2 * kWidth};
+  }
+  void release(FrameSlot slot) noexcept override {
+    EXPECT_EQ(script_->held.erase(slot), 1U) << "a slot that is not held";
+  }
+  void stop() noexcept override { ++script_->stops; }
+  DeviceStatus trigger_once() noexcept override {
+    ++script_->triggers;
+    return DeviceStatus::ok;
+  }
+  std::string last_error() const override { return "it offers 16 x 2"; }
+  std::string remark() const override { return "a remark"; }
+  CameraStatistics statistics() const noexcept override { return {99, 98, 3, 2, 1}; }
+
+ private:
+  Script* script_;
+  DeviceInfo info_{"scripted", "7", "Pair", "here"};
+  std::array<std::uint8_t, 2 * kWidth * kHeight> pixels_{};
+  std::uint64_t next_ = 0;
+};
+
+class Counting final : public Notifier {
+ public:
+  void notify() noexcept override { ++count; }
+  int count = 0;
+};
+
+class SideBySide : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::tie(left_, right_) = split_side_by_side(std::make_unique<ScriptedCamera>(&script_));
+  }
+  void stream() {
+    ASSERT_EQ(left_->configure(asked_, nullptr), DeviceStatus::ok);
+    ASSERT_EQ(right_->configure(asked_, nullptr), DeviceStatus::ok);
+    ASSERT_EQ(left_->start(nullptr), DeviceStatus::ok);
+    ASSERT_EQ(right_->start(nullptr), DeviceStatus::ok);
+  }
+
+  ScriptedCamera::Script script_;
+  std::unique_ptr<CameraDevice> left_, right_;
+  CameraConfiguration asked_{kWidth, kHeight, 30};
+};
+
+TEST_F(SideBySide, askForTwiceTheWidthAndTellTheirOwn) {
+  CameraConfiguration actual;
+  ASSERT_EQ(left_->configure(asked_, &actual), DeviceStatus::ok);
+  EXPECT_EQ(script_.configured.width, 2 * kWidth);
+  EXPECT_EQ(script_.configured.height, kHeight);
+  EXPECT_EQ(actual.width, kWidth);
+  EXPECT_EQ(actual.exposure, Duration::microseconds(4990));
+  EXPECT_NE(left_->info().model, right_->info().model);
+  EXPECT_EQ(left_->info().serial, "7");
+}
+
+TEST_F(SideBySide, areOfOneSize) {
+  ASSERT_EQ(left_->configure(asked_, nullptr), DeviceStatus::ok);
+  CameraConfiguration other = asked_;
+  other.width = kWidth / 2;
+  EXPECT_EQ(right_->configure(other, nullptr), DeviceStatus::bad_configuration);
+  EXPECT_NE(right_->last_error().find("8 x 2"), std::string::npos) << right_->last_error();
+}
+
+TEST_F(SideBySide, sayWhatTheCameraOffersAndThatItIsTwiceTheWidth) {
+  asked_.width = 3 * kWidth;
+  EXPECT_EQ(left_->configure(asked_, nullptr), DeviceStatus::unsupported);
+  EXPECT_NE(left_->last_error().find("it offers 16 x 2 (twice the width"), std::string::npos)
+      << left_->last_error();
+  EXPECT_EQ(left_->start(nullptr), DeviceStatus::bad_configuration) << "not configured";
+}
+
+TEST_F(SideBySide, seeTheTwoSidesOfOneExposure) {
+  stream();
+  script_.answers = {DeviceStatus::ok, DeviceStatus::ok};
+  std::array<Frame, 2> left{}, right{};
+  for (Frame& f : left) ASSERT_EQ(left_->wait({}, &f), DeviceStatus::ok);
+  for (Frame& f : right) ASSERT_EQ(right_->wait({}, &f), DeviceStatus::ok);
+  EXPECT_EQ(left_->wait({}, left.data()), DeviceStatus::timeout);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(left[i].counter, i);
+    EXPECT_EQ(right[i].counter, i);
+    EXPECT_EQ(right[i].exposure_start, left[i].exposure_start);
+    EXPECT_EQ(right[i].slot, left[i].slot);
+  }
+  const ImageView a = left_->view(left[0].slot), b = right_->view(right[0].slot);
+  EXPECT_EQ(a.width, kWidth);
+  EXPECT_EQ(b.width, kWidth);
+  EXPECT_EQ(a.height, kHeight);
+  EXPECT_EQ(b.row(0), a.row(0) + kWidth);
+  EXPECT_EQ(*b.row(1), 3 * kWidth) << "the picture's second row, its right half";
+}
+
+TEST_F(SideBySide, giveASlotBackWhenBothHaveReleasedIt) {
+  stream();
+  script_.answers = {DeviceStatus::ok};
+  Frame left, right;
+  ASSERT_EQ(right_->wait({}, &right), DeviceStatus::ok);
+  ASSERT_EQ(left_->wait({}, &left), DeviceStatus::ok);
+  left_->release(left.slot);
+  EXPECT_EQ(script_.held.size(), 1U);
+  EXPECT_EQ(left_->configure(asked_, nullptr), DeviceStatus::busy);
+  right_->release(right.slot);
+  EXPECT_TRUE(script_.held.empty());
+}
+
+TEST_F(SideBySide, giveBackOnStopWhatOneOfThemHasNotTaken) {
+  stream();
+  script_.answers = {DeviceStatus::ok, DeviceStatus::ok};
+  Frame frame;
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
+  left_->stop();
+  EXPECT_EQ(script_.held.size(), 2U) << "the left ones are held";
+  left_->release(0);
+  left_->release(1);
+  EXPECT_TRUE(script_.held.empty());
+}
+
+TEST_F(SideBySide, areBothGoneBeforeEitherComesBack) {
+  stream();
+  script_.answers = {DeviceStatus::ok, DeviceStatus::gone};
+  Frame frame;
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::gone);
+  EXPECT_EQ(frame.arrival, HostStamp(7'000'000));
+  const int starts = script_.starts;
+  EXPECT_EQ(left_->start(nullptr), DeviceStatus::gone) << "the right half does not know yet";
+  EXPECT_EQ(script_.starts, starts);
+  ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::ok) << "what came before it went";
+  ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::gone);
+  script_.on_start = DeviceStatus::gone;
+  EXPECT_EQ(left_->start(nullptr), DeviceStatus::gone);
+  EXPECT_EQ(right_->start(nullptr), DeviceStatus::gone);
+  script_.on_start = DeviceStatus::ok;
+  EXPECT_EQ(right_->start(nullptr), DeviceStatus::ok);
+  EXPECT_EQ(left_->start(nullptr), DeviceStatus::ok);
+  script_.answers = {DeviceStatus::ok};
+  EXPECT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
+  EXPECT_EQ(right_->wait({}, &frame), DeviceStatus::ok);
+}
+
+TEST_F(SideBySide, oneThatGoesAgainBeforeBothAreBackComesBackToo) {
+  stream();
+  script_.answers = {DeviceStatus::gone};
+  Frame frame;
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::gone);
+  ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::gone);
+  ASSERT_EQ(left_->start(nullptr), DeviceStatus::ok);
+  script_.answers = {DeviceStatus::gone};
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::gone);
+  ASSERT_EQ(right_->start(nullptr), DeviceStatus::ok);
+  ASSERT_EQ(left_->start(nullptr), DeviceStatus::ok);
+  script_.answers = {DeviceStatus::ok};
+  EXPECT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
+}
+
+TEST_F(SideBySide, notifyEachOnce) {
+  Counting both, other;
+  ASSERT_EQ(left_->configure(asked_, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(right_->configure(asked_, nullptr), DeviceStatus::ok);
+  ASSERT_EQ(left_->start(&both), DeviceStatus::ok);
+  ASSERT_EQ(right_->start(&both), DeviceStatus::ok);
+  script_.ready->notify();
+  EXPECT_EQ(both.count, 1);
+  ASSERT_EQ(right_->start(&other), DeviceStatus::ok);
+  script_.ready->notify();
+  EXPECT_EQ(both.count, 2);
+  EXPECT_EQ(other.count, 1);
+}
+
+TEST_F(SideBySide, areTriggeredOnceAndRemarkOnce) {
+  stream();
+  EXPECT_EQ(left_->trigger_once(), DeviceStatus::ok);
+  EXPECT_EQ(right_->trigger_once(), DeviceStatus::ok);
+  EXPECT_EQ(script_.triggers, 1);
+  EXPECT_EQ(left_->remark() + right_->remark(), "a remark");
+}
+
+TEST_F(SideBySide, countTheirOwnFramesAndTheCamerasLosses) {
+  stream();
+  script_.answers = {DeviceStatus::ok};
+  Frame frame;
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
+  EXPECT_EQ(left_->statistics().delivered, 1U);
+  EXPECT_EQ(right_->statistics().delivered, 0U);
+  EXPECT_EQ(right_->statistics().lost, 2U);
+  EXPECT_EQ(right_->statistics().underruns, 3U);
+}
+
+}  // namespace
+}  // namespace vergence
