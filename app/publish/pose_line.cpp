@@ -1,5 +1,6 @@
 #include "app/publish/pose_line.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -24,6 +25,29 @@ bool finite(const PoseNumbers& pose) {
   return std::isfinite(sum);
 }
 
+void write_covariance(const char* key, const Covariance6& covariance, std::string* line) {
+  fmt::format_to(std::back_inserter(*line), R"(,"{}":[{:.4g})", key, covariance[0]);
+  for (std::size_t i = 1; i < covariance.size(); ++i)
+    fmt::format_to(std::back_inserter(*line), ",{:.4g}", covariance[i]);
+  *line += ']';
+}
+
+bool finite(const Covariance6& covariance) {
+  return std::all_of(covariance.begin(), covariance.end(),
+                     [](float c) { return std::isfinite(c); });
+}
+
+void write_covariances(const PublishedPose& pose, std::string* line) {
+  if (pose.status == PoseStatus::lost || !finite(pose.covariance) ||
+      !finite(pose.motion_covariance) || !std::isfinite(pose.length_sigma)) {
+    *line += R"(,"covariance":null,"motion_covariance":null,"length_sigma":null)";
+    return;
+  }
+  write_covariance("covariance", pose.covariance, line);
+  write_covariance("motion_covariance", pose.motion_covariance, line);
+  fmt::format_to(std::back_inserter(*line), R"(,"length_sigma":{:.5f})", pose.length_sigma);
+}
+
 }  // namespace
 
 PublishedPose PublishedPose::of(const PoseSample& sample, HostStamp out) noexcept {
@@ -35,6 +59,9 @@ PublishedPose PublishedPose::of(const PoseSample& sample, HostStamp out) noexcep
   p.status = sample.status;
   p.reason = sample.reason;
   p.world_left = PoseNumbers::of(sample.T_world_left);
+  p.covariance = sample.covariance;
+  p.motion_covariance = sample.motion_covariance;
+  p.length_sigma = sample.length_sigma;
   p.inliers = sample.inliers;
   p.stereo_inliers = sample.stereo_inliers;
   p.reprojection_px = sample.reprojection_px;
@@ -65,9 +92,8 @@ void write_pose_line(const PublishedPose& pose, const std::optional<EarthNumbers
         R"({{"position_m":[{:.6f},{:.6f},{:.6f}],"orientation_xyzw":[{:.9f},{:.9f},{:.9f},{:.9f}]}})",
         t[0], t[1], t[2], q[0], q[1], q[2], q[3]);
   }
-  // The estimator has none of a single pose; the key stands so that readers need no other schema
-  // on the day it has.
-  *line += R"(,"covariance":null,"earth":)";
+  write_covariances(pose, line);
+  *line += R"(,"earth":)";
   if (pose.status == PoseStatus::lost || !earth) {
     *line += "null";
   } else {

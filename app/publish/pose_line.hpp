@@ -24,6 +24,8 @@ struct PublishedPose {
   PoseStatus status = PoseStatus::lost;
   Reason reason = Reason::none;
   PoseNumbers world_left{};  // meaningless when `lost`
+  Covariance6 covariance{}, motion_covariance{};  // as PoseSample's
+  float length_sigma = 0;
   int inliers = 0, stereo_inliers = 0;
   double reprojection_px = 0;
   float estimate_ms = 0;

@@ -20,6 +20,15 @@ void put_matrix(CdrWriter* out, const Mat3& M) noexcept {
   for (int i = 0; i < 9; ++i) out->put(M(i / 3, i % 3));
 }
 
+std::array<double, 36> full_matrix(const Covariance6& upper) noexcept {
+  std::array<double, 36> full;
+  auto next = upper.begin();
+  for (std::size_t i = 0; i < 6; ++i)
+    for (std::size_t j = i; j < 6; ++j)
+      full[6 * i + j] = full[6 * j + i] = static_cast<double>(*next++);
+  return full;
+}
+
 /// Of all that was written so far.
 void put_crc(CdrWriter* out) noexcept {
   const auto bytes = out->written();
@@ -158,12 +167,13 @@ void write_odometry(CdrWriter* out, const PoseSample& sample) noexcept {
   const Transform T = posed ? sample.T_world_left : Transform{};
   put_vector(out, T.t);
   put_quaternion(out, T.R);
-  std::array<double, 36> covariance{};
-  covariance[0] = posed ? 0.0 : -1.0;
+  std::array<double, 36> covariance = full_matrix(sample.covariance);
+  if (!posed) covariance[0] = -1.0;
   out->items(covariance);
   put_vector(out, Vec3::Zero());
   put_vector(out, Vec3::Zero());
-  covariance[0] = -1.0;
+  covariance = {};
+  covariance[0] = -1.0;  // the speed is not measured
   out->items(covariance);
 }
 

@@ -26,7 +26,8 @@ class InsComparison {
   static constexpr std::size_t kMostPlacements = 64;  // that are kept; later ones count
 
   /// Without a source poses go through and nothing is said. `journal` outlives it.
-  InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena, EventLog& journal);
+  InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
+                EventLog& journal);
 
   /// Before the first add(). `output` outlives the last one; with a source its recorder takes
   /// readings (Recorder::Options::ins).

@@ -89,8 +89,8 @@ void LiveSource::make_facts() {
   facts_.frames = devices_.frames();
   facts_.expected_frames = devices_.frames();  // 0: nobody knows
   if (devices_.ins() != nullptr)
-    facts_.ins = SourceIns{comparison_options(configuration_), InsSource::device,
-                           "the configuration", 0};
+    facts_.ins =
+        SourceIns{comparison_options(configuration_), InsSource::device, "the configuration", 0};
   const auto is_full = [](const mock::Fault& f) { return f.kind == mock::FaultKind::disk_full; };
   const auto scheduled = devices_.faults();
   if (std::any_of(scheduled.begin(), scheduled.end(), is_full))

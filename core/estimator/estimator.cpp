@@ -117,7 +117,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   sample.state = p.state;
   p.grade(out, frame.pairing, &sample);
   p.relinked = out.relinked;
-  if (out.posed) sample.T_world_left = out.T_left_world.inverse();
+  if (out.posed) p.propagate(out, &sample);
   sample.inliers = out.inliers;
   sample.stereo_inliers = out.stereo_inliers;
   sample.reprojection_px = out.reprojection_px;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/estimator/detail/estimator_parts.hpp"
@@ -69,6 +70,7 @@ void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset,
              frame.stamp);
   calibrator.seek(cause, onset, frame.number);
   verified = superseded = false;
+  length_sigma_percent = kUnlinkedLengthPercent;
   odometry.unlink();
 }
 
@@ -84,6 +86,7 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
   transition(Trigger::rig_changed, frame.stamp);
   calibrator.seek(cause, frame.number, frame.number);
   verified = superseded = false;
+  length_sigma_percent = kUnlinkedLengthPercent;
   odometry.unlink();
 }
 
@@ -149,6 +152,17 @@ void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
   tell_missing(frame.stamp);
 }
 
+/// How far lengths may be off now: a calibration that is adopted by its own sigma, one that stays
+/// also by what the drive measured beside it.
+void Estimator::Parts::note_length_sigma(const CalibrationDecision& decision) noexcept {
+  if (!(decision.depth_sigma_percent > 0)) return;
+  if (decision.accepted)
+    length_sigma_percent = decision.depth_sigma_percent;
+  else if (odometry.linked() == odometry::Link::linked && verified)
+    length_sigma_percent =
+        std::hypot(decision.depth_sigma_percent, decision.depth_difference_percent);
+}
+
 /// What the drive has measured of the rig while it went on.
 void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept {
   if (decision.cause == CalibrationCause::contradicted && !verified)
@@ -184,7 +198,11 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
     note(EstimatorEvent::Kind::focal_length_contradicted, stamp,
          "the focal length given is not that of these images", decision.focal.measured_px);
   focal_contradicted = decision.focal.contradicted;
-  if (decision.learnt) return take_learnt(decision, stamp);
+  if (decision.learnt) {
+    take_learnt(decision, stamp);
+    return note_length_sigma(decision);
+  }
+  note_length_sigma(decision);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
          decision.calibration.frames);

@@ -7,6 +7,17 @@ namespace {
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
 // Frames with good images that no scene can be made of with the calibration in use.
 constexpr int kUnmatchedAfter = 15;
+// Posed frames after an image that came twice, in which the monitor shows whether that camera is an
+// exposure behind from then on: it needs nine.
+constexpr int kLagShownAfter = 12;
+
+Covariance6 upper_triangle(const Mat6& C) noexcept {
+  Covariance6 out;
+  auto next = out.begin();
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) *next++ = static_cast<float>(C(i, j));
+  return out;
+}
 
 }  // namespace
 
@@ -26,6 +37,10 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     give_up_calibration(frame, kUnmatchedAfter);
     odometry.reset_extrinsics();
   }
+  if (out.uneven)
+    may_lag = kLagShownAfter;
+  else if (out.posed && may_lag > 0)
+    --may_lag;
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);
@@ -55,6 +70,18 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
          0);
 }
 
+/// The frame's pose and how uncertain it is by now.
+void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept {
+  sample->T_world_left = out.T_left_world.inverse();
+  const double length_sigma = 0.01 * length_sigma_percent;
+  const Mat6 motion = odometry::motion_covariance(
+      out.fit_covariance, drift.motion_to(out.T_left_world), out.restarted ? out.gap_s : 0.0);
+  drift.step(out.T_left_world, motion, length_sigma);
+  sample->covariance = upper_triangle(drift.pose());
+  sample->motion_covariance = upper_triangle(motion);
+  sample->length_sigma = static_cast<float>(length_sigma);
+}
+
 /// What the state of the calibration makes of a pose's status.
 void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
                              PoseSample* sample) const noexcept {
@@ -67,6 +94,9 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
   } else if (sample->status == PoseStatus::ok && out_of_step > 0) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::out_of_step;
+  } else if (sample->status == PoseStatus::ok && may_lag > 0) {
+    sample->status = PoseStatus::degraded;
+    sample->reason = Reason::image_repeated;
   } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::recalibrating;

@@ -120,6 +120,7 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
   };
   runner_.run(TaskRef(left), TaskRef(others));
   ImageCheck check;
+  bool renewed = false;
   for (int k = 0; k < cameras_; ++k) {
     const auto i = static_cast<std::size_t>(k);
     if (!frame.images[i].empty())
@@ -130,10 +131,12 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
       structured[i] = false;
     }
     if (repeated[i]) check.repeated = true;
+    if (structured[i] && !repeated[i]) renewed = true;
     if (structured[i])
       check.structured =
           static_cast<std::uint8_t>(check.structured | (1U << static_cast<unsigned>(k)));
   }
+  check.uneven = check.repeated && renewed;
   structured_ = check.structured;
   return check;
 }

@@ -23,6 +23,7 @@ struct ImageCheck {
   std::uint8_t structured = 0;  // bit k: and it shows something
   bool repeated = false;  // a camera gave its last image or the left one's once more: noise makes
                           // that impossible
+  bool uneven = false;    // one repeated an image while another gave a new one
 };
 
 /// How the search across went for the corners of one frame.

@@ -175,6 +175,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const ImageCheck images = front_end_.begin(frame);
   clock.mark(Stage::pyramid);
   out.images_good = weakness(images) == Reason::none;
+  out.uneven = images.uneven;
   const double dt = motion_.any() ? (frame.stamp - motion_.stamp()).to_seconds() : 0.0;
   const Transform predicted =
       motion_.any() ? motion_.predict(std::min(dt, kLongestExtrapolation)) : Transform{};
@@ -203,6 +204,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   out.inliers = fit.inliers;
   out.stereo_inliers = fit.stereo;
   out.reprojection_px = fit.rms_px;
+  out.fit_covariance = fit.covariance;
   // The same image again says nothing about motion: the speed stays what it was.
   if (images.repeated)
     out.T_left_world = motion_.T_left_world();

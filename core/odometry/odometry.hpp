@@ -16,6 +16,7 @@ namespace vergence::odometry {
 struct FrameOutcome {
   bool posed = false;
   Transform T_left_world{};
+  Mat6 fit_covariance = Mat6::Zero();  // as PoseFit::covariance; zero: the pose is not a fit
   PoseStatus status = PoseStatus::lost;
   Reason reason = Reason::no_pose;
   int inliers = 0;
@@ -31,6 +32,8 @@ struct FrameOutcome {
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
   bool images_good = false;  // every camera gave an image, new and with structure
+  bool uneven = false;  // a camera gave an older image again and another a new one: from here on
+                        // the one may be an exposure behind
   double scale =
       1;  // everything of the world was scaled by this about the left camera, to the known baseline
   std::array<float, kStages> stage_ms{};

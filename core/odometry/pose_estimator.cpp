@@ -4,12 +4,21 @@
 #include <bit>
 #include <cmath>
 
+#include <Eigen/Cholesky>
+
 namespace vergence::odometry {
 namespace {
 
 constexpr double kOutlier = 9.21;  // squared sigmas, two coordinates at 99 %
 constexpr int kCameraHolds = 8;    // inliers for a camera to count as one that supports the pose
 constexpr int kCameraAlone = 12;   // inliers for a camera's own pose to be believed
+
+/// Zero where the observations hold no pose.
+Mat6 covariance_of(const RefinedPose& pose) noexcept {
+  const Eigen::LLT<Mat6> factor(pose.information);
+  if (factor.info() != Eigen::Success) return Mat6::Zero();
+  return factor.solve(Mat6::Identity());
+}
 
 }  // namespace
 
@@ -85,6 +94,7 @@ PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample) 
   s.T = r.T_left_world;
   s.rms_px = r.rms_px;
   s.inliers = r.inliers;
+  s.covariance = covariance_of(r);
   return s;
 }
 
@@ -126,6 +136,7 @@ PoseFit PoseEstimator::fit_linked(const Map& map, const Transform& start, bool s
   if (s.found) {
     fit.T_left_world = s.T;
     fit.rms_px = s.rms_px;
+    fit.covariance = s.covariance;
     for (std::size_t i = 0; i < owner_.size(); ++i) agrees_[owner_[i]] = refiner_.flags()[i];
   }
   count(map, &fit);
@@ -149,6 +160,7 @@ PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept
   if (!r.usable()) return fit;
   fit.T_left_world = r.T_left_world;
   fit.rms_px = r.rms_px;
+  fit.covariance = covariance_of(r);
   for (std::size_t i = 0; i < owner_.size(); ++i) agrees_[owner_[i]] = refiner_.flags()[i];
   count(map, &fit);
   return fit;
@@ -184,10 +196,12 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
       if (refiner_.flags()[i] != 0)
         agrees_[owner_[i]] =
             static_cast<std::uint8_t>(agrees_[owner_[i]] | (1U << static_cast<unsigned>(k)));
-    if (k == 0)
+    if (k == 0) {
       fit.T_left_world = s.T;
-    else
+      fit.covariance = s.covariance;
+    } else {
       T_camera_left[c] = s.T * fit.T_left_world.inverse();
+    }
     squares += s.rms_px * s.rms_px;
     ++cameras;
   }

@@ -16,7 +16,9 @@ struct PoseFit {
   int near = 0;          // inliers whose depth this frame measures
   int given = 0;         // points that were found in the images at all
   double rms_px = 0;
-  std::uint8_t cameras = 0;  // bit k: camera k holds at least a few of the inliers
+  std::uint8_t cameras = 0;        // bit k: camera k holds at least a few of the inliers
+  Mat6 covariance = Mat6::Zero();  // of T_left_world with the points held: left perturbation (φ
+                                   // rad, τ m), about the left camera
 };
 
 /// Poses from points: three points in MLESAC, then all of them (METHOD §3).
@@ -52,6 +54,7 @@ class PoseEstimator {
     int inliers = 0;
     Transform T{};
     double rms_px = 0;
+    Mat6 covariance = Mat6::Zero();
   };
   void collect(const Map& map) noexcept;
   void collect_camera(const Map& map, int k) noexcept;

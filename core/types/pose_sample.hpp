@@ -31,7 +31,8 @@ enum class Reason : std::uint8_t {
   none,
   no_image,           // a camera delivered nothing for this frame
   image_dark,         // an image carries no structure: covered, black, saturated
-  image_repeated,     // a camera delivered the image of the frame before once more
+  image_repeated,     // a camera delivered the image of the frame before once more, now or a dozen
+                      // frames ago, while others went on: it may be an exposure behind
   few_features,       // too little texture to start from
   no_stereo_matches,  // left and right do not fit this calibration
   cameras_swapped,    // points would lie behind the rig: left and right exchanged
@@ -65,6 +66,9 @@ enum class Stage : std::uint8_t { pyramid, detect, track, match, pose, window };
 inline constexpr int kStages = 6;
 [[nodiscard]] std::string_view to_string(Stage) noexcept;
 
+/// Upper triangle of a symmetric 6×6 matrix, row by row.
+using Covariance6 = std::array<float, 21>;
+
 /// What the estimator says about one frame. A value: copied through rings.
 struct PoseSample {
   std::uint64_t frame = 0;
@@ -72,9 +76,14 @@ struct PoseSample {
   State state = State::initialising;
   PoseStatus status = PoseStatus::lost;
   Reason reason = Reason::none;
-  Transform T_world_left{};    // identity and meaningless when `lost`
-  int inliers = 0;             // points that support the pose
-  int stereo_inliers = 0;      // of these, seen by a second camera in this frame
+  Transform T_world_left{};  // identity and meaningless when `lost`
+  Covariance6 covariance{};  // of T_world_left, by dead reckoning since the first pose: position
+                             // (m), rotation (rad), about the world's axes
+  Covariance6 motion_covariance{};  // of the motion since the last pose: translation (m), rotation
+                                    // (rad), about the left camera's axes; without …
+  float length_sigma = 0;  // … the relative error that all lengths share, 1 σ: the calibration's
+  int inliers = 0;         // points that support the pose
+  int stereo_inliers = 0;  // of these, seen by a second camera in this frame
   double reprojection_px = 0;  // rms of the inliers' residuals, per coordinate
   bool keyframe = false;
   FrameEffort effort{};                   // what was done of the work beside the pose

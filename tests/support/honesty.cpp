@@ -6,17 +6,6 @@
 namespace vergence::test {
 namespace {
 
-/// The true pose nearest in time; nothing beyond half of EuRoC's interval of truth.
-const Transform* true_pose(const app::Trajectory& truth, Stamp stamp) {
-  auto at = std::lower_bound(truth.begin(), truth.end(), stamp,
-                             [](const StampedPose& p, Stamp s) { return p.stamp < s; });
-  if (at != truth.begin() && (at == truth.end() || at->stamp - stamp > stamp - (at - 1)->stamp))
-    --at;
-  if (at == truth.end()) return nullptr;
-  const Duration apart = at->stamp > stamp ? at->stamp - stamp : stamp - at->stamp;
-  return apart <= Duration::milliseconds(3) ? &at->T_world_body : nullptr;
-}
-
 /// Error of the motion between two poses, m; negative: the truth is not known at one of them.
 double motion_error(const JudgedPose& from, const JudgedPose& to, const app::Trajectory& truth) {
   const Transform *a = true_pose(truth, from.stamp), *b = true_pose(truth, to.stamp);
@@ -26,6 +15,16 @@ double motion_error(const JudgedPose& from, const JudgedPose& to, const app::Tra
 }
 
 }  // namespace
+
+const Transform* true_pose(const app::Trajectory& truth, Stamp stamp) {
+  auto at = std::lower_bound(truth.begin(), truth.end(), stamp,
+                             [](const StampedPose& p, Stamp s) { return p.stamp < s; });
+  if (at != truth.begin() && (at == truth.end() || at->stamp - stamp > stamp - (at - 1)->stamp))
+    --at;
+  if (at == truth.end()) return nullptr;
+  const Duration apart = at->stamp > stamp ? at->stamp - stamp : stamp - at->stamp;
+  return apart <= Duration::milliseconds(3) ? &at->T_world_body : nullptr;
+}
 
 NormalErrors normal_errors(std::span<const JudgedPose> poses, const app::Trajectory& truth) {
   NormalErrors sum{};

@@ -19,6 +19,10 @@ namespace vergence::test {
 inline constexpr std::size_t kHonestyFrames = 20;  // fewer at the beginning
 inline constexpr double kHonestyTimes = 5;
 
+/// The true pose nearest in time; null beyond half of EuRoC's interval of truth. Valid as long as
+/// `truth`.
+[[nodiscard]] const Transform* true_pose(const app::Trajectory& truth, Stamp stamp);
+
 struct JudgedPose {
   Stamp stamp{};
   PoseStatus status = PoseStatus::lost;

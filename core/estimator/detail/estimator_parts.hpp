@@ -4,17 +4,25 @@
 #include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
+#include "core/odometry/drift_covariance.hpp"
 #include "core/odometry/odometry.hpp"
 
 /// What an Estimator is made of, for its own sources.
 namespace vergence {
 
 struct Estimator::Parts {
+  // Without a calibration the baseline between two poses found separately is the scale: as far off
+  // as the mean of such frames on recorded drives.
+  static constexpr double kUnlinkedLengthPercent = 10;
+
   Parts(const EstimatorOptions& o, const RigCalibration& r, const RigCalibration& nominal,
         Arena& arena, PairRunner& runner, BackgroundRunner& solver)
       : options(o),
         odometry(options.odometry, r, o.trust != CalibrationTrust::none, arena, runner, o.masks),
         calibrator(options, r, nominal, arena, solver),
+        length_sigma_percent(o.trust == CalibrationTrust::none
+                                 ? kUnlinkedLengthPercent
+                                 : o.calibration.tolerated_depth_percent),
         unconfirmed(o.trust == CalibrationTrust::unconfirmed) {}
 
   void transition(Trigger trigger, Stamp stamp) noexcept {
@@ -39,6 +47,8 @@ struct Estimator::Parts {
     (void)events.push(e);
   }
 
+  void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
+  void note_length_sigma(const CalibrationDecision& decision) noexcept;
   void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
@@ -56,6 +66,8 @@ struct Estimator::Parts {
   EstimatorOptions options;
   odometry::Odometry odometry;
   OnlineCalibrator calibrator;
+  odometry::DriftCovariance drift{};
+  double length_sigma_percent;  // of all lengths, by what is known of the calibration in use
   State state = State::initialising;
   Stamp last{};
   std::uint64_t last_number = 0;
@@ -68,6 +80,7 @@ struct Estimator::Parts {
   bool focal_contradicted = false;  // and noted
   bool superseded = false;          // poses still are of a calibration that was contradicted
   int out_of_step = 0;              // frames for which that is still believed
+  int may_lag = 0;                  // frames for which a camera may be an exposure behind, unseen
   int without_pose = 0;
   bool in_gap = false;       // and the last event has said so
   int unmatched_frames = 0;  // in a row

@@ -18,7 +18,6 @@ struct FaultCase {
   std::string system{};  // what goes wrong below the program, in real time (faulty_system.c)
   double duration_s = 20;
   double recovers_within_s = 0;
-  int known_wrong = 0;  // `ok` poses that are wrong as yet: docs/faults.md names them
 };
 
 /// A drive as its session has it.

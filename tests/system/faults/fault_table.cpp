@@ -19,7 +19,6 @@ struct Kind {
   double seconds;          // 0: none, it is done at once and stays
   // s, within which poses are `ok` again for good: pairing proven, the calibration confirmed anew
   double recovers = 3;
-  int known_wrong = 0;
 };
 
 const std::vector<Kind>& kinds() {
@@ -44,7 +43,7 @@ const std::vector<Kind>& kinds() {
       {"30 % of the frames late", "late_frames", "share=0.3", 5},
       {"30 % of the frames twice", "duplicate_frames", "share=0.3", 5},
       {"pairs broken", "break_pairs", "share=1", 3},
-      {"one camera a frame late", "lag", "camera=1", 3, 5, 3},
+      {"one camera a frame late", "lag", "camera=1", 3, 5},
       {"cables exchanged", "swap_cables", "", 3, 9},
       {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0},
       {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0},
@@ -69,7 +68,6 @@ void add(const Kind& kind, double at_s, FaultCase* c) {
   c->from_s = first ? at_s : std::min(c->from_s, at_s);
   c->until_s = std::max(c->until_s, at_s + kind.seconds);
   c->recovers_within_s = std::max(c->recovers_within_s, kind.recovers);
-  c->known_wrong += kind.known_wrong;
   c->duration_s = c->until_s + c->recovers_within_s + 2;  // twenty frames and some
 }
 

@@ -52,6 +52,7 @@ class Pairs {
       app::CameraRequest r{"cameras." + std::to_string(k),
                            "gige",
                            o.address,
+                           app::PictureHalf::whole,
                            {kWidth, kHeight, rate, Duration::milliseconds(2), 0}};
       give<gige::Options>(&r.configuration, "packet_size", "16000");
       give<gige::Options>(&r.configuration, "resend", resend);

@@ -12,7 +12,7 @@ import threading
 
 import drive as d
 
-KEYS = {"version", "frame", "stamp_ns", "state", "status", "reason", "pose", "covariance", "earth", "inliers", "stereo_inliers",
+KEYS = {"version", "frame", "stamp_ns", "state", "status", "reason", "pose", "covariance", "motion_covariance", "length_sigma", "earth", "inliers", "stereo_inliers",
         "reprojection_px", "estimate_ms", "age_ms", "dropped"}
 SLACK_MS = 50  # of a machine that runs other tests beside this one; the figure itself is publish_bench's
 
@@ -32,8 +32,9 @@ def check_lines(lines, poses, placed_wanted):
         assert line["reason"] == row["reason"], (line, row)
         assert line["inliers"] == int(row["inliers"])
         if line["status"] == "lost":
-            assert line["pose"] is None and line["earth"] is None
+            assert line["pose"] is None and line["earth"] is None and line["covariance"] is None
             continue
+        assert len(line["covariance"]) == len(line["motion_covariance"]) == 21
         for ours, name in zip(line["pose"]["position_m"], "xyz"):
             assert abs(ours - float(row[name])) < 2e-4, (line, row)
         assert line["age_ms"] is not None and line["age_ms"] > 0

@@ -13,7 +13,7 @@ const types = [
   "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/Imu", "nav_msgs/msg/Odometry",
   "diagnostic_msgs/msg/DiagnosticArray", "tf2_msgs/msg/TFMessage", "std_msgs/msg/String",
   "std_msgs/msg/UInt8MultiArray", "vergence_msgs/msg/Frame", "vergence_msgs/msg/InsReading",
-  "vergence_msgs/msg/Pulse",
+  "vergence_msgs/msg/Pulse", "vergence_msgs/msg/DeviceFrame",
 ];
 
 const readable = {
@@ -62,6 +62,8 @@ const fix = last.get("sensor_msgs/msg/NavSatFix");
 assert.deepEqual([fix.latitude, fix.longitude, fix.altitude, fix.position_covariance[0]],
   [-27.476543, 153.028765, 52.25, 4]);
 assert.deepEqual(last.get("nav_msgs/msg/Odometry").pose.pose.position, { x: 1, y: 2, z: 3 });
+const covariance = last.get("nav_msgs/msg/Odometry").pose.covariance;
+assert.deepEqual([covariance[0], covariance[1], covariance[6], covariance[35]], [0.25, 0.125, 0.125, 0.5]);
 const diagnostic = last.get("diagnostic_msgs/msg/DiagnosticArray").status[0];
 assert.deepEqual(diagnostic.values.map((v) => [v.key, v.value]),
   [["dropped", "3"], ["behind_ns", "-12"]]);

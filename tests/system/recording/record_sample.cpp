@@ -19,7 +19,7 @@ constexpr std::array kTopics{RosType::image,       RosType::compressed_image,
                              RosType::diagnostics, RosType::tf,
                              RosType::text,        RosType::bytes,
                              RosType::frame,       RosType::ins_reading,
-                             RosType::pulse};
+                             RosType::pulse,       RosType::device_frame};
 
 void write(CdrWriter* out, RosType type, Stamp stamp) {
   std::array<std::uint8_t, 12> pixels{};
@@ -39,6 +39,9 @@ void write(CdrWriter* out, RosType type, Stamp stamp) {
   pose.stamp = stamp;
   pose.status = PoseStatus::ok;
   pose.T_world_left.t = Vec3(1, 2, 3);
+  pose.covariance[0] = 0.25F;   // of x
+  pose.covariance[1] = 0.125F;  // of x and y
+  pose.covariance[20] = 0.5F;   // of the rotation about z
   FrameRecord frame;
   frame.stamp = stamp;
   frame.number = 3;
@@ -75,6 +78,11 @@ void write(CdrWriter* out, RosType type, Stamp stamp) {
       Pulse pulse;
       pulse.number = 9;
       return write_pulse(out, stamp, pulse);
+    }
+    case RosType::device_frame: {
+      Frame frame;
+      frame.counter = 11;
+      return write_device_frame(out, stamp, "left", frame);
     }
   }
 }

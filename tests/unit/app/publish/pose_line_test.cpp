@@ -20,6 +20,10 @@ PublishedPose sample() {
   s.status = PoseStatus::degraded;
   s.reason = Reason::few_inliers;
   s.T_world_left = {exp_so3({0.1, -0.2, 0.3}), {1.25, -2.5, 3.125}};
+  s.covariance[0] = 0.25F;
+  s.covariance[20] = 1e-6F;
+  s.motion_covariance[6] = 0.0004F;
+  s.length_sigma = 0.0125F;
   s.inliers = 44;
   s.stereo_inliers = 33;
   s.reprojection_px = 0.25;
@@ -52,7 +56,12 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   const PoseNumbers numbers = sample().world_left;
   for (std::size_t i = 0; i < 4; ++i)
     EXPECT_NEAR(j["pose"]["orientation_xyzw"][i].get<double>(), numbers.q[i], 1e-9);
-  EXPECT_TRUE(j["covariance"].is_null());
+  ASSERT_EQ(j["covariance"].size(), 21U);
+  EXPECT_DOUBLE_EQ(j["covariance"][0], 0.25);
+  EXPECT_DOUBLE_EQ(j["covariance"][20], 1e-6);  // four digits are written
+  ASSERT_EQ(j["motion_covariance"].size(), 21U);
+  EXPECT_DOUBLE_EQ(j["motion_covariance"][6], 0.0004);
+  EXPECT_DOUBLE_EQ(j["length_sigma"], 0.0125);
   EXPECT_EQ(j["earth"]["enu_m"], (std::vector<double>{1, 2, 3}));
   EXPECT_EQ(j["earth"]["latitude_deg"], -27.4975);
   EXPECT_EQ(j["earth"]["heading_deg"], 358.25);
@@ -62,7 +71,7 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   EXPECT_EQ(j["estimate_ms"], 7.5);
   EXPECT_EQ(j["age_ms"], 21.5);
   EXPECT_EQ(j["dropped"], 7);
-  EXPECT_EQ(j.size(), 15U) << "a key that docs/publish.md does not have";
+  EXPECT_EQ(j.size(), 17U) << "a key that docs/publish.md does not have";
 }
 
 TEST(PoseLine, ofALostFrameHasNoPlace) {
@@ -70,6 +79,7 @@ TEST(PoseLine, ofALostFrameHasNoPlace) {
   lost.status = PoseStatus::lost;
   const auto j = line_of(lost, EarthNumbers{}, std::nullopt);
   EXPECT_TRUE(j["pose"].is_null());
+  EXPECT_TRUE(j["covariance"].is_null());
   EXPECT_TRUE(j["earth"].is_null());
   EXPECT_TRUE(j["age_ms"].is_null());
 }
@@ -77,9 +87,11 @@ TEST(PoseLine, ofALostFrameHasNoPlace) {
 TEST(PoseLine, staysJsonWithNumbersThatAreNone) {
   PublishedPose pose = sample();
   pose.world_left.t[1] = std::numeric_limits<double>::infinity();
+  pose.motion_covariance[3] = std::numeric_limits<float>::infinity();
   pose.reprojection_px = std::numeric_limits<double>::quiet_NaN();
   const auto j = line_of(pose, std::nullopt, 1e300);
   EXPECT_TRUE(j["pose"].is_null());
+  EXPECT_TRUE(j["motion_covariance"].is_null());
   EXPECT_TRUE(j["reprojection_px"].is_null());
 }
 

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "app/recorder/recorder.hpp"
+#include "app/recorder/pose_line.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {

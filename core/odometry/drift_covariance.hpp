@@ -1,0 +1,48 @@
+#pragma once
+#include "core/math/se3.hpp"
+
+namespace vergence::odometry {
+
+/// Covariance of one frame's motion, translation (m) first, then rotation (rad), about the left
+/// camera's axes.
+///
+/// kFitInflation² times that of the frame's own fit, `fit` (left perturbation φ rad, τ m): a fit
+/// holds the points as if they were known, and their errors last for many frames; the factor is
+/// measured on recorded drives (build/bench/covariance_bench). A motion that was extrapolated over
+/// `extrapolated_s` is off by half of itself. Threads pure.
+[[nodiscard]] Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
+                                     double extrapolated_s) noexcept;
+
+/// How uncertain dead reckoning is, propagated from pose to pose.
+///
+/// Model  Motions have independent errors. Besides, all of a drive share four: lengths are off by
+///        one factor, that of the calibration's depth, and what is wrong with a lens turns the path
+///        by so much a metre. First order: P ← A P Aᵀ + Q, and c ← A c + q for what is shared, with
+///        the adjoint A of the motion (Barfoot, State Estimation for Robotics, 7.3.1).
+///
+///     drift.step(T_left_world, motion_covariance(fit, drift.motion_to(T_left_world), 0), 0.005);
+///     use(drift.pose());
+///
+/// Threads  A value; one caller. Memory: none.
+class DriftCovariance {
+ public:
+  /// The next pose, the covariance of the motion to it as motion_covariance()'s, and the relative
+  /// 1 σ of its length by the calibration. The first pose is exact: it is the world.
+  void step(const Transform& T_left_world, const Mat6& motion, double length_sigma) noexcept;
+  /// T_now_before of a pose that follows; before the first the identity.
+  [[nodiscard]] Transform motion_to(const Transform& T_left_world) const noexcept {
+    return any_ ? T_left_world * T_left_world_.inverse() : Transform{};
+  }
+  /// Of the pose T_world_left since the first one: left camera's position (m), then rotation (rad),
+  /// both about the world's axes.
+  [[nodiscard]] Mat6 pose() const noexcept;
+
+ private:
+  bool any_ = false;
+  Transform T_left_world_{};
+  Mat6 noise_ = Mat6::Zero();  // of T_left_world: left perturbation, translation first
+  // Of the same, 1 σ of each shared error: of lengths, then of turns about x, y, z.
+  Eigen::Matrix<double, 6, 4> shared_ = Eigen::Matrix<double, 6, 4>::Zero();
+};
+
+}  // namespace vergence::odometry

@@ -1,0 +1,117 @@
+#include "core/odometry/drift_covariance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace vergence::odometry {
+namespace {
+
+/// T_left_world of a camera at `centre`, turned about its y axis.
+Transform looking(double yaw, const Vec3& centre) {
+  const Mat3 R = exp_so3({0, -yaw, 0});
+  return {R, -(R * centre)};
+}
+
+/// Noise of a step, translation first.
+Mat6 noise(double metres, double radians) {
+  Mat6 Q = Mat6::Zero();
+  Q.diagonal().head<3>().setConstant(metres * metres);
+  Q.diagonal().tail<3>().setConstant(radians * radians);
+  return Q;
+}
+
+TEST(DriftCovariance, ofTheFirstPoseIsZero) {
+  DriftCovariance drift;
+  drift.step(looking(0.3, {1, 2, 3}), noise(1, 1), 0.1);
+  EXPECT_TRUE(drift.pose().isZero());
+}
+
+TEST(DriftCovariance, ofStandingIsTheSumOfTheSteps) {
+  DriftCovariance drift;
+  for (int i = 0; i <= 9; ++i) drift.step(looking(0.3, {1, 2, 3}), noise(0.02, 0.001), 0.1);
+  EXPECT_TRUE(drift.pose().isApprox(9 * noise(0.02, 0.001), 1e-9));
+}
+
+TEST(DriftCovariance, lengthsAreOffTogether) {
+  DriftCovariance drift;
+  for (int i = 0; i <= 10; ++i) drift.step(looking(0, {0.5 * i, 0, 0}), Mat6::Zero(), 0.02);
+  // Five metres along x, by 2 %.
+  EXPECT_NEAR(std::sqrt(drift.pose()(0, 0)), 0.1, 1e-9);
+}
+
+TEST(DriftCovariance, aTurnThatIsSharedMovesThePoseAside) {
+  DriftCovariance drift;
+  constexpr int kSteps = 100;
+  for (int i = 0; i <= kSteps; ++i) drift.step(looking(0, {0, 0, 1.0 * i}), Mat6::Zero(), 0);
+  const Mat6 P = drift.pose();
+  const double turn = std::sqrt(P(4, 4));
+  EXPECT_NEAR(turn, 2.6e-4 * kSteps, 1e-9);
+  // A circle of that curvature: half of the turn times the way; 1 % for the steps' finite number.
+  EXPECT_NEAR(std::sqrt(P(0, 0)), 0.5 * turn * kSteps, 0.01 * 0.5 * turn * kSteps);
+  EXPECT_NEAR(P(2, 2), 0, 1e-12) << "to first order nothing along the way";
+}
+
+/// Against the errors of many drives round a bend, each step with its own noise.
+TEST(DriftCovariance, isThatOfManyDrives) {
+  constexpr int kDrives = 4000, kSteps = 20;
+  constexpr double kMetres = 0.01, kRadians = 0.002;
+  DriftCovariance drift;
+  std::vector<Transform> exact;
+  for (int i = 0; i <= kSteps; ++i) {
+    exact.push_back(looking(0.05 * i, {0.2 * i, 0.1 * std::sin(0.3 * i), 1.0 * i}));
+    drift.step(exact.back(), noise(kMetres, kRadians), 0);
+  }
+  // What all turns share is taken off again: this is about the rest.
+  DriftCovariance shared;
+  for (const Transform& T : exact) shared.step(T, Mat6::Zero(), 0);
+  const Mat6 expected = drift.pose() - shared.pose();
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  const auto any = [&](double sigma) {
+    return Vec3(sigma * normal(random), sigma * normal(random), sigma * normal(random));
+  };
+  Mat6 measured = Mat6::Zero();
+  const Transform T_world_left = exact.back().inverse();
+  for (int n = 0; n < kDrives; ++n) {
+    Transform T = exact[0];
+    for (int i = 1; i <= kSteps; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const Transform error{exp_so3(any(kRadians)), any(kMetres)};
+      T = error * (exact[k] * exact[k - 1].inverse()) * T;
+    }
+    const Transform off = T.inverse();
+    Vec6 e;
+    e << off.t - T_world_left.t, log_so3(off.R * T_world_left.R.transpose());
+    measured += e * e.transpose() / kDrives;
+  }
+  // A variance of n samples is known to √(2/n): five of that, and its share of the largest.
+  const double tolerance = 5 * std::sqrt(2.0 / kDrives);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      EXPECT_NEAR(measured(i, j), expected(i, j),
+                  tolerance * std::sqrt(expected(i, i) * expected(j, j)))
+          << i << ' ' << j;
+}
+
+TEST(MotionCovariance, ofAnExtrapolatedMotionIsHalfOfIt) {
+  const Transform moved{Mat3::Identity(), {0, 0, -3}};
+  const Mat6 C = motion_covariance(Mat6::Zero(), moved, 0.5);
+  EXPECT_NEAR(std::sqrt(C(2, 2)), 1.5, 1e-12);
+  EXPECT_NEAR(std::sqrt(C(4, 4)), 0.05, 1e-12);
+  EXPECT_TRUE(motion_covariance(Mat6::Zero(), moved, 0).isZero());
+}
+
+TEST(MotionCovariance, hasTranslationFirst) {
+  Mat6 fit = Mat6::Zero();
+  fit(0, 0) = 4;  // rotation about x
+  fit(5, 5) = 1;  // translation along z
+  const Mat6 C = motion_covariance(fit, {}, 0);
+  EXPECT_GT(C(3, 3), 0);
+  EXPECT_DOUBLE_EQ(C(3, 3), 4 * C(2, 2));
+}
+
+}  // namespace
+}  // namespace vergence::odometry
