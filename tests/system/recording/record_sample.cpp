@@ -80,9 +80,9 @@ void write(CdrWriter* out, RosType type, Stamp stamp) {
       return write_pulse(out, stamp, pulse);
     }
     case RosType::device_frame: {
-      Frame frame;
-      frame.counter = 11;
-      return write_device_frame(out, stamp, "left", frame);
+      Frame of_device;
+      of_device.counter = 11;
+      return write_device_frame(out, stamp, "left", of_device);
     }
   }
 }
