@@ -33,7 +33,7 @@ void BoardClock::forget() noexcept {
   used_ = 0;
 }
 
-void BoardClock::told_lock(bool locked, HostStamp now) noexcept {
+void BoardClock::report_lock(bool locked, HostStamp now) noexcept {
   if (locked && !locked_) lock_began_ = now;
   locked_ = locked;
   // What was mapped while it moved is in the older one for so long.

@@ -61,7 +61,7 @@ class BoardClock {
   /// `pps`: something disciplines its ticks.
   void restart(Duration spread, bool pps) noexcept;
   /// What the board says of PPS, about every second.
-  void told_lock(bool locked, HostStamp now) noexcept;
+  void report_lock(bool locked, HostStamp now) noexcept;
   /// The line was opened again: what was under way is not answered any more. The fit stays. `wire`:
   /// a byte's time on it, 0 where it has none.
   void reopen(Duration wire) noexcept;

@@ -41,23 +41,14 @@ std::string hex_of(const std::uint8_t (&bytes)[12]) {
 }  // namespace
 
 Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
-    : SerialDevice(std::move(place), "vergence-board"), options_(options) {
+    : SerialDevice(std::move(place), "vergence-board"),
+      options_(options),
+      receiver_(pause_, [this](const Pulse& pulse) { hand_out(pulse, pulse.arrival); }) {
   info_.driver = "board";
   info_.place = this->place().name();
 }
 
 Device::~Device() { stop(); }
-
-DeviceStatus Device::refuse(DeviceStatus status, std::string sentence) {
-  const std::lock_guard lock(last_error_mutex_);
-  last_error_ = std::move(sentence);
-  return status;
-}
-
-std::string Device::last_error() const {
-  const std::lock_guard lock(last_error_mutex_);
-  return last_error_;
-}
 
 Duration Device::byte_time() const noexcept {
   return options_.native_usb || baud_ == 0 ? Duration{}
@@ -77,17 +68,19 @@ DeviceStatus Device::open() {
 DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   DeviceStatus status = open();
   if (status != DeviceStatus::ok)
-    return refuse(status, place().name() + " cannot be opened: " + std::string(to_string(status)));
-  Setup setup(*line(), frames_, stopping(), this);
+    return last_error_.refuse(
+        status, place().name() + " cannot be opened: " + std::string(to_string(status)));
+  Setup setup(*line(), frames_, stopping(), &receiver_);
   TriggerInfo who;
   status = setup.find(options_.native_usb ? line()->baud() : options_.baud, &who);
-  if (status != DeviceStatus::ok) return refuse(status, place().name() + ": " + setup.last_error());
+  if (status != DeviceStatus::ok)
+    return last_error_.refuse(status, place().name() + ": " + setup.last_error());
   const std::string serial = hex_of(who.serial);
   // Another board would have other lines: that is for a person to decide.
   if (connected_ && serial != info_.serial)
-    return refuse(DeviceStatus::not_found, place().name() +
-                                               ": another trigger board is there now (" + serial +
-                                               " instead of " + info_.serial + ")");
+    return last_error_.refuse(DeviceStatus::not_found,
+                              place().name() + ": another trigger board is there now (" + serial +
+                                  " instead of " + info_.serial + ")");
   if (!connected_) {
     info_.serial = serial;
     info_.model = "trigger board, firmware " + std::to_string(who.firmware_major) + "." +
@@ -115,7 +108,7 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
   try {
     stop();
     remark_.clear();
-    (void)refuse(DeviceStatus::ok, {});
+    last_error_.clear();
     if (line() == nullptr) {
       if (const DeviceStatus s = connect(); s != DeviceStatus::ok) return s;
     }
@@ -123,7 +116,7 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
     TriggerConfig config;
     const DeviceStatus possible =
         wire_configuration(requested, options_, identity_, &config, &sentence);
-    if (possible != DeviceStatus::ok) return refuse(possible, std::move(sentence));
+    if (possible != DeviceStatus::ok) return last_error_.refuse(possible, std::move(sentence));
     config_ = config;
     mark_ = mark_of(config);
     DeviceStatus status = set_up();
@@ -143,20 +136,20 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
 }
 
 DeviceStatus Device::set_up() {
-  Setup setup(*line(), frames_, kNever, this);
+  Setup setup(*line(), frames_, kNever, &receiver_);
   TriggerStatus status;
   DeviceStatus done = setup.halt(&status);
   if (done == DeviceStatus::ok) done = setup.configure(config_, &status);
   if (done != DeviceStatus::ok) {
     if (done == DeviceStatus::gone) close_line();
-    return refuse(done, place().name() + ": " + setup.last_error());
+    return last_error_.refuse(done, place().name() + ": " + setup.last_error());
   }
   return DeviceStatus::ok;
 }
 
 DeviceStatus Device::start(Notifier* ready) noexcept {
   if (!configured_) return DeviceStatus::bad_configuration;
-  if (!running()) pause_.store(0, std::memory_order_relaxed);
+  if (!running()) pause_.drop_new();
   return start_thread(ready);
 }
 
@@ -167,8 +160,7 @@ DeviceStatus Device::wait(Duration limit, Pulse* pulse) noexcept { return take(l
 DeviceStatus Device::pause(std::uint32_t pulses) noexcept {
   if (!streaming()) return DeviceStatus::stopped;
   if (away()) return DeviceStatus::gone;
-  pause_.fetch_add(pulses,
-                   std::memory_order_release);  // the thread looks at least every ping_interval
+  pause_.add(pulses);  // the thread looks at least every ping_interval
   return DeviceStatus::ok;
 }
 
@@ -183,11 +175,6 @@ TriggerStatistics Device::statistics() const noexcept {
   s.overruns = overruns();
   s.starts = starts();
   return s;
-}
-
-BoardStatistics Device::board_statistics() const noexcept {
-  const std::lock_guard lock(published_mutex_);
-  return published_statistics_;
 }
 
 }  // namespace vergence::trigger_board

@@ -1,33 +1,32 @@
 #pragma once
-#include <atomic>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "core/math/random.hpp"
+#include "drivers/common/last_error.hpp"
+#include "drivers/common/published.hpp"
 #include "drivers/common/serial_device.hpp"
 #include "drivers/trigger.hpp"
-#include "drivers/trigger_board/board_clock.hpp"
 #include "drivers/trigger_board/board_line.hpp"
+#include "drivers/trigger_board/board_receiver.hpp"
 #include "drivers/trigger_board/options.hpp"
-#include "drivers/trigger_board/pulse_account.hpp"
+#include "drivers/trigger_board/pause_request.hpp"
 #include "drivers/trigger_board/setup.hpp"
 
 namespace vergence::trigger_board {
 
+/// What a board's session went through, since open.
+struct SessionCounters {
+  std::uint64_t writes_refused = 0;  // questions that the line did not take
+  std::uint64_t gone = 0;            // the line was lost
+  std::uint64_t restarts = 0;        // it had stopped by itself, and was started again
+};
+
 /// All that a board's driver counts and measures, for reports. Counters since open.
-struct BoardStatistics {
+struct BoardStatistics : ReceiverCounters, SessionCounters {
   LineCounters line{};  // frames, and what was none
   PulseCounters pulses{};
-  std::uint64_t frames_unknown =
-      0;                     // right frames of a type or size that this protocol does not have
-  std::uint64_t errors = 0;  // ERROR messages that no one waited for
-  std::uint64_t writes_refused = 0;     // questions that the line did not take
-  std::uint64_t reboots = 0, gone = 0;  // begun again; the line was lost
-  std::uint64_t restarts = 0;           // it had stopped by itself, and was started again
-  std::uint64_t pps_edges = 0, ins_edges = 0;
   TimeQuality time{};
-  TriggerStatus board{};  // its newest own word; all zero before the first
 };
 
 /// A trigger board on a serial line.
@@ -42,13 +41,10 @@ struct BoardStatistics {
 ///          Options::ping_interval. Where it answers none, they come unmapped.
 /// Memory   The thread allocates only while the board is gone or begins again.
 class Device final : public TriggerDevice,
-                     private SerialDevice<Pulse, 256>,  // pulses: eight seconds at 30 Hz
-                     private FrameSink {
+                     private SerialDevice<Pulse, 256> {  // pulses: eight seconds at 30 Hz
  public:
   static constexpr Duration kSilent = Duration::seconds(1);
   static constexpr int kFirstPings = 8;
-  static constexpr int kMostRefused =
-      8;  // events in a row that make no sense: the board is set up anew
 
   Device(std::unique_ptr<LinePlace> place, const Options& options);
   ~Device() override;
@@ -69,38 +65,23 @@ class Device final : public TriggerDevice,
     set_byte_observer(observer);
     return true;
   }
-  [[nodiscard]] std::string last_error() const override;
+  [[nodiscard]] std::string last_error() const override { return last_error_.get(); }
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] TriggerStatistics statistics() const noexcept override;
 
   /// Who the board said it is. Precondition: connected.
   [[nodiscard]] const TriggerInfo& identity() const noexcept { return identity_; }
   /// Any thread; at most a tenth of a second old.
-  [[nodiscard]] BoardStatistics board_statistics() const noexcept;
+  [[nodiscard]] BoardStatistics board_statistics() const noexcept { return statistics_.get(); }
 
  private:
-  struct AskedPause {
-    std::uint32_t pulses = 0;  // 0: none is waiting for its answer
-    std::uint8_t sequence = 0;
-    int turns = 0;
-    HostStamp again{};
-  };
-  enum class Seen : std::uint8_t {
-    nothing,
-    reboot,
-    halted,
-    nonsense
-  };  // what makes the thread stop reading and set the board up
-
   [[nodiscard]] DeviceStatus open();
   [[nodiscard]] DeviceStatus meet(TriggerInfo* who);
   [[nodiscard]] DeviceStatus set_up();
-  [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string sentence);
   [[nodiscard]] Duration byte_time() const noexcept;
 
   [[nodiscard]] DeviceStatus begin() noexcept override;
   [[nodiscard]] DeviceStatus begin_on(Setup* setup);
-  [[nodiscard]] DeviceStatus started() noexcept;
   [[nodiscard]] DeviceStatus tie_clocks() noexcept;
   [[nodiscard]] DeviceStatus read_on() noexcept override;
   [[nodiscard]] DeviceStatus reopen() override;
@@ -111,11 +92,6 @@ class Device final : public TriggerDevice,
   [[nodiscard]] std::uint32_t open_reports() const noexcept;
   void ping() noexcept;
   void send_pause(HostStamp now) noexcept;
-  void accept(const TriggerFrame& frame, const BoardLine::Times& times) noexcept override;
-  void take_event(const TriggerEvent& event, HostStamp arrival) noexcept;
-  void take_pong(const TriggerPong& pong, HostStamp departure) noexcept;
-  void take_status(const TriggerStatus& status) noexcept;
-  [[nodiscard]] bool same_boot(std::uint32_t boot) noexcept;
   void publish(bool last) noexcept;
   void go_streaming(HostStamp now) noexcept;
 
@@ -128,25 +104,18 @@ class Device final : public TriggerDevice,
   bool connected_ = false, configured_ = false;
   DeviceTiming timing_{};
   std::string remark_;
-  mutable std::mutex last_error_mutex_;
-  std::string last_error_;
+  LastError last_error_;
+  PauseRequest pause_;
 
   // From here on: of the thread while it runs, else the owner's.
   BoardLine frames_;
-  PulseAccount account_;
-  BoardClock clock_;
-  BoardStatistics counted_{};
+  BoardReceiver receiver_;
+  SessionCounters counters_{};
   Random dither_{1, 63};
-  AskedPause asked_pause_{};
-  Seen seen_ = Seen::nothing;
-  bool known_boot_ = false;  // account_.boot() is one
-  bool running_ = false;     // it was started and makes pulses, as far as we know
-  bool streaming_ = false;   // events go to the consumer
-  HostStamp heard_{}, published_{};
+  bool running_ = false;  // it was started and makes pulses, as far as we know
+  HostStamp published_at_{};
 
-  std::atomic<std::uint32_t> pause_{0};  // pulses that shall be left out and are not asked for yet
-  mutable std::mutex published_mutex_;
-  BoardStatistics published_statistics_{};
+  Published<BoardStatistics> statistics_;
 };
 
 }  // namespace vergence::trigger_board

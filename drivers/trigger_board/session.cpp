@@ -14,18 +14,15 @@ constexpr Duration kPublish = Duration::milliseconds(100);  // statistics are as
 constexpr Duration kFirstPong =
     Duration::milliseconds(50);  // the first pings wait for their answers
 
-constexpr Duration kPauseAgain = Duration::milliseconds(300);  // without an answer
-constexpr int kPauseTurns = 3;
-
 /// Nobody tells the last question to end: it is short.
 const std::atomic<bool> kNever{false};
 
 }  // namespace
 
 void Device::interrupted(DeviceStatus status) noexcept {
-  streaming_ = false;
+  receiver_.hold();
   publish(false);
-  if (status != DeviceStatus::ok && status != DeviceStatus::ended) ++counted_.gone;
+  if (status != DeviceStatus::ok && status != DeviceStatus::ended) ++counters_.gone;
 }
 
 void Device::finished() noexcept {
@@ -35,10 +32,10 @@ void Device::finished() noexcept {
 
 DeviceStatus Device::begin() noexcept {
   try {
-    Setup setup(*line(), frames_, stopping(), this);
+    Setup setup(*line(), frames_, stopping(), &receiver_);
     const DeviceStatus status = begin_on(&setup);
     if (status != DeviceStatus::ok && status != DeviceStatus::stopped)
-      (void)refuse(status, place().name() + ": " + setup.last_error());
+      last_error_.set(place().name() + ": " + setup.last_error());
     // What it will not do it does not do the next time either; but boards are switched, and
     // programs wait.
     return status == DeviceStatus::ok || status == DeviceStatus::stopped ||
@@ -52,64 +49,52 @@ DeviceStatus Device::begin() noexcept {
 
 /// Who is there, what it shall do, what time it is, and off.
 DeviceStatus Device::begin_on(Setup* setup) {
-  seen_ = Seen::nothing;
+  receiver_.clear_finding();
   TriggerInfo who;
   DeviceStatus status = setup->find(line()->baud(), &who);
   if (status != DeviceStatus::ok) return status;
-  clock_.reopen(byte_time());
+  receiver_.clock().reopen(byte_time());
   frames_.set_byte_time(byte_time());
+  receiver_.expect_configuration(mark_);
   TriggerStatus board{};
-  if (running_ && who.boot_id == account_.boot()) {
+  if (running_ && who.boot_id == receiver_.boot()) {
     // Its pulses may have gone on while the line was away, or it has stopped by itself: it goes on,
     // and what was missed counts.
     go_streaming(line()->now());
     status = setup->start(&board);
-    if (status == DeviceStatus::ok && board.configuration == mark_) return started();
-    streaming_ = false;
+    if (status == DeviceStatus::ok && board.configuration == mark_) {
+      receiver_.forget_halt();
+      return status;
+    }
+    receiver_.hold();
     if (status != DeviceStatus::ok && status != DeviceStatus::failed) return status;
   }
   status = setup->halt(&board);
   if (status == DeviceStatus::ok) status = setup->configure(config_, &board);
   if (status != DeviceStatus::ok) return status;
-  if (who.boot_id != account_.boot() || !known_boot_) {
-    if (known_boot_) ++counted_.reboots;
-    known_boot_ = true;
-    account_.begin(who.boot_id, board.pulses);
-    clock_.restart(timing_.delay_spread, config_.pps_edge != trigger_edge_none);
-    pause_.store(0, std::memory_order_relaxed);  // what was asked of the other start is past
-    asked_pause_ = {};
-  } else {
-    account_.end(board.pulses, 0);
-  }
-  account_.set_intervals(config_.rate_millihertz, config_.vary_us);
+  receiver_.begin_boot(who.boot_id, board.pulses, config_, timing_.delay_spread);
   status = tie_clocks();
   if (status != DeviceStatus::ok) return status;
   running_ = true;
   go_streaming(line()->now());
   status = setup->start(&board);
-  return status == DeviceStatus::ok ? started() : status;
-}
-
-/// What the board said by itself while it was being started is past.
-DeviceStatus Device::started() noexcept {
-  if (seen_ == Seen::halted) seen_ = Seen::nothing;
-  return DeviceStatus::ok;
+  if (status == DeviceStatus::ok) receiver_.forget_halt();
+  return status;
 }
 
 /// Before the first event is handed out.
 void Device::go_streaming(HostStamp now) noexcept {
   report_streaming(now);
-  streaming_ = true;
-  heard_ = now;
+  receiver_.stream(now);
 }
 
 /// Pings before the first pulse, so that it comes with its time.
 DeviceStatus Device::tie_clocks() noexcept {
   for (int i = 0; i < kFirstPings; ++i) {
-    const std::uint64_t before = clock_.answers();
+    const std::uint64_t before = receiver_.clock().answers();
     ping();
     const HostStamp until = line()->now() + kFirstPong;
-    while (clock_.answers() == before && line()->now() < until) {
+    while (receiver_.clock().answers() == before && line()->now() < until) {
       if (stop_requested()) return DeviceStatus::stopped;
       const DeviceStatus status = read_one(until);
       if (status != DeviceStatus::ok && status != DeviceStatus::timeout &&
@@ -123,19 +108,19 @@ DeviceStatus Device::tie_clocks() noexcept {
 /// → ok (it must be set up anew), stopped, ended, gone, failed
 DeviceStatus Device::read_on() noexcept {
   HostStamp next_ping = line()->now();
-  while (seen_ == Seen::nothing) {
+  while (receiver_.finding() == BoardReceiver::Finding::none) {
     if (stop_requested()) return DeviceStatus::stopped;
     const HostStamp now = line()->now();
     send_pause(now);
-    if (now - heard_ > kSilent) return DeviceStatus::gone;
+    if (now - receiver_.last_frame() > kSilent) return DeviceStatus::gone;
     if (now >= next_ping) {
       ping();
       const double part = 1 + 0.2 * dither_.uniform(-1, 1);
       next_ping = now + Duration::nanoseconds(
                             std::llround(part * static_cast<double>(options_.ping_interval.ns())));
     }
-    if (now - published_ >= kPublish || now < published_) {
-      published_ = now;
+    if (now - published_at_ >= kPublish || now < published_at_) {
+      published_at_ = now;
       publish(false);
     }
     const DeviceStatus status = read_one(next_ping);
@@ -143,14 +128,13 @@ DeviceStatus Device::read_on() noexcept {
         status != DeviceStatus::stopped)
       return status;
   }
-  if (seen_ == Seen::halted) ++counted_.restarts;
-  if (seen_ != Seen::nonsense) return DeviceStatus::ok;
+  if (receiver_.finding() == BoardReceiver::Finding::halted) ++counters_.restarts;
+  if (receiver_.finding() != BoardReceiver::Finding::invalid) return DeviceStatus::ok;
   running_ = false;
   try {
-    (void)refuse(
-        DeviceStatus::failed,
+    last_error_.set(
         place().name() +
-            ": the trigger board's numbers or ticks run backwards; check its supply and firmware");
+        ": the trigger board's numbers or ticks run backwards; check its supply and firmware");
   } catch (const std::exception&) {  // out of memory: the counters say it
   }
   return DeviceStatus::failed;
@@ -160,7 +144,7 @@ DeviceStatus Device::read_one(HostStamp deadline) noexcept {
   TriggerFrame frame;
   BoardLine::Times times;
   const DeviceStatus status = frames_.next(deadline, &frame, &times);
-  if (status == DeviceStatus::ok) accept(frame, times);
+  if (status == DeviceStatus::ok) receiver_.accept(frame, times);
   return status;
 }
 
@@ -176,136 +160,55 @@ std::uint32_t Device::open_reports() const noexcept { return config_.feedback_in
 /// No pulse after it, and the last ones are counted.
 void Device::halt_board() noexcept {
   try {
-    Setup setup(*line(), frames_, kNever, this);
+    Setup setup(*line(), frames_, kNever, &receiver_);
     TriggerStatus status;
     const DeviceStatus done = setup.halt(&status);
-    if (done == DeviceStatus::ok) counted_.board = status;
-    if (done == DeviceStatus::ok && status.boot_id == account_.boot())
-      account_.end(status.pulses, open_reports());
-    if (done != DeviceStatus::ok) (void)refuse(done, place().name() + ": " + setup.last_error());
+    if (done == DeviceStatus::ok)
+      receiver_.end(status, open_reports());
+    else
+      last_error_.set(place().name() + ": " + setup.last_error());
     if (done == DeviceStatus::gone) close_line();
   } catch (const std::exception&) {
     close_line();
   }
-  running_ = streaming_ = false;
+  running_ = false;
+  receiver_.hold();
 }
 
 void Device::ping() noexcept {
   std::array<std::uint8_t, trigger_ping_payload_size> payload{};
-  const TriggerPing message{clock_.ask(line()->now())};
+  const TriggerPing message{receiver_.clock().ask(line()->now())};
   trigger_put_ping(&message, payload.data());
-  if (frames_.send(trigger_ping, payload, nullptr) != DeviceStatus::ok) ++counted_.writes_refused;
+  if (frames_.send(trigger_ping, payload, nullptr) != DeviceStatus::ok) ++counters_.writes_refused;
 }
 
-/// Sends what was asked for, and again where no answer comes. One that was heard and whose answer
-/// was lost makes another pause: a gap more, which its numbers tell.
 void Device::send_pause(HostStamp now) noexcept {
-  const std::uint32_t fresh = pause_.exchange(0, std::memory_order_acq_rel);
-  if (fresh > 0)
-    asked_pause_ = {asked_pause_.pulses + fresh, 0, 0, {}};
-  else if (asked_pause_.pulses == 0 || now < asked_pause_.again)
-    return;
-  if (asked_pause_.turns == kPauseTurns) {
-    asked_pause_ = {};
-    return;
-  }
+  const std::uint32_t pulses = pause_.due(now);
+  if (pulses == 0) return;
   std::array<std::uint8_t, trigger_pause_payload_size> payload{};
-  const TriggerPause message{asked_pause_.pulses};
+  const TriggerPause message{pulses};
   trigger_put_pause(&message, payload.data());
-  ++asked_pause_.turns;
-  asked_pause_.again = now + kPauseAgain;
-  if (frames_.send(trigger_pause, payload, &asked_pause_.sequence) == DeviceStatus::ok)
-    account_.expect_pause(asked_pause_.pulses);
+  std::uint8_t sequence = 0;
+  const DeviceStatus status = frames_.send(trigger_pause, payload, &sequence);
+  pause_.sent(sequence, now);
+  if (status == DeviceStatus::ok)
+    receiver_.account().expect_pause(pulses);
   else
-    ++counted_.writes_refused;
-}
-
-// ---- what comes in
-
-/// False: the board has begun again since it was set up.
-bool Device::same_boot(std::uint32_t boot) noexcept {
-  if (!streaming_ || boot == account_.boot()) return true;
-  seen_ = Seen::reboot;
-  return false;
-}
-
-void Device::accept(const TriggerFrame& frame, const BoardLine::Times& times) noexcept {
-  heard_ = times.arrival;
-  const auto size = static_cast<std::size_t>(frame.size);
-  TriggerEvent event;
-  TriggerPong pong;
-  TriggerStatus status;
-  TriggerEdge edge;
-  TriggerInfo info;
-  TriggerError error;
-  if (frame.type == trigger_event && trigger_get_event(frame.payload, size, &event)) {
-    take_event(event, times.arrival);
-  } else if (frame.type == trigger_pong && trigger_get_pong(frame.payload, size, &pong)) {
-    take_pong(pong, times.departure);
-  } else if (frame.type == trigger_status && trigger_get_status(frame.payload, size, &status)) {
-    if (asked_pause_.turns > 0 && frame.sequence == asked_pause_.sequence) asked_pause_ = {};
-    take_status(status);
-  } else if (frame.type == trigger_pps && trigger_get_edge(frame.payload, size, &edge)) {
-    if (same_boot(edge.boot_id)) ++counted_.pps_edges;
-  } else if (frame.type == trigger_ins && trigger_get_edge(frame.payload, size, &edge)) {
-    if (same_boot(edge.boot_id)) ++counted_.ins_edges;
-  } else if (frame.type == trigger_error && trigger_get_error(frame.payload, size, &error)) {
-    ++counted_.errors;
-    if (error.refused == trigger_pause) {
-      asked_pause_ = {};
-      account_.forget_pause();
-    }
-  } else if (frame.type != trigger_info ||
-             !trigger_get_info(frame.payload, size,
-                               &info)) {  // an INFO answers a question given up
-    ++counted_.frames_unknown;
-  }
-}
-
-void Device::take_event(const TriggerEvent& event, HostStamp arrival) noexcept {
-  if (!streaming_ || !same_boot(event.boot_id)) return;
-  Pulse pulse;
-  if (!account_.take(event, &pulse)) {
-    if (account_.refused_in_row() >= kMostRefused) seen_ = Seen::nonsense;
-    return;
-  }
-  const MappedStamp mapped = clock_.map(pulse.edge, arrival);
-  pulse.arrival = arrival;
-  pulse.mapped = true;
-  pulse.host = mapped.host;
-  pulse.host_error = mapped.error;
-  hand_out(pulse, arrival);
-}
-
-void Device::take_pong(const TriggerPong& pong, HostStamp departure) noexcept {
-  if (!same_boot(pong.boot_id)) return;
-  const std::uint64_t resets = clock_.resets_by_set_back();
-  (void)clock_.answer(pong, departure);
-  if (clock_.resets_by_set_back() != resets) account_.forget_time();
-}
-
-void Device::take_status(const TriggerStatus& status) noexcept {
-  counted_.board = status;
-  clock_.told_lock(status.pps_locked != 0, heard_);
-  if (!streaming_ || !same_boot(status.boot_id)) return;
-  if (status.state == trigger_stopped || status.configuration != mark_) seen_ = Seen::halted;
+    ++counters_.writes_refused;
 }
 
 void Device::publish(bool last) noexcept {
-  counted_.line = frames_.counters();
-  counted_.pulses = account_.counters();
-  counted_.time = clock_.quality();
-  counted_.time.pps_locked = counted_.board.pps_locked != 0;
-  const bool seen = counted_.board.boot_id != 0 && counted_.board.pps_age_ms != 0xFFFFFFFFU;
-  counted_.time.pps_age =
-      seen ? Duration::milliseconds(counted_.board.pps_age_ms) : Duration::nanoseconds(-1);
+  BoardStatistics s;
+  static_cast<ReceiverCounters&>(s) = receiver_.counters();
+  static_cast<SessionCounters&>(s) = counters_;
+  s.line = frames_.counters();
+  s.pulses = receiver_.account().counters();
+  s.time = receiver_.time_quality();
   // Whoever reads it holds the lock for a copy's time; the next tenth of a second will do as well.
-  std::unique_lock lock(published_mutex_, std::defer_lock);
   if (last)
-    lock.lock();
+    statistics_.set(s);
   else
-    (void)lock.try_lock();
-  if (lock.owns_lock()) published_statistics_ = counted_;
+    statistics_.offer(s);
 }
 
 }  // namespace vergence::trigger_board

@@ -33,7 +33,6 @@ OVER = {
     ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
     ("drivers/sync/pulse_matcher.hpp", "PulseMatcher"): (30, 21),
     ("drivers/sync/rig_synchronizer.hpp", "RigSynchronizer"): (26, 30),
-    ("drivers/trigger_board/device.hpp", "Device"): (27, 22),
     ("drivers/v4l2/camera_device.hpp", "V4l2Camera"): (34, 15),
 }
 

@@ -1,0 +1,127 @@
+#include "drivers/trigger_board/board_receiver.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace vergence::trigger_board {
+namespace {
+
+constexpr std::uint64_t kPeriod = 33'333;
+constexpr std::uint32_t kBoot = 7, kMark = 0x1234;
+
+TriggerFrame frame_of(std::uint8_t type, std::size_t size, std::uint8_t sequence = 0) {
+  TriggerFrame frame{};
+  frame.type = type;
+  frame.size = static_cast<decltype(frame.size)>(size);
+  frame.sequence = sequence;
+  return frame;
+}
+
+/// A receiver whose board was set up, and streams.
+struct Receiving : ::testing::Test {
+  Receiving() {
+    TriggerConfig config{};
+    config.rate_millihertz = 30'000;
+    receiver.expect_configuration(kMark);
+    receiver.begin_boot(kBoot, 0, config, Duration::milliseconds(4));
+    receiver.stream(HostStamp(0));
+  }
+  void event(std::uint32_t number, std::uint64_t tick, std::uint32_t boot = kBoot) {
+    TriggerEvent e{};
+    e.boot_id = boot;
+    e.pulse = number;
+    e.tick = tick;
+    for (TriggerExposure& x : e.exposure) x = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
+    TriggerFrame frame = frame_of(trigger_event, trigger_event_payload_size);
+    trigger_put_event(&e, frame.payload);
+    accept(frame);
+  }
+  void status(std::uint8_t state, std::uint32_t mark, std::uint8_t sequence = 0) {
+    TriggerStatus s{};
+    s.boot_id = kBoot;
+    s.state = state;
+    s.configuration = mark;
+    TriggerFrame frame = frame_of(trigger_status, trigger_status_payload_size, sequence);
+    trigger_put_status(&s, frame.payload);
+    accept(frame);
+  }
+  void accept(const TriggerFrame& frame) {
+    arrival = arrival + Duration::milliseconds(1);
+    receiver.accept(frame, {arrival, arrival});
+  }
+
+  using Finding = BoardReceiver::Finding;
+  HostStamp arrival{};
+  std::vector<Pulse> pulses;
+  PauseRequest pause;
+  BoardReceiver receiver{pause, [this](const Pulse& p) { pulses.push_back(p); }};
+};
+
+TEST_F(Receiving, anEventIsAPulseWithTheHostsTimeAndItsArrival) {
+  event(0, kPeriod);
+  event(1, 2 * kPeriod);
+  ASSERT_EQ(pulses.size(), 2U);
+  EXPECT_EQ(pulses[1].number, 1U);
+  EXPECT_TRUE(pulses[1].mapped);
+  EXPECT_EQ(pulses[1].arrival, arrival);
+  EXPECT_EQ(receiver.last_frame(), arrival);
+  EXPECT_EQ(receiver.finding(), Finding::none);
+}
+
+TEST_F(Receiving, nothingIsHandedOutWhileItIsBeingSetUp) {
+  receiver.hold();
+  event(0, kPeriod);
+  event(0, kPeriod, kBoot + 1);
+  EXPECT_TRUE(pulses.empty());
+  EXPECT_EQ(receiver.finding(), Finding::none) << "a change of the board is none yet";
+}
+
+TEST_F(Receiving, anotherBootIsFoundByAnyFrameThatHasOne) {
+  event(0, kPeriod, kBoot + 1);
+  EXPECT_TRUE(pulses.empty());
+  EXPECT_EQ(receiver.finding(), Finding::reboot);
+  receiver.clear_finding();
+  receiver.begin_boot(kBoot + 1, 0, TriggerConfig{}, {});
+  EXPECT_EQ(receiver.counters().reboots, 1U);
+  event(0, kPeriod, kBoot + 1);
+  EXPECT_EQ(pulses.size(), 1U);
+}
+
+TEST_F(Receiving, aBoardThatStoppedOrHasAnotherConfigurationIsHalted) {
+  status(trigger_running, kMark);
+  EXPECT_EQ(receiver.finding(), Finding::none);
+  status(trigger_running, kMark + 1);
+  EXPECT_EQ(receiver.finding(), Finding::halted);
+  receiver.forget_halt();
+  EXPECT_EQ(receiver.finding(), Finding::none);
+  status(trigger_stopped, kMark);
+  EXPECT_EQ(receiver.finding(), Finding::halted);
+}
+
+TEST_F(Receiving, numbersThatCannotBeEndInInvalidAfterAFewInARow) {
+  event(5, 6 * kPeriod);
+  for (int i = 1; i < BoardReceiver::kMostRefused; ++i) event(5, 6 * kPeriod);
+  EXPECT_EQ(receiver.finding(), Finding::none) << "one fewer than it takes";
+  event(5, 6 * kPeriod);
+  EXPECT_EQ(receiver.finding(), Finding::invalid);
+  EXPECT_EQ(pulses.size(), 1U);
+}
+
+TEST_F(Receiving, aStatusWithTheSequenceOfAPauseAnswersIt) {
+  pause.add(3);
+  ASSERT_EQ(pause.due(arrival), 3U);
+  pause.sent(11, arrival);
+  status(trigger_running, kMark, 11);
+  EXPECT_EQ(pause.due(arrival + PauseRequest::kAnswerLimit * 2), 0U);
+}
+
+TEST_F(Receiving, framesOfNoKnownTypeOrSizeAreCounted) {
+  accept(frame_of(0x7E, 3));
+  accept(frame_of(trigger_event, trigger_event_payload_size - 1));
+  EXPECT_EQ(receiver.counters().frames_unknown, 2U);
+  EXPECT_TRUE(pulses.empty());
+}
+
+}  // namespace
+}  // namespace vergence::trigger_board
