@@ -66,7 +66,8 @@ std::size_t BoardPattern::corners() const noexcept {
 Vec3 BoardPattern::corner(std::size_t i) const noexcept {
   const std::size_t at = kind == BoardKind::aprilgrid ? i / 4 : i;
   const auto n = static_cast<std::size_t>(columns);
-  const auto column = static_cast<double>(at % n), row = static_cast<double>(at / n);
+  const std::size_t in_column = at % n, in_row = at / n;
+  const auto column = static_cast<double>(in_column), row = static_cast<double>(in_row);
   if (kind != BoardKind::aprilgrid) return {square * column, square * row, 0};
   const double pitch = square * (1 + spacing);
   const bool right = i % 4 == 1 || i % 4 == 2, upper = i % 4 >= 2;

@@ -135,8 +135,8 @@ ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands
     complain(error.what());
     return ExitCode::device_failed;
   } catch (const std::bad_alloc&) {
-    std::fputs("vergence: not enough memory; close other programs or choose smaller capacities\n",
-               stderr);
+    (void)std::fputs(
+        "vergence: not enough memory; close other programs or choose smaller capacities\n", stderr);
   } catch (const std::exception& error) {
     complain(std::string("stopped by an error nobody foresaw: ") + error.what());
   }

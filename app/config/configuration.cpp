@@ -36,6 +36,7 @@ class Flattener {
   explicit Flattener(std::vector<Entry>* entries) : entries_(entries) {}
 
   /// `origin`: for every entry instead of its file:line; empty: by file and line.
+  // NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
   void add(const YamlFile& file, const YAML::Node& node, const std::string& name,
            const std::string& origin, int depth = 0) {
     const std::string here = origin.empty() ? file.at(node) : origin;

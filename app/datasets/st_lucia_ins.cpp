@@ -105,6 +105,7 @@ void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
 std::vector<Moving> motions(const std::vector<Line>& lines) {
   const LocalTangentPlane plane(lines.front().place);
   std::vector<Vec3> places;
+  places.reserve(lines.size());
   for (const Line& line : lines) places.push_back(plane.to_enu(line.place));
   std::vector<Moving> out;
   std::size_t before = 0, after = 0;

@@ -17,7 +17,7 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 
 std::filesystem::path find_beside(const std::filesystem::path& folder, const std::string& name) {
-  const std::filesystem::path path(name);
+  std::filesystem::path path(name);
   std::error_code none;
   if (path.is_absolute() || folder.empty() || !std::filesystem::exists(folder / path, none))
     return path;

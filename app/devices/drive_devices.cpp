@@ -27,7 +27,7 @@ bool all_mock(const Configuration& c) {
 
 /// The MTi-G-700/710 makes pulses of 400 Hz / n and marks the reading each left with; the MTi-G
 /// makes its own sample rate / n, unmarked.
-bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find("7") != std::string::npos; }
+bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find('7') != std::string::npos; }
 
 void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
   constexpr double kBase = 400;  // Hz

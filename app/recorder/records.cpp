@@ -118,8 +118,8 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
   if (state) {
     std::array<char, 256> text{};
     const auto from = to_string(event.from), to = to_string(event.to);
-    std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()),
-                  from.data(), static_cast<int>(to.size()), to.data(), event.why);
+    (void)std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()),
+                        from.data(), static_cast<int>(to.size()), to.data(), event.why);
     r.set_sentence(text.data());
     // The words are string literals: views of them end with 0.
     r.fields[0] = {"from", from.data()};

@@ -24,6 +24,7 @@ void fit_x(PlotBox* box, double low, double high) {
 
 std::vector<Line> on_paper(const PlotBox& box, const std::vector<Line>& lines) {
   std::vector<Line> placed;
+  placed.reserve(lines.size());
   for (const Line& line : lines) placed.push_back(box.line(line));
   return placed;
 }

@@ -145,6 +145,7 @@ std::string numbers_text(const nlohmann::json& value) {
 }
 
 /// Numbers below an object, its keys as names; for blocks whose keys are not fixed.
+// NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
 void flatten(const nlohmann::json& json, const std::string& prefix, int depth, std::size_t* rows,
              Figures* f) {
   constexpr int kDeepest = 3;

@@ -37,7 +37,7 @@ std::string_view first_line(const char* path, std::array<char, 64>* buffer) noex
 }
 
 void add_thread(const char* id, std::vector<ProcessThread>* threads) {
-  const int number = std::atoi(id);  // 0: `.` and `..`
+  const int number = static_cast<int>(std::strtol(id, nullptr, 10));  // 0: `.` and `..`
   if (number <= 0) return;
   std::array<char, 64> path{}, text{};
   (void)std::snprintf(path.data(), path.size(), "/proc/self/task/%d/comm", number);

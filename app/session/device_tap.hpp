@@ -29,18 +29,18 @@ class DeviceTap final : public AcquisitionObserver {
 
  private:
   struct InsLine final : ByteObserver {
-    explicit InsLine(DeviceTap* tap) noexcept : tap_(tap) {}
+    explicit InsLine(DeviceTap* t) noexcept : tap(t) {}
     void on_bytes(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept override {
-      tap_->observer_->on_ins_bytes(tap_->tie_.stamp_at(arrival), bytes);
+      tap->observer_->on_ins_bytes(tap->tie_.stamp_at(arrival), bytes);
     }
-    DeviceTap* tap_;
+    DeviceTap* tap;
   };
   struct BoardLine final : ByteObserver {
-    explicit BoardLine(DeviceTap* tap) noexcept : tap_(tap) {}
+    explicit BoardLine(DeviceTap* t) noexcept : tap(t) {}
     void on_bytes(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept override {
-      tap_->observer_->on_board_bytes(tap_->tie_.stamp_at(arrival), bytes);
+      tap->observer_->on_board_bytes(tap->tie_.stamp_at(arrival), bytes);
     }
-    DeviceTap* tap_;
+    DeviceTap* tap;
   };
 
   DeviceObserver* observer_;

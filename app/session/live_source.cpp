@@ -33,6 +33,7 @@ std::int64_t clock_ns(clockid_t clock) {
 
 std::vector<std::string> serials_of(const std::vector<CameraDevice*>& cameras) {
   std::vector<std::string> serials;
+  serials.reserve(cameras.size());
   for (const CameraDevice* camera : cameras) serials.push_back(camera->info().serial);
   return serials;
 }

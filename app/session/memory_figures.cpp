@@ -55,7 +55,7 @@ std::size_t resident_bytes(const Arena& arena) {
                     pages.begin(), pages.end(), [](unsigned char p) { return (p & 1U) != 0; }));
 }
 
-ResidentMemory resident_memory(std::vector<std::pair<std::string, const Arena*>> arenas) {
+ResidentMemory resident_memory(const std::vector<std::pair<std::string, const Arena*>>& arenas) {
   ResidentMemory memory;
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {

@@ -31,7 +31,7 @@ struct ResidentMemory {
 [[nodiscard]] std::size_t resident_bytes(const Arena& arena);
 /// Zeros where proc is not mounted.
 [[nodiscard]] ResidentMemory resident_memory(
-    std::vector<std::pair<std::string, const Arena*>> arenas);
+    const std::vector<std::pair<std::string, const Arena*>>& arenas);
 
 /// Its figures as summary.json has them.
 [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> named(

@@ -83,7 +83,7 @@ Transform draw_pose(const SimulatedRig& rig, const SimulationOptions& o, Random&
     const Mat3 R = looking_along(-outward, random.uniform(0, 2 * M_PI));
     if (o.generator == SimulationGenerator::ring) {
       const Vec3 centre = outward * random.uniform(20, 25);
-      const Transform T{R, -(R * centre)};
+      Transform T{R, -(R * centre)};
       if (sees_all(rig, T)) return T;
       continue;
     }
@@ -94,7 +94,7 @@ Transform draw_pose(const SimulatedRig& rig, const SimulationOptions& o, Random&
     double distance = 1.02 * o.radius;
     for (int step = 0; step < 400; ++step, distance *= 1.02) {
       const Vec3 centre = outward * distance - R.transpose() * middle;
-      const Transform T{R, -(R * centre)};
+      Transform T{R, -(R * centre)};
       if (sees_all(rig, T)) return T;
     }
   }
@@ -160,16 +160,17 @@ SimulatedRig simulate_rig(const SimulationOptions& o, Random& random) {
   }
   for (int i = 0; i < o.poses; ++i) rig.true_poses.push_back(draw_pose(rig, o, random));
   for (std::uint32_t j = 0; j < rig.true_points.size(); ++j)
-    for (std::uint16_t i = 0; i < rig.true_poses.size(); ++i)
-      for (std::uint8_t k = 0; k < rig.cameras.size(); ++k) {
+    for (std::size_t i = 0; i < rig.true_poses.size(); ++i)
+      for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
         Vec2 pixel;
         if (rig.cameras[k].project(rig.true_cameras[k] * (rig.true_poses[i] * rig.true_points[j]),
                                    &pixel, nullptr) != ProjectStatus::ok)
           continue;
         const double dx = random.normal(), dy = random.normal();
         const float inverse_sigma = o.noise > 0 ? static_cast<float>(1.0 / o.noise) : 1.0F;
-        rig.observations.push_back(
-            {j, i, k, inverse_sigma, pixel.x() + o.noise * dx, pixel.y() + o.noise * dy});
+        rig.observations.push_back({j, static_cast<std::uint16_t>(i), static_cast<std::uint8_t>(k),
+                                    inverse_sigma, pixel.x() + o.noise * dx,
+                                    pixel.y() + o.noise * dy});
       }
   perturb_start(rig, o, random);
   return rig;

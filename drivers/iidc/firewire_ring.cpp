@@ -64,6 +64,7 @@ bool FirewireBus::find_map() {
   for (std::string line; std::getline(maps, line);) {
     if (!line.ends_with(node_.device)) continue;
     std::uintptr_t first = 0, last = 0;
+    // NOLINTNEXTLINE(cert-err34-c): two addresses that the kernel wrote
     if (std::sscanf(line.c_str(), "%" SCNxPTR "-%" SCNxPTR, &first, &last) != 2) continue;
     auto* base = reinterpret_cast<std::uint8_t*>(first);
     if (base == known || last - first < shape_.buffers * shape_.frame_bytes) continue;

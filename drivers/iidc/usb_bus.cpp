@@ -341,6 +341,7 @@ std::string UsbBus::remark(const StreamShape& shape, double rate_hz, int sharing
       static_cast<double>(kTransfers * shape.frame_bytes) * sharing / 1048576.0;
   int limit = 0;
   if (std::FILE* f = std::fopen("/sys/module/usbcore/parameters/usbfs_memory_mb", "r")) {
+    // NOLINTNEXTLINE(cert-err34-c): a number that the kernel wrote
     if (std::fscanf(f, "%d", &limit) != 1) limit = 0;
     (void)std::fclose(f);
   }

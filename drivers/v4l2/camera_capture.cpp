@@ -12,7 +12,8 @@
 namespace vergence::v4l2 {
 namespace {
 
-constexpr int kPollLimit_ms = 500;  // the longest look of the capture thread; nothing depends on it
+constexpr int kPollLimit =
+    500;  // ms: the longest look of the capture thread; nothing depends on it
 constexpr int kPollErrors =
     20;  // looks in a row that end in an error without a frame: nothing comes any more
 
@@ -33,7 +34,7 @@ void V4l2Camera::capture() noexcept {
     enqueue_returned();
     // Without a buffer of ours the kernel answers at once that there is nothing to wait for.
     pollfd fds[2] = {{with_kernel_ > 0 ? fd_.get() : -1, POLLIN, 0}, {wake_.get(), POLLIN, 0}};
-    (void)::poll(fds, 2, kPollLimit_ms);
+    (void)::poll(fds, 2, kPollLimit);
     std::uint64_t woken = 0;
     if (fds[1].revents != 0) (void)!::read(wake_.get(), &woken, sizeof woken);
     if (fds[0].revents == 0) continue;

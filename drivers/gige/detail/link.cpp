@@ -25,7 +25,8 @@ constexpr int kMostBySwitches = 9000;  // bytes; beyond it few switches go
 
 double packets_of(const LinkLoad& load, int packet_size) noexcept {
   const int data = std::max(1, packet_size - (load.extended_ids ? kExtendedHeaders : kHeaders));
-  return static_cast<double>((load.payload + data - 1) / data + 2);  // leader and trailer
+  const auto filled = (load.payload + data - 1) / data;
+  return static_cast<double>(filled + 2);  // leader and trailer
 }
 
 }  // namespace
@@ -91,7 +92,7 @@ int find_udp_socket(std::uint16_t port) {
   if (folder == nullptr) return -1;
   int found = -1;
   while (const dirent* entry = ::readdir(folder)) {
-    const int fd = std::atoi(entry->d_name);
+    const int fd = static_cast<int>(std::strtol(entry->d_name, nullptr, 10));
     int type = 0;
     socklen_t length = sizeof type;
     if (fd <= 2 || ::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &length) != 0 || type != SOCK_DGRAM)

@@ -109,7 +109,7 @@ class Path {
 
 // ---- the driver
 
-constexpr double kLongestEnd_s = 60;  // of the standing start and end, however long stops are
+constexpr double kLongestEnd = 60;  // s, of the standing start and end, however long stops are
 
 /// Distance driven at every kDriveStep: the fastest way along the path within the limits, with
 /// pauses.
@@ -131,7 +131,7 @@ std::vector<double> distances(const Path& path, const std::vector<double>& stops
   for (std::size_t i = n; i-- > 0;)
     v2[i] = std::min(v2[i], v2[i + 1] + 2 * 1.3 * o.acceleration * step);
 
-  const double dt = kDriveStep.to_seconds(), ends = std::min(o.stop_s, kLongestEnd_s);
+  const double dt = kDriveStep.to_seconds(), ends = std::min(o.stop_s, kLongestEnd);
   std::vector<double> out;
   double time = 0;  // at sample i of the path
   const auto emit_until = [&](double until, double s0, double s1, double t0, double v0, double v1) {
