@@ -24,7 +24,6 @@ MOST_METHODS = 30
 OVER = {
     ("app/recording/recording.hpp", "Recording"): (37, 23),
     ("drivers/acquisition/acquisition.hpp", "Acquisition"): (29, 23),
-    ("drivers/gige/detail/gige_camera.hpp", "GigeCamera"): (37, 18),
     ("drivers/iidc/firewire_bus.hpp", "FirewireBus"): (23, 19),
     ("drivers/iidc/iidc_camera.hpp", "IidcCamera"): (27, 8),
     ("drivers/mock/detail/devices.hpp", "MockCamera"): (21, 9),
