@@ -30,7 +30,6 @@ OVER = {
     ("drivers/mock/detail/scheduler.hpp", "Scheduler"): (29, 36),
     ("drivers/mock/simulators/simulated_line.cpp", "SimulatedPlace"): (26, 29),
     ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
-    ("drivers/sync/pulse_matcher.hpp", "PulseMatcher"): (30, 21),
     ("drivers/sync/rig_synchronizer.hpp", "RigSynchronizer"): (26, 30),
     ("drivers/v4l2/camera_device.hpp", "V4l2Camera"): (34, 15),
 }
