@@ -31,7 +31,6 @@ OVER = {
     ("drivers/mock/simulators/simulated_line.cpp", "SimulatedPlace"): (26, 29),
     ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
     ("drivers/sync/rig_synchronizer.hpp", "RigSynchronizer"): (26, 30),
-    ("drivers/v4l2/camera_device.hpp", "V4l2Camera"): (34, 15),
 }
 
 COMMENT_OR_TEXT = re.compile(
