@@ -27,7 +27,6 @@ OVER = {
     ("drivers/iidc/firewire_bus.hpp", "FirewireBus"): (23, 19),
     ("drivers/iidc/iidc_camera.hpp", "IidcCamera"): (27, 8),
     ("drivers/mock/detail/devices.hpp", "MockCamera"): (21, 9),
-    ("drivers/mock/detail/scheduler.hpp", "Scheduler"): (29, 36),
     ("drivers/mock/simulators/simulated_line.cpp", "SimulatedPlace"): (26, 29),
     ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
     ("drivers/sync/rig_synchronizer.hpp", "RigSynchronizer"): (26, 30),
