@@ -144,7 +144,9 @@ struct RecordSettings {
   double keep_s = 0;                                        // 0: everything
   int roll_mb = 0;                                          // 0: one file
   double roll_s = 0;                                        // 0: one file
-  int memory_mb = 0;  // 0: as much as six seconds take, and keep_s
+  int memory_mb = 0;     // 0: as much as six seconds take, and keep_s
+  int image_format = 0;  // kRawImages …
+  static constexpr int kRawImages = 0, kPngImages = 1;
 
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses + raw > 0; }
 };

@@ -42,8 +42,11 @@ Group record() {
       .choice("poses", &R::poses, off_on, "Odometry, transforms and diagnostics of every frame.")
       .choice("ins", &R::ins, off_on, "All readings of the INS, as they were compared.")
       .choice("images", &R::images, off_on,
-              "All images that the estimator was given, not packed, with their cameras: what "
-              "`replay --format session` needs.")
+              "All images that the estimator was given, with their cameras: what `replay --format "
+              "session` needs.")
+      .choice("image_format", &R::image_format, {"raw", "png"},
+              "`raw`: `sensor_msgs/Image`, as it is; `png`: `sensor_msgs/CompressedImage`, half of "
+              "the disk for some of a processor (docs/recording.md).")
       .choice("pulses", &R::pulses, off_on,
               "Of a live drive: the trigger board's pulses and the cameras' frames by their own "
               "counters and clocks, before they are paired.")

@@ -103,7 +103,7 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
                        "with --calibration",
                        name, topic));
   const RosCameraInfo& info = found->second;
-  const RosCamera camera = is_rectified(topic) ? rectified(info.camera) : info.camera;
+  RosCamera camera = is_rectified(topic) ? rectified(info.camera) : info.camera;
   const std::string& fault = is_rectified(topic) ? info.fault_rectified : info.fault;
   if (!fault.empty())
     refuse(path, 0, fmt::format("{}: {}; give a calibration with --calibration", name, fault));

@@ -3,11 +3,16 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <mutex>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "app/datasets/detail/bag_index.hpp"
+#include "app/datasets/detail/grey_png.hpp"
+#include "app/datasets/detail/png.hpp"
+#include "app/datasets/detail/ros_messages.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/version.hpp"
@@ -103,6 +108,24 @@ std::optional<RecordedReading> read_reading(std::span<const std::uint8_t> bytes)
 
 struct RecordedSession::Files {
   std::vector<detail::BagFile> list;
+
+  // Where PNGs are read into and decoded: of the largest, so that read() takes no heap.
+  std::mutex decoding;
+  std::vector<std::uint8_t> packed;
+  detail::GreyPngDecoder decoder;
+
+  void reserve(const RecordedImage& image) {
+    if (image.packed > packed.size()) packed.resize(image.packed);
+    decoder.reserve(image.packed, {image.width, image.height});
+  }
+  [[nodiscard]] bool decode(const detail::ByteSource& file, const RecordedImage& image,
+                            std::uint8_t* out) noexcept {
+    const std::lock_guard lock(decoding);
+    const auto png = std::span(packed).first(image.packed);
+    return file.read(image.offset, png) && detail::check_png(png) == ImageFileStatus::ok &&
+           decoder.decode(png, {image.width, image.height}, out,
+                          static_cast<std::size_t>(image.width));
+  }
 };
 
 /// What a scan gathers.
@@ -113,12 +136,14 @@ struct RecordedSession::Reader {
   bool described = false;
   std::array<RecordedImage, kMaxCameras> newest{};  // not yet of a frame
   std::array<Stamp, kMaxCameras> newest_stamp{};
+  std::map<std::pair<Stamp, std::size_t>, RecordedImage> packed{};  // by camera
   std::size_t broken = 0, images_lost = 0;
 
   void take(const detail::BagMessage& m, std::uint32_t file) {
     const std::string& type = m.channel->type;
     if (m.channel->topic == SessionDescription::kTopic) return take_description(m);
     if (type == "sensor_msgs/Image") return take_image(m, file);
+    if (type == "sensor_msgs/CompressedImage") return take_packed_image(m, file);
     if (type == "vergence_msgs/Frame") return take_frame(m);
     if (type == "vergence_msgs/InsReading") return take_reading(m);
   }
@@ -147,9 +172,38 @@ struct RecordedSession::Reader {
     if (!image || image->layout != detail::PixelLayout::grey ||
         image->step != static_cast<std::uint32_t>(image->size.width))
       return;
-    newest[camera->second] = {file, m.place.offset + image->offset, image->size.width,
+    newest[camera->second] = {file, 0, m.place.offset + image->offset, image->size.width,
                               image->size.height};
     newest_stamp[camera->second] = image->stamp;
+  }
+
+  /// Encoded by a thread of its own, it comes behind its frame more often than before it.
+  void take_packed_image(const detail::BagMessage& m, std::uint32_t file) {
+    const auto camera = cameras.find(m.channel->topic);
+    if (camera == cameras.end() || m.place.chunk != detail::BagPlace::kNoChunk) return;
+    std::array<std::uint8_t, detail::kRosImageHead> head{};
+    const auto bytes = std::span(head).first(std::min<std::size_t>(head.size(), m.place.size));
+    if (!m.bytes->read(m.place.offset, bytes)) return;
+    const auto image =
+        detail::read_ros_compressed_image(bytes, m.place.size, detail::MessageEncoding::cdr);
+    if (!image || image->bytes == 0) return;
+    packed[{image->stamp, camera->second}] = {file, image->bytes, m.place.offset + image->offset,
+                                              image->size.width, image->size.height};
+  }
+
+  /// Images that the frames do not have yet, among those that were packed.
+  void finish() {
+    for (RecordedFrame& frame : session->frames_)
+      for (std::size_t k = 0; k < static_cast<std::size_t>(frame.given.cameras); ++k) {
+        if ((frame.given.images_present >> k & 1U) == 0 || frame.images[k].offset != 0) continue;
+        const auto found = packed.find({frame.given.stamp, k});
+        if (found == packed.end()) {
+          ++images_lost;
+          continue;
+        }
+        frame.images[k] = found->second;
+        session->files_->reserve(found->second);
+      }
   }
 
   void take_frame(const detail::BagMessage& m) {
@@ -163,10 +217,7 @@ struct RecordedSession::Reader {
     RecordedFrame frame{*record, {}, session->readings_.size()};
     for (std::size_t k = 0; k < static_cast<std::size_t>(record->cameras); ++k) {
       if ((record->images_present >> k & 1U) == 0) continue;
-      if (newest[k].offset != 0 && newest_stamp[k] == record->stamp)
-        frame.images[k] = newest[k];
-      else
-        ++images_lost;
+      if (newest[k].offset != 0 && newest_stamp[k] == record->stamp) frame.images[k] = newest[k];
     }
     newest = {};
     session->frames_.push_back(frame);
@@ -212,6 +263,7 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
           scan->broken_chunks, scan->broken_records, *scan->first_broken, scan->why_broken));
     session.complete_ = session.complete_ && !scan->first_broken;
   }
+  reader.finish();
   if (!reader.described)
     refuse(folder, 0,
            "holds no recording of a session: its .mcap files are another program's, which "
@@ -248,7 +300,8 @@ bool RecordedSession::read(const RecordedFrame& frame, std::size_t camera, std::
   const auto size = width * static_cast<std::size_t>(image.height);
   const detail::ByteSource& file = *files_->list[image.file].bytes;
   // In one piece, so that the check sum is one; then the rows move apart, the last one first.
-  if (!file.read(image.offset, {out, size})) return false;
+  if (image.packed == 0 ? !file.read(image.offset, {out, size}) : !files_->decode(file, image, out))
+    return false;
   if (crc32_of({out, size}) != frame.given.image_crc[camera]) return false;
   if (stride != width)
     for (std::size_t y = static_cast<std::size_t>(image.height); y-- > 0;)

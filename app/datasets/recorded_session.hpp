@@ -15,10 +15,11 @@
 /// What `record:` wrote of a session: everything the estimator was given, in its order.
 namespace vergence::app {
 
-/// Where the pixels of an image are, 8-bit grey without padding.
+/// Where the pixels of an image are, 8-bit grey without padding, or the PNG of them.
 struct RecordedImage {
   std::uint32_t file = 0;    // of the recording's files
-  std::uint64_t offset = 0;  // in it; 0: there is no such image
+  std::uint32_t packed = 0;  // bytes of the PNG; 0: pixels
+  std::uint64_t offset = 0;  // in the file; 0: there is no such image
   int width = 0, height = 0;
 };
 
@@ -29,7 +30,7 @@ struct RecordedFrame {
 };
 
 /// A recording, opened. Memory  Some 400 bytes a frame and 250 a reading; pixels stay in the files.
-/// Threads  read(): any number at once.
+/// Threads  read(): any number at once; PNGs are decoded one at a time.
 ///
 ///     const RecordedSession session = RecordedSession::open("sessions/monday");
 ///     for (const RecordedFrame& frame : session.frames()) {

@@ -18,6 +18,7 @@
 #include <sstream>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 namespace vergence::app {
 namespace fs = std::filesystem;
@@ -39,6 +40,26 @@ std::optional<Integer> whole_number(const std::optional<std::string>& text, int 
   return value;
 }
 
+constexpr std::size_t kMostEntry = 16384;  // bytes of a group's or a user's entry
+
+/// Empty: there is none.
+std::string group_name(gid_t id) {
+  std::vector<char> text(kMostEntry);
+  ::group entry{};
+  ::group* found = nullptr;
+  (void)::getgrgid_r(id, &entry, text.data(), text.size(), &found);
+  return found == nullptr || found->gr_name == nullptr ? std::string() : found->gr_name;
+}
+
+/// Empty: there is none.
+std::string own_name() {
+  std::vector<char> text(kMostEntry);
+  passwd entry{};
+  passwd* found = nullptr;
+  (void)::getpwuid_r(::getuid(), &entry, text.data(), text.size(), &found);
+  return found == nullptr || found->pw_name == nullptr ? std::string() : found->pw_name;
+}
+
 std::vector<std::string> own_groups() {
   std::vector<gid_t> ids(static_cast<std::size_t>(std::max(0, ::getgroups(0, nullptr))));
   const int n = ::getgroups(static_cast<int>(ids.size()), ids.data());
@@ -46,7 +67,7 @@ std::vector<std::string> own_groups() {
   ids.push_back(::getegid());
   std::vector<std::string> names;
   for (const gid_t id : ids)
-    if (const ::group* g = ::getgrgid(id); g != nullptr) names.emplace_back(g->gr_name);
+    if (std::string name = group_name(id); !name.empty()) names.push_back(std::move(name));
   std::sort(names.begin(), names.end());
   names.erase(std::unique(names.begin(), names.end()), names.end());
   return names;
@@ -71,8 +92,7 @@ std::vector<InterfaceAddress> own_addresses() {
 std::string group_of_node(const std::string& node) {
   struct stat s {};
   if (::stat(node.c_str(), &s) != 0) return {};
-  const ::group* g = ::getgrgid(s.st_gid);
-  return g == nullptr ? std::string() : g->gr_name;
+  return group_name(s.st_gid);
 }
 
 std::optional<std::uint64_t> free_bytes_of(const fs::path& folder) {
@@ -96,8 +116,7 @@ std::optional<bool> kernel_clock_synchronised() {
 
 Machine Machine::here() {
   Machine m;
-  if (const passwd* p = ::getpwuid(::getuid()); p != nullptr && p->pw_name != nullptr)
-    m.user = p->pw_name;
+  m.user = own_name();
   m.groups = own_groups();
   m.addresses = own_addresses();
   m.may_use = [](const std::string& node) { return ::access(node.c_str(), R_OK | W_OK) == 0; };

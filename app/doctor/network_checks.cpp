@@ -203,6 +203,7 @@ std::vector<Link> links_of(const Machine& m, const std::vector<Reached>& cameras
     link.speed = megabits > 0 ? static_cast<double>(megabits) * kMega : 0;
   }
   std::vector<Link> all;
+  all.reserve(links.size());
   for (auto& [name, link] : links) all.push_back(std::move(link));
   return all;
 }

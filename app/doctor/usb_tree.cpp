@@ -26,7 +26,7 @@ std::vector<std::string> video_nodes(const Machine& m, const std::string& folder
   std::vector<std::string> nodes;
   for (const std::string& entry : m.names(folder))
     if (entry.starts_with(port + ":"))
-      for (const std::string& node : m.names(folder + "/" + entry + "/video4linux"))
+      for (const std::string& node : m.names(fmt::format("{}/{}/video4linux", folder, entry)))
         nodes.push_back(node);
   return nodes;
 }
@@ -52,7 +52,7 @@ std::vector<UsbDevice> list_usb_devices(const Machine& m) {
                       what = m.line(folder + "/product").value_or("");
     d.title = maker.empty() || what.starts_with(maker) ? what
               : what.empty()                           ? maker
-                                                       : maker + " " + what;
+                                                       : fmt::format("{} {}", maker, what);
     d.bus = small_number(m, folder + "/busnum");
     d.number = small_number(m, folder + "/devnum");
     d.mbit = speed_of(m, folder + "/speed");

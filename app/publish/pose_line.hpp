@@ -23,7 +23,7 @@ struct PublishedPose {
   State state = State::initialising;
   PoseStatus status = PoseStatus::lost;
   Reason reason = Reason::none;
-  PoseNumbers world_left{};  // meaningless when `lost`
+  PoseNumbers world_left{};                       // meaningless when `lost`
   Covariance6 covariance{}, motion_covariance{};  // as PoseSample's
   float length_sigma = 0;
   int inliers = 0, stereo_inliers = 0;

@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "app/config/configuration.hpp"
+#include "app/recording/image_encoder.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/recording.hpp"
 #include "app/session/device_observer.hpp"
@@ -46,7 +48,7 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   /// The file at hand ends, a new one begins. Any thread.
   void roll() noexcept { recording_.roll(); }
   /// Ends the files.
-  void close() noexcept { recording_.close(); }
+  void close() noexcept;
   /// Nothing more is recorded. The estimator's thread.
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
@@ -58,6 +60,7 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
                      const Write& write, std::size_t queue = 0) noexcept;
   void post_bytes(std::size_t topic, Stamp stamp, std::span<const std::uint8_t> bytes,
                   std::size_t queue) noexcept;
+  [[nodiscard]] bool post_pixels(const RigFrame& frame, std::size_t camera) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
   void post_health(const PoseSample& sample) noexcept;
@@ -67,6 +70,7 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   std::array<std::string, kMaxCameras> frames_;  // of reference, of the cameras
   std::array<std::string_view, kMaxCameras> frame_names_{};
   Recording recording_;
+  std::optional<ImageEncoder> encoder_;  // record.image_format: png
 
   // Of the estimator's thread.
   RigCalibration rig_;

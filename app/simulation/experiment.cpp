@@ -88,7 +88,7 @@ void run_once(BundleAdjuster& adjuster, const Experiment& a, const SimulationOpt
   if (a.length == "measured")
     for (std::size_t k = 1; k < rig.cameras.size(); ++k)
       options.length[k] = {BundleLength::measured,
-                           rig.true_T_camera_left[k].t.norm() + kMeasuredSigma * random.normal(),
+                           rig.true_cameras[k].t.norm() + kMeasuredSigma * random.normal(),
                            kMeasuredSigma};
   std::vector<float> squared(rig.observations.size());
   BundleProblem problem = rig.problem();
@@ -117,13 +117,12 @@ void run_once(BundleAdjuster& adjuster, const Experiment& a, const SimulationOpt
   }
   double rotation = 0, translation = 0, pose = 0;
   for (std::size_t k = 1; k < rig.cameras.size(); ++k) {
-    rotation += rotation_angle(rig.T_camera_left[k].R * rig.true_T_camera_left[k].R.transpose()) /
+    rotation += rotation_angle(rig.T_camera_left[k].R * rig.true_cameras[k].R.transpose()) /
                 (s.cameras - 1);
-    translation += (rig.T_camera_left[k].t - rig.true_T_camera_left[k].t).norm() / (s.cameras - 1);
+    translation += (rig.T_camera_left[k].t - rig.true_cameras[k].t).norm() / (s.cameras - 1);
   }
   for (std::size_t i = 1; i < rig.T_left_world.size(); ++i)
-    pose +=
-        (rig.T_left_world[i].centre() - rig.true_T_left_world[i].centre()).norm() / (s.poses - 1);
+    pose += (rig.T_left_world[i].centre() - rig.true_poses[i].centre()).norm() / (s.poses - 1);
   level->reprojection_px.add(reprojection);
   level->pose_m.add(pose);
   level->rotation_rad.add(rotation);

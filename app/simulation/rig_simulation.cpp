@@ -66,7 +66,7 @@ std::vector<Transform> draw_cameras(const SimulationOptions& o, Random& random) 
 
 bool sees_all(const SimulatedRig& rig, const Transform& T_left_world) {
   for (std::size_t k = 0; k < rig.cameras.size(); ++k) {
-    const Transform T = rig.true_T_camera_left[k] * T_left_world;
+    const Transform T = rig.true_cameras[k] * T_left_world;
     for (const Vec3& p : rig.true_points) {
       Vec2 pixel;
       if (rig.cameras[k].project(T * p, &pixel, nullptr) != ProjectStatus::ok ||
@@ -89,9 +89,8 @@ Transform draw_pose(const SimulatedRig& rig, const SimulationOptions& o, Random&
     }
     // Left camera so that the middle of the baseline to camera 1 sits on the axis through the
     // centre.
-    const Vec3 middle = rig.true_T_camera_left.size() > 1
-                            ? Vec3(0.5 * rig.true_T_camera_left[1].centre())
-                            : Vec3::Zero();
+    const Vec3 middle =
+        rig.true_cameras.size() > 1 ? Vec3(0.5 * rig.true_cameras[1].centre()) : Vec3::Zero();
     double distance = 1.02 * o.radius;
     for (int step = 0; step < 400; ++step, distance *= 1.02) {
       const Vec3 centre = outward * distance - R.transpose() * middle;
@@ -153,20 +152,19 @@ BundleProblem SimulatedRig::monocular_problem(std::vector<Transform>* images,
 SimulatedRig simulate_rig(const SimulationOptions& o, Random& random) {
   SimulatedRig rig;
   rig.cameras.assign(static_cast<std::size_t>(o.cameras), pinhole());
-  rig.true_T_camera_left = draw_cameras(o, random);
+  rig.true_cameras = draw_cameras(o, random);
   for (int i = 0; i < o.points; ++i) {
     const Vec3 d = direction(random);
     const double r = o.shape == SimulationShape::shell ? 1.0 : std::cbrt(random.uniform());
     rig.true_points.push_back(d * r * o.radius);
   }
-  for (int i = 0; i < o.poses; ++i) rig.true_T_left_world.push_back(draw_pose(rig, o, random));
+  for (int i = 0; i < o.poses; ++i) rig.true_poses.push_back(draw_pose(rig, o, random));
   for (std::uint32_t j = 0; j < rig.true_points.size(); ++j)
-    for (std::uint16_t i = 0; i < rig.true_T_left_world.size(); ++i)
+    for (std::uint16_t i = 0; i < rig.true_poses.size(); ++i)
       for (std::uint8_t k = 0; k < rig.cameras.size(); ++k) {
         Vec2 pixel;
-        if (rig.cameras[k].project(
-                rig.true_T_camera_left[k] * (rig.true_T_left_world[i] * rig.true_points[j]), &pixel,
-                nullptr) != ProjectStatus::ok)
+        if (rig.cameras[k].project(rig.true_cameras[k] * (rig.true_poses[i] * rig.true_points[j]),
+                                   &pixel, nullptr) != ProjectStatus::ok)
           continue;
         const double dx = random.normal(), dy = random.normal();
         const float inverse_sigma = o.noise > 0 ? static_cast<float>(1.0 / o.noise) : 1.0F;
@@ -178,8 +176,8 @@ SimulatedRig simulate_rig(const SimulationOptions& o, Random& random) {
 }
 
 void perturb_start(SimulatedRig& rig, const SimulationOptions& o, Random& random) {
-  rig.T_camera_left = rig.true_T_camera_left;
-  rig.T_left_world = rig.true_T_left_world;
+  rig.T_camera_left = rig.true_cameras;
+  rig.T_left_world = rig.true_poses;
   rig.points = rig.true_points;
   for (std::size_t i = 1; i < rig.T_left_world.size(); ++i) {
     Transform& T = rig.T_left_world[i];

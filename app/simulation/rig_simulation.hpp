@@ -37,7 +37,8 @@ struct SimulationOptions {
 /// real-time path.
 struct SimulatedRig {
   std::vector<Camera> cameras;
-  std::vector<Transform> true_T_camera_left, true_T_left_world, T_camera_left, T_left_world;
+  std::vector<Transform> true_cameras, true_poses;     // T_camera_left, T_left_world of the truth
+  std::vector<Transform> T_camera_left, T_left_world;  // of the start
   std::vector<Vec3> true_points, points;
   std::vector<BundleObservation> observations;
 

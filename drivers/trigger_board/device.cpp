@@ -16,9 +16,9 @@ const std::atomic<bool> kNever{false};
 
 DeviceTiming timing_of(const TriggerConfig& config, Duration byte_time,
                        Duration latency_timer) noexcept {
-  constexpr std::int64_t kEventBytes = trigger_event_payload_size + trigger_overhead + 2;
+  constexpr std::int64_t kReportBytes = trigger_event_payload_size + trigger_overhead + 2;
   DeviceTiming t;
-  t.least_delay = byte_time * kEventBytes;
+  t.least_delay = byte_time * kReportBytes;
   // A report waits for the end of the exposures, at the latest for the next pulse.
   const Duration period =
       Duration::nanoseconds(1'000'000'000'000 / std::max<std::int64_t>(1, config.rate_millihertz));

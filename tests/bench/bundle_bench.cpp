@@ -258,7 +258,7 @@ void window(int runs) {
   double steps = 0, observations = 0;
   for (int i = 0; i < runs; ++i) {
     SimulatedRig rig = simulate_rig(s, random);
-    rig.T_camera_left = rig.true_T_camera_left;
+    rig.T_camera_left = rig.true_cameras;
     std::vector<std::uint16_t> first(kPoints), last(kPoints);
     for (std::size_t j = 0; j < kPoints; ++j) {
       first[j] = static_cast<std::uint16_t>(random.below(kPoses - 1));

@@ -73,36 +73,62 @@ bool unfilter(std::uint8_t filter, const std::uint8_t* from, const std::uint8_t*
   }
 }
 
-struct Release {
-  void operator()(libdeflate_decompressor* d) const noexcept { libdeflate_free_decompressor(d); }
-};
+/// The content of the chunks, the filtered rows, and a row of nothing above the first.
+std::size_t work_bytes(std::size_t file_bytes, ImageSize size) noexcept {
+  const auto width = static_cast<std::size_t>(size.width),
+             height = static_cast<std::size_t>(size.height);
+  return file_bytes + (width + 1) * height + width;
+}
 
 }  // namespace
 
-bool decode_grey_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept {
-  if (!is_plain_grey(bytes)) return false;
+void GreyPngDecoder::Release::operator()(libdeflate_decompressor* d) const noexcept {
+  libdeflate_free_decompressor(d);
+}
+
+GreyPngDecoder::GreyPngDecoder() : inflater_(libdeflate_alloc_decompressor()) {
+  if (!inflater_) throw std::bad_alloc();
+}
+
+GreyPngDecoder::~GreyPngDecoder() = default;
+
+void GreyPngDecoder::reserve(std::size_t file_bytes, ImageSize size) {
+  const std::size_t bytes = work_bytes(file_bytes, size);
+  if (bytes <= work_size_) return;
+  work_ = std::make_unique_for_overwrite<std::uint8_t[]>(bytes);
+  work_size_ = bytes;
+}
+
+bool GreyPngDecoder::decode(Bytes bytes, ImageSize size, std::uint8_t* out,
+                            std::size_t stride) noexcept {
+  if (!is_plain_grey(bytes) || work_bytes(bytes.size(), size) > work_size_) return false;
   const auto width = static_cast<std::size_t>(size.width),
              height = static_cast<std::size_t>(size.height);
   const std::size_t row = width + 1;  // its filter before it
-  // The row above the first is 0.
-  const std::size_t filtered_at = bytes.size(), nothing_at = filtered_at + row * height;
-  const std::unique_ptr<std::uint8_t[]> work(new (std::nothrow) std::uint8_t[nothing_at + width]);
-  const std::unique_ptr<libdeflate_decompressor, Release> inflater(libdeflate_alloc_decompressor());
-  if (!work || !inflater) return false;
-  const std::size_t packed = join_pixel_chunks(bytes, work.get());
+  std::uint8_t *filtered = work_.get() + bytes.size(), *nothing = filtered + row * height;
+  const std::size_t packed = join_pixel_chunks(bytes, work_.get());
   std::size_t read = 0;
-  if (libdeflate_zlib_decompress_ex(inflater.get(), work.get(), packed, &work[filtered_at],
-                                    row * height, &read, nullptr) != LIBDEFLATE_SUCCESS)
+  if (libdeflate_zlib_decompress_ex(inflater_.get(), work_.get(), packed, filtered, row * height,
+                                    &read, nullptr) != LIBDEFLATE_SUCCESS)
     return false;
-  std::memset(&work[nothing_at], 0, width);
-  const std::uint8_t* above = &work[nothing_at];
+  std::memset(nothing, 0, width);
+  const std::uint8_t* above = nothing;
   for (std::size_t y = 0; y < height; ++y) {
-    const std::uint8_t* from = &work[filtered_at + y * row];
+    const std::uint8_t* from = filtered + y * row;
     std::uint8_t* to = out + y * stride;
     if (!unfilter(from[0], from + 1, above, width, to)) return false;
     above = to;
   }
   return true;
+}
+
+bool decode_grey_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride) noexcept
+    try {
+  GreyPngDecoder decoder;
+  decoder.reserve(bytes.size(), size);
+  return decoder.decode(bytes, size, out, stride);
+} catch (const std::bad_alloc&) {
+  return false;
 }
 
 }  // namespace vergence::app::detail

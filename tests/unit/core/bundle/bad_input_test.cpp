@@ -41,7 +41,7 @@ class BadBundle : public ::testing::Test {
 };
 
 TEST_F(BadBundle, pointBehindItsCameraIsNamed) {
-  rig.points[7] = rig.true_T_left_world[0].inverse() * Vec3(0, 0, -5);
+  rig.points[7] = rig.true_poses[0].inverse() * Vec3(0, 0, -5);
   expect(BundleTermination::invalid_input, BundleDefect::behind, rig.problem());
   EXPECT_EQ(rig.observations[index].point, 7U);
 }
@@ -138,7 +138,7 @@ TEST_F(BadBundle, aPoseSeenByTwoPointsIsRankDeficient) {
   std::erase_if(rig.observations, [](const BundleObservation& o) {
     return o.pose == 3 && (o.point > 1 || o.camera == 1);
   });
-  rig.T_camera_left = rig.true_T_camera_left;
+  rig.T_camera_left = rig.true_cameras;
   const BundleResult r = own.adjuster.solve(rig.problem(), {});
   EXPECT_EQ(r.termination, BundleTermination::rank_deficient) << to_string(r.termination);
   EXPECT_TRUE(rig.T_left_world[3].finite());

@@ -23,17 +23,16 @@ inline BundleOptions calibration_options() {
 inline double pose_error(const SimulatedRig& rig) {
   double worst = 0;
   for (std::size_t i = 0; i < rig.T_left_world.size(); ++i)
-    worst =
-        std::max(worst, (rig.T_left_world[i].centre() - rig.true_T_left_world[i].centre()).norm());
+    worst = std::max(worst, (rig.T_left_world[i].centre() - rig.true_poses[i].centre()).norm());
   return worst;
 }
 
 inline double rotation_error(const SimulatedRig& rig, std::size_t camera) {
-  return rotation_angle(rig.T_camera_left[camera].R * rig.true_T_camera_left[camera].R.transpose());
+  return rotation_angle(rig.T_camera_left[camera].R * rig.true_cameras[camera].R.transpose());
 }
 
 inline double translation_error(const SimulatedRig& rig, std::size_t camera) {
-  return (rig.T_camera_left[camera].t - rig.true_T_camera_left[camera].t).norm();
+  return (rig.T_camera_left[camera].t - rig.true_cameras[camera].t).norm();
 }
 
 }  // namespace vergence

@@ -55,12 +55,12 @@ TEST(Bundle, stereoOdometryLeavesTheRigAloneAndFindsThePoses) {
   Random random(13);
   for (int run = 0; run < 20; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
-    rig.T_camera_left = rig.true_T_camera_left;
+    rig.T_camera_left = rig.true_cameras;
     const BundleResult r = own.adjuster.solve(rig.problem(), {});
     ASSERT_TRUE(r.converged()) << to_string(r.termination);
     EXPECT_LT(r.rms_px, kExactPixel);
     EXPECT_LT(pose_error(rig), kExactMetre);
-    EXPECT_EQ(rig.T_camera_left[1].t, rig.true_T_camera_left[1].t);
+    EXPECT_EQ(rig.T_camera_left[1].t, rig.true_cameras[1].t);
   }
 }
 
@@ -82,10 +82,9 @@ TEST(Bundle, parallelMonocularFindsEveryImageUpToScale) {
     EXPECT_LT(r.rms_px, kExactPixel);
     const Transform& newest_left = images[images.size() - 2];
     const Transform T_right_left = images.back() * newest_left.inverse();
-    const double scale = rig.true_T_camera_left[1].t.norm() / T_right_left.t.norm();
-    EXPECT_LT(rotation_angle(T_right_left.R * rig.true_T_camera_left[1].R.transpose()),
-              kExactRadian);
-    EXPECT_LT((scale * T_right_left.t - rig.true_T_camera_left[1].t).norm(), kExactMetre);
+    const double scale = rig.true_cameras[1].t.norm() / T_right_left.t.norm();
+    EXPECT_LT(rotation_angle(T_right_left.R * rig.true_cameras[1].R.transpose()), kExactRadian);
+    EXPECT_LT((scale * T_right_left.t - rig.true_cameras[1].t).norm(), kExactMetre);
   }
 }
 
@@ -123,8 +122,7 @@ TEST(Bundle, intrinsicsWithPriorsAreFoundThroughDistortion) {
   for (BundleObservation& o : rig.observations) {
     Vec2 pixel;
     ASSERT_EQ(rig.cameras[o.camera].project(
-                  rig.true_T_camera_left[o.camera] *
-                      (rig.true_T_left_world[o.pose] * rig.true_points[o.point]),
+                  rig.true_cameras[o.camera] * (rig.true_poses[o.pose] * rig.true_points[o.point]),
                   &pixel, nullptr),
               ProjectStatus::ok);
     o.x = pixel.x();
@@ -219,8 +217,8 @@ TEST(Bundle, withEveryPoseConstantThePointsAloneAreFound) {
   s.noise = 0;
   Random random(24);
   SimulatedRig rig = simulate_rig(s, random);
-  rig.T_camera_left = rig.true_T_camera_left;
-  rig.T_left_world = rig.true_T_left_world;
+  rig.T_camera_left = rig.true_cameras;
+  rig.T_left_world = rig.true_poses;
   const std::vector<std::uint8_t> constant(rig.T_left_world.size(), 1);
   BundleProblem p = rig.problem();
   p.pose_constant = constant;
@@ -236,10 +234,10 @@ TEST(Bundle, aPosePriorHoldsAPoseThatNothingElseHolds) {
   s.noise = 0;
   Random random(20);
   SimulatedRig rig = simulate_rig(s, random);
-  rig.T_camera_left = rig.true_T_camera_left;
+  rig.T_camera_left = rig.true_cameras;
   BundlePosePrior prior;
   prior.pose = 0;
-  prior.T_left_world = rig.true_T_left_world[0];
+  prior.T_left_world = rig.true_poses[0];
   prior.information = Mat6::Identity() * 1e4;
   rig.T_left_world[0] = perturbed(rig.T_left_world[0], {0.01, -0.02, 0.01}, {0.1, 0.1, -0.1});
   std::vector<std::uint8_t> constant(10, 0);
@@ -250,7 +248,7 @@ TEST(Bundle, aPosePriorHoldsAPoseThatNothingElseHolds) {
   const BundleResult r = own.adjuster.solve(p, {});
   ASSERT_TRUE(r.converged()) << to_string(r.termination);
   EXPECT_LT(pose_error(rig), 1e-8);
-  EXPECT_LT(rotation_angle(rig.T_left_world[0].R * rig.true_T_left_world[0].R.transpose()), 1e-9);
+  EXPECT_LT(rotation_angle(rig.T_left_world[0].R * rig.true_poses[0].R.transpose()), 1e-9);
 }
 
 TEST(Bundle, solveDoesNotAllocate) {

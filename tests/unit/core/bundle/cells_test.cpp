@@ -22,16 +22,14 @@ SimulatedRig small_motion(int poses, int life, Random& random,
   Intrinsics lens;
   lens.width = 1024, lens.height = 768, lens.fx = lens.fy = 887, lens.cx = 511.5, lens.cy = 383.5;
   rig.cameras.assign(2, Camera(lens));
-  rig.true_T_camera_left = {Transform{},
-                            Transform{exp_so3({5e-3, -8e-3, 3e-3}), {-0.7, 0.01, 0.02}}};
+  rig.true_cameras = {Transform{}, Transform{exp_so3({5e-3, -8e-3, 3e-3}), {-0.7, 0.01, 0.02}}};
   for (int i = 0; i < poses; ++i) {
     const auto within = [&](double most) {
       const double x = random.uniform(-most, most), y = random.uniform(-most, most),
                    z = random.uniform(-most, most);
       return Vec3(x, y, z);
     };
-    rig.true_T_left_world.push_back(i == 0 ? Transform{}
-                                           : Transform{exp_so3(within(0.02)), within(0.5)});
+    rig.true_poses.push_back(i == 0 ? Transform{} : Transform{exp_so3(within(0.02)), within(0.5)});
   }
   for (std::uint32_t j = 0; j < kPoints; ++j) {
     const double x = random.uniform(-0.55, 0.55), y = random.uniform(-0.4, 0.4);
@@ -42,17 +40,16 @@ SimulatedRig small_motion(int poses, int life, Random& random,
     for (auto i = static_cast<std::uint16_t>(first); i < last; ++i)
       for (std::uint8_t k = 0; k < 2; ++k) {
         Vec2 at;
-        if (rig.cameras[k].project(
-                rig.true_T_camera_left[k] * (rig.true_T_left_world[i] * rig.true_points[j]), &at,
-                nullptr) != ProjectStatus::ok)
+        if (rig.cameras[k].project(rig.true_cameras[k] * (rig.true_poses[i] * rig.true_points[j]),
+                                   &at, nullptr) != ProjectStatus::ok)
           continue;
         const double dx = kNoise * random.normal(), dy = kNoise * random.normal();
         const Vec2 seen = at + Vec2(dx, dy) + (k == 1 ? field_of_the_right(at) : Vec2::Zero());
         rig.observations.push_back({j, i, k, static_cast<float>(1 / kNoise), seen.x(), seen.y()});
       }
   }
-  rig.T_camera_left = rig.true_T_camera_left;
-  rig.T_left_world = rig.true_T_left_world;
+  rig.T_camera_left = rig.true_cameras;
+  rig.T_left_world = rig.true_poses;
   rig.points = rig.true_points;
   return rig;
 }

@@ -10,8 +10,8 @@ namespace {
 /// Error of T_camera_left[1] as the left perturbation (φ, τ) that takes the truth to the estimate.
 Vec6 error_of(const SimulatedRig& rig) {
   Vec6 e;
-  e << log_so3(rig.T_camera_left[1].R * rig.true_T_camera_left[1].R.transpose()),
-      rig.T_camera_left[1].t - rig.true_T_camera_left[1].t;
+  e << log_so3(rig.T_camera_left[1].R * rig.true_cameras[1].R.transpose()),
+      rig.T_camera_left[1].t - rig.true_cameras[1].t;
   return e;
 }
 
@@ -71,8 +71,8 @@ TEST(BundleCovariance, normalisedErrorsHaveTheirChiSquareMeanWithAMeasuredLength
   for (int run = 0; run < 1000; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
     BundleOptions o = with_covariance();
-    o.length[1] = {BundleLength::measured,
-                   rig.true_T_camera_left[1].t.norm() + 1e-3 * random.normal(), 1e-3};
+    o.length[1] = {BundleLength::measured, rig.true_cameras[1].t.norm() + 1e-3 * random.normal(),
+                   1e-3};
     const BundleResult r = own.adjuster.solve(rig.problem(), o);
     ASSERT_TRUE(r.converged() && r.has_covariance) << run << to_string(r.termination);
     sum += normalised_squared(error_of(rig), r.covariance_white[1], rig.T_camera_left[1].t, false);
@@ -198,11 +198,11 @@ TEST(BundleCovariance, newestPoseOfAnOdometryWindowHasItsCovariance) {
   double sum = 0;
   for (int run = 0; run < kRuns; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
-    rig.T_camera_left = rig.true_T_camera_left;
+    rig.T_camera_left = rig.true_cameras;
     const BundleResult r = own.adjuster.solve(rig.problem(), o);
     ASSERT_TRUE(r.converged() && r.has_pose_covariance);
     ASSERT_EQ(r.pose, 9);
-    const Transform &T = rig.T_left_world[9], &truth = rig.true_T_left_world[9];
+    const Transform &T = rig.T_left_world[9], &truth = rig.true_poses[9];
     const Mat3 turn = T.R * truth.R.transpose();
     Vec6 e;
     e << log_so3(turn), T.t - turn * truth.t;

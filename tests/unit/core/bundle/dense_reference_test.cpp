@@ -182,15 +182,15 @@ TEST_P(DenseReference, oneStepIsTheDenseStep) {
   for (BundleObservation& o : d.rig.observations) {  // the truth seen through this lens, the noise
                                                      // kept small against the curvature
     Vec2 pixel;
-    ASSERT_EQ(d.rig.cameras[o.camera].project(
-                  d.rig.true_T_camera_left[o.camera] *
-                      (d.rig.true_T_left_world[o.pose] * d.rig.true_points[o.point]),
-                  &pixel, nullptr),
-              ProjectStatus::ok);
+    ASSERT_EQ(
+        d.rig.cameras[o.camera].project(
+            d.rig.true_cameras[o.camera] * (d.rig.true_poses[o.pose] * d.rig.true_points[o.point]),
+            &pixel, nullptr),
+        ProjectStatus::ok);
     o.x = pixel.x() + 0.5 * random.normal();
     o.y = pixel.y() + 0.5 * random.normal();
   }
-  if (!d.calibrating()) d.rig.T_camera_left = d.rig.true_T_camera_left;
+  if (!d.calibrating()) d.rig.T_camera_left = d.rig.true_cameras;
   const SimulatedRig expected = d.step();
 
   SimulatedRig rig = d.rig;

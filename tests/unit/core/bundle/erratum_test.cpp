@@ -24,7 +24,7 @@ Vector printed_residuals(const SimulatedRig& rig, const Vector& v) {
   Vector e(2 * static_cast<Eigen::Index>(rig.observations.size()));
   for (std::size_t n = 0; n < rig.observations.size(); ++n) {
     const BundleObservation& o = rig.observations[n];
-    const Transform P = o.pose == 0 ? rig.true_T_left_world[0] : transform_at(6 * o.pose);
+    const Transform P = o.pose == 0 ? rig.true_poses[0] : transform_at(6 * o.pose);
     const Vec3 X = v.segment<3>(6 * poses + 3 * static_cast<Eigen::Index>(o.point));
     const Vec3 Y = o.camera == 0 ? P * X : P * (T1 * X);
     const Intrinsics& k = rig.cameras[0].intrinsics();
@@ -80,9 +80,8 @@ TEST(Erratum, printedOrderCannotFitARigThatMovesAndTurnsAndOursCan) {
     const auto put = [&](Eigen::Index i, const Transform& T) {
       start.segment<6>(i) << log_so3(T.R), T.t;
     };
-    put(0, rig.true_T_camera_left[1]);
-    for (Eigen::Index i = 1; i < 6; ++i)
-      put(6 * i, rig.true_T_left_world[static_cast<std::size_t>(i)]);
+    put(0, rig.true_cameras[1]);
+    for (Eigen::Index i = 1; i < 6; ++i) put(6 * i, rig.true_poses[static_cast<std::size_t>(i)]);
     for (Eigen::Index j = 0; j < 15; ++j)
       start.segment<3>(36 + 3 * j) = rig.true_points[static_cast<std::size_t>(j)];
     EXPECT_GT(fit([&](const Vector& v) { return printed_residuals(rig, v); }, start), 1.0)

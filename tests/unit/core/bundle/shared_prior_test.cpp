@@ -83,7 +83,7 @@ TEST(BundleSharedPrior, aTightOneHoldsTheTransformWhereItIs) {
   Alone a(71);
   ASSERT_TRUE(a.result.converged() && a.result.has_covariance);
   SimulatedRig truth = a.start;
-  truth.T_camera_left = truth.true_T_camera_left;
+  truth.T_camera_left = truth.true_cameras;
   BundleResult r;
   const SimulatedRig found = a.with(calibration_of(truth, times(a.result.covariance, 1e-6)), &r);
   ASSERT_TRUE(r.converged()) << to_string(r.termination);
@@ -124,7 +124,7 @@ struct TwoHalves {
   explicit TwoHalves(std::uint64_t seed) {
     Random random(seed);
     all = simulate_rig(simulation, random);
-    all.T_left_world[5] = all.true_T_left_world[5];
+    all.T_left_world[5] = all.true_poses[5];
     std::erase_if(all.observations, [](const BundleObservation& o) {
       return (o.pose < 5) != (o.point < kPoints / 2);
     });

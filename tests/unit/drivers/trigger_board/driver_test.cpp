@@ -97,7 +97,7 @@ TEST(Driver, opensByPortBySerialNumberOrTheOnlyOne) {
   EXPECT_NE(driver.open("/dev/ttyACM0", &s), nullptr);
   m.add_board("/dev/ttyACM1", 0xBB);
   EXPECT_EQ(driver.open("", &s), nullptr);
-  EXPECT_EQ(s, DeviceStatus::not_found);
+  EXPECT_EQ(s, DeviceStatus::bad_configuration) << "which of the two nobody has said";
   EXPECT_NE(driver.last_error().find("trigger.port"), std::string::npos);
   const auto one = driver.open("30002b000b513336343931bb", &s);
   ASSERT_NE(one, nullptr) << driver.last_error();

@@ -1,0 +1,143 @@
+#include "app/session/recording_plan.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "app/config/calibration_file.hpp"
+#include "app/config/schema.hpp"
+#include "app/recording/messages.hpp"
+#include "app/recording/session_description.hpp"
+#include "app/runtime/version.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue without images
+constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
+constexpr std::size_t kDeviceQueue = std::size_t{1} << 20;  // bytes
+
+std::vector<RecordedTopic> topics(const CalibrationFile& file, bool png) {
+  std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
+                                 {"/vergence/frame", RosType::frame, false},
+                                 {"/vergence/odometry", RosType::odometry, false},
+                                 {"/tf", RosType::tf, false},
+                                 {"/tf_static", RosType::tf, true},
+                                 {"/diagnostics", RosType::diagnostics, false},
+                                 {"/vergence/ins_reading", RosType::ins_reading, false},
+                                 {"/ins/fix", RosType::nav_sat_fix, false},
+                                 {"/ins/imu", RosType::imu, false},
+                                 {"/vergence/pulse", RosType::pulse, false},
+                                 {"/ins/raw", RosType::bytes, false},
+                                 {"/trigger_board/raw", RosType::bytes, false}};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
+    const std::string images = "/" + file.names[k] + "/image_raw";
+    out.push_back(png ? RecordedTopic{images + "/compressed", RosType::compressed_image, false}
+                      : RecordedTopic{images, RosType::image, false});
+    out.push_back({"/" + file.names[k] + "/camera_info", RosType::camera_info, false});
+    out.push_back({"/" + file.names[k] + "/device_frame", RosType::device_frame, false});
+  }
+  return out;
+}
+
+/// Keys that are not as they are when nobody says anything.
+std::vector<std::string> settings_of(const Configuration& c) {
+  const Configuration defaults;
+  std::vector<std::string> out;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys)
+      if (std::string value = to_text(key.get(c)); value != to_text(key.get(defaults))) {
+        if (key.name.ends_with(".mask"))  // beside the configuration, wherever the replay runs
+          value = std::filesystem::absolute(c.folder / value).string();
+        out.push_back(key.name + "=" + value);
+      }
+  return out;
+}
+
+std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts& facts) {
+  SessionDescription d;
+  d.program = version();
+  d.calibration = format_calibration(facts.begin.file);
+  CalibrationFile nominal = facts.begin.file;
+  nominal.rig = facts.begin.nominal;
+  d.nominal = format_calibration(nominal);
+  d.trust = facts.begin.trust;
+  d.cause = facts.begin.cause;
+  d.source = facts.begin.source;
+  d.adoption = facts.adoption;
+  d.ins = facts.ins.has_value();
+  if (facts.ins) d.mount_source = facts.ins->mount_source;
+  d.settings = settings_of(c);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(facts.begin.file.rig.cameras); ++k)
+    d.cameras.push_back(topics(facts.begin.file, as_png(c.record))[image_topic(k)].name);
+  const std::string json = to_json(d);
+  std::vector<std::uint8_t> bytes(json.size() + 16);
+  CdrWriter out(bytes);
+  write_text(&out, json);
+  bytes.resize(out.size());
+  return bytes;
+}
+
+/// Of all cameras' images of one frame.
+double frame_bytes(const SourceFacts& facts) {
+  double bytes = 0;
+  for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
+    const Intrinsics& lens = facts.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
+    bytes += static_cast<double>(lens.width) * lens.height;
+  }
+  return bytes;
+}
+
+constexpr double kLeastHeld = 16;  // frames that wait: a replay waits for room
+
+/// Bytes of images a second, and how many seconds of them are held.
+std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
+  if (c.record.memory_mb > 0) return static_cast<std::size_t>(c.record.memory_mb) << 20U;
+  if (c.record.images == 0) return kSmall;
+  const double held = facts.when_full == Recorder::WhenFull::wait
+                          ? kLeastHeld
+                          : (kDiskS + c.record.keep_s) * c.trigger.rate;
+  return kSmall + static_cast<std::size_t>(frame_bytes(facts) * std::max(held, kLeastHeld));
+}
+
+Recording::WhenFull when_full(const SourceFacts& facts) {
+  return facts.when_full == Recorder::WhenFull::wait ? Recording::WhenFull::wait
+                                                     : Recording::WhenFull::drop;
+}
+
+}  // namespace
+
+bool as_png(const RecordSettings& settings) noexcept {
+  return settings.images != 0 && settings.image_format == RecordSettings::kPngImages;
+}
+
+ImageEncoder::Options encoder_options(const SourceFacts& facts) {
+  ImageEncoder::Options o;
+  o.queue = png_queue;
+  o.waiting = static_cast<std::size_t>(kLeastHeld * frame_bytes(facts));
+  for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
+    const Intrinsics& lens = facts.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
+    o.width = std::max(o.width, lens.width);
+    o.height = std::max(o.height, lens.height);
+  }
+  o.when_full = when_full(facts);
+  return o;
+}
+
+Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
+  Recording::Options o;
+  const bool png = as_png(c.record);
+  o.topics = topics(facts.begin.file, png);
+  o.queues = {png ? kSmall : queue_bytes(c, facts), kDeviceQueue, kDeviceQueue, kDeviceQueue};
+  if (png) o.queues.push_back(queue_bytes(c, facts));
+  o.preamble = {{session_topic, description(c, facts)}};
+  o.start = facts.first;
+  o.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
+  o.roll_time = Duration::seconds(c.record.roll_s);
+  o.keep = Duration::seconds(c.record.keep_s);
+  o.when_full = when_full(facts);
+  return o;
+}
+
+}  // namespace vergence::app

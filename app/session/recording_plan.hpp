@@ -1,0 +1,43 @@
+#pragma once
+#include <cstddef>
+
+#include "app/config/configuration.hpp"
+#include "app/recording/image_encoder.hpp"
+#include "app/recording/recording.hpp"
+#include "app/session/frame_source.hpp"
+
+/// What a session's recording is made of: topics, queues, how much may wait. Threads pure.
+namespace vergence::app {
+
+/// Queues of a recording, one for each thread that posts.
+enum Queue : std::size_t { estimator_queue, acquisition_queue, ins_queue, board_queue, png_queue };
+
+/// Topics of a recording. Of a camera there are three, from first_camera_topic on.
+enum Topic : std::size_t {
+  session_topic,
+  frame_topic,
+  odometry_topic,
+  tf_topic,
+  tf_static_topic,
+  diagnostics_topic,
+  reading_topic,
+  fix_topic,
+  imu_topic,
+  pulse_topic,
+  ins_raw_topic,
+  board_raw_topic,
+  first_camera_topic
+};
+
+/// A camera's images; its CameraInfo is the next one, its device's frames the one after.
+constexpr std::size_t image_topic(std::size_t camera) noexcept {
+  return first_camera_topic + 3 * camera;
+}
+
+/// Images are recorded, and as PNG.
+[[nodiscard]] bool as_png(const RecordSettings& settings) noexcept;
+[[nodiscard]] ImageEncoder::Options encoder_options(const SourceFacts& facts);
+[[nodiscard]] Recording::Options recording_options(const Configuration& configuration,
+                                                   const SourceFacts& facts);
+
+}  // namespace vergence::app
