@@ -1,30 +1,17 @@
 #include "drivers/sync/pulse_matcher.hpp"
 
 #include <algorithm>
-#include <cmath>
+
+#include "drivers/sync/durations.hpp"
 
 namespace vergence {
-namespace {
-
-Duration magnitude(Duration d) noexcept { return d < Duration{} ? -d : d; }
-Duration scaled(Duration d, double factor) noexcept {
-  return Duration::nanoseconds(std::llround(static_cast<double>(d.ns()) * factor));
-}
-
-/// Counts that a camera advanced; negative: it ran back.
-std::int64_t advance(std::uint64_t from, std::uint64_t to) noexcept {
-  return static_cast<std::int64_t>(to - from);
-}
-
-}  // namespace
 
 void PulseMatcher::restart() noexcept {
   proven_ = false;
-  count_ = tried_ = 0;
+  acquisition_.clear();
   recents_ = pendings_ = 0;
-  begun_ = false;
   failures_ = 0;
-  doubt_ = 0;
+  doubt_.clear();
 }
 
 std::uint64_t PulseMatcher::least_number(std::uint64_t counter) const noexcept {
@@ -34,9 +21,9 @@ std::uint64_t PulseMatcher::least_number(std::uint64_t counter) const noexcept {
 
 PulseMatcher::Match PulseMatcher::frame(const PulseTrain& train, std::uint64_t counter,
                                         DeviceStamp stamp, HostStamp arrival) noexcept {
-  const Seen seen{counter, stamp, arrival, 0};
-  if (proven_) return match(train, seen);
-  remember(seen);
+  const StampedFrame frame{counter, stamp, arrival, 0};
+  if (proven_) return match(train, frame);
+  acquisition_.add(frame);
   acquire(train, arrival);
   return {};
 }
@@ -50,10 +37,11 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train,
   const PulseTrain::Entry& pulse = train.newest();
   const std::uint64_t before = train.size() > 1 ? train[train.size() - 2].number : pulse.number;
   std::size_t kept = 0;
-  std::optional<Seen> made;
+  std::optional<StampedFrame> made;
   for (std::size_t i = 0; i < pendings_; ++i) {
-    const Seen& frame = pending_[i];
-    const bool at_edge = magnitude(pulse.edge - edge_of(frame.stamp)) <= gate(frame.stamp),
+    const StampedFrame& frame = pending_[i];
+    const bool at_edge =
+                   magnitude(pulse.edge - tie_.edge_of(frame.stamp)) <= tie_.gate(frame.stamp),
                numbered = frame.number == pulse.number;
     const bool in_pause = pulse.resumed && frame.number < pulse.number && frame.number > before;
     if (at_edge != numbered || in_pause) {
@@ -67,7 +55,7 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train,
   }
   pendings_ = kept;
   if (made) {
-    tie(made->stamp, pulse.edge);
+    tie_.add(made->stamp, pulse.edge);
     settle(train, pulse.number);
   }
   return std::nullopt;
@@ -75,276 +63,120 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train,
 
 // ---- acquiring ----
 
-void PulseMatcher::remember(const Seen& seen) noexcept {
-  if (!begun_) {
-    begun_ = true;
-    began_ = seen.arrival;
-  }
-  if (count_ > 0) {
-    const Seen& last = frames_[count_ - 1];
-    if (seen.counter == last.counter && seen.stamp == last.stamp) return;
-    if (advance(last.counter, seen.counter) < 1 || seen.stamp <= last.stamp)
-      count_ = tried_ = 0;  // it began to count from zero
-  }
-  if (count_ == kFrames) {
-    std::move(frames_.begin() + 1, frames_.end(), frames_.begin());
-    --count_;
-    tried_ -= tried_ > 0 ? 1 : 0;
-  }
-  frames_[count_++] = seen;
-}
-
 void PulseMatcher::acquire(const PulseTrain& train, HostStamp now) noexcept {
-  if (train.size() < kRun) return;
-  const HostStamp known_until = train.newest().host - train.newest().host_error;
-  std::size_t end = count_;
-  while (end > 0 && frames_[end - 1].arrival > known_until) --end;
-  if (end < kRun || end == tried_) return;
-  tried_ = end;
-  std::size_t found = 0, fits = 0, beyond = 0;
-  bool strict = false, open_ended = false;
-  for (std::size_t place = 0; place < train.size(); ++place) {
-    const Fit f = fit(train, place, end);
-    if (f == Fit::beyond) {
-      open_ended = true;
-      beyond = place;
-    }
-    if (f != Fit::strict && f != Fit::loose) continue;
-    ++fits;
-    strict = f == Fit::strict;
-    found = place;
-  }
-  const bool proven = fits == 1 && strict && !(open_ended && beyond + kNear >= found) &&
-                      believable(train, found, end);
-  if (proven) {
-    adopt(train, found, end, now);
-  } else {
+  const auto trial = acquisition_.attempt(train);
+  if (!trial) return;
+  if (trial->proven)
+    adopt(train, *trial, now);
+  else
     ++failures_;
-  }
 }
 
-/// The frame came no later than frames do, every pulse that it might be of instead was tried, and a
-/// pause hides none.
-bool PulseMatcher::believable(const PulseTrain& train, std::size_t place,
-                              std::size_t end) const noexcept {
-  if (frames_[end - 1].arrival - train[place].host > latest_) return false;
-  const std::size_t until = std::min(train.size(), place + kNear + 1);
-  for (std::size_t i = place > 2 * kRun ? place - 2 * kRun : 1; i < until; ++i) {
-    const std::uint64_t left_out = train[i].number - train[i - 1].number - 1;
-    const bool beside = i + kNear >= place,
-               pause = train[i].resumed && (pause_ == 0 || left_out == pause_);
-    if (left_out > 0 && !pause && (beside || train[i].resumed)) return false;
-  }
-  return true;
-}
-
-/// Whether the run that ends before frame `end` fits with its last frame on the train's `place`.
-PulseMatcher::Fit PulseMatcher::fit(const PulseTrain& train, std::size_t place,
-                                    std::size_t end) const noexcept {
-  const std::size_t begin = end - kRun;
-  const Seen& last = frames_[end - 1];
-  std::size_t at = place;
-  DeviceStamp edge = train[place].edge;
-  std::uint64_t number = train[place].number, skipped = train[place].skipped, odd = 0;
-  bool strict = true;
-  for (std::size_t i = end - 1; i-- > begin;) {
-    const Duration since = frames_[i + 1].stamp - frames_[i].stamp;
-    const Duration noise = noise_ * 2 + scaled(since, kDrift);
-    const DeviceStamp target = edge - since;
-    while (at > 0 && train[at].edge > target + noise * 2) --at;
-    const PulseTrain::Entry& pulse = train[at];
-    const Duration off = magnitude(pulse.edge - target);
-    const auto counted =
-        static_cast<std::uint64_t>(advance(frames_[i].counter, frames_[i + 1].counter));
-    if (off <= noise * 2) {
-      const Duration span = last.stamp - frames_[i].stamp;
-      const Duration along = noise_ * 2 + scaled(span, kDrift);
-      const Duration apart = magnitude((train[place].edge - pulse.edge) - span);
-      if (apart > along * 2) return Fit::none;
-      strict = strict && off <= noise && apart <= along;
-      const std::uint64_t least = PulseTrain::least(pulse.number, pulse.skipped, number, skipped);
-      if (counted > number - pulse.number) return Fit::none;
-      odd += least > counted ? least - counted : 0;
-      edge = pulse.edge;
-      number = pulse.number;
-      skipped = pulse.skipped;
-    } else if (pulse.edge > target) {
-      return pulse.resumed ? Fit::none : Fit::beyond;  // before the oldest that is held
-    } else {
-      const auto unreported = train.place(target, Duration{});
-      if (!unreported || unreported->number >= number) return Fit::none;
-      if (counted > number - unreported->number) return Fit::none;
-      const std::uint64_t least =
-          PulseTrain::least(unreported->number, unreported->skipped_with, number, skipped);
-      odd += (least > counted ? least - counted : 0) + (unreported->paused ? 1 : 0);
-      strict = false;
-      edge = target;
-      number = unreported->number;
-      skipped = unreported->skipped;
-    }
-  }
-  if (odd > kOdd) return Fit::none;
-  return strict && odd == 0 ? Fit::strict : Fit::loose;
-}
-
-void PulseMatcher::adopt(const PulseTrain& train, std::size_t place, std::size_t end,
+void PulseMatcher::adopt(const PulseTrain& train, const PulseAcquisition::Trial& trial,
                          HostStamp now) noexcept {
   proven_ = true;
   failures_ = 0;
-  begun_ = false;
   ++acquisitions_;
-  worst_acquisition_ = std::max(worst_acquisition_, now - began_);
-  pairs_ = 0;
-  rate_ = 0;
+  worst_acquisition_ = std::max(worst_acquisition_, now - acquisition_.began());
+  tie_.clear();
   recents_ = pendings_ = 0;
   // The run again, forwards: its offset is known, every frame has its pulse.
-  std::size_t at = place;
+  const auto frames = acquisition_.frames();
+  const auto run = frames.subspan(trial.end - kRun, kRun);
+  std::size_t at = trial.place;
   std::array<std::size_t, kRun> places{};
   for (std::size_t i = kRun; i-- > 0;) {
-    const Duration span = frames_[end - 1].stamp - frames_[end - kRun + i].stamp;
-    const DeviceStamp target = train[place].edge - span;
+    const Duration span = run.back().stamp - run[i].stamp;
+    const DeviceStamp target = train[trial.place].edge - span;
     while (at > 0 && magnitude(train[at - 1].edge - target) < magnitude(train[at].edge - target))
       --at;
     places[i] = at;
   }
   for (std::size_t i = 0; i < kRun; ++i) {
-    Seen seen = frames_[end - kRun + i];
+    StampedFrame frame = run[i];
     const PulseTrain::Entry& pulse = train[places[i]];
-    seen.number = pulse.number;
-    tie(seen.stamp, pulse.edge);
-    const Duration delay = seen.arrival - pulse.host;
+    frame.number = pulse.number;
+    tie_.add(frame.stamp, pulse.edge);
+    const Duration delay = frame.arrival - pulse.host;
     least_delay_ = i == 0 ? delay : std::min(least_delay_, delay);
-    last_ = seen;
+    last_ = frame;
     last_skipped_ = pulse.skipped;
-    recent_[recents_++ % kRecent] = seen;
+    recent_[recents_++ % kRecent] = frame;
   }
   // Those that came since; a contradiction among them undoes the proof.
-  std::array<Seen, kFrames> later{};
-  const std::size_t waiting = count_ - end;
-  std::copy_n(frames_.begin() + static_cast<std::ptrdiff_t>(end), waiting, later.begin());
-  count_ = tried_ = 0;
+  std::array<StampedFrame, PulseAcquisition::kFrames> later{};
+  const std::size_t waiting = frames.size() - trial.end;
+  std::copy_n(frames.begin() + static_cast<std::ptrdiff_t>(trial.end), waiting, later.begin());
+  acquisition_.clear();
   for (std::size_t i = 0; i < waiting && proven_; ++i) (void)match(train, later[i]);
 }
 
 // ---- proven ----
 
-DeviceStamp PulseMatcher::edge_of(DeviceStamp stamp) const noexcept {
-  const Duration since = stamp - tie_stamp_;
-  return tie_edge_ + since + scaled(since, rate_);
-}
-
-Duration PulseMatcher::gate(DeviceStamp stamp) const noexcept {
-  constexpr Duration kLeast = Duration::microseconds(50);
-  constexpr double kWander = 30e-6;  // of the rate, where nothing was seen for a while
-  const Duration near = std::min(noise_ * 4 + kLeast, interval_ / 5);
-  return near + scaled(magnitude(stamp - tie_stamp_), kWander);
-}
-
-void PulseMatcher::tie(DeviceStamp stamp, DeviceStamp edge) noexcept {
-  if (pairs_ == 0) {
-    tie_stamp_ = stamp;
-    tie_edge_ = edge;
-    pairs_ = 1;
-    return;
-  }
-  const Duration since = stamp - tie_stamp_;
-  if (since <= Duration{}) return;
-  pairs_ = std::min(pairs_ + 1, kMemory);
-  const double n = pairs_, g = 2 * (2 * n - 1) / (n * (n + 1)), h = 6 / (n * (n + 1));
-  const DeviceStamp expected = edge_of(stamp);
-  const Duration off = edge - expected;
-  tie_stamp_ = stamp;
-  tie_edge_ = expected + scaled(off, g);
-  rate_ = std::clamp(rate_ + h * static_cast<double>(off.ns()) / static_cast<double>(since.ns()),
-                     -kDrift, kDrift);
-}
-
-PulseMatcher::Match PulseMatcher::contradict(const Seen& seen) noexcept {
+PulseMatcher::Match PulseMatcher::contradict(const StampedFrame& frame) noexcept {
   restart();
-  remember(seen);
+  acquisition_.add(frame);
   Match m;
   m.outcome = Outcome::contradicted;
   return m;
 }
 
-PulseMatcher::Match PulseMatcher::repeated(const Seen& seen) const noexcept {
+PulseMatcher::Match PulseMatcher::repeated(const StampedFrame& frame) const noexcept {
   Match m;
   for (std::size_t i = 0; i < std::min(recents_, kRecent); ++i) {
-    if (recent_[i].counter != seen.counter || recent_[i].stamp != seen.stamp) continue;
+    if (recent_[i].counter != frame.counter || recent_[i].stamp != frame.stamp) continue;
     m.outcome = Outcome::again;
     m.number = recent_[i].number;
   }
   return m;
 }
 
-/// A frame of this reported pulse fits it within the gate. Had the clock been set instead of s
-/// triggers missed, its stamps would now follow the pulse s earlier, a constant time off: refuted
-/// where that time changes by more than two gates.
+/// A frame of this reported pulse fits it within the gate.
 void PulseMatcher::settle(const PulseTrain& train, std::uint64_t number) noexcept {
-  if (doubt_ == 0) return;
-  const PulseTrain::Entry* pulse = train.find(number);
-  bool all = true;
-  for (std::size_t s = 1; s <= doubt_; ++s) {
-    const std::size_t i = s - 1;
-    const PulseTrain::Entry* earlier = train.before(number, s);
-    if (!refuted_[i] && pulse != nullptr && earlier != nullptr) {
-      const Duration apart = pulse->edge - earlier->edge;
-      auto& [least, greatest] = apart_[i];
-      least = compared_[i] ? std::min(least, apart) : apart;
-      greatest = compared_[i] ? std::max(greatest, apart) : apart;
-      compared_[i] = true;
-      refuted_[i] = greatest - least > gate(tie_stamp_) * 2;
-    }
-    all = all && refuted_[i];
-  }
+  if (!doubt_.any()) return;
   ++failures_;
-  if (!all) return;
-  doubt_ = 0;
-  failures_ = 0;
+  if (doubt_.compare(train, number, tie_.gate() * 2)) failures_ = 0;
 }
 
-PulseMatcher::Match PulseMatcher::match(const PulseTrain& train, const Seen& seen) noexcept {
-  const std::int64_t counted = advance(last_.counter, seen.counter);
+PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
+                                        const StampedFrame& frame) noexcept {
+  const std::int64_t counted = advance(last_.counter, frame.counter);
   if (counted <= 0) {
-    const Match m = repeated(seen);
-    return m.outcome == Outcome::again ? m : contradict(seen);
+    const Match m = repeated(frame);
+    return m.outcome == Outcome::again ? m : contradict(frame);
   }
   Match m;
-  m.edge = edge_of(seen.stamp);
-  m.gate = gate(seen.stamp);
+  m.edge = tie_.edge_of(frame.stamp);
+  m.gate = tie_.gate(frame.stamp);
   if (m.gate * 3 > interval_)
     return contradict(
-        seen);  // nothing was seen for so long that the stamp no longer tells the pulse
+        frame);  // nothing was seen for so long that the stamp no longer tells the pulse
   const auto place = train.place(m.edge, m.gate);
-  if (!place || place->paused || place->number <= last_.number) return contradict(seen);
+  if (!place || place->paused || place->number <= last_.number) return contradict(frame);
   const std::uint64_t most = place->number - last_.number;
   const std::uint64_t least =
       PulseTrain::least(last_.number, last_skipped_, place->number, place->skipped);
   const auto exposures = static_cast<std::uint64_t>(counted);
-  if (exposures > most) return contradict(seen);
+  if (exposures > most) return contradict(frame);
   m.missed = least > exposures ? least - exposures : 0;
   m.lost = exposures - 1;
   // A clock that was set may point at another pulse; then the frame seems quicker than ever, or is
   // here before its pulse.
   const MappedStamp host = train.host_of(m.edge);
-  const Duration delay = seen.arrival - host.host;
+  const Duration delay = frame.arrival - host.host;
   if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < least_delay_))
-    return contradict(seen);
+    return contradict(frame);
   least_delay_ = std::min(least_delay_, delay);
-  if (m.missed > 0) {
-    doubt_ += m.missed;
-    if (doubt_ > kDoubted) return contradict(seen);
-    refuted_ = compared_ = {};
-  }
+  if (m.missed > 0 && !doubt_.add(m.missed)) return contradict(frame);
   m.outcome = Outcome::matched;
   m.number = place->number;
-  last_ = seen;
+  last_ = frame;
   last_.number = m.number;
   last_skipped_ = place->skipped_with;
   recent_[recents_++ % kRecent] = last_;
   if (place->entry != nullptr) {
     pendings_ = 0;  // reports come in order: older ones never will
-    tie(seen.stamp, place->entry->edge);
+    tie_.add(frame.stamp, place->entry->edge);
     settle(train, m.number);
   } else if (train.newest().number < m.number) {
     if (pendings_ == kPending) {

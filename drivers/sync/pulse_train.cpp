@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/sync/durations.hpp"
+
 namespace vergence {
-namespace {
-
-Duration magnitude(Duration d) noexcept { return d < Duration{} ? -d : d; }
-
-}  // namespace
 
 PulseTrain::Step PulseTrain::add(const Pulse& pulse, std::uint64_t first_free) noexcept {
   const bool same = count_ > 0 && pulse.boot == boot_;

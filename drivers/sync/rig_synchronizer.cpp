@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cassert>
 
+#include "drivers/sync/durations.hpp"
+
 namespace vergence {
-namespace {
-
-Duration magnitude(Duration d) noexcept { return d < Duration{} ? -d : d; }
-
-}  // namespace
 
 RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept
     : options_(options), train_(options.interval) {

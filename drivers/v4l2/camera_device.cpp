@@ -2,16 +2,12 @@
 
 #include <fcntl.h>
 #include <linux/videodev2.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <exception>
 #include <utility>
 
-#include "drivers/clock.hpp"
 #include "drivers/v4l2/v4l2.hpp"
 
 namespace vergence::v4l2 {
@@ -23,16 +19,11 @@ constexpr Duration kUnstamped =
 }  // namespace
 
 V4l2Camera::V4l2Camera(UniqueFd fd, Node node)
-    : info_{"v4l2", node.serial, node.card, node.path},
-      node_(std::move(node)),
-      fd_(std::move(fd)),
-      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    : info_{"v4l2", node.serial, node.card, node.path}, node_(std::move(node)), fd_(std::move(fd)) {
   controls_.add(fd_.get());
 }
 
 V4l2Camera::~V4l2Camera() { stop(); }
-
-// ---- the owner's side
 
 DeviceStatus V4l2Camera::refuse(DeviceStatus status, std::string sentence) noexcept {
   last_error_ = std::move(sentence);
@@ -42,13 +33,10 @@ DeviceStatus V4l2Camera::refuse(DeviceStatus status, std::string sentence) noexc
 DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   last_error_.clear();
-  {
-    const std::lock_guard lock(mutex_);
-    if (streaming_ || slots_.held() > 0) return DeviceStatus::busy;
-  }
+  if (exchange_.busy()) return DeviceStatus::busy;
   try {
-    if (std::string nonsense = find_nonsense(requested); !nonsense.empty())
-      return refuse(DeviceStatus::bad_configuration, nonsense + " is no configuration");
+    if (std::string invalid = find_invalid(requested); !invalid.empty())
+      return refuse(DeviceStatus::bad_configuration, invalid + " is no configuration");
     if (lost_node_)
       if (const DeviceStatus status = open_again(); status != DeviceStatus::ok) return status;
     const DeviceStatus status = bring_to(requested, false);
@@ -88,7 +76,7 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool kee
   controls_ = std::move(controls);
 
   if (queue_) {  // formats can be changed only while there are no buffers
-    forget_buffers();
+    exchange_.install({});
     queue_->free();
     queue_.reset();
   }
@@ -116,24 +104,18 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool kee
   stamps_ = stamp_kind(queue.description_flags(), 1);
   if (!keep_slots) {
     if (settings.format.layout == Layout::luma_plane)
-      slots_.use_buffers(requested.width, requested.height, settings.stride);
+      exchange_.use_buffers(requested.width, requested.height, settings.stride);
     else
-      slots_.use_pool(requested.width, requested.height);
+      exchange_.use_pool(requested.width, requested.height);
   }
-  const std::lock_guard lock(mutex_);
-  slots_.install(std::move(mappings));
+  exchange_.install(std::move(mappings));
   queue_ = queue;
   settings_ = std::move(settings);
   return DeviceStatus::ok;
 }
 
-void V4l2Camera::forget_buffers() noexcept {
-  const std::lock_guard lock(mutex_);
-  slots_.install({});
-}
-
 void V4l2Camera::close_node() noexcept {
-  forget_buffers();
+  exchange_.install({});
   queue_.reset();
   subdevice_.reset();
   fd_.reset();
@@ -163,10 +145,7 @@ DeviceTiming V4l2Camera::timing() const noexcept {
 
 DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
   last_error_.clear();
-  {
-    const std::lock_guard lock(mutex_);
-    if (streaming_ && !gone_) return DeviceStatus::ok;
-  }
+  if (exchange_.standing() == DeviceStatus::ok) return DeviceStatus::ok;
   if (!requested_) return DeviceStatus::bad_configuration;
   try {
     const std::lock_guard controlling(controlling_);
@@ -180,29 +159,10 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
       }
     }
     if (const DeviceStatus status = start_streaming(); status != DeviceStatus::ok) return status;
-    notifier_ = ready;
-    const Duration period = settings_->camera_rate_hz > 0
-                                ? Duration::seconds(1 / settings_->camera_rate_hz)
-                                : Duration{};
-    counter_.emplace(period);
-    raster_.reset();
-    if (settings_->options.thin > 1)
-      raster_.emplace(Duration::seconds(1 / settings_->actual.rate_hz));
-    poll_errors_ = 0;
-    exposures_.reset({settings_->actual.exposure, settings_->actual.gain_db});
-    exposure_now_ = settings_->actual.exposure;
-    {
-      const std::lock_guard lock(mutex_);
-      streaming_ = true;
-      gone_ = node_died_ = false;
-      ++statistics_.starts;
-    }
-    thread_ = std::thread([this] { capture(); });
+    exchange_.begin(ready);
+    capture_.start(*queue_, *settings_, fd_.get());
   } catch (const std::exception& e) {
-    {
-      const std::lock_guard lock(mutex_);
-      streaming_ = false;
-    }
+    exchange_.abort();
     (void)queue_->stop();
     return refuse(DeviceStatus::failed, e.what());
   }
@@ -210,13 +170,7 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
 }
 
 DeviceStatus V4l2Camera::start_streaming() {
-  {
-    const std::lock_guard lock(mutex_);
-    returned_count_ = 0;
-    with_kernel_ = 0;
-    for (std::uint32_t i = 0; i < slots_.buffers(); ++i)
-      if (slots_.may_enqueue(i) && queue_->enqueue(i) == 0) ++with_kernel_;
-  }
+  capture_.enqueue_free(*queue_);
   const int error = queue_->start();
   switch (error) {
     case 0:
@@ -241,34 +195,21 @@ DeviceStatus V4l2Camera::start_streaming() {
 
 /// After it the owner alone has the camera.
 void V4l2Camera::end_thread() noexcept {
-  if (!thread_.joinable()) return;
-  wake_capture();
-  thread_.join();
+  if (!capture_.stop()) return;
   if (queue_) (void)queue_->stop();
-  const std::lock_guard lock(mutex_);
-  if (node_died_) lost_node_ = true;
-  for (; ready_count_ > 0; --ready_count_, ready_first_ = (ready_first_ + 1) % ready_.size())
-    (void)slots_.release(ready_[ready_first_].slot);
+  if (exchange_.drain()) lost_node_ = true;
 }
 
 void V4l2Camera::stop() noexcept {
-  {
-    const std::lock_guard lock(mutex_);
-    streaming_ = false;
-    gone_ = false;
-  }
-  changed_.notify_all();
+  exchange_.end();
   end_thread();
 }
 
 DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
   const std::lock_guard controlling(controlling_);
-  {
-    const std::lock_guard lock(mutex_);
-    if (!streaming_) return DeviceStatus::stopped;
-    if (gone_) return DeviceStatus::gone;
-  }
+  if (const DeviceStatus standing = exchange_.standing(); standing != DeviceStatus::ok)
+    return standing;
   if (requested.exposure <= Duration{} ||
       requested.exposure.to_seconds() * settings_->actual.rate_hz > 1)
     return DeviceStatus::bad_configuration;
@@ -280,46 +221,13 @@ DeviceStatus V4l2Camera::set_exposure(const ExposureSetting& requested,
   requested_->gain_db = taken.gain_db;
   settings_->actual.exposure = taken.exposure;
   settings_->actual.gain_db = taken.gain_db;
-  (void)exposures_.change(taken, monotonic_now());
+  capture_.change_exposure(taken);
   if (actual != nullptr) *actual = taken;
   return DeviceStatus::ok;
 }
 
-// ---- the consumer's side
-
-DeviceStatus V4l2Camera::wait(Duration limit, Frame* frame) noexcept {
-  std::unique_lock lock(mutex_);
-  if (!streaming_) return DeviceStatus::stopped;
-  const auto something = [this] { return ready_count_ > 0 || gone_ || !streaming_; };
-  if (!something() && limit > Duration{})
-    (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), something);
-  if (!streaming_) return DeviceStatus::stopped;
-  if (ready_count_ > 0) {
-    *frame = ready_[ready_first_];
-    ready_first_ = (ready_first_ + 1) % ready_.size();
-    --ready_count_;
-    ++statistics_.delivered;
-    if (frame->status == FrameStatus::torn) ++statistics_.torn;
-    return DeviceStatus::ok;
-  }
-  if (!gone_) return DeviceStatus::timeout;
-  frame->arrival = gone_at_;
-  return DeviceStatus::gone;
-}
-
 void V4l2Camera::release(FrameSlot slot) noexcept {
-  {
-    const std::lock_guard lock(mutex_);
-    const std::optional<std::uint32_t> buffer = slots_.release(slot);
-    if (!buffer) return;
-    returned_[returned_count_++] = *buffer;  // while stopped start() finds it by itself
-  }
-  wake_capture();
-}
-
-CameraStatistics V4l2Camera::statistics() const noexcept {
-  const std::lock_guard lock(mutex_);
-  return statistics_;
+  if (exchange_.release(slot)) capture_.wake();
 }
 
 }  // namespace vergence::v4l2

@@ -11,7 +11,7 @@ std::string number_text(double value) {
   return text.data();
 }
 
-std::string find_nonsense(const CameraConfiguration& requested) {
+std::string find_invalid(const CameraConfiguration& requested) {
   if (requested.width <= 0 || requested.height <= 0)
     return "a size of " + std::to_string(requested.width) + " x " +
            std::to_string(requested.height);

@@ -7,14 +7,6 @@
 #include "drivers/clock.hpp"
 
 namespace vergence::gige {
-namespace {
-
-constexpr std::size_t kSpare =
-    3;  // buffers beside the slots that may be out: one is being filled, the next two wait
-constexpr std::size_t kWireBuffers = 4;  // where every frame is converted at once
-
-}  // namespace
-
 std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
@@ -25,25 +17,13 @@ GigeCamera::GigeCamera(std::unique_ptr<Session> session)
 GigeCamera::~GigeCamera() {
   stop();
   session_.reset();
-  drop_buffers();
-}
-
-DeviceStatus GigeCamera::refuse(DeviceStatus status, std::string sentence) {
-  const std::lock_guard lock(words_);
-  last_error_ = std::move(sentence);
-  return status;
-}
-
-std::string GigeCamera::last_error() const {
-  const std::lock_guard lock(words_);
-  return last_error_;
 }
 
 std::string GigeCamera::remark() const {
-  const std::lock_guard lock(words_);
-  const std::uint64_t untold = untold_.load(std::memory_order_relaxed);
-  if (untold == 0) return remark_;
-  return remark_ + (remark_.empty() ? "" : "; ") + std::to_string(untold) +
+  const std::string remark = remark_.get();
+  const std::uint64_t unknown = receiver_.without_exposure();
+  if (unknown == 0) return remark;
+  return remark + (remark.empty() ? "" : "; ") + std::to_string(unknown) +
          " images came without their exposure in the chunk data: it was reckoned; if that is most "
          "of them, set the option chunks to off";
 }
@@ -52,78 +32,47 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   try {
     if (handover_.state() != Handover::State::stopped)
-      return refuse(DeviceStatus::busy, "the camera streams; stop it first");
+      return last_error_.refuse(DeviceStatus::busy, "the camera streams; stop it first");
     if (handover_.any_out())
-      return refuse(DeviceStatus::busy, "images are still in use; release them first");
+      return last_error_.refuse(DeviceStatus::busy, "images are still in use; release them first");
     if (requested.width <= 0 || requested.height <= 0 || requested.offset_x < 0 ||
         requested.offset_y < 0)
-      return refuse(DeviceStatus::bad_configuration,
-                    "a region of " + size_text(requested.width, requested.height) + " px is none");
+      return last_error_.refuse(
+          DeviceStatus::bad_configuration,
+          "a region of " + size_text(requested.width, requested.height) + " px is none");
     if (!(requested.rate_hz > 0) || requested.exposure <= Duration{} ||
         requested.exposure.to_seconds() * requested.rate_hz > 1)
-      return refuse(DeviceStatus::bad_configuration,
-                    "rate and exposure must be positive, the exposure shorter than the time "
-                    "between two images");
+      return last_error_.refuse(
+          DeviceStatus::bad_configuration,
+          "rate and exposure must be positive, the exposure shorter than the time "
+          "between two images");
     Options options;
     if (std::string why;
         !take_options(requested.options, option_table(), "GigE cameras", &options, &why))
-      return refuse(DeviceStatus::unsupported, std::move(why));
+      return last_error_.refuse(DeviceStatus::unsupported, std::move(why));
     const std::lock_guard lock(device_);
     if (const DeviceStatus s = reach(); s != DeviceStatus::ok) return s;
     Applied applied;
     stale_ = true;
     if (const DeviceStatus s = session_->apply(requested, options, &applied); s != DeviceStatus::ok)
-      return refuse(s, session_->last_error());
+      return last_error_.refuse(s, session_->last_error());
     stale_ = false;
     requested_ = requested;
     options_ = options;
     applied_ = std::move(applied);
     in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
-    untold_.store(0, std::memory_order_relaxed);
-    make_slots();
+    receiver_.reset_counts();
+    memory_.allocate(*applied_.format, requested_.width, requested_.height, applied_.payload,
+                     static_cast<std::size_t>(options_.buffers));
+    handover_.set_slots(memory_.slots(), static_cast<std::size_t>(options_.buffers));
     configured_ = true;
     if (actual != nullptr) *actual = applied_.actual;
-    const std::lock_guard words(words_);
-    remark_ = session_->remark();
+    remark_.set(session_->remark());
     return DeviceStatus::ok;
   } catch (const std::exception& e) {
     configured_ = false;
     return DeviceStatus::failed;
   }
-}
-
-void GigeCamera::make_slots() {
-  drop_buffers();
-  converting_ = applied_.format->how != GreyFormat::How::as_it_is;
-  const auto most = static_cast<std::size_t>(options_.buffers);
-  const auto width = static_cast<std::size_t>(requested_.width),
-             height = static_cast<std::size_t>(requested_.height);
-  const auto padded = [](std::size_t bytes) {
-    return (bytes + kCacheLine - 1) / kCacheLine * kCacheLine;
-  };
-  slots_ = most +
-           (converting_
-                ? 1
-                : kSpare);  // converting: one more, into which the frame goes that is then refused
-  stride_ = converting_ ? FramePool::stride(requested_.width) : width;
-  slot_bytes_ = converting_ ? stride_ * height : padded(applied_.payload);
-  wire_bytes_ = converting_ ? padded(applied_.payload) : 0;
-  arena_ = std::make_unique<Arena>(slots_ * slot_bytes_ + kWireBuffers * wire_bytes_);
-  pixels_ = arena_->make<std::uint8_t>(slots_ * slot_bytes_, "slots");
-  wire_ = arena_->make<std::uint8_t>(converting_ ? kWireBuffers * wire_bytes_ : 0, "packets");
-  // Exactly the payload: Aravis counts the packets of a frame by it.
-  for (std::size_t i = 0; i < (converting_ ? kWireBuffers : slots_); ++i)
-    buffers_.push_back(arv_buffer_new_full(
-        applied_.payload,
-        converting_ ? wire_.data() + i * wire_bytes_ : pixels_.data() + i * slot_bytes_,
-        GSIZE_TO_POINTER(i), nullptr));
-  free_.reserve(slots_);
-  handover_.set_slots(slots_, most);
-}
-
-void GigeCamera::drop_buffers() noexcept {
-  for (ArvBuffer* b : buffers_) g_object_unref(b);
-  buffers_.clear();
 }
 
 DeviceTiming GigeCamera::timing() const noexcept {
@@ -143,7 +92,7 @@ DeviceStatus GigeCamera::reach() {
   DeviceStatus status = DeviceStatus::ok;
   std::string why;
   session_ = Session::open(address_, &status, &why);
-  if (session_ == nullptr) return refuse(DeviceStatus::gone, why);
+  if (session_ == nullptr) return last_error_.refuse(DeviceStatus::gone, why);
   stale_ = true;
   return DeviceStatus::ok;
 }
@@ -153,9 +102,10 @@ DeviceStatus GigeCamera::reach() {
 DeviceStatus GigeCamera::apply_again() {
   Applied again;
   if (const DeviceStatus s = session_->apply(requested_, options_, &again); s != DeviceStatus::ok)
-    return refuse(s, session_->last_error());
+    return last_error_.refuse(s, session_->last_error());
   if (again.payload != applied_.payload || again.format != applied_.format)
-    return refuse(DeviceStatus::gone, "the camera came back with frames of another size");
+    return last_error_.refuse(DeviceStatus::gone,
+                              "the camera came back with frames of another size");
   applied_ = std::move(again);
   in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
   stale_ = false;
@@ -174,11 +124,10 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
     if (status == DeviceStatus::ok) status = begin(ready);
     if (status == DeviceStatus::ok) {
       handover_.count_start();
-      if (!supervising_.joinable()) supervising_ = std::thread([this] { supervise(); });
+      start_supervising();
       return status;
     }
-    if (session_ != nullptr) session_->close_stream(false);
-    stream_ = nullptr;
+    close_stream(false);
     if (state == Handover::State::back) {  // not yet, after all
       session_.reset();
       handover_.fail(monotonic_now());
@@ -193,46 +142,29 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
 
 /// Precondition: device_ held, a session that is configured.
 DeviceStatus GigeCamera::begin(Notifier* ready) {
-  if (const DeviceStatus s = session_->open_stream(applied_, &GigeCamera::called, this);
+  if (const DeviceStatus s = session_->open_stream(applied_, &FrameReceiver::callback, &receiver_);
       s != DeviceStatus::ok)
-    return refuse(s, session_->last_error());
-  stream_ = session_->stream();
-  blocks_.restart();
-  exposures_.reset(in_force_);
-  exposure_now_ = in_force_.exposure;
-  wrong_sizes_ = 0;
-  heard_ns_ = monotonic_now().ns();
+    return last_error_.refuse(s, session_->last_error());
+  receiver_.begin(*session_, applied_, requested_.width, requested_.height, in_force_);
   handover_.begin(ready);
-  free_.clear();
-  for (std::size_t i = 0; i < slots_; ++i) {
-    const auto slot = static_cast<FrameSlot>(i);
-    if (handover_.is_out(slot)) continue;  // comes when it is released
-    if (converting_)
-      free_.push_back(slot);
-    else
-      session_->push(buffers_[i]);
-  }
-  if (converting_)
-    for (ArvBuffer* b : buffers_) session_->push(b);
+  receiver_.supply_buffers();
   if (const DeviceStatus s = session_->start_acquisition(); s != DeviceStatus::ok)
-    return refuse(s, session_->last_error());
-  const std::lock_guard words(words_);
-  remark_ = session_->remark();
+    return last_error_.refuse(s, session_->last_error());
+  remark_.set(session_->remark());
   return DeviceStatus::ok;
+}
+
+/// Precondition: device_ held.
+void GigeCamera::close_stream(bool reachable) noexcept {
+  if (session_ != nullptr) session_->close_stream(reachable);
+  receiver_.end();
 }
 
 void GigeCamera::stop() noexcept {
   handover_.end();
-  {
-    const std::lock_guard lock(supervisor_);
-    quit_ = true;
-  }
-  wake_.notify_all();
-  if (supervising_.joinable()) supervising_.join();
-  quit_ = false;
+  supervisor_.stop();
   const std::lock_guard lock(device_);
-  if (session_ != nullptr) session_->close_stream(!session_->lost());
-  stream_ = nullptr;
+  close_stream(session_ != nullptr && !session_->lost());
 }
 
 DeviceStatus GigeCamera::standing() const noexcept {
@@ -252,19 +184,20 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
     if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
     if (requested.exposure <= Duration{} ||
         requested.exposure.to_seconds() * requested_.rate_hz > 1)
-      return refuse(DeviceStatus::bad_configuration,
-                    "the exposure must be positive, and shorter than the time between two images");
+      return last_error_.refuse(
+          DeviceStatus::bad_configuration,
+          "the exposure must be positive, and shorter than the time between two images");
     const std::lock_guard lock(device_);
     if (session_ == nullptr || standing() != DeviceStatus::ok)
       return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
     ExposureSetting taken;
     if (const DeviceStatus s = session_->change_exposure(requested, options_, &taken);
         s != DeviceStatus::ok)
-      return refuse(s, session_->last_error());
+      return last_error_.refuse(s, session_->last_error());
     requested_.exposure = taken.exposure;  // also after it was unplugged
     requested_.gain_db = taken.gain_db;
     in_force_ = taken;
-    (void)exposures_.change(taken, monotonic_now());
+    receiver_.change_exposure(taken);
     if (actual != nullptr) *actual = taken;
     return DeviceStatus::ok;
   } catch (const std::exception&) {
@@ -281,15 +214,10 @@ DeviceStatus GigeCamera::trigger_once() noexcept {
     if (session_ == nullptr || standing() != DeviceStatus::ok)
       return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
     const DeviceStatus s = session_->trigger();
-    return s == DeviceStatus::ok ? s : refuse(s, session_->last_error());
+    return s == DeviceStatus::ok ? s : last_error_.refuse(s, session_->last_error());
   } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
-}
-
-ImageView GigeCamera::view(FrameSlot slot) const noexcept {
-  return {pixels_.data() + slot * slot_bytes_, requested_.width, requested_.height,
-          static_cast<std::ptrdiff_t>(stride_)};
 }
 
 }  // namespace vergence::gige

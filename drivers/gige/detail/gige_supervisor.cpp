@@ -1,8 +1,6 @@
-#include <pthread.h>
-
 #include <algorithm>
-#include <chrono>
 #include <exception>
+#include <memory>
 
 #include "drivers/clock.hpp"
 #include "drivers/gige/detail/gige_camera.hpp"
@@ -22,51 +20,55 @@ constexpr int kWrongSizes = 3;                            // in a row: no accide
 
 }  // namespace
 
-void GigeCamera::supervise() {
-  (void)pthread_setname_np(pthread_self(), "vergence-watch");
+/// What one round of the supervisor leaves for the next.
+struct GigeCamera::Watch {
   Duration pause = kFirstPause;
   HostStamp next_try{}, asked = monotonic_now();
-  for (std::unique_lock lock(supervisor_); !quit_;) {
-    (void)wake_.wait_for(lock, std::chrono::nanoseconds(kTick.ns()), [this] { return quit_; });
-    if (quit_) return;
-    lock.unlock();
-    try {
-      switch (handover_.state()) {
-        case Handover::State::streaming:
-          pause = kFirstPause;
-          next_try = monotonic_now() + pause;
-          if (const Trouble trouble = what_is_wrong(monotonic_now(), &asked); !trouble.why.empty())
-            lose(trouble);
-          break;
-        case Handover::State::gone:
-          if (monotonic_now() < next_try) break;
-          if (reopen()) handover_.ready_again();
-          pause = std::min(pause * 2, kLongestPause);
-          next_try = monotonic_now() + pause;
-          break;
-        case Handover::State::back:
-          handover_.ready_again();
-          break;
-        case Handover::State::stopped:
-          break;
-      }
-    } catch (const std::exception&) {  // no memory for a sentence: the next round tries again
+};
+
+void GigeCamera::start_supervising() {
+  supervisor_.start("vergence-watch", kTick,
+                    [this, watch = std::make_shared<Watch>()] { supervise(watch.get()); });
+}
+
+void GigeCamera::supervise(Watch* watch) {
+  try {
+    switch (handover_.state()) {
+      case Handover::State::streaming:
+        watch->pause = kFirstPause;
+        watch->next_try = monotonic_now() + watch->pause;
+        if (const Fault fault = check(monotonic_now(), &watch->asked); !fault.reason.empty())
+          lose(fault);
+        break;
+      case Handover::State::gone:
+        if (monotonic_now() < watch->next_try) break;
+        if (reopen()) handover_.ready_again();
+        watch->pause = std::min(watch->pause * 2, kLongestPause);
+        watch->next_try = monotonic_now() + watch->pause;
+        break;
+      case Handover::State::back:
+        handover_.ready_again();
+        break;
+      case Handover::State::stopped:
+        break;
     }
-    lock.lock();
+  } catch (const std::exception&) {  // no memory for a sentence: the next round tries again
   }
 }
 
-GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
-  static const Trouble kSilent{"the camera does not answer any more", false};
-  if (wrong_sizes_.load(std::memory_order_relaxed) >= kWrongSizes)
+GigeCamera::Fault GigeCamera::check(HostStamp at, HostStamp* asked) {
+  static const Fault kSilent{"the camera does not answer any more", false};
+  if (receiver_.wrong_sizes() >= kWrongSizes)
     return {"the camera sends " +
-            (seen_width_ > 0 ? size_text(seen_width_, seen_height_) : "images without their size") +
+            (receiver_.wrong_width() > 0
+                 ? size_text(receiver_.wrong_width(), receiver_.wrong_height())
+                 : "images without their size") +
             " where " + size_text(requested_.width, requested_.height) +
             " was configured; power it off and on"};
   const std::lock_guard lock(device_);
   if (session_ == nullptr || handover_.state() != Handover::State::streaming) return {};
   if (session_->lost()) return kSilent;
-  const Duration silence = at - HostStamp(heard_ns_.load(std::memory_order_acquire));
+  const Duration silence = at - receiver_.last_buffer();
   const Duration period = Duration::seconds(1 / requested_.rate_hz);
   if (requested_.trigger == CameraTrigger::free && silence > std::max(kLeastSilence, period * 10)) {
     if (!session_->in_control()) return kSilent;
@@ -80,18 +82,12 @@ GigeCamera::Trouble GigeCamera::what_is_wrong(HostStamp at, HostStamp* asked) {
   return {};
 }
 
-void GigeCamera::lose(const Trouble& trouble) {
-  (void)refuse(DeviceStatus::gone, trouble.why);
+void GigeCamera::lose(const Fault& fault) {
+  last_error_.set(fault.reason);
   handover_.lose(monotonic_now());
   const std::lock_guard lock(device_);
-  if (session_ != nullptr) session_->close_stream(trouble.reachable);
-  stream_ = nullptr;
+  close_stream(fault.reachable);
   session_.reset();
-}
-
-bool GigeCamera::quitting() {
-  const std::lock_guard lock(supervisor_);
-  return quit_;
 }
 
 bool GigeCamera::reopen() {
@@ -101,11 +97,11 @@ bool GigeCamera::reopen() {
   session_ = Session::open(address_, &status, &why);
   if (session_ != nullptr && session_->info().serial != info_.serial) session_.reset();
   if (session_ == nullptr && status == DeviceStatus::not_found &&
-      !quitting())  // with another address, perhaps
+      !supervisor_.stopping())  // with another address, perhaps
     for (const Found& f : discover())
       if (f.info.serial == info_.serial && session_ == nullptr)
         session_ = Session::open(f.info.place, &status, &why);
-  if (session_ == nullptr || quitting()) return false;
+  if (session_ == nullptr || supervisor_.stopping()) return false;
   address_ = session_->info().place;
   if (apply_again() == DeviceStatus::ok) return true;
   session_.reset();

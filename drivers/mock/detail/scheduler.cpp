@@ -44,29 +44,15 @@ std::array<PulseExposure, kMaxCameras> Scheduler::feed(HostStamp edge) {
     exposures[static_cast<std::size_t>(k)] = {true, begins,
                                               begins + camera.configuration().exposure};
   }
-  {
-    const std::lock_guard lock(feeding_);
-    if (!feed_over_) feed_.push(time);
-  }
-  fed_more_.notify_all();
+  feed_.push(time);
   return exposures;
-}
-
-void Scheduler::end_feed() noexcept {
-  {
-    const std::lock_guard lock(feeding_);
-    feed_over_ = true;
-  }
-  fed_more_.notify_all();
 }
 
 bool Scheduler::has_slot(std::uint64_t n) {
   while (rig_.options.fed && plan_.size() < n + 2) {
-    std::unique_lock lock(feeding_);
-    fed_more_.wait(lock, [this] { return !feed_.empty() || feed_over_ || stopping(); });
-    if (feed_.empty() || stopping()) break;
-    plan_.append(feed_.front());
-    feed_.pop();
+    const auto time = feed_.next();
+    if (!time) break;
+    plan_.append(*time);
   }
   return n < plan_.size();
 }
@@ -77,32 +63,22 @@ void Scheduler::begin(const TriggerConfiguration& c) {
   plan_ = rig_.options.fed ? PulsePlan(Duration::seconds(1 / c.rate_hz)) : plan_of(c);
   fed_ = plan_;
   stop_ = false;
-  finished_ = false;
   rig_.delivered.restart();
   constexpr Duration kLead =
       Duration::milliseconds(100);  // the first pictures are rendered before they are due
   if (rig_.options.real_time) start_ = monotonic_now() + kLead;
   rig_.pulsing = true;
+  queue_.begin();
   producer_ = std::thread([this] { produce(); });
-  if (rig_.options.real_time) deliverer_ = std::thread([this] { hand_out_in_time(); });
 }
 
 void Scheduler::halt() noexcept {
   stop_.store(true, std::memory_order_release);
   rig_.room.signal();
-  { const std::lock_guard lock(mutex_); }
-  { const std::lock_guard lock(feeding_); }
-  posted_.notify_all();
-  fed_more_.notify_all();
+  feed_.wake();
   if (producer_.joinable()) producer_.join();
-  if (deliverer_.joinable()) deliverer_.join();
+  queue_.join();
   rig_.pulsing = false;
-}
-
-void Scheduler::leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept {
-  const std::lock_guard lock(pausing_);
-  from = std::max(from, made_);
-  pause_ = {from, from + pulses, boot};
 }
 
 std::uint64_t Scheduler::pulses(double rate_hz) const noexcept {
@@ -133,7 +109,7 @@ void Scheduler::produce() {
     if (left_out(n)) {
       for (Sender& s : senders_) ++s.counter_base;
       resumed_ = true;
-      if (!rig_.options.real_time) deliver_until(host_of(n + 1));
+      if (!rig_.options.real_time) queue_.deliver_until(host_of(n + 1));
       continue;
     }
     if (!rig_.options.fed) make_report(n);
@@ -143,18 +119,11 @@ void Scheduler::produce() {
     }
     make_frames(n);
     // Whatever is made later was measured at the next pulse or after it.
-    if (!rig_.options.real_time) deliver_until(host_of(n + 1));
+    if (!rig_.options.real_time) queue_.deliver_until(host_of(n + 1));
   }
   const std::uint64_t count = plan_.size();
   make_link_events(count);
-  announce_end(host_of(count + 4) + Duration::seconds(11));
-  if (!rig_.options.real_time) {
-    deliver_until(HostStamp(INT64_MAX));
-  } else {
-    const std::lock_guard lock(mutex_);
-    finished_ = true;
-    posted_.notify_all();
-  }
+  queue_.finish(host_of(count + 4) + Duration::seconds(11));
 }
 
 /// Every image of camera 0 that has arrived was looked at, and what was asked for then is known.
@@ -186,19 +155,15 @@ void Scheduler::make_link_events(std::uint64_t pulse) {
     p.arrival = start_ + event.time;
     p.report.what =
         event.gone ? Delivery<BoardReport>::What::gone : Delivery<BoardReport>::What::back;
-    post(p);
+    queue_.post(p);
   }
 }
 
 /// A pause that is due, in the boot that it was asked of.
 bool Scheduler::left_out(std::uint64_t pulse) {
-  const std::lock_guard lock(pausing_);
-  made_ = pulse + 1;
+  const bool paused = pauses_.make(pulse, boot_of(pulse));
   rig_.planned.store(pulse + 1);
-  if (!pause_) return false;
-  const bool in_boot = pause_->boot == 0 || pause_->boot == boot_of(pulse);
-  if (!in_boot || pulse >= pause_->end) pause_.reset();
-  return pause_ && pulse >= pause_->from;
+  return paused;
 }
 
 std::uint32_t Scheduler::boot_of(std::uint64_t pulse) const noexcept {
@@ -244,14 +209,15 @@ void Scheduler::make_report(std::uint64_t pulse) {
     report.edge = DeviceStamp(
         (report.edge - trigger_->clock().read(booted, slot.time, rig_.truth->faults())).ns());
   if (slot.boot > 0 && slot.number == 0) trigger_->reboots.fetch_add(1, std::memory_order_relaxed);
-  Duration told{};  // after the edge
+  Duration reported{};  // after the edge
   for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
     if ((board_.feedback >> static_cast<unsigned>(k) & 1U) == 0) continue;
     PulseExposure& e = report.exposure[static_cast<std::size_t>(k)];
     e = feedback(pulse, k);
-    told = std::max(told, e.seen ? e.end : plan_.at(pulse + 1).time - slot.time - kReportLatency);
+    reported =
+        std::max(reported, e.seen ? e.end : plan_.at(pulse + 1).time - slot.time - kReportLatency);
   }
-  p.arrival = jittered(edge + std::max(told, Duration{}) + kReportLatency, 20, pulse);
+  p.arrival = jittered(edge + std::max(reported, Duration{}) + kReportLatency, 20, pulse);
   if (board_.feedback !=
       0) {  // the report waits for exposures of any length, so the board is asked for its time
     constexpr double kKnown = 20e3;  // ns
@@ -264,7 +230,7 @@ void Scheduler::make_report(std::uint64_t pulse) {
     trigger_->lost.fetch_add(1, std::memory_order_relaxed);
     return;
   }
-  post(p);
+  queue_.post(p);
 }
 
 void Scheduler::make_readings(HostStamp until) {
@@ -287,7 +253,7 @@ void Scheduler::make_readings(HostStamp until) {
     p.arrival = jittered(at + kInsLatency, 10, readings_);
     p.reading.value.sample = sample;
     p.reading.value.measured = ins_.clock().read(at, time, rig_.truth->faults());
-    post(p);
+    queue_.post(p);
   }
 }
 

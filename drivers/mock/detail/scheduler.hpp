@@ -1,26 +1,25 @@
 #pragma once
 #include <array>
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <queue>
 #include <thread>
-#include <utility>
 #include <vector>
 
+#include "drivers/mock/detail/delivery_queue.hpp"
 #include "drivers/mock/detail/devices.hpp"
 #include "drivers/mock/detail/exposure.hpp"
+#include "drivers/mock/detail/pause_window.hpp"
+#include "drivers/mock/detail/pulse_feed.hpp"
 #include "drivers/mock/detail/pulse_plan.hpp"
 
 namespace vergence::mock {
 
-/// Makes what the devices deliver, pulse after pulse, and hands it out in the order of arrival.
+/// Makes what the devices deliver, pulse after pulse; the DeliveryQueue hands it out.
 ///
 /// Threads  begin(), halt(): the owner's. One thread makes everything, a second one renders every
-///          other camera; in real time another hands out what is due.
+///          other camera.
 /// Time     Virtual: what is made before the next pulse is delivered before it, and the producer
 ///          waits for room. Real: a pulse that is over before its pictures are begun has none.
 /// Pauses   Virtual, with reports_taken: slot n is made once every report that arrives before it
@@ -32,13 +31,18 @@ class Scheduler final : public PulseListener {
   Scheduler(RigContext* rig, std::vector<std::unique_ptr<MockCamera>>* cameras, MockIns* ins)
       : rig_(*rig), cameras_(*cameras), ins_(*ins) {}
   ~Scheduler() override { halt(); }
-  void attach(MockTrigger* trigger) noexcept { trigger_ = trigger; }
+  void attach(MockTrigger* trigger) noexcept {
+    trigger_ = trigger;
+    queue_.attach(trigger);
+  }
 
   void begin(const TriggerConfiguration& c) override;
   void halt() noexcept override;
-  void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept override;
+  void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept override {
+    pauses_.request(from, pulses, boot);
+  }
   [[nodiscard]] std::array<PulseExposure, kMaxCameras> feed(HostStamp edge);
-  void end_feed() noexcept;
+  void end_feed() noexcept { feed_.end(); }
   /// After the drive.
   [[nodiscard]] const PulsePlan& fed_plan() const noexcept { return fed_; }
   [[nodiscard]] PulsePlan plan_of(const TriggerConfiguration& c) const;
@@ -47,28 +51,10 @@ class Scheduler final : public PulseListener {
   [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;
 
  private:
-  /// One delivery on its way; `device`: camera, kInsDevice or kTriggerDevice.
-  struct Parcel {
-    HostStamp arrival{};
-    std::uint64_t order = 0;  // of making: breaks ties
-    int device = 0;
-    Delivery<Frame> frame{};
-    Delivery<InsReading> reading{};
-    Delivery<BoardReport> report{};
-    std::uint32_t generation = 0;  // of the camera's memory that the frame is in
-    [[nodiscard]] bool operator<(
-        const Parcel& o) const noexcept {  // the queue's top is the earliest
-      return std::pair(arrival, order) > std::pair(o.arrival, o.order);
-    }
-  };
   /// What the scheduler knows of a camera.
   struct Sender {
     bool unplugged = false;
     std::uint64_t counter_base = 0;  // of the slot less what the camera counts
-    std::atomic<int> on_the_way{0};  // frames in parcels_
-    std::vector<FrameSlot>
-        spare;  // of frames nobody was there for, of that generation; under mutex_
-    std::uint32_t spare_generation = 0;
   };
   struct Shooting {
     int camera = 0;  // that sends it
@@ -76,11 +62,6 @@ class Scheduler final : public PulseListener {
     FrameSlot slot = 0;
     ExposureSetting setting{};
   };
-  struct Pause {
-    std::uint64_t from = 0, end = 0;  // slots
-    std::uint32_t boot = 0;           // of Pulse; 0: the first
-  };
-  static constexpr int kInsDevice = -1, kTriggerDevice = -2;
   static constexpr HostStamp kVirtualStart{
       1'000'000'000'000};  // 1000 s after a machine's start, on every run
 
@@ -109,13 +90,6 @@ class Scheduler final : public PulseListener {
   [[nodiscard]] std::optional<Shooting> plan(std::uint64_t pulse, int k);
   void render(const Shooting& shooting);
   void send(std::uint64_t pulse, const Shooting& shooting);
-  void post(Parcel parcel);
-  void announce_end(HostStamp at);
-  void deliver_until(HostStamp horizon);
-  void hand_out_in_time();
-  void deliver(const Parcel& parcel, HostStamp arrival);
-  template <class S, class D>
-  [[nodiscard]] bool push_or_wait(S* stream, const D& delivery);  // false: nobody takes it
   [[nodiscard]] std::optional<FrameSlot> slot_of(int k);
   [[nodiscard]] HostStamp jittered(HostStamp least, std::uint64_t device,
                                    std::uint64_t number) const noexcept;
@@ -132,24 +106,16 @@ class Scheduler final : public PulseListener {
   TriggerConfiguration board_{};
   PulsePlan plan_;
   HostStamp start_ = kVirtualStart;
-  std::uint64_t readings_ = 0, orders_ = 0;
+  std::uint64_t readings_ = 0;
   std::size_t link_events_ = 0;  // of the plan, posted
   bool resumed_ = true;          // the next pulse is the first after a start or a pause
-  std::mutex pausing_;           // of what follows
-  std::optional<Pause> pause_;
-  std::uint64_t made_ = 0;  // slots
-  PulsePlan fed_;           // of who feeds
-  std::mutex feeding_;      // of what follows
-  std::condition_variable fed_more_;
-  std::queue<Duration> feed_;
-  bool feed_over_ = false;
+  PauseWindow pauses_;
+  PulsePlan fed_;  // of who feeds
   std::array<Sender, kMaxCameras> senders_{};
-  std::mutex mutex_;  // of parcels_, in real time
-  std::condition_variable posted_;
-  std::priority_queue<Parcel> parcels_;
-  bool finished_ = false;  // under mutex_: nothing more will be posted
   std::atomic<bool> stop_{false};
-  std::thread producer_, deliverer_;
+  PulseFeed feed_{stop_};
+  DeliveryQueue queue_{rig_, cameras_, ins_, stop_};
+  std::thread producer_;
 };
 
 }  // namespace vergence::mock

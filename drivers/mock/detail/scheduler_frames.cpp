@@ -1,7 +1,6 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <mutex>
 #include <shared_mutex>
 #include <thread>
 #include <vector>
@@ -46,7 +45,7 @@ bool Scheduler::present(std::uint64_t pulse, int k) {
     p.device = k;
     p.arrival = host_of(pulse) + kTransfer;  // after what was under way, before the next frame
     p.frame.what = gone ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
-    post(p);
+    queue_.post(p);
     sender.unplugged = gone;
     sender.counter_base = pulse;
   }
@@ -58,20 +57,10 @@ std::optional<FrameSlot> Scheduler::slot_of(int k) {
   for (;;) {
     const WakeEvent::Ticket seen = rig_.room.ticket();
     if (stopping()) return std::nullopt;
-    {
-      const std::lock_guard lock(mutex_);
-      Sender& sender = senders_[static_cast<std::size_t>(k)];
-      std::vector<FrameSlot>& spare = sender.spare;
-      if (!spare.empty() && sender.spare_generation == camera.generation()) {
-        const FrameSlot slot = spare.back();
-        spare.pop_back();
-        return slot;
-      }
-    }
+    if (const auto slot = queue_.take_spare(k)) return slot;
     if (const auto slot = camera.pool().acquire()) return slot;
     // Slots that only time will free are not waited for: late frames hold them.
-    const bool held_by_delay = senders_[static_cast<std::size_t>(k)].on_the_way.load() >
-                               static_cast<int>(MockRig::kSlots) / 2;
+    const bool held_by_delay = queue_.on_the_way(k) > static_cast<int>(MockRig::kSlots) / 2;
     if (rig_.options.real_time || held_by_delay || !camera.stream.streaming()) return std::nullopt;
     rig_.room.wait(seen);
   }
@@ -127,11 +116,9 @@ void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
     Parcel again = p;
     again.frame.value.slot = *copy;
     again.arrival = p.arrival + kTransfer;
-    sender.on_the_way.fetch_add(1);
-    post(again);
+    queue_.post(again);
   }
-  sender.on_the_way.fetch_add(1);
-  post(p);
+  queue_.post(p);
 }
 
 void Scheduler::render(const Shooting& shooting) {

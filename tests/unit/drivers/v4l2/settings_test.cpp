@@ -13,13 +13,13 @@ CameraConfiguration sound() {
   return c;
 }
 
-TEST(V4l2Settings, soundNumbersAreNotNonsense) { EXPECT_EQ(find_nonsense(sound()), ""); }
+TEST(V4l2Settings, soundNumbersAreValid) { EXPECT_EQ(find_invalid(sound()), ""); }
 
 TEST(V4l2Settings, nonsenseIsNamed) {
   const auto nonsense = [](auto&& change) {
     CameraConfiguration c = sound();
     change(&c);
-    return find_nonsense(c);
+    return find_invalid(c);
   };
   EXPECT_NE(nonsense([](auto* c) { c->width = 0; }).find("0 x 480"), std::string::npos);
   EXPECT_NE(nonsense([](auto* c) { c->rate_hz = std::numeric_limits<double>::quiet_NaN(); }), "");

@@ -1,3 +1,5 @@
+#include "drivers/mock/detail/delivery_queue.hpp"
+
 #include <pthread.h>
 
 #include <chrono>
@@ -6,12 +8,21 @@
 #include <shared_mutex>
 
 #include "drivers/clock.hpp"
-#include "drivers/mock/detail/scheduler.hpp"
 
-/// Handing out what was made, in the order of arrival.
 namespace vergence::mock {
 
-void Scheduler::announce_end(HostStamp at) {
+void DeliveryQueue::begin() {
+  finished_ = false;
+  if (rig_.options.real_time) deliverer_ = std::thread([this] { hand_out_in_time(); });
+}
+
+void DeliveryQueue::join() noexcept {
+  { const std::lock_guard lock(mutex_); }
+  posted_.notify_all();
+  if (deliverer_.joinable()) deliverer_.join();
+}
+
+void DeliveryQueue::finish(HostStamp at) {
   for (int device = kTriggerDevice; device < static_cast<int>(cameras_.size()); ++device) {
     Parcel p;
     p.device = device;
@@ -21,16 +32,36 @@ void Scheduler::announce_end(HostStamp at) {
     p.report.what = Delivery<BoardReport>::What::end;
     post(p);
   }
+  if (!rig_.options.real_time) {
+    deliver_until(HostStamp(INT64_MAX));
+  } else {
+    const std::lock_guard lock(mutex_);
+    finished_ = true;
+    posted_.notify_all();
+  }
 }
 
-void Scheduler::post(Parcel parcel) {
+std::optional<FrameSlot> DeliveryQueue::take_spare(int k) {
+  const std::lock_guard lock(mutex_);
+  Sender& sender = senders_[static_cast<std::size_t>(k)];
+  if (sender.spare.empty() ||
+      sender.spare_generation != cameras_[static_cast<std::size_t>(k)]->generation())
+    return std::nullopt;
+  const FrameSlot slot = sender.spare.back();
+  sender.spare.pop_back();
+  return slot;
+}
+
+void DeliveryQueue::post(Parcel parcel) {
+  if (parcel.device >= 0 && parcel.frame.what == Delivery<Frame>::What::item)
+    senders_[static_cast<std::size_t>(parcel.device)].on_the_way.fetch_add(1);
   const std::lock_guard lock(mutex_);
   parcel.order = orders_++;
   parcels_.push(parcel);
   posted_.notify_all();
 }
 
-void Scheduler::deliver_until(HostStamp horizon) {
+void DeliveryQueue::deliver_until(HostStamp horizon) {
   for (;;) {
     if (stopping()) return;
     if (parcels_.empty() || parcels_.top().arrival >= horizon) break;
@@ -42,7 +73,7 @@ void Scheduler::deliver_until(HostStamp horizon) {
   rig_.delivered.advance(horizon);
 }
 
-void Scheduler::hand_out_in_time() {
+void DeliveryQueue::hand_out_in_time() {
   (void)pthread_setname_np(pthread_self(), "vergence-mockio");
   std::unique_lock lock(mutex_);
   while (!stopping()) {
@@ -67,7 +98,7 @@ void Scheduler::hand_out_in_time() {
 }
 
 template <class S, class D>
-bool Scheduler::push_or_wait(S* stream, const D& delivery) {
+bool DeliveryQueue::push_or_wait(S* stream, const D& delivery) {
   for (;;) {
     const WakeEvent::Ticket seen = rig_.room.ticket();
     if (stopping() || !stream->streaming()) return false;
@@ -77,7 +108,7 @@ bool Scheduler::push_or_wait(S* stream, const D& delivery) {
   }
 }
 
-void Scheduler::deliver(const Parcel& parcel, HostStamp arrival) {
+void DeliveryQueue::deliver(const Parcel& parcel, HostStamp arrival) {
   if (parcel.device == kTriggerDevice) {
     Delivery<BoardReport> d = parcel.report;
     d.arrival = arrival;
@@ -95,6 +126,10 @@ void Scheduler::deliver(const Parcel& parcel, HostStamp arrival) {
     (void)push_or_wait(&ins_.stream, d);
     return;
   }
+  deliver_frame(parcel, arrival);
+}
+
+void DeliveryQueue::deliver_frame(const Parcel& parcel, HostStamp arrival) {
   Delivery<Frame> d = parcel.frame;
   d.arrival = arrival;
   const auto k = static_cast<std::size_t>(parcel.device);

@@ -1,0 +1,152 @@
+#include "drivers/gige/detail/frame_receiver.hpp"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+#include "drivers/clock.hpp"
+
+namespace vergence::gige {
+
+void FrameReceiver::begin(Session& session, const Applied& applied, int width, int height,
+                          const ExposureSetting& exposure) {
+  session_ = &session;
+  applied_ = &applied;
+  width_ = width;
+  height_ = height;
+  free_.reserve(memory_.slots());
+  blocks_.restart();
+  exposures_.reset(exposure);
+  last_exposure_ = exposure.exposure;
+  wrong_sizes_ = 0;
+  last_buffer_ns_ = monotonic_now().ns();
+}
+
+void FrameReceiver::supply_buffers() {
+  free_.clear();
+  for (std::size_t i = 0; i < memory_.slots(); ++i) {
+    const auto slot = static_cast<FrameSlot>(i);
+    if (handover_.is_out(slot)) continue;  // comes when it is released
+    if (memory_.converts())
+      free_.push_back(slot);
+    else
+      session_->push(memory_.buffers()[i]);
+  }
+  if (memory_.converts())
+    for (ArvBuffer* b : memory_.buffers()) session_->push(b);
+}
+
+void FrameReceiver::change_exposure(const ExposureSetting& setting) noexcept {
+  (void)exposures_.change(setting, monotonic_now());
+}
+
+void FrameReceiver::callback(void* self, ArvStreamCallbackType type, ArvBuffer*) {
+  auto* receiver = static_cast<FrameReceiver*>(self);
+  if (type == ARV_STREAM_CALLBACK_TYPE_INIT)
+    (void)pthread_setname_np(pthread_self(), "vergence-gige");
+  if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
+  if (ArvBuffer* done = arv_stream_try_pop_buffer(receiver->session_->stream()); done != nullptr)
+    receiver->take(done);
+}
+
+/// Slots that came back go to the transport again.
+void FrameReceiver::recycle() noexcept {
+  for (FrameSlot slot = 0; handover_.returned(&slot);) {
+    if (memory_.converts())
+      free_.push_back(slot);
+    else
+      session_->push(memory_.buffers()[slot]);
+  }
+}
+
+void FrameReceiver::take(ArvBuffer* buffer) noexcept {
+  const HostStamp arrival = monotonic_now();
+  g_object_unref(buffer);  // the memory's reference stands
+  recycle();
+  const std::size_t index = ImageMemory::index_of(buffer);
+  Frame frame;
+  if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_ABORTED) return;  // the stream is closing
+  if (!describe(buffer, arrival, &frame)) {
+    session_->push(buffer);
+    return;
+  }
+  if (!memory_.converts()) {
+    frame.slot = static_cast<FrameSlot>(index);
+    if (!handover_.offer(frame)) session_->push(buffer);
+    return;
+  }
+  if (free_.empty()) {  // cannot be: one more than may be out
+    session_->push(buffer);
+    return;
+  }
+  frame.slot = free_.back();
+  memory_.convert(*applied_->format, index, frame.slot);
+  session_->push(buffer);
+  if (handover_.offer(frame)) free_.pop_back();
+}
+
+/// What is known of a buffer that is done; false: nothing that could be handed out.
+bool FrameReceiver::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept {
+  const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
+  const std::uint64_t id = arv_buffer_get_frame_id(buffer);
+  last_buffer_ns_.store(arrival.ns(), std::memory_order_release);
+  const auto step = blocks_.next(id);  // 0, as it was pushed: the leader is lost; the next frame's
+                                       // id shows that one is missing
+  if (!step) return false;
+  handover_.count_lost(step->missing);
+  frame->counter = step->counter;
+  frame->arrival = arrival;
+  const bool stamp_at_end = applied_->options.stamp_at_end;
+  const ExposureSetting& had = exposures_.at(arrival - applied_->plan.transfer - last_exposure_);
+  const auto reported = whole ? reported_exposure(buffer) : std::nullopt;
+  frame->status =
+      whole && right_size(buffer, reported.has_value()) ? FrameStatus::complete : FrameStatus::torn;
+  const bool complete = frame->status == FrameStatus::complete;
+  if (complete && !reported && applied_->exposure_chunk)
+    without_exposure_.fetch_add(1, std::memory_order_relaxed);
+  frame->exposure = complete && reported ? *reported : had.exposure;
+  frame->gain_db = had.gain_db;
+  last_exposure_ = frame->exposure;
+  const Duration before = applied_->plan.transfer + (stamp_at_end ? Duration{} : frame->exposure);
+  frame->exposure_start =
+      applied_->tick_frequency > 0
+          ? DeviceStamp(static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)))
+          : DeviceStamp(arrival.ns()) - before;
+  if (stamp_at_end) frame->exposure_start = frame->exposure_start - frame->exposure;
+  return true;
+}
+
+/// Precondition: the frame came whole.
+std::optional<Duration> FrameReceiver::reported_exposure(ArvBuffer* buffer) const noexcept {
+  if (!applied_->exposure_chunk) return std::nullopt;
+  std::size_t bytes = 0;
+  const auto* data = static_cast<const std::uint8_t*>(arv_buffer_get_data(buffer, &bytes));
+  return exposure_in_chunks(std::span(data, bytes).subspan(std::min(applied_->pixels, bytes)),
+                            *applied_->exposure_chunk);
+}
+
+/// A frame that came whole may still be another than the one that was asked for.
+bool FrameReceiver::right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept {
+  gint x = 0, y = 0, width = 0, height = 0;
+  std::size_t bytes = 0;
+  (void)arv_buffer_get_data(buffer, &bytes);
+  if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_CHUNK_DATA) {
+    arv_buffer_get_image_region(buffer, &x, &y, &width, &height);
+  } else if (chunks_in_place) {  // such a leader does not say; what is where it has to be behind
+                                 // the pixels does
+    width = width_;
+    height = height_;
+  }
+  if (width == width_ && height == height_ && bytes >= applied_->payload) {
+    wrong_sizes_.store(0, std::memory_order_relaxed);
+    return true;
+  }
+  wrong_width_.store(width, std::memory_order_relaxed);
+  wrong_height_.store(height, std::memory_order_relaxed);
+  wrong_sizes_.fetch_add(1, std::memory_order_relaxed);
+  return false;
+}
+
+}  // namespace vergence::gige

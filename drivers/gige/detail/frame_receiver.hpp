@@ -1,0 +1,85 @@
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "drivers/camera.hpp"
+#include "drivers/exposure/applied_exposure.hpp"
+#include "drivers/gige/detail/block_counter.hpp"
+#include "drivers/gige/detail/handover.hpp"
+#include "drivers/gige/detail/image_memory.hpp"
+#include "drivers/gige/detail/session.hpp"
+
+namespace vergence::gige {
+
+/// What Aravis's receive thread does: buffers that are done become frames with number, time,
+/// exposure and state, and go to the Handover; slots that come back go to the transport again.
+///
+/// Threads  begin(), supply_buffers(), end(): the owner, while no callback can come. callback():
+///          Aravis's thread, vergence-gige. The others: any.
+/// Memory   Taken by begin().
+/// Errors   A frame of another size than configured is torn, and counted.
+class FrameReceiver {
+ public:
+  /// Both outlive the receiver.
+  FrameReceiver(Handover& handover, ImageMemory& memory) : handover_(handover), memory_(memory) {}
+
+  /// Of Session::open_stream(); `self` is a FrameReceiver.
+  static void callback(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
+
+  /// A stream of the session was opened. `applied` is its configuration, `exposure` what the
+  /// camera's registers hold; both are constant, `session` is there, until end().
+  void begin(Session& session, const Applied& applied, int width, int height,
+             const ExposureSetting& exposure);
+  /// Gives the transport every buffer whose slot is not with the consumer.
+  void supply_buffers();
+  /// The stream was closed: no callback comes any more.
+  void end() noexcept { session_ = nullptr; }
+
+  /// The camera's registers hold this from now on.
+  void change_exposure(const ExposureSetting& setting) noexcept;
+
+  /// Of the newest buffer, or of begin().
+  [[nodiscard]] HostStamp last_buffer() const noexcept {
+    return HostStamp(last_buffer_ns_.load(std::memory_order_acquire));
+  }
+  /// Frames in a row whose size is not the configured one.
+  [[nodiscard]] int wrong_sizes() const noexcept {
+    return wrong_sizes_.load(std::memory_order_relaxed);
+  }
+  /// Of the newest of these; 0: it did not say.
+  [[nodiscard]] int wrong_width() const noexcept {
+    return wrong_width_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] int wrong_height() const noexcept {
+    return wrong_height_.load(std::memory_order_relaxed);
+  }
+  /// Whole frames since reset_counts() whose chunk data did not have the exposure.
+  [[nodiscard]] std::uint64_t without_exposure() const noexcept {
+    return without_exposure_.load(std::memory_order_relaxed);
+  }
+  void reset_counts() noexcept { without_exposure_.store(0, std::memory_order_relaxed); }
+
+ private:
+  void take(ArvBuffer* buffer) noexcept;
+  [[nodiscard]] bool describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept;
+  [[nodiscard]] bool right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept;
+  [[nodiscard]] std::optional<Duration> reported_exposure(ArvBuffer* buffer) const noexcept;
+  void recycle() noexcept;
+
+  Handover& handover_;
+  ImageMemory& memory_;
+  Session* session_ = nullptr;
+  const Applied* applied_ = nullptr;
+  int width_ = 0, height_ = 0;
+  BlockCounter blocks_;
+  exposure::AppliedExposure exposures_;
+  Duration last_exposure_{};     // of the last frame
+  std::vector<FrameSlot> free_;  // converting: slots that are the transport's
+  std::atomic<std::int64_t> last_buffer_ns_{0};
+  std::atomic<int> wrong_sizes_{0}, wrong_width_{0}, wrong_height_{0};
+  std::atomic<std::uint64_t> without_exposure_{0};
+};
+
+}  // namespace vergence::gige
