@@ -13,7 +13,8 @@
 namespace vergence::v4l2 {
 namespace {
 
-constexpr int kPollLimit = 500;  // the longest look of the capture thread; nothing depends on it
+constexpr int kPollLimit =
+    500;  // ms: the longest look of the capture thread; nothing depends on it
 constexpr int kPollErrors =
     20;  // looks in a row that end in an error without a frame: nothing comes any more
 
