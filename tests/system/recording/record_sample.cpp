@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/recording/messages.hpp"
+#include "app/recording/png_encoder.hpp"
 #include "app/recording/recording.hpp"
 
 namespace vergence::app {
@@ -52,8 +53,12 @@ void write(CdrWriter* out, RosType type, Stamp stamp) {
   switch (type) {
     case RosType::image:
       return write_image(out, stamp, "left", {pixels.data(), 4, 3, 4});
-    case RosType::compressed_image:
-      return write_compressed_image(out, stamp, "left", "png", pixels);
+    case RosType::compressed_image: {
+      PngEncoder png(4, 3);
+      std::vector<std::uint8_t> file(PngEncoder::most_bytes(4, 3));
+      file.resize(png.encode({pixels.data(), 4, 3, 4}, file));
+      return write_compressed_image(out, stamp, "left", "png", file);
+    }
     case RosType::camera_info:
       return write_camera_info(out, stamp, "right", rig, 1, true);
     case RosType::nav_sat_fix:
