@@ -134,7 +134,7 @@ void ExposureControl::ask(const ExposureSetting& requested) noexcept {
     return;
   }
   under_way_.store(true, std::memory_order_release);
-  (void)wishes_.push(requested);  // one at a time: there is room
+  (void)requests_.push(requested);  // one at a time: there is room
   wake_.signal();
 }
 
@@ -160,7 +160,7 @@ void ExposureControl::work() noexcept {
   for (ExposureSetting requested;;) {
     const WakeEvent::Ticket seen = wake_.ticket();
     if (stop_.load(std::memory_order_acquire)) return;
-    if (!wishes_.pop(&requested)) {
+    if (!requests_.pop(&requested)) {
       wake_.wait(seen);
       continue;
     }

@@ -278,17 +278,18 @@ void check_load(const Link& link, std::vector<Finding>* findings) {
 
 void check_rp_filter(const CheckContext& p, const std::vector<Reached>& cameras,
                      std::vector<Finding>* findings) {
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
   const auto filter = [&](const std::string& name) {
     return p.machine.number("/proc/sys/net/ipv4/conf/" + name + "/rp_filter").value_or(0);
   };
   for (const Reached& r : cameras) {
-    if (r.through == nullptr || std::find(told.begin(), told.end(), r.through->name) != told.end())
+    if (r.through == nullptr ||
+        std::find(reported.begin(), reported.end(), r.through->name) != reported.end())
       continue;
     const auto other = std::find_if(p.machine.addresses.begin(), p.machine.addresses.end(),
                                     [&](const auto& a) { return overlap(*r.through, a); });
     if (other == p.machine.addresses.end()) continue;
-    told.push_back(r.through->name);
+    reported.push_back(r.through->name);
     const bool strict = std::max(filter("all"), filter(r.through->name)) == 1;
     findings->push_back(
         {"rp_filter", strict ? FindingState::problem : FindingState::advice,

@@ -183,17 +183,17 @@ class Planner {
   }
 
   bool choose_mode() {
-    const auto wishes = codings();
+    const auto candidates = codings();
     const bool region = requested_.offset_x != 0 || requested_.offset_y != 0;
     const bool may_fixed =
         !region && !plan_.options.packet_bytes && !plan_.options.format7.value_or(false);
     const bool may_format7 = plan_.options.format7.value_or(true);
-    for (const ColorCoding c : wishes) {
+    for (const ColorCoding c : candidates) {
       if (may_fixed && fixed(c, true)) return true;
       if (may_format7 && format7(c)) return true;
       if (r_.status() != DeviceStatus::ok) return false;
     }
-    for (const ColorCoding c : wishes)
+    for (const ColorCoding c : candidates)
       if (may_fixed && fixed(c, false)) return true;
     last_error_ = text("%d x %d", requested_.width, requested_.height) +
                   (requested_.pixel_format.empty() ? "" : " " + requested_.pixel_format) +

@@ -81,7 +81,7 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
   const HostStamp sent = q.sent + wire_ * kPingBytes;
   if (pong.sent < pong.received || pong.sent > kMostTicks) {
     ++totals_.refused;
-    return PongWord::nonsense;
+    return PongWord::invalid;
   }
   const Duration inside =
       Duration::microseconds(static_cast<std::int64_t>(pong.sent - pong.received));
@@ -90,7 +90,7 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
   const Duration tolerance = Duration::microseconds(2) + inside / 1000;
   if (rtt < -tolerance) {
     ++totals_.refused;
-    return PongWord::nonsense;
+    return PongWord::invalid;
   }
   if (pong.received < newest_tick_) {
     ++totals_.refused;

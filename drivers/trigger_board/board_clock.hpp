@@ -12,7 +12,7 @@ namespace vergence::trigger_board {
 enum class PongWord : std::uint8_t {
   taken,
   unasked,   // no such question is open
-  nonsense,  // it cannot be: sent before received, or longer in the board than under way
+  invalid,   // it cannot be: sent before received, or longer in the board than under way
   backward,  // earlier than the one before
 };
 

@@ -10,15 +10,15 @@ namespace {
 constexpr std::size_t kTextAtLeast = 12;  // so many printable bytes in a row are no accident
 
 /// The first bytes may be the end of something, or of another baud rate.
-std::string_view longest_text(std::string_view heard) noexcept {
+std::string_view longest_text(std::string_view received) noexcept {
   const auto printable = [](char c) {
     return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\t';
   };
   std::string_view best;
-  for (std::size_t from = 0; from < heard.size(); ++from) {
+  for (std::size_t from = 0; from < received.size(); ++from) {
     std::size_t to = from;
-    while (to < heard.size() && printable(heard[to])) ++to;
-    if (to - from > best.size()) best = heard.substr(from, to - from);
+    while (to < received.size() && printable(received[to])) ++to;
+    if (to - from > best.size()) best = received.substr(from, to - from);
     from = to;
   }
   return best;
@@ -84,7 +84,7 @@ DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, Times* tim
         bounded_ = false;
       }
       if (!ready) continue;
-      ++frames_heard_;
+      ++frames_received_;
       *times = {arrival_, departure};
       return DeviceStatus::ok;
     }
@@ -101,24 +101,24 @@ DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, Times* tim
 }
 
 void BoardLine::remember() noexcept {
-  const std::size_t n = std::min(size_, heard_.size() - heard_size_);
-  std::memcpy(heard_.data() + heard_size_, buffer_.data(), n);
-  heard_size_ += n;
+  const std::size_t n = std::min(size_, first_bytes_.size() - first_size_);
+  std::memcpy(first_bytes_.data() + first_size_, buffer_.data(), n);
+  first_size_ += n;
 }
 
 void BoardLine::forget() noexcept {
-  heard_size_ = 0;
-  frames_heard_ = 0;
+  first_size_ = 0;
+  frames_received_ = 0;
 }
 
-std::string BoardLine::heard_instead() const {
-  const std::string_view heard(heard_.data(), heard_size_);
-  if (heard.empty() || frames_heard_ > 0) return {};
-  if (heard.find("\xFA\xFF") != std::string_view::npos)
+std::string BoardLine::received_instead() const {
+  const std::string_view received(first_bytes_.data(), first_size_);
+  if (received.empty() || frames_received_ > 0) return {};
+  if (received.find("\xFA\xFF") != std::string_view::npos)
     return "it speaks Xbus, as an XSens INS does";
-  if (heard.find("$G") != std::string_view::npos)
+  if (received.find("$G") != std::string_view::npos)
     return "it speaks NMEA 0183, as a GNSS receiver does";
-  if (const std::string_view text = longest_text(heard); text.size() >= kTextAtLeast) {
+  if (const std::string_view text = longest_text(received); text.size() >= kTextAtLeast) {
     std::string some(text.substr(0, 40));
     std::replace_if(
         some.begin(), some.end(), [](char c) { return c < ' '; }, ' ');

@@ -51,8 +51,8 @@ class BoardLine {
 
   [[nodiscard]] LineCounters counters() const noexcept;
   /// What the first bytes look like when no frame has come since attach() or forget(). Empty:
-  /// nothing was heard, or frames were.
-  [[nodiscard]] std::string heard_instead() const;
+  /// nothing was received, or frames were.
+  [[nodiscard]] std::string received_instead() const;
   void forget() noexcept;
 
  private:
@@ -71,9 +71,9 @@ class BoardLine {
   std::int64_t into_frame_ = 0;  // bytes of the frame that is being received
   bool bounded_ = false;         // departure_ is a bound of it
   HostStamp departure_{};
-  std::array<char, 256> heard_{};
-  std::size_t heard_size_ = 0;
-  std::uint64_t frames_heard_ = 0;
+  std::array<char, 256> first_bytes_{};
+  std::size_t first_size_ = 0;
+  std::uint64_t frames_received_ = 0;
 };
 
 }  // namespace vergence::trigger_board

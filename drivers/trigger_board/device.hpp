@@ -100,7 +100,7 @@ class Device final : public TriggerDevice,
   TriggerInfo identity_{};
   TriggerConfig config_{};
   std::uint32_t mark_ = 0;  // of config_, in STATUS
-  std::uint32_t baud_ = 0;  // at which the board was last heard; 0: not yet
+  std::uint32_t baud_ = 0;  // at which the board last answered; 0: not yet
   bool connected_ = false, configured_ = false;
   DeviceTiming timing_{};
   std::string remark_;

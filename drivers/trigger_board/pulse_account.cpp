@@ -14,15 +14,16 @@ std::int64_t steps_from(std::uint64_t expected, std::uint32_t low) noexcept {
                          : static_cast<std::int64_t>(d) - 0x100000000LL;
 }
 
-enum class ExposureWord : std::uint8_t { none, good, nonsense };
+enum class ExposureWord : std::uint8_t { none, good, invalid };
 
-ExposureWord exposure_of(const TriggerExposure& told, PulseExposure* exposure) noexcept {
+ExposureWord exposure_of(const TriggerExposure& reported, PulseExposure* exposure) noexcept {
   constexpr std::int32_t kLongest = 10'000'000;  // µs
-  if (told.start_us == TRIGGER_NOT_SEEN || told.end_us == TRIGGER_NOT_SEEN)
+  if (reported.start_us == TRIGGER_NOT_SEEN || reported.end_us == TRIGGER_NOT_SEEN)
     return ExposureWord::none;
-  if (told.start_us < 0 || told.end_us < told.start_us || told.end_us > kLongest)
-    return ExposureWord::nonsense;
-  *exposure = {true, Duration::microseconds(told.start_us), Duration::microseconds(told.end_us)};
+  if (reported.start_us < 0 || reported.end_us < reported.start_us || reported.end_us > kLongest)
+    return ExposureWord::invalid;
+  *exposure = {true, Duration::microseconds(reported.start_us),
+               Duration::microseconds(reported.end_us)};
   return ExposureWord::good;
 }
 
@@ -89,7 +90,7 @@ bool PulseAccount::take(const TriggerEvent& event, Pulse* pulse) noexcept {
   p.boot = event.boot_id;
   p.resumed = flagged || over;
   for (std::size_t k = 0; k < p.exposure.size(); ++k)
-    if (exposure_of(event.exposure[k], &p.exposure[k]) == ExposureWord::nonsense)
+    if (exposure_of(event.exposure[k], &p.exposure[k]) == ExposureWord::invalid)
       ++counters_.exposures_refused;
   *pulse = p;
   next_ = p.number + 1;

@@ -20,7 +20,7 @@ struct PulseCounters {
   [[nodiscard]] std::uint64_t refused() const noexcept { return repeated + backward + too_many; }
 };
 
-/// Events to pulses: numbers unwrapped, what is missing told apart, nonsense refused.
+/// Events to pulses: numbers unwrapped, what is missing sorted by cause, invalid events refused.
 ///
 /// Threads  One caller. Memory: none. Time: `edge` is the board's ticks in nanoseconds.
 /// Errors   An event that cannot follow the one before is refused and counted by name.
@@ -60,7 +60,7 @@ class PulseAccount {
   PulseCounters counters_{};
 };
 
-/// Beyond this a tick is nonsense: thirty years.
+/// Beyond this a tick is invalid: thirty years.
 inline constexpr std::uint64_t kMostTicks = 1'000'000'000'000'000;
 
 [[nodiscard]] inline DeviceStamp stamp_of_tick(std::uint64_t tick) noexcept {

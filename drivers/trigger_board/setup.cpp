@@ -183,7 +183,7 @@ DeviceStatus Setup::name_version() {
 }
 
 DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
-  std::string heard;
+  std::string received;
   // Twice round: boards that begin anew when their port is opened sleep through the first.
   for (int round = 0; round < 2; ++round) {
     for (const std::uint32_t candidate : kBauds) {
@@ -197,15 +197,15 @@ DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
       }
       const DeviceStatus status = hello(kHello, info);
       if (status != DeviceStatus::timeout) return status;
-      if (heard.empty()) heard = frames_.heard_instead();
+      if (received.empty()) received = frames_.received_instead();
       if (baud != 0) break;
     }
   }
-  last_error_ = heard.empty() ? std::string(
-                                    "nothing there answers as a trigger board does; check its "
-                                    "cable, supply and firmware")
-                              : "what is there is no trigger board: " + heard +
-                                    "; name the board's port in trigger.port";
+  last_error_ = received.empty() ? std::string(
+                                       "nothing there answers as a trigger board does; check its "
+                                       "cable, supply and firmware")
+                                 : "what is there is no trigger board: " + received +
+                                       "; name the board's port in trigger.port";
   return DeviceStatus::not_found;
 }
 

@@ -179,9 +179,9 @@ std::vector<double> smoothed(const std::vector<double>& in, double sigma_s) {
 // ---- the springs
 
 /// A sum of sines with random phases: smooth, bounded, without memory.
-class Unrest {
+class Disturbance {
  public:
-  Unrest(Random* random, double low_hz, double high_hz, double amplitude) {
+  Disturbance(Random* random, double low_hz, double high_hz, double amplitude) {
     for (Wave& w : waves_)
       w = {2 * kPi * random->uniform(low_hz, high_hz), random->uniform(0, 2 * kPi),
            amplitude * random->uniform(0.25, 0.55)};
@@ -244,13 +244,13 @@ Drive::Drive(const DriveOptions& options, const World& world) : options_(checked
 
   Random random(options_.seed, 30);
   const double degree = kPi / 180;
-  const Unrest pitch(&random, 0.5, 1.9, 0.22 * degree * options_.suspension),
+  const Disturbance pitch(&random, 0.5, 1.9, 0.22 * degree * options_.suspension),
       roll(&random, 0.4, 1.6, 0.25 * degree * options_.suspension);
-  const Unrest heave(&random, 0.6, 2.0, 0.011 * options_.suspension),
+  const Disturbance heave(&random, 0.6, 2.0, 0.011 * options_.suspension),
       wander(&random, 0.05, 0.3, 0.10);
-  const Unrest shake_pitch(&random, 6, 12, 0.018 * degree * options_.vibration),
+  const Disturbance shake_pitch(&random, 6, 12, 0.018 * degree * options_.vibration),
       shake_roll(&random, 6, 12, 0.018 * degree * options_.vibration);
-  const Unrest shake_heave(&random, 6, 12, 0.0006 * options_.vibration);
+  const Disturbance shake_heave(&random, 6, 12, 0.0006 * options_.vibration);
   constexpr double kSpring = 0.0055;  // rad per m/s²: how far the body leans
 
   const double dt = kDriveStep.to_seconds();

@@ -20,7 +20,7 @@ enum class DriveKind : std::uint8_t {
 
 struct DriveOptions {
   DriveKind kind = DriveKind::loop;
-  std::uint64_t seed = 1;     // of the suspension's and the driver's unrest
+  std::uint64_t seed = 1;     // of the suspension's and the driver's disturbances
   double speed = 12.0;        // m/s, on the straights; 0.02..20
   double acceleration = 1.4;  // m/s², speeding up; braking is 1.3 times that; 0.3..4
   double lateral = 2.6;       // m/s², in corners; 0.5..5
@@ -44,8 +44,8 @@ struct BodyState {
 ///
 /// Method     Position and attitude angles are uniform quintic B-splines (C⁴) over control points
 ///            every kDriveStep, which come from a path of lines and arcs, a speed profile with
-///            limited acceleration, the ground's height and a sprung body's unrest. The spline is
-///            the truth: sampled exactly, differentiated exactly.
+///            limited acceleration, the ground's height and a sprung body's disturbances. The
+///            spline is the truth: sampled exactly, differentiated exactly.
 /// Time       Since the drive's start. Before it and after its end the vehicle stands.
 /// Threads    Const after construction.
 /// Errors     The constructor throws std::invalid_argument naming the option out of range. at()

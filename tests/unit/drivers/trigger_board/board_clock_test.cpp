@@ -44,15 +44,15 @@ TEST(BoardClock, answersThatCannotBeAreRefused) {
   BoardClock clock;
   EXPECT_EQ(clock.answer(pong(77, 10, 20), host(30)), PongWord::unasked);
   const std::uint32_t a = clock.ask(host(100));
-  EXPECT_EQ(clock.answer(pong(a, 300, 200), host(400)), PongWord::nonsense)
+  EXPECT_EQ(clock.answer(pong(a, 300, 200), host(400)), PongWord::invalid)
       << "sent before received";
   EXPECT_EQ(clock.answer(pong(a, 200, 300), host(400)), PongWord::unasked)
       << "it has been answered";
   const std::uint32_t b = clock.ask(host(1000));
-  EXPECT_EQ(clock.answer(pong(b, 1000, 9000), host(2000)), PongWord::nonsense)
+  EXPECT_EQ(clock.answer(pong(b, 1000, 9000), host(2000)), PongWord::invalid)
       << "longer in the board than under way";
   const std::uint32_t c = clock.ask(host(3000));
-  EXPECT_EQ(clock.answer(pong(c, kMostTicks, kMostTicks + 1), host(4000)), PongWord::nonsense);
+  EXPECT_EQ(clock.answer(pong(c, kMostTicks, kMostTicks + 1), host(4000)), PongWord::invalid);
   EXPECT_FALSE(clock.known());
   EXPECT_EQ(clock.quality().refused, 5U);
 }
