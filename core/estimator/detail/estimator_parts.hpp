@@ -11,8 +11,8 @@
 namespace vergence {
 
 struct Estimator::Parts {
-  // Without a calibration the baseline between two poses found separately is the scale: as far off
-  // as the mean of such frames on recorded drives.
+  // Without a calibration the baseline between two poses found separately is the scale: assumed,
+  // not measured; such poses are degraded.
   static constexpr double kUnlinkedLengthPercent = 10;
 
   Parts(const EstimatorOptions& o, const RigCalibration& r, const RigCalibration& nominal,
