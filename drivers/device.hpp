@@ -55,14 +55,29 @@ class Notifier {
   virtual void notify() noexcept = 0;
 };
 
-/// Sees what a device sends over its line, as it comes: for a record.
+/// One step of the conversation on a device's line, as its driver made it. In their order these
+/// steps, with the bytes, are all that a driver on a line learns of its device.
+struct LineEvent {
+  enum class Kind : std::uint8_t {
+    opened,   // bytes: the place's name; value: its latency timer, µs
+    read,     // bytes; time: arrival of the last of them
+    written,  // bytes; time: what the driver's last look at the clock had told it
+    baud,     // value: to be spoken from now on
+    lost,     // value: the DeviceStatus that a read ended with
+  } kind = Kind::read;
+  HostStamp time{};
+  std::uint32_t value = 0;
+  std::span<const std::uint8_t> bytes{};  // valid during the call
+};
+
+/// Sees the conversation on a device's line: for a record.
 ///
-/// Threads  on_bytes() on the device's own, one device each; it does not wait. `arrival`: of the
-///          last of the bytes.
-class ByteObserver {
+/// Threads  on_line_event() on the device's own, one device each; it does not wait. What was said
+///          before there was an observer: on the owner's.
+class LineObserver {
  public:
-  virtual ~ByteObserver() = default;
-  virtual void on_bytes(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept = 0;
+  virtual ~LineObserver() = default;
+  virtual void on_line_event(const LineEvent& event) noexcept = 0;
 };
 
 }  // namespace vergence

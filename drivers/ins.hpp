@@ -71,9 +71,10 @@ class InsDevice {
   /// once). `gone`: reading->arrival says when it was noticed. → ok, timeout, stopped, ended, gone
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, InsReading* reading) noexcept = 0;
   virtual void stop() noexcept = 0;
-  /// Who sees the bytes of its line from the next start() on, which outlives it; null: nobody.
-  /// False: it has no line. Owner's thread, while stopped.
-  virtual bool observe_bytes(ByteObserver* /*observer*/) noexcept { return false; }
+  /// Who sees the conversation on its line, which outlives it; null: nobody. Before the first
+  /// start(): also what was said since the device was opened. False: it has no line. Owner's
+  /// thread, while stopped.
+  virtual bool observe_line(LineObserver* /*observer*/) noexcept { return false; }
   /// One sentence about the last call that was not `ok`: what was refused, what to do. Empty: the
   /// status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }

@@ -83,9 +83,10 @@ class TriggerDevice {
   }
   /// No pulse after it returns.
   virtual void stop() noexcept = 0;
-  /// Who sees the bytes of its line from the next start() on, which outlives it; null: nobody.
-  /// False: it has no line. Owner's thread, while stopped.
-  virtual bool observe_bytes(ByteObserver* /*observer*/) noexcept { return false; }
+  /// Who sees the conversation on its line, which outlives it; null: nobody. Before the first
+  /// start(): also what was said since the device was opened. False: it has no line. Owner's
+  /// thread, while stopped.
+  virtual bool observe_line(LineObserver* /*observer*/) noexcept { return false; }
   /// As those of InsDevice.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
   [[nodiscard]] virtual std::string remark() const { return {}; }

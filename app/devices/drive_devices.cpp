@@ -25,21 +25,6 @@ bool all_mock(const Configuration& c) {
   });
 }
 
-/// The MTi-G-700/710 makes pulses of 400 Hz / n and marks the reading each left with; the MTi-G
-/// makes its own sample rate / n, unmarked.
-bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find('7') != std::string::npos; }
-
-void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
-  constexpr double kBase = 400;  // Hz
-  const double base = marks_sync_out(ins) ? kBase : c.ins.rate;
-  const double nearest = base / std::max(1.0, std::round(base / c.trigger.rate));
-  if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
-  throw InputError(
-      fmt::format("trigger.rate is {}, and {} makes pulses of {:g} Hz / n: set trigger.rate and "
-                  "ins.sync_out_hz to {:.6g}",
-                  c.trigger.rate, ins_title(ins), base, nearest));
-}
-
 /// What real devices need of a configuration before any of them is opened.
 std::vector<CameraRequest> requests_of(const Configuration& c) {
   std::vector<CameraRequest> requests;
@@ -86,13 +71,6 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
                     "cameras with trigger: hardware",
                     to_string(c.cameras[0].trigger)));
   return requests;
-}
-
-InsRequest ins_request(const InsSettings& s) {
-  return {s.driver,      s.port,
-          s.rate,        static_cast<std::uint32_t>(s.baud),
-          s.sync_out_hz, s.sync_out_width_ms,
-          s.sync_in,     s.processing_ms};
 }
 
 }  // namespace
@@ -152,19 +130,17 @@ void DriveDevices::open_real(const Configuration& c) {
   ins_ = opened_ins_.get();
   if (sync_.mode == SyncMode::ins_syncout) {
     check_sync_out(c, ins_->info());
-    if (!marks_sync_out(ins_->info()))
-      sync_out_divider_ = static_cast<std::uint32_t>(std::lround(c.ins.rate / c.trigger.rate));
+    sync_out_divider_ = sync_out_divider(c, ins_->info());
   }
   if (c.trigger.driver == "board") {
     board_ = open_trigger_board(c.trigger, pulses, &remarks_);
     trigger_ = board_.get();
     board_driver_ = board_.get();
   }
-  for (std::size_t k = 0; k < opened_.size(); ++k)
-    sync_.camera[k].resolution = opened_[k].device->timing().resolution;
+  std::vector<DeviceTiming> timings;
+  for (const OpenedCamera& camera : opened_) timings.push_back(camera.device->timing());
+  fit_to_devices(c, timings, trigger_ != nullptr, &sync_);
   const CameraTrigger trigger = requests[0].configuration.trigger;
-  sync_.align_start = trigger == CameraTrigger::hardware && sync_.mode == SyncMode::counter &&
-                      trigger_ == nullptr;  // the pulses do not wait for us
   if (trigger == CameraTrigger::software) {
     software_ = std::make_unique<SoftwareTrigger>(cameras_);
     if (software_->configure(pulses, nullptr) != DeviceStatus::ok)

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/devices/ins_drivers.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -154,6 +155,10 @@ Duration jitter_of(const CameraSettings& s) {
 
 Duration microseconds(double us) { return Duration::nanoseconds(std::llround(us * 1e3)); }
 
+/// The MTi-G-700/710 makes pulses of 400 Hz / n and marks the reading each left with; the MTi-G
+/// makes its own sample rate / n, unmarked.
+bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find('7') != std::string::npos; }
+
 }  // namespace
 
 SyncOptions sync_options(const Configuration& c, int cameras) {
@@ -173,6 +178,31 @@ SyncOptions sync_options(const Configuration& c, int cameras) {
   if (const char* sentence = o.validate())
     throw InputError(fmt::format("sync ({}): {}", to_string(c.sync.mode), sentence));
   return o;
+}
+
+void fit_to_devices(const Configuration& c, const std::vector<DeviceTiming>& cameras, bool trigger,
+                    SyncOptions* options) {
+  for (std::size_t k = 0; k < cameras.size(); ++k)
+    options->camera[k].resolution = cameras[k].resolution;
+  options->align_start = c.cameras[0].trigger == CameraTrigger::hardware &&
+                         options->mode == SyncMode::counter &&
+                         !trigger;  // the pulses do not wait for us
+}
+
+void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
+  constexpr double kBase = 400;  // Hz
+  const double base = marks_sync_out(ins) ? kBase : c.ins.rate;
+  const double nearest = base / std::max(1.0, std::round(base / c.trigger.rate));
+  if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
+  throw InputError(
+      fmt::format("trigger.rate is {}, and {} makes pulses of {:g} Hz / n: set trigger.rate and "
+                  "ins.sync_out_hz to {:.6g}",
+                  c.trigger.rate, ins_title(ins), base, nearest));
+}
+
+std::uint32_t sync_out_divider(const Configuration& c, const DeviceInfo& ins) {
+  if (marks_sync_out(ins)) return 0;
+  return static_cast<std::uint32_t>(std::lround(c.ins.rate / c.trigger.rate));
 }
 
 TriggerConfiguration trigger_configuration(const Configuration& c, int cameras) {

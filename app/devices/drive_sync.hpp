@@ -1,4 +1,7 @@
 #pragma once
+#include <cstdint>
+#include <vector>
+
 #include "app/config/configuration.hpp"
 #include "drivers/sync/sync_types.hpp"
 #include "drivers/trigger.hpp"
@@ -10,6 +13,16 @@ namespace vergence::app {
 /// How the images are paired. Checks that the devices of the configuration can do what `sync.mode`
 /// needs.
 [[nodiscard]] SyncOptions sync_options(const Configuration& configuration, int cameras);
+
+/// What real devices say beyond the configuration. `trigger`: pulses are started by us.
+void fit_to_devices(const Configuration& configuration, const std::vector<DeviceTiming>& cameras,
+                    bool trigger, SyncOptions* options);
+
+/// The INS can make pulses of trigger.rate.
+void check_sync_out(const Configuration& configuration, const DeviceInfo& ins);
+/// Acquisition::Options::sync_out_divider for that INS; 0: it marks its readings.
+[[nodiscard]] std::uint32_t sync_out_divider(const Configuration& configuration,
+                                             const DeviceInfo& ins);
 
 /// What the board is asked for.
 [[nodiscard]] TriggerConfiguration trigger_configuration(const Configuration& configuration,

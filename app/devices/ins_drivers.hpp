@@ -3,7 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "app/config/configuration.hpp"
 #include "drivers/ins.hpp"
+#include "drivers/serial/byte_line.hpp"
 #include "drivers/xsens/options.hpp"
 
 namespace vergence::app {
@@ -20,17 +22,25 @@ struct InsRequest {
   double processing_ms = 2;
 };
 
+[[nodiscard]] InsRequest ins_request(const InsSettings& settings);
+
 /// A kind of INS that a configuration can name.
 struct InsDriverRow {
   const char* name;     // of `ins.driver`
   const char* meaning;  // for lists
   std::unique_ptr<InsDriver> (*make)(const InsRequest& request);
+  /// On any line, a recorded one for instance. Null: *status and *error say why.
+  std::unique_ptr<InsDevice> (*open_on)(std::unique_ptr<LinePlace> place, const InsRequest& request,
+                                        DeviceStatus* status, std::string* error);
 };
 
 /// The table of drivers for real INS: everything that talks to one is chosen here. The mock's INS
 /// comes from its rig.
 [[nodiscard]] const std::vector<InsDriverRow>& ins_driver_rows();
 [[nodiscard]] std::vector<std::string> ins_driver_names();
+
+/// The row of that name; null: none has it.
+[[nodiscard]] const InsDriverRow* find_ins_driver(const std::string& name);
 
 /// Opens and configures it; null for `none`.
 ///

@@ -47,8 +47,8 @@ class SimulatedBoard final : public TriggerDevice {
     rig_->end_feed();
     rig_->trigger().stop();
   }
-  bool observe_bytes(ByteObserver* observer) noexcept override {
-    return board_->observe_bytes(observer);
+  bool observe_line(LineObserver* observer) noexcept override {
+    return board_->observe_line(observer);
   }
   std::string last_error() const override { return board_->last_error(); }
   std::string remark() const override { return board_->remark(); }

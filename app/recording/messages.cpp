@@ -229,7 +229,7 @@ void write_device_frame(CdrWriter* out, Stamp stamp, std::string_view name,
   out->boolean(frame.status == FrameStatus::complete);
 }
 
-void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse) noexcept {
+void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse, Stamp edge) noexcept {
   out->header(stamp, "board").put(pulse.number).put(pulse.boot).put(pulse.edge.ns());
   out->put(pulse.arrival.ns()).boolean(pulse.resumed);
   std::uint8_t seen = 0;
@@ -239,6 +239,21 @@ void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse) noexcept {
   for (const PulseExposure& e : pulse.exposure) out->put(e.start.ns());
   out->count(pulse.exposure.size());
   for (const PulseExposure& e : pulse.exposure) out->put(e.end.ns());
+  out->boolean(pulse.mapped).put(edge.ns()).put(pulse.host_error.ns());
+}
+
+void write_device_gone(CdrWriter* out, Stamp stamp, int camera) noexcept {
+  out->put(stamp.ns()).put(static_cast<std::int32_t>(camera));
+}
+
+void write_line_event(CdrWriter* out, Stamp stamp, const LineEvent& event) noexcept {
+  out->put(stamp.ns()).put(static_cast<std::uint8_t>(event.kind)).put(event.value);
+  out->count(event.bytes.size()).raw(event.bytes);
+}
+
+void write_set(CdrWriter* out, Stamp stamp, const SetArrivals& set) noexcept {
+  out->header(stamp, "").put(set.number).count(set.at.size());
+  for (const Stamp& arrival : set.at) out->put(arrival.ns());
 }
 
 }  // namespace vergence::app

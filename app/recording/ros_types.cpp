@@ -62,10 +62,20 @@ constexpr std::array kDefinitions{
     Definition{"vergence_msgs/Pulse",
                "std_msgs/Header header\nuint64 number\nuint32 boot\nint64 edge_device_ns\n"
                "int64 arrival_host_ns\nbool resumed\nuint8 exposures_seen\n"
-               "int64[] exposure_start_ns\nint64[] exposure_end_ns\n"},
+               "int64[] exposure_start_ns\nint64[] exposure_end_ns\nbool mapped\n"
+               "int64 edge_ns\nint64 edge_error_ns\n"},
     Definition{"vergence_msgs/DeviceFrame",
                "std_msgs/Header header\nuint64 counter\nint64 exposure_start_device_ns\n"
                "int64 arrival_host_ns\nint64 exposure_ns\nfloat64 gain_db\nbool complete\n"},
+    // Camera −1: the trigger board.
+    Definition{"vergence_msgs/DeviceGone", "int64 stamp_ns\nint32 camera\n"},
+    // A step of the conversation on a line but for the bytes that were read: `kind` 0 opened (data:
+    // the port, value: latency timer in µs), 2 written (data), 3 baud rate (value), 4 lost.
+    Definition{"vergence_msgs/LineEvent",
+               "int64 stamp_ns\nuint8 kind\nuint32 value\nuint8[] data\n"},
+    // The frames that a set was made of, by their arrivals; 0: none of that camera.
+    Definition{"vergence_msgs/RigSet",
+               "std_msgs/Header header\nuint64 number\nint64[] arrival_ns\n"},
     // What those are made of.
     Definition{"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},
     Definition{"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
@@ -110,7 +120,10 @@ constexpr std::array<std::string_view, kRosTypes> kNames{"sensor_msgs/msg/Image"
                                                          "vergence_msgs/msg/Frame",
                                                          "vergence_msgs/msg/InsReading",
                                                          "vergence_msgs/msg/Pulse",
-                                                         "vergence_msgs/msg/DeviceFrame"};
+                                                         "vergence_msgs/msg/DeviceFrame",
+                                                         "vergence_msgs/msg/DeviceGone",
+                                                         "vergence_msgs/msg/LineEvent",
+                                                         "vergence_msgs/msg/RigSet"};
 
 const Definition* find(std::string_view name) {
   for (const Definition& d : kDefinitions)

@@ -23,8 +23,11 @@ enum class RosType : std::uint8_t {
   ins_reading,   // vergence_msgs/msg/InsReading
   pulse,         // vergence_msgs/msg/Pulse
   device_frame,  // vergence_msgs/msg/DeviceFrame
+  device_gone,   // vergence_msgs/msg/DeviceGone
+  line_event,    // vergence_msgs/msg/LineEvent
+  rig_set,       // vergence_msgs/msg/RigSet
 };
-inline constexpr int kRosTypes = 14;
+inline constexpr int kRosTypes = 17;
 
 /// `sensor_msgs/msg/Image`.
 [[nodiscard]] std::string_view ros_type_name(RosType type) noexcept;

@@ -195,47 +195,58 @@ void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcep
   if (settings_.poses != 0) post_rig(calibration.stamp);
 }
 
-void DriveRecorder::on_device_frame(Stamp arrival, int camera, const Frame& frame) noexcept {
-  if (settings_.pulses == 0) return;
-  const auto k = static_cast<std::size_t>(camera);
-  post(
-      image_topic(k) + 2, arrival, kMessageRoom, false,
-      [&](CdrWriter* out) {
-        write_device_frame(out, arrival, frame_names_[k], frame);
-        return std::size_t{0};
-      },
-      acquisition_queue);
-}
+// ---- what the devices gave
 
-void DriveRecorder::on_pulse(Stamp arrival, const Pulse& pulse) noexcept {
-  if (settings_.pulses == 0) return;
+/// `bytes`: that the message holds beside what every small one takes.
+template <class Write>
+void DriveRecorder::post_small(std::size_t topic, Stamp stamp, std::size_t queue, std::size_t bytes,
+                               const Write& write) noexcept {
   post(
-      pulse_topic, arrival, kMessageRoom, false,
+      topic, stamp, kMessageRoom + bytes, false,
       [&](CdrWriter* out) {
-        write_pulse(out, arrival, pulse);
-        return std::size_t{0};
-      },
-      acquisition_queue);
-}
-
-void DriveRecorder::post_bytes(std::size_t topic, Stamp stamp, std::span<const std::uint8_t> bytes,
-                               std::size_t queue) noexcept {
-  if (settings_.raw == 0) return;
-  post(
-      topic, stamp, kMessageRoom + bytes.size(), false,
-      [&](CdrWriter* out) {
-        write_bytes(out, bytes);
+        write(out);
         return std::size_t{0};
       },
       queue);
 }
 
-void DriveRecorder::on_ins_bytes(Stamp arrival, std::span<const std::uint8_t> bytes) noexcept {
-  post_bytes(ins_raw_topic, arrival, bytes, ins_queue);
+void DriveRecorder::on_device_frame(Stamp arrival, int camera, const Frame& frame) noexcept {
+  if (settings_.pulses == 0) return;
+  const auto k = static_cast<std::size_t>(camera);
+  post_small(image_topic(k) + 2, arrival, acquisition_queue, 0,
+             [&](CdrWriter* out) { write_device_frame(out, arrival, frame_names_[k], frame); });
 }
 
-void DriveRecorder::on_board_bytes(Stamp arrival, std::span<const std::uint8_t> bytes) noexcept {
-  post_bytes(board_raw_topic, arrival, bytes, board_queue);
+void DriveRecorder::on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept {
+  if (settings_.pulses == 0) return;
+  post_small(pulse_topic, arrival, acquisition_queue, 0,
+             [&](CdrWriter* out) { write_pulse(out, arrival, pulse, edge); });
+}
+
+void DriveRecorder::on_device_gone(Stamp when, int camera) noexcept {
+  if (settings_.pulses == 0) return;
+  post_small(device_gone_topic, when, acquisition_queue, 0,
+             [&](CdrWriter* out) { write_device_gone(out, when, camera); });
+}
+
+void DriveRecorder::on_set(const SetArrivals& set) noexcept {
+  if (settings_.pulses == 0) return;
+  const Stamp newest = *std::max_element(set.at.begin(), set.at.end());
+  post_small(set_topic, newest, estimator_queue, 0,
+             [&](CdrWriter* out) { write_set(out, newest, set); });
+}
+
+void DriveRecorder::on_line_event(Stamp when, DeviceLine line, const LineEvent& event) noexcept {
+  if (settings_.raw == 0) return;
+  const bool ins = line == DeviceLine::ins, read = event.kind == LineEvent::Kind::read;
+  const std::size_t topic =
+      read ? (ins ? ins_raw_topic : board_raw_topic) : (ins ? ins_line_topic : board_line_topic);
+  post_small(topic, when, ins ? ins_queue : board_queue, event.bytes.size(), [&](CdrWriter* out) {
+    if (read)
+      write_bytes(out, event.bytes);
+    else
+      write_line_event(out, when, event);
+  });
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> DriveRecorder::counters() {

@@ -39,9 +39,10 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
 
   void on_device_frame(Stamp arrival, int camera, const Frame& frame) noexcept override;
-  void on_pulse(Stamp arrival, const Pulse& pulse) noexcept override;
-  void on_ins_bytes(Stamp arrival, std::span<const std::uint8_t> bytes) noexcept override;
-  void on_board_bytes(Stamp arrival, std::span<const std::uint8_t> bytes) noexcept override;
+  void on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept override;
+  void on_device_gone(Stamp when, int camera) noexcept override;
+  void on_line_event(Stamp when, DeviceLine line, const LineEvent& event) noexcept override;
+  void on_set(const SetArrivals& set) noexcept override;
 
   /// Sentences about the disk, since the last call.
   [[nodiscard]] std::vector<std::string> take_errors() { return recording_.take_errors(); }
@@ -58,8 +59,9 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   template <class Write>
   std::uint32_t post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
                      const Write& write, std::size_t queue = 0) noexcept;
-  void post_bytes(std::size_t topic, Stamp stamp, std::span<const std::uint8_t> bytes,
-                  std::size_t queue) noexcept;
+  template <class Write>
+  void post_small(std::size_t topic, Stamp stamp, std::size_t queue, std::size_t bytes,
+                  const Write& write) noexcept;
   [[nodiscard]] bool post_pixels(const RigFrame& frame, std::size_t camera) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;

@@ -12,6 +12,7 @@
 #include "app/recorder/ins_file.hpp"
 #include "app/recorder/recorder.hpp"
 #include "app/recorder/summary.hpp"
+#include "app/recording/session_description.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/session/device_observer.hpp"
@@ -66,6 +67,7 @@ struct SourceFacts {
   Stamp first{};                           // of the drive
   std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
   std::optional<SourceIns> ins{};
+  RecordedDevices devices{};  // of a live drive, for its recording
   Trajectory truth{};  // that came with a recording: what an estimate without INS is compared with
   std::vector<SourceRemark> remarks{};
   std::size_t image_bytes = 0, ring_bytes = 0;

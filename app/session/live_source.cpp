@@ -88,7 +88,7 @@ void LiveSource::make_facts() {
   if (!request_.fast) facts_.frame_interval = Duration::seconds(1.0 / configuration_.trigger.rate);
   facts_.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
   facts_.frames = devices_.frames();
-  facts_.expected_frames = devices_.frames();  // 0: nobody knows
+  facts_.expected_frames = static_cast<std::size_t>(devices_.frames());  // 0: nobody knows
   if (devices_.ins() != nullptr)
     facts_.ins =
         SourceIns{comparison_options(configuration_), InsSource::device, "the configuration", 0};
@@ -108,6 +108,11 @@ void LiveSource::make_facts() {
   if (mode == SyncMode::software)
     facts_.remarks.push_back(
         {std::string(proof_sentence(mode)) + "; poses in motion suffer from it"});
+  for (const CameraDevice* camera : devices_.cameras())
+    facts_.devices.cameras.push_back({camera->info(), camera->timing()});
+  if (const InsDevice* ins = devices_.ins()) facts_.devices.ins = {ins->info(), ins->timing()};
+  if (const TriggerDevice* trigger = devices_.trigger())
+    facts_.devices.trigger = {trigger->info(), trigger->timing()};
   facts_.image_bytes = devices_.image_bytes();
   facts_.ring_bytes = sizeof(Acquisition);
   facts_.word_of_skipped = "dropped";
@@ -116,8 +121,8 @@ void LiveSource::make_facts() {
 
 void LiveSource::observe_devices(DeviceObserver* observer) {
   tap_ = std::make_unique<DeviceTap>(observer, tie_);
-  if (InsDevice* ins = devices_.ins()) (void)ins->observe_bytes(&tap_->ins_line());
-  if (TriggerDevice* board = devices_.trigger()) (void)board->observe_bytes(&tap_->board_line());
+  if (InsDevice* ins = devices_.ins()) (void)ins->observe_line(&tap_->ins_line());
+  if (TriggerDevice* board = devices_.trigger()) (void)board->observe_line(&tap_->board_line());
 }
 
 void LiveSource::start(std::vector<std::string>* faults) {
@@ -137,7 +142,9 @@ bool LiveSource::next(SourceItem* item) noexcept {
     if (waiting_) {
       if (next_event(item)) return true;
       waiting_ = false;
-      *item = SourceFrame{std::get_if<AcquiredFrame>(&in_hand_)->rig, 0};
+      const auto* frame = std::get_if<AcquiredFrame>(&in_hand_);
+      if (tap_ != nullptr) tap_->on_set(frame->set);
+      *item = SourceFrame{frame->rig, 0};
       return true;
     }
     if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {

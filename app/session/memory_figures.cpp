@@ -62,7 +62,8 @@ ResidentMemory resident_memory(const std::vector<std::pair<std::string, const Ar
     for (const auto& [key, value] : {std::pair{std::string_view("VmRSS:"), &memory.total},
                                      std::pair{std::string_view("RssFile:"), &memory.program}})
       if (line.starts_with(key))
-        *value = kKiB * std::strtoull(line.c_str() + key.size(), nullptr, 10);
+        *value =
+            kKiB * static_cast<std::size_t>(std::strtoull(line.c_str() + key.size(), nullptr, 10));
   }
   for (const auto& [name, arena] : arenas) memory.arenas.emplace_back(name, resident_bytes(*arena));
   return memory;
@@ -89,7 +90,8 @@ void print_memory_table(const std::vector<MemoryRow>& memory) {
 }
 
 void print_memory_table(const ResidentMemory& memory) {
-  for (const auto& [name, bytes] : named(memory)) print_row("resident " + name, bytes);
+  for (const auto& [name, bytes] : named(memory))
+    print_row("resident " + name, static_cast<std::size_t>(bytes));
   (void)std::fflush(stdout);
 }
 

@@ -30,7 +30,11 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file, bool png) {
                                  {"/ins/imu", RosType::imu, false},
                                  {"/vergence/pulse", RosType::pulse, false},
                                  {"/ins/raw", RosType::bytes, false},
-                                 {"/trigger_board/raw", RosType::bytes, false}};
+                                 {"/trigger_board/raw", RosType::bytes, false},
+                                 {"/ins/line", RosType::line_event, false},
+                                 {"/trigger_board/line", RosType::line_event, false},
+                                 {"/vergence/device_gone", RosType::device_gone, false},
+                                 {"/vergence/set", RosType::rig_set, false}};
   for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
     const std::string images = "/" + file.names[k] + "/image_raw";
     out.push_back(png ? RecordedTopic{images + "/compressed", RosType::compressed_image, false}
@@ -69,6 +73,7 @@ std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts&
   d.ins = facts.ins.has_value();
   if (facts.ins) d.mount_source = facts.ins->mount_source;
   d.settings = settings_of(c);
+  d.devices = facts.devices;
   for (std::size_t k = 0; k < static_cast<std::size_t>(facts.begin.file.rig.cameras); ++k)
     d.cameras.push_back(topics(facts.begin.file, as_png(c.record))[image_topic(k)].name);
   const std::string json = to_json(d);

@@ -26,6 +26,10 @@ enum Topic : std::size_t {
   pulse_topic,
   ins_raw_topic,
   board_raw_topic,
+  ins_line_topic,
+  board_line_topic,
+  device_gone_topic,
+  set_topic,
   first_camera_topic
 };
 

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/session/device_replay_source.hpp"
 #include "app/session/drive_calibration.hpp"
 #include "app/session/recorded_source.hpp"
 #include "app/session/replayed_ins.hpp"
@@ -130,7 +131,9 @@ ExitCode replay_recording(const ReplayRequest& request) {
     throw InputError(fmt::format("--start {} is beyond the drive: {} has {} frames", request.start,
                                  request.data.string(), session.frames().size()));
   auto other = other_beginning(request, session);
-  const auto source = in_words([&] {
+  const auto source = in_words([&]() -> std::unique_ptr<FrameSource> {
+    if (request.through_devices)
+      return std::make_unique<DeviceReplaySource>(request, std::move(session), std::move(other));
     return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
   });
   const SignalGuard signals(SignalGuard::OnHangup::reopen);
@@ -139,14 +142,15 @@ ExitCode replay_recording(const ReplayRequest& request) {
 
 }  // namespace
 
-std::vector<std::string> recorded_settings(const std::filesystem::path& session) {
-  // What poses depend on; devices, the mock and what is recorded are the drive's own.
-  constexpr std::array kGroups{"odometry.",        "calibration.",       "monitor.", "comparison.",
-                               "ins.lever_arm_m.", "ins.boresight_deg.", "rig.name="};
+std::vector<std::string> recorded_settings(const std::filesystem::path& session, bool devices) {
+  // What poses depend on; the mock and what is recorded are the drive's own.
+  std::vector<const char*> kept{"odometry.",        "calibration.",       "monitor.", "comparison.",
+                                "ins.lever_arm_m.", "ins.boresight_deg.", "rig.name="};
+  if (devices) kept.insert(kept.end(), {"cameras.", "trigger.", "sync.", "ins.", "mock."});
   std::vector<std::string> settings = RecordedSession::open(session).description().settings;
   std::erase_if(settings, [&](const std::string& s) {
     const bool mask = s.starts_with("cameras.") && s.find(".mask=") != std::string::npos;
-    return !mask && std::none_of(kGroups.begin(), kGroups.end(),
+    return !mask && std::none_of(kept.begin(), kept.end(),
                                  [&](const char* group) { return s.starts_with(group); });
   });
   return settings;

@@ -30,6 +30,46 @@ StartingCalibration recorded_beginning(const SessionDescription& d, const std::s
   return begin;
 }
 
+SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSession& session,
+                               std::optional<StartingCalibration> other, std::size_t first,
+                               std::size_t end) {
+  const SessionDescription& d = session.description();
+  const bool as_then = !other;
+  SourceFacts facts;
+  facts.begin = other ? std::move(*other) : recorded_beginning(d, request.data.string());
+  facts.adoption = as_then ? d.adoption : Adoption::after_fixed_frames;
+  facts.frames = facts.expected_frames = end - first;
+  facts.first = session.frames()[first].given.stamp;
+  if (d.ins && !session.readings().empty())
+    facts.ins = SourceIns{comparison_options(request.configuration), InsSource::recording,
+                          d.mount_source, session.readings().capacity() * sizeof(RecordedReading)};
+  for (const std::string& sentence : session.remarks())
+    facts.remarks.push_back({sentence, "data", !request.session.quiet});
+  if (as_then && !session.complete())
+    facts.remarks.push_back({"the recording is not whole: the poses are not those of the drive",
+                             "data", !request.session.quiet});
+  for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
+    const Intrinsics& lens = facts.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
+    facts.image_bytes +=
+        static_cast<std::size_t>(lens.width) * static_cast<std::size_t>(lens.height);
+  }
+  return facts;
+}
+
+void decide_as_then(const FrameRecord& given, SourceFrame* frame) noexcept {
+  frame->solver_idle = given.solver_done;
+  frame->rig.effort = given.sample.effort;
+}
+
+SourceEvent recalibration_as_then(Stamp stamp) noexcept {
+  SourceEvent event;
+  event.record.stamp = stamp;
+  event.record.kind = "recalibration_requested";
+  event.record.set_sentence("a new calibration was asked for, as in the drive");
+  event.recalibrate = true;
+  return event;
+}
+
 SessionSource::SessionSource(const ReplayRequest& request, RecordedSession session,
                              std::optional<StartingCalibration> other)
     : request_(request),
@@ -38,7 +78,7 @@ SessionSource::SessionSource(const ReplayRequest& request, RecordedSession sessi
       end_(std::min(session_.frames().size(),
                     request.start + request.frames.value_or(session_.frames().size()))),
       next_frame_(request.start) {
-  make_facts(std::move(other));
+  facts_ = facts_of_recording(request, session_, std::move(other), next_frame_, end_);
   const RigCalibration& rig = facts_.begin.file.rig;
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
     pixels_[k].resize(static_cast<std::size_t>(rig.intrinsics[k].width) *
@@ -60,28 +100,6 @@ SessionSource::SessionSource(const ReplayRequest& request, RecordedSession sessi
   if (next_frame_ > 0) next_reading_ = session_.frames()[next_frame_ - 1].readings;
 }
 
-void SessionSource::make_facts(std::optional<StartingCalibration> other) {
-  const SessionDescription& d = session_.description();
-  facts_.begin = other ? std::move(*other) : recorded_beginning(d, request_.data.string());
-  facts_.adoption = other_ ? Adoption::after_fixed_frames : d.adoption;
-  facts_.frames = facts_.expected_frames = end_ - next_frame_;
-  facts_.first = session_.frames()[next_frame_].given.stamp;
-  if (d.ins && !session_.readings().empty())
-    facts_.ins =
-        SourceIns{comparison_options(request_.configuration), InsSource::recording, d.mount_source,
-                  session_.readings().capacity() * sizeof(RecordedReading)};
-  for (const std::string& sentence : session_.remarks())
-    facts_.remarks.push_back({sentence, "data", !request_.session.quiet});
-  if (!other_ && !session_.complete())
-    facts_.remarks.push_back({"the recording is not whole: the poses are not those of the drive",
-                              "data", !request_.session.quiet});
-  for (int k = 0; k < facts_.begin.file.rig.cameras; ++k) {
-    const Intrinsics& lens = facts_.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
-    facts_.image_bytes +=
-        static_cast<std::size_t>(lens.width) * static_cast<std::size_t>(lens.height);
-  }
-}
-
 // ---- the estimator's thread
 
 bool SessionSource::next(SourceItem* item) noexcept {
@@ -99,12 +117,7 @@ bool SessionSource::next(SourceItem* item) noexcept {
   const RecordedFrame& frame = session_.frames()[next_frame_];
   if (frame.given.recalibration_requested && !recalibration_said_) {
     recalibration_said_ = true;
-    SourceEvent event;
-    event.record.stamp = frame.given.stamp;
-    event.record.kind = "recalibration_requested";
-    event.record.set_sentence("a new calibration was asked for, as in the drive");
-    event.recalibrate = true;
-    *item = event;
+    *item = recalibration_as_then(frame.given.stamp);
     return true;
   }
   recalibration_said_ = false;
@@ -124,10 +137,7 @@ SourceFrame SessionSource::load(const RecordedFrame& recorded) noexcept {
   frame.rig.pairing = static_cast<Pairing>(
       std::min(given.pairing, static_cast<std::uint8_t>(Pairing::contradicted)));
   frame.rig.cameras = facts_.begin.file.rig.cameras;
-  if (!other_) {
-    frame.solver_idle = given.solver_done;
-    frame.rig.effort = given.sample.effort;
-  }
+  if (!other_) decide_as_then(given, &frame);
   for (std::size_t k = 0; k < static_cast<std::size_t>(frame.rig.cameras); ++k) {
     if ((given.images_present >> k & 1U) == 0) continue;
     const RecordedImage& image = recorded.images[k];

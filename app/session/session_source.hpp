@@ -39,13 +39,12 @@ class SessionSource final : public FrameSource {
                      Progress* progress) const override;
 
  private:
-  void make_facts(std::optional<StartingCalibration> other);
   [[nodiscard]] SourceFrame load(const RecordedFrame& frame) noexcept;
 
   const ReplayRequest& request_;
   const RecordedSession session_;
-  const bool other_;     // another beginning than the drive's
-  std::size_t end_ = 0;  // behind the last frame of this replay
+  const bool other_;       // another beginning than the drive's
+  const std::size_t end_;  // behind the last frame of this replay
   SourceFacts facts_;
   std::array<std::vector<std::uint8_t>, kMaxCameras> pixels_;  // of the frame in hand
   std::atomic<bool> stopped_{false};
@@ -55,6 +54,16 @@ class SessionSource final : public FrameSource {
   bool recalibration_said_ = false;  // of the next frame
   std::uint64_t images_missing_ = 0;
 };
+
+/// Facts of a replay of frames `first` to before `end`. `other`: as SessionSource's.
+[[nodiscard]] SourceFacts facts_of_recording(const ReplayRequest& request,
+                                             const RecordedSession& session,
+                                             std::optional<StartingCalibration> other,
+                                             std::size_t first, std::size_t end);
+/// What time decided of a frame's pose in the drive, for the estimator to decide again.
+void decide_as_then(const FrameRecord& given, SourceFrame* frame) noexcept;
+/// Somebody asked for a calibration before that frame.
+[[nodiscard]] SourceEvent recalibration_as_then(Stamp stamp) noexcept;
 
 /// What a recorded session began with. InputError: the recording's description is damaged.
 [[nodiscard]] StartingCalibration recorded_beginning(const SessionDescription& description,

@@ -48,6 +48,9 @@ class AcquisitionObserver {
   virtual ~AcquisitionObserver() = default;
   virtual void on_device_frame(int camera, const Frame& frame) noexcept = 0;
   virtual void on_pulse(const Pulse& pulse) noexcept = 0;
+  /// A camera, or the trigger (kTrigger), is not there any more.
+  virtual void on_device_gone(int camera, HostStamp when) noexcept = 0;
+  static constexpr int kTrigger = -1;
 };
 
 using Acquired = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent>;

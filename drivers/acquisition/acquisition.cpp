@@ -234,6 +234,7 @@ void Acquisition::take_frame(std::size_t k) {
   const int camera = static_cast<int>(k);
   if (head.event) {
     head.gone = true;
+    if (options_.observer != nullptr) options_.observer->on_device_gone(camera, head.value.arrival);
     sync_.absent(camera);
     push_event(DeviceEvent::Kind::camera_gone, head.value.arrival, camera);
     return;

@@ -11,6 +11,8 @@ void Acquisition::take_board() {
   head.held = false;
   if (head.event) {
     head.gone = true;
+    if (options_.observer != nullptr)
+      options_.observer->on_device_gone(AcquisitionObserver::kTrigger, head.value.arrival);
     push_event(DeviceEvent::Kind::board_gone, head.value.arrival);
     return;
   }

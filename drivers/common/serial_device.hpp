@@ -63,7 +63,10 @@ class SerialDevice {
   [[nodiscard]] DeviceStatus open_line(const LineSettings& settings) {
     DeviceStatus status = DeviceStatus::ok;
     auto line = place_->open(settings, &status);
-    if (line != nullptr) line = std::make_unique<ObservedLine>(std::move(line), observer_);
+    if (line != nullptr) {
+      log_.opened(*place_, line->now());
+      line = std::make_unique<ObservedLine>(std::move(line), log_);
+    }
     const std::lock_guard lock(line_mutex_);
     line_ = std::move(line);
     return status;
@@ -81,6 +84,7 @@ class SerialDevice {
   /// perhaps back.
   [[nodiscard]] DeviceStatus start_thread(Notifier* ready) noexcept {
     if (thread_.joinable()) return out_.start(ready);
+    log_.streaming();
     out_.clear();  // of the start before: its readings are past
     const DeviceStatus status = out_.start(ready);
     if (status != DeviceStatus::ok) return status;
@@ -110,10 +114,8 @@ class SerialDevice {
     stopping_.store(false, std::memory_order_release);
   }
   [[nodiscard]] bool running() const noexcept { return thread_.joinable(); }
-  /// As InsDevice::observe_bytes().
-  void set_byte_observer(ByteObserver* observer) noexcept {
-    observer_.store(observer, std::memory_order_release);
-  }
+  /// Of what is said on the line. Owner's thread, while the device's does not run.
+  [[nodiscard]] LineLog& log() noexcept { return log_; }
 
   // ---- any thread
 
@@ -182,6 +184,10 @@ class SerialDevice {
   [[nodiscard]] bool come_back() noexcept {
     close_line();
     while (!stop_requested()) {
+      if (place_->exhausted()) {
+        push({Item::What::end, HostStamp{}, {}}, true);
+        return false;
+      }
       try {
         if (reopen() == DeviceStatus::ok) return true;
       } catch (const std::exception&) {  // out of memory: perhaps not the next time
@@ -213,7 +219,7 @@ class SerialDevice {
   std::unique_ptr<LinePlace> place_;
   const char* const thread_name_;
   bool virtual_time_ = false;
-  std::atomic<ByteObserver*> observer_{nullptr};
+  LineLog log_;
   std::mutex line_mutex_;  // of the pointer: stop_thread() wakes a line that may be replaced
   std::unique_ptr<ByteLine> line_;
   Stream<Value, kRing> out_;

@@ -1,5 +1,7 @@
 #include "drivers/gnss/gnss.hpp"
 
+#include <utility>
+
 #include "drivers/common/serial_ports.hpp"
 #include "drivers/gnss/device.hpp"
 #include "drivers/serial/serial_port.hpp"
@@ -13,10 +15,15 @@ std::vector<DeviceInfo> Driver::enumerate() {
 std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* status) {
   const std::string name = only_usb_serial_port(port, status, &last_error_);
   if (name.empty()) return nullptr;
-  auto device = std::make_unique<Device>(std::make_unique<SerialPort>(name), options_);
+  return open_on(std::make_unique<SerialPort>(name), options_, status, &last_error_);
+}
+
+std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place, const Options& options,
+                                   DeviceStatus* status, std::string* error) {
+  auto device = std::make_unique<Device>(std::move(place), options);
   *status = device->connect();
   if (*status == DeviceStatus::ok) return device;
-  last_error_ = device->last_error();
+  *error = device->last_error();
   return nullptr;
 }
 

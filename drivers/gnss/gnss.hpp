@@ -28,4 +28,9 @@ class Driver final : public InsDriver {
   std::string last_error_;
 };
 
+/// The same on any line: recordings, tests. Null: *status and *error say why.
+[[nodiscard]] std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place,
+                                                 const Options& options, DeviceStatus* status,
+                                                 std::string* error);
+
 }  // namespace vergence::gnss

@@ -62,7 +62,7 @@ const PulseTrain::Entry* PulseTrain::before(std::uint64_t number,
     const Entry& e = (*this)[i];
     if (e.number > number) continue;
     if (e.number < number) return nullptr;
-    const Entry& earlier = (*this)[i - pulses];
+    const Entry& earlier = (*this)[i - static_cast<std::size_t>(pulses)];
     return least(earlier.number, earlier.skipped, e.number, e.skipped) == pulses ? &earlier
                                                                                  : nullptr;
   }

@@ -74,6 +74,7 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   }
   open->set.present[k] = true;
   open->set.slots[k] = frame.slot;
+  open->set.arrivals[k] = frame.arrival;
   open->set.arrival = std::max(open->set.arrival, frame.arrival);
   open->images[k] = image;
   Source& source = sources_[k];

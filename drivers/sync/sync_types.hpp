@@ -115,6 +115,7 @@ struct SyncedSet {
   HostStamp arrival{};  // of the last image
   std::array<bool, kMaxCameras> present{};
   std::array<FrameSlot, kMaxCameras> slots{};
+  std::array<HostStamp, kMaxCameras> arrivals{};  // of those that are present
   bool complete = false;
   bool reported = false;  // the pulse's report was here; else, with pulses, the stamp is reckoned
                           // from the camera's clock

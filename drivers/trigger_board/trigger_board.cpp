@@ -13,14 +13,14 @@ bool of_xsens(const SerialPortInfo& port) noexcept {
          (port.usb_vendor == kFtdi && port.usb_product >= 0xD388 && port.usb_product <= 0xD38F);
 }
 
-/// The board's own USB: its baud rate is a word without meaning.
-bool is_native(const std::string& port) {
+}  // namespace
+
+// Its baud rate is a word without meaning.
+bool is_native_usb(const std::string& port) {
   std::error_code none;
   const std::filesystem::path real = std::filesystem::canonical(port, none);
   return (none ? std::filesystem::path(port) : real).filename().string().rfind("ttyACM", 0) == 0;
 }
-
-}  // namespace
 
 Driver::Driver(const Options& options)
     : Driver(options, {list_serial_ports, [](const std::string& port) {
@@ -36,7 +36,7 @@ std::vector<std::string> Driver::candidates() const {
 
 std::unique_ptr<Device> Driver::open_port(const std::string& port, DeviceStatus* status) {
   Options options = options_;
-  options.native_usb = options.native_usb || is_native(port);
+  options.native_usb = options.native_usb || is_native_usb(port);
   return open_on(ports_.at(port), options, status, &last_error_);
 }
 

@@ -52,7 +52,10 @@ class Driver final : public TriggerDriver {
   std::string last_error_;
 };
 
-/// The same on any line: simulators, tests. Null: *status and *error say why.
+/// The port is the board's own USB: bytes take no time on a line.
+[[nodiscard]] bool is_native_usb(const std::string& port);
+
+/// The same on any line: simulators, recordings, tests. Null: *status and *error say why.
 [[nodiscard]] std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place,
                                               const Options& options, DeviceStatus* status,
                                               std::string* error);

@@ -35,8 +35,8 @@ class Device final : public InsDevice,
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
   [[nodiscard]] DeviceStatus wait(Duration limit, InsReading* reading) noexcept override;
   void stop() noexcept override;
-  bool observe_bytes(ByteObserver* observer) noexcept override {
-    set_byte_observer(observer);
+  bool observe_line(LineObserver* observer) noexcept override {
+    log().observe(observer);
     return true;
   }
   [[nodiscard]] std::string last_error() const override { return last_error_; }

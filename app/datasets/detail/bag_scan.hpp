@@ -49,6 +49,7 @@ struct BagMessage {
   const BagChannel* channel = nullptr;  // until the scan ends
   BagPlace place{};
   const ByteSource* bytes = nullptr;  // where place.offset counts; during the call
+  std::int64_t log_time = 0;          // ns, when it was recorded; of rosbags 0
 };
 
 using BagVisitor = std::function<void(const BagMessage&)>;

@@ -185,11 +185,14 @@ class Scanner {
       ++scan_.orphans;
       return;
     }
+    (void)in.u32();  // sequence
+    const std::uint64_t log_time = in.u64();
     ++scan_.messages;
     each_({&channel->second,
            {chunk, record.content + kMessageHead,
             static_cast<std::uint32_t>(record.size - kMessageHead)},
-           &bytes});
+           &bytes,
+           static_cast<std::int64_t>(log_time)});
   }
 
   const ByteSource& file_;

@@ -94,7 +94,7 @@ std::optional<Record> record_at(const ByteSource& bytes, std::uint64_t offset) {
   record.sound =
       parse_fields(there.subspan(kLength, static_cast<std::size_t>(length)), &record.header) &&
       record.header.op;
-  record.size = u32_at(there, whole - kLength);
+  record.size = u32_at(there, static_cast<std::size_t>(whole - kLength));
   record.data = offset + whole;
   if (record.size > bytes.size() - record.data) return std::nullopt;
   return record;

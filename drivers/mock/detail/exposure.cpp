@@ -14,9 +14,9 @@ void choose_image(const RigTruth& truth, const PulseAt& pulse, Exposure* e) noex
     if (f.kind == FaultKind::swap_cables && e->camera < 2) e->camera = 1 - e->camera;
   }
   if (!late) return;
-  e->time = pulse.time - (pulse.number == 0 ? pulse.plan->period()
-                                            : pulse.plan->at(pulse.number).time -
-                                                  pulse.plan->at(pulse.number - 1).time);
+  const std::uint64_t i = pulse.number;
+  e->time = pulse.time - (i == 0 ? pulse.plan->period()
+                                 : pulse.plan->at(i).time - pulse.plan->at(i - 1).time);
   e->pulse = pulse.number - 1;
 }
 

@@ -74,10 +74,10 @@ PulsePlan::PulsePlan(const TriggerConfiguration& c, Duration length,
   }
 }
 
-PulsePlan::Slot PulsePlan::at(std::size_t i) const noexcept {
-  if (i < slots_.size()) return slots_[i];
+PulsePlan::Slot PulsePlan::at(std::uint64_t i) const noexcept {
+  if (i < slots_.size()) return slots_[static_cast<std::size_t>(i)];
   if (slots_.empty()) return {period_ * static_cast<std::int64_t>(i), i, 0};
-  const std::size_t beyond = i - (slots_.size() - 1);
+  const std::uint64_t beyond = i - (slots_.size() - 1);
   const Slot& last = slots_.back();
   return {last.time + period_ * static_cast<std::int64_t>(beyond), last.number + beyond, last.boot};
 }

@@ -37,7 +37,7 @@ class PulsePlan {
 
   [[nodiscard]] std::size_t size() const noexcept { return slots_.size(); }
   /// Beyond the last: evenly on.
-  [[nodiscard]] Slot at(std::size_t i) const noexcept;
+  [[nodiscard]] Slot at(std::uint64_t i) const noexcept;
   /// The first slot not before that time.
   [[nodiscard]] std::size_t first_from(Duration time) const noexcept;
   [[nodiscard]] Duration period() const noexcept { return period_; }

@@ -1,0 +1,51 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "app/datasets/device_recording.hpp"
+#include "drivers/serial/byte_line.hpp"
+
+namespace vergence::app {
+
+/// How well a driver kept to the conversation that was recorded.
+struct LineReplayCounters {
+  std::uint64_t reads = 0;     // handed to the driver
+  std::uint64_t writes = 0;    // that it made as recorded
+  std::uint64_t not_made = 0;  // recorded, and not made by it
+  std::uint64_t other = 0;     // made by it, and not recorded
+};
+
+/// The port of a device in a recorded drive: a driver that behaves as it did then reads what it
+/// read then, at the same times of its clock.
+///
+/// Time     Virtual: the recording's. A read lets it pass to the next step, at most by its limit.
+///          Where the driver then wrote, a read is woken (`stopped`) at that very time, so that it
+///          can; what it still does not write is passed over.
+/// Ownership  The record outlives the place and its lines. Threads: as LinePlace, one line at a
+///            time; counters(): when no line is in use.
+/// A limit  What a driver does because of its calling thread (a pause, the end) comes when it
+/// comes.
+class RecordedPlace final : public LinePlace {
+ public:
+  explicit RecordedPlace(const LineRecord& record);
+  ~RecordedPlace() override;
+
+  /// The next line that was opened; when there is none, one that has ended.
+  [[nodiscard]] std::unique_ptr<ByteLine> open(const LineSettings& settings,
+                                               DeviceStatus* status) override;
+  [[nodiscard]] std::string name() const override;
+  [[nodiscard]] Duration latency_timer() const override;
+  [[nodiscard]] bool pass(Duration /*time*/) override { return true; }
+  [[nodiscard]] bool exhausted() const noexcept override;
+
+  [[nodiscard]] const LineReplayCounters& counters() const noexcept;
+
+  class Conversation;  // where in the record it is; lives as long as the place or a line of it
+
+ private:
+  std::shared_ptr<Conversation> conversation_;
+};
+
+}  // namespace vergence::app
