@@ -13,6 +13,7 @@
 #include "app/devices/mock_drive.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/support/xsens_terminal.hpp"
 #include "tests/system/gige/pairs.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -101,11 +102,9 @@ double path_length(const std::vector<StampedPose>& poses) {
   return sum;
 }
 
-TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
-  if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
-  const RenderedDrive drive;
-  const Wires wires(&drive);
-  std::thread pulses([&wires] {
+/// Pulses for both cameras once they stream, kPairs of them.
+std::thread pulse_cameras(const Wires& wires) {
+  return std::thread([&wires] {
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     while (!(wires.cameras[0]->acquiring() && wires.cameras[1]->acquiring())) {
       if (std::chrono::steady_clock::now() > give_up) return;
@@ -118,6 +117,13 @@ TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
       std::this_thread::sleep_for(std::chrono::duration<double>(1 / kRate));
     }
   });
+}
+
+TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
+  if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
+  const RenderedDrive drive;
+  const Wires wires(&drive);
+  std::thread pulses = pulse_cameras(wires);
   const TemporaryFolder folder;
   const auto session = folder / "s";
   const Outcome o =
@@ -149,6 +155,37 @@ TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
   EXPECT_NEAR(path_length(poses) / way, 1, 0.03);
   // By the host's clock the pulses came 100 ms apart; the stamps are the cameras', mapped.
   for (std::size_t i = 1; i < poses.size(); ++i) EXPECT_GT(poses[i].stamp, poses[i - 1].stamp);
+}
+
+// In real time, with an INS behind a terminal: what threads and a scheduler do to arrivals is in
+// the record, too.
+TEST(GigeRun, aRecordedDriveComesAboutAgainFromItsDevicesOn) {
+  if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
+  const RenderedDrive drive;
+  const Wires wires(&drive);
+  const test::XsensOnTerminal ins({});
+  std::thread pulses = pulse_cameras(wires);
+  const TemporaryFolder folder;
+  const Outcome o =
+      run_vergence("run '" + kExample + "' --duration " + std::to_string(kPairs / kRate + 3) +
+                   " --out '" + (folder / "s").string() + "'" + wires.settings() +
+                   " --record images,ins,pulses,raw --set ins.driver=xsens --set ins.rate=100 "
+                   "--set ins.baud=115200 --set ins.port=" +
+                   ins.port());
+  pulses.join();
+  ASSERT_LE(o.code, 1) << o.err;
+  const Outcome again = run_vergence("replay '" + (folder / "s").string() + "' --out '" +
+                                     (folder / "again").string() + "' --through-devices");
+  ASSERT_LE(again.code, 1) << again.err;
+  EXPECT_EQ(test::read_file(folder / "s" / "trajectory.tum"),
+            test::read_file(folder / "again" / "trajectory.tum"));
+  std::ifstream in(folder / "again" / "summary.json");
+  const auto devices = nlohmann::json::parse(in)["devices"];
+  EXPECT_EQ(devices["frames_as_in_the_drive"], kPairs);
+  EXPECT_GT(devices["readings_compared"], 300);
+  EXPECT_EQ(devices["readings_as_in_the_drive"], devices["readings_compared"]);
+  EXPECT_GT(devices["ins_line_writes_as_recorded"], 3);
+  EXPECT_EQ(devices["ins_line_writes_not_recorded"], 0);
 }
 
 TEST(GigeRun, whatCannotBeDrivenIsRefusedInASentence) {

@@ -322,5 +322,104 @@ TEST(RecordedDevices, linesPulsesAndFramesAreRecordedAndTheDriveIsTheSame) {
   EXPECT_GT(board.size(), 4U * 20U * 10U) << "reports of 20 pulses a second";
 }
 
+/// A drive with the real drivers on simulated lines, recorded from its devices on.
+Outcome drive_chain(const std::filesystem::path& session, const std::string& more) {
+  return run_vergence("run '" + std::string(VERGENCE_SOURCE_DIR) +
+                      "/app/config/mock_chain.yaml' --fast --record images,ins,pulses,raw --out '" +
+                      session.string() + "'" + kSmall + " " + more);
+}
+
+/// Poses, stamps and readings of the drive came about again, and drivers said what they had said.
+void expect_replayed_through_devices(const std::filesystem::path& session,
+                                     const std::filesystem::path& again) {
+  const Outcome o = replay(session, again, "--through-devices");
+  ASSERT_LE(o.code, 1) << o.err;
+  expect_same_poses(session, again);
+  const auto then = summary_of(session), now = summary_of(again);
+  const auto& devices = now["devices"];
+  EXPECT_EQ(now["frames"]["read"], then["frames"]["read"]);
+  EXPECT_EQ(devices["frames_as_in_the_drive"], then["frames"]["read"]);
+  EXPECT_EQ(devices["readings_as_in_the_drive"], devices["readings_compared"]);
+  EXPECT_EQ(devices["worst_stamp_difference_ns"], 0);
+  EXPECT_EQ(devices["images_missing"], 0);
+}
+
+TEST(ThroughDevices, aDriveWhoseDevicesFailedComesAboutAgain) {
+  const TemporaryFolder folder;
+  const Outcome o = drive_chain(
+      folder / "s",
+      "--duration 14 --fault \"camera_gone@4 camera=1 duration_s=1\" --fault \"board_reboot@7\" "
+      "--fault \"ins_gone@9 duration_s=1\" --fault \"camera_gone@11 camera=-1 duration_s=0.05\"");
+  ASSERT_LE(o.code, 1) << o.err;
+  expect_replayed_through_devices(folder / "s", folder / "again");
+  const auto devices = summary_of(folder / "again")["devices"];
+  for (const std::string line : {"ins_line", "board_line"}) {
+    EXPECT_GT(devices[line + "_reads"], 100);
+    EXPECT_EQ(devices[line + "_writes_not_made"], 0);
+    EXPECT_EQ(devices[line + "_writes_not_recorded"], 0);
+  }
+}
+
+TEST(ThroughDevices, legacyInsAndABoardWithItsOwnUsbComeAboutAgain) {
+  const TemporaryFolder folder;
+  const Outcome o =
+      drive_chain(folder / "s",
+                  "--duration 5 --set mock.ins_line=mti-g --set mock.board_line=usb --fault "
+                  "\"board_gone@2 duration_s=1 powered=0\"");
+  ASSERT_LE(o.code, 1) << o.err;
+  expect_replayed_through_devices(folder / "s", folder / "again");
+}
+
+TEST(ThroughDevices, aLiveDriveWithoutLinesComesAboutAgain) {
+  const TemporaryFolder folder;
+  ASSERT_LE(drive(folder / "s", "--duration 6 --record images,ins,pulses,raw").code, 1);
+  expect_replayed_through_devices(folder / "s", folder / "again");
+}
+
+TEST(ThroughDevices, anotherConfigurationGivesWhatThatPairs) {
+  const TemporaryFolder folder;
+  ASSERT_LE(drive_chain(folder / "s", "--duration 4 --set trigger.feedback=0").code, 1);
+  // The cameras expose 30 µs after their pulses; who says half a millisecond gets other stamps.
+  const Outcome o = replay(folder / "s", folder / "other",
+                           "--through-devices --set cameras.0.trigger_delay_us=530 --set "
+                           "cameras.1.trigger_delay_us=530");
+  ASSERT_LE(o.code, 1) << o.err;
+  const auto devices = summary_of(folder / "other")["devices"];
+  EXPECT_EQ(devices["frames_as_in_the_drive"], 0);
+  EXPECT_EQ(devices["worst_stamp_difference_ns"], 500'000);
+  EXPECT_EQ(devices["frames_replayed"], summary_of(folder / "s")["frames"]["read"]);
+  // Another setting of the board is another conversation with it.
+  const Outcome wired =
+      replay(folder / "s", folder / "wired", "--through-devices --set trigger.feedback=3");
+  EXPECT_EQ(wired.code, 2);
+  EXPECT_NE(wired.err.find("is the configuration that of the drive?"), std::string::npos)
+      << wired.err;
+}
+
+TEST(ThroughDevices, recordingsWithoutDevicesAreRefusedWithASentence) {
+  const TemporaryFolder folder;
+  ASSERT_LE(drive(folder / "s", "--fast --duration 4").code, 1);  // images and INS alone
+  const Outcome o = replay(folder / "s", folder / "again", "--through-devices");
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("record: [images, pulses, raw]"), std::string::npos) << o.err;
+  const Outcome other =
+      run_vergence("replay '" + (folder / "s").string() + "' --out '" + (folder / "x").string() +
+                   "' --through-devices --calibrate-first");
+  EXPECT_EQ(other.code, 2);
+}
+
+TEST(ThroughDevices, aCutRecordingGoesAsFarAsItGoes) {
+  const TemporaryFolder folder;
+  ASSERT_LE(drive_chain(folder / "s", "--duration 5").code, 1);
+  std::string bytes = test::read_file(folder / "s" / "drive.mcap");
+  bytes.resize(bytes.size() * 2 / 3);
+  (void)folder.write("cut/drive.mcap", bytes);
+  (void)folder.write("cut/poses.csv", "");
+  const Outcome o = replay(folder / "cut", folder / "again", "--through-devices");
+  ASSERT_LE(o.code, 1) << o.err;
+  const auto devices = summary_of(folder / "again")["devices"];
+  EXPECT_GT(devices["frames_as_in_the_drive"], 30);
+}
+
 }  // namespace
 }  // namespace vergence
