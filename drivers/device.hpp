@@ -64,6 +64,7 @@ struct LineEvent {
     written,  // bytes; time: what the driver's last look at the clock had told it
     baud,     // value: to be spoken from now on
     lost,     // value: the DeviceStatus that a read ended with
+    timeout,  // a read brought nothing; time: when it ended
   } kind = Kind::read;
   HostStamp time{};
   std::uint32_t value = 0;

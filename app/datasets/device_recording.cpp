@@ -1,5 +1,6 @@
 #include "app/datasets/device_recording.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -88,7 +89,7 @@ std::optional<LineEvent> read_line_event(std::span<const std::uint8_t> message) 
   const auto kind = in.get<std::uint8_t>();
   e.value = in.get<std::uint32_t>();
   const auto bytes = data(message, &in);
-  if (!bytes || kind > static_cast<std::uint8_t>(LineEvent::Kind::lost)) return std::nullopt;
+  if (!bytes || kind > static_cast<std::uint8_t>(LineEvent::Kind::timeout)) return std::nullopt;
   e.kind = static_cast<LineEvent::Kind>(kind);
   e.bytes = *bytes;
   return e;
@@ -195,6 +196,14 @@ void LineRecord::add(const LineEvent& event) {
   steps.push_back({event, bytes.size(), event.bytes.size()});
   steps.back().event.bytes = {};
   bytes.insert(bytes.end(), event.bytes.begin(), event.bytes.end());
+}
+
+HostStamp DeviceRecording::end() const noexcept {
+  HostStamp last{};
+  for (const auto& frames : cameras)
+    if (!frames.empty()) last = std::max(last, frames.back().value.arrival);
+  if (!pulses.empty()) last = std::max(last, pulses.back().value.arrival);
+  return last;
 }
 
 DeviceRecording read_device_recording(const std::filesystem::path& folder,

@@ -47,9 +47,8 @@ struct DeviceRecording {
   std::vector<SetArrivals> sets{};  // that the estimator was given, numbers ascending
   std::size_t damaged = 0;          // messages that are none
 
-  [[nodiscard]] LineRecord& line(DeviceLine which) noexcept {
-    return which == DeviceLine::ins ? ins : board;
-  }
+  /// Arrival of the last frame or pulse that was taken: what lines brought after it came too late.
+  [[nodiscard]] HostStamp end() const noexcept;
 };
 
 /// Of a session's folder. InputError: no recording, more of anything than is held.

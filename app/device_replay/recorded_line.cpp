@@ -13,8 +13,6 @@ using Step = LineRecord::Step;
 /// Reads that are woken for a write before it is passed over: a driver's loop may go round once for
 /// something else.
 constexpr int kPatience = 4;
-/// By how much later each of them is: a due time that was reckoned some µs later than then is past.
-constexpr Duration kLater = Duration::microseconds(20);
 /// Steps ahead in which a write of the driver is looked for, where it is early.
 constexpr std::size_t kAhead = 256;
 
@@ -22,7 +20,7 @@ constexpr std::size_t kAhead = 256;
 
 class RecordedPlace::Conversation {
  public:
-  explicit Conversation(const LineRecord& record) : record_(record) {
+  Conversation(const LineRecord& record, HostStamp until) : record_(record), until_(until) {
     made_.resize(record.steps.size());
     for (const Step& step : record.steps)
       if (step.event.kind == Kind::opened) {
@@ -37,36 +35,34 @@ class RecordedPlace::Conversation {
   bool open() noexcept {
     while (!at_end() && step().event.kind != Kind::opened) pass_over();
     if (at_end()) return false;
-    now_ = std::max(now_, step().event.time);
+    pass_to(step().event.time);
     next();
     return true;
   }
 
-  LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept {
+  LineRead read(std::span<std::uint8_t> out) noexcept {
     for (;;) {  // each turn passes a step over, or returns
       if (at_end()) return {DeviceStatus::ended, 0, now_};
       const LineEvent& event = step().event;
-      if (event.kind == Kind::read || event.kind == Kind::lost) {
-        if (!reached(event.time, limit)) return {DeviceStatus::timeout, 0, now_};
-        if (event.kind == Kind::read) return bytes(out);
-        const auto status = static_cast<DeviceStatus>(event.value);
+      // Then the driver gave the line up; now it has to.
+      if (event.kind == Kind::opened) return {DeviceStatus::gone, 0, now_};
+      if (event.kind == Kind::read) return bytes(out);
+      if (event.kind == Kind::timeout || event.kind == Kind::lost) {
+        const auto status = event.kind == Kind::timeout ? DeviceStatus::timeout
+                                                        : static_cast<DeviceStatus>(event.value);
+        pass_to(event.time);
         next();
         return {status, 0, now_};
-      }
-      if (event.kind == Kind::opened) {  // the driver gave the line up then, and does not now
-        if (!reached(event.time, limit)) return {DeviceStatus::timeout, 0, now_};
-        return {DeviceStatus::gone, 0, now_};
       }
       if (made_[at_]) {
         next();
         continue;
       }
-      if (!reached(event.time + kLater * woken_, limit) || limit <= Duration{})
-        return {DeviceStatus::timeout, 0, now_};
       if (++woken_ > kPatience) {
         pass_over();
         continue;
       }
+      pass_to(event.time);
       // Who waits for a baud rate takes the time out for an end; who writes, for a question.
       return {event.kind == Kind::written ? DeviceStatus::stopped : DeviceStatus::timeout, 0, now_};
     }
@@ -83,7 +79,10 @@ class RecordedPlace::Conversation {
       ++counters_.writes;
       return;
     }
+    // Numbered otherwise since something else was written at another place, it stands for what was
+    // written here.
     ++counters_.other;
+    if (writes_next()) made_[at_] = true;
   }
 
   /// Reads before the switch that the driver did not make are lost, as on a line.
@@ -93,13 +92,18 @@ class RecordedPlace::Conversation {
       if (event.kind == Kind::opened || (event.kind == Kind::baud && event.value != baud)) return;
       if (event.kind != Kind::baud) continue;
       at_ = i;
-      now_ = std::max(now_, event.time);
+      pass_to(event.time);
       return next();
     }
   }
 
-  [[nodiscard]] HostStamp now() const noexcept { return now_; }
-  [[nodiscard]] bool at_end() const noexcept { return at_ >= record_.steps.size(); }
+  /// What the driver's last look had told it, where it then wrote.
+  [[nodiscard]] HostStamp now() const noexcept {
+    return writes_next() ? std::max(now_, step().event.time) : now_;
+  }
+  [[nodiscard]] bool at_end() const noexcept {
+    return at_ >= record_.steps.size() || step().event.time > until_;
+  }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] Duration latency() const noexcept { return latency_; }
   [[nodiscard]] const LineReplayCounters& counters() const noexcept { return counters_; }
@@ -116,16 +120,15 @@ class RecordedPlace::Conversation {
     if (step().event.kind == Kind::written && !made_[at_]) ++counters_.not_made;
     next();
   }
-  /// Time passes until then, or by the limit.
-  bool reached(HostStamp then, Duration limit) noexcept {
-    const bool there = then <= now_ + limit;
-    now_ = std::max(now_, there ? then : now_ + limit);
-    return there;
+  [[nodiscard]] bool writes_next() const noexcept {
+    return !at_end() && step().event.kind == Kind::written && !made_[at_];
   }
+  void pass_to(HostStamp then) noexcept { now_ = std::max(now_, then); }
   LineRead bytes(std::span<std::uint8_t> out) noexcept {
     const auto left = record_.bytes_of(step()).subspan(taken_);
     const std::size_t size = std::min(left.size(), out.size());
     const HostStamp arrival = step().event.time;
+    pass_to(arrival);
     std::copy_n(left.begin(), size, out.begin());
     taken_ += size;
     if (size == left.size()) next();
@@ -134,6 +137,7 @@ class RecordedPlace::Conversation {
   }
 
   const LineRecord& record_;
+  const HostStamp until_;
   std::vector<bool> made_;  // by step: the driver wrote it
   std::string name_;
   Duration latency_{};
@@ -151,10 +155,10 @@ class RecordedLine final : public ByteLine {
   RecordedLine(std::shared_ptr<RecordedPlace::Conversation> conversation, std::uint32_t baud)
       : conversation_(std::move(conversation)), baud_(baud) {}
 
-  LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
+  LineRead read(std::span<std::uint8_t> out, Duration /*limit*/) noexcept override {
     if (woken_.exchange(false, std::memory_order_acq_rel))
       return {DeviceStatus::stopped, 0, conversation_->now()};
-    return conversation_->read(out, limit);
+    return conversation_->read(out);
   }
   DeviceStatus write(std::span<const std::uint8_t> bytes, Duration /*limit*/) noexcept override {
     conversation_->write(bytes);
@@ -178,8 +182,8 @@ class RecordedLine final : public ByteLine {
 
 }  // namespace
 
-RecordedPlace::RecordedPlace(const LineRecord& record)
-    : conversation_(std::make_shared<Conversation>(record)) {}
+RecordedPlace::RecordedPlace(const LineRecord& record, HostStamp until)
+    : conversation_(std::make_shared<Conversation>(record, until)) {}
 RecordedPlace::~RecordedPlace() = default;
 
 std::unique_ptr<ByteLine> RecordedPlace::open(const LineSettings& settings, DeviceStatus* status) {

@@ -20,16 +20,18 @@ struct LineReplayCounters {
 /// The port of a device in a recorded drive: a driver that behaves as it did then reads what it
 /// read then, at the same times of its clock.
 ///
-/// Time     Virtual: the recording's. A read lets it pass to the next step, at most by its limit.
-///          Where the driver then wrote, a read is woken (`stopped`) at that very time, so that it
-///          can; what it still does not write is passed over.
+/// Time     Virtual: the recording's. A read brings what the next read brought then, bytes or
+///          nothing, whatever its limit: a thread may have been late. Before the driver writes, the
+///          clock shows what it showed it then; what it does not write is passed over after a few
+///          reads that were woken (`stopped`) for it.
 /// Ownership  The record outlives the place and its lines. Threads: as LinePlace, one line at a
 ///            time; counters(): when no line is in use.
 /// A limit  What a driver does because of its calling thread (a pause, the end) comes when it
 /// comes.
 class RecordedPlace final : public LinePlace {
  public:
-  explicit RecordedPlace(const LineRecord& record);
+  /// `until`: steps after it are not there.
+  explicit RecordedPlace(const LineRecord& record, HostStamp until = HostStamp(INT64_MAX));
   ~RecordedPlace() override;
 
   /// The next line that was opened; when there is none, one that has ended.

@@ -84,7 +84,7 @@ void ReplayedDevices::open_ins(const Configuration& c, const ReplayedDrive& driv
     ins_ = std::make_unique<RecordedInsDevice>(*device, readings_);
     return;
   }
-  auto place = std::make_unique<RecordedPlace>(drive.recording.ins);
+  auto place = std::make_unique<RecordedPlace>(drive.recording.ins, drive.recording.end());
   ins_place_ = place.get();
   DeviceStatus status = DeviceStatus::ok;
   std::string error;
@@ -101,7 +101,7 @@ void ReplayedDevices::open_trigger(const Configuration& c, const ReplayedDrive& 
     trigger_ = std::make_unique<RecordedTrigger>(*device, drive.recording.pulses);
     return;
   }
-  auto place = std::make_unique<RecordedPlace>(drive.recording.board);
+  auto place = std::make_unique<RecordedPlace>(drive.recording.board, drive.recording.end());
   board_place_ = place.get();
   trigger_board::Options options = trigger_board_options(c.trigger);
   options.native_usb = trigger_board::is_native_usb(place->name());

@@ -70,7 +70,8 @@ constexpr std::array kDefinitions{
     // Camera −1: the trigger board.
     Definition{"vergence_msgs/DeviceGone", "int64 stamp_ns\nint32 camera\n"},
     // A step of the conversation on a line but for the bytes that were read: `kind` 0 opened (data:
-    // the port, value: latency timer in µs), 2 written (data), 3 baud rate (value), 4 lost.
+    // the port, value: latency timer in µs), 2 written (data), 3 baud rate (value), 4 lost,
+    // 5 a read that brought nothing.
     Definition{"vergence_msgs/LineEvent",
                "int64 stamp_ns\nuint8 kind\nuint32 value\nuint8[] data\n"},
     // The frames that a set was made of, by their arrivals; 0: none of that camera.

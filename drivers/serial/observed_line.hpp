@@ -19,7 +19,9 @@ class ObservedLine final : public ByteLine {
     const LineRead r = line_->read(out, limit);
     if (r.size > 0)
       log_.note({LineEvent::Kind::read, r.arrival, 0, out.first(r.size)});
-    else if (r.status != DeviceStatus::timeout && r.status != DeviceStatus::stopped)
+    else if (r.status == DeviceStatus::timeout)
+      log_.note({LineEvent::Kind::timeout, line_->now(), 0, {}});
+    else if (r.status != DeviceStatus::stopped)
       log_.note({LineEvent::Kind::lost, line_->now(), static_cast<std::uint32_t>(r.status), {}});
     return r;
   }

@@ -64,4 +64,22 @@ class DeviceOnDescriptor {
   std::thread thread_;
 };
 
+/// The same behind a pseudo-terminal: port() is what a driver opens.
+class DeviceOnTerminal {
+ public:
+  explicit DeviceOnTerminal(std::unique_ptr<mock::DeviceModel> device)
+      : master_(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
+    if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0)
+      throw std::runtime_error("no pseudo-terminal");
+    port_ = ::ptsname(master_);
+    device_ = std::make_unique<DeviceOnDescriptor>(master_, std::move(device));
+  }
+  [[nodiscard]] const std::string& port() const noexcept { return port_; }
+
+ private:
+  int master_;
+  std::string port_;
+  std::unique_ptr<DeviceOnDescriptor> device_;
+};
+
 }  // namespace vergence::test

@@ -52,7 +52,7 @@ TEST(InsDrivers, readsARealTerminalInRealTime) {
   for (const xbus::Generation generation : {xbus::Generation::legacy, xbus::Generation::mark4}) {
     mock::XsensSimulatorOptions sensor;
     sensor.generation = generation;
-    test::XsensOnTerminal terminal(sensor);
+    test::DeviceOnTerminal terminal(test::resting_xsens(sensor));
     std::vector<std::string> remarks;
     const auto device = open_ins(xsens_on(terminal.port(), 120), &remarks);
     ASSERT_NE(device, nullptr);
