@@ -191,11 +191,16 @@ class Solve {
     return options_.configuration == BundleConfiguration::parallel_monocular ? 1 : 0;
   }
 
+  /// Least ratio of a direction that something should see.
+  double least_seen(const detail::PivotReport& pivots) const noexcept {
+    return free_directions() == 0 ? pivots.least_ratio : pivots.second_ratio;
+  }
+
   /// A direction that only the damping holds: its pivot falls with λ, that of a seen one stays. One
   /// factorisation cannot tell them apart.
   void watch_rank() noexcept {
     constexpr double kFell = 0.3;  // of the ratio, when λ fell to a tenth
-    const double ratio = free_directions() == 0 ? pivots_.least_ratio : pivots_.second_ratio;
+    const double ratio = least_seen(pivots_);
     if (watched_damping_ > 0 && damping_ < 0.5 * watched_damping_)
       rank_suspicious_ = ratio < kFell * watched_ratio_;
     rank_suspicious_ = rank_suspicious_ || ratio < kRankTolerance;
@@ -205,9 +210,12 @@ class Solve {
 
   bool rank_deficient() noexcept {
     if (system_.rows() == 0 || !system_.linearise(best(), 0.0)) return false;
-    return detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(),
-                            kRankTolerance)
-               .small > free_directions();
+    // What rounding leaves of the pivot of an unseen direction may be well above the tolerance, of
+    // either sign. It is still far below what the damping alone had made of it.
+    constexpr double kLeft = 0.01;  // of the last ratio under damping
+    const auto pivots =
+        detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(), kRankTolerance);
+    return pivots.small > free_directions() || least_seen(pivots) < kLeft * watched_ratio_;
   }
 
   void pose_covariance() noexcept {
