@@ -29,7 +29,6 @@ OVER = {
     ("drivers/mock/detail/devices.hpp", "MockCamera"): (21, 9),
     ("drivers/mock/simulators/simulated_line.cpp", "SimulatedPlace"): (26, 29),
     ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
-    ("drivers/sync/rig_synchronizer.hpp", "RigSynchronizer"): (26, 30),
 }
 
 COMMENT_OR_TEXT = re.compile(
