@@ -24,7 +24,6 @@ MOST_METHODS = 30
 OVER = {
     ("app/recording/recording.hpp", "Recording"): (37, 23),
     ("drivers/iidc/firewire_bus.hpp", "FirewireBus"): (23, 19),
-    ("drivers/iidc/iidc_camera.hpp", "IidcCamera"): (27, 8),
     ("drivers/mock/detail/devices.hpp", "MockCamera"): (21, 9),
     ("drivers/mock/simulators/simulated_line.cpp", "SimulatedPlace"): (26, 29),
     ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
