@@ -26,14 +26,14 @@ Acquisition::Acquisition(std::vector<CameraDevice*> cameras, InsDevice* ins, Tri
       trigger_(trigger),
       options_(options),
       sync_(options.sync),
-      heads_(cameras_.size()) {
+      heads_(cameras_.size()),
+      pulse_mapper_(trigger_ != nullptr ? clock_options(trigger_->timing()) : ClockMapperOptions{}),
+      queue_(cameras_, options.wait_when_full) {
   for (std::size_t k = 0; k < cameras_.size(); ++k) heads_[k].device = cameras_[k];
   ins_head_.device = ins_;
   board_head_.device = trigger_;
   for (const CameraDevice* camera : cameras_) clocks_.emplace_back(clock_options(camera->timing()));
   if (ins_ != nullptr) ins_clock_ = std::make_unique<ClockMapper>(clock_options(ins_->timing()));
-  if (trigger_ != nullptr)
-    board_clock_ = std::make_unique<ClockMapper>(clock_options(trigger_->timing()));
   if (options.sync.mode == SyncMode::ins_syncout)
     sync_out_.emplace(options.sync.interval, options.sync_out_divider);
 }
@@ -64,8 +64,7 @@ std::optional<StartFailure> Acquisition::start(AcquisitionObserver* observer) {
 void Acquisition::stop() noexcept {
   stop_.store(true, std::memory_order_release);
   wake_.signal();
-  filled_.signal();
-  freed_.signal();
+  queue_.stop();
 }
 
 void Acquisition::join() noexcept {
@@ -76,52 +75,12 @@ void Acquisition::join() noexcept {
   counters_.sync = sync_.counters();
   for (std::size_t k = 0; k < cameras_.size(); ++k)
     counters_.proven[k] = sync_.proven(static_cast<int>(k));
-  counters_.dropped_sets = skipped_.load();
+  counters_.dropped_sets = queue_.skipped_sets();
+  counters_.dropped_readings = queue_.dropped_readings();
+  counters_.ring_high_water = queue_.high_water();
   counters_.clock_resets = ins_clock_ ? ins_clock_->resets() : 0;
-  for (const ClockMapper& clock : clocks_) counters_.clock_resets += clock.resets();
-  if (board_clock_) counters_.clock_resets += board_clock_->resets();
-}
-
-bool Acquisition::next(Acquired* out) noexcept {
-  for (Item item;;) {
-    const WakeEvent::Ticket seen = filled_.ticket();
-    const bool finished = finished_.load(
-        std::memory_order_acquire);  // before the ring: what was pushed before is still found
-    if (!ring_.pop(&item)) {
-      if (finished) return false;
-      filled_.wait(seen);
-      continue;
-    }
-    freed_.signal();
-    if (const auto* reading = std::get_if<AcquiredReading>(&item)) {
-      *out = *reading;
-      return true;
-    }
-    if (const auto* event = std::get_if<DeviceEvent>(&item)) {
-      *out = *event;
-      return true;
-    }
-    if (const auto* refused = std::get_if<Refused>(&item)) {
-      release(refused->set);
-      continue;
-    }
-    auto* frame = std::get_if<AcquiredFrame>(&item);
-    const int behind = waiting_.fetch_sub(1, std::memory_order_acq_rel) - 1;
-    if (!options_.wait_when_full && behind >= kMostWaiting) {
-      release(frame->set);
-      skipped_.fetch_add(1, std::memory_order_relaxed);
-      continue;
-    }
-    for (std::size_t k = 0; k < cameras_.size(); ++k)
-      if (frame->set.present[k]) frame->rig.images[k] = cameras_[k]->view(frame->set.slots[k]);
-    *out = *frame;
-    return true;
-  }
-}
-
-void Acquisition::release(const SyncedSet& set) noexcept {
-  for (std::size_t k = 0; k < cameras_.size(); ++k)
-    if (set.present[k]) cameras_[k]->release(set.slots[k]);
+  for (const CameraClock& clock : clocks_) counters_.clock_resets += clock.resets();
+  counters_.clock_resets += pulse_mapper_.clock_resets();
 }
 
 Stamp Acquisition::stamp_of(HostStamp host) const noexcept {
@@ -160,8 +119,7 @@ void Acquisition::work() {
   for (std::size_t k = 0; k < heads_.size(); ++k) {
     if (heads_[k].gone) missing_.push_back(static_cast<int>(k));
   }
-  finished_.store(true, std::memory_order_release);
-  filled_.signal();
+  queue_.finish();
 }
 
 void Acquisition::look() {
@@ -243,7 +201,7 @@ void Acquisition::take_frame(std::size_t k) {
     head.back = false;
     clocks_[k].restart();
     counters_.cameras[k].restart();
-    proofs_[k] = {};
+    pairing_.restarted(k);
     sync_.restarted(camera);
     push_event(DeviceEvent::Kind::camera_back, head.value.arrival, camera);
   }
@@ -253,11 +211,7 @@ void Acquisition::take_frame(std::size_t k) {
   in.camera = camera;
   in.slot = frame.slot;
   in.counter = frame.counter;
-  // From the end of an exposure to the arrival is always as long, from its start not.
-  if (exposures_[k] == Duration{}) exposures_[k] = frame.exposure;
-  const Duration longer = frame.exposure - exposures_[k];
-  in.middle = clocks_[k].map(frame.exposure_start + longer, frame.arrival);
-  in.middle.host = in.middle.host - longer;
+  in.middle = clocks_[k].start_of(frame);
   counters_.cameras[k].note(frame.exposure_start, in.middle);
   in.middle.host = in.middle.host + frame.exposure / 2;
   in.arrival = frame.arrival;
@@ -267,14 +221,14 @@ void Acquisition::take_frame(std::size_t k) {
   counters_.torn += torn ? 1 : 0;
   if (torn) sync_.lost(in.camera, in.counter);
   const bool taken = !torn && sync_.offer(in) == SyncVerdict::taken;
-  proofs_[k].any = true;
+  pairing_.frame(k);
   note_proofs(frame.arrival);
   if (options_.sync.mode == SyncMode::master_strobe && k == 0) pause_pulses();
   if (taken) return;
-  Refused refused;
+  AcquiredQueue::Refused refused;
   refused.set.present[k] = true;
   refused.set.slots[k] = frame.slot;
-  push(refused);
+  queue_.push(refused);
 }
 
 void Acquisition::take_reading() {
@@ -286,7 +240,7 @@ void Acquisition::take_reading() {
   item.sample.stamp = stamp_of(at.host);
   item.sample.stamp_error = at.error;
   counters_.ins.note(r.measured, at);
-  push(item);
+  queue_.push(item);
   if (!sync_out_) return;
   if (const auto pulse = sync_out_->reading(r, at)) {
     take_pulse(*pulse);
@@ -308,28 +262,12 @@ void Acquisition::hand_out_sets() {
                 {}};
     if (set.number > kSettled)
       counters_.worst_stamp_error_ns = std::max(counters_.worst_stamp_error_ns, set.error.ns());
-    push(item);
+    queue_.push(item);
   }
 }
 
 void Acquisition::push_event(DeviceEvent::Kind kind, HostStamp when, int camera, double seconds) {
-  push(DeviceEvent{kind, stamp_of(when), camera, seconds});
-}
-
-void Acquisition::push(const Item& item) {
-  if (std::holds_alternative<AcquiredFrame>(item)) waiting_.fetch_add(1, std::memory_order_acq_rel);
-  for (;;) {
-    const WakeEvent::Ticket seen = freed_.ticket();
-    if (ring_.push(item)) break;
-    if (stop_.load(std::memory_order_acquire)) return;  // nobody may be taking any more
-    if (!options_.wait_when_full && std::holds_alternative<AcquiredReading>(item)) {
-      ++counters_.dropped_readings;
-      return;
-    }
-    freed_.wait(seen);  // images: meanwhile the cameras drop, and count
-  }
-  counters_.ring_high_water = std::max(counters_.ring_high_water, ring_.size());
-  filled_.signal();
+  queue_.push(DeviceEvent{kind, stamp_of(when), camera, seconds});
 }
 
 }  // namespace vergence

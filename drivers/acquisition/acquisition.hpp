@@ -6,14 +6,16 @@
 #include <optional>
 #include <string>
 #include <thread>
-#include <variant>
 #include <vector>
 
-#include "core/memory/ring.hpp"
 #include "core/types/rig_frame.hpp"
 #include "drivers/acquisition/acquired.hpp"
+#include "drivers/acquisition/acquired_queue.hpp"
+#include "drivers/acquisition/camera_clock.hpp"
 #include "drivers/acquisition/clock_record.hpp"
 #include "drivers/acquisition/device_head.hpp"
+#include "drivers/acquisition/pairing_watch.hpp"
+#include "drivers/acquisition/pulse_mapper.hpp"
 #include "drivers/camera.hpp"
 #include "drivers/common/wake_event.hpp"
 #include "drivers/ins.hpp"
@@ -106,9 +108,9 @@ class Acquisition final : private Notifier {
   /// `observer`, if any, instead of that of the options.
   [[nodiscard]] std::optional<StartFailure> start(AcquisitionObserver* observer = nullptr);
   /// False: the drive is over, or stop() was called.
-  [[nodiscard]] bool next(Acquired* item) noexcept;
+  [[nodiscard]] bool next(Acquired* item) noexcept { return queue_.next(item); }
   /// Of every AcquiredFrame that next() gave, once.
-  void release(const AcquiredFrame& frame) noexcept { release(frame.set); }
+  void release(const AcquiredFrame& frame) noexcept { queue_.release(frame.set); }
   /// Ends the stream: next() gives what is in the ring, then false.
   void stop() noexcept;
   /// Waits for the thread, stops the devices. After it the counters are exact.
@@ -119,16 +121,6 @@ class Acquisition final : private Notifier {
   [[nodiscard]] const std::vector<int>& missing() const noexcept { return missing_; }
 
  private:
-  /// Slots of a frame that was refused, on their way back on the consumer's thread.
-  struct Refused {
-    SyncedSet set{};
-  };
-  using Item = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent, Refused>;
-  static constexpr std::size_t kRing = 256;
-  // Live: sets that may wait for the estimator before the oldest is skipped; when an image was lost
-  // so many come at once.
-  static constexpr int kMostWaiting = static_cast<int>(RigSynchronizer::kOpen);
-
   void notify() noexcept override { wake_.signal(); }
   void work();
   void look();
@@ -148,8 +140,6 @@ class Acquisition final : private Notifier {
   void note_proofs(HostStamp now);
   void hand_out_sets();
   void push_event(DeviceEvent::Kind kind, HostStamp when, int camera = 0, double seconds = 0);
-  void push(const Item& item);
-  void release(const SyncedSet& set) noexcept;
   [[nodiscard]] Stamp stamp_of(HostStamp host) const noexcept;
 
   std::vector<CameraDevice*> cameras_;
@@ -157,29 +147,18 @@ class Acquisition final : private Notifier {
   TriggerDevice* trigger_;
   Options options_;
   RigSynchronizer sync_;
-  std::vector<ClockMapper> clocks_;
-  std::array<Duration, kMaxCameras>
-      exposures_{};  // of the first frames: what the mappers' least delays hold for
+  std::vector<CameraClock> clocks_;
   std::vector<DeviceHead<CameraDevice, Frame>> heads_;
   std::unique_ptr<ClockMapper> ins_clock_;
   DeviceHead<InsDevice, InsReading> ins_head_;
-  std::unique_ptr<ClockMapper> board_clock_;
+  PulseMapper pulse_mapper_;
   DeviceHead<TriggerDevice, Pulse> board_head_;
   std::optional<SyncOutPulses> sync_out_;
-  bool any_pulse_ = false;
-  std::uint32_t boot_ = 0;  // of the newest pulse
-  struct Proof {
-    bool any = false;  // a frame has come since it was started
-    bool proven = true;
-    HostStamp since{};  // of the first frame without
-  };
-  std::array<Proof, kMaxCameras> proofs_{};
+  PairingWatch pairing_;
 
-  Ring<Item, kRing> ring_;
-  std::atomic<int> waiting_{0};  // sets in the ring
-  WakeEvent wake_, filled_, freed_;
-  std::atomic<bool> stop_{false}, finished_{false};
-  std::atomic<std::uint64_t> skipped_{0};
+  AcquiredQueue queue_;
+  WakeEvent wake_;
+  std::atomic<bool> stop_{false};
   AcquisitionCounters counters_{};
   std::vector<int> missing_;
   std::thread thread_;

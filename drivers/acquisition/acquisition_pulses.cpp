@@ -25,26 +25,15 @@ void Acquisition::take_board() {
 }
 
 void Acquisition::take_pulse(const Pulse& reported) {
-  Pulse pulse = reported;
   if (options_.observer != nullptr) options_.observer->on_pulse(reported);
-  const bool rebooted = any_pulse_ && pulse.boot != boot_;
-  if (rebooted && !sync_out_) {
+  const PulseMapper::Report report = pulse_mapper_.add(reported);
+  const Pulse& pulse = report.pulse;
+  if (report.rebooted && !sync_out_) {
     ++counters_.reboots;
     push_event(DeviceEvent::Kind::board_rebooted, pulse.arrival);
   }
-  any_pulse_ = true;
-  boot_ = pulse.boot;
   ++counters_.pulses;
-  if (!pulse.mapped) {
-    if (rebooted) {
-      board_clock_->restart();
-      counters_.board.restart();
-    }
-    const MappedStamp at = board_clock_->map(pulse.edge, pulse.arrival);
-    pulse.mapped = true;
-    pulse.host = at.host;
-    pulse.host_error = at.error;
-  }
+  if (report.rebooted && !reported.mapped) counters_.board.restart();
   if (!sync_out_) counters_.board.note(pulse.edge, {pulse.host, pulse.host_error});
   if (!wants_pulses(options_.sync.mode)) return;
   sync_.pulse(pulse);
@@ -82,13 +71,11 @@ void Acquisition::pause_pulses() {
 
 void Acquisition::note_proofs(HostStamp now) {
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
-    Proof& proof = proofs_[k];
-    const bool proven = sync_.proven(static_cast<int>(k));
-    if (proven == proof.proven || heads_[k].gone || !proof.any) continue;
-    const double seconds = proven ? (now - proof.since).to_seconds() : 0;
-    proof = {true, proven, now};
-    push_event(proven ? DeviceEvent::Kind::proven : DeviceEvent::Kind::acquiring, now,
-               static_cast<int>(k), seconds);
+    if (heads_[k].gone) continue;
+    const auto change = pairing_.look(k, sync_.proven(static_cast<int>(k)), now);
+    if (!change) continue;
+    push_event(change->proven ? DeviceEvent::Kind::proven : DeviceEvent::Kind::acquiring, now,
+               static_cast<int>(k), change->seconds);
   }
 }
 

@@ -1,7 +1,6 @@
 #include "drivers/iidc/iidc_camera.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <utility>
 
@@ -49,9 +48,8 @@ DeviceStatus IidcCamera::configure(const CameraConfiguration& requested,
 
 DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& requested,
                                             CameraConfiguration* actual) {
-  if (streaming_.load(std::memory_order_acquire))
-    return refused(DeviceStatus::busy, "it is streaming; stop it first");
-  if (held_.size() != 0) return refused(DeviceStatus::busy, "images of it are still in use");
+  if (queue_.started()) return refused(DeviceStatus::busy, "it is streaming; stop it first");
+  if (queue_.held() != 0) return refused(DeviceStatus::busy, "images of it are still in use");
   drain();
   CameraPlan plan;
   std::string why;
@@ -107,23 +105,22 @@ DeviceTiming IidcCamera::timing() const noexcept {
 
 DeviceStatus IidcCamera::start(Notifier* ready) noexcept {
   if (!configured_) return DeviceStatus::bad_configuration;
-  if (streaming_.load(std::memory_order_acquire) && !lost_.load(std::memory_order_acquire))
-    return DeviceStatus::ok;
-  const bool again = streaming_.load(std::memory_order_acquire);
+  const bool again = queue_.started();
+  if (again && !lost_.load(std::memory_order_acquire)) return DeviceStatus::ok;
   const std::lock_guard lock(asking_);
   bus_->stop();
-  notifier_.store(ready, std::memory_order_release);
   try {
-    const DeviceStatus status = begin();
+    const DeviceStatus status = begin(ready);
     if (status == DeviceStatus::ok) return status;
     if (!lost_.load(std::memory_order_acquire)) {
       registers_.transmit(false);
       (void)registers_.take_status();
     }
     bus_->stop();
-    if (again) {  // still gone, until it comes back or stop()
-      gone_.store(true, std::memory_order_release);
-      streaming_.store(true, std::memory_order_release);
+    if (again) {
+      queue_.fail();  // still gone, until it comes back or stop()
+    } else {
+      queue_.end();
     }
     return status;
   } catch (const std::exception&) {
@@ -131,7 +128,7 @@ DeviceStatus IidcCamera::start(Notifier* ready) noexcept {
   }
 }
 
-DeviceStatus IidcCamera::begin() {
+DeviceStatus IidcCamera::begin(Notifier* ready) {
   std::string why;
   if (lost_.load(std::memory_order_acquire)) {
     const DeviceStatus back = bus_->reopen();
@@ -163,8 +160,7 @@ DeviceStatus IidcCamera::begin() {
   exposure_now_ = plan_.exposure;
   transfer_ = transfer_time();
   strays_ = 0;
-  gone_.store(false, std::memory_order_release);
-  streaming_.store(true, std::memory_order_release);
+  queue_.begin(ready);
   status = bus_->start(this);
   if (status == DeviceStatus::ok) {
     registers_.transmit(true);
@@ -177,16 +173,16 @@ DeviceStatus IidcCamera::begin() {
   }
   if (status != DeviceStatus::ok) {
     if (status == DeviceStatus::gone) lost_.store(true, std::memory_order_release);
-    streaming_.store(false, std::memory_order_release);
     return refused(status, std::move(why));
   }
-  starts_.fetch_add(1, std::memory_order_relaxed);
+  queue_.count_start();
   last_error_.clear();
   return DeviceStatus::ok;
 }
 
 void IidcCamera::stop() noexcept {
-  const bool was = streaming_.exchange(false, std::memory_order_acq_rel);
+  const bool was = queue_.started();
+  queue_.end();
   if (was && !lost_.load(std::memory_order_acquire)) {
     const std::lock_guard lock(asking_);
     registers_.transmit(false);
@@ -194,14 +190,11 @@ void IidcCamera::stop() noexcept {
       lost_.store(true, std::memory_order_release);
   }
   if (was) bus_->stop();
-  notifier_.store(nullptr, std::memory_order_release);
-  { const std::lock_guard lock(mutex_); }
-  changed_.notify_all();
 }
 
 DeviceStatus IidcCamera::trigger_once() noexcept {
   if (!configured_ || plan_.trigger != CameraTrigger::software) return DeviceStatus::unsupported;
-  if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
+  if (!queue_.started()) return DeviceStatus::stopped;
   if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
   const std::lock_guard lock(asking_);
   registers_.software_trigger();
@@ -217,7 +210,7 @@ DeviceStatus IidcCamera::trigger_once() noexcept {
 
 DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
-  if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
+  if (!queue_.started()) return DeviceStatus::stopped;
   if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
   const std::lock_guard lock(asking_);
   if (requested.exposure <= Duration{} || requested.exposure.to_seconds() * plan_.rate_hz > 1)
@@ -250,12 +243,6 @@ std::string IidcCamera::remark() const {
   return text;
 }
 
-CameraStatistics IidcCamera::statistics() const noexcept {
-  return {delivered_.load(std::memory_order_relaxed), torn_.load(std::memory_order_relaxed),
-          underruns_.load(std::memory_order_relaxed), missing_.load(std::memory_order_relaxed),
-          starts_.load(std::memory_order_relaxed)};
-}
-
 // ---- the stream's thread
 
 bool IidcCamera::frame(const Arrival& arrival) noexcept {
@@ -269,72 +256,35 @@ bool IidcCamera::frame(const Arrival& arrival) noexcept {
     return false;
   }
   strays_ = 0;
-  missing_.fetch_add(read.missing, std::memory_order_relaxed);
-  Delivery d;
-  d.frame = {arrival.slot, read.counter, read.exposure_start, arrival.at,
-             had.exposure, read.status,  had.gain_db};
+  if (read.missing > 0) queue_.count_lost(read.missing);
+  Frame frame{arrival.slot, read.counter, read.exposure_start, arrival.at,
+              had.exposure, read.status,  had.gain_db};
   const bool convert = !plan_.grey.none();
   if (convert) {
     const auto slot = converted_.acquire();
     if (!slot) {
-      underruns_.fetch_add(1, std::memory_order_relaxed);
+      queue_.count_underrun();
       return false;
     }
-    d.frame.slot = *slot;
+    frame.slot = *slot;
     if (read.status == FrameStatus::complete)
       to_grey(plan_.grey, arrival.data, plan_.size.width, plan_.size.height,
               converted_.bytes(*slot), FramePool::stride(plan_.size.width));
   } else if (!arrival.spare) {
-    underruns_.fetch_add(1, std::memory_order_relaxed);
+    queue_.count_underrun();
     return false;
   }
-  push(d);
-  return !convert;
+  const bool offered = queue_.offer(frame);
+  if (!offered && convert) converted_.release(frame.slot);  // it was stopped just now
+  return offered && !convert;
 }
 
 void IidcCamera::gone(HostStamp at) noexcept {
   if (lost_.exchange(true, std::memory_order_acq_rel)) return;
-  Delivery d;
-  d.gone = true;
-  d.frame.arrival = at;
-  push(d);
-}
-
-void IidcCamera::push(const Delivery& delivery) noexcept {
-  if (!ready_.push(delivery)) return;  // cannot be: it holds more than there are slots
-  { const std::lock_guard lock(mutex_); }
-  changed_.notify_one();
-  if (Notifier* n = notifier_.load(std::memory_order_acquire)) n->notify();
+  queue_.lose(at);
 }
 
 // ---- the consumer's thread
-
-DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
-  Delivery d;
-  {
-    std::unique_lock lock(mutex_);
-    if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
-    if (gone_.load(std::memory_order_acquire)) return DeviceStatus::gone;
-    if (!ready_.pop(&d)) {
-      if (limit <= Duration{}) return DeviceStatus::timeout;
-      (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), [this] {
-        return !ready_.empty() || !streaming_.load(std::memory_order_acquire);
-      });
-      if (!streaming_.load(std::memory_order_acquire)) return DeviceStatus::stopped;
-      if (!ready_.pop(&d)) return DeviceStatus::timeout;
-    }
-    if (!d.gone) held_.put(d.frame.slot);
-  }
-  if (d.gone) {
-    frame->arrival = d.frame.arrival;
-    gone_.store(true, std::memory_order_release);
-    return DeviceStatus::gone;
-  }
-  *frame = d.frame;
-  delivered_.fetch_add(1, std::memory_order_relaxed);
-  if (d.frame.status != FrameStatus::complete) torn_.fetch_add(1, std::memory_order_relaxed);
-  return DeviceStatus::ok;
-}
 
 ImageView IidcCamera::view(FrameSlot slot) const noexcept {
   const int width = plan_.size.width, height = plan_.size.height;
@@ -352,14 +302,12 @@ void IidcCamera::return_slot(FrameSlot slot) noexcept {
 }
 
 void IidcCamera::release(FrameSlot slot) noexcept {
-  if (held_.remove(slot)) return_slot(slot);
+  if (queue_.release(slot)) return_slot(slot);
 }
 
 /// What a stop left between stream and consumer. Precondition: the stream is stopped.
 void IidcCamera::drain() noexcept {
-  const std::lock_guard lock(mutex_);
-  for (Delivery d; ready_.pop(&d);)
-    if (!d.gone) return_slot(d.frame.slot);
+  for (FrameSlot slot = 0; queue_.drain(&slot);) return_slot(slot);
 }
 
 }  // namespace vergence::iidc

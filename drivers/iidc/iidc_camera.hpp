@@ -1,13 +1,12 @@
 #pragma once
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string>
 
-#include "core/memory/ring.hpp"
 #include "drivers/camera.hpp"
+#include "drivers/common/frame_queue.hpp"
 #include "drivers/exposure/applied_exposure.hpp"
 #include "drivers/iidc/bus.hpp"
 #include "drivers/iidc/camera_plan.hpp"
@@ -45,7 +44,9 @@ class IidcCamera final : public CameraDevice, private StreamSink {
                                        CameraConfiguration* actual) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override;
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
-  [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
+  [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
+    return queue_.wait(limit, frame);
+  }
   [[nodiscard]] ImageView view(FrameSlot slot) const noexcept override;
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
@@ -54,22 +55,19 @@ class IidcCamera final : public CameraDevice, private StreamSink {
                                           ExposureSetting* actual) noexcept override;
   [[nodiscard]] std::string last_error() const override { return last_error_; }
   [[nodiscard]] std::string remark() const override;
-  [[nodiscard]] CameraStatistics statistics() const noexcept override;
+  [[nodiscard]] CameraStatistics statistics() const noexcept override {
+    return queue_.statistics();
+  }
 
   /// The plan in force; its mode and packets are what the diagnosis of a bus needs. Owner's thread.
   [[nodiscard]] const CameraPlan& plan() const noexcept { return plan_; }
 
  private:
-  struct Delivery {
-    bool gone = false;
-    Frame frame{};
-  };
   [[nodiscard]] bool frame(const Arrival& arrival) noexcept override;
   void gone(HostStamp at) noexcept override;
-  void push(const Delivery& delivery) noexcept;
   [[nodiscard]] DeviceStatus configure_or_throw(const CameraConfiguration& requested,
                                                 CameraConfiguration* actual);
-  [[nodiscard]] DeviceStatus begin();
+  [[nodiscard]] DeviceStatus begin(Notifier* ready);
   [[nodiscard]] Duration transfer_time() const noexcept;
   void return_slot(FrameSlot slot) noexcept;
   void drain() noexcept;
@@ -90,14 +88,8 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   SlotMemory converted_;                  // where the bus's buffers are not the image
   int strays_ = 0;
 
-  Ring<Delivery, 128> ready_;  // more than there are slots
-  SlotSet held_;               // handed out by wait()
-  std::atomic<Notifier*> notifier_{nullptr};
-  std::atomic<bool> streaming_{false}, gone_{false};  // gone_: wait() has told it
-  std::atomic<bool> lost_{false};                     // the device is gone, whether told or not
-  std::mutex mutex_;  // of the consumer's end of ready_, and for sleeping
-  std::condition_variable changed_;
-  std::atomic<std::uint64_t> delivered_{0}, torn_{0}, underruns_{0}, missing_{0}, starts_{0};
+  FrameQueue queue_;
+  std::atomic<bool> lost_{false};  // the device is gone, whether told or not
 };
 
 }  // namespace vergence::iidc

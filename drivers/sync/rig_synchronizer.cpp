@@ -8,70 +8,32 @@
 namespace vergence {
 
 RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept
-    : options_(options), train_(options.interval) {
+    : options_(options),
+      by_counter_(options.interval, options.align_start && options.mode == SyncMode::counter),
+      by_time_(options),
+      train_(options.interval),
+      master_(options.interval) {
   assert(options.validate() == nullptr);
-  for (Source& s : sources_) s.align = options.align_start && options.mode == SyncMode::counter;
   const std::uint64_t pause = options.mode == SyncMode::master_strobe ? 0 : kPause;
   for (std::size_t k = 0; k < matchers_.size(); ++k)
     matchers_[k] = PulseMatcher(noise_of(k), options.interval, options.camera[k].latest, pause);
 }
 
-RigSynchronizer::Open* RigSynchronizer::find(std::uint64_t number) noexcept {
-  for (Open& o : open_)
-    if (o.used && o.set.number == number) return &o;
-  return nullptr;
-}
-
-RigSynchronizer::Open* RigSynchronizer::oldest() noexcept {
-  Open* best = nullptr;
-  for (Open& o : open_)
-    if (o.used && (best == nullptr || o.set.number < best->set.number)) best = &o;
-  return best;
-}
-
 SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
-  assert(frame.camera >= 0 && frame.camera < options_.cameras && open_count_ <= kOpen);
+  assert(frame.camera >= 0 && frame.camera < options_.cameras && !sets_.crowded());
   const auto k = static_cast<std::size_t>(frame.camera);
   now_ = std::max(now_, frame.arrival);
-  const bool by_time = pairs_by_time(options_.mode);
-  Image image{frame.middle, 0, {}, {}, frame.exposure};
+  SetImage image{frame.middle, 0, {}, {}, frame.exposure};
   std::uint64_t number = 0;
-  Step step = Step::numbered;
-  if (by_time) {
-    image.time = pairing_time(frame);
-    number = number_by_time(frame, image.time);
-  } else if (proves_numbers(options_.mode)) {
-    step = number_by_pulse(frame, &number, &image);
-  } else {
-    number = number_of(frame);
-  }
+  const Step step = number_of(frame, &number, &image);
   if (step == Step::acquiring) return SyncVerdict::acquiring;
-  if (any_out_ && number <= last_out_ && number < sources_[k].from) {
-    ++counters_.acquiring[k];
-    return SyncVerdict::acquiring;
-  }
-  if (any_out_ && number <= last_out_) {
-    const Gone& g = history_[number % kHistory];
-    const bool of_it = !by_time || image.time - last_time_ >= -options_.tolerance.ns();
-    const bool given =
-        step == Step::again || (of_it && g.used && g.number == number && g.present[k]);
-    ++(given ? counters_.duplicate : counters_.late)[k];
-    return given ? SyncVerdict::duplicate : SyncVerdict::late;
-  }
-  Open* open = find(number);
+  if (sets_.is_out(number)) return verdict_on_late(k, number, step, image);
+  OpenSet* open = sets_.find(number);
   if (step == Step::again || (open != nullptr && open->set.present[k])) {
     ++counters_.duplicate[k];
     return SyncVerdict::duplicate;
   }
-  if (open == nullptr) {
-    open = std::find_if(open_.data(), open_.data() + open_.size(),
-                        [](const Open& o) { return !o.used; });
-    *open = Open{};
-    open->used = true;
-    open->set.number = number;
-    open->first = frame.arrival;
-    ++open_count_;
-  }
+  if (open == nullptr) open = &sets_.open(number, frame.arrival);
   open->set.present[k] = true;
   open->set.slots[k] = frame.slot;
   open->set.arrivals[k] = frame.arrival;
@@ -81,44 +43,54 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   source.here = true;
   source.newest = source.any ? std::max(source.newest, number) : number;
   source.any = true;
-  if (k == 0 || !timed_ || !sources_[0].here) {
-    timed_ = true;
-    timed_number_ = number;
-    timed_middle_ = frame.middle.host;
-  }
+  by_counter_.note(number, frame.middle.host, k == 0 || !sources_[0].here);
   return SyncVerdict::taken;
+}
+
+/// A frame whose set has gone out: with its image, without it, or before it was proven at all.
+SyncVerdict RigSynchronizer::verdict_on_late(std::size_t camera, std::uint64_t number, Step step,
+                                             const SetImage& image) noexcept {
+  if (number < sources_[camera].from) {
+    ++counters_.acquiring[camera];
+    return SyncVerdict::acquiring;
+  }
+  const bool of_it =
+      !pairs_by_time(options_.mode) || image.time - sets_.last_time() >= -options_.tolerance.ns();
+  const bool given = step == Step::again || (of_it && sets_.went_out_with(number, camera));
+  ++(given ? counters_.duplicate : counters_.late)[camera];
+  return given ? SyncVerdict::duplicate : SyncVerdict::late;
 }
 
 bool RigSynchronizer::waited_for(std::size_t camera) const noexcept {
   return sources_[camera].here && proven(static_cast<int>(camera));
 }
 
-bool RigSynchronizer::ready(const Open& open) const noexcept {
+bool RigSynchronizer::ready(const OpenSet& open) const noexcept {
   const std::uint64_t number = open.set.number;
-  if (finishing_ || open_count_ > kOpen || now_ - open.first >= options_.hold || number < flushed_)
+  if (finishing_ || sets_.crowded() || now_ - open.first >= options_.hold ||
+      number < sets_.flushed_below())
     return true;
   if (proves_numbers(options_.mode) && (train_.size() == 0 || train_.newest().number < number))
     return false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const Source& s = sources_[k];
     if (open.set.present[k] && open.images[k].doubtful && matchers_[k].doubtful()) return false;
-    const bool passed = s.any && !s.align && s.newest > number;
+    const bool passed = s.any && !by_counter_.aligning(k) && s.newest > number;
     if (waited_for(k) && !open.set.present[k] && !passed) return false;
   }
   return true;
 }
 
 bool RigSynchronizer::next(SyncedSet* set) noexcept {
-  Open* open = oldest();
+  OpenSet* open = sets_.oldest();
   if (open == nullptr || !ready(*open)) return false;
   emit(open, set);
   return true;
 }
 
 /// Camera 0's middle, or that of the first camera that is there.
-void RigSynchronizer::stamp(const Open& open, SyncedSet* set) const noexcept {
-  std::size_t base = 0;
-  while (!set->present[base]) ++base;
+void RigSynchronizer::stamp(const OpenSet& open, SyncedSet* set) const noexcept {
+  const std::size_t base = open.base();
   set->stamp = open.images[base].middle.host;
   set->error = open.images[base].middle.error;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k)
@@ -128,10 +100,9 @@ void RigSynchronizer::stamp(const Open& open, SyncedSet* set) const noexcept {
 
 /// The pulse's edge on the host's clock, and from it to the middles of the exposures, as they were
 /// fed back or as they were asked for.
-void RigSynchronizer::stamp_by_pulse(const Open& open, SyncedSet* set) const noexcept {
+void RigSynchronizer::stamp_by_pulse(const OpenSet& open, SyncedSet* set) const noexcept {
   const PulseTrain::Entry* pulse = train_.find(set->number);
-  std::size_t base = 0;
-  while (!set->present[base]) ++base;
+  const std::size_t base = open.base();
   set->reported = pulse != nullptr;
   MappedStamp edge{};
   if (pulse != nullptr) {
@@ -151,11 +122,11 @@ void RigSynchronizer::stamp_by_pulse(const Open& open, SyncedSet* set) const noe
     if (set->present[k]) set->spread = std::max(set->spread, magnitude(middle(k) - middle(base)));
 }
 
-void RigSynchronizer::emit(Open* open, SyncedSet* set) noexcept {
+void RigSynchronizer::emit(OpenSet* open, SyncedSet* set) noexcept {
   *set = open->set;
   const bool numbered = proves_numbers(options_.mode);
   // Pulses of a train that has ended are no longer known: their cameras' own stamps are.
-  const bool of_train = numbered && train_.size() > 0 && set->number >= flushed_;
+  const bool of_train = numbered && train_.size() > 0 && set->number >= sets_.flushed_below();
   if (of_train) {
     stamp_by_pulse(*open, set);
   } else {
@@ -174,25 +145,20 @@ void RigSynchronizer::emit(Open* open, SyncedSet* set) noexcept {
   }
   prove(open, set);
   ++(set->complete ? counters_.complete : counters_.incomplete);
-  if (!set->complete && open_count_ > kOpen) ++counters_.pushed_out;
+  if (!set->complete && sets_.crowded()) ++counters_.pushed_out;
+  const bool any_out = sets_.any_out();
+  const std::uint64_t last_out = sets_.last_out();
   if (numbered) {
     counters_.missed +=
-        any_out_ && last_out_ >= steady_from_ ? train_.between(last_out_, set->number) : 0;
+        any_out && last_out >= steady_from_ ? train_.between(last_out, set->number) : 0;
   } else {
-    counters_.missed += any_out_ ? set->number - last_out_ - 1 : set->number;
+    counters_.missed += any_out ? set->number - last_out - 1 : set->number;
   }
-  history_[set->number % kHistory] = {set->number, set->present, true};
-  any_out_ = true;
-  last_out_ = set->number;
-  std::size_t base = 0;
-  while (!set->present[base]) ++base;
-  last_time_ = open->images[base].time;
-  open->used = false;
-  --open_count_;
+  sets_.close(open);
 }
 
 /// What can be said of a set's togetherness, and whether the pulses have to be found again.
-void RigSynchronizer::prove(Open* open, SyncedSet* set) noexcept {
+void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
   switch (options_.mode) {
     case SyncMode::software:
       set->proof = SyncProof::by_time;
@@ -220,17 +186,12 @@ void RigSynchronizer::prove(Open* open, SyncedSet* set) noexcept {
   }
   const bool several = std::count(set->present.begin(), set->present.end(), true) > 1;
   if (!several) return;
-  if (set->spread * 2 <= options_.interval) {
-    unproven_run_ = 0;
-    return;
+  const bool agree = set->spread * 2 <= options_.interval;
+  if (!agree) {
+    set->proof = SyncProof::unproven;
+    ++counters_.unproven;
   }
-  set->proof = SyncProof::unproven;
-  ++counters_.unproven;
-  if (!options_.align_start || ++unproven_run_ < kUnproven) return;
-  unproven_run_ = 0;
-  ++counters_.realigned;
-  for (std::size_t k = 1; k < sources_.size(); ++k)
-    sources_[k].align = true;  // to camera 0, whose numbers go on
+  if (by_counter_.judge(agree)) ++counters_.realigned;
 }
 
 SyncCounters RigSynchronizer::counters() const noexcept {
@@ -246,10 +207,10 @@ void RigSynchronizer::lost(int camera, std::uint64_t counter) noexcept {
   const auto k = static_cast<std::size_t>(camera);
   Source& source = sources_[k];
   std::uint64_t next = 0;  // the first that is still waited for
-  if (options_.mode == SyncMode::counter && !source.align) {
-    const std::int64_t number = source.base + static_cast<std::int64_t>(counter);
-    if (number < 0) return;
-    next = static_cast<std::uint64_t>(number) + 1;
+  if (options_.mode == SyncMode::counter) {
+    const auto number = by_counter_.number_of_lost(k, counter);
+    if (!number) return;
+    next = *number + 1;
   } else if (proves_numbers(options_.mode) && matchers_[k].proven()) {
     next = matchers_[k].least_number(counter) + 1;
   } else {
@@ -268,10 +229,10 @@ void RigSynchronizer::restarted(int camera) noexcept {
   Source& source = sources_[k];
   source.here = true;
   source.any = false;
-  source.align = options_.mode == SyncMode::counter;
-  distrust(k);
+  if (options_.mode == SyncMode::counter) by_counter_.align(k);
+  sets_.contradict_doubtful(k);
   matchers_[k].restart();
-  if (k == 0) master_.align = master_.known;
+  if (k == 0) master_.restart();
 }
 
 }  // namespace vergence

@@ -3,9 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "drivers/sync/counter_numbering.hpp"
+#include "drivers/sync/master_pulses.hpp"
+#include "drivers/sync/open_sets.hpp"
 #include "drivers/sync/pulse_matcher.hpp"
 #include "drivers/sync/pulse_train.hpp"
 #include "drivers/sync/sync_types.hpp"
+#include "drivers/sync/time_numbering.hpp"
 #include "drivers/trigger.hpp"
 
 namespace vergence {
@@ -36,11 +40,8 @@ namespace vergence {
 /// Errors     Nothing throws. What cannot be paired is told by the verdict and counted.
 class RigSynchronizer {
  public:
-  static constexpr std::size_t kOpen =
-      4;  // pulses waiting at most: bounds the latency and the slots held
-  static constexpr std::size_t kHistory =
-      64;                               // sets remembered, to tell a duplicate from a late frame
-  static constexpr int kUnproven = 10;  // in a row: the pulses were not found rightly
+  static constexpr std::size_t kOpen = OpenSets::kOpen;
+  static constexpr int kUnproven = CounterNumbering::kUnproven;
   static constexpr std::uint32_t kPause =
       4;  // pulses left out: more than what a camera misses by itself
 
@@ -81,86 +82,41 @@ class RigSynchronizer {
  private:
   struct Source {
     bool here = true;
-    bool align = false;     // the next frame's number is found by time
-    std::int64_t base = 0;  // number − counter
     bool any = false;
     std::uint64_t newest = 0;  // number
     std::uint64_t from = 0;    // number; sets below did not wait for it, as it was acquiring
   };
-  struct Image {
-    MappedStamp middle{};
-    std::int64_t time = 0;  // ns, of the clock that pairs, where stamps do: middle of the exposure
-    DeviceStamp edge{};     // of the pulse by its source's clock, as this camera's stamp has it
-    Duration gate{};        // |true edge − edge| is below this
-    Duration exposure{};
-    bool doubtful = false;  // perhaps of an earlier pulse
-  };
-  struct Open {
-    bool used = false;
-    bool contradicted = false;  // its pulse's report does not agree with an image's stamp
-    SyncedSet set{};
-    std::array<Image, kMaxCameras> images{};
-    HostStamp first{};
-  };
-  struct Gone {
-    std::uint64_t number = 0;
-    std::array<bool, kMaxCameras> present{};
-    bool used = false;
-  };
-  /// Camera 0 where its exposures are the pulses.
-  struct Master {
-    bool known = false;
-    bool align = false;      // it was started again: its count is another, its clock may go on
-    std::uint64_t base = 0;  // pulse number − counter, modulo 2^64
-    std::uint64_t counter = 0;
-    DeviceStamp stamp{};
-    std::uint32_t boot = 0;
-  };
   enum class Step : std::uint8_t { numbered, again, acquiring };
 
   // By counter, by time, by pulses: the number of a frame's set.
-  [[nodiscard]] std::uint64_t number_of(const SyncFrame& frame) noexcept;
-  [[nodiscard]] std::int64_t pairing_time(const SyncFrame& frame) const noexcept;
-  [[nodiscard]] std::uint64_t number_by_time(const SyncFrame& frame, std::int64_t time) noexcept;
-  [[nodiscard]] bool ran_back(std::int64_t time) noexcept;
+  [[nodiscard]] Step number_of(const SyncFrame& frame, std::uint64_t* number,
+                               SetImage* image) noexcept;
   [[nodiscard]] Step number_by_pulse(const SyncFrame& frame, std::uint64_t* number,
-                                     Image* image) noexcept;
+                                     SetImage* image) noexcept;
   [[nodiscard]] Step number_by_master(const SyncFrame& frame, std::uint64_t* number,
-                                      Image* image) noexcept;
+                                      SetImage* image) noexcept;
+  [[nodiscard]] SyncVerdict verdict_on_late(std::size_t camera, std::uint64_t number, Step step,
+                                            const SetImage& image) noexcept;
   void take_pulse(const Pulse& pulse) noexcept;
-  void distrust(std::size_t camera) noexcept;
   void acquired(std::size_t camera) noexcept;
   void begin_again() noexcept;
-  [[nodiscard]] std::uint64_t first_free() const noexcept;
   [[nodiscard]] Duration noise_of(std::size_t camera) const noexcept;
 
-  void prove(Open* open, SyncedSet* set) noexcept;
-  [[nodiscard]] Open* oldest() noexcept;
-  [[nodiscard]] Open* find(std::uint64_t number) noexcept;
-  [[nodiscard]] bool ready(const Open& open) const noexcept;
+  void prove(OpenSet* open, SyncedSet* set) noexcept;
+  [[nodiscard]] bool ready(const OpenSet& open) const noexcept;
   [[nodiscard]] bool waited_for(std::size_t camera) const noexcept;
-  void emit(Open* open, SyncedSet* set) noexcept;
-  void stamp(const Open& open, SyncedSet* set) const noexcept;
-  void stamp_by_pulse(const Open& open, SyncedSet* set) const noexcept;
+  void emit(OpenSet* open, SyncedSet* set) noexcept;
+  void stamp(const OpenSet& open, SyncedSet* set) const noexcept;
+  void stamp_by_pulse(const OpenSet& open, SyncedSet* set) const noexcept;
 
   SyncOptions options_;
   std::array<Source, kMaxCameras> sources_{};
-  std::array<Open, kOpen + 1> open_{};  // one more: the frame that pushes the oldest out
-  std::size_t open_count_ = 0;
-  std::array<Gone, kHistory> history_{};
-  bool any_out_ = false;
-  std::uint64_t last_out_ = 0;
-  std::int64_t last_time_ = 0;  // Image::time of the set that went out last
-  int unproven_run_ = 0;
-  bool timed_ = false;  // a number and its time, to find the pulse of a camera that came back
-  std::uint64_t timed_number_ = 0;
-  HostStamp timed_middle_{};
-  int back_ = 0;               // frames in a row whose common clock has run back
-  bool new_clock_ = false;     // … and was set: the next frame begins a new count of time
-  std::uint64_t flushed_ = 0;  // sets below this number wait for nobody
+  OpenSets sets_;
+  CounterNumbering by_counter_;
+  TimeNumbering by_time_;
   PulseTrain train_;
   std::array<PulseMatcher, kMaxCameras> matchers_{};
-  Master master_{};
+  MasterPulses master_;            // camera 0 where its exposures are the pulses
   std::uint64_t steady_from_ = 0;  // number from which on every pulse without image is a missed one
   std::uint64_t pulses_ = 0, asked_at_ = 0;
   bool asked_ = false;

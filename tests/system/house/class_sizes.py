@@ -23,13 +23,10 @@ MOST_METHODS = 30
 # Those that are over it since before the rule: (members, methods), which may only become fewer; a row goes when its class is split.
 OVER = {
     ("app/recording/recording.hpp", "Recording"): (37, 23),
-    ("drivers/acquisition/acquisition.hpp", "Acquisition"): (29, 23),
     ("drivers/iidc/firewire_bus.hpp", "FirewireBus"): (23, 19),
-    ("drivers/iidc/iidc_camera.hpp", "IidcCamera"): (27, 8),
     ("drivers/mock/detail/devices.hpp", "MockCamera"): (21, 9),
     ("drivers/mock/simulators/simulated_line.cpp", "SimulatedPlace"): (26, 29),
     ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
-    ("drivers/sync/rig_synchronizer.hpp", "RigSynchronizer"): (26, 30),
 }
 
 COMMENT_OR_TEXT = re.compile(

@@ -1,0 +1,71 @@
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <variant>
+#include <vector>
+
+#include "core/memory/ring.hpp"
+#include "drivers/acquisition/acquired.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/common/wake_event.hpp"
+#include "drivers/sync/open_sets.hpp"
+
+namespace vergence {
+
+/// What an acquisition has put together, in order, on its way to the consumer's thread.
+///
+/// Ownership  Cameras outlive it. Slots that the consumer is not given (of frames that were
+///            refused, of sets that a newer one overtook) go back to their cameras on the
+///            consumer's thread, as those do that it was given and releases.
+/// Threads    push(), finish(): one producer. next(), release(): one consumer, which may be sealed.
+///            stop(), the figures: any.
+/// Full       `wait_when_full`: the producer waits. Else the consumer skips to the newest images,
+///            readings that find the queue full are dropped, all else waits.
+/// Memory     In place. Errors: none; what was left out is counted.
+class AcquiredQueue {
+ public:
+  /// Slots of a frame that was refused.
+  struct Refused {
+    SyncedSet set{};
+  };
+  using Item = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent, Refused>;
+
+  /// `cameras`: in the order of the rig; the vector outlives it.
+  AcquiredQueue(const std::vector<CameraDevice*>& cameras, bool wait_when_full) noexcept
+      : cameras_(cameras), wait_when_full_(wait_when_full) {}
+
+  void push(const Item& item) noexcept;
+  /// Nothing more will be pushed: next() gives what is there, then false.
+  void finish() noexcept;
+  /// Nobody may be taking any more: push() does not wait from now on. finish() is still owed.
+  void stop() noexcept;
+
+  /// The oldest item, waiting for it; images are views of their slots. False: finished.
+  [[nodiscard]] bool next(Acquired* item) noexcept;
+  /// Of every set that next() gave, once.
+  void release(const SyncedSet& set) noexcept;
+
+  /// Sets that the consumer was not given because it was late.
+  [[nodiscard]] std::uint64_t skipped_sets() const noexcept { return skipped_sets_.load(); }
+  [[nodiscard]] std::uint64_t dropped_readings() const noexcept { return dropped_readings_.load(); }
+  /// Items that waited at once at most.
+  [[nodiscard]] std::size_t high_water() const noexcept { return high_water_.load(); }
+
+ private:
+  static constexpr std::size_t kItems = 256;
+  // Live: sets that may wait for the estimator before the oldest is skipped; when an image was lost
+  // so many come at once.
+  static constexpr int kMostWaiting = static_cast<int>(OpenSets::kOpen);
+
+  const std::vector<CameraDevice*>& cameras_;
+  bool wait_when_full_;
+  Ring<Item, kItems> ring_;
+  std::atomic<int> waiting_{0};  // sets in the ring
+  WakeEvent filled_, freed_;
+  std::atomic<bool> stopped_{false}, finished_{false};
+  std::atomic<std::uint64_t> skipped_sets_{0}, dropped_readings_{0};
+  std::atomic<std::size_t> high_water_{0};
+};
+
+}  // namespace vergence

@@ -1,0 +1,144 @@
+#include "drivers/common/frame_queue.hpp"
+
+#include <bit>
+#include <cassert>
+#include <chrono>
+
+namespace vergence {
+namespace {
+
+static_assert(FramePool::kMaxSlots <= 64, "a bit a slot");
+
+constexpr std::uint64_t bit(FrameSlot slot) noexcept { return std::uint64_t{1} << slot; }
+
+}  // namespace
+
+void FrameQueue::begin(Notifier* ready) noexcept {
+  const std::lock_guard lock(mutex_);
+  notifier_ = ready;
+  state_ = State::streaming;
+}
+
+void FrameQueue::end() noexcept {
+  const std::lock_guard lock(mutex_);
+  state_ = State::stopped;
+  notifier_ = nullptr;
+  changed_.notify_all();
+}
+
+void FrameQueue::fail(HostStamp when) noexcept {
+  const std::lock_guard lock(mutex_);
+  state_ = State::gone;
+  gone_at_ = when;
+}
+
+void FrameQueue::fail() noexcept {
+  const std::lock_guard lock(mutex_);
+  state_ = State::gone;
+}
+
+bool FrameQueue::drain(FrameSlot* slot) noexcept {
+  const std::lock_guard lock(mutex_);
+  if (offered_ == 0) return false;
+  *slot = frames_[first_].slot;
+  first_ = (first_ + 1) % frames_.size();
+  --offered_;
+  offered_slots_ &= ~bit(*slot);
+  return true;
+}
+
+void FrameQueue::count_start() noexcept {
+  const std::lock_guard lock(mutex_);
+  ++statistics_.starts;
+}
+
+bool FrameQueue::offer(const Frame& frame) noexcept {
+  const std::lock_guard lock(mutex_);
+  assert(((offered_slots_ | held_slots_) & bit(frame.slot)) == 0);
+  if (state_ != State::streaming || offered_ == frames_.size()) return false;
+  frames_[(first_ + offered_++) % frames_.size()] = frame;
+  offered_slots_ |= bit(frame.slot);
+  changed_.notify_all();
+  if (notifier_ != nullptr) notifier_->notify();
+  return true;
+}
+
+void FrameQueue::count_lost(std::uint64_t exposures) noexcept {
+  const std::lock_guard lock(mutex_);
+  statistics_.lost += exposures;
+}
+
+void FrameQueue::count_underrun() noexcept {
+  const std::lock_guard lock(mutex_);
+  ++statistics_.underruns;
+}
+
+void FrameQueue::lose(HostStamp when) noexcept {
+  const std::lock_guard lock(mutex_);
+  if (state_ != State::streaming) return;
+  state_ = State::gone;
+  gone_at_ = when;
+  changed_.notify_all();
+  if (notifier_ != nullptr) notifier_->notify();
+}
+
+void FrameQueue::ready_again() noexcept {
+  const std::lock_guard lock(mutex_);
+  if (state_ == State::gone) state_ = State::back;
+  if (state_ == State::back && notifier_ != nullptr) notifier_->notify();
+}
+
+DeviceStatus FrameQueue::wait(Duration limit, Frame* frame) noexcept {
+  std::unique_lock lock(mutex_);
+  if (limit > Duration{})
+    (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
+                            [this] { return offered_ > 0 || state_ != State::streaming; });
+  if (state_ == State::stopped) return DeviceStatus::stopped;
+  if (offered_ > 0) {
+    *frame = frames_[first_];
+    first_ = (first_ + 1) % frames_.size();
+    --offered_;
+    offered_slots_ &= ~bit(frame->slot);
+    held_slots_ |= bit(frame->slot);
+    ++statistics_.delivered;
+    if (frame->status != FrameStatus::complete) ++statistics_.torn;
+    return DeviceStatus::ok;
+  }
+  if (state_ == State::streaming) return DeviceStatus::timeout;
+  frame->arrival = gone_at_;
+  return DeviceStatus::gone;
+}
+
+bool FrameQueue::release(FrameSlot slot) noexcept {
+  const std::lock_guard lock(mutex_);
+  const bool held = (held_slots_ & bit(slot)) != 0;
+  held_slots_ &= ~bit(slot);
+  return held;
+}
+
+FrameQueue::State FrameQueue::state() const noexcept {
+  const std::lock_guard lock(mutex_);
+  return state_;
+}
+
+std::size_t FrameQueue::held() const noexcept {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(std::popcount(held_slots_));
+}
+
+std::size_t FrameQueue::out() const noexcept {
+  const std::lock_guard lock(mutex_);
+  return static_cast<std::size_t>(std::popcount(offered_slots_ | held_slots_));
+}
+
+bool FrameQueue::is_out(FrameSlot slot) const noexcept {
+  const std::lock_guard lock(mutex_);
+  return ((offered_slots_ | held_slots_) & bit(slot)) != 0;
+}
+
+CameraStatistics FrameQueue::statistics() const noexcept {
+  const std::lock_guard lock(mutex_);
+  return statistics_;
+}
+
+}  // namespace vergence

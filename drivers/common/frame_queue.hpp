@@ -1,0 +1,84 @@
+#pragma once
+#include <array>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+
+#include "core/memory/frame_pool.hpp"
+#include "drivers/camera.hpp"
+
+namespace vergence {
+
+/// A camera's frames on their way from the transport to the consumer, who has which slot, and what
+/// state the stream is in: wait() and release() of a CameraDevice.
+///
+/// Ownership  A slot that was offered is the queue's, one that was handed out the consumer's until
+///            release(); what becomes of it then is the driver's.
+/// Threads    Each call by whom its comment names. One mutex, held for a few assignments and the
+///            Notifier's call only: after end() nobody is notified any more.
+/// Memory     Fixed, a place for every slot there can be: it is never full.
+/// Time       No call waits but wait(), which ends at its limit.
+/// Errors     Nothing throws.
+class FrameQueue {
+ public:
+  /// From streaming to gone by lose(); back: it is still gone, and start() may go on.
+  enum class State : std::uint8_t { stopped, streaming, gone, back };
+
+  // The owner.
+  /// Streams from now on. What was offered and not taken stays to be drained first. `ready` may be
+  /// null.
+  void begin(Notifier* ready) noexcept;
+  /// Stopped from now on; who waits is told.
+  void end() noexcept;
+  /// What began does not stream: gone at this time, or as long as it was before (no `when`).
+  void fail(HostStamp when) noexcept;
+  void fail() noexcept;
+  /// Takes out a frame that was offered and that nobody took; false: there is none. Precondition:
+  /// nobody offers.
+  [[nodiscard]] bool drain(FrameSlot* slot) noexcept;
+  void count_start() noexcept;
+
+  // The transport.
+  /// False: it does not stream, the slot stays the transport's. Precondition: the slot is neither
+  /// offered nor held.
+  [[nodiscard]] bool offer(const Frame& frame) noexcept;
+  void count_lost(std::uint64_t exposures) noexcept;
+  void count_underrun() noexcept;
+  /// From streaming: the device is gone. What was offered is still handed out first. Elsewhere it
+  /// does nothing.
+  void lose(HostStamp when) noexcept;
+  /// From gone: the stream can be begun again. The Notifier is told, again at every call.
+  void ready_again() noexcept;
+
+  // The consumer.
+  /// As CameraDevice::wait().
+  [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept;
+  // The releaser.
+  /// False: the consumer does not have it.
+  bool release(FrameSlot slot) noexcept;
+
+  // Any thread.
+  [[nodiscard]] State state() const noexcept;
+  /// Streaming, gone or back: not stopped.
+  [[nodiscard]] bool started() const noexcept { return state() != State::stopped; }
+  /// Slots that the consumer has.
+  [[nodiscard]] std::size_t held() const noexcept;
+  /// Slots that are offered or that the consumer has.
+  [[nodiscard]] std::size_t out() const noexcept;
+  [[nodiscard]] bool is_out(FrameSlot slot) const noexcept;
+  [[nodiscard]] CameraStatistics statistics() const noexcept;
+
+ private:
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  State state_ = State::stopped;
+  HostStamp gone_at_{};
+  Notifier* notifier_ = nullptr;
+  std::array<Frame, FramePool::kMaxSlots> frames_{};  // offered, a ring
+  std::size_t first_ = 0, offered_ = 0;
+  std::uint64_t offered_slots_ = 0, held_slots_ = 0;  // a bit a slot
+  CameraStatistics statistics_{};
+};
+
+}  // namespace vergence

@@ -1,0 +1,136 @@
+#include "drivers/common/frame_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+namespace vergence {
+namespace {
+
+struct Counting final : Notifier {
+  void notify() noexcept override { ++count; }
+  std::atomic<int> count{0};
+};
+
+Frame frame(FrameSlot slot, FrameStatus status = FrameStatus::complete) {
+  Frame f;
+  f.slot = slot;
+  f.counter = slot + 100U;
+  f.status = status;
+  return f;
+}
+
+struct Queue : ::testing::Test {
+  Queue() { queue.begin(&ready); }
+  Counting ready;
+  FrameQueue queue;
+  Frame out{};
+};
+
+TEST_F(Queue, framesComeInTheirOrderAndAreCounted) {
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout);
+  ASSERT_TRUE(queue.offer(frame(5)));
+  ASSERT_TRUE(queue.offer(frame(2, FrameStatus::torn)));
+  EXPECT_EQ(ready.count, 2);
+  ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
+  EXPECT_EQ(out.counter, 105U);
+  ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
+  EXPECT_EQ(out.slot, 2U);
+  queue.count_lost(3);
+  queue.count_underrun();
+  queue.count_start();
+  const CameraStatistics s = queue.statistics();
+  EXPECT_EQ(s.delivered, 2U);
+  EXPECT_EQ(s.torn, 1U);
+  EXPECT_EQ(s.lost, 3U);
+  EXPECT_EQ(s.underruns, 1U);
+  EXPECT_EQ(s.starts, 1U);
+}
+
+TEST_F(Queue, aSlotIsOutFromItsOfferToItsRelease) {
+  EXPECT_FALSE(queue.is_out(63));
+  ASSERT_TRUE(queue.offer(frame(63)));
+  EXPECT_TRUE(queue.is_out(63));
+  EXPECT_EQ(queue.held(), 0U) << "nobody has it yet";
+  ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
+  EXPECT_EQ(queue.held(), 1U);
+  EXPECT_EQ(queue.out(), 1U);
+  EXPECT_TRUE(queue.release(63));
+  EXPECT_FALSE(queue.release(63)) << "once";
+  EXPECT_FALSE(queue.is_out(63));
+}
+
+TEST_F(Queue, everySlotThereCanBeHasAPlace) {
+  for (FrameSlot s = 0; s < FramePool::kMaxSlots; ++s) ASSERT_TRUE(queue.offer(frame(s)));
+  EXPECT_EQ(queue.out(), FramePool::kMaxSlots);
+  for (FrameSlot s = 0; s < FramePool::kMaxSlots; ++s) {
+    ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
+    EXPECT_EQ(out.slot, s);
+  }
+}
+
+TEST_F(Queue, whatWasOfferedBeforeALossIsStillHandedOut) {
+  ASSERT_TRUE(queue.offer(frame(1)));
+  queue.lose(HostStamp(42));
+  EXPECT_FALSE(queue.offer(frame(2)));
+  EXPECT_EQ(ready.count, 2) << "of the frame and of the loss";
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::ok);
+  EXPECT_EQ(queue.wait(Duration::seconds(9), &out), DeviceStatus::gone);
+  EXPECT_EQ(out.arrival, HostStamp(42));
+  EXPECT_TRUE(queue.started());
+}
+
+TEST_F(Queue, aDeviceThatIsBackIsGoneUntilItIsBegunAgain) {
+  queue.ready_again();
+  EXPECT_EQ(queue.state(), FrameQueue::State::streaming) << "it was never gone";
+  queue.lose(HostStamp(42));
+  queue.ready_again();
+  queue.ready_again();
+  EXPECT_EQ(queue.state(), FrameQueue::State::back);
+  EXPECT_EQ(ready.count, 3) << "told at every call";
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::gone);
+  queue.fail(HostStamp(50));
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::gone);
+  EXPECT_EQ(out.arrival, HostStamp(50));
+  queue.fail();
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::gone);
+  EXPECT_EQ(out.arrival, HostStamp(50)) << "as before";
+  queue.begin(&ready);
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout);
+}
+
+TEST_F(Queue, aStopHandsOutNothingAndWhatNobodyTookIsDrained) {
+  ASSERT_TRUE(queue.offer(frame(1)));
+  ASSERT_TRUE(queue.offer(frame(3)));
+  ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
+  queue.end();
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::stopped);
+  EXPECT_FALSE(queue.offer(frame(4)));
+  queue.lose(HostStamp(42));
+  EXPECT_EQ(queue.state(), FrameQueue::State::stopped) << "a loss after the stop is none";
+  EXPECT_EQ(ready.count, 2) << "nobody is told after the stop";
+  FrameSlot slot = 0;
+  ASSERT_TRUE(queue.drain(&slot));
+  EXPECT_EQ(slot, 3U);
+  EXPECT_FALSE(queue.drain(&slot)) << "1 is held";
+  EXPECT_EQ(queue.held(), 1U);
+  queue.begin(nullptr);
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout);
+  EXPECT_TRUE(queue.release(1)) << "over the stop";
+}
+
+TEST_F(Queue, whoWaitsIsWokenByAFrameALossAndAStop) {
+  const auto woken_by = [&](auto action, DeviceStatus expected) {
+    std::thread other([&] { action(); });
+    EXPECT_EQ(queue.wait(Duration::seconds(60), &out), expected);
+    other.join();
+  };
+  woken_by([&] { EXPECT_TRUE(queue.offer(frame(7))); }, DeviceStatus::ok);
+  woken_by([&] { queue.lose(HostStamp(1)); }, DeviceStatus::gone);
+  queue.begin(nullptr);
+  woken_by([&] { queue.end(); }, DeviceStatus::stopped);
+}
+
+}  // namespace
+}  // namespace vergence
