@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -126,6 +127,9 @@ class CameraDevice {
                                                   ExposureSetting* /*actual*/) noexcept {
     return DeviceStatus::unsupported;
   }
+  /// Of sensor or housing, °C, where the device tells. Talks to the device as set_exposure() does;
+  /// any thread but that of wait().
+  [[nodiscard]] virtual std::optional<double> temperature_c() noexcept { return std::nullopt; }
   /// Virtual time, which other devices may run ahead of: waits, at most `limit`, until all that
   /// this camera delivers before `instant` (frames, its going and coming back) is there to be
   /// taken. False: not yet. Consumer's thread. A real camera delivers when it does: always true.

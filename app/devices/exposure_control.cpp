@@ -46,6 +46,7 @@ class ExposureControl::Watched final : public CameraDevice {
                             ExposureSetting* actual) noexcept override {
     return camera_->set_exposure(requested, actual);
   }
+  std::optional<double> temperature_c() noexcept override { return camera_->temperature_c(); }
   bool delivered_until(HostStamp instant, Duration limit) noexcept override {
     return camera_->delivered_until(instant, limit);
   }

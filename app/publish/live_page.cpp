@@ -80,6 +80,11 @@ void LivePage::on_calibration(const CalibrationRecord& calibration) noexcept {
   push(&calibrations_, calibration);
 }
 
+void LivePage::on_temperature(int camera, double celsius) noexcept {
+  temperatures_[static_cast<std::size_t>(camera)].store(static_cast<float>(celsius),
+                                                        std::memory_order_relaxed);
+}
+
 std::vector<std::pair<std::string, std::uint64_t>> LivePage::counters() {
   ended_.store(true, std::memory_order_release);
   server_.wake();
@@ -118,6 +123,9 @@ void LivePage::drain() {
   for (LiveFrame frame; frames_.pop(&frame);) state_.add(frame);
   for (PoseRecord pose; compared_.pop(&pose);) state_.add(pose);
   for (EventRecord event; events_.pop(&event);) state_.add(event);
+  for (std::size_t k = 0; k < temperatures_.size(); ++k)
+    if (const float celsius = temperatures_[k].load(std::memory_order_relaxed); celsius != 0)
+      state_.set_temperature(k, celsius);
   if (ended) state_.end();
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -49,6 +50,7 @@ class LivePage final : public SessionObserver {
   void on_compared(const PoseRecord& pose) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
+  void on_temperature(int camera, double celsius) noexcept override;
   /// Shows the end of the drive first.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
 
@@ -76,6 +78,7 @@ class LivePage final : public SessionObserver {
   Ring<EventRecord, 64> events_;
   Ring<CalibrationRecord, 8> calibrations_;
   Ring<PublishedPlacement, 8> placements_;
+  std::array<std::atomic<float>, kMaxCameras> temperatures_{};  // °C; 0: none told
   std::atomic<std::uint64_t> dropped_{0};
   LiveImages images_;
   std::atomic<bool> started_{false}, ended_{false}, stop_{false};

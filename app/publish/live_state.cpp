@@ -69,6 +69,17 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
   return camera;
 }
 
+/// By camera, null where it tells none; empty where none does.
+json temperatures_json(const std::array<std::optional<float>, kMaxCameras>& celsius) {
+  json out = json::array();
+  for (std::size_t k = 0; k < celsius.size(); ++k) {
+    if (!celsius[k]) continue;
+    while (out.size() < k) out.push_back(nullptr);
+    out.push_back(rounded(*celsius[k], 1));
+  }
+  return out;
+}
+
 }  // namespace
 
 void LiveState::add(const LiveFrame& frame) {
@@ -154,6 +165,7 @@ json LiveState::frame_json() const {
            {"inliers", p.inliers},
            {"stereo_inliers", p.stereo_inliers},
            {"reprojection_px", rounded(p.reprojection_px, 3)},
+           {"temperatures_c", temperatures_json(temperatures_)},
            {"estimate_ms", rounded(p.estimate_ms, 2)},
            {"estimate_p50_ms", rounded(estimate_.percentile(0.5), 2)},
            {"estimate_p99_ms", rounded(estimate_.percentile(0.99), 2)},

@@ -42,6 +42,9 @@ class LiveState {
   void add(const EventRecord& event);
   void add(const CalibrationRecord& calibration);
   void add(const PublishedPlacement& placement);
+  void set_temperature(std::size_t camera, float celsius) noexcept {
+    temperatures_[camera] = celsius;
+  }
   void end() noexcept { ended_ = true; }
 
   /// The rig in use, for the judgement of points; not known yet: nullptr.
@@ -81,6 +84,7 @@ class LiveState {
 
   SessionStart start_{};
   LiveFrame newest_{};
+  std::array<std::optional<float>, kMaxCameras> temperatures_{};  // °C
   bool any_ = false, ended_ = false;
   TimeHistogram estimate_;
   std::optional<PoseRecord> compared_{};

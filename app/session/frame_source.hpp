@@ -99,6 +99,8 @@ class FrameSource {
   virtual void stop() noexcept = 0;
   /// Called every 50 ms while frames come.
   virtual void look() {}
+  /// Of a camera, °C, where it tells; asks the device.
+  [[nodiscard]] virtual std::optional<double> temperature_c(int /*camera*/) { return std::nullopt; }
   /// Ends what start() began.
   virtual void finish(Progress* progress, std::vector<std::string>* faults) = 0;
 

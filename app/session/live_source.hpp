@@ -32,6 +32,9 @@ class LiveSource final : public FrameSource {
   void done(const PoseSample& sample) noexcept override;
   void stop() noexcept override { acquisition_->stop(); }
   void look() override;
+  [[nodiscard]] std::optional<double> temperature_c(int camera) override {
+    return devices_.cameras()[static_cast<std::size_t>(camera)]->temperature_c();
+  }
   void finish(Progress* progress, std::vector<std::string>* faults) override;
   void describe(const SessionTotals& totals, const Estimator& estimator,
                 SummaryInput* input) const override;

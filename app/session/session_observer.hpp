@@ -86,6 +86,10 @@ class SessionObserver {
   /// A calibration that was accepted or rejected, or that the session begins with.
   virtual void on_calibration(const CalibrationRecord& /*calibration*/) noexcept {}
 
+  /// A camera told its temperature. The caller's thread, every few seconds, while the estimator's
+  /// runs.
+  virtual void on_temperature(int /*camera*/, double /*celsius*/) noexcept {}
+
   /// For summary.json, block `devices`. The caller's thread, once, after the last frame.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> counters() { return {}; }
 };

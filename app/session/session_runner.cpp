@@ -38,6 +38,7 @@ class SessionRunner {
   [[nodiscard]] SessionStart session_start() const;
   void say_remarks(Progress* progress);
   void estimate() noexcept;
+  void pass_on_temperatures();
   void watch(Progress* progress);
   void say_recording_errors(Progress* progress);
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
@@ -64,6 +65,7 @@ class SessionRunner {
   ServiceManager service_;  // of the caller's thread
   std::mutex mutex_;        // with done_, for the caller's thread that waits
   std::condition_variable changed_;
+  std::chrono::steady_clock::time_point temperatures_due_{};
   bool done_ = false;
   ResidentMemory resident_{};  // at the drive's end
   DriveThreads threads_;       // of the caller's thread
@@ -86,6 +88,17 @@ void SessionRunner::estimate() noexcept {
   changed_.notify_one();
 }
 
+/// Every few seconds: a camera takes minutes to warm up, and answers beside its images.
+void SessionRunner::pass_on_temperatures() {
+  constexpr std::chrono::seconds kInterval{5};
+  const auto now = std::chrono::steady_clock::now();
+  if (request_.observers.empty() || now < temperatures_due_) return;
+  temperatures_due_ = now + kInterval;
+  for (int k = 0; k < facts_.begin.file.rig.cameras; ++k)
+    if (const auto celsius = source_.temperature_c(k))
+      for (SessionObserver* observer : request_.observers) observer->on_temperature(k, *celsius);
+}
+
 void SessionRunner::watch(Progress* progress) {
   constexpr std::chrono::milliseconds kLook{50};
   std::unique_lock lock(mutex_);
@@ -99,6 +112,7 @@ void SessionRunner::watch(Progress* progress) {
       recorder_->reopen();
       if (recording_) recording_->roll();
     }
+    pass_on_temperatures();
     threads_.look(progress);
     loop_.event_log().show(progress, facts_.frames);
     say_recording_errors(progress);

@@ -54,6 +54,19 @@ std::uint32_t CameraRegisters::get_optional(std::uint32_t offset) noexcept {
   return 0;
 }
 
+/// IIDC 1.31 leaves the unit to the maker: tenths of a Kelvin (Point Grey), or of a degree Celsius
+/// (Allied Vision, Stingray manual 4.4, from −55 to 150 °C). Which it is, the value says, but for
+/// those below freezing, which could be either.
+std::optional<double> CameraRegisters::temperature_c() noexcept {
+  constexpr std::uint32_t kColdest = 2230, kHottest = 3540;  // 0.1 K
+  constexpr std::uint32_t kMostCelsius = 1500;               // 0.1 °C
+  const FeatureValue v = FeatureValue::of(get_optional(reg::feature_value(Feature::temperature)));
+  if (!v.present) return std::nullopt;
+  if (v.value <= kMostCelsius) return 0.1 * v.value;
+  if (v.value < kColdest || v.value > kHottest) return std::nullopt;
+  return 0.1 * v.value - 273.15;
+}
+
 std::uint64_t CameraRegisters::table(std::uint32_t offset) noexcept {
   constexpr std::uint32_t kLargest = 0x0FFF'FFFF / 4;  // inside the node's register space
   const std::uint32_t quadlets = get(offset);

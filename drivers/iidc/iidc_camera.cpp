@@ -234,6 +234,14 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
   return DeviceStatus::ok;
 }
 
+std::optional<double> IidcCamera::temperature_c() noexcept {
+  if (!queue_.started() || lost_.load(std::memory_order_acquire)) return std::nullopt;
+  const std::lock_guard lock(asking_);
+  const std::optional<double> t = registers_.temperature_c();
+  (void)registers_.take_status();  // of a camera that has just gone
+  return t;
+}
+
 std::string IidcCamera::remark() const {
   if (!configured_) return {};
   std::string text = bus_->remark(plan_.shape, plan_.rate_hz, sharing_);

@@ -53,6 +53,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   [[nodiscard]] DeviceStatus trigger_once() noexcept override;
   [[nodiscard]] DeviceStatus set_exposure(const ExposureSetting& requested,
                                           ExposureSetting* actual) noexcept override;
+  [[nodiscard]] std::optional<double> temperature_c() noexcept override;
   [[nodiscard]] std::string last_error() const override { return last_error_; }
   [[nodiscard]] std::string remark() const override;
   [[nodiscard]] CameraStatistics statistics() const noexcept override {

@@ -23,6 +23,7 @@ constexpr std::array kNames{
     Names{Purpose::ptp_status, {"PtpStatus", "GevIEEE1588Status", nullptr, nullptr}},
     Names{Purpose::ptp_latch, {"PtpDataSetLatch", "GevIEEE1588DataSetLatch", nullptr, nullptr}},
     Names{Purpose::chunk_mode, {"ChunkModeActive", "ChunkMode", nullptr, nullptr}},
+    Names{Purpose::temperature, {"DeviceTemperature", "DeviceTemperatureAbs"}},
     Names{Purpose::chunk_exposure,
           {"ChunkExposureTime", "ChunkExposureTimeAbs", "ChunkExposure", nullptr}},
 };

@@ -19,6 +19,7 @@ enum class Purpose : std::uint8_t {
   ptp_latch,
   chunk_mode,      // whether frames have chunk data at all
   chunk_exposure,  // in a frame's chunk data; µs
+  temperature,     // °C
 };
 
 /// The GenICam features of an open camera, with sentences for what it does not have.

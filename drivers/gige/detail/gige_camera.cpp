@@ -205,6 +205,16 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
   }
 }
 
+std::optional<double> GigeCamera::temperature_c() noexcept {
+  try {
+    const std::lock_guard lock(device_);
+    if (session_ == nullptr || standing() != DeviceStatus::ok) return std::nullopt;
+    return session_->temperature_c();
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
 DeviceStatus GigeCamera::trigger_once() noexcept {
   if (!configured_ || requested_.trigger != CameraTrigger::software)
     return DeviceStatus::unsupported;

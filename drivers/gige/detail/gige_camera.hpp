@@ -46,6 +46,7 @@ class GigeCamera final : public CameraDevice {
   DeviceStatus trigger_once() noexcept override;
   DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override;
+  [[nodiscard]] std::optional<double> temperature_c() noexcept override;
   std::string last_error() const override { return last_error_.get(); }
   std::string remark() const override;
   CameraStatistics statistics() const noexcept override { return handover_.statistics(); }

@@ -110,6 +110,11 @@ DeviceStatus Session::refuse(DeviceStatus status, std::string sentence) {
   return status;
 }
 
+std::optional<double> Session::temperature_c() const {
+  const char* name = features_.find(Purpose::temperature);
+  return name != nullptr ? features_.number(name) : std::nullopt;
+}
+
 bool Session::in_control() {
   std::uint32_t privilege = 0;
   Error error;

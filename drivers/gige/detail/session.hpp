@@ -72,6 +72,9 @@ class Session {
   [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& requested,
                                              const Options& options, ExposureSetting* actual);
 
+  /// °C; nothing where it does not tell.
+  [[nodiscard]] std::optional<double> temperature_c() const;
+
   /// Asks the camera: it answers, and we are in control.
   [[nodiscard]] bool in_control();
   /// Noticed by the heartbeat.

@@ -49,6 +49,8 @@ class MockCamera final : public CameraDevice {
   const DeviceInfo& info() const noexcept override { return info_; }
   DeviceStatus configure(const CameraConfiguration& requested,
                          CameraConfiguration* actual) noexcept override;
+  /// One of them warms up more than the other.
+  std::optional<double> temperature_c() noexcept override { return 38.5 + 0.5 * k_; }
   DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override;
   DeviceTiming timing() const noexcept override {

@@ -55,7 +55,9 @@ TEST(LiveState, tellsWhatIsNewOnceAndALateViewerEverything) {
   state.add(at(0.1));  // no step
   state.add(at(1));
   state.add(event("mark", "a <b>mark</b> \xff"));
+  state.set_temperature(1, 41.26F);
   const json first = json::parse(state.update(-1));
+  EXPECT_EQ(first["now"]["temperatures_c"], json::parse("[null, 41.3]"));
   EXPECT_EQ(first["now"]["frame"], 41);
   EXPECT_EQ(first["now"]["read"], 3);
   EXPECT_EQ(first["now"]["status"], "degraded");

@@ -120,6 +120,15 @@ TEST(GigeCamera, everyPulseIsOneFrameAndRestIsNoError) {
   EXPECT_EQ(b.camera->trigger_once(), DeviceStatus::unsupported);
 }
 
+TEST(GigeCamera, itsTemperatureIsReadWhileItStreams) {
+  GigeBench b;
+  b.configure(b.wish());
+  EXPECT_FALSE(b.camera->temperature_c()) << "not streaming";
+  b.start();
+  ASSERT_TRUE(b.camera->temperature_c());
+  EXPECT_DOUBLE_EQ(*b.camera->temperature_c(), 41.5);
+}
+
 TEST(GigeCamera, softwareTriggersAreFrames) {
   GigeBench b;
   CameraConfiguration c = b.wish();

@@ -238,6 +238,25 @@ TEST(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
   EXPECT_EQ(f.exposure_start.ns(), f.arrival.ns() - f.exposure.ns());
 }
 
+TEST(IidcCamera, ItsTemperatureIsReadInEitherUnitThatMakersUse) {
+  CameraUnderTest c;
+  EXPECT_FALSE(c.camera->temperature_c()) << "not streaming";
+  c.start();
+  EXPECT_FALSE(c.camera->temperature_c()) << "the model has no such register";
+  const std::uint64_t at =
+      c.bus->rom().command_base + iidc::reg::feature_value(iidc::Feature::temperature);
+  const auto reads = [&](std::uint32_t value) {
+    c.bus->masked[at] = 0x8200'0000U | value;
+    c.bus->stuck[at] = 0x8200'0000U | value;
+    return c.camera->temperature_c().value_or(-1);
+  };
+  EXPECT_DOUBLE_EQ(reads(415), 41.5);     // tenths of a degree
+  EXPECT_NEAR(reads(3147), 41.55, 1e-9);  // tenths of a Kelvin
+  EXPECT_DOUBLE_EQ(reads(4000), -1) << "neither";
+  c.bus->all_accesses = DeviceStatus::gone;
+  EXPECT_FALSE(c.camera->temperature_c());
+}
+
 TEST(IidcCamera, TimingIsExposureAndTheWay) {
   CameraUnderTest usb, bus(true);
   usb.configure();
