@@ -34,8 +34,10 @@ DeviceStatus FakeBus::read(std::uint64_t address, std::uint32_t* value) noexcept
   const std::lock_guard lock(mutex_);
   if (!plugged_) return DeviceStatus::gone;
   if (all_accesses != DeviceStatus::ok) return all_accesses;
-  if (refused.contains(address) || iidc_read(&model_, address, value) != 0)
+  const bool known = iidc_read(&model_, address, value) == 0;
+  if (refused.contains(address) || (!known && !stuck.contains(address)))
     return DeviceStatus::unsupported;
+  if (!known) *value = 0;
   if (const auto it = stuck.find(address); it != stuck.end()) *value |= it->second;
   if (const auto it = masked.find(address); it != masked.end()) *value &= it->second;
   return DeviceStatus::ok;

@@ -51,7 +51,8 @@ class FakeBus final : public iidc::CameraBus {
   void lose(int exposures) { lose_ += exposures; }
 
   // ---- faults of the registers ----
-  std::map<std::uint64_t, std::uint32_t> stuck;   // address → bits that always read 1
+  std::map<std::uint64_t, std::uint32_t>
+      stuck;  // address → bits that always read 1; the model need not know it
   std::map<std::uint64_t, std::uint32_t> masked;  // address → the only bits that can read 1
   std::set<std::uint64_t> refused;                // addresses the camera does not know
   DeviceStatus all_accesses = DeviceStatus::ok;   // not ok: what every access says
