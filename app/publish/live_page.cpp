@@ -88,8 +88,8 @@ void LivePage::on_temperature(int camera, double celsius) noexcept {
 std::vector<std::pair<std::string, std::uint64_t>> LivePage::counters() {
   ended_.store(true, std::memory_order_release);
   server_.wake();
-  return {{"page_updates", updates_.load(std::memory_order_relaxed)},
-          {"page_dropped", dropped_.load(std::memory_order_relaxed)}};
+  return {{"page_updates", counts_.updates.load(std::memory_order_relaxed)},
+          {"page_dropped", counts_.dropped.load(std::memory_order_relaxed)}};
 }
 
 // ---- the page's thread
@@ -133,7 +133,7 @@ void LivePage::show() {
   // Ten a second, not a little fewer; what was late is not made up for.
   shown_ = std::max(shown_ + kBetweenUpdates, Clock::now() - kBetweenUpdates / 2);
   if (!begun_) return;  // the mock's world takes its time; viewers wait for the session
-  updates_.fetch_add(1, std::memory_order_relaxed);
+  counts_.updates.fetch_add(1, std::memory_order_relaxed);
   server_.broadcast("update", state_.update(line_age_ms_()), HttpServer::Skipped::greet_again);
   // After the update: what a greeting has is not told again.
   server_.greet("hello", [this] { return state_.hello(); });

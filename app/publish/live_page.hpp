@@ -59,7 +59,7 @@ class LivePage final : public SessionObserver {
 
   template <class T, std::size_t N>
   void push(Ring<T, N>* ring, const T& value) noexcept {
-    if (!ring->push(value)) dropped_.fetch_add(1, std::memory_order_relaxed);
+    if (!ring->push(value)) counts_.dropped.fetch_add(1, std::memory_order_relaxed);
   }
   void work();
   void drain();
@@ -79,7 +79,10 @@ class LivePage final : public SessionObserver {
   Ring<CalibrationRecord, 8> calibrations_;
   Ring<PublishedPlacement, 8> placements_;
   std::array<std::atomic<float>, kMaxCameras> temperatures_{};  // °C; 0: none told
-  std::atomic<std::uint64_t> dropped_{0};
+  /// For summary.json.
+  struct Counts {
+    std::atomic<std::uint64_t> updates{0}, dropped{0};
+  } counts_;
   LiveImages images_;
   std::atomic<bool> started_{false}, ended_{false}, stop_{false};
   SessionStart start_{};  // published by started_
@@ -89,7 +92,6 @@ class LivePage final : public SessionObserver {
   bool begun_ = false;
   HttpServer server_;
   Clock::time_point shown_{};
-  std::atomic<std::uint64_t> updates_{0};
   std::thread thread_;
 };
 

@@ -7,13 +7,8 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cerrno>
-#include <climits>
-#include <cstdio>
 #include <limits>
 
-#include "app/runtime/errors.hpp"
-#include "app/runtime/version.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
@@ -25,35 +20,13 @@ constexpr auto kLook = 20ms;                      // between two looks at the qu
 constexpr std::int64_t kMostWaitNs = 40'000'000;  // of a message for its chunk: with a look and
                                                   // the write it is less than 100 ms
 constexpr std::size_t kMostChunkBytes = std::size_t{32} << 20;  // half of what readers take
-constexpr std::int64_t kRetryNs = 250'000'000;                  // until a disk is asked again
-constexpr std::int64_t kSlowNs = 1'000'000'000;       // a write that takes so long is said
-constexpr std::size_t kSpare = std::size_t{1} << 20;  // of a queue, for what is not bulky
+constexpr std::size_t kSpare = std::size_t{1} << 20;            // of a queue, for what is not bulky
 constexpr int kNice = 5;  // poses come first; what is recorded waits in memory
-
-constexpr const char* kQosOf[] = {
-    // reliable, keep last, volatile; and for what is latched: transient local
-    "- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n  deadline:\n    sec: "
-    "2147483647\n    nsec: 4294967295\n  lifespan:\n    sec: 2147483647\n    nsec: 4294967295\n  "
-    "liveliness: 1\n  liveliness_lease_duration:\n    sec: 2147483647\n    nsec: 4294967295\n  "
-    "avoid_ros_namespace_conventions: false\n",
-    "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n  deadline:\n    sec: "
-    "2147483647\n    nsec: 4294967295\n  lifespan:\n    sec: 2147483647\n    nsec: 4294967295\n  "
-    "liveliness: 1\n  liveliness_lease_duration:\n    sec: 2147483647\n    nsec: 4294967295\n  "
-    "avoid_ros_namespace_conventions: false\n"};
 
 std::int64_t monotonic_ns() noexcept {
   timespec t{};
   (void)::clock_gettime(CLOCK_MONOTONIC, &t);
   return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
-}
-
-std::vector<McapTopic> described(const std::vector<RecordedTopic>& topics) {
-  std::vector<McapTopic> out;
-  out.reserve(topics.size());
-  for (const RecordedTopic& t : topics)
-    out.push_back({t.name, std::string(ros_type_name(t.type)), ros_definition(t.type),
-                   kQosOf[t.latched ? 1 : 0]});
-  return out;
 }
 
 /// How full a queue may be that is not written: a producer that does not wait finds room for an
@@ -68,31 +41,13 @@ McapMessageHead head_of(std::span<const std::uint8_t> records) noexcept {
 
 }  // namespace
 
-Recording::Recording(const std::filesystem::path& folder, Options options)
-    : folder_(folder.string()),
-      options_(std::move(options)),
-      topics_(described(options_.topics)),
-      sequences_(topics_.size()),
-      disk_(options_.disk != nullptr ? *options_.disk : system_disk()),
-      file_(disk_, topics_, "vergence " + std::string(version())),
-      path_(PATH_MAX),
-      other_path_(PATH_MAX),
+Recording::Recording(const std::filesystem::path& folder, const Options& options)
+    : options_(options),
+      sequences_(options.files.topics.size()),
+      files_(folder, options.files),
       keep_until_ns_(std::numeric_limits<std::int64_t>::min()) {
   assert(options_.queues.size() <= McapFile::kMostParts);
-  if (folder_.size() + 32 > PATH_MAX)
-    throw InputError(folder_ + ": the name is too long for a recording in it");
   for (const std::size_t bytes : options_.queues) queues_.push_back(std::make_unique<Queue>(bytes));
-  for (const Preamble& p : options_.preamble) {
-    std::array<std::uint8_t, McapMessageHead::kSize> head{};
-    McapMessageHead{static_cast<std::uint16_t>(p.topic + 1), 0, 0, p.message.size()}.write(head);
-    preamble_.insert(preamble_.end(), head.begin(), head.end());
-    preamble_.insert(preamble_.end(), p.message.begin(), p.message.end());
-  }
-  if (!open_file()) {
-    const auto sentences = take_errors();
-    throw InputError(sentences.empty() ? folder_ + ": nothing can be recorded there"
-                                       : sentences.front());
-  }
   thread_ = std::thread([this] { work(); });
 }
 
@@ -121,8 +76,8 @@ std::span<std::uint8_t> Recording::begin(std::size_t queue, std::size_t topic, S
     freed_.wait(seen);
   }
   if (q.open.empty()) {
-    dropped_.fetch_add(1, std::memory_order_relaxed);
-    if (bulky) dropped_images_.fetch_add(1, std::memory_order_relaxed);
+    counts_.dropped.fetch_add(1, std::memory_order_relaxed);
+    if (bulky) counts_.dropped_images.fetch_add(1, std::memory_order_relaxed);
     return {};
   }
   return q.open.subspan(McapMessageHead::kSize);
@@ -164,11 +119,7 @@ void Recording::work() noexcept {
     }
     drain(hurried || last, last);
   }
-  if (file_.open() && preamble_due_)
-    (void)write_preamble(
-        static_cast<std::uint64_t>(std::max<std::int64_t>(options_.start.ns(), 0)));
-  const int error = file_.finish();
-  if (error != 0) (void)notices_.push({Trouble::unfinished, -error, 0, number_});
+  files_.finish(static_cast<std::uint64_t>(std::max<std::int64_t>(options_.start.ns(), 0)));
 }
 
 bool Recording::holding() const noexcept {
@@ -189,14 +140,14 @@ void Recording::drain(bool at_once, bool last) noexcept {
       return;
     }
     if (!at_once && !due(batch)) return;
-    if (trouble_ != Trouble::none && !last && monotonic_ns() < retry_ns_) return make_room(at_once);
+    if (!last && files_.resting()) return make_room(at_once);
     if (store(batch)) {
       release(batch);
-      roll_if_wanted();
+      files_.roll(roll_asked_.exchange(false, std::memory_order_relaxed));
       continue;
     }
     if (!last) return make_room(at_once);
-    lost_.fetch_add(batch.messages, std::memory_order_relaxed);
+    counts_.lost.fetch_add(batch.messages, std::memory_order_relaxed);
     release(batch);
   }
 }
@@ -249,7 +200,7 @@ void Recording::pass_over_old(bool hurried, bool all) noexcept {
       if (!all && newest - oldest <= options_.keep.ns() &&
           q->ring.fill() <= room_left_at(q->ring, hurried))
         break;
-      drop_oldest(&q->ring, &passed_over_);
+      drop_oldest(&q->ring, &counts_.passed_over);
     }
   if (options_.when_full == WhenFull::wait) freed_.signal();
 }
@@ -257,98 +208,19 @@ void Recording::pass_over_old(bool hurried, bool all) noexcept {
 /// While the disk takes nothing: the newest are worth more than the oldest.
 void Recording::make_room(bool hurried) noexcept {
   for (const auto& q : queues_)
-    while (q->ring.fill() > room_left_at(q->ring, hurried)) drop_oldest(&q->ring, &lost_);
+    while (q->ring.fill() > room_left_at(q->ring, hurried)) drop_oldest(&q->ring, &counts_.lost);
   if (options_.when_full == WhenFull::wait) freed_.signal();
 }
 
 bool Recording::store(const Batch& batch) noexcept {
-  if (!file_.open() && !open_file()) return false;
-  const std::int64_t begun = monotonic_ns();
-  const std::uint64_t before = file_.size();
-  int error = preamble_due_ ? write_preamble(batch.first) : 0;
-  if (error == 0) error = file_.write_chunk(std::span(batch.parts).first(queues_.size()));
-  if (error != 0) {
-    fail(-error);
-    return false;
-  }
-  if (const std::int64_t took = monotonic_ns() - begun; took > kSlowNs)
-    (void)notices_.push({Trouble::slow, static_cast<int>(took / 1'000'000), 0, number_});
-  if (trouble_ != Trouble::none) {
-    trouble_ = Trouble::none;
-    (void)notices_.push({Trouble::none, 0, lost_.load(std::memory_order_relaxed), number_});
-  }
-  messages_.fetch_add(batch.messages, std::memory_order_relaxed);
-  bytes_.fetch_add(file_.size() - before, std::memory_order_relaxed);
-  chunks_.fetch_add(1, std::memory_order_relaxed);
+  const std::uint64_t bytes =
+      files_.append(std::span(batch.parts).first(queues_.size()), batch.first,
+                    counts_.lost.load(std::memory_order_relaxed));
+  if (bytes == 0) return false;
+  counts_.messages.fetch_add(batch.messages, std::memory_order_relaxed);
+  counts_.bytes.fetch_add(bytes, std::memory_order_relaxed);
+  counts_.chunks.fetch_add(1, std::memory_order_relaxed);
   return true;
-}
-
-bool Recording::open_file() noexcept {
-  if (const int error = file_.create(path(number_, &path_)); error != 0) {
-    fail(-error);
-    return false;
-  }
-  files_.fetch_add(1, std::memory_order_relaxed);
-  preamble_due_ = !preamble_.empty();
-  return true;
-}
-
-/// In front of the first chunk of a file, at its time: before it nobody knows when the file begins.
-/// → 0
-int Recording::write_preamble(std::uint64_t time) noexcept {
-  for (std::span<std::uint8_t> rest(preamble_); !rest.empty();) {
-    McapMessageHead head = head_of(rest);
-    head.log_time = time;
-    head.write(rest.first<McapMessageHead::kSize>());
-    rest = rest.subspan(head.record_size());
-  }
-  const std::array<std::span<const std::uint8_t>, 1> part{preamble_};
-  const int error = file_.write_chunk(part);
-  preamble_due_ = error != 0;
-  return error;
-}
-
-/// What the system said of a write. A full disk goes on with the same file; any other fault may
-/// mean that it is not there any more: with a new one.
-void Recording::fail(int error) noexcept {
-  const bool full = error == ENOSPC || error == EDQUOT;
-  if (!full && (file_.open() || error == EEXIST)) {
-    file_.abandon();
-    begin_next_number();
-  }
-  if (trouble_ == Trouble::none)
-    (void)notices_.push({full ? Trouble::full : Trouble::gone, error, 0, number_});
-  trouble_ = full ? Trouble::full : Trouble::gone;
-  retry_ns_ = monotonic_ns() + kRetryNs;
-}
-
-void Recording::roll_if_wanted() noexcept {
-  const bool wanted =
-      roll_asked_.exchange(false, std::memory_order_relaxed) || file_.full() ||
-      (options_.roll_bytes > 0 && file_.size() >= options_.roll_bytes) ||
-      (options_.roll_time > Duration{} && file_.last_time() - file_.first_time() >=
-                                              static_cast<std::uint64_t>(options_.roll_time.ns()));
-  if (!wanted) return;
-  const int error = file_.finish();
-  if (error != 0) (void)notices_.push({Trouble::unfinished, -error, 0, number_});
-  begin_next_number();
-}
-
-void Recording::begin_next_number() noexcept {
-  if (number_ == 0) {
-    const char* only = path(0, &path_);
-    several_ = true;
-    (void)disk_.rename(only, path(0, &other_path_));
-  }
-  ++number_;
-}
-
-const char* Recording::path(int number, std::vector<char>* out) const noexcept {
-  if (several_)
-    (void)std::snprintf(out->data(), out->size(), "%s/drive_%d.mcap", folder_.c_str(), number);
-  else
-    (void)std::snprintf(out->data(), out->size(), "%s/drive.mcap", folder_.c_str());
-  return out->data();
 }
 
 // ---- the owner
@@ -361,6 +233,22 @@ void Recording::close() noexcept {
   }
   wake_.notify_one();
   thread_.join();
+}
+
+RecordingCounters Recording::counters() const noexcept {
+  RecordingCounters c;
+  const auto get = [](const std::atomic<std::uint64_t>& v) {
+    return v.load(std::memory_order_relaxed);
+  };
+  c.messages = get(counts_.messages), c.bytes = get(counts_.bytes);
+  c.chunks = get(counts_.chunks), c.files = files_.files();
+  c.dropped = get(counts_.dropped), c.dropped_images = get(counts_.dropped_images);
+  c.lost = get(counts_.lost), c.passed_over = get(counts_.passed_over);
+  if (!queues_.empty()) {
+    c.queue_bytes = queues_.front()->ring.capacity();
+    c.queue_high_water = queues_.front()->ring.high_water();
+  }
+  return c;
 }
 
 }  // namespace vergence::app

@@ -14,19 +14,11 @@
 
 #include "app/recording/mcap_file.hpp"
 #include "app/recording/record_ring.hpp"
-#include "app/recording/ros_types.hpp"
-#include "core/memory/ring.hpp"
+#include "app/recording/recording_files.hpp"
 #include "core/types/time.hpp"
 #include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
-
-/// One topic of a recording. Its number is its place in the list.
-struct RecordedTopic {
-  std::string name;
-  RosType type = RosType::text;
-  bool latched = false;  // who comes later is to have the last message (tf_static)
-};
 
 /// Counters; exact after close().
 struct RecordingCounters {
@@ -62,24 +54,16 @@ struct RecordingCounters {
 class Recording {
  public:
   enum class WhenFull : std::uint8_t { drop, wait };
-  struct Preamble {
-    std::size_t topic = 0;
-    std::vector<std::uint8_t> message{};  // CDR
-  };
   struct Options {
-    std::vector<RecordedTopic> topics;
-    std::vector<std::size_t> queues;   // bytes of each
-    std::vector<Preamble> preamble{};  // messages at the beginning of every file
-    Stamp start{};                     // of the preamble where nothing follows
-    std::uint64_t roll_bytes = 0;      // a file is ended when it has so many; 0: never
-    Duration roll_time{};              // … or when its messages span so long; 0: never
-    Duration keep{};                   // 0: everything
+    RecordingFiles::Options files{};
+    std::vector<std::size_t> queues;  // bytes of each
+    Stamp start{};                    // of the preamble where nothing follows
+    Duration keep{};                  // 0: everything
     WhenFull when_full = WhenFull::drop;
-    Disk* disk = nullptr;  // null: the system's
   };
 
   /// `folder` exists.
-  Recording(const std::filesystem::path& folder, Options options);
+  Recording(const std::filesystem::path& folder, const Options& options);
   ~Recording();
   Recording(const Recording&) = delete;
   Recording& operator=(const Recording&) = delete;
@@ -97,19 +81,12 @@ class Recording {
   void roll() noexcept { roll_asked_.store(true, std::memory_order_relaxed); }
 
   /// Sentences about the disk since the last call.
-  [[nodiscard]] std::vector<std::string> take_errors();
+  [[nodiscard]] std::vector<std::string> take_errors() { return files_.take_errors(); }
   [[nodiscard]] RecordingCounters counters() const noexcept;
   /// Writes what waits, ends the file. Once.
   void close() noexcept;
 
  private:
-  enum class Trouble : std::uint8_t { none, full, gone, slow, unfinished };
-  struct Notice {
-    Trouble trouble = Trouble::none;  // none: the disk takes data again
-    int error = 0;                    // errno; of slow: ms
-    std::uint64_t lost = 0;           // messages, so far
-    int file = 0;
-  };
   /// A producer's: only its thread touches what is no ring.
   struct Queue {
     explicit Queue(std::size_t bytes) : ring(bytes) {}
@@ -125,6 +102,12 @@ class Recording {
     bool filled = false;      // there is more than a chunk takes
   };
 
+  /// RecordingCounters as they grow.
+  struct Counts {
+    std::atomic<std::uint64_t> messages{0}, bytes{0}, chunks{0};
+    std::atomic<std::uint64_t> dropped{0}, dropped_images{0}, lost{0}, passed_over{0};
+  };
+
   void work() noexcept;
   /// at_once: however young what waits is. last: what cannot be stored now is lost.
   void drain(bool at_once, bool last) noexcept;
@@ -135,39 +118,19 @@ class Recording {
   void make_room(bool hurried) noexcept;
   static void drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counter) noexcept;
   [[nodiscard]] bool store(const Batch& batch) noexcept;
-  [[nodiscard]] bool open_file() noexcept;
-  [[nodiscard]] int write_preamble(std::uint64_t time) noexcept;
-  void fail(int error) noexcept;
-  void roll_if_wanted() noexcept;
-  void begin_next_number() noexcept;
-  [[nodiscard]] const char* path(int number, std::vector<char>* out) const noexcept;
   [[nodiscard]] bool holding() const noexcept;
 
-  std::string folder_;
-  Options options_;
-  std::vector<McapTopic> topics_;
+  const Options options_;
   std::vector<std::uint32_t> sequences_;  // by topic; of its producer
   std::vector<std::unique_ptr<Queue>> queues_;
-  std::vector<std::uint8_t> preamble_;  // Message records
-  Disk& disk_;
-  McapFile file_;
-
-  // Of the writer's thread.
-  int number_ = 0;             // of the file at hand
-  bool several_ = false;       // files have numbers
-  bool preamble_due_ = false;  // of the file at hand
-  Trouble trouble_ = Trouble::none;
-  std::int64_t retry_ns_ = 0, waiting_since_ns_ = 0;  // monotonic
-  std::vector<char> path_, other_path_;
+  RecordingFiles files_;
+  std::int64_t waiting_since_ns_ = 0;  // monotonic; of the writer's thread
 
   std::atomic<std::int64_t> keep_until_ns_;
   std::atomic<bool> roll_asked_{false};
   std::atomic<std::uint64_t> newest_ns_{0};  // of what was posted
-  std::atomic<std::uint64_t> messages_{0}, bytes_{0}, chunks_{0}, files_{0};
-  std::atomic<std::uint64_t> dropped_{0}, dropped_images_{0}, lost_{0}, passed_over_{0};
-  Ring<Notice, 64> notices_;  // writer to take_errors()
-  std::mutex errors_mutex_;   // of those who take
-  std::mutex mutex_;          // with stop_ and hurry_, for the writer that sleeps
+  Counts counts_;
+  std::mutex mutex_;  // with stop_ and hurry_, for the writer that sleeps
   std::condition_variable wake_;
   bool stop_ = false, hurry_ = false;
   WakeEvent freed_;

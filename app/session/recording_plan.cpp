@@ -133,13 +133,13 @@ ImageEncoder::Options encoder_options(const SourceFacts& facts) {
 Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
   Recording::Options o;
   const bool png = as_png(c.record);
-  o.topics = topics(facts.begin.file, png);
+  o.files.topics = topics(facts.begin.file, png);
   o.queues = {png ? kSmall : queue_bytes(c, facts), kDeviceQueue, kDeviceQueue, kDeviceQueue};
   if (png) o.queues.push_back(queue_bytes(c, facts));
-  o.preamble = {{session_topic, description(c, facts)}};
+  o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
-  o.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
-  o.roll_time = Duration::seconds(c.record.roll_s);
+  o.files.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
+  o.files.roll_time = Duration::seconds(c.record.roll_s);
   o.keep = Duration::seconds(c.record.keep_s);
   o.when_full = when_full(facts);
   return o;

@@ -97,7 +97,7 @@ void post_frame(Recording* recording, Stamp stamp, const ImageView& l, const Ima
 
 int measure(const Arguments& a, const std::filesystem::path& folder) {
   Recording::Options options;
-  options.topics = {{"/left/image_raw", RosType::image, false},
+  options.files.topics = {{"/left/image_raw", RosType::image, false},
                     {"/right/image_raw", RosType::image, false},
                     {"/left/camera_info", RosType::camera_info, false},
                     {"/right/camera_info", RosType::camera_info, false},

@@ -20,7 +20,9 @@ constexpr std::array kTopics{RosType::image,       RosType::compressed_image,
                              RosType::diagnostics, RosType::tf,
                              RosType::text,        RosType::bytes,
                              RosType::frame,       RosType::ins_reading,
-                             RosType::pulse,       RosType::device_frame};
+                             RosType::pulse,       RosType::device_frame,
+                             RosType::device_gone, RosType::line_event,
+                             RosType::rig_set};
 
 void write(CdrWriter* out, RosType type, Stamp stamp) {
   std::array<std::uint8_t, 12> pixels{};
@@ -82,13 +84,19 @@ void write(CdrWriter* out, RosType type, Stamp stamp) {
     case RosType::pulse: {
       Pulse pulse;
       pulse.number = 9;
-      return write_pulse(out, stamp, pulse);
+      return write_pulse(out, stamp, pulse, stamp);
     }
     case RosType::device_frame: {
       Frame of_device;
       of_device.counter = 11;
       return write_device_frame(out, stamp, "left", of_device);
     }
+    case RosType::device_gone:
+      return write_device_gone(out, stamp, 1);
+    case RosType::line_event:
+      return write_line_event(out, stamp, {LineEvent::Kind::written, {}, 7, pixels});
+    case RosType::rig_set:
+      return write_set(out, stamp, {12, {stamp, stamp}});
   }
 }
 
@@ -96,7 +104,7 @@ int record(const std::filesystem::path& folder) {
   constexpr int kRounds = 50;
   Recording::Options options;
   for (const RosType type : kTopics)
-    options.topics.push_back(
+    options.files.topics.push_back(
         {"/sample_" + std::to_string(static_cast<int>(type)), type, type == RosType::tf});
   options.queues = {64U << 10U};  // full many times: many chunks
   options.when_full = Recording::WhenFull::wait;

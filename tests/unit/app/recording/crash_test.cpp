@@ -21,7 +21,7 @@ TEST(CrashedRecording, readsBackUpToTheLast100MsAfterAKill) {
 /// A finished file of some 40 chunks.
 std::string recorded(const TemporaryFolder& folder) {
   Recording::Options o;
-  o.topics = {{"/text", RosType::text, false}};
+  o.files.topics = {{"/text", RosType::text, false}};
   o.queues = {8U << 10U};  // a chunk each time that it is full
   o.when_full = Recording::WhenFull::wait;
   Recording recording(folder.path(), o);

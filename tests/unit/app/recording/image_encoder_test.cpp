@@ -18,7 +18,7 @@ constexpr int kWidth = 160, kHeight = 120;
 
 Recording::Options recording_options() {
   Recording::Options o;
-  o.topics = {{"/left/image_raw/compressed", RosType::compressed_image, false}};
+  o.files.topics = {{"/left/image_raw/compressed", RosType::compressed_image, false}};
   o.queues = {1U << 20U};
   o.when_full = Recording::WhenFull::wait;
   return o;

@@ -44,7 +44,7 @@ inline Killed record_and_kill(const std::filesystem::path& folder,
   const pid_t child = ::fork();
   if (child == 0) {
     app::Recording::Options o;
-    o.topics = {{"/text", app::RosType::text, false}, {"/image", app::RosType::image, false}};
+    o.files.topics = {{"/text", app::RosType::text, false}, {"/image", app::RosType::image, false}};
     o.queues = {8U << 20U};
     app::Recording recording(folder, o);
     for (std::uint32_t n = 0; n < PostTimes::kMost; ++n) {

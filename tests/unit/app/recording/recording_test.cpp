@@ -26,7 +26,7 @@ constexpr std::size_t kText = 0, kImage = 1;
 
 Recording::Options options() {
   Recording::Options o;
-  o.topics = {{"/text", RosType::text, false}, {"/left/image_raw", RosType::image, false}};
+  o.files.topics = {{"/text", RosType::text, false}, {"/left/image_raw", RosType::image, false}};
   o.queues = {4U << 20U};
   o.when_full = Recording::WhenFull::wait;
   return o;
@@ -105,9 +105,9 @@ TEST(Recording, rollsBySizeAndByTimeAsRosbagNamesIt) {
     std::filesystem::create_directories(below);
     Recording::Options o = options();
     o.queues = {64U << 10U};
-    o.preamble = {{kText, {0, 1, 0, 0, 2, 0, 0, 0, 'p', 0}}};
-    o.roll_bytes = by_size ? 300'000 : 0;
-    o.roll_time = by_size ? Duration{} : Duration::nanoseconds(1'000'000'000);
+    o.files.preamble = {{kText, {0, 1, 0, 0, 2, 0, 0, 0, 'p', 0}}};
+    o.files.roll_bytes = by_size ? 300'000 : 0;
+    o.files.roll_time = by_size ? Duration{} : Duration::nanoseconds(1'000'000'000);
     Recording recording(below, o);
     for (int i = 0; i < 3000; ++i) ASSERT_TRUE(post(&recording, i, 500));
     recording.close();
@@ -132,7 +132,7 @@ TEST(Recording, imagesNeverPushOutSmallMessages) {
   FaultyDisk disk;
   Recording::Options o = options();
   o.when_full = Recording::WhenFull::drop;
-  o.disk = &disk;
+  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   disk.stall_ms = 400;  // the first chunk
   ASSERT_TRUE(post(&recording, 0));
@@ -162,7 +162,7 @@ TEST(Recording, shortWritesLoseNothing) {
   FaultyDisk disk;
   disk.most = 777;
   Recording::Options o = options();
-  o.disk = &disk;
+  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   for (int i = 0; i < 500; ++i) ASSERT_TRUE(post(&recording, i));
   recording.close();
@@ -174,7 +174,7 @@ TEST(Recording, aFullDiskLosesNothingWhileTheQueueHasRoomAndIsSaidOnce) {
   const TemporaryFolder folder;
   FaultyDisk disk;
   Recording::Options o = options();
-  o.disk = &disk;
+  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
   std::this_thread::sleep_for(200ms);
@@ -202,7 +202,7 @@ TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {
   FaultyDisk disk;
   Recording::Options o = options();
   o.queues = {64U << 10U};
-  o.disk = &disk;
+  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   disk.room = 0;
   for (int i = 0; i < 2000; ++i) ASSERT_TRUE(post(&recording, i, 100));
@@ -220,7 +220,7 @@ TEST(Recording, aDiskThatIsGoneIsTriedAgainWithANewFile) {
   const TemporaryFolder folder;
   FaultyDisk disk;
   Recording::Options o = options();
-  o.disk = &disk;
+  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
   std::this_thread::sleep_for(200ms);
@@ -243,7 +243,7 @@ TEST(Recording, aStalledDiskKeepsNobodyWaitingAndLosesNothingThatHasRoom) {
   FaultyDisk disk;
   Recording::Options o = options();
   o.when_full = Recording::WhenFull::drop;
-  o.disk = &disk;
+  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   disk.stall_ms = 1500;
   auto longest = 0ns;
@@ -291,8 +291,8 @@ TEST(Recording, postingAndWritingTakeNoMemory) {
   FaultyDisk disk;
   Recording::Options o = options();
   o.queues = {64U << 10U};
-  o.roll_bytes = 100'000;
-  o.disk = &disk;
+  o.files.roll_bytes = 100'000;
+  o.files.disk = &disk;
   Recording recording(folder.path(), o);
   const auto before = AllocationGuard::allocations_after_seal();
   {

@@ -1,0 +1,209 @@
+#include "app/recording/recording_files.hpp"
+
+#include <time.h>
+
+#include <cerrno>
+#include <climits>
+#include <cstdio>
+#include <cstring>
+
+#include <fmt/format.h>
+
+#include "app/runtime/errors.hpp"
+#include "app/runtime/version.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::int64_t kRetryNs = 250'000'000;   // until a disk is asked again
+constexpr std::int64_t kSlowNs = 1'000'000'000;  // a write that takes so long is said
+
+constexpr const char* kQosOf[] = {
+    // reliable, keep last, volatile; and for what is latched: transient local
+    "- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n  deadline:\n    sec: "
+    "2147483647\n    nsec: 4294967295\n  lifespan:\n    sec: 2147483647\n    nsec: 4294967295\n  "
+    "liveliness: 1\n  liveliness_lease_duration:\n    sec: 2147483647\n    nsec: 4294967295\n  "
+    "avoid_ros_namespace_conventions: false\n",
+    "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n  deadline:\n    sec: "
+    "2147483647\n    nsec: 4294967295\n  lifespan:\n    sec: 2147483647\n    nsec: 4294967295\n  "
+    "liveliness: 1\n  liveliness_lease_duration:\n    sec: 2147483647\n    nsec: 4294967295\n  "
+    "avoid_ros_namespace_conventions: false\n"};
+
+std::int64_t monotonic_ns() noexcept {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
+  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
+}
+
+std::vector<McapTopic> described(const std::vector<RecordedTopic>& topics) {
+  std::vector<McapTopic> out;
+  out.reserve(topics.size());
+  for (const RecordedTopic& t : topics)
+    out.push_back({t.name, std::string(ros_type_name(t.type)), ros_definition(t.type),
+                   kQosOf[t.latched ? 1 : 0]});
+  return out;
+}
+
+}  // namespace
+
+RecordingFiles::RecordingFiles(const std::filesystem::path& folder, const Options& options)
+    : folder_(folder.string()),
+      roll_bytes_(options.roll_bytes),
+      roll_time_(options.roll_time),
+      topics_(described(options.topics)),
+      disk_(options.disk != nullptr ? *options.disk : system_disk()),
+      file_(disk_, topics_, "vergence " + std::string(version())),
+      path_(PATH_MAX),
+      other_path_(PATH_MAX) {
+  if (folder_.size() + 32 > PATH_MAX)
+    throw InputError(folder_ + ": the name is too long for a recording in it");
+  for (const RecordingPreamble& p : options.preamble) {
+    std::array<std::uint8_t, McapMessageHead::kSize> head{};
+    McapMessageHead{static_cast<std::uint16_t>(p.topic + 1), 0, 0, p.message.size()}.write(head);
+    preamble_.insert(preamble_.end(), head.begin(), head.end());
+    preamble_.insert(preamble_.end(), p.message.begin(), p.message.end());
+  }
+  if (open()) return;
+  const auto sentences = take_errors();
+  throw InputError(sentences.empty() ? folder_ + ": nothing can be recorded there"
+                                     : sentences.front());
+}
+
+// ---- the writer
+
+bool RecordingFiles::resting() const noexcept {
+  return state_ != DiskState::good && monotonic_ns() < retry_ns_;
+}
+
+std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
+                                     std::uint64_t lost) noexcept {
+  if (!file_.open() && !open()) return 0;
+  const std::int64_t begun = monotonic_ns();
+  const std::uint64_t before = file_.size();
+  int error = preamble_due_ ? write_preamble(first) : 0;
+  if (error == 0) error = file_.write_chunk(parts);
+  if (error != 0) {
+    fail(-error);
+    return 0;
+  }
+  if (const std::int64_t took = monotonic_ns() - begun; took > kSlowNs)
+    (void)notices_.push({Notice::Kind::slow, static_cast<int>(took / 1'000'000), 0, number_});
+  if (state_ != DiskState::good) {
+    state_ = DiskState::good;
+    (void)notices_.push({Notice::Kind::good_again, 0, lost, number_});
+  }
+  return file_.size() - before;
+}
+
+void RecordingFiles::finish(std::uint64_t time) noexcept {
+  if (file_.open() && preamble_due_) (void)write_preamble(time);
+  const int error = file_.finish();
+  if (error != 0) (void)notices_.push({Notice::Kind::unfinished, -error, 0, number_});
+}
+
+bool RecordingFiles::open() noexcept {
+  if (const int error = file_.create(path(&path_)); error != 0) {
+    fail(-error);
+    return false;
+  }
+  files_.fetch_add(1, std::memory_order_relaxed);
+  preamble_due_ = !preamble_.empty();
+  return true;
+}
+
+/// In front of the first chunk of a file, at its time: before it nobody knows when the file begins.
+/// → 0
+int RecordingFiles::write_preamble(std::uint64_t time) noexcept {
+  for (std::span<std::uint8_t> rest(preamble_); !rest.empty();) {
+    McapMessageHead head = McapMessageHead::read(rest.first<McapMessageHead::kSize>());
+    head.log_time = time;
+    head.write(rest.first<McapMessageHead::kSize>());
+    rest = rest.subspan(head.record_size());
+  }
+  const std::array<std::span<const std::uint8_t>, 1> part{preamble_};
+  const int error = file_.write_chunk(part);
+  preamble_due_ = error != 0;
+  return error;
+}
+
+/// What the system said of a write. A full disk goes on with the same file; any other fault may
+/// mean that it is not there any more: with a new one.
+void RecordingFiles::fail(int error) noexcept {
+  const bool full = error == ENOSPC || error == EDQUOT;
+  if (!full && (file_.open() || error == EEXIST)) {
+    file_.abandon();
+    begin_next_number();
+  }
+  if (state_ == DiskState::good)
+    (void)notices_.push({full ? Notice::Kind::full : Notice::Kind::gone, error, 0, number_});
+  state_ = full ? DiskState::full : DiskState::gone;
+  retry_ns_ = monotonic_ns() + kRetryNs;
+}
+
+void RecordingFiles::roll(bool asked) noexcept {
+  const bool wanted = asked || file_.full() || (roll_bytes_ > 0 && file_.size() >= roll_bytes_) ||
+                      (roll_time_ > Duration{} && file_.last_time() - file_.first_time() >=
+                                                      static_cast<std::uint64_t>(roll_time_.ns()));
+  if (!wanted) return;
+  const int error = file_.finish();
+  if (error != 0) (void)notices_.push({Notice::Kind::unfinished, -error, 0, number_});
+  begin_next_number();
+}
+
+void RecordingFiles::begin_next_number() noexcept {
+  if (number_ == 0) {
+    const char* only = path(&path_);
+    several_ = true;
+    (void)disk_.rename(only, path(&other_path_));
+  }
+  ++number_;
+}
+
+const char* RecordingFiles::path(std::vector<char>* out) const noexcept {
+  if (several_)
+    (void)std::snprintf(out->data(), out->size(), "%s/drive_%d.mcap", folder_.c_str(), number_);
+  else
+    (void)std::snprintf(out->data(), out->size(), "%s/drive.mcap", folder_.c_str());
+  return out->data();
+}
+
+// ---- anybody
+
+std::vector<std::string> RecordingFiles::take_errors() {
+  const std::lock_guard lock(errors_mutex_);
+  std::vector<std::string> out;
+  for (Notice n; notices_.pop(&n);) out.push_back(sentence(n));
+  return out;
+}
+
+std::string RecordingFiles::sentence(const Notice& n) const {
+  const std::string what = std::strerror(n.error);
+  switch (n.kind) {
+    case Notice::Kind::good_again:
+      return fmt::format("{}: the disk takes the recording again; {} messages were lost", folder_,
+                         n.lost);
+    case Notice::Kind::full:
+      return fmt::format(
+          "{}: the recording has no room ({}): the drive goes on, what is recorded waits in "
+          "memory and then is lost; make room on that disk",
+          folder_, what);
+    case Notice::Kind::gone:
+      return fmt::format(
+          "{}: the recording cannot be written ({}): the drive goes on, a new file is tried "
+          "four times a second; look after that disk",
+          folder_, what);
+    case Notice::Kind::slow:
+      return fmt::format(
+          "{}: the disk kept the recording waiting for {:.1f} s; what found no room in memory "
+          "meanwhile is counted as dropped",
+          folder_, n.error / 1000.0);
+    case Notice::Kind::unfinished:
+      return fmt::format(
+          "{}: file {} of the recording has no summary ({}); it reads back without, up to its "
+          "last chunk",
+          folder_, n.file, what);
+  }
+  return {};
+}
+
+}  // namespace vergence::app
