@@ -222,9 +222,7 @@ class Half final : public CameraDevice {
                             ExposureSetting* actual) noexcept override {
     return whole_->set_exposure(requested, actual);
   }
-  std::optional<double> temperature_c() noexcept override {
-    return whole_->temperature_c();
-  }
+  std::optional<double> temperature_c() noexcept override { return whole_->temperature_c(); }
   std::string last_error() const override { return last_error_; }
   std::string remark() const override {
     return half_ == 0 ? whole_->camera().remark() : std::string();

@@ -67,7 +67,8 @@ int CaptureQueue::request(std::uint32_t requested, std::vector<Mapping>* mapping
   for (std::uint32_t i = 0; i < ask.count; ++i) {
     Description d(type_, i);
     if (const int error = control(fd_, VIDIOC_QUERYBUF, &d.buffer); error != 0) return error;
-    void* at = ::mmap(nullptr, d.length(), PROT_READ, MAP_SHARED, fd_, static_cast<off_t>(d.offset()));
+    void* at =
+        ::mmap(nullptr, d.length(), PROT_READ, MAP_SHARED, fd_, static_cast<off_t>(d.offset()));
     if (at == MAP_FAILED) return errno;
     mappings->emplace_back(at, d.length());
     flags_ = d.buffer.flags;

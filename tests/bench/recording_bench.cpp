@@ -98,12 +98,12 @@ void post_frame(Recording* recording, Stamp stamp, const ImageView& l, const Ima
 int measure(const Arguments& a, const std::filesystem::path& folder) {
   Recording::Options options;
   options.files.topics = {{"/left/image_raw", RosType::image, false},
-                    {"/right/image_raw", RosType::image, false},
-                    {"/left/camera_info", RosType::camera_info, false},
-                    {"/right/camera_info", RosType::camera_info, false},
-                    {"/odometry", RosType::odometry, false},
-                    {"/ins/fix", RosType::nav_sat_fix, false},
-                    {"/ins/reading", RosType::ins_reading, false}};
+                          {"/right/image_raw", RosType::image, false},
+                          {"/left/camera_info", RosType::camera_info, false},
+                          {"/right/camera_info", RosType::camera_info, false},
+                          {"/odometry", RosType::odometry, false},
+                          {"/ins/fix", RosType::nav_sat_fix, false},
+                          {"/ins/reading", RosType::ins_reading, false}};
   options.queues = {a.queue_mb << 20U};
   const auto pictures = images();
   Recording recording(folder, options);

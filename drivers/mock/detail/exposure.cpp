@@ -15,8 +15,8 @@ void choose_image(const RigTruth& truth, const PulseAt& pulse, Exposure* e) noex
   }
   if (!late) return;
   const std::uint64_t i = pulse.number;
-  e->time = pulse.time - (i == 0 ? pulse.plan->period()
-                                 : pulse.plan->at(i).time - pulse.plan->at(i - 1).time);
+  e->time = pulse.time -
+            (i == 0 ? pulse.plan->period() : pulse.plan->at(i).time - pulse.plan->at(i - 1).time);
   e->pulse = pulse.number - 1;
 }
 
