@@ -23,8 +23,6 @@ MOST_METHODS = 30
 # Those that are over it since before the rule: (members, methods), which may only become fewer; a row goes when its class is split.
 OVER = {
     ("app/recording/recording.hpp", "Recording"): (37, 23),
-    ("drivers/mock/simulators/simulated_line.cpp", "SimulatedPlace"): (26, 29),
-    ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
 }
 
 COMMENT_OR_TEXT = re.compile(
