@@ -100,19 +100,17 @@ void FirewireBus::close_node() noexcept {
 
 FirewireBus::~FirewireBus() {
   stop();
-  tear_down();
+  ring_.forget_kept();  // the consumer is gone by contract
+  end_ring();
   close_node();
-  kept_.clear();  // the consumer is gone by contract
-  drop_orphan();
   if (wake_ >= 0) (void)::close(wake_);
   ledger_->remove(this);
 }
 
 DeviceStatus FirewireBus::reopen() noexcept {
   try {
-    drop_orphan();
-    const std::size_t other = 1 - generation_.load(std::memory_order_relaxed);
-    if (map().base != nullptr && maps_[other].base != nullptr) {
+    ring_.drop_orphans();
+    if (!ring_.has_room()) {
       last_error_ = "images of before it was unplugged are still in use";
       return DeviceStatus::gone;
     }
@@ -125,7 +123,7 @@ DeviceStatus FirewireBus::reopen() noexcept {
                  ? status
                  : DeviceStatus::gone;
     }
-    if (map().base != nullptr) generation_.store(other, std::memory_order_release);
+    ring_.use_free_range();
     lost_.store(false, std::memory_order_release);
     return status;
   } catch (const std::exception&) {
@@ -155,6 +153,38 @@ DeviceStatus FirewireBus::write(std::uint64_t address, std::uint32_t value) noex
   return dc1394_set_registers(camera_, address - kRegisterSpace, &value, 1) == DC1394_SUCCESS
              ? DeviceStatus::ok
              : failure(begun);
+}
+
+// ---- the ring
+
+/// Precondition: no slot of it is kept.
+void FirewireBus::end_ring() noexcept {
+  if (lost_.load(std::memory_order_acquire)) {
+    ring_.abandon();
+  } else {
+    ring_.end();
+  }
+}
+
+DeviceStatus FirewireBus::allocate(const StreamShape& shape) noexcept {
+  end_ring();
+  ring_.set_shape(shape);
+  try {
+    ledger_->put(this, node_.bus, {shape.packet_bytes, shape.speed, shape.image_bytes});
+  } catch (const std::exception&) {
+    return DeviceStatus::failed;
+  }
+  return DeviceStatus::ok;
+}
+
+DeviceStatus FirewireBus::set_up() {
+  last_error_ = ledger_->last_error(node_.bus);
+  if (!last_error_.empty()) return DeviceStatus::no_bandwidth;
+  return ring_.set_up(camera_, node_.device, &last_error_);
+}
+
+void FirewireBus::give_back(FrameSlot slot) noexcept {
+  if (ring_.give_back(slot) && wake_ >= 0) (void)!::write(wake_, "\1\0\0\0\0\0\0", 8);
 }
 
 std::string FirewireBus::remark(const StreamShape& shape, double, int sharing) const {

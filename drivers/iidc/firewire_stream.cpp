@@ -32,9 +32,9 @@ DeviceStatus FirewireBus::start(StreamSink* sink) noexcept {
   if (camera_ == nullptr) return DeviceStatus::gone;
   try {
     if (wake_ < 0) wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    if (captured_ && kept_in(generation_.load(std::memory_order_relaxed)) == 0) tear_down();
-    if (captured_) {
-      resume();
+    if (!ring_.any_kept()) end_ring();
+    if (ring_.captured()) {
+      ring_.resume();
     } else if (const DeviceStatus status = set_up(); status != DeviceStatus::ok) {
       return status;
     }
@@ -47,21 +47,6 @@ DeviceStatus FirewireBus::start(StreamSink* sink) noexcept {
   }
 }
 
-/// Goes on with a ring of which images are still held: what came meanwhile goes back.
-void FirewireBus::resume() noexcept {
-  enqueue_returned();
-  for (std::size_t i = 0; i < kMaxBuffers; ++i) {
-    dc1394video_frame_t* frame = nullptr;
-    if (dc1394_capture_dequeue(camera_, DC1394_CAPTURE_POLICY_POLL, &frame) != DC1394_SUCCESS ||
-        frame == nullptr || queued_ == 0)
-      return;
-    const std::size_t buffer = queue_[queue_first_];
-    queue_first_ = (queue_first_ + 1) % queue_.size();
-    --queued_;
-    enqueue(buffer);
-  }
-}
-
 void FirewireBus::stop() noexcept {
   stopping_.store(true, std::memory_order_release);
   if (thread_.joinable()) {
@@ -69,17 +54,13 @@ void FirewireBus::stop() noexcept {
     thread_.join();
   }
   sink_ = nullptr;
-  if (lost_.load(std::memory_order_acquire)) {
-    abandon();
-  } else if (captured_ && kept_in(generation_.load(std::memory_order_relaxed)) == 0) {
-    tear_down();
-  }
-  drop_orphan();
+  if (lost_.load(std::memory_order_acquire) || !ring_.any_kept()) end_ring();
+  ring_.drop_orphans();
 }
 
 void FirewireBus::stream() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-iidc13");
-  const int fd = dc1394_capture_get_fileno(camera_);
+  const int fd = ring_.descriptor();
   while (!stopping_.load(std::memory_order_acquire)) {
     std::array<pollfd, 2> fds{pollfd{fd, POLLIN, 0}, pollfd{wake_, POLLIN, 0}};
     if (::poll(fds.data(), fds.size(), kLookMs) < 0 && errno != EINTR) break;
@@ -87,7 +68,7 @@ void FirewireBus::stream() noexcept {
       std::uint64_t rung = 0;
       (void)!::read(wake_, &rung, sizeof rung);
     }
-    enqueue_returned();
+    ring_.enqueue_returned();
     if (fds[0].revents != 0 && !take_one()) break;
   }
   if (stopping_.load(std::memory_order_acquire)) return;
@@ -97,31 +78,28 @@ void FirewireBus::stream() noexcept {
 
 /// False: the device is gone.
 bool FirewireBus::take_one() noexcept {
-  dc1394video_frame_t* frame = nullptr;
-  if (dc1394_capture_dequeue(camera_, DC1394_CAPTURE_POLICY_POLL, &frame) != DC1394_SUCCESS)
-    return false;
-  if (frame == nullptr) return true;  // a bus reset, or nothing
-  if (queued_ == 0) return true;      // cannot be: the kernel filled what it did not have
-  const std::size_t buffer = queue_[queue_first_];
-  queue_first_ = (queue_first_ + 1) % queue_.size();
-  --queued_;
+  FirewireRing::Filled filled;
+  switch (ring_.take(&filled)) {
+    case FirewireRing::Take::gone:
+      return false;
+    case FirewireRing::Take::nothing:
+      return true;
+    case FirewireRing::Take::filled:
+      break;
+  }
   Arrival a;
-  a.slot = slot_of(buffer);
-  a.data = bytes(a.slot);
-  a.bytes = shape_.frame_bytes;
+  a.slot = filled.slot;
+  a.data = ring_.bytes(a.slot);
+  a.bytes = ring_.shape().frame_bytes;
   a.at = monotonic_now();
-  a.broken = frame->total_bytes != shape_.frame_bytes;
-  a.spare = queued_ >= kReserve;
-  if (frame->timestamp != 0) {
+  a.broken = filled.broken;
+  a.spare = filled.spare;
+  if (filled.at_us != 0) {
     a.has_bus_stamp = true;
     a.bus_stamp =
-        a.at - Duration::microseconds(realtime_us() - static_cast<std::int64_t>(frame->timestamp));
+        a.at - Duration::microseconds(realtime_us() - static_cast<std::int64_t>(filled.at_us));
   }
-  kept_.put(a.slot);
-  if (!sink_->frame(a)) {
-    (void)kept_.remove(a.slot);
-    enqueue(buffer);
-  }
+  if (!sink_->frame(a)) ring_.refuse(a.slot);
   return true;
 }
 

@@ -39,10 +39,7 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& requested,
     return DeviceStatus::failed;
   }
   configuration_ = requested;
-  {
-    const std::lock_guard lock(setting_);
-    changes_ = {{0, {requested.exposure, requested.gain_db}}};
-  }
+  exposures_.reset({requested.exposure, requested.gain_db});
   generation_.fetch_add(1, std::memory_order_release);
   if (actual != nullptr) *actual = requested;
   return DeviceStatus::ok;
@@ -58,26 +55,16 @@ DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
   const ExposureSetting taken{requested.exposure, std::clamp(requested.gain_db, 0.0, kMostGain)};
   const auto latency = static_cast<std::uint64_t>(std::max(1, rig_->options.exposure_latency));
   const std::uint64_t from = std::max(rig_->looked_at.load() + latency, rig_->planned.load());
+  // Of what is past only the last is of use.
+  const std::uint64_t planned = rig_->planned.load();
+  const std::uint64_t past = planned > MockRig::kSlots ? planned - MockRig::kSlots : 0;
   try {
-    const std::lock_guard lock(setting_);
-    while (changes_.size() > 1 && changes_.back().from >= from) changes_.pop_back();
-    // Of what is past only the last is of use.
-    while (changes_.size() > 1 && changes_[1].from + MockRig::kSlots < rig_->planned.load())
-      changes_.erase(changes_.begin());
-    changes_.push_back({from, taken});
+    exposures_.change(from, taken, past);
   } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
   if (actual != nullptr) *actual = taken;
   return DeviceStatus::ok;
-}
-
-ExposureSetting MockCamera::setting_at(std::uint64_t pulse) const {
-  const std::lock_guard lock(setting_);
-  ExposureSetting setting = changes_.front().setting;
-  for (const Change& c : changes_)
-    if (c.from <= pulse) setting = c.setting;
-  return setting;
 }
 
 DeviceStatus MockCamera::start(Notifier* ready) noexcept {

@@ -12,6 +12,7 @@
 #include "drivers/common/wake_event.hpp"
 #include "drivers/ins.hpp"
 #include "drivers/mock/detail/delivery_progress.hpp"
+#include "drivers/mock/detail/exposure_plan.hpp"
 #include "drivers/mock/detail/oscillator.hpp"
 #include "drivers/mock/ins_model.hpp"
 #include "drivers/mock/mock_rig.hpp"
@@ -80,7 +81,9 @@ class MockCamera final : public CameraDevice {
   }
   [[nodiscard]] FramePool& pool() noexcept { return *pool_; }
   /// What an image of that pulse is taken with.
-  [[nodiscard]] ExposureSetting setting_at(std::uint64_t pulse) const;
+  [[nodiscard]] ExposureSetting setting_at(std::uint64_t pulse) const {
+    return exposures_.at(pulse);
+  }
   /// Tells whose pulse the image in a slot is.
   void label(FrameSlot slot, std::uint64_t pulse) noexcept {
     pulse_of_[slot].store(pulse, std::memory_order_release);
@@ -108,13 +111,8 @@ class MockCamera final : public CameraDevice {
   std::atomic<std::uint32_t> generation_{0};
   std::atomic<int> out_{0};  // slots the consumer holds
   std::array<std::atomic<std::uint64_t>, MockRig::kSlots> pulse_of_{};
-  struct Change {
-    std::uint64_t from = 0;  // pulse
-    ExposureSetting setting{};
-  };
-  mutable std::mutex setting_;   // of what follows
-  std::vector<Change> changes_;  // by pulse, the first is in force
-  bool gone_ = false;            // the consumer's
+  ExposurePlan exposures_;
+  bool gone_ = false;  // the consumer's
 };
 
 class MockIns final : public InsDevice {

@@ -12,13 +12,10 @@
 #include <utility>
 
 #include "core/math/random.hpp"
+#include "drivers/mock/simulators/usb_converter.hpp"
 
 namespace vergence::mock {
 namespace {
-
-constexpr Duration kUsbFrame = Duration::milliseconds(1);
-constexpr std::size_t kPacketBytes = 62;
-constexpr std::size_t kTransferPackets = 8;
 
 HostStamp monotonic() noexcept {
   timespec t{};
@@ -35,10 +32,10 @@ class SimulatedPlace::World {
       : device_(std::move(device)),
         options_(options),
         random_(options.seed, 62),
-        now_(options.real_time ? monotonic() : options.start) {
-    next_frame_ = now_ + Duration::nanoseconds(random_.below(1'000'000));
-    last_packet_ = now_;
-  }
+        now_(options.real_time ? monotonic() : options.start),
+        outages_(options.outages),
+        converter_(options.latency_timer, options.converter_clock_ppm, now_,
+                   now_ + Duration::nanoseconds(random_.below(1'000'000))) {}
 
   std::mutex mutex;
   std::condition_variable woken_up;
@@ -46,20 +43,18 @@ class SimulatedPlace::World {
 
   [[nodiscard]] const SimulatedLineOptions& options() const noexcept { return options_; }
   [[nodiscard]] HostStamp now() const noexcept { return options_.real_time ? monotonic() : now_; }
-  [[nodiscard]] bool unplugged() const noexcept {
-    return outage_ < options_.outages.size() && now_ >= options_.outages[outage_].from;
-  }
-  [[nodiscard]] std::size_t outages_begun() const noexcept { return outages_begun_; }
+  [[nodiscard]] bool unplugged() const noexcept { return outages_.unplugged(now_); }
+  [[nodiscard]] std::size_t outages_begun() const noexcept { return outages_.begun(); }
   [[nodiscard]] bool anything_readable() const noexcept { return !ready_.empty(); }
   [[nodiscard]] bool ended() const {
-    return device_->ended() && on_wire_.empty() && chip_.empty() && frozen_.empty() &&
-           transfer_.empty() && arriving_.empty() && ready_.empty();
+    return device_->ended() && on_wire_.empty() && converter_.empty() && fifo_.empty() &&
+           arriving_.empty() && ready_.empty();
   }
 
   /// Lets time pass until `until`, or until bytes can be read or the line is cut.
   void run(HostStamp until) {
-    const std::size_t outages = outages_begun_;
-    while (ready_.empty() && outages == outages_begun_ && step(until)) {
+    const std::size_t outages = outages_.begun();
+    while (ready_.empty() && outages == outages_.begun() && step(until)) {
     }
   }
   void run_through(HostStamp until) {
@@ -88,10 +83,8 @@ class SimulatedPlace::World {
   void discard() {
     ready_.clear();
     arriving_.clear();
-    transfer_.clear();
-    transfer_packets_ = 0;
-    chip_.clear();
-    frozen_.clear();
+    converter_.discard();
+    fifo_.clear();
   }
   void set_open(bool open) {
     open_ = open;
@@ -129,15 +122,13 @@ class SimulatedPlace::World {
       if (t < at || (t == at && what == What::nothing)) at = std::max(t, now_), what = w;
     };
     if (!arriving_.empty()) consider(arriving_.front().at, What::arrival);
-    if (outage_ < options_.outages.size())
-      consider(outage_begun_ ? options_.outages[outage_].to : options_.outages[outage_].from,
-               What::outage);
+    if (const auto change = outages_.next()) consider(*change, What::outage);
     if (!to_device_.empty()) consider(to_device_.front().at, What::command);
     if (const auto next = device_->next()) consider(*next, What::produce);
     if (!on_wire_.empty()) consider(on_wire_.front().done, What::byte);
     if (options_.converter) {
-      if (!timer_fired_) consider(last_packet_ + timer(), What::timer);
-      consider(next_frame_, What::frame);
+      if (const auto timer = converter_.timer_at()) consider(*timer, What::timer);
+      consider(converter_.frame_at(), What::frame);
     }
     now_ = std::max(now_, at);
     switch (what) {
@@ -160,7 +151,7 @@ class SimulatedPlace::World {
         take_byte();
         return true;
       case What::timer:
-        freeze();
+        converter_.run_out();
         return true;
       case What::frame:
         frame();
@@ -169,31 +160,20 @@ class SimulatedPlace::World {
     return false;
   }
 
-  [[nodiscard]] Duration timer() const noexcept {
-    return Duration::nanoseconds(std::llround(static_cast<double>(options_.latency_timer.ns()) *
-                                              (1 + 1e-6 * options_.converter_clock_ppm)));
-  }
-
   void change_outage() {
-    const Outage& o = options_.outages[outage_];
-    if (!outage_begun_) {
-      outage_begun_ = true;
-      ++outages_begun_;
+    const Outage& outage = outages_.change();
+    if (outages_.in_outage()) {
       discard();
-      return;
-    }
-    if (!o.device_powered) {
+    } else if (!outage.device_powered) {
       on_wire_.clear();
       device_->power_cycle(now_);
     }
-    outage_begun_ = false;
-    ++outage_;
   }
 
   void command() {
     Chunk chunk = std::move(to_device_.front());
     to_device_.pop_front();
-    if (outage_begun_) return;
+    if (outages_.in_outage()) return;
     if (device_->baud() != host_baud_) garble(&chunk.bytes);
     device_->receive(chunk.bytes, now_);
   }
@@ -213,52 +193,22 @@ class SimulatedPlace::World {
   void take_byte() {
     std::uint8_t value = on_wire_.front().value;
     on_wire_.pop_front();
-    if (outage_begun_ || !open_) return;
+    if (outages_.in_outage() || !open_) return;
     if (options_.corrupt > 0 && random_.uniform() < options_.corrupt)
       value ^= static_cast<std::uint8_t>(1U << random_.below(8));
     if (options_.converter) {
-      chip_.push_back(value);
+      converter_.receive(value);
       return;
     }
     // The UART's FIFO: an interrupt at so many bytes, or when the line falls idle.
-    transfer_.push_back(value);
-    if (transfer_.size() >= options_.fifo || on_wire_.empty()) complete_transfer();
-  }
-
-  /// The latency timer has run out: what is there now goes with the next frame, what comes later
-  /// does not.
-  void freeze() {
-    timer_fired_ = true;
-    if (chip_.size() >= kPacketBytes) return;
-    frozen_.assign(chip_.begin(), chip_.end());
-    chip_.clear();
+    fifo_.push_back(value);
+    if (fifo_.size() >= options_.fifo || on_wire_.empty()) arrive(std::exchange(fifo_, {}));
   }
 
   void frame() {
-    next_frame_ = next_frame_ + kUsbFrame;
-    if (timer_fired_ && (!frozen_.empty() || chip_.size() < kPacketBytes)) {
-      transfer_.insert(transfer_.end(), frozen_.begin(), frozen_.end());
-      frozen_.clear();
-      packet_went();
-      complete_transfer();
-    }
-    while (chip_.size() >= kPacketBytes) {
-      transfer_.insert(transfer_.end(), chip_.begin(), chip_.begin() + kPacketBytes);
-      chip_.erase(chip_.begin(), chip_.begin() + kPacketBytes);
-      packet_went();
-      if (++transfer_packets_ == kTransferPackets) complete_transfer();
-    }
-  }
-
-  void packet_went() noexcept {
-    last_packet_ = now_;
-    timer_fired_ = false;
-  }
-
-  void complete_transfer() {
-    transfer_packets_ = 0;
-    if (transfer_.empty()) return;
-    arrive(std::exchange(transfer_, {}));
+    std::vector<std::vector<std::uint8_t>> transfers;
+    converter_.frame(now_, &transfers);
+    for (std::vector<std::uint8_t>& bytes : transfers) arrive(std::move(bytes));
   }
 
   void arrive(std::vector<std::uint8_t> bytes) {
@@ -281,16 +231,14 @@ class SimulatedPlace::World {
   SimulatedLineOptions options_;
   Random random_;
   HostStamp now_;
-  HostStamp line_free_{}, host_line_free_{}, next_frame_{}, last_packet_{}, last_arrival_{};
+  HostStamp line_free_{}, host_line_free_{}, last_arrival_{};
   std::uint32_t host_baud_ = LineSettings{}.baud;
-  bool open_ = false, timer_fired_ = false, outage_begun_ = false;
-  std::size_t outage_ = 0, outages_begun_ = 0;
+  bool open_ = false;
+  OutageSchedule outages_;
   std::deque<Chunk> to_device_, arriving_;
   std::deque<Byte> on_wire_;
-  std::deque<std::uint8_t> chip_;       // in the converter
-  std::vector<std::uint8_t> frozen_;    // its short packet that waits for a frame
-  std::vector<std::uint8_t> transfer_;  // gathered by the host's controller
-  std::size_t transfer_packets_ = 0;
+  UsbConverter converter_;          // used with options_.converter,
+  std::vector<std::uint8_t> fifo_;  // this without
   std::deque<std::uint8_t> ready_;  // to be read
 };
 

@@ -5,15 +5,10 @@
 #include <vector>
 
 #include "drivers/mock/simulators/device_model.hpp"
+#include "drivers/mock/simulators/outage_schedule.hpp"
 #include "drivers/serial/byte_line.hpp"
 
 namespace vergence::mock {
-
-/// The line is unplugged for a while.
-struct Outage {
-  HostStamp from{}, to{};
-  bool device_powered = true;  // false: the device is off, too
-};
 
 struct SimulatedLineOptions {
   bool converter = true;  // a USB converter of FTDI's kind; false: bytes go straight into the host

@@ -1,6 +1,7 @@
 #include "drivers/mock/simulators/xsens_simulator.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -12,18 +13,6 @@ using namespace xbus;
 constexpr Duration kWakeTime = Duration::milliseconds(500);  // that a host has to answer a wake-up
 constexpr Duration kStartTime = Duration::milliseconds(20);  // from power to the first byte
 
-OutputConfiguration factory_outputs() noexcept {
-  OutputConfiguration o;
-  for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage},
-                              {0x1060, kEveryMessage},
-                              {0x2030, 100},
-                              {0x4020, 100},
-                              {0x8020, 100},
-                              {0xE020, kEveryMessage}})
-    (void)o.add(e);
-  return o;
-}
-
 }  // namespace
 
 XsensSimulator::XsensSimulator(InsSource source, const XsensSimulatorOptions& options)
@@ -31,12 +20,8 @@ XsensSimulator::XsensSimulator(InsSource source, const XsensSimulatorOptions& op
       options_(options),
       random_(options.seed, 710),
       baud_(options.baud),
-      stored_baud_(options.baud),
-      counter_(options.first_counter),
-      outputs_(options.outputs.count > 0 ? options.outputs : factory_outputs()),
-      layout_(options.layout),
-      period_(options.period) {
-  sync_.entries[sync_.count++] = {14, 1, 1, 0, 0, 0, 0, 0};  // the receiver's clock, on by default
+      settings_(options),
+      messages_(options, settings_) {
   now_ = options.power_on;
   wake(now_);
 }
@@ -51,21 +36,10 @@ std::int64_t XsensSimulator::device_ns(HostStamp host) const noexcept {
                       (1 + 1e-6 * options_.clock_ppm));
 }
 
-std::int64_t XsensSimulator::period_ns() const noexcept {
-  if (legacy())
-    return static_cast<std::int64_t>(period_) * (skip_ + 1) * 1'000'000'000 / kPeriodClock;
-  std::uint16_t rate = 0;
-  for (const OutputEntry& e : outputs_.items())
-    if (e.rate_hz != kEveryMessage && (e.id & 0xF000U) != 0x7000U) rate = std::max(rate, e.rate_hz);
-  return rate == 0 ? 1'000'000'000 : 1'000'000'000 / rate;
-}
-
-double XsensSimulator::rate_hz() const noexcept { return 1e9 / static_cast<double>(period_ns()); }
-
 // ---- states
 
 void XsensSimulator::wake(HostStamp at) {
-  baud_ = stored_baud_;
+  baud_ = settings_.stored_baud();
   in_.reset();
   outgoing_.clear();
   mode_ = Mode::waking;
@@ -75,16 +49,15 @@ void XsensSimulator::wake(HostStamp at) {
 
 void XsensSimulator::measure(HostStamp at) {
   mode_ = Mode::measuring;
-  sample_ns_ = (device_ns(at) / period_ns() + 2) * period_ns();  // on the device's own grid
+  const std::int64_t period = settings_.period_ns();
+  sample_ns_ = (device_ns(at) / period + 2) * period;  // on the device's own grid
   plan_sample();
-  next_fix_ns_ = sample_ns_;
+  messages_.begin(sample_ns_);
 }
 
 void XsensSimulator::power_cycle(HostStamp at) {
   now_ = std::max(now_, at);
-  clock_zero_ns_ = device_ns(now_);
-  counter_ = 0;
-  options_.first_sample_time = 0;
+  messages_.power_cycle(device_ns(now_));
   wake(now_);
 }
 
@@ -104,11 +77,6 @@ void XsensSimulator::receive(std::span<const std::uint8_t> bytes, HostStamp at) 
 
 void XsensSimulator::answer(std::uint8_t id, std::span<const std::uint8_t> payload) {
   send(now_ + kAnswerTime, id, payload);
-}
-
-void XsensSimulator::refuse(std::uint8_t code) {
-  ++writes_.refused;
-  answer(id_of(MessageId::error), std::array{code});
 }
 
 void XsensSimulator::send(HostStamp at, std::uint8_t id, std::span<const std::uint8_t> payload) {
@@ -136,7 +104,27 @@ void XsensSimulator::handle(const Message& m) {
     reset_at_ = now_ + kAnswerTime * 5;  // the answer still goes out at the old baud rate
     return;
   }
-  if (mode_ == Mode::configuring) handle_setting(m);
+  if (mode_ != Mode::configuring) return;
+  if (m.is(MessageId::go_to_measurement)) return go_to_measurement(m);
+  const XsensSettings::Reply reply = settings_.handle(m);
+  answer(reply.id, reply.payload);
+}
+
+void XsensSimulator::go_to_measurement(const Message& m) {
+  constexpr std::uint8_t kTooMuch = 0x29;
+  if (settings_.line_load(baud_) > 1) {
+    const XsensSettings::Reply reply = settings_.refuse(kTooMuch);
+    return answer(reply.id, reply.payload);
+  }
+  if (settings_.legacy()) send_configuration(now_ + kAnswerTime);
+  answer(m.id + 1, {});
+  measure(now_ + kAnswerTime);
+}
+
+void XsensSimulator::send_configuration(HostStamp at) {
+  std::array<std::uint8_t, kConfigurationSize> payload{};
+  write_configuration(settings_.configuration(), payload);
+  send(at, id_of(MessageId::configuration), payload);
 }
 
 // ---- what it measures
@@ -175,7 +163,7 @@ void XsensSimulator::produce(HostStamp at, std::vector<std::uint8_t>* out) {
     outgoing_.clear();
   }
   if (mode_ == Mode::waking && now_ >= waits_for_host_until_) {
-    if (legacy()) send_configuration(now_);
+    if (settings_.legacy()) send_configuration(now_);
     measure(now_);
   }
   if (mode_ == Mode::measuring && now_ >= sample_at_) take_sample();
@@ -188,7 +176,7 @@ void XsensSimulator::produce(HostStamp at, std::vector<std::uint8_t>* out) {
 void XsensSimulator::plan_sample() { sample_at_ = host_time(sample_ns_); }
 
 void XsensSimulator::take_sample() {
-  Taken taken;
+  XsensMessages::Sample taken;
   taken.device_ns = sample_ns_;
   taken.sample = source_(samples_++, sample_at_ - options_.power_on);
   sample_times_.push_back(sample_ns_);
@@ -197,17 +185,10 @@ void XsensSimulator::take_sample() {
       sample_at_ + options_.processing +
       Duration::nanoseconds(
           std::llround(random_.uniform() * static_cast<double>(options_.processing_jitter.ns())));
-  if (legacy())
-    send_legacy(taken, ready);
-  else
-    send_mark4(taken, ready);
-  history_.push_back(taken);
-  if (history_.size() > static_cast<std::size_t>(options_.fix_age) + 1) history_.pop_front();
-  if (!legacy() && sample_ns_ >= next_fix_ns_) {
-    next_fix_ns_ += options_.fix_interval.ns();
-    send_fix(ready);
-  }
-  sample_ns_ += period_ns();
+  std::vector<XsensMessages::Message> messages;
+  messages_.add(taken, &random_, &messages);
+  for (const XsensMessages::Message& message : messages) send(ready, message.id, message.payload);
+  sample_ns_ += settings_.period_ns();
   plan_sample();
 }
 

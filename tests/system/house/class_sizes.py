@@ -21,12 +21,7 @@ MOST_MEMBERS = 20
 MOST_METHODS = 30
 
 # Those that are over it since before the rule: (members, methods), which may only become fewer; a row goes when its class is split.
-OVER = {
-    ("drivers/iidc/firewire_bus.hpp", "FirewireBus"): (23, 19),
-    ("drivers/mock/detail/devices.hpp", "MockCamera"): (21, 9),
-    ("drivers/mock/simulators/simulated_line.cpp", "SimulatedPlace"): (26, 29),
-    ("drivers/mock/simulators/xsens_simulator.hpp", "XsensSimulator"): (32, 32),
-}
+OVER = {}
 
 COMMENT_OR_TEXT = re.compile(
     r'R"([^()\s\\]{0,16})\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'|//[^\n]*|/\*.*?\*/', re.DOTALL)

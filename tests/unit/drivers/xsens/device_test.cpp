@@ -124,11 +124,12 @@ TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
   ASSERT_EQ(rig.device->configure(legacy() ? 120 : 100, &actual), DeviceStatus::ok)
       << rig.device->last_error();
   if (legacy()) {
-    EXPECT_EQ(rig.simulator->legacy_sync_out(), (std::array<std::uint32_t, 4>{0x12, 3, 0, 58982}));
+    EXPECT_EQ(rig.simulator->settings().legacy_sync_out(),
+              (std::array<std::uint32_t, 4>{0x12, 3, 0, 58982}));
     EXPECT_EQ(rig.device->stream().sync_out_hz, 30);
     EXPECT_TRUE(rig.device->remark().empty()) << rig.device->remark();
   } else {
-    const auto entries = rig.simulator->sync_settings().items();
+    const auto entries = rig.simulator->settings().sync_settings().items();
     ASSERT_EQ(entries.size(), 2U);
     EXPECT_EQ(entries[0].function, 14) << "the receiver's clock stays";
     EXPECT_EQ(entries[1], (xbus::SyncEntry{xbus::kSyncIntervalTransition, xbus::kSyncLineOut,

@@ -1,12 +1,9 @@
+#include "drivers/mock/simulators/xsens_settings.hpp"
+
 #include <algorithm>
-#include <array>
-#include <cstdint>
 #include <cstdlib>
 #include <string_view>
 
-#include "drivers/mock/simulators/xsens_simulator.hpp"
-
-/// What the host asks of a device in its configuration state, and the answers.
 namespace vergence::mock {
 namespace {
 
@@ -23,40 +20,77 @@ std::uint16_t rate_taken(std::uint16_t asked) noexcept {
   return best;
 }
 
+OutputConfiguration factory_outputs() noexcept {
+  OutputConfiguration o;
+  for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage},
+                              {0x1060, kEveryMessage},
+                              {0x2030, 100},
+                              {0x4020, 100},
+                              {0x8020, 100},
+                              {0xE020, kEveryMessage}})
+    (void)o.add(e);
+  return o;
+}
+
+[[nodiscard]] std::uint8_t id_of(MessageId id) noexcept { return static_cast<std::uint8_t>(id); }
+
+/// The acknowledgement of a message.
+[[nodiscard]] XsensSettings::Reply answer(const Message& m, std::span<const std::uint8_t> payload) {
+  return {static_cast<std::uint8_t>(m.id + 1), {payload.begin(), payload.end()}};
+}
+
 }  // namespace
 
-void XsensSimulator::handle_setting(const Message& m) {
+XsensSettings::XsensSettings(const XsensSimulatorOptions& options)
+    : generation_(options.generation),
+      device_id_(options.device_id),
+      stored_baud_(options.baud),
+      outputs_(options.outputs.count > 0 ? options.outputs : factory_outputs()),
+      layout_(options.layout),
+      period_(options.period) {
+  sync_.entries[sync_.count++] = {14, 1, 1, 0, 0, 0, 0, 0};  // the receiver's clock, on by default
+}
+
+std::int64_t XsensSettings::period_ns() const noexcept {
+  if (legacy())
+    return static_cast<std::int64_t>(period_) * (skip_ + 1) * 1'000'000'000 / kPeriodClock;
+  std::uint16_t rate = 0;
+  for (const OutputEntry& e : outputs_.items())
+    if (e.rate_hz != kEveryMessage && (e.id & 0xF000U) != 0x7000U) rate = std::max(rate, e.rate_hz);
+  return rate == 0 ? 1'000'000'000 : 1'000'000'000 / rate;
+}
+
+double XsensSettings::line_load(std::uint32_t baud) const noexcept {
+  return legacy() ? line_budget(layout_, rate_hz(), baud).load : line_budget(outputs_, baud).load;
+}
+
+XsensSettings::Reply XsensSettings::refuse(std::uint8_t code) {
+  ++writes_.refused;
+  return {id_of(MessageId::error), {code}};
+}
+
+XsensSettings::Reply XsensSettings::handle(const Message& m) {
   std::array<std::uint8_t, kMaxPayload> payload{};
   switch (static_cast<MessageId>(m.id)) {
-    case MessageId::go_to_measurement: {
-      const double load = legacy() ? line_budget(layout_, rate_hz(), baud_).load
-                                   : line_budget(outputs_, baud_).load;
-      constexpr std::uint8_t kTooMuch = 0x29;
-      if (load > 1) return refuse(kTooMuch);
-      if (legacy()) send_configuration(now_ + kAnswerTime);
-      answer(m.id + 1, {});
-      measure(now_ + kAnswerTime);
-      return;
-    }
     case MessageId::device_id_request:
     case MessageId::init_bus:
-      write_u32(payload, options_.device_id);
-      return answer(m.id + 1, std::span(payload).first(4));
+      write_u32(payload, device_id_);
+      return answer(m, std::span(payload).first(4));
     case MessageId::product_code_request: {
       constexpr std::string_view kLegacyCode = "MTi-G-28A53G35      ",
                                  kCode = "MTI-G-710-2A8G4     ";
       const std::string_view code = legacy() ? kLegacyCode : kCode;
       std::copy(code.begin(), code.end(), payload.begin());
-      return answer(m.id + 1, std::span(payload).first(code.size()));
+      return answer(m, std::span(payload).first(code.size()));
     }
     case MessageId::firmware_request:
       payload[0] = legacy() ? 2 : 1;
       payload[1] = legacy() ? 6 : 8;
       payload[2] = 1;
-      return answer(m.id + 1, std::span(payload).first(legacy() ? 3 : 11));
+      return answer(m, std::span(payload).first(legacy() ? 3 : 11));
     case MessageId::configuration_request:
       write_configuration(configuration(), payload);
-      return answer(m.id + 1, std::span(payload).first(kConfigurationSize));
+      return answer(m, std::span(payload).first(kConfigurationSize));
     case MessageId::baudrate: {
       if (m.payload.size() == 1) {
         const auto baud = baud_of_code(m.payload[0]);
@@ -64,28 +98,29 @@ void XsensSimulator::handle_setting(const Message& m) {
         stored_baud_ = *baud;
         ++writes_.baud;
       }
-      payload[0] = baud_code(stored_baud_, options_.generation).value_or(0);
-      return answer(m.id + 1, m.payload.size() == 1 ? std::span<const std::uint8_t>{}
-                                                    : std::span(payload).first(1));
+      payload[0] = baud_code(stored_baud_, generation_).value_or(0);
+      return answer(
+          m, m.payload.size() == 1 ? std::span<const std::uint8_t>{} : std::span(payload).first(1));
     }
     default:
       return legacy() ? handle_legacy(m) : handle_mark4(m);
   }
 }
 
-void XsensSimulator::answer_u16(const Message& m, std::uint16_t* setting, int* writes) {
+XsensSettings::Reply XsensSettings::answer_u16(const Message& m, std::uint16_t* setting,
+                                               int* writes) {
   std::array<std::uint8_t, 2> now{};
   if (m.payload.size() == 2) {
     *setting = read_u16(m.payload);
     ++*writes;
-    return answer(m.id + 1, {});
+    return answer(m, {});
   }
   if (!m.payload.empty()) return refuse(kErrorParameter);
   write_u16(now, *setting);
-  answer(m.id + 1, now);
+  return answer(m, now);
 }
 
-void XsensSimulator::handle_legacy(const Message& m) {
+XsensSettings::Reply XsensSettings::handle_legacy(const Message& m) {
   std::array<std::uint8_t, 8> payload{};
   switch (static_cast<MessageId>(m.id)) {
     case MessageId::period:
@@ -100,13 +135,13 @@ void XsensSimulator::handle_legacy(const Message& m) {
       if (m.payload.size() == 4) {
         layout_.settings = read_u32(m.payload);
         ++writes_.layout;
-        return answer(m.id + 1, {});
+        return answer(m, {});
       }
       write_u32(payload, layout_.settings);
-      return answer(m.id + 1, std::span(payload).first(4));
+      return answer(m, std::span(payload).first(4));
     case MessageId::data_length_request:
       write_u16(payload, static_cast<std::uint16_t>(layout_.payload_size().value_or(0)));
-      return answer(m.id + 1, std::span(payload).first(2));
+      return answer(m, std::span(payload).first(2));
     case MessageId::legacy_sync_in:
     case MessageId::legacy_sync_out: {
       auto& settings = m.is(MessageId::legacy_sync_in) ? legacy_sync_in_ : legacy_sync_out_;
@@ -115,19 +150,19 @@ void XsensSimulator::handle_legacy(const Message& m) {
       if (read_legacy_sync(m.payload, &parameter, &value)) {
         settings[static_cast<std::size_t>(parameter)] = value;
         ++(m.is(MessageId::legacy_sync_in) ? writes_.sync_in : writes_.sync_out);
-        return answer(m.id + 1, {});
+        return answer(m, {});
       }
       if (m.payload.size() != 1 || m.payload[0] > 3) return refuse(kErrorParameter);
       const std::size_t n =
           write_legacy_sync(static_cast<LegacySync>(m.payload[0]), settings[m.payload[0]], payload);
-      return answer(m.id + 1, std::span(payload).first(n));
+      return answer(m, std::span(payload).first(n));
     }
     default:
       return refuse(kErrorMessageUnknown);
   }
 }
 
-void XsensSimulator::handle_mark4(const Message& m) {
+XsensSettings::Reply XsensSettings::handle_mark4(const Message& m) {
   std::array<std::uint8_t, 4 * kMostOutputs + kMostSyncEntries * kSyncEntrySize> payload{};
   switch (static_cast<MessageId>(m.id)) {
     case MessageId::output_configuration: {
@@ -140,30 +175,29 @@ void XsensSimulator::handle_mark4(const Message& m) {
         outputs_ = asked;
         ++writes_.outputs;
       }
-      return answer(m.id + 1,
-                    std::span(payload).first(write_output_configuration(outputs_, payload)));
+      return answer(m, std::span(payload).first(write_output_configuration(outputs_, payload)));
     }
     case MessageId::sync_settings:
       if (!m.payload.empty()) {
         if (!read_sync_settings(m.payload, &sync_)) return refuse(kErrorParameter);
         ++writes_.sync_settings;
       }
-      return answer(m.id + 1, std::span(payload).first(write_sync_settings(sync_, payload)));
+      return answer(m, std::span(payload).first(write_sync_settings(sync_, payload)));
     case MessageId::string_output: {
       int ignored = 0;
       return answer_u16(m, &string_output_, &ignored);
     }
     case MessageId::legacy_sync_in:
       ++writes_.heading;
-      return answer(m.id + 1, {});
+      return answer(m, {});
     default:
       return refuse(kErrorMessageUnknown);
   }
 }
 
-DeviceConfiguration XsensSimulator::configuration() const noexcept {
+DeviceConfiguration XsensSettings::configuration() const noexcept {
   DeviceConfiguration c;
-  c.master_id = c.device_id = options_.device_id;
+  c.master_id = c.device_id = device_id_;
   c.period = period_;
   c.output_skip = skip_;
   c.devices = 1;
@@ -175,10 +209,14 @@ DeviceConfiguration XsensSimulator::configuration() const noexcept {
   return c;
 }
 
-void XsensSimulator::send_configuration(HostStamp at) {
-  std::array<std::uint8_t, kConfigurationSize> payload{};
-  write_configuration(configuration(), payload);
-  send(at, id_of(MessageId::configuration), payload);
+bool XsensSettings::sync_out_within(std::int64_t from_ns, std::int64_t to_ns) const noexcept {
+  for (const SyncEntry& e : sync_.items()) {
+    if (e.function != kSyncIntervalTransition || e.line != kSyncLineOut || e.polarity == 0)
+      continue;
+    const auto period = static_cast<std::int64_t>(1e9 / kSyncOutBase) * (e.skip + 1);
+    if (to_ns / period != from_ns / period) return true;
+  }
+  return false;
 }
 
 }  // namespace vergence::mock

@@ -1,11 +1,9 @@
+#include "drivers/mock/simulators/xsens_messages.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 
-#include "drivers/mock/simulators/xsens_simulator.hpp"
-
-/// The data messages of both generations.
 namespace vergence::mock {
 namespace {
 
@@ -96,11 +94,38 @@ std::uint32_t status_of(const InsSample& s) noexcept {
   return status;
 }
 
+[[nodiscard]] std::uint8_t id_of(MessageId id) noexcept { return static_cast<std::uint8_t>(id); }
+
+[[nodiscard]] XsensMessages::Message message(MessageId id, std::span<const std::uint8_t> payload) {
+  return {id_of(id), {payload.begin(), payload.end()}};
+}
+
 }  // namespace
 
-void XsensSimulator::send_legacy(const Taken& now, HostStamp at) {
+XsensMessages::XsensMessages(const XsensSimulatorOptions& options, const XsensSettings& settings)
+    : options_(options),
+      settings_(settings),
+      first_sample_time_(options.first_sample_time),
+      counter_(options.first_counter) {}
+
+void XsensMessages::power_cycle(std::int64_t device_ns) noexcept {
+  clock_zero_ns_ = device_ns;
+  counter_ = 0;
+  first_sample_time_ = 0;
+}
+
+void XsensMessages::add(const Sample& now, Random* random, std::vector<Message>* out) {
+  out->push_back(settings_.legacy() ? legacy(now) : mark4(now, random));
+  history_.push_back(now);
+  if (history_.size() > static_cast<std::size_t>(options_.fix_age) + 1) history_.pop_front();
+  if (settings_.legacy() || now.device_ns < next_fix_ns_) return;
+  next_fix_ns_ += options_.fix_interval.ns();
+  if (fix_requested()) out->push_back(fix());
+}
+
+XsensMessages::Message XsensMessages::legacy(const Sample& now) {
   Mtdata d;
-  const LocalFrame frame = layout_.frame();
+  const LocalFrame frame = settings_.layout().frame();
   const InsSample& s = now.sample;
   const Matrix R = attitude_in(frame, s);
   d.raw = RawInertial{};
@@ -115,9 +140,9 @@ void XsensSimulator::send_legacy(const Taken& now, HostStamp at) {
   d.status = static_cast<std::uint8_t>(status_of(s) & 0x7U);
   d.sample_counter = counter_++;
   d.utc = utc_of_unix_ns(options_.unix_ns_at_power_on + now.device_ns, 7);
-  fix_age_ = sample_ns_ >= next_fix_ns_ ? std::uint8_t{0}
-                                        : static_cast<std::uint8_t>(std::min(255, fix_age_ + 1));
-  if (sample_ns_ >= next_fix_ns_) next_fix_ns_ += options_.fix_interval.ns();
+  fix_age_ = now.device_ns >= next_fix_ns_ ? std::uint8_t{0}
+                                           : static_cast<std::uint8_t>(std::min(255, fix_age_ + 1));
+  if (now.device_ns >= next_fix_ns_) next_fix_ns_ += options_.fix_interval.ns();
   LegacyFix f;
   constexpr double kSeaLevel = 101325;
   f.pressure_2pa = static_cast<std::uint16_t>(kSeaLevel / 2);
@@ -136,13 +161,14 @@ void XsensSimulator::send_legacy(const Taken& now, HostStamp at) {
   f.age = fix_age_;
   d.fix = f;
   std::array<std::uint8_t, kMaxPayload> payload{};
-  send(at, id_of(MessageId::mtdata), std::span(payload).first(encode_mtdata(d, layout_, payload)));
+  return message(MessageId::mtdata,
+                 std::span(payload).first(encode_mtdata(d, settings_.layout(), payload)));
 }
 
-void XsensSimulator::put_stamps(std::int64_t sample_ns, PacketWriter* packets) {
-  const auto ticks = static_cast<std::uint64_t>((sample_ns - clock_zero_ns_) / 100'000) +
-                     options_.first_sample_time;
-  for (const OutputEntry& e : outputs_.items()) {
+void XsensMessages::put_stamps(std::int64_t sample_ns, PacketWriter* packets) {
+  const auto ticks =
+      static_cast<std::uint64_t>((sample_ns - clock_zero_ns_) / 100'000) + first_sample_time_;
+  for (const OutputEntry& e : settings_.outputs().items()) {
     if (e.rate_hz != kEveryMessage) continue;
     switch (packet_id(e.id)) {
       case PacketId::utc:
@@ -161,14 +187,14 @@ void XsensSimulator::put_stamps(std::int64_t sample_ns, PacketWriter* packets) {
   ++counter_;
 }
 
-void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
+XsensMessages::Message XsensMessages::mark4(const Sample& now, Random* random) {
   std::array<std::uint8_t, kMaxPayload> buffer{};
   PacketWriter packets(buffer);
   const InsSample& s = now.sample;
   put_stamps(now.device_ns, &packets);
   const bool place = s.fix != FixStatus::none && !(options_.missing_position > 0 &&
-                                                   random_.uniform() < options_.missing_position);
-  for (const OutputEntry& e : outputs_.items()) {
+                                                   random->uniform() < options_.missing_position);
+  for (const OutputEntry& e : settings_.outputs().items()) {
     const auto frame = static_cast<LocalFrame>((e.id >> 2U) & 3U);
     switch (packet_id(e.id)) {
       case PacketId::quaternion:
@@ -197,9 +223,11 @@ void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
         if (place) packets.put_numbers(e.id, in_frame(frame, s.velocity_enu));
         break;
       case PacketId::status_word:
-        packets.put_u32(e.id, status_of(s) | (sync_out_within(sample_ns_ - period_ns(), sample_ns_)
-                                                  ? kStatusSyncOutMarker
-                                                  : 0U));
+        packets.put_u32(
+            e.id, status_of(s) | (settings_.sync_out_within(now.device_ns - settings_.period_ns(),
+                                                            now.device_ns)
+                                      ? kStatusSyncOutMarker
+                                      : 0U));
         break;
       case PacketId::status_byte:
         packets.put(e.id, std::array{static_cast<std::uint8_t>(status_of(s))});
@@ -208,15 +236,19 @@ void XsensSimulator::send_mark4(const Taken& now, HostStamp at) {
         break;
     }
   }
-  send(at, id_of(MessageId::mtdata2), packets.payload());
+  return message(MessageId::mtdata2, packets.payload());
 }
 
-void XsensSimulator::send_fix(HostStamp at) {
+bool XsensMessages::fix_requested() const noexcept {
   bool requested = false;
-  for (const OutputEntry& e : outputs_.items())
+  for (const OutputEntry& e : settings_.outputs().items())
     requested = requested || packet_id(e.id) == PacketId::gnss_pvt;
-  if (!requested) return;
-  const Taken& then = history_.front();
+  return requested;
+}
+
+/// Of the oldest sample that is remembered.
+XsensMessages::Message XsensMessages::fix() {
+  const Sample& then = history_.front();
   const InsSample& s = then.sample;
   const Utc utc = utc_of_unix_ns(options_.unix_ns_at_power_on + then.device_ns, 7);
   GnssPvt p;
@@ -245,17 +277,7 @@ void XsensSimulator::send_fix(HostStamp at) {
   PacketWriter packets(buffer);
   packets.put_pvt(p);  // in these messages the data stands before the stamps
   put_stamps(then.device_ns, &packets);
-  send(at, id_of(MessageId::mtdata2), packets.payload());
-}
-
-bool XsensSimulator::sync_out_within(std::int64_t from_ns, std::int64_t to_ns) const noexcept {
-  for (const SyncEntry& e : sync_.items()) {
-    if (e.function != kSyncIntervalTransition || e.line != kSyncLineOut || e.polarity == 0)
-      continue;
-    const auto period = static_cast<std::int64_t>(1e9 / kSyncOutBase) * (e.skip + 1);
-    if (to_ns / period != from_ns / period) return true;
-  }
-  return false;
+  return message(MessageId::mtdata2, packets.payload());
 }
 
 }  // namespace vergence::mock
