@@ -23,7 +23,7 @@ enum class DeviceStatus : std::uint8_t {
   no_permission,      // the system does not let us
   busy,               // somebody else has it
   unsupported,        // the device cannot do what was asked (size, rate, trigger)
-  bad_configuration,  // nonsense was asked: zero rate, negative exposure
+  bad_configuration,  // an impossible value was requested: zero rate, negative exposure
   no_bandwidth,       // the bus has no room for this stream
   failed,             // the system or the device refused for another reason
 };

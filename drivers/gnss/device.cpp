@@ -76,11 +76,11 @@ DeviceStatus Device::find() {
   }
   if (status == DeviceStatus::not_found)
     last_error_ = place().name() + ": " +
-                  heard_instead(decoder_.sentences() - sentences, decoder_.frames() - frames);
+                  received_instead(decoder_.sentences() - sentences, decoder_.frames() - frames);
   return status;
 }
 
-std::string Device::heard_instead(std::uint64_t sentences, std::uint64_t frames) const {
+std::string Device::received_instead(std::uint64_t sentences, std::uint64_t frames) const {
   const bool nmea = options_.protocol == Protocol::nmea;
   if (nmea && sentences > 0)
     return "it sends NMEA 0183, but neither GGA nor RMC; enable GGA and RMC on this port";
@@ -202,7 +202,7 @@ DeviceStatus Device::begin() noexcept {
 }
 
 DeviceStatus Device::read_on() noexcept {
-  HostStamp heard = line()->now();
+  HostStamp last_received = line()->now();
   std::uint64_t fixes = decoder_.fixes();
   for (;;) {
     if (stop_requested()) return DeviceStatus::stopped;
@@ -210,9 +210,9 @@ DeviceStatus Device::read_on() noexcept {
     if (status != DeviceStatus::ok && status != DeviceStatus::timeout &&
         status != DeviceStatus::stopped)
       return status;
-    if (decoder_.fixes() != fixes) heard = line()->now();
+    if (decoder_.fixes() != fixes) last_received = line()->now();
     fixes = decoder_.fixes();
-    if (line()->now() - heard > kSilent) return DeviceStatus::gone;
+    if (line()->now() - last_received > kSilent) return DeviceStatus::gone;
   }
 }
 

@@ -50,7 +50,7 @@ class Device final : public InsDevice, private SerialDevice<InsReading, 256> {  
   [[nodiscard]] DeviceStatus listen(std::uint32_t baud);
   [[nodiscard]] DeviceStatus measure_rate();
   [[nodiscard]] DeviceStatus read_once(Duration limit, bool discard) noexcept;
-  [[nodiscard]] std::string heard_instead(std::uint64_t sentences, std::uint64_t frames) const;
+  [[nodiscard]] std::string received_instead(std::uint64_t sentences, std::uint64_t frames) const;
   [[nodiscard]] DeviceStatus begin() noexcept override;
   [[nodiscard]] DeviceStatus read_on() noexcept override;
   [[nodiscard]] DeviceStatus reopen() override;
@@ -58,7 +58,7 @@ class Device final : public InsDevice, private SerialDevice<InsReading, 256> {  
 
   const Options options_;
   DeviceInfo info_;
-  std::uint32_t baud_ = 0;  // at which the receiver was last heard; 0: not yet
+  std::uint32_t baud_ = 0;  // at which the receiver last sent something; 0: not yet
   double rate_hz_ = 0;      // measured
   bool configured_ = false, has_native_usb_ = false;
   std::string last_error_, remark_;

@@ -162,7 +162,7 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
     exchange_.begin(ready);
     capture_.start(*queue_, *settings_, fd_.get());
   } catch (const std::exception& e) {
-    exchange_.abort();
+    exchange_.end();
     (void)queue_->stop();
     return refuse(DeviceStatus::failed, e.what());
   }

@@ -1,6 +1,5 @@
 #include "drivers/v4l2/frame_exchange.hpp"
 
-#include <chrono>
 #include <utility>
 
 namespace vergence::v4l2 {
@@ -9,7 +8,7 @@ namespace vergence::v4l2 {
 
 bool FrameExchange::busy() const noexcept {
   const std::lock_guard lock(mutex_);
-  return streaming_ || slots_.held() > 0;
+  return queue_.started() || slots_.held() > 0;
 }
 
 void FrameExchange::use_buffers(int width, int height, std::size_t stride) {
@@ -37,76 +36,38 @@ FrameExchange::Buffers FrameExchange::free_buffers() noexcept {
 }
 
 void FrameExchange::begin(Notifier* ready) noexcept {
-  const std::lock_guard lock(mutex_);
-  notifier_ = ready;
-  streaming_ = true;
-  gone_ = node_died_ = false;
-  ++statistics_.starts;
-}
-
-void FrameExchange::abort() noexcept {
-  const std::lock_guard lock(mutex_);
-  streaming_ = false;
-}
-
-void FrameExchange::end() noexcept {
   {
     const std::lock_guard lock(mutex_);
-    streaming_ = false;
-    gone_ = false;
+    node_died_ = false;
   }
-  changed_.notify_all();
+  queue_.begin(ready);
+  queue_.count_start();
 }
 
 bool FrameExchange::drain() noexcept {
   const std::lock_guard lock(mutex_);
-  for (; ready_count_ > 0; --ready_count_, ready_first_ = (ready_first_ + 1) % ready_.size())
-    (void)slots_.release(ready_[ready_first_].slot);
+  for (FrameSlot slot = 0; queue_.drain(&slot);) (void)slots_.release(slot);
   return node_died_;
 }
 
 // ---- any thread
 
-bool FrameExchange::streaming() const noexcept {
-  const std::lock_guard lock(mutex_);
-  return streaming_;
-}
-
 DeviceStatus FrameExchange::standing() const noexcept {
-  const std::lock_guard lock(mutex_);
-  if (!streaming_) return DeviceStatus::stopped;
-  return gone_ ? DeviceStatus::gone : DeviceStatus::ok;
-}
-
-CameraStatistics FrameExchange::statistics() const noexcept {
-  const std::lock_guard lock(mutex_);
-  return statistics_;
-}
-
-// ---- the consumer and the releaser
-
-DeviceStatus FrameExchange::wait(Duration limit, Frame* frame) noexcept {
-  std::unique_lock lock(mutex_);
-  if (!streaming_) return DeviceStatus::stopped;
-  const auto something = [this] { return ready_count_ > 0 || gone_ || !streaming_; };
-  if (!something() && limit > Duration{})
-    (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()), something);
-  if (!streaming_) return DeviceStatus::stopped;
-  if (ready_count_ > 0) {
-    *frame = ready_[ready_first_];
-    ready_first_ = (ready_first_ + 1) % ready_.size();
-    --ready_count_;
-    ++statistics_.delivered;
-    if (frame->status == FrameStatus::torn) ++statistics_.torn;
-    return DeviceStatus::ok;
+  switch (queue_.state()) {
+    case FrameQueue::State::stopped:
+      return DeviceStatus::stopped;
+    case FrameQueue::State::streaming:
+      return DeviceStatus::ok;
+    default:
+      return DeviceStatus::gone;
   }
-  if (!gone_) return DeviceStatus::timeout;
-  frame->arrival = gone_at_;
-  return DeviceStatus::gone;
 }
+
+// ---- the releaser
 
 bool FrameExchange::release(FrameSlot slot) noexcept {
   const std::lock_guard lock(mutex_);
+  (void)queue_.release(slot);  // before it is free to be offered again
   const std::optional<std::uint32_t> buffer = slots_.release(slot);
   if (buffer)
     returned_.index[returned_.count++] = *buffer;  // while stopped start() finds it by itself
@@ -122,14 +83,9 @@ FrameExchange::Buffers FrameExchange::take_returned() noexcept {
   return taken;
 }
 
-void FrameExchange::count_lost(std::uint64_t exposures) noexcept {
-  const std::lock_guard lock(mutex_);
-  statistics_.lost += exposures;
-}
-
 /// Precondition: mutex_ held.
 std::optional<FrameSlot> FrameExchange::counted(std::optional<FrameSlot> slot) noexcept {
-  if (!slot) ++statistics_.underruns;
+  if (!slot) queue_.count_underrun();
   return slot;
 }
 
@@ -146,29 +102,14 @@ std::optional<FrameSlot> FrameExchange::hold_pooled() noexcept {
 }
 
 void FrameExchange::offer(const Frame& frame) noexcept {
-  {
-    const std::lock_guard lock(mutex_);
-    ready_[(ready_first_ + ready_count_) % ready_.size()] = frame;
-    ++ready_count_;
-  }
-  changed_.notify_one();
-  if (notifier_ != nullptr) notifier_->notify();
+  if (queue_.offer(frame)) return;
+  const std::lock_guard lock(mutex_);
+  (void)slots_.release(frame.slot);  // its buffer: start() finds it by itself
 }
 
 void FrameExchange::note_dead_node() noexcept {
   const std::lock_guard lock(mutex_);
   node_died_ = true;
-}
-
-void FrameExchange::lose(HostStamp when) noexcept {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!streaming_) return;
-    gone_ = true;
-    gone_at_ = when;
-  }
-  changed_.notify_all();
-  if (notifier_ != nullptr) notifier_->notify();
 }
 
 }  // namespace vergence::v4l2

@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "drivers/camera.hpp"
+#include "drivers/common/frame_queue.hpp"
 #include "drivers/v4l2/slots.hpp"
 
 namespace vergence::v4l2 {
@@ -16,11 +16,11 @@ namespace vergence::v4l2 {
 inline constexpr std::size_t kBufferReserve =
     2;  // the kernel always has: with none it drops frames, and nobody knows how many
 
-/// Between the capture thread and the camera's users: frames one way, buffers back, and what state
-/// the stream is in.
+/// Between the capture thread and the camera's users: frames one way, by a FrameQueue, and the
+/// kernel's buffers back.
 ///
-/// Threads  Each call by whom its comment names. One mutex, held for a few assignments only, never
-///          across a system call.
+/// Threads  Each call by whom its comment names. One mutex beside the queue's, held for a few
+///          assignments only, never across a system call.
 /// Memory   Fixed, but for the slots (Slots). Full: the newest frame is refused and counted as an
 ///          underrun.
 class FrameExchange {
@@ -46,22 +46,22 @@ class FrameExchange {
   [[nodiscard]] Buffers free_buffers() noexcept;
   /// It streams: one start more.
   void begin(Notifier* ready) noexcept;
-  /// It does not after all.
-  void abort() noexcept;
-  /// Those who wait are woken.
-  void end() noexcept;
+  /// It does not, or not any more. Those who wait are woken.
+  void end() noexcept { queue_.end(); }
   /// After the capture thread's end: what nobody took is free again. True: the node has died.
   [[nodiscard]] bool drain() noexcept;
 
   // Any thread.
-  [[nodiscard]] bool streaming() const noexcept;
+  [[nodiscard]] bool started() const noexcept { return queue_.started(); }
   /// → ok (it streams), stopped, gone
   [[nodiscard]] DeviceStatus standing() const noexcept;
   [[nodiscard]] ImageView view(FrameSlot slot) const noexcept { return slots_.view(slot); }
-  [[nodiscard]] CameraStatistics statistics() const noexcept;
+  [[nodiscard]] CameraStatistics statistics() const noexcept { return queue_.statistics(); }
 
   // The consumer.
-  [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept;
+  [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept {
+    return queue_.wait(limit, frame);
+  }
   // The releaser.
   /// True: a buffer is free by it, for the capture thread.
   [[nodiscard]] bool release(FrameSlot slot) noexcept;
@@ -73,32 +73,27 @@ class FrameExchange {
   [[nodiscard]] std::span<std::uint8_t> writable(FrameSlot slot) noexcept {
     return slots_.writable(slot);
   }
-  void count_lost(std::uint64_t exposures) noexcept;
+  void count_lost(std::uint64_t exposures) noexcept { queue_.count_lost(exposures); }
   /// The slot that a filled buffer is, its first pixel at `offset`; nothing: the kernel, which has
   /// `with_kernel` beside it, would have too few. Precondition: slots().in_place().
   [[nodiscard]] std::optional<FrameSlot> hold_buffer(std::uint32_t index, std::size_t offset,
                                                      std::size_t with_kernel) noexcept;
   /// A slot to convert into; nothing: all are out. Precondition: not slots().in_place().
   [[nodiscard]] std::optional<FrameSlot> hold_pooled() noexcept;
-  /// Of a slot that is held.
+  /// Of a slot that is held; free again where it was stopped meanwhile.
   void offer(const Frame& frame) noexcept;
   void note_dead_node() noexcept;
   /// From streaming: the camera is gone. Nothing happens where it was stopped.
-  void lose(HostStamp when) noexcept;
+  void lose(HostStamp when) noexcept { queue_.lose(when); }
 
  private:
   [[nodiscard]] std::optional<FrameSlot> counted(std::optional<FrameSlot> slot) noexcept;
 
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  Notifier* notifier_ = nullptr;  // constant while streaming
+  FrameQueue queue_;
+  mutable std::mutex mutex_;  // of what follows
   Slots slots_;
-  std::array<Frame, Slots::kMost> ready_{};
-  std::size_t ready_first_ = 0, ready_count_ = 0;
   Buffers returned_{};
-  bool streaming_ = false, gone_ = false, node_died_ = false;
-  HostStamp gone_at_{};
-  CameraStatistics statistics_{};
+  bool node_died_ = false;
 };
 
 }  // namespace vergence::v4l2

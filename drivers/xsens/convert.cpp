@@ -28,7 +28,7 @@ Eigen::Quaterniond enu_from(LocalFrame frame) noexcept {
 /// What both generations' status bits say alike.
 void fill_fix(bool filter_valid, bool fix, bool coasting, const Receiver& receiver, HostStamp now,
               InsReading* r) noexcept {
-  const bool fresh = receiver.known && now - receiver.heard < kReceiverStale;
+  const bool fresh = receiver.known && now - receiver.received < kReceiverStale;
   InsSample& s = r->sample;
   r->quality.filter_valid = filter_valid;
   if (fresh) {
@@ -127,13 +127,13 @@ std::array<double, 3> enu_vector(const Three& v, LocalFrame frame) noexcept {
   return v;
 }
 
-Receiver receiver_of(const GnssPvt& p, HostStamp heard) noexcept {
+Receiver receiver_of(const GnssPvt& p, HostStamp received) noexcept {
   constexpr std::uint32_t kUnknown = 0xFFFFFFFF;
   constexpr std::uint16_t kNoDop = 9999;
   const auto metres = [](std::uint32_t mm) { return mm == kUnknown ? 0 : 1e-3 * mm; };
   Receiver r;
   r.known = true;
-  r.heard = heard;
+  r.received = received;
   r.fix = (p.flags & 1U) != 0 ? p.fix : std::uint8_t{0};
   r.satellites = p.satellites;
   if (p.dop_1e2[1] != kNoDop) r.position_dop = 0.01F * static_cast<float>(p.dop_1e2[1]);
@@ -144,10 +144,10 @@ Receiver receiver_of(const GnssPvt& p, HostStamp heard) noexcept {
   return r;
 }
 
-Receiver receiver_of(const LegacyFix& f, std::uint8_t status, HostStamp heard) noexcept {
+Receiver receiver_of(const LegacyFix& f, std::uint8_t status, HostStamp received) noexcept {
   Receiver r;
   r.known = true;
-  r.heard = heard;
+  r.received = received;
   r.fix = (status & kStatusGnssFix) != 0 ? 3 : 0;
   r.position_sigma = 1e-3 * f.horizontal_accuracy_mm / std::numbers::sqrt2;
   r.height_sigma = 1e-3 * f.vertical_accuracy_mm;

@@ -26,16 +26,16 @@ namespace vergence::xsens {
 /// The receiver's newest word about its fix.
 struct Receiver {
   bool known = false;
-  HostStamp heard{};
+  HostStamp received{};
   std::uint8_t fix = 0;  // as GnssPvt
   std::uint8_t satellites = 0;
   float position_dop = 0;
   double position_sigma = 0, height_sigma = 0,
          velocity_sigma = 0;  // m, m, m/s, each axis; 0: not told
 };
-[[nodiscard]] Receiver receiver_of(const xbus::GnssPvt& pvt, HostStamp heard) noexcept;
+[[nodiscard]] Receiver receiver_of(const xbus::GnssPvt& pvt, HostStamp received) noexcept;
 [[nodiscard]] Receiver receiver_of(const xbus::LegacyFix& fix, std::uint8_t status,
-                                   HostStamp heard) noexcept;
+                                   HostStamp received) noexcept;
 
 /// Fills attitude, velocity, position, fix, sigmas and quality; number and times are the caller's.
 /// Absent fields stay invalid. A receiver's word older than kReceiverStale is not used.

@@ -161,7 +161,7 @@ DeviceStatus Device::begin() noexcept {
 
 DeviceStatus Device::read_on() noexcept {
   std::array<std::uint8_t, Decoder::kMostBytes> bytes{};
-  HostStamp heard = line()->now();
+  HostStamp last_received = line()->now();
   std::uint64_t frames = decoder_.line_counters().messages;
   for (;;) {
     if (stop_requested()) return DeviceStatus::stopped;
@@ -170,7 +170,7 @@ DeviceStatus Device::read_on() noexcept {
       decoder_.accept(std::span(bytes).first(r.size), r.arrival);
       for (InsReading reading; decoder_.next(&reading);) hand_out(reading, reading.arrival);
       count();
-      if (decoder_.line_counters().messages != frames) heard = r.arrival;
+      if (decoder_.line_counters().messages != frames) last_received = r.arrival;
       frames = decoder_.line_counters().messages;
     } else if (r.status == DeviceStatus::timeout) {
       decoder_.quiet();
@@ -178,7 +178,7 @@ DeviceStatus Device::read_on() noexcept {
       return r.status;
     }
     // No whole frame for that long, be it silence or noise.
-    if (line()->now() - heard > kSilent) return DeviceStatus::gone;
+    if (line()->now() - last_received > kSilent) return DeviceStatus::gone;
   }
 }
 

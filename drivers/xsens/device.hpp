@@ -60,7 +60,7 @@ class Device final : public InsDevice,
   Identity identity_{};
   StreamSettings set_{};
   double rate_hz_ = 0;
-  std::uint32_t baud_ = 0;  // at which the device was last heard; 0: not yet
+  std::uint32_t baud_ = 0;  // at which the device last sent something; 0: not yet
   bool configured_ = false;
   std::string last_error_, remark_;
 

@@ -58,27 +58,30 @@ Answer RequestReply::listen(std::uint8_t requested, HostStamp until, Reply* repl
 }
 
 void RequestReply::remember(std::span<const std::uint8_t> bytes) noexcept {
-  const std::size_t n = std::min(bytes.size(), heard_.size() - heard_size_);
-  std::copy_n(bytes.begin(), n, heard_.begin() + static_cast<std::ptrdiff_t>(heard_size_));
-  heard_size_ += n;
+  const std::size_t n = std::min(bytes.size(), received_.size() - received_size_);
+  std::copy_n(bytes.begin(), n, received_.begin() + static_cast<std::ptrdiff_t>(received_size_));
+  received_size_ += n;
 }
 
 void RequestReply::forget() noexcept {
   stream_.reset();
   messages_ = 0;
-  heard_size_ = 0;
+  received_size_ = 0;
 }
 
-std::string RequestReply::heard_instead() const {
-  const std::string_view heard(reinterpret_cast<const char*>(heard_.data()), heard_size_);
-  if (heard.empty() || messages_ > 0) return {};
-  if (heard.find("$G") != std::string_view::npos && heard.find("\r\n") != std::string_view::npos)
+std::string RequestReply::received_instead() const {
+  const std::string_view received(reinterpret_cast<const char*>(received_.data()), received_size_);
+  if (received.empty() || messages_ > 0) return {};
+  if (received.find("$G") != std::string_view::npos &&
+      received.find("\r\n") != std::string_view::npos)
     return "it speaks NMEA 0183";
-  if (heard.find("\xB5\x62") != std::string_view::npos) return "it speaks u-blox's protocol";
-  if (heard.find("\xAA\x44\x12") != std::string_view::npos) return "it speaks NovAtel's protocol";
-  if (heard.find("snp") != std::string_view::npos)
+  if (received.find("\xB5\x62") != std::string_view::npos) return "it speaks u-blox's protocol";
+  if (received.find("\xAA\x44\x12") != std::string_view::npos)
+    return "it speaks NovAtel's protocol";
+  if (received.find("snp") != std::string_view::npos)
     return "it speaks the protocol of a Redshift or CH Robotics sensor";
-  if (heard.find("VNYMR") != std::string_view::npos || heard.find("$VN") != std::string_view::npos)
+  if (received.find("VNYMR") != std::string_view::npos ||
+      received.find("$VN") != std::string_view::npos)
     return "it speaks VectorNav's protocol";
   return "its bytes are no Xbus";
 }

@@ -46,11 +46,11 @@ class RequestReply {
            Duration limit = kAnswerTime);
   void ask(xbus::MessageId id, Reply* reply) { ask(id, {}, reply); }
 
-  /// What the bytes that were heard look like, when they are no Xbus: for a sentence. Empty:
-  /// nothing was heard.
-  [[nodiscard]] std::string heard_instead() const;
-  [[nodiscard]] std::uint64_t messages_heard() const noexcept { return messages_; }
-  /// Forgets what was heard: after a change of the baud rate.
+  /// What the bytes that were received look like, when they are no Xbus: for a sentence. Empty:
+  /// nothing was received.
+  [[nodiscard]] std::string received_instead() const;
+  [[nodiscard]] std::uint64_t messages_received() const noexcept { return messages_; }
+  /// Forgets what was received: after a change of the baud rate.
   void forget() noexcept;
 
  private:
@@ -61,8 +61,8 @@ class RequestReply {
   const std::atomic<bool>& stop_;
   xbus::FrameStream stream_;
   std::uint64_t messages_ = 0;
-  std::array<std::uint8_t, 512> heard_{};  // the first bytes
-  std::size_t heard_size_ = 0;
+  std::array<std::uint8_t, 512> received_{};  // the first bytes
+  std::size_t received_size_ = 0;
 };
 
 }  // namespace vergence::xsens

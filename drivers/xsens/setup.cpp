@@ -58,10 +58,11 @@ DeviceStatus Setup::find() {
       last_error_ = "the line went dead while the device was looked for; check its cable";
       return status;
     }
-    const std::string heard = dialogue_.heard_instead();
+    const std::string received = dialogue_.received_instead();
     // At the wrong rate any device is noise: what is recognised outranks what is not.
-    if (!heard.empty() && (instead.empty() || instead == "its bytes are no Xbus")) instead = heard;
-    if (dialogue_.messages_heard() > 0)
+    if (!received.empty() && (instead.empty() || instead == "its bytes are no Xbus"))
+      instead = received;
+    if (dialogue_.messages_received() > 0)
       instead = format_text(
           "it sends Xbus messages at %u baud, but does not answer: check the line towards it",
           bauds[i]);

@@ -23,7 +23,7 @@ std::span<const std::uint8_t> find_chunk(std::span<const std::uint8_t> tail,
   for (int i = 0; i < kMostChunks && tail.size() >= kTag; ++i) {
     const std::size_t end = tail.size() - kTag;
     const std::uint32_t length = word_at(tail, end + 4);
-    if (length > end) return {};  // the pixels, or nonsense
+    if (length > end) return {};  // the pixels, or no chunk
     if (word_at(tail, end) == id) return tail.subspan(end - length, length);
     tail = tail.first(end - length);
   }

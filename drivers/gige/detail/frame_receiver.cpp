@@ -28,7 +28,7 @@ void FrameReceiver::supply_buffers() {
   free_.clear();
   for (std::size_t i = 0; i < memory_.slots(); ++i) {
     const auto slot = static_cast<FrameSlot>(i);
-    if (handover_.is_out(slot)) continue;  // comes when it is released
+    if (slots_.is_out(slot)) continue;  // comes when it is released
     if (memory_.converts())
       free_.push_back(slot);
     else
@@ -53,7 +53,7 @@ void FrameReceiver::callback(void* self, ArvStreamCallbackType type, ArvBuffer*)
 
 /// Slots that came back go to the transport again.
 void FrameReceiver::recycle() noexcept {
-  for (FrameSlot slot = 0; handover_.returned(&slot);) {
+  for (FrameSlot slot = 0; slots_.returned(&slot);) {
     if (memory_.converts())
       free_.push_back(slot);
     else
@@ -74,7 +74,7 @@ void FrameReceiver::take(ArvBuffer* buffer) noexcept {
   }
   if (!memory_.converts()) {
     frame.slot = static_cast<FrameSlot>(index);
-    if (!handover_.offer(frame)) session_->push(buffer);
+    if (!slots_.offer(frame)) session_->push(buffer);
     return;
   }
   if (free_.empty()) {  // cannot be: one more than may be out
@@ -84,7 +84,7 @@ void FrameReceiver::take(ArvBuffer* buffer) noexcept {
   frame.slot = free_.back();
   memory_.convert(*applied_->format, index, frame.slot);
   session_->push(buffer);
-  if (handover_.offer(frame)) free_.pop_back();
+  if (slots_.offer(frame)) free_.pop_back();
 }
 
 /// What is known of a buffer that is done; false: nothing that could be handed out.
@@ -95,7 +95,7 @@ bool FrameReceiver::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame)
   const auto step = blocks_.next(id);  // 0, as it was pushed: the leader is lost; the next frame's
                                        // id shows that one is missing
   if (!step) return false;
-  handover_.count_lost(step->missing);
+  queue_.count_lost(step->missing);
   frame->counter = step->counter;
   frame->arrival = arrival;
   const bool stamp_at_end = applied_->options.stamp_at_end;

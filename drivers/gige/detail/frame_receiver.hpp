@@ -5,16 +5,17 @@
 #include <vector>
 
 #include "drivers/camera.hpp"
+#include "drivers/common/frame_queue.hpp"
 #include "drivers/exposure/applied_exposure.hpp"
 #include "drivers/gige/detail/block_counter.hpp"
-#include "drivers/gige/detail/handover.hpp"
 #include "drivers/gige/detail/image_memory.hpp"
 #include "drivers/gige/detail/session.hpp"
+#include "drivers/gige/detail/slot_returns.hpp"
 
 namespace vergence::gige {
 
 /// What Aravis's receive thread does: buffers that are done become frames with number, time,
-/// exposure and state, and go to the Handover; slots that come back go to the transport again.
+/// exposure and state, and go to the FrameQueue; slots that come back go to the transport again.
 ///
 /// Threads  begin(), supply_buffers(), end(): the owner, while no callback can come. callback():
 ///          Aravis's thread, vergence-gige. The others: any.
@@ -22,8 +23,9 @@ namespace vergence::gige {
 /// Errors   A frame of another size than configured is torn, and counted.
 class FrameReceiver {
  public:
-  /// Both outlive the receiver.
-  FrameReceiver(Handover& handover, ImageMemory& memory) : handover_(handover), memory_(memory) {}
+  /// All outlive the receiver.
+  FrameReceiver(FrameQueue& queue, SlotReturns& slots, ImageMemory& memory)
+      : queue_(queue), slots_(slots), memory_(memory) {}
 
   /// Of Session::open_stream(); `self` is a FrameReceiver.
   static void callback(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
@@ -68,7 +70,8 @@ class FrameReceiver {
   [[nodiscard]] std::optional<Duration> reported_exposure(ArvBuffer* buffer) const noexcept;
   void recycle() noexcept;
 
-  Handover& handover_;
+  FrameQueue& queue_;
+  SlotReturns& slots_;
   ImageMemory& memory_;
   Session* session_ = nullptr;
   const Applied* applied_ = nullptr;

@@ -31,9 +31,9 @@ std::string GigeCamera::remark() const {
 DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   try {
-    if (handover_.state() != Handover::State::stopped)
+    if (queue_.state() != FrameQueue::State::stopped)
       return last_error_.refuse(DeviceStatus::busy, "the camera streams; stop it first");
-    if (handover_.any_out())
+    if (queue_.held() != 0)
       return last_error_.refuse(DeviceStatus::busy, "images are still in use; release them first");
     if (requested.width <= 0 || requested.height <= 0 || requested.offset_x < 0 ||
         requested.offset_y < 0)
@@ -64,7 +64,7 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
     receiver_.reset_counts();
     memory_.allocate(*applied_.format, requested_.width, requested_.height, applied_.payload,
                      static_cast<std::size_t>(options_.buffers));
-    handover_.set_slots(memory_.slots(), static_cast<std::size_t>(options_.buffers));
+    slots_.set_most(static_cast<std::size_t>(options_.buffers));
     configured_ = true;
     if (actual != nullptr) *actual = applied_.actual;
     remark_.set(session_->remark());
@@ -115,25 +115,25 @@ DeviceStatus GigeCamera::apply_again() {
 DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
   try {
     if (!configured_) return DeviceStatus::bad_configuration;
-    const Handover::State state = handover_.state();
-    if (state == Handover::State::streaming) return DeviceStatus::ok;
-    if (state == Handover::State::gone) return DeviceStatus::gone;  // the supervisor is at it
+    const FrameQueue::State state = queue_.state();
+    if (state == FrameQueue::State::streaming) return DeviceStatus::ok;
+    if (state == FrameQueue::State::gone) return DeviceStatus::gone;  // the supervisor is at it
     const std::lock_guard lock(device_);
-    DeviceStatus status = state == Handover::State::stopped ? reach() : DeviceStatus::ok;
+    DeviceStatus status = state == FrameQueue::State::stopped ? reach() : DeviceStatus::ok;
     if (status == DeviceStatus::ok && stale_) status = apply_again();
     if (status == DeviceStatus::ok) status = begin(ready);
     if (status == DeviceStatus::ok) {
-      handover_.count_start();
+      queue_.count_start();
       start_supervising();
       return status;
     }
     close_stream(false);
-    if (state == Handover::State::back) {  // not yet, after all
+    if (state == FrameQueue::State::back) {  // not yet, after all
       session_.reset();
-      handover_.fail(monotonic_now());
+      queue_.fail(monotonic_now());
       return DeviceStatus::gone;
     }
-    handover_.end();
+    queue_.end();
     return status == DeviceStatus::unsupported ? DeviceStatus::bad_configuration : status;
   } catch (const std::exception&) {
     return DeviceStatus::failed;
@@ -146,7 +146,8 @@ DeviceStatus GigeCamera::begin(Notifier* ready) {
       s != DeviceStatus::ok)
     return last_error_.refuse(s, session_->last_error());
   receiver_.begin(*session_, applied_, requested_.width, requested_.height, in_force_);
-  handover_.begin(ready);
+  slots_.take_back();
+  queue_.begin(ready);
   receiver_.supply_buffers();
   if (const DeviceStatus s = session_->start_acquisition(); s != DeviceStatus::ok)
     return last_error_.refuse(s, session_->last_error());
@@ -161,17 +162,17 @@ void GigeCamera::close_stream(bool reachable) noexcept {
 }
 
 void GigeCamera::stop() noexcept {
-  handover_.end();
+  queue_.end();
   supervisor_.stop();
   const std::lock_guard lock(device_);
   close_stream(session_ != nullptr && !session_->lost());
 }
 
 DeviceStatus GigeCamera::standing() const noexcept {
-  switch (handover_.state()) {
-    case Handover::State::stopped:
+  switch (queue_.state()) {
+    case FrameQueue::State::stopped:
       return DeviceStatus::stopped;
-    case Handover::State::streaming:
+    case FrameQueue::State::streaming:
       return DeviceStatus::ok;
     default:
       return DeviceStatus::gone;

@@ -4,13 +4,14 @@
 #include <string>
 
 #include "drivers/camera.hpp"
+#include "drivers/common/frame_queue.hpp"
 #include "drivers/common/last_error.hpp"
 #include "drivers/common/published.hpp"
 #include "drivers/gige/detail/frame_receiver.hpp"
-#include "drivers/gige/detail/handover.hpp"
 #include "drivers/gige/detail/image_memory.hpp"
 #include "drivers/gige/detail/periodic_thread.hpp"
 #include "drivers/gige/detail/session.hpp"
+#include "drivers/gige/detail/slot_returns.hpp"
 
 namespace vergence::gige {
 
@@ -20,7 +21,7 @@ namespace vergence::gige {
 /// A GigE Vision camera: drivers/camera.hpp and gige.hpp have the contract.
 ///
 /// Aravis's receive thread fills buffers of the ImageMemory, the FrameReceiver makes frames of them
-/// and offers them to the Handover. A supervisor watches while
+/// and offers them to the FrameQueue. A supervisor watches while
 /// streaming: a camera that answers no more, or sends no more, is gone; then it opens and
 /// configures it again, with growing pauses, until start() can go on.
 /// Threads  The owner, Aravis's, the supervisor; the session is under device_, which the frames'
@@ -38,10 +39,10 @@ class GigeCamera final : public CameraDevice {
   DeviceTiming timing() const noexcept override;
   DeviceStatus start(Notifier* ready) noexcept override;
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
-    return handover_.wait(limit, frame);
+    return queue_.wait(limit, frame);
   }
   ImageView view(FrameSlot slot) const noexcept override { return memory_.view(slot); }
-  void release(FrameSlot slot) noexcept override { handover_.release(slot); }
+  void release(FrameSlot slot) noexcept override { slots_.release(slot); }
   void stop() noexcept override;
   DeviceStatus trigger_once() noexcept override;
   DeviceStatus set_exposure(const ExposureSetting& requested,
@@ -49,7 +50,7 @@ class GigeCamera final : public CameraDevice {
   [[nodiscard]] std::optional<double> temperature_c() noexcept override;
   std::string last_error() const override { return last_error_.get(); }
   std::string remark() const override;
-  CameraStatistics statistics() const noexcept override { return handover_.statistics(); }
+  CameraStatistics statistics() const noexcept override { return queue_.statistics(); }
 
  private:
   /// Whether the camera can be asked now. → ok, stopped, gone
@@ -86,8 +87,9 @@ class GigeCamera final : public CameraDevice {
   bool configured_ = false, stale_ = false;  // stale: the camera may hold what was refused
 
   ImageMemory memory_;
-  Handover handover_;
-  FrameReceiver receiver_{handover_, memory_};
+  FrameQueue queue_;
+  SlotReturns slots_{queue_};
+  FrameReceiver receiver_{queue_, slots_, memory_};
   PeriodicThread supervisor_;
 };
 

@@ -33,23 +33,23 @@ void GigeCamera::start_supervising() {
 
 void GigeCamera::supervise(Watch* watch) {
   try {
-    switch (handover_.state()) {
-      case Handover::State::streaming:
+    switch (queue_.state()) {
+      case FrameQueue::State::streaming:
         watch->pause = kFirstPause;
         watch->next_try = monotonic_now() + watch->pause;
         if (const Fault fault = check(monotonic_now(), &watch->asked); !fault.reason.empty())
           lose(fault);
         break;
-      case Handover::State::gone:
+      case FrameQueue::State::gone:
         if (monotonic_now() < watch->next_try) break;
-        if (reopen()) handover_.ready_again();
+        if (reopen()) queue_.ready_again();
         watch->pause = std::min(watch->pause * 2, kLongestPause);
         watch->next_try = monotonic_now() + watch->pause;
         break;
-      case Handover::State::back:
-        handover_.ready_again();
+      case FrameQueue::State::back:
+        queue_.ready_again();
         break;
-      case Handover::State::stopped:
+      case FrameQueue::State::stopped:
         break;
     }
   } catch (const std::exception&) {  // no memory for a sentence: the next round tries again
@@ -66,7 +66,7 @@ GigeCamera::Fault GigeCamera::check(HostStamp at, HostStamp* asked) {
             " where " + size_text(requested_.width, requested_.height) +
             " was configured; power it off and on"};
   const std::lock_guard lock(device_);
-  if (session_ == nullptr || handover_.state() != Handover::State::streaming) return {};
+  if (session_ == nullptr || queue_.state() != FrameQueue::State::streaming) return {};
   if (session_->lost()) return kSilent;
   const Duration silence = at - receiver_.last_buffer();
   const Duration period = Duration::seconds(1 / requested_.rate_hz);
@@ -84,7 +84,7 @@ GigeCamera::Fault GigeCamera::check(HostStamp at, HostStamp* asked) {
 
 void GigeCamera::lose(const Fault& fault) {
   last_error_.set(fault.reason);
-  handover_.lose(monotonic_now());
+  queue_.lose(monotonic_now());
   const std::lock_guard lock(device_);
   close_stream(fault.reachable);
   session_.reset();

@@ -17,7 +17,7 @@ namespace vergence::gige {
 ///
 /// Ownership  One reference to every buffer is this object's.
 /// Threads    allocate(), clear(): the owner, while no stream is open. The others: any; pixels
-///            belong to whom the Handover says.
+///            belong to whom the SlotReturns say.
 /// Memory     One arena, taken by allocate().
 class ImageMemory {
  public:

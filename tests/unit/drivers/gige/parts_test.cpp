@@ -7,8 +7,8 @@
 
 #include "drivers/gige/detail/block_counter.hpp"
 #include "drivers/gige/detail/grey.hpp"
-#include "drivers/gige/detail/handover.hpp"
 #include "drivers/gige/detail/link.hpp"
+#include "drivers/gige/detail/slot_returns.hpp"
 #include "drivers/gige/gige.hpp"
 
 namespace vergence::gige {
@@ -139,71 +139,55 @@ TEST(GigeGrey, aMosaicOfOneColourHasNoGrid) {
   for (const std::uint8_t v : out) EXPECT_EQ(v, 110);
 }
 
-TEST(GigeHandover, slotsOutAreLimitedAndComeBack) {
-  Handover h;
-  h.set_slots(6, 3);
+TEST(GigeSlotReturns, slotsOutAreLimitedAndComeBack) {
+  FrameQueue queue;
+  SlotReturns slots(queue);
+  slots.set_most(3);
   Frame frame;
-  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::stopped);
-  h.begin(nullptr);
-  h.count_start();
+  EXPECT_FALSE(slots.offer(frame)) << "stopped";
+  queue.begin(nullptr);
   for (FrameSlot s = 0; s < 3; ++s) {
     frame.slot = s;
-    EXPECT_TRUE(h.offer(frame));
+    EXPECT_TRUE(slots.offer(frame));
   }
   frame.slot = 3;
-  EXPECT_FALSE(h.offer(frame));
-  EXPECT_EQ(h.statistics().underruns, 1U);
-  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::ok);
+  EXPECT_FALSE(slots.offer(frame));
+  EXPECT_EQ(queue.statistics().underruns, 1U) << "not that of the stopped one";
+  EXPECT_EQ(queue.wait(Duration{}, &frame), DeviceStatus::ok);
   EXPECT_EQ(frame.slot, 0);
-  EXPECT_TRUE(h.any_out());
-  h.release(0);
-  EXPECT_FALSE(h.any_out());
+  slots.release(0);
+  EXPECT_TRUE(slots.is_out(0)) << "on its way";
   FrameSlot back = 9;
-  EXPECT_TRUE(h.returned(&back));
+  EXPECT_TRUE(slots.returned(&back));
   EXPECT_EQ(back, 0);
-  EXPECT_FALSE(h.returned(&back));
+  EXPECT_FALSE(slots.is_out(0));
+  EXPECT_FALSE(slots.returned(&back));
   frame.slot = 3;
-  EXPECT_TRUE(h.offer(frame));
-  EXPECT_EQ(h.statistics().delivered, 1U);
+  EXPECT_TRUE(slots.offer(frame));
 }
 
-TEST(GigeHandover, aNewBeginningKeepsOnlyWhatTheConsumerHolds) {
-  Handover h;
-  h.set_slots(4, 4);
-  h.begin(nullptr);
+TEST(GigeSlotReturns, aNewBeginningKeepsOnlyWhatTheConsumerHolds) {
+  FrameQueue queue;
+  SlotReturns slots(queue);
+  slots.set_most(4);
+  queue.begin(nullptr);
   Frame frame;
   for (FrameSlot s = 0; s < 4; ++s) {
     frame.slot = s;
-    EXPECT_TRUE(h.offer(frame));
+    EXPECT_TRUE(slots.offer(frame));
   }
-  ASSERT_EQ(h.wait(Duration{}, &frame), DeviceStatus::ok);  // 0, kept
-  ASSERT_EQ(h.wait(Duration{}, &frame), DeviceStatus::ok);  // 1, given back
-  h.release(1);
-  h.end();
-  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::stopped)
+  ASSERT_EQ(queue.wait(Duration{}, &frame), DeviceStatus::ok);  // 0, kept
+  ASSERT_EQ(queue.wait(Duration{}, &frame), DeviceStatus::ok);  // 1, given back
+  slots.release(1);
+  queue.end();
+  slots.take_back();
+  queue.begin(nullptr);
+  EXPECT_EQ(queue.wait(Duration{}, &frame), DeviceStatus::timeout)
       << "2 and 3 are of the stream before";
-  EXPECT_FALSE(h.offer(frame));
-  h.begin(nullptr);
-  EXPECT_EQ(h.wait(Duration{}, &frame), DeviceStatus::timeout);
-  EXPECT_TRUE(h.is_out(0));
-  for (FrameSlot s = 1; s < 4; ++s) EXPECT_FALSE(h.is_out(s)) << s;
-}
-
-TEST(GigeHandover, whatWasOfferedIsHandedOutBeforeGone) {
-  Handover h;
-  h.set_slots(4, 4);
-  h.begin(nullptr);
-  Frame frame;
-  EXPECT_TRUE(h.offer(frame));
-  h.lose(HostStamp(77));
-  EXPECT_EQ(h.wait(Duration::seconds(1), &frame), DeviceStatus::ok);
-  EXPECT_EQ(h.wait(Duration::seconds(1), &frame), DeviceStatus::gone);
-  EXPECT_EQ(frame.arrival, HostStamp(77));
-  h.ready_again();
-  EXPECT_EQ(h.state(), Handover::State::back);
-  EXPECT_EQ(h.wait(Duration::seconds(1), &frame), DeviceStatus::gone) << "until start()";
-  h.end();
-  EXPECT_EQ(h.wait(Duration::seconds(1), &frame), DeviceStatus::stopped);
+  EXPECT_TRUE(slots.is_out(0));
+  for (FrameSlot s = 1; s < 4; ++s) EXPECT_FALSE(slots.is_out(s)) << s;
+  FrameSlot back = 9;
+  EXPECT_FALSE(slots.returned(&back)) << "1 is the transport's already";
 }
 
 }  // namespace
