@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0 OR MIT */
 /*
- * /dev/vbus1394: a virtual IEEE 1394 bus. The kernel side (vergence_1394.c) is a card driver for
- * the kernel's own FireWire core; the other nodes of the bus live in one user program, which opens
- * the device, announces the nodes, answers the requests sent to them and sends isochronous packets.
+ * /dev/vbus1394: a virtual IEEE 1394 bus. The kernel side (vergence_1394_main.c) is a card driver
+ * for the kernel's own FireWire core; the other nodes of the bus live in one user program, which
+ * opens the device, announces the nodes, answers the requests sent to them and sends isochronous
+ * packets.
  * All records start with struct vb_record and are padded to 8 bytes. Host byte order, except packet
  * payload, which is bus order (big endian) as on the wire.
  */
