@@ -2,7 +2,6 @@
 
 #include <pthread.h>
 #include <sys/resource.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <limits>
 
 #include "core/memory/allocation_guard.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
@@ -22,12 +22,6 @@ constexpr std::int64_t kMostWaitNs = 40'000'000;  // of a message for its chunk:
 constexpr std::size_t kMostChunkBytes = std::size_t{32} << 20;  // half of what readers take
 constexpr std::size_t kSpare = std::size_t{1} << 20;            // of a queue, for what is not bulky
 constexpr int kNice = 5;  // poses come first; what is recorded waits in memory
-
-std::int64_t monotonic_ns() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
-}
 
 /// How full a queue may be that is not written: a producer that does not wait finds room for an
 /// image; one that waits (`hurried`) for anything that fits at all.
@@ -174,7 +168,7 @@ Recording::Batch Recording::gather() const noexcept {
 }
 
 bool Recording::due(const Batch& batch) noexcept {
-  const std::int64_t now = monotonic_ns();
+  const std::int64_t now = monotonic_now().ns();
   if (waiting_since_ns_ == 0) waiting_since_ns_ = now;
   return batch.filled || now - waiting_since_ns_ >= kMostWaitNs;
 }

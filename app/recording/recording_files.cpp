@@ -1,7 +1,5 @@
 #include "app/recording/recording_files.hpp"
 
-#include <time.h>
-
 #include <cerrno>
 #include <climits>
 #include <cstdio>
@@ -11,6 +9,7 @@
 
 #include "app/runtime/errors.hpp"
 #include "app/runtime/version.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
@@ -28,12 +27,6 @@ constexpr const char* kQosOf[] = {
     "2147483647\n    nsec: 4294967295\n  lifespan:\n    sec: 2147483647\n    nsec: 4294967295\n  "
     "liveliness: 1\n  liveliness_lease_duration:\n    sec: 2147483647\n    nsec: 4294967295\n  "
     "avoid_ros_namespace_conventions: false\n"};
-
-std::int64_t monotonic_ns() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
-}
 
 std::vector<McapTopic> described(const std::vector<RecordedTopic>& topics) {
   std::vector<McapTopic> out;
@@ -72,13 +65,13 @@ RecordingFiles::RecordingFiles(const std::filesystem::path& folder, const Option
 // ---- the writer
 
 bool RecordingFiles::resting() const noexcept {
-  return state_ != DiskState::good && monotonic_ns() < retry_ns_;
+  return state_ != DiskState::good && monotonic_now().ns() < retry_ns_;
 }
 
 std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
                                      std::uint64_t lost) noexcept {
   if (!file_.open() && !open()) return 0;
-  const std::int64_t begun = monotonic_ns();
+  const std::int64_t begun = monotonic_now().ns();
   const std::uint64_t before = file_.size();
   int error = preamble_due_ ? write_preamble(first) : 0;
   if (error == 0) error = file_.write_chunk(parts);
@@ -86,7 +79,7 @@ std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
     fail(-error);
     return 0;
   }
-  if (const std::int64_t took = monotonic_ns() - begun; took > kSlowNs)
+  if (const std::int64_t took = monotonic_now().ns() - begun; took > kSlowNs)
     (void)notices_.push({Notice::Kind::slow, static_cast<int>(took / 1'000'000), 0, number_});
   if (state_ != DiskState::good) {
     state_ = DiskState::good;
@@ -137,7 +130,7 @@ void RecordingFiles::fail(int error) noexcept {
   if (state_ == DiskState::good)
     (void)notices_.push({full ? Notice::Kind::full : Notice::Kind::gone, error, 0, number_});
   state_ = full ? DiskState::full : DiskState::gone;
-  retry_ns_ = monotonic_ns() + kRetryNs;
+  retry_ns_ = monotonic_now().ns() + kRetryNs;
 }
 
 void RecordingFiles::roll(bool asked) noexcept {
