@@ -25,6 +25,7 @@
 #include "tests/rigs/vivid.hpp"
 #include "tests/support/gnss_bytes.hpp"
 #include "tests/support/receiver_terminal.hpp"
+#include "tests/support/thread_allocations.hpp"
 
 namespace vergence {
 namespace {
@@ -137,6 +138,7 @@ class V4l2Run : public ::testing::Test {
     EXPECT_GE(frames["posed"].get<std::uint64_t>() * 20, read * 19);
     EXPECT_EQ(frames["lost"].get<std::uint64_t>() + frames["posed"].get<std::uint64_t>(), read);
     EXPECT_EQ(summary["allocations_after_seal"], 0);
+    test::expect_no_heap_but_of({}, summary);  // the INS on a line is among them
     const app::Trajectory trajectory = app::read_tum(session_ + "/trajectory.tum");
     const Transform& last = trajectory.back().T_world_body;
     const Transform& truth = film.T_first_left(film.pairs() - 1);
