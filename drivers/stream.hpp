@@ -95,14 +95,14 @@ class Stream {
       if (!streaming()) return DeviceStatus::stopped;
       if (!ring_.pop(d)) return DeviceStatus::timeout;
     }
-    tell_taken();
+    notify_taken();
     gone_ = d->what == Delivery<T>::What::gone;
     ended_ = d->what == Delivery<T>::What::end;
     return gone_ ? DeviceStatus::gone : ended_ ? DeviceStatus::ended : DeviceStatus::ok;
   }
 
  private:
-  void tell_taken() noexcept {
+  void notify_taken() noexcept {
     taken_.fetch_add(1, std::memory_order_release);
     taken_.notify_one();
   }

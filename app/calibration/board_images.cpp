@@ -89,11 +89,11 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
   std::vector<Numbered> numbers;
   numbers.reserve(cameras.size());
   for (const auto& files : cameras) numbers.push_back(numbered(files));
-  const bool told =
+  const bool all_numbered =
       std::none_of(numbers.begin(), numbers.end(), [](const Numbered& n) { return n.empty(); });
   std::vector<std::vector<fs::path>> views;
   std::vector<fs::path> alone;
-  if (told) {
+  if (all_numbered) {
     for (const auto& [number, file] : numbers[0]) {
       std::vector<fs::path> view;
       for (const Numbered& n : numbers)
@@ -128,7 +128,7 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
 
 BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
                               const BoardPattern& board,
-                              const std::function<void(std::size_t, std::size_t)>& told) {
+                              const std::function<void(std::size_t, std::size_t)>& on_view) {
   const std::size_t cameras = views.empty() ? 0 : views.front().size();
   BoardImages images;
   images.sizes.resize(cameras);
@@ -163,7 +163,7 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
                                                ? "; the views of the other cameras are skipped, too"
                                                : "; skipped"));
     if (usable) images.views.push_back(std::move(view));
-    if (told) told(v + 1, images.views.size());
+    if (on_view) on_view(v + 1, images.views.size());
   }
   return images;
 }

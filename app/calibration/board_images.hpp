@@ -30,12 +30,11 @@ struct BoardImages {
   std::vector<std::string> remarks{};  // a sentence for every view that is skipped
 };
 
-/// Finds the board in all of them. `told` (may be empty) hears of every view: how many are done,
-/// how many of them have the board.
-/// InputError: no image can be read, or images of one camera differ in size. An image that cannot
-/// be read is a remark.
+/// Finds the board in all of them. `on_view` (may be empty) is called after every view: how many
+/// are done, how many of them have the board. InputError: no image can be read, or images of one
+/// camera differ in size. An image that cannot be read is a remark.
 [[nodiscard]] BoardImages read_board_images(
     const std::vector<std::vector<std::filesystem::path>>& views, const BoardPattern& board,
-    const std::function<void(std::size_t done, std::size_t found)>& told);
+    const std::function<void(std::size_t done, std::size_t found)>& on_view);
 
 }  // namespace vergence::app

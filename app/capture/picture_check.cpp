@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <optional>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -102,6 +104,17 @@ PictureRemark remark(bool unusable, std::string sentence) {
   return {unusable, std::move(sentence)};
 }
 
+std::optional<std::string> why_unusable(const PictureFigures& f, const std::string& who) {
+  if (f.mean < kBlack) return who + " is black: a cap on the lens, no light, or no exposure";
+  if (f.saturated > kMuch)
+    return fmt::format(
+        "{} is overexposed: {:.0f} % of it is white; lower exposure_us, then gain_db", who,
+        100 * f.saturated);
+  if (f.contrast < kFlat)
+    return who + " shows nothing: one grey all over; a cap, fog on the glass, or no sensor signal";
+  return std::nullopt;
+}
+
 }  // namespace
 
 PictureFigures figures_of(const ImageView& image) noexcept {
@@ -141,23 +154,10 @@ std::vector<PictureRemark> judge_pictures(std::span<const std::string> names,
   for (std::size_t k = 0; k < figures.size(); ++k) {
     const PictureFigures& f = figures[k];
     const std::string& who = names[k];
-    const bool told = [&] {
-      if (f.mean < kBlack)
-        return remarks.push_back(
-                   remark(true, who + " is black: a cap on the lens, no light, or no exposure")),
-               true;
-      if (f.saturated > kMuch)
-        return remarks.push_back(remark(true, fmt::format("{} is overexposed: {:.0f} % of it is "
-                                                          "white; lower exposure_us, then gain_db",
-                                                          who, 100 * f.saturated))),
-               true;
-      if (f.contrast < kFlat)
-        return remarks.push_back(remark(true, who + " shows nothing: one grey all over; a cap, fog "
-                                                    "on the glass, or no sensor signal")),
-               true;
-      return false;
-    }();
-    if (told) continue;
+    if (const auto reason = why_unusable(f, who)) {
+      remarks.push_back(remark(true, *reason));
+      continue;
+    }
     if (f.saturated > kSome)
       remarks.push_back(remark(false, fmt::format("{}: {:.0f} % of it is white, where nothing can "
                                                   "be tracked; a shorter exposure_us may help",

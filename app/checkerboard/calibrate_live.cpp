@@ -66,9 +66,9 @@ class Collection {
     std::unique_lock lock(mutex_);
     while (!changed_.wait_for(lock, std::chrono::milliseconds(50), [this] { return done_; })) {
       if (signals.stop_requested()) source_->stop();
-      tell(progress);
+      show_progress(progress);
     }
-    tell(progress);
+    show_progress(progress);
     lock.unlock();
     looking.join();
   }
@@ -136,7 +136,7 @@ class Collection {
   }
 
   /// Under the lock.
-  void tell(Progress* progress) {
+  void show_progress(Progress* progress) {
     for (const std::string& sentence : sentences_) progress->say("vergence: " + sentence);
     sentences_.clear();
     ProgressState state;

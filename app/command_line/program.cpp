@@ -22,7 +22,7 @@ namespace {
 
 /// One sentence on one line of stderr. Words of the user's may stand in it: nothing in them may
 /// steer a terminal.
-void complain(std::string sentence) {
+void print_error(std::string sentence) {
   std::replace_if(
       sentence.begin(), sentence.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
   std::cerr << "vergence: " << sentence << '\n';
@@ -130,15 +130,15 @@ ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands
     if (!std::cout) throw InputError("standard output cannot be written; is the disk full?");
     return code;
   } catch (const InputError& error) {
-    complain(error.what());
+    print_error(error.what());
   } catch (const DeviceError& error) {
-    complain(error.what());
+    print_error(error.what());
     return ExitCode::device_failed;
   } catch (const std::bad_alloc&) {
     (void)std::fputs(
         "vergence: not enough memory; close other programs or choose smaller capacities\n", stderr);
   } catch (const std::exception& error) {
-    complain(std::string("stopped by an error nobody foresaw: ") + error.what());
+    print_error(std::string("stopped by an error nobody foresaw: ") + error.what());
   }
   return ExitCode::bad_input;
 }

@@ -146,8 +146,8 @@ std::size_t beyond(const fs::path& data, std::size_t lines) {
   return n;
 }
 
-void tell(const Packets& packets, const KittiStamps& stamps, std::size_t without_stamp,
-          std::size_t disordered, RecordedIns* ins) {
+void add_remarks(const Packets& packets, const KittiStamps& stamps, std::size_t without_stamp,
+                 std::size_t disordered, RecordedIns* ins) {
   const auto say = [ins](std::size_t n, const std::string& what) {
     if (n > 0) ins->remarks.push_back(fmt::format("oxts: {} {}", n, what));
   };
@@ -189,8 +189,8 @@ RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras,
   const std::vector<std::size_t> kept = ascending(packets.stamps);
   ins.readings.reserve(kept.size());
   for (const std::size_t i : kept) ins.readings.push_back(packets.readings[i]);
-  tell(packets, stamps, beyond(data, stamps.lines.size()), packets.readings.size() - kept.size(),
-       &ins);
+  add_remarks(packets, stamps, beyond(data, stamps.lines.size()),
+              packets.readings.size() - kept.size(), &ins);
   if (!mount_wanted) return ins;
 
   const StereoSequence images = open_kitti_raw(folder, true, cameras);

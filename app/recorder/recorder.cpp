@@ -162,7 +162,7 @@ void Recorder::write(const CalibrationRecord& c) {
   }
   if (!c.decided || !totals_.add(c) || keeper_ == nullptr) return;
   if (!keeper_->post(c.stamp, c.rig))
-    complain("a calibration is not kept: the disk has not taken those before it");
+    report_error("a calibration is not kept: the disk has not taken those before it");
 }
 
 void Recorder::write(const PoseRecord& p) {
@@ -184,7 +184,7 @@ bool Recorder::take_outcome() {
   CalibrationKeeper::Outcome outcome;
   if (keeper_ == nullptr || !keeper_->next(&outcome)) return false;
   write(outcome.event);
-  if (outcome.failed) complain("{}", outcome.event.sentence.data());
+  if (outcome.failed) report_error("{}", outcome.event.sentence.data());
   return true;
 }
 
@@ -195,7 +195,7 @@ void Recorder::flush() {
       files_->reported[i] = 0;
     else if (files_->reported[i] != files[i]->fault()) {
       files_->reported[i] = files[i]->fault();
-      complain(*files[i]);
+      report_error(*files[i]);
     }
   }
   note_disk(pretended_ || std::any_of(files.begin(), files.end(),
@@ -210,7 +210,7 @@ void Recorder::reopen() noexcept {
 void Recorder::reopen_files() {
   for (LineFile* file : files_->all) {
     bool fresh = false;
-    if (!file->reopen(&fresh)) complain(*file);
+    if (!file->reopen(&fresh)) report_error(*file);
     if (fresh) file->append(files_->head(file));
   }
   EventRecord event;
@@ -227,7 +227,7 @@ void Recorder::pretend(Stamp stamp) {
   pretended_ = full;
   for (LineFile* file : files_->all) file->pretend_full(full);
   if (full)
-    complain(
+    report_error(
         "{}: the disk has no room, as the drive's faults want it; the session goes on, lines wait "
         "in memory",
         folder_);
@@ -255,25 +255,24 @@ std::uint64_t Recorder::lost_lines() const {
   return lines;
 }
 
-void Recorder::complain(const LineFile& file) {
+void Recorder::report_error(const LineFile& file) {
   const char* words = ::strerrordesc_np(file.fault());  // strerror() may take memory
-  complain(
+  report_error(
       "{}: cannot be written ({}); the session goes on, lines wait in memory: make room on that "
       "disk",
       file.path().native(), words != nullptr ? words : "unknown error");
 }
 
 template <class... Arguments>
-void Recorder::complain(const char* format, const Arguments&... arguments) noexcept {
-  Complaint complaint{};
-  (void)fmt::format_to_n(complaint.begin(), complaint.size() - 1, fmt::runtime(format),
-                         arguments...);
-  (void)complaints_.push(complaint);
+void Recorder::report_error(const char* format, const Arguments&... arguments) noexcept {
+  ErrorSentence sentence{};
+  (void)fmt::format_to_n(sentence.begin(), sentence.size() - 1, fmt::runtime(format), arguments...);
+  (void)error_sentences_.push(sentence);
 }
 
 std::vector<std::string> Recorder::take_errors() {
   std::vector<std::string> sentences;
-  for (Complaint c; complaints_.pop(&c);) sentences.emplace_back(c.data());
+  for (ErrorSentence c; error_sentences_.pop(&c);) sentences.emplace_back(c.data());
   sentences.insert(sentences.end(), errors_.begin(), errors_.end());
   errors_.clear();
   return sentences;

@@ -119,10 +119,10 @@ class Recorder {
   void note_disk(bool full);
   [[nodiscard]] std::uint64_t lost_lines() const;
   void stop_and_join() noexcept;
-  using Complaint = std::array<char, 512>;  // ends with 0, cut at the array's end
-  void complain(const LineFile& file);
+  using ErrorSentence = std::array<char, 512>;  // ends with 0, cut at the array's end
+  void report_error(const LineFile& file);
   template <class... Arguments>
-  void complain(const char* format, const Arguments&... arguments) noexcept;
+  void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
 
   struct Files;
@@ -139,7 +139,7 @@ class Recorder {
   Queue<InsRecord, kReadings> readings_;
   WakeEvent filled_, freed_;
   std::atomic<bool> stop_{false}, reopen_{false};
-  Ring<Complaint, 16> complaints_;             // full: the newest are lost
+  Ring<ErrorSentence, 16> error_sentences_;    // full: the newest are lost
   std::vector<std::string> errors_;            // of close()
   std::unique_ptr<CalibrationKeeper> keeper_;  // null: nothing is kept
   std::thread thread_;

@@ -196,9 +196,9 @@ void DeviceReplaySource::done(const PoseSample& /*sample*/) noexcept {
 
 // ---- the caller's thread
 
-void DeviceReplaySource::finish(Progress* /*progress*/, std::vector<std::string>* /*faults*/) {
-  acquisition_->join();
-}
+void DeviceReplaySource::halt() noexcept { acquisition_->join(); }
+
+void DeviceReplaySource::finish(Progress* /*progress*/, std::vector<std::string>* /*faults*/) {}
 
 std::vector<std::pair<std::string, std::uint64_t>> DeviceReplaySource::counters() const {
   const AcquisitionCounters& c = acquisition_->counters();

@@ -36,6 +36,7 @@ class DeviceReplaySource final : public FrameSource {
   [[nodiscard]] bool next(SourceItem* item) noexcept override;
   void done(const PoseSample& sample) noexcept override;
   void stop() noexcept override { acquisition_->stop(); }
+  void halt() noexcept override;
   void finish(Progress* progress, std::vector<std::string>* faults) override;
   void describe(const SessionTotals& totals, const Estimator& estimator,
                 SummaryInput* input) const override;

@@ -56,6 +56,7 @@ void EstimationLoop::run() noexcept {
     if (comparison_) comparison_->drain();
   }
   ThreadAllocations::end();
+  drained_.store(true, std::memory_order_release);
   estimator_->finish();
   log_.note(*estimator_);
   if (comparison_) comparison_->finish();
@@ -65,12 +66,12 @@ void EstimationLoop::run() noexcept {
 void EstimationLoop::handle(const SourceEvent& event) noexcept {
   if (event.recalibrate) estimator_->request_recalibration();
   if (event.skipped) log_.note_skipped();
-  if (event.listed) log_.tell(event.record, event.to_user);
+  if (event.listed) log_.log(event.record, event.to_user);
 }
 
 void EstimationLoop::request_recalibration(Stamp stamp, const char* sentence) noexcept {
   estimator_->request_recalibration();
-  log_.tell(stamp, "recalibration_requested", sentence, true);
+  log_.log(stamp, "recalibration_requested", sentence, true);
 }
 
 /// What viewers of the session have asked for.
@@ -80,10 +81,10 @@ void EstimationLoop::take_requests(Stamp stamp) noexcept {
   if (requests_->recalibrate.exchange(false, kOrder) && facts_.on_request)
     request_recalibration(stamp, "a new calibration was asked for on the live page");
   if (requests_->mark.exchange(false, kOrder))
-    log_.tell(stamp, "mark", "marked on the live page", true);
+    log_.log(stamp, "mark", "marked on the live page", true);
   if (requests_->stop_recording.exchange(false, kOrder) && recording_) {
-    log_.tell(stamp, "recording_stopped",
-              "drive.mcap ends here, as asked for on the live page; the drive goes on", true);
+    log_.log(stamp, "recording_stopped",
+             "drive.mcap ends here, as asked for on the live page; the drive goes on", true);
     recording_->stop();
   }
 }

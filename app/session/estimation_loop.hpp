@@ -21,7 +21,8 @@ namespace vergence::app {
 /// What the estimator's thread does: takes what the source delivers, poses it, compares it with
 /// the INS, and hands everything on to the session's output.
 ///
-/// Threads  run(): the estimator's, sealed. ask_calibration(), items(): any. Everything else: the
+/// Threads  run(): the estimator's, sealed. ask_calibration(), drained(), items(): any. Everything
+/// else: the
 ///          owner's, before run() or after its thread has joined, but for event_log()'s show().
 /// Memory   Arenas, at construction.
 class EstimationLoop {
@@ -36,6 +37,8 @@ class EstimationLoop {
   void run() noexcept;
   /// From the next frame on a new calibration is sought.
   void ask_calibration() noexcept { calibration_asked_.store(true, std::memory_order_relaxed); }
+  /// The source has given its last item; the estimator may still be deciding a calibration.
+  [[nodiscard]] bool drained() const noexcept { return drained_.load(std::memory_order_acquire); }
   /// Items handled so far.
   [[nodiscard]] std::uint64_t items() const noexcept {
     return items_.load(std::memory_order_relaxed);
@@ -75,7 +78,7 @@ class EstimationLoop {
   SessionOutput output_;
   EventLog log_;
   std::unique_ptr<InsComparison> comparison_;
-  std::atomic<bool> calibration_asked_{false};
+  std::atomic<bool> calibration_asked_{false}, drained_{false};
   std::atomic<std::uint64_t> items_{0};
   bool delivering_ = false;  // a frame has come
 };

@@ -12,7 +12,7 @@ namespace {
 constexpr int kWholeAgain = 100;  // frames, after which dropped work is news
 
 /// What a user wants to hear of at once.
-bool aloud(EstimatorEvent::Kind kind) noexcept {
+bool is_for_user(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
   return kind == Kind::rig_changed || kind == Kind::calibration_confirmed ||
          kind == Kind::calibration_contradicted || kind == Kind::focal_length_contradicted ||
@@ -50,7 +50,7 @@ void EventLog::note(const Estimator& estimator) noexcept {
       dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
     const EventRecord record = EventRecord::of(event);
     output_->post(record);
-    if (aloud(event.kind)) (void)notices_.push(record);
+    if (is_for_user(event.kind)) (void)notices_.push(record);
   }
   for (const CalibrationDecision& decision : estimator.calibrations()) {
     output_->post(CalibrationRecord::of(decision));
@@ -82,7 +82,7 @@ void EventLog::note_effort(const PoseSample& sample) noexcept {
   event.fields[0] = {"points_percent", std::int64_t{sample.effort.points_percent}};
   event.fields[1] = {"window_keyframes", std::int64_t{sample.effort.window_keyframes}};
   event.fields[2] = {"window_steps", std::int64_t{sample.effort.window_steps}};
-  tell(event, true);
+  log(event, true);
 }
 
 void EventLog::note(const PoseSample& sample) noexcept {
@@ -105,16 +105,16 @@ void EventLog::note_skipped() noexcept {
   (void)glimpses_.push(now_);
 }
 
-void EventLog::tell(Stamp stamp, const char* kind, std::string_view sentence,
-                    bool to_user) noexcept {
+void EventLog::log(Stamp stamp, const char* kind, std::string_view sentence,
+                   bool to_user) noexcept {
   EventRecord event;
   event.stamp = stamp;
   event.kind = kind;
   event.set_sentence(sentence);
-  tell(event, to_user);
+  log(event, to_user);
 }
 
-void EventLog::tell(const EventRecord& event, bool to_user) noexcept {
+void EventLog::log(const EventRecord& event, bool to_user) noexcept {
   output_->post(event);
   if (to_user) (void)notices_.push(event);
 }

@@ -15,7 +15,7 @@ namespace vergence::app {
 /// recorder, the state of things for the progress line, sentences for the user, a sample of the
 /// matches across.
 ///
-/// Threads  note…(), tell(): the estimator's, sealed. show(): the caller's. After the estimator's
+/// Threads  note…(), log(): the estimator's, sealed. show(): the caller's. After the estimator's
 ///          thread has joined all is anyone's.
 /// Memory   Fixed, most of it the sample of matches: not for a stack. Full: of the states for the
 ///          line the newest are lost, the next one tells the same and more; of the sentences too,
@@ -32,9 +32,9 @@ class EventLog {
   /// A frame that was not read.
   void note_skipped() noexcept;
   void note_distance_from_ins(double metres) noexcept { now_.from_ins_m = metres; }
-  /// An event of the session's own. `kind` points to a constant. `aloud`: on stderr, too.
-  void tell(Stamp stamp, const char* kind, std::string_view sentence, bool aloud) noexcept;
-  void tell(const EventRecord& event, bool aloud) noexcept;
+  /// An event of the session's own. `kind` points to a constant. `to_user`: on stderr, too.
+  void log(Stamp stamp, const char* kind, std::string_view sentence, bool to_user) noexcept;
+  void log(const EventRecord& event, bool to_user) noexcept;
 
   /// Matches of the drive so far. Before the estimator's thread has joined they are its own.
   [[nodiscard]] const MatchSample& matches() const noexcept { return matches_; }

@@ -79,8 +79,9 @@ struct SourceFacts {
 /// Where a session's frames, readings and device events come from: devices (LiveSource), or a
 /// recorded drive (RecordedSource). SessionRunner does the rest, the same for both.
 ///
-/// Threads  next(), done(): the estimator's, sealed. stop(): any. The rest: the caller's, and what
-///          comes after finish() when the estimator's has joined.
+/// Threads  next(), done(): the estimator's, sealed. stop(): any. The rest: the caller's; finish()
+/// and
+///          what comes after it when the estimator's has joined.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
@@ -101,7 +102,10 @@ class FrameSource {
   virtual void look() {}
   /// Of a camera, °C, where it tells; asks the device.
   [[nodiscard]] virtual std::optional<double> temperature_c(int /*camera*/) { return std::nullopt; }
-  /// Ends what start() began.
+  /// Called once when next() has ended, which the estimator may take time to conclude: stops what
+  /// still delivers.
+  virtual void halt() noexcept {}
+  /// Ends what start() began, after halt().
   virtual void finish(Progress* progress, std::vector<std::string>* faults) = 0;
 
   /// What it adds to the summary: frames skipped, devices, times, truth.

@@ -7,11 +7,11 @@
 namespace vergence::app {
 
 InsComparison::InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
-                             EventLog& journal)
+                             EventLog& event_log)
     : T_ins_left_(options.T_ins_left),
       comparison_(options, arena),
-      journal_(journal),
-      events_(source, options.scale_stretch_m, journal) {}
+      event_log_(event_log),
+      events_(source, options.scale_stretch_m, event_log) {}
 
 void InsComparison::add(const InsRecord& reading) noexcept {
   output_->post(reading);
@@ -31,7 +31,7 @@ void InsComparison::drain() noexcept {
         PoseRecord::of(pose, decode_ms_[static_cast<std::size_t>(drained_++ % decode_ms_.size())]));
     if (pose.ins_valid) ++matches_;
     measure(pose);
-    journal_.note_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
+    event_log_.note_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
     take_placement(pose.pose.stamp);
     if (pose.scale_disagrees) ++scale_disagreements_;
     events_.note(pose, matches_);

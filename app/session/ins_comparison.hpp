@@ -25,9 +25,9 @@ class InsComparison {
  public:
   static constexpr std::size_t kMostPlacements = 64;  // that are kept; later ones count
 
-  /// Without a source poses go through and nothing is said. `journal` outlives it.
+  /// Without a source poses go through and nothing is said. `event_log` outlives it.
   InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
-                EventLog& journal);
+                EventLog& event_log);
 
   /// Before the first add(). `output` outlives the last one; with a source its recorder takes
   /// readings (Recorder::Options::ins).
@@ -51,7 +51,7 @@ class InsComparison {
   void take_placement(Stamp stamp) noexcept;
   const Transform T_ins_left_;
   Comparison comparison_;
-  EventLog& journal_;
+  EventLog& event_log_;
   InsEvents events_;
   SessionOutput* output_ = nullptr;
   std::array<float, Comparison::kPending> decode_ms_{};  // of the poses that wait, by their count

@@ -12,7 +12,7 @@ void InsEvents::note(const InsSample& sample, std::uint64_t jumps) noexcept {
   note_attitude(sample);
   if (jumps == jumps_) return;
   jumps_ = jumps;
-  journal_.tell(
+  event_log_.log(
       sample.stamp, "ins_jump",
       "the INS's position leapt: not interpolated across, errors from here on contain the leap",
       true);
@@ -29,7 +29,7 @@ void InsEvents::note(const Placement& p, Stamp stamp) noexcept {
   (void)std::snprintf(text.data(), text.size(),
                       "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m",
                       p.distance, p.rotation_sigma.z() * kDegrees, p.residual);
-  journal_.tell(stamp, "placement", text.data(), false);
+  event_log_.log(stamp, "placement", text.data(), false);
 }
 
 /// Once a drive: a receiver never has one, an INS has it after it has aligned.
@@ -38,12 +38,12 @@ void InsEvents::note_attitude(const InsSample& sample) noexcept {
       std::exchange(attitude_noted_, true))
     return;
   const bool heading = sample.heading_source == HeadingSource::heading;
-  journal_.tell(sample.stamp, "ins_without_attitude",
-                heading ? "the INS gives no roll and pitch: taken as level; position and measured "
-                          "heading are compared"
-                        : "the INS gives no attitude: taken as level; position and course are "
-                          "compared",
-                false);
+  event_log_.log(sample.stamp, "ins_without_attitude",
+                 heading ? "the INS gives no roll and pitch: taken as level; position and measured "
+                           "heading are compared"
+                         : "the INS gives no attitude: taken as level; position and course are "
+                           "compared",
+                 false);
 }
 
 void InsEvents::note_match(const ComparedPose& pose, std::uint64_t matches) noexcept {
@@ -55,11 +55,11 @@ void InsEvents::note_match(const ComparedPose& pose, std::uint64_t matches) noex
   switch (pose.ins) {
     case InsMatch::ok:
       if (matches > kSettled)
-        journal_.tell(pose.pose.stamp, "ins_ok",
-                      "the INS has a position again; the comparison goes on", false);
+        event_log_.log(pose.pose.stamp, "ins_ok",
+                       "the INS has a position again; the comparison goes on", false);
       break;
     case InsMatch::none:
-      journal_.tell(
+      event_log_.log(
           pose.pose.stamp, "ins_silent",
           recorded
               ? "the recording has no reading of the INS here: these poses are not compared"
@@ -67,14 +67,14 @@ void InsEvents::note_match(const ComparedPose& pose, std::uint64_t matches) noex
           true);
       break;
     case InsMatch::gap:
-      journal_.tell(pose.pose.stamp, "ins_gap",
-                    "readings of the INS are missing: these poses are not compared", true);
+      event_log_.log(pose.pose.stamp, "ins_gap",
+                     "readings of the INS are missing: these poses are not compared", true);
       break;
     case InsMatch::no_fix:
-      journal_.tell(pose.pose.stamp, "ins_no_fix",
-                    recorded ? "the INS had no position: the comparison pauses"
-                             : "the INS has no position: the comparison pauses; check its antenna",
-                    true);
+      event_log_.log(pose.pose.stamp, "ins_no_fix",
+                     recorded ? "the INS had no position: the comparison pauses"
+                              : "the INS has no position: the comparison pauses; check its antenna",
+                     true);
       break;
     case InsMatch::jump:  // told with the reading: it may fall between two frames
       break;
@@ -95,8 +95,8 @@ void InsEvents::note_scale(const ComparedPose& pose) noexcept {
   else
     (void)std::snprintf(text.data(), text.size(),
                         "the distance travelled agrees with the INS again");
-  journal_.tell(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees", text.data(),
-                scale_disagrees_);
+  event_log_.log(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees",
+                 text.data(), scale_disagrees_);
 }
 
 }  // namespace vergence::app

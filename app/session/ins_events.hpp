@@ -13,9 +13,9 @@ enum class InsSource : std::uint8_t { none, device, recording };
 /// Threads: the estimator's, sealed.
 class InsEvents {
  public:
-  /// Without a source nothing is said about its silence. `journal` outlives this.
-  InsEvents(InsSource source, double scale_stretch_m, EventLog& journal) noexcept
-      : source_(source), scale_stretch_m_(scale_stretch_m), journal_(journal) {}
+  /// Without a source nothing is said about its silence. `event_log` outlives this.
+  InsEvents(InsSource source, double scale_stretch_m, EventLog& event_log) noexcept
+      : source_(source), scale_stretch_m_(scale_stretch_m), event_log_(event_log) {}
 
   /// A reading, after the comparison has counted `jumps` of the position.
   void note(const InsSample& sample, std::uint64_t jumps) noexcept;
@@ -30,7 +30,7 @@ class InsEvents {
 
   const InsSource source_;
   const double scale_stretch_m_;
-  EventLog& journal_;
+  EventLog& event_log_;
   bool attitude_noted_ = false, scale_disagrees_ = false;
   std::uint64_t jumps_ = 0;
   InsMatch last_match_ = InsMatch::ok;

@@ -43,7 +43,7 @@ SourceEvent event_of(Stamp stamp, const TimingMonitor::Sentence& sentence) noexc
   event.record.stamp = stamp;
   event.record.kind = sentence.kind;
   event.record.set_sentence(sentence.text.data());
-  event.to_user = sentence.aloud;
+  event.to_user = sentence.to_user;
   return event;
 }
 
@@ -54,7 +54,7 @@ LiveSource::LiveSource(const RunRequest& request)
       configuration_(request.configuration),
       devices_(request.configuration, request.faults, request.fast, request.duration_s),
       time_(devices_.sync().mode, request.fast),
-      fault_told_(devices_.faults().size(), false) {
+      fault_logged_(devices_.faults().size(), false) {
   facts_.begin =
       starting_calibration(configuration_, request.calibration, serials_of(devices_.cameras()));
   make_acquisition();
@@ -179,8 +179,8 @@ bool LiveSource::next_event(SourceItem* item) noexcept {
   const Stamp stamp = std::get_if<AcquiredFrame>(&in_hand_)->rig.stamp;
   const auto faults = devices_.faults();
   for (std::size_t i = 0; i < faults.size(); ++i) {
-    if (fault_told_[i] || stamp < start_ + faults[i].at) continue;
-    fault_told_[i] = true;
+    if (fault_logged_[i] || stamp < start_ + faults[i].at) continue;
+    fault_logged_[i] = true;
     std::array<char, 96> text{};
     const std::string_view kind = mock::to_string(faults[i].kind);
     (void)std::snprintf(text.data(), text.size(), "%.*s, as scheduled",
@@ -212,8 +212,9 @@ void LiveSource::look() {  // real cameras do not end by themselves
     acquisition_->stop();
 }
 
+void LiveSource::halt() noexcept { acquisition_->join(); }
+
 void LiveSource::finish(Progress* progress, std::vector<std::string>* faults) {
-  acquisition_->join();
   if (devices_.mock() != nullptr &&
       devices_.board_keeps_own_time()) {  // whose pulses nobody knew before they were made
     truth_ = true_trajectory(*devices_.mock(), configuration_, start_);

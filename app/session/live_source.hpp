@@ -35,6 +35,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] std::optional<double> temperature_c(int camera) override {
     return devices_.cameras()[static_cast<std::size_t>(camera)]->temperature_c();
   }
+  void halt() noexcept override;
   void finish(Progress* progress, std::vector<std::string>* faults) override;
   void describe(const SessionTotals& totals, const Estimator& estimator,
                 SummaryInput* input) const override;
@@ -67,7 +68,7 @@ class LiveSource final : public FrameSource {
 
   // Of the estimator's thread; read by others after it has joined.
   TimingMonitor time_;
-  std::vector<bool> fault_told_;
+  std::vector<bool> fault_logged_;
   Acquired in_hand_{};    // given, or held back behind its events
   bool waiting_ = false;  // in_hand_ is a frame that was not given yet
 };

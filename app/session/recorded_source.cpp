@@ -29,7 +29,7 @@ SourceEvent event_of(const DecodedPair& pair, std::uint64_t unread) noexcept {
   return event;
 }
 
-void tell_earth(const EarthFigures& earth, double placement_m, Progress* progress) {
+void report_earth_errors(const EarthFigures& earth, double placement_m, Progress* progress) {
   const EarthErrors& e = earth.errors;
   if (e.poses > 0)
     progress->say(
@@ -144,7 +144,8 @@ void RecordedSource::print_figures(const SessionTotals& /*totals*/, const Summar
         fmt::format("there is no reference to compare with; next: vergence evaluate {} REFERENCE",
                     (request_.session.out / "trajectory.tum").string()));
   }
-  if (facts_.ins) tell_earth(*input.earth, request_.configuration.comparison.placement_m, progress);
+  if (facts_.ins)
+    report_earth_errors(*input.earth, request_.configuration.comparison.placement_m, progress);
 }
 
 }  // namespace vergence::app

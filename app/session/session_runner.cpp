@@ -40,6 +40,7 @@ class SessionRunner {
   void estimate() noexcept;
   void pass_on_temperatures();
   void watch(Progress* progress);
+  void halt_source() noexcept;
   void say_recording_errors(Progress* progress);
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
                                            std::uint64_t allocations) const;
@@ -67,6 +68,7 @@ class SessionRunner {
   std::condition_variable changed_;
   std::chrono::steady_clock::time_point temperatures_due_{};
   bool done_ = false;
+  bool halted_ = false;        // the caller's thread alone
   ResidentMemory resident_{};  // at the drive's end
   DriveThreads threads_;       // of the caller's thread
 };
@@ -112,14 +114,24 @@ void SessionRunner::watch(Progress* progress) {
       recorder_->reopen();
       if (recording_) recording_->roll();
     }
-    pass_on_temperatures();
+    if (loop_.drained())
+      halt_source();
+    else
+      pass_on_temperatures();
     threads_.look(progress);
     loop_.event_log().show(progress, facts_.frames);
     say_recording_errors(progress);
     lock.lock();
   }
   lock.unlock();
+  halt_source();
   loop_.event_log().show(progress, facts_.frames);
+}
+
+/// When the drive is over: cameras do not expose on while its last calibration is decided.
+void SessionRunner::halt_source() noexcept {
+  if (!halted_) source_.halt();
+  halted_ = true;
 }
 
 void SessionRunner::say_recording_errors(Progress* progress) {
@@ -172,12 +184,12 @@ SessionStart SessionRunner::session_start() const {
 void SessionRunner::say_remarks(Progress* progress) {
   for (const std::string& sentence : removed_) {
     progress->say("vergence: " + sentence);
-    loop_.event_log().tell(facts_.first, "session_removed", sentence, false);
+    loop_.event_log().log(facts_.first, "session_removed", sentence, false);
   }
   for (const SourceRemark& remark : facts_.remarks) {
     if (remark.say) progress->say("vergence: " + remark.sentence);
     if (remark.kind != nullptr)
-      loop_.event_log().tell(facts_.first, remark.kind, remark.sentence, false);
+      loop_.event_log().log(facts_.first, remark.kind, remark.sentence, false);
   }
 }
 

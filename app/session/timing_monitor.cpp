@@ -18,11 +18,11 @@ constexpr double kMicroseconds = 1e6;
 double us(Duration d) { return d.to_seconds() * kMicroseconds; }
 
 template <class... Arguments>
-TimingMonitor::Sentence sentence(const char* kind, bool aloud, const char* format,
+TimingMonitor::Sentence sentence(const char* kind, bool to_user, const char* format,
                                  Arguments... arguments) noexcept {
   TimingMonitor::Sentence s;
   s.kind = kind;
-  s.aloud = aloud;
+  s.to_user = to_user;
   (void)std::snprintf(s.text.data(), s.text.size(), format, arguments...);
   return s;
 }
@@ -142,9 +142,9 @@ TimingMonitor::Sentence TimingMonitor::of_utc(const AcquiredReading& reading) no
   utc_.most_s = utc_.readings == 0 ? ahead : std::max(utc_.most_s, ahead);
   ++utc_.readings;
   sum_ahead_s_ += ahead;
-  if (told_utc_ && std::abs(ahead - told_ahead_s_) < kStep) return {};
-  told_utc_ = true;
-  told_ahead_s_ = ahead;
+  if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return {};
+  utc_reported_ = true;
+  reported_ahead_s_ = ahead;
   return sentence("utc", false,
                   "the host's clock is %.4f s %s the INS's UTC; stamps are the host's",
                   std::abs(ahead), ahead < 0 ? "behind" : "ahead of");

@@ -17,7 +17,7 @@ class TimingMonitor {
   struct Sentence {
     const char* kind = nullptr;  // null: nothing to tell
     std::array<char, 200> text{};
-    bool aloud = false;
+    bool to_user = false;
   };
 
   explicit TimingMonitor(SyncMode mode, bool virtual_time) : mode_(mode), virtual_(virtual_time) {}
@@ -46,8 +46,8 @@ class TimingMonitor {
   TimeHistogram latency_;
   InsQuality quality_{};  // as told last
   FixStatus fix_ = FixStatus::none;
-  bool any_quality_ = false, told_utc_ = false;
-  double told_ahead_s_ = 0, sum_ahead_s_ = 0;
+  bool any_quality_ = false, utc_reported_ = false;
+  double reported_ahead_s_ = 0, sum_ahead_s_ = 0;
   UtcFigures utc_{};
   SatelliteFigures satellites_{};
 };

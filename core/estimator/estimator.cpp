@@ -99,7 +99,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     p.doubt(CalibrationCause::requested, frame.number, frame);
 
   if (p.relinked && std::exchange(p.superseded, false) && p.calibrator.verified())
-    p.tell_confirmed(frame.stamp);
+    p.notify_confirmed(frame.stamp);
   odometry::FrameOutcome out = p.odometry.process(frame, p.options.frame_budget);
   p.follow(out, frame);
   if (p.options.online) {

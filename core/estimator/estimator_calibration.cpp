@@ -149,7 +149,7 @@ void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
     calibrator.start_solve();
     if (calibrator.seeking()) transition(Trigger::frames_enough, frame.stamp);
   }
-  tell_missing(frame.stamp);
+  notify_missing(frame.stamp);
 }
 
 /// How far lengths may be off now: a calibration that is adopted by its own sigma, one that stays
@@ -176,18 +176,18 @@ void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp st
     superseded = decision.cause == CalibrationCause::contradicted;
     undecided = false;
   }
-  tell_verified(decision, stamp);
+  notify_verified(decision, stamp);
 }
 
-void Estimator::Parts::tell_verified(const CalibrationDecision& decision, Stamp stamp) noexcept {
+void Estimator::Parts::notify_verified(const CalibrationDecision& decision, Stamp stamp) noexcept {
   const bool was_verified = std::exchange(verified, calibrator.verified());
   if (!verified || was_verified) return;
   unconfirmed = false;
   confirmed_percent = decision.depth_sigma_percent;
-  if (!superseded) tell_confirmed(stamp);
+  if (!superseded) notify_confirmed(stamp);
 }
 
-void Estimator::Parts::tell_confirmed(Stamp stamp) noexcept {
+void Estimator::Parts::notify_confirmed(Stamp stamp) noexcept {
   note(EstimatorEvent::Kind::calibration_confirmed, stamp,
        "the drive confirms the calibration in use", confirmed_percent);
 }
@@ -210,7 +210,7 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
     odometry.link(decision.calibration);
     undecided = false;
     transition(Trigger::calibration_accepted, stamp);
-    tell_verified(decision, stamp);
+    notify_verified(decision, stamp);
     return;
   }
   note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason,
@@ -229,10 +229,10 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
   }
 }
 
-void Estimator::Parts::tell_missing(Stamp stamp) noexcept {
+void Estimator::Parts::notify_missing(Stamp stamp) noexcept {
   const Reason missing = calibrator.missing();
-  if (missing == told_missing) return;
-  told_missing = missing;
+  if (missing == notified_missing) return;
+  notified_missing = missing;
   if (missing == Reason::needs_motion)
     note(EstimatorEvent::Kind::calibration_waits, stamp,
          "the rig has to move before it can be calibrated", 0);

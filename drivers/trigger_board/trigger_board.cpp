@@ -52,13 +52,13 @@ std::vector<DeviceInfo> Driver::enumerate() {
 std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* status) {
   std::unique_ptr<Device> chosen;
   std::string others;
-  DeviceStatus trouble = DeviceStatus::not_found;
+  DeviceStatus worst_status = DeviceStatus::not_found;
   for (const std::string& port : candidates()) {
     std::unique_ptr<Device> board = open_port(port, status);
     if (board == nullptr) {
       // A board that cannot be used is worth more words than a port without one.
       if (*status != DeviceStatus::not_found && *status != DeviceStatus::gone)
-        trouble = *status, others = last_error_;
+        worst_status = *status, others = last_error_;
       continue;
     }
     if (!serial.empty() && board->info().serial != serial) continue;
@@ -70,7 +70,7 @@ std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* 
     }
     chosen = std::move(board);
   }
-  *status = chosen != nullptr ? DeviceStatus::ok : trouble;
+  *status = chosen != nullptr ? DeviceStatus::ok : worst_status;
   last_error_ =
       chosen != nullptr ? ""
       : !others.empty() ? others

@@ -82,9 +82,9 @@ DeviceStatus Setup::set_legacy_line(MessageId id, LegacySync parameter, std::uin
   if (const DeviceStatus s = write(id, {&which, 1}, "the question for a synchronisation line");
       s != DeviceStatus::ok)
     return s;
-  LegacySync told{};
+  LegacySync stored{};
   std::uint32_t has = 0;
-  if (read_legacy_sync(reply_.bytes(), &told, &has) && told == parameter && has == value)
+  if (read_legacy_sync(reply_.bytes(), &stored, &has) && stored == parameter && has == value)
     return DeviceStatus::ok;
   std::array<std::uint8_t, 5> bytes{};
   return write(id, std::span(bytes).first(write_legacy_sync(parameter, value, bytes)),

@@ -56,10 +56,10 @@ struct Estimator::Parts {
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept;
-  void tell_verified(const CalibrationDecision& decision, Stamp stamp) noexcept;
-  void tell_confirmed(Stamp stamp) noexcept;
+  void notify_verified(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void notify_confirmed(Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
-  void tell_missing(Stamp stamp) noexcept;
+  void notify_missing(Stamp stamp) noexcept;
   void grade(const odometry::FrameOutcome& out, Pairing pairing, PoseSample* sample) const noexcept;
   [[nodiscard]] Reason why_uncalibrated() const noexcept;
 
@@ -84,7 +84,7 @@ struct Estimator::Parts {
   int without_pose = 0;
   bool in_gap = false;       // and the last event has said so
   int unmatched_frames = 0;  // in a row
-  Reason told_missing = Reason::none;
+  Reason notified_missing = Reason::none;
   std::atomic<bool> requested{false};
   FixedVector<EstimatorEvent, 16> events;         // a frame raises at most eight
   FixedVector<CalibrationDecision, 3> decisions;  // three in finish() at most

@@ -147,8 +147,9 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
                underruns = devices.at(name + "underruns").get<std::int64_t>();
     EXPECT_EQ(devices.at("frames_torn").get<int>(), 0);
     // What the emulator says it exposed, but for the images that came when the drive had ended: the
-    // cameras are stopped when its last calibration is decided, within a second.
-    constexpr int kAfterTheEnd = 10;
+    // cameras are stopped by the next look of the caller's thread (50 ms), one after the other, on
+    // the one processor of this machine. At 10 Hz that is within 0.4 s.
+    constexpr int kAfterTheEnd = 4;
     EXPECT_LE(delivered + lost + underruns, count_of(report, k, "exposed"));
     EXPECT_GE(delivered + lost + underruns + kAfterTheEnd, count_of(report, k, "exposed"));
     EXPECT_LE(lost, count_of(report, k, "overtaken"));
