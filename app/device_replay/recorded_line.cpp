@@ -79,10 +79,14 @@ class RecordedPlace::Conversation {
       ++counters_.writes;
       return;
     }
+    if (!writes_next()) {
+      ++counters_.other;
+      return;
+    }
     // Numbered otherwise since something else was written at another place, it stands for what was
     // written here.
-    ++counters_.other;
-    if (writes_next()) made_[at_] = true;
+    ++counters_.in_place;
+    made_[at_] = true;
   }
 
   /// Reads before the switch that the driver did not make are lost, as on a line.

@@ -14,7 +14,8 @@ struct LineReplayCounters {
   std::uint64_t reads = 0;     // handed to the driver
   std::uint64_t writes = 0;    // that it made as recorded
   std::uint64_t not_made = 0;  // recorded, and not made by it
-  std::uint64_t other = 0;     // made by it, and not recorded
+  std::uint64_t in_place = 0;  // made by it with other bytes, where one was recorded
+  std::uint64_t other = 0;     // made by it where none was recorded
 };
 
 /// The port of a device in a recorded drive: a driver that behaves as it did then reads what it

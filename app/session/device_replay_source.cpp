@@ -216,6 +216,7 @@ std::vector<std::pair<std::string, std::uint64_t>> DeviceReplaySource::counters(
     if (line == nullptr) return;
     out.emplace_back(std::string(name) + "_reads", line->reads);
     out.emplace_back(std::string(name) + "_writes_as_recorded", line->writes);
+    out.emplace_back(std::string(name) + "_writes_with_other_bytes", line->in_place);
     out.emplace_back(std::string(name) + "_writes_not_made", line->not_made);
     out.emplace_back(std::string(name) + "_writes_not_recorded", line->other);
   };

@@ -90,7 +90,7 @@ class Device final : public TriggerDevice,
   [[nodiscard]] DeviceStatus read_one(HostStamp deadline) noexcept;
   void halt_board() noexcept;
   [[nodiscard]] std::uint32_t open_reports() const noexcept;
-  void ping() noexcept;
+  void ping(HostStamp now) noexcept;
   void send_pause(HostStamp now) noexcept;
   void publish(bool last) noexcept;
   void go_streaming(HostStamp now) noexcept;

@@ -92,8 +92,9 @@ void Device::go_streaming(HostStamp now) noexcept {
 DeviceStatus Device::tie_clocks() noexcept {
   for (int i = 0; i < kFirstPings; ++i) {
     const std::uint64_t before = receiver_.clock().answers();
-    ping();
-    const HostStamp until = line()->now() + kFirstPong;
+    const HostStamp now = line()->now();
+    ping(now);
+    const HostStamp until = now + kFirstPong;
     while (receiver_.clock().answers() == before && line()->now() < until) {
       if (stop_requested()) return DeviceStatus::stopped;
       const DeviceStatus status = read_one(until);
@@ -114,7 +115,7 @@ DeviceStatus Device::read_on() noexcept {
     send_pause(now);
     if (now - receiver_.last_frame() > kSilent) return DeviceStatus::gone;
     if (now >= next_ping) {
-      ping();
+      ping(now);
       const double part = 1 + 0.2 * dither_.uniform(-1, 1);
       next_ping = now + Duration::nanoseconds(
                             std::llround(part * static_cast<double>(options_.ping_interval.ns())));
@@ -175,9 +176,11 @@ void Device::halt_board() noexcept {
   receiver_.hold();
 }
 
-void Device::ping() noexcept {
+/// `now` is the look at the clock that made it due: a record keeps one for a write, and from that a
+/// replay does the same.
+void Device::ping(HostStamp now) noexcept {
   std::array<std::uint8_t, trigger_ping_payload_size> payload{};
-  const TriggerPing message{receiver_.clock().ask(line()->now())};
+  const TriggerPing message{receiver_.clock().ask(now)};
   trigger_put_ping(&message, payload.data());
   if (frames_.send(trigger_ping, payload, nullptr) != DeviceStatus::ok) ++counters_.writes_refused;
 }

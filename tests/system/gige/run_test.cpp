@@ -174,35 +174,33 @@ std::unique_ptr<mock::BoardSimulator> board_of(const Wires& wires) {
       o);
 }
 
-// In real time, with an INS and a board behind terminals: what threads and a scheduler do to
-// arrivals is in the record, too.
-TEST(GigeRun, aRecordedDriveComesAboutAgainFromItsDevicesOn) {
-  if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
-  const RenderedDrive drive;
+nlohmann::json summary_of(const std::filesystem::path& session) {
+  std::ifstream in(session / "summary.json");
+  return nlohmann::json::parse(in);
+}
+
+/// With an INS and a board behind terminals, twice as long as the film lasts.
+Outcome record_drive(const RenderedDrive& drive, const std::filesystem::path& session) {
   const Wires wires(&drive);
   const test::DeviceOnTerminal ins(test::resting_xsens()), board(board_of(wires));
-  const TemporaryFolder folder;
-  const Outcome o = run_vergence(
-      "run '" + kExample + "' --duration " + std::to_string(2 * kPairs / kRate) + " --out '" +
-      (folder / "s").string() + "'" + wires.settings() +
-      " --record images,ins,pulses,raw --set ins.driver=xsens --set ins.rate=100 --set "
-      "ins.baud=115200 --set ins.port=" +
-      ins.port() +
-      " --set trigger.driver=board --set sync.mode=board --set trigger.vary_us=4000 --set "
-      "trigger.port=" +
-      board.port());
+  return run_vergence("run '" + kExample + "' --duration " + std::to_string(2 * kPairs / kRate) +
+                      " --out '" + session.string() + "'" + wires.settings() +
+                      " --record images,ins,pulses,raw --set ins.driver=xsens --set ins.rate=100 "
+                      "--set ins.baud=115200 --set ins.port=" +
+                      ins.port() +
+                      " --set trigger.driver=board --set sync.mode=board --set "
+                      "trigger.vary_us=4000 --set trigger.port=" +
+                      board.port());
+}
+
+void expect_same_from_devices_on(const std::filesystem::path& session,
+                                 const std::filesystem::path& again) {
+  const Outcome o = run_vergence("replay '" + session.string() + "' --out '" + again.string() +
+                                 "' --through-devices");
   ASSERT_LE(o.code, 1) << o.err;
-  const Outcome again = run_vergence("replay '" + (folder / "s").string() + "' --out '" +
-                                     (folder / "again").string() + "' --through-devices");
-  ASSERT_LE(again.code, 1) << again.err;
-  EXPECT_EQ(test::read_file(folder / "s" / "trajectory.tum"),
-            test::read_file(folder / "again" / "trajectory.tum"));
-  const auto summary = [&](const char* session) {
-    std::ifstream in(folder / session / "summary.json");
-    return nlohmann::json::parse(in);
-  };
-  const auto devices = summary("again")["devices"];
-  const int frames = summary("s")["frames"]["read"];
+  EXPECT_EQ(test::read_file(session / "trajectory.tum"), test::read_file(again / "trajectory.tum"));
+  const auto devices = summary_of(again)["devices"];
+  const int frames = summary_of(session)["frames"]["read"];
   EXPECT_GT(frames, 4);
   EXPECT_EQ(devices["frames_as_in_the_drive"], frames);
   EXPECT_GT(devices["readings_compared"], 200);
@@ -211,6 +209,22 @@ TEST(GigeRun, aRecordedDriveComesAboutAgainFromItsDevicesOn) {
     EXPECT_GT(devices[line + "_writes_as_recorded"], 3) << line;
     EXPECT_LE(devices[line + "_writes_not_recorded"], 1) << line << ": that it shall stop";
   }
+}
+
+// In real time: what threads and a scheduler do to arrivals is in the record, too. Not so when the
+// pulses are paused, which another thread asks for: of a drive that lost images to a busy machine
+// nothing is claimed.
+TEST(GigeRun, aRecordedDriveComesAboutAgainFromItsDevicesOn) {
+  if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
+  const RenderedDrive drive;
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    const TemporaryFolder folder;
+    const Outcome o = record_drive(drive, folder / "s");
+    ASSERT_LE(o.code, 1) << o.err;
+    if (summary_of(folder / "s").at("time").at("pairing").at("pauses") > 0) continue;
+    return expect_same_from_devices_on(folder / "s", folder / "again");
+  }
+  GTEST_SKIP() << "this machine lost images in each of three drives";
 }
 
 TEST(GigeRun, whatCannotBeDrivenIsRefusedInASentence) {
