@@ -102,11 +102,19 @@ class RecordedPlace::Conversation {
   }
 
   /// What the driver's last look had told it, where it then wrote.
-  [[nodiscard]] HostStamp now() const noexcept {
-    return writes_next() ? std::max(now_, step().event.time) : now_;
+  [[nodiscard]] HostStamp now() noexcept {
+    if (!writes_next()) return now_;
+    if (before_writes_ && announced_ <= at_) {
+      announced_ = at_ + 1;
+      before_writes_(at_);
+    }
+    return std::max(now_, step().event.time);
   }
   [[nodiscard]] bool at_end() const noexcept {
     return at_ >= record_.steps.size() || step().event.time > until_;
+  }
+  void before_writes(std::function<void(std::size_t step)> call) {
+    before_writes_ = std::move(call);
   }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] Duration latency() const noexcept { return latency_; }
@@ -149,6 +157,8 @@ class RecordedPlace::Conversation {
   std::size_t at_ = 0;
   std::size_t taken_ = 0;  // of the bytes of the step in hand
   int woken_ = 0;          // for the write in hand
+  std::function<void(std::size_t step)> before_writes_;
+  std::size_t announced_ = 0;  // steps before this were
   LineReplayCounters counters_{};
 };
 
@@ -201,6 +211,9 @@ Duration RecordedPlace::latency_timer() const { return conversation_->latency();
 bool RecordedPlace::exhausted() const noexcept { return conversation_->at_end(); }
 const LineReplayCounters& RecordedPlace::counters() const noexcept {
   return conversation_->counters();
+}
+void RecordedPlace::before_writes(std::function<void(std::size_t step)> call) {
+  conversation_->before_writes(std::move(call));
 }
 
 }  // namespace vergence::app

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -27,8 +28,8 @@ struct LineReplayCounters {
 ///          reads that were woken (`stopped`) for it.
 /// Ownership  The record outlives the place and its lines. Threads: as LinePlace, one line at a
 ///            time; counters(): when no line is in use.
-/// A limit  What a driver does because of its calling thread (a pause, the end) comes when it
-/// comes.
+/// A limit  What a driver does because of another thread (a pause, the end) comes when it comes,
+///          unless before_writes() is used to make it come where it came.
 class RecordedPlace final : public LinePlace {
  public:
   /// `until`: steps after it are not there.
@@ -44,6 +45,10 @@ class RecordedPlace final : public LinePlace {
   [[nodiscard]] bool exhausted() const noexcept override;
 
   [[nodiscard]] const LineReplayCounters& counters() const noexcept;
+  /// `call` with the number of the record's step, once for each recorded write that the driver has
+  /// not made: when it is the next to come and the driver looks at its clock, on that thread. While
+  /// no line is in use.
+  void before_writes(std::function<void(std::size_t step)> call);
 
   class Conversation;  // where in the record it is; lives as long as the place or a line of it
 

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "app/device_replay/recorded_board.hpp"
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/ins_drivers.hpp"
 #include "app/devices/trigger_boards.hpp"
@@ -102,13 +103,15 @@ void ReplayedDevices::open_trigger(const Configuration& c, const ReplayedDrive& 
     return;
   }
   auto place = std::make_unique<RecordedPlace>(drive.recording.board, drive.recording.end());
-  board_place_ = place.get();
+  RecordedPlace& line = *place;
+  board_place_ = &line;
   trigger_board::Options options = trigger_board_options(c.trigger);
   options.native_usb = trigger_board::is_native_usb(place->name());
   DeviceStatus status = DeviceStatus::ok;
   std::string error;
   trigger_ = trigger_board::open_on(std::move(place), options, &status, &error);
   if (trigger_ == nullptr) refuse_line(drive, "trigger board", error);
+  trigger_ = std::make_unique<RecordedBoard>(std::move(trigger_), drive.recording.board, line);
   if (trigger_->configure(trigger_configuration(c, static_cast<int>(cameras_.size())), nullptr) !=
       DeviceStatus::ok)
     refuse_line(drive, "trigger board", trigger_->last_error());

@@ -125,6 +125,8 @@ VividPlayer::VividPlayer(const std::vector<std::string>& outputs, std::int64_t i
     outputs_.push_back(std::move(out));
   }
   for (std::size_t k = 0; k < outputs_.size(); ++k) {
+    outputs_[k].numbers.assign(outputs_[k].buffers.size(), 0);
+    outputs_[k].next_from_ns = outputs_[k].looked_ns = now_ns();
     for (std::uint32_t i = 0; i < outputs_[k].buffers.size(); ++i) {
       draw_(k, 0, outputs_[k].buffers[i]);
       v4l2_buffer b = description(i, image_bytes_);
@@ -147,29 +149,40 @@ void VividPlayer::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
+std::uint64_t VividPlayer::due() const noexcept {
+  return static_cast<std::uint64_t>((now_ns() + ahead_ns_ - interval_ns_ / 2) / interval_ns_);
+}
+
+/// Draws into every buffer that is back, and queues it again. False: the output is gone.
+bool VividPlayer::refill(std::size_t output, std::uint64_t first) {
+  Output& out = outputs_[output];
+  const std::int64_t looked_before_ns = out.looked_ns;
+  std::size_t back = 0;
+  v4l2_buffer b = description(0, image_bytes_);
+  while (v4l2::control(out.fd.get(), VIDIOC_DQBUF, &b) == 0) {
+    const std::int64_t now = now_ns();
+    out.showings.push_back({out.numbers[b.index], out.next_from_ns, now});
+    out.next_from_ns = looked_before_ns;
+    const std::uint64_t number = due() - first;
+    draw_(output, number, out.buffers[b.index]);
+    out.numbers[b.index] = static_cast<std::int64_t>(number);
+    // With as many back as there are, the queue was empty from some moment on until this one.
+    if (++back >= out.buffers.size()) out.showings.push_back({kNoise, looked_before_ns, now_ns()});
+    b = description(b.index, image_bytes_);
+    if (v4l2::control(out.fd.get(), VIDIOC_QBUF, &b) != 0) return false;
+  }
+  out.looked_ns = now_ns();
+  return true;
+}
+
 void VividPlayer::feed() {
-  const auto due = [this] {
-    return static_cast<std::uint64_t>((now_ns() + ahead_ns_ - interval_ns_ / 2) / interval_ns_);
-  };
   const std::uint64_t first = due();
   std::vector<pollfd> looks;
   for (const Output& out : outputs_) looks.push_back({out.fd.get(), POLLOUT, 0});
   while (!stop_) {
     (void)::poll(looks.data(), looks.size(), 100);
-    for (std::size_t k = 0; k < outputs_.size(); ++k) {
-      Output& out = outputs_[k];
-      v4l2_buffer b = description(0, image_bytes_);
-      while (v4l2::control(out.fd.get(), VIDIOC_DQBUF, &b) == 0) {
-        out.last = due() - first;
-        draw_(k, out.last, out.buffers[b.index]);
-        b = description(b.index, image_bytes_);
-        if (v4l2::control(out.fd.get(), VIDIOC_QBUF, &b) != 0) return;
-      }
-    }
-    shown_ =
-        std::min_element(outputs_.begin(), outputs_.end(), [](const Output& a, const Output& b) {
-          return a.last < b.last;
-        })->last;
+    for (std::size_t k = 0; k < outputs_.size(); ++k)
+      if (!refill(k, first)) return;
   }
 }
 

@@ -53,23 +53,38 @@ class VividPlayer {
   VividPlayer& operator=(const VividPlayer&) = delete;
 
   void stop();
-  /// Images that have been given to all outputs at least once.
-  [[nodiscard]] std::uint64_t shown() const noexcept { return shown_.load(); }
+
+  /// An image in the place that a looped camera copies from, CLOCK_MONOTONIC.
+  struct Showing {
+    std::int64_t number = 0;   // kNoise: the player was late, and the camera makes noise of its own
+    std::int64_t from_ns = 0;  // not earlier
+    std::int64_t until_ns = 0;  // not later
+  };
+  static constexpr std::int64_t kNoise = -1;
+  /// What an output has shown, in order; neighbours may overlap by the time between two looks at
+  /// the output's queue. Call after stop().
+  [[nodiscard]] const std::vector<Showing>& showings(std::size_t output) const {
+    return outputs_[output].showings;
+  }
 
  private:
   struct Output {
     v4l2::UniqueFd fd;
     std::vector<std::span<std::uint8_t>> buffers;
-    std::uint64_t last = 0;
+    std::vector<std::int64_t> numbers;  // by buffer
+    std::vector<Showing> showings;
+    std::int64_t next_from_ns = 0;  // of the image after the last that came back
+    std::int64_t looked_ns = 0;     // when no other buffer was back
   };
   void feed();
+  [[nodiscard]] bool refill(std::size_t output, std::uint64_t first);
+  [[nodiscard]] std::uint64_t due() const noexcept;
 
   std::vector<Output> outputs_;
   std::int64_t interval_ns_, ahead_ns_;
   Draw draw_;
   std::uint32_t image_bytes_;
   std::atomic<bool> stop_{false};
-  std::atomic<std::uint64_t> shown_{0};
   std::thread thread_;
 };
 
