@@ -55,6 +55,11 @@ class RecordedSession {
   /// read, or are not those that were recorded. No heap.
   [[nodiscard]] bool read(const RecordedFrame& frame, std::size_t camera, std::uint8_t* out,
                           std::size_t stride) const noexcept;
+  /// Gives back what frames() and readings() take, and they are empty; all else stays.
+  void forget_frames() noexcept {
+    frames_ = std::vector<RecordedFrame>();
+    readings_ = std::vector<RecordedReading>();
+  }
 
  private:
   struct Reader;

@@ -159,6 +159,7 @@ void SessionSource::finish(Progress* progress, std::vector<std::string>* /*fault
         "vergence: {} images of the drive are damaged or not in the recording; frames went without "
         "them",
         images_missing_));
+  session_.forget_frames();  // the report is not to be written on top of them
 }
 
 void SessionSource::describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,

@@ -42,9 +42,9 @@ class SessionSource final : public FrameSource {
   [[nodiscard]] SourceFrame load(const RecordedFrame& frame) noexcept;
 
   const ReplayRequest& request_;
-  const RecordedSession session_;
-  const bool other_;       // another beginning than the drive's
-  const std::size_t end_;  // behind the last frame of this replay
+  RecordedSession session_;  // without frames after finish()
+  const bool other_;         // another beginning than the drive's
+  const std::size_t end_;    // behind the last frame of this replay
   SourceFacts facts_;
   std::array<std::vector<std::uint8_t>, kMaxCameras> pixels_;  // of the frame in hand
   std::atomic<bool> stopped_{false};

@@ -49,7 +49,9 @@ void lay_out(BundleWorkspace& w, const BundleCapacities& c, Take& take) {
   take(w.slots, w.slot_capacity, "bundle: observations");
   take(w.poses, c.poses, "bundle: poses");
   take(w.point_free, batches * kBatch, "bundle: free points");
-  take(w.y, w.block_capacity * kYSize, "bundle: Y of poses");
+  take(w.y, w.block_capacity * kYTop, "bundle: Y of poses");
+  take(w.y_group, std::min(kGroupLimit * c.poses, w.block_capacity) * kYSize,
+       "bundle: Y of a group");
   take(w.y_shared, batches * shared_blocks * kYSize, "bundle: Y of shared parameters");
   take(w.factors, batches * kFactorRows * kBatch, "bundle: point factors");
   take(w.sums, c.poses * c.cameras * kPoseSums * kBatch, "bundle: sums of poses");

@@ -70,7 +70,7 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
   logged_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.poses, "calibration poses"));
   points_ = BoundedVector<Vec3>(arena.make<Vec3>(c.points, "calibration points"));
   observations_ = BoundedVector<BundleObservation>(
-      arena.make<BundleObservation>(c.observations, "calibration observations"));
+      arena.make_unset<BundleObservation>(c.observations, "calibration observations"));
   residuals_ = arena.make<float>(c.observations, "calibration residuals");
   sorted_ = arena.make<float>(c.observations, "calibration residuals");
   references_ = BoundedVector<Reference>(

@@ -50,19 +50,19 @@ class Arena {
   /// arena.
   template <class T>
   [[nodiscard]] std::span<T> make(std::size_t n, const char* who) {
-    static_assert(std::is_trivially_destructible_v<T>, "nothing in the arena is destroyed");
-    static_assert(alignof(T) <= kCacheLine);
-    const std::size_t bytes = (n * sizeof(T) + kCacheLine - 1) / kCacheLine * kCacheLine;
-    if (n > capacity_ / sizeof(T) || bytes > capacity_ - used_)
-      throw std::length_error(
-          std::string("arena full: ") + who + " asks for " + std::to_string(bytes) + " bytes, " +
-          std::to_string(capacity_ - used_) + " of " + std::to_string(capacity_) + " are left");
-    T* first = reinterpret_cast<T*>(begin_ + used_);
-    used_ += bytes;
-    count(who, bytes);
+    const std::span<T> all = take<T>(n, who);
     // Zero pages are values already where a default is all zero bytes: they stay untouched.
-    if (n > 0 && !zero_by_default<T>(first)) std::uninitialized_value_construct_n(first, n);
-    return {first, n};
+    if (n > 0 && !zero_by_default<T>(all.data()))
+      std::uninitialized_value_construct_n(all.data(), n);
+    return all;
+  }
+
+  /// n objects of zero bytes, whatever a T is by default, for who writes one before it is read, as
+  /// a BoundedVector does: pages stay untouched until then.
+  template <class T>
+  [[nodiscard]] std::span<T> make_unset(std::size_t n, const char* who) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    return take<T>(n, who);
   }
 
   [[nodiscard]] std::size_t used() const noexcept { return used_; }
@@ -76,6 +76,21 @@ class Arena {
   struct Free {
     void operator()(void* p) const noexcept { std::free(p); }
   };
+
+  template <class T>
+  [[nodiscard]] std::span<T> take(std::size_t n, const char* who) {
+    static_assert(std::is_trivially_destructible_v<T>, "nothing in the arena is destroyed");
+    static_assert(alignof(T) <= kCacheLine);
+    const std::size_t bytes = (n * sizeof(T) + kCacheLine - 1) / kCacheLine * kCacheLine;
+    if (n > capacity_ / sizeof(T) || bytes > capacity_ - used_)
+      throw std::length_error(
+          std::string("arena full: ") + who + " asks for " + std::to_string(bytes) + " bytes, " +
+          std::to_string(capacity_ - used_) + " of " + std::to_string(capacity_) + " are left");
+    T* first = reinterpret_cast<T*>(begin_ + used_);
+    used_ += bytes;
+    count(who, bytes);
+    return {first, n};
+  }
 
   /// Whether a value-initialised T is all zero bytes; one is made at `at`, which is zero.
   template <class T>

@@ -47,7 +47,7 @@ WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibrat
   points_ = BoundedVector<Vec3>(arena.make<Vec3>(c.points, "window points"));
   owner_ = BoundedVector<std::uint16_t>(arena.make<std::uint16_t>(c.points, "window points"));
   observations_ = BoundedVector<BundleObservation>(
-      arena.make<BundleObservation>(c.observations, "window observations"));
+      arena.make_unset<BundleObservation>(c.observations, "window observations"));
   residuals_ = arena.make<float>(c.observations, "window residuals");
   take_up_rig();
 }

@@ -107,7 +107,7 @@ void subtract_points_one(const KernelJob& job, std::size_t first, std::size_t la
   const std::size_t block_count = batch.block_end - batch.block_begin;
   const auto block_at = [&](std::size_t i) {
     if (i < block_count)
-      return YBlock{job.y + (batch.block_begin + i) * kYSize, block_count * kYSize,
+      return YBlock{job.y_group + i * kYSize, block_count * kYSize,
                     job.poses[job.blocks[batch.block_begin + i].pose].block * kBlock};
     const std::size_t s = i - block_count, shared = static_cast<std::size_t>(job.shared.blocks);
     return YBlock{job.y_shared + (first * shared + s) * kYSize, shared * kYSize,

@@ -71,7 +71,7 @@ HWY_INLINE void back_substitute_lanes(KernelJob& job, std::size_t index, std::si
     const double* step = delta + pose.block * kBlock;  // τ, φ
     V Xi[3];
     transform(pose.R, pose.t, X, Xi);
-    const double* y = job.y + static_cast<std::size_t>(at) * kYSize + lane;
+    const double* y = job.y + static_cast<std::size_t>(at) * kYTop + lane;
 #pragma GCC unroll 3
     for (int r = 0; r < 3; ++r) {  // how far the step moves X_i: τ + φ × X_i
       const int a = (r + 1) % 3, b = (r + 2) % 3;

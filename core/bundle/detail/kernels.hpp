@@ -10,8 +10,8 @@ namespace vergence::detail {
 /// over their observations.
 void linearise(KernelJob& job, std::size_t first, std::size_t last) noexcept;
 
-/// A −= Y Yᵀ over batches [first, last) of one group; A is lower triangular, column-major, leading
-/// dimension ld.
+/// A −= Y Yᵀ over batches [first, last), a whole group and the last that linearise() had in hand; A
+/// is lower triangular, column-major, leading dimension ld.
 void subtract_points(const KernelJob& job, std::size_t first, std::size_t last, double* A,
                      std::size_t ld) noexcept;
 

@@ -266,7 +266,7 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
       }
     }
     if (pose.block >= 0) {
-      double* y = job.y + static_cast<std::size_t>(at) * kYSize + lane;
+      double* y = job.y + static_cast<std::size_t>(at) * kYTop + lane;
 #pragma GCC unroll 3
       for (int r = 0; r < 3; ++r)
 #pragma GCC unroll 3
@@ -304,7 +304,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
     if (pose.block < 0) continue;
     V Xi[3], Y[3][3];
     transform(pose.R, pose.t, X, Xi);
-    double* y = job.y + static_cast<std::size_t>(at) * kYSize + lane;
+    double* y = job.y + static_cast<std::size_t>(at) * kYTop + lane;
+    double* whole = job.y_group + (at - job.group_begin) * kYSize + lane;
     double* g = job.reduced + static_cast<std::size_t>(pose.block) * kBlock * kBatch + lane;
 #pragma GCC unroll 3
     for (int r = 0; r < 3; ++r) {
@@ -322,7 +323,8 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
       for (int c = 0; c < 3; ++c) {
         const V turned = hn::NegMulAdd(Xi[b], Y[a][c], hn::Mul(Xi[a], Y[b][c]));
         store(Y[r][c], y + (3 * r + c) * kBatch);
-        store(turned, y + (9 + 3 * r + c) * kBatch);
+        store(Y[r][c], whole + (3 * r + c) * kBatch);
+        store(turned, whole + (9 + 3 * r + c) * kBatch);
         top = hn::MulAdd(Y[r][c], z[c], top);
         bottom = hn::MulAdd(turned, z[c], bottom);
       }

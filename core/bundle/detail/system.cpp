@@ -49,6 +49,7 @@ System::System(BundleWorkspace& workspace, const BundleProblem& problem,
   job_.poses = w_.poses.data();
   job_.point_free = w_.point_free.data();
   job_.y = w_.y.data();
+  job_.y_group = w_.y_group.data();
   job_.y_shared = w_.y_shared.data();
   job_.factors = w_.factors.data();
   job_.sums = w_.sums.data();
@@ -167,6 +168,7 @@ bool System::linearise(const BundleState& state, double damping) noexcept {
   for (std::size_t b = 0; b < w_.batch_count;) {
     std::size_t end = b + 1;
     while (end < w_.batch_count && w_.batches[end].group == w_.batches[b].group) ++end;
+    job_.group_begin = w_.batches[b].block_begin;
     if (use_jets_) {
       for (std::size_t i = b; i < end; ++i) {
         fill_jets(state, w_.batches[i]);

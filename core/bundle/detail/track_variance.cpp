@@ -44,9 +44,9 @@ class TrackGradient {
     for (std::uint32_t b = w_.batches[batch].block_begin; b < w_.batches[batch].block_end; ++b) {
       const std::int32_t block = w_.poses[w_.blocks[b].pose].block;
       if (block < 0) continue;
-      for (std::size_t r = 0; r < kBlock; ++r)
-        subtract_pose(static_cast<std::size_t>(block) * kBlock + r,
-                      -product(job_.y + b * kYSize + r * 3 * kBatch + lane), &s);
+      const double* y = job_.y + b * kYTop + lane;
+      const Vec3 of_position(product(y), product(y + 3 * kBatch), product(y + 6 * kBatch));
+      subtract_pose(block, of_pose(-of_position, state_.poses[w_.blocks[b].pose] * X), &s);
     }
     const double* rows =
         job_.y_shared + batch * static_cast<std::size_t>(layout.blocks) * kYSize + lane;
@@ -61,9 +61,17 @@ class TrackGradient {
     return {c(0), c(1), c(2)};
   }
 
-  void subtract_pose(std::size_t row, double gradient, SharedVector* s) const noexcept {
-    const double* K = w_.A.data() + row * ld_ + first_;
-    for (Index i = 0; i < s->size(); ++i) (*s)[i] -= K[i] * gradient;
+  /// By (τ, φ), where q is by the point in the base camera.
+  static Vec6 of_pose(const Vec3& q, const Vec3& Xi) noexcept {
+    Vec6 gradient;
+    gradient << q, Xi.cross(q);
+    return gradient;
+  }
+
+  void subtract_pose(std::int32_t block, const Vec6& gradient, SharedVector* s) const noexcept {
+    const double* K = w_.A.data() + static_cast<std::size_t>(block) * kBlock * ld_ + first_;
+    for (Index r = 0; r < kBlock; ++r, K += ld_)
+      for (Index i = 0; i < s->size(); ++i) (*s)[i] -= K[i] * gradient[r];
   }
 
   double weight(double squared) const noexcept {
@@ -85,13 +93,9 @@ class TrackGradient {
     const Vec2 miss(o.x - pixel.x(), o.y - pixel.y());
     const Vec2 weighted = weight(miss.squaredNorm() * information) * information * miss;
     const Vec3 q = (G * T.R).transpose() * weighted;
-    Vec6 gradient;
-    gradient << q, Xi.cross(q);
+    const Vec6 gradient = of_pose(q, Xi);
     const std::int32_t block = w_.poses[o.pose].block;
-    if (block >= 0)
-      for (std::size_t r = 0; r < kBlock; ++r)
-        subtract_pose(static_cast<std::size_t>(block) * kBlock + r, gradient[static_cast<Index>(r)],
-                      s);
+    if (block >= 0) subtract_pose(block, gradient, s);
     const int k = o.camera;
     if (layout.extrinsic[k] >= 0) {
       const Vec6 own = extrinsic_basis(layout, job_.cameras[k], k).transpose() * gradient;

@@ -12,6 +12,7 @@ inline constexpr int kBatch =
 inline constexpr int kBlock =
     6;  // rows of one pose in the reduced system; θ_S is padded to a multiple
 inline constexpr int kYSize = kBlock * 3 * kBatch;  // doubles of one block of Y
+inline constexpr int kYTop = 3 * 3 * kBatch;        // of its first three rows
 inline constexpr int kFactorRows = 11;              // of PointFactor
 inline constexpr double kFar = 1e30;                // m: depth of what nobody sees
 inline constexpr int kPoseSums = 27;                // 21 of the symmetric 6×6, 6 of the gradient
@@ -85,8 +86,11 @@ struct KernelJob {
   const double* jets = nullptr;  // [slot of the batch][kJetRows][kBatch]; only for cameras with
                                  // distortion or free intrinsics
   double* candidate = nullptr;   // [batch][3][kBatch], out of back_substitute
-  double* y = nullptr;           // [block][6][3][kBatch]: Y = O L⁻ᵀ with P = L Lᵀ
-  double* y_shared = nullptr;    // [batch][shared.blocks][6][3][kBatch]: N L⁻ᵀ
+  double* y = nullptr;  // [block][3][3][kBatch]: of Y = O L⁻ᵀ with P = L Lᵀ the rows of τ; those of
+                        // φ are X_i × them, and kept for the group in hand alone
+  double* y_group = nullptr;    // [block of the group][6][3][kBatch]: Y whole
+  std::size_t group_begin = 0;  // block: the first of the group in hand
+  double* y_shared = nullptr;   // [batch][shared.blocks][6][3][kBatch]: N L⁻ᵀ
   double* factors =
       nullptr;  // [batch][kFactorRows][kBatch]: L⁻¹ (6), z = L⁻¹ e_P (3), least depth, 0
   double* sums = nullptr;            // [pose][classes][kPoseSums][kBatch]
@@ -136,8 +140,8 @@ struct BundleWorkspace {
   std::span<PoseBlock> blocks;
   std::span<Slot> slots;
   std::span<KernelPose> poses;
-  std::span<double> point_free, y, y_shared, factors, sums, intrinsic_sums, intrinsic_own, reduced,
-      jets;
+  std::span<double> point_free, y, y_group, y_shared, factors, sums, intrinsic_sums, intrinsic_own,
+      reduced, jets;
   std::span<double> A, rhs, delta;
   std::span<float> squared;
   BundleState states[2];

@@ -86,6 +86,20 @@ TEST(Arena, objectsOfZerosAreZerosWhetherTheyAreConstructedOrNot) {
   }
 }
 
+TEST(Arena, unsetObjectsAreZeroBytesWhateverTheirDefaults) {
+  struct Slot {
+    int id = -1;
+    float score = 0.5F;
+  };
+  Arena arena(4096);
+  for (const Slot& slot : arena.make_unset<Slot>(7, "slots")) {
+    EXPECT_EQ(slot.id, 0);
+    EXPECT_EQ(slot.score, 0.0F);
+  }
+  EXPECT_EQ(arena.used(), kCacheLine);
+  EXPECT_THROW((void)arena.make_unset<Slot>(4096, "too many"), std::length_error);
+}
+
 TEST(Arena, tellsWhoHoldsWhat) {
   Arena arena(4096);
   (void)arena.make<std::uint8_t>(65, "tracks");
