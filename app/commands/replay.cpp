@@ -152,11 +152,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   command->add_flag("--through-devices", a->through_devices,
                     "Of a recorded session: bytes of INS and board through their drivers, frames "
                     "and pulses through clocks and synchroniser, instead of what came out of them");
-  declare_also(*command, &a->also);
-  command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
-  command->add_flag("--page", a->page,
-                    "Show the session on a page in a browser: publish.http, 127.0.0.1:8080 unless "
-                    "the configuration says otherwise");
+  declare_session_options(*command, &a->also, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {
     ReplayRequest request = request_of(*a);

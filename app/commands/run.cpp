@@ -78,11 +78,7 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
           "--record", a->record,
           "What is recorded into drive.mcap, e.g. poses,ins,images,pulses,raw (docs/recording.md)")
       ->type_name("WORDS");
-  declare_also(*command, &a->also);
-  command->add_flag("--memory", a->memory, "Print what memory is held, by whom");
-  command->add_flag("--page", a->page,
-                    "Show the session on a page in a browser: publish.http, 127.0.0.1:8080 unless "
-                    "the configuration says otherwise");
+  declare_session_options(*command, &a->also, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {
     RunRequest request = request_of(*a);

@@ -13,6 +13,7 @@
 #include "core/odometry/options.hpp"
 #include "core/types/calibration.hpp"
 #include "drivers/camera.hpp"
+#include "drivers/mock/world/kinds.hpp"
 #include "drivers/options/options.hpp"
 #include "drivers/sync/sync_types.hpp"
 #include "drivers/trigger_board/options.hpp"
@@ -122,10 +123,18 @@ struct CalibrationErrorSettings {
 };
 
 struct MockSettings {
-  std::string world = "suburb", drive = "loop", pattern = "grey", ins = "noisy", ins_line = "none";
+  enum class Ins : std::uint8_t { noisy, ideal };
+  enum class InsLine : std::uint8_t { none, mti_g, mti_g_710 };
+  enum class BoardLine : std::uint8_t { none, usb, ftdi };
+
+  std::string world = "suburb";
+  vergence::mock::DriveKind drive = vergence::mock::DriveKind::loop;
+  vergence::mock::Pattern pattern = vergence::mock::Pattern::grey;
+  Ins ins = Ins::noisy;
+  InsLine ins_line = InsLine::none;
   int ins_latency_timer_ms = 16;  // 0: no converter
   double ins_late_percent = 1, ins_late_ms = 4;
-  std::string board_line = "none";
+  BoardLine board_line = BoardLine::none;
   int board_latency_timer_ms = 1;  // of `ftdi`
   double board_late_percent = 1, board_late_ms = 2;
   std::int64_t seed = 1;

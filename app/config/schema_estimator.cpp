@@ -103,9 +103,10 @@ Group calibration_options() {
                "A result is adopted when the frames after its snapshot confirm it, 12 of them or "
                "more; so many frames after the snapshot it is decided about, one way or the other. "
                "In a replay and with `--fast` the solver is waited for: alike on every machine.")
-      .integer("max_observations", &C::max_observations, 10'000, 1'000'000, "",
-               "Sightings that one solve takes; of more, frames are taken at wider steps: time and "
-               "memory.")
+      .integer(
+          "max_observations", &C::max_observations, 10'000, 1'000'000, "",
+          "Observations that one solve takes; of more, frames are taken at wider steps: time and "
+          "memory.")
       .choice("focal_lengths", &C::estimate_focal_lengths, {"hold", "estimate"},
               "`estimate`: the focal length of each further camera is found with the transform, by "
               "its prior; `hold`: it is believed.")

@@ -47,31 +47,45 @@ Group calibration_error() {
 
 Group mock() {
   using M = MockSettings;
+  using Kind = vergence::mock::DriveKind;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   return Rows<M>(
              "mock", "The world and the vehicle of the mock drivers; see docs/mock.md.",
              [](auto& c) -> auto& { return c.mock; })
-      .text("world", &M::world, 16, "What is driven through: `suburb`.")
-      .word("drive", &M::drive, {"loop", "figure-eight", "straight", "brief", "still"},
-            "Where: `loop` (1 km), `figure-eight`, `straight`, `brief` (120 m) or `still`.")
+      .word("world", &M::world, {"suburb"}, "What is driven through: `suburb`.")
+      .choice("drive", &M::drive,
+              {{"loop", Kind::loop},
+               {"figure-eight", Kind::figure_eight},
+               {"straight", Kind::straight},
+               {"brief", Kind::brief},
+               {"still", Kind::still}},
+              "Where: `loop` (1 km), `figure-eight`, `straight`, `brief` (120 m) or `still`.")
       .integer("seed", &M::seed, 0, kLargestSeed, "",
                "Of the town, the vehicle's unrest and all noise: the same seed, the same drive.")
-      .word("pattern", &M::pattern, {"grey", "gbrg"}, "Sensors: `grey`, or `gbrg` (Bayer).")
-      .word("ins", &M::ins, {"noisy", "ideal"},
-            "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
-      .word("ins_line", &M::ins_line, {"none", "mti-g", "mti-g-710"},
-            "With `--fast`: the INS as bytes on a simulated line, read by the real driver: `mti-g` "
-            "or `mti-g-710`; `none`.")
+      .choice("pattern", &M::pattern,
+              {{"grey", vergence::mock::Pattern::grey}, {"gbrg", vergence::mock::Pattern::gbrg}},
+              "Sensors: `grey`, or `gbrg` (Bayer).")
+      .choice("ins", &M::ins, {{"noisy", M::Ins::noisy}, {"ideal", M::Ins::ideal}},
+              "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
+      .choice(
+          "ins_line", &M::ins_line,
+          {{"none", M::InsLine::none},
+           {"mti-g", M::InsLine::mti_g},
+           {"mti-g-710", M::InsLine::mti_g_710}},
+          "With `--fast`: the INS as bytes on a simulated line, read by the real driver: `mti-g` "
+          "or `mti-g-710`; `none`.")
       .integer("ins_latency_timer_ms", &M::ins_latency_timer_ms, 0, 255, "ms",
                "Latency timer of that line's USB converter; 0: there is none.")
       .number("ins_late_percent", &M::ins_late_percent, 0, 100, "%",
               "Of its reads: they come late …")
       .number("ins_late_ms", &M::ins_late_ms, 0, 1000, "ms",
               "… by an exponential time of this mean.")
-      .word("board_line", &M::board_line, {"none", "usb", "ftdi"},
-            "With `--fast`: the trigger board as bytes on a simulated line, read by the real "
-            "driver, its pulses trigger the cameras: `usb`, "
-            "packets as they are full, or `ftdi`, a converter with a latency timer; `none`.")
+      .choice(
+          "board_line", &M::board_line,
+          {{"none", M::BoardLine::none}, {"usb", M::BoardLine::usb}, {"ftdi", M::BoardLine::ftdi}},
+          "With `--fast`: the trigger board as bytes on a simulated line, read by the real "
+          "driver, its pulses trigger the cameras: `usb`, "
+          "packets as they are full, or `ftdi`, a converter with a latency timer; `none`.")
       .integer("board_latency_timer_ms", &M::board_latency_timer_ms, 0, 255, "ms",
                "With `ftdi`: latency timer of that line's USB converter.")
       .number("board_late_percent", &M::board_late_percent, 0, 100, "%",

@@ -100,18 +100,18 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
   mock_ = make_mock_drive(c, faults, !fast, duration_s);
   for (int k = 0; k < mock_.rig->cameras(); ++k) cameras_.push_back(&mock_.rig->camera(k));
   if (mock_.has_ins) ins_ = &mock_.rig->ins();
-  if (mock_.has_ins && c.mock.ins_line != "none") {
+  if (mock_.has_ins && c.mock.ins_line != MockSettings::InsLine::none) {
     if (!fast)
-      throw InputError("mock.ins_line is \"" + c.mock.ins_line +
-                       "\", a line in virtual time; run with --fast, or set it to none");
+      throw InputError(
+          "mock.ins_line: that line is one in virtual time; run with --fast, or set it to none");
     opened_ins_ = make_simulated_ins(c, *mock_.rig, &remarks_);
     ins_ = opened_ins_.get();
   }
   trigger_ = &mock_.rig->trigger();
-  if (c.mock.board_line != "none") {
+  if (c.mock.board_line != MockSettings::BoardLine::none) {
     if (!fast)
-      throw InputError("mock.board_line is \"" + c.mock.board_line +
-                       "\", a line in virtual time; run with --fast, or set it to none");
+      throw InputError(
+          "mock.board_line: that line is one in virtual time; run with --fast, or set it to none");
     simulated_board_ = make_simulated_board(c, mock_.rig.get(), &board_driver_, &remarks_);
     trigger_ = simulated_board_.get();
     board_keeps_own_time_ = true;

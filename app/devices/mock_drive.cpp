@@ -71,7 +71,6 @@ void check_drive(const Configuration& c) {
   }
   one_of("ins.driver", c.ins.driver, {"mock", "none"});
   one_of("trigger.driver", c.trigger.driver, {"mock"});
-  one_of("mock.world", c.mock.world, {"suburb"});
   (void)sync_options(c, n);
   (void)trigger_configuration(c, n);
 }
@@ -87,7 +86,7 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     world.texture_detail = c.mock.texture_detail;
     world.hill_deg = c.mock.hill_deg;
     mock::DriveOptions way;
-    (void)mock::parse(c.mock.drive, &way.kind);
+    way.kind = c.mock.drive;
     way.seed = world.seed;
     way.speed = c.mock.speed;
     way.suspension = c.mock.suspension;
@@ -101,13 +100,13 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     mock::MockRigOptions o;
     o.real_time = real_time;
     o.seed = world.seed;
-    o.pattern = c.mock.pattern == "gbrg" ? mock::Pattern::gbrg : mock::Pattern::grey;
+    o.pattern = c.mock.pattern;
     o.raw = raw;
     o.noise = c.mock.noise != 0;
     o.blur_samples = c.mock.blur_samples;
-    o.ideal_ins = c.mock.ins == "ideal";
+    o.ideal_ins = c.mock.ins == MockSettings::Ins::ideal;
     o.clock_drift_ppm = c.mock.clock_drift_ppm;
-    o.fed = c.mock.board_line != "none";
+    o.fed = c.mock.board_line != MockSettings::BoardLine::none;
     o.reports_taken =
         !o.fed &&
         c.sync.mode == SyncMode::board;  // else nobody asks for a pause, nor need take them
@@ -134,7 +133,8 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
 }
 
 Duration stamp_grid(const Configuration& c) noexcept {
-  return c.mock.pattern == "gbrg" ? Duration::microseconds(1) : Duration::nanoseconds(1);
+  return c.mock.pattern == mock::Pattern::gbrg ? Duration::microseconds(1)
+                                               : Duration::nanoseconds(1);
 }
 
 std::vector<StampedPose> true_trajectory(const mock::MockRig& rig, const Configuration& c,

@@ -86,7 +86,7 @@ mock::SimulatedLineOptions line_of(const Configuration& c, const mock::MockRig& 
   constexpr std::size_t kUsbPacket = 64;
   mock::SimulatedLineOptions o;
   o.start = rig.start() - kBefore;
-  o.converter = c.mock.board_line == "ftdi";
+  o.converter = c.mock.board_line == MockSettings::BoardLine::ftdi;
   if (o.converter)
     o.latency_timer = Duration::milliseconds(std::max(1, c.mock.board_latency_timer_ms));
   else

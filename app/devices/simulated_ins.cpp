@@ -23,7 +23,7 @@ Duration length_of(const Configuration& c, const mock::MockRig& rig) {
 
 mock::InsSource source_of(const Configuration& c, const mock::MockRig& rig) {
   mock::InsModelOptions o;
-  o.ideal = c.mock.ins == "ideal";
+  o.ideal = c.mock.ins == MockSettings::Ins::ideal;
   o.seed = static_cast<std::uint64_t>(c.mock.seed);
   o.rate_hz = c.ins.rate;
   auto model = std::make_shared<mock::InsModel>(o, rig.truth());
@@ -58,8 +58,8 @@ mock::SimulatedLineOptions line_of(const Configuration& c, const mock::MockRig& 
 std::unique_ptr<InsDevice> make_simulated_ins(const Configuration& c, const mock::MockRig& rig,
                                               std::vector<std::string>* remarks) {
   mock::XsensSimulatorOptions sensor;
-  sensor.generation =
-      c.mock.ins_line == "mti-g" ? xbus::Generation::legacy : xbus::Generation::mark4;
+  sensor.generation = c.mock.ins_line == MockSettings::InsLine::mti_g ? xbus::Generation::legacy
+                                                                      : xbus::Generation::mark4;
   sensor.device_id = sensor.generation == xbus::Generation::legacy ? 0x00500123 : 0x07701234;
   sensor.clock_ppm = c.mock.clock_drift_ppm;
   sensor.power_on = rig.start() - kBefore;

@@ -21,7 +21,7 @@ MapPoint* Map::make_point() noexcept {
     p.now.cameras = 0;
     p.in_images = 0;
     p.logged = false;
-    for (Sighting& s : p.seen) s.cameras = 0;
+    for (PointObservation& s : p.seen) s.cameras = 0;
     return &p;
   }
   return nullptr;

@@ -19,7 +19,7 @@ inline constexpr double kNearDisparity =
 
 /// What one rig frame saw of a point: pixels of an ideal pinhole camera with each camera's own K,
 /// distortion removed.
-struct Sighting {
+struct PointObservation {
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};
   std::array<float, kMaxCameras> sigma{};  // px, one coordinate
   std::uint8_t cameras = 0;                // bit k: camera k saw it
@@ -56,13 +56,13 @@ struct MapPoint {
   Vec3 ray = Vec3::UnitZ();               // (x, y, 1) of its pixel there
   Mat2 d_ray_d_pixel = Mat2::Identity();  // of that ray's x, y by the raw pixel
   features::Patch patch{};
-  Sighting now{};  // this frame's
+  PointObservation now{};  // this frame's
   std::uint8_t in_images =
       0;  // bit k: found in camera k's image now, whether that agrees with the pose or not
   bool logged = false;          // `logged_at` says where
   Eigen::Vector2f logged_at{};  // raw pixel in `left` when the track log last took a frame
-  std::array<Eigen::Vector2f, kMaxCameras> raw{};  // this frame's pixels as the image has them
-  std::array<Sighting, kMaxWindow> seen{};         // by keyframe slot
+  std::array<Eigen::Vector2f, kMaxCameras> raw{};   // this frame's pixels as the image has them
+  std::array<PointObservation, kMaxWindow> seen{};  // by keyframe slot
 
   /// Its position is good enough to reckon poses with.
   [[nodiscard]] bool holds_poses() const noexcept {

@@ -9,11 +9,11 @@ namespace vergence::odometry {
 namespace {
 
 constexpr std::size_t kMaxWindowPoints = 1024;
-constexpr std::size_t kSightingsAPoint =
+constexpr std::size_t kObservationsAPoint =
     10;  // on average, of all cameras; more are left out of the step
 constexpr float kOutlier =
     16.F;  // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
-constexpr int kSightingsOfPose = 3;        // that hold six degrees of freedom
+constexpr int kObservationsOfPose = 3;     // that hold six degrees of freedom
 constexpr double kMinDepthOfPoint = 0.05;  // m in front of every camera that sees it
 constexpr double kJudgedDepth = 20.0;      // m, where a calibration is asked for its depth error
 constexpr double kHeldSigma = 1e-6;        // rad and m, of what a window does not estimate of a rig
@@ -28,7 +28,7 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options,
   c.cameras = static_cast<std::size_t>(rig.cameras);
   c.poses = static_cast<std::size_t>(options.window_keyframes * rig.cameras);
   c.points = kMaxWindowPoints;
-  c.observations = kMaxWindowPoints * kSightingsAPoint;
+  c.observations = kMaxWindowPoints * kObservationsAPoint;
   c.shared = options.rig_turn_sigma > 0;
   return c;
 }
@@ -114,7 +114,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameEffort& effort) no
     int keyframes = 0;
     bool fits = !points_.full();
     for (std::size_t frame = oldest_; frame < map.order().size() && fits; ++frame) {
-      const Sighting& s = p.seen[map.order()[frame]];
+      const PointObservation& s = p.seen[map.order()[frame]];
       if (s.cameras == 0) continue;
       ++keyframes;
       for (int k = 0; k < rig_.cameras && fits; ++k) {
@@ -146,7 +146,7 @@ void WindowAdjuster::gather(Map& map, bool linked, const FrameEffort& effort) no
   std::array<int, kMaxWindow * kMaxCameras> seen{};
   for (const BundleObservation& o : observations_) ++seen[o.pose];
   for (std::size_t i = 0; i < poses_.size(); ++i)
-    if (seen[i] < kSightingsOfPose) constant_[i] = 1;
+    if (seen[i] < kObservationsOfPose) constant_[i] = 1;
 }
 
 int WindowAdjuster::drop_outliers(Map& map) noexcept {

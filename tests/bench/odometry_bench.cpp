@@ -7,6 +7,8 @@
 // Images are decoded beforehand; the clock runs from the decoded pair to the pose. Yardstick:
 // OpenCV's pyramidal Lucas–Kanade on 1000 corners of one pair of successive EuRoC left images
 // (pyramids included, one thread). A time counts as its ratio to it.
+#include <time.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -52,7 +54,8 @@ struct DecodedDrive {
 
 struct Replay {
   std::vector<StampedPose> poses;
-  std::vector<float> milliseconds;
+  std::vector<float> milliseconds;         // a frame, of the clock …
+  std::vector<float> cpu_milliseconds;     // … and of the estimator's thread
   std::array<double, kStages> stage_ms{};  // sums
   int posed = 0, ok = 0, keyframes = 0;
 };
@@ -85,6 +88,13 @@ cv::Mat decode(const std::filesystem::path& file, int width, int height) {
       app::decode_grey(bytes, {width, height}, image.data, image.step) != app::ImageFileStatus::ok)
     throw std::runtime_error(file.string() + ": cannot be decoded");
   return image;
+}
+
+/// What this thread has run so far, ms.
+double thread_ms() {
+  timespec t{};
+  (void)::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
 DecodedDrive load(const Excerpt& excerpt, const std::filesystem::path& folder) {
@@ -128,7 +138,9 @@ Replay replay(const DecodedDrive& d, const app::Configuration& configuration, in
       frame.images[k] = {d.pairs[i][k].data, c.width, c.height,
                          static_cast<std::ptrdiff_t>(d.pairs[i][k].step)};
     }
+    const double before = thread_ms();
     const PoseSample s = estimator.process(frame);
+    r.cpu_milliseconds.push_back(static_cast<float>(thread_ms() - before));
     r.milliseconds.push_back(s.estimate_ms);
     for (std::size_t k = 0; k < kStages; ++k) r.stage_ms[k] += static_cast<double>(s.stage_ms[k]);
     r.keyframes += s.keyframe ? 1 : 0;
@@ -210,7 +222,7 @@ double segments_without_mount(const std::vector<StampedPose>& estimate,
 nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive,
                        const Arguments& arguments, double* yardstick) {
   const app::Configuration configuration = app::load_configuration(std::nullopt, arguments.set);
-  std::vector<float> pooled, means, yards;
+  std::vector<float> pooled, cpu, means;
   Replay last;
   for (int i = 0; i < arguments.repeats; ++i) {
     std::FILE* frames =
@@ -223,6 +235,7 @@ nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive,
       write_tum(arguments.frames + "." + excerpt.name + ".tum", last.poses);
     }
     pooled.insert(pooled.end(), last.milliseconds.begin(), last.milliseconds.end());
+    cpu.insert(cpu.end(), last.cpu_milliseconds.begin(), last.cpu_milliseconds.end());
     means.push_back(static_cast<float>(mean(last.milliseconds)));
   }
   EvaluationOptions options;
@@ -248,6 +261,8 @@ nlohmann::json measure(const Excerpt& excerpt, const DecodedDrive& drive,
   j["p50_ms"] = quantile(pooled, 0.5);
   j["p99_ms"] = quantile(pooled, 0.99);
   j["max_ms"] = *std::max_element(pooled.begin(), pooled.end());
+  j["cpu_p50_ms"] = quantile(cpu, 0.5);
+  j["cpu_p999_ms"] = quantile(cpu, 0.999);
   if (*yardstick > 0) {
     j["yardstick_ms"] = *yardstick;
     j["ratio"] = quantile(means, 0.5) / *yardstick;
@@ -276,6 +291,9 @@ void print(const nlohmann::json& j) {
   if (j.contains("ratio"))
     fmt::print(" · yardstick {:.2f} ms, ratio {:.3f}", j["yardstick_ms"].get<double>(),
                j["ratio"].get<double>());
+  const double median = j["cpu_p50_ms"].get<double>(), slowest = j["cpu_p999_ms"].get<double>();
+  fmt::print("\n  estimator's thread: {:.2f} ms p50 · {:.2f} p99.9, {:.2f} medians", median,
+             slowest, slowest / median);
   fmt::print("\n ");
   for (const auto& [stage, ms] : j["stages_ms"].items())
     fmt::print(" {} {:.2f}", stage, ms.get<double>());

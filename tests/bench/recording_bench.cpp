@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -157,11 +158,16 @@ Arguments parse(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const Arguments a = parse(argc, argv);
-  if (!a.out.empty()) return measure(a, a.out);
-  std::string name = (std::filesystem::temp_directory_path() / "recording-bench-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) return 2;
-  const int result = measure(a, name);
-  std::filesystem::remove_all(name);
-  return result;
+  try {
+    const Arguments a = parse(argc, argv);
+    if (!a.out.empty()) return measure(a, a.out);
+    std::string name = (std::filesystem::temp_directory_path() / "recording-bench-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) return 2;
+    const int result = measure(a, name);
+    std::filesystem::remove_all(name);
+    return result;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "recording_bench: %s\n", e.what());
+    return 2;
+  }
 }

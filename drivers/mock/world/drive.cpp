@@ -320,20 +320,6 @@ BodyState Drive::at(Duration time) const noexcept {
   return state;
 }
 
-bool parse(const std::string& name, DriveKind* kind) noexcept {
-  constexpr std::pair<const char*, DriveKind> kNames[] = {{"loop", DriveKind::loop},
-                                                          {"figure-eight", DriveKind::figure_eight},
-                                                          {"straight", DriveKind::straight},
-                                                          {"brief", DriveKind::brief},
-                                                          {"still", DriveKind::still}};
-  for (const auto& [text, value] : kNames)
-    if (name == text) {
-      *kind = value;
-      return true;
-    }
-  return false;
-}
-
 Transform camera_mount(const Vec3& position_body, double tilt_down) noexcept {
   Mat3 R;  // columns: the camera's right, down, forward in body axes
   R << 0, -std::sin(tilt_down), std::cos(tilt_down),  //

@@ -6,17 +6,10 @@
 
 #include "core/math/se3.hpp"
 #include "core/types/time.hpp"
+#include "drivers/mock/world/kinds.hpp"
 #include "drivers/mock/world/world.hpp"
 
 namespace vergence::mock {
-
-enum class DriveKind : std::uint8_t {
-  loop,          // 1 km round the town: right turns, two stops, hills, ends 6 m past its start
-  figure_eight,  // 1 km, left and right turns
-  straight,      // 480 m along a hilly street with one stop
-  brief,         // 120 m with one corner
-  still,         // stands for 30 s
-};
 
 struct DriveOptions {
   DriveKind kind = DriveKind::loop;
@@ -69,10 +62,6 @@ class Drive {
 
 inline constexpr Duration kDriveStep =
     Duration::milliseconds(20);  // between control points: holds what moves up to 12 Hz
-
-/// "loop", "figure-eight", "straight", "brief", "still" → kind. False: no such kind, *kind
-/// untouched.
-[[nodiscard]] bool parse(const std::string& name, DriveKind* kind) noexcept;
 
 /// Camera on the vehicle: at `position_body` (m), looking forward, tilted down by `tilt_down`
 /// (rad). p_body = T · p_camera.

@@ -5,6 +5,7 @@
 
 #include "core/camera/camera.hpp"
 #include "core/math/se3.hpp"
+#include "drivers/mock/world/kinds.hpp"
 #include "drivers/mock/world/world.hpp"
 
 namespace vergence::mock {
@@ -17,11 +18,6 @@ struct Shot {
   double shot_noise = 0.02;  // variance per grey level; a 12 ke⁻ well on 255 levels: 255/12000
   double read_noise = 0.6;   // grey levels, sigma
   std::uint32_t noise_seed = 0;  // a different one for every frame and camera; 0: no noise at all
-};
-
-enum class Pattern : std::uint8_t {
-  grey,  // a monochrome sensor
-  gbrg,  // Bayer: green blue / red green
 };
 
 /// One mock camera's image formation: casts a ray per pixel through the lens model into a world.

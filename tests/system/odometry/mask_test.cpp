@@ -107,7 +107,7 @@ const DirtyDrive& dirty_drive() {
 }
 
 struct Passed {
-  std::array<int, 2> sightings{}, painted{};  // by camera; of these, of what is painted
+  std::array<int, 2> observations{}, painted{};  // by camera; of these, of what is painted
   int posed = 0;
   Transform T_left_world{};
   double error = 0;  // m, of the way from the first frame to the last
@@ -131,7 +131,7 @@ Passed pass(bool dirty, std::span<const ImageView> masks, bool known = true) {
         const auto c = static_cast<std::size_t>(k);
         const int x = static_cast<int>(std::lround(p.raw[c].x())),
                   y = static_cast<int>(std::lround(p.raw[c].y()));
-        ++passed.sightings[c];
+        ++passed.observations[c];
         passed.painted[c] += is_painted(c, x, y, truth.rig.intrinsics[0].height) ? 1 : 0;
       }
   }
@@ -150,7 +150,7 @@ TEST(MaskedOdometry, sightsNothingUnderAMaskAndIsAsGoodAsOnCleanGlass) {
   const Passed bare = pass(true, {});
   for (std::size_t k = 0; k < 2; ++k) {
     EXPECT_EQ(masked.painted[k], 0) << "camera " << k;
-    EXPECT_GT(masked.sightings[k], static_cast<int>(kFrames) * 100) << "camera " << k;
+    EXPECT_GT(masked.observations[k], static_cast<int>(kFrames) * 100) << "camera " << k;
     // What the mask is for: without it the paint is followed.
     EXPECT_GT(bare.painted[k], static_cast<int>(kFrames)) << "camera " << k;
   }
@@ -175,7 +175,7 @@ TEST(MaskedOdometry, withAMaskThatHidesNothingIsTheSameBitForBit) {
   const Passed with = pass(false, masks), without = pass(false, {});
   EXPECT_EQ(with.T_left_world.t, without.T_left_world.t);
   EXPECT_EQ(with.T_left_world.R, without.T_left_world.R);
-  EXPECT_EQ(with.sightings, without.sightings);
+  EXPECT_EQ(with.observations, without.observations);
 }
 
 TEST(MaskedOdometry, theEstimatorRefusesAMaskOfAnotherSize) {

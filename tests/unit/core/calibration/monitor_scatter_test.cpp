@@ -12,8 +12,8 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr double kLambda = 3;       // px² of a unit of information: what noise is inflated by
-constexpr double kSightings = 4e4;  // of a block, each of 1 px
+constexpr double kLambda = 3;          // px² of a unit of information: what noise is inflated by
+constexpr double kObservations = 4e4;  // of a block, each of 1 px
 
 /// Blocks of a drive, each with an offset of its own besides the noise of its tracks.
 class Blocks {
@@ -22,7 +22,7 @@ class Blocks {
     Mat5 root = Mat5::Identity();
     for (int i = 0; i < 5; ++i)
       for (int j = 0; j < i; ++j) root(i, j) = 0.3 * random_.normal();
-    A_ = kSightings * root * root.transpose();
+    A_ = kObservations * root * root.transpose();
   }
   /// `rms_px`: of the offset over the image.
   [[nodiscard]] Evidence draw(double rms_px) {
@@ -32,13 +32,14 @@ class Blocks {
     // dᵀ A d / n is the mean square over the image: a fifth of it in each of A's own directions.
     const Eigen::LLT<Mat5> factor(A_);
     const Mat5 L = factor.matrixL();
-    const Vec5 g = L * (std::sqrt(kLambda) * noise + std::sqrt(kSightings / 5) * rms_px * offset);
+    const Vec5 g =
+        L * (std::sqrt(kLambda) * noise + std::sqrt(kObservations / 5) * rms_px * offset);
     Evidence e;
     for (int i = 0; i < 5; ++i) {
       e.g[static_cast<std::size_t>(i)] = g[i];
       for (int j = 0; j <= i; ++j) e.A[lower(i, j)] = A_(i, j);
     }
-    e.n = kSightings;
+    e.n = kObservations;
     return e;
   }
   /// `count` blocks one after the other, each against those before it.

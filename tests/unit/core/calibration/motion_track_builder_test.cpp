@@ -29,7 +29,7 @@ struct Fed {
   }
 };
 
-TEST(MotionTrackBuilder, usesNoStretchOfATrackTwiceAndPairsTheRightSightings) {
+TEST(MotionTrackBuilder, usesNoStretchOfATrackTwiceAndPairsTheRightObservations) {
   Fed fed({});
   struct Seen {
     Vec2 left, right;

@@ -218,7 +218,7 @@ TEST(Stretches, oneThatFailsLeavesNoTraceInTheNext) {
   EXPECT_EQ(third[0].rig.sigma_noise[1], third[1].rig.sigma_noise[1]);
 }
 
-TEST(TrackLogAppend, aFrameOfAnotherLogComesWithItsSightings) {
+TEST(TrackLogAppend, aFrameOfAnotherLogComesWithItsObservations) {
   Arena a(TrackLog::memory_needed(4, 8)), b(TrackLog::memory_needed(3, 5));
   TrackLog from(4, 8, a), to(3, 5, b);
   for (std::uint64_t number = 1; number <= 4; ++number) {

@@ -40,7 +40,7 @@ void expect_frame(const LoggedFrame& f, std::uint64_t number, std::size_t observ
     EXPECT_EQ(f.observations[i].track, 100 * number + i);
 }
 
-TEST(TrackLog, keepsFramesInOrderWithTheirSightings) {
+TEST(TrackLog, keepsFramesInOrderWithTheirObservations) {
   Log l(4, 5);
   EXPECT_TRUE(l.log.empty());
   l.frame(3, 2);

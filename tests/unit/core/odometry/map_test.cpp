@@ -42,7 +42,7 @@ TEST(Map, whenItsPointsAreUsedUpItRefuses) {
   EXPECT_EQ(again->found, 0);
   EXPECT_EQ(again->missed, 0);
   EXPECT_EQ(again->now.cameras, 0);
-  for (const Sighting& s : again->seen) EXPECT_EQ(s.cameras, 0);
+  for (const PointObservation& s : again->seen) EXPECT_EQ(s.cameras, 0);
 }
 
 TEST(Map, pointsOnTrialLeaveNoTraceInTheOrderOfSlots) {
@@ -72,7 +72,7 @@ TEST(Map, aFullWindowDropsItsOldestKeyframe) {
   EXPECT_EQ(f.map.order().size(), 3U);
 }
 
-TEST(Map, aNewKeyframeHasNoSightingsOfTheOneWhoseSlotItTakes) {
+TEST(Map, aNewKeyframeHasNoObservationsOfTheOneWhoseSlotItTakes) {
   Filled f(2);
   MapPoint* p = f.point(PointStage::active);
   const std::size_t a = f.keyframe();
@@ -121,8 +121,8 @@ TEST(Map, clearedItIsEmptyAndHasItsWholeRoomAgain) {
   EXPECT_EQ(n, kMaxPoints);
 }
 
-TEST(Sighting, holdsACameraABit) {
-  Sighting s;
+TEST(PointObservation, holdsACameraABit) {
+  PointObservation s;
   s.set(0, {1.5, 2.5}, 0.2F);
   s.set(3, {7, 8}, 0.3F);
   EXPECT_TRUE(s.by(0));

@@ -76,7 +76,7 @@ void expect_exact(const Transform& found, const Transform& truth) {
   EXPECT_LT((found.t - truth.t).norm(), kExactShift);
 }
 
-TEST(PoseEstimator, aRigsPoseIsFoundFromExactSightings) {
+TEST(PoseEstimator, aRigsPoseIsFoundFromExactObservations) {
   for (const bool sample : {false, true}) {
     Scene s;
     PoseEstimator e(s.options, s.rig, s.arena);
@@ -108,7 +108,7 @@ TEST(PoseEstimator, pointsThatHoldNoPosesAreNotAsked) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(e.agrees()[static_cast<std::size_t>(3 * i)], 0);
 }
 
-TEST(PoseEstimator, aThirdOfWrongSightingsDoNotMoveIt) {
+TEST(PoseEstimator, aThirdOfWrongObservationsDoNotMoveIt) {
   Scene s;
   PoseEstimator e(s.options, s.rig, s.arena);
   for (int i = 0; i < 100; ++i)

@@ -105,7 +105,7 @@ struct Bend {
   }
 };
 
-TEST(WindowAdjuster, exactSightingsBringThePosesBack) {
+TEST(WindowAdjuster, exactObservationsBringThePosesBack) {
   Bend b;
   const Transform first = b.map.keyframe(b.map.order()[0]).T_left_world;
   b.disturb();

@@ -145,14 +145,6 @@ TEST(Drive, refusesImpossibleOptionsByName) {
   }
 }
 
-TEST(Drive, namesOfKinds) {
-  DriveKind kind = DriveKind::still;
-  EXPECT_TRUE(parse("figure-eight", &kind));
-  EXPECT_EQ(kind, DriveKind::figure_eight);
-  EXPECT_FALSE(parse("spiral", &kind));
-  EXPECT_EQ(kind, DriveKind::figure_eight);
-}
-
 TEST(CameraMount, looksForwardAndDownByTheTilt) {
   const Transform T_body_camera = camera_mount({1, 2, 3}, 0.1);
   EXPECT_LT((T_body_camera * Vec3(0, 0, 1) - Vec3(1 + std::cos(0.1), 2, 3 - std::sin(0.1))).norm(),
