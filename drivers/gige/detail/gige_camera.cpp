@@ -20,7 +20,7 @@ GigeCamera::~GigeCamera() {
 }
 
 std::string GigeCamera::remark() const {
-  const std::string remark = remark_.get();
+  std::string remark = remark_.get();
   const std::uint64_t unknown = receiver_.without_exposure();
   if (unknown == 0) return remark;
   return remark + (remark.empty() ? "" : "; ") + std::to_string(unknown) +
