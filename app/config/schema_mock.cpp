@@ -52,7 +52,7 @@ Group mock() {
   return Rows<M>(
              "mock", "The world and the vehicle of the mock drivers; see docs/mock.md.",
              [](auto& c) -> auto& { return c.mock; })
-      .word("world", &M::world, {"suburb"}, "What is driven through: `suburb`.")
+      .text("world", &M::world, 16, "What is driven through: `suburb`.")
       .choice("drive", &M::drive,
               {{"loop", Kind::loop},
                {"figure-eight", Kind::figure_eight},

@@ -71,6 +71,7 @@ void check_drive(const Configuration& c) {
   }
   one_of("ins.driver", c.ins.driver, {"mock", "none"});
   one_of("trigger.driver", c.trigger.driver, {"mock"});
+  one_of("mock.world", c.mock.world, {"suburb"});
   (void)sync_options(c, n);
   (void)trigger_configuration(c, n);
 }
