@@ -1,33 +1,21 @@
 #pragma once
-#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <vector>
 
 #include "app/device_replay/recorded_line.hpp"
-#include "drivers/trigger.hpp"
+#include "drivers/trigger_board/device.hpp"
 
 namespace vergence::app {
-
-/// A pause of the pulses as it was first asked of a board.
-struct RequestedPause {
-  std::size_t step = 0;      // of the record: where its message was written
-  std::uint32_t pulses = 0;  // without those of an earlier one that was asked for with it again
-};
-
-/// All of a record, in order. What the driver sent again by itself, its answer missing, is none.
-[[nodiscard]] std::vector<RequestedPause> requested_pauses(const LineRecord& record);
 
 /// A board's driver on a recorded line, which is asked for pauses where it was in the drive: what
 /// its caller asks for comes at another time than it did then, and so does what the board said
 /// about it.
 ///
-/// Ownership  `line` is in `board`; the record outlives the construction alone.
+/// Ownership  `line` is in `board`.
 /// Threads, errors, time: as those of `board`.
 class RecordedBoard final : public TriggerDevice {
  public:
-  RecordedBoard(std::unique_ptr<TriggerDevice> board, const LineRecord& record,
-                RecordedPlace& line);
+  RecordedBoard(std::unique_ptr<trigger_board::Device> board, RecordedPlace& line);
 
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return board_->info(); }
   [[nodiscard]] DeviceStatus configure(const TriggerConfiguration& requested,
@@ -56,9 +44,7 @@ class RecordedBoard final : public TriggerDevice {
   }
 
  private:
-  std::vector<RequestedPause> pauses_;
-  std::size_t next_ = 0;                  // of the board's thread
-  std::unique_ptr<TriggerDevice> board_;  // the first to go: its thread uses the others
+  std::unique_ptr<trigger_board::Device> board_;
 };
 
 }  // namespace vergence::app

@@ -106,14 +106,14 @@ class RecordedPlace::Conversation {
     if (!writes_next()) return now_;
     if (before_writes_ && announced_ <= at_) {
       announced_ = at_ + 1;
-      before_writes_(at_);
+      before_writes_(record_.bytes_of(step()));
     }
     return std::max(now_, step().event.time);
   }
   [[nodiscard]] bool at_end() const noexcept {
     return at_ >= record_.steps.size() || step().event.time > until_;
   }
-  void before_writes(std::function<void(std::size_t step)> call) {
+  void before_writes(std::function<void(std::span<const std::uint8_t>)> call) {
     before_writes_ = std::move(call);
   }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
@@ -157,7 +157,7 @@ class RecordedPlace::Conversation {
   std::size_t at_ = 0;
   std::size_t taken_ = 0;  // of the bytes of the step in hand
   int woken_ = 0;          // for the write in hand
-  std::function<void(std::size_t step)> before_writes_;
+  std::function<void(std::span<const std::uint8_t>)> before_writes_;
   std::size_t announced_ = 0;  // steps before this were
   LineReplayCounters counters_{};
 };
@@ -212,7 +212,7 @@ bool RecordedPlace::exhausted() const noexcept { return conversation_->at_end();
 const LineReplayCounters& RecordedPlace::counters() const noexcept {
   return conversation_->counters();
 }
-void RecordedPlace::before_writes(std::function<void(std::size_t step)> call) {
+void RecordedPlace::before_writes(std::function<void(std::span<const std::uint8_t>)> call) {
   conversation_->before_writes(std::move(call));
 }
 

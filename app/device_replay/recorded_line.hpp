@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "app/datasets/device_recording.hpp"
@@ -45,10 +46,10 @@ class RecordedPlace final : public LinePlace {
   [[nodiscard]] bool exhausted() const noexcept override;
 
   [[nodiscard]] const LineReplayCounters& counters() const noexcept;
-  /// `call` with the number of the record's step, once for each recorded write that the driver has
-  /// not made: when it is the next to come and the driver looks at its clock, on that thread. While
-  /// no line is in use.
-  void before_writes(std::function<void(std::size_t step)> call);
+  /// `call` with the bytes of a recorded write that the driver has not made, once for each of them:
+  /// when it is the next to come and the driver looks at its clock, on that thread. While no line
+  /// is in use.
+  void before_writes(std::function<void(std::span<const std::uint8_t>)> call);
 
   class Conversation;  // where in the record it is; lives as long as the place or a line of it
 

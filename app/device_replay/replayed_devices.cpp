@@ -109,9 +109,9 @@ void ReplayedDevices::open_trigger(const Configuration& c, const ReplayedDrive& 
   options.native_usb = trigger_board::is_native_usb(place->name());
   DeviceStatus status = DeviceStatus::ok;
   std::string error;
-  trigger_ = trigger_board::open_on(std::move(place), options, &status, &error);
-  if (trigger_ == nullptr) refuse_line(drive, "trigger board", error);
-  trigger_ = std::make_unique<RecordedBoard>(std::move(trigger_), drive.recording.board, line);
+  auto board = trigger_board::open_on(std::move(place), options, &status, &error);
+  if (board == nullptr) refuse_line(drive, "trigger board", error);
+  trigger_ = std::make_unique<RecordedBoard>(std::move(board), line);
   if (trigger_->configure(trigger_configuration(c, static_cast<int>(cameras_.size())), nullptr) !=
       DeviceStatus::ok)
     refuse_line(drive, "trigger board", trigger_->last_error());

@@ -162,6 +162,7 @@ bool VividPlayer::refill(std::size_t output, std::uint64_t first) {
   while (v4l2::control(out.fd.get(), VIDIOC_DQBUF, &b) == 0) {
     const std::int64_t now = now_ns();
     out.showings.push_back({out.numbers[b.index], out.next_from_ns, now});
+    out.current = (b.index + 1) % out.buffers.size();
     out.next_from_ns = looked_before_ns;
     const std::uint64_t number = due() - first;
     draw_(output, number, out.buffers[b.index]);
@@ -184,6 +185,8 @@ void VividPlayer::feed() {
     for (std::size_t k = 0; k < outputs_.size(); ++k)
       if (!refill(k, first)) return;
   }
+  for (Output& out : outputs_)
+    out.showings.push_back({out.numbers[out.current], out.next_from_ns, now_ns()});
 }
 
 }  // namespace vergence::test

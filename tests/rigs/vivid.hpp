@@ -71,7 +71,8 @@ class VividPlayer {
   struct Output {
     v4l2::UniqueFd fd;
     std::vector<std::span<std::uint8_t>> buffers;
-    std::vector<std::int64_t> numbers;  // by buffer
+    std::vector<std::int64_t> numbers;  // by buffer; they are shown in the order of buffers
+    std::size_t current = 0;            // the buffer that is shown
     std::vector<Showing> showings;
     std::int64_t next_from_ns = 0;  // of the image after the last that came back
     std::int64_t looked_ns = 0;     // when no other buffer was back

@@ -106,8 +106,7 @@ std::vector<Pulse> replay(const Record& record, Pauses pauses, LineReplayCounter
   auto place = std::make_unique<RecordedPlace>(record.line);
   RecordedPlace& line = *place;
   RecordedBoard board(
-      std::make_unique<trigger_board::Device>(std::move(place), trigger_board::Options{}),
-      record.line, line);
+      std::make_unique<trigger_board::Device>(std::move(place), trigger_board::Options{}), line);
   std::vector<Pulse> pulses = pulses_of(board, nullptr, pauses);
   *counters = line.counters();
   return pulses;
@@ -134,7 +133,6 @@ TEST(RecordedBoard, pulsesHaveTheSameTimesWhereTheThreadWasPreempted) {
     ASSERT_GT(then.size(), 1700U);
     LineReplayCounters counters;
     expect_same(replay(record, Pauses::none, &counters), then, seed);
-    EXPECT_TRUE(requested_pauses(record.line).empty());
   }
 }
 
@@ -148,7 +146,6 @@ TEST(RecordedBoard, pausesComeWhereTheyCameWhoeverAsks) {
       left_out += then[i].number - then[i - 1].number - 1;
     // Fourteen requests come in time, whichever way the threads run.
     ASSERT_GE(left_out, 28U);
-    ASSERT_FALSE(requested_pauses(record.line).empty());
     for (const Pauses pauses : {Pauses::none, Pauses::every_hundred}) {
       LineReplayCounters counters;
       expect_same(replay(record, pauses, &counters), then, seed);

@@ -52,11 +52,13 @@ TEST(Arena, sizesThatOverflowAreRefused) {
   EXPECT_EQ(arena.used(), 0U);
 }
 
+/// By default not all zero bytes.
+struct Slot {
+  int id = -1;
+  float score = 0.5F;
+};
+
 TEST(Arena, objectsTakeTheirDefaults) {
-  struct Slot {
-    int id = -1;
-    float score = 0.5F;
-  };
   Arena arena(4096);
   for (const Slot& slot : arena.make<Slot>(7, "slots")) {
     EXPECT_EQ(slot.id, -1);
@@ -87,10 +89,6 @@ TEST(Arena, objectsOfZerosAreZerosWhetherTheyAreConstructedOrNot) {
 }
 
 TEST(Arena, unsetObjectsAreZeroBytesWhateverTheirDefaults) {
-  struct Slot {
-    int id = -1;
-    float score = 0.5F;
-  };
   Arena arena(4096);
   for (const Slot& slot : arena.make_unset<Slot>(7, "slots")) {
     EXPECT_EQ(slot.id, 0);
