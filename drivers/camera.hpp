@@ -73,6 +73,20 @@ struct CameraStatistics {
 
 /// One opened camera: gige, iidc, v4l2 and mock, all behind this.
 ///
+///     DeviceStatus status = DeviceStatus::ok;
+///     const std::unique_ptr<CameraDevice> camera = driver.open("", &status);  // "": the first
+///     if (camera == nullptr) return;  // status and driver.last_error() say why
+///     CameraConfiguration actual;
+///     if (camera->configure({.width = 752, .height = 480, .rate_hz = 20}, &actual) !=
+///             DeviceStatus::ok ||
+///         camera->start(nullptr) != DeviceStatus::ok)
+///       return;  // camera->last_error()
+///     for (Frame frame; camera->wait(Duration::seconds(1), &frame) == DeviceStatus::ok;) {
+///       if (frame.status == FrameStatus::complete)
+///         use(camera->view(frame.slot), frame.exposure_start);
+///       camera->release(frame.slot);
+///     }
+///
 /// Ownership  A slot belongs to the camera until wait() hands it out, then to the caller until
 ///            release(). Slots are the transport's own buffers or those of a FramePool; either way
 ///            view() shows the pixels, without a copy.

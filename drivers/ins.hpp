@@ -47,6 +47,12 @@ struct InsStatistics {
 
 /// One opened inertial navigation system with satellite receiver.
 ///
+///     if (ins.configure(100, nullptr) != DeviceStatus::ok) return;  // ins.last_error()
+///     if (ins.start(nullptr) != DeviceStatus::ok) return;
+///     for (InsReading reading; ins.wait(Duration::seconds(1), &reading) == DeviceStatus::ok;)
+///       use(reading.sample, reading.mapped ? reading.host
+///                                          : mapper.map(reading.measured, reading.arrival).host);
+///
 /// Ownership  Values; nothing to give back.
 /// Threads    configure, start, stop: the owner's thread. wait: one consumer thread; it may overlap
 ///            stop(). statistics: any.

@@ -21,8 +21,8 @@ struct Delivery {
 /// From the thread of a driver to the consumer of its device.
 ///
 /// Threads  push(), full(), empty(), wait_for_room(): producer. start(), stop(): owner. take(): one
-///          consumer; with limit 0 it takes no
-/// lock. Full     push() refuses; the driver drops and counts, or, in virtual time, waits for room.
+///          consumer; with limit 0 it takes no lock.
+/// Full     push() refuses; the driver drops and counts, or, in virtual time, waits for room.
 template <class T, std::size_t N>
 class Stream {
  public:

@@ -59,6 +59,12 @@ struct TriggerStatistics {
 
 /// One opened trigger board. Cameras are armed (started) first, then the board.
 ///
+///     if (board.configure({.rate_hz = 20, .lines = 0x03}, nullptr) != DeviceStatus::ok) return;
+///     if (left.start(nullptr) != DeviceStatus::ok) return;  // armed before there are pulses
+///     if (board.start(nullptr) != DeviceStatus::ok) return;
+///     for (Pulse pulse; board.wait(Duration::seconds(1), &pulse) == DeviceStatus::ok;)
+///       if (pulse.mapped) synchronizer.pulse(pulse);
+///
 /// Ownership, threads, memory, errors: as InsDevice.
 class TriggerDevice {
  public:

@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kSharedErrors = 1.5;  // between over wide: from here on noise is not all there is
 
 int digits_for(double sigma) {
@@ -68,7 +67,8 @@ std::string lens_table(const BoardReport& r) {
 
 std::string place_table(const BoardReport& r, std::size_t k) {
   const RigCalibration& rig = r.file.rig;
-  const Vec3 turn = log_so3(rig.T_camera_left[k].R) * kDegrees, t = rig.T_camera_left[k].t * 1e3;
+  const Vec3 turn = log_so3(rig.T_camera_left[k].R) * kDegreesPerRadian,
+             t = rig.T_camera_left[k].t * 1e3;
   constexpr std::array kNames{"rotation x, °", "rotation y, °", "rotation z, °",
                               "t_x, mm",       "t_y, mm",       "t_z, mm"};
   std::string text = fmt::format("{} from {}: X_{} = R X_{} + t\n", r.file.names[k],
@@ -76,7 +76,7 @@ std::string place_table(const BoardReport& r, std::size_t k) {
   text += fmt::format("{:<16}{:>12}{:>12}{:>14}{:>16}\n", "", "", "1 σ", "lenses held",
                       "between views");
   for (std::size_t i = 0; i < 6; ++i) {
-    const double unit = i < 3 ? kDegrees : 1e3;
+    const double unit = i < 3 ? kDegreesPerRadian : 1e3;
     const double sigma = unit * rig.sigma_wide[k][i];
     const int digits = std::max(digits_for(sigma), i < 3 ? 4 : 3);
     const auto at = static_cast<Eigen::Index>(i % 3);
@@ -195,10 +195,10 @@ nlohmann::ordered_json json_report(const BoardReport& r) {
         {"distortion_sigma", c.distortion_sigma}};
     if (k > 0) {
       const Transform& T = rig.T_camera_left[k];
-      const Vec3 turn = log_so3(T.R) * kDegrees;
+      const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;
       std::array<double, 6> sigma{}, held{}, between{};
       for (std::size_t i = 0; i < 6; ++i) {
-        const double unit = i < 3 ? kDegrees : 1e3;
+        const double unit = i < 3 ? kDegreesPerRadian : 1e3;
         sigma[i] = unit * rig.sigma_wide[k][i], held[i] = unit * rig.sigma_noise[k][i],
         between[i] = unit * r.found.between[k][i];
       }

@@ -11,7 +11,7 @@ namespace vergence::app {
 namespace {
 
 /// An ordinary drive instead of a board.
-DriveCalibrationRequest request_of(const CalibrateOptions& a) {
+DriveCalibrationRequest calibrate_request(const CalibrateOptions& a) {
   if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
   check_writable(a.out, a.force);
   DriveCalibrationRequest r;
@@ -32,7 +32,7 @@ DriveCalibrationRequest request_of(const CalibrateOptions& a) {
 void add_calibrate(CLI::App& root, const ProgramWords& words, ExitCode* exit_code) {
   const auto a = std::make_shared<CalibrateOptions>();
   a->declare(root)->callback([a, words, exit_code] {
-    *exit_code = a->way() == CalibrateWay::drive ? calibrate_from_drive(request_of(*a))
+    *exit_code = a->way() == CalibrateWay::drive ? calibrate_from_drive(calibrate_request(*a))
                                                  : run_checkerboard_tool(words);
   });
 }

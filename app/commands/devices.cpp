@@ -14,7 +14,7 @@
 namespace vergence::app {
 namespace {
 
-struct Arguments {
+struct DevicesArguments {
   bool json = false, probe = false;
   std::string rig;    // configuration; empty: whatever is plugged in
   std::string rules;  // `-`: standard output
@@ -39,7 +39,7 @@ void write_rules(const std::string& file, const std::string& rules) {
             << " written; now: sudo udevadm control --reload && sudo udevadm trigger\n";
 }
 
-void list(const Arguments& a, bool rules_asked) {
+void list(const DevicesArguments& a, bool rules_asked) {
   Needs needs;
   if (!a.rig.empty()) needs = needs_of(load_configuration(a.rig, {}));
   if (needs.given && !rules_asked)
@@ -63,7 +63,7 @@ void list(const Arguments& a, bool rules_asked) {
 }  // namespace
 
 void add_devices(CLI::App& root, ExitCode* exit_code) {
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<DevicesArguments>();
   CLI::App* command = root.add_subcommand("devices",
                                           "List the cameras, sensors and boards that are "
                                           "connected, with what to paste into a configuration");

@@ -11,13 +11,13 @@
 namespace vergence::app {
 namespace {
 
-struct Arguments {
+struct DoctorArguments {
   std::string configuration, out = ".";
   std::vector<std::string> set;
   bool json = false;
 };
 
-ExitCode examine_machine(const Arguments& a) {
+ExitCode examine_machine(const DoctorArguments& a) {
   Needs needs;
   if (!a.configuration.empty()) needs = needs_of(load_configuration(a.configuration, a.set));
   InventoryOptions options;
@@ -36,7 +36,7 @@ ExitCode examine_machine(const Arguments& a) {
 }  // namespace
 
 void add_doctor(CLI::App& root, ExitCode* exit_code) {
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<DoctorArguments>();
   CLI::App* command = root.add_subcommand(
       "doctor",
       "Check this machine and its devices for what a drive needs; says the command that mends");

@@ -12,7 +12,7 @@ namespace vergence::app {
 namespace {
 
 /// The words as given; checked when the command runs.
-struct Arguments {
+struct EvaluateArguments {
   std::string estimate, reference;
   bool json = false, estimate_mount = false;
   std::optional<std::string> lengths;  // m
@@ -52,7 +52,7 @@ std::vector<SegmentOptions> usual_segments(const std::optional<int>& step) {
           {{0.1, 0.2, 0.3, 0.4, 0.5}, step.value_or(1), false}};
 }
 
-EvaluationOptions options_of(const Arguments& a) {
+EvaluationOptions options_of(const EvaluateArguments& a) {
   EvaluationOptions options;
   options.association = a.associate == "nearest" ? Association::nearest : Association::interpolate;
   options.max_gap = parse_duration("--max-gap", a.max_gap);
@@ -66,7 +66,7 @@ EvaluationOptions options_of(const Arguments& a) {
   return options;
 }
 
-EvaluationRequest request_of(const Arguments& a) {
+EvaluationRequest evaluate_request(const EvaluateArguments& a) {
   EvaluationRequest r;
   r.estimate = a.estimate;
   r.reference = a.reference;
@@ -80,7 +80,7 @@ EvaluationRequest request_of(const Arguments& a) {
 }  // namespace
 
 void add_evaluate(CLI::App& root, ExitCode* exit_code) {
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<EvaluateArguments>();
   CLI::App* command = root.add_subcommand("evaluate", "Compare a trajectory with a reference");
   command->add_option("ESTIMATE", a->estimate, "TUM file, session folder, or data set")->required();
   command->add_option(
@@ -111,7 +111,7 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   command->add_flag("--estimate-mount", a->estimate_mount,
                     "Find how the two bodies sit to one another; compare at the estimate's. "
                     "Without REFERENCE: the session's own INS");
-  command->callback([a, exit_code] { *exit_code = run_evaluation(request_of(*a)); });
+  command->callback([a, exit_code] { *exit_code = run_evaluation(evaluate_request(*a)); });
 }
 
 }  // namespace vergence::app

@@ -20,7 +20,7 @@ constexpr std::array<std::pair<const char*, ExportFormat>, 3> kFormats{
      {"euroc", ExportFormat::euroc},
      {"kitti", ExportFormat::kitti}}};
 
-struct Arguments {
+struct ExportArguments {
   std::string session, format, out;
   std::optional<std::string> calibration;
   bool quiet = false;
@@ -34,7 +34,7 @@ Trajectory truth_of(const std::filesystem::path& session) {
   return {};
 }
 
-ExitCode run_export(const Arguments& a) {
+ExitCode run_export(const ExportArguments& a) {
   const RecordedSession session = RecordedSession::open(a.session);
   ExportRequest request;
   for (const auto& [word, format] : kFormats)
@@ -68,7 +68,7 @@ ExitCode run_export(const Arguments& a) {
 }  // namespace
 
 void add_export(CLI::App& root, ExitCode* exit_code) {
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<ExportArguments>();
   CLI::App* command = root.add_subcommand(
       "export", "Write a recorded session's images and truth for other programs");
   command->add_option("SESSION", a->session, "Session folder with drive.mcap (docs/recording.md)")

@@ -14,7 +14,7 @@ namespace vergence::app {
 namespace {
 
 /// The words as given; checked when the command runs.
-struct Arguments {
+struct ReplayArguments {
   CommonOptions common;
   std::string data, format = "auto", out, model = "radtan";
   std::optional<std::string> calibration, also;
@@ -27,7 +27,7 @@ struct Arguments {
        through_devices = false;
 };
 
-std::optional<KnownNumbers> known_numbers(const Arguments& a) {
+std::optional<KnownNumbers> known_numbers(const ReplayArguments& a) {
   if (!a.focal) {
     if (a.distortion)
       throw InputError("--distortion goes with --focal; a calibration.yaml has its own");
@@ -53,7 +53,7 @@ std::optional<KnownNumbers> known_numbers(const Arguments& a) {
   return known;
 }
 
-ReplayRequest request_of(const Arguments& a) {
+ReplayRequest replay_request(const ReplayArguments& a) {
   if (a.baseline && !(*a.baseline >= 0.005 && *a.baseline <= 20))
     throw InputError("--baseline is the distance of the two cameras in metres, 0.005 to 20");
   if (a.start < 0) throw InputError("--start is the number of a frame, 0 or more");
@@ -93,7 +93,7 @@ ReplayRequest request_of(const Arguments& a) {
 }  // namespace
 
 void add_replay(CLI::App& root, ExitCode* exit_code) {
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<ReplayArguments>();
   CLI::App* command = root.add_subcommand(
       "replay", "Run a recorded drive through the estimator and write a session folder");
   command->add_option("DATA", a->data, "Folder of the data set, or a .mcap or .bag file")
@@ -155,7 +155,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   declare_session_options(*command, &a->also, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {
-    ReplayRequest request = request_of(*a);
+    ReplayRequest request = replay_request(*a);
     if (a->page) page_by_default(&request.configuration);
     Publishing publishing(request.configuration);
     publishing.attach(&request.session);

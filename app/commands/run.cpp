@@ -12,7 +12,7 @@ namespace vergence::app {
 namespace {
 
 /// The words as given; checked when the command runs.
-struct Arguments {
+struct RunArguments {
   CommonOptions common;
   std::string configuration, out;
   std::vector<std::string> faults;
@@ -21,7 +21,7 @@ struct Arguments {
   bool fast = false, from_scratch = false, memory = false, page = false;
 };
 
-RunRequest request_of(const Arguments& a) {
+RunRequest run_request(const RunArguments& a) {
   if (a.duration_s && !(*a.duration_s > 0 && *a.duration_s <= 86400))
     throw InputError("--duration needs seconds, more than 0 and at most 86400");
   RunRequest r;
@@ -43,7 +43,7 @@ RunRequest request_of(const Arguments& a) {
 }  // namespace
 
 void add_run(CLI::App& root, ExitCode* exit_code) {
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<RunArguments>();
   CLI::App* command = root.add_subcommand("run",
                                           "Drive: with the cameras, the trigger board and the INS "
                                           "of a configuration, real or rendered");
@@ -81,7 +81,7 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   declare_session_options(*command, &a->also, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {
-    RunRequest request = request_of(*a);
+    RunRequest request = run_request(*a);
     if (a->page) page_by_default(&request.configuration);
     Publishing publishing(request.configuration);
     publishing.attach(&request.session);

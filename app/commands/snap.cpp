@@ -8,14 +8,14 @@
 namespace vergence::app {
 namespace {
 
-struct Arguments {
+struct SnapArguments {
   std::vector<std::string> set;
   std::string configuration, out;
   int count = 1;
   double wait_s = 5;
 };
 
-SnapRequest request_of(const Arguments& a) {
+SnapRequest snap_request(const SnapArguments& a) {
   if (a.count < 1 || a.count > 9999)
     throw InputError("--count needs a number of sets from 1 to 9999");
   if (!(a.wait_s > 0 && a.wait_s <= 3600))
@@ -31,7 +31,7 @@ SnapRequest request_of(const Arguments& a) {
 }  // namespace
 
 void add_snap(CLI::App& root, ExitCode* exit_code) {
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<SnapArguments>();
   CLI::App* command = root.add_subcommand("snap",
                                           "Take one picture with every camera of a configuration, "
                                           "at the same time, and say what is wrong with them");
@@ -59,7 +59,7 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
       "Exit code: 0 done, 1 the pictures are no good (black, white, twice the same, exchanged), 2 "
       "bad arguments,\n"
       "3 a camera is not there or sent nothing.");
-  command->callback([a, exit_code] { *exit_code = take_pictures(request_of(*a)); });
+  command->callback([a, exit_code] { *exit_code = take_pictures(snap_request(*a)); });
 }
 
 }  // namespace vergence::app

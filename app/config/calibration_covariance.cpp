@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 
 #include "app/runtime/nearest.hpp"
 
@@ -168,8 +168,9 @@ std::optional<std::string> find_flaw(const RigCovariance& covariance) {
                  : covariance(a, b) / std::sqrt(covariance(a, a)) / std::sqrt(covariance(b, b));
       if (!(std::abs(correlation(i, j)) <= 1 + kRounding)) return "has a correlation beyond 1";
     }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(correlation, Eigen::EigenvaluesOnly);
-  if (!(solver.eigenvalues()(0) >= -kRounding))
+  // No eigenvalue is below −kRounding.
+  correlation.diagonal().array() += kRounding;
+  if (correlation.llt().info() != Eigen::Success)
     return "is not positive semidefinite: some combination of its parameters has a negative "
            "variance";
   return std::nullopt;

@@ -11,6 +11,7 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app::detail {
@@ -20,7 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kFields = 30;
 constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;  // bytes
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// The columns of a packet that are read; order and units are those of the development kit (its
 /// dataformat.txt).
@@ -43,7 +43,7 @@ enum Column : std::size_t {
 
 // What the unit, an RT3003 with two antennas, is specified to: its packets have accuracies of place
 // and velocity alone.
-constexpr double kTiltSigma = 0.03 * kDegree, kHeadingSigma = 0.1 * kDegree;
+constexpr double kTiltSigma = 0.03 * kRadiansPerDegree, kHeadingSigma = 0.1 * kRadiansPerDegree;
 constexpr double kHeightOverPlace =
     2;  // a receiver's height is about so much less accurate than its place
 

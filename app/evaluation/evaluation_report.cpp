@@ -3,17 +3,17 @@
 #include <cassert>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+
+#include "core/math/angle.hpp"
 
 namespace vergence::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kPercent = 100.0;
 
 Json statistics_json(const ErrorStatistics& s, double unit) {
@@ -24,10 +24,10 @@ Json statistics_json(const ErrorStatistics& s, double unit) {
 }
 
 Json heading_json(const HeadingErrors& h) {
-  return {{"rms", h.rms * kDegrees},
-          {"mean", h.mean * kDegrees},
-          {"max_abs", h.max_abs * kDegrees},
-          {"last", h.last * kDegrees}};
+  return {{"rms", h.rms * kDegreesPerRadian},
+          {"mean", h.mean * kDegreesPerRadian},
+          {"max_abs", h.max_abs * kDegreesPerRadian},
+          {"last", h.last * kDegreesPerRadian}};
 }
 
 Json vector_json(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
@@ -46,14 +46,14 @@ Json segments_json(const SegmentErrors& segments) {
     lengths.push_back(length_json(row.length));
     rows[fmt::format("{}", row.length)] = {{"n", row.count},
                                            {"t_percent", row.translation * kPercent},
-                                           {"r_deg_per_m", row.rotation * kDegrees}};
+                                           {"r_deg_per_m", row.rotation * kDegreesPerRadian}};
   }
   return {{"step", segments.step},
           {"lengths", lengths},
           {"per_length", rows},
           {"n", segments.count},
           {"t_percent", segments.translation * kPercent},
-          {"r_deg_per_m", segments.rotation * kDegrees}};
+          {"r_deg_per_m", segments.rotation * kDegreesPerRadian}};
 }
 
 std::string left_out(const TrajectoryEvaluation& e, const EvaluationOptions& options) {
@@ -72,8 +72,8 @@ void statistics_row(std::string* out, const char* name, const ErrorStatistics& s
 
 void heading_row(std::string* out, const char* name, const HeadingErrors& h) {
   fmt::format_to(std::back_inserter(*out), "  {:<34}{:>11.4f} {:>11.4f} {:>11.4f} {:>11.4f}  deg\n",
-                 name, h.rms * kDegrees, h.mean * kDegrees, h.max_abs * kDegrees,
-                 h.last * kDegrees);
+                 name, h.rms * kDegreesPerRadian, h.mean * kDegreesPerRadian,
+                 h.max_abs * kDegreesPerRadian, h.last * kDegreesPerRadian);
 }
 
 void segment_rows(std::string* out, const SegmentErrors& segments) {
@@ -86,7 +86,7 @@ void segment_rows(std::string* out, const SegmentErrors& segments) {
       fmt::format_to(at, "  {:<34}{:>8}   the path is too short\n", name, "none");
     else
       fmt::format_to(at, "  {:<34}{:>8} {:>10.4f} %  {:>10.6f} deg/m\n", name, count,
-                     translation * kPercent, rotation * kDegrees);
+                     translation * kPercent, rotation * kDegreesPerRadian);
   };
   for (const LengthError& length : segments.per_length)
     row(fmt::format("{} m", length.length), length.count, length.translation, length.rotation);
@@ -116,12 +116,12 @@ nlohmann::ordered_json evaluation_json(const TrajectoryEvaluation& e,
   out["ate_unaligned_m"] = statistics_json(e.ate_unaligned, 1.0);
   out["heading_error_deg"] = heading_json(e.heading_se3);
   out["heading_error_start_aligned_deg"] = heading_json(e.heading_start_aligned);
-  out["rotation_error_deg"] = statistics_json(e.rotation_se3, kDegrees);
+  out["rotation_error_deg"] = statistics_json(e.rotation_se3, kDegreesPerRadian);
   out["roll_about_path_unobservable"] = e.se3.roll_unobservable;
   out["end_error_aligned_m"] = e.end_error_se3;
   out["end_error_start_aligned_m"] = e.end_error_start_aligned;
   out["end_error_start_aligned_percent"] = e.end_error_ratio * kPercent;
-  out["end_rotation_start_aligned_deg"] = e.end_rotation_start_aligned * kDegrees;
+  out["end_rotation_start_aligned_deg"] = e.end_rotation_start_aligned * kDegreesPerRadian;
   out["segments"] = Json::array();
   for (const SegmentErrors& segments : e.segments)
     out["segments"].push_back(segments_json(segments));
@@ -150,7 +150,7 @@ std::string evaluation_text(const TrajectoryEvaluation& e, const EvaluationOptio
   heading_row(&out, "SE(3)-aligned", e.heading_se3);
   fmt::format_to(at, "\n  {:<34}{:>11} {:>11} {:>11} {:>11}\n", "rotation error", "rmse", "mean",
                  "median", "max");
-  statistics_row(&out, "SE(3)-aligned", e.rotation_se3, kDegrees, "deg");
+  statistics_row(&out, "SE(3)-aligned", e.rotation_se3, kDegreesPerRadian, "deg");
   if (e.se3.roll_unobservable)
     out +=
         "  The path is nearly straight: positions do not hold the rotation about it. Use the "
@@ -158,7 +158,7 @@ std::string evaluation_text(const TrajectoryEvaluation& e, const EvaluationOptio
 
   fmt::format_to(at, "\n  {:<34}{:>11.4f} m = {:.4f} % of the path, {:.4f} deg\n",
                  "end error, start-aligned", e.end_error_start_aligned,
-                 e.end_error_ratio * kPercent, e.end_rotation_start_aligned * kDegrees);
+                 e.end_error_ratio * kPercent, e.end_rotation_start_aligned * kDegreesPerRadian);
   fmt::format_to(at, "  {:<34}{:>11.4f} m\n", "end error, SE(3)-aligned", e.end_error_se3);
   for (const SegmentErrors& segments : e.segments) segment_rows(&out, segments);
   return out;

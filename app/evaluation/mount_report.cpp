@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -13,14 +12,13 @@
 
 #include "core/comparison/comparison.hpp"
 #include "core/comparison/geodesy.hpp"
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 Json value_json(const MountValue& v, double unit) {
   return {{"value", v.observable ? Json(v.value * unit) : Json(nullptr)},
@@ -56,7 +54,7 @@ std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
   if (!found.of_ins ||
       !std::all_of(r.begin(), r.end(), [](const MountValue& v) { return v.observable; }))
     return std::nullopt;
-  const Vec3 turn = boresight_of(found.mount.T_ref_est.R) * kDegrees;
+  const Vec3 turn = boresight_of(found.mount.T_ref_est.R) * kDegreesPerRadian;
   return std::array{turn.x(), turn.y(), turn.z()};
 }
 
@@ -140,13 +138,13 @@ Json mount_json(const FoundMount& found) {
   const Mount& m = found.mount;
   constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
   for (std::size_t k = 0; k < 3; ++k) {
-    out["rotation_deg"][kAxes[k]] = value_json(m.rotation[k], kDegrees);
+    out["rotation_deg"][kAxes[k]] = value_json(m.rotation[k], kDegreesPerRadian);
     out["lever_arm_m"][kAxes[k]] = value_json(m.lever_arm[k], 1);
   }
   out["clock_offset_s"] = value_json(m.clock_offset, 1);
   if (const auto boresight = boresight_deg(found)) out["boresight_deg"] = *boresight;
   out["moments"] = m.moments;
-  out["residual_rotation_deg"] = m.residual_rotation * kDegrees;
+  out["residual_rotation_deg"] = m.residual_rotation * kDegreesPerRadian;
   out["residual_position_m"] = m.residual_position;
   return out;
 }
@@ -157,10 +155,10 @@ std::string mount_text(const FoundMount& found) {
   std::string out = fmt::format(
       "mount of the {}, from {} moments (residuals {:.3f} deg, {:.3f} m)\n",
       found.of_ins ? "left camera in the INS's body" : "estimate's body in the reference's",
-      m.moments, m.residual_rotation * kDegrees, m.residual_position);
-  out += row("turn about the reference's x", m.rotation[0], kDegrees, "deg");
-  out += row("turn about its y", m.rotation[1], kDegrees, "deg");
-  out += row("turn about its z", m.rotation[2], kDegrees, "deg");
+      m.moments, m.residual_rotation * kDegreesPerRadian, m.residual_position);
+  out += row("turn about the reference's x", m.rotation[0], kDegreesPerRadian, "deg");
+  out += row("turn about its y", m.rotation[1], kDegreesPerRadian, "deg");
+  out += row("turn about its z", m.rotation[2], kDegreesPerRadian, "deg");
   out += row("lever arm along x", m.lever_arm[0], 1, "m");
   out += row("lever arm along y", m.lever_arm[1], 1, "m");
   out += row("lever arm along z", m.lever_arm[2], 1, "m");

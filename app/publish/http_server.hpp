@@ -23,6 +23,13 @@ struct HttpCounters {
 
 /// A few connections at a time: one page, one stream of events, a few actions.
 ///
+///     HttpServer server(address, policy, page, 4, [&](HttpRoute route) { act(route); });
+///     while (!ended) {
+///       server.step(std::chrono::milliseconds(100));
+///       server.greet("hello", [&] { return state.hello(); });
+///       server.broadcast("update", state.update(-1), HttpServer::Skipped::greet_again);
+///     }
+///
 /// Own code, because Debian's cpp-httplib is a compiled library that brings OpenSSL and brotli: six
 /// shared libraries more, and `--version` at 14 MB where 12 are allowed; it gives every connection
 /// a thread, and its queue of connections has no bound.

@@ -22,9 +22,9 @@ namespace vergence::app {
 /// `publish.http`: the live page (docs/publish.md).
 ///
 /// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
-/// picture,
-///          copies rows of two images; no lock, no system call. Everything else: a thread of its
-///          own, made by the constructor, that yields to the estimator's where a core is short.
+///          picture, copies rows of two images; no lock, no system call. Everything else: a thread
+///          of its own, made by the constructor, that yields to the estimator's where a core is
+///          short.
 /// Memory   Rings fixed; the images' memory in on_start(). Ring full: frames are left out, totals
 ///          stay true.
 /// Errors   The constructor throws InputError (HttpServer), std::system_error.

@@ -2,20 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "app/report/advice.hpp"
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
 
 using nlohmann::json;
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 /// A number with as many digits as a page needs; none for what is no number.
 json rounded(double value, double digits) {
@@ -49,7 +47,7 @@ json event_json(const EventRecord& event, Stamp first) {
 json camera_json(const RigCalibration& rig, std::size_t k) {
   const Intrinsics& lens = rig.intrinsics[k];
   const Transform& T = rig.T_camera_left[k];
-  const Vec3 turn = log_so3(T.R) * kDegrees;
+  const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;
   json camera{{"width", lens.width},
               {"height", lens.height},
               {"fisheye", lens.kind == CameraModelKind::pinhole_equidistant},
@@ -61,7 +59,7 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
   json& figures = camera["figures"] = json::array();
   const auto& sigma = rig.sigma_wide[k];
   for (std::size_t i = 0; i < 6; ++i) {
-    const double unit = i < 3 ? kDegrees : 1e3;
+    const double unit = i < 3 ? kDegreesPerRadian : 1e3;
     const auto axis = static_cast<Eigen::Index>(i % 3);
     figures.push_back({rounded(i < 3 ? turn[axis] : T.t[axis] * unit, i < 3 ? 4 : 2),
                        sigma[i] > 0 ? rounded(2 * sigma[i] * unit, i < 3 ? 4 : 2) : nullptr});

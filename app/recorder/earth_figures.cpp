@@ -1,18 +1,16 @@
 #include "app/recorder/earth_figures.hpp"
 
 #include <algorithm>
-#include <numbers>
 
 #include <nlohmann/json.hpp>
 
 #include "core/comparison/comparison.hpp"
+#include "core/math/angle.hpp"
 
 namespace vergence::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 Json placement_json(const PlacementRecord& record) {
   const Placement& p = record.placement;
@@ -25,7 +23,7 @@ Json placement_json(const PlacementRecord& record) {
           {"T_enu_world", rows},
           {"fitted_over_m", p.distance},
           {"residual_m", p.residual},
-          {"heading_sigma_deg", p.rotation_sigma.z() * kDegrees}};
+          {"heading_sigma_deg", p.rotation_sigma.z() * kDegreesPerRadian}};
 }
 
 Json errors_json(const EarthErrors& e) {
@@ -56,7 +54,7 @@ const Transform* placement_at(std::span<const PlacementRecord> placements, Stamp
 
 Json earth_json(const EarthFigures& figures) {
   if (!figures.origin) return nullptr;
-  const Vec3 turn = boresight_of(figures.T_ins_left.R) * kDegrees;
+  const Vec3 turn = boresight_of(figures.T_ins_left.R) * kDegreesPerRadian;
   const Vec3& arm = figures.T_ins_left.t;
   Json placements = Json::array();
   for (const PlacementRecord& record : figures.placements)

@@ -6,7 +6,6 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
-#include <numbers>
 #include <span>
 #include <system_error>
 
@@ -14,13 +13,13 @@
 
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/text_file.hpp"
+#include "core/math/angle.hpp"
 
 namespace vergence::app {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kQuaternionLength =
     0.02;  // how far from 1: nine decimals keep it far closer, other columns rarely do
 constexpr std::array<std::string_view, 4> kFixes{"none", "dead_reckoning", "fix_2d", "fix_3d"};
@@ -115,8 +114,8 @@ InsRecord parse(Columns columns) {
   s.position_sigma = columns.sigma();
   s.height_sigma = columns.sigma();
   s.velocity_sigma = columns.sigma();
-  s.tilt_sigma = columns.sigma() / kDegrees;
-  s.heading_sigma = columns.sigma() / kDegrees;
+  s.tilt_sigma = columns.sigma() / kDegreesPerRadian;
+  s.heading_sigma = columns.sigma() / kDegreesPerRadian;
   r.quality.status = static_cast<std::uint32_t>(
       columns.integer("a status word", 0, std::numeric_limits<std::uint32_t>::max()));
   r.quality.satellites =
@@ -150,8 +149,8 @@ void format_ins_record(const InsRecord& record, std::string* line) {
   append_sigma(line, s.position_sigma, 1);
   append_sigma(line, s.height_sigma, 1);
   append_sigma(line, s.velocity_sigma, 1);
-  append_sigma(line, s.tilt_sigma, kDegrees);
-  append_sigma(line, s.heading_sigma, kDegrees);
+  append_sigma(line, s.tilt_sigma, kDegreesPerRadian);
+  append_sigma(line, s.heading_sigma, kDegreesPerRadian);
   fmt::format_to(out, ",{},", q.status);
   if (q.satellites != 0) fmt::format_to(out, "{}", q.satellites);
   fmt::format_to(out, ",{},", q.filter_valid ? 1 : 0);

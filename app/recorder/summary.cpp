@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 #include "app/runtime/version.hpp"
 #include "core/calibration/health.hpp"
 #include "core/features/simd_target.hpp"
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
@@ -18,7 +18,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kPercent = 100.0;
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 /// Times to the microsecond: what is behind it is the clock's noise.
 double ms(double value) { return std::round(value * 1e3) / 1e3; }
@@ -55,7 +54,8 @@ Json metrics_json(const std::optional<TrajectoryEvaluation>& evaluation) {
           {"segment_error_percent", far.translation * kPercent},
           {"segment_error_short_percent", near.translation * kPercent},
           {"segment_error_scaled_percent", scaled.translation * kPercent},
-          {"rotation_error_deg_per_m", (far.count > 0 ? far.rotation : near.rotation) * kDegrees},
+          {"rotation_error_deg_per_m",
+           (far.count > 0 ? far.rotation : near.rotation) * kDegreesPerRadian},
           {"end_error_percent", e.end_error_ratio * kPercent}};
 }
 

@@ -42,6 +42,13 @@ struct McapMessageHead {
 /// One MCAP file (mcap.dev, version 0, profile ros2) that grows by whole chunks: schemas and
 /// channels first, chunks that are not packed with their check sum and index, a summary at the end.
 ///
+///     McapFile file(disk, topics, "vergence");
+///     if (const int error = file.create("drive.mcap")) return;  // -ENOSPC …
+///     McapMessageHead head{.channel = 1, .log_time = 1700000000000000000, .content = body.size()};
+///     head.write(std::span(record).first<McapMessageHead::kSize>());
+///     if (file.write_chunk(parts) == 0) use(file.size());  // good up to here, whatever happens
+///     if (file.finish() != 0) return;
+///
 /// A chunk is one write, at an offset that only moves when all of it was taken; what a failed write
 /// left behind is cut off and written over. So the file is always good up to the last chunk, also
 /// without its end.

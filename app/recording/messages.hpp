@@ -51,9 +51,8 @@ void write_imu(CdrWriter* out, const InsSample& sample) noexcept;
 /// All of a reading, bit for bit.
 void write_ins_reading(CdrWriter* out, const InsSample& sample, const InsQuality& quality) noexcept;
 
-/// Pose of the left camera in `world`. The estimator publishes no covariance of a single pose: its
-/// numbers are 0, which is ROS' word for unknown, and −1 in the first where the pose is not to be
-/// used. Twist the same.
+/// Pose of the left camera in `world` with its covariance (PoseSample), −1 in its first number
+/// where the pose is not to be used. The speed is not measured: −1 always.
 void write_odometry(CdrWriter* out, const PoseSample& sample) noexcept;
 /// `world` → `left` of a frame that has a pose.
 void write_pose_transform(CdrWriter* out, const PoseSample& sample) noexcept;

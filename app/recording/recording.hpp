@@ -33,13 +33,17 @@ struct RecordingCounters {
 
 /// Messages into MCAP files `drive.mcap` on a thread of its own: who posts never waits for a disk.
 ///
+///     Recording recording("sessions/monday", options);
+///     if (const auto room = recording.begin(0, kPose, stamp, 500); !room.empty())
+///       recording.commit(0, encode(sample, room));  // bytes written; 0: none after all
+///     recording.close();
+///
 /// Queues     One for each producer thread. What is posted lies there as it will lie in the file;
 ///            the thread takes all that waits every 20 ms and writes it as a chunk when its oldest
 ///            message has waited 40 ms. So a process that is killed loses the last 100 ms at most.
 /// Files      Rolled by size, by time, by roll() and when the index is full: drive.mcap becomes
-/// drive_0.mcap,
-///            the next is drive_1.mcap. Every file begins with all schemas, channels and the
-///            preamble.
+///            drive_0.mcap, the next is drive_1.mcap. Every file begins with all schemas, channels
+///            and the preamble.
 /// Events     With keep > 0 only what was posted up to so long before an event and so long after
 ///            it is written; the rest is passed over.
 /// Threads    begin(), commit(): one thread a queue. mark_event(): any. take_errors(), counters():

@@ -9,12 +9,12 @@
 
 #include "app/report/decimation.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app::report {
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kPlacement =
     100.0;  // m: the stretch that lays the trajectory on its reference, as with the INS
 constexpr double kPercent = 100.0;
@@ -173,7 +173,7 @@ void compare_with_reference(const Session& s, const MatchedTrajectories& m, cons
     a->vertical_m[i] = up_is_z ? T.t.z() - R.t.z() : R.t.y() - T.t.y();
     a->heading_deg[i] =
         std::remainder(view_angle(T.R, up_is_z) - view_angle(R.R, up_is_z), 2 * std::numbers::pi) *
-        kDegrees;
+        kDegreesPerRadian;
   }
 }
 
@@ -304,7 +304,7 @@ void reckon_metrics(const Session& s, Analysis* a) {
   a->scale = e.sim3.scale, a->ate_m = e.ate_se3.rmse, a->end_error = e.end_error_ratio;
   if (used.count == 0) return;
   a->drift = used.translation;
-  a->rotation_deg_per_m = used.rotation * kDegrees;
+  a->rotation_deg_per_m = used.rotation * kDegreesPerRadian;
   a->drift_sentence =
       far ? "mean of all segments of 100 to 800 m" : "mean of segments of 10 to 50 m";
 }

@@ -1,15 +1,14 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "app/report/frame.hpp"
 #include "app/report/plots.hpp"
 #include "app/report/svg.hpp"
+#include "core/math/angle.hpp"
 
 namespace vergence::app::report {
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kMillimetres = 1e3;
 constexpr int kPlaceNumbers = 6;  // before those of the lens
 
@@ -37,7 +36,7 @@ Component component_of(const CalibrationRow& c, int component) {
     const auto i = static_cast<std::size_t>(component - kPlaceNumbers);
     return {c.lens[i], c.lens_sigma[i]};
   }
-  const double unit = component < 3 ? kDegrees : kMillimetres;
+  const double unit = component < 3 ? kDegreesPerRadian : kMillimetres;
   const auto k = static_cast<std::size_t>(component);
   return {c.value[k] * unit, c.has_sigma ? c.sigma[k] * unit : kNone};
 }

@@ -3,19 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "app/report/svg.hpp"
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app::report {
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr std::size_t kMostRows = 40;  // of a group whose keys come from a file
 
 /// Rows "name value" under heads; names of ours are plain text, all else is escaped by who adds it.
@@ -114,7 +113,7 @@ void calibration_group(const Session& s, const Analysis& a, Figures* f) {
   if (s.calibration) {
     const RigCalibration& rig = s.calibration->rig;
     for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
-      const Vec3 phi = log_so3(rig.T_camera_left[k].R) * kDegrees;
+      const Vec3 phi = log_so3(rig.T_camera_left[k].R) * kDegreesPerRadian;
       const std::string camera = rig.cameras > 2 ? s.calibration->names[k] + ": " : "";
       f->row(camera + "baseline", fmt::format("{:.2f} mm", rig.T_camera_left[k].t.norm() * 1e3));
       f->row(camera + "rotation x, y, z",

@@ -3,8 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <utility>
+
+#include "core/math/angle.hpp"
 
 namespace vergence::app {
 
@@ -25,10 +26,9 @@ void InsEvents::note(const ComparedPose& pose, std::uint64_t matches) noexcept {
 
 void InsEvents::note(const Placement& p, Stamp stamp) noexcept {
   std::array<char, 160> text{};
-  constexpr double kDegrees = 180.0 / std::numbers::pi;
   (void)std::snprintf(text.data(), text.size(),
                       "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m",
-                      p.distance, p.rotation_sigma.z() * kDegrees, p.residual);
+                      p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual);
   event_log_.log(stamp, "placement", text.data(), false);
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 
@@ -10,6 +9,7 @@
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/session/given_calibration.hpp"
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
@@ -69,7 +69,6 @@ double angle_between(const Vec3& a, const Vec3& b) {
 
 RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibration& mounted,
                                 const calibration::CalibrationOptions& options) {
-  constexpr double kRadians = std::numbers::pi / 180;
   RigCalibration nominal = given;
   apply_use({.length_only = true}, &nominal);
   const double length = mounted.T_camera_left[1].t.norm();
@@ -77,8 +76,9 @@ RigCalibration nominal_geometry(const RigCalibration& given, const RigCalibratio
       length > 0 ? given.baseline / length : 1;  // somebody may have measured another length
   for (std::size_t k = 1; k < static_cast<std::size_t>(nominal.cameras); ++k) {
     const Transform& T = mounted.T_camera_left[k];
-    if (log_so3(T.R).norm() > options.max_rotation_deg * kRadians ||
-        angle_between(T.t, nominal.T_camera_left[k].t) > options.max_direction_deg * kRadians)
+    if (log_so3(T.R).norm() > options.max_rotation_deg * kRadiansPerDegree ||
+        angle_between(T.t, nominal.T_camera_left[k].t) >
+            options.max_direction_deg * kRadiansPerDegree)
       nominal.T_camera_left[k] = {T.R, factor * T.t};
   }
   return nominal;

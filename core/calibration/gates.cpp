@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <span>
 
 #include "core/calibration/health.hpp"
 #include "core/camera/camera.hpp"
 #include "core/geometry/epipolar.hpp"
+#include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::calibration {
@@ -186,7 +186,6 @@ namespace {
 
 /// What has to be so whatever was estimated.
 Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
-  constexpr double kDegree = std::numbers::pi / 180.0;
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;
   for (int k = 1; k < s.rig.cameras; ++k) {
@@ -195,10 +194,10 @@ Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noe
     if (found.t.dot(nominal.t) < 0) return Gate::cameras_swapped;
     if (s.out_of_step) return Gate::out_of_step;
     if (q.may_have_changed && s.changed_at > 0) return Gate::rig_changed;
-    if (angle_between(found.t, nominal.t) > o.max_direction_deg * kDegree)
+    if (angle_between(found.t, nominal.t) > o.max_direction_deg * kRadiansPerDegree)
       return Gate::implausible_direction;
     if (q.in_use != nullptr &&
-        log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kDegree)
+        log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kRadiansPerDegree)
       return Gate::implausible_rotation;
   }
   // With the lenses free, the depth's own sigma says whether the path was long enough.

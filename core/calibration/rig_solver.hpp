@@ -61,6 +61,12 @@ struct RigSolution {
 /// right cameras re-initialised through it, points triangulated, all adjusted with the shared
 /// transform; sigmas noise-only and wide.
 ///
+///     RigSolver solver(options, monitor, 2, features, arena);
+///     solver.log().begin(frame);  // of each posed frame, and what it saw
+///     for (const LoggedObservation& seen : observations) solver.log().push(seen);
+///     const RigSolution solution = solver.solve(rig);
+///     if (solution.status == RigSolveStatus::ok) use(solution.rig, solution.rig.covariance);
+///
 /// Threads  log() is filled by the estimator's thread while no solve runs; solve() runs on the
 ///          solver's.
 /// Memory   All from the arena at construction. Time: bounded; some hundred milliseconds for 60

@@ -125,7 +125,13 @@ using Basis = std::array<Mat3, 4>;  // X Y Z W
   }
   const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, 5>> qr(A);
   if (!(std::abs(qr.matrixQR()(4, 4)) > kMinRank * std::abs(qr.matrixQR()(0, 0)))) return false;
-  const Mat9 Q = qr.householderQ();
+  // qr.householderQ() one reflector after another: all of it takes the compiler seconds.
+  Mat9 Q = Mat9::Identity();
+  Eigen::Matrix<double, 9, 1> workspace;
+  for (Eigen::Index k = 4; k >= 0; --k)
+    Q.bottomRightCorner(9 - k, 9 - k)
+        .applyHouseholderOnTheLeft(qr.matrixQR().col(k).tail(8 - k), qr.hCoeffs()[k],
+                                   workspace.data());
   for (int k = 0; k < 4; ++k)
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) (*basis)[static_cast<std::size_t>(k)](r, c) = Q(3 * r + c, 5 + k);

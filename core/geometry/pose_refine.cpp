@@ -1,9 +1,10 @@
 #include "core/geometry/pose_refine.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "core/math/semidefinite.hpp"
 
 namespace vergence {
 namespace {
@@ -160,19 +161,14 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
     d[i] = 1.0 / std::sqrt(out.information(i, i));
   }
   const Mat6 unit = d.asDiagonal() * out.information * d.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Mat6> scaled(unit, Eigen::EigenvaluesOnly);
-  out.eigenvalues =
-      Eigen::SelfAdjointEigenSolver<Mat6>(out.information, Eigen::EigenvaluesOnly).eigenvalues();
-  const double least = scaled.eigenvalues()[0];
-  if (!(least > scaled.eigenvalues()[5] / kMaxCondition))
-    return refuse(PoseRefineStatus::rank_deficient);
-  out.condition = scaled.eigenvalues()[5] / least;
+  const Vec6 scaled = semidefinite_eigenvalues(unit);
+  if (!(scaled[5] > scaled[0] / kMaxCondition)) return refuse(PoseRefineStatus::rank_deficient);
+  out.condition = scaled[0] / scaled[5];
   const Mat6 covariance =
       d.asDiagonal() * Mat6(Eigen::LLT<Mat6>(unit).solve(Mat6::Identity())) * d.asDiagonal();
   const auto worst = [&covariance](int at) noexcept {
     const Mat3 block = covariance.block<3, 3>(at, at);
-    return std::sqrt(std::max(
-        0.0, Eigen::SelfAdjointEigenSolver<Mat3>(block, Eigen::EigenvaluesOnly).eigenvalues()[2]));
+    return std::sqrt(semidefinite_eigenvalues(block)[0]);
   };
   out.rotation_sigma = worst(0);
   out.translation_sigma = worst(3);

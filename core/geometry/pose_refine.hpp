@@ -30,9 +30,8 @@ struct RefinedPose {
   Transform T_left_world{};         // the start where nothing could be refined
   Mat6 information = Mat6::Zero();  // Σ w JᵀJ/(σ scale)² at the end, undamped; δ = (φ rad, τ m),
                                     // X_left ← Exp(φ) X_left + τ
-  Vec6 eigenvalues = Vec6::Zero();  // of `information`, ascending
-  double rotation_sigma = 0;        // rad, in the direction known worst, the translation unknown
-  double translation_sigma = 0;     // m, likewise: camera position; large → weak_geometry
+  double rotation_sigma = 0;     // rad, in the direction known worst, the translation unknown
+  double translation_sigma = 0;  // m, likewise: camera position; large → weak_geometry
   double condition = 0;  // largest over least eigenvalue of the information scaled to a unit
                          // diagonal; units drop out
   double scale = 1;      // robust residual scale in given sigmas, ≥ min_scale

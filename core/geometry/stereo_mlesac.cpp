@@ -1,7 +1,6 @@
 #include "core/geometry/stereo_mlesac.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "core/geometry/detail/kernels.hpp"
 #include "core/geometry/five_point.hpp"
 #include "core/geometry/mlesac.hpp"
+#include "core/math/semidefinite.hpp"
 
 namespace vergence {
 namespace {
@@ -229,16 +229,14 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
   Vec5 unused;
   out.information = information(cap, out.T_right_left, &unused);
   out.rotation_sigma = out.direction_sigma = std::numeric_limits<double>::infinity();
-  const Eigen::SelfAdjointEigenSolver<Mat5> eigen(out.information);
-  if (eigen.eigenvalues()[0] > eigen.eigenvalues()[4] / kMaxCondition) {
-    const Mat5 covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                            eigen.eigenvectors().transpose();
+  const Vec5 along = semidefinite_eigenvalues(out.information);
+  const Eigen::LLT<Mat5> factor(out.information);
+  if (along[4] > along[0] / kMaxCondition && factor.info() == Eigen::Success) {
+    const Mat5 covariance = factor.solve(Mat5::Identity());
     const Mat3 turn = covariance.topLeftCorner<3, 3>();
     const Mat2 direction = covariance.bottomRightCorner<2, 2>();
-    out.rotation_sigma = std::sqrt(
-        Eigen::SelfAdjointEigenSolver<Mat3>(turn, Eigen::EigenvaluesOnly).eigenvalues()[2]);
-    out.direction_sigma = std::sqrt(
-        Eigen::SelfAdjointEigenSolver<Mat2>(direction, Eigen::EigenvaluesOnly).eigenvalues()[1]);
+    out.rotation_sigma = std::sqrt(semidefinite_eigenvalues(turn)[0]);
+    out.direction_sigma = std::sqrt(semidefinite_eigenvalues(direction)[0]);
   }
   return out;
 }

@@ -26,6 +26,10 @@ struct ArenaRow {
 
 /// All memory of the real-time path, taken once at start. Hands out, never takes back (DESIGN §4).
 ///
+///     Arena arena(odometry::Map::memory_needed());
+///     odometry::Map map(10, arena);  // 10 keyframes
+///     for (const ArenaRow& row : arena.rows()) use(row.name, row.bytes);
+///
 /// Ownership  The arena owns the bytes; what is made in it lives as long as the arena.
 /// Threads    One thread, before the seal.
 /// Memory     Reserved as zero pages: one becomes resident when it is first written to, so what a

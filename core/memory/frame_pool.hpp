@@ -17,6 +17,14 @@ using FrameSlot = std::uint16_t;
 /// Image memory of one size, taken once: slots start on a cache line, rows are padded to whole
 /// cache lines (DESIGN §4).
 ///
+///     Arena arena(FramePool::memory_needed(752, 480, 4));
+///     FramePool pool(752, 480, 4, arena);
+///     if (const auto slot = pool.acquire()) {
+///       fill(pool.writable(*slot), FramePool::stride(752));
+///       use(pool.view(*slot));
+///       pool.release(*slot);
+///     }
+///
 /// Ownership  acquire() makes a slot the caller's, until release(). Views of it are valid that
 ///            long.
 /// Threads    acquire(), writable(): one thread. release(): one thread, the same or another.

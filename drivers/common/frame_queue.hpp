@@ -13,6 +13,11 @@ namespace vergence {
 /// A camera's frames on their way from the transport to the consumer, who has which slot, and what
 /// state the stream is in: wait() and release() of a CameraDevice.
 ///
+///     queue.begin(ready);                                    // the owner's start()
+///     if (!queue.offer(frame)) give_back(frame.slot);        // the transport, each image
+///     if (lost_it) queue.lose(now);                          // `gone`, once all is handed out
+///     if (queue.release(frame.slot)) give_back(frame.slot);  // the consumer's release()
+///
 /// Ownership  A slot that was offered is the queue's, one that was handed out the consumer's until
 ///            release(); what becomes of it then is the driver's.
 /// Threads    Each call by whom its comment names. One mutex, held for a few assignments and the

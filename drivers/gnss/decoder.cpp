@@ -5,13 +5,14 @@
 #include <numbers>
 #include <utility>
 
+#include "core/math/angle.hpp"
+
 namespace vergence::gnss {
 namespace {
 
 constexpr Duration kClockSet = Duration::seconds(10);  // backwards: the receiver's time was set
 constexpr Duration kShortest = Duration::milliseconds(10);  // no receiver sends faster
 constexpr double kMostLost = 1000;  // at once; beyond: the line was away, or the time was set
-constexpr double kDegree = std::numbers::pi / 180;
 
 ClockMapperOptions mapping(const Options& o) noexcept {
   ClockMapperOptions m;
@@ -56,7 +57,8 @@ void fill(const ubx::Pvt& p, InsReading* r) noexcept {
     s.heading_source = HeadingSource::course;
     s.yaw_enu = yaw_of_heading(p.course_deg);
   }
-  if (s.heading_source != HeadingSource::none) s.heading_sigma = p.course_sigma_deg * kDegree;
+  if (s.heading_source != HeadingSource::none)
+    s.heading_sigma = p.course_sigma_deg * kRadiansPerDegree;
   r->quality.status = static_cast<std::uint32_t>(p.fix);
   r->quality.satellites = p.satellites;
   r->quality.position_dop = static_cast<float>(p.position_dop);

@@ -32,9 +32,8 @@ bool has_native_usb(const std::string& port) {
 }  // namespace
 
 Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
-    : SerialDevice(std::move(place), "vergence-ins"), options_(options), decoder_(options) {
+    : SerialInsDevice(std::move(place)), options_(options), decoder_(options) {
   info_.driver = name_of(options.protocol);
-  info_.place = this->place().name();
   info_.model =
       options.protocol == Protocol::nmea ? "NMEA 0183 receiver" : "u-blox receiver (NAV-PVT)";
 }
@@ -170,29 +169,6 @@ DeviceTiming Device::timing() const noexcept {
   return t;
 }
 
-DeviceStatus Device::start(Notifier* ready) noexcept {
-  return configured_ ? start_thread(ready) : DeviceStatus::bad_configuration;
-}
-
-void Device::stop() noexcept { stop_thread(); }
-
-DeviceStatus Device::wait(Duration limit, InsReading* reading) noexcept {
-  const DeviceStatus status = take(limit, reading);
-  if (status == DeviceStatus::ok) delivered_.fetch_add(1, std::memory_order_relaxed);
-  return status;
-}
-
-InsStatistics Device::statistics() const noexcept {
-  InsStatistics s;
-  s.delivered = delivered_.load(std::memory_order_relaxed);
-  s.lost = lost_.load(std::memory_order_relaxed);
-  s.malformed = malformed_.load(std::memory_order_relaxed);
-  s.restarts = restarts_.load(std::memory_order_relaxed);
-  s.overruns = overruns();
-  s.starts = starts();
-  return s;
-}
-
 // ---- the device's thread
 
 DeviceStatus Device::begin() noexcept {
@@ -227,7 +203,7 @@ DeviceStatus Device::read_once(Duration limit, bool discard) noexcept {
     return r.status;
   for (InsReading reading; decoder_.next(&reading);)
     if (!discard) hand_out(reading, reading.arrival);
-  count();
+  count_decoded();
   return r.status;
 }
 
@@ -236,11 +212,9 @@ DeviceStatus Device::reopen() {
   return listen(baud_);
 }
 
-void Device::count() noexcept {
+void Device::count_decoded() noexcept {
   const DecoderCounters c = decoder_.counters();
-  lost_.store(c.lost, std::memory_order_relaxed);
-  malformed_.store(c.malformed, std::memory_order_relaxed);
-  restarts_.store(c.restarts, std::memory_order_relaxed);
+  count(c.lost, c.malformed, c.restarts);
 }
 
 }  // namespace vergence::gnss

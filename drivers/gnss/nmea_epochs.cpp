@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/math/angle.hpp"
+
 namespace vergence::gnss {
 namespace {
 
@@ -11,7 +13,6 @@ using nmea::Type;
 
 constexpr std::int64_t kDay = 86'400'000'000'000;
 constexpr Duration kFresh = Duration::milliseconds(1100);  // VTG and HDT, at 1 Hz and faster
-constexpr double kDegree = std::numbers::pi / 180;
 
 unsigned bit(Type type) noexcept { return 1U << static_cast<unsigned>(type); }
 
@@ -25,7 +26,7 @@ FixStatus fix_of(const Sentence& gga, bool has_height) noexcept {
 }  // namespace
 
 double yaw_of_heading(double heading_deg) noexcept {
-  return std::remainder((90 - heading_deg) * kDegree, 2 * std::numbers::pi);
+  return std::remainder((90 - heading_deg) * kRadiansPerDegree, 2 * std::numbers::pi);
 }
 
 bool NmeaEpochs::accept(const Sentence& s, std::size_t bytes, HostStamp arrival,

@@ -1,9 +1,10 @@
 #include "drivers/mock/faults.hpp"
 
 #include <charconv>
-#include <numbers>
 #include <sstream>
 #include <stdexcept>
+
+#include "core/math/angle.hpp"
 
 namespace vergence::mock {
 namespace {
@@ -125,13 +126,12 @@ const FaultRow& row_of(const std::string& kind) {
 }
 
 void set(Fault* fault, std::string_view name, double value) {
-  constexpr double kDegree = std::numbers::pi / 180;
   if (name == "camera") fault->camera = static_cast<int>(value);
   if (name == "duration_s") fault->duration = Duration::seconds(value);
-  if (name == "pitch_deg") fault->turn.x() = value * kDegree;
-  if (name == "yaw_deg") fault->turn.y() = value * kDegree;
-  if (name == "roll_deg") fault->turn.z() = value * kDegree;
-  if (name == "turn_deg") fault->turn.z() = value * kDegree;
+  if (name == "pitch_deg") fault->turn.x() = value * kRadiansPerDegree;
+  if (name == "yaw_deg") fault->turn.y() = value * kRadiansPerDegree;
+  if (name == "roll_deg") fault->turn.z() = value * kRadiansPerDegree;
+  if (name == "turn_deg") fault->turn.z() = value * kRadiansPerDegree;
   if (name == "x_m" || name == "east_m" || name == "ahead_m") fault->shift.x() = value;
   if (name == "y_m" || name == "north_m" || name == "left_m") fault->shift.y() = value;
   if (name == "speed_mps") fault->speed = value;

@@ -1,15 +1,12 @@
 #include "drivers/mock/ins_model.hpp"
 
 #include <cmath>
-#include <numbers>
 #include <vector>
 
+#include "core/math/angle.hpp"
+
 namespace vergence::mock {
-namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
-
-}  // namespace
+namespace {}  // namespace
 
 InsModel::InsModel(const InsModelOptions& options, const RigTruth& truth)
     : options_(options),
@@ -22,9 +19,9 @@ InsModel::InsModel(const InsModelOptions& options, const RigTruth& truth)
                {0.1, 5, 0},
                {0.1, 5, 0},
                {0.1, 5, 0},
-               {0.5 * kDegree, 30, 0},
-               {0.5 * kDegree, 30, 0},
-               {1.0 * kDegree, 60, 0}}} {
+               {0.5 * kRadiansPerDegree, 30, 0},
+               {0.5 * kRadiansPerDegree, 30, 0},
+               {1.0 * kRadiansPerDegree, 60, 0}}} {
   for (Wander& w : wander_) w.value = w.sigma * random_.normal();
 }
 

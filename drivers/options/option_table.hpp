@@ -26,10 +26,11 @@ struct OptionRow {
 /// The options of one kind of camera, a row for each member of the struct `Options`, in the order
 /// of the documentation.
 ///
+///     const std::vector<std::pair<std::string, At>> instants{{"start", At::start},
+///                                                            {"end", At::end}};
 ///     static const auto table = OptionTable<Options>()
 ///         .number("delay_us", &Options::delay, {0, 10000}, "µs", "computed", "Pause …")
-///         .choice("stamp_at", &Options::stamp, {{"start", At::start}, {"end", At::end}}, "start",
-///                 "Which instant …");
+///         .choice("stamp_at", &Options::stamp, instants, "start", "Which instant …");
 ///     Options o;
 ///     table.set("delay_us", "12.5", &o);  // o.delay is 12.5 µs
 ///

@@ -29,6 +29,10 @@ struct MappedStamp {
 /// Ties a device's clock to the host's: offset and drift, from pairs of device stamp and arrival,
 /// or from questions and answers.
 ///
+///     ClockMapper clock({.least_delay = Duration::microseconds(300)});
+///     const MappedStamp mapped = clock.map(frame.exposure_start, frame.arrival);
+///     use(mapped.host, mapped.error);
+///
 /// One way    Arrivals are late, never early: the line under all points (host − device against
 ///            device) is the clock. Every kBin of device time keeps its least-delayed pair, kBins
 ///            of them are held; the line is the edge of their lower convex hull under the mean, its

@@ -14,7 +14,7 @@ inline constexpr double kMostDrift = 400e-6;
 /// Threads  One caller. Memory: fixed. Time: constant a call.
 /// Errors   None. A pair that is not later than the one before is passed over.
 ///
-///     tie.add(frame.stamp, pulse.edge);
+///     tie.add(frame.exposure_start, pulse.edge);
 ///     const bool same = magnitude(next.edge - tie.edge_of(stamp)) <= tie.gate(stamp);
 class ClockTie {
  public:

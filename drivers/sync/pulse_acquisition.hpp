@@ -37,7 +37,7 @@ struct StampedFrame {
 /// Errors     None: an acquisition that proves nothing goes on.
 ///
 ///     acquisition.add(frame);
-///     if (const auto trial = acquisition.attempt(train); trial && trial->proven) …
+///     if (const auto trial = acquisition.attempt(train); trial && trial->proven) use(*trial);
 class PulseAcquisition {
  public:
   static constexpr std::size_t kRun =

@@ -22,6 +22,11 @@ namespace vergence {
 /// the set's first image, by the arrivals of others. Sets go out in order of their numbers, each
 /// once. Determined by what is offered and in which order; no clock is read.
 ///
+///     RigSynchronizer synchronizer({.cameras = 2, .interval = Duration::milliseconds(50)});
+///     if (synchronizer.offer(frame) != SyncVerdict::taken) camera.release(frame.slot);
+///     for (SyncedSet set; synchronizer.next(&set);)
+///       if (set.complete) use(set.slots, set.stamp);  // its slots are ours again
+///
 /// Pulses     A camera is `acquiring` until its own intervals fit the pulses' at exactly one place;
 ///            arrival never decides. Its frames are given back and counted meanwhile, those of the
 ///            others go out without them. From then on every frame's pulse follows from its stamp

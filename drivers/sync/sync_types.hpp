@@ -102,9 +102,8 @@ enum class SyncProof : std::uint8_t {
 /// The images of one pulse.
 ///
 /// stamp   Mid-exposure, one for all images. With pulses: their edge on the host's clock + delay +
-/// exposure / 2 of camera 0, or the middle
-///         that the feedback line told; without camera 0 of the first that is there. Else that
-///         camera's own.
+///         exposure / 2 of camera 0, or the middle that the feedback line told; without camera 0 of
+///         the first that is there. Else that camera's own.
 /// spread  The largest distance of another image's middle to it: unequal exposures.
 struct SyncedSet {
   std::uint64_t number =

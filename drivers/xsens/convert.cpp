@@ -5,12 +5,12 @@
 
 #include <Eigen/Geometry>
 
+#include "core/math/angle.hpp"
+
 namespace vergence::xsens {
 namespace {
 
 using namespace xbus;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 Eigen::Quaterniond enu_from(LocalFrame frame) noexcept {
   const double h = std::numbers::sqrt2 / 2;
@@ -103,9 +103,10 @@ std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& w
 }
 
 std::array<double, 4> quaternion_of_euler(const Three& deg) noexcept {
-  const Eigen::Quaterniond q = Eigen::AngleAxisd(deg[2] * kDegree, Eigen::Vector3d::UnitZ()) *
-                               Eigen::AngleAxisd(deg[1] * kDegree, Eigen::Vector3d::UnitY()) *
-                               Eigen::AngleAxisd(deg[0] * kDegree, Eigen::Vector3d::UnitX());
+  const Eigen::Quaterniond q =
+      Eigen::AngleAxisd(deg[2] * kRadiansPerDegree, Eigen::Vector3d::UnitZ()) *
+      Eigen::AngleAxisd(deg[1] * kRadiansPerDegree, Eigen::Vector3d::UnitY()) *
+      Eigen::AngleAxisd(deg[0] * kRadiansPerDegree, Eigen::Vector3d::UnitX());
   return {q.w(), q.x(), q.y(), q.z()};
 }
 

@@ -33,6 +33,10 @@ struct DecoderCounters {
 
 /// Bytes of a measuring device into readings with times.
 ///
+///     decoder.begin(settings, 115200, Duration::milliseconds(2));
+///     decoder.accept(bytes, arrival);  // of each read
+///     for (InsReading reading; decoder.next(&reading);) use(reading.sample, reading.host);
+///
 /// Time     A reading's time is that of its sample by the device's clock, mapped to the host's by
 ///          ArrivalTiming. The receiver's messages are older than the inertial ones before them and
 ///          not in step: they say how good the fix is, and are no readings.

@@ -14,9 +14,8 @@ constexpr Duration kRead = Duration::milliseconds(200);
 }  // namespace
 
 Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
-    : SerialDevice(std::move(place), "vergence-ins"), options_(options) {
+    : SerialInsDevice(std::move(place)), options_(options) {
   info_.driver = "xsens";
-  info_.place = this->place().name();
 }
 
 Device::~Device() { stop(); }
@@ -121,29 +120,6 @@ DeviceTiming Device::timing() const noexcept {
   return t;
 }
 
-DeviceStatus Device::start(Notifier* ready) noexcept {
-  return configured_ ? start_thread(ready) : DeviceStatus::bad_configuration;
-}
-
-void Device::stop() noexcept { stop_thread(); }
-
-DeviceStatus Device::wait(Duration limit, InsReading* reading) noexcept {
-  const DeviceStatus status = take(limit, reading);
-  if (status == DeviceStatus::ok) delivered_.fetch_add(1, std::memory_order_relaxed);
-  return status;
-}
-
-InsStatistics Device::statistics() const noexcept {
-  InsStatistics s;
-  s.delivered = delivered_.load(std::memory_order_relaxed);
-  s.lost = lost_.load(std::memory_order_relaxed);
-  s.malformed = malformed_.load(std::memory_order_relaxed);
-  s.restarts = restarts_.load(std::memory_order_relaxed);
-  s.overruns = overruns();
-  s.starts = starts();
-  return s;
-}
-
 // ---- the device's thread
 
 DeviceStatus Device::begin() noexcept {
@@ -169,7 +145,7 @@ DeviceStatus Device::read_on() noexcept {
     if (r.status == DeviceStatus::ok) {
       decoder_.accept(std::span(bytes).first(r.size), r.arrival);
       for (InsReading reading; decoder_.next(&reading);) hand_out(reading, reading.arrival);
-      count();
+      count_decoded();
       if (decoder_.line_counters().messages != frames) last_received = r.arrival;
       frames = decoder_.line_counters().messages;
     } else if (r.status == DeviceStatus::timeout) {
@@ -200,12 +176,9 @@ DeviceStatus Device::reopen() {
   return DeviceStatus::ok;
 }
 
-void Device::count() noexcept {
+void Device::count_decoded() noexcept {
   const DecoderCounters& c = decoder_.counters();
-  lost_.store(c.lost, std::memory_order_relaxed);
-  malformed_.store(c.malformed + decoder_.line_counters().checksum_wrong,
-                   std::memory_order_relaxed);
-  restarts_.store(c.restarts, std::memory_order_relaxed);
+  count(c.lost, c.malformed + decoder_.line_counters().checksum_wrong, c.restarts);
 }
 
 }  // namespace vergence::xsens

@@ -111,7 +111,7 @@ struct StreamCounters {
 ///     while (!bytes.empty()) {
 ///       bytes = bytes.subspan(stream.accept(bytes));
 ///       Message message;
-///       while (stream.next(&message)) …
+///       while (stream.next(&message)) use(message);
 ///     }
 ///
 /// Ownership  A message's payload points into the stream's buffer: valid until the next accept().

@@ -20,31 +20,60 @@ if(VERGENCE_SANITIZE)
   target_link_options(vergence_options INTERFACE -fsanitize=${VERGENCE_SANITIZE})
 endif()
 
-# Reading headers is most of what a file costs to compile: several files at once read them once. Kernels that Highway compiles for many
-# instruction sets include themselves, and stay alone.
-function(vergence_unite name alone)
-  set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+# Reading headers and making their templates is most of what a file costs to compile: several files at once do it once.
+function(vergence_unite name)
+  set(united)
   foreach(source IN LISTS ARGN)
-    set(kernel)
-    if(NOT IS_ABSOLUTE ${source})
-      file(STRINGS ${CMAKE_CURRENT_SOURCE_DIR}/${source} kernel REGEX "hwy/foreach_target.h" LIMIT_COUNT 1)
-    endif()
-    if(kernel OR source IN_LIST alone OR IS_ABSOLUTE ${source})
-      set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    if(source MATCHES "\\.cpp$" AND NOT IS_ABSOLUTE ${source})
+      list(APPEND united ${source})
     endif()
   endforeach()
+  if(NOT united)
+    return()
+  endif()
+  execute_process(COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/scripts/cmake/united_files.py ${CMAKE_CURRENT_SOURCE_DIR} ${united}
+    OUTPUT_VARIABLE groups COMMAND_ERROR_IS_FATAL ANY)
+  string(REPLACE ";" "|" groups "${groups}")
+  string(REGEX MATCHALL "[^\n]+" groups "${groups}")
+  set(number 0)
+  foreach(group IN LISTS groups)
+    math(EXPR number "${number} + 1")
+    string(REPLACE "|" ";" group "${group}")
+    set_source_files_properties(${group} PROPERTIES UNITY_GROUP ${number})
+  endforeach()
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+  # Memory that the compiler's garbage collector leaves alone: a tenth of the time.
+  target_compile_options(${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>)
+  if(TARGET vergence_headers) # firmware_iface stands alone
+    # The compiler refuses precompiled headers where other macros are defined than when they were made.
+    target_link_libraries(${name} PRIVATE fmt::fmt)
+    target_compile_options(${name} PRIVATE -pthread)
+    target_precompile_headers(${name} REUSE_FROM vergence_headers)
+  endif()
 endfunction()
 
-# vergence_library(NAME [UNITY] SOURCES a.cpp b.cpp [ALONE b.cpp …] [DEPENDS targets…]): the library of one room.
-# Without sources it is a header-only room. UNITY: with VERGENCE_UNITY its files are compiled together, but for those that are ALONE because
-# they use a name of another's unnamed namespace (a test finds them).
+# What most files read, in a form that is read fast.
+function(vergence_precompile_headers)
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/vergence_headers.cpp CONTENT "")
+  add_library(vergence_headers OBJECT ${PROJECT_BINARY_DIR}/vergence_headers.cpp)
+  target_link_libraries(vergence_headers PRIVATE vergence_options Eigen3::Eigen fmt::fmt)
+  target_compile_options(vergence_headers PRIVATE -pthread $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>)
+  target_precompile_headers(vergence_headers PRIVATE
+    <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> <Eigen/LU>
+    <algorithm> <array> <atomic> <charconv> <chrono> <cmath> <condition_variable> <filesystem> <fstream> <functional> <map> <memory>
+    <mutex> <optional> <random> <span> <sstream> <string> <string_view> <thread> <unordered_map> <variant> <vector>
+    <fmt/format.h> <nlohmann/json.hpp>)
+endfunction()
+
+# vergence_library(NAME SOURCES a.cpp b.cpp [DEPENDS targets…]): the library of one room.
+# Without sources it is a header-only room. With VERGENCE_UNITY its files are compiled together where they can be.
 function(vergence_library name)
-  cmake_parse_arguments(ARG "UNITY" "" "SOURCES;ALONE;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_link_libraries(${name} PUBLIC vergence_options ${ARG_DEPENDS})
-    if(ARG_UNITY AND VERGENCE_UNITY)
-      vergence_unite(${name} "${ARG_ALONE}" ${ARG_SOURCES})
+    if(VERGENCE_UNITY)
+      vergence_unite(${name} ${ARG_SOURCES})
     endif()
   else()
     add_library(${name} INTERFACE)

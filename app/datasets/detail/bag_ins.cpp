@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 
 #include "app/datasets/text_file.hpp"
 #include "core/comparison/geodesy.hpp"
+#include "core/math/angle.hpp"
 
 namespace vergence::app::detail {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr Duration kMostGap = Duration::milliseconds(100);   // between two orientations
 constexpr Duration kSameTime = Duration::milliseconds(500);  // fix to odometry, a vehicle's 15 m
 constexpr Duration kFixHolds = Duration::seconds(3);  // so long a fix says how its successors are
@@ -215,7 +214,7 @@ void say_place(const std::string& name, const std::string& fix, const WorldPlace
       world.turned
           ? fmt::format("{}: its world is placed by {} fixes of {} over {:.0f} m, turned by {:.1f} "
                         "deg from east, north, up",
-                        name, world.n, fix, world.way, world.yaw / kDegree)
+                        name, world.n, fix, world.way, world.yaw / kRadiansPerDegree)
           : fmt::format("{}: its world is placed by {} fixes of {} over {:.0f} m, too few to show "
                         "how it is turned: taken to be east, north, up",
                         name, world.n, fix, world.way));

@@ -23,7 +23,8 @@ import shutil
 import subprocess
 import sys
 
-import unity
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../scripts/cmake"))
+import united_files  # noqa: E402: of the build
 
 SKIPPED = 77
 ROOMS = ("app/", "core/", "drivers/", "firmware_iface/")
@@ -67,7 +68,7 @@ def batches(root, build, prefixes):
         if name.endswith(".c") or DISPATCHED in text:
             closed.append(Batch([name], command, directory))
             continue
-        names, key = unity.defined(text), (os.path.dirname(name), tuple(command))
+        names, key = united_files.defined(text), (os.path.dirname(name), tuple(command))
         for batch, taken in open_ones.setdefault(key, []):
             if len(batch.files) < MOST_FILES and not names & taken:
                 batch.files.append(name)

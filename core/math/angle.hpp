@@ -1,0 +1,9 @@
+#pragma once
+#include <numbers>
+
+namespace vergence {
+
+inline constexpr double kDegreesPerRadian = 180.0 / std::numbers::pi;
+inline constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
+
+}  // namespace vergence

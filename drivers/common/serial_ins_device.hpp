@@ -1,0 +1,74 @@
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "drivers/common/serial_device.hpp"
+#include "drivers/ins.hpp"
+
+namespace vergence {
+
+/// An INS or satellite receiver on a serial line: what InsDevice wants, but for what its protocol
+/// does. Readings of kRing wait for their consumer.
+///
+/// States, ownership, threads, memory, errors  As SerialDevice and InsDevice.
+template <std::size_t kRing>
+class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRing> {
+ public:
+  [[nodiscard]] const DeviceInfo& info() const noexcept final { return info_; }
+  [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept final {
+    return configured_ ? this->start_thread(ready) : DeviceStatus::bad_configuration;
+  }
+  void stop() noexcept final { this->stop_thread(); }
+  [[nodiscard]] DeviceStatus wait(Duration limit, InsReading* reading) noexcept final {
+    const DeviceStatus status = this->take(limit, reading);
+    if (status == DeviceStatus::ok) delivered_.fetch_add(1, std::memory_order_relaxed);
+    return status;
+  }
+  bool observe_line(LineObserver* observer) noexcept final {
+    this->log().observe(observer);
+    return true;
+  }
+  [[nodiscard]] std::string last_error() const final { return last_error_; }
+  [[nodiscard]] std::string remark() const final { return remark_; }
+  [[nodiscard]] bool keeps_own_time() const noexcept final { return this->virtual_time(); }
+  [[nodiscard]] InsStatistics statistics() const noexcept final {
+    InsStatistics s;
+    s.delivered = delivered_.load(std::memory_order_relaxed);
+    s.lost = lost_.load(std::memory_order_relaxed);
+    s.malformed = malformed_.load(std::memory_order_relaxed);
+    s.restarts = restarts_.load(std::memory_order_relaxed);
+    s.overruns = this->overruns();
+    s.starts = this->starts();
+    return s;
+  }
+
+ protected:
+  explicit SerialInsDevice(std::unique_ptr<LinePlace> place)
+      : SerialDevice<InsReading, kRing>(std::move(place), "vergence-ins") {
+    info_.place = this->place().name();
+  }
+
+  /// As a decoder has counted since the device was opened. The device's thread, or the owner's
+  /// while there is none.
+  void count(std::uint64_t lost, std::uint64_t malformed, std::uint64_t restarts) noexcept {
+    lost_.store(lost, std::memory_order_relaxed);
+    malformed_.store(malformed, std::memory_order_relaxed);
+    restarts_.store(restarts, std::memory_order_relaxed);
+  }
+
+  // The owner's thread.
+  DeviceInfo info_{};
+  std::string last_error_{}, remark_{};
+  bool configured_ = false;  // start() may go on
+  double rate_hz_ = 0;
+  std::uint32_t baud_ = 0;  // at which the device last sent something; 0: not yet. As line()
+
+ private:
+  std::atomic<std::uint64_t> delivered_{0}, lost_{0}, malformed_{0}, restarts_{0};
+};
+
+}  // namespace vergence

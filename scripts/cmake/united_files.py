@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+"""Which files of a library can be compiled as one: files whose unnamed namespaces define no name twice, some thousand lines together.
+
+  united_files.py FOLDER FILE…    a line for each group of files, separated by semicolons; FILE relative to FOLDER
+  united_files.py --self-test
+
+A group of its own is a kernel that Highway compiles for many instruction sets, as it includes itself, and what includes a header of the
+kernel's that defines a name of the C library's otherwise.
+"""
+import os
+import re
+import sys
+import tempfile
+
+STAYS_ALONE = ("hwy/foreach_target.h", "<asm/termbits.h>")
+MOST_LINES = 2500  # of a group: two processors are to end at the same time
+
+UNNAMED = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.DOTALL | re.MULTILINE)
+DEFINITIONS = (
+    re.compile(r"^(?:struct|class|enum class|enum) (\w+)"),
+    re.compile(r"^(?:inline |static )?(?:constexpr|const) .*?\b(k[A-Z]\w*)"),
+    re.compile(r"^(?:template <.*?> ?)?(?:\[\[\w+\]\] )?[A-Za-z][\w:<>,&*\s]*?[\s&*](\w+)\([^;]*$"),
+    re.compile(r"^(?:template <.*?> ?)?(?:\[\[\w+\]\] )?[A-Za-z][\w:<>,&*\s]*?[\s&*](\w+)\(.*\{"),
+)
+MORE_CONSTANTS = re.compile(r",\s*(k[A-Z]\w*)\s*[={\[]")
+
+
+def defined(text):
+    """Names that a file's unnamed namespaces define; of overloads the name alone: a call may find either."""
+    names = set()
+    for block in UNNAMED.findall(text):
+        depth = 0
+        for line in block.splitlines():
+            if depth == 0:
+                for pattern in DEFINITIONS:
+                    found = pattern.match(line)
+                    if found:
+                        names.add(found.group(1))
+                        break
+                if line.startswith(("constexpr", "const ")):
+                    names.update(MORE_CONSTANTS.findall(line))
+            depth += line.count("{") - line.count("}")
+    return names
+
+
+def groups(folder, files):
+    """Each file of `folder` in one group, with the first that has room and none of its names."""
+    found = []
+    for file in files:
+        with open(os.path.join(folder, file), encoding="utf-8") as source:
+            text = source.read()
+        if any(word in text for word in STAYS_ALONE):
+            found.append(([file], {None}, MOST_LINES))
+            continue
+        names, lines = defined(text), text.count("\n")
+        for i, (members, taken, size) in enumerate(found):
+            if size + lines <= MOST_LINES and not names & taken:
+                found[i] = (members + [file], taken | names, size + lines)
+                break
+        else:
+            found.append(([file], names, lines))
+    return [members for members, _, _ in found]
+
+
+def self_test():
+    text = ("namespace a {\nnamespace {\n\nconstexpr int kA = 1, kB = 2;\nstruct S {\n  int kInner = 0;\n};\n"
+            "[[nodiscard]] bool f(int x) {\n  return g(x);\n}\nvoid long_one(int a,\n              int b) {\n}\n}  // namespace\n"
+            "int outside(int) { return 0; }\n}\n")
+    expected = {"kA", "kB", "S", "f", "long_one"}
+    if defined(text) != expected:
+        return "found %s, expected %s" % (sorted(defined(text)), sorted(expected))
+    with tempfile.TemporaryDirectory() as folder:
+        sources = {"a.cpp": text, "b.cpp": text, "c.cpp": "int other;\n", "k.cpp": '#include "hwy/foreach_target.h"\n', "long.cpp": "\n" * MOST_LINES}
+        for name, content in sources.items():
+            with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+                file.write(content)
+        found = groups(folder, sorted(sources))
+    wanted = [["a.cpp", "c.cpp"], ["b.cpp"], ["k.cpp"], ["long.cpp"]]
+    return None if found == wanted else "grouped %s, expected %s" % (found, wanted)
+
+
+def main():
+    if sys.argv[1:] == ["--self-test"]:
+        return self_test()
+    for group in groups(sys.argv[1], sys.argv[2:]):
+        print(";".join(group))
+    return None
+
+
+if __name__ == "__main__":
+    sys.exit(main())
