@@ -47,7 +47,7 @@ std::string help_hint(const CLI::App& command) {
   return "'vergence" + word + " --help' shows what is";
 }
 
-/// CLI11's complaints about a command line, as one sentence.
+/// CLI11's errors about a command line, as one sentence.
 std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
   const auto given = root.get_subcommands();
   CLI::App& command = given.empty() ? root : *given.front();

@@ -44,7 +44,7 @@ std::string contents(const std::filesystem::path& path) {
 /// A scalar as it may stand in a sentence.
 std::string shown(const std::string& scalar) {
   constexpr std::size_t kShown = 60;  // bytes: enough to recognise it
-  return scalar.size() <= kShown ? scalar : scalar.substr(0, kShown) + "…";
+  return scalar.size() <= kShown ? scalar : fmt::format("{}…", scalar.substr(0, kShown));
 }
 
 /// Looks at the first two documents of a text without building them.

@@ -11,7 +11,7 @@ namespace vergence::app {
 [[nodiscard]] std::string serial_open_error(const std::string& who, DeviceStatus status,
                                             const std::string& error);
 
-/// Throws: InputError where the request is at fault (a device cannot do it, nonsense is asked, one
+/// Throws: InputError where the request is at fault (a device cannot do it, it makes no sense, one
 /// of several is not named), DeviceError where the device is: the same may succeed later.
 [[noreturn]] void refuse_device(DeviceStatus status, const std::string& sentence);
 

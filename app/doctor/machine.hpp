@@ -19,7 +19,7 @@ struct InterfaceAddress {
 ///
 /// Threads  Const calls: any. Memory: ordinary.
 /// Errors   Nothing throws. A file that is missing, refuses to be read, is no regular file or holds
-///          nonsense is `nullopt`.
+///          something else is `nullopt`.
 struct Machine {
   static constexpr std::size_t kMostText =
       4096;  // bytes that are read of a file: those under /sys hold a page

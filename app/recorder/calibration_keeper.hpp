@@ -11,8 +11,8 @@
 
 namespace vergence::app {
 
-/// What became of a calibration that was to be kept: a line of events.jsonl, a complaint as well
-/// when it failed.
+/// What became of a calibration that was to be kept: a line of events.jsonl, an error of the
+/// session as well when it failed.
 struct Kept {
   bool failed = false;
   std::string sentence{};  // empty: nothing to tell

@@ -54,10 +54,10 @@ inline constexpr const char* kCalibrationsHeader =
 ///          expected, or for kMostStatuses. close() reads the trajectories back from their files.
 /// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
 ///          Readings have a ring of their own: they never push out a pose.
-/// Errors   The constructor throws InputError. A disk that takes no more: a complaint and an event
+/// Errors   The constructor throws InputError. A disk that takes no more: an error and an event
 ///          `disk_full`, the session goes on, see LineFile; an event `disk_room` when it takes
 ///          lines again says what was lost. Lines lost in between leave the session usable and are
-///          a complaint of close(); a file that could not be ended is a fault of its totals.
+///          an error of close(); a file that could not be ended is a fault of its totals.
 class Recorder {
  public:
   enum class WhenFull : std::uint8_t { wait, drop };

@@ -14,7 +14,7 @@ struct TimeSection {
   std::string caption{};  // of that
 };
 
-/// Whatever is missing or nonsense is left out.
+/// Whatever is missing or makes no sense is left out.
 [[nodiscard]] TimeSection time_section(const Session& session);
 
 }  // namespace vergence::app::report

@@ -91,9 +91,9 @@ std::string Device::received_instead(std::uint64_t sentences, std::uint64_t fram
     return "it sends NMEA 0183; set ins.driver to nmea, or enable UBX-NAV-PVT on this port "
            "(u-center)";
   return options_.baud != 0
-             ? "no receiver is heard at " + std::to_string(options_.baud) +
+             ? "nothing is received at " + std::to_string(options_.baud) +
                    " baud; set ins.baud to its rate, or to 0 to look for it"
-             : "no receiver is heard at any usual baud rate; check power, cable and port";
+             : "nothing is received at any usual baud rate; check power, cable and port";
 }
 
 DeviceStatus Device::listen(std::uint32_t baud) {

@@ -28,7 +28,7 @@ struct PixelFormat {
 /// The four characters, trailing blanks cut; unprintable ones become '?'.
 [[nodiscard]] std::string name_of(std::uint32_t fourcc);
 
-/// Of the formats a camera offers: the one called `requested`, or without a wish the first of
+/// Of the formats a camera offers: the one called `requested`, or where that is empty the first of
 /// known_formats(). Null: none.
 [[nodiscard]] const PixelFormat* choose_format(std::span<const std::uint32_t> offered,
                                                std::string_view requested) noexcept;

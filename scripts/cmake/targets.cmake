@@ -2,9 +2,7 @@
 
 add_library(vergence_options INTERFACE)
 target_include_directories(vergence_options INTERFACE ${PROJECT_SOURCE_DIR})
-# United files shadow each other's names, which says nothing about either.
-target_compile_options(vergence_options INTERFACE
-  -Wall -Wextra $<$<NOT:$<BOOL:${VERGENCE_UNITY}>>:-Wshadow> $<$<COMPILE_LANGUAGE:CXX>:-Wconversion> $<$<COMPILE_LANGUAGE:C>:-Wconversion> -Werror)
+target_compile_options(vergence_options INTERFACE -Wall -Wextra -Wconversion -Wshadow -Werror)
 # The same bits on every machine: no fused multiply-add behind our back on targets that have it.
 target_compile_options(vergence_options INTERFACE -ffp-contract=off)
 # Vectors of the Scalable Vector Extension are no C++ objects (no arrays, no members): such machines run the NEON kernels.
@@ -20,7 +18,47 @@ if(VERGENCE_SANITIZE)
   target_link_options(vergence_options INTERFACE -fsanitize=${VERGENCE_SANITIZE})
 endif()
 
-# Reading headers and making their templates is most of what a file costs to compile: several files at once do it once.
+# What most files read.
+set(VERGENCE_COMMON_HEADERS
+  <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> <Eigen/LU>
+  <algorithm> <array> <atomic> <charconv> <chrono> <cmath> <condition_variable> <filesystem> <fstream> <functional> <map> <memory>
+  <mutex> <optional> <random> <span> <sstream> <string> <string_view> <thread> <unordered_map> <variant> <vector>
+  <fmt/format.h> <nlohmann/json.hpp>)
+
+# vergence_precompile(NAME PACKAGES targets… HEADERS <a> …): headers in a form that is read fast.
+function(vergence_precompile name)
+  cmake_parse_arguments(ARG "" "" "PACKAGES;HEADERS" ${ARGN})
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${name}.cpp CONTENT "")
+  add_library(${name} OBJECT ${PROJECT_BINARY_DIR}/${name}.cpp)
+  target_link_libraries(${name} PRIVATE vergence_options ${ARG_PACKAGES})
+  target_compile_options(${name} PRIVATE ${VERGENCE_PRECOMPILED_OPTIONS})
+  target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
+  set_property(GLOBAL PROPERTY ${name}_PACKAGES ${ARG_PACKAGES})
+endfunction()
+
+# What precompiled headers and what is compiled with them have to share. Memory that the compiler's garbage collector leaves alone is a tenth
+# of the time; ccache asks for the last one.
+set(VERGENCE_PRECOMPILED_OPTIONS -pthread $<$<COMPILE_LANG_AND_ID:CXX,GNU>:--param=ggc-min-heapsize=524288;-fpch-preprocess>)
+
+# vergence_read_precompiled(NAME HEADERS SOURCES…): the target's files read HEADERS, of vergence_precompile(), where there are such.
+function(vergence_read_precompiled name headers)
+  if(NOT TARGET ${headers}) # firmware_iface stands alone
+    return()
+  endif()
+  foreach(source IN LISTS ARGN)
+    if(source MATCHES "\\.c$")
+      set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+    endif()
+  endforeach()
+  # The compiler refuses precompiled headers where other macros are defined than when they were made.
+  get_property(packages GLOBAL PROPERTY ${headers}_PACKAGES)
+  target_link_libraries(${name} PRIVATE ${packages})
+  target_compile_options(${name} PRIVATE ${VERGENCE_PRECOMPILED_OPTIONS})
+  target_precompile_headers(${name} REUSE_FROM ${headers})
+endfunction()
+
+# vergence_unite(NAME SOURCES…): the target's files are compiled together where they can be. Reading headers and making their templates is most
+# of what a file costs to compile: several files at once do it once.
 function(vergence_unite name)
   set(united)
   foreach(source IN LISTS ARGN)
@@ -31,7 +69,7 @@ function(vergence_unite name)
   if(NOT united)
     return()
   endif()
-  execute_process(COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/scripts/cmake/united_files.py ${CMAKE_CURRENT_SOURCE_DIR} ${united}
+  execute_process(COMMAND ${VERGENCE_PYTHON} -I -S ${PROJECT_SOURCE_DIR}/scripts/cmake/united_files.py ${CMAKE_CURRENT_SOURCE_DIR} ${united}
     OUTPUT_VARIABLE groups COMMAND_ERROR_IS_FATAL ANY)
   string(REPLACE ";" "|" groups "${groups}")
   string(REGEX MATCHALL "[^\n]+" groups "${groups}")
@@ -42,27 +80,6 @@ function(vergence_unite name)
     set_source_files_properties(${group} PROPERTIES UNITY_GROUP ${number})
   endforeach()
   set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
-  # Memory that the compiler's garbage collector leaves alone: a tenth of the time.
-  target_compile_options(${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>)
-  if(TARGET vergence_headers) # firmware_iface stands alone
-    # The compiler refuses precompiled headers where other macros are defined than when they were made.
-    target_link_libraries(${name} PRIVATE fmt::fmt)
-    target_compile_options(${name} PRIVATE -pthread)
-    target_precompile_headers(${name} REUSE_FROM vergence_headers)
-  endif()
-endfunction()
-
-# What most files read, in a form that is read fast.
-function(vergence_precompile_headers)
-  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/vergence_headers.cpp CONTENT "")
-  add_library(vergence_headers OBJECT ${PROJECT_BINARY_DIR}/vergence_headers.cpp)
-  target_link_libraries(vergence_headers PRIVATE vergence_options Eigen3::Eigen fmt::fmt)
-  target_compile_options(vergence_headers PRIVATE -pthread $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>)
-  target_precompile_headers(vergence_headers PRIVATE
-    <Eigen/Cholesky> <Eigen/Core> <Eigen/Geometry> <Eigen/LU>
-    <algorithm> <array> <atomic> <charconv> <chrono> <cmath> <condition_variable> <filesystem> <fstream> <functional> <map> <memory>
-    <mutex> <optional> <random> <span> <sstream> <string> <string_view> <thread> <unordered_map> <variant> <vector>
-    <fmt/format.h> <nlohmann/json.hpp>)
 endfunction()
 
 # vergence_library(NAME SOURCES a.cpp b.cpp [DEPENDS targets…]): the library of one room.
@@ -72,6 +89,7 @@ function(vergence_library name)
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
     target_link_libraries(${name} PUBLIC vergence_options ${ARG_DEPENDS})
+    vergence_read_precompiled(${name} vergence_headers ${ARG_SOURCES})
     if(VERGENCE_UNITY)
       vergence_unite(${name} ${ARG_SOURCES})
     endif()
@@ -87,6 +105,10 @@ function(vergence_test name)
   cmake_parse_arguments(ARG "SERIAL" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE vergence_options ${ARG_DEPENDS} GTest::gtest GTest::gtest_main)
+  vergence_read_precompiled(${name} vergence_test_headers ${ARG_SOURCES})
+  if(VERGENCE_UNITY)
+    vergence_unite(${name} ${ARG_SOURCES})
+  endif()
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
   if(VERGENCE_SANITIZE) # optimising a test's own file takes as long again as compiling it, and warns of what the sanitizer put there
     target_compile_options(${name} PRIVATE -O0)

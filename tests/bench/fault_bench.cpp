@@ -1,10 +1,13 @@
 // Drives of the mock with faults, as the table of docs/faults.md:
-//   fault_bench [single | long | pairs | random [COUNT [FIRST SEED]]] [part of a name]
+//   fault_bench [single | long | pairs | random] [COUNT [FIRST] | part of a name]
+// The first 20 of `random`, all of the others, unless COUNT says how many, from FIRST (1) on.
 // Ends with 1 where an `ok` pose was wrong or a session is not whole.
-#include <cstdint>
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,22 +17,27 @@
 int main(int argc, char** argv) {
   using namespace vergence::test;
   const std::string what = argc > 1 ? argv[1] : "single";
-  std::string filter;
+  const bool counted =
+      argc > 2 && std::string_view(argv[2]).find_first_not_of("0123456789") == std::string::npos;
+  const std::string filter = argc > 2 && !counted ? argv[2] : "";
+  const auto number = [&](int at, std::size_t otherwise) -> std::size_t {
+    return counted && argc > at ? std::strtoull(argv[at], nullptr, 10) : otherwise;
+  };
+  const std::size_t first = std::max<std::size_t>(1, number(3, 1));
   std::vector<FaultCase> cases;
   if (what == "random") {
-    const std::uint64_t count = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 20,
-                        first = argc > 3 ? std::strtoull(argv[3], nullptr, 10) : 1;
-    for (std::uint64_t i = 0; i < count; ++i) cases.push_back(random_faults(first + i));
+    for (std::size_t i = 0; i < number(2, 20); ++i) cases.push_back(random_faults(first + i));
   } else {
     cases = what == "pairs" ? fault_pairs() : what == "long" ? long_faults() : single_faults();
-    if (argc > 2) filter = argv[2];
+    cases.erase(cases.begin(), cases.begin() + std::ptrdiff_t(std::min(first - 1, cases.size())));
+    cases.resize(std::min(number(2, cases.size()), cases.size()));
+    std::erase_if(cases, [&](const FaultCase& c) { return c.name.find(filter) == c.name.npos; });
   }
   const FaultDrive untouched = drive_with_faults(no_fault());
   const NormalError normal = normal_error_there(untouched.poses, untouched.truth);
   fmt::print("{}", fault_table_head());
   int bad = 0;
   for (const FaultCase& c : cases) {
-    if (c.name.find(filter) == std::string::npos) continue;
     const FaultDrive drive = drive_with_faults(c);
     const FaultResult result = judge(c, drive, normal);
     fmt::print("{}", fault_table_line(c, drive, result));

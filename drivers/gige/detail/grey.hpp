@@ -14,8 +14,8 @@ struct GreyFormat {
   int shift = 0;  // words: bits below the eight that are kept
 };
 
-/// Of the formats a camera offers the one called `requested`, or without a wish the cheapest. Null:
-/// none that gives grey.
+/// Of the formats a camera offers the one called `requested`, or where that is empty the cheapest.
+/// Null: none that gives grey.
 [[nodiscard]] const GreyFormat* choose_format(const std::vector<std::string>& offered,
                                               std::string_view requested) noexcept;
 

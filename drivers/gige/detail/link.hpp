@@ -31,7 +31,7 @@ struct LinkPlan {
 };
 inline constexpr double kMostOfPeriod = 0.9;  // the rest is for resent packets and control
 
-/// The largest packet that interface, camera and wish allow, a multiple of the camera's step.
+/// The largest packet that interface, camera and request allow, a multiple of the camera's step.
 /// `wished` 0: at most 9000, what switches carry.
 [[nodiscard]] int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t most,
                                      std::int64_t step) noexcept;

@@ -90,7 +90,7 @@ typedef struct {
   bool armed_late;
   bool stop_asked; /* STOP is answered when the armed pulse is back or out */
   uint8_t stop_sequence;
-  uint8_t told_state, told_locked;
+  uint8_t reported_state, reported_locked;
   uint64_t status_due;
   uint32_t pps_edges, ins_edges;
   uint64_t last_pps;

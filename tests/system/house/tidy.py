@@ -37,6 +37,16 @@ FINDING = re.compile(r"^(\S+?):\d+:\d+: (?:error|warning): ", re.MULTILINE)
 Batch = collections.namedtuple("Batch", "files command directory")
 
 
+def configured(root, build):
+    """A folder below BUILD whose compile_commands.json has every file by itself, which BUILD itself need not."""
+    folder = os.path.join(build, "tidy", "configured")
+    done = subprocess.run(["cmake", "-S", root, "-B", folder, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DVERGENCE_UNITY=OFF",
+                           "-DVERGENCE_CCACHE=OFF", "-DVERGENCE_TESTS=OFF", "-DVERGENCE_CHECKERBOARD=ON"], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit("cannot configure %s:\n%s" % (folder, done.stderr))
+    return folder
+
+
 def commands(root, build):
     """{file: (compiler's arguments without the files, directory)} of the product."""
     with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as file:
@@ -51,7 +61,7 @@ def commands(root, build):
             word = words.pop(0)
             if word in ("-o", "-c", "-MF", "-MT", "-MQ"):
                 words.pop(0)
-            elif word not in ("-MD", "-MMD") and os.path.basename(word) != "ccache":
+            elif word not in ("-MD", "-MMD"):
                 kept.append(word)
         found[name] = (kept, entry["directory"])
     return found
@@ -206,7 +216,7 @@ def self_test():
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", default=".")
-    parser.add_argument("--build", default="build", help="folder of compile_commands.json")
+    parser.add_argument("--build", default="build", help="a configured build, of which a folder `tidy` is made")
     parser.add_argument("--part", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--self-test", action="store_true")
@@ -218,7 +228,7 @@ def main():
         print("skipped: clang-tidy or clang++ is not installed")
         return SKIPPED
     else:
-        todo = part_of(batches(given.root, given.build, given.prefixes), given.part, turn(given.root))
+        todo = part_of(batches(given.root, configured(given.root, given.build), given.prefixes), given.part, turn(given.root))
         if not todo:
             print("no file begins with any of: %s" % " ".join(given.prefixes))
             return 1

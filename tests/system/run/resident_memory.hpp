@@ -8,11 +8,13 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 
 #include "tests/support/temporary_folder.hpp"
@@ -55,6 +57,13 @@ inline std::optional<Resident> resident_of(pid_t process) {
   return resident;
 }
 
+/// Files, sockets and pipes that a process has open.
+inline int handles_of(pid_t process) {
+  std::error_code ended;
+  const std::filesystem::directory_iterator open("/proc/" + std::to_string(process) + "/fd", ended);
+  return static_cast<int>(std::distance(begin(open), end(open)));
+}
+
 /// A drive that goes on for `seconds` of its own time with one frame a second.
 struct SlowDrive {
   int seconds = 0;
@@ -63,8 +72,8 @@ struct SlowDrive {
 };
 
 inline pid_t start(const SlowDrive& drive, const std::filesystem::path& session) {
-  const std::string file = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml",
-                    out = session.string(), duration = std::to_string(drive.seconds),
+  const std::string file = VERGENCE_SOURCE_DIR "/app/config/mock.yaml", out = session.string(),
+                    duration = std::to_string(drive.seconds),
                     speed = "mock.speed=" + std::to_string(drive.speed);
   const pid_t process = ::fork();
   if (process != 0) return process;
@@ -82,12 +91,27 @@ inline int frames_written(const std::filesystem::path& session) {
   return static_cast<int>(std::count(std::istreambuf_iterator<char>(file), {}, '\n')) - 1;
 }
 
+/// How many of the last frames that a session has written have a pose to use.
+inline int usable_of_the_last(const std::filesystem::path& session, std::size_t frames) {
+  std::ifstream file(session / "poses.csv");
+  std::deque<bool> last;
+  for (std::string line; std::getline(file, line);) {
+    last.push_back(line.find(",lost,") == std::string::npos);
+    if (last.size() > frames) last.pop_front();
+  }
+  return static_cast<int>(std::count(last.begin(), last.end(), true));
+}
+
 /// Resident once the drive has settled, and the last before its end or before `wall` is over.
 struct Growth {
   std::optional<Resident> settled{};
   Resident at_the_end{};
+  int handles_settled = 0, handles_at_the_end = 0;
   int frames = 0;
+  int usable = 0;  // of the last kLastFrames
 };
+
+constexpr std::size_t kLastFrames = 1000;
 
 inline Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
   constexpr int kReport = 5;  // frames before the end: what is written then takes memory of its own
@@ -100,8 +124,12 @@ inline Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
     const auto now = resident_of(process);
     const int frames = frames_written(folder / "s");
     if (now && frames >= drive.settled && frames < drive.seconds - kReport) {
-      if (!growth.settled) growth.settled = now;
+      if (!growth.settled) {
+        growth.settled = now;
+        growth.handles_settled = handles_of(process);
+      }
       growth.at_the_end = *now;
+      growth.handles_at_the_end = handles_of(process);
       growth.frames = frames;
     }
     if (std::chrono::steady_clock::now() > until) {
@@ -111,6 +139,7 @@ inline Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
     }
     std::this_thread::sleep_for(kLook);
   }
+  growth.usable = usable_of_the_last(folder / "s", kLastFrames);
   return growth;
 }
 
@@ -122,6 +151,7 @@ inline void expect_flat(const Growth& growth, int least) {
   const std::int64_t others = growth.at_the_end.others - growth.settled->others,
                      arena = growth.at_the_end.arena - growth.settled->arena;
   EXPECT_LE(others, kMiB) << "after " << growth.frames << " frames";
+  EXPECT_EQ(growth.handles_at_the_end, growth.handles_settled);
   testing::Test::RecordProperty("frames", growth.frames);
   testing::Test::RecordProperty("growth_bytes", std::to_string(others));
   testing::Test::RecordProperty("growth_of_the_arena_bytes", std::to_string(arena));

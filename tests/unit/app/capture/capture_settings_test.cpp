@@ -10,7 +10,7 @@ namespace vergence::app {
 namespace {
 
 Configuration example(const std::string& name) {
-  return load_configuration(std::string(VERGENCE_SOURCE_DIR) + "/app/config/" + name, {});
+  return load_configuration(VERGENCE_SOURCE_DIR "/app/config/" + name, {});
 }
 
 TEST(CaptureSettings, anInsThatTriggersTheCamerasStays) {

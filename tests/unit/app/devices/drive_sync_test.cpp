@@ -23,8 +23,7 @@ int cameras_of(const Configuration& c) {
 TEST(DriveSync, everyExampleLoadsAndTheyShowEveryMode) {
   std::set<SyncMode> modes;
   int files = 0;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(std::string(VERGENCE_SOURCE_DIR) + "/app/config")) {
+  for (const auto& entry : std::filesystem::directory_iterator(VERGENCE_SOURCE_DIR "/app/config")) {
     if (entry.path().extension() != ".yaml") continue;
     SCOPED_TRACE(entry.path().filename());
     ++files;

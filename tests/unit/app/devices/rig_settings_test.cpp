@@ -129,8 +129,8 @@ TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
 }
 
 TEST(RigSettings, theRigOfThePaperIsItsPublishedCalibration) {
-  const RigCalibration rig = mounted_rig(
-      load_configuration(std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock_st_lucia.yaml", {}));
+  const RigCalibration rig =
+      mounted_rig(load_configuration(VERGENCE_SOURCE_DIR "/app/config/mock_st_lucia.yaml", {}));
   EXPECT_NEAR(rig.baseline, 0.750683, 1e-6);
   const Vec3 published(-0.0051537, -0.0053061, -0.0013430);  // rad, rotation vector
   EXPECT_TRUE(log_so3(rig.T_camera_left[1].R).isApprox(published, 1e-4));

@@ -131,7 +131,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
 
 TEST(EventRecord, aLongSentenceIsCutBetweenCharacters) {
   EventRecord event;
-  event.set_sentence(std::string(254, 'a') + "é and more");  // the é would straddle the end
+  event.set_sentence(std::string(254, 'a').append("é and more"));  // the é would straddle the end
   const std::string kept = event.sentence.data();
   EXPECT_EQ(kept, std::string(254, 'a'));
 }
