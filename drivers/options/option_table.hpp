@@ -32,7 +32,7 @@ struct OptionRow {
 ///         .number("delay_us", &Options::delay, {0, 10000}, "µs", "computed", "Pause …")
 ///         .choice("stamp_at", &Options::stamp, instants, "start", "Which instant …");
 ///     Options o;
-///     table.set("delay_us", "12.5", &o);  // o.delay is 12.5 µs
+///     const bool known = table.set("delay_us", "12.5", &o);  // o.delay is 12.5 µs
 ///
 /// Threads  A table that is made is only read. Memory: ordinary.
 template <class Options>

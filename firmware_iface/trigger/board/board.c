@@ -163,7 +163,8 @@ void board_poll(TriggerBoard* board, uint64_t now) {
   for (unsigned n = 0; n < slots_a_poll && slot_is_over(board, now); ++n) next_slot(board);
   if (board->event.open && now >= board->event.close_at) board_close_event(board);
   const uint8_t locked = board->ticks.locked ? 1 : 0;
-  if (now < board->status_due && board->state == board->reported_state && locked == board->reported_locked)
+  if (now < board->status_due && board->state == board->reported_state &&
+      locked == board->reported_locked)
     return;
   uint8_t payload[trigger_status_payload_size];
   board_put_status(board, now, payload);
