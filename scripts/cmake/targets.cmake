@@ -100,9 +100,9 @@ function(vergence_library name)
 endfunction()
 
 # vergence_test(NAME SOURCES … [DEPENDS …] [LABELS slow …] [SERIAL]): one GoogleTest program, one ctest a case.
-# SERIAL: its tests run alone (image rate, timing of threads).
+# SERIAL: its tests run alone (image rate, timing of threads). SHARDS n: n ctests of many cases each, for cases that share what takes long to make.
 function(vergence_test name)
-  cmake_parse_arguments(ARG "SERIAL" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "SERIAL" "TIMEOUT;SHARDS" "SOURCES;DEPENDS;LABELS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE vergence_options ${ARG_DEPENDS} GTest::gtest GTest::gtest_main)
   vergence_read_precompiled(${name} vergence_test_headers ${ARG_SOURCES})
@@ -125,6 +125,15 @@ function(vergence_test name)
   endif()
   if(ARG_SERIAL)
     list(APPEND properties RUN_SERIAL TRUE)
+  endif()
+  if(ARG_SHARDS)
+    foreach(shard RANGE 1 ${ARG_SHARDS})
+      math(EXPR index "${shard} - 1")
+      add_test(NAME ${name}.${shard}_of_${ARG_SHARDS} COMMAND ${name} --gtest_brief=1)
+      set_tests_properties(${name}.${shard}_of_${ARG_SHARDS} PROPERTIES ${properties}
+        ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index}")
+    endforeach()
+    return()
   endif()
   # Parameters that print as bytes would make a name of addresses.
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES PROPERTIES ${properties})

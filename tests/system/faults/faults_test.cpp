@@ -57,7 +57,7 @@ class RandomFaults : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(RandomFaults, leaveNoWrongOkAndAWholeSession) { expect_honest(random_faults(GetParam())); }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, RandomFaults, ::testing::Range<std::uint64_t>(1, 11));
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomFaults, ::testing::Range<std::uint64_t>(1, 21));
 
 }  // namespace
 }  // namespace vergence::test
