@@ -99,8 +99,9 @@ function(vergence_library name)
   endif()
 endfunction()
 
-# vergence_test(NAME SOURCES … [DEPENDS …] [LABELS slow …] [SERIAL]): one GoogleTest program, one ctest a case.
-# SERIAL: its tests run alone (image rate, timing of threads). SHARDS n: n ctests of many cases each, for cases that share what takes long to make.
+# vergence_test(NAME SOURCES … [DEPENDS …] [LABELS slow …] [TIMEOUT s] [SERIAL] [SHARDS n]): one GoogleTest program, one ctest a case.
+# SERIAL: its tests run alone (image rate, timing of threads). SHARDS: n ctests named NAME.1_of_n and so on instead, for cases that share
+# what takes long to make.
 function(vergence_test name)
   cmake_parse_arguments(ARG "SERIAL" "TIMEOUT;SHARDS" "SOURCES;DEPENDS;LABELS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})

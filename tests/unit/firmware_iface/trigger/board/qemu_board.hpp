@@ -19,10 +19,9 @@ namespace vergence {
 ///
 /// What the machine is: RCC reads 0, so that the image runs on the clock it falls back to, 16 MHz;
 /// the timers count 1 GHz of virtual time, so that a second of the board's is 16 ms; compare and
-/// capture units do nothing, so that pulses are forced by the main loop (late); GPIO is a stub;
-/// edges come in through EXTI. Virtual time is the host's (steady_clock), or it goes on by so many
-/// nanoseconds with every
-/// instruction: then nothing depends on how busy the host is.
+/// capture units do nothing, so that pulses are forced by the main loop (late); its GPIO has no
+/// levels, edges come in through EXTI. Virtual time is the host's (steady_clock), or it goes on by
+/// so many nanoseconds with every instruction: then nothing depends on how busy the host is.
 ///
 /// Ownership  The process is killed by the destructor, and by the kernel when the test dies.
 /// Threads    One of its own reads the line: a machine whose line is full stands still.
