@@ -8,6 +8,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
@@ -71,6 +72,27 @@ SerialPortInfo info_of(const sp_port* port) {
   return info;
 }
 
+/// A port with hardware behind it: pseudo-terminals and consoles have none, and of the ports that a
+/// PC may have the missing ones are of type 0 (PORT_UNKNOWN in linux/serial.h).
+bool has_hardware(const fs::path& tty) {
+  std::error_code error;
+  if (!fs::exists(tty / "device", error)) return false;
+  std::ifstream file(tty / "type");
+  int type = 0;
+  return !(file >> type) || type != 0;
+}
+
+/// Device files of the ports that are there, in order.
+std::vector<std::string> names_of_ttys() {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator tty("/sys/class/tty", error), end; !error && tty != end;
+       tty.increment(error))
+    if (has_hardware(tty->path())) names.push_back("/dev/" + tty->path().filename().string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 /// The line is ours alone: TIOCEXCL keeps others out, the lock also those with the rights to ignore
 /// that.
 DeviceStatus hold(int fd) noexcept {
@@ -106,12 +128,17 @@ DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, Unique
 
 }  // namespace
 
+// Not sp_list_ports(): libserialport 0.1.1 writes through a null pointer when a port vanishes while
+// it is listed (list_ports() in its linux.c), and opens ports of a PC to see whether they are
+// there.
 std::vector<SerialPortInfo> list_serial_ports() {
   std::vector<SerialPortInfo> ports;
-  sp_port** list = nullptr;
-  if (::sp_list_ports(&list) != SP_OK) return ports;
-  for (sp_port** p = list; *p != nullptr; ++p) ports.push_back(info_of(*p));
-  ::sp_free_port_list(list);
+  for (const std::string& name : names_of_ttys()) {
+    sp_port* found = nullptr;
+    if (::sp_get_port_by_name(name.c_str(), &found) != SP_OK) continue;  // it has vanished since
+    const UniquePort port(found);
+    ports.push_back(info_of(found));
+  }
   return ports;
 }
 

@@ -19,7 +19,7 @@ struct SerialPortInfo {
   std::optional<int> latency_timer_ms;            // of FTDI converters
 };
 
-/// Ports that are there now.
+/// Ports that are there now, by name; one that vanishes meanwhile is left out.
 [[nodiscard]] std::vector<SerialPortInfo> list_serial_ports();
 
 /// Latency timer of the FTDI converter behind a port (`/dev/ttyUSB0` or a link to it); nothing: no

@@ -88,5 +88,12 @@ rig_end() {
     tail -n 20 "$job/console" >&2 || true
     exit 125
   fi
-  exit "$(<"$job/status")"
+  local status
+  status=$(<"$job/status")
+  # What a signal ended: the kernel knows the address, and where in which file that is.
+  if [[ $status -gt 128 ]]; then
+    echo "$program: ended by signal $((status - 128)); the kernel's last words:" >&2
+    tail -n 10 "$job/dmesg" >&2 || true
+  fi
+  exit "$status"
 }

@@ -1,16 +1,44 @@
 // The trigger board's firmware, simulated, at the far end of an emulated FTDI converter: the driver
 // on the kernel's ftdi_sio.
+#include <dlfcn.h>
+#include <errno.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <fstream>
 #include <map>
+#include <string_view>
 #include <thread>
 
 #include "drivers/serial/serial.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
 #include "tests/rigs/board_rig.hpp"
 #include "tests/support/within.hpp"
+
+namespace {
+
+constexpr int kNever = -1;
+/// Looks at the port in /sys that succeed yet; from then on it has vanished.
+std::atomic<int> looks_left{kNever};
+
+}  // namespace
+
+/// In front of the C library's, for the C++ library and libserialport.
+extern "C" ssize_t readlink(const char* path, char* target, size_t size) noexcept {
+  using Function = ssize_t (*)(const char*, char*, size_t);
+  static const auto real = reinterpret_cast<Function>(::dlsym(RTLD_NEXT, "readlink"));
+  if (looks_left != kNever && std::string_view(path) == "/sys/class/tty/ttyUSB0") {
+    if (looks_left == 0) {
+      errno = ENOENT;
+      return -1;
+    }
+    --looks_left;
+  }
+  return real(path, target, size);
+}
 
 namespace vergence {
 namespace {
@@ -79,6 +107,21 @@ TEST_F(BoardRig, reportsEveryPulseThroughTheRealDriverWithEitherLatencyTimer) {
         << "but for what was under way when the line was taken over";
     EXPECT_EQ(device->statistics().lost, 0U);
     device->stop();
+  }
+}
+
+TEST_F(BoardRig, aPortThatVanishesWhileItIsListedIsLeftOut) {
+  const auto there = [] {
+    const auto ports = list_serial_ports();
+    return std::any_of(ports.begin(), ports.end(),
+                       [](const SerialPortInfo& p) { return p.port == "/dev/ttyUSB0"; });
+  };
+  ASSERT_TRUE(within(10, there));
+  for (const bool seen_by_the_library : {false, true}) {
+    looks_left = seen_by_the_library ? 1 : 0;  // a second look would be in vain
+    const bool listed = there();
+    looks_left = kNever;
+    EXPECT_EQ(listed, seen_by_the_library);
   }
 }
 
