@@ -133,9 +133,14 @@ void Estimator::Parts::watch_sought(const odometry::FrameOutcome& out,
   note(EstimatorEvent::Kind::rig_changed, frame.stamp,
        "a camera was knocked while the calibration was sought",
        static_cast<double>(frame.number - *onset));
-  calibrator.seek(
-      calibrator.calibrated() ? CalibrationCause::knock : CalibrationCause::from_scratch, *onset,
-      frame.number);
+  seek_anew(calibrator.calibrated() ? CalibrationCause::knock : CalibrationCause::from_scratch,
+            *onset, frame);
+}
+
+/// What the search has so far is of another rig.
+void Estimator::Parts::seek_anew(CalibrationCause cause, std::uint64_t onset,
+                                 const RigFrame& frame) noexcept {
+  calibrator.seek(cause, onset, frame.number);
   if (state == State::calibrating) transition(Trigger::calibration_rejected, frame.stamp);
 }
 

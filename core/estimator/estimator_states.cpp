@@ -1,5 +1,7 @@
 #include "core/estimator/detail/estimator_parts.hpp"
 
+#include <cmath>
+
 /// States and the status of poses.
 namespace vergence {
 namespace {
@@ -37,10 +39,13 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     give_up_calibration(frame, kUnmatchedAfter);
     odometry.reset_extrinsics();
   }
-  if (out.uneven)
+  if (out.uneven) {
     may_lag = kLagShownAfter;
-  else if (out.posed && may_lag > 0)
+    // Frames from before and frames out of step would be one solve, and a rig that is neither's.
+    if (calibrator.seeking()) seek_anew(calibrator.sought_because(), frame.number, frame);
+  } else if (out.posed && may_lag > 0) {
     --may_lag;
+  }
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);
@@ -74,12 +79,25 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
 void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept {
   sample->T_world_left = out.T_left_world.inverse();
   const double length_sigma = 0.01 * length_sigma_percent;
-  const Mat6 motion = odometry::motion_covariance(
-      out.fit_covariance, drift.motion_to(out.T_left_world), out.restarted ? out.gap_s : 0.0);
+  const Transform T_now_before = drift.motion_to(out.T_left_world);
+  const Mat6 motion = odometry::motion_covariance(out.fit_covariance, T_now_before,
+                                                  out.restarted ? out.gap_s : 0.0);
+  grade_motion(out, motion, T_now_before.t.norm(), sample);
   drift.step(out.T_left_world, motion, length_sigma);
   sample->covariance = upper_triangle(drift.pose());
   sample->motion_covariance = upper_triangle(motion);
   sample->length_sigma = static_cast<float>(length_sigma);
+}
+
+/// Against the drive's other motions, where nothing else is known to be wrong.
+void Estimator::Parts::grade_motion(const odometry::FrameOutcome& out, const Mat6& motion,
+                                    double step_m, PoseSample* sample) noexcept {
+  const bool doubted = out_of_step > 0 || may_lag > 0 || undecided || state == State::recalibrating;
+  const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
+  if (out.status != PoseStatus::ok || doubted || !UsualSpread::judges(step_m, sigma_m)) return;
+  if (!usual.unusual(sigma_m) || sample->status != PoseStatus::ok) return;
+  sample->status = PoseStatus::degraded;
+  sample->reason = Reason::weak_geometry;
 }
 
 /// What the state of the calibration makes of a pose's status.

@@ -43,6 +43,7 @@ class OnlineCalibrator {
   /// forgotten, and so is a solve of them that is still under way.
   void seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t now) noexcept;
   [[nodiscard]] bool seeking() const noexcept { return seeking_; }
+  [[nodiscard]] CalibrationCause sought_because() const noexcept { return search_.cause; }
   /// There are frames enough to solve from and no solve is under way.
   [[nodiscard]] bool can_solve() const noexcept;
   /// Takes a snapshot and starts the solver on it.

@@ -9,6 +9,7 @@
 // errors of its own, which are added to the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger,
 // Lenz, Urtasun, CVPR 2012), of EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where
 // nothing is stated, an assumed 0.05°.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <span>
@@ -19,6 +20,7 @@
 #include <Eigen/Cholesky>
 
 #include "app/session/drive_calibration.hpp"
+#include "core/estimator/detail/usual_spread.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/odometry/drift_covariance.hpp"
 #include "tests/support/honesty.hpp"
@@ -140,6 +142,22 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
   return poses;
 }
 
+/// The most uncertain motion, times what is usual.
+double most_unusual(std::span<const Posed> poses) {
+  UsualSpread usual;
+  double most = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const Transform motion =
+        poses[i - 1].sample.T_world_left.inverse() * poses[i].sample.T_world_left;
+    const Mat6 C = full(poses[i].sample.motion_covariance);
+    const double sigma_m = std::sqrt(C.topLeftCorner<3, 3>().trace());
+    if (!UsualSpread::judges(motion.t.norm(), sigma_m)) continue;
+    (void)usual.unusual(sigma_m);
+    most = std::max(most, usual.times_usual());
+  }
+  return most;
+}
+
 void print(const std::string& name, const TruthSigma& sigma, std::span<const Posed> poses) {
   if (poses.empty()) return;
   for (const std::size_t frames : {1U, 5U, 10U, 20U, 50U, 100U}) {
@@ -153,6 +171,8 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
   for (std::size_t i = 10; i < poses.size(); ++i)
     add_motion(poses[0], poses[i], sigma, full(poses[i].sample.covariance), &all);
   all.print(name, "all");
+  fmt::print("{:12s} most uncertain motion: {:.1f} times as the usual one\n", name,
+             most_unusual(poses));
 }
 
 }  // namespace

@@ -36,14 +36,17 @@ int main(int argc, char** argv) {
   const FaultDrive untouched = drive_with_faults(no_fault());
   const NormalError normal = normal_error_there(untouched.poses, untouched.truth);
   fmt::print("{}", fault_table_head());
-  int bad = 0;
+  int bad = 0, unusable = 0;
   for (const FaultCase& c : cases) {
-    const FaultDrive drive = drive_with_faults(c);
-    const FaultResult result = judge(c, drive, normal);
+    const auto [drive, result] = drive_until_recovered(c, normal);
     fmt::print("{}", fault_table_line(c, drive, result));
     std::fflush(stdout);
     bad += result.honesty.wrong > 0 || !drive.whole ? 1 : 0;
+    unusable += result.recovery_s ? 0 : 1;
   }
-  fmt::print("\n{} of {} with a wrong `ok` or without a whole session\n", bad, cases.size());
+  fmt::print(
+      "\n{} of {} with a wrong `ok` or without a whole session, {} not usable any more within a "
+      "minute\n",
+      bad, cases.size(), unusable);
   return bad > 0 ? 1 : 0;
 }

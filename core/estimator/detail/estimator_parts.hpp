@@ -1,6 +1,7 @@
 #pragma once
 #include <atomic>
 
+#include "core/estimator/detail/usual_spread.hpp"
 #include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
@@ -50,6 +51,7 @@ struct Estimator::Parts {
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void note_length_sigma(const CalibrationDecision& decision) noexcept;
   void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
+  void seek_anew(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
@@ -61,12 +63,15 @@ struct Estimator::Parts {
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void notify_missing(Stamp stamp) noexcept;
   void grade(const odometry::FrameOutcome& out, Pairing pairing, PoseSample* sample) const noexcept;
+  void grade_motion(const odometry::FrameOutcome& out, const Mat6& motion, double step_m,
+                    PoseSample* sample) noexcept;
   [[nodiscard]] Reason why_uncalibrated() const noexcept;
 
   EstimatorOptions options;
   odometry::Odometry odometry;
   OnlineCalibrator calibrator;
   odometry::DriftCovariance drift{};
+  UsualSpread usual{};
   double length_sigma_percent;  // of all lengths, by what is known of the calibration in use
   State state = State::initialising;
   Stamp last{};

@@ -46,6 +46,12 @@ struct FaultResult {
 [[nodiscard]] FaultDrive drive_with_faults(const FaultCase& c);
 [[nodiscard]] FaultResult judge(const FaultCase& c, const FaultDrive& drive,
                                 const NormalError& normal);
+struct JudgedDrive {
+  FaultDrive drive{};
+  FaultResult result{};
+};
+/// The case's drive; where that ends before the last fault is over with, one of a minute.
+[[nodiscard]] JudgedDrive drive_until_recovered(FaultCase c, const NormalError& normal);
 
 /// The faults of docs/mock.md, one at a time; begin at 9 s, when the calibration is confirmed.
 [[nodiscard]] const std::vector<FaultCase>& single_faults();

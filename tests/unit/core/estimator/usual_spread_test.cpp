@@ -1,0 +1,39 @@
+#include "core/estimator/detail/usual_spread.hpp"
+
+#include <gtest/gtest.h>
+
+namespace vergence {
+namespace {
+
+constexpr int kEnough = 15, kHalfOfTheKept = 31;  // motions
+
+UsualSpread driven(int motions) {
+  UsualSpread usual;
+  for (int i = 0; i < motions; ++i) EXPECT_FALSE(usual.unusual(0.010 + 0.002 * (i % 5)));
+  return usual;  // 0.014 on the median
+}
+
+TEST(UsualSpread, aMotionFourTimesAsUncertainAsTheOthersIsUnusual) {
+  EXPECT_TRUE(driven(kEnough).unusual(0.057));
+  EXPECT_FALSE(driven(kEnough).unusual(0.055));
+  EXPECT_FALSE(driven(kEnough - 1).unusual(0.057)) << "too few to tell";
+}
+
+TEST(UsualSpread, afterOneTwiceAsUncertainIsUnusualStill) {
+  UsualSpread usual = driven(100);
+  EXPECT_FALSE(usual.unusual(0.030));
+  EXPECT_TRUE(usual.unusual(0.060));
+  EXPECT_TRUE(usual.unusual(0.030));
+  EXPECT_FALSE(usual.unusual(0.014));
+  EXPECT_FALSE(usual.unusual(0.030));
+}
+
+TEST(UsualSpread, whatStaysIsUsualAfterHalfTheMotionsKept) {
+  UsualSpread usual = driven(200);
+  int told = 0;
+  for (int i = 0; i < 100; ++i) told += usual.unusual(0.1) ? 1 : 0;
+  EXPECT_EQ(told, kHalfOfTheKept);
+}
+
+}  // namespace
+}  // namespace vergence
