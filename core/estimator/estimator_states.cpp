@@ -75,7 +75,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
          0);
 }
 
-/// The frame's pose and how uncertain it is by now.
+/// The frame's pose, how uncertain it is by now, and its status by how uncertain its motion is.
 void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept {
   sample->T_world_left = out.T_left_world.inverse();
   const double length_sigma = 0.01 * length_sigma_percent;

@@ -128,9 +128,9 @@ DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, Unique
 
 }  // namespace
 
-// Not sp_list_ports(): libserialport 0.1.1 writes through a null pointer when a port vanishes while
-// it is listed (list_ports() in its linux.c), and opens ports of a PC to see whether they are
-// there.
+// Not sp_list_ports(): where a port vanishes while it is listed, libserialport 0.1.1 hands out a
+// null list or reads one itself (list_ports() in its linux.c does not check list_append()), and it
+// opens the ports of a PC to see whether they are there.
 std::vector<SerialPortInfo> list_serial_ports() {
   std::vector<SerialPortInfo> ports;
   for (const std::string& name : names_of_ttys()) {

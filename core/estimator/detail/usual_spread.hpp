@@ -10,7 +10,9 @@ namespace vergence {
 ///
 /// Of the recorded drives, untouched, no motion is more than 1.6 times as uncertain as usual, of
 /// the rendered street 2.3 times (build/bench/covariance_bench); cameras that are out of step,
-/// unseen, make it 5 to 10 times. Threads  One. Memory: none of the heap.
+/// unseen, make it 5 to 10 times.
+///
+/// Threads  One. Memory: none of the heap.
 class UsualSpread {
  public:
   /// Standing still, residuals are smaller than they are on the way: such motions are no measure,
@@ -19,9 +21,10 @@ class UsualSpread {
     constexpr double kMoves = 2;  // sigmas
     return step_m > kMoves * sigma_m;
   }
-  /// sigma_m: of the translation of one motion that judges(), m. Afterwards it is one of the usual
-  /// ones, so what stays uncertain is told for half the motions kept. → it is more than 4 times as
-  /// uncertain as usual; after one that was, more than twice
+  /// Whether a motion is more than 4 times as uncertain as usual; after one that was, more than
+  /// twice. Then it is one of the usual ones: what stays uncertain is told for half of those kept.
+  ///
+  /// sigma_m: of the translation of a motion that judges(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
     times_ = kept_ >= kLeast ? sigma_m / median() : 0;
     unusual_ = times_ > (unusual_ ? kRelease : kTimes);
