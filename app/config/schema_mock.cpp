@@ -97,7 +97,7 @@ Group mock() {
       .integer("noise", &M::noise, 0, 1, "", "1: shot and read noise of the sensors; 0: none.")
       .integer("blur_samples", &M::blur_samples, 1, 16, "",
                "Poses averaged over an exposure: 1 is no motion blur; time grows with it.")
-      .number("speed", &M::speed, 0.02, 20, "m/s", "Speed on the straights.")
+      .number("speed", &M::speed, 0.01, 20, "m/s", "Speed on the straights.")
       .number("suspension", &M::suspension, 0, 3, "",
               "Gain on pitch, roll and heave of the springs.")
       .number("vibration", &M::vibration, 0, 5, "", "Gain on the shake at 6 to 12 Hz.")

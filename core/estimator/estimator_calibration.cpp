@@ -137,8 +137,8 @@ void Estimator::Parts::watch_sought(const odometry::FrameOutcome& out,
             *onset, frame);
 }
 
-/// What the search has so far is of another rig.
-void Estimator::Parts::seek_anew(CalibrationCause cause, std::uint64_t onset,
+/// What the search has so far is of another rig. No cause: that of the search.
+void Estimator::Parts::seek_anew(std::optional<CalibrationCause> cause, std::uint64_t onset,
                                  const RigFrame& frame) noexcept {
   calibrator.seek(cause, onset, frame.number);
   if (state == State::calibrating) transition(Trigger::calibration_rejected, frame.stamp);

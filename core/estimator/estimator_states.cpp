@@ -42,7 +42,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   if (out.uneven) {
     may_lag = kLagShownAfter;
     // Frames from before and frames out of step would be one solve, and a rig that is neither's.
-    if (calibrator.seeking()) seek_anew(calibrator.sought_because(), frame.number, frame);
+    if (calibrator.seeking()) seek_anew(std::nullopt, frame.number, frame);
   } else if (out.posed && may_lag > 0) {
     --may_lag;
   }

@@ -80,9 +80,9 @@ void OnlineCalibrator::scene_lost() noexcept {
   monitor_.scene_lost();
 }
 
-void OnlineCalibrator::seek(CalibrationCause cause, std::uint64_t onset,
+void OnlineCalibrator::seek(std::optional<CalibrationCause> cause, std::uint64_t onset,
                             std::uint64_t now) noexcept {
-  search_ = {.cause = cause, .onset = onset, .since = now};
+  search_ = {.cause = cause.value_or(search_.cause), .onset = onset, .since = now};
   seeking_ = true;
   verified_ = false;
   gate_ = Gate::open;

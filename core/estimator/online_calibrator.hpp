@@ -40,10 +40,10 @@ class OnlineCalibrator {
   [[nodiscard]] RigMonitor& monitor() noexcept { return monitor_; }
 
   /// From now on a calibration is sought. Frames before `onset` belong to another rig and are
-  /// forgotten, and so is a solve of them that is still under way.
-  void seek(CalibrationCause cause, std::uint64_t onset, std::uint64_t now) noexcept;
+  /// forgotten, and so is a solve of them that is still under way. No cause: that of the search
+  /// before.
+  void seek(std::optional<CalibrationCause> cause, std::uint64_t onset, std::uint64_t now) noexcept;
   [[nodiscard]] bool seeking() const noexcept { return seeking_; }
-  [[nodiscard]] CalibrationCause sought_because() const noexcept { return search_.cause; }
   /// There are frames enough to solve from and no solve is under way.
   [[nodiscard]] bool can_solve() const noexcept;
   /// Takes a snapshot and starts the solver on it.

@@ -1,5 +1,6 @@
 #pragma once
 #include <atomic>
+#include <optional>
 
 #include "core/estimator/detail/usual_spread.hpp"
 #include "core/estimator/online_calibrator.hpp"
@@ -51,7 +52,8 @@ struct Estimator::Parts {
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void note_length_sigma(const CalibrationDecision& decision) noexcept;
   void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
-  void seek_anew(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
+  void seek_anew(std::optional<CalibrationCause> cause, std::uint64_t onset,
+                 const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;

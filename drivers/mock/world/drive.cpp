@@ -205,7 +205,7 @@ const DriveOptions& checked(const DriveOptions& o) {
       throw std::invalid_argument(std::string("mock drive: ") + name + " must be between " +
                                   std::to_string(lo) + " and " + std::to_string(hi));
   };
-  in(o.speed, 0.02, 20, "speed");
+  in(o.speed, 0.01, 20, "speed");
   in(o.acceleration, 0.3, 4, "acceleration");
   in(o.lateral, 0.5, 5, "lateral");
   in(o.suspension, 0, 3, "suspension");

@@ -14,7 +14,7 @@ namespace vergence::mock {
 struct DriveOptions {
   DriveKind kind = DriveKind::loop;
   std::uint64_t seed = 1;     // of the suspension's and the driver's disturbances
-  double speed = 12.0;        // m/s, on the straights; 0.02..20
+  double speed = 12.0;        // m/s, on the straights; 0.01..20
   double acceleration = 1.4;  // m/s², speeding up; braking is 1.3 times that; 0.3..4
   double lateral = 2.6;       // m/s², in corners; 0.5..5
   double suspension = 1.0;    // gain on pitch, roll and heave of the springs; 0: rigid; up to 3
