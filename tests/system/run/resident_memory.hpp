@@ -26,16 +26,19 @@ namespace vergence::test {
 constexpr std::int64_t kKiB = 1024;
 
 /// Resident bytes. The estimator's arena is zero pages that a drive comes to use one after the
-/// other up to its capacity: it is told apart, with what lies beside it in one mapping.
+/// other up to its capacity: it is told apart, with what lies beside it in one mapping. Of the
+/// large mappings the other is the mock's way, which is laid out at the start.
 struct Resident {
-  std::int64_t arena = 0;   // the largest mapping without a file
-  std::int64_t others = 0;  // all the rest of the process
+  std::int64_t arena = 0;         // large mappings without a file
+  std::int64_t arena_mapped = 0;  // and what these could hold
+  std::int64_t others = 0;        // all the rest of the process
 };
+constexpr std::int64_t kLargeMapping = 64 * 1024 * kKiB;
 
 /// Of a process by its smaps (proc(5)); nothing: it has ended.
 inline std::optional<Resident> resident_of(pid_t process) {
   std::ifstream smaps("/proc/" + std::to_string(process) + "/smaps");
-  std::int64_t size = 0, largest = 0, all = 0;
+  std::int64_t size = 0, all = 0;
   bool has_file = false;
   Resident resident;
   for (std::string line; std::getline(smaps, line);) {
@@ -48,9 +51,9 @@ inline std::optional<Resident> resident_of(pid_t process) {
     } else if (line.starts_with("Rss:")) {
       const std::int64_t bytes = kKiB * std::strtoll(line.c_str() + 4, nullptr, 10);
       all += bytes;
-      if (has_file || size <= largest) continue;
-      largest = size;
-      resident.arena = bytes;
+      if (has_file || size < kLargeMapping) continue;
+      resident.arena += bytes;
+      resident.arena_mapped += size;
     }
   }
   if (all == 0) return std::nullopt;
@@ -162,6 +165,7 @@ inline void expect_flat(const Growth& growth, int least) {
   const std::int64_t others = growth.at_the_end.others - growth.settled->others,
                      arena = growth.at_the_end.arena - growth.settled->arena;
   EXPECT_LE(others, kMiB) << "after " << growth.frames << " frames";
+  EXPECT_EQ(growth.at_the_end.arena_mapped, growth.settled->arena_mapped);
   EXPECT_EQ(growth.handles_at_the_end, growth.handles_settled);
   testing::Test::RecordProperty("frames", growth.frames);
   testing::Test::RecordProperty("growth_bytes", std::to_string(others));
