@@ -41,7 +41,7 @@ enum class Reason : std::uint8_t {
   no_pose,            // tracking failed
   time_gap,           // no frame for longer than motion can be predicted
   scene_restarted,    // the map was rebuilt; the motion across the gap was extrapolated
-  weak_geometry,      // the points do not hold the pose well in some direction
+  weak_geometry,      // the points do not hold the pose well, or several times worse than usual
   moving_scene,       // more outliers than a rigid scene has
   unconfirmed,        // calibration from a state file that the drive has not confirmed yet
   unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands

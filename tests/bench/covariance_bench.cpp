@@ -8,7 +8,8 @@
 // "within" is the share of positions inside the ellipsoid of 95 %. The recorded drives' truth has
 // errors of its own, which are added to the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger,
 // Lenz, Urtasun, CVPR 2012), of EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where
-// nothing is stated, an assumed 0.05°.
+// nothing is stated, an assumed 0.05°. The last line of a drive tells how uncertain its most
+// uncertain motion is, times the usual one.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>

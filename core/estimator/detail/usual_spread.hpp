@@ -9,8 +9,8 @@ namespace vergence {
 /// several times less certain than that cannot be relied on as the others can, whatever spoils it.
 ///
 /// Of the recorded drives, untouched, no motion is more than 1.6 times as uncertain as usual, of
-/// the rendered street 2.3 times (build/bench/covariance_bench); cameras that are out of step,
-/// unseen, make it 5 to 10 times.
+/// the rendered street 2.3 times (build/bench/covariance_bench); cameras that are out of step
+/// make it more than 4 times (FaultPairs.anImageLateFromALostOneOnIsNotOk).
 ///
 /// Threads  One. Memory: none of the heap.
 class UsualSpread {
