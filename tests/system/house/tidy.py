@@ -147,13 +147,14 @@ def look(root, build, batch):
 
 
 def part_of(found, parts, turn):
-    """Every parts-th batch, beginning with another one each turn: all of them in `parts` turns."""
+    """Every parts-th batch, which ones the turn decides: all of them in `parts` turns that follow one another."""
     return [batch for i, batch in enumerate(found) if (i + turn) % parts == 0]
 
 
 def turn(root):
-    counted = subprocess.run(["git", "-C", root, "rev-list", "--count", "HEAD"], capture_output=True, text=True, check=False)
-    return int(counted.stdout) if counted.returncode == 0 else 0
+    """From the commit's hash, which a shallow clone knows as well."""
+    commit = subprocess.run(["git", "-C", root, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
+    return int(commit.stdout, 16) if commit.returncode == 0 else 0
 
 
 def without_repetition(found):
