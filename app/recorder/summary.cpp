@@ -22,23 +22,33 @@ constexpr double kPercent = 100.0;
 /// Times to the microsecond: what is behind it is the clock's noise.
 double ms(double value) { return std::round(value * 1e3) / 1e3; }
 
+Json distribution_json(const TimeHistogram& times) {
+  return {{"p50", ms(times.percentile(0.5))},
+          {"p99", ms(times.percentile(0.99))},
+          {"p99_9", ms(times.percentile(0.999))},
+          {"max", ms(times.max())}};
+}
+
 Json timing_json(const SessionTotals& t) {
   Json stages = {{"decode", ms(t.decode.mean())}};
-  for (std::size_t i = 0; i < t.stages.size(); ++i)
-    stages[std::string(to_string(static_cast<Stage>(i)))] = ms(t.stages[i].mean());
+  Json of_stages = {{"decode", distribution_json(t.decode)}};
+  for (std::size_t i = 0; i < t.stages.size(); ++i) {
+    const std::string stage(to_string(static_cast<Stage>(i)));
+    stages[stage] = ms(t.stages[i].mean());
+    of_stages[stage] = distribution_json(t.stages[i]);
+  }
   Json calibrating;
   if (t.calibrating.count() > 0)
     calibrating = {{"frames", t.calibrating.count()},
                    {"mean", ms(t.calibrating.mean())},
                    {"p99", ms(t.calibrating.percentile(0.99))},
                    {"max", ms(t.calibrating.max())}};
-  return {{"mean", ms(t.estimate.mean())},
-          {"p50", ms(t.estimate.percentile(0.5))},
-          {"p99", ms(t.estimate.percentile(0.99))},
-          {"p99_9", ms(t.estimate.percentile(0.999))},
-          {"max", ms(t.estimate.max())},
-          {"while_calibrating", calibrating},
-          {"stages", stages}};
+  Json json = {{"mean", ms(t.estimate.mean())}};
+  json.update(distribution_json(t.estimate));
+  json["while_calibrating"] = calibrating;
+  json["stages"] = stages;
+  json["stage_distributions"] = of_stages;
+  return json;
 }
 
 Json metrics_json(const std::optional<TrajectoryEvaluation>& evaluation) {

@@ -116,6 +116,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   }
   sample.state = p.state;
   p.grade(out, frame.pairing, &sample);
+  p.grade_window(out, &sample);
   p.relinked = out.relinked;
   if (out.posed) p.propagate(out, &sample);
   sample.inliers = out.inliers;

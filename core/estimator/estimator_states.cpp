@@ -129,6 +129,20 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
   }
 }
 
+/// What was wrong in the frames before makes of the status of one about which nothing is.
+void Estimator::Parts::grade_window(const odometry::FrameOutcome& out,
+                                    PoseSample* sample) noexcept {
+  if (!out.posed) return;
+  if (out.relinked || out.restarted) return window_doubt.clear();
+  if (out.gap_s > 0) return window_doubt.add(Reason::time_gap, WindowDoubt::kWindow);
+  if (undecided || state == State::recalibrating)
+    return window_doubt.add(Reason::recalibrating, 1);
+  const Reason why = window_doubt.next();
+  if (why == Reason::none || sample->status != PoseStatus::ok) return;
+  sample->status = PoseStatus::degraded;
+  sample->reason = why;
+}
+
 /// What a pose of cameras that are not linked says of its calibration: the most particular that is
 /// known.
 Reason Estimator::Parts::why_uncalibrated() const noexcept {

@@ -169,8 +169,11 @@ std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uin
                                                            bool last) noexcept {
   solve_.close();
   if (solve_.outdated(seeking_)) return std::nullopt;
-  solve_.focal_check().take(frames_.solved_frames() >= frames_.most());
   const SolutionReview now = review(last);
+  // Frames of two rigs, or out of step, tell no focal length.
+  const Gate gate = now.gate(now.measured(), false);
+  if (gate != Gate::rig_changed && gate != Gate::out_of_step)
+    solve_.focal_check().take(frames_.solved_frames() >= frames_.most());
   return solve_.sought() ? judge_sought(now, stamp, number)
                          : judge_learnt(now, stamp, number, last);
 }

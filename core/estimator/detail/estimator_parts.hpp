@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "core/estimator/detail/usual_spread.hpp"
+#include "core/estimator/detail/window_doubt.hpp"
 #include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
@@ -65,6 +66,7 @@ struct Estimator::Parts {
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void notify_missing(Stamp stamp) noexcept;
   void grade(const odometry::FrameOutcome& out, Pairing pairing, PoseSample* sample) const noexcept;
+  void grade_window(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void grade_motion(const odometry::FrameOutcome& out, const Mat6& motion, double step_m,
                     PoseSample* sample) noexcept;
   [[nodiscard]] Reason why_uncalibrated() const noexcept;
@@ -74,6 +76,7 @@ struct Estimator::Parts {
   OnlineCalibrator calibrator;
   odometry::DriftCovariance drift{};
   UsualSpread usual{};
+  WindowDoubt window_doubt{};
   double length_sigma_percent;  // of all lengths, by what is known of the calibration in use
   State state = State::initialising;
   Stamp last{};

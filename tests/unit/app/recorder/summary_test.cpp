@@ -54,6 +54,8 @@ TEST(Summary, hasTheKeysOfTheContractAndNullWhereThereIsNoReference) {
   auto totals = std::make_unique<SessionTotals>();
   totals->read = 5, totals->ok = 3, totals->degraded = 1, totals->lost = 1;
   totals->estimate.add(8);
+  for (int i = 0; i < 99; ++i) totals->stages[std::size_t(Stage::track)].add(1);
+  totals->stages[std::size_t(Stage::track)].add(16);
   const auto json = summary_json(*totals, input());
   for (const char* key :
        {"frames", "timing_ms", "metrics", "calibration", "recalibrations", "allocations_after_seal",
@@ -67,8 +69,13 @@ TEST(Summary, hasTheKeysOfTheContractAndNullWhereThereIsNoReference) {
   EXPECT_EQ(json["timing_ms"]["mean"], 8.0);
   for (const char* key : {"p50", "p99", "p99_9", "max"})
     EXPECT_TRUE(json["timing_ms"].contains(key)) << key;
-  for (const char* stage : {"decode", "pyramid", "detect", "track", "match", "pose", "window"})
+  for (const char* stage : {"decode", "pyramid", "detect", "track", "match", "pose", "window"}) {
     EXPECT_TRUE(json["timing_ms"]["stages"].contains(stage)) << stage;
+    EXPECT_EQ(json["timing_ms"]["stage_distributions"][stage].size(), 4u) << stage;
+  }
+  const auto& track = json["timing_ms"]["stage_distributions"]["track"];
+  EXPECT_NEAR(track["p50"], 1.0, 0.0035);  // half a bin, and microseconds
+  EXPECT_EQ(track["max"], 16.0);
   EXPECT_EQ(json["memory"]["sum_bytes"], 7);
   EXPECT_TRUE(json["calibration"]["word"].is_null());
   EXPECT_TRUE(json["calibration"]["depth_error_percent"]["20"].is_null());
