@@ -273,7 +273,7 @@ ExitCode Snap::verdict(const Taking& taking) const {
 
 ExitCode take_pictures(const SnapRequest& request) {
   Snap snap(request);
-  make_session_folder(request.out);
+  (void)make_session_folder(request.out);
   return snap.run();
 }
 

@@ -44,7 +44,7 @@ ExitCode run_export(const ExportArguments& a) {
                             ? read_calibration(*a.calibration)
                             : parse_calibration(session.description().calibration, a.session);
   request.truth = truth_of(a.session);
-  make_session_folder(request.out);
+  (void)make_session_folder(request.out);
   Progress progress = Progress::on_stderr(a.quiet);
   const ExportResult result = export_session(session, request, [&](std::size_t done) {
     ProgressState state;

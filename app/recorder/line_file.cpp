@@ -59,7 +59,9 @@ void LineFile::write_back() noexcept {
 
 bool LineFile::reopen(bool* fresh) {
   *fresh = false;
-  (void)flush();
+  // The rest of a line that is half written belongs to the old one.
+  reopen_due_ = !flush();
+  if (reopen_due_) return false;
   const int fd = open_for_lines(path_);
   if (fd < 0) {
     fault_ = errno;

@@ -35,9 +35,11 @@ class LineFile {
   /// itself it begins after 30 s (vm.dirty_expire_centisecs), and so much a power cut would cost.
   void write_back() noexcept;
   /// Hands over what is waiting and opens the file anew by its name: what was moved away stays as
-  /// it is, and a new one begins. *fresh: it is empty. False: it cannot be opened, the old one
-  /// stays in use; fault() says why.
+  /// it is, and a new one begins. *fresh: it is empty. False: it cannot be opened, or something
+  /// still waits for room in the old one, which stays in use; fault() says why.
   bool reopen(bool* fresh);
+  /// The last reopen() had to wait: to be called again once flush() says true.
+  [[nodiscard]] bool reopen_due() const noexcept { return reopen_due_; }
   /// flush(), then asks the system to put it on the disk, and closes. Twice is harmless.
   bool close();
 
@@ -55,7 +57,7 @@ class LineFile {
   std::size_t pending_ = kPending;
   int fd_ = -1;
   int fault_ = 0;
-  bool pretend_full_ = false;
+  bool pretend_full_ = false, reopen_due_ = false;
   std::uint64_t lost_lines_ = 0;
   std::string waiting_;
 };

@@ -191,9 +191,10 @@ bool Recorder::take_outcome() {
 void Recorder::flush() {
   const auto& files = files_->all;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    if (files[i]->flush())
+    if (files[i]->flush()) {
       files_->reported[i] = 0;
-    else if (files_->reported[i] != files[i]->fault()) {
+      if (files[i]->reopen_due()) reopen(files[i]);
+    } else if (files_->reported[i] != files[i]->fault()) {
       files_->reported[i] = files[i]->fault();
       report_error(*files[i]);
     }
@@ -207,12 +208,16 @@ void Recorder::reopen() noexcept {
   filled_.signal();
 }
 
+void Recorder::reopen(LineFile* file) {
+  bool fresh = false;
+  if (!file->reopen(&fresh)) report_error(*file);
+  if (!fresh) return;
+  file->append(files_->head(file));
+  if (file == &files_->trajectory) totals_.trajectory_begins_anew();
+}
+
 void Recorder::reopen_files() {
-  for (LineFile* file : files_->all) {
-    bool fresh = false;
-    if (!file->reopen(&fresh)) report_error(*file);
-    if (fresh) file->append(files_->head(file));
-  }
+  for (LineFile* file : files_->all) reopen(file);
   EventRecord event;
   event.stamp = newest_;
   event.kind = "files_reopened";

@@ -115,6 +115,7 @@ class Recorder {
   void write(const InsRecord& reading);
   void flush();
   void reopen_files();
+  void reopen(LineFile* file);
   void pretend(Stamp stamp);
   void note_disk(bool full);
   [[nodiscard]] std::uint64_t lost_lines() const;

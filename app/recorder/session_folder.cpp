@@ -7,7 +7,7 @@
 
 namespace vergence::app {
 
-void make_session_folder(const std::filesystem::path& folder) {
+bool make_session_folder(const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
   const std::string name = folder.string();
   if (name.empty()) throw InputError("--out is empty; name a folder for the session");
@@ -24,12 +24,27 @@ void make_session_folder(const std::filesystem::path& folder) {
       throw InputError(
           name +
           ": is not empty, and nothing is ever overwritten; name a new or empty folder with --out");
-    return;
+    return false;
   }
   fs::create_directories(folder, error);
   if (error)
     throw InputError(name + ": cannot be made (" + error.message() +
                      "): check the folder above it");
+  return true;
+}
+
+void discard_session_folder(const std::filesystem::path& folder, bool made) noexcept {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (made) {
+    fs::remove_all(folder, error);
+    return;
+  }
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code ignored;
+    fs::remove_all(entry->path(), ignored);
+  }
 }
 
 }  // namespace vergence::app

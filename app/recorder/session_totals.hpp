@@ -77,6 +77,9 @@ class TotalsBuilder {
   /// An attempt that was decided. True: it was accepted.
   bool add(const CalibrationRecord& calibration);
 
+  /// What is in trajectory.tum from now on is all that there will be at the end.
+  void trajectory_begins_anew() noexcept { totals_.statuses.clear(); }
+
   [[nodiscard]] std::size_t memory() const noexcept;
   [[nodiscard]] SessionTotals& totals() noexcept { return totals_; }
 

@@ -46,23 +46,25 @@ RecordRing::RecordRing(std::size_t bytes) {
 RecordRing::~RecordRing() { ::munmap(memory_, 2 * capacity_); }
 
 std::span<std::uint8_t> RecordRing::begin(std::size_t size, std::size_t spare) noexcept {
-  const std::size_t tail = tail_.load(std::memory_order_relaxed);
-  const std::size_t free = capacity_ - (tail - head_.load(std::memory_order_acquire));
+  const Count tail = tail_.load(std::memory_order_relaxed);
+  const std::size_t free =
+      capacity_ - static_cast<std::size_t>(tail - head_.load(std::memory_order_acquire));
   if (size > free || spare > free - size) return {};
-  return {memory_ + tail % capacity_, size};
+  return {place(tail), size};
 }
 
 void RecordRing::commit(std::size_t size) noexcept {
-  const std::size_t tail = tail_.load(std::memory_order_relaxed) + size;
-  const std::size_t waiting = tail - head_.load(std::memory_order_relaxed);
+  const Count tail = tail_.load(std::memory_order_relaxed) + size;
+  const auto waiting = static_cast<std::size_t>(tail - head_.load(std::memory_order_relaxed));
   if (waiting > high_water_.load(std::memory_order_relaxed))
     high_water_.store(waiting, std::memory_order_relaxed);
   tail_.store(tail, std::memory_order_release);
 }
 
 std::span<const std::uint8_t> RecordRing::waiting() const noexcept {
-  const std::size_t head = head_.load(std::memory_order_relaxed);
-  return {memory_ + head % capacity_, tail_.load(std::memory_order_acquire) - head};
+  const Count head = head_.load(std::memory_order_relaxed);
+  return {place(head),
+          static_cast<std::size_t>(tail_.load(std::memory_order_acquire) - head)};
 }
 
 void RecordRing::release(std::size_t size) noexcept {

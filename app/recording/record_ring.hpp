@@ -38,7 +38,8 @@ class RecordRing {
 
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
   [[nodiscard]] std::size_t fill() const noexcept {
-    return tail_.load(std::memory_order_acquire) - head_.load(std::memory_order_acquire);
+    return static_cast<std::size_t>(tail_.load(std::memory_order_acquire) -
+                                    head_.load(std::memory_order_acquire));
   }
   /// Most bytes that ever waited; exact for the producer.
   [[nodiscard]] std::size_t high_water() const noexcept {
@@ -48,8 +49,15 @@ class RecordRing {
  private:
   std::size_t capacity_ = 0;
   std::uint8_t* memory_ = nullptr;
-  alignas(kCacheLine) std::atomic<std::size_t> head_{0};  // bytes released since the start
-  alignas(kCacheLine) std::atomic<std::size_t> tail_{0};  // bytes committed since the start
+  // 64 bits on every machine: the place in the ring is the count modulo a capacity that is no power
+  // of two, which jumps where a count wraps.
+  using Count = std::uint64_t;
+  [[nodiscard]] std::uint8_t* place(Count count) const noexcept {
+    return memory_ + static_cast<std::size_t>(count % capacity_);
+  }
+  static_assert(std::atomic<Count>::is_always_lock_free);
+  alignas(kCacheLine) std::atomic<Count> head_{0};  // bytes released since the start
+  alignas(kCacheLine) std::atomic<Count> tail_{0};  // bytes committed since the start
   std::atomic<std::size_t> high_water_{0};
 };
 

@@ -105,6 +105,12 @@ std::vector<std::string> RealtimeThreads::lock_memory() {
 std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>& threads) {
   std::vector<std::string> sentences;
   if (request_.priority <= 0 && !request_.affinity && !request_.solver_affinity) return sentences;
+  // One that has ended is forgotten: capture threads come and go for months, and a number is given
+  // again.
+  std::erase_if(done_, [&](const auto& done) {
+    return std::none_of(threads.begin(), threads.end(),
+                        [&](const ProcessThread& thread) { return thread.id == done.first; });
+  });
   for (const ProcessThread& thread : threads) {
     const ThreadRole role = thread_role(thread.name);
     if (role == ThreadRole::other) continue;  // it may still be about to get its name

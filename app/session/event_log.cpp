@@ -71,7 +71,7 @@ void EventLog::note_change(const CalibrationDecision& decision) noexcept {
 /// Frames in a row without all of their work are one event.
 void EventLog::note_effort(const PoseSample& sample) noexcept {
   if (sample.effort.whole()) {
-    ++whole_frames_;
+    whole_frames_ = std::min(whole_frames_ + 1, kWholeAgain);
     return;
   }
   if (std::exchange(whole_frames_, 0) < kWholeAgain) return;

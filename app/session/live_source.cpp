@@ -205,7 +205,10 @@ void LiveSource::done(const PoseSample& sample) noexcept {
 
 // ---- the caller's thread
 
-void LiveSource::look() {  // real cameras do not end by themselves
+void LiveSource::look() {
+  // Of simulated devices one always has something to come, and in virtual time a look is an order.
+  if (devices_.mock() == nullptr) acquisition_->look_again();
+  // Real cameras do not end by themselves.
   if (devices_.mock() == nullptr && request_.duration_s &&
       std::chrono::steady_clock::now() - begun_ >
           std::chrono::duration<double>(*request_.duration_s))

@@ -40,6 +40,7 @@ class SessionRunner {
   void estimate() noexcept;
   void pass_on_temperatures();
   void watch(Progress* progress);
+  void start_source(std::vector<std::string>* faults);
   void halt_source() noexcept;
   void say_recording_errors(Progress* progress);
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
@@ -68,6 +69,7 @@ class SessionRunner {
   std::condition_variable changed_;
   std::chrono::steady_clock::time_point temperatures_due_{};
   bool done_ = false;
+  bool made_folder_ = false;   // it was not there before
   bool halted_ = false;        // the caller's thread alone
   ResidentMemory resident_{};  // at the drive's end
   DriveThreads threads_;       // of the caller's thread
@@ -134,6 +136,19 @@ void SessionRunner::halt_source() noexcept {
   halted_ = true;
 }
 
+/// A device that does not start ends the session before it began: a service that is restarted until
+/// the device is there leaves no folder behind each time.
+void SessionRunner::start_source(std::vector<std::string>* faults) {
+  try {
+    source_.start(faults);
+  } catch (const std::exception&) {
+    if (recording_) recording_->close();
+    (void)recorder_->close();
+    discard_session_folder(request_.out, made_folder_);
+    throw;
+  }
+}
+
 void SessionRunner::say_recording_errors(Progress* progress) {
   if (!recording_) return;
   for (const std::string& sentence : recording_->take_errors())
@@ -141,7 +156,7 @@ void SessionRunner::say_recording_errors(Progress* progress) {
 }
 
 void SessionRunner::open(std::vector<std::string>* faults) {
-  make_session_folder(request_.out);
+  made_folder_ = make_session_folder(request_.out);
   if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
     removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
   Recorder::Options to_record;
@@ -283,7 +298,7 @@ ExitCode SessionRunner::run() {
   say_remarks(&progress);
   (void)::malloc_trim(0);  // what setting up took and gave back goes to the system
   threads_.lock_memory(&progress);
-  source_.start(&faults);
+  start_source(&faults);
   std::thread estimating([this] { estimate(); });
   service_.ready();
   watch(&progress);

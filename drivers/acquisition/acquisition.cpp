@@ -194,7 +194,8 @@ void Acquisition::take_frame(std::size_t k) {
     head.gone = true;
     if (options_.observer != nullptr) options_.observer->on_device_gone(camera, head.value.arrival);
     sync_.absent(camera);
-    push_event(DeviceEvent::Kind::camera_gone, head.value.arrival, camera);
+    // One that started and gave nothing has not been back: it is not gone once more.
+    if (!head.back) push_event(DeviceEvent::Kind::camera_gone, head.value.arrival, camera);
     return;
   }
   if (head.back) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -22,6 +23,8 @@ struct DeviceHead {
   };
   static constexpr std::int64_t kAskAgain =
       1'000'000'000;  // ns: opening a bus device takes a while, a second more is no loss
+  static constexpr std::int64_t kRest =
+      10;  // times what asking took: meanwhile nobody takes what the other devices have
 
   Device* device = nullptr;
   bool held = false;   // `value` waits to be taken
@@ -29,7 +32,7 @@ struct DeviceHead {
   bool gone = false;
   bool back = false;  // it was started again, which nobody has been told yet
   bool ended = false;
-  std::int64_t asked_ns = 0;  // when it was last asked to come back, steady clock
+  std::int64_t ask_ns = 0;  // when it is next asked to come back, steady clock
   Value value{};
 
   void look(const Look& l) {
@@ -48,15 +51,17 @@ struct DeviceHead {
 
  private:
   [[nodiscard]] bool start_again(const Look& l) {
-    const std::int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
-    if (!l.ask_always && now - asked_ns < kAskAgain) return false;
-    asked_ns = now;
+    const auto now = [] { return std::chrono::steady_clock::now().time_since_epoch().count(); };
+    const std::int64_t begun = now();
+    if (!l.ask_always && begun < ask_ns) return false;
     DeviceStatus status = device->start(l.ready);
     // Its time passes by itself: as long as it is not back, nothing says what else may go on.
     while (status == DeviceStatus::gone && l.own_time && !l.stop->load(std::memory_order_acquire)) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       status = device->start(l.ready);
     }
+    const std::int64_t done = now();
+    ask_ns = done + std::max(kAskAgain, kRest * (done - begun));
     ended = status == DeviceStatus::ended;
     if (status != DeviceStatus::ok) return false;
     gone = false;

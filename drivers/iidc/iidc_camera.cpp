@@ -117,13 +117,15 @@ DeviceStatus IidcCamera::start(Notifier* ready) noexcept {
       (void)registers_.take_status();
     }
     bus_->stop();
-    if (again) {
-      queue_.fail();  // still gone, until it comes back or stop()
+    if (again) {  // still gone, until it comes back or stop()
+      lost_.store(true, std::memory_order_release);
+      queue_.fail();
     } else {
       queue_.end();
     }
     return status;
   } catch (const std::exception&) {
+    if (again) lost_.store(true, std::memory_order_release);
     return DeviceStatus::failed;
   }
 }

@@ -9,9 +9,10 @@ target_compile_options(vergence_options INTERFACE -ffp-contract=off)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
   target_compile_definitions(vergence_options INTERFACE "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
 endif()
-# ARMv7's NEON has no doubles, which half of the kernels are made of: portable code throughout.
+# ARMv7's NEON has no doubles, which half of the kernels are made of: portable code throughout. And a file would end at 2 GiB: the
+# readings of a day or two.
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "armv7")
-  target_compile_definitions(vergence_options INTERFACE HWY_DISABLED_TARGETS=HWY_NEON)
+  target_compile_definitions(vergence_options INTERFACE HWY_DISABLED_TARGETS=HWY_NEON _FILE_OFFSET_BITS=64)
 endif()
 if(VERGENCE_SANITIZE)
   target_compile_options(vergence_options INTERFACE -fsanitize=${VERGENCE_SANITIZE} -fno-omit-frame-pointer)

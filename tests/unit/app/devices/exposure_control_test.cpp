@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -176,6 +177,7 @@ class SlowCamera final : public CameraDevice {
     return answer.load();
   }
   CameraStatistics statistics() const noexcept override { return {}; }
+  void show(double grey) { std::fill(pixels_.begin(), pixels_.end(), std::uint8_t(grey)); }
 
   ExposureSetting has{};
   std::atomic<int> asked{0};
@@ -224,6 +226,23 @@ TEST(ExposureControl, aCameraThatCannotEndsItAndOneThatForgotIsAskedAgain) {
     (void)again.cameras().front()->wait({}, &frame);
   EXPECT_EQ(forgetful.asked, 1);
   EXPECT_EQ(again.counters().again, 1U);
+}
+
+TEST(ExposureControl, aCameraThatWasAwayDuringAChangeIsGivenItWhenItIsBack) {
+  const ExposureSetting start{Duration::microseconds(1000), 0};
+  SlowCamera camera;  // dark: a longer exposure is asked for
+  camera.has = start;
+  camera.answer = DeviceStatus::gone;
+  exposure::ExposureOptions options;
+  ExposureControl control({&camera}, kWidth, kHeight, {}, options, start, true);
+  Frame frame;
+  const auto look = [&] { (void)control.cameras().front()->wait({}, &frame); };
+  while (camera.asked == 0) look();
+  camera.answer = DeviceStatus::ok;
+  camera.show(options.target);  // nothing more is to be changed
+  for (int i = 0; i < 8 * options.settle_frames && camera.asked == 1; ++i) look();
+  EXPECT_EQ(camera.asked, 2);
+  EXPECT_EQ(control.counters().again, 1U);
 }
 
 }  // namespace

@@ -108,6 +108,28 @@ TEST(LineFile, afterAMoveReopenBeginsANewFileAndLosesNoLine) {
   EXPECT_EQ(test::read_file(folder / "a.txt"), "three\n");
 }
 
+TEST(LineFile, onAFullDiskReopenWaitsUntilTheOldFileHasItsLinesWhole) {
+  const test::TemporaryFolder folder;
+  LineFile file(folder / "a.txt");
+  bool fresh = true;
+  EXPECT_TRUE(file.append("one\n"));
+  std::filesystem::rename(folder / "a.txt", folder / "a.txt.1");
+  {
+    SmallDisk disk(2);
+    EXPECT_FALSE(file.reopen(&fresh));
+    EXPECT_FALSE(fresh);
+    EXPECT_TRUE(file.reopen_due());
+  }
+  EXPECT_TRUE(file.flush());
+  EXPECT_TRUE(file.reopen(&fresh));
+  EXPECT_TRUE(fresh);
+  EXPECT_FALSE(file.reopen_due());
+  EXPECT_TRUE(file.append("two\n"));
+  EXPECT_TRUE(file.close());
+  EXPECT_EQ(test::read_file(folder / "a.txt.1"), "one\n");
+  EXPECT_EQ(test::read_file(folder / "a.txt"), "two\n");
+}
+
 TEST(LineFile, whatCannotBeReopenedGoesOnInTheOldFile) {
   const test::TemporaryFolder folder;
   std::filesystem::create_directory(folder / "s");

@@ -46,15 +46,19 @@ std::vector<std::string> lines_of(const std::filesystem::path& file) {
 
 TEST(SessionFolder, isMadeOrTakenWhenEmptyAndRefusedOtherwise) {
   const test::TemporaryFolder folder;
-  make_session_folder(folder / "a/b/session");
+  EXPECT_TRUE(make_session_folder(folder / "a/b/session"));
   EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b/session"));
-  make_session_folder(folder / "a/b/session");  // empty: taken
+  EXPECT_FALSE(make_session_folder(folder / "a/b/session")) << "empty: taken";
   folder.write("a/b/session/notes.txt", "mine");
   EXPECT_THROW(make_session_folder(folder / "a/b/session"), InputError);
   EXPECT_THROW(make_session_folder(folder / "a/b/session/notes.txt"), InputError);
   EXPECT_THROW(make_session_folder(folder / "a/b/session/notes.txt/below"), InputError);
   EXPECT_THROW(make_session_folder(""), InputError);
   EXPECT_EQ(test::read_file(folder / "a/b/session/notes.txt"), "mine");
+  discard_session_folder(folder / "a/b/session", false);
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "a/b/session")) << "as it was";
+  discard_session_folder(folder / "a/b/session", true);
+  EXPECT_FALSE(std::filesystem::exists(folder / "a/b/session"));
 }
 
 TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
@@ -417,6 +421,23 @@ std::function<bool(Stamp)> full_from_to(std::uint64_t first, std::uint64_t last)
     return s >= Stamp(kStamp + static_cast<std::int64_t>(first) * 50'000'000) &&
            s < Stamp(kStamp + static_cast<std::int64_t>(last) * 50'000'000);
   };
+}
+
+TEST(Recorder, statusesAreOfTheFileThatTheTrajectoryIsInAtTheEnd) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  for (std::uint64_t i = 0; i < 5; ++i) recorder.post(pose(i, PoseStatus::degraded, 0.1));
+  while (lines_of(folder / "trajectory.tum").size() < 5)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  std::filesystem::rename(folder / "trajectory.tum", folder / "trajectory.tum.1");
+  recorder.reopen();
+  while (told(folder.path(), "files_reopened").empty())
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  for (std::uint64_t i = 5; i < 8; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1));
+  const auto totals = recorder.close();
+  EXPECT_EQ(totals->statuses, std::vector<PoseStatus>(3, PoseStatus::ok));
+  EXPECT_EQ(totals->trajectory.size(), 3U);
+  EXPECT_EQ(totals->degraded, 5U) << "counts are of all";
 }
 
 TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {

@@ -79,6 +79,18 @@ TEST(Realtime, aThreadIsSetOnceAndALaterOneWhenItComes) {
   EXPECT_EQ(system.priorities[9], 40);
 }
 
+TEST(Realtime, aThreadThatIsGivenTheNumberOfOneThatEndedIsSet) {
+  FakeSystem system;
+  RealtimeRequest request;
+  request.priority = 40;
+  RealtimeThreads threads(request, system);
+  const std::vector<ProcessThread> capture = {{9, "vergence-v4l2"}};
+  (void)threads.apply(capture);
+  (void)threads.apply({});
+  (void)threads.apply(capture);
+  EXPECT_EQ(system.calls, 2);
+}
+
 TEST(Realtime, theSolverHasProcessorsOfItsOwn) {
   FakeSystem system;
   RealtimeRequest request;

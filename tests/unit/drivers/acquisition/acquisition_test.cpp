@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "core/memory/allocation_guard.hpp"
@@ -193,6 +196,52 @@ TEST(Acquisition, aCameraThatWasGoneJoinsTheRightPulsesAgain) {
     EXPECT_LT(set.spread, Duration::milliseconds(5)) << set.number;
   }
   EXPECT_TRUE(b.source->missing().empty());
+}
+
+/// Starts, gives nothing and is gone, again and again; who tells it is only told of the first.
+class EmptyCamera final : public CameraDevice {
+ public:
+  const DeviceInfo& info() const noexcept override { return info_; }
+  DeviceStatus configure(const CameraConfiguration&, CameraConfiguration*) noexcept override {
+    return DeviceStatus::ok;
+  }
+  DeviceTiming timing() const noexcept override { return {}; }
+  DeviceStatus start(Notifier*) noexcept override {
+    starts.fetch_add(1);
+    return DeviceStatus::ok;
+  }
+  DeviceStatus wait(Duration, Frame* frame) noexcept override {
+    frame->arrival = HostStamp(starts.load());
+    return DeviceStatus::gone;
+  }
+  ImageView view(FrameSlot) const noexcept override { return {}; }
+  void release(FrameSlot) noexcept override {}
+  void stop() noexcept override {}
+  CameraStatistics statistics() const noexcept override { return {}; }
+
+  std::atomic<int> starts{0};
+
+ private:
+  DeviceInfo info_;
+};
+
+TEST(Acquisition, aCameraThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
+  EmptyCamera left, right;
+  Acquisition::Options options;
+  options.sync.interval = Duration::milliseconds(50);
+  options.sync.mode = SyncMode::software;
+  Acquisition source({&left, &right}, nullptr, nullptr, options);
+  ASSERT_FALSE(source.start());
+  constexpr int kTwiceAgain = 3;  // starts
+  while (left.starts < kTwiceAgain || right.starts < kTwiceAgain) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    source.look_again();
+  }
+  source.stop();
+  std::vector<Acquired> items;
+  for (Acquired item; source.next(&item);) items.push_back(item);
+  source.join();
+  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_gone), 2) << "each once";
 }
 
 TEST(Acquisition, everySlotComesBack) {
