@@ -93,6 +93,12 @@ HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration&
   return fit_of(std::span(medians).first(n));
 }
 
+bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept {
+  int n = 0;
+  for_held_out(log, after, [&n](const LoggedFrame&) noexcept { ++n; });
+  return n >= kFewestHeldOut;
+}
+
 bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
                  const RigCalibration& worse, double chance) noexcept {
   double sum = 0, squares = 0;

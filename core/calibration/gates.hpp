@@ -67,6 +67,28 @@ enum class Gate : std::uint8_t {
 /// The sentence for events and calibrations.csv; empty for `open`.
 [[nodiscard]] const char* reason(Gate gate) noexcept;
 
+/// Whether a solution that came to this gate is at least one of the rig that the images are of now.
+[[nodiscard]] constexpr bool of_this_rig(Gate gate) noexcept {
+  switch (gate) {
+    case Gate::not_solved:
+    case Gate::cameras_swapped:
+    case Gate::implausible_direction:
+    case Gate::implausible_rotation:
+    case Gate::out_of_step:
+    case Gate::does_not_fit:
+    case Gate::rig_changed:
+      return false;
+    case Gate::open:
+    case Gate::sigmas_too_large:
+    case Gate::needs_motion:
+    case Gate::needs_near_structure:
+    case Gate::no_better:
+    case Gate::depth_unknown:
+      return true;
+  }
+  return false;
+}
+
 struct AcceptanceInput {
   const RigSolution* solution = nullptr;
   const RigCalibration* nominal = nullptr;
@@ -86,6 +108,9 @@ struct AcceptanceInput {
 /// METHOD §4: what stands between a solution and its use. Threads pure.
 [[nodiscard]] Gate check_acceptance(const AcceptanceInput& question,
                                     const CalibrationOptions& options) noexcept;
+
+/// Whether the log has as many frames after that number as it takes to hold a solution against.
+[[nodiscard]] bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept;
 
 /// How many times the wanted sigmas the worst of the solution is; ≤ 1: enough.
 [[nodiscard]] double sigma_excess(const RigCalibration& rig,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace vergence::calibration {
 namespace {
@@ -217,7 +218,8 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   s.status = r.has_covariance ? RigSolveStatus::ok : RigSolveStatus::not_observable;
   if (s.status == RigSolveStatus::ok) {
     write_result(r, &s);
-    if (request.known != nullptr) s.rig.frames += request.known->frames;
+    if (request.known != nullptr)  // over months: no sum beyond what it holds
+      s.rig.frames += std::min(request.known->frames, std::numeric_limits<int>::max() / 2);
     watch_frames(&s);
   }
   s.solve_ms = milliseconds_since(start);

@@ -94,8 +94,10 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   p.last_number = frame.number;
   if (p.state == State::initialising && p.calibrator.calibrated())
     p.transition(Trigger::calibration_given, frame.stamp);
-  if (p.requested.exchange(false, std::memory_order_relaxed) && p.state == State::stereo_odometry &&
-      p.options.online)
+  // Asked for while there is no pose, it waits until there is one.
+  const bool can_be_asked = p.state != State::lost && p.state != State::initialising;
+  if (can_be_asked && p.requested.exchange(false, std::memory_order_relaxed) &&
+      p.state == State::stereo_odometry && p.options.online)
     p.doubt(CalibrationCause::requested, frame.number, frame);
 
   if (p.relinked && std::exchange(p.superseded, false) && p.calibrator.verified())

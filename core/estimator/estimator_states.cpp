@@ -94,7 +94,7 @@ void Estimator::Parts::grade_motion(const odometry::FrameOutcome& out, const Mat
                                     double step_m, PoseSample* sample) noexcept {
   const bool doubted = out_of_step > 0 || may_lag > 0 || undecided || state == State::recalibrating;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
-  if (out.status != PoseStatus::ok || doubted || !UsualSpread::judges(step_m, sigma_m)) return;
+  if (out.status != PoseStatus::ok || doubted || !usual.judges(step_m, sigma_m)) return;
   if (!usual.unusual(sigma_m) || sample->status != PoseStatus::ok) return;
   sample->status = PoseStatus::degraded;
   sample->reason = Reason::weak_geometry;

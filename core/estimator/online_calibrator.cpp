@@ -130,7 +130,7 @@ SolutionReview OnlineCalibrator::review(bool last) const noexcept {
            .in_use = calibrated_ ? &rig_ : nullptr,
            .log = frames_.log(),
            .focal = solve_.focal_check(),
-           .may_have_changed = !search_.change_believed,
+           .may_have_changed = !(seeking_ && search_.change_believed),
            .last = last}};
 }
 
@@ -138,6 +138,9 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
                                                             std::uint64_t number) noexcept {
   solve_.clear_waited();
   if (!solve_.running() || !solve_.next_frame()) return std::nullopt;
+  // Frames that stand are not logged: who stops then waits with the decision, for frames that were
+  // not used have to speak for it.
+  if (!solve_.outdated(seeking_) && !review(false).held_out_enough()) return std::nullopt;
   // What is sought is adopted as soon as the frames after it confirm it; it is rejected only when
   // more of them would not help. What is learnt beside a calibration in use waits for no more than
   // it is judged by.
@@ -190,6 +193,7 @@ CalibrationDecision OnlineCalibrator::judge_sought(const SolutionReview& review,
   d.reason = calibration::reason(gate_);
   review.assess_next(found.rig, found.newest, &d);
   if (d.accepted) {
+    forget_learnt_rig();
     verified_ = d.verified;
     ever_verified_ = ever_verified_ || verified_;
   } else {
@@ -253,15 +257,21 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
     // Frames that contradict what was measured before them confirm nothing.
     d.verified = gate_ == Gate::open
                      ? a.sigma_percent <= options_.calibration.tolerated_depth_percent
-                     : a.confirmed && gate_ != Gate::does_not_fit;
+                     : a.confirmed && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
     d.verified = d.verified && !d.focal.contradicted;
     if (d.verified || a.contradicted || d.focal.contradicted) set_verified(d.verified);
     watched_ = watched_ || d.verified;
   }
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
+  if (d.accepted && d.cause == CalibrationCause::contradicted) forget_learnt_rig();
   plan_learning(found);
   return d;
+}
+
+/// Another rig is adopted: what was learnt of the one before is no prior of it, but for the lenses.
+void OnlineCalibrator::forget_learnt_rig() noexcept {
+  if (learnt_) calibration::forget_transforms(&*learnt_);
 }
 
 /// A full segment is closed: what it has shown is the next one's prior. So is one that the frames

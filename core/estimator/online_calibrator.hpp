@@ -108,6 +108,7 @@ class OnlineCalibrator {
   /// What the gate says of the frames to solve from next.
   void plan_search(const calibration::RigSolution& found) noexcept;
   void plan_learning(const calibration::RigSolution& found) noexcept;
+  void forget_learnt_rig() noexcept;
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;

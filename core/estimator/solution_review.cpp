@@ -20,6 +20,13 @@ Gate SolutionReview::gate(const RigSolution& found, bool must_be_better) const n
   return calibration::check_acceptance(q, context_.options.calibration);
 }
 
+bool SolutionReview::held_out_enough() const noexcept {
+  for (const RigSolution* found : {&solved_.transforms, &solved_.lenses})
+    if (found->status == RigSolveStatus::ok)
+      return calibration::held_out_enough(context_.log, found->newest);
+  return true;
+}
+
 const RigSolution& SolutionReview::sought() const noexcept {
   return lenses_are_off() ? solved_.lenses : solved_.transforms;
 }

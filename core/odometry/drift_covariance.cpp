@@ -1,5 +1,8 @@
 #include "core/odometry/drift_covariance.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace vergence::odometry {
@@ -9,7 +12,8 @@ namespace {
 constexpr double kFitInflation = 3;
 constexpr double kSharedTurn = 2.6e-4;      // rad a metre: 0.015°
 constexpr double kExtrapolatedShare = 0.5;  // of the assumed translation
-constexpr double kExtrapolatedTurn = 0.1;   // rad/s: what a vehicle's turn may change by unseen
+constexpr double kExtrapolatedTurn = 0.1;   // rad/s: what a vehicle's turn may change by unseen …
+constexpr double kUnknownAcceleration = 1;  // m/s²: … and how it may gather way or brake
 
 Mat3 skew(const Vec3& v) noexcept {
   Mat3 S;
@@ -39,8 +43,10 @@ Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                        double extrapolated_s) noexcept {
   Mat6 Q = kFitInflation * kFitInflation * translation_first(fit);
   if (extrapolated_s > 0) {
-    const double away = kExtrapolatedShare * T_now_before.t.norm();
-    const double turned = kExtrapolatedTurn * extrapolated_s;
+    // The motion is carried on for a while only; what a vehicle does later is its own.
+    const double away = std::hypot(kExtrapolatedShare * T_now_before.t.norm(),
+                                   0.5 * kUnknownAcceleration * extrapolated_s * extrapolated_s);
+    const double turned = std::min(kExtrapolatedTurn * extrapolated_s, std::numbers::pi);
     Q.diagonal().head<3>().array() += away * away;
     Q.diagonal().tail<3>().array() += turned * turned;
   }

@@ -48,7 +48,7 @@ enum class PointStage : std::uint8_t {
 /// made.
 struct MapPoint {
   PointStage stage = PointStage::free;
-  std::uint32_t id = 0;     // of the track, never given twice
+  std::uint32_t id = 0;     // of the track; given again after 2^32 others
   std::uint8_t missed = 0;  // frames in a row that did not find it
   std::uint16_t found = 0;  // frames that did
   Vec3 p_world = Vec3::Zero();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 #include "core/odometry/detail/frame_steps.hpp"
 
@@ -169,7 +170,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     }
     if (p.now.cameras != 0) {
       p.missed = 0;
-      ++p.found;
+      if (p.found < std::numeric_limits<std::uint16_t>::max()) ++p.found;
       if (p.stage == PointStage::candidate && p.found >= kFoundEnough) p.stage = PointStage::active;
       continue;
     }

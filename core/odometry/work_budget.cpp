@@ -50,7 +50,8 @@ void WorkBudget::points_took(double ms, const FrameEffort& effort) noexcept {
 }
 
 void WorkBudget::window_took(double ms, int keyframes, int steps) noexcept {
-  if (keyframes > 0 && steps > 0) take(ms / (keyframes * steps), &window_step_ms_);
+  // One that was left out is tried again before long: what made the last one dear may be over.
+  take(keyframes > 0 && steps > 0 ? ms / (keyframes * steps) : 0, &window_step_ms_);
 }
 
 }  // namespace vergence::odometry

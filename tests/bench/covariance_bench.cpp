@@ -152,7 +152,7 @@ double most_unusual(std::span<const Posed> poses) {
         poses[i - 1].sample.T_world_left.inverse() * poses[i].sample.T_world_left;
     const Mat6 C = full(poses[i].sample.motion_covariance);
     const double sigma_m = std::sqrt(C.topLeftCorner<3, 3>().trace());
-    if (!UsualSpread::judges(motion.t.norm(), sigma_m)) continue;
+    if (!usual.judges(motion.t.norm(), sigma_m)) continue;
     (void)usual.unusual(sigma_m);
     most = std::max(most, usual.times_usual());
   }

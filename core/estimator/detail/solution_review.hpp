@@ -24,6 +24,9 @@ class SolutionReview {
   /// `must_be_better` than the calibration in use.
   [[nodiscard]] calibration::Gate gate(const calibration::RigSolution& found,
                                        bool must_be_better = true) const noexcept;
+  /// There are frames that were not used, as many as it takes to hold the solutions against; where
+  /// all failed none are needed.
+  [[nodiscard]] bool held_out_enough() const noexcept;
   /// Of a calibration that was sought: lenses are taken from the drive where it shows that the ones
   /// in use are off, and holds them well enough; else transforms alone.
   [[nodiscard]] const calibration::RigSolution& sought() const noexcept;

@@ -16,10 +16,10 @@ namespace vergence {
 class UsualSpread {
  public:
   /// Standing still, residuals are smaller than they are on the way: such motions are no measure,
-  /// and need none.
-  [[nodiscard]] static bool judges(double step_m, double sigma_m) noexcept {
+  /// and need none. By the usual sigma: the more uncertain a motion, the more it has to be judged.
+  [[nodiscard]] bool judges(double step_m, double sigma_m) const noexcept {
     constexpr double kMoves = 2;  // sigmas
-    return step_m > kMoves * sigma_m;
+    return step_m > kMoves * (kept_ >= kLeast ? median() : sigma_m);
   }
   /// Whether a motion is more than 4 times as uncertain as usual; after one that was, more than
   /// twice. Then it is one of the usual ones: what stays uncertain is told for half of those kept.

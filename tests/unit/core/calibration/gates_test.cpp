@@ -150,6 +150,8 @@ TEST(Gates, whatFramesNotUsedContradictIsNotAdopted) {
   c.solution.newest = 47;
   EXPECT_EQ(held_out(c.log, c.solution.newest, c.solution.rig).frames, 2);
   EXPECT_EQ(c.ask(), Gate::open);
+  EXPECT_FALSE(held_out_enough(c.log, 47)) << "so no solve is decided then";
+  EXPECT_TRUE(held_out_enough(c.log, 46));
 }
 
 TEST(Gates, framesNotUsedAreTheNewestTwelve) {

@@ -28,6 +28,14 @@ TEST(UsualSpread, afterOneTwiceAsUncertainIsUnusualStill) {
   EXPECT_FALSE(usual.unusual(0.030));
 }
 
+TEST(UsualSpread, standingIsNotJudgedAndALargeSigmaIsNoStanding) {
+  EXPECT_FALSE(UsualSpread{}.judges(0.027, 0.014));
+  EXPECT_TRUE(UsualSpread{}.judges(0.029, 0.014));
+  const UsualSpread usual = driven(kEnough);
+  EXPECT_FALSE(usual.judges(0.027, 0.001));
+  EXPECT_TRUE(usual.judges(0.029, 0.1)) << "seven times the usual";
+}
+
 TEST(UsualSpread, whatStaysIsUsualAfterHalfTheMotionsKept) {
   UsualSpread usual = driven(200);
   int told = 0;

@@ -130,6 +130,26 @@ TEST(Verifying, aYawKnockedInAnOutageIsNeverOkWithTheOldCalibration) {
   EXPECT_TRUE(c.estimator->verified()) << c.story;
 }
 
+// What 150 frames have taught is the prior of the solves after them: of another rig it is none.
+TEST(Verifying, aYawKnockedAfterARigWasLearntIsMendedOnceAndNotDrawnBack) {
+  constexpr int kKnock = 200;
+  const Vec3 knock(0, 0.01, 0);
+  Claim c;
+  c.drive(320, kKnock, knock);
+  const int adopted = c.first(Kind::calibration_accepted, kKnock);
+  ASSERT_GE(adopted, kKnock) << c.story;
+  EXPECT_EQ(c.first(Kind::calibration_contradicted, adopted + 1), -1) << c.story;
+  EXPECT_EQ(c.first(Kind::rig_changed, adopted + 1), -1) << c.story;
+  EXPECT_EQ(c.samples.back().status, PoseStatus::ok) << c.story;
+  const Mat3 truth = exp_so3(knock) * c.corridor.rig().T_camera_left[1].R;
+  const RigCalibration& found = c.estimator->calibration();
+  const double yaw = log_so3(found.T_camera_left[1].R * truth.transpose()).y();
+  const Intrinsics &lens = found.intrinsics[1], &true_lens = c.corridor.rig().intrinsics[1];
+  EXPECT_NEAR(yaw + (lens.cx - true_lens.cx) / true_lens.fx, 0, 1.5e-3)
+      << "the tolerated 2 %\n"
+      << c.story;
+}
+
 TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
   Claim c;
   const Transform truth = c.given.T_camera_left[1];

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -96,12 +97,16 @@ TEST(DriftCovariance, isThatOfManyDrives) {
           << i << ' ' << j;
 }
 
-TEST(MotionCovariance, ofAnExtrapolatedMotionIsHalfOfIt) {
+TEST(MotionCovariance, ofAnExtrapolatedMotionIsHalfOfItAndWhatAVehicleMayDoUnseen) {
   const Transform moved{Mat3::Identity(), {0, 0, -3}};
   const Mat6 C = motion_covariance(Mat6::Zero(), moved, 0.5);
-  EXPECT_NEAR(std::sqrt(C(2, 2)), 1.5, 1e-12);
+  const double gathered = 0.5 * 0.5 * 0.5;  // m: half of 1 m/s² in half a second
+  EXPECT_NEAR(std::sqrt(C(2, 2)), std::hypot(1.5, gathered), 1e-12);
   EXPECT_NEAR(std::sqrt(C(4, 4)), 0.05, 1e-12);
   EXPECT_TRUE(motion_covariance(Mat6::Zero(), moved, 0).isZero());
+  const Mat6 parked = motion_covariance(Mat6::Zero(), {}, 10 * 3600);
+  EXPECT_GT(std::sqrt(parked(0, 0)), 1e6) << "anywhere";
+  EXPECT_NEAR(std::sqrt(parked(3, 3)), std::numbers::pi, 1e-12) << "any way round";
 }
 
 TEST(MotionCovariance, hasTranslationFirst) {
