@@ -63,8 +63,7 @@ void RecordRing::commit(std::size_t size) noexcept {
 
 std::span<const std::uint8_t> RecordRing::waiting() const noexcept {
   const Count head = head_.load(std::memory_order_relaxed);
-  return {place(head),
-          static_cast<std::size_t>(tail_.load(std::memory_order_acquire) - head)};
+  return {place(head), static_cast<std::size_t>(tail_.load(std::memory_order_acquire) - head)};
 }
 
 void RecordRing::release(std::size_t size) noexcept {

@@ -39,14 +39,14 @@ enum class Reason : std::uint8_t {
   few_inliers,        // the pose rests on few points
   one_camera,         // only one camera supports the pose; its scale is remembered, not measured
   no_pose,            // tracking failed
-  time_gap,           // no frame for longer than motion can be predicted
+  time_gap,           // no frame for longer than motion can be predicted, up to ten frames ago
   scene_restarted,    // the map was rebuilt; the motion across the gap was extrapolated
   weak_geometry,      // the points do not hold the pose well, or several times worse than usual
   moving_scene,       // more outliers than a rigid scene has
   unconfirmed,        // calibration from a state file that the drive has not confirmed yet
   unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands
                            // on
-  recalibrating,           // the rig no longer fits its calibration
+  recalibrating,           // the rig no longer fits its calibration, up to ten frames ago
   uncalibrated,  // no calibration yet: each camera's pose is found for itself, the scale is the
                  // last pair's
   out_of_step,   // a camera's images are of another instant than the others'

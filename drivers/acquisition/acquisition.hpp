@@ -111,8 +111,8 @@ class Acquisition final : private Notifier {
   [[nodiscard]] bool next(Acquired* item) noexcept { return queue_.next(item); }
   /// Of every AcquiredFrame that next() gave, once.
   void release(const AcquiredFrame& frame) noexcept { queue_.release(frame.set); }
-  /// Devices that are gone are asked to come back at every look, a second apart at least, and a look
-  /// follows on whatever a device brings. From who knows that time passes where none brings
+  /// Devices that are gone are asked to come back at every look, a second apart at least, and a
+  /// look follows on whatever a device brings. From who knows that time passes where none brings
   /// anything: some times a second.
   void look_again() noexcept { notify(); }
   /// Ends the stream: next() gives what is in the ring, then false.

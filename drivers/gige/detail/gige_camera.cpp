@@ -207,7 +207,8 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
 }
 
 std::optional<double> GigeCamera::temperature_c() noexcept {
-  if (standing() != DeviceStatus::ok) return std::nullopt;  // who opens it anew holds it for seconds
+  if (standing() != DeviceStatus::ok)
+    return std::nullopt;  // who opens it anew holds it for seconds
   try {
     const std::lock_guard lock(device_);
     if (session_ == nullptr || standing() != DeviceStatus::ok) return std::nullopt;

@@ -152,9 +152,8 @@ TEST(Verifying, aYawKnockedAfterARigWasLearntIsMendedOnceAndNotDrawnBack) {
   const RigCalibration& found = c.estimator->calibration();
   const double yaw = log_so3(found.T_camera_left[1].R * truth.transpose()).y();
   const Intrinsics &lens = found.intrinsics[1], &true_lens = c.corridor.rig().intrinsics[1];
-  EXPECT_NEAR(yaw + (lens.cx - true_lens.cx) / true_lens.fx, 0, 1.5e-3)
-      << "the tolerated 2 %\n"
-      << c.story;
+  EXPECT_NEAR(yaw + (lens.cx - true_lens.cx) / true_lens.fx, 0, 1.5e-3) << "the tolerated 2 %\n"
+                                                                        << c.story;
 }
 
 TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
