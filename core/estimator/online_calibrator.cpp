@@ -19,6 +19,11 @@ std::size_t most_tracks(const EstimatorOptions& o) noexcept {
   return static_cast<std::size_t>(o.odometry.features);
 }
 
+/// Another rig is adopted: what was learnt of the one before is no prior of it, but for the lenses.
+void forget_rig(std::optional<RigCalibration>* learnt) noexcept {
+  if (*learnt) calibration::forget_transforms(&**learnt);
+}
+
 }  // namespace
 
 std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o,
@@ -193,7 +198,7 @@ CalibrationDecision OnlineCalibrator::judge_sought(const SolutionReview& review,
   d.reason = calibration::reason(gate_);
   review.assess_next(found.rig, found.newest, &d);
   if (d.accepted) {
-    forget_learnt_rig();
+    forget_rig(&learnt_);
     verified_ = d.verified;
     ever_verified_ = ever_verified_ || verified_;
   } else {
@@ -264,14 +269,9 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
   }
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
-  if (d.accepted && d.cause == CalibrationCause::contradicted) forget_learnt_rig();
+  if (d.accepted && d.cause == CalibrationCause::contradicted) forget_rig(&learnt_);
   plan_learning(found);
   return d;
-}
-
-/// Another rig is adopted: what was learnt of the one before is no prior of it, but for the lenses.
-void OnlineCalibrator::forget_learnt_rig() noexcept {
-  if (learnt_) calibration::forget_transforms(&*learnt_);
 }
 
 /// A full segment is closed: what it has shown is the next one's prior. So is one that the frames

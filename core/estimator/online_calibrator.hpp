@@ -108,7 +108,6 @@ class OnlineCalibrator {
   /// What the gate says of the frames to solve from next.
   void plan_search(const calibration::RigSolution& found) noexcept;
   void plan_learning(const calibration::RigSolution& found) noexcept;
-  void forget_learnt_rig() noexcept;
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;

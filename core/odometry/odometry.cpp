@@ -217,6 +217,8 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
   if (next_rig_ && weakness(images) == Reason::none) {
     out.relink_due = true;
+  } else if (out.gap_s > 0 && link_ == Link::linked && out.images_good) {
+    renew_scene(&out);
   } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
     out.effort = effort;
     make_keyframe(fit, frame.stamp, &out);

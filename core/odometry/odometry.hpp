@@ -112,6 +112,8 @@ class Odometry {
                                  FrameOutcome* out) noexcept;
   void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
                    double dt, FrameOutcome* out) noexcept;
+  /// The scene is made anew from this frame, where its pose says that the camera is.
+  void renew_scene(FrameOutcome* out) noexcept;
   void take_up_link() noexcept;
   /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
   /// again.

@@ -139,8 +139,18 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
   // The scene was made with another rig: it is rebuilt, where the camera now is.
   take_up_link();
   out->relinked = true;
+  renew_scene(out);
+}
+
+/// After a gap, too: the few points that the map still knew were seen from where the rig now is by
+/// nothing but this frame, and a window that holds to them takes back over many frames what the
+/// pose across the gap was off by.
+void Odometry::renew_scene(FrameOutcome* out) noexcept {
   FrameOutcome built;
-  if (!start_scene(motion_.T_left_world(), motion_.stamp(), &built)) out->reason = built.reason;
+  if (start_scene(motion_.T_left_world(), motion_.stamp(), &built))
+    out->keyframe = true;
+  else
+    out->reason = built.reason;
 }
 
 }  // namespace vergence::odometry
