@@ -4,8 +4,10 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <stdexcept>
@@ -49,7 +51,7 @@ class DeviceOnDescriptor {
         (void)!::write(descriptor_, out.data(),
                        out.size());  // a line that nobody reads drops bytes
       pollfd p{descriptor_, POLLIN, 0};
-      if (::poll(&p, 1, 1) <= 0) continue;
+      if (::poll(&p, 1, patience()) <= 0) continue;
       std::array<std::uint8_t, 512> in{};
       const ssize_t n = ::read(descriptor_, in.data(), in.size());
       if (n > 0)
@@ -58,6 +60,16 @@ class DeviceOnDescriptor {
         ::usleep(1000);  // nobody has the other end open: poll() does not wait
     }
   }
+  /// Until the device has something to say, in ms: a rig's kernel has better to do than to wake it
+  /// for nothing.
+  [[nodiscard]] int patience() const {
+    constexpr std::int64_t kLongest = 20;  // stop_ is seen
+    const auto next = device_->next();
+    if (!next) return kLongest;
+    return static_cast<int>(
+        std::clamp<std::int64_t>((*next - monotonic_now()).ns() / 1'000'000, 1, kLongest));
+  }
+
   int descriptor_;
   std::unique_ptr<mock::DeviceModel> device_;
   std::atomic<bool> stop_{false};

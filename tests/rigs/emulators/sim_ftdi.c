@@ -25,6 +25,10 @@
 #define PACKET 64u  /* two status bytes and 62 of data */
 #define MODEM 0x31u /* CTS and DSR on, in the layout of the chip's first status byte */
 #define LINE 0x60u  /* transmitter empty */
+/* The chip reports its status each time that the latency timer runs out, a thousand times a second
+ * at 1 ms. Where there is nothing but the status, here less often: a rig's kernel has better to do.
+ */
+#define IDLE_NS 20000000u
 
 /* One direction of the line: a byte that waits is through when its ten bits have passed, never
  * sooner. */
@@ -159,11 +163,12 @@ static void take_from_wire(uint64_t ns) {
     ftdi.used += bytes;
     pass(w, bytes);
   }
-  /* after that: what is found now was not on the line while this program was held up */
+  /* after that, and from the time after the read: what is found now was not on the line while this
+   * program was held up */
   if (w->used == sizeof w->waiting) return;
   ssize_t n = read(ftdi.wire, w->waiting + w->used, sizeof w->waiting - w->used);
   if (n <= 0) return;
-  begin(w, ns);
+  begin(w, now_ns());
   w->used += (size_t)n;
 }
 
@@ -186,7 +191,9 @@ static void send_up(uint64_t ns) {
     at += PACKET;
     ftdi.up += PACKET - 2;
   }
-  bool expired = ns - ftdi.reported >= latency && (!ftdi.used || ns - ftdi.oldest >= latency);
+  uint64_t silent = ns - ftdi.reported;
+  bool expired = ftdi.used ? silent >= latency && ns - ftdi.oldest >= latency
+                           : silent >= latency && silent >= IDLE_NS;
   if (expired && at + PACKET <= (size_t)room && at + PACKET <= sizeof transfer) {
     transfer[at] = MODEM;
     transfer[at + 1] = LINE;
@@ -252,8 +259,12 @@ int main(int argc, char** argv) {
 
   bool input = true;
   while (!stop) {
-    struct pollfd fds[3] = {{ftdi.usb.fd, POLLIN, 0}, {input ? 0 : -1, POLLIN, 0}, {-1, 0, 0}};
-    poll(fds, 2, 1);
+    bool under_way = ftdi.used || ftdi.to_wire.used || ftdi.from_wire.used;
+    bool full = ftdi.from_wire.used == sizeof ftdi.from_wire.waiting;
+    struct pollfd fds[3] = {{ftdi.usb.fd, POLLIN, 0},
+                            {input ? 0 : -1, POLLIN, 0},
+                            {full || !ftdi.usb.configuration ? -1 : ftdi.wire, POLLIN, 0}};
+    poll(fds, 3, under_way ? 1 : IDLE_NS / 1000000);
     if (fds[1].revents) {
       ssize_t got = read(0, line, sizeof line - 1);
       if (got <= 0) {

@@ -50,7 +50,7 @@ std::map<std::uint64_t, Pose> read_poses(const std::filesystem::path& file) {
 /// Distance of the track from the film's, worst of all poses, as part of the way: the film begins
 /// with the first exposure of any camera, the track with the first pair, a few images later.
 double worst_error(const std::map<std::uint64_t, Pose>& poses, const Film& film) {
-  constexpr std::size_t kLatest = 20;
+  constexpr std::size_t kLatest = 30;
   double best = 1e9;
   for (std::size_t shift = 0; shift < kLatest; ++shift) {
     double worst = 0, way = 0;
@@ -79,15 +79,15 @@ double worst_error(const std::map<std::uint64_t, Pose>& poses, const Film& film)
   return best;
 }
 
-/// `vergence run` for nine seconds of the film; `settings`: --set KEY=VALUE. → the session's
-/// folder.
-std::filesystem::path run_nine_seconds(const std::string& name, const std::string& configuration,
-                                       const std::vector<std::string>& settings) {
+/// `vergence run` for so many seconds of the film; `settings`: --set KEY=VALUE. →
+/// the session's folder.
+std::filesystem::path run_film(const std::string& name, const std::string& configuration,
+                               int seconds, const std::vector<std::string>& settings) {
   const std::filesystem::path out = std::filesystem::absolute("session-" + name);
   std::filesystem::remove_all(out);
   std::string command = std::string(VERGENCE_PROGRAM) + " run " + VERGENCE_SOURCE_FOLDER +
-                        "/app/config/" + configuration + " --out " + out.string() +
-                        " --duration 9 --quiet --set rig.state_dir=none";
+                        "/app/config/" + configuration + " --out " + out.string() + " --duration " +
+                        std::to_string(seconds) + " --quiet --set rig.state_dir=none";
   for (const std::string& setting : settings) command += " --set " + setting;
   EXPECT_EQ(std::system(command.c_str()), 0) << command;
   return out;
@@ -98,7 +98,7 @@ void expect_a_drive(const std::filesystem::path& session, const nlohmann::json& 
                     const Film& film) {
   const auto& frames = summary.at("frames");
   const auto& devices = summary.at("devices");
-  EXPECT_GE(frames.at("read").get<int>(), 60) << "of 90 at 10 Hz";
+  EXPECT_GE(frames.at("read").get<int>(), 60) << "of 90 at 10 Hz, or at 5 Hz in twice the time";
   EXPECT_GE(frames.at("posed").get<int>(), devices.at("sets_complete").get<int>())
       << "every pair that came gets a pose";
   EXPECT_GE(frames.at("ok").get<int>(), 15)
@@ -130,7 +130,7 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
   Emulator emulator(GetParam().emulator, arguments);
   ASSERT_TRUE(await_cameras(driver.get(), 2));
 
-  const auto out = run_nine_seconds(GetParam().name, GetParam().configuration, {});
+  const auto out = run_film(GetParam().name, GetParam().configuration, 9, {});
   const std::string report = emulator.finish();
   const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
   const auto& frames = summary.at("frames");
@@ -162,7 +162,9 @@ TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
     GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
   const Film film(film_folder);
   auto driver = iidc::make_usb_driver();
-  Emulator cameras("sim_usb_iidc", {"--cameras", "2", "--film", film_folder, "--film-hz", "10"});
+  // Half the rate of the other drives: two serial lines cost the one processor as much as the
+  // cameras do, and what it cannot expose no pulse can be proven by.
+  Emulator cameras("sim_usb_iidc", {"--cameras", "2", "--film", film_folder, "--film-hz", "5"});
   ASSERT_TRUE(await_cameras(driver.get(), 2));
   std::atomic<bool> wired{true};
   BoardBehindConverter board([&](const mock::SimulatedPulse& pulse) {
@@ -180,11 +182,10 @@ TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
   DeviceOnDescriptor sensor(::open(kInsWire, O_RDWR | O_NOCTTY | O_NONBLOCK), resting_xsens());
   ASSERT_TRUE(await_port("/dev/ttyUSB1"));
 
-  const auto out =
-      run_nine_seconds("board", "iidc_usb.yaml",
-                       {"sync.mode=board", "trigger.driver=board", "trigger.port=/dev/ttyUSB0",
-                        "trigger.vary_us=2000", "ins.driver=xsens", "ins.port=/dev/ttyUSB1",
-                        "ins.baud=115200", "ins.rate=50"});
+  const auto out = run_film("board", "iidc_usb.yaml", 18,
+                            {"sync.mode=board", "trigger.driver=board", "trigger.port=/dev/ttyUSB0",
+                             "trigger.rate=5", "trigger.vary_us=2000", "ins.driver=xsens",
+                             "ins.port=/dev/ttyUSB1", "ins.baud=115200", "ins.rate=50"});
   wired = false;
   const std::string report = cameras.finish();
   const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
