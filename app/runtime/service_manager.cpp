@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <charconv>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
+#include <mutex>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -17,6 +20,9 @@ namespace vergence::app {
 namespace {
 
 constexpr int kSigns = 3;  // of life in an interval of the watchdog
+constexpr std::chrono::nanoseconds kUnwatched = std::chrono::seconds(1);  // between two otherwise
+constexpr std::chrono::minutes kLongestClosing{10};
+constexpr const char* kMoreTime = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=60000000";
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
@@ -48,6 +54,7 @@ ServiceManager::ServiceManager(const std::string& socket, std::chrono::nanosecon
 }
 
 ServiceManager::~ServiceManager() {
+  closing_ = {};  // its thread ends before what it sends to is closed
   if (fd_ >= 0) ::close(fd_);
 }
 
@@ -66,13 +73,32 @@ void ServiceManager::alive(std::uint64_t beats,
                            std::chrono::steady_clock::time_point now) noexcept {
   if (fd_ < 0 || beats == beats_) return;
   const bool watched = interval_.count() > 0;
-  const std::chrono::nanoseconds interval = watched ? interval_ : std::chrono::seconds(1);
+  const std::chrono::nanoseconds interval = watched ? interval_ : kUnwatched;
   if (any_ && now - last_ < interval) return;
   any_ = true;
   last_ = now;
   beats_ = beats;
   send(fmt::format("{}STATUS={} frames, readings and events handled", watched ? "WATCHDOG=1\n" : "",
                    beats));
+}
+
+void ServiceManager::stopping() noexcept {
+  send("STOPPING=1\nWATCHDOG=1");
+  if (fd_ < 0 || closing_.joinable()) return;
+  const std::chrono::nanoseconds interval = interval_.count() > 0 ? interval_ : kUnwatched;
+  try {
+    closing_ = std::jthread([this, interval](const std::stop_token& end) {
+      std::mutex mutex;
+      std::condition_variable_any ended;
+      std::unique_lock lock(mutex);
+      const auto last = std::chrono::steady_clock::now() + kLongestClosing;
+      while (std::chrono::steady_clock::now() < last) {
+        send(kMoreTime);
+        if (ended.wait_for(lock, end, interval, [&end] { return end.stop_requested(); })) return;
+      }
+    });
+  } catch (const std::exception&) {  // no thread: the limits of the unit hold
+  }
 }
 
 }  // namespace vergence::app

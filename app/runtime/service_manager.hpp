@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <thread>
 
 namespace vergence::app {
 
@@ -13,7 +14,8 @@ namespace vergence::app {
 ///          an abstract name); WATCHDOG_USEC is how often a sign of life is wanted. systemd keeps
 ///          that protocol stable for programs without its library; libsystemd would bring a
 ///          compressor or five into a program that sends four words.
-/// Threads  One caller. Never blocks: what the manager does not take is dropped.
+/// Threads  One caller, and from stopping() on one of its own. Never blocks: what the manager does
+///          not take is dropped.
 class ServiceManager {
  public:
   /// From the environment of the process.
@@ -25,8 +27,10 @@ class ServiceManager {
   ServiceManager& operator=(const ServiceManager&) = delete;
 
   void ready() noexcept { send("READY=1"); }
-  /// With a last sign of life: reports of long drives take seconds.
-  void stopping() noexcept { send("STOPPING=1\nWATCHDOG=1"); }
+  /// The last call. What follows, a report of a day's drive above all, may take longer than the
+  /// watchdog's interval and the unit's TimeoutStopSec: signs of life that ask for more time go out
+  /// until the end, ten minutes at most.
+  void stopping() noexcept;
   /// `beats`: how many items the estimator's loop has handled. A sign of life goes out three times
   /// in a watchdog's interval, if it handled any since the last: a loop that hangs, or that no
   /// device gives anything to, is not alive.
@@ -41,6 +45,7 @@ class ServiceManager {
   std::uint64_t beats_ = 0;
   std::chrono::steady_clock::time_point last_{};
   bool any_ = false;
+  std::jthread closing_;  // last: it uses the others
 };
 
 }  // namespace vergence::app

@@ -317,6 +317,9 @@ ExitCode SessionRunner::run() {
       summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
   write_files(*totals, input, &faults, &progress);
   if (!request_.quiet) print_figures(*totals, input, &progress);
+  // The report reads the files: of a day's drive two are not held at once.
+  totals->trajectory = {};
+  totals->reference = {};
   const SessionReport report = write_session_report(request_.out);
   ExitCode code = verdict(*totals, faults, &progress);
   if (code == ExitCode::done && !report.outcome.usable) code = ExitCode::not_usable;

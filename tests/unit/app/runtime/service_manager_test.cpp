@@ -1,5 +1,6 @@
 #include "app/runtime/service_manager.hpp"
 
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -9,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -36,6 +38,11 @@ class Manager {
     const ssize_t n = ::recv(fd_, text.data(), text.size(), 0);
     return n > 0 ? std::string(text.data(), static_cast<std::size_t>(n)) : "";
   }
+  /// The next datagram, waiting for it; empty: none in ten seconds.
+  std::string awaited() {
+    pollfd p{fd_, POLLIN, 0};
+    return ::poll(&p, 1, 10'000) > 0 ? heard() : "";
+  }
 
  private:
   int fd_;
@@ -54,6 +61,20 @@ TEST_F(ServiceManagerTest, SaysReadyAndStopping) {
   EXPECT_EQ(manager.heard(), "READY=1");
   service.stopping();
   EXPECT_EQ(manager.heard(), "STOPPING=1\nWATCHDOG=1");
+}
+
+TEST_F(ServiceManagerTest, AsksForMoreTimeAndIsAliveWhileTheSessionIsClosed) {
+  constexpr const char* kMoreTime = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=60000000";
+  {
+    ServiceManager service(path.string(), 30ms);
+    service.stopping();
+    EXPECT_EQ(manager.awaited(), "STOPPING=1\nWATCHDOG=1");
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(manager.awaited(), kMoreTime) << i;
+  }
+  while (!manager.heard().empty()) {
+  }
+  std::this_thread::sleep_for(50ms);
+  EXPECT_EQ(manager.heard(), "") << "it goes on after the end";
 }
 
 TEST_F(ServiceManagerTest, ASlowLoopIsAliveAndAHungOneIsNot) {
