@@ -1,8 +1,11 @@
 #include "drivers/common/frame_queue.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cassert>
 #include <chrono>
+
+#include "drivers/clock.hpp"
 
 namespace vergence {
 namespace {
@@ -13,9 +16,17 @@ constexpr std::uint64_t bit(FrameSlot slot) noexcept { return std::uint64_t{1} <
 
 }  // namespace
 
-void FrameQueue::begin(Notifier* ready) noexcept {
+Duration longest_silence(CameraTrigger trigger, double rate_hz) noexcept {
+  constexpr Duration kLeast = Duration::seconds(2);
+  if (trigger != CameraTrigger::free || !(rate_hz > 0)) return {};
+  return std::max(kLeast, Duration::seconds(10 / rate_hz));
+}
+
+void FrameQueue::begin(Notifier* ready, Duration silence) noexcept {
   const std::lock_guard lock(mutex_);
   notifier_ = ready;
+  silence_ = silence;
+  heard_ = asked_ = monotonic_now();
   state_ = State::streaming;
 }
 
@@ -55,6 +66,7 @@ void FrameQueue::count_start() noexcept {
 bool FrameQueue::offer(const Frame& frame) noexcept {
   const std::lock_guard lock(mutex_);
   assert(((offered_slots_ | held_slots_) & bit(frame.slot)) == 0);
+  if (silence_ > Duration{}) heard_ = monotonic_now();
   if (state_ != State::streaming || offered_ == frames_.size()) return false;
   frames_[(first_ + offered_++) % frames_.size()] = frame;
   offered_slots_ |= bit(frame.slot);
@@ -71,6 +83,7 @@ void FrameQueue::count_lost(std::uint64_t exposures) noexcept {
 void FrameQueue::count_underrun() noexcept {
   const std::lock_guard lock(mutex_);
   ++statistics_.underruns;
+  if (silence_ > Duration{}) heard_ = monotonic_now();
 }
 
 void FrameQueue::lose(HostStamp when) noexcept {
@@ -88,6 +101,12 @@ void FrameQueue::ready_again() noexcept {
   if (state_ == State::back && notifier_ != nullptr) notifier_->notify();
 }
 
+bool FrameQueue::silent(HostStamp now) noexcept {
+  if (now - asked_ > kAway) heard_ = now;
+  asked_ = now;
+  return now - heard_ > silence_;
+}
+
 DeviceStatus FrameQueue::wait(Duration limit, Frame* frame) noexcept {
   std::unique_lock lock(mutex_);
   if (limit > Duration{})
@@ -103,6 +122,11 @@ DeviceStatus FrameQueue::wait(Duration limit, Frame* frame) noexcept {
     ++statistics_.delivered;
     if (frame->status != FrameStatus::complete) ++statistics_.torn;
     return DeviceStatus::ok;
+  }
+  if (const HostStamp now = monotonic_now();
+      state_ == State::streaming && silence_ > Duration{} && silent(now)) {
+    state_ = State::gone;
+    gone_at_ = now;
   }
   if (state_ == State::streaming) return DeviceStatus::timeout;
   frame->arrival = gone_at_;

@@ -10,6 +10,10 @@
 
 namespace vergence {
 
+/// How long a camera that exposes at this rate may be without an image before it is taken for gone:
+/// ten intervals, two seconds at least. Zero, any time: it exposes when it is told to.
+[[nodiscard]] Duration longest_silence(CameraTrigger trigger, double rate_hz) noexcept;
+
 /// A camera's frames on their way from the transport to the consumer, who has which slot, and what
 /// state the stream is in: wait() and release() of a CameraDevice.
 ///
@@ -32,8 +36,9 @@ class FrameQueue {
 
   // The owner.
   /// Streams from now on. What was offered and not taken stays to be drained first. `ready` may be
-  /// null.
-  void begin(Notifier* ready) noexcept;
+  /// null. `silence`: so long without an image, and the device is gone, for who asks for images
+  /// all the time; zero: it may rest.
+  void begin(Notifier* ready, Duration silence = {}) noexcept;
   /// Stopped from now on; who waits is told.
   void end() noexcept;
   /// What began does not stream: gone at this time, or as long as it was before (no `when`).
@@ -57,7 +62,8 @@ class FrameQueue {
   void ready_again() noexcept;
 
   // The consumer.
-  /// As CameraDevice::wait().
+  /// As CameraDevice::wait(). Who comes less often than once in kAway cannot tell a silent device:
+  /// the transport may have been held up as well.
   [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept;
   // The releaser.
   /// False: the consumer does not have it.
@@ -75,10 +81,16 @@ class FrameQueue {
   [[nodiscard]] CameraStatistics statistics() const noexcept;
 
  private:
+  static constexpr Duration kAway = Duration::seconds(1);
+
+  [[nodiscard]] bool silent(HostStamp now) noexcept;
+
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   State state_ = State::stopped;
   HostStamp gone_at_{};
+  Duration silence_{};           // zero: no limit
+  HostStamp heard_{}, asked_{};  // the newest image; the end of the newest wait()
   Notifier* notifier_ = nullptr;
   std::array<Frame, FramePool::kMaxSlots> frames_{};  // offered, a ring
   std::size_t first_ = 0, offered_ = 0;

@@ -162,7 +162,7 @@ DeviceStatus IidcCamera::begin(Notifier* ready) {
   exposure_now_ = plan_.exposure;
   transfer_ = transfer_time();
   strays_ = 0;
-  queue_.begin(ready);
+  queue_.begin(ready, longest_silence(plan_.trigger, plan_.rate_hz));
   status = bus_->start(this);
   if (status == DeviceStatus::ok) {
     registers_.transmit(true);
@@ -295,6 +295,12 @@ void IidcCamera::gone(HostStamp at) noexcept {
 }
 
 // ---- the consumer's thread
+
+DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
+  const DeviceStatus status = queue_.wait(limit, frame);
+  if (status == DeviceStatus::gone) lost_.store(true, std::memory_order_release);  // silent, then
+  return status;
+}
 
 ImageView IidcCamera::view(FrameSlot slot) const noexcept {
   const int width = plan_.size.width, height = plan_.size.height;

@@ -23,8 +23,8 @@ namespace vergence::iidc {
 ///           counts them as soon as a later one is here.
 /// Stamps    The camera's own clock where it embeds it (on one 1394 bus common to all cameras),
 ///           else the arrival.
-/// Gone      When the bus says so, or when the stream is out of step for kStrays frames: start()
-///           begins again.
+/// Gone      When the bus says so, when the stream is out of step for kStrays frames, or when a
+///           free running camera is silent (longest_silence()): start() begins again.
 /// Restart   start() writes all registers again: after a stop or a replug the camera is as
 ///           configured.
 class IidcCamera final : public CameraDevice, private StreamSink {
@@ -44,9 +44,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
                                        CameraConfiguration* actual) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override;
   [[nodiscard]] DeviceStatus start(Notifier* ready) noexcept override;
-  [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
-    return queue_.wait(limit, frame);
-  }
+  [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept override;
   [[nodiscard]] ImageView view(FrameSlot slot) const noexcept override;
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;

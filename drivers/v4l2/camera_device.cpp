@@ -159,7 +159,7 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
       }
     }
     if (const DeviceStatus status = start_streaming(); status != DeviceStatus::ok) return status;
-    exchange_.begin(ready);
+    exchange_.begin(ready, longest_silence(requested_->trigger, settings_->actual.rate_hz));
     capture_.start(*queue_, *settings_, fd_.get());
   } catch (const std::exception& e) {
     exchange_.end();

@@ -64,7 +64,7 @@ void CaptureThread::wake() const noexcept {
 void CaptureThread::capture() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-v4l2");
   for (;;) {
-    if (!exchange_.started()) return;
+    if (exchange_.standing() != DeviceStatus::ok) return;
     enqueue_returned();
     // Without a buffer of ours the kernel answers at once that there is nothing to wait for.
     pollfd fds[2] = {{with_kernel_ > 0 ? fd_ : -1, POLLIN, 0}, {wake_.get(), POLLIN, 0}};

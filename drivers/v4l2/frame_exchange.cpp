@@ -35,12 +35,12 @@ FrameExchange::Buffers FrameExchange::free_buffers() noexcept {
   return free;
 }
 
-void FrameExchange::begin(Notifier* ready) noexcept {
+void FrameExchange::begin(Notifier* ready, Duration silence) noexcept {
   {
     const std::lock_guard lock(mutex_);
     node_died_ = false;
   }
-  queue_.begin(ready);
+  queue_.begin(ready, silence);
   queue_.count_start();
 }
 

@@ -44,8 +44,8 @@ class FrameExchange {
   void install(std::vector<Mapping> mappings);
   /// Precondition: no capture thread runs. All that the kernel may have now.
   [[nodiscard]] Buffers free_buffers() noexcept;
-  /// It streams: one start more.
-  void begin(Notifier* ready) noexcept;
+  /// It streams: one start more. `silence` as FrameQueue::begin().
+  void begin(Notifier* ready, Duration silence) noexcept;
   /// It does not, or not any more. Those who wait are woken.
   void end() noexcept { queue_.end(); }
   /// After the capture thread's end: what nobody took is free again. True: the node has died.

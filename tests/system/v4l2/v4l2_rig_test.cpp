@@ -300,6 +300,23 @@ TEST_F(V4l2Rig, aSilentCameraIsATimeoutAndWhatItSwallowedIsCounted) {
   camera->release(frame.slot);
 }
 
+TEST_F(V4l2Rig, oneThatStaysSilentIsGoneAndStreamsAgain) {
+  auto camera = streaming(0);
+  set_control(node(0), "percentage_of_dropped_buffers", 100);
+  Frame frame;
+  DeviceStatus status = DeviceStatus::timeout;
+  for (int i = 0; i < 300 && status != DeviceStatus::gone; ++i) {  // 30 s at most
+    status = camera->wait(Duration::milliseconds(100), &frame);
+    if (status == DeviceStatus::ok) camera->release(frame.slot);
+  }
+  EXPECT_EQ(status, DeviceStatus::gone);
+  set_control(node(0), "percentage_of_dropped_buffers", 0);
+  ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
+  ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
+  camera->release(frame.slot);
+  EXPECT_EQ(camera->statistics().starts, 2U);
+}
+
 TEST_F(V4l2Rig, aBufferWithTheErrorFlagIsTorn) {
   auto camera = streaming(0);
   Frame frame;

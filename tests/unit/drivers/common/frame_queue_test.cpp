@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <thread>
+
+#include "drivers/clock.hpp"
 
 namespace vergence {
 namespace {
@@ -130,6 +133,61 @@ TEST_F(Queue, whoWaitsIsWokenByAFrameALossAndAStop) {
   woken_by([&] { queue.lose(HostStamp(1)); }, DeviceStatus::gone);
   queue.begin(nullptr);
   woken_by([&] { queue.end(); }, DeviceStatus::stopped);
+}
+
+/// Asks again and again, as a drive does, until it is not a time-out or `most` has passed.
+DeviceStatus ask(FrameQueue* queue, Duration most, Frame* out) {
+  const HostStamp begun = monotonic_now();
+  DeviceStatus status = DeviceStatus::timeout;
+  while (status == DeviceStatus::timeout && monotonic_now() - begun < most) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    status = queue->wait({}, out);
+  }
+  return status;
+}
+
+constexpr Duration kSilence = Duration::milliseconds(100);
+constexpr Duration kAnswer = Duration::seconds(10);  // of a busy machine
+
+TEST_F(Queue, ASilentDeviceIsGoneAndStreamsAgainAfterAStart) {
+  const HostStamp begun = monotonic_now();
+  queue.begin(&ready, kSilence);
+  EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::gone);
+  EXPECT_GT(out.arrival - begun, kSilence);
+  EXPECT_EQ(queue.state(), FrameQueue::State::gone);
+  EXPECT_FALSE(queue.offer(frame(1)));
+  queue.begin(&ready, kSilence);
+  EXPECT_TRUE(queue.offer(frame(1)));
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::ok);
+}
+
+TEST_F(Queue, WhoMayRestIsNeverSilent) {
+  queue.begin(&ready);
+  EXPECT_EQ(ask(&queue, kSilence * 2, &out), DeviceStatus::timeout);
+}
+
+TEST_F(Queue, ImagesThatFoundNoSlotAreNoSilence) {
+  const HostStamp begun = monotonic_now();
+  queue.begin(&ready, kSilence * 20);
+  while (monotonic_now() - begun < kSilence * 22) {
+    queue.count_underrun();
+    ASSERT_EQ(ask(&queue, kSilence, &out), DeviceStatus::timeout);
+  }
+}
+
+TEST_F(Queue, WhoDidNotAskCannotTellSilence) {
+  queue.begin(&ready, kSilence);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout) << "it was away itself";
+  EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::gone);
+}
+
+TEST(LongestSilence, IsTenIntervalsOfAFreeRunningCameraAndTwoSecondsAtLeast) {
+  EXPECT_EQ(longest_silence(CameraTrigger::free, 20), Duration::seconds(2));
+  EXPECT_EQ(longest_silence(CameraTrigger::free, 0.5), Duration::seconds(20));
+  EXPECT_EQ(longest_silence(CameraTrigger::free, 0), Duration{}) << "nobody knows its rate";
+  EXPECT_EQ(longest_silence(CameraTrigger::hardware, 20), Duration{});
+  EXPECT_EQ(longest_silence(CameraTrigger::software, 20), Duration{});
 }
 
 }  // namespace

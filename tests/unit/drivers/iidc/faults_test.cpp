@@ -158,6 +158,22 @@ TEST(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
   EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
 }
 
+TEST(IidcFaults, AFreeRunningCameraThatFallsSilentIsGoneAndIsOpenedAnew) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->expose(1);
+  (void)c.take_and_release();
+  Frame f;
+  DeviceStatus status = DeviceStatus::timeout;
+  for (int i = 0; i < 300 && status == DeviceStatus::timeout; ++i)  // 30 s at most
+    status = c.camera->wait(Duration::milliseconds(100), &f);
+  EXPECT_EQ(status, DeviceStatus::gone);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  EXPECT_EQ(c.bus->reopened(), 1);
+  c.bus->expose(1);
+  EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
+}
+
 TEST(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
   CameraUnderTest c;
   c.start();

@@ -24,7 +24,7 @@ struct Exchange : ::testing::Test {
   Exchange() {
     exchange.use_buffers(60, 40, 64);
     exchange.install(memory(4));
-    exchange.begin(&ready);
+    exchange.begin(&ready, {});
   }
   /// A filled buffer, handed over.
   bool offer(std::uint32_t buffer, std::uint64_t counter,
