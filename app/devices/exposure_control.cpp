@@ -17,6 +17,12 @@ bool alike(const Duration& a, const Duration& b) noexcept {
          kAlike * static_cast<double>(std::max(a, b).ns());
 }
 
+bool alike_gain(double a_db, double b_db) noexcept { return std::abs(a_db - b_db) <= kAlikeGain; }
+
+bool has(const Frame& frame, const ExposureSetting& setting) noexcept {
+  return alike(frame.exposure, setting.exposure) && alike_gain(frame.gain_db, setting.gain_db);
+}
+
 }  // namespace
 
 /// A camera whose frames are looked at as they are handed out.
@@ -122,7 +128,7 @@ void ExposureControl::look(std::size_t k, const Frame& frame, const ImageView& i
 bool ExposureControl::is_without(std::size_t k, const Frame& frame) noexcept {
   const int patience = 4 * options_.settle_frames;
   int& n = frames_without_[k];
-  n = alike(frame.exposure, taken_[k].exposure) ? 0 : n + 1;
+  n = has(frame, taken_[k]) ? 0 : n + 1;
   if (n < patience) return false;
   n = 0;
   return true;
@@ -148,12 +154,12 @@ void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
     if (status != DeviceStatus::ok) {
       refused_.fetch_add(1, std::memory_order_relaxed);
       // One that is away comes back with what it had: its frames tell, and it is asked again.
-      if (status != DeviceStatus::unsupported) taken_[k] = requested;
+      if (status == DeviceStatus::gone) taken_[k] = requested;
       continue;
     }
     taken_[k] = actual;
     unequal = unequal || !alike(actual.exposure, taken_[0].exposure) ||
-              std::abs(actual.gain_db - taken_[0].gain_db) > kAlikeGain;
+              !alike_gain(actual.gain_db, taken_[0].gain_db);
   }
   if (unequal) unequal_.fetch_add(1, std::memory_order_relaxed);
 }

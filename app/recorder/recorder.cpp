@@ -221,7 +221,13 @@ void Recorder::reopen_files() {
   EventRecord event;
   event.stamp = newest_;
   event.kind = "files_reopened";
-  event.set_sentence("the session's files were opened again by their names, as SIGHUP asked for");
+  const bool waits = std::any_of(files_->all.begin(), files_->all.end(),
+                                 [](const LineFile* f) { return f->reopen_due(); });
+  event.set_sentence(waits
+                         ? "the session's files are opened again by their names, as SIGHUP asked "
+                           "for, once the disk has room for the lines that wait"
+                         : "the session's files were opened again by their names, as SIGHUP asked "
+                           "for");
   write(event);
 }
 
@@ -305,6 +311,7 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   while (take_outcome()) {
   }
   for (LineFile* file : files_->all) {
+    if (file->reopen_due()) reopen(file);
     const bool good = file->close();
     totals.lost_lines += file->lost_lines();
     if (!good)

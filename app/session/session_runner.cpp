@@ -142,6 +142,7 @@ void SessionRunner::start_source(std::vector<std::string>* faults) {
   try {
     source_.start(faults);
   } catch (const std::exception&) {
+    halt_source();  // of the devices that did start some already bring what is recorded
     if (recording_) recording_->close();
     (void)recorder_->close();
     discard_session_folder(request_.out, made_folder_);
@@ -318,8 +319,8 @@ ExitCode SessionRunner::run() {
   write_files(*totals, input, &faults, &progress);
   if (!request_.quiet) print_figures(*totals, input, &progress);
   // The report reads the files: of a day's drive two are not held at once.
-  totals->trajectory = {};
-  totals->reference = {};
+  totals->trajectory = std::vector<StampedPose>();  // not {}, which keeps the memory
+  totals->reference = std::vector<StampedPose>();
   const SessionReport report = write_session_report(request_.out);
   ExitCode code = verdict(*totals, faults, &progress);
   if (code == ExitCode::done && !report.outcome.usable) code = ExitCode::not_usable;

@@ -112,8 +112,11 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
         p.watch_sought(out, frame);
       p.calibrator.frames().take(p.odometry, out, frame);
     }
-    p.odometry.rebuild(&out);
+  }
+  p.odometry.rebuild(&out);
+  if (p.options.online) {
     if (out.relinked) p.calibrator.scene_rebuilt(p.odometry);
+    if (out.renewed) p.calibrator.monitor().scene_renewed(p.odometry.map());
     p.calibrate(frame);
   }
   sample.state = p.state;

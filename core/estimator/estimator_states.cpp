@@ -134,7 +134,7 @@ void Estimator::Parts::grade_window(const odometry::FrameOutcome& out,
                                     PoseSample* sample) noexcept {
   if (!out.posed) return;
   if (out.relinked || out.restarted) return window_doubt.clear();
-  if (out.gap_s > 0) return window_doubt.add(Reason::time_gap, WindowDoubt::kWindow);
+  if (out.gap_s > 0 || out.renewed) return window_doubt.add(Reason::time_gap, WindowDoubt::kWindow);
   if (undecided || state == State::recalibrating) return window_doubt.add(Reason::recalibrating, 1);
   const Reason why = window_doubt.next();
   if (why == Reason::none || sample->status != PoseStatus::ok) return;

@@ -118,10 +118,14 @@ void RigMonitor::scene_rebuilt(const odometry::Map& map, const RigCalibration& r
                                bool confirmed) noexcept {
   scene_pending_ = false;
   watch(rig, confirmed);
-  // Points made in this frame are where the next begins: no frame is between two that are compared.
+  scene_renewed(map);
+}
+
+/// Points made in this frame are where the next begins: no frame is between two that are compared.
+void RigMonitor::scene_renewed(const odometry::Map& map) noexcept {
   for (int k = 1; k < cameras_; ++k) {
     (void)collect_stereo(map, k, 1);
-    camera(k).jumps.rebase(transform(rig, k), pinhole(rig, 0), pinhole(rig, k), stereo_.span());
+    camera(k).jumps.rebase(transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k), stereo_.span());
   }
 }
 

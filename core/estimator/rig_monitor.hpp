@@ -38,6 +38,8 @@ class RigMonitor {
   [[nodiscard]] bool scene_pending() const noexcept { return scene_pending_; }
   /// The scene of the calibration adopted has just been made; it is watched from here on.
   void scene_rebuilt(const odometry::Map& map, const RigCalibration& rig, bool confirmed) noexcept;
+  /// A scene of the same calibration has just been made: its points are compared from here on.
+  void scene_renewed(const odometry::Map& map) noexcept;
   /// The cameras are not linked from now on: a calibration is sought.
   void begin_unlinked(const RigCalibration& rig) noexcept;
 

@@ -56,6 +56,7 @@ void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = rig; }
 
 void Odometry::unlink() noexcept {
   link_ = Link::unlinked;
+  renewal_due_ = false;
   next_rig_.reset();
   front_end_.set_band(std::max(options_.band_px, kUnlinkedBand));
 }
@@ -142,7 +143,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::scene_restarted;
   else if (of_images != Reason::none)
     out->reason = of_images;
-  else if (out->gap_s > 0)
+  else if (out->gap_s > 0 || renewal_due_)
     out->reason = Reason::time_gap;
   else if (std::popcount(fit.cameras) < 2)
     out->reason = Reason::one_camera;
@@ -168,6 +169,17 @@ void Odometry::try_points() noexcept {
   on_trial_ = true;
 }
 
+/// After a gap the scene is due to be made anew: the few points that the map still knows are seen
+/// from where the rig now is by one frame alone, and a window that holds to them takes back over
+/// many frames what the pose across the gap was off by. Where every interval is a gap the window is
+/// all there is, and stays.
+void Odometry::note_gap(double dt, FrameOutcome* out) noexcept {
+  const bool gap = dt > options_.max_gap_s && frames_lost_ == 0;
+  if (gap) out->gap_s = dt;
+  if (gap && !gap_before_ && link_ == Link::linked) renewal_due_ = true;
+  gap_before_ = gap;
+}
+
 FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept {
   FrameOutcome out;
   StageClock clock(&out);
@@ -189,7 +201,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     return out;
   }
 
-  if (dt > options_.max_gap_s && frames_lost_ == 0) out.gap_s = dt;
+  note_gap(dt, &out);
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
     out.reason = weakness(images) != Reason::none ? weakness(images)
@@ -217,8 +229,8 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
   if (next_rig_ && weakness(images) == Reason::none) {
     out.relink_due = true;
-  } else if (out.gap_s > 0 && link_ == Link::linked && out.images_good) {
-    renew_scene(&out);
+  } else if (renewal_due_ && out.images_good && confirmed_stereo(fit)) {
+    out.renewal_due = true;
   } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
     out.effort = effort;
     make_keyframe(fit, frame.stamp, &out);

@@ -29,6 +29,8 @@ struct FrameOutcome {
   bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
                              // tracks are of no more use
   bool relinked = false;     // it was, in this frame
+  bool renewal_due = false;  // after a gap rebuild() makes the scene anew from this frame
+  bool renewed = false;      // it did
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
   bool images_good = false;  // every camera gave an image, new and with structure
@@ -55,7 +57,7 @@ enum class Link : std::uint8_t {
 ///     odometry::Odometry odometry(options, rig, true, arena, runner);
 ///     odometry::FrameOutcome out = odometry.process(frame);
 ///     if (out.posed) use(out.T_left_world);
-///     if (out.relink_due) odometry.rebuild(&out);
+///     odometry.rebuild(&out);  // when this frame's tracks are of no more use
 ///
 /// Frames     T_left_world; world is the left camera of the first frame posed and stays when the
 ///            scene is rebuilt.
@@ -78,7 +80,8 @@ class Odometry {
   /// From the next frame on the cameras are one rig with this calibration: that frame is still
   /// posed as before, then rebuild() makes a new scene from it.
   void link(const RigCalibration& rig) noexcept;
-  /// After process() of a frame that says `relink_due`. Nothing, if the link was taken back since.
+  /// After process() of every frame: what its outcome says is due. Of a link that was taken back
+  /// since, nothing.
   void rebuild(FrameOutcome* out) noexcept;
   /// From the next frame on the cameras are not linked; the scene stays.
   void unlink() noexcept;
@@ -103,6 +106,7 @@ class Odometry {
   /// Cameras whose own pose was not found are sought by what the points look like.
   void recover_cameras(const PoseFit& fit) noexcept;
   void settle_points(const PoseFit& fit) noexcept;
+  void note_gap(double dt, FrameOutcome* out) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
   void try_points() noexcept;
@@ -112,7 +116,7 @@ class Odometry {
                                  FrameOutcome* out) noexcept;
   void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
                    double dt, FrameOutcome* out) noexcept;
-  /// The scene is made anew from this frame, where its pose says that the camera is.
+  /// The scene is made anew from the newest frame, where its pose says that the camera is.
   void renew_scene(FrameOutcome* out) noexcept;
   void take_up_link() noexcept;
   /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
@@ -138,6 +142,8 @@ class Odometry {
   MotionModel motion_;
 
   int frames_lost_ = 0;        // in a row, with images that show something
+  bool gap_before_ = false;    // the newest frame came after a gap
+  bool renewal_due_ = false;   // the scene is from before one
   bool stereo_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
   bool scene_moves_ = false;   // the last points made do not fit the motion that the pose follows
   bool on_trial_ = false;      // the candidates are there to be tried and belong to no keyframe

@@ -60,7 +60,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
            stereo.near < kNearEnough)
     out->reason = Reason::no_stereo_matches;
   else {
-    stereo_fails_ = scene_moves_ = false;
+    stereo_fails_ = scene_moves_ = renewal_due_ = false;
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
     keyframe_points_ = 0;
@@ -135,22 +135,23 @@ void Odometry::take_up_link() noexcept {
 }
 
 void Odometry::rebuild(FrameOutcome* out) noexcept {
-  if (!next_rig_ || !out->relink_due) return;
-  // The scene was made with another rig: it is rebuilt, where the camera now is.
-  take_up_link();
-  out->relinked = true;
-  renew_scene(out);
+  if (next_rig_ && out->relink_due) {  // the scene was made with another rig
+    take_up_link();
+    out->relinked = true;
+    renew_scene(out);
+  } else if (renewal_due_ && out->renewal_due) {
+    out->renewed = true;
+    renew_scene(out);
+  }
 }
 
-/// After a gap, too: the few points that the map still knew were seen from where the rig now is by
-/// nothing but this frame, and a window that holds to them takes back over many frames what the
-/// pose across the gap was off by.
 void Odometry::renew_scene(FrameOutcome* out) noexcept {
   FrameOutcome built;
   if (start_scene(motion_.T_left_world(), motion_.stamp(), &built))
     out->keyframe = true;
   else
     out->reason = built.reason;
+  for (std::size_t i = 0; i < out->stage_ms.size(); ++i) out->stage_ms[i] += built.stage_ms[i];
 }
 
 }  // namespace vergence::odometry

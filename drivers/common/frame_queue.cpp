@@ -26,6 +26,7 @@ void FrameQueue::begin(Notifier* ready, Duration silence) noexcept {
   const std::lock_guard lock(mutex_);
   notifier_ = ready;
   silence_ = silence;
+  heard_any_ = false;
   heard_ = asked_ = monotonic_now();
   state_ = State::streaming;
 }
@@ -66,7 +67,7 @@ void FrameQueue::count_start() noexcept {
 bool FrameQueue::offer(const Frame& frame) noexcept {
   const std::lock_guard lock(mutex_);
   assert(((offered_slots_ | held_slots_) & bit(frame.slot)) == 0);
-  if (silence_ > Duration{}) heard_ = monotonic_now();
+  hear();
   if (state_ != State::streaming || offered_ == frames_.size()) return false;
   frames_[(first_ + offered_++) % frames_.size()] = frame;
   offered_slots_ |= bit(frame.slot);
@@ -83,7 +84,7 @@ void FrameQueue::count_lost(std::uint64_t exposures) noexcept {
 void FrameQueue::count_underrun() noexcept {
   const std::lock_guard lock(mutex_);
   ++statistics_.underruns;
-  if (silence_ > Duration{}) heard_ = monotonic_now();
+  hear();
 }
 
 void FrameQueue::lose(HostStamp when) noexcept {
@@ -101,16 +102,28 @@ void FrameQueue::ready_again() noexcept {
   if (state_ == State::back && notifier_ != nullptr) notifier_->notify();
 }
 
-bool FrameQueue::silent(HostStamp now) noexcept {
-  if (now - asked_ > kAway) heard_ = now;
-  asked_ = now;
-  return now - heard_ > silence_;
+void FrameQueue::hear() noexcept {
+  heard_any_ = true;
+  if (silence_ > Duration{}) heard_ = monotonic_now();
+}
+
+bool FrameQueue::silent(HostStamp now) const noexcept {
+  if (silence_ <= Duration{}) return false;
+  return now - heard_ > (heard_any_ ? silence_ : std::max(silence_, kFirstImage));
 }
 
 DeviceStatus FrameQueue::wait(Duration limit, Frame* frame) noexcept {
   std::unique_lock lock(mutex_);
+  if (const HostStamp now = monotonic_now(); now - asked_ > kAway) heard_ = now;
+  const DeviceStatus status = wait_locked(&lock, limit, frame);
+  asked_ = monotonic_now();
+  return status;
+}
+
+DeviceStatus FrameQueue::wait_locked(std::unique_lock<std::mutex>* lock, Duration limit,
+                                     Frame* frame) noexcept {
   if (limit > Duration{})
-    (void)changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
+    (void)changed_.wait_for(*lock, std::chrono::nanoseconds(limit.ns()),
                             [this] { return offered_ > 0 || state_ != State::streaming; });
   if (state_ == State::stopped) return DeviceStatus::stopped;
   if (offered_ > 0) {
@@ -123,8 +136,7 @@ DeviceStatus FrameQueue::wait(Duration limit, Frame* frame) noexcept {
     if (frame->status != FrameStatus::complete) ++statistics_.torn;
     return DeviceStatus::ok;
   }
-  if (const HostStamp now = monotonic_now();
-      state_ == State::streaming && silence_ > Duration{} && silent(now)) {
+  if (const HostStamp now = monotonic_now(); state_ == State::streaming && silent(now)) {
     state_ = State::gone;
     gone_at_ = now;
   }

@@ -36,8 +36,8 @@ class FrameQueue {
 
   // The owner.
   /// Streams from now on. What was offered and not taken stays to be drained first. `ready` may be
-  /// null. `silence`: so long without an image, and the device is gone, for who asks for images
-  /// all the time; zero: it may rest.
+  /// null. `silence`: so long without an image, for the first one longer, and the device is gone;
+  /// zero: it may rest.
   void begin(Notifier* ready, Duration silence = {}) noexcept;
   /// Stopped from now on; who waits is told.
   void end() noexcept;
@@ -62,8 +62,8 @@ class FrameQueue {
   void ready_again() noexcept;
 
   // The consumer.
-  /// As CameraDevice::wait(). Who comes less often than once in kAway cannot tell a silent device:
-  /// the transport may have been held up as well.
+  /// As CameraDevice::wait(). Who has not waited for kAway cannot tell a silent device: the
+  /// transport may have been held up as well.
   [[nodiscard]] DeviceStatus wait(Duration limit, Frame* frame) noexcept;
   // The releaser.
   /// False: the consumer does not have it.
@@ -82,14 +82,20 @@ class FrameQueue {
 
  private:
   static constexpr Duration kAway = Duration::seconds(1);
+  static constexpr Duration kFirstImage =
+      Duration::seconds(10);  // after begin(), at least: sensors that power up take their time
 
-  [[nodiscard]] bool silent(HostStamp now) noexcept;
+  void hear() noexcept;
+  [[nodiscard]] DeviceStatus wait_locked(std::unique_lock<std::mutex>* lock, Duration limit,
+                                         Frame* frame) noexcept;
+  [[nodiscard]] bool silent(HostStamp now) const noexcept;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   State state_ = State::stopped;
   HostStamp gone_at_{};
   Duration silence_{};           // zero: no limit
+  bool heard_any_ = false;       // an image since begin()
   HostStamp heard_{}, asked_{};  // the newest image; the end of the newest wait()
   Notifier* notifier_ = nullptr;
   std::array<Frame, FramePool::kMaxSlots> frames_{};  // offered, a ring

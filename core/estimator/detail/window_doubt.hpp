@@ -13,7 +13,7 @@ namespace vergence {
 /// Threads  One. Memory: none of the heap.
 class WindowDoubt {
  public:
-  static constexpr int kWindow = 10;  // frames: at speed each is a keyframe (odometry.window)
+  static constexpr int kWindow = 10;  // frames, of odometry.window_keyframes: at speed each is one
 
   /// So many more frames of the window are doubted, and why.
   void add(Reason why, int frames) noexcept {

@@ -165,12 +165,39 @@ TEST(OdometryInBadConditions, afterTwoSecondsWithoutFramesItSaysSoAndStartsAnew)
   EXPECT_GT(way.norm(), 0.5 * frames * step.norm());
 }
 
+constexpr std::size_t kGapEnds = kFirst + 12;  // 0.65 s, more than max_gap_s
+constexpr std::size_t kWindow = 10;            // frames until the window is renewed after it
+
 TEST(OdometryInBadConditions, aShortGapIsMarkedAndBridged) {
-  const std::size_t back = kFirst + 12;  // 0.65 s, more than max_gap_s
-  constexpr std::size_t kWindow = 10;    // frames until the window is renewed
-  const Verdict v(leave_out(kFirst, back), back, back + 1 + kWindow);
+  const Verdict v(leave_out(kFirst, kGapEnds), kGapEnds, kGapEnds + 1 + kWindow);
   v.expect_reason(Reason::time_gap);
   v.expect_recovery(0);
+}
+
+TEST(OdometryInBadConditions, aGapWhoseFirstFrameIsOfNoUseIsMarkedFromTheNextOn) {
+  constexpr std::size_t kEnds = kFirst + 10, kMarked = kEnds + 2 + kWindow, kAgo = 100;
+  const Edit gap = leave_out(kFirst, kEnds);
+  const Edit one_image = take_away(1, kEnds, kEnds + 1);
+  const Edit of_elsewhere = [](std::size_t i, RigFrame* f) {
+    for (std::size_t k = 0; i == kEnds && k < 2; ++k)
+      f->images[k] = drive().pairs[kEnds - kAgo][k].view();
+    return true;
+  };
+  for (const Edit& spoil : {one_image, of_elsewhere}) {
+    const Verdict v([&](std::size_t i, RigFrame* f) { return spoil(i, f) && gap(i, f); }, kEnds,
+                    kMarked);
+    EXPECT_EQ(v.at(kEnds + 1)->sample.reason, Reason::time_gap) << story(v.replayed.answers);
+    EXPECT_EQ(count_ok(v.replayed.answers, kMarked, drive().size()),
+              static_cast<int>(drive().size() - kMarked))
+        << story(v.replayed.answers);
+  }
+}
+
+TEST(OdometryInBadConditions, whereEveryIntervalIsAGapTheCalibrationIsKept) {
+  const Replay r = replay(still_drive(), [](std::size_t i, RigFrame*) { return i % 11 == 0; });
+  ASSERT_EQ(r.answers.size(), 6U);
+  for (const Answer& a : r.answers) EXPECT_EQ(a.sample.state, State::stereo_odometry);
+  EXPECT_EQ(count_ok(r.answers, 1, still_drive().size()), 0) << story(r.answers);
 }
 
 TEST(OdometryInBadConditions, oneLostFrameInThreeIsNothing) {

@@ -152,6 +152,7 @@ constexpr Duration kAnswer = Duration::seconds(10);  // of a busy machine
 TEST_F(Queue, ASilentDeviceIsGoneAndStreamsAgainAfterAStart) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence);
+  queue.count_underrun();  // one image
   EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::gone);
   EXPECT_GT(out.arrival - begun, kSilence);
   EXPECT_EQ(queue.state(), FrameQueue::State::gone);
@@ -175,11 +176,25 @@ TEST_F(Queue, ImagesThatFoundNoSlotAreNoSilence) {
   }
 }
 
+TEST_F(Queue, TheFirstImageMayTakeLonger) {
+  const HostStamp begun = monotonic_now();
+  queue.begin(&ready, kSilence);
+  EXPECT_EQ(ask(&queue, kAnswer * 3, &out), DeviceStatus::gone);
+  EXPECT_GT(out.arrival - begun, Duration::seconds(10));
+}
+
 TEST_F(Queue, WhoDidNotAskCannotTellSilence) {
   queue.begin(&ready, kSilence);
+  queue.count_underrun();
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout) << "it was away itself";
   EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::gone);
+}
+
+TEST_F(Queue, OneLongWaitTellsSilence) {
+  queue.begin(&ready, kSilence);
+  queue.count_underrun();
+  EXPECT_EQ(queue.wait(Duration::milliseconds(1500), &out), DeviceStatus::gone);
 }
 
 TEST(LongestSilence, IsTenIntervalsOfAFreeRunningCameraAndTwoSecondsAtLeast) {
