@@ -34,7 +34,7 @@ vergence replay DATA --format folder --out session --set odometry.features=400 -
 A key that does not exist is an error that names the nearest one that does; so is a value of the wrong type or outside its range,
 a key that is given twice, and two keys that contradict each other. The sentence names the file and the line; the program exits with 2.
 
-Units and frames: SI units, pixels of the image as it was taken, radians. `summary.json` of a session holds `configuration_hash`, equal for
+Units stand in the column `unit`; pixels are those of the image as it was taken. `summary.json` of a session holds `configuration_hash`, equal for
 equal values of all keys however they were written.
 )";
 

@@ -131,9 +131,10 @@ Group calibration_options() {
               "The same of a tangential coefficient (p1, p2).")
       .number("max_direction_deg", &C::max_direction_deg, 0.1, 180, "°",
               "A calibration whose translation points farther from the nominal one is rejected.")
-      .number(
-          "max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
-          "The same of the rotation; with `--from-scratch` only the side of the camera is asked.")
+      .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
+              "The same of the rotation; the first calibration of a drive from scratch is asked "
+              "for its "
+              "direction only.")
       .number("needs_motion_m", &C::needs_motion_m, 0.01, 1000, "m",
               "Way within the frames gathered (or three baselines) below which the reason is "
               "`needs_motion`.")

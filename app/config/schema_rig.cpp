@@ -90,7 +90,8 @@ Group cameras() {
             .number("trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
                     "From a pulse's edge to the start of the exposure: of the input (10 to 100 µs "
                     "if it is opto-coupled) and of the camera. "
-                    "It goes into every stamp, unless `trigger.feedback` measures it.")
+                    "With `sync.mode` `board`, `ins_syncout` or `master_strobe` it goes into every "
+                    "stamp, unless `trigger.feedback` measures it.")
             .number("stamp_jitter_us", &C::stamp_jitter_us, 0, 5000, "µs",
                     "By how much its stamps may be off the pulses; 0: what this driver's stamps "
                     "have (20, of a camera that only the host "

@@ -50,6 +50,7 @@ class UnixLineSocket final : public LineSocket {
     listener_ = FileDescriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     if (!listener_ ||
         ::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+        ::chmod(address.sun_path, S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0 ||  // whatever umask
         ::listen(listener_.get(), kPending) != 0)
       throw InputError(fmt::format("{}: no socket at {} ({}); does its folder exist?", key, path,
                                    std::strerror(errno)));

@@ -29,8 +29,8 @@ struct CalibrationOptions {
       0.01;  // the same of radial coefficients, and of k1 … k4 of equidistant lenses, 1e-5 … 1
   double tangential_sigma = 0.003;  // the same of p1, p2, 1e-6 … 0.1
   double max_direction_deg = 10;    // gate: direction of t from the nominal one, 0.1 … 180
-  double max_rotation_deg = 10;  // gate: rotation from the nominal one; from scratch only the sign
-                                 // of t_x is asked, 0.1 … 180
+  double max_rotation_deg = 10;     // gate: rotation from the nominal one, 0.1 … 180; the first
+                                    // calibration of a drive from scratch is not asked for it
   double needs_motion_m =
       1;  // travelled in the window, and three baselines, else `needs_motion`, 0.01 … 1000
   int needs_near_points =

@@ -56,7 +56,7 @@ void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = rig; }
 
 void Odometry::unlink() noexcept {
   link_ = Link::unlinked;
-  renewal_due_ = false;
+  gaps_.forget();
   next_rig_.reset();
   front_end_.set_band(std::max(options_.band_px, kUnlinkedBand));
 }
@@ -143,7 +143,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::scene_restarted;
   else if (of_images != Reason::none)
     out->reason = of_images;
-  else if (out->gap_s > 0 || renewal_due_)
+  else if (out->gap_s > 0 || gaps_.renewal_due())
     out->reason = Reason::time_gap;
   else if (std::popcount(fit.cameras) < 2)
     out->reason = Reason::one_camera;
@@ -166,18 +166,6 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
 void Odometry::try_points() noexcept {
   cursor_before_trial_ = map_.cursor();
   (void)front_end_.add_points(map_, motion_.T_left_world(), PointStage::candidate);
-  on_trial_ = true;
-}
-
-/// After a gap the scene is due to be made anew: the few points that the map still knows are seen
-/// from where the rig now is by one frame alone, and a window that holds to them takes back over
-/// many frames what the pose across the gap was off by. Where every interval is a gap the window is
-/// all there is, and stays.
-void Odometry::note_gap(double dt, FrameOutcome* out) noexcept {
-  const bool gap = dt > options_.max_gap_s && frames_lost_ == 0;
-  if (gap) out->gap_s = dt;
-  if (gap && !gap_before_ && link_ == Link::linked) renewal_due_ = true;
-  gap_before_ = gap;
 }
 
 FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept {
@@ -201,7 +189,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     return out;
   }
 
-  note_gap(dt, &out);
+  out.gap_s = gaps_.note(dt, options_.max_gap_s, frames_lost_ == 0, link_ == Link::linked);
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
     out.reason = weakness(images) != Reason::none ? weakness(images)
@@ -229,7 +217,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
   if (next_rig_ && weakness(images) == Reason::none) {
     out.relink_due = true;
-  } else if (renewal_due_ && out.images_good && confirmed_stereo(fit)) {
+  } else if (gaps_.renewal_due() && out.images_good && confirmed_stereo(fit)) {
     out.renewal_due = true;
   } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
     out.effort = effort;

@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "core/odometry/front_end.hpp"
+#include "core/odometry/gap_watch.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/motion_model.hpp"
 #include "core/odometry/pose_estimator.hpp"
@@ -106,7 +107,6 @@ class Odometry {
   /// Cameras whose own pose was not found are sought by what the points look like.
   void recover_cameras(const PoseFit& fit) noexcept;
   void settle_points(const PoseFit& fit) noexcept;
-  void note_gap(double dt, FrameOutcome* out) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
   void try_points() noexcept;
@@ -140,14 +140,13 @@ class Odometry {
   PoseEstimator poses_;
   RigInitialiser initialiser_;
   MotionModel motion_;
+  GapWatch gaps_;
 
   int frames_lost_ = 0;        // in a row, with images that show something
-  bool gap_before_ = false;    // the newest frame came after a gap
-  bool renewal_due_ = false;   // the scene is from before one
   bool stereo_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
   bool scene_moves_ = false;   // the last points made do not fit the motion that the pose follows
-  bool on_trial_ = false;      // the candidates are there to be tried and belong to no keyframe
-  std::size_t cursor_before_trial_ = 0;
+  // There are candidates, made to be tried, that belong to no keyframe; where they begin.
+  std::optional<std::size_t> cursor_before_trial_;
   int frames_untried_ = 0;    // since new points were tried
   int restart_cooldown_ = 0;  // frames still marked after a restart
   int keyframe_points_ = 0;   // active points when the last keyframe was made

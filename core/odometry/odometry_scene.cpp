@@ -60,7 +60,8 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
            stereo.near < kNearEnough)
     out->reason = Reason::no_stereo_matches;
   else {
-    stereo_fails_ = scene_moves_ = renewal_due_ = false;
+    stereo_fails_ = scene_moves_ = false;
+    gaps_.forget();
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
     keyframe_points_ = 0;
@@ -139,7 +140,7 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
     take_up_link();
     out->relinked = true;
     renew_scene(out);
-  } else if (renewal_due_ && out->renewal_due) {
+  } else if (gaps_.renewal_due() && out->renewal_due) {
     out->renewed = true;
     renew_scene(out);
   }

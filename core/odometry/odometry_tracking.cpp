@@ -163,7 +163,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
           p.now.drop(k);
       }
       kept += p.now.cameras != 0 ? 1 : 0;
-      if (on_trial_) {
+      if (cursor_before_trial_) {
         p.stage = PointStage::free;
         continue;
       }
@@ -182,8 +182,8 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
   }
   if (tried >= kNewPoints) scene_moves_ = kept < kNewPointsKept * tried;
   frames_untried_ = tried > 0 ? 0 : frames_untried_ + 1;
-  if (on_trial_) map_.rewind(cursor_before_trial_);
-  on_trial_ = false;
+  if (cursor_before_trial_) map_.rewind(*cursor_before_trial_);
+  cursor_before_trial_.reset();
 }
 
 }  // namespace vergence::odometry

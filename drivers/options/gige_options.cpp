@@ -20,7 +20,7 @@ OptionTable<Options> make_table() {
   t.choice<Resend, Resend>(
       "resend", &O::resend, {{"auto", Resend::automatic}, {"on", Resend::on}, {"off", Resend::off}},
       nullptr, "Asks again for lost packets; auto: where the camera says that it can.");
-  t.number("frame_retention_ms", &O::frame_retention, {1, 1000}, "ms", "3 periods",
+  t.number("frame_retention_ms", &O::frame_retention, {1, 1000}, "ms", "3 periods, 60 to 100 ms",
            "How long an incomplete frame waits for packets that were asked for again.");
   t.number("socket_buffer_kb", &O::socket_buffer_kb, {64, 500000}, "KiB", "eight frames",
            "Receive buffer of the socket; needs net.core.rmem_max of that size.");

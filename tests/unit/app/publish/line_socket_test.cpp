@@ -2,6 +2,7 @@
 
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 
 #include <gtest/gtest.h>
@@ -53,6 +54,15 @@ TEST_F(UnixLines, everyReaderGetsEveryLineFromWhenItCameOn) {
   EXPECT_EQ(all_of(b), "two\n");
   EXPECT_EQ(socket->counters().sent, 3U);
   EXPECT_EQ(socket->counters().readers, 2U);
+}
+
+TEST_F(UnixLines, theGroupMayReadWhateverTheUmaskAndNobodyElse) {
+  const mode_t before = ::umask(0077);
+  const auto lines = open_line_socket(address_, "k");
+  (void)::umask(before);
+  struct stat status {};
+  ASSERT_EQ(::stat(path_.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777U, 0660U);
 }
 
 TEST_F(UnixLines, whoDoesNotReadLosesWholeLinesAndHoldsNobodyUp) {

@@ -1,0 +1,31 @@
+#pragma once
+
+namespace vergence::odometry {
+
+/// Gaps between frames, too long to predict the motion over, and what they leave to be done.
+///
+/// After a gap the scene is due to be made anew: the few points that the map still knows are seen
+/// from where the rig now is by one frame alone, and a window that holds to them takes back over
+/// many frames what the pose across the gap was off by. Where every interval is a gap the window is
+/// all there is, and stays.
+/// Threads  One. Memory: none of the heap.
+class GapWatch {
+ public:
+  /// A frame `dt` seconds after the last pose. `first`: none without a pose lies between. `renew`:
+  /// the scene could be made anew. → dt where it is a gap, else 0
+  [[nodiscard]] double note(double dt, double longest, bool first, bool renew) noexcept {
+    const bool gap = first && dt > longest;
+    if (gap && !before_ && renew) due_ = true;
+    before_ = gap;
+    return gap ? dt : 0;
+  }
+  [[nodiscard]] bool renewal_due() const noexcept { return due_; }
+  /// The scene is new, or of another kind.
+  void forget() noexcept { due_ = false; }
+
+ private:
+  bool before_ = false;  // the newest frame came after a gap
+  bool due_ = false;
+};
+
+}  // namespace vergence::odometry
