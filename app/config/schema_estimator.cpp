@@ -133,8 +133,7 @@ Group calibration_options() {
               "A calibration whose translation points farther from the nominal one is rejected.")
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
               "The same of the rotation; the first calibration of a drive from scratch is asked "
-              "for its "
-              "direction only.")
+              "for its direction only.")
       .number("needs_motion_m", &C::needs_motion_m, 0.01, 1000, "m",
               "Way within the frames gathered (or three baselines) below which the reason is "
               "`needs_motion`.")

@@ -13,7 +13,8 @@ namespace vergence {
 /// Threads  One. Memory: none of the heap.
 class WindowDoubt {
  public:
-  static constexpr int kWindow = 10;  // frames, of odometry.window_keyframes: at speed each is one
+  // Frames: the default of odometry.window_keyframes; at speed each frame is a keyframe.
+  static constexpr int kWindow = 10;
 
   /// So many more frames of the window are doubted, and why.
   void add(Reason why, int frames) noexcept {

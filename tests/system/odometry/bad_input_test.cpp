@@ -56,7 +56,6 @@ struct Verdict {
   }
 };
 
-constexpr std::size_t kAtOnce = 3;  // frames: the map still knows the place
 constexpr std::size_t kAfterRestart =
     20;  // frames: three tries, ten marked ones after the restart, and as many to fill the map
 

@@ -162,6 +162,7 @@ class SlowCamera final : public CameraDevice {
   DeviceStatus start(Notifier*) noexcept override { return DeviceStatus::ok; }
   DeviceStatus wait(Duration, Frame* frame) noexcept override {
     frame->exposure = has.exposure;
+    frame->gain_db = has.gain_db;
     return DeviceStatus::ok;
   }
   ImageView view(FrameSlot) const noexcept override {
@@ -216,16 +217,20 @@ TEST(ExposureControl, aCameraThatCannotEndsItAndOneThatForgotIsAskedAgain) {
   EXPECT_EQ(unable.asked, 1);
   EXPECT_TRUE(control.counters().unsupported);
 
-  SlowCamera forgetful;
-  forgetful.has = {Duration::microseconds(100), 0};  // another than it was given
   exposure::ExposureOptions options;
   options.target = 20;
   options.dead_band = 1;  // 10 grey levels are within a stop of 20
-  ExposureControl again({&forgetful}, kWidth, kHeight, {}, options, start, true);
-  for (int i = 0; i < 4 * options.settle_frames; ++i)
-    (void)again.cameras().front()->wait({}, &frame);
-  EXPECT_EQ(forgetful.asked, 1);
-  EXPECT_EQ(again.counters().again, 1U);
+  // Another exposure than it was given, or another gain alone.
+  for (const ExposureSetting& has : {ExposureSetting{Duration::microseconds(100), 0},
+                                     ExposureSetting{Duration::microseconds(1000), 6}}) {
+    SlowCamera forgetful;
+    forgetful.has = has;
+    ExposureControl again({&forgetful}, kWidth, kHeight, {}, options, start, true);
+    for (int i = 0; i < 4 * options.settle_frames; ++i)
+      (void)again.cameras().front()->wait({}, &frame);
+    EXPECT_EQ(forgetful.asked, 1);
+    EXPECT_EQ(again.counters().again, 1U);
+  }
 }
 
 TEST(ExposureControl, aCameraThatWasAwayDuringAChangeIsGivenItWhenItIsBack) {
