@@ -118,7 +118,7 @@ function(vergence_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
-  if(CMAKE_CROSSCOMPILING) # an emulator takes some ten times as long
+  if(CMAKE_CROSSCOMPILING OR VERGENCE_SANITIZE) # an emulator, or a sanitizer beside another test, takes some ten times as long
     math(EXPR ARG_TIMEOUT "5 * ${ARG_TIMEOUT}")
   endif()
   set(properties TIMEOUT ${ARG_TIMEOUT})

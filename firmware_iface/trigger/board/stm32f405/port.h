@@ -12,9 +12,13 @@ typedef struct {
   uint32_t ppm; /* that they may be off */
 } Clocks;
 
-/* identity.c: the processor. A word, or 0 and false where the bus has nothing there. */
+/* processor.c. A word, or 0 and false where the bus has nothing there. */
 bool probe_word(uint32_t address, uint32_t* word);
 void bus_fault_handler(void);
+void irq_enable(unsigned irq, uint8_t priority);
+/* Interrupts off; → what irq_restore() takes. */
+uint32_t irq_off(void);
+void irq_restore(uint32_t primask);
 
 /* clocks.c */
 void clocks_start(Clocks* clocks);
@@ -36,11 +40,5 @@ void usart1_handler(void);
 
 /* start.c */
 void restart(void) __attribute__((noreturn));
-
-void irq_enable(unsigned irq, uint8_t priority);
-
-/* Interrupts off; → what irq_restore() takes. */
-uint32_t irq_off(void);
-void irq_restore(uint32_t primask);
 
 #endif

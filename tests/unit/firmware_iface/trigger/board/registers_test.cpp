@@ -12,7 +12,7 @@ extern "C" {
 #include "firmware_iface/trigger/board/hal.h"
 #include "firmware_iface/trigger/board/stm32f405/port.h"
 
-// identity.c is the processor's own.
+// processor.c is not in this program.
 void irq_enable(unsigned, std::uint8_t) {}
 std::uint32_t irq_off() { return 0; }
 void irq_restore(std::uint32_t) {}
