@@ -25,6 +25,8 @@ expect_refusal "$work/empty is neither KITTI" "$source/scripts/demo" empty
 expect_refusal "takes nothing, or the word program" "$source/scripts/setup" everything
 expect_refusal "takes arm64 or armhf" "$source/scripts/cross" riscv64
 expect_refusal "takes arm64 or armhf" "$source/scripts/sysroot" arm64 everything
+expect_refusal "ten is neither seconds nor a number of inputs" "$source/scripts/fuzz" ten
+expect_refusal "takes subset, asan or tsan" "$source/scripts/sanitize" everything
 expect_refusal "takes nothing, or --keep and a folder" "$source/scripts/deployment-test" arm64
 [ -z "$(find . -mindepth 1 -not -name empty -not -name out -not -name err)" ] || { echo "a script left files behind"; failures=$((failures + 1)); }
 
@@ -38,7 +40,7 @@ if [ -n "$twice$odd" ]; then
 fi
 
 if command -v shellcheck >/dev/null; then
-  shellcheck "$source"/scripts/{setup,demo,test,bench,cross,sysroot,deployment-test} "$source/.ci/run" "$source"/tests/system/{house,packages,deployment}/*.sh \
+  shellcheck "$source"/scripts/{setup,demo,test,bench,cross,sysroot,deployment-test,fuzz,sanitize} "$source/.ci/run" "$source"/tests/system/{house,packages,deployment}/*.sh \
     "$source/packaging/vergence-session" "$source"/packaging/debian/{postinst,prerm,postrm} || failures=$((failures + 1))
   (cd "$source/tests/rigs" && shellcheck -x build-kernel build-qemu run-in-kernel run-in-qemu init-in-kernel check ./*.sh) ||
     failures=$((failures + 1))
