@@ -70,6 +70,7 @@ class Stream {
   }
   void stop() noexcept {
     streaming_.store(false, std::memory_order_release);
+    notify_taken();  // a producer that waits for room has nobody who would make any
     {
       const std::lock_guard lock(mutex_);
       notifier_ = nullptr;

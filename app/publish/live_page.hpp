@@ -50,6 +50,7 @@ class LivePage final : public SessionObserver {
   void on_compared(const PoseRecord& pose) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
+  [[nodiscard]] bool wants_temperatures() const noexcept override { return true; }
   void on_temperature(int camera, double celsius) noexcept override;
   /// Shows the end of the drive first.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;

@@ -221,7 +221,7 @@ json LiveState::calibration_json() const {
                                        : c.learnt ? "kept"
                                                   : "rejected"},
                               {"cause", c.cause},
-                              {"reason", c.reason}});
+                              {"reason", c.why()}});
   return out;
 }
 

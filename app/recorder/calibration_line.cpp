@@ -50,7 +50,7 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
                  : c.learnt ? "kept"
                             : "rejected");
   append_field(line, c.cause);
-  append_field(line, c.reason);
+  append_field(line, c.why());
   fmt::format_to(out, ",{}", rig.frames);
   if (c.decided)
     fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame,

@@ -4,6 +4,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 
@@ -13,8 +15,37 @@ namespace vergence::app {
 
 namespace {
 
+constexpr std::size_t kLongestHead = 1024;  // bytes: that of calibrations.csv has some 700
+
+/// What room mends. A disk that has none goes on where it stopped; EFBIG is a limit of the process.
+bool lacks_room(int error) { return error == ENOSPC || error == EDQUOT || error == EFBIG; }
+
 int open_for_lines(const std::filesystem::path& file) {
   return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+}
+
+/// Where the last whole line ends; −1: it cannot be read.
+off_t end_of_lines(int fd, off_t size) {
+  std::array<char, 512> piece;
+  for (off_t end = size; end > 0;) {
+    const off_t at = std::max<off_t>(0, end - static_cast<off_t>(piece.size()));
+    const auto wanted = static_cast<std::size_t>(end - at);
+    if (::pread(fd, piece.data(), wanted, at) != static_cast<ssize_t>(wanted)) return -1;
+    const auto newline = std::string_view(piece.data(), wanted).rfind('\n');
+    if (newline != std::string_view::npos) return at + static_cast<off_t>(newline) + 1;
+    end = at;
+  }
+  return 0;
+}
+
+/// A disk that went away may have kept half of a line. True: there was one, and it is gone.
+bool cut_half_line(const std::filesystem::path& file) {
+  const int fd = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
+  if (fd < 0) return false;
+  const off_t size = ::lseek(fd, 0, SEEK_END), end = end_of_lines(fd, size);
+  const bool cut = end >= 0 && end < size && ::ftruncate(fd, end) == 0;
+  (void)::close(fd);
+  return cut;
 }
 
 }  // namespace
@@ -24,7 +55,7 @@ LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
   if (fd_ < 0)
     throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) +
                      "): check the folder's permissions");
-  waiting_.reserve(pending_);
+  waiting_.reserve(pending_ + kLongestHead);
 }
 
 LineFile::~LineFile() { close(); }
@@ -48,6 +79,7 @@ bool LineFile::flush() {
     else if (n == 0 || errno != EINTR)
       error = n == 0 ? ENOSPC : errno;
   }
+  if (done > 0) half_written_ = waiting_[done - 1] != '\n';
   waiting_.erase(0, done);
   fault_ = error;
   return error == 0;
@@ -59,20 +91,34 @@ void LineFile::write_back() noexcept {
 
 bool LineFile::reopen(bool* fresh) {
   *fresh = false;
-  // The rest of a line that is half written belongs to the old one.
-  reopen_due_ = !flush();
+  // The rest of a line that is half written belongs to the old one, while that may yet take it.
+  const bool flushed = flush();
+  reopen_due_ = !flushed && !out_of_reach();
   if (reopen_due_) return false;
   const int fd = open_for_lines(path_);
   if (fd < 0) {
-    fault_ = errno;
+    if (flushed) fault_ = errno;  // else the old one's stands
     return false;
   }
   (void)::fdatasync(fd_);
   (void)::close(fd_);
   fd_ = fd;
+  if (!flushed) give_up_cut_line();
   struct stat status {};
   *fresh = ::fstat(fd_, &status) == 0 && status.st_size == 0;
   return true;
+}
+
+void LineFile::give_up_cut_line() noexcept {
+  if (half_written_) waiting_.erase(0, waiting_.find('\n') + 1);  // a whole line's end is there
+  if (cut_half_line(path_) || half_written_) ++lost_lines_;
+  half_written_ = false;
+}
+
+bool LineFile::out_of_reach() const noexcept { return fault_ != 0 && !lacks_room(fault_); }
+
+std::size_t LineFile::waiting_lines() const noexcept {
+  return static_cast<std::size_t>(std::count(waiting_.begin(), waiting_.end(), '\n'));
 }
 
 bool LineFile::close() {

@@ -7,11 +7,13 @@
 
 namespace vergence::app {
 
-/// A file that grows by whole lines and survives a full disk.
+/// A file that grows by whole lines and survives a full disk, and one that goes away and comes
+/// back.
 ///
 /// What the system does not take stays in memory and is tried again with the next flush(); when as
 /// many bytes wait as it may keep, new lines are refused and counted. So a file never holds a line
-/// that lacks its end in the middle, and goes on when room comes back.
+/// that lacks its end in the middle, and goes on when room comes back. A disk that was gone gives
+/// the old descriptor errors for ever: out_of_reach() says so, reopen() finds the file by its name.
 ///
 /// Threads  One. Memory  A buffer of `pending` bytes, taken at the beginning.
 /// Errors   The constructor throws InputError. Afterwards nothing throws: a failure is kept in
@@ -37,9 +39,19 @@ class LineFile {
   /// Hands over what is waiting and opens the file anew by its name: what was moved away stays as
   /// it is, and a new one begins. *fresh: it is empty. False: it cannot be opened, or something
   /// still waits for room in the old one, which stays in use; fault() says why.
+  /// Out of reach, the old one is given up: whole lines that wait are for the file of that name,
+  /// with the next flush(); a line that is cut, there or here, is lost and counted.
   bool reopen(bool* fresh);
   /// The last reopen() had to wait: to be called again once flush() says true.
   [[nodiscard]] bool reopen_due() const noexcept { return reopen_due_; }
+  /// The last flush() failed, and not for want of room: the descriptor may never take a line again.
+  [[nodiscard]] bool out_of_reach() const noexcept;
+  /// Before all that waits: the first line of a file that reopen() found empty. Once is enough.
+  void begin_with(std::string_view head) {
+    if (!waiting_.starts_with(head)) waiting_.insert(0, head);
+  }
+  /// Lines that wait, the rest of one among them.
+  [[nodiscard]] std::size_t waiting_lines() const noexcept;
   /// flush(), then asks the system to put it on the disk, and closes. Twice is harmless.
   bool close();
 
@@ -53,11 +65,14 @@ class LineFile {
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
  private:
+  void give_up_cut_line() noexcept;
+
   std::filesystem::path path_;
   std::size_t pending_ = kPending;
   int fd_ = -1;
   int fault_ = 0;
   bool pretend_full_ = false, reopen_due_ = false;
+  bool half_written_ = false;  // waiting_ begins within a line
   std::uint64_t lost_lines_ = 0;
   std::string waiting_;
 };

@@ -45,7 +45,8 @@ struct Recorder::Files {
   std::optional<LineFile> ins{};
   bool has_reference = false;  // a line was written there
   std::vector<LineFile*> all;
-  std::vector<int> reported{};  // errno that was reported, by all
+  std::vector<int> reported{};                       // errno that was reported, by all
+  std::chrono::steady_clock::time_point anew_due{};  // when files out of reach are opened again
 };
 
 namespace {
@@ -188,10 +189,21 @@ bool Recorder::take_outcome() {
   return true;
 }
 
+/// `anew`: a file that is out of reach is looked for by its name, where a disk that was gone may
+/// have it again. False: not all was taken.
+bool Recorder::flush(LineFile* file, bool anew) {
+  if (file->flush()) return true;
+  return anew && file->out_of_reach() && open_anew(file) && file->flush();
+}
+
 void Recorder::flush() {
+  constexpr std::chrono::seconds kAnew{3};
   const auto& files = files_->all;
+  const auto now = std::chrono::steady_clock::now();
+  const bool anew = now >= files_->anew_due;
+  if (anew) files_->anew_due = now + kAnew;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    if (files[i]->flush()) {
+    if (flush(files[i], anew)) {
       files_->reported[i] = 0;
       if (files[i]->reopen_due()) reopen(files[i]);
     } else if (files_->reported[i] != files[i]->fault()) {
@@ -209,11 +221,16 @@ void Recorder::reopen() noexcept {
 }
 
 void Recorder::reopen(LineFile* file) {
+  if (!open_anew(file)) report_error(*file);
+}
+
+bool Recorder::open_anew(LineFile* file) {
   bool fresh = false;
-  if (!file->reopen(&fresh)) report_error(*file);
-  if (!fresh) return;
-  file->append(files_->head(file));
-  if (file == &files_->trajectory) totals_.trajectory_begins_anew();
+  const bool opened = file->reopen(&fresh);
+  if (!fresh) return opened;
+  if (file == &files_->trajectory) totals_.trajectory_begins_anew(file->waiting_lines());
+  file->begin_with(files_->head(file));
+  return opened;
 }
 
 void Recorder::reopen_files() {
@@ -255,8 +272,11 @@ void Recorder::note_disk(bool full) {
   std::array<char, 96> room{};
   (void)fmt::format_to_n(room.begin(), room.size() - 1, "the disk takes lines again; {} were lost",
                          lost_lines());
-  event.set_sentence(full ? "the disk of the session has no room: lines wait in memory"
-                          : room.data());
+  const bool away = std::any_of(files_->all.begin(), files_->all.end(),
+                                [](const LineFile* f) { return f->out_of_reach(); });
+  event.set_sentence(!full  ? room.data()
+                     : away ? "the disk of the session takes nothing: lines wait in memory"
+                            : "the disk of the session has no room: lines wait in memory");
   write(event);
 }
 
@@ -268,10 +288,9 @@ std::uint64_t Recorder::lost_lines() const {
 
 void Recorder::report_error(const LineFile& file) {
   const char* words = ::strerrordesc_np(file.fault());  // strerror() may take memory
-  report_error(
-      "{}: cannot be written ({}); the session goes on, lines wait in memory: make room on that "
-      "disk",
-      file.path().native(), words != nullptr ? words : "unknown error");
+  report_error("{}: cannot be written ({}); the session goes on, lines wait in memory: {}",
+               file.path().native(), words != nullptr ? words : "unknown error",
+               file.out_of_reach() ? "check that disk" : "make room on that disk");
 }
 
 template <class... Arguments>
@@ -312,6 +331,7 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   }
   for (LineFile* file : files_->all) {
     if (file->reopen_due()) reopen(file);
+    (void)flush(file, true);
     const bool good = file->close();
     totals.lost_lines += file->lost_lines();
     if (!good)

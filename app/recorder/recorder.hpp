@@ -114,7 +114,9 @@ class Recorder {
   void write(const CalibrationRecord& calibration);
   void write(const InsRecord& reading);
   void flush();
+  [[nodiscard]] bool flush(LineFile* file, bool anew);
   void reopen_files();
+  [[nodiscard]] bool open_anew(LineFile* file);
   void reopen(LineFile* file);
   void pretend(Stamp stamp);
   void note_disk(bool full);

@@ -52,6 +52,16 @@ const char* opening(EstimatorEvent::Kind kind) noexcept {
   }
 }
 
+/// As much of the text as fits, in whole UTF-8 characters, with a 0 behind it.
+template <std::size_t N>
+void copy_text(std::string_view text, std::array<char, N>* out) noexcept {
+  std::size_t n = std::min(text.size(), N - 1);
+  if (n < text.size())
+    while (n > 0 && (static_cast<unsigned char>(text[n]) & 0xc0U) == 0x80U) --n;
+  std::copy_n(text.begin(), n, out->begin());
+  (*out)[n] = 0;
+}
+
 }  // namespace
 
 PoseNumbers PoseNumbers::of(const Transform& T) noexcept {
@@ -102,13 +112,7 @@ PoseRecord PoseRecord::of(const ComparedPose& pose, float decode_ms) noexcept {
   return r;
 }
 
-void EventRecord::set_sentence(std::string_view text) noexcept {
-  std::size_t n = std::min(text.size(), sentence.size() - 1);
-  if (n < text.size())
-    while (n > 0 && (static_cast<unsigned char>(text[n]) & 0xc0U) == 0x80U) --n;
-  std::copy_n(text.begin(), n, sentence.begin());
-  sentence[n] = 0;
-}
+void EventRecord::set_sentence(std::string_view text) noexcept { copy_text(text, &sentence); }
 
 EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
   EventRecord r;
@@ -220,11 +224,11 @@ CalibrationRecord CalibrationRecord::of(const CalibrationDecision& d) noexcept {
 }
 
 CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stamp,
-                                           const char* cause, const char* reason) noexcept {
+                                           const char* cause, std::string_view origin) noexcept {
   CalibrationRecord r;
   r.stamp = stamp;
   r.cause = cause;
-  r.reason = reason;
+  copy_text(origin, &r.origin);
   r.rig = RigNumbers::of(rig);
   return r;
 }

@@ -104,7 +104,10 @@ struct CalibrationRecord {
   bool accepted = true;
   const char* cause =
       "";  // of a decision the word of its CalibrationCause, else `given`, `state_file`
-  const char* reason = "";
+  const char* reason = "";  // of a decision: a constant
+  /// Where it is from, if the drive began with it; ends with 0. A copy, for who keeps a record may
+  /// outlive the source that has the text.
+  std::array<char, 256> origin{};
   int latency_frames = 0;
   std::uint64_t onset_frame = 0;
   double held_out_before_px = 0, held_out_after_px = 0;
@@ -118,9 +121,12 @@ struct CalibrationRecord {
   RigNumbers rig{};
 
   [[nodiscard]] static CalibrationRecord of(const CalibrationDecision& decision) noexcept;
-  /// What the drive begins with.
+  /// What the drive begins with. `origin` is copied, cut at the array's end, at a whole UTF-8
+  /// character; `cause` is a constant.
   [[nodiscard]] static CalibrationRecord begin(const RigCalibration& rig, Stamp stamp,
-                                               const char* cause, const char* reason) noexcept;
+                                               const char* cause, std::string_view origin) noexcept;
+  /// The decision's reason, or the origin of what the drive began with.
+  [[nodiscard]] const char* why() const noexcept { return decided ? reason : origin.data(); }
 };
 
 using Record = std::variant<PoseRecord, EventRecord, CalibrationRecord>;

@@ -49,6 +49,13 @@ void TotalsBuilder::add(const PoseRecord& p, bool in_trajectory) {
   last_pose_ = p.world_left;
 }
 
+void TotalsBuilder::trajectory_begins_anew(std::size_t waiting) noexcept {
+  auto first = totals_.statuses.end();
+  while (waiting > 0 && first != totals_.statuses.begin())
+    waiting -= *--first != PoseStatus::lost ? 1 : 0;
+  totals_.statuses.erase(totals_.statuses.begin(), first);
+}
+
 /// An event comes before the pose of its frame, or after the last one.
 void TotalsBuilder::match_confirmed() {
   if (totals_.confirmed == newest_ && !totals_.confirmed_frame && totals_.read > 0)

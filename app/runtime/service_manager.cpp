@@ -69,7 +69,7 @@ void ServiceManager::send(const std::string& lines) noexcept {
                  reinterpret_cast<const sockaddr*>(&address), size);
 }
 
-void ServiceManager::alive(std::uint64_t beats,
+void ServiceManager::alive(std::uint64_t beats, std::uint64_t items,
                            std::chrono::steady_clock::time_point now) noexcept {
   if (fd_ < 0 || beats == beats_) return;
   const bool watched = interval_.count() > 0;
@@ -79,7 +79,7 @@ void ServiceManager::alive(std::uint64_t beats,
   last_ = now;
   beats_ = beats;
   send(fmt::format("{}STATUS={} frames, readings and events handled", watched ? "WATCHDOG=1\n" : "",
-                   beats));
+                   items));
 }
 
 void ServiceManager::stopping() noexcept {

@@ -31,10 +31,11 @@ class ServiceManager {
   /// watchdog's interval and the unit's TimeoutStopSec: signs of life that ask for more time go out
   /// until the end, ten minutes at most.
   void stopping() noexcept;
-  /// `beats`: how many items the estimator's loop has handled. A sign of life goes out three times
-  /// in a watchdog's interval, if it handled any since the last: a loop that hangs, or that no
-  /// device gives anything to, is not alive.
-  void alive(std::uint64_t beats, std::chrono::steady_clock::time_point now) noexcept;
+  /// `beats`: a number that changes while the estimator's loop is alive (Heartbeat). A sign of life
+  /// goes out three times in a watchdog's interval, if it has changed since the last: not of a loop
+  /// that hangs. `items`: how many it has handled, for the line of status.
+  void alive(std::uint64_t beats, std::uint64_t items,
+             std::chrono::steady_clock::time_point now) noexcept;
 
  private:
   void send(const std::string& lines) noexcept;

@@ -45,11 +45,18 @@ void EstimationLoop::open(const SessionOutput& output, DriveRecorder* recording)
   if (comparison_) comparison_->open(&output_);
 }
 
+bool EstimationLoop::next(SourceItem* item) noexcept {
+  beat_.waiting.store(true, std::memory_order_relaxed);
+  const bool got = source_.next(item);
+  beat_.waiting.store(false, std::memory_order_relaxed);
+  beat_.items.fetch_add(got ? 1 : 0, std::memory_order_relaxed);
+  return got;
+}
+
 void EstimationLoop::run() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-estim");
   AllocationGuard::seal_thread();
-  for (SourceItem item; source_.next(&item);) {
-    items_.fetch_add(1, std::memory_order_relaxed);
+  for (SourceItem item; next(&item);) {
     if (const auto* frame = std::get_if<SourceFrame>(&item)) handle(*frame);
     if (const auto* reading = std::get_if<InsRecord>(&item)) handle(*reading);
     if (const auto* event = std::get_if<SourceEvent>(&item)) handle(*event);

@@ -21,9 +21,9 @@ namespace vergence::app {
 /// What the estimator's thread does: takes what the source delivers, poses it, compares it with
 /// the INS, and hands everything on to the session's output.
 ///
-/// Threads  run(): the estimator's, sealed. ask_calibration(), drained(), items(): any. Everything
-/// else: the
-///          owner's, before run() or after its thread has joined, but for event_log()'s show().
+/// Threads  run(): the estimator's, sealed. ask_calibration(), drained(), items(), waiting(): any.
+///          Everything else: the owner's, before run() or after its thread has joined, but for
+///          event_log()'s show().
 /// Memory   Arenas, at construction.
 class EstimationLoop {
  public:
@@ -41,7 +41,11 @@ class EstimationLoop {
   [[nodiscard]] bool drained() const noexcept { return drained_.load(std::memory_order_acquire); }
   /// Items handled so far.
   [[nodiscard]] std::uint64_t items() const noexcept {
-    return items_.load(std::memory_order_relaxed);
+    return beat_.items.load(std::memory_order_relaxed);
+  }
+  /// It has nothing to do until the source has its next item.
+  [[nodiscard]] bool waiting() const noexcept {
+    return beat_.waiting.load(std::memory_order_relaxed);
   }
 
   [[nodiscard]] EventLog& event_log() noexcept { return log_; }
@@ -56,6 +60,11 @@ class EstimationLoop {
   [[nodiscard]] const Arena& comparison_arena() const noexcept { return comparison_arena_; }
 
  private:
+  struct Beat {  // for who asks whether the loop hangs
+    std::atomic<std::uint64_t> items{0};
+    std::atomic<bool> waiting{false};
+  };
+  [[nodiscard]] bool next(SourceItem* item) noexcept;
   void handle(const SourceFrame& frame) noexcept;
   void handle(const InsRecord& reading) noexcept { comparison_->add(reading); }
   void handle(const SourceEvent& event) noexcept;
@@ -79,7 +88,7 @@ class EstimationLoop {
   EventLog log_;
   std::unique_ptr<InsComparison> comparison_;
   std::atomic<bool> calibration_asked_{false}, drained_{false};
-  std::atomic<std::uint64_t> items_{0};
+  Beat beat_;
   bool delivering_ = false;  // a frame has come
 };
 

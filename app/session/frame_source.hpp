@@ -79,9 +79,9 @@ struct SourceFacts {
 /// Where a session's frames, readings and device events come from: devices (LiveSource), or a
 /// recorded drive (RecordedSource). SessionRunner does the rest, the same for both.
 ///
-/// Threads  next(), done(): the estimator's, sealed. stop(): any. The rest: the caller's; finish()
-/// and
-///          what comes after it when the estimator's has joined.
+/// Threads  next(), done(): the estimator's, sealed. stop(): any. temperature_c(): one of its own,
+///          beside all the others. The rest: the caller's; finish() and what comes after it when
+///          the estimator's has joined.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
@@ -98,9 +98,12 @@ class FrameSource {
   /// The frame that next() gave last has its pose: takes the slots back.
   virtual void done(const PoseSample& sample) noexcept = 0;
   virtual void stop() noexcept = 0;
+  /// How often what next() waits for has gone round, whether it brought anything or not: what does
+  /// not go round any more hangs. Any thread; always 0: nobody can tell.
+  [[nodiscard]] virtual std::uint64_t rounds() const noexcept { return 0; }
   /// Called every 50 ms while frames come.
   virtual void look() {}
-  /// Of a camera, °C, where it tells; asks the device.
+  /// Of a camera, °C, where it tells; asks the device, which may take seconds.
   [[nodiscard]] virtual std::optional<double> temperature_c(int /*camera*/) { return std::nullopt; }
   /// Called once when next() has ended, which the estimator may take time to conclude: stops what
   /// still delivers.

@@ -31,6 +31,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool next(SourceItem* item) noexcept override;
   void done(const PoseSample& sample) noexcept override;
   void stop() noexcept override { acquisition_->stop(); }
+  [[nodiscard]] std::uint64_t rounds() const noexcept override { return acquisition_->rounds(); }
   void look() override;
   [[nodiscard]] std::optional<double> temperature_c(int camera) override {
     return devices_.cameras()[static_cast<std::size_t>(camera)]->temperature_c();

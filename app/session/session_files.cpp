@@ -56,6 +56,12 @@ std::function<Kept(const RigCalibration&)> calibration_keeper(
 
 namespace {
 
+/// Takes out the sentences of one file, which begin with its name.
+void forget_faults_of(const std::filesystem::path& file, std::vector<std::string>* faults) {
+  const std::string name = file.string() + ":";
+  std::erase_if(*faults, [&name](const std::string& fault) { return fault.starts_with(name); });
+}
+
 /// residuals.csv, where there are matches.
 void write_residuals(const std::filesystem::path& session,
                      const std::optional<RigCalibration>& before, const RigCalibration& at_the_end,
@@ -80,7 +86,7 @@ void write_residuals(const std::filesystem::path& session,
 void begin_session(const std::filesystem::path& session, const StartingCalibration& begin,
                    Stamp stamp, SessionOutput* output, std::vector<std::string>* faults) {
   if (begin.trust == CalibrationTrust::none) return;
-  output->post(CalibrationRecord::begin(begin.file.rig, stamp, begin.cause, begin.source.c_str()));
+  output->post(CalibrationRecord::begin(begin.file.rig, stamp, begin.cause, begin.source));
   write_session_calibration(session, begin.file,
                             faults);  // at once: a session that is killed has it, too
 }
@@ -114,6 +120,7 @@ void end_session(const std::filesystem::path& session, const StartingCalibration
   CalibrationFile file = begin.file;
   file.rig = input.calibration;
   if (totals.accepted > 0) file.source = "online";
+  forget_faults_of(session / "calibration.yaml", faults);
   write_session_calibration(session, file, faults);
   // With one calibration throughout there is nothing to compare.
   write_residuals(session, totals.accepted > 0 ? input.before : std::nullopt, input.calibration,

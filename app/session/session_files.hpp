@@ -53,7 +53,8 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
 [[nodiscard]] std::string verification_sentence(const SummaryInput& input);
 
 /// calibration.yaml as it is in use at the end, if there is one, and residuals.csv, if there are
-/// matches to look at it with.
+/// matches to look at it with. A sentence of *faults that calibration.yaml could not be written at
+/// the start gives way to what becomes of it now.
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
                  const SummaryInput& input, const SessionTotals& totals, const MatchSample& matches,
                  std::vector<std::string>* faults);

@@ -86,6 +86,8 @@ class SessionObserver {
   /// A calibration that was accepted or rejected, or that the session begins with.
   virtual void on_calibration(const CalibrationRecord& /*calibration*/) noexcept {}
 
+  /// Whether on_temperature() is to be called: the cameras are asked only where somebody wants it.
+  [[nodiscard]] virtual bool wants_temperatures() const noexcept { return false; }
   /// A camera told its temperature. The caller's thread, every few seconds, while the estimator's
   /// runs.
   virtual void on_temperature(int /*camera*/, double /*celsius*/) noexcept {}

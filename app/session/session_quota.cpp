@@ -46,12 +46,35 @@ std::uint64_t bytes_in(const fs::path& folder) {
   return bytes;
 }
 
+/// The folder that the session lies in. Behind a slash or a dot at its end there is no name to take
+/// away.
+fs::path folder_above(const fs::path& session) {
+  std::error_code error;
+  const fs::path path = fs::absolute(session, error).lexically_normal();
+  return path.has_filename() ? path.parent_path() : path.parent_path().parent_path();
+}
+
+/// → the first error. poses.csv, the mark of a session, stays until all else is gone.
+std::error_code remove_session(const fs::path& folder) {
+  std::error_code first, error;
+  std::vector<fs::path> inside;
+  for (fs::directory_iterator at(folder, first), end; !first && at != end; at.increment(first))
+    if (at->path().filename() != "poses.csv") inside.push_back(at->path());
+  for (const fs::path& path : inside) {
+    fs::remove_all(path, error);
+    if (error && !first) first = error;
+  }
+  if (!first) fs::remove(folder / "poses.csv", first);
+  if (!first) fs::remove(folder, first);
+  return first;
+}
+
 /// Oldest first.
 std::vector<OldSession> sessions_beside(const fs::path& session) {
   std::vector<OldSession> found;
   std::error_code error;
-  const fs::path above = fs::absolute(session, error).lexically_normal().parent_path();
-  for (fs::directory_iterator at(above, error), end; !error && at != end; at.increment(error)) {
+  for (fs::directory_iterator at(folder_above(session), error), end; !error && at != end;
+       at.increment(error)) {
     std::error_code ignored;
     if (at->is_symlink(ignored) || !at->is_directory(ignored) ||
         fs::equivalent(at->path(), session, ignored) || !has_poses(at->path()))
@@ -75,15 +98,13 @@ std::vector<std::string> keep_session_quota(const fs::path& session, std::uint64
   std::vector<std::string> sentences;
   for (const OldSession& s : sessions) {
     if (bytes <= most_bytes) break;
-    std::error_code error;
-    fs::remove_all(s.folder, error);
-    if (error) {
+    bytes -= s.bytes;
+    if (const std::error_code error = remove_session(s.folder)) {
       sentences.push_back(fmt::format(
           "{}: is over sessions.quota_mb and cannot be removed ({}): check its permissions",
           s.folder.string(), error.message()));
       continue;
     }
-    bytes -= s.bytes;
     sentences.push_back(
         fmt::format("{}: removed ({} MB), the oldest session over sessions.quota_mb",
                     s.folder.string(), (s.bytes + 999'999) / 1'000'000));

@@ -17,9 +17,11 @@
 #include "app/session/drive_recorder.hpp"
 #include "app/session/drive_threads.hpp"
 #include "app/session/estimation_loop.hpp"
+#include "app/session/heartbeat.hpp"
 #include "app/session/memory_figures.hpp"
 #include "app/session/session_files.hpp"
 #include "app/session/session_quota.hpp"
+#include "app/session/temperature_watch.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
@@ -64,15 +66,16 @@ class SessionRunner {
   std::vector<SessionObserver*> observers_;
   std::vector<std::string> removed_;  // sessions over the quota: a sentence each
 
-  ServiceManager service_;  // of the caller's thread
-  std::mutex mutex_;        // with done_, for the caller's thread that waits
+  ServiceManager service_;  // of the caller's thread, as the next
+  Heartbeat heart_;
+  std::mutex mutex_;  // with done_, for the caller's thread that waits
   std::condition_variable changed_;
-  std::chrono::steady_clock::time_point temperatures_due_{};
   bool done_ = false;
   bool made_folder_ = false;   // it was not there before
   bool halted_ = false;        // the caller's thread alone
   ResidentMemory resident_{};  // at the drive's end
   DriveThreads threads_;       // of the caller's thread
+  TemperatureWatch temperatures_;
 };
 
 SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
@@ -83,7 +86,8 @@ SessionRunner::SessionRunner(FrameSource& source, const Configuration& configura
       request_(options),
       signals_(signals),
       loop_(source, configuration, options),
-      threads_(configuration.realtime) {}
+      threads_(configuration.realtime),
+      temperatures_(source) {}
 
 void SessionRunner::estimate() noexcept {
   loop_.run();
@@ -92,15 +96,12 @@ void SessionRunner::estimate() noexcept {
   changed_.notify_one();
 }
 
-/// Every few seconds: a camera takes minutes to warm up, and answers beside its images.
 void SessionRunner::pass_on_temperatures() {
-  constexpr std::chrono::seconds kInterval{5};
-  const auto now = std::chrono::steady_clock::now();
-  if (request_.observers.empty() || now < temperatures_due_) return;
-  temperatures_due_ = now + kInterval;
-  for (int k = 0; k < facts_.begin.file.rig.cameras; ++k)
-    if (const auto celsius = source_.temperature_c(k))
-      for (SessionObserver* observer : request_.observers) observer->on_temperature(k, *celsius);
+  const TemperatureWatch::Celsius celsius = temperatures_.take_new();
+  for (std::size_t k = 0; k < celsius.size(); ++k)
+    if (celsius[k])
+      for (SessionObserver* observer : request_.observers)
+        observer->on_temperature(static_cast<int>(k), *celsius[k]);
 }
 
 void SessionRunner::watch(Progress* progress) {
@@ -109,7 +110,9 @@ void SessionRunner::watch(Progress* progress) {
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
     if (signals_.stop_requested()) source_.stop();
     source_.look();
-    service_.alive(loop_.items(), std::chrono::steady_clock::now());
+    const std::uint64_t items = loop_.items();
+    service_.alive(heart_.beats(items, loop_.waiting(), source_.rounds()), items,
+                   std::chrono::steady_clock::now());
     if (facts_.on_request && signals_.take_calibration_request()) loop_.ask_calibration();
     lock.unlock();
     if (signals_.take_reopen_request()) {
@@ -132,6 +135,7 @@ void SessionRunner::watch(Progress* progress) {
 
 /// When the drive is over: cameras do not expose on while its last calibration is decided.
 void SessionRunner::halt_source() noexcept {
+  temperatures_.end();
   if (!halted_) source_.halt();
   halted_ = true;
 }
@@ -157,9 +161,12 @@ void SessionRunner::say_recording_errors(Progress* progress) {
 }
 
 void SessionRunner::open(std::vector<std::string>* faults) {
-  made_folder_ = make_session_folder(request_.out);
+  // A session that is refused costs no other one, and on a full disk there is room for its folder
+  // only when the quota has made some.
+  (void)check_session_folder(request_.out);
   if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
     removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
+  made_folder_ = make_session_folder(request_.out);
   Recorder::Options to_record;
   to_record.when_full = facts_.when_full;
   to_record.expected_frames = facts_.expected_frames;
@@ -246,8 +253,7 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
 
 void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput& input,
                                 std::vector<std::string>* faults, Progress* progress) {
-  if (faults->empty())
-    end_session(request_.out, facts_.begin, input, totals, loop_.event_log().matches(), faults);
+  end_session(request_.out, facts_.begin, input, totals, loop_.event_log().matches(), faults);
   write_session_summary(request_.out, totals, input, faults);
   faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
   for (const std::string& sentence : write_other_formats(
@@ -300,6 +306,9 @@ ExitCode SessionRunner::run() {
   (void)::malloc_trim(0);  // what setting up took and gave back goes to the system
   threads_.lock_memory(&progress);
   start_source(&faults);
+  if (std::any_of(request_.observers.begin(), request_.observers.end(),
+                  [](const SessionObserver* o) { return o->wants_temperatures(); }))
+    temperatures_.begin();
   std::thread estimating([this] { estimate(); });
   service_.ready();
   watch(&progress);

@@ -1,5 +1,6 @@
 #include "core/calibration/monitor.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -59,15 +60,19 @@ struct Monitor::Parts {
   detail::Decision latest{};
   int agreed = 0, poor = 0, collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
-  double lag_found = 0;  // the last one that was `out_of_step`, frames
+  double lag_found = 0;       // the last one that was `out_of_step`, frames
+  bool measured_lag = false;  // by the frame looked at
+  int small_lag = 0;          // measured frames in a row with less than what is called a lag
 
   void forget() noexcept {
     looks.reset();
     windows.reset(options, covariance);
     latest = detail::Decision{};
     latest.lag_sigma = latest.yaw_sigma = std::numeric_limits<double>::infinity();
-    agreed = poor = collapsed = standing_over = 0;
+    agreed = poor = collapsed = standing_over = small_lag = 0;
+    measured_lag = false;
   }
+  [[nodiscard]] bool in_step() noexcept;
   void watch_collapse(const MonitorFrame& frame) noexcept;
   void watch_matches(const MonitorFrame& frame) noexcept;
   void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& look) noexcept;
@@ -149,6 +154,7 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   }
   windows.push(e);
   latest = windows.decide();
+  measured_lag = true;
   const bool measured = windows.frames() >= static_cast<std::uint64_t>(options.short_window);
   agreed = measured && latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold
                ? agreed + 1
@@ -173,6 +179,19 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
   latest.frames = standing_over;
 }
 
+/// Of frames that measured it: while standing, or where hardly anything matches, `latest` is of
+/// frames before. A rig whose cameras are a constant fifth of a frame apart was never called out of
+/// step for that: after a long window of it an alarm is over as well.
+bool Monitor::Parts::in_step() noexcept {
+  if (!measured_lag) return false;
+  const bool quiet = latest.kind == Kind::quiet && !latest.undecided &&
+                     std::abs(latest.lag) < options.lag_frames &&
+                     latest.lag_sigma < kLagSigma * std::max(lag_found, options.lag_frames);
+  small_lag = quiet ? std::min(small_lag + 1, options.long_window) : 0;
+  return quiet &&
+         (std::abs(latest.lag) < kNoLag * options.lag_frames || small_lag == options.long_window);
+}
+
 MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   Parts& p = *parts_;
   MonitorVerdict v;
@@ -180,6 +199,7 @@ MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   v.onset_frame = frame.frame;
   v.lag_sigma = std::numeric_limits<double>::infinity();
   if (!p.valid || !frame.T_now_previous.finite()) return v;
+  p.measured_lag = false;
   p.watch_collapse(frame);
   p.watch_matches(frame);
   const detail::Decision& d = p.latest;
@@ -191,9 +211,7 @@ MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   v.lag_frames = d.lag;
   v.lag_sigma = d.lag_sigma;
   if (d.kind == Kind::out_of_step) p.lag_found = std::abs(d.lag);
-  v.in_step = d.kind == Kind::quiet && !d.undecided &&
-              std::abs(d.lag) < kNoLag * p.options.lag_frames &&
-              d.lag_sigma < kLagSigma * std::max(p.lag_found, p.options.lag_frames);
+  v.in_step = p.in_step();
   v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
   v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
   if (p.collapsed >= p.options.collapse_frames) {

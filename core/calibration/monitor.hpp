@@ -86,8 +86,8 @@ struct MonitorVerdict {
   double lag_frames =
       0;  // best estimate over the longest window, frames; meaningless where lag_sigma is infinite
   double lag_sigma = 0;  // frames; infinite: not seen
-  bool in_step = false;  // since set_reference() or reset(): there is no lag, and the last one that
-                         // was found would be seen
+  bool in_step = false;  // this frame's motion shows, with those since set_reference() or reset(),
+                         // that there is no lag, and would show the last one that was found
   std::uint64_t onset_frame =
       0;  // knock, out_of_step: first frame of the changed rig; drift: where it began; else `frame`
   int frames_since_onset = 0;  // frames measured since then

@@ -57,8 +57,9 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   without_pose = 0;
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
-               : calibrator.calibrated()                   ? Trigger::pose_found_doubtful
-                                                           : Trigger::pose_found_uncalibrated,
+               : !calibrator.calibrated()                  ? Trigger::pose_found_uncalibrated
+               : calibrator.seeking()                      ? Trigger::pose_found_doubtful
+                                      : Trigger::pose_found,  // found, and linked with this frame
                frame.stamp);
   if (state == State::initialising) {
     transition(Trigger::pair_found, frame.stamp);

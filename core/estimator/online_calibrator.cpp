@@ -80,7 +80,7 @@ void OnlineCalibrator::forget_frames() noexcept {
 }
 
 void OnlineCalibrator::scene_lost() noexcept {
-  watched_ = false;
+  watched_ = learnt_since_outage_ = false;
   forget_frames();
   monitor_.scene_lost();
 }
@@ -120,7 +120,7 @@ void OnlineCalibrator::start_solve() noexcept {
     const calibration::TrackLog& log = frames_.log();
     const double hours = (log.frame(log.size() - 1).stamp - prior.found).to_seconds() / 3600.0;
     // What was learnt before an outage is no witness that nobody knocked the rig in it.
-    if (seeking_ || !watched_)
+    if (seeking_ || !(watched_ || learnt_since_outage_))
       calibration::forget_transforms(&prior);
     else
       calibration::let_drift(hours, options_.calibration, &prior);
@@ -259,9 +259,12 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
                             ? found_with_lenses_ == d.lenses
                             : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
+    // One that the drive has confirmed is not given for one that it has not.
+    const bool certain = a.sigma_percent <= options_.calibration.tolerated_depth_percent;
+    if (gate_ == Gate::open && verified() && !certain && !a.contradicted) gate_ = Gate::no_better;
     // Frames that contradict what was measured before them confirm nothing.
     d.verified = gate_ == Gate::open
-                     ? a.sigma_percent <= options_.calibration.tolerated_depth_percent
+                     ? certain
                      : a.confirmed && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
     d.verified = d.verified && !d.focal.contradicted;
     if (d.verified || a.contradicted || d.focal.contradicted) set_verified(d.verified);
@@ -281,7 +284,10 @@ void OnlineCalibrator::plan_learning(const RigSolution& found) noexcept {
   if (gate_ == Gate::does_not_fit) {
     frames_.begin_segment(found.newest + 1);
   } else if (frames_.solved_frames() >= frames_.most()) {
-    if (usable) learnt_ = found.rig;
+    if (usable) {
+      learnt_ = found.rig;
+      learnt_since_outage_ = true;
+    }
     frames_.begin_segment(found.newest + 1);
     frames_.want_full();
   } else {

@@ -117,6 +117,7 @@ class OnlineCalibrator {
                          // confirmed
   bool found_with_lenses_ = false;
   std::optional<RigCalibration> learnt_;  // what closed segments show, with the lenses free
+  bool learnt_since_outage_ = false;      // its transforms are of segments after the last outage
   CalibrationFrames frames_;
   BackgroundSolve solve_;
   RigMonitor monitor_;

@@ -103,6 +103,10 @@ void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchang
 StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointStage stage,
                                  const FrameEffort& effort) noexcept {
   StereoCount count;
+  corners_.clear();
+  // Without a left image the pyramid still looks at the last one, whose memory its camera may have
+  // taken back.
+  if ((structured_ & 1U) == 0) return count;
   const auto start = std::chrono::steady_clock::now();
   taken_.clear();
   for (const MapPoint& p : map.points())

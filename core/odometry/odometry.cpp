@@ -151,7 +151,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
-  else if (fit.inliers < kRigidShare * fit.given || (link_ == Link::linked && scene_moves_))
+  else if (fit.inliers < kRigidShare * fit.given || (link_ == Link::linked && new_points_.lost()))
     out->reason = Reason::moving_scene;
   else if (fit.near < kNearEnough)
     out->reason = Reason::weak_geometry;

@@ -5,6 +5,7 @@
 #include "core/odometry/gap_watch.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/motion_model.hpp"
+#include "core/odometry/new_points.hpp"
 #include "core/odometry/pose_estimator.hpp"
 #include "core/odometry/rig_initialiser.hpp"
 #include "core/odometry/window.hpp"
@@ -141,10 +142,10 @@ class Odometry {
   RigInitialiser initialiser_;
   MotionModel motion_;
   GapWatch gaps_;
+  NewPoints new_points_;
 
   int frames_lost_ = 0;        // in a row, with images that show something
   bool stereo_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
-  bool scene_moves_ = false;   // the last points made do not fit the motion that the pose follows
   // There are candidates, made to be tried, that belong to no keyframe; where they begin.
   std::optional<std::size_t> cursor_before_trial_;
   int frames_untried_ = 0;    // since new points were tried

@@ -54,13 +54,15 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   if (stereo.corners < kStartMatches)
     out->reason = Reason::few_features;
   else if (stereo.near < kCertainShare * stereo.corners &&
-           front_end_.count_exchanged() > stereo.near)
+           front_end_.count_exchanged() > std::max(stereo.near, kNearEnough - 1))
     out->reason = Reason::cameras_swapped;
-  else if (stereo.matched < kStartMatches || stereo.matched < kStartShare * stereo.corners ||
-           stereo.near < kNearEnough)
+  else if (stereo.matched < kStartMatches || stereo.matched < kStartShare * stereo.corners)
     out->reason = Reason::no_stereo_matches;
+  else if (stereo.near < kNearEnough)  // the rig fits, and nothing seen holds the scale
+    out->reason = Reason::weak_geometry;
   else {
-    stereo_fails_ = scene_moves_ = false;
+    stereo_fails_ = false;
+    new_points_.forget();
     gaps_.forget();
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     map_.keyframe(slot).T_camera_left = rig_.T_camera_left;

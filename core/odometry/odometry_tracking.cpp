@@ -29,10 +29,6 @@ constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough =
     2;                             // rig frames, so four images, before a point holds a pose
 constexpr double kOutlier = 9.21;  // squared sigmas, two coordinates at 99 %
-constexpr int kNewPoints = 30;     // tried in a frame, to judge from
-constexpr double kNewPointsKept =
-    0.3;  // of the points just made that fit the motion a frame later: half to nine in ten where
-          // the scene stands, a twentieth where the pose follows what moves in front of it
 
 /// A pose of the sample that all points may be followed from.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
@@ -180,7 +176,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     else if (p.missed > kMissesAllowed)
       p.stage = PointStage::dormant;
   }
-  if (tried >= kNewPoints) scene_moves_ = kept < kNewPointsKept * tried;
+  new_points_.add(tried, kept);
   frames_untried_ = tried > 0 ? 0 : frames_untried_ + 1;
   if (cursor_before_trial_) map_.rewind(*cursor_before_trial_);
   cursor_before_trial_.reset();

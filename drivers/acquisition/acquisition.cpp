@@ -92,6 +92,7 @@ Stamp Acquisition::stamp_of(HostStamp host) const noexcept {
 void Acquisition::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-sync");
   while (!stop_.load(std::memory_order_acquire)) {
+    rounds_.fetch_add(1, std::memory_order_relaxed);
     const WakeEvent::Ticket seen = wake_.ticket();
     // Twice: whatever arrived before an item of the first look is there at the second.
     look();

@@ -115,6 +115,10 @@ class Acquisition final : private Notifier {
   /// look follows on whatever a device brings. From who knows that time passes where none brings
   /// anything: some times a second.
   void look_again() noexcept { notify(); }
+  /// How often its thread has gone round: it stands still while a device holds that up. Any thread.
+  [[nodiscard]] std::uint64_t rounds() const noexcept {
+    return rounds_.load(std::memory_order_relaxed);
+  }
   /// Ends the stream: next() gives what is in the ring, then false.
   void stop() noexcept;
   /// Waits for the thread, stops the devices. After it the counters are exact.
@@ -163,6 +167,7 @@ class Acquisition final : private Notifier {
   AcquiredQueue queue_;
   WakeEvent wake_;
   std::atomic<bool> stop_{false};
+  std::atomic<std::uint64_t> rounds_{0};
   AcquisitionCounters counters_{};
   std::vector<int> missing_;
   std::thread thread_;

@@ -62,17 +62,18 @@ DeviceStatus Device::connect() {
   return status;
 }
 
-/// The baud rate asked for alone, or the usual ones.
+/// The baud rate asked for alone, or that of the last fix and the usual ones.
+DeviceStatus Device::search() {
+  if (options_.baud != 0) return listen(options_.baud);
+  DeviceStatus status = baud_ != 0 ? listen(baud_) : DeviceStatus::not_found;
+  for (std::size_t i = 0; i < kBauds.size() && status == DeviceStatus::not_found; ++i)
+    status = listen(kBauds[i]);
+  return status;
+}
+
 DeviceStatus Device::find() {
   const std::uint64_t sentences = decoder_.sentences(), frames = decoder_.frames();
-  DeviceStatus status = DeviceStatus::not_found;
-  if (options_.baud != 0) {
-    status = listen(options_.baud);
-  } else {
-    if (baud_ != 0) status = listen(baud_);
-    for (std::size_t i = 0; i < kBauds.size() && status == DeviceStatus::not_found; ++i)
-      status = listen(kBauds[i]);
-  }
+  const DeviceStatus status = search();
   if (status == DeviceStatus::not_found)
     last_error_ = place().name() + ": " +
                   received_instead(decoder_.sentences() - sentences, decoder_.frames() - frames);
@@ -207,9 +208,10 @@ DeviceStatus Device::read_once(Duration limit, bool discard) noexcept {
   return r.status;
 }
 
+/// A receiver that lost its supply may be back at the rate it was made with.
 DeviceStatus Device::reopen() {
   if (const DeviceStatus s = open(); s != DeviceStatus::ok) return s;
-  return listen(baud_);
+  return search();
 }
 
 void Device::count_decoded() noexcept {

@@ -12,7 +12,9 @@ namespace vergence::gnss {
 ///
 /// As InsDevice says. connect() listens at the baud rate asked for or at the usual ones, up to 1.3
 /// s each, and then until the interval between fixes is known; so the owner calls it before the
-/// drive. After `gone` the line is opened again until fixes come. Silent for kSilent is gone.
+/// drive. After `gone` the line is opened again, and listened at likewise, until fixes come. Silent
+/// for kSilent is gone.
+///
 /// Time     Readings are mapped: `host` and `host_error` are set (decoder.hpp).
 /// Samples  No attitude; heading_source says what the heading is of.
 class Device final : public SerialInsDevice<256> {  // 12 s at 20 Hz
@@ -32,6 +34,7 @@ class Device final : public SerialInsDevice<256> {  // 12 s at 20 Hz
 
  private:
   [[nodiscard]] DeviceStatus open();
+  [[nodiscard]] DeviceStatus search();
   [[nodiscard]] DeviceStatus find();
   [[nodiscard]] DeviceStatus listen(std::uint32_t baud);
   [[nodiscard]] DeviceStatus measure_rate();

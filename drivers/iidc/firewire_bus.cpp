@@ -107,8 +107,19 @@ FirewireBus::~FirewireBus() {
   ledger_->remove(this);
 }
 
+/// A camera that was given up while its node is there (silent, out of step) still captures where an
+/// image is held: close_node() would free what the capture works on.
+void FirewireBus::end_capture() noexcept {
+  if (ring_.any_kept()) {
+    ring_.abandon();
+  } else {
+    end_ring();
+  }
+}
+
 DeviceStatus FirewireBus::reopen() noexcept {
   try {
+    end_capture();
     ring_.drop_orphans();
     if (!ring_.has_room()) {
       last_error_ = "images of before it was unplugged are still in use";

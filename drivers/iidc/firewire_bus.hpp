@@ -55,6 +55,7 @@ class FirewireBus final : public CameraBus {
   void close_node() noexcept;
   [[nodiscard]] DeviceStatus set_up();
   void end_ring() noexcept;
+  void end_capture() noexcept;
   void stream() noexcept;
   [[nodiscard]] bool take_one() noexcept;
   [[nodiscard]] DeviceStatus failure(HostStamp begun) const noexcept;

@@ -61,7 +61,7 @@ class FirewireRing {
   void resume() noexcept;
   /// Ends a capture whose node is there, if it still is. Precondition: !any_kept().
   void end() noexcept;
-  /// Ends a capture whose node is gone, as far as nobody looks at its images.
+  /// Ends a capture whose node is gone or about to be closed, as far as nobody looks at its images.
   void abandon() noexcept;
   /// Unmaps what is left of captures that ended, once nothing in it is kept.
   void drop_orphans() noexcept;

@@ -150,12 +150,27 @@ std::optional<int> read_latency_timer_ms(const std::string& port) {
   return ms;
 }
 
+std::string port_with_serial(const std::vector<SerialPortInfo>& ports,
+                             const std::string& usb_serial, const std::string& asked) {
+  if (usb_serial.empty()) return asked;
+  const std::string real = resolved(asked).string();
+  const auto bears = [&](const SerialPortInfo& p) { return p.usb_serial == usb_serial; };
+  const auto named = [&](const SerialPortInfo& p) { return p.port == real && bears(p); };
+  if (std::any_of(ports.begin(), ports.end(), named)) return asked;
+  if (std::count_if(ports.begin(), ports.end(), bears) != 1) return asked;
+  return std::find_if(ports.begin(), ports.end(), bears)->port;
+}
+
 std::string SerialPort::find() const {
-  if (!usb_serial_.empty()) {
-    for (const SerialPortInfo& info : list_serial_ports())
-      if (info.usb_serial == usb_serial_) return info.port;
-  }
-  return port_;
+  return usb_serial_.empty() ? port_ : port_with_serial(list_serial_ports(), usb_serial_, port_);
+}
+
+/// Only a number of its own tells it from others when it comes back. The ports of one converter
+/// share theirs, and some makers give all of theirs the same.
+void SerialPort::remember(const std::string& usb_serial) {
+  const std::vector<SerialPortInfo> ports = list_serial_ports();
+  const auto bears = [&](const SerialPortInfo& p) { return p.usb_serial == usb_serial; };
+  if (std::count_if(ports.begin(), ports.end(), bears) == 1) usb_serial_ = usb_serial;
 }
 
 std::unique_ptr<ByteLine> SerialPort::open(const LineSettings& settings, DeviceStatus* status) {
@@ -173,7 +188,7 @@ std::unique_ptr<ByteLine> SerialPort::open(const LineSettings& settings, DeviceS
     *status = DeviceStatus::failed;
     return nullptr;
   }
-  if (port && usb_serial_.empty()) usb_serial_ = text(::sp_get_port_usb_serial(port.get()));
+  if (port && usb_serial_.empty()) remember(text(::sp_get_port_usb_serial(port.get())));
   auto line = std::make_unique<FdLine>(std::move(port), std::move(tty), std::move(wake), settings);
   line->discard_input();
   return line;

@@ -26,14 +26,21 @@ struct SerialPortInfo {
 /// such chip.
 [[nodiscard]] std::optional<int> read_latency_timer_ms(const std::string& port);
 
+/// Where the device that was at port `asked` (or a link to it) is now, by its converter's serial
+/// number: at `asked`, if that bears the number; else at the only one of `ports` that does. `asked`
+/// where none or several do: a port of another device must not be taken for it.
+[[nodiscard]] std::string port_with_serial(const std::vector<SerialPortInfo>& ports,
+                                           const std::string& usb_serial, const std::string& asked);
+
 /// A serial port by its name, a link to it (/dev/serial/by-id/…), or a plain tty (a
 /// pseudo-terminal).
 ///
 /// Real ports are opened and set through libserialport, which refuses links and pseudo-terminals:
 /// links are resolved, the others are opened as ttys. Reading waits in poll(): the library's own
 /// waiting reads spin after an unplug. A port on USB is remembered by the converter's serial number
-/// from its first opening: a device that comes back as ttyUSB1 is found. The port is held
-/// exclusively; a second opening is `busy`.
+/// from its first opening, if no other port bears it: a device that comes back as ttyUSB1 is found.
+/// The port is held exclusively; a second opening is `busy`.
+///
 /// Threads  One caller. Memory: ordinary; the lines as ByteLine says.
 class SerialPort final : public LinePlace {
  public:
@@ -46,9 +53,10 @@ class SerialPort final : public LinePlace {
 
  private:
   [[nodiscard]] std::string find() const;
+  void remember(const std::string& usb_serial);
 
   std::string port_;        // as asked for
-  std::string usb_serial_;  // of the first opening
+  std::string usb_serial_;  // of the first opening; empty: none, or not the only one with it
 };
 
 }  // namespace vergence

@@ -163,10 +163,15 @@ void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
     case SyncMode::software:
       set->proof = SyncProof::by_time;
       return;
-    case SyncMode::bus:
-    case SyncMode::ptp:
     case SyncMode::one_picture:
       set->proof = SyncProof::common_clock;
+      return;
+    case SyncMode::bus:
+    case SyncMode::ptp:
+      // A clock that is common no more (no master, two of them) pairs one exposure with the next
+      // once it has drifted apart by an interval; the host's stamps know better.
+      set->proof = SyncProof::common_clock;
+      if (!host_stamps_agree(*set)) doubt(set);
       return;
     case SyncMode::board:
     case SyncMode::ins_syncout:
@@ -176,22 +181,25 @@ void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
                                                     matchers_[k].doubtful());
       set->proof =
           options_.mode == SyncMode::master_strobe ? SyncProof::master : SyncProof::numbered;
-      if (open->contradicted) {
-        set->proof = SyncProof::unproven;
-        ++counters_.unproven;
-      }
+      if (open->contradicted) doubt(set);
       return;
     case SyncMode::counter:
       break;
   }
-  const bool several = std::count(set->present.begin(), set->present.end(), true) > 1;
-  if (!several) return;
-  const bool agree = set->spread * 2 <= options_.interval;
-  if (!agree) {
-    set->proof = SyncProof::unproven;
-    ++counters_.unproven;
-  }
+  if (std::count(set->present.begin(), set->present.end(), true) < 2) return;
+  const bool agree = host_stamps_agree(*set);
+  if (!agree) doubt(set);
   if (by_counter_.judge(agree)) ++counters_.realigned;
+}
+
+/// True also of a single image, whose spread is none.
+bool RigSynchronizer::host_stamps_agree(const SyncedSet& set) const noexcept {
+  return set.spread * 2 <= options_.interval;
+}
+
+void RigSynchronizer::doubt(SyncedSet* set) noexcept {
+  set->proof = SyncProof::unproven;
+  ++counters_.unproven;
 }
 
 SyncCounters RigSynchronizer::counters() const noexcept {

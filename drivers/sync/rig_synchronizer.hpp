@@ -37,6 +37,8 @@ namespace vergence {
 ///            `unproven`. A pulse that runs back in number or has another `boot` makes all acquire
 ///            again. A frame that comes before its pulse's report is given the pulse's number all
 ///            the same; the report then confirms it, or the set is `unproven`.
+/// One clock  Of a set paired by stamps of one bus or PTP clock the host's stamps must agree within
+///            half an interval, else it is `unproven`.
 /// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot
 ///            be told here.
 /// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the
@@ -108,6 +110,8 @@ class RigSynchronizer {
   [[nodiscard]] Duration noise_of(std::size_t camera) const noexcept;
 
   void prove(OpenSet* open, SyncedSet* set) noexcept;
+  [[nodiscard]] bool host_stamps_agree(const SyncedSet& set) const noexcept;
+  void doubt(SyncedSet* set) noexcept;
   [[nodiscard]] bool ready(const OpenSet& open) const noexcept;
   [[nodiscard]] bool waited_for(std::size_t camera) const noexcept;
   void emit(OpenSet* open, SyncedSet* set) noexcept;

@@ -1,6 +1,23 @@
 #include "drivers/sync/sync_out_pulses.hpp"
 
 namespace vergence {
+namespace {
+
+/// A device that marks its pulses makes them at 400 Hz / n. The rate it was asked for is a decimal
+/// number, 26.6667 say: edges reckoned from that would run away from the pulses by milliseconds an
+/// hour.
+Duration as_marked(Duration asked) noexcept {
+  constexpr Duration kStep = Duration::nanoseconds(2'500'000);
+  constexpr std::int64_t kAccepted = 1000;  // it may be off by one part in so many
+  const Duration made = kStep * ((asked + kStep / 2).ns() / kStep.ns());
+  const Duration off = made < asked ? asked - made : made - asked;
+  return off * kAccepted <= asked ? made : asked;
+}
+
+}  // namespace
+
+SyncOutPulses::SyncOutPulses(Duration interval, std::uint32_t divider) noexcept
+    : interval_(divider == 0 ? as_marked(interval) : interval), divider_(divider) {}
 
 std::optional<Pulse> SyncOutPulses::reading(const InsReading& reading, MappedStamp at) noexcept {
   const bool marked = divider_ == 0;
@@ -28,6 +45,13 @@ std::optional<Pulse> SyncOutPulses::reading(const InsReading& reading, MappedSta
   const std::uint64_t number = base_ + static_cast<std::uint64_t>(steps);
   if (!of_pulse || (!begins && number <= number_)) return std::nullopt;
   number_ = number;
+  if (!marked) {
+    // It left with this very sample. Reckoned on from here, what the interval is off by never adds
+    // up.
+    first_ = reading.measured;
+    base_ = number;
+    off = {};
+  }
   Pulse p;
   p.number = number;
   p.edge = reading.measured - off;

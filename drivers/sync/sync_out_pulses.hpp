@@ -11,24 +11,20 @@ namespace vergence {
 /// The pulses of an INS's SyncOut, from its readings: for the mode ins_syncout.
 ///
 /// Numbers  Intervals of the INS's own clock, which makes the pulses too; a reading that was lost
-///          loses no number. A gap made on purpose
-/// must
-///          be told by restart(): numbers go on after it, for it is the gap between pulses of one
-///          boot that proves.
+///          loses no number. A gap made on purpose must be told by restart(): numbers go on after
+///          it, for it is the gap between pulses of one boot that proves.
 /// Marked   A device that marks its pulses (InsQuality::sync_out) does so on the sample after the
-///          pulse: edges are multiples of the
-/// interval
-///          from the earliest mark. One that does not pulses with every `divider`-th sample from
-///          its first since restart().
+///          pulse: edges are multiples of its interval, 400 Hz / n, from the earliest mark. One
+///          that does not pulses with every `divider`-th sample from its first since restart();
+///          each is reckoned from the one before.
 /// Threads  One caller. Memory: in place. Errors: none; a clock that runs back is another boot.
 /// A limit  The INS's clock must go on over the gap: one that is continued by the host's time only
 ///          proves nothing.
 class SyncOutPulses {
  public:
-  /// `interval`: between two pulses. `divider`: readings a pulse where none are marked; 0: they are
-  /// marked.
-  SyncOutPulses(Duration interval, std::uint32_t divider) noexcept
-      : interval_(interval), divider_(divider) {}
+  /// `interval`: between two pulses, as good as a decimal rate says it. `divider`: readings a pulse
+  /// where none are marked; 0: they are marked.
+  SyncOutPulses(Duration interval, std::uint32_t divider) noexcept;
 
   /// The pulse that left with this reading, if one did. `at`: the reading's stamp on the host's
   /// clock.
@@ -41,7 +37,7 @@ class SyncOutPulses {
   Duration interval_;
   std::uint32_t divider_;
   bool any_ = false, fresh_ = true;
-  DeviceStamp first_{};  // of the pulses since the gap, numbered base_
+  DeviceStamp first_{};  // pulse that the next are reckoned from, numbered base_
   DeviceStamp last_{};   // reading that was looked at
   std::uint64_t base_ = 0, number_ = 0;
   std::uint32_t boot_ = 0;

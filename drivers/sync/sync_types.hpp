@@ -88,13 +88,13 @@ struct SyncFrame {
 
 /// How sure it is that a set's images were exposed together.
 enum class SyncProof : std::uint8_t {
-  counted,   // paired by counter, and the stamps agree within half an interval (also: one image
-             // only)
-  unproven,  // paired by counter, and the stamps do not agree; or a pulse's report contradicts: do
-             // not estimate from it
-  by_time,   // paired by the host's stamps
-  numbered,  // every image belongs to this numbered pulse, as its camera's own intervals proved
-  master,    // the same with camera 0's exposures for pulses
+  counted,       // paired by counter, and the stamps agree within half an interval (also: one image
+                 // only)
+  unproven,      // paired by counter or a common clock, and the host's stamps do not agree; or a
+                 // pulse's report contradicts: do not estimate from it
+  by_time,       // paired by the host's stamps
+  numbered,      // every image belongs to this numbered pulse, as its camera's own intervals proved
+  master,        // the same with camera 0's exposures for pulses
   common_clock,  // paired by stamps of one common clock
 };
 [[nodiscard]] const char* to_string(SyncProof) noexcept;

@@ -57,7 +57,8 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
   }
 }
 
-/// `keep_slots`: of a camera that came back, whose images may be held; its size is the same.
+/// `keep_slots`: of a camera that came back, whose images may be held; their size is the same,
+/// their layout must be.
 DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool keep_slots) {
   Options options;
   if (!take_options(requested.options, option_table(), "V4L2 cameras", &options, &last_error_))
@@ -85,6 +86,9 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool kee
           apply(fd_.get(), node_.type, controls_, requested, options, &settings, &last_error_);
       s != DeviceStatus::ok)
     return s;
+  const bool in_place = settings.format.layout == Layout::luma_plane;
+  if (keep_slots && !exchange_.slots().fit(in_place, settings.stride))
+    return refuse(DeviceStatus::failed, "the camera came back with images of another layout");
   CaptureQueue queue(fd_.get(), node_.type);
   std::vector<Mapping> mappings;
   if (const int error = queue.request(static_cast<std::uint32_t>(options.buffers), &mappings);
@@ -103,7 +107,7 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool kee
   }
   stamps_ = stamp_kind(queue.description_flags(), 1);
   if (!keep_slots) {
-    if (settings.format.layout == Layout::luma_plane)
+    if (in_place)
       exchange_.use_buffers(requested.width, requested.height, settings.stride);
     else
       exchange_.use_pool(requested.width, requested.height);

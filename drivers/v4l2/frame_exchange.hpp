@@ -68,7 +68,7 @@ class FrameExchange {
 
   // The capture thread.
   [[nodiscard]] Buffers take_returned() noexcept;
-  /// Constant while it streams, as are the buffers.
+  /// Constant while it streams, as are the buffers. Before it does, the owner's too.
   [[nodiscard]] const Slots& slots() const noexcept { return slots_; }
   [[nodiscard]] std::span<std::uint8_t> writable(FrameSlot slot) noexcept {
     return slots_.writable(slot);

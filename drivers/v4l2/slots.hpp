@@ -31,6 +31,11 @@ class Slots {
   /// To be turned to grey: slots are the pool's. Precondition as above. May throw std::bad_alloc.
   void use_pool(int width, int height);
   [[nodiscard]] bool in_place() const noexcept { return pool_ == nullptr; }
+  /// Images that come grey with such rows, or that are to be turned to grey, fit the slots that are
+  /// there: those held can stay.
+  [[nodiscard]] bool fit(bool grey_as_they_come, std::size_t stride) const noexcept {
+    return grey_as_they_come == in_place() && (!grey_as_they_come || stride == stride_);
+  }
 
   /// New buffers from the kernel, those before become nobody's. Without effect on a pool's slots.
   void install(std::vector<Mapping> mappings);

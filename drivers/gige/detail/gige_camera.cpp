@@ -85,13 +85,22 @@ DeviceTiming GigeCamera::timing() const noexcept {
   return t;
 }
 
+/// Addresses change hands: the left camera must not become the right one. Null: *why says it.
+std::unique_ptr<Session> GigeCamera::open_ours(const std::string& address, std::string* why) const {
+  DeviceStatus status = DeviceStatus::ok;
+  std::unique_ptr<Session> session = Session::open(address, &status, why);
+  if (session == nullptr || session->info().serial == info_.serial) return session;
+  *why = "another camera, " + session->info().serial + ", has the address " + address +
+         " now, where " + info_.serial + " was";
+  return nullptr;
+}
+
 /// A session, the old one or a new one. Precondition: device_ held.
 DeviceStatus GigeCamera::reach() {
   if (session_ != nullptr && !session_->lost() && session_->in_control()) return DeviceStatus::ok;
   session_.reset();
-  DeviceStatus status = DeviceStatus::ok;
   std::string why;
-  session_ = Session::open(address_, &status, &why);
+  session_ = open_ours(address_, &why);
   if (session_ == nullptr) return last_error_.refuse(DeviceStatus::gone, why);
   stale_ = true;
   return DeviceStatus::ok;

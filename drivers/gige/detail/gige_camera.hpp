@@ -55,6 +55,8 @@ class GigeCamera final : public CameraDevice {
  private:
   /// Whether the camera can be asked now. → ok, stopped, gone
   [[nodiscard]] DeviceStatus standing() const noexcept;
+  [[nodiscard]] std::unique_ptr<Session> open_ours(const std::string& address,
+                                                   std::string* why) const;
   [[nodiscard]] DeviceStatus reach();
   [[nodiscard]] DeviceStatus apply_again();
   [[nodiscard]] DeviceStatus begin(Notifier* ready);

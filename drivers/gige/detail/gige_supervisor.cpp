@@ -92,15 +92,13 @@ void GigeCamera::lose(const Fault& fault) {
 
 bool GigeCamera::reopen() {
   const std::lock_guard lock(device_);
-  DeviceStatus status = DeviceStatus::ok;
   std::string why;
-  session_ = Session::open(address_, &status, &why);
-  if (session_ != nullptr && session_->info().serial != info_.serial) session_.reset();
-  if (session_ == nullptr && status == DeviceStatus::not_found &&
-      !supervisor_.stopping())  // with another address, perhaps
+  session_ = open_ours(address_, &why);
+  // With another address, perhaps, whoever has the old one now: nobody, or another camera.
+  if (session_ == nullptr && !info_.serial.empty() && !supervisor_.stopping())
     for (const Found& f : discover())
       if (f.info.serial == info_.serial && session_ == nullptr)
-        session_ = Session::open(f.info.place, &status, &why);
+        session_ = open_ours(f.info.place, &why);
   if (session_ == nullptr || supervisor_.stopping()) return false;
   address_ = session_->info().place;
   if (apply_again() == DeviceStatus::ok) return true;

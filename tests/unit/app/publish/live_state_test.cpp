@@ -77,6 +77,24 @@ TEST(LiveState, tellsWhatIsNewOnceAndALateViewerEverything) {
   EXPECT_FALSE(hello["ended"].get<bool>());
 }
 
+TEST(LiveState, aLateViewerReadsWhereACalibrationIsFromWhenItsSourceIsGone) {
+  LiveState state;
+  auto source = std::make_unique<std::string>("a calibration file of some other day");
+  state.add(CalibrationRecord::begin({}, Stamp(), "given", *source));
+  source.reset();
+  const json hello = json::parse(state.hello());
+  EXPECT_EQ(hello["calibration"]["history"][0]["reason"], "a calibration file of some other day");
+}
+
+TEST(LiveState, anOriginThatIsTooLongIsCutAtAWholeCharacter) {
+  std::string path(254, '/');
+  path += "\xc3\xa4";  // the second byte would be the array's last
+  LiveState state;
+  state.add(CalibrationRecord::begin({}, Stamp(), "state_file", path));
+  const json hello = json::parse(state.hello());
+  EXPECT_EQ(hello["calibration"]["history"][0]["reason"], std::string(254, '/'));
+}
+
 TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
   LiveState state;
   std::size_t told = 0;

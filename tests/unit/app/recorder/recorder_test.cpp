@@ -17,6 +17,7 @@
 #include "core/math/so3.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/recorder/broken_descriptor.hpp"
 
 namespace vergence::app {
 namespace {
@@ -487,6 +488,50 @@ TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
     return c.find("lines that found no room on the disk in time; the others are all there") !=
            std::string::npos;
   }));
+}
+
+TEST(Recorder, aDiskThatIsMountedAgainGoesOnWithTheLinesThatWaited) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path session = folder / "session", away = folder / "away";
+  std::filesystem::create_directory(session);
+  Recorder recorder(session, {});
+  const auto post = [&recorder](std::uint64_t first, std::uint64_t end) {
+    for (std::uint64_t i = first; i < end; ++i)
+      recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  };
+  const auto has_lines = [](const std::filesystem::path& file, std::size_t lines) {
+    for (int i = 0; i < 1000; ++i) {
+      if (lines_of(file).size() == lines) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+  };
+  post(0, 5);
+  ASSERT_TRUE(has_lines(session / "trajectory.tum", 5));
+  ASSERT_TRUE(has_lines(session / "poses.csv", 6));
+  std::filesystem::rename(session, away);
+  for (const char* file : {"trajectory.tum", "poses.csv", "events.jsonl"})
+    ASSERT_EQ(test::break_descriptors_of(away / file), 1) << file;
+  post(5, 10);
+  std::vector<std::string> errors;
+  for (int i = 0; i < 500 && errors.empty(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    errors = recorder.take_errors();
+  }
+  ASSERT_FALSE(errors.empty());
+  EXPECT_NE(errors[0].find("check that disk"), std::string::npos) << errors[0];
+  std::filesystem::rename(away, session);
+  for (std::uint64_t i = 10; i < 10'000 && lines_of(session / "poses.csv").size() == 6; ++i) {
+    post(i, i + 1);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  const auto totals = recorder.close();
+  EXPECT_TRUE(totals->faults.empty());
+  EXPECT_EQ(totals->lost_lines, 0U);
+  EXPECT_EQ(lines_of(session / "trajectory.tum").size(), totals->read);
+  EXPECT_EQ(lines_of(session / "poses.csv").size(), totals->read + 1);
+  EXPECT_EQ(told(session, "disk_full").size(), 1U);
+  EXPECT_EQ(told(session, "disk_room").size(), 1U);
 }
 
 TEST(Recorder, aDiskThatIsFullToTheEndLeavesFilesThatAreNotWholeAndNamesThem) {

@@ -80,18 +80,20 @@ TEST_F(ServiceManagerTest, AsksForMoreTimeAndIsAliveWhileTheSessionIsClosed) {
 TEST_F(ServiceManagerTest, ASlowLoopIsAliveAndAHungOneIsNot) {
   ServiceManager service(path.string(), 9s);
   for (int second = 0; second < 9; ++second)
-    service.alive(static_cast<std::uint64_t>(second + 1), begin + second * 1s);
+    service.alive(static_cast<std::uint64_t>(second + 1), 0, begin + second * 1s);
   // Three signs in nine seconds.
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(manager.heard().starts_with("WATCHDOG=1\nSTATUS=")) << i;
   EXPECT_EQ(manager.heard(), "");
-  for (int second = 9; second < 60; ++second) service.alive(9, begin + second * 1s);
+  for (int second = 9; second < 60; ++second) service.alive(9, 0, begin + second * 1s);
   EXPECT_TRUE(manager.heard().starts_with("WATCHDOG=1")) << "of what was handled before it hung";
   EXPECT_EQ(manager.heard(), "");
 }
 
 TEST_F(ServiceManagerTest, WithoutAWatchdogTheStatusGoesOutOnceASecond) {
   ServiceManager service(path.string(), 0s);
-  for (int i = 0; i < 20; ++i) service.alive(static_cast<std::uint64_t>(i + 1), begin + i * 100ms);
+  for (int i = 0; i < 20; ++i)
+    service.alive(static_cast<std::uint64_t>(i + 5), static_cast<std::uint64_t>(i + 1),
+                  begin + i * 100ms);
   EXPECT_EQ(manager.heard(), "STATUS=1 frames, readings and events handled");
   EXPECT_EQ(manager.heard(), "STATUS=11 frames, readings and events handled");
   EXPECT_EQ(manager.heard(), "");
@@ -101,7 +103,7 @@ TEST_F(ServiceManagerTest, NobodyAsksOrTheNameIsNoSocketsName) {
   for (const std::string& name : {std::string(), std::string("notify"), std::string(300, '/')}) {
     ServiceManager service(name, 1s);
     service.ready();
-    service.alive(1, begin);
+    service.alive(1, 1, begin);
   }
   EXPECT_EQ(manager.heard(), "");
   ServiceManager gone((folder / "nobody").string(), 1s);

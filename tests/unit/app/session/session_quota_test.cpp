@@ -1,6 +1,7 @@
 #include "app/session/session_quota.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <fstream>
@@ -58,9 +59,66 @@ TEST(SessionQuota, whatIsNoSessionARunningDriveALinkAndTheSessionItselfStay) {
 
 TEST(SessionQuota, aPathThatEndsWithASlashIsTheSameSession) {
   const test::TemporaryFolder folder;
-  make_session(folder / "now", 2);
-  EXPECT_TRUE(keep_session_quota((folder / "now").string() + "/", 0).empty());
-  EXPECT_TRUE(fs::exists(folder / "now"));
+  for (const char* end : {"/", "//", "/."}) {
+    make_session(folder / "now", 2);
+    make_session(folder / "now" / "inside", 2);
+    make_session(folder / "beside", 3);
+    EXPECT_EQ(keep_session_quota((folder / "now").string() + end, 0).size(), 1U) << end;
+    EXPECT_FALSE(fs::exists(folder / "beside")) << end;
+    EXPECT_TRUE(fs::exists(folder / "now" / "inside" / "poses.csv")) << end;
+  }
+}
+
+TEST(SessionQuota, theSessionsOwnFolderNeedNotBeThereYet) {
+  const test::TemporaryFolder folder;
+  for (const char* own : {"now", "now/"}) {
+    make_session(folder / "old", 3);
+    EXPECT_EQ(keep_session_quota(folder / own, 0).size(), 1U) << own;
+    EXPECT_TRUE(fs::is_empty(folder.path())) << own;
+  }
+}
+
+/// Somebody who may remove nothing from a folder without write permission, which root may.
+class Unprivileged {
+ public:
+  explicit Unprivileged(const fs::path& owned) : root_(::geteuid() == 0) {
+    if (!root_) return;
+    ready_ = ::chown(owned.c_str(), kNobody, kNobody) == 0;
+    for (const auto& entry : fs::recursive_directory_iterator(owned))
+      ready_ = ready_ && ::chown(entry.path().c_str(), kNobody, kNobody) == 0;
+    ready_ = ready_ && ::seteuid(kNobody) == 0;
+  }
+  ~Unprivileged() {
+    if (root_) (void)::seteuid(0);
+  }
+  Unprivileged(const Unprivileged&) = delete;
+  Unprivileged& operator=(const Unprivileged&) = delete;
+  [[nodiscard]] bool ready() const { return ready_; }
+
+ private:
+  static constexpr uid_t kNobody = 65534;
+  bool root_, ready_ = true;
+};
+
+TEST(SessionQuota, oneThatCannotGoStaysASessionAndCostsNoNewerOne) {
+  const test::TemporaryFolder folder;
+  make_session(folder / "stuck", 9);
+  make_session(folder / "older", 5);
+  make_session(folder / "newer", 3);
+  fs::permissions(folder / "stuck" / "more", fs::perms::owner_read | fs::perms::owner_exec);
+  {
+    const Unprivileged user(folder.path());
+    if (!user.ready()) GTEST_SKIP() << "the tests run as a root who cannot become somebody else";
+    const auto sentences = keep_session_quota(folder / "now", kSize + 5000);
+    ASSERT_EQ(sentences.size(), 2U);
+    EXPECT_NE(sentences[0].find("/stuck: is over"), std::string::npos) << sentences[0];
+    EXPECT_NE(sentences[1].find("/older: removed"), std::string::npos) << sentences[1];
+    EXPECT_TRUE(fs::exists(folder / "newer"));
+    EXPECT_TRUE(fs::exists(folder / "stuck" / "poses.csv")) << "what is left would be no session";
+  }
+  fs::permissions(folder / "stuck" / "more", fs::perms::owner_all);
+  EXPECT_EQ(keep_session_quota(folder / "now", kSize + 5000).size(), 1U);
+  EXPECT_FALSE(fs::exists(folder / "stuck")) << "cut short once, it goes the next time";
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 #include "app/session/session_runner.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/recorder/pose_line.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -222,6 +225,66 @@ TEST(SessionRunner, whatAnObserverAsksForActsOnceWhereTheSessionCanAndItsCounter
   std::ifstream in(options.out / "summary.json");
   const std::string summary(std::istreambuf_iterator<char>(in), {});
   EXPECT_NE(summary.find("\"asked\": 17"), std::string::npos);
+}
+
+TEST(SessionRunner, theQuotaMakesRoomBeforeTheFolderAndASessionThatIsRefusedCostsNone) {
+  const test::TemporaryFolder folder;
+  const auto make_old = [&folder] {
+    folder.write("old/poses.csv", kPosesHeader);
+    folder.write("old/summary.json", "{}");
+    folder.write("old/drive.mcap", "");
+    std::filesystem::resize_file(folder / "old/drive.mcap", 2'000'000);
+  };
+  const Configuration configuration = load_configuration(std::nullopt, {"sessions.quota_mb=1"});
+  const SignalGuard signals;
+  SessionOptions options;
+  options.out = folder / "taken";
+  options.quiet = true;
+  make_old();
+  folder.write("taken/notes.txt", "mine");
+  BlackSource refused(2);
+  EXPECT_THROW((void)run_session(refused, configuration, options, signals), InputError);
+  EXPECT_TRUE(std::filesystem::exists(folder / "old"));
+
+  // A folder that cannot be made, as on a full disk: the old session went first.
+  options.out = folder / "new";
+  std::filesystem::create_symlink(folder / "none" / "new", options.out);
+  BlackSource without_room(2);
+  EXPECT_THROW((void)run_session(without_room, configuration, options, signals), InputError);
+  EXPECT_FALSE(std::filesystem::exists(folder / "old"));
+}
+
+/// Keeps calibration.yaml from being written until the first pose.
+class InTheWay final : public SessionObserver {
+ public:
+  explicit InTheWay(const std::filesystem::path& session)
+      : folder_((session / "calibration.yaml.new").string()) {}
+  void on_start(const SessionStart& /*start*/) noexcept override {
+    made_ = ::mkdir(folder_.c_str(), 0755) == 0;
+  }
+  void on_pose(const PoseSample& /*sample*/) noexcept override { (void)::rmdir(folder_.c_str()); }
+  [[nodiscard]] bool made() const { return made_; }
+
+ private:
+  std::string folder_;
+  bool made_ = false;
+};
+
+TEST(SessionRunner, aCalibrationThatCouldNotBeWrittenAtTheStartIsWrittenAtTheEnd) {
+  const test::TemporaryFolder folder;
+  BlackSource source(4);
+  SessionOptions options;
+  options.out = folder / "session";
+  options.quiet = true;
+  InTheWay in_the_way(options.out);
+  options.observers = {&in_the_way};
+  const SignalGuard signals;
+  testing::internal::CaptureStderr();
+  (void)run_session(source, load_configuration(std::nullopt, {}), options, signals);
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(in_the_way.made());
+  EXPECT_TRUE(std::filesystem::exists(options.out / "calibration.yaml"));
+  EXPECT_EQ(said.find("calibration.yaml:"), std::string::npos) << said;
 }
 
 TEST(SessionRunner, withoutAPoseThatIsTheVerdictWhateverTheSourceThinks) {

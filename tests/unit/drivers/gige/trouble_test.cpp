@@ -125,6 +125,54 @@ TEST(GigeTrouble, anUnpluggedCameraThatRestsIsNoticed) {
   EXPECT_LT(seconds_since(begin), 15) << "stop() waits for one attempt at most";
 }
 
+GigeCameraOptions at_address_of(const GigeBench& b, const std::string& serial) {
+  GigeCameraOptions o = b.simulator->options();
+  o.serial = serial;
+  return o;
+}
+
+TEST(GigeTrouble, anotherCameraAtItsAddressIsNotTakenForIt) {
+  GigeBench b;
+  b.configure(b.wish());
+  b.start();
+  EXPECT_EQ(b.take(3).size(), 3U);
+  b.camera->stop();
+  const GigeCameraOptions other = at_address_of(b, "OTHER"), same = b.simulator->options();
+  b.simulator.reset();
+  b.simulator = std::make_unique<GigeCamera>(other);
+  EXPECT_EQ(b.camera->start(nullptr), DeviceStatus::gone);
+  EXPECT_NE(b.camera->last_error().find("another camera, OTHER,"), std::string::npos)
+      << b.camera->last_error();
+  EXPECT_EQ(b.simulator->report().starts, 0U);
+  b.simulator.reset();
+  b.simulator = std::make_unique<GigeCamera>(same);
+  ASSERT_EQ(b.camera->start(nullptr), DeviceStatus::ok) << b.camera->last_error();
+  EXPECT_EQ(b.take(3).size(), 3U);
+}
+
+TEST(GigeTrouble, isFoundElsewhereThoughAnotherCameraHasItsAddress) {
+  GigeBench b({}, 202);
+  if (gige::make_driver()->enumerate().empty())
+    GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
+  b.configure(b.wish());
+  b.start();
+  EXPECT_EQ(b.take(3).size(), 3U);
+  const GigeCameraOptions other = at_address_of(b, "OTHER");
+  GigeCameraOptions moved = b.simulator->options();
+  moved.address = GigeCamera::address(203);
+  b.simulator.reset();
+  const GigeCamera stranger(other);
+  b.simulator = std::make_unique<GigeCamera>(moved);
+  ASSERT_TRUE(goes(&b, 12));
+  const auto begin = Clock::now();
+  DeviceStatus status = DeviceStatus::gone;
+  while ((status = b.camera->start(nullptr)) == DeviceStatus::gone && seconds_since(begin) < 30)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  ASSERT_EQ(status, DeviceStatus::ok) << b.camera->last_error();
+  EXPECT_EQ(b.take(3).size(), 3U);
+  EXPECT_EQ(stranger.report().starts, 0U);
+}
+
 TEST(GigeTrouble, losingControlToSomebodyElseIsGone) {
   GigeBench b;
   b.configure(b.wish());

@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <memory>
+#include <span>
+#include <string>
 #include <thread>
 
 #include "drivers/gnss/gnss.hpp"
@@ -116,6 +121,92 @@ TEST(GnssDevice, silenceIsGoneAndFixesBringItBack) {
   for (int i = 0; i < 200 && device->start(nullptr) == DeviceStatus::gone; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_EQ(device->wait(Duration::seconds(5), &r), DeviceStatus::ok);
+}
+
+/// A receiver at a baud rate of its own, an epoch every 100 ms of virtual time.
+struct Wire {
+  std::atomic<std::uint32_t> baud{38400};
+  std::atomic<std::int64_t> now{1'000'000'000};  // ns
+};
+
+class WireLine final : public ByteLine {
+ public:
+  WireLine(Wire* wire, std::uint32_t baud) : wire_(*wire), baud_(baud) {}
+  [[nodiscard]] LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
+    constexpr std::int64_t kEpoch = 100'000'000;
+    if (woken_.exchange(false)) return {DeviceStatus::stopped, 0, {}};
+    const std::int64_t number = wire_.now / kEpoch + 1, next = number * kEpoch;
+    if (wire_.baud != baud_ || next > wire_.now + limit.ns()) {
+      wire_.now += limit.ns();
+      return {};
+    }
+    wire_.now = next;
+    const std::string bytes = ubx_epoch(static_cast<int>(number));
+    std::copy(bytes.begin(), bytes.end(), out.begin());
+    return {DeviceStatus::ok, bytes.size(), now()};
+  }
+  [[nodiscard]] DeviceStatus write(std::span<const std::uint8_t>, Duration) noexcept override {
+    return DeviceStatus::failed;
+  }
+  [[nodiscard]] DeviceStatus set_baud(std::uint32_t baud) noexcept override {
+    baud_ = baud;
+    return DeviceStatus::ok;
+  }
+  [[nodiscard]] std::uint32_t baud() const noexcept override { return baud_; }
+  void discard_input() noexcept override {}
+  void wake() noexcept override { woken_ = true; }
+  [[nodiscard]] HostStamp now() const noexcept override { return HostStamp(wire_.now); }
+
+ private:
+  Wire& wire_;
+  std::uint32_t baud_;
+  std::atomic<bool> woken_{false};
+};
+
+class WirePlace final : public LinePlace {
+ public:
+  explicit WirePlace(Wire* wire) : wire_(*wire) {}
+  [[nodiscard]] std::unique_ptr<ByteLine> open(const LineSettings& settings,
+                                               DeviceStatus* status) override {
+    *status = DeviceStatus::ok;
+    return std::make_unique<WireLine>(&wire_, settings.baud);
+  }
+  [[nodiscard]] std::string name() const override { return "wire"; }
+  [[nodiscard]] bool pass(Duration time) override {
+    wire_.now += time.ns();
+    return true;
+  }
+
+ private:
+  Wire& wire_;
+};
+
+/// What wait() says once the receiver went over from 38400 to 115200 baud and was waited for.
+DeviceStatus after_another_baud(std::uint32_t asked) {
+  Wire wire;
+  Device device(std::make_unique<WirePlace>(&wire), {Protocol::ubx, asked, {}});
+  EXPECT_EQ(device.connect(), DeviceStatus::ok) << device.last_error();
+  EXPECT_EQ(device.configure(10, nullptr), DeviceStatus::ok) << device.last_error();
+  EXPECT_EQ(device.start(nullptr), DeviceStatus::ok);
+  InsReading r;
+  EXPECT_EQ(device.wait(Duration::seconds(5), &r), DeviceStatus::ok);
+  wire.baud = 115200;
+  DeviceStatus status = DeviceStatus::ok;
+  while (status == DeviceStatus::ok) status = device.wait(Duration::seconds(5), &r);
+  EXPECT_EQ(status, DeviceStatus::gone);
+  for (int i = 0; i < 200 && device.start(nullptr) == DeviceStatus::gone; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  status = device.wait(Duration::seconds(1), &r);
+  EXPECT_EQ(device.last_error(), "") << "the owner's alone";
+  return status;
+}
+
+TEST(GnssDevice, aReceiverThatComesBackAtAnotherBaudRateIsFoundAgain) {
+  EXPECT_EQ(after_another_baud(0), DeviceStatus::ok);
+}
+
+TEST(GnssDevice, theBaudRateThatWasAskedForStays) {
+  EXPECT_EQ(after_another_baud(38400), DeviceStatus::gone);
 }
 
 }  // namespace

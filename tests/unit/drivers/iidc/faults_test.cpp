@@ -174,6 +174,28 @@ TEST(IidcFaults, AFreeRunningCameraThatFallsSilentIsGoneAndIsOpenedAnew) {
   EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
 }
 
+TEST(IidcFaults, ACameraThatFallsSilentWhileAnImageIsHeldGoesOnBesideIt) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->expose(2);
+  (void)c.take_and_release();
+  const Frame held = c.take();
+  const std::uint8_t seen = c.camera->view(held.slot).at(0, 1);
+  Frame f;
+  DeviceStatus status = DeviceStatus::timeout;
+  for (int i = 0; i < 300 && status == DeviceStatus::timeout; ++i)  // 30 s at most
+    status = c.camera->wait(Duration::milliseconds(100), &f);
+  ASSERT_EQ(status, DeviceStatus::gone);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->last_error();
+  EXPECT_EQ(c.bus->reopened(), 1);
+  EXPECT_EQ(c.camera->view(held.slot).at(0, 1), seen) << "an image that is held stays";
+  c.camera->release(held.slot);
+  for (std::size_t i = 0; i < 2 * c.bus->shape().buffers; ++i) {
+    c.bus->expose(1);
+    EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
+  }
+}
+
 TEST(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
   CameraUnderTest c;
   c.start();

@@ -254,6 +254,39 @@ TEST(SerialPort, opensThroughALink) {
   ::close(master);
 }
 
+SerialPortInfo usb_port(const std::string& port, const std::string& serial) {
+  SerialPortInfo info;
+  info.port = port;
+  info.usb_serial = serial;
+  return info;
+}
+
+TEST(SerialPort, aDeviceThatCameBackElsewhereIsFoundByItsSerialNumber) {
+  const std::vector<SerialPortInfo> ports{usb_port("/dev/ttyS0", ""), usb_port("/dev/ttyV0", "B"),
+                                          usb_port("/dev/ttyV1", "A")};
+  EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV0"), "/dev/ttyV1") << "V0 is another now";
+  EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV7"), "/dev/ttyV1");
+  EXPECT_EQ(port_with_serial(ports, "C", "/dev/ttyV7"), "/dev/ttyV7") << "nobody is C";
+  EXPECT_EQ(port_with_serial(ports, "", "/dev/ttyV7"), "/dev/ttyV7") << "never by no number";
+}
+
+TEST(SerialPort, ofPortsThatShareASerialNumberTheOneAskedForIsTaken) {
+  // An FT4232H has one number for its four ports, a CP2102 often has "0001".
+  const std::vector<SerialPortInfo> ports{usb_port("/dev/ttyV0", "A"), usb_port("/dev/ttyV1", "A"),
+                                          usb_port("/dev/ttyV2", "A")};
+  EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV1"), "/dev/ttyV1");
+  EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV7"), "/dev/ttyV7") << "which one nobody knows";
+}
+
+TEST(SerialPort, aLinkIsKeptWhereItLeadsToThePortWithTheSerialNumber) {
+  const std::filesystem::path link =
+      std::filesystem::temp_directory_path() / ("vergence-by-id-" + std::to_string(::getpid()));
+  std::filesystem::create_symlink("/dev/null", link);
+  const std::vector<SerialPortInfo> ports{usb_port("/dev/ttyV0", "A"), usb_port("/dev/null", "A")};
+  EXPECT_EQ(port_with_serial(ports, "A", link.string()), link.string());
+  std::filesystem::remove(link);
+}
+
 TEST(SerialPort, whatCannotBeOpenedIsNamed) {
   DeviceStatus status = DeviceStatus::ok;
   EXPECT_EQ(SerialPort("/dev/ttyThatIsNotThere").open({}, &status), nullptr);

@@ -62,6 +62,18 @@ TEST(V4l2Slots, whatIsHeldOutlivesTheCamera) {
   EXPECT_EQ(slots.held(), 0U);
 }
 
+TEST(V4l2Slots, imagesOfAnotherLayoutDoNotFit) {
+  Slots slots;
+  slots.use_buffers(60, 40, 64);
+  EXPECT_TRUE(slots.fit(true, 64));
+  EXPECT_FALSE(slots.fit(true, 80)) << "rows of another length";
+  EXPECT_FALSE(slots.fit(false, 64)) << "to be turned to grey";
+  slots.use_pool(60, 40);
+  EXPECT_TRUE(slots.fit(false, 128));
+  EXPECT_TRUE(slots.fit(false, 256)) << "the pool has rows of its own";
+  EXPECT_FALSE(slots.fit(true, 64));
+}
+
 TEST(V4l2Slots, moreBuffersThanSlotsAreNotUsed) {
   Slots slots;
   slots.use_buffers(60, 40, 64);

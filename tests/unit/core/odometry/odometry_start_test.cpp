@@ -1,0 +1,91 @@
+// What a scene is begun from, and what it is not.
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+
+#include <cstring>
+
+#include "core/odometry/odometry.hpp"
+#include "tests/unit/core/odometry/corridor.hpp"
+
+namespace vergence::odometry {
+namespace {
+
+struct Fixture {
+  explicit Fixture(const RigCalibration& rig)
+      : arena(Odometry::memory_needed(options, rig)), odometry(options, rig, true, arena, runner) {}
+  OdometryOptions options;
+  SequentialRunner runner;
+  Arena arena;
+  Odometry odometry;
+};
+
+/// An image in memory of its own that can be taken away, as a camera's driver does when it begins
+/// anew.
+class LentImage {
+ public:
+  explicit LentImage(const ImageView& from)
+      : bytes_(static_cast<std::size_t>(from.width) * static_cast<std::size_t>(from.height)),
+        memory_(mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)),
+        view_(from) {
+    for (int y = 0; y < from.height; ++y)
+      std::memcpy(static_cast<std::uint8_t*>(memory_) + y * from.width, from.row(y),
+                  static_cast<std::size_t>(from.width));
+    view_.data = static_cast<const std::uint8_t*>(memory_);
+    view_.stride = from.width;
+  }
+  LentImage(const LentImage&) = delete;
+  LentImage& operator=(const LentImage&) = delete;
+  ~LentImage() { (void)munmap(memory_, bytes_); }
+  [[nodiscard]] const ImageView& view() const { return view_; }
+  void take_back() { (void)mprotect(memory_, bytes_, PROT_NONE); }
+
+ private:
+  std::size_t bytes_;
+  void* memory_;
+  ImageView view_;
+};
+
+TEST(OdometryStart, aLeftCameraThatIsGoneIsNotLookedAtInTheMemoryItHad) {
+  constexpr int kGone = 6, kBack = 60;
+  test::Corridor corridor;
+  Fixture f(corridor.rig());
+  RigFrame frame;
+  for (int i = 0; i < kGone; ++i) {
+    frame = corridor.frame(i);
+    LentImage left(frame.images[0]);
+    frame.images[0] = left.view();
+    EXPECT_TRUE(f.odometry.process(frame).posed) << i;
+    left.take_back();
+  }
+  int lost = 0;
+  for (int i = kGone; i < kBack; ++i) {
+    frame = corridor.frame(i);
+    frame.images[0] = {};
+    const FrameOutcome out = f.odometry.process(frame);
+    EXPECT_NE(out.status, PoseStatus::ok) << i;
+    if (out.posed) continue;
+    ++lost;
+    EXPECT_EQ(out.reason, Reason::no_image) << i;
+  }
+  EXPECT_GT(lost, 10) << "the map outlived the camera: no scene was begun without it";
+  int posed = 0;
+  for (int i = kBack; i < kBack + 20; ++i) posed += f.odometry.process(corridor.frame(i)).posed;
+  EXPECT_GT(posed, 15);
+}
+
+// 20 mm of baseline: everything matches, nearly all of it with a disparity that measures no depth.
+TEST(OdometryStart, whereAllIsFarTheRigIsNotSaidToBeUnfit) {
+  test::Corridor corridor;
+  RigCalibration rig = corridor.rig();
+  rig.T_camera_left[1].t *= 0.02 / rig.baseline;
+  rig.baseline = 0.02;
+  Fixture f(rig);
+  for (int i = 0; i < 10; ++i) {
+    const FrameOutcome out = f.odometry.process(corridor.frame(i, rig.T_camera_left));
+    EXPECT_FALSE(out.posed) << i;
+    EXPECT_EQ(out.reason, Reason::weak_geometry) << i << ' ' << to_string(out.reason);
+  }
+}
+
+}  // namespace
+}  // namespace vergence::odometry

@@ -1,0 +1,80 @@
+#include "drivers/sync/sync_out_pulses.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <optional>
+
+/// The rate of the pulses is written with six digits, the device's own is 400 Hz / n or its sample
+/// rate / n: over a long drive the difference must add up to nothing.
+namespace vergence {
+namespace {
+
+constexpr std::int64_t kBegin = 1'000'000'000, kTenHours = 36'000'000'000'000;  // ns
+constexpr std::int64_t kSample = 10'000'000;                                    // ns
+constexpr std::int64_t kOffset = 5;  // ns, the host's clock before the device's
+
+/// What came of ten hours.
+struct Account {
+  std::int64_t taken = 0, wrong = 0;
+
+  void add(const std::optional<Pulse>& p, std::int64_t number, std::int64_t edge) {
+    if (!p) return;
+    ++taken;
+    const Duration off = p->host - HostStamp(edge + kOffset);
+    const bool right = p->number == static_cast<std::uint64_t>(number) && off <= p->host_error &&
+                       -off <= p->host_error;
+    wrong += right ? 0 : 1;
+  }
+};
+
+std::optional<Pulse> read(SyncOutPulses* pulses, std::int64_t sample, bool marked) {
+  InsReading r;
+  r.measured = DeviceStamp(sample);
+  r.quality.sync_out = marked;
+  return pulses->reading(r, {HostStamp(sample + kOffset), Duration::microseconds(9)});
+}
+
+TEST(SyncOutPulses, MarksStayWhereThePulsesAreForHours) {
+  constexpr std::int64_t kPulse = 37'500'000;  // 400 Hz / 15: 26.66… Hz
+  for (const double rate : {26.6667, 26.6666}) {
+    SyncOutPulses pulses(Duration::seconds(1 / rate), 0);
+    Account account;
+    std::int64_t n = 0;
+    for (std::int64_t edge = kBegin; edge < kTenHours; edge += kPulse, ++n)
+      account.add(read(&pulses, (edge + kSample - 1) / kSample * kSample, true), n, edge);
+    EXPECT_EQ(account.wrong, 0) << rate;
+    EXPECT_EQ(account.taken, n) << rate;
+  }
+}
+
+TEST(SyncOutPulses, CountedOnesStayOnTheirSamplesForHoursThoughReadingsAreLost) {
+  constexpr std::int64_t kDivider = 3;  // 100 Hz / 3: 33.33… Hz
+  for (const double rate : {33.3333, 33.3334}) {
+    SyncOutPulses pulses(Duration::seconds(1 / rate), kDivider);
+    Account account;
+    std::int64_t made = 0;
+    for (std::int64_t i = 0; kBegin + i * kSample < kTenHours; ++i) {
+      if (i % 1000 >= 900) continue;  // one second in ten is lost
+      made += i % kDivider == 0 ? 1 : 0;
+      account.add(read(&pulses, kBegin + i * kSample, false), i / kDivider, kBegin + i * kSample);
+    }
+    EXPECT_EQ(account.wrong, 0) << rate;
+    EXPECT_EQ(account.taken, made) << rate;
+  }
+}
+
+TEST(SyncOutPulses, AnIntervalThatIsNoneOfTheDevicesIsTakenAsItIs) {
+  constexpr std::int64_t kPulse = 37'600'000;  // 0.27 % beside 400 Hz / 15
+  SyncOutPulses pulses(Duration::nanoseconds(kPulse), 0);
+  Account account;
+  for (std::int64_t n = 0; n < 10'000; ++n) {
+    const std::int64_t edge = kBegin + n * kPulse;
+    account.add(read(&pulses, edge, true), n, edge);
+  }
+  EXPECT_EQ(account.wrong, 0);
+  EXPECT_EQ(account.taken, 10'000);
+}
+
+}  // namespace
+}  // namespace vergence
