@@ -62,17 +62,16 @@ struct Monitor::Parts {
   std::uint64_t collapsed_from = 0, standing_from = 0;
   double lag_found = 0;       // the last one that was `out_of_step`, frames
   bool measured_lag = false;  // by the frame looked at
-  int small_lag = 0;          // measured frames in a row with less than what is called a lag
 
   void forget() noexcept {
     looks.reset();
     windows.reset(options, covariance);
     latest = detail::Decision{};
     latest.lag_sigma = latest.yaw_sigma = std::numeric_limits<double>::infinity();
-    agreed = poor = collapsed = standing_over = small_lag = 0;
+    agreed = poor = collapsed = standing_over = 0;
     measured_lag = false;
   }
-  [[nodiscard]] bool in_step() noexcept;
+  [[nodiscard]] bool in_step() const noexcept;
   void watch_collapse(const MonitorFrame& frame) noexcept;
   void watch_matches(const MonitorFrame& frame) noexcept;
   void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& look) noexcept;
@@ -180,16 +179,11 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
 }
 
 /// Of frames that measured it: while standing, or where hardly anything matches, `latest` is of
-/// frames before. A rig whose cameras are a constant fifth of a frame apart was never called out of
-/// step for that: after a long window of it an alarm is over as well.
-bool Monitor::Parts::in_step() noexcept {
-  if (!measured_lag) return false;
-  const bool quiet = latest.kind == Kind::quiet && !latest.undecided &&
-                     std::abs(latest.lag) < options.lag_frames &&
-                     latest.lag_sigma < kLagSigma * std::max(lag_found, options.lag_frames);
-  small_lag = quiet ? std::min(small_lag + 1, options.long_window) : 0;
-  return quiet &&
-         (std::abs(latest.lag) < kNoLag * options.lag_frames || small_lag == options.long_window);
+/// frames before.
+bool Monitor::Parts::in_step() const noexcept {
+  return measured_lag && latest.kind == Kind::quiet && !latest.undecided &&
+         std::abs(latest.lag) < kNoLag * options.lag_frames &&
+         latest.lag_sigma < kLagSigma * std::max(lag_found, options.lag_frames);
 }
 
 MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {

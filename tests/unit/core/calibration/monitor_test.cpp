@@ -181,29 +181,6 @@ TEST(Monitor, saysInStepOfAFrameThatMovesOnly) {
   }
 }
 
-// A fifth of a frame is not called out of step, so it must not keep what once was so for ever.
-TEST(Monitor, saysInStepOfAConstantLagTooSmallToBeCalledOne) {
-  constexpr std::uint64_t kFrom = 150, kUntil = 240;
-  FeatureDriveOptions o = street(8, 3, 300);
-  o.lags = {{0, 0.2}, {kFrom, 1.0}, {kUntil, 0.2}};
-  MonitorTrial trial(o);
-  for (std::uint64_t i = 0; i < kFrom; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
-  while (trial.frame().frame + 1 < kUntil)
-    if (trial.step().kind == Kind::out_of_step) trial.monitor().reset();
-  const int long_window = calibration::MonitorOptions{}.long_window;
-  int in_step = 0;
-  for (int i = 0; i < 2 * long_window; ++i) {
-    const MonitorVerdict& v = trial.step();
-    if (v.kind == Kind::out_of_step) trial.monitor().reset();
-    in_step += v.in_step ? 1 : 0;
-    if (i < long_window / 2) {
-      ASSERT_FALSE(v.in_step) << i << ", lag " << v.lag_frames;
-    }
-  }
-  EXPECT_GT(in_step, 30) << "lag " << trial.verdict().lag_frames << " ± "
-                         << trial.verdict().lag_sigma;
-}
-
 TEST(Monitor, findsALagThatTheCalibrationHasSwallowed) {
   FeatureDriveOptions o = street(8, 4, 300);
   o.lags = {{0, 1.0}};
