@@ -17,7 +17,7 @@ constexpr double kLeastJump = 0.6;    // px: twice what 95 % of untouched frames
 constexpr double kJumpSigmas = 8.0;   // of the frame's own tracks
 constexpr double kJumpScatter = 5.0;  // times the root mean square of this drive's shifts
 constexpr int kFirstFrames = 5;       // measured, before the scatter is known
-constexpr double kForget = 0.05;      // of the mean square, a frame
+constexpr int kScatterFrames = 20;    // that the mean square is reckoned over, about
 constexpr double kGoesBack = 0.5;  // of the shift: more taken back by the next frame is no change
 constexpr int kUnmeasured = 2;     // frames without enough tracks after it: it was a change
 constexpr double kLeastParallax = 1e-4;  // rad: further points say the same at any depth
@@ -164,9 +164,8 @@ void DisparityJumpDetector::judge(std::uint64_t frame, DisparityJump* jump) noex
     pending_ = Pending{true, frame, jump->px, 0};
     return;
   }
-  if (measured_ < kFirstFrames) ++measured_;
-  const double share = std::max(kForget, 1.0 / measured_);
-  mean_square_ += share * (jump->px * jump->px - mean_square_);
+  if (measured_ < kScatterFrames) ++measured_;
+  mean_square_ += (jump->px * jump->px - mean_square_) / measured_;
 }
 
 DisparityJump DisparityJumpDetector::next(std::uint64_t frame,

@@ -88,7 +88,7 @@ class DisparityJumpDetector {
   std::span<double> scratch_;
   std::size_t count_ = 0;  // of before_
   Pending pending_{};
-  int measured_ = 0;        // frames, up to kFirstFrames
+  int measured_ = 0;        // frames, up to kScatterFrames
   double mean_square_ = 0;  // px², of the shifts that were no jump
 };
 

@@ -112,6 +112,17 @@ TEST(DisparityJump, OneSpoiltImageIsSuspectedAndNotConfirmed) {
   EXPECT_FALSE(street.drive(rig(0)).confirmed);
 }
 
+// 0.03° are 0.38 px: shaken by that, 1 px is within five times the scatter (1.9 px), and eight calm
+// frames later still, for (19/20)^8 of its square are left (1.5 px).
+TEST(DisparityJump, WhatADriveShakesByIsRememberedForSomeTwentyFrames) {
+  Street street(rig(0));
+  for (int i = 0; i < 40; ++i) EXPECT_FALSE(street.drive(rig(i % 2 == 0 ? 0 : 0.03)).suspected);
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(street.drive(rig(0)).suspected);
+  EXPECT_FALSE(street.drive(rig(0.08)).suspected);
+  for (int i = 0; i < 60; ++i) (void)street.drive(rig(0.08));
+  EXPECT_TRUE(street.drive(rig(0)).suspected) << "calm for long, it is a jump";
+}
+
 TEST(DisparityJump, TooFewTracksMeasureNothing) {
   Arena arena(DisparityJumpDetector::memory_needed(10));
   DisparityJumpDetector detector(10, arena);
