@@ -61,7 +61,9 @@ LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
 LineFile::~LineFile() { close(); }
 
 bool LineFile::append(std::string_view line) {
-  if (waiting_.size() + line.size() > pending_) {
+  const auto fits = [&] { return waiting_.size() + line.size() <= pending_; };
+  // More lines than fit between two of the owner's flushes are no sign that the disk takes none.
+  if (!fits() && (fault_ != 0 || !flush() || !fits())) {
     ++lost_lines_;
     return false;
   }

@@ -28,8 +28,8 @@ class LineFile {
   LineFile(const LineFile&) = delete;
   LineFile& operator=(const LineFile&) = delete;
 
-  /// Takes a line, end of line included; nothing is written yet. False: too much is waiting
-  /// already; the line is lost and counted.
+  /// Takes a line, end of line included. Nothing is written yet, unless as much waits as may: then
+  /// it is flushed first. False: the disk does not take that; the line is lost and counted.
   bool append(std::string_view line);
   /// Hands the system what is waiting. False: not all was taken; fault() says why.
   bool flush();

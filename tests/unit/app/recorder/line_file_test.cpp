@@ -48,6 +48,20 @@ TEST(LineFile, linesAreInTheFileAfterFlushAndNotBefore) {
   EXPECT_EQ(test::read_file(folder / "a.txt"), "one\ntwo\n");
 }
 
+TEST(LineFile, moreThanMayWaitIsHandedOverWhileTheDiskTakesIt) {
+  const test::TemporaryFolder folder;
+  LineFile file(folder / "a.txt", 16);
+  std::string all;
+  for (int i = 10; i < 50; ++i) {
+    const std::string line = "line " + std::to_string(i) + '\n';
+    EXPECT_TRUE(file.append(line)) << i;
+    all += line;
+  }
+  EXPECT_TRUE(file.close());
+  EXPECT_EQ(file.lost_lines(), 0U);
+  EXPECT_EQ(test::read_file(folder / "a.txt"), all);
+}
+
 TEST(LineFile, aFullDeviceIsAFaultWithItsReason) {
   LineFile file("/dev/full");
   EXPECT_TRUE(file.append("lost\n"));
