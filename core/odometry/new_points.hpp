@@ -2,10 +2,10 @@
 
 namespace vergence::odometry {
 
-/// Whether points made lately fit the motion that the pose follows: where
-/// it follows what moves in front of the scene they are lost as soon as they are made.
+/// Whether points made lately fit the motion that the pose follows: where it follows what
+/// moves in front of the scene they are lost as soon as they are made.
 ///
-/// Few at a time are judged together: one blurred frame's verdict would stand until many came at
+/// Few at a time are judged together: else one blurred frame's verdict stood until many came at
 /// once.
 /// Threads  One. Memory: none of the heap.
 class NewPoints {
