@@ -83,8 +83,8 @@ void ServiceManager::alive(std::uint64_t beats, std::uint64_t items,
 }
 
 void ServiceManager::stopping() noexcept {
-  send("STOPPING=1\nWATCHDOG=1");
   if (fd_ < 0 || closing_.joinable()) return;
+  send("STOPPING=1\nWATCHDOG=1");
   const std::chrono::nanoseconds interval = interval_.count() > 0 ? interval_ : kUnwatched;
   try {
     closing_ = std::jthread([this, interval](const std::stop_token& end) {

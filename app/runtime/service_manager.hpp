@@ -27,9 +27,9 @@ class ServiceManager {
   ServiceManager& operator=(const ServiceManager&) = delete;
 
   void ready() noexcept { send("READY=1"); }
-  /// The last call. What follows, a report of a day's drive above all, may take longer than the
-  /// watchdog's interval and the unit's TimeoutStopSec: signs of life that ask for more time go out
-  /// until the end, ten minutes at most.
+  /// The last call; again: nothing. What follows, a report of a day's drive above all, may take
+  /// longer than the watchdog's interval and the unit's TimeoutStopSec: signs of life that ask for
+  /// more time go out until the end, ten minutes at most.
   void stopping() noexcept;
   /// `beats`: a number that changes while the estimator's loop is alive (Heartbeat). A sign of life
   /// goes out three times in a watchdog's interval, if it has changed since the last: not of a loop

@@ -133,8 +133,10 @@ void SessionRunner::watch(Progress* progress) {
   loop_.event_log().show(progress, facts_.frames);
 }
 
-/// When the drive is over: cameras do not expose on while its last calibration is decided.
+/// When the drive is over: cameras do not expose on while its last calibration is decided. That and
+/// cameras that are slow to stop may take longer than the watchdog waits.
 void SessionRunner::halt_source() noexcept {
+  service_.stopping();
   temperatures_.end();
   if (!halted_) source_.halt();
   halted_ = true;
@@ -312,7 +314,6 @@ ExitCode SessionRunner::run() {
   std::thread estimating([this] { estimate(); });
   service_.ready();
   watch(&progress);
-  service_.stopping();
   estimating.join();
   resident_ = resident_memory({{"estimator_bytes", &loop_.estimator_arena()},
                                {"comparison_bytes", &loop_.comparison_arena()}});

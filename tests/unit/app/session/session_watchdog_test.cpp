@@ -16,13 +16,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-enum class Hangs { nothing, devices, estimator };
+enum class Hangs { nothing, devices, estimator, halt };
 
 class Drive final : public test::WaitingSource {
  public:
-  explicit Drive(Hangs hangs) : WaitingSource(hangs == Hangs::estimator ? 0ms : 1s), hangs_(hangs) {
+  explicit Drive(Hangs hangs)
+      : WaitingSource(hangs == Hangs::estimator || hangs == Hangs::halt ? 0ms : 1s), hangs_(hangs) {
     frames_ = hangs == Hangs::estimator ? 1 : 0;
   }
+  void halt() noexcept override { std::this_thread::sleep_for(hangs_ == Hangs::halt ? 1s : 0s); }
   void done(const PoseSample& /*sample*/) noexcept override { std::this_thread::sleep_for(1s); }
   void look() override { rounds_ += hangs_ == Hangs::devices ? 0 : 1; }
   [[nodiscard]] std::uint64_t rounds() const noexcept override { return rounds_; }
@@ -32,9 +34,12 @@ class Drive final : public test::WaitingSource {
   std::uint64_t rounds_ = 1;  // of the thread that calls look() and asks
 };
 
+constexpr const char* kOfTheLoop = "WATCHDOG=1\nSTATUS=";
+constexpr const char* kOfTheEnd = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=";
+
 /// The signs of life that systemd hears of a drive of a second, with a watchdog that wants
 /// five: the socket's queue has room for ten.
-int signs_of_life(Hangs hangs) {
+int signs_of_life(Hangs hangs, const char* sign = kOfTheLoop) {
   const test::TemporaryFolder folder;
   const std::string path = (folder / "notify").string();
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -59,10 +64,7 @@ int signs_of_life(Hangs hangs) {
   int signs = 0;
   std::array<char, 256> text{};
   for (ssize_t n = 0; (n = ::recv(fd, text.data(), text.size(), 0)) > 0;)
-    signs += std::string_view(text.data(), static_cast<std::size_t>(n))
-                     .starts_with("WATCHDOG=1\nSTATUS=")
-                 ? 1
-                 : 0;
+    signs += std::string_view(text.data(), static_cast<std::size_t>(n)).starts_with(sign) ? 1 : 0;
   (void)::close(fd);
   return signs;
 }
@@ -71,6 +73,10 @@ TEST(SessionWatchdog, hearsOfALoopThatWaitsWhileTheDevicesThreadGoesRoundAndOfNo
   EXPECT_GE(signs_of_life(Hangs::nothing), 3);
   EXPECT_LE(signs_of_life(Hangs::devices), 1) << "of their first round";
   EXPECT_LE(signs_of_life(Hangs::estimator), 1) << "of the frame that it hangs at";
+}
+
+TEST(SessionWatchdog, hearsThatTheDriveIsOverWhileCamerasAreSlowToStop) {
+  EXPECT_GE(signs_of_life(Hangs::halt, kOfTheEnd), 5);
 }
 
 }  // namespace
