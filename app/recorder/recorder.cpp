@@ -60,7 +60,8 @@ Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
       files_(std::make_unique<Files>(folder, options.ins)),
       totals_(!options.keep_trajectory      ? 0
               : options.expected_frames > 0 ? options.expected_frames
-                                            : kMostStatuses) {
+                                            : kMostStatuses),
+      newest_(options.first) {
   line_.reserve(kLongestLine);
   folder_ = folder.string();
   if (options.keep) keeper_ = std::make_unique<CalibrationKeeper>(options.keep, &filled_);

@@ -66,6 +66,7 @@ class Recorder {
     bool keep_trajectory = true;
     std::size_t expected_frames = 0;  // 0: nobody knows
     bool ins = false;                 // readings are posted: ins.csv is there
+    Stamp first{};                    // of the recorder's own events before the first pose
     /// Called on a thread of its own with every calibration that was accepted while driving: files
     /// may be written there. May be empty.
     std::function<Kept(const RigCalibration&)> keep{};
@@ -135,7 +136,7 @@ class Recorder {
   std::string line_;    // being formatted
   std::string folder_;  // for sentences
   std::size_t memory_ = 0;
-  Stamp newest_{};  // of the poses
+  Stamp newest_;  // of the poses
   bool disk_full_ = false, pretended_ = false;
 
   Queue<Record, kRing> records_;

@@ -78,8 +78,16 @@ bool TotalsBuilder::add(const CalibrationRecord& c) {
   if (c.learnt && !c.accepted) return false;  // the drive goes on: nothing was attempted
   ++(c.accepted ? totals_.accepted : totals_.rejected);
   if (totals_.attempts.size() == kMostAttempts) totals_.attempts.erase(totals_.attempts.begin());
-  totals_.attempts.push_back(
-      {c.stamp, c.cause, c.reason, c.accepted, c.latency_frames, c.rig.frames, c.solve_ms});
+  const CalibrationAttempt attempt{c.stamp,          c.cause,      c.reason,  c.accepted,
+                                   c.latency_frames, c.rig.frames, c.solve_ms};
+  totals_.attempts.push_back(attempt);
+  if (FromScratch& search = totals_.from_scratch;
+      !search.found && attempt.cause == "from_scratch") {
+    if (attempt.accepted)
+      search.found = attempt;
+    else
+      ++search.rejected;
+  }
   return c.accepted;
 }
 

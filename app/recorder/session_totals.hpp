@@ -21,6 +21,12 @@ struct CalibrationAttempt {
   double solve_ms = 0;
 };
 
+/// The search of a drive that began without a calibration.
+struct FromScratch {
+  std::optional<CalibrationAttempt> found{};  // the first that was accepted
+  std::uint64_t rejected = 0;                 // before it
+};
+
 /// The calibration in use was not that of the rig.
 struct Contradiction {
   Stamp stamp{};
@@ -42,6 +48,7 @@ struct SessionTotals {
   std::array<TimeHistogram, kStages> stages;
   std::vector<CalibrationAttempt> attempts;  // the newest kMostAttempts
   std::uint64_t accepted = 0, rejected = 0;  // of all of them
+  FromScratch from_scratch{};
   std::optional<Stamp> confirmed{};  // when the drive first confirmed the calibration in use
   std::optional<std::uint64_t> confirmed_frame{};  // the frame of that stamp
   std::optional<Contradiction>

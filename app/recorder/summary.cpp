@@ -128,19 +128,13 @@ Json sigmas_json(const std::array<double, 6>& sigmas) {
 
 /// The attempt by which a drive from scratch found its first calibration.
 Json from_scratch_json(const SessionTotals& totals) {
-  constexpr std::string_view kWord = "from_scratch";
-  std::uint64_t rejected = 0;
-  for (const CalibrationAttempt& a : totals.attempts) {
-    if (a.cause != kWord) continue;
-    if (a.accepted)
-      return {{"stamp_ns", a.stamp.ns()},
-              {"latency_frames", a.latency_frames},
-              {"frames", a.frames},
-              {"solve_ms", ms(a.solve_ms)},
-              {"rejected_before", rejected}};
-    ++rejected;
-  }
-  return nullptr;
+  const auto& [found, rejected] = totals.from_scratch;
+  if (!found) return nullptr;
+  return {{"stamp_ns", found->stamp.ns()},
+          {"latency_frames", found->latency_frames},
+          {"frames", found->frames},
+          {"solve_ms", ms(found->solve_ms)},
+          {"rejected_before", rejected}};
 }
 
 Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {

@@ -46,6 +46,7 @@ class SystemDisk final : public Disk {
   [[nodiscard]] int rename(const char* from, const char* to) noexcept override {
     return std::rename(from, to) == 0 ? 0 : -errno;
   }
+  void remove(const char* path) noexcept override { (void)::unlink(path); }
 };
 
 }  // namespace

@@ -27,6 +27,7 @@ class Disk {
   [[nodiscard]] virtual int synchronise(int fd) noexcept = 0;
   virtual void close(int fd) noexcept = 0;
   [[nodiscard]] virtual int rename(const char* from, const char* to) noexcept = 0;
+  virtual void remove(const char* path) noexcept = 0;
 };
 
 /// The system's.

@@ -130,7 +130,10 @@ int McapFile::create(const char* path) noexcept {
   write_schemas(&out);
   write_channels(&out);
   out.flush();
-  if (out.error() != 0) abandon();
+  if (out.error() != 0) {
+    abandon();
+    disk_.remove(path);  // it is no recording, and in the way of the next attempt
+  }
   return out.error();
 }
 

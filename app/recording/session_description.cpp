@@ -72,7 +72,7 @@ std::string to_json(const SessionDescription& d) {
                         {"settings", d.settings},
                         {"cameras", d.cameras},
                         {"devices", json_of(d.devices)}}
-      .dump(1);
+      .dump(1, ' ', false, nlohmann::json::error_handler_t::replace);  // names need not be UTF-8
 }
 
 SessionDescription parse_session_description(std::string_view json, const std::string& name) {

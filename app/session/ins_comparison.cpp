@@ -11,7 +11,9 @@ InsComparison::InsComparison(const ComparisonOptions& options, InsSource source,
     : T_ins_left_(options.T_ins_left),
       comparison_(options, arena),
       event_log_(event_log),
-      events_(source, options.scale_stretch_m, event_log) {}
+      events_(source, options.scale_stretch_m, event_log) {
+  placements_.reserve(kMostPlacements);
+}
 
 void InsComparison::add(const InsRecord& reading) noexcept {
   output_->post(reading);
@@ -102,7 +104,15 @@ void InsComparison::take_placement(Stamp stamp) noexcept {
   const Placement& p = comparison_.placement();
   if (p.revision == placement_revision_) return;
   placement_revision_ = p.revision;
-  (void)placements_.push({stamp, p});  // full: the count goes on
+  if (placements_.size() < kMostPlacements) {
+    placements_.push_back({stamp, p});
+    if (placements_.size() == kMostPlacements)
+      event_log_.log(stamp, "placements_full",
+                     "the drive was placed on the earth anew so often that trajectory_enu.tum, "
+                     "drive.geojson and drive.kml keep this placement from here on; poses.csv has "
+                     "every one",
+                     true);
+  }
   output_->post(p, comparison_.plane().origin());
   events_.note(p, stamp);
 }

@@ -11,7 +11,6 @@
 #include "app/session/ins_events.hpp"
 #include "app/session/session_output.hpp"
 #include "core/comparison/comparison.hpp"
-#include "core/memory/fixed_vector.hpp"
 
 namespace vergence::app {
 
@@ -23,7 +22,8 @@ namespace vergence::app {
 /// Order      Readings and poses as they come; every add() of a pose is followed by drain().
 class InsComparison {
  public:
-  static constexpr std::size_t kMostPlacements = 64;  // that are kept; later ones count
+  /// That are kept for the files at the end; later ones are in poses.csv alone, and count.
+  static constexpr std::size_t kMostPlacements = 4096;
 
   /// Without a source poses go through and nothing is said. `event_log` outlives it.
   InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
@@ -58,9 +58,9 @@ class InsComparison {
   std::uint64_t added_ = 0, drained_ = 0;
   std::uint64_t matches_ = 0, scale_disagreements_ = 0;
   std::uint32_t placement_revision_ = 0;
-  FixedVector<PlacementRecord, kMostPlacements> placements_;
-  EarthErrors errors_{};  // means and roots are squares' sums until earth()
-  bool on_way_ = false;   // last_place_ means something
+  std::vector<PlacementRecord> placements_;  // its memory is taken at construction
+  EarthErrors errors_{};                     // means and roots are squares' sums until earth()
+  bool on_way_ = false;                      // last_place_ means something
   Vec3 last_place_ = Vec3::Zero();
   Stamp newest_stamp_{};
 };

@@ -5,10 +5,13 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "app/config/calibration_file.hpp"
 #include "app/config/schema.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
+#include "app/runtime/errors.hpp"
 #include "app/runtime/version.hpp"
 
 namespace vergence::app {
@@ -96,14 +99,27 @@ double frame_bytes(const SourceFacts& facts) {
 
 constexpr double kLeastHeld = 16;  // frames that wait: a replay waits for room
 
+/// What an address of this machine reaches; a 32-bit one's program has 3 GB for all.
+constexpr double kMostQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
+
 /// Bytes of images a second, and how many seconds of them are held.
-std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
-  if (c.record.memory_mb > 0) return static_cast<std::size_t>(c.record.memory_mb) << 20U;
+double wanted_queue_bytes(const Configuration& c, const SourceFacts& facts) {
+  if (c.record.memory_mb > 0) return static_cast<double>(c.record.memory_mb) * 0x1p20;
   if (c.record.images == 0) return kSmall;
   const double held = facts.when_full == Recorder::WhenFull::wait
                           ? kLeastHeld
                           : (kDiskS + c.record.keep_s) * c.trigger.rate;
-  return kSmall + static_cast<std::size_t>(frame_bytes(facts) * std::max(held, kLeastHeld));
+  return kSmall + frame_bytes(facts) * std::max(held, kLeastHeld);
+}
+
+std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
+  const double bytes = wanted_queue_bytes(c, facts);
+  if (bytes > kMostQueue)
+    throw InputError(fmt::format(
+        "record.memory_mb, record.keep_s: {:.0f} MB of images are to wait, more than this machine "
+        "can address",
+        bytes / 1e6));
+  return static_cast<std::size_t>(bytes);
 }
 
 Recording::WhenFull when_full(const SourceFacts& facts) {

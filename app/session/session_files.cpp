@@ -129,7 +129,10 @@ void end_session(const std::filesystem::path& session, const StartingCalibration
 
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
                            const SummaryInput& input, std::vector<std::string>* faults) {
-  const std::string text = summary_json(totals, input).dump(2) + "\n";
+  // Names of files need not be UTF-8.
+  const std::string text =
+      summary_json(totals, input).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) +
+      "\n";
   try {
     replace_durably(session / "summary.json", text);
   } catch (const InputError& e) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <optional>
 #include <string_view>
 #include <system_error>
 
@@ -28,10 +29,26 @@ bool has_poses(const fs::path& folder) {
   return in && head == kPosesHeader;
 }
 
+/// When the newest of its files was written: while the cameras are gone a drive writes others than
+/// poses.csv.
+std::optional<fs::file_time_type> last_written(const fs::path& folder) {
+  std::optional<fs::file_time_type> newest;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    std::error_code ignored;
+    if (!at->is_regular_file(ignored) || at->is_symlink(ignored)) continue;
+    const auto written = fs::last_write_time(at->path(), ignored);
+    if (!ignored && (!newest || written > *newest)) newest = written;
+  }
+  return newest;
+}
+
+/// What was written an hour ahead was cut off before a clock without a battery began anew.
 bool may_go_on(const fs::path& folder, fs::file_time_type written) {
   std::error_code error;
+  const auto age = fs::file_time_type::clock::now() - written;
   return !fs::exists(folder / "summary.json", error) &&
-         fs::file_time_type::clock::now() - written < std::chrono::hours(1);
+         std::chrono::abs(age) < std::chrono::hours(1);
 }
 
 std::uint64_t bytes_in(const fs::path& folder) {
@@ -79,9 +96,9 @@ std::vector<OldSession> sessions_beside(const fs::path& session) {
     if (at->is_symlink(ignored) || !at->is_directory(ignored) ||
         fs::equivalent(at->path(), session, ignored) || !has_poses(at->path()))
       continue;
-    const auto written = fs::last_write_time(at->path() / "poses.csv", ignored);
-    if (ignored || may_go_on(at->path(), written)) continue;
-    found.push_back({at->path(), written, bytes_in(at->path())});
+    const auto written = last_written(at->path());
+    if (!written || may_go_on(at->path(), *written)) continue;
+    found.push_back({at->path(), *written, bytes_in(at->path())});
   }
   std::sort(found.begin(), found.end(), [](const OldSession& a, const OldSession& b) {
     return a.written != b.written ? a.written < b.written : a.folder < b.folder;

@@ -37,12 +37,14 @@ class SessionRunner {
 
  private:
   void open(std::vector<std::string>* faults);
+  void open_files(std::vector<std::string>* faults);
   [[nodiscard]] SessionStart session_start() const;
   void say_remarks(Progress* progress);
   void estimate() noexcept;
   void pass_on_temperatures();
   void watch(Progress* progress);
   void start_source(std::vector<std::string>* faults);
+  void leave_no_folder();
   void halt_source() noexcept;
   void say_recording_errors(Progress* progress);
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
@@ -142,18 +144,22 @@ void SessionRunner::halt_source() noexcept {
   halted_ = true;
 }
 
-/// A device that does not start ends the session before it began: a service that is restarted until
-/// the device is there leaves no folder behind each time.
 void SessionRunner::start_source(std::vector<std::string>* faults) {
   try {
     source_.start(faults);
   } catch (const std::exception&) {
     halt_source();  // of the devices that did start some already bring what is recorded
-    if (recording_) recording_->close();
-    (void)recorder_->close();
-    discard_session_folder(request_.out, made_folder_);
+    leave_no_folder();
     throw;
   }
+}
+
+/// Of a session that ends before it began: a service is started again and again until its devices
+/// are there.
+void SessionRunner::leave_no_folder() {
+  if (recording_) recording_->close();
+  if (recorder_) (void)recorder_->close();
+  discard_session_folder(request_.out, made_folder_);
 }
 
 void SessionRunner::say_recording_errors(Progress* progress) {
@@ -169,7 +175,17 @@ void SessionRunner::open(std::vector<std::string>* faults) {
   if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
     removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
   made_folder_ = make_session_folder(request_.out);
+  try {
+    open_files(faults);
+  } catch (const std::exception&) {
+    leave_no_folder();
+    throw;
+  }
+}
+
+void SessionRunner::open_files(std::vector<std::string>* faults) {
   Recorder::Options to_record;
+  to_record.first = facts_.first;
   to_record.when_full = facts_.when_full;
   to_record.expected_frames = facts_.expected_frames;
   to_record.ins = loop_.comparison() != nullptr;

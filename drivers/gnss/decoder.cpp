@@ -155,6 +155,18 @@ void Decoder::count(Duration step) noexcept {
   counters_.lost += steps - 1;
 }
 
+/// Without a fix the time may be that of the receiver's own clock, which a night puts off by
+/// tenths of a second: it is no witness of the fit.
+MappedStamp Decoder::host_stamp(const Fix& fix, HostStamp arrival) noexcept {
+  constexpr Duration kClose = Duration::seconds(1);
+  if (fix.reading.sample.fix != FixStatus::none) return mapper_.map(fix.measured, arrival);
+  const MappedStamp of_arrival{arrival - options_.processing, kClose};
+  if (!mapper_.known()) return of_arrival;
+  const MappedStamp fitted = mapper_.at(fix.measured);
+  const Duration apart = fitted.host - of_arrival.host;
+  return apart < kClose && Duration{} - apart < kClose ? fitted : of_arrival;
+}
+
 bool Decoder::map(const Fix& fix, InsReading* reading) noexcept {
   best_heading_ = std::max(best_heading_, fix.reading.sample.heading_source);
   if (any_) {
@@ -176,7 +188,7 @@ bool Decoder::map(const Fix& fix, InsReading* reading) noexcept {
   last_ = fix.measured;
   const Duration on_wire =
       Duration::nanoseconds(std::llround(byte_ns_ * static_cast<double>(fix.bytes)));
-  const MappedStamp mapped = mapper_.map(fix.measured, fix.arrival - on_wire);
+  const MappedStamp mapped = host_stamp(fix, fix.arrival - on_wire);
   if (counters_.readings > 0 && mapped.host <= last_host_) {
     ++counters_.unsettled;
     return false;

@@ -57,6 +57,7 @@ class Decoder {
   [[nodiscard]] bool next_nmea(Fix* fix) noexcept;
   [[nodiscard]] bool next_ubx(Fix* fix) noexcept;
   [[nodiscard]] bool map(const Fix& fix, InsReading* reading) noexcept;
+  [[nodiscard]] MappedStamp host_stamp(const Fix& fix, HostStamp arrival) noexcept;
   void count(Duration step) noexcept;
 
   Options options_;

@@ -157,8 +157,12 @@ std::string port_with_serial(const std::vector<SerialPortInfo>& ports,
   const auto bears = [&](const SerialPortInfo& p) { return p.usb_serial == usb_serial; };
   const auto named = [&](const SerialPortInfo& p) { return p.port == real && bears(p); };
   if (std::any_of(ports.begin(), ports.end(), named)) return asked;
-  if (std::count_if(ports.begin(), ports.end(), bears) != 1) return asked;
-  return std::find_if(ports.begin(), ports.end(), bears)->port;
+  if (std::count_if(ports.begin(), ports.end(), bears) == 1)
+    return std::find_if(ports.begin(), ports.end(), bears)->port;
+  const bool of_another = std::any_of(ports.begin(), ports.end(), [&](const SerialPortInfo& p) {
+    return p.port == real && !p.usb_serial.empty() && p.usb_serial != usb_serial;
+  });
+  return of_another ? std::string() : asked;
 }
 
 std::string SerialPort::find() const {
@@ -178,7 +182,12 @@ std::unique_ptr<ByteLine> SerialPort::open(const LineSettings& settings, DeviceS
     *status = DeviceStatus::unsupported;
     return nullptr;
   }
-  const fs::path real = resolved(find());
+  const std::string found = find();
+  if (found.empty()) {
+    *status = DeviceStatus::not_found;
+    return nullptr;
+  }
+  const fs::path real = resolved(found);
   UniquePort port;
   UniqueFd tty;
   *status = open_tty(real, settings, &port, &tty);

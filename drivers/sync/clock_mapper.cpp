@@ -120,13 +120,19 @@ MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
     return begin_one_way(device, arrival);
   }
   if (above > in_ns(options_.stall) || p.device < newest - 2 * in_ns(kBin)) {
-    // A stall or a clock set back: which, the next ones tell. Until then the arrival is the better
-    // witness, within the stall.
-    if (++behind_ >= kBehind) {
+    // A stall or a clock set back: which, the next ones tell. What was held up arrives at once,
+    // stamps of a clock that was set back arrive as evenly as before.
+    if (behind_++ == 0) first_behind_ = device, first_behind_host_ = host;
+    const bool evenly = 2 * (host - first_behind_host_).ns() >= (device - first_behind_).ns();
+    if (behind_ >= kBehind && evenly) {
       ++resets_;
       return begin_one_way(device, arrival);
     }
-    return {host, options_.delay_spread + options_.stall};
+    // Until then a stamp that runs back has only the arrival as its witness; another was measured
+    // between what the fit says and the arrival.
+    if (p.device <= newest) return {host, options_.delay_spread + options_.stall};
+    const MappedStamp fitted = at(device);
+    return {fitted.host, fitted.error + (host - fitted.host)};
   }
   behind_ = 0;
   lagging_ = above > in_ns(options_.jump) ? lagging_ + 1 : 0;

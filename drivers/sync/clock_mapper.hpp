@@ -78,7 +78,7 @@ class ClockMapper {
   static constexpr std::size_t kBins =
       64;  // of kBin: a minute, over which a crystal's rate holds to 1e-8
   static constexpr Duration kBin = Duration::seconds(1);
-  static constexpr int kBehind = 3;  // in a row beyond `stall`: the clock was set back
+  static constexpr int kBehind = 3;  // in a row beyond `stall`, not all at once: it was set back
   static constexpr int kLagging =
       16;  // in a row beyond `jump`: no transport stays congested so evenly
 
@@ -121,6 +121,8 @@ class ClockMapper {
                                     // the newest point, and in slope
   std::uint64_t pairs_ = 0;         // taken since begin()
   int behind_ = 0, lagging_ = 0;
+  DeviceStamp first_behind_{};  // of those in a row, and its arrival
+  HostStamp first_behind_host_{};
   std::uint64_t resets_ = 0;
 };
 

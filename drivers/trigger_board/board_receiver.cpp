@@ -12,6 +12,8 @@ void BoardReceiver::begin_boot(std::uint32_t boot, std::uint32_t next, const Tri
     account_.begin(boot, next);
     clock_.restart(delay_spread, config.pps_edge != trigger_edge_none);
     pause_.restart();  // what was requested of the other start is past
+  } else if (account_.refused_in_row() >= kMostRefused) {
+    account_.begin(boot, next);  // what it held against the board was wrong itself
   } else {
     account_.end(next, 0);
   }

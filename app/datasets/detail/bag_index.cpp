@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostFiles = 500;  // each stays open
+constexpr std::size_t kMostFiles = 100'000;  // of a minute each: ten weeks
 constexpr std::size_t kMostImages =
     4'000'000;  // of all topics: a day and a half at 30 Hz, 320 MB of index
 constexpr std::size_t kMostAttitudes = 8'000'000;  // of all topics: five hours at 400 Hz, 460 MB

@@ -16,8 +16,12 @@ class ByteSource {
                                   std::span<std::uint8_t> out) const noexcept = 0;
 };
 
+/// A file of which there may be more than a process may have open: those read last are kept open,
+/// kMostOpen of them, the others are opened again when they are read.
 class FileBytes final : public ByteSource {
  public:
+  static constexpr std::size_t kMostOpen = 128;  // of all; the system's usual limit is 1024
+
   /// InputError: no such file, no regular file, or it cannot be opened.
   explicit FileBytes(const std::filesystem::path& file);
   ~FileBytes() override;
@@ -30,7 +34,7 @@ class FileBytes final : public ByteSource {
 
  private:
   std::filesystem::path path_;
-  int fd_ = -1;
+  std::uint64_t number_;  // no other one of the process has it
   std::uint64_t size_ = 0;
 };
 

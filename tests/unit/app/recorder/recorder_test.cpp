@@ -103,6 +103,16 @@ TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
   EXPECT_TRUE(totals->faults.empty());
 }
 
+TEST(Recorder, itsOwnEventsBeforeTheFirstPoseAreOfTheDrivesBegin) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {.first = Stamp(kStamp)});
+  recorder.reopen();
+  (void)recorder.close();
+  const auto lines = lines_of(folder / "events.jsonl");
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_NE(lines[0].find(std::to_string(kStamp)), std::string::npos) << lines[0];
+}
+
 TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
@@ -224,6 +234,24 @@ TEST(Recorder, whatTheDriveMeasuredWhileItWentOnIsKeptAndNoAttempt) {
   EXPECT_TRUE(lines[1].ends_with(",20.00,0.2500,1.5000,1,1")) << lines[1];
   EXPECT_EQ(totals->rejected, 0U);
   EXPECT_TRUE(totals->attempts.empty());
+}
+
+TEST(TotalsBuilder, theFirstCalibrationFoundIsKnownAlsoAfterThousandsOfAttempts) {
+  TotalsBuilder builder(0);
+  const auto attempt = [&builder](CalibrationCause cause, bool accepted) {
+    CalibrationDecision d = decision(accepted);
+    d.cause = cause;
+    return builder.add(CalibrationRecord::of(d));
+  };
+  for (std::size_t i = 0; i < kMostAttempts + 5; ++i)
+    EXPECT_FALSE(attempt(CalibrationCause::from_scratch, false));
+  EXPECT_TRUE(attempt(CalibrationCause::from_scratch, true));
+  for (std::size_t i = 0; i < kMostAttempts + 5; ++i)
+    EXPECT_FALSE(attempt(CalibrationCause::knock, false));
+  const SessionTotals& totals = builder.totals();
+  ASSERT_TRUE(totals.from_scratch.found);
+  EXPECT_EQ(totals.from_scratch.rejected, kMostAttempts + 5);
+  EXPECT_EQ(totals.attempts.size(), kMostAttempts);
 }
 
 EventRecord event_at(std::int64_t ns, EstimatorEvent::Kind kind, double value) {

@@ -186,6 +186,7 @@ TEST(Summary, recalibrationsAreListedAndTheFirstFromScratchStandsApart) {
       {Stamp(20), "from_scratch", "", true, 75, 60, 12.0},
       {Stamp(30), "knock", "held-out frames do not fit better", false, 90, 25, 11.0},
       {Stamp(40), "knock", "", true, 150, 60, 13.0}};
+  totals->from_scratch = {totals->attempts[1], 1};
   totals->calibrating.add(4);
   const auto json = summary_json(*totals, input());
   ASSERT_EQ(json["recalibrations"].size(), 2U);

@@ -45,6 +45,9 @@ class FaultyDisk final : public app::Disk {
   [[nodiscard]] int rename(const char* from, const char* to) noexcept override {
     return error != 0 ? -error : system_.rename(from, to);
   }
+  void remove(const char* path) noexcept override {
+    if (error == 0) system_.remove(path);
+  }
 
  private:
   app::Disk& system_ = app::system_disk();

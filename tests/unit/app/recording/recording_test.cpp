@@ -238,6 +238,27 @@ TEST(Recording, aDiskThatIsGoneIsTriedAgainWithANewFile) {
   EXPECT_EQ(numbers(folder / "drive_1.mcap"), sequence(100, 200));
 }
 
+TEST(Recording, aDiskWithoutRoomForTheNextFileHasNoEmptyOnes) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.files.disk = &disk;
+  Recording recording(folder.path(), o);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(200ms);
+  disk.room = 0;
+  recording.roll();
+  std::this_thread::sleep_for(200ms);
+  for (int i = 100; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(1s);  // four attempts
+  disk.room = ~std::uint64_t{0};
+  std::this_thread::sleep_for(500ms);
+  recording.close();
+  EXPECT_EQ(numbers(folder / "drive_0.mcap"), sequence(0, 100));
+  EXPECT_EQ(numbers(folder / "drive_1.mcap"), sequence(100, 200));
+  EXPECT_FALSE(std::filesystem::exists(folder / "drive_2.mcap"));
+}
+
 TEST(Recording, aStalledDiskKeepsNobodyWaitingAndLosesNothingThatHasRoom) {
   const TemporaryFolder folder;
   FaultyDisk disk;

@@ -23,8 +23,10 @@ void make_session(const fs::path& folder, int hours, bool ended = true) {
   std::ofstream(folder / "poses.csv") << kPosesHeader << "\n";
   std::ofstream(folder / "more" / "drive.mcap") << std::string(kSize, 'x');
   if (ended) std::ofstream(folder / "summary.json") << "{}";
-  fs::last_write_time(folder / "poses.csv",
-                      fs::file_time_type::clock::now() - std::chrono::hours(hours));
+  for (const char* file : {"poses.csv", "summary.json"})
+    if (fs::exists(folder / file))
+      fs::last_write_time(folder / file,
+                          fs::file_time_type::clock::now() - std::chrono::hours(hours));
 }
 
 TEST(SessionQuota, theOldestGoUntilTheRestFits) {
@@ -55,6 +57,17 @@ TEST(SessionQuota, whatIsNoSessionARunningDriveALinkAndTheSessionItselfStay) {
   for (const char* kept : {"running", "now", "photos", "linked"})
     EXPECT_TRUE(fs::exists(folder / "sessions" / kept)) << kept;
   EXPECT_TRUE(fs::exists(folder / "elsewhere" / "linked" / "poses.csv"));
+}
+
+TEST(SessionQuota, aSessionCutOffBeforeTheClockWasSetBackGoesAndADriveWithoutCamerasStays) {
+  const test::TemporaryFolder folder;
+  make_session(folder / "ahead", -48, false);
+  make_session(folder / "no_cameras", 2, false);
+  std::ofstream(folder / "no_cameras" / "ins.csv") << "stamp_ns\n";  // a moment ago
+  const auto sentences = keep_session_quota(folder / "now", 0);
+  ASSERT_EQ(sentences.size(), 1U);
+  EXPECT_FALSE(fs::exists(folder / "ahead"));
+  EXPECT_TRUE(fs::exists(folder / "no_cameras"));
 }
 
 TEST(SessionQuota, aPathThatEndsWithASlashIsTheSameSession) {

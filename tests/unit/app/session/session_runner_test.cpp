@@ -1,6 +1,7 @@
 #include "app/session/session_runner.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -84,6 +85,7 @@ class BlackSource final : public FrameSource {
     return ExitCode::device_failed;
   }
 
+  void begin_from(const std::string& source) { facts_.begin.source = source; }
   [[nodiscard]] int held() const { return held_; }
   [[nodiscard]] int finished() const { return finished_; }
 
@@ -285,6 +287,51 @@ TEST(SessionRunner, aCalibrationThatCouldNotBeWrittenAtTheStartIsWrittenAtTheEnd
   EXPECT_TRUE(in_the_way.made());
   EXPECT_TRUE(std::filesystem::exists(options.out / "calibration.yaml"));
   EXPECT_EQ(said.find("calibration.yaml:"), std::string::npos) << said;
+}
+
+TEST(SessionRunner, namesNeedNotBeUtf8) {
+  const test::TemporaryFolder folder;
+  BlackSource source(4);
+  source.begin_from("k\xe4lib.yaml");
+  SessionOptions options;
+  options.out = folder / "session";
+  options.quiet = true;
+  const SignalGuard signals;
+  testing::internal::CaptureStderr();
+  const Configuration configuration = load_configuration(std::nullopt, {"record=[poses]"});
+  EXPECT_EQ(run_session(source, configuration, options, signals), ExitCode::not_usable);
+  (void)testing::internal::GetCapturedStderr();
+  for (const char* file : {"summary.json", "drive.mcap"})
+    EXPECT_TRUE(std::filesystem::exists(options.out / file)) << file;
+}
+
+/// Files of this process may have so many bytes while it lives.
+class LargestFile {
+ public:
+  explicit LargestFile(rlim_t bytes) {
+    (void)::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit small{bytes, before_.rlim_max};
+    (void)::setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~LargestFile() { (void)::setrlimit(RLIMIT_FSIZE, &before_); }
+  LargestFile(const LargestFile&) = delete;
+  LargestFile& operator=(const LargestFile&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST(SessionRunner, aSessionThatCannotBeRecordedLeavesNoFolder) {
+  const test::TemporaryFolder folder;
+  BlackSource source(4);
+  SessionOptions options;
+  options.out = folder / "session";
+  options.quiet = true;
+  const SignalGuard signals;  // SIGXFSZ ends nothing
+  const Configuration configuration = load_configuration(std::nullopt, {"record=[poses]"});
+  const LargestFile limit(2000);
+  EXPECT_THROW((void)run_session(source, configuration, options, signals), InputError);
+  EXPECT_FALSE(std::filesystem::exists(options.out));
 }
 
 TEST(SessionRunner, withoutAPoseThatIsTheVerdictWhateverTheSourceThinks) {

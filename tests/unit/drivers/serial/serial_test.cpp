@@ -268,6 +268,8 @@ TEST(SerialPort, aDeviceThatCameBackElsewhereIsFoundByItsSerialNumber) {
   EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV7"), "/dev/ttyV1");
   EXPECT_EQ(port_with_serial(ports, "C", "/dev/ttyV7"), "/dev/ttyV7") << "nobody is C";
   EXPECT_EQ(port_with_serial(ports, "", "/dev/ttyV7"), "/dev/ttyV7") << "never by no number";
+  EXPECT_EQ(port_with_serial(ports, "C", "/dev/ttyV0"), "") << "B has its place, C is away";
+  EXPECT_EQ(port_with_serial(ports, "C", "/dev/ttyS0"), "/dev/ttyS0") << "whose nobody knows";
 }
 
 TEST(SerialPort, ofPortsThatShareASerialNumberTheOneAskedForIsTaken) {

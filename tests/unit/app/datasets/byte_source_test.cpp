@@ -1,0 +1,71 @@
+#include "app/datasets/detail/byte_source.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+std::size_t descriptors() {
+  const std::filesystem::directory_iterator open("/proc/self/fd");
+  return static_cast<std::size_t>(std::distance(begin(open), end(open)));
+}
+
+/// A drive that began a file a minute for a day.
+TEST(FileBytes, moreThanAProcessMayHaveOpenAreReadByManyThreads) {
+  constexpr std::size_t kFiles = 1440;
+  const test::TemporaryFolder folder;
+  std::vector<std::unique_ptr<FileBytes>> files;
+  const std::size_t before = descriptors();
+  for (std::size_t i = 0; i < kFiles; ++i) {
+    const std::string name = std::to_string(i);
+    folder.write(name, "file " + name);
+    files.push_back(std::make_unique<FileBytes>(folder / name));
+  }
+  EXPECT_LE(descriptors(), before + FileBytes::kMostOpen);
+  std::atomic<int> wrong{0};
+  const auto read_all = [&](std::size_t first) {
+    for (std::size_t k = 0; k < kFiles; ++k) {
+      const std::size_t i = (first + k * 7) % kFiles;
+      const std::string wanted = std::to_string(i);
+      std::vector<std::uint8_t> bytes(wanted.size());
+      if (!files[i]->read(5, bytes) || !std::equal(wanted.begin(), wanted.end(), bytes.begin()))
+        ++wrong;
+    }
+  };
+  {
+    std::vector<std::jthread> readers;
+    for (std::size_t r = 0; r < 4; ++r) readers.emplace_back(read_all, r * 300);
+  }
+  EXPECT_EQ(wrong, 0);
+  EXPECT_LE(descriptors(), before + FileBytes::kMostOpen);
+  files.clear();
+  EXPECT_EQ(descriptors(), before);
+}
+
+TEST(FileBytes, oneThatIsRemovedWhileItIsNotOpenCannotBeRead) {
+  const test::TemporaryFolder folder;
+  folder.write("first", "first");
+  const FileBytes first(folder / "first");
+  std::vector<std::unique_ptr<FileBytes>> others;
+  for (std::size_t i = 0; i < FileBytes::kMostOpen; ++i) {
+    folder.write(std::to_string(i), "x");
+    others.push_back(std::make_unique<FileBytes>(folder / std::to_string(i)));
+  }
+  std::filesystem::remove(folder / "first");
+  std::array<std::uint8_t, 5> bytes{};
+  EXPECT_FALSE(first.read(0, bytes));
+}
+
+}  // namespace
+}  // namespace vergence::app::detail

@@ -1,0 +1,70 @@
+#include "app/session/ins_comparison.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "core/comparison/geodesy.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr int kRestarts = 70;
+constexpr double kBetween = 200;  // m
+constexpr double kSpeed = 10;     // m/s, eastwards
+
+Stamp at(double t) { return Stamp(1403636584000000000) + Duration::seconds(t); }
+
+InsRecord reading(const LocalTangentPlane& plane, double t) {
+  InsRecord r;
+  r.sample.stamp = at(t);
+  r.sample.fix = FixStatus::fix_3d;
+  r.sample.attitude_valid = true;
+  const Vec3 place(kSpeed * t, 0, 0);
+  r.sample.position = plane.to_geodetic(place);
+  const Eigen::Quaterniond q = quaternion(plane.rotation_from(r.sample.position).transpose());
+  r.sample.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
+  r.sample.position_sigma = r.sample.height_sigma = 0.001;
+  r.sample.tilt_sigma = 1e-5;
+  return r;
+}
+
+/// A drive whose scene is begun anew after every tunnel: each time it is placed on the earth anew.
+TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {.ins = true});
+  SessionOutput output(&recorder, {});
+  const auto log = std::make_unique<EventLog>();
+  log->open(&output, at(0));
+  const ComparisonOptions options;
+  Arena arena(Comparison::bytes_needed(options));
+  InsComparison comparison(options, InsSource::device, arena, *log);
+  comparison.open(&output);
+  const LocalTangentPlane plane(Geodetic{48, 11, 500});
+  constexpr int kPoses = static_cast<int>(kBetween / kSpeed * 10);  // of a scene, at 10 Hz
+  for (int i = 0; i < kPoses * (kRestarts + 1); ++i) {
+    const double t = i / 10.0;
+    PoseSample pose;
+    pose.number = static_cast<std::uint64_t>(i);
+    pose.stamp = at(t + 0.003);
+    pose.status = PoseStatus::ok;
+    if (i > 0 && i % kPoses == 0) pose.reason = Reason::scene_restarted;
+    pose.T_world_left.t = {kSpeed * (t + 0.003), 0, 0};
+    comparison.add(pose, 0);
+    for (int k = 0; k < 10; ++k) comparison.add(reading(plane, t + k / 100.0));
+    comparison.drain();
+  }
+  comparison.finish();
+  const EarthFigures earth = comparison.earth("the test");
+  EXPECT_EQ(earth.placements.size(), static_cast<std::size_t>(kRestarts + 1));
+  for (const auto& [name, count] : comparison.counters()) {
+    if (name == "placements") {
+      EXPECT_EQ(count, earth.placements.size());
+    }
+  }
+  (void)recorder.close();
+}
+
+}  // namespace
+}  // namespace vergence::app
