@@ -28,6 +28,7 @@ struct InsReading {
   InsQuality quality{};
   DeviceStamp measured{};  // by the INS's clock, unwrapped; grows while the device is not gone
   HostStamp arrival{};     // when the last byte was here
+  bool resumed = false;    // the first after a pause()
   // A driver that knows how bytes travel (when each was on the wire) maps the stamp itself; else a
   // ClockMapper does, from `arrival`.
   bool mapped = false;
@@ -77,6 +78,12 @@ class InsDevice {
   /// once). `gone`: reading->arrival says when it was noticed. → ok, timeout, stopped, ended, gone
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, InsReading* reading) noexcept = 0;
   virtual void stop() noexcept = 0;
+  /// While it streams: makes neither readings nor pulses (SyncOut) for so long, as soon as it can;
+  /// no reading before or after is lost for it. Does not wait. Any thread. → ok, unsupported,
+  /// stopped
+  [[nodiscard]] virtual DeviceStatus pause(Duration /*gap*/) noexcept {
+    return DeviceStatus::unsupported;
+  }
   /// Who sees the conversation on its line, which outlives it; null: nobody. Before the first
   /// start(): also what was said since the device was opened. False: it has no line. Owner's
   /// thread, while stopped.

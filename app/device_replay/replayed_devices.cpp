@@ -64,8 +64,6 @@ ReplayedDevices::ReplayedDevices(const Configuration& c, const ReplayedDrive& dr
   // The mock's cameras are as good as the configuration says.
   if (devices.cameras[0].info.driver != "mock")
     fit_to_devices(c, timings, trigger_ != nullptr, &options_.sync);
-  if (options_.sync.mode == SyncMode::ins_syncout && ins_ != nullptr)
-    options_.sync_out_divider = sync_out_divider(c, ins_->info());
   options_.wait_when_full = true;
   options_.board_keeps_own_time = board_place_ != nullptr;
 }

@@ -128,10 +128,7 @@ void DriveDevices::open_real(const Configuration& c) {
   for (const OpenedCamera& camera : opened_) cameras_.push_back(camera.device.get());
   opened_ins_ = open_ins(ins_request(c.ins), &remarks_);
   ins_ = opened_ins_.get();
-  if (sync_.mode == SyncMode::ins_syncout) {
-    check_sync_out(c, ins_->info());
-    sync_out_divider_ = sync_out_divider(c, ins_->info());
-  }
+  if (sync_.mode == SyncMode::ins_syncout) check_sync_out(c, ins_->info());
   if (c.trigger.driver == "board") {
     board_ = open_trigger_board(c.trigger, pulses, &remarks_);
     trigger_ = board_.get();
@@ -154,7 +151,6 @@ Acquisition::Options DriveDevices::acquisition_options() const {
   Acquisition::Options o;
   o.sync = sync_;
   o.board_keeps_own_time = board_keeps_own_time_;
-  o.sync_out_divider = sync_out_divider_;
   return o;
 }
 

@@ -70,7 +70,6 @@ class DriveDevices {
   InsDevice* ins_ = nullptr;
   TriggerDevice* trigger_ = nullptr;
   SyncOptions sync_;
-  std::uint32_t sync_out_divider_ = 0;
   bool board_keeps_own_time_ = false;
   std::vector<std::string> remarks_;
   std::uint64_t frames_ = 0;

@@ -39,9 +39,9 @@ void check_ins_syncout(const Configuration& c, int cameras) {
                           "wired to the cameras",
                           c.ins.driver));
   if (!(c.ins.sync_out_hz > 0))
-    refuse(c,
-           "ins.sync_out_hz says how many pulses a second the INS makes; set it, 30 of 120 Hz for "
-           "instance");
+    refuse(
+        c,
+        "ins.sync_out_hz says how many pulses a second the INS makes; set it, to 25 for instance");
   if (std::abs(c.ins.sync_out_hz - c.trigger.rate) > 1e-3 * c.trigger.rate)
     refuse(c, fmt::format("trigger.rate is {} and ins.sync_out_hz {}; the INS triggers the "
                           "cameras, so both are one rate",
@@ -155,8 +155,7 @@ Duration jitter_of(const CameraSettings& s) {
 
 Duration microseconds(double us) { return Duration::nanoseconds(std::llround(us * 1e3)); }
 
-/// The MTi-G-700/710 makes pulses of 400 Hz / n and marks the reading each left with; the MTi-G
-/// makes its own sample rate / n, unmarked.
+/// The MTi-G-700/710 marks the reading that each pulse left with.
 bool marks_sync_out(const DeviceInfo& ins) { return ins.model.find('7') != std::string::npos; }
 
 }  // namespace
@@ -190,19 +189,18 @@ void fit_to_devices(const Configuration& c, const std::vector<DeviceTiming>& cam
 }
 
 void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
-  constexpr double kBase = 400;  // Hz
-  const double base = marks_sync_out(ins) ? kBase : c.ins.rate;
-  const double nearest = base / std::max(1.0, std::round(base / c.trigger.rate));
+  if (!marks_sync_out(ins))
+    refuse(c, fmt::format("{} tells which pulses it made by no clock that goes on over a gap, so "
+                          "nothing could prove the pairs; set sync.mode to counter (not proven), "
+                          "or to board with a trigger board",
+                          ins_title(ins)));
+  constexpr double kBase = 400;  // Hz, over n
+  const double nearest = kBase / std::max(1.0, std::round(kBase / c.trigger.rate));
   if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
   throw InputError(
       fmt::format("trigger.rate is {}, and {} makes pulses of {:g} Hz / n: set trigger.rate and "
                   "ins.sync_out_hz to {:.6g}",
-                  c.trigger.rate, ins_title(ins), base, nearest));
-}
-
-std::uint32_t sync_out_divider(const Configuration& c, const DeviceInfo& ins) {
-  if (marks_sync_out(ins)) return 0;
-  return static_cast<std::uint32_t>(std::lround(c.ins.rate / c.trigger.rate));
+                  c.trigger.rate, ins_title(ins), kBase, nearest));
 }
 
 TriggerConfiguration trigger_configuration(const Configuration& c, int cameras) {

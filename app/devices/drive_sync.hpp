@@ -18,11 +18,8 @@ namespace vergence::app {
 void fit_to_devices(const Configuration& configuration, const std::vector<DeviceTiming>& cameras,
                     bool trigger, SyncOptions* options);
 
-/// The INS can make pulses of trigger.rate.
+/// The INS can make pulses of trigger.rate, and tells of each.
 void check_sync_out(const Configuration& configuration, const DeviceInfo& ins);
-/// Acquisition::Options::sync_out_divider for that INS; 0: it marks its readings.
-[[nodiscard]] std::uint32_t sync_out_divider(const Configuration& configuration,
-                                             const DeviceInfo& ins);
 
 /// What the board is asked for.
 [[nodiscard]] TriggerConfiguration trigger_configuration(const Configuration& configuration,

@@ -34,8 +34,7 @@ Acquisition::Acquisition(std::vector<CameraDevice*> cameras, InsDevice* ins, Tri
   board_head_.device = trigger_;
   for (const CameraDevice* camera : cameras_) clocks_.emplace_back(clock_options(camera->timing()));
   if (ins_ != nullptr) ins_clock_ = std::make_unique<ClockMapper>(clock_options(ins_->timing()));
-  if (options.sync.mode == SyncMode::ins_syncout)
-    sync_out_.emplace(options.sync.interval, options.sync_out_divider);
+  if (options.sync.mode == SyncMode::ins_syncout) sync_out_.emplace(options.sync.interval);
 }
 
 Acquisition::~Acquisition() {
@@ -244,6 +243,7 @@ void Acquisition::take_reading() {
   counters_.ins.note(r.measured, at);
   queue_.push(item);
   if (!sync_out_) return;
+  if (r.resumed) sync_out_->restart();
   if (const auto pulse = sync_out_->reading(r, at)) {
     take_pulse(*pulse);
     pause_pulses();

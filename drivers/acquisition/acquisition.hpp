@@ -91,8 +91,6 @@ class Acquisition final : private Notifier {
     /// The board lives in a virtual time of its own, beside the other devices: its next report is
     /// there for the waiting.
     bool board_keeps_own_time = false;
-    std::uint32_t sync_out_divider =
-        0;  // ins_syncout: readings a pulse, where the INS does not mark those that one left with
     AcquisitionObserver* observer =
         nullptr;  // sees what the devices hand out; outlives it. Null: nobody
   };

@@ -48,15 +48,16 @@ void Acquisition::pause_pulses() {
     if (trigger_->pause(pulses) != DeviceStatus::ok) ++counters_.pauses_refused;
     return;
   }
+  const bool master = options_.sync.mode == SyncMode::master_strobe;
+  const Duration gap = options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1);
+  if (!master && ins_->pause(gap) == DeviceStatus::ok) return;  // InsReading::resumed ends it
   // No other way than to stop who makes the pulses; meanwhile nothing else comes that could not
   // wait.
-  const bool master = options_.sync.mode == SyncMode::master_strobe;
   if (master)
     cameras_[0]->stop();
   else
     ins_->stop();
-  std::this_thread::sleep_for(std::chrono::nanoseconds(
-      (options_.sync.interval * (static_cast<std::int64_t>(pulses) + 1)).ns()));
+  std::this_thread::sleep_for(std::chrono::nanoseconds(gap.ns()));
   const DeviceStatus status = master ? cameras_[0]->start(this) : ins_->start(this);
   if (status != DeviceStatus::ok) ++counters_.pauses_refused;
   if (master) {

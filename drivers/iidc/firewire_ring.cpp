@@ -6,6 +6,7 @@
 #include <bit>
 #include <cinttypes>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 
 #include "firmware_iface/iidc/bandwidth.hpp"
@@ -72,9 +73,27 @@ void FirewireRing::end() noexcept {
   maps_[generation()] = {};
 }
 
+/// Images that are held stay at their addresses, in memory of their own: as long as anything of the
+/// node's file is mapped the kernel keeps the capture, and its channel, which the next one wants.
+void FirewireRing::detach_kept() noexcept {
+  const Map& m = maps_[generation()];
+  std::uint64_t bits = kept_in(generation());
+  if (m.base == nullptr || bits == 0) return;
+  void* const own =
+      ::mmap(nullptr, m.length, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (own == MAP_FAILED) return;  // it ends when they come back, then
+  for (; bits != 0; bits &= bits - 1) {
+    const auto at = static_cast<std::size_t>(std::countr_zero(bits)) * m.stride;
+    std::memcpy(static_cast<std::uint8_t*>(own) + at, m.base + at, m.stride);
+  }
+  if (::mremap(own, m.length, m.length, MREMAP_MAYMOVE | MREMAP_FIXED, m.base) == MAP_FAILED)
+    (void)::munmap(own, m.length);
+}
+
 void FirewireRing::abandon() noexcept {
   if (!captured_) return;
   captured_ = false;
+  detach_kept();
   const int fd = dc1394_capture_get_fileno(camera_);
   if (fd >= 0) (void)::close(fd);
   drop_orphans();

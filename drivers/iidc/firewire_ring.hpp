@@ -18,8 +18,8 @@ namespace vergence::iidc {
 /// by the order in which they were queued, kept here. So buffers can come back in any order, and
 /// one that finds no taker goes back at once; kReserve stay with the kernel, that it never runs
 /// dry.
-/// Slots      Two ranges of kMaxBuffers: after an unplug images that are still held stay mapped in
-///            one, the new ring takes the other.
+/// Slots      Two ranges of kMaxBuffers: after an unplug images that are still held stay where they
+///            are in one, the new ring takes the other.
 /// Unplug     libdc1394's capture_stop fails on a node that is gone, and leaves mapping and
 ///            descriptor: they are undone here. (Some kilobytes of its heap stay.)
 /// Ownership  The camera is the caller's and open from set_up() to end() or abandon().
@@ -93,6 +93,7 @@ class FirewireRing {
     std::size_t stride = 0;
   };
   [[nodiscard]] bool find_map(const std::string& device);
+  void detach_kept() noexcept;
   void enqueue(std::size_t buffer) noexcept;
   [[nodiscard]] bool dequeue(dc1394video_frame_t** frame) noexcept;
   [[nodiscard]] std::size_t pop_queued() noexcept;

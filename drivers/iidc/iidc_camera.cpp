@@ -185,20 +185,25 @@ DeviceStatus IidcCamera::begin(Notifier* ready) {
 void IidcCamera::stop() noexcept {
   const bool was = queue_.started();
   queue_.end();
-  if (was && !lost_.load(std::memory_order_acquire)) {
-    const std::lock_guard lock(asking_);
+  if (!was) return;
+  const std::lock_guard lock(asking_);  // libdc1394 takes no question while a capture ends
+  if (!lost_.load(std::memory_order_acquire)) {
     registers_.transmit(false);
     if (registers_.take_status() == DeviceStatus::gone)
       lost_.store(true, std::memory_order_release);
   }
-  if (was) bus_->stop();
+  bus_->stop();
+}
+
+DeviceStatus IidcCamera::standing() const noexcept {
+  if (!queue_.started()) return DeviceStatus::stopped;
+  return lost_.load(std::memory_order_acquire) ? DeviceStatus::gone : DeviceStatus::ok;
 }
 
 DeviceStatus IidcCamera::trigger_once() noexcept {
   if (!configured_ || plan_.trigger != CameraTrigger::software) return DeviceStatus::unsupported;
-  if (!queue_.started()) return DeviceStatus::stopped;
-  if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
   const std::lock_guard lock(asking_);
+  if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
   registers_.software_trigger();
   const DeviceStatus status = registers_.take_status();
   if (status == DeviceStatus::ok) return status;
@@ -212,9 +217,8 @@ DeviceStatus IidcCamera::trigger_once() noexcept {
 
 DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
-  if (!queue_.started()) return DeviceStatus::stopped;
-  if (lost_.load(std::memory_order_acquire)) return DeviceStatus::gone;
   const std::lock_guard lock(asking_);
+  if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
   if (requested.exposure <= Duration{} || requested.exposure.to_seconds() * plan_.rate_hz > 1)
     return DeviceStatus::bad_configuration;
   const auto nearest = [](const AbsoluteRange& r, double value) {
@@ -237,8 +241,8 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
 }
 
 std::optional<double> IidcCamera::temperature_c() noexcept {
-  if (!queue_.started() || lost_.load(std::memory_order_acquire)) return std::nullopt;
   const std::lock_guard lock(asking_);
+  if (standing() != DeviceStatus::ok) return std::nullopt;
   const std::optional<double> t = registers_.temperature_c();
   (void)registers_.take_status();  // of a camera that has just gone
   return t;

@@ -68,13 +68,16 @@ class IidcCamera final : public CameraDevice, private StreamSink {
                                                 CameraConfiguration* actual);
   [[nodiscard]] DeviceStatus begin(Notifier* ready);
   [[nodiscard]] Duration transfer_time() const noexcept;
+  /// → ok, stopped, gone
+  [[nodiscard]] DeviceStatus standing() const noexcept;
   void return_slot(FrameSlot slot) noexcept;
   void drain() noexcept;
   [[nodiscard]] DeviceStatus refused(DeviceStatus status, std::string why);
 
   std::unique_ptr<CameraBus> bus_;
   std::shared_ptr<SharedClock> clock_;
-  std::mutex asking_;  // of registers_ and plan_ between owner, trigger_once() and set_exposure()
+  std::mutex asking_;  // of registers_, plan_ and the bus's start and stop: the owner's, and
+                       // trigger_once(), set_exposure(), temperature_c()
   CameraRegisters registers_;
   CameraPlan plan_{};
   int sharing_ = 1;

@@ -165,16 +165,30 @@ std::string port_with_serial(const std::vector<SerialPortInfo>& ports,
   return of_another ? std::string() : asked;
 }
 
-std::string SerialPort::find() const {
-  return usb_serial_.empty() ? port_ : port_with_serial(list_serial_ports(), usb_serial_, port_);
+namespace {
+
+bool only_one_bears(const std::vector<SerialPortInfo>& ports, const std::string& usb_serial) {
+  return std::count_if(ports.begin(), ports.end(),
+                       [&](const SerialPortInfo& p) { return p.usb_serial == usb_serial; }) <= 1;
 }
 
-/// Only a number of its own tells it from others when it comes back. The ports of one converter
-/// share theirs, and some makers give all of theirs the same.
-void SerialPort::remember(const std::string& usb_serial) {
-  const std::vector<SerialPortInfo> ports = list_serial_ports();
-  const auto bears = [&](const SerialPortInfo& p) { return p.usb_serial == usb_serial; };
-  if (std::count_if(ports.begin(), ports.end(), bears) == 1) usb_serial_ = usb_serial;
+}  // namespace
+
+void ConverterNumber::opened(const std::vector<SerialPortInfo>& ports,
+                             const std::string& usb_serial) {
+  if (decided_) return;
+  decided_ = true;
+  if (only_one_bears(ports, usb_serial)) number_ = usb_serial;
+}
+
+std::string ConverterNumber::find(const std::vector<SerialPortInfo>& ports,
+                                  const std::string& asked) const {
+  if (!only_one_bears(ports, number_)) shared_.store(true, std::memory_order_relaxed);
+  return shared_.load(std::memory_order_relaxed) ? asked : port_with_serial(ports, number_, asked);
+}
+
+std::string SerialPort::find() const {
+  return converter_.known() ? converter_.find(list_serial_ports(), port_) : port_;
 }
 
 std::unique_ptr<ByteLine> SerialPort::open(const LineSettings& settings, DeviceStatus* status) {
@@ -197,7 +211,8 @@ std::unique_ptr<ByteLine> SerialPort::open(const LineSettings& settings, DeviceS
     *status = DeviceStatus::failed;
     return nullptr;
   }
-  if (port && usb_serial_.empty()) remember(text(::sp_get_port_usb_serial(port.get())));
+  if (port && !converter_.decided())
+    converter_.opened(list_serial_ports(), text(::sp_get_port_usb_serial(port.get())));
   auto line = std::make_unique<FdLine>(std::move(port), std::move(tty), std::move(wake), settings);
   line->discard_input();
   return line;

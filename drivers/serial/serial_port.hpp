@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -27,10 +28,33 @@ struct SerialPortInfo {
 [[nodiscard]] std::optional<int> read_latency_timer_ms(const std::string& port);
 
 /// Where the device that was at port `asked` (or a link to it) is now, by its converter's serial
-/// number: at `asked`, if that bears the number; else at the only one of `ports` that does. `asked`
-/// where none or several do: a port of another device must not be taken for it.
+/// number: at `asked`, if that bears the number; else at the only one of `ports` that does. Where
+/// none or several do, `asked`, or nothing if that bears another number: a port of another device
+/// must not be taken for it.
 [[nodiscard]] std::string port_with_serial(const std::vector<SerialPortInfo>& ports,
                                            const std::string& usb_serial, const std::string& asked);
+
+/// The serial number of the converter that a port was first opened through, as far as it tells that
+/// converter from others. The ports of one converter share theirs, and some makers give all of
+/// theirs the same: where two were ever seen with it, the other may be the only one the next time.
+/// Threads  opened(): the first one before all else. find(): any.
+class ConverterNumber {
+ public:
+  /// `asked` was opened, through a converter of that number. The first opening counts.
+  void opened(const std::vector<SerialPortInfo>& ports, const std::string& usb_serial);
+  /// Where the device is now, as port_with_serial().
+  [[nodiscard]] std::string find(const std::vector<SerialPortInfo>& ports,
+                                 const std::string& asked) const;
+  /// opened() was called.
+  [[nodiscard]] bool decided() const noexcept { return decided_; }
+  /// find() has something to look for.
+  [[nodiscard]] bool known() const noexcept { return !number_.empty(); }
+
+ private:
+  bool decided_ = false;
+  std::string number_;
+  mutable std::atomic<bool> shared_{false};
+};
 
 /// A serial port by its name, a link to it (/dev/serial/by-id/…), or a plain tty (a
 /// pseudo-terminal).
@@ -53,10 +77,9 @@ class SerialPort final : public LinePlace {
 
  private:
   [[nodiscard]] std::string find() const;
-  void remember(const std::string& usb_serial);
 
-  std::string port_;        // as asked for
-  std::string usb_serial_;  // of the first opening; empty: none, or not the only one with it
+  std::string port_;  // as asked for
+  ConverterNumber converter_;
 };
 
 }  // namespace vergence

@@ -3,7 +3,7 @@
 namespace vergence {
 namespace {
 
-/// A device that marks its pulses makes them at 400 Hz / n. The rate it was asked for is a decimal
+/// It makes them at 400 Hz / n. The rate it was asked for is a decimal
 /// number, 26.6667 say: edges reckoned from that would run away from the pulses by milliseconds an
 /// hour.
 Duration as_marked(Duration asked) noexcept {
@@ -16,12 +16,10 @@ Duration as_marked(Duration asked) noexcept {
 
 }  // namespace
 
-SyncOutPulses::SyncOutPulses(Duration interval, std::uint32_t divider) noexcept
-    : interval_(divider == 0 ? as_marked(interval) : interval), divider_(divider) {}
+SyncOutPulses::SyncOutPulses(Duration interval) noexcept : interval_(as_marked(interval)) {}
 
 std::optional<Pulse> SyncOutPulses::reading(const InsReading& reading, MappedStamp at) noexcept {
-  const bool marked = divider_ == 0;
-  if (marked && !reading.quality.sync_out) return std::nullopt;
+  if (!reading.quality.sync_out) return std::nullopt;
   if (any_ && reading.measured <= last_) {
     ++boot_;
     fresh_ = true;
@@ -37,21 +35,13 @@ std::optional<Pulse> SyncOutPulses::reading(const InsReading& reading, MappedSta
   const Duration since = reading.measured - first_;
   const std::int64_t steps = (since + interval_ / 2).ns() / interval_.ns();
   Duration off = since - interval_ * steps;
-  if (marked && off < Duration{}) {
+  if (off < Duration{}) {
     first_ = first_ + off;
     off = {};
   }
-  const bool of_pulse = marked || ((off < Duration{} ? -off : off) * 2 * divider_ < interval_);
   const std::uint64_t number = base_ + static_cast<std::uint64_t>(steps);
-  if (!of_pulse || (!begins && number <= number_)) return std::nullopt;
+  if (!begins && number <= number_) return std::nullopt;
   number_ = number;
-  if (!marked) {
-    // It left with this very sample. Reckoned on from here, what the interval is off by never adds
-    // up.
-    first_ = reading.measured;
-    base_ = number;
-    off = {};
-  }
   Pulse p;
   p.number = number;
   p.edge = reading.measured - off;

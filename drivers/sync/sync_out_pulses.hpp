@@ -12,30 +12,24 @@ namespace vergence {
 ///
 /// Numbers  Intervals of the INS's own clock, which makes the pulses too; a reading that was lost
 ///          loses no number. A gap made on purpose must be told by restart(): numbers go on after
-///          it, for it is the gap between pulses of one boot that proves.
-/// Marked   A device that marks its pulses (InsQuality::sync_out) does so on the sample after the
-///          pulse: edges are multiples of its interval, 400 Hz / n, from the earliest mark. One
-///          that does not pulses with every `divider`-th sample from its first since restart();
-///          each is reckoned from the one before.
+///          it, for it is the gap between pulses of one boot that proves. So the clock must go on
+///          over the gap, and every pulse on either side of it have its reading.
+/// Marks    InsQuality::sync_out, on the sample after the pulse: edges are multiples of the
+///          interval, 400 Hz / n, from the earliest mark.
 /// Threads  One caller. Memory: in place. Errors: none; a clock that runs back is another boot.
-/// A limit  The INS's clock must go on over the gap: one that is continued by the host's time only
-///          proves nothing.
 class SyncOutPulses {
  public:
-  /// `interval`: between two pulses, as good as a decimal rate says it. `divider`: readings a pulse
-  /// where none are marked; 0: they are marked.
-  SyncOutPulses(Duration interval, std::uint32_t divider) noexcept;
+  /// `interval`: between two pulses, as good as a decimal rate says it.
+  explicit SyncOutPulses(Duration interval) noexcept;
 
   /// The pulse that left with this reading, if one did. `at`: the reading's stamp on the host's
   /// clock.
   [[nodiscard]] std::optional<Pulse> reading(const InsReading& reading, MappedStamp at) noexcept;
-  /// The device was told to stop measuring and to go on: a gap. Its first reading after it is a
-  /// pulse.
+  /// The device was told to stop measuring and to go on: a gap.
   void restart() noexcept { fresh_ = true; }
 
  private:
   Duration interval_;
-  std::uint32_t divider_;
   bool any_ = false, fresh_ = true;
   DeviceStamp first_{};  // pulse that the next are reckoned from, numbered base_
   DeviceStamp last_{};   // reading that was looked at

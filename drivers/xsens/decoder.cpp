@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace vergence::xsens {
 namespace {
@@ -10,6 +11,10 @@ using namespace xbus;
 
 constexpr Duration kWithoutPlace =
     Duration::milliseconds(200);  // so long a position may be missing while there is a fix
+
+bool answers(const Message& m, MessageId request) noexcept {
+  return m.id == static_cast<std::uint8_t>(static_cast<unsigned>(request) + 1U);
+}
 
 }  // namespace
 
@@ -27,6 +32,7 @@ void Decoder::begin(const StreamSettings& stream, std::uint32_t baud,
   counted_ = false;
   woke_ = false;
   any_ = false;
+  stopped_ = going_on_ = resumed_ = false;
   last_sample_ = {};
 }
 
@@ -41,6 +47,10 @@ bool Decoder::woke() noexcept {
   const bool woke = woke_;
   woke_ = false;
   return woke;
+}
+
+bool Decoder::answered(MessageId request) noexcept {
+  return std::exchange(request == MessageId::go_to_config ? stopped_ : going_on_, false);
 }
 
 bool Decoder::next(InsReading* reading) noexcept {
@@ -63,6 +73,8 @@ bool Decoder::next(InsReading* reading) noexcept {
 void Decoder::take_other(const Message& m) noexcept {
   ++counters_.other;
   if (m.is(MessageId::wake_up)) woke_ = true;
+  if (answers(m, MessageId::go_to_config)) stopped_ = true;
+  if (answers(m, MessageId::go_to_measurement)) going_on_ = resumed_ = true;
   if (!m.is(MessageId::error)) return;
   ++counters_.errors;
   counters_.last_error = m.payload.empty() ? std::uint8_t{0} : m.payload[0];
@@ -173,6 +185,7 @@ bool Decoder::hand_out(const InsReading& r, InsReading* reading) noexcept {
   last_host_ = r.host;
   ++counters_.readings;
   *reading = r;
+  reading->resumed = std::exchange(resumed_, false);
   return true;
 }
 

@@ -58,6 +58,9 @@ class Decoder {
   void quiet() noexcept { stream_.abandon(); }
   /// The device has told that it restarts, since the last call.
   [[nodiscard]] bool woke() noexcept;
+  /// It has answered that it stopped measuring, or goes on: which of the two `request` is. Since
+  /// the last call for that. The first reading after it goes on is `resumed`.
+  [[nodiscard]] bool answered(xbus::MessageId request) noexcept;
 
   [[nodiscard]] const DecoderCounters& counters() const noexcept { return counters_; }
   [[nodiscard]] const xbus::StreamCounters& line_counters() const noexcept {
@@ -92,6 +95,7 @@ class Decoder {
   std::uint64_t received_ = 0, base_ = 0;
   std::uint64_t number_ = 0;
   bool any_ = false, counted_ = false, woke_ = false;
+  bool stopped_ = false, going_on_ = false, resumed_ = false;
   std::uint16_t last_message_ = 0;
   std::uint8_t last_fix_age_ = 0;
 };

@@ -1,5 +1,6 @@
 #include "drivers/xsens/device.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -136,26 +137,84 @@ DeviceStatus Device::begin() noexcept {
 }
 
 DeviceStatus Device::read_on() noexcept {
-  std::array<std::uint8_t, Decoder::kMostBytes> bytes{};
-  HostStamp last_received = line()->now();
-  std::uint64_t frames = decoder_.line_counters().messages;
+  last_received_ = line()->now();
+  gap_ns_.store(0, std::memory_order_relaxed);  // what was wanted before is past
   for (;;) {
     if (stop_requested()) return DeviceStatus::stopped;
-    const LineRead r = line()->read(bytes, kRead);
-    if (r.status == DeviceStatus::ok) {
-      decoder_.accept(std::span(bytes).first(r.size), r.arrival);
-      for (InsReading reading; decoder_.next(&reading);) hand_out(reading, reading.arrival);
-      count_decoded();
-      if (decoder_.line_counters().messages != frames) last_received = r.arrival;
-      frames = decoder_.line_counters().messages;
-    } else if (r.status == DeviceStatus::timeout) {
-      decoder_.quiet();
-    } else if (r.status != DeviceStatus::stopped) {
-      return r.status;
-    }
+    DeviceStatus status = read_once(kRead);
+    if (const std::int64_t gap = gap_ns_.exchange(0, std::memory_order_relaxed);
+        gap > 0 && status != DeviceStatus::gone)
+      status = make_gap(Duration::nanoseconds(gap));
+    if (status != DeviceStatus::ok && status != DeviceStatus::timeout) return status;
     // No whole frame for that long, be it silence or noise.
-    if (line()->now() - last_received > kSilent) return DeviceStatus::gone;
+    if (line()->now() - last_received_ > kSilent) return DeviceStatus::gone;
   }
+}
+
+/// Hands out what a read brings. → ok, timeout (also where it was woken), ended, gone, failed
+DeviceStatus Device::read_once(Duration limit) noexcept {
+  std::array<std::uint8_t, Decoder::kMostBytes> bytes{};
+  const std::uint64_t before = decoder_.line_counters().messages;
+  const LineRead r = line()->read(bytes, limit);
+  if (r.status == DeviceStatus::timeout) decoder_.quiet();
+  if (r.status == DeviceStatus::stopped) return DeviceStatus::timeout;
+  if (r.status != DeviceStatus::ok) return r.status;
+  decoder_.accept(std::span(bytes).first(r.size), r.arrival);
+  for (InsReading reading; decoder_.next(&reading);) hand_out(reading, reading.arrival);
+  count_decoded();
+  if (decoder_.line_counters().messages != before) last_received_ = r.arrival;
+  return r.status;
+}
+
+DeviceStatus Device::pause(Duration gap) noexcept {
+  if (identity_.generation != xbus::Generation::mark4) return DeviceStatus::unsupported;
+  if (!streaming()) return DeviceStatus::stopped;
+  gap_ns_.store(gap.ns(), std::memory_order_relaxed);
+  return DeviceStatus::ok;
+}
+
+/// A pulse leaves with every so many samples: all up to the device's answer are handed out, and all
+/// from its next one on.
+DeviceStatus Device::make_gap(Duration gap) noexcept {
+  if (const DeviceStatus s = tell(xbus::MessageId::go_to_config); s != DeviceStatus::ok) return s;
+  const HostStamp end = line()->now() + gap;
+  while (line()->now() < end) {
+    if (stop_requested()) return DeviceStatus::stopped;
+    const DeviceStatus s = read_once(std::min(kRead, end - line()->now()));
+    if (s != DeviceStatus::ok && s != DeviceStatus::timeout) return s;
+  }
+  last_received_ = line()->now();  // it was silent because it was told to be
+  return tell(xbus::MessageId::go_to_measurement);
+}
+
+/// → ok: it has answered; stopped, gone, failed
+DeviceStatus Device::tell(xbus::MessageId request) noexcept {
+  constexpr int kTimes = 4;
+  constexpr Duration kAnswer = Duration::milliseconds(150), kWrite = Duration::milliseconds(100);
+  std::array<std::uint8_t, xbus::kMaxFrame> frame{};
+  const xbus::WrittenFrame w =
+      xbus::write_frame({xbus::kBusMaster, static_cast<std::uint8_t>(request), {}}, frame);
+  (void)decoder_.answered(request);
+  for (int i = 0; i < kTimes; ++i) {
+    const DeviceStatus sent = line()->write(std::span(frame).first(w.size), kWrite);
+    if (sent != DeviceStatus::ok && sent != DeviceStatus::timeout) return sent;
+    for (const HostStamp until = line()->now() + kAnswer; line()->now() < until;) {
+      if (stop_requested()) return DeviceStatus::stopped;
+      const DeviceStatus s = read_once(until - line()->now());
+      if (s != DeviceStatus::ok && s != DeviceStatus::timeout) return s;
+      if (decoder_.answered(request)) return DeviceStatus::ok;
+    }
+  }
+  return DeviceStatus::gone;  // opened again it is set anew
+}
+
+/// Cameras that its SyncOut triggers expose no more after a stop.
+void Device::finished() noexcept {
+  if (line() == nullptr || options_.sync_out_hz <= 0) return;
+  constexpr Duration kShort = Duration::milliseconds(300);
+  const std::atomic<bool> never{false};
+  Reply reply;
+  RequestReply(*line(), never).ask(xbus::MessageId::go_to_config, {}, &reply, kShort);
 }
 
 /// Opens and sets the device again.

@@ -1,4 +1,6 @@
 #pragma once
+#include <atomic>
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -28,6 +30,8 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
 
   [[nodiscard]] DeviceStatus configure(double rate_hz, double* actual_hz) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override;
+  /// Of an MTi-G-700/710, whose clock goes on meanwhile; others: `unsupported`.
+  [[nodiscard]] DeviceStatus pause(Duration gap) noexcept override;
 
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
   [[nodiscard]] const StreamSettings& stream() const noexcept { return set_; }
@@ -38,12 +42,18 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
   [[nodiscard]] DeviceStatus begin() noexcept override;
   [[nodiscard]] DeviceStatus read_on() noexcept override;
   [[nodiscard]] DeviceStatus reopen() override;
+  void finished() noexcept override;
+  [[nodiscard]] DeviceStatus read_once(Duration limit) noexcept;
+  [[nodiscard]] DeviceStatus make_gap(Duration gap) noexcept;
+  [[nodiscard]] DeviceStatus tell(xbus::MessageId request) noexcept;
   void count_decoded() noexcept;
 
   const Options options_;
   Identity identity_{};
   StreamSettings set_{};
-  Decoder decoder_;  // of the thread while it runs, else the owner's
+  Decoder decoder_;                      // of the thread while it runs, else the owner's
+  HostStamp last_received_{};            // the thread's, a whole message
+  std::atomic<std::int64_t> gap_ns_{0};  // that is to be made; 0: none
 };
 
 }  // namespace vergence::xsens

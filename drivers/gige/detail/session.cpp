@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <mutex>
+#include <shared_mutex>
 #include <thread>
 #include <utility>
 
@@ -32,9 +34,17 @@ std::string address_of(GSocketAddress* address) {
   return text_of(text.get());
 }
 
+/// Of Aravis's list of devices, which it looks up and makes anew without a lock, while every camera
+/// that is away has a thread that looks for it.
+std::shared_mutex& device_list() {
+  static std::shared_mutex mutex;
+  return mutex;
+}
+
 }  // namespace
 
 std::vector<Found> discover() {
+  const std::unique_lock lock(device_list());
   ArvInterface* gv = arv_gv_interface_get_instance();
   arv_interface_update_device_list(gv);
   std::vector<Found> all;
@@ -55,6 +65,7 @@ std::vector<Found> discover() {
 std::unique_ptr<Session> Session::open(const std::string& where, DeviceStatus* status,
                                        std::string* message) {
   Error error;
+  std::shared_lock lock(device_list());
   Object<ArvDevice> device(
       arv_interface_open_device(arv_gv_interface_get_instance(), where.c_str(), error.out()));
   if (device == nullptr || !ARV_IS_GV_DEVICE(device.get())) {
@@ -63,6 +74,7 @@ std::unique_ptr<Session> Session::open(const std::string& where, DeviceStatus* s
                      : where + " does not answer; is its address in the network of this host?";
     return nullptr;
   }
+  lock.unlock();
   if (arv_gv_device_is_controller(ARV_GV_DEVICE(device.get())) == FALSE) {
     *status = DeviceStatus::busy;
     *message = where + " is controlled by another program, or was by one that ended seconds ago";

@@ -44,6 +44,7 @@ class XsensSimulator final : public DeviceModel {
     return messages_.sample_time_origin_ns();
   }
   [[nodiscard]] const XsensWrites& writes() const noexcept { return settings_.writes(); }
+  [[nodiscard]] bool measuring() const noexcept { return mode_ == Mode::measuring; }
   [[nodiscard]] double rate_hz() const noexcept { return settings_.rate_hz(); }
   /// As the host has set it.
   [[nodiscard]] const XsensSettings& settings() const noexcept { return settings_; }

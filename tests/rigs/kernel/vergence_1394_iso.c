@@ -94,10 +94,19 @@ void vcard_take_iso(struct vcard* v, const struct vb_iso* iso, const u8* data, s
   spin_unlock_irq(&v->lock);
 }
 
+/* An OHCI controller gives a channel to one receive context. */
+static bool channel_taken(const struct vcard* v, int channel) {
+  const struct vcontext* c;
+
+  list_for_each_entry(c, &v->contexts, link) if (c->base.channel == channel) return true;
+  return false;
+}
+
 struct fw_iso_context* vcard_allocate_iso(struct fw_card* card, int type, int channel,
                                           size_t header_size) {
   struct vcard* v = to_vcard(card);
   struct vcontext* c;
+  bool taken;
 
   if (type != FW_ISO_CONTEXT_RECEIVE) return ERR_PTR(-EOPNOTSUPP);
   c = kzalloc(sizeof(*c), GFP_KERNEL);
@@ -111,8 +120,14 @@ struct fw_iso_context* vcard_allocate_iso(struct fw_card* card, int type, int ch
   c->base.channel = channel;
   c->base.header_size = header_size;
   spin_lock_irq(&v->lock);
-  list_add_tail(&c->link, &v->contexts);
+  taken = channel_taken(v, channel);
+  if (!taken) list_add_tail(&c->link, &v->contexts);
   spin_unlock_irq(&v->lock);
+  if (taken) {
+    free_page((unsigned long)c->header);
+    kfree(c);
+    return ERR_PTR(-EBUSY);
+  }
   return &c->base;
 }
 

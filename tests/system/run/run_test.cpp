@@ -87,6 +87,7 @@ TEST(Run, inRealTimeEveryFrameIsPosedOrCounted) {
   ASSERT_TRUE(o.code == 0 || o.code == 1) << o.code << ": " << o.err;
   const auto summary = summary_of(session);
   const auto& devices = summary["devices"];
+  EXPECT_GT(summary["frames"]["posed"].get<int>(), 0);
   const int read = summary["frames"]["read"], overtaken = devices["sets_overtaken"];
   EXPECT_EQ(read + overtaken,
             devices["sets_complete"].get<int>() + devices["sets_incomplete"].get<int>());

@@ -109,6 +109,32 @@ TEST(GnssDecoder, stampsAreThoseOfTheFixNotOfTheArrival) {
   EXPECT_EQ(d.counters().malformed, 0U);
 }
 
+// A receiver's own clock is tenths of a second off after a night; its first fix sets it.
+TEST(GnssDecoder, theTimeBeforeTheFirstFixIsNoWitness) {
+  for (const int ahead_ms : {150, 400}) {
+    Decoder d({Protocol::ubx, 0, Duration::milliseconds(30)});
+    int fixed = 0;
+    for (int i = 0; i < 600; ++i) {
+      const bool fix = i >= 300;
+      const std::int64_t since = i * 100'000'000LL,
+                         told = since + (fix ? 0 : ahead_ms * 1'000'000LL);
+      test::PvtBytes pvt;
+      pvt.put(9, 1, 23 + told / 60'000'000'000);
+      pvt.put(10, 1, told / 1'000'000'000 % 60);
+      pvt.put(16, 4, told % 1'000'000'000);
+      if (!fix) pvt.put(20, 1, 0), pvt.put(21, 1, 0);
+      const HostStamp truth(7'000'000'000 + since);
+      const auto all = read(&d, pvt.frame(), truth + Duration::milliseconds(30 + (i * 37) % 61));
+      if (!fix || all.empty()) continue;
+      ++fixed;
+      EXPECT_EQ(all[0].sample.fix, FixStatus::fix_3d);
+      EXPECT_LE(std::abs((all[0].host - truth).to_seconds()), all[0].host_error.to_seconds())
+          << ahead_ms << " ms, " << i;
+    }
+    EXPECT_GT(fixed, 290);
+  }
+}
+
 TEST(GnssDecoder, missingEpochsAreCounted) {
   Decoder d({Protocol::ubx, 0, {}});
   std::uint64_t number = 0;

@@ -280,6 +280,20 @@ TEST(SerialPort, ofPortsThatShareASerialNumberTheOneAskedForIsTaken) {
   EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV7"), "/dev/ttyV7") << "which one nobody knows";
 }
 
+TEST(ConverterNumber, thatTwoWereSeenWithTellsNobodyForGood) {
+  const auto one = usb_port("/dev/ttyV0", "0001"), other = usb_port("/dev/ttyV1", "0001");
+  ConverterNumber shared;
+  shared.opened({one, other}, "0001");
+  shared.opened({one}, "0001");  // after the hub began anew it was there first
+  EXPECT_EQ(shared.find({other}, "/dev/ttyV0"), "/dev/ttyV0");
+
+  ConverterNumber alone;
+  alone.opened({one}, "0001");
+  EXPECT_EQ(alone.find({usb_port("/dev/ttyV5", "0001")}, "/dev/ttyV0"), "/dev/ttyV5");
+  EXPECT_EQ(alone.find({one, other}, "/dev/ttyV0"), "/dev/ttyV0");
+  EXPECT_EQ(alone.find({other}, "/dev/ttyV0"), "/dev/ttyV0");
+}
+
 TEST(SerialPort, aLinkIsKeptWhereItLeadsToThePortWithTheSerialNumber) {
   const std::filesystem::path link =
       std::filesystem::temp_directory_path() / ("vergence-by-id-" + std::to_string(::getpid()));

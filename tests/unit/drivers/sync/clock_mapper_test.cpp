@@ -89,6 +89,20 @@ TEST(ClockMapper, aStallOfTheTransportDoesNotMoveTheClock) {
   EXPECT_EQ(mapper.resets(), 0U);
 }
 
+// The process slept, and what its driver had queued comes at once: none is within the stall.
+TEST(ClockMapper, aBacklogIsNoClockThatWasSetBack) {
+  Device device;
+  ClockMapper mapper(options_of(device));
+  for (int i = 0; i < 2000; ++i) {
+    const HostStamp truth = at(10 + i * 0.05);
+    HostStamp arrival = device.arrival(truth);
+    if (i >= 1000 && i < 1008) arrival = at(10 + 999 * 0.05 + 0.95);  // 0.9 to 0.55 s late
+    const MappedStamp m = mapper.map(device.read(truth), arrival);
+    ASSERT_LE(std::abs((m.host - truth).to_seconds()), m.error.to_seconds()) << i;
+  }
+  EXPECT_EQ(mapper.resets(), 0U);
+}
+
 TEST(ClockMapper, stampsOfARegularDeviceNeverGoBack) {
   Device device{80e-6, -5'000'000'000};
   ClockMapper mapper(options_of(device));

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <optional>
 
-/// The rate of the pulses is written with six digits, the device's own is 400 Hz / n or its sample
-/// rate / n: over a long drive the difference must add up to nothing.
+/// The rate of the pulses is written with six digits, the device's own is 400 Hz / n: over a long
+/// drive the difference must add up to nothing.
 namespace vergence {
 namespace {
 
@@ -28,49 +28,33 @@ struct Account {
   }
 };
 
-std::optional<Pulse> read(SyncOutPulses* pulses, std::int64_t sample, bool marked) {
+std::optional<Pulse> read(SyncOutPulses* pulses, std::int64_t sample) {
   InsReading r;
   r.measured = DeviceStamp(sample);
-  r.quality.sync_out = marked;
+  r.quality.sync_out = true;
   return pulses->reading(r, {HostStamp(sample + kOffset), Duration::microseconds(9)});
 }
 
 TEST(SyncOutPulses, MarksStayWhereThePulsesAreForHours) {
   constexpr std::int64_t kPulse = 37'500'000;  // 400 Hz / 15: 26.66… Hz
   for (const double rate : {26.6667, 26.6666}) {
-    SyncOutPulses pulses(Duration::seconds(1 / rate), 0);
+    SyncOutPulses pulses(Duration::seconds(1 / rate));
     Account account;
     std::int64_t n = 0;
     for (std::int64_t edge = kBegin; edge < kTenHours; edge += kPulse, ++n)
-      account.add(read(&pulses, (edge + kSample - 1) / kSample * kSample, true), n, edge);
+      account.add(read(&pulses, (edge + kSample - 1) / kSample * kSample), n, edge);
     EXPECT_EQ(account.wrong, 0) << rate;
     EXPECT_EQ(account.taken, n) << rate;
   }
 }
 
-TEST(SyncOutPulses, CountedOnesStayOnTheirSamplesForHoursThoughReadingsAreLost) {
-  constexpr std::int64_t kDivider = 3;  // 100 Hz / 3: 33.33… Hz
-  for (const double rate : {33.3333, 33.3334}) {
-    SyncOutPulses pulses(Duration::seconds(1 / rate), kDivider);
-    Account account;
-    std::int64_t made = 0;
-    for (std::int64_t i = 0; kBegin + i * kSample < kTenHours; ++i) {
-      if (i % 1000 >= 900) continue;  // one second in ten is lost
-      made += i % kDivider == 0 ? 1 : 0;
-      account.add(read(&pulses, kBegin + i * kSample, false), i / kDivider, kBegin + i * kSample);
-    }
-    EXPECT_EQ(account.wrong, 0) << rate;
-    EXPECT_EQ(account.taken, made) << rate;
-  }
-}
-
 TEST(SyncOutPulses, AnIntervalThatIsNoneOfTheDevicesIsTakenAsItIs) {
   constexpr std::int64_t kPulse = 37'600'000;  // 0.27 % beside 400 Hz / 15
-  SyncOutPulses pulses(Duration::nanoseconds(kPulse), 0);
+  SyncOutPulses pulses(Duration::nanoseconds(kPulse));
   Account account;
   for (std::int64_t n = 0; n < 10'000; ++n) {
     const std::int64_t edge = kBegin + n * kPulse;
-    account.add(read(&pulses, edge, true), n, edge);
+    account.add(read(&pulses, edge), n, edge);
   }
   EXPECT_EQ(account.wrong, 0);
   EXPECT_EQ(account.taken, 10'000);

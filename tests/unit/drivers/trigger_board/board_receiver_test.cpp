@@ -108,6 +108,20 @@ TEST_F(Receiving, numbersThatCannotBeEndInInvalidAfterAFewInARow) {
   EXPECT_EQ(pulses.size(), 1U);
 }
 
+TEST_F(Receiving, afterOneWrongTickItGoesOnOnceTheBoardIsSetUpAnew) {
+  for (std::uint32_t n = 0; n < 10; ++n) event(n, (n + 1) * kPeriod);
+  event(10, 11 * kPeriod + (std::uint64_t{1} << 32U));
+  for (std::uint32_t n = 11; receiver.finding() == Finding::none && n < 100; ++n)
+    event(n, (n + 1) * kPeriod);
+  ASSERT_EQ(receiver.finding(), Finding::invalid);
+  const std::size_t before = pulses.size();
+  receiver.clear_finding();
+  receiver.begin_boot(kBoot, 100, TriggerConfig{.rate_millihertz = 30'000}, {});
+  for (std::uint32_t n = 100; n < 120; ++n) event(n, (n + 1) * kPeriod);
+  EXPECT_EQ(pulses.size(), before + 20);
+  EXPECT_EQ(receiver.finding(), Finding::none);
+}
+
 TEST_F(Receiving, aStatusWithTheSequenceOfAPauseAnswersIt) {
   pause.add(3);
   ASSERT_EQ(pause.due(arrival), 3U);

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <utility>
+
 #include "tests/unit/drivers/xsens/rig.hpp"
 
 namespace vergence::xsens {
@@ -86,6 +89,56 @@ TEST_P(BothGenerations, valuesAreThoseOfTheDriveInEastNorthUp) {
     EXPECT_NEAR(all.back().sample.height_sigma, 3, 1e-3);
     EXPECT_NEAR(all.back().sample.velocity_sigma, 0.1, 1e-3);
   }
+}
+
+/// Where there is more than a period between two stamps: both of them. Once only.
+template <class Times, class OfTime>
+std::pair<std::int64_t, std::int64_t> gap_in(const Times& times, const OfTime& ns_of) {
+  std::pair<std::int64_t, std::int64_t> gap{0, 0};
+  for (std::size_t i = 1; i < times.size(); ++i) {
+    if (ns_of(times[i]) - ns_of(times[i - 1]) <= 10'000'000) continue;
+    EXPECT_EQ(gap.second, 0) << "a second one at " << i;
+    gap = {ns_of(times[i - 1]), ns_of(times[i])};
+  }
+  return gap;
+}
+
+// Cameras that SyncOut triggers are paired by a gap: every pulse on either side of it has to have
+// its reading, also behind a converter that keeps bytes for 16 ms.
+TEST(XsensDevice, aPauseLosesNoReadingOnEitherSideAndTheFirstAfterItIsMarked) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
+  sensor.duration = Duration::seconds(30);
+  Options options;
+  options.sync_out_hz = 25;
+  XsensRig rig(sensor, {}, options);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->last_error();
+  EXPECT_EQ(rig.device->pause(Duration::milliseconds(200)), DeviceStatus::stopped);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  auto all = rig.readings(300);
+  ASSERT_EQ(rig.device->pause(Duration::milliseconds(200)), DeviceStatus::ok);
+  const auto rest = rig.readings();
+  all.insert(all.end(), rest.begin(), rest.end());
+  const auto made = gap_in(rig.simulator->sample_times_ns(), [](std::int64_t ns) { return ns; });
+  const auto told = gap_in(all, [](const InsReading& r) { return r.measured.ns(); });
+  EXPECT_GE(made.second - made.first, 200'000'000);
+  EXPECT_LT(made.second - made.first, 400'000'000);
+  const std::int64_t origin = rig.simulator->sample_time_origin_ns();
+  EXPECT_EQ(told.first - origin, made.first);
+  EXPECT_EQ(told.second - origin, made.second);
+  for (const InsReading& r : all) EXPECT_EQ(r.resumed, r.measured.ns() == told.second);
+  EXPECT_EQ(rig.times_gone, 0);
+}
+
+TEST(XsensDevice, aStopEndsThePulsesWhereSyncOutIsInUse) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
+  Options options;
+  options.sync_out_hz = 25;
+  XsensRig rig(sensor, {}, options);
+  ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->last_error();
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  (void)rig.readings(20);
+  rig.device->stop();
+  EXPECT_FALSE(rig.simulator->measuring());
 }
 
 TEST_P(BothGenerations, whatIsSetAlreadyIsNotWrittenAgain) {
