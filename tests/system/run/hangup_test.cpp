@@ -1,4 +1,4 @@
-// SIGHUP on a drive: the files are opened again, unless the terminal has gone.
+// SIGHUP on a drive: the files are opened again, unless the terminal has gone. SIGTERM before it.
 #include <gtest/gtest.h>
 #include <pty.h>
 #include <sys/wait.h>
@@ -115,6 +115,16 @@ TEST(Hangup, theFilesOfADriveThatWereMovedAwayBeginAnewAndNoPoseIsLost) {
             summary["frames"]["read"].get<std::size_t>() + 2);
   EXPECT_TRUE(fs::exists(session / "report.html"));
   EXPECT_TRUE(fs::exists(session / "drive_1.mcap")) << "the recording goes on in a new file";
+}
+
+// Devices take seconds to open, a mock's world to build: who stops it then has no session.
+TEST(Stop, beforeTheDriveBeganLeavesNoFolder) {
+  const test::TemporaryFolder folder;
+  Drive drive(folder / "s", false, 600);
+  std::this_thread::sleep_for(100ms);
+  drive.signal(SIGTERM);
+  EXPECT_EQ(drive.wait(), 143);
+  EXPECT_FALSE(fs::exists(folder / "s"));
 }
 
 TEST(Hangup, aTerminalThatIsThereStopsNothingAndOneThatGoesClosesTheSession) {

@@ -116,7 +116,9 @@ TEST_F(Receiving, afterOneWrongTickItGoesOnOnceTheBoardIsSetUpAnew) {
   ASSERT_EQ(receiver.finding(), Finding::invalid);
   const std::size_t before = pulses.size();
   receiver.clear_finding();
-  receiver.begin_boot(kBoot, 100, TriggerConfig{.rate_millihertz = 30'000}, {});
+  TriggerConfig config{};
+  config.rate_millihertz = 30'000;
+  receiver.begin_boot(kBoot, 100, config, {});
   for (std::uint32_t n = 100; n < 120; ++n) event(n, (n + 1) * kPeriod);
   EXPECT_EQ(pulses.size(), before + 20);
   EXPECT_EQ(receiver.finding(), Finding::none);
