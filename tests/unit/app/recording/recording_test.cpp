@@ -246,16 +246,17 @@ TEST(Recording, aDiskWithoutRoomForTheNextFileHasNoEmptyOnes) {
   Recording recording(folder.path(), o);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
   std::this_thread::sleep_for(200ms);
+  recording.roll();  // with the next message
+  ASSERT_TRUE(post(&recording, 100));
+  std::this_thread::sleep_for(300ms);
   disk.room = 0;
-  recording.roll();
-  std::this_thread::sleep_for(200ms);
-  for (int i = 100; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
+  for (int i = 101; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
   std::this_thread::sleep_for(1s);  // four attempts
   disk.room = ~std::uint64_t{0};
   std::this_thread::sleep_for(500ms);
   recording.close();
-  EXPECT_EQ(numbers(folder / "drive_0.mcap"), sequence(0, 100));
-  EXPECT_EQ(numbers(folder / "drive_1.mcap"), sequence(100, 200));
+  EXPECT_EQ(numbers(folder / "drive_0.mcap"), sequence(0, 101));
+  EXPECT_EQ(numbers(folder / "drive_1.mcap"), sequence(101, 200));
   EXPECT_FALSE(std::filesystem::exists(folder / "drive_2.mcap"));
 }
 

@@ -46,7 +46,6 @@ TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
   for (int i = 0; i < kPoses * (kRestarts + 1); ++i) {
     const double t = i / 10.0;
     PoseSample pose;
-    pose.number = static_cast<std::uint64_t>(i);
     pose.stamp = at(t + 0.003);
     pose.status = PoseStatus::ok;
     if (i > 0 && i % kPoses == 0) pose.reason = Reason::scene_restarted;
