@@ -23,10 +23,12 @@ constexpr double kTimesUsed = 3.0, kLeastMisfit = 0.4;
 constexpr double kCertain = 3.0;         // sigmas of depth by which a calibration is contradicted
 constexpr double kNeedsBaselines = 3.0;  // travelled, besides needs_motion_m
 
-/// Median distance to the epipolar lines of one frame's matches, px; negative: hardly a match.
-double median_distance(const LoggedFrame& frame, const RigCalibration& rig) noexcept {
-  const Camera left(rig.intrinsics[0]), right(rig.intrinsics[1]);
-  const EpipolarGeometry geometry(rig.T_camera_left[1]);
+/// Median distance to the epipolar lines of one frame's matches of the left camera and camera k,
+/// px; negative: hardly a match.
+double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int k) noexcept {
+  const auto other = static_cast<std::size_t>(k);
+  const Camera left(rig.intrinsics[0]), right(rig.intrinsics[other]);
+  const EpipolarGeometry geometry(rig.T_camera_left[other]);
   std::array<double, kHeldOutMatches> distance;
   std::size_t n = 0;
   const std::size_t step = frame.observations.size() / kHeldOutMatches + 1;
@@ -34,12 +36,12 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig) noex
     const LoggedObservation& s = frame.observations[i];
     Vec3 a, b;
     double d = 0;
-    if (!s.by(0) || !s.by(1) || !left.unproject(s.raw[0].cast<double>(), &a) ||
-        !right.unproject(s.raw[1].cast<double>(), &b) ||
+    if (!s.by(0) || !s.by(k) || !left.unproject(s.raw[0].cast<double>(), &a) ||
+        !right.unproject(s.raw[other].cast<double>(), &b) ||
         geometry.to_line(a.head<2>() / a.z(), b.head<2>() / b.z(), &d, nullptr) !=
             EpipolarStatus::ok)
       continue;
-    distance[n++] = std::abs(d) * rig.intrinsics[1].fx;
+    distance[n++] = std::abs(d) * rig.intrinsics[other].fx;
   }
   if (n < 10) return -1.0;
   const auto middle = distance.begin() + static_cast<std::ptrdiff_t>(n / 2);
@@ -67,15 +69,38 @@ HeldOut fit_of(std::span<double> medians) noexcept {
   return h;
 }
 
+/// How well camera k fits the newest frames after a number.
+HeldOut fit_of_held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig,
+                        int k) noexcept {
+  std::array<double, kHeldOutFrames> medians;
+  std::size_t n = 0;
+  for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
+    if (const double m = median_distance(f, rig, k); m >= 0) medians[n++] = m;
+  });
+  return fit_of(std::span(medians).first(n));
+}
+
 /// The same of the newest frames that a solution up to `newest` rests on.
-HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibration& rig) noexcept {
+HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibration& rig,
+                    int k) noexcept {
   std::array<double, kHeldOutFrames> medians;
   std::size_t n = 0;
   for (std::size_t i = log.size(); i-- > 0 && n < medians.size();) {
     if (log.frame(i).number > newest) continue;
-    if (const double m = median_distance(log.frame(i), rig); m >= 0) medians[n++] = m;
+    if (const double m = median_distance(log.frame(i), rig, k); m >= 0) medians[n++] = m;
   }
   return fit_of(std::span(medians).first(n));
+}
+
+/// Whether frames that were not used contradict camera k of a solution.
+bool contradicted(const TrackLog& log, const RigSolution& s, int k) noexcept {
+  const HeldOut fit = fit_of_held_out(log, s.newest, s.rig, k);
+  if (fit.frames < kFewestHeldOut) return false;
+  const HeldOut used = fit_of_used(log, s.newest, s.rig, k);
+  const double worst = used.frames < kFewestHeldOut
+                           ? kWorstFit
+                           : std::clamp(kTimesUsed * used.median_px, kLeastMisfit, kWorstFit);
+  return fit.median_px > worst;
 }
 
 double angle_between(const Vec3& a, const Vec3& b) noexcept {
@@ -85,12 +110,12 @@ double angle_between(const Vec3& a, const Vec3& b) noexcept {
 }  // namespace
 
 HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig) noexcept {
-  std::array<double, kHeldOutFrames> medians;
-  std::size_t n = 0;
-  for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
-    if (const double m = median_distance(f, rig); m >= 0) medians[n++] = m;
-  });
-  return fit_of(std::span(medians).first(n));
+  HeldOut worst = fit_of_held_out(log, after, rig, 1);
+  for (int k = 2; k < rig.cameras; ++k) {
+    const HeldOut fit = fit_of_held_out(log, after, rig, k);
+    if (fit.median_px > worst.median_px) worst = fit;
+  }
+  return worst;
 }
 
 bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept {
@@ -104,12 +129,19 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
   double sum = 0, squares = 0;
   int n = 0;
   for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
-    const double a = median_distance(f, worse), b = median_distance(f, better);
-    // Without a match by which to tell: the one that was searched with the other's band is no
-    // witness.
-    if (a < 0 || b < 0) return;
-    sum += a - b;
-    squares += (a - b) * (a - b);
+    double gain = 0;
+    bool told = false;
+    for (int k = 1; k < better.cameras; ++k) {
+      const double a = median_distance(f, worse, k), b = median_distance(f, better, k);
+      // Without a match by which to tell: the one that was searched with the other's band is no
+      // witness.
+      if (a < 0 || b < 0) continue;
+      gain += a - b;
+      told = true;
+    }
+    if (!told) return;
+    sum += gain;
+    squares += gain * gain;
     ++n;
   });
   if (n < kFewestHeldOut) return true;
@@ -228,14 +260,8 @@ Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noe
     return Gate::sigmas_too_large;
   }
   if (q.log == nullptr) return Gate::open;
-  const HeldOut fit = held_out(*q.log, s.newest, s.rig);
-  if (fit.frames >= kFewestHeldOut) {
-    const HeldOut used = fit_of_used(*q.log, s.newest, s.rig);
-    const double worst = used.frames < kFewestHeldOut
-                             ? kWorstFit
-                             : std::clamp(kTimesUsed * used.median_px, kLeastMisfit, kWorstFit);
-    if (fit.median_px > worst) return Gate::does_not_fit;
-  }
+  for (int k = 1; k < s.rig.cameras; ++k)
+    if (contradicted(*q.log, s, k)) return Gate::does_not_fit;
   if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))
     return Gate::no_better;
   return Gate::open;

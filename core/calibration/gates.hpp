@@ -16,14 +16,17 @@ struct HeldOut {
 };
 
 /// Frames newer than `after`. At most the newest kHeldOutFrames, and of each at most
-/// kHeldOutMatches. Threads pure.
+/// kHeldOutMatches. Of more than one further camera the one that fits worst, px of its own. Threads
+/// pure.
 inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 [[nodiscard]] HeldOut held_out(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& rig) noexcept;
 
 /// Whether `better` fits those frames better than `worse` by more than chance: mean over frames of
 /// the difference of medians against `chance` of its standard errors; true, too, where hardly a
-/// frame can say. Threads pure.
+/// frame can say. Of more than one further camera the sum of what each gains: a camera that was
+/// knocked tells, and another that a shorter drive holds a little less well does not outweigh it.
+/// Threads pure.
 inline constexpr double kChance = 2.0,
                         kRareChance =
                             3.0;  // of a question asked once; of one that is asked all the time

@@ -1,4 +1,7 @@
 #pragma once
+#include <array>
+#include <optional>
+
 #include "core/bundle/bundle.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/motion_track_builder.hpp"
@@ -50,11 +53,12 @@ struct RigSolution {
   int steps = 0;
   int near = 0;              // tracks nearer than CalibrationOptions::near_baselines
   double travelled_m = 0;    // along the frames used
-  double lag_frames = 0;     // of camera 1, by the monitor over the frames used
+  double lag_frames = 0;     // of the first camera that is out of step, else of camera 1, by the
+                             // monitors over the frames used
   bool out_of_step = false;  // and it is significant
-  std::uint64_t changed_at =
-      0;  // frame since which the tracks are of another transform than before; 0: they are of one
-  double solve_ms = 0;  // wall time
+  std::uint64_t changed_at = 0;  // frame since which the tracks are of another transform than
+                                 // before, the latest of all cameras; 0: they are of one
+  double solve_ms = 0;           // wall time
 };
 
 /// The stereo calibration adjustment of METHOD §3 over a snapshot of the track log: candidate pair,
@@ -113,11 +117,18 @@ class RigSolver {
   void write_result(const BundleResult& r, RigSolution* s) const noexcept;
   void describe(RigSolution* s) const noexcept;
   void watch_frames(RigSolution* s) noexcept;
+  /// What the frames used say of one camera, held against the result.
+  struct Watch {
+    double lag_frames = 0;
+    bool out_of_step = false;
+    std::uint64_t changed_at = 0;
+  };
+  [[nodiscard]] Watch watch_camera(int k, const RigCalibration& rig) noexcept;
 
   const CalibrationOptions& options_;
   TrackLog log_;
   BundleAdjuster adjuster_;
-  Monitor monitor_;
+  std::array<std::optional<Monitor>, kMaxCameras> monitors_;  // [k] of camera k ≥ 1
   double expected_scatter_px_;
   MotionTrackBuilder track_builder_;
   std::size_t most_frames_;

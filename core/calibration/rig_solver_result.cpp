@@ -72,23 +72,36 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
   rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
 }
 
-/// What the monitor would have said during the drive, had it known the result: a camera out of
+/// What the monitors would have said during the drive, had they known the result: a camera out of
 /// step, or two rigs in one solve.
 void RigSolver::watch_frames(RigSolution* s) noexcept {
-  const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[1].intrinsics();
+  for (int k = 1; k < count_; ++k) {
+    const Watch seen = watch_camera(k, s->rig);
+    if (k == 1 || (seen.out_of_step && !s->out_of_step)) s->lag_frames = seen.lag_frames;
+    s->out_of_step = s->out_of_step || seen.out_of_step;
+    // Since the latest change all cameras are where they are now.
+    s->changed_at = std::max(s->changed_at, seen.changed_at);
+  }
+}
+
+RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexcept {
+  Watch seen;
+  const auto other = static_cast<std::size_t>(k);
+  const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[other].intrinsics();
   const Pinhole left{a.fx, a.fy, a.cx, a.cy}, right{b.fx, b.fy, b.cx, b.cy};
-  if (!monitor_.set_reference(s->rig.T_camera_left[1], left, right, s->rig.covariance_wide[1]))
-    return;
-  monitor_.expect_scatter(expected_scatter_px_);
+  Monitor& monitor = *monitors_[other];
+  if (!monitor.set_reference(rig.T_camera_left[other], left, right, rig.covariance_wide[other]))
+    return seen;
+  monitor.expect_scatter(expected_scatter_px_);
   track_builder_.reset();
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const LoggedFrame& f = log_.frame(logged_[i]);
     stereo_.clear();
     for (const LoggedObservation& observation : f.observations) {
       Vec3 l, r;
-      if (!observation.by(0) || !observation.by(1) ||
+      if (!observation.by(0) || !observation.by(k) ||
           !cameras_[0].unproject(pixel_of(observation, 0), &l) ||
-          !cameras_[1].unproject(pixel_of(observation, 1), &r))
+          !cameras_[other].unproject(pixel_of(observation, k), &r))
         continue;
       (void)stereo_.push(
           {Vec2(left.fx * l.x() / l.z() + left.cx, left.fy * l.y() / l.z() + left.cy),
@@ -97,12 +110,13 @@ void RigSolver::watch_frames(RigSolution* s) noexcept {
     }
     const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();
     const MonitorVerdict v =
-        monitor_.look(track_builder_.next(f.stamp, f.number, stereo_.span(), step));
-    s->lag_frames = v.lag_frames;
-    if (v.kind == MonitorVerdict::Kind::out_of_step) s->out_of_step = true;
+        monitor.look(track_builder_.next(f.stamp, f.number, stereo_.span(), step));
+    seen.lag_frames = v.lag_frames;
+    if (v.kind == MonitorVerdict::Kind::out_of_step) seen.out_of_step = true;
     if (v.kind == MonitorVerdict::Kind::knock && v.statistic > kCertainChange * v.threshold)
-      s->changed_at = v.onset_frame;
+      seen.changed_at = v.onset_frame;
   }
+  return seen;
 }
 
 }  // namespace vergence::calibration

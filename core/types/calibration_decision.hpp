@@ -42,7 +42,8 @@ struct CalibrationDecision {
   int latency_frames = 0;         // from the alarm (or the start, or the request) to here
   std::uint64_t onset_frame = 0;  // when the rig is thought to have changed; 0: does not apply
   double held_out_before_px = 0;  // distance to the epipolar lines of frames that were not in the
-                                  // solve, median: with the one before
+                                  // solve, median, of the camera that fits worst: with the one
+                                  // before
   double held_out_after_px = 0;   // and with this one
   double judged_depth_m =
       0;  // METHOD §6.4: the depth that the next three are of; 0: nothing was measured

@@ -38,6 +38,24 @@ namespace vergence::test {
   return rig_of(drive, {drive.left, drive.right}, {kExact, kExact, kExact, kExact});
 }
 
+/// Another camera that sees every track, with the left one's lens and a third of a pixel of noise.
+struct FurtherCamera {
+  std::size_t number = 2;  // 1: the drive's right camera then is camera 2
+  Transform T_camera_left;
+};
+
+/// The rig of a drive that was logged with another camera.
+[[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive,
+                                           const FurtherCamera& further) {
+  RigCalibration rig = rig_of(drive);
+  rig.cameras = 3;
+  rig.intrinsics[2] = rig.intrinsics[1];
+  rig.T_camera_left[further.number == 1 ? 2 : 1] = drive.T_right_left;
+  rig.T_camera_left[further.number] = further.T_camera_left;
+  rig.baseline = rig.T_camera_left[1].t.norm();
+  return rig;
+}
+
 /// How far what is logged is from the truth, beyond the errors of the tracks: where a solve starts
 /// from.
 struct LogStart {
@@ -47,8 +65,9 @@ struct LogStart {
 
 /// The next `frames` frames of a drive as the estimator would log them.
 inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start,
-                      calibration::TrackLog& log) {
-  Random random(drive.options().seed, 5);
+                      calibration::TrackLog& log, const FurtherCamera* further = nullptr) {
+  Random random(drive.options().seed, 5), of_further(drive.options().seed, 7);
+  const std::size_t right = further != nullptr && further->number == 1 ? 2 : 1;
   const auto vector = [&](double sigma) {
     return Vec3(sigma * Vec3(random.normal(), random.normal(), random.normal()));
   };
@@ -60,8 +79,9 @@ inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start,
     f.T_left_world =
         i == 0 ? drive.T_left_world()
                : perturbed(drive.T_left_world(), vector(start.pose_rad), vector(start.pose_m));
-    f.T_camera_left[1] =
+    f.T_camera_left[right] =
         perturbed(drive.T_right_left(), vector(start.rig_rad), vector(start.rig_m));
+    if (further != nullptr) f.T_camera_left[further->number] = further->T_camera_left;
     f.unlinked = true;
     f.reprojection_px = 0.5;
     f.stereo = static_cast<int>(drive.tracks().size());
@@ -72,7 +92,17 @@ inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start,
       s.cameras = t.seen;
       s.sigma = static_cast<float>(t.sigma_px);
       s.raw[0] = t.left.cast<float>();
-      s.raw[1] = t.right.cast<float>();
+      s.raw[right] = t.right.cast<float>();
+      if (further != nullptr) {
+        const Pinhole& lens = drive.options().left;
+        const Vec3 p = further->T_camera_left * (drive.T_left_world() * t.p_world);
+        const double noise = drive.options().white_px;
+        s.cameras = 0b111;
+        s.raw[further->number] =
+            Vec2(lens.fx * p.x() / p.z() + lens.cx + noise * of_further.normal(),
+                 lens.fy * p.y() / p.z() + lens.cy + noise * of_further.normal())
+                .cast<float>();
+      }
       log.push(s);
     }
   }
@@ -84,10 +114,11 @@ struct SolverInArena {
   calibration::MonitorOptions monitor;
   Arena arena;
   calibration::RigSolver solver;
-  explicit SolverInArena(const calibration::CalibrationOptions& o, std::size_t features = 300)
+  explicit SolverInArena(const calibration::CalibrationOptions& o, int cameras = 2)
       : options(o),
-        arena(calibration::RigSolver::memory_needed(o, monitor, 2, features)),
-        solver(options, monitor, 2, features, arena) {}
+        arena(calibration::RigSolver::memory_needed(o, monitor, cameras, kFeatures)),
+        solver(options, monitor, cameras, kFeatures, arena) {}
+  static constexpr std::size_t kFeatures = 300;
 };
 
 using Vec5 = Eigen::Matrix<double, 5, 1>;

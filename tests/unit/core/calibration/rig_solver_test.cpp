@@ -154,6 +154,28 @@ TEST(RigSolver, aRightCameraThatIsLateIsOutOfStep) {
   EXPECT_FALSE(in_step.solver.solve(rig_of(drive)).out_of_step);
 }
 
+TEST(RigSolver, aThirdCameraThatIsLateIsOutOfStep) {
+  FeatureDriveOptions drive;
+  drive.drive_s = 4;
+  drive.stop_s = 0.2;
+  drive.speed = 4;
+  const FurtherCamera second{1, {exp_so3({-6e-3, 4e-3, 2e-3}), {-0.4, -0.05, 0.01}}};
+  CalibrationOptions o = held();
+  o.max_frames = 110;
+  for (const double lag : {0.0, 0.6}) {
+    drive.lags = {{0, lag}};
+    SolverInArena s(o, 3);
+    FeatureDrive d(drive);
+    log_drive(d, 110, kRough, s.solver.log(), &second);
+    const RigSolution solution = s.solver.solve(rig_of(drive, second));
+    ASSERT_EQ(solution.status, RigSolveStatus::ok) << lag;
+    EXPECT_EQ(solution.out_of_step, lag > 0);
+    if (lag > 0) {
+      EXPECT_NEAR(solution.lag_frames, lag, 0.2);
+    }
+  }
+}
+
 TEST(RigSolver, whatHoldsNoTransformSaysSo) {
   const FeatureDriveOptions drive = exact_drive();
   const RigCalibration rig = rig_of(drive);
