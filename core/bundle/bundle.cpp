@@ -1,10 +1,9 @@
 #include "core/bundle/bundle.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
-
-#include <Eigen/Cholesky>
 
 #include "core/bundle/detail/covariance.hpp"
 #include "core/bundle/detail/setup.hpp"
@@ -220,24 +219,24 @@ class Solve {
     return pivots.small > free_directions() || least_seen(pivots) < kLeft * watched_ratio_;
   }
 
+  /// The newest free pose's block of the inverse of the whole system, θ_S and all: in the factor
+  /// that takes the rows from that pose on.
   void pose_covariance() noexcept {
-    const std::size_t rows = system_.rows();
-    if (w_.free_poses == 0 || system_.job().shared.blocks > 0 || !system_.linearise(best(), 0.0))
-      return;
-    const std::size_t before = rows - detail::kBlock;
-    if (detail::cholesky(w_.A.data(), rows, before, system_.ld(), kRankTolerance).small > 0) return;
-    Mat6 information;  // (τ, φ)
-    for (std::size_t r = 0; r < detail::kBlock; ++r)
-      for (std::size_t c = 0; c <= r; ++c) {
-        double v = w_.A[(before + c) * system_.ld() + before + r];
-        for (std::size_t k = 0; k < before; ++k)
-          v -= w_.A[k * system_.ld() + before + r] * w_.A[k * system_.ld() + before + c];
-        information(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) =
-            information(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(r)) = v;
-      }
-    const Eigen::LLT<Mat6> factor(information);
-    if (factor.info() != Eigen::Success) return;
-    const Mat6 covariance = factor.solve(Mat6::Identity());
+    const std::size_t rows = system_.rows(), ld = system_.ld();
+    if (w_.free_poses == 0 || !system_.linearise(best(), 0.0)) return;
+    if (detail::cholesky(w_.A.data(), rows, rows, ld, kRankTolerance).small > 0) return;
+    const std::size_t first = (static_cast<std::size_t>(w_.free_poses) - 1) * detail::kBlock;
+    // That pose's columns of L⁻¹, by rows.
+    std::array<Vec6, detail::kBlock*(1 + detail::kMaxSharedBlocks)> inverse;
+    Mat6 covariance = Mat6::Zero();  // (τ, φ)
+    for (std::size_t r = first; r < rows; ++r) {
+      Vec6 row = Vec6::Zero();
+      if (r - first < detail::kBlock) row[static_cast<Eigen::Index>(r - first)] = 1;
+      for (std::size_t k = first; k < r; ++k) row -= w_.A[k * ld + r] * inverse[k - first];
+      row /= w_.A[r * ld + r];
+      inverse[r - first] = row;
+      covariance += row * row.transpose();
+    }
     if (!covariance.allFinite()) return;
     result_.pose_covariance << covariance.bottomRightCorner<3, 3>(),
         covariance.bottomLeftCorner<3, 3>(), covariance.topRightCorner<3, 3>(),

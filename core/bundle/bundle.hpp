@@ -122,9 +122,9 @@ struct BundleOptions {
                                     // over the root of its diagonal, is below, ≥ 0
   double initial_damping = 1e-4;  // λ of the first step; diagonals × (1 + λ), ÷ 10 after a success,
                                   // × 10 after a failure, in (0, 1e6]
-  bool covariance = false;  // fill BundleResult's covariances of θ_S (stereo_calibration)
-  bool pose_covariance =
-      false;  // fill BundleResult::pose_covariance, of the free pose with the highest index
+  bool covariance = false;       // fill BundleResult's covariances of θ_S (stereo_calibration)
+  bool pose_covariance = false;  // fill BundleResult::pose_covariance, of the free pose with the
+                                 // highest index; costs as much as a step
 
   /// Empty when every field is in its range, else one sentence naming the field.
   [[nodiscard]] const char* validate() const noexcept;
@@ -196,9 +196,9 @@ struct BundleResult {
                          // itself believes (H⁻¹)
 
   bool has_pose_covariance = false;
-  std::uint16_t pose = 0;  // whose
-  Mat6 pose_covariance =
-      Mat6::Zero();  // H⁻¹ (inverse_sigma taken as true), of R ← Exp(φ) R, t ← Exp(φ) t + τ
+  std::uint16_t pose = 0;               // whose
+  Mat6 pose_covariance = Mat6::Zero();  // H⁻¹ (inverse_sigma taken as true) with all else that is
+                                        // free marginalised, of R ← Exp(φ) R, t ← Exp(φ) t + τ
 
   /// The parameters are at a minimum, as far as the tolerances say.
   [[nodiscard]] bool converged() const noexcept {
