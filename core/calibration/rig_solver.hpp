@@ -116,6 +116,9 @@ class RigSolver {
   void drop_outliers(double limit) noexcept;
   void write_result(const BundleResult& r, RigSolution* s) const noexcept;
   void describe(RigSolution* s) const noexcept;
+  /// Relative sigma by the noise of the tracks of the length driven, in the last piece that tracks
+  /// tie together.
+  [[nodiscard]] double length_noise(const BundleResult& r) const noexcept;
   void watch_frames(RigSolution* s) noexcept;
   /// What the frames used say of one camera, held against the result.
   struct Watch {

@@ -34,6 +34,24 @@ void RigSolver::describe(RigSolution* s) const noexcept {
   s->observations = static_cast<int>(observations_.size());
 }
 
+double RigSolver::length_noise(const BundleResult& r) const noexcept {
+  if (!r.has_pose_covariance) return 0;
+  std::size_t first = r.pose;
+  double driven = 0;
+  for (; first > 0 && held_[first] == 0; --first)
+    driven += (poses_[first].centre() - poses_[first - 1].centre()).norm();
+  if (!(driven > 0)) return 0;
+  // The pose's τ are in the axes of its own camera, and so is this.
+  const Vec3 way = (poses_[r.pose] * poses_[first].inverse()).t.normalized();
+  const double believed =
+      way.dot(r.pose_covariance.bottomRightCorner<3, 3>() * way);  // inverse_sigma taken as true
+  // A path's length hangs on the yaw between the cameras most of all: clusters make it as uncertain
+  // as that.
+  const double white = r.covariance_white[1](1, 1), clustered = r.covariance_noise[1](1, 1);
+  const double inflation = white > 0 ? std::max(1.0, clustered / white) : 1.0;
+  return std::sqrt(std::max(0.0, believed * r.sigma0_squared * inflation)) / driven;
+}
+
 void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexcept {
   // What uncertain intrinsics do to the scale of the path (METHOD's numbers, §3.3 and §5): half of
   // what the focal lengths are off, and 0.31 % for each mrad that the principal points are off.
@@ -60,15 +78,7 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
   rig.reprojection_px = r.rms_px;
   const double focal = options_.focal_sigma_percent * 0.01,
                centre = options_.principal_point_sigma_px / rig.intrinsics[0].fx;
-  double noise = 0;
-  if (r.has_pose_covariance && s->travelled_m > 0) {
-    const Vec3 way = poses_.back().t.normalized();
-    const double white = r.covariance_white[1](1, 1), clustered = r.covariance_noise[1](1, 1);
-    const double inflation = white > 0 ? std::max(1.0, clustered / white) : 1.0;
-    noise = std::sqrt(std::max(0.0, way.dot(r.pose_covariance.bottomRightCorner<3, 3>() * way)) *
-                      inflation) /
-            s->travelled_m;
-  }
+  const double noise = length_noise(r);
   rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
 }
 

@@ -92,9 +92,10 @@ struct RigCalibration {
   Stamp found{};               // when the stereo transform was found; 0: given
   int frames = 0;              // rig frames it was found from, all that its information is of
   double reprojection_px = 0;  // root mean square of that solve
-  double scale_sigma = 0;      // relative, of the odometry's scale
-  double inflation = 0;  // variance of what was found over what its solve believes: weighs it as
-                         // the next one's prior; 0: not known
+  double scale_sigma = 0;  // relative, of lengths driven: by the noise of the tracks it was found
+                           // from, and by what lenses usually are off; not by baseline_sigma
+  double inflation = 0;    // variance of what was found over what its solve believes: weighs it as
+                           // the next one's prior; 0: not known
 };
 
 }  // namespace vergence

@@ -63,16 +63,21 @@ struct LogStart {
   double rig_rad = 0, rig_m = 0;    // of every frame's T_camera_left
 };
 
-/// The next `frames` frames of a drive as the estimator would log them.
-inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start,
-                      calibration::TrackLog& log, const FurtherCamera* further = nullptr) {
+/// The next `frames` frames of a drive as the estimator would log them; how far they drive, m.
+inline double log_drive(FeatureDrive& drive, int frames, const LogStart& start,
+                        calibration::TrackLog& log, const FurtherCamera* further = nullptr) {
   Random random(drive.options().seed, 5), of_further(drive.options().seed, 7);
   const std::size_t right = further != nullptr && further->number == 1 ? 2 : 1;
   const auto vector = [&](double sigma) {
     return Vec3(sigma * Vec3(random.normal(), random.normal(), random.normal()));
   };
+  double driven = 0;
+  Vec3 before = Vec3::Zero();
   for (int i = 0; i < frames; ++i) {
     drive.next();
+    const Vec3 centre = drive.T_left_world().centre();
+    if (i > 0) driven += (centre - before).norm();
+    before = centre;
     calibration::LoggedFrame f;
     f.number = drive.frame();
     f.stamp = drive.stamp();
@@ -106,6 +111,7 @@ inline void log_drive(FeatureDrive& drive, int frames, const LogStart& start,
       log.push(s);
     }
   }
+  return driven;
 }
 
 /// A RigSolver with its memory.

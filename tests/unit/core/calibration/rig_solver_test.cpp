@@ -110,6 +110,67 @@ TEST(RigSolver, theFurtherCamerasFocalLengthIsFoundWhenItIsAskedFor) {
   EXPECT_LT(s.rig.intrinsics[1].sigma[0], sigma);
 }
 
+/// Held, and lenses off by nothing: the scale's sigma is what tracks make it.
+CalibrationOptions held_by_tracks() {
+  CalibrationOptions o = held();
+  o.focal_sigma_percent = o.principal_point_sigma_px = 0;
+  return o;
+}
+
+// White noise five times as large makes the length driven five times as uncertain; each sigma rests
+// on a residual variance and on the variance of some hundred clusters, 10 % of it.
+TEST(RigSolver, theScaleIsAsUncertainAsTheTracksMakeIt) {
+  FeatureDriveOptions drive = exact_drive();
+  drive.white_px = 0.1;
+  const RigSolution quiet = solve(drive, held_by_tracks(), rig_of(drive));
+  drive.white_px = 0.5;
+  const RigSolution noisy = solve(drive, held_by_tracks(), rig_of(drive));
+  ASSERT_EQ(quiet.status, RigSolveStatus::ok);
+  ASSERT_EQ(noisy.status, RigSolveStatus::ok);
+  EXPECT_GT(quiet.rig.scale_sigma, 0);
+  EXPECT_NEAR(noisy.rig.scale_sigma / quiet.rig.scale_sigma, 5.0, 1.0);
+}
+
+TEST(RigSolver, theScaleIsAsUncertainWhereverTheWorldBegins) {
+  const FeatureDriveOptions drive;
+  double sigma[2];
+  for (const std::size_t i : {0U, 1U}) {
+    SolverInArena s(held_by_tracks());
+    FeatureDrive d(drive);
+    log_drive(d, 40, kRough, s.solver.log());
+    const Transform moved{exp_so3({0.1, 0.7, -0.2}), {30, -5, -20}};
+    for (std::size_t f = 0; f < s.solver.log().size() && i == 1; ++f) {
+      Transform& T = s.solver.log().frame(f).T_left_world;
+      T = T * moved;
+    }
+    const RigSolution solution = s.solver.solve(rig_of(drive));
+    ASSERT_EQ(solution.status, RigSolveStatus::ok);
+    sigma[i] = solution.rig.scale_sigma;
+  }
+  // Each ends within a step that changes the cost by less than 3e-6 of it: some thousandths of a
+  // sigma.
+  EXPECT_NEAR(sigma[1] / sigma[0], 1.0, 0.01);
+}
+
+// Half as long a way whose errors are independent is √2 times as uncertain, one that hangs on the
+// yaw no more than the whole.
+TEST(RigSolver, theScaleIsThatOfTheNewestFramesThatTracksTieTogether) {
+  const FeatureDriveOptions drive;
+  double sigma[2];
+  for (const std::size_t pieces : {1U, 2U}) {
+    SolverInArena s(held_by_tracks());
+    FeatureDrive d(drive);
+    log_drive(d, 40, kRough, s.solver.log());
+    for (std::size_t f = 20; f < 40 && pieces == 2; ++f)
+      for (auto& seen : s.solver.log().frame(f).observations) seen.track += 1'000'000;
+    const RigSolution solution = s.solver.solve(rig_of(drive));
+    ASSERT_EQ(solution.status, RigSolveStatus::ok);
+    sigma[pieces - 1] = solution.rig.scale_sigma;
+  }
+  EXPECT_GT(sigma[1], sigma[0]);
+  EXPECT_LT(sigma[1], 2 * sigma[0]);
+}
+
 TEST(RigSolver, aSolveLeavesNoTraceInTheNext) {
   const FeatureDriveOptions first, other = [] {
     FeatureDriveOptions o;
