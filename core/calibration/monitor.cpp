@@ -60,8 +60,9 @@ struct Monitor::Parts {
   detail::Decision latest{};
   int agreed = 0, poor = 0, collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
-  double lag_found = 0;       // the last one that was `out_of_step`, frames
-  bool measured_lag = false;  // by the frame looked at
+  double lag_found = 0;         // the last one that was `out_of_step`, frames
+  bool measured_lag = false;    // by the frame looked at
+  bool would_show_lag = false;  // the frame looked at, of one frame
 
   void forget() noexcept {
     looks.reset();
@@ -69,7 +70,7 @@ struct Monitor::Parts {
     latest = detail::Decision{};
     latest.lag_sigma = latest.yaw_sigma = std::numeric_limits<double>::infinity();
     agreed = poor = collapsed = standing_over = 0;
-    measured_lag = false;
+    measured_lag = would_show_lag = false;
   }
   [[nodiscard]] bool in_step() const noexcept;
   void watch_collapse(const MonitorFrame& frame) noexcept;
@@ -154,6 +155,7 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   windows.push(e);
   latest = windows.decide();
   measured_lag = true;
+  would_show_lag = windows.lag_statistic(e.evidence.stereo) > options.threshold;
   const bool measured = windows.frames() >= static_cast<std::uint64_t>(options.short_window);
   agreed = measured && latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold
                ? agreed + 1
@@ -193,7 +195,7 @@ MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   v.onset_frame = frame.frame;
   v.lag_sigma = std::numeric_limits<double>::infinity();
   if (!p.valid || !frame.T_now_previous.finite()) return v;
-  p.measured_lag = false;
+  p.measured_lag = p.would_show_lag = false;
   p.watch_collapse(frame);
   p.watch_matches(frame);
   const detail::Decision& d = p.latest;
@@ -206,6 +208,7 @@ MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   v.lag_sigma = d.lag_sigma;
   if (d.kind == Kind::out_of_step) p.lag_found = std::abs(d.lag);
   v.in_step = p.in_step();
+  v.shows_no_lag = p.would_show_lag && d.kind == Kind::quiet && !d.undecided;
   v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
   v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
   if (p.collapsed >= p.options.collapse_frames) {

@@ -85,7 +85,9 @@ struct MonitorVerdict {
   Mat6 covariance = Mat6::Zero();  // of `offset`; rank 5, the length is not seen
   double lag_frames =
       0;  // best estimate over the longest window, frames; meaningless where lag_sigma is infinite
-  double lag_sigma = 0;  // frames; infinite: not seen
+  double lag_sigma = 0;       // frames; infinite: not seen
+  bool shows_no_lag = false;  // this frame moved so far that a lag of one frame that began since
+                              // then would be over the threshold in it, and nothing is
   bool in_step = false;  // this frame's motion shows, with those since set_reference() or reset(),
                          // that there is no lag, and would show the last one that was found
   std::uint64_t onset_frame =

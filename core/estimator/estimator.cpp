@@ -119,6 +119,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     if (out.renewed) p.calibrator.monitor().scene_renewed(p.odometry.map());
     p.calibrate(frame);
   }
+  p.settle_lag(out);
   sample.state = p.state;
   p.grade(out, frame.pairing, &sample);
   p.grade_window(out, &sample);

@@ -95,6 +95,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
   using K = calibration::MonitorVerdict::Kind;
   const calibration::MonitorVerdict v = calibrator.monitor().update(odometry, out, frame);
   undecided = v.undecided;
+  shows_no_lag = v.shows_no_lag;
   if (v.kind == K::out_of_step) {
     if (out_of_step == 0)
       note(EstimatorEvent::Kind::rig_changed, frame.stamp,

@@ -9,8 +9,8 @@ namespace {
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
 // Frames with good images that no scene can be made of with the calibration in use.
 constexpr int kUnmatchedAfter = 15;
-// Posed frames after an image that came twice, in which the monitor shows whether that camera is an
-// exposure behind from then on: it needs nine.
+// Frames after an image that came twice that would show that camera an exposure behind from then
+// on, before it is believed not to be: the monitor needs nine.
 constexpr int kLagShownAfter = 12;
 
 Covariance6 upper_triangle(const Mat6& C) noexcept {
@@ -43,9 +43,9 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     may_lag = kLagShownAfter;
     // Frames from before and frames out of step would be one solve, and a rig that is neither's.
     if (calibrator.seeking()) seek_anew(std::nullopt, frame.number, frame);
-  } else if (out.posed && may_lag > 0) {
-    --may_lag;
   }
+  moves = out.posed && !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_of(out));
+  shows_no_lag = moves;  // where no monitor watches, as far as anything does
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);
@@ -76,14 +76,24 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
          0);
 }
 
+/// A rig that stands, or creeps, looks the same with a camera an exposure behind: such frames say
+/// nothing about it.
+void Estimator::Parts::settle_lag(const odometry::FrameOutcome& out) noexcept {
+  if (may_lag > 0 && shows_no_lag && !out.uneven) --may_lag;
+}
+
+/// Covariance of the motion since the last pose.
+Mat6 Estimator::Parts::motion_of(const odometry::FrameOutcome& out) const noexcept {
+  return odometry::motion_covariance(out.fit_covariance, drift.motion_to(out.T_left_world),
+                                     out.restarted ? out.gap_s : 0.0);
+}
+
 /// The frame's pose, how uncertain it is by now, and its status by how uncertain its motion is.
 void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept {
   sample->T_world_left = out.T_left_world.inverse();
   const double length_sigma = 0.01 * length_sigma_percent;
-  const Transform T_now_before = drift.motion_to(out.T_left_world);
-  const Mat6 motion = odometry::motion_covariance(out.fit_covariance, T_now_before,
-                                                  out.restarted ? out.gap_s : 0.0);
-  grade_motion(out, motion, T_now_before.t.norm(), sample);
+  const Mat6 motion = motion_of(out);
+  grade_motion(out, motion, drift.motion_to(out.T_left_world).t.norm(), sample);
   drift.step(out.T_left_world, motion, length_sigma);
   sample->covariance = upper_triangle(drift.pose());
   sample->motion_covariance = upper_triangle(motion);
@@ -113,7 +123,8 @@ void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
   } else if (sample->status == PoseStatus::ok && out_of_step > 0) {
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::out_of_step;
-  } else if (sample->status == PoseStatus::ok && may_lag > 0) {
+  } else if (sample->status == PoseStatus::ok && may_lag > 0 && moves) {
+    // Of a pose that stands there is nothing to be wrong by an exposure.
     sample->status = PoseStatus::degraded;
     sample->reason = Reason::image_repeated;
   } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {

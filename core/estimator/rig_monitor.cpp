@@ -225,7 +225,7 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
                                   const odometry::FrameOutcome& outcome,
                                   const RigFrame& frame) noexcept {
   MonitorVerdict worst;
-  bool in_step = true;
+  bool in_step = true, no_lag = true;
   const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < cameras_; ++k) {
     const int found = collect_stereo(odometry.map(), k, kWitness);
@@ -233,7 +233,7 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
         camera(k).jumps.next(frame.number, stereo_.span(), step);
     if (scene_pending_) {
       worst.undecided = worst.undecided || jump.suspected;
-      in_step = false;
+      in_step = no_lag = false;
       if (jump.confirmed) {
         worst.kind = MonitorVerdict::Kind::knock;
         worst.onset_frame = jump.onset_frame;
@@ -242,6 +242,7 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
     }
     MonitorVerdict v = monitor_verdict(k, odometry, outcome, frame, found, step);
     in_step = in_step && v.in_step;
+    no_lag = no_lag && v.shows_no_lag;
     if (jump.confirmed && rank(v.kind) < rank(MonitorVerdict::Kind::knock)) {
       v.kind = MonitorVerdict::Kind::knock;
       v.onset_frame = jump.onset_frame;
@@ -252,6 +253,7 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
       worst = v;
   }
   worst.in_step = in_step;
+  worst.shows_no_lag = no_lag;
   return worst;
 }
 

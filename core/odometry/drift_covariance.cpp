@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 namespace vergence::odometry {
 namespace {
 
@@ -51,6 +53,15 @@ Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
     Q.diagonal().tail<3>().array() += turned * turned;
   }
   return Q;
+}
+
+bool may_be_none(const Transform& T_now_before, const Mat6& motion) noexcept {
+  constexpr double kSigmas = 3;
+  Vec6 e;
+  e << T_now_before.t, log_so3(T_now_before.R);
+  if (e.isZero(0)) return true;
+  const Eigen::LLT<Mat6> factor(motion);
+  return factor.info() == Eigen::Success && e.dot(factor.solve(e)) < kSigmas * kSigmas;
 }
 
 void DriftCovariance::step(const Transform& T_left_world, const Mat6& motion,

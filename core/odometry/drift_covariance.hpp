@@ -13,6 +13,11 @@ namespace vergence::odometry {
 [[nodiscard]] Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                                      double extrapolated_s) noexcept;
 
+/// Whether a motion may as well be none, `motion` its covariance: within three sigmas, together
+/// those of all six. Of two fits of a rig that stands one in a million is not, as they are
+/// inflated.
+[[nodiscard]] bool may_be_none(const Transform& T_now_before, const Mat6& motion) noexcept;
+
 /// How uncertain dead reckoning is, propagated from pose to pose.
 ///
 /// Model  Motions have independent errors. Besides, all of a drive share four: lengths are off by

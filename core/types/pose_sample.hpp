@@ -31,8 +31,9 @@ enum class Reason : std::uint8_t {
   none,
   no_image,           // a camera delivered nothing for this frame
   image_dark,         // an image carries no structure: covered, black, saturated
-  image_repeated,     // a camera delivered the image of the frame before once more, now or a dozen
-                      // frames ago, while others went on: it may be an exposure behind
+  image_repeated,     // a camera delivered the image of the frame before once more, now or earlier
+                      // while others went on: it may be an exposure behind until a dozen frames of
+                      // a rig that drives have shown it is not
   few_features,       // too little texture to start from
   no_stereo_matches,  // left and right do not fit this calibration
   cameras_swapped,    // points would lie behind the rig: left and right exchanged

@@ -171,6 +171,13 @@ double ChangeDetector::single(const Evidence& stereo, double spread) const noexc
   return statistic(e, Vec5::Zero(), covariance_);
 }
 
+double ChangeDetector::lag_statistic(const Evidence& stereo) const noexcept {
+  Evidence e;
+  e.add(stereo, 1.0 / (lambda_stereo_ + bias2_ * stereo.n));
+  for (int i = 0; i < kFixed; ++i) e.g[static_cast<std::size_t>(i)] = e.A[lower(kLag, i)];
+  return statistic(e, Vec5::Zero(), covariance_);
+}
+
 void ChangeDetector::single_estimate(const Evidence& stereo, double spread, Vec5* theta,
                                      Mat5* covariance) const noexcept {
   Evidence e;

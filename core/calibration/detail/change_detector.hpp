@@ -47,6 +47,10 @@ class ChangeDetector {
   [[nodiscard]] Decision decide() noexcept;
   /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
   [[nodiscard]] double single(const Evidence& stereo, double spread) const noexcept;
+  /// What a lag of one frame would make of the statistic of a moving frame by itself. It grows with
+  /// the way between two frames, hardly with the number of frames: the reference is no better
+  /// known.
+  [[nodiscard]] double lag_statistic(const Evidence& stereo) const noexcept;
   /// A⁻¹ g and A⁻¹ of that frame, floors included.
   void single_estimate(const Evidence& stereo, double spread, Vec5* theta,
                        Mat5* covariance) const noexcept;

@@ -50,6 +50,8 @@ struct Estimator::Parts {
     (void)events.push(e);
   }
 
+  void settle_lag(const odometry::FrameOutcome& out) noexcept;
+  [[nodiscard]] Mat6 motion_of(const odometry::FrameOutcome& out) const noexcept;
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void note_length_sigma(const CalibrationDecision& decision) noexcept;
   void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
@@ -90,7 +92,9 @@ struct Estimator::Parts {
   bool focal_contradicted = false;  // and noted
   bool superseded = false;          // poses still are of a calibration that was contradicted
   int out_of_step = 0;              // frames for which that is still believed
-  int may_lag = 0;                  // frames for which a camera may be an exposure behind, unseen
+  int may_lag = 0;  // a camera may be an exposure behind until so many frames have shown it is not
+  bool shows_no_lag = false;  // this frame
+  bool moves = false;         // this frame's pose, for all that is known of it
   int without_pose = 0;
   bool in_gap = false;       // and the last event has said so
   int unmatched_frames = 0;  // in a row

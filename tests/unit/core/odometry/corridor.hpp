@@ -29,8 +29,8 @@ class Corridor {
   }
   [[nodiscard]] const RigCalibration& rig() const { return rig_; }
 
-  /// Where the left camera is in frame i: 0.15 m further each time, weaving.
-  [[nodiscard]] static Transform T_world_left(int i) {
+  /// Where the left camera is in frame i: 0.15 m further each time, weaving. Between frames, too.
+  [[nodiscard]] static Transform T_world_left(double i) {
     const double a = 0.05 * i;
     return {exp_so3({0.004 * std::sin(3 * a), 0.02 * std::sin(a), 0.003 * std::cos(2 * a)}),
             {0.1 * std::sin(a), 0, 0.15 * i}};
@@ -41,6 +41,11 @@ class Corridor {
 
   /// Frame i seen by a rig of these transforms; the images live until the next call.
   [[nodiscard]] RigFrame frame(int i, const std::array<Transform, kMaxCameras>& T_camera_left) {
+    return frame_at(i, i, T_camera_left);
+  }
+  /// Frame i of a drive of its own: seen from where frame `place` of the usual one is.
+  [[nodiscard]] RigFrame frame_at(int i, double place,
+                                  const std::array<Transform, kMaxCameras>& T_camera_left) {
     RigFrame f;
     f.number = static_cast<std::uint64_t>(i);
     f.stamp = Stamp(1'000'000'000 + 50'000'000LL * i);
@@ -48,7 +53,7 @@ class Corridor {
     for (std::size_t k = 0; k < images_.size(); ++k) {
       Random noise(static_cast<std::uint64_t>(4 * i) + k);
       const Transform T_left_camera = T_camera_left[k].inverse();
-      const Transform T_world_camera = T_world_left(i) * T_left_camera;
+      const Transform T_world_camera = T_world_left(place) * T_left_camera;
       const Intrinsics& c = rig_.intrinsics[k];
       for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x) {
@@ -63,6 +68,9 @@ class Corridor {
     return f;
   }
   [[nodiscard]] RigFrame frame(int i) { return frame(i, rig_.T_camera_left); }
+  [[nodiscard]] RigFrame frame_at(int i, double place) {
+    return frame_at(i, place, rig_.T_camera_left);
+  }
 
  private:
   static constexpr int kWidth = 320, kHeight = 240;
