@@ -84,8 +84,7 @@ void Estimator::Parts::settle_lag(const odometry::FrameOutcome& out) noexcept {
 
 /// Covariance of the motion since the last pose.
 Mat6 Estimator::Parts::motion_of(const odometry::FrameOutcome& out) const noexcept {
-  return odometry::motion_covariance(out.fit_covariance, drift.motion_to(out.T_left_world),
-                                     out.restarted ? out.gap_s : 0.0);
+  return odometry::motion_covariance(out.fit_covariance, out.expected, out.unseen_s);
 }
 
 /// The frame's pose, how uncertain it is by now, and its status by how uncertain its motion is.

@@ -132,10 +132,13 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
     }
     if (repeated[i]) check.repeated = true;
     if (structured[i] && !repeated[i]) renewed = true;
+    // What a further camera has shown before it does not see now; the left one's pose stands.
+    if (k > 0 && repeated[i] && !repeated[0]) structured[i] = false;
     if (structured[i])
       check.structured =
           static_cast<std::uint8_t>(check.structured | (1U << static_cast<unsigned>(k)));
   }
+  check.left_repeated = repeated[0];
   check.uneven = check.repeated && renewed;
   structured_ = check.structured;
   return check;

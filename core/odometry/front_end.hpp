@@ -20,10 +20,11 @@ namespace vergence::odometry {
 /// What the images of one frame are good for.
 struct ImageCheck {
   std::uint8_t given = 0;       // bit k: camera k delivered an image
-  std::uint8_t structured = 0;  // bit k: and it shows something
+  std::uint8_t structured = 0;  // bit k: and it shows something of this frame
   bool repeated = false;  // a camera gave its last image or the left one's once more: noise makes
                           // that impossible
-  bool uneven = false;    // one repeated an image while another gave a new one
+  bool left_repeated = false;  // the left one is among them
+  bool uneven = false;         // one repeated an image while another gave a new one
 };
 
 /// How the search across went for the corners of one frame.

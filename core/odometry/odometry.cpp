@@ -205,9 +205,10 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   out.stereo_inliers = fit.stereo;
   out.reprojection_px = fit.rms_px;
   out.fit_covariance = fit.covariance;
-  // The same image again says nothing about motion: the speed stays what it was.
-  if (images.repeated)
-    out.T_left_world = motion_.T_left_world();
+  // The same image again says nothing about motion: the speed stays what it was, and where that
+  // has led by now is not seen.
+  if (images.left_repeated)
+    out.expect(dt, predicted * motion_.T_left_world().inverse());
   else
     motion_.update(fit.T_left_world, frame.stamp);
   out.T_left_world = motion_.T_left_world();

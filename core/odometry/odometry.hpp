@@ -26,6 +26,9 @@ struct FrameOutcome {
   double reprojection_px = 0;
   bool keyframe = false;
   FrameEffort effort{};      // what was done of the work beside the pose
+  double unseen_s = 0;       // since the last pose that images have shown; 0: this one
+  Transform expected{};      // the motion since then that is expected: the pose is predicted by it,
+                             // or, of a left image that came twice, is without it
   bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
   bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
@@ -41,6 +44,11 @@ struct FrameOutcome {
   double scale =
       1;  // everything of the world was scaled by this about the left camera, to the known baseline
   std::array<float, kStages> stage_ms{};
+
+  void expect(double since_s, const Transform& T_now_before) noexcept {
+    unseen_s = since_s;
+    expected = T_now_before;
+  }
 };
 
 /// How the cameras hang together.

@@ -108,6 +108,7 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
   if (motion_.any()) {
     out->restarted = true;
     out->gap_s = dt;
+    out->expect(dt, predicted * motion_.T_left_world().inverse());
     restart_cooldown_ = kRestartedFrames;
     out->status = PoseStatus::degraded;
     out->reason = Reason::scene_restarted;

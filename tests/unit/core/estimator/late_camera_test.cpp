@@ -11,15 +11,9 @@
 namespace vergence {
 namespace {
 
+using features::test::copy_of;
 using features::test::Image;
 using odometry::test::Corridor;
-
-Image copy_of(const ImageView& view) {
-  Image copy(view.width, view.height);
-  for (int y = 0; y < view.height; ++y)
-    std::copy_n(view.row(y), view.width, copy.bytes.data() + y * copy.stride);
-  return copy;
-}
 
 /// A rig that drives, stands, and drives off again. While it stands the right camera gives an image
 /// twice; with `late` it is one frame behind from then on.

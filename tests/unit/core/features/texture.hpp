@@ -34,6 +34,13 @@ struct Image {
   }
 };
 
+inline Image copy_of(const ImageView& view) {
+  Image copy(view.width, view.height);
+  for (int y = 0; y < view.height; ++y)
+    std::copy_n(view.row(y), view.width, copy.bytes.data() + y * copy.stride);
+  return copy;
+}
+
 template <class Value>
 Image draw(int width, int height, const Value& value, int extra = 0) {
   Image image(width, height, extra);
