@@ -45,10 +45,15 @@ Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                        double extrapolated_s) noexcept {
   Mat6 Q = kFitInflation * kFitInflation * translation_first(fit);
   if (extrapolated_s > 0) {
-    // The motion is carried on for a while only; what a vehicle does later is its own.
-    const double away = std::hypot(kExtrapolatedShare * T_now_before.t.norm(),
+    // The motion is carried on for a while only; a vehicle that goes on as it went is so many times
+    // that further.
+    const double carried_s = std::min(extrapolated_s, kLongestExtrapolation);
+    const double missing = (extrapolated_s - carried_s) / carried_s;
+    const double way = T_now_before.t.norm(), turn = log_so3(T_now_before.R).norm();
+    const double away = std::hypot(kExtrapolatedShare * way, missing * way,
                                    0.5 * kUnknownAcceleration * extrapolated_s * extrapolated_s);
-    const double turned = std::min(kExtrapolatedTurn * extrapolated_s, std::numbers::pi);
+    const double turned =
+        std::min(std::hypot(kExtrapolatedTurn * extrapolated_s, missing * turn), std::numbers::pi);
     Q.diagonal().head<3>().array() += away * away;
     Q.diagonal().tail<3>().array() += turned * turned;
   }

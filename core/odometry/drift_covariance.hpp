@@ -3,13 +3,17 @@
 
 namespace vergence::odometry {
 
+inline constexpr double kLongestExtrapolation =
+    2.0;  // s that a motion is carried on for: a vehicle's speed says nothing about later
+
 /// Covariance of one frame's motion, translation (m) first, then rotation (rad), about the left
 /// camera's axes.
 ///
 /// kFitInflation² times that of the frame's own fit, `fit` (left perturbation φ rad, τ m): a fit
 /// holds the points as if they were known, and their errors last for many frames; the factor is
 /// measured on recorded drives (build/bench/covariance_bench). A motion that was extrapolated over
-/// `extrapolated_s` is off by half of itself. Threads pure.
+/// `extrapolated_s` is off by half of itself, and by what it does not contain of the motion after
+/// kLongestExtrapolation. Threads pure.
 [[nodiscard]] Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                                      double extrapolated_s) noexcept;
 

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "core/odometry/detail/frame_steps.hpp"
+#include "core/odometry/drift_covariance.hpp"
 
 namespace vergence::odometry {
 
@@ -21,7 +22,6 @@ constexpr double kStereoShare =
 constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
                                          // rig that fits, 0.12 to 0.2 a frame out of step
 constexpr int kFramesLostBeforeRestart = 3;
-constexpr double kLongestExtrapolation = 2.0;  // s: a vehicle's speed says nothing about later
 constexpr double kUnlinkedBand =
     4.0;  // px: this frame's transform between the cameras is itself measured
 

@@ -109,6 +109,19 @@ TEST(MotionCovariance, ofAnExtrapolatedMotionIsHalfOfItAndWhatAVehicleMayDoUnsee
   EXPECT_NEAR(std::sqrt(parked(3, 3)), std::numbers::pi, 1e-12) << "any way round";
 }
 
+TEST(MotionCovariance, containsWhatIsNotCarriedOn) {
+  // 25 m/s and 0.2 rad/s kept through eight seconds of darkness: two are carried on, 150 m and 1.2
+  // rad are missing.
+  const Transform carried{exp_so3({0, 0.2 * kLongestExtrapolation, 0}),
+                          {0, 0, -25 * kLongestExtrapolation}};
+  const Mat6 C = motion_covariance(Mat6::Zero(), carried, 8);
+  EXPECT_GE(std::sqrt(C(2, 2)), 150);
+  EXPECT_GE(std::sqrt(C(4, 4)), 1.2);
+  // Up to there nothing is missing.
+  const Mat6 whole = motion_covariance(Mat6::Zero(), carried, kLongestExtrapolation);
+  EXPECT_NEAR(std::sqrt(whole(2, 2)), std::hypot(25, 2), 1e-12);
+}
+
 TEST(MotionCovariance, hasTranslationFirst) {
   Mat6 fit = Mat6::Zero();
   fit(0, 0) = 4;  // rotation about x
