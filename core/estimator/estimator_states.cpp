@@ -93,7 +93,7 @@ void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* 
   const double length_sigma = 0.01 * length_sigma_percent;
   const Mat6 motion = motion_of(out);
   grade_motion(out, motion, drift.motion_to(out.T_left_world).t.norm(), sample);
-  drift.step(out.T_left_world, motion, length_sigma);
+  drift.step(out.T_left_world, motion, length_sigma, out.keyframe);
   sample->covariance = upper_triangle(drift.pose());
   sample->motion_covariance = upper_triangle(motion);
   sample->length_sigma = static_cast<float>(length_sigma);

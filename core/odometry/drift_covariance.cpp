@@ -69,27 +69,30 @@ bool may_be_none(const Transform& T_now_before, const Mat6& motion) noexcept {
   return factor.info() == Eigen::Success && e.dot(factor.solve(e)) < kSigmas * kSigmas;
 }
 
-void DriftCovariance::step(const Transform& T_left_world, const Mat6& motion,
-                           double length_sigma) noexcept {
-  if (std::exchange(any_, true)) {
-    const Transform T_now_before = T_left_world * T_left_world_.inverse();
-    const Mat6 A = adjoint(T_now_before);
-    const Mat6 noise = A * noise_ * A.transpose() + motion;
-    noise_ = 0.5 * (noise + noise.transpose());  // stays symmetric over millions of steps
-    shared_ = A * shared_;
-    shared_.col(0).head<3>() += length_sigma * T_now_before.t;
-    for (int axis = 0; axis < 3; ++axis)
-      shared_(3 + axis, 1 + axis) += kSharedTurn * T_now_before.t.norm();
+void DriftCovariance::step(const Transform& T_left_world, const Mat6& motion, double length_sigma,
+                           bool map_changed) noexcept {
+  if (!std::exchange(any_, true)) {
+    now_.T_left_world = anchor_.T_left_world = T_left_world;
+    return;
   }
-  T_left_world_ = T_left_world;
+  const Transform T_now_anchor = T_left_world * anchor_.T_left_world.inverse();
+  const Mat6 A = adjoint(T_now_anchor);
+  const Mat6 noise = A * anchor_.noise * A.transpose() + motion;
+  now_.noise = 0.5 * (noise + noise.transpose());  // stays symmetric over millions of steps
+  now_.shared = A * anchor_.shared;
+  now_.shared.col(0).head<3>() += length_sigma * T_now_anchor.t;
+  for (int axis = 0; axis < 3; ++axis)
+    now_.shared(3 + axis, 1 + axis) += kSharedTurn * T_now_anchor.t.norm();
+  now_.T_left_world = T_left_world;
+  if (map_changed || !may_be_none(T_now_anchor, motion)) anchor_ = now_;
 }
 
 Mat6 DriftCovariance::pose() const noexcept {
   // p_left = Exp(φ) (R p + t) + τ puts the camera at C − Rᵀ τ, turned about the world's axes by
   // −Rᵀ φ.
-  const Mat6 both = noise_ + shared_ * shared_.transpose();
+  const Mat6 both = now_.noise + now_.shared * now_.shared.transpose();
   Mat6 P;
-  const Mat3 R = T_left_world_.R.transpose();
+  const Mat3 R = now_.T_left_world.R.transpose();
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j)
       P.block<3, 3>(3 * i, 3 * j) = R * both.block<3, 3>(3 * i, 3 * j) * R.transpose();

@@ -27,31 +27,40 @@ inline constexpr double kLongestExtrapolation =
 /// Model  Motions have independent errors. Besides, all of a drive share four: lengths are off by
 ///        one factor, that of the calibration's depth, and what is wrong with a lens turns the path
 ///        by so much a metre. First order: P ← A P Aᵀ + Q, and c ← A c + q for what is shared, with
-///        the adjoint A of the motion (Barfoot, State Estimation for Robotics, 7.3.1).
+///        the adjoint A of the motion (Barfoot, State Estimation for Robotics, 7.3.1). A frame is
+///        measured against the map, not against the frame before: P, c and the motion are those of
+///        an anchor, the last pose that has moved off for certain or has changed the map. While the
+///        rig stands nothing adds up.
 ///
-///     drift.step(T_left_world, motion_covariance(fit, drift.motion_to(T_left_world), 0), 0.005);
+///     const Mat6 motion = motion_covariance(fit, drift.motion_to(T_left_world), 0);
+///     drift.step(T_left_world, motion, 0.005, keyframe);
 ///     use(drift.pose());
 ///
 /// Threads  A value; one caller. Memory: none.
 class DriftCovariance {
  public:
   /// The next pose, the covariance of the motion to it as motion_covariance()'s, and the relative
-  /// 1 σ of its length by the calibration. The first pose is exact: it is the world.
-  void step(const Transform& T_left_world, const Mat6& motion, double length_sigma) noexcept;
+  /// 1 σ of its length by the calibration. `map_changed` by this frame: what follows is measured
+  /// against something new. The first pose is exact: it is the world.
+  void step(const Transform& T_left_world, const Mat6& motion, double length_sigma,
+            bool map_changed) noexcept;
   /// T_now_before of a pose that follows; before the first the identity.
   [[nodiscard]] Transform motion_to(const Transform& T_left_world) const noexcept {
-    return any_ ? T_left_world * T_left_world_.inverse() : Transform{};
+    return any_ ? T_left_world * now_.T_left_world.inverse() : Transform{};
   }
   /// Of the pose T_world_left since the first one: left camera's position (m), then rotation (rad),
   /// both about the world's axes.
   [[nodiscard]] Mat6 pose() const noexcept;
 
  private:
+  struct Pose {
+    Transform T_left_world{};
+    Mat6 noise = Mat6::Zero();  // of T_left_world: left perturbation, translation first
+    // Of the same, 1 σ of each shared error: of lengths, then of turns about x, y, z.
+    Eigen::Matrix<double, 6, 4> shared = Eigen::Matrix<double, 6, 4>::Zero();
+  };
   bool any_ = false;
-  Transform T_left_world_{};
-  Mat6 noise_ = Mat6::Zero();  // of T_left_world: left perturbation, translation first
-  // Of the same, 1 σ of each shared error: of lengths, then of turns about x, y, z.
-  Eigen::Matrix<double, 6, 4> shared_ = Eigen::Matrix<double, 6, 4>::Zero();
+  Pose now_{}, anchor_{};
 };
 
 }  // namespace vergence::odometry

@@ -103,7 +103,7 @@ Mat6 propagated(std::span<const Posed> poses) {
   const Transform T_world_first = poses.front().sample.T_world_left;
   for (const Posed& p : poses)
     drift.step(p.sample.T_world_left.inverse() * T_world_first, full(p.sample.motion_covariance),
-               static_cast<double>(p.sample.length_sigma));
+               static_cast<double>(p.sample.length_sigma), p.sample.keyframe);
   return drift.pose();
 }
 

@@ -49,7 +49,7 @@ CONTEXTS = {
         "const odometry::FrameOutcome& outcome, const RigFrame& frame"),
     "core/memory/arena.hpp": (("core/odometry/map.hpp",), ""),
     "core/memory/frame_pool.hpp": ((), "void (*fill)(std::span<std::uint8_t>, std::size_t stride)"),
-    "core/odometry/drift_covariance.hpp": ((), "DriftCovariance& drift, const Transform& T_left_world, const Mat6& fit"),
+    "core/odometry/drift_covariance.hpp": ((), "DriftCovariance& drift, const Transform& T_left_world, const Mat6& fit, bool keyframe"),
     "core/odometry/odometry.hpp": (
         (), "const OdometryOptions& options, const RigCalibration& rig, Arena& arena, PairRunner& runner, const RigFrame& frame"),
     "drivers/acquisition/acquisition.hpp": (

@@ -99,6 +99,27 @@ TEST(Estimator, answersEveryFrameWithItsNumberAndStamp) {
   }
 }
 
+/// 1 σ of a pose's position, m.
+double position_sigma(const PoseSample& s) {
+  const auto variance = [&](std::size_t at) { return static_cast<double>(s.covariance[at]); };
+  return std::sqrt(variance(0) + variance(6) + variance(11));
+}
+
+// Every frame is measured against the same map: the pose of the last is no worse than that of the
+// tenth. Summed up frame by frame it would be √20 times.
+TEST(Estimator, aPoseThatStandsGetsNoMoreUncertain) {
+  Standing s;
+  double tenth = 0;
+  for (int i = 0; i <= 200; ++i) {
+    const PoseSample sample = s.give(i);
+    if (i == 10) tenth = position_sigma(sample);
+    if (i == 200) {
+      EXPECT_GT(position_sigma(sample), 0);
+      EXPECT_LT(position_sigma(sample), 3 * tenth);
+    }
+  }
+}
+
 TEST(Estimator, theFirstFrameSaysThatACalibrationWasGiven) {
   Standing s;
   EXPECT_EQ(s.estimator.state(), State::initialising);

@@ -26,19 +26,45 @@ Mat6 noise(double metres, double radians) {
 
 TEST(DriftCovariance, ofTheFirstPoseIsZero) {
   DriftCovariance drift;
-  drift.step(looking(0.3, {1, 2, 3}), noise(1, 1), 0.1);
+  drift.step(looking(0.3, {1, 2, 3}), noise(1, 1), 0.1, true);
   EXPECT_TRUE(drift.pose().isZero());
 }
 
-TEST(DriftCovariance, ofStandingIsTheSumOfTheSteps) {
+TEST(DriftCovariance, ofStandingIsThatOfOneStepForEachMap) {
   DriftCovariance drift;
-  for (int i = 0; i <= 9; ++i) drift.step(looking(0.3, {1, 2, 3}), noise(0.02, 0.001), 0.1);
-  EXPECT_TRUE(drift.pose().isApprox(9 * noise(0.02, 0.001), 1e-9));
+  const Mat6 step = noise(0.02, 0.001);
+  for (int i = 0; i <= 100; ++i) drift.step(looking(0.3, {1, 2, 3}), step, 0.1, false);
+  EXPECT_TRUE(drift.pose().isApprox(step, 1e-9)) << "measured against the same map";
+  // A keyframe ends the first map, and the frames after it have their own error once.
+  drift.step(looking(0.3, {1, 2, 3}), step, 0.1, true);
+  for (int i = 0; i <= 100; ++i) drift.step(looking(0.3, {1, 2, 3}), step, 0.1, false);
+  EXPECT_TRUE(drift.pose().isApprox(2 * step, 1e-9));
+}
+
+TEST(DriftCovariance, ofCreepingIsOneStepForEachWayThatIsCertain) {
+  DriftCovariance drift;
+  constexpr double kSigma = 0.02;
+  // 0.45 sigmas each: the seventh step is more than three sigmas from where it began.
+  for (int i = 0; i <= 70; ++i)
+    drift.step(looking(0, {0.45 * kSigma * i, 0, 0}), noise(kSigma, 1e-6), 0, false);
+  // The turns lend the position no more than a millionth of the way, 0.6 m.
+  EXPECT_NEAR(std::sqrt(drift.pose()(0, 0)), std::sqrt(10) * kSigma, 1e-6);
+}
+
+TEST(DriftCovariance, ofAPoseThatWasNotSeenEndsWhenOneIs) {
+  DriftCovariance drift;
+  const Mat6 seen = noise(0.02, 0.001), unseen = noise(5, 0.1);
+  for (int i = 0; i <= 9; ++i) drift.step(looking(0, {0, 0, 1.0 * i}), seen, 0, true);
+  const Mat6 before = drift.pose();
+  for (int i = 0; i < 5; ++i) drift.step(looking(0, {0, 0, 9}), unseen, 0, false);
+  EXPECT_TRUE(drift.pose().isApprox(before + unseen, 1e-9)) << "once: it is since the same pose";
+  drift.step(looking(0, {0, 0, 9}), seen, 0, false);
+  EXPECT_TRUE(drift.pose().isApprox(before + seen, 1e-9));
 }
 
 TEST(DriftCovariance, lengthsAreOffTogether) {
   DriftCovariance drift;
-  for (int i = 0; i <= 10; ++i) drift.step(looking(0, {0.5 * i, 0, 0}), Mat6::Zero(), 0.02);
+  for (int i = 0; i <= 10; ++i) drift.step(looking(0, {0.5 * i, 0, 0}), Mat6::Zero(), 0.02, false);
   // Five metres along x, by 2 %.
   EXPECT_NEAR(std::sqrt(drift.pose()(0, 0)), 0.1, 1e-9);
 }
@@ -46,7 +72,7 @@ TEST(DriftCovariance, lengthsAreOffTogether) {
 TEST(DriftCovariance, aTurnThatIsSharedMovesThePoseAside) {
   DriftCovariance drift;
   constexpr int kSteps = 100;
-  for (int i = 0; i <= kSteps; ++i) drift.step(looking(0, {0, 0, 1.0 * i}), Mat6::Zero(), 0);
+  for (int i = 0; i <= kSteps; ++i) drift.step(looking(0, {0, 0, 1.0 * i}), Mat6::Zero(), 0, false);
   const Mat6 P = drift.pose();
   const double turn = std::sqrt(P(4, 4));
   EXPECT_NEAR(turn, 2.6e-4 * kSteps, 1e-9);
@@ -63,11 +89,11 @@ TEST(DriftCovariance, isThatOfManyDrives) {
   std::vector<Transform> exact;
   for (int i = 0; i <= kSteps; ++i) {
     exact.push_back(looking(0.05 * i, {0.2 * i, 0.1 * std::sin(0.3 * i), 1.0 * i}));
-    drift.step(exact.back(), noise(kMetres, kRadians), 0);
+    drift.step(exact.back(), noise(kMetres, kRadians), 0, false);
   }
   // What all turns share is taken off again: this is about the rest.
   DriftCovariance shared;
-  for (const Transform& T : exact) shared.step(T, Mat6::Zero(), 0);
+  for (const Transform& T : exact) shared.step(T, Mat6::Zero(), 0, false);
   const Mat6 expected = drift.pose() - shared.pose();
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
