@@ -15,17 +15,21 @@ constexpr float kMinStructure = 3.0F;  // grey levels, standard deviation of the
 constexpr int kMaskMargin =
     features::kWindow / 2 + 1;  // px: no pixel that holds a feature is a masked one
 
-/// Sums over a small image: whether it shows something, and whether it is the one seen before.
+/// Of a small image: whether it shows something, and whether it is the one seen before.
 FrontEnd::Fingerprint fingerprint(const ImageView& image) noexcept {
+  // Knuth's, of MMIX: odd, so that no pixel's part is lost in what follows it.
+  constexpr std::uint64_t kMultiplier = 6364136223846793005U;
   std::int64_t sum = 0, square = 0;
+  std::uint64_t hash = 0;
   for (int y = 0; y < image.height; ++y) {
     const std::uint8_t* row = image.row(y);
     for (int x = 0; x < image.width; ++x) {
       sum += row[x];
       square += row[x] * row[x];
+      hash = hash * kMultiplier + row[x];
     }
   }
-  return {sum, square};
+  return {sum, square, hash};
 }
 
 bool shows_something(const FrontEnd::Fingerprint& f, const ImageView& image) noexcept {
