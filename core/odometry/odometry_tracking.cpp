@@ -40,12 +40,9 @@ bool sample_agrees(const PoseFit& fit, double share) noexcept {
 
 PoseFit Odometry::fit(const Transform& start, bool sample) noexcept {
   if (link_ == Link::unlinked) return poses_.fit_unlinked(map_, start, sample, rig_.T_camera_left);
-  PoseFit all = poses_.fit_linked(map_, start, sample);
+  const PoseFit all = poses_.fit_linked(map_, start, sample);
   if (!all.found || confirmed_stereo(all) || all.stereo_found == 0) return all;
-  // The cameras contradict each other. Which is right the images do not say, but the left one is
-  // what the pose is of.
-  const PoseFit left = poses_.fit_left(map_, start);
-  return left.found && left.inliers >= options_.ok_inliers ? left : all;
+  return poses_.prefer_left(map_, start, all);
 }
 
 PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,

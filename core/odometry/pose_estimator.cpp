@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -24,8 +25,8 @@ Mat6 covariance_of(const RefinedPose& pose) noexcept {
 
 std::size_t PoseEstimator::memory_needed() noexcept {
   return RigObservationTable::memory_needed(kMaxPoints) + RigMlesac::memory_needed(kMaxPoints) +
-         PoseRefiner::memory_needed(kMaxPoints) + kMaxPoints * (sizeof(std::uint16_t) + 1) +
-         2 * kCacheLine;
+         PoseRefiner::memory_needed(kMaxPoints) + kMaxPoints * (sizeof(std::uint16_t) + 2) +
+         3 * kCacheLine;
 }
 
 PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibration& rig,
@@ -37,6 +38,7 @@ PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibratio
       refiner_(kMaxPoints, arena),
       owner_(arena.make<std::uint16_t>(kMaxPoints, "pose rows")),
       agrees_(arena.make<std::uint8_t>(kMaxPoints, "pose flags")),
+      agrees_all_(arena.make<std::uint8_t>(kMaxPoints, "pose flags of all cameras")),
       random_(options.seed) {}
 
 void PoseEstimator::collect(const Map& map) noexcept {
@@ -164,6 +166,15 @@ PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept
   for (std::size_t i = 0; i < owner_.size(); ++i) agrees_[owner_[i]] = refiner_.flags()[i];
   count(map, &fit);
   return fit;
+}
+
+PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
+                                   const PoseFit& all) noexcept {
+  std::swap(agrees_, agrees_all_);
+  const PoseFit left = fit_left(map, start);
+  if (left.found && left.inliers >= options_.ok_inliers) return left;
+  std::swap(agrees_, agrees_all_);
+  return all;
 }
 
 bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start, bool sample,

@@ -37,6 +37,11 @@ class PoseEstimator {
   /// By the left camera's observations alone; the others' are judged by the pose that comes out.
   /// Not found: the fit says so.
   [[nodiscard]] PoseFit fit_left(const Map& map, const Transform& start) noexcept;
+  /// For a fit, the last one, of cameras that contradict each other: which is right the images do
+  /// not say, but the left one is what the pose is of. Its own fit if that is good enough; else
+  /// `all` stands, and agrees() with it.
+  [[nodiscard]] PoseFit prefer_left(const Map& map, const Transform& start,
+                                    const PoseFit& all) noexcept;
   /// Each camera for itself. T_camera_left (in/out, as many as cameras): prediction, then this
   /// frame's; a camera that found no pose keeps its prediction and supports nothing.
   [[nodiscard]] PoseFit fit_unlinked(const Map& map, const Transform& start, bool sample,
@@ -45,7 +50,8 @@ class PoseEstimator {
   [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
                                 Transform* T_camera_world) noexcept;
 
-  /// By map point: bit k set if camera k's observation agrees with the last fit.
+  /// By map point: bit k set if camera k's observation agrees with the last fit, or with the one
+  /// that prefer_left() let stand.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return agrees_; }
 
  private:
@@ -66,8 +72,8 @@ class PoseEstimator {
   RigObservationTable table_;
   RigMlesac mlesac_;
   PoseRefiner refiner_;
-  BoundedVector<std::uint16_t> owner_;  // map index of each row of the table
-  std::span<std::uint8_t> agrees_;
+  BoundedVector<std::uint16_t> owner_;           // map index of each row of the table
+  std::span<std::uint8_t> agrees_, agrees_all_;  // the latter while prefer_left() tries another
   Random random_;
 };
 

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/math/random.hpp"
 
@@ -134,6 +136,32 @@ TEST(PoseEstimator, theLeftCamerasPoseIsItsOwn) {
   EXPECT_EQ(fit.cameras, 0b01);
   EXPECT_EQ(fit.stereo, 0);
   EXPECT_EQ(fit.stereo_found, kPoints);
+}
+
+TEST(PoseEstimator, ofCamerasThatContradictEachOtherTheLeftOneIsPreferredWhereItHoldsAPose) {
+  for (const int seen_left : {kPoints, OdometryOptions{}.ok_inliers - 1}) {
+    Scene s;
+    s.T_camera_left[1].R = exp_so3({0.03, 0, 0}) * s.T_camera_left[1].R;
+    s.see();
+    for (int i = seen_left; i < kPoints; ++i) s.points()[static_cast<std::size_t>(i)].now.drop(0);
+    PoseEstimator e(s.options, s.rig, s.arena);
+    // The right camera sees three hundred points: where the left one sees few it is what holds.
+    const PoseFit all = e.fit_linked(s.map, s.near(0.01, 0.1), true);
+    ASSERT_TRUE(all.found) << seen_left;
+    const std::vector<std::uint8_t> agreed(e.agrees().begin(), e.agrees().end());
+    const PoseFit fit = e.prefer_left(s.map, s.near(0.01, 0.1), all);
+    ASSERT_TRUE(fit.found) << seen_left;
+    if (seen_left == kPoints) {
+      expect_exact(fit.T_left_world, s.T_left_world);
+      EXPECT_EQ(s.agreeing(e, 0), kPoints);
+      EXPECT_EQ(s.agreeing(e, 1), 0);
+    } else {
+      EXPECT_EQ(fit.T_left_world.t, all.T_left_world.t);
+      EXPECT_EQ(s.agreeing(e, 0), 0);
+      EXPECT_EQ(s.agreeing(e, 1), kPoints);
+      EXPECT_TRUE(std::equal(agreed.begin(), agreed.end(), e.agrees().begin()));
+    }
+  }
 }
 
 TEST(PoseEstimator, camerasPosedEachForItselfGiveTheRig) {
