@@ -30,9 +30,8 @@ void Decoder::begin(const StreamSettings& stream, std::uint32_t baud,
   sample_counter_ = {};
   receiver_ = {};
   counted_ = false;
-  woke_ = false;
+  said_ = {};
   any_ = false;
-  stopped_ = going_on_ = resumed_ = false;
   last_sample_ = {};
 }
 
@@ -43,14 +42,10 @@ void Decoder::accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noe
   (void)stream_.accept(bytes);  // kMostBytes fit beside any frame that waits
 }
 
-bool Decoder::woke() noexcept {
-  const bool woke = woke_;
-  woke_ = false;
-  return woke;
-}
+bool Decoder::woke() noexcept { return std::exchange(said_.woke, false); }
 
 bool Decoder::answered(MessageId request) noexcept {
-  return std::exchange(request == MessageId::go_to_config ? stopped_ : going_on_, false);
+  return std::exchange(request == MessageId::go_to_config ? said_.stopped : said_.going_on, false);
 }
 
 bool Decoder::next(InsReading* reading) noexcept {
@@ -72,13 +67,13 @@ bool Decoder::next(InsReading* reading) noexcept {
 
 void Decoder::take_other(const Message& m) noexcept {
   ++counters_.other;
-  if (m.is(MessageId::wake_up)) woke_ = true;
-  if (answers(m, MessageId::go_to_config)) stopped_ = true;
-  if (answers(m, MessageId::go_to_measurement)) going_on_ = resumed_ = true;
+  if (m.is(MessageId::wake_up)) said_.woke = true;
+  if (answers(m, MessageId::go_to_config)) said_.stopped = true;
+  if (answers(m, MessageId::go_to_measurement)) said_.going_on = said_.resumed = true;
   if (!m.is(MessageId::error)) return;
   ++counters_.errors;
   counters_.last_error = m.payload.empty() ? std::uint8_t{0} : m.payload[0];
-  if (counters_.last_error == kErrorPowerDip) woke_ = true;
+  if (counters_.last_error == kErrorPowerDip) said_.woke = true;
 }
 
 void Decoder::count_messages(std::uint16_t counter) noexcept {
@@ -185,7 +180,7 @@ bool Decoder::hand_out(const InsReading& r, InsReading* reading) noexcept {
   last_host_ = r.host;
   ++counters_.readings;
   *reading = r;
-  reading->resumed = std::exchange(resumed_, false);
+  reading->resumed = std::exchange(said_.resumed, false);
   return true;
 }
 

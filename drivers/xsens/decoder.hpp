@@ -69,6 +69,11 @@ class Decoder {
   [[nodiscard]] const ArrivalTiming& timing() const noexcept { return timing_; }
 
  private:
+  /// What the device told of itself that nobody has asked for yet, and of the next reading.
+  struct Said {
+    bool woke = false, stopped = false, going_on = false;
+    bool resumed = false;
+  };
   [[nodiscard]] bool take_mtdata2(const xbus::Message& message, std::uint64_t begin,
                                   std::uint64_t end, InsReading* reading) noexcept;
   [[nodiscard]] bool take_mtdata(const xbus::Message& message, std::uint64_t begin,
@@ -94,8 +99,8 @@ class Decoder {
   HostStamp last_host_{};    // of the newest reading
   std::uint64_t received_ = 0, base_ = 0;
   std::uint64_t number_ = 0;
-  bool any_ = false, counted_ = false, woke_ = false;
-  bool stopped_ = false, going_on_ = false, resumed_ = false;
+  bool any_ = false, counted_ = false;
+  Said said_{};
   std::uint16_t last_message_ = 0;
   std::uint8_t last_fix_age_ = 0;
 };

@@ -82,6 +82,7 @@ def declarations(body):
         d = re.sub(r"\b(public|private|protected)\s*:(?!:)", "", d)
         d = re.sub(r"\[\[[^\]]*\]\]", "", d)
         d = re.sub(r"^\s*#[^\n]*$", "", d, flags=re.MULTILINE)
+        d = re.sub(r'^[\s"]+', "", d)  # what is left of a comment in front of it
         d = " ".join(d.split())
         if d:
             cleaned.append(d)
