@@ -150,6 +150,20 @@ std::optional<int> read_latency_timer_ms(const std::string& port) {
   return ms;
 }
 
+namespace {
+
+/// `asked`, or nothing where another device has its name now.
+std::string unless_of_another(const std::vector<SerialPortInfo>& ports,
+                              const std::string& usb_serial, const std::string& asked) {
+  const std::string real = resolved(asked).string();
+  const bool of_another = std::any_of(ports.begin(), ports.end(), [&](const SerialPortInfo& p) {
+    return p.port == real && !p.usb_serial.empty() && p.usb_serial != usb_serial;
+  });
+  return of_another ? std::string() : asked;
+}
+
+}  // namespace
+
 std::string port_with_serial(const std::vector<SerialPortInfo>& ports,
                              const std::string& usb_serial, const std::string& asked) {
   if (usb_serial.empty()) return asked;
@@ -159,10 +173,7 @@ std::string port_with_serial(const std::vector<SerialPortInfo>& ports,
   if (std::any_of(ports.begin(), ports.end(), named)) return asked;
   if (std::count_if(ports.begin(), ports.end(), bears) == 1)
     return std::find_if(ports.begin(), ports.end(), bears)->port;
-  const bool of_another = std::any_of(ports.begin(), ports.end(), [&](const SerialPortInfo& p) {
-    return p.port == real && !p.usb_serial.empty() && p.usb_serial != usb_serial;
-  });
-  return of_another ? std::string() : asked;
+  return unless_of_another(ports, usb_serial, asked);
 }
 
 namespace {
@@ -184,7 +195,8 @@ void ConverterNumber::opened(const std::vector<SerialPortInfo>& ports,
 std::string ConverterNumber::find(const std::vector<SerialPortInfo>& ports,
                                   const std::string& asked) const {
   if (!only_one_bears(ports, number_)) shared_.store(true, std::memory_order_relaxed);
-  return shared_.load(std::memory_order_relaxed) ? asked : port_with_serial(ports, number_, asked);
+  return shared_.load(std::memory_order_relaxed) ? unless_of_another(ports, number_, asked)
+                                                 : port_with_serial(ports, number_, asked);
 }
 
 std::string SerialPort::find() const {

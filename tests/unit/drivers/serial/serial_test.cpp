@@ -292,6 +292,7 @@ TEST(ConverterNumber, thatTwoWereSeenWithTellsNobodyForGood) {
   EXPECT_EQ(alone.find({usb_port("/dev/ttyV5", "0001")}, "/dev/ttyV0"), "/dev/ttyV5");
   EXPECT_EQ(alone.find({one, other}, "/dev/ttyV0"), "/dev/ttyV0");
   EXPECT_EQ(alone.find({other}, "/dev/ttyV0"), "/dev/ttyV0");
+  EXPECT_EQ(alone.find({usb_port("/dev/ttyV0", "B")}, "/dev/ttyV0"), "") << "that is B's now";
 }
 
 TEST(SerialPort, aLinkIsKeptWhereItLeadsToThePortWithTheSerialNumber) {
