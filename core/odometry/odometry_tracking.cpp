@@ -40,7 +40,7 @@ bool sample_agrees(const PoseFit& fit, double share) noexcept {
 
 PoseFit Odometry::fit(const Transform& start, bool sample) noexcept {
   if (link_ == Link::unlinked) return poses_.fit_unlinked(map_, start, sample, rig_.T_camera_left);
-  const PoseFit all = poses_.fit_linked(map_, start, sample);
+  PoseFit all = poses_.fit_linked(map_, start, sample);
   if (!all.found || confirmed_stereo(all) || all.stereo_found == 0) return all;
   return poses_.prefer_left(map_, start, all);
 }

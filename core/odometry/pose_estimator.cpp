@@ -171,7 +171,7 @@ PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept
 PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
                                    const PoseFit& all) noexcept {
   std::swap(agrees_, agrees_all_);
-  const PoseFit left = fit_left(map, start);
+  PoseFit left = fit_left(map, start);
   if (left.found && left.inliers >= options_.ok_inliers) return left;
   std::swap(agrees_, agrees_all_);
   return all;
