@@ -1,0 +1,171 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+
+#include "app/recorder/recorder.hpp"
+#include "core/math/so3.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/recorder/recorder_inputs.hpp"
+
+namespace vergence::app {
+namespace {
+
+TEST(Recorder, calibrationsCarryTheirNumbersAndEmptyFieldsWhereNothingIsGiven) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  recorder.post(CalibrationRecord::begin(two_cameras(), Stamp(kStamp), "given", "of a, file"));
+  recorder.post(CalibrationRecord::of(decision(true)));
+  recorder.post(CalibrationRecord::of(decision(false)));
+  const auto totals = recorder.close();
+  const auto lines = lines_of(folder / "calibrations.csv");
+  ASSERT_EQ(lines.size(), 4U);
+  EXPECT_EQ(lines[0], kCalibrationsHeader);
+  const std::string numbers =
+      ",1,0.000000000,0.000000000,0.000000000,-0.500000000,0.000000000,0.250000000,"
+      "0.000100000,0.000200000,0.000300000,0.001000000,0.002000000,0.003000000,,,,,,,460.00000,461."
+      "00000,320.00000,240.00000,";
+  const std::string distortion = ",0.000000000,0.000000000,0.000000000,0.000000000,,,,";
+  EXPECT_EQ(lines[1], "1403636584763555584,accepted,given,of a; file,0,,,0.0000,,,0.000000" +
+                          numbers + ",,," + distortion + distortion + ",,,,,");
+  EXPECT_EQ(lines[2],
+            "1403636584763555584,accepted,knock,,60,71,840,0.1800,1.5000,0.1250,0.002000" +
+                numbers + "0.200000000,0.300000000,0.000000000,0.000000000" + distortion +
+                distortion + ",,,,,");
+  EXPECT_EQ(lines[3].substr(0, 71),
+            "1403636584763555584,rejected,knock,held-out frames do not fit better,60");
+  for (const std::string& line : lines)
+    EXPECT_EQ(std::count(lines[0].begin(), lines[0].end(), ','),
+              std::count(line.begin(), line.end(), ','))
+        << line;
+
+  EXPECT_EQ(totals->accepted, 1U) << "what the drive begins with is no decision";
+  EXPECT_EQ(totals->rejected, 1U);
+  ASSERT_EQ(totals->attempts.size(), 2U);
+  EXPECT_EQ(totals->attempts[0].cause, "knock");
+  EXPECT_EQ(totals->attempts[0].latency_frames, 71);
+  EXPECT_EQ(totals->attempts[1].reason, "held-out frames do not fit better");
+}
+
+TEST(Recorder, whatTheDriveMeasuredWhileItWentOnIsKeptAndNoAttempt) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  CalibrationDecision measured = decision(false);
+  measured.cause = CalibrationCause::refinement;
+  measured.learnt = true;
+  measured.judged_depth_m = 20;
+  measured.depth_sigma_percent = 0.25;
+  measured.depth_difference_percent = 1.5;
+  measured.verified = measured.lenses = true;
+  recorder.post(CalibrationRecord::of(measured));
+  const auto totals = recorder.close();
+  const auto lines = lines_of(folder / "calibrations.csv");
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_EQ(lines[1].substr(0, 40), "1403636584763555584,kept,refinement,held");
+  EXPECT_TRUE(lines[1].ends_with(",20.00,0.2500,1.5000,1,1")) << lines[1];
+  EXPECT_EQ(totals->rejected, 0U);
+  EXPECT_TRUE(totals->attempts.empty());
+}
+
+TEST(TotalsBuilder, theFirstCalibrationFoundIsKnownAlsoAfterThousandsOfAttempts) {
+  TotalsBuilder builder(0);
+  const auto attempt = [&builder](CalibrationCause cause, bool accepted) {
+    CalibrationDecision d = decision(accepted);
+    d.cause = cause;
+    return builder.add(CalibrationRecord::of(d));
+  };
+  for (std::size_t i = 0; i < kMostAttempts + 5; ++i)
+    EXPECT_FALSE(attempt(CalibrationCause::from_scratch, false));
+  EXPECT_TRUE(attempt(CalibrationCause::from_scratch, true));
+  for (std::size_t i = 0; i < kMostAttempts + 5; ++i)
+    EXPECT_FALSE(attempt(CalibrationCause::knock, false));
+  const SessionTotals& totals = builder.totals();
+  ASSERT_TRUE(totals.from_scratch.found);
+  EXPECT_EQ(totals.from_scratch.rejected, kMostAttempts + 5);
+  EXPECT_EQ(totals.attempts.size(), kMostAttempts);
+}
+
+EventRecord event_at(std::int64_t ns, EstimatorEvent::Kind kind, double value) {
+  EstimatorEvent event;
+  event.stamp = Stamp(ns);
+  event.kind = kind;
+  event.value = value;
+  return EventRecord::of(event);
+}
+
+TEST(Recorder, theFirstConfirmationAndTheFirstContradictionAreInTheTotals) {
+  using Kind = EstimatorEvent::Kind;
+  for (const bool after_the_pose :
+       {false, true}) {  // at the end of a drive the event comes after the last pose
+    const test::TemporaryFolder folder;
+    Recorder recorder(folder.path(), {});
+    PoseSample sample;
+    sample.frame = 7, sample.stamp = Stamp(700);
+    recorder.post(event_at(700, Kind::calibration_contradicted, 6.5));
+    if (after_the_pose) recorder.post(PoseRecord::of(sample, 0, std::nullopt));
+    recorder.post(event_at(700, Kind::calibration_confirmed, 0.3));
+    if (!after_the_pose) recorder.post(PoseRecord::of(sample, 0, std::nullopt));
+    recorder.post(event_at(900, Kind::calibration_contradicted, 1.0));
+    recorder.post(event_at(900, Kind::calibration_confirmed, 0.3));
+    sample.frame = 9, sample.stamp = Stamp(900);
+    recorder.post(PoseRecord::of(sample, 0, std::nullopt));
+    const auto totals = recorder.close();
+    EXPECT_EQ(totals->confirmed, Stamp(700));
+    EXPECT_EQ(totals->confirmed_frame, 7U);
+    ASSERT_TRUE(totals->contradicted);
+    EXPECT_EQ(totals->contradicted->stamp, Stamp(700));
+    EXPECT_EQ(totals->contradicted->depth_percent, 6.5);
+  }
+}
+
+TEST(RigNumbers, thereAndBackAreTheSameDoubles) {
+  RigCalibration rig = two_cameras();
+  rig.cameras = 3;
+  rig.T_camera_left[2] = {exp_so3({0.1, -0.2, 0.3}), Vec3(-0.1, 0.2, 0.3)};
+  rig.covariance_wide[2] = Mat6::Identity() * 3e-7;
+  rig.covariance_wide[2](1, 4) = rig.covariance_wide[2](4, 1) = 1e-8;
+  rig.baseline = 0.559;
+  rig.baseline_sigma = 0.001;
+  rig.found = Stamp(kStamp);
+  const RigCalibration again = RigNumbers::of(rig).rig();
+  EXPECT_EQ(again.cameras, 3);
+  EXPECT_EQ(again.T_camera_left[2].R, rig.T_camera_left[2].R);
+  EXPECT_EQ(again.T_camera_left[2].t, rig.T_camera_left[2].t);
+  EXPECT_EQ(again.covariance_wide[2], rig.covariance_wide[2]);
+  EXPECT_EQ(again.intrinsics[1].fy, 461);
+  EXPECT_EQ(again.sigma_noise, rig.sigma_noise);
+  EXPECT_EQ(again.baseline_sigma, 0.001);
+  EXPECT_EQ(again.found, rig.found);
+}
+
+TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndASentence) {
+  for (const bool fails : {false, true}) {
+    const test::TemporaryFolder folder;
+    std::thread::id where;
+    int calls = 0;
+    Recorder::Options options;
+    options.keep = [&](const RigCalibration& rig) {
+      ++calls;
+      where = std::this_thread::get_id();
+      EXPECT_EQ(rig.frames, 60);
+      return Kept{fails, fails ? "state: no room" : "kept"};
+    };
+    Recorder recorder(folder.path(), options);
+    recorder.post(CalibrationRecord::begin(two_cameras(), Stamp(kStamp), "given", ""));
+    recorder.post(CalibrationRecord::of(decision(false)));
+    recorder.post(CalibrationRecord::of(decision(true)));
+    (void)recorder.close();
+    EXPECT_EQ(calls, 1);
+    EXPECT_NE(where, std::this_thread::get_id());
+    const auto events = lines_of(folder / "events.jsonl");
+    ASSERT_EQ(events.size(), 1U);
+    const auto event = nlohmann::json::parse(events[0]);
+    EXPECT_EQ(event["kind"], fails ? "calibration_not_kept" : "calibration_kept");
+    EXPECT_EQ(recorder.take_errors().size(), fails ? 1U : 0U);
+  }
+}
+
+}  // namespace
+}  // namespace vergence::app
