@@ -32,6 +32,11 @@ class Section {
   }
 
   [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
+  /// False: the key is not there, or stands for no values: nothing behind it, or `[]`.
+  [[nodiscard]] bool gives(const char* key) const {
+    const YAML::Node node = node_[key];
+    return node && !node.IsNull() && !(node.IsSequence() && node.size() == 0);
+  }
   [[nodiscard]] std::string field(const char* key) const {
     return name_.empty() ? key : name_ + "." + key;
   }
@@ -92,7 +97,7 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
 
   const auto f = camera.numbers("intrinsics", 4, 4);
   k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
-  if (camera.has("distortion") && camera.need("distortion").size() > 0) {  // [] or nothing: none
+  if (camera.gives("distortion")) {
     const auto d = camera.numbers("distortion", 4, most_coefficients(k));
     std::copy(d.begin(), d.end(), k.distortion.begin());
   }

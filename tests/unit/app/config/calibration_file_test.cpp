@@ -217,6 +217,16 @@ TEST(CalibrationPlausibility, Distortion) {
       << "equidistant has four";
 }
 
+TEST(CalibrationFile, ADistortionThatIsNoListIsNotTakenForNone) {
+  const std::string list = "[-0.28, 0.07, 1e-4, 2e-5, 0.01]";
+  for (const char* other : {"-0.28", "\"-0.28, 0.07, 0, 0\"", "none", "{}"})
+    EXPECT_TRUE(refused(with(list, other), "c.yaml:9: cameras.1.distortion", "list of 4 to 5"))
+        << other;
+  for (const char* none : {"[]", "", "~"})
+    EXPECT_FALSE(parse_calibration(with(list, none), "c.yaml").rig.intrinsics[1].has_distortion())
+        << none;
+}
+
 TEST(CalibrationPlausibility, SigmasOfDistortion) {
   const std::string sigmas =
       "    distortion_sigma: [1e-3, 1e-3, 1e-4, 1e-4, 1e-2]\n    T_camera_left";
