@@ -31,6 +31,28 @@ CalibrationFormat format_of_content(const std::vector<YamlFile>& files, bool ope
                    "(camera_matrix), OpenCV stereo (M1, D1, M2, D2, R, T)");
 }
 
+/// The files of a calibration, parsed, and what only their text shows.
+struct Content {
+  std::vector<YamlFile> files;
+  bool opencv_head = false;  // %YAML:1.0, which is no YAML
+};
+
+Content read_content(const std::string& in) {
+  Content content;
+  std::error_code ignored;
+  for (const fs::path& path : detail::files_of(in, fs::is_directory(in, ignored))) {
+    std::string text = read_text(path, kLargestYaml);
+    content.opencv_head = content.opencv_head || text.starts_with("%YAML:");
+    content.files.push_back(parse_opencv_yaml(std::move(text), path.string()));
+    const YAML::Node& root = content.files.back().root();
+    if (root.IsNull()) throw InputError(path.string() + ": is empty; a calibration is expected");
+    if (!root.IsMap())
+      throw InputError(path.string() +
+                       ": is not a group of keys (`key: value`); a calibration is expected");
+  }
+  return content;
+}
+
 void refuse_number_of_files(const std::string& in, const char* what) {
   throw InputError(fmt::format("{}: {}", in, what));
 }
@@ -41,7 +63,9 @@ namespace detail {
 
 std::vector<std::filesystem::path> files_of(const std::string& text, bool folder) {
   if (folder) return {fs::path(text) / "left.yaml", fs::path(text) / "right.yaml"};
-  if (const auto comma = text.find(','); comma != std::string::npos)
+  std::error_code ignored;
+  if (const auto comma = text.find(',');
+      comma != std::string::npos && !fs::exists(text, ignored))  // a name may have one, too
     return {text.substr(0, comma), text.substr(comma + 1)};
   return {text};
 }
@@ -86,21 +110,14 @@ void remark_more_cameras(const CalibrationFile& calibration, const char* format,
 
 }  // namespace detail
 
+CalibrationFormat calibration_format(const std::string& in) {
+  const Content content = read_content(in);
+  return format_of_content(content.files, content.opencv_head);
+}
+
 CalibrationFile read_any_calibration(const std::string& in, const std::optional<ImageSize>& size,
                                      Remarks* remarks) {
-  std::vector<YamlFile> files;
-  bool opencv_head = false;
-  std::error_code ignored;
-  for (const fs::path& path : detail::files_of(in, fs::is_directory(in, ignored))) {
-    std::string text = read_text(path, kLargestYaml);
-    opencv_head = opencv_head || text.starts_with("%YAML:");
-    files.push_back(parse_opencv_yaml(std::move(text), path.string()));
-    if (files.back().root().IsNull())
-      throw InputError(path.string() + ": is empty; a calibration is expected");
-    if (!files.back().root().IsMap())
-      throw InputError(path.string() +
-                       ": is not a group of keys (`key: value`); a calibration is expected");
-  }
+  const auto [files, opencv_head] = read_content(in);
   switch (format_of_content(files, opencv_head)) {
     case CalibrationFormat::vergence:
       if (files.size() != 1) refuse_number_of_files(in, "calibration.yaml is one file");

@@ -11,20 +11,11 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kLargestFile = std::size_t{1} << 20U;
-
-/// Whether another program's format is to be looked for: a pair of files, a folder, or words that
-/// calibration.yaml does not have.
+/// Ours is one file: a pair or a folder of them is refused with the other formats.
 bool is_foreign(const std::string& in) {
   std::error_code ignored;
-  if (in.find(',') != std::string::npos || std::filesystem::is_directory(in, ignored)) return true;
-  const std::string text = read_text(in, kLargestFile);
-  if (text.find("\ncameras:") != std::string::npos || text.starts_with("cameras:")) return false;
-  constexpr std::array<std::string_view, 5> kWords{"cam0:", "camera_matrix",
-                                                   "%YAML:", "M1:", "K1:"};
-  return std::any_of(kWords.begin(), kWords.end(), [&text](std::string_view word) {
-    return text.find(word) != std::string::npos;
-  });
+  return !std::filesystem::is_regular_file(in, ignored) ||
+         calibration_format(in) != CalibrationFormat::vergence;
 }
 
 }  // namespace
@@ -46,7 +37,10 @@ std::vector<double> parse_distortion(const std::string& text) {
 CalibrationFile read_given_calibration(const std::string& in, const CalibrationUse& use,
                                        const std::optional<ImageSize>& size,
                                        std::vector<std::string>* remarks) {
-  return is_foreign(in) ? read_any_calibration(in, size, remarks) : read_calibration(in, use);
+  if (!is_foreign(in)) return read_calibration(in, use);
+  CalibrationFile file = read_any_calibration(in, size, remarks);
+  apply_use(use, &file.rig);
+  return file;
 }
 
 GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,

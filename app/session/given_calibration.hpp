@@ -26,8 +26,8 @@ struct KnownNumbers {
 
 /// calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or a folder with
 /// them) or OpenCV stereo YAML, told by
-/// content. `size`: of the images, where a file has none. What a format did not carry over is a
-/// sentence of *remarks.
+/// content, with what is wanted of it applied. `size`: of the images, where a file has none. What a
+/// format did not carry over is a sentence of *remarks.
 /// Errors     InputError
 [[nodiscard]] CalibrationFile read_given_calibration(const std::string& in,
                                                      const CalibrationUse& use,
