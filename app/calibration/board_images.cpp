@@ -132,6 +132,7 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
   const std::size_t cameras = views.empty() ? 0 : views.front().size();
   BoardImages images;
   images.sizes.resize(cameras);
+  const bool part_is_enough = board.kind != BoardKind::checkerboard;
   Grey grey;
   for (std::size_t v = 0; v < views.size(); ++v) {
     BoardView view;
@@ -152,7 +153,9 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
       const ImageView pixels{grey.pixels.data(), size.width, size.height, size.width};
       view.corners[k] = find_board(pixels, board, BoardSearch::thorough, view.corners[0]);
       if (view.corners[k].empty())
-        without.push_back(fmt::format("no board of {} in {}", board.words(), file.string()));
+        without.push_back(fmt::format("no board of {}{} in {}", board.words(),
+                                      part_is_enough ? ", or too little of it," : "",
+                                      file.string()));
     }
     const auto with = std::count_if(view.corners.begin(), view.corners.end(),
                                     [](const auto& c) { return !c.empty(); });

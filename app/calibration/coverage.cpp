@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 
+#include "app/calibration/board_detector.hpp"
+
 namespace vergence::app {
 namespace {
 
@@ -62,10 +64,15 @@ Coverage::Stand Coverage::stand_of(const BoardView& view) const {
   }
   stand.extent =
       std::max((most.x() - least.x()) / sizes_[0].width, (most.y() - least.y()) / sizes_[0].height);
+  if (!determine_a_homography(corners, board_)) return stand;
   const cv::Mat K = (cv::Mat_<double>(3, 3) << focal_px_, 0, 0.5 * (sizes_[0].width - 1), 0,
                      focal_px_, 0.5 * (sizes_[0].height - 1), 0, 0, 1);
   cv::Mat turn, place, R;
-  if (!cv::solvePnP(object, image, K, cv::noArray(), turn, place)) return stand;
+  try {
+    if (!cv::solvePnP(object, image, K, cv::noArray(), turn, place)) return stand;
+  } catch (const cv::Exception&) {
+    return stand;  // e.g. corners that lie on a line in the image: its tilts are not known
+  }
   cv::Rodrigues(turn, R);
   // The board's normal away from the camera: where it leans to the right, the right edge is the
   // nearer one.

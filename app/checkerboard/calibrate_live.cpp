@@ -2,6 +2,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <thread>
 
@@ -60,7 +61,7 @@ class Collection {
         source_(source),
         collector_(Coverage(request.board, rig.names, rig.sizes, focal_px), rig.sizes[0].width) {}
 
-  /// Until the source ends, nothing is missing, or `stop` says so.
+  /// Until the source ends, nothing is missing, or a signal comes. Throws what looking threw.
   void run(const SignalGuard& signals, Progress* progress) {
     std::thread looking([this] { look(); });
     std::unique_lock lock(mutex_);
@@ -71,12 +72,25 @@ class Collection {
     show_progress(progress);
     lock.unlock();
     looking.join();
+    if (failure_) std::rethrow_exception(failure_);
   }
   [[nodiscard]] const std::vector<BoardView>& views() const noexcept { return collector_.views(); }
   [[nodiscard]] bool complete() const { return collector_.complete(); }
 
  private:
   void look() {
+    try {
+      look_at_all();
+    } catch (...) {  // out of a thread it would end the program
+      failure_ = std::current_exception();
+      source_->stop();
+    }
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+    changed_.notify_one();
+  }
+
+  void look_at_all() {
     for (Acquired item; source_->next(&item);) {
       if (const auto* event = std::get_if<DeviceEvent>(&item)) note(*event);
       const auto* frame = std::get_if<AcquiredFrame>(&item);
@@ -85,9 +99,6 @@ class Collection {
       source_->release(*frame);
       if (complete_) source_->stop();
     }
-    const std::lock_guard lock(mutex_);
-    done_ = true;
-    changed_.notify_one();
   }
 
   void note(const DeviceEvent& event) {
@@ -149,8 +160,9 @@ class Collection {
   const CalibrateRequest& request_;
   const CalibratedRig& rig_;
   Acquisition* source_;
-  ViewCollector collector_;  // of the looking thread, until it has ended
-  bool complete_ = false;    // likewise
+  ViewCollector collector_;       // of the looking thread, until it has ended
+  bool complete_ = false;         // likewise
+  std::exception_ptr failure_{};  // likewise
 
   std::mutex mutex_;
   std::condition_variable changed_;

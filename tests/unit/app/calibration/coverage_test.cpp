@@ -92,6 +92,20 @@ TEST(Coverage, theGridCountsCornersWhereTheyAre) {
   EXPECT_EQ(grid.substr(grid.find('\n') + 1, 1), "#");
 }
 
+TEST(Coverage, cornersThatDoNotTellHowTheBoardStandsHaveNoTilt) {
+  const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
+  const BoardView whole = seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)));
+  for (const std::size_t corners : {3U, 7U}) {  // of the first row: they lie on a line
+    BoardView few;
+    few.corners[0].assign(whole.corners[0].begin(),
+                          whole.corners[0].begin() + static_cast<std::ptrdiff_t>(corners));
+    Coverage c = nothing_yet(rig);
+    EXPECT_NO_THROW((void)c.brings_something(few)) << corners;
+    EXPECT_NO_THROW(c.add(few)) << corners;
+    EXPECT_TRUE(contains(all(c.needs()), "tilted, each edge nearer in turn")) << all(c.needs());
+  }
+}
+
 TEST(ViewCollector, takesAViewOnceHeldStillAndEndsWhenNothingIsMissing) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   ViewCollector collector(nothing_yet(rig), 640);
