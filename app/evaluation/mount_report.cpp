@@ -39,8 +39,8 @@ const char* problem(MountStatus status) {
     case MountStatus::no_motion:
       return "nothing moved: a mount shows only while driving";
     case MountStatus::not_converged:
-      return "no fit: the two trajectories are not of the same drive, or their clocks are more "
-             "than 0.3 s apart";
+      return "no fit: the two trajectories are not of the same drive, their clocks are more than "
+             "0.3 s apart, or their attitudes drift apart by more than 15 degrees";
     case MountStatus::ok:
       break;
   }

@@ -119,6 +119,7 @@ class Fit {
   [[nodiscard]] bool all_errors(const State& s, std::vector<Errors>* all) const;
   [[nodiscard]] bool step(Parameters* d);
   void learn_noise(const std::vector<Errors>& all);
+  [[nodiscard]] bool settle();
   void report(const Mat3& nominal, Mount* mount) const;
 
   std::vector<Moment> moments_;
@@ -338,19 +339,33 @@ void Fit::report(const Mat3& nominal, Mount* mount) const {
   *mount = m;
 }
 
-MountStatus Fit::run(const Mat3& nominal, Mount* mount) {
-  if (!start(nominal)) return MountStatus::no_motion;
+/// False: the fit does not come to rest, or only where the clocks are farther apart than it can
+/// see.
+bool Fit::settle() {
   constexpr double kLargest = 0.3;   // s: the room that moments have for the offset
   constexpr double kSettled = 1e-2;  // of a sigma
   for (int round = 0; round < kMountRounds; ++round) {
     Parameters d;
-    if (!step(&d)) return MountStatus::not_converged;
+    if (!step(&d)) return false;
     state_ = moved(state_, d);
     state_.offset = std::clamp(state_.offset, -kLargest, kLargest);
     constexpr int kLeastRounds = 6;  // for the correlations
-    if (round >= kLeastRounds && d.dot(information_ * d) < kSettled * kSettled) break;
+    if (round >= kLeastRounds && d.dot(information_ * d) < kSettled * kSettled)
+      return std::abs(state_.offset) < kLargest;
   }
-  report(nominal, mount);
+  return false;
+}
+
+MountStatus Fit::run(const Mat3& nominal, Mount* mount) {
+  if (!start(nominal)) return MountStatus::no_motion;
+  if (!settle()) return MountStatus::not_converged;
+  Mount found;
+  report(nominal, &found);
+  // Errors are taken as small turns: the half square that this leaves out has to be less than what
+  // counts as seen.
+  if (found.residual_rotation * found.residual_rotation / 2 > options_.rotation_sigma)
+    return MountStatus::not_converged;
+  *mount = found;
   return MountStatus::ok;
 }
 
