@@ -40,7 +40,8 @@ using Remarks = std::vector<std::string>;
 
 /// OpenCV's stereo calibration: M1 D1 M2 D2 R T (K1, cameraMatrix1, distCoeffs1 … likewise) in one
 /// file or in several, as its sample writes intrinsics.yml and extrinsics.yml; fisheye_model: 1
-/// makes it equidistant. X_2 = R X_1 + T. `size` where the files have none.
+/// makes it equidistant; four coefficients without that key are a remark. X_2 = R X_1 + T. `size`
+/// where the files have none.
 [[nodiscard]] CalibrationFile read_opencv(const std::vector<YamlFile>& files,
                                           const std::optional<ImageSize>& size, Remarks* remarks);
 /// Intrinsics and extrinsics without the head `%YAML:1.0`; a file may hold either or one after the

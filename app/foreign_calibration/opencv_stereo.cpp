@@ -75,8 +75,9 @@ Entry need_entry(const std::vector<YamlFile>& files, std::span<const char* const
   throw InputError(fmt::format("{}: {} is missing ({} or {})", names, what, keys[0], keys[1]));
 }
 
-void read_lens(const std::vector<YamlFile>& files, std::span<const char* const> matrix,
-               std::span<const char* const> distortion, bool fisheye, Intrinsics* lens) {
+/// → how many distortion coefficients there are.
+std::size_t read_lens(const std::vector<YamlFile>& files, std::span<const char* const> matrix,
+                      std::span<const char* const> distortion, bool fisheye, Intrinsics* lens) {
   const Entry m = need_entry(files, matrix, "a camera matrix");
   const auto K = read_matrix(*m.file, m.node, m.key, 3, 3);
   if (K[1] != 0 || K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
@@ -96,6 +97,7 @@ void read_lens(const std::vector<YamlFile>& files, std::span<const char* const> 
                                        "radtan has not; calibrate with k1 k2 p1 p2 k3",
                                        d.key));
   }
+  return values.size();
 }
 
 ImageSize read_size(const std::vector<YamlFile>& files, const std::optional<ImageSize>& given) {
@@ -116,10 +118,12 @@ ImageSize read_size(const std::vector<YamlFile>& files, const std::optional<Imag
   return *given;
 }
 
-bool is_fisheye(const std::vector<YamlFile>& files) {
+/// What the files say; nothing: they say nothing.
+std::optional<bool> is_fisheye(const std::vector<YamlFile>& files) {
   constexpr std::array kFisheye{"fisheye_model"};
   const auto entry = find(files, kFisheye);
-  return entry && entry->file->integer(entry->node, entry->key, 0, 1) == 1;
+  if (!entry) return std::nullopt;
+  return entry->file->integer(entry->node, entry->key, 0, 1) == 1;
 }
 
 std::string format_matrix(const char* key, int rows, int columns, std::span<const double> values) {
@@ -138,13 +142,21 @@ YamlFile parse_opencv_yaml(std::string text, const std::string& name) {
 }
 
 CalibrationFile read_opencv(const std::vector<YamlFile>& files,
-                            const std::optional<ImageSize>& size, Remarks* /*remarks*/) {
+                            const std::optional<ImageSize>& size, Remarks* remarks) {
   CalibrationFile calibration;
   RigCalibration& rig = calibration.rig;
   rig.cameras = 2;
-  const bool fisheye = is_fisheye(files);
-  read_lens(files, kMatrix1, kDistortion1, fisheye, &rig.intrinsics[0]);
-  read_lens(files, kMatrix2, kDistortion2, fisheye, &rig.intrinsics[1]);
+  const auto said = is_fisheye(files);
+  const bool fisheye = said.value_or(false);
+  const std::array coefficients{
+      read_lens(files, kMatrix1, kDistortion1, fisheye, &rig.intrinsics[0]),
+      read_lens(files, kMatrix2, kDistortion2, fisheye, &rig.intrinsics[1])};
+  // stereoCalibrate writes five or more unless it is told otherwise, its fisheye namesake four.
+  if (!said && std::count(coefficients.begin(), coefficients.end(), 4U) > 0)
+    remarks->push_back(
+        files.front().name() +
+        ": four distortion coefficients are taken for k1 k2 p1 p2 (radtan); if they are k1 k2 k3 "
+        "k4 of cv::fisheye, add the line `fisheye_model: 1`, else `fisheye_model: 0`");
   const Entry R = need_entry(files, kRotation, "the rotation of camera 2 from camera 1");
   const auto r = read_matrix(*R.file, R.node, R.key, 3, 3);
   const Entry T = need_entry(files, kTranslation, "the translation of camera 2 from camera 1");

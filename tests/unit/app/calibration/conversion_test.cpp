@@ -366,6 +366,38 @@ TEST(OpenCvStereo, whatOpenCvWritesIsReadAsItProjectsUnderEachOfItsNames) {
   }
 }
 
+/// As cv::fisheye::stereoCalibrate's answer is written: nothing but the count tells its D from that
+/// of a lens with k1 k2 p1 p2, which is legal, too.
+TEST(OpenCvStereo, fourCoefficientsThatMayBeOfAFisheyeLensAreSaid) {
+  const std::string lens =
+      "!!opencv-matrix {rows: 3, cols: 3, dt: d, data: [290, 0, 320, 0, 291, "
+      "240, 0, 0, 1]}\n";
+  const auto text = [&](const std::string& d, const std::string& more) {
+    return "%YAML:1.0\n---\nM1: " + lens + "D1: " + d + "M2: " + lens + "D2: " + d +
+           "R: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n"
+           "T: {rows: 3, cols: 1, data: [-0.12, 0, 0]}\nimageSize: [640, 480]\n" +
+           more;
+  };
+  const std::string four = "{rows: 4, cols: 1, data: [-0.02, 0.008, -0.004, 0.0008]}\n",
+                    five = "{rows: 1, cols: 5, data: [-0.02, 0.008, -0.004, 0.0008, 0]}\n";
+  const auto read = [](const std::string& yaml, Remarks* remarks) {
+    return read_opencv({parse_opencv_yaml(yaml, "stereo.yml")}, std::nullopt, remarks)
+        .rig.intrinsics[1]
+        .kind;
+  };
+  Remarks remarks;
+  EXPECT_EQ(read(text(four, ""), &remarks), CameraModelKind::pinhole_radtan);
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_NE(remarks[0].find("stereo.yml: four distortion coefficients"), std::string::npos);
+  EXPECT_NE(remarks[0].find("fisheye_model: 1"), std::string::npos) << remarks[0];
+
+  remarks.clear();
+  EXPECT_EQ(read(text(four, "fisheye_model: 1\n"), &remarks), CameraModelKind::pinhole_equidistant);
+  EXPECT_EQ(read(text(four, "fisheye_model: 0\n"), &remarks), CameraModelKind::pinhole_radtan);
+  EXPECT_EQ(read(text(five, ""), &remarks), CameraModelKind::pinhole_radtan);
+  EXPECT_TRUE(remarks.empty()) << remarks[0];
+}
+
 // ---- all of them
 
 TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
