@@ -17,17 +17,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The last run of digits in a file's name: `left08.jpg` → `08`.
+/// The last run of digits in a file's name without zeros in front, which one camera's files may
+/// have and another's not: `left08.jpg` → `8`. Empty: there is none.
 std::string number_in(const fs::path& file) {
   const std::string stem = file.stem().string();
   std::size_t end = stem.size();
   while (end > 0 && std::isdigit(static_cast<unsigned char>(stem[end - 1])) == 0) --end;
   std::size_t begin = end;
   while (begin > 0 && std::isdigit(static_cast<unsigned char>(stem[begin - 1])) != 0) --begin;
+  while (begin + 1 < end && stem[begin] == '0') ++begin;
   return stem.substr(begin, end - begin);
 }
 
-using Numbered = std::map<std::string, fs::path>;
+/// Shorter numbers are smaller.
+struct LessNumber {
+  bool operator()(const std::string& a, const std::string& b) const {
+    return a.size() != b.size() ? a.size() < b.size() : a < b;
+  }
+};
+
+using Numbered = std::map<std::string, fs::path, LessNumber>;
 
 /// By number; empty where two files have the same or one has none.
 Numbered numbered(const std::vector<fs::path>& files) {
@@ -37,6 +46,13 @@ Numbered numbered(const std::vector<fs::path>& files) {
     if (number.empty() || !by_number.emplace(number, file).second) return {};
   }
   return by_number;
+}
+
+/// In order of number.
+std::vector<fs::path> files_of(const Numbered& numbered) {
+  std::vector<fs::path> files;
+  for (const auto& [number, file] : numbered) files.push_back(file);
+  return files;
 }
 
 std::vector<std::vector<fs::path>> by_order(const std::vector<std::vector<fs::path>>& cameras) {
@@ -110,8 +126,12 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
   const bool same_length = std::all_of(cameras.begin(), cameras.end(), [&](const auto& files) {
     return files.size() == cameras[0].size();
   });
-  if (same_length && (alone.empty() || 2 * views.size() < cameras[0].size()))
-    return by_order(cameras);
+  if (same_length && (alone.empty() || 2 * views.size() < cameras[0].size())) {
+    if (!all_numbered) return by_order(cameras);
+    std::vector<std::vector<fs::path>> in_order;
+    for (const Numbered& n : numbers) in_order.push_back(files_of(n));
+    return by_order(in_order);
+  }
   if (views.empty()) {
     std::string counts;
     for (const auto& files : cameras)

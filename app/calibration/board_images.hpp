@@ -16,9 +16,10 @@ namespace vergence::app {
 [[nodiscard]] std::vector<std::filesystem::path> matching_files(
     const std::vector<std::string>& patterns, const std::string& option);
 
-/// One list of files a camera → one list of files a view, in order of name. Where the last numbers
-/// in the names tell them apart and not every camera has the same ones, views are those that all
-/// have; the others are said in *remarks.
+/// One list of files a camera → one list of files a view, in order of the last numbers in the names
+/// where these tell a camera's files apart, else of the names. Numbers are equal whatever zeros are
+/// in front. Where not every camera has the same ones, views are those that all have; the others
+/// are said in *remarks.
 /// InputError: lists of different length that numbers do not put together.
 [[nodiscard]] std::vector<std::vector<std::filesystem::path>> group_views(
     const std::vector<std::vector<std::filesystem::path>>& cameras,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
@@ -84,12 +85,20 @@ class Layout {
   std::vector<cv::Point> squares_;  // by id
 };
 
+/// Those that the board has. Its dictionary may have more: somebody's label on the wall.
+std::vector<Marker> of_board(const std::vector<Marker>& markers, const Layout& layout) {
+  std::vector<Marker> own;
+  std::copy_if(markers.begin(), markers.end(), std::back_inserter(own),
+               [&](const Marker& m) { return layout.square(m.id).has_value(); });
+  return own;
+}
+
+/// Of markers that the board has; infinite: they are too few.
 double misfit(const std::vector<Marker>& markers, const Layout& layout) {
+  if (markers.size() < kFewestMarkers) return std::numeric_limits<double>::infinity();
   std::vector<cv::Point2d> on_board, in_image;
   for (const Marker& m : markers) {
-    const auto square = layout.square(m.id);
-    if (!square) return std::numeric_limits<double>::infinity();
-    const auto corners = layout.corners(*square);
+    const auto corners = layout.corners(*layout.square(m.id));
     on_board.insert(on_board.end(), corners.begin(), corners.end());
     in_image.insert(in_image.end(), m.corners.begin(), m.corners.end());
   }
@@ -139,11 +148,14 @@ double mean_side(const std::vector<Marker>& markers) {
 BoardCorners find_charuco(const ImageView& image, const BoardPattern& board) {
   if (image.empty()) return {};
   const cv::Mat pixels = matrix_of(image);
-  const std::vector<Marker> markers = detect(pixels, board);
-  if (markers.size() < kFewestMarkers) return {};
+  const std::vector<Marker> all = detect(pixels, board);
   const std::array<Layout, 2> layouts{Layout(board, true), Layout(board, false)};
-  const std::array<double, 2> misfits{misfit(markers, layouts[0]), misfit(markers, layouts[1])};
+  // One layout may have a marker more than the other.
+  const std::array<std::vector<Marker>, 2> own{of_board(all, layouts[0]),
+                                               of_board(all, layouts[1])};
+  const std::array<double, 2> misfits{misfit(own[0], layouts[0]), misfit(own[1], layouts[1])};
   const std::size_t best = misfits[1] < misfits[0] ? 1 : 0;
+  const std::vector<Marker>& markers = own[best];
   const double side = mean_side(markers);
   if (!(misfits[best] < kFlatToSide * side)) return {};
   const double square = side * board.square / board.marker;  // px

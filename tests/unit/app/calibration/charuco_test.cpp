@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include <opencv2/aruco.hpp>
 
 #include "app/runtime/errors.hpp"
 #include "tests/unit/app/calibration/board_scene.hpp"
@@ -61,6 +64,28 @@ TEST(Charuco, aPartOfTheBoardIsEnough) {
     EXPECT_LT(found.size(), board.corners()) << "the board is not cut off: nothing is tested";
     expect_corners(found, rig, board, T);
   }
+}
+
+TEST(Charuco, aMarkerThatTheBoardDoesNotHaveIsPassedOver) {
+  const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
+  const BoardPattern board = parse_charuco("8x7", 0.06, 0.044, "5X5_100");
+  const Transform T = shown_charuco(board, Vec3(0.3, -0.2, 0.1), Vec3(0.02, -0.01, 0.85));
+  auto pixels = CharucoPainter(board, true).paint(rig.intrinsics[0], T);
+  const BoardCorners alone = found_in(pixels, board);
+  ASSERT_FALSE(alone.empty());
+  constexpr int kSide = 42, kMargin = 8;
+  cv::Mat label(kSide + 2 * kMargin, kSide + 2 * kMargin, CV_8U, cv::Scalar(255)), marker;
+  cv::aruco::getPredefinedDictionary(static_cast<int>(board.dictionary))
+      ->drawMarker(99, kSide, marker, 1);
+  marker.copyTo(label(cv::Rect(kMargin, kMargin, kSide, kSide)));
+  cv::Mat image(kHeight, kWidth, CV_8U, pixels.data());
+  label.copyTo(image(cv::Rect(0, kHeight - label.rows, label.cols, label.rows)));
+  std::vector<std::vector<cv::Point2f>> corners;
+  std::vector<int> ids;
+  cv::aruco::detectMarkers(
+      image, cv::aruco::getPredefinedDictionary(static_cast<int>(board.dictionary)), corners, ids);
+  ASSERT_EQ(std::count(ids.begin(), ids.end(), 99), 1) << "it is not seen: nothing is tested";
+  EXPECT_EQ(found_in(pixels, board).size(), alone.size());
 }
 
 TEST(Charuco, anotherBoardOrNoneIsNothing) {
