@@ -14,7 +14,7 @@ install(FILES ${configurations} DESTINATION ${CMAKE_INSTALL_DATADIR}/vergence/co
 
 install(FILES ${PROJECT_SOURCE_DIR}/udev/99-vergence.rules DESTINATION lib/udev/rules.d COMPONENT program)
 install(FILES ${packaging}/vergence.service DESTINATION lib/systemd/system COMPONENT program)
-install(FILES ${packaging}/60-vergence.conf DESTINATION lib/sysctl.d COMPONENT program)
+install(FILES ${packaging}/10-vergence.conf DESTINATION lib/sysctl.d COMPONENT program)
 install(PROGRAMS ${packaging}/vergence-session DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/vergence COMPONENT program)
 
 # When installing, so that they are those of the program that is installed.

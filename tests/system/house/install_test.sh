@@ -17,7 +17,7 @@ program="$work/usr/bin/vergence"
 "$program" run "$work/usr/share/vergence/config/mock.yaml" --fast --duration 1 --quiet --out "$work/session" 2>"$work/err" ||
   [ "$?" -le 1 ] || fail "$(cat "$work/err")"
 [ -f "$work/session/summary.json" ] || fail "the example left no session"
-for file in lib/udev/rules.d/99-vergence.rules lib/systemd/system/vergence.service lib/sysctl.d/60-vergence.conf libexec/vergence/vergence-session; do
+for file in lib/udev/rules.d/99-vergence.rules lib/systemd/system/vergence.service lib/sysctl.d/10-vergence.conf libexec/vergence/vergence-session; do
   [ -f "$work/usr/$file" ] || fail "$file is not installed"
 done
 # The manual pages and the completion are those of this program.
