@@ -9,7 +9,7 @@
 #include "app/commands/commands.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/session_export.hpp"
-#include "app/recorder/recorder.hpp"
+#include "app/recorder/session_folder.hpp"
 #include "app/runtime/progress.hpp"
 
 namespace vergence::app {
@@ -44,9 +44,9 @@ ExitCode run_export(const ExportArguments& a) {
                             ? read_calibration(*a.calibration)
                             : parse_calibration(session.description().calibration, a.session);
   request.truth = truth_of(a.session);
-  (void)make_session_folder(request.out);
+  (void)check_session_folder(request.out);
   Progress progress = Progress::on_stderr(a.quiet);
-  const ExportResult result = export_session(session, request, [&](std::size_t done) {
+  const ExportResult result = export_session(session, std::move(request), [&](std::size_t done) {
     ProgressState state;
     state.state = "export";
     state.frame = done;

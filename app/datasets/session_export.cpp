@@ -1,5 +1,6 @@
 #include "app/datasets/session_export.hpp"
 
+#include <algorithm>
 #include <array>
 #include <system_error>
 
@@ -196,6 +197,42 @@ std::unique_ptr<Writer> make_writer(const ExportRequest& request) {
   return std::make_unique<FolderWriter>(request);
 }
 
+bool has_pair(const RecordedFrame& frame) {
+  return frame.images[0].offset != 0 && frame.images[1].offset != 0;
+}
+
+/// The first frame of which both images were recorded.
+const RecordedFrame& first_pair(const RecordedSession& session) {
+  const auto& frames = session.frames();
+  const auto first = std::find_if(frames.begin(), frames.end(), has_pair);
+  if (first == frames.end())
+    throw InputError("the recording has no frame with both images; nothing is exported");
+  return *first;
+}
+
+/// A data set with a calibration for images of another size is one that no program takes.
+void check_sizes(const RecordedFrame& frame, const CalibrationFile& calibration) {
+  for (std::size_t k = 0; k < 2; ++k) {
+    const RecordedImage& image = frame.images[k];
+    const Intrinsics& lens = calibration.rig.intrinsics[k];
+    if (image.width != lens.width || image.height != lens.height)
+      throw InputError(fmt::format(
+          "the {} camera's images have {}x{} pixels, but the calibration is for {}x{}; "
+          "use the calibration that belongs to these images",
+          k == 0 ? "left" : "right", image.width, image.height, lens.width, lens.height));
+  }
+}
+
+/// The layouts hold two cameras, and so must their calibration.
+void keep_two_cameras(int recorded, CalibrationFile* calibration,
+                      std::vector<std::string>* remarks) {
+  if (recorded > 2)
+    remarks->push_back(fmt::format(
+        "{} cameras were recorded; the first two are exported, the layout holds no more",
+        recorded));
+  calibration->rig.cameras = 2;
+}
+
 /// False: one of the pair is not there.
 bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
                std::array<std::vector<std::uint8_t>, 2>* pixels) {
@@ -210,11 +247,14 @@ bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
 
 }  // namespace
 
-ExportResult export_session(const RecordedSession& session, const ExportRequest& request,
+ExportResult export_session(const RecordedSession& session, ExportRequest request,
                             const std::function<void(std::size_t)>& progress) {
-  const std::unique_ptr<Writer> writer = make_writer(request);
   ExportResult result;
   result.remarks = session.remarks();
+  const RecordedFrame& first = first_pair(session);
+  check_sizes(first, request.calibration);
+  keep_two_cameras(first.given.cameras, &request.calibration, &result.remarks);
+  const std::unique_ptr<Writer> writer = make_writer(request);
   std::array<std::vector<std::uint8_t>, 2> pixels;
   std::size_t done = 0;
   for (const RecordedFrame& frame : session.frames()) {
@@ -232,7 +272,7 @@ ExportResult export_session(const RecordedSession& session, const ExportRequest&
     ++result.frames;
   }
   if (result.frames == 0)
-    throw InputError("the recording has no frame with both images; nothing is exported");
+    throw InputError("no frame has two images that read back; nothing is exported");
   writer->finish(ReferenceTrack(request.truth), &result);
   return result;
 }

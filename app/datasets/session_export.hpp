@@ -17,7 +17,7 @@ enum class ExportFormat : std::uint8_t { folder, euroc, kitti };
 
 struct ExportRequest {
   ExportFormat format = ExportFormat::folder;
-  std::filesystem::path out;    // exists and is empty
+  std::filesystem::path out;    // is empty, or is made
   CalibrationFile calibration;  // that goes with the images
   Trajectory truth;             // of the left camera; empty: none
 };
@@ -35,9 +35,10 @@ struct ExportResult {
 ///   kitti   image_0, image_1, times.txt, calib.txt; poses.txt where there is truth for every
 ///   frame.
 ///           KITTI has rectified images: lenses with distortion and turned cameras are refused.
-/// `progress` is called with the frames done.
-/// InputError: a disk that takes no more, a rig that the format cannot hold, no pair at all.
-ExportResult export_session(const RecordedSession& session, const ExportRequest& request,
+/// The first two cameras of a rig with more. `progress` is called with the frames done.
+/// InputError: a disk that takes no more; before anything is written, a calibration of images of
+/// another size, a rig that the format cannot hold, no pair at all.
+ExportResult export_session(const RecordedSession& session, ExportRequest request,
                             const std::function<void(std::size_t)>& progress);
 
 }  // namespace vergence::app

@@ -41,6 +41,11 @@ Outcome replay(const std::filesystem::path& data, const std::filesystem::path& s
   return run_vergence("replay '" + data.string() + "' --out '" + session.string() + "' " + more);
 }
 
+Outcome export_to(const std::filesystem::path& data, const std::filesystem::path& session,
+                  const std::string& more) {
+  return run_vergence("export '" + session.string() + "' --out '" + data.string() + "' " + more);
+}
+
 void expect_same_poses(const std::filesystem::path& a, const std::filesystem::path& b) {
   const std::string poses = text_of(a / "trajectory.tum");
   EXPECT_FALSE(poses.empty());
@@ -171,8 +176,7 @@ TEST_F(RecordedDrive, recordingsOfOtherVersionsAndProgramsAreRefusedWithASentenc
 
 TEST_F(RecordedDrive, isExportedForOtherPrograms) {
   const auto to = [&](const std::string& format) {
-    return run_vergence("export '" + session().string() + "' --format " + format + " --out '" +
-                        out(format).string() + "'");
+    return export_to(out(format), session(), "--format " + format);
   };
   const Outcome folder = to("folder");
   EXPECT_EQ(folder.code, 0) << folder.err;
@@ -192,16 +196,58 @@ TEST_F(RecordedDrive, isExportedForOtherPrograms) {
   const Outcome kitti = to("kitti");
   EXPECT_EQ(kitti.code, 2);
   EXPECT_NE(kitti.err.find("no place for distortion"), std::string::npos) << kitti.err;
+  EXPECT_FALSE(std::filesystem::exists(out("kitti")));
+}
+
+TEST_F(RecordedDrive, isNotExportedWithACalibrationOfImagesOfAnotherSize) {
+  std::string calibration = text_of(session() / "calibration.yaml");
+  const std::string size = "size: [320, 240]";
+  const auto at = calibration.rfind(size);  // the right camera's
+  ASSERT_NE(at, std::string::npos);
+  calibration.replace(at, size.size(), "size: [326, 240]");
+  const TemporaryFolder other;
+  const auto file = other.write("calibration.yaml", calibration);
+  for (const std::string format : {"folder", "euroc"}) {
+    const Outcome o = export_to(other / format, session(),
+                                "--format " + format + " --calibration '" + file.string() + "'");
+    EXPECT_EQ(o.code, 2);
+    EXPECT_NE(o.err.find("320x240 pixels, but the calibration is for 326x240"), std::string::npos)
+        << o.err;
+    EXPECT_FALSE(std::filesystem::exists(other / format));
+  }
+  // The one that the drive ended with is of these images: what comes of it is replayed.
+  const auto last = session() / "calibration.yaml";
+  EXPECT_EQ(
+      export_to(other / "last", session(), "--format euroc --calibration '" + last.string() + "'")
+          .code,
+      0);
+  EXPECT_LE(replay(other / "last", other / "again", "--frames 20").code, 1);
 }
 
 TEST(Recorded, aPlainDriveComesBackFromItsExportBitForBit) {
   const TemporaryFolder folder;
   ASSERT_LE(drive(folder / "s", "--fast --duration 5").code, 1);
-  const Outcome o = run_vergence("export '" + (folder / "s").string() +
-                                 "' --format folder --out '" + (folder / "data").string() + "'");
+  const Outcome o = export_to(folder / "data", folder / "s", "--format folder");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_LE(replay(folder / "data", folder / "again").code, 1);
   expect_same_poses(folder / "s", folder / "again");
+}
+
+TEST(Recorded, ofThreeCamerasTwoAreExportedAndReplayed) {
+  const TemporaryFolder folder;
+  const Outcome run =
+      run_vergence("run '" + std::string(VERGENCE_SOURCE_DIR) +
+                   "/app/config/mock_three.yaml' --fast --duration 3 --record images,ins --out '" +
+                   (folder / "s").string() + "'" + kSmall + " --set cameras.2.size=[320,240]");
+  ASSERT_LE(run.code, 1) << run.err;
+  for (const std::string format : {"folder", "euroc"}) {
+    const Outcome o = export_to(folder / format, folder / "s", "--format " + format);
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("3 cameras were recorded; the first two are exported"), std::string::npos)
+        << o.err;
+    const Outcome again = replay(folder / format, folder / ("of-" + format));
+    EXPECT_LE(again.code, 1) << again.err;
+  }
 }
 
 // In real time: images are dropped as this machine is busy, and the solver answers when it is done.
@@ -255,8 +301,7 @@ TEST(Recorded, aDriveRecordedAsPngReplaysBitForBitAndIsExported) {
   const Outcome bag = replay(folder / "s" / "drive.mcap", folder / "bag",
                              "--calibration '" + session + "/calibration.yaml' --frames 20");
   EXPECT_LE(bag.code, 1) << bag.err;
-  const Outcome o = run_vergence("export '" + session + "' --format folder --out '" +
-                                 (folder / "data").string() + "'");
+  const Outcome o = export_to(folder / "data", session, "--format folder");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_LE(replay(folder / "data", folder / "third").code, 1);
   expect_same_poses(session, folder / "third");
