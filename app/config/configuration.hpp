@@ -48,9 +48,10 @@ struct CameraSettings {
   double stamp_jitter_us = 0;   // 0: what the driver's kind of stamp has
   double gain_db = 0;
   std::string mask{};  // file; empty: none
+  CameraModelKind model = CameraModelKind::pinhole_radtan;
   std::array<double, 4>
-      intrinsics{};  // fx fy cx cy, px; fx 0: those of rig.nominal, distortion included
-  std::array<double, 5> distortion{};      // k1 k2 p1 p2 k3
+      intrinsics{};  // fx fy cx cy, px; zeros: those of rig.nominal, distortion included
+  std::array<double, 5> distortion{};      // k1 k2 p1 p2 k3, or k1 to k4 of an equidistant lens
   std::array<double, 12> T_camera_left{};  // rows of [R t], m; zeros: as rig.nominal
 };
 

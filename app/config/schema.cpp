@@ -1,5 +1,6 @@
 #include "app/config/schema.hpp"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,7 +23,33 @@ const std::vector<Group>& schema() {
   return all;
 }
 
+namespace {
+
+/// What of a camera's lens would be read by nobody.
+std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
+  const auto given = [](double v) { return v != 0; };
+  const auto& numbers = camera.intrinsics;
+  const bool none = std::none_of(numbers.begin(), numbers.end(), given);
+  if (!none && !std::all_of(numbers.begin(), numbers.end(), given))
+    return fmt::format(
+        "cameras.{}.intrinsics is [{}]; it takes all four of fx, fy, cx, cy in pixels, or none", k,
+        fmt::join(numbers, ", "));
+  if (none && std::any_of(camera.distortion.begin(), camera.distortion.end(), given))
+    return fmt::format(
+        "cameras.{}.distortion is given without cameras.{}.intrinsics, so that the lens is that of "
+        "rig.nominal with rig.nominal.k1 and k2; give the intrinsics, too",
+        k, k);
+  if (camera.model == CameraModelKind::pinhole_equidistant && given(camera.distortion[4]))
+    return fmt::format(
+        "cameras.{}.distortion has five coefficients; a pinhole-equidistant lens has k1 to k4", k);
+  return {};
+}
+
+}  // namespace
+
 std::string find_contradiction(const Configuration& c) {
+  for (std::size_t k = 0; k < c.cameras.size(); ++k)
+    if (std::string unread = find_unread_lens(c.cameras[k], k); !unread.empty()) return unread;
   if (c.odometry.ok_inliers < c.odometry.min_inliers)
     return fmt::format(
         "odometry.ok_inliers ({}) is below odometry.min_inliers ({}); a pose would be lost before "

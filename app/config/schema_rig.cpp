@@ -34,13 +34,14 @@ Group rig() {
       .number("nominal.focal_px", &R::focal_px, 0, 20000, "px",
               "Focal length of every camera; 0: 0.72 of the image's width.")
       .number("nominal.k1", &R::k1, -1, 1, "",
-              "First radial coefficient of every lens (radtan model).")
+              "First radial coefficient of every lens, of the model that it has.")
       .number("nominal.k2", &R::k2, -1, 1, "", "Second radial coefficient of every lens.")
-      .text("state_dir", &R::state_dir, 400,
-            "Folder of `calibration_state.yaml`, the last calibration accepted: written at once, "
-            "where the next `run` begins. Empty: "
-            "`$XDG_STATE_HOME/vergence/NAME`, without that variable "
-            "`~/.local/state/vergence/NAME`; `none`: there is none.")
+      .text(
+          "state_dir", &R::state_dir, 400,
+          "Folder of `calibration_state.yaml`, the last calibration accepted or confirmed: written "
+          "at once, where the next `run` begins. Empty: "
+          "`$XDG_STATE_HOME/vergence/NAME`, without that variable "
+          "`~/.local/state/vergence/NAME`; `none`: there is none.")
       .done();
 }
 
@@ -102,15 +103,23 @@ Group cameras() {
                   "PNG or PGM of the image's size, 0 where nothing is to be looked for: the "
                   "vehicle itself, dirt. A relative path begins "
                   "at this file's folder.")
+            .choice<CameraModelKind>(
+                "model", &C::model,
+                {{"pinhole-radtan", CameraModelKind::pinhole_radtan},
+                 {"pinhole-equidistant", CameraModelKind::pinhole_equidistant}},
+                "What its lens is like: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a "
+                "fisheye lens, k1 k2 k3 k4.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
-                     {"Focal length along x of this camera's lens; 0: the lens is that of "
+                     {"Focal length along x of this camera's lens; all four 0: the lens is that of "
                       "`rig.nominal`.",
                       "Focal length along y.", "Principal point of that lens, x.",
                       "Principal point of that lens, y."})
             .numbers("distortion", &C::distortion, -2, 2, "",
-                     {"With `intrinsics`: first radial coefficient, k1 (radtan model).",
-                      "Second radial coefficient, k2.", "First tangential coefficient, p1.",
-                      "Second tangential coefficient, p2.", "Third radial coefficient, k3."})
+                     {"With `intrinsics`: first radial coefficient, k1.",
+                      "Second radial coefficient, k2.",
+                      "First tangential coefficient, p1; of an equidistant lens k3.",
+                      "Second tangential coefficient, p2; of an equidistant lens k4.",
+                      "Third radial coefficient, k3; an equidistant lens has none."})
             .numbers(
                 "T_camera_left", &C::T_camera_left, -20, 20, "1, m",
                 {"Where the camera sits, X_camera = R X_left + t, as rows of [R t]: r11. All zero: "

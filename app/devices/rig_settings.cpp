@@ -20,6 +20,7 @@ Intrinsics lens_of(const Configuration& c, const CameraSettings& camera) {
   Intrinsics lens;
   lens.width = camera.width;
   lens.height = camera.height;
+  lens.kind = camera.model;
   if (camera.intrinsics[0] > 0) {
     lens.fx = camera.intrinsics[0];
     lens.fy = camera.intrinsics[1];

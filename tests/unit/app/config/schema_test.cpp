@@ -36,6 +36,12 @@ bool accepts(const Key& key, const KeyValue& value) {
                                  "calibration.max_frames=150",
                                  "calibration.good_depth_percent=0.01",
                                  "calibration.usable_depth_percent=100"};
+    // A lens is given whole.
+    const std::string lens = key.name.substr(0, key.name.find('.', 8)) + ".intrinsics";
+    if (key.name.starts_with(lens + "."))
+      set.push_back(fmt::format("{0}=[{1}, {1}, {1}, {1}]", lens, text));
+    if (key.name.find(".distortion.") != std::string::npos)
+      set.push_back(lens + "=[500, 500, 320, 240]");
     set.push_back(key.name + "=" + text);
     return to_text(key.get(parse_configuration("", "", set))) == text;
   } catch (const InputError&) {

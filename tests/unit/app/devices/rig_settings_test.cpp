@@ -116,6 +116,32 @@ TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
   EXPECT_NEAR(log_so3(moved.R).x(), 0.2 * std::numbers::pi / 180, 1e-12);
 }
 
+TEST(RigSettings, aCamerasLensIsOfTheModelThatItsKeySays) {
+  const RigCalibration rig = mounted_rig(configured(
+      {"cameras.1.model=pinhole-equidistant", "cameras.1.intrinsics=[300, 301, 322, 241]",
+       "cameras.1.distortion=[0.003, 0.0007, -0.002, 0.0002]"}));
+  EXPECT_EQ(rig.intrinsics[0].kind, CameraModelKind::pinhole_radtan);
+  EXPECT_EQ(rig.intrinsics[1].kind, CameraModelKind::pinhole_equidistant);
+  EXPECT_EQ(rig.intrinsics[1].distortion[3], 0.0002);
+}
+
+TEST(RigSettings, aLensThatNobodyWouldReadIsRefusedByItsKey) {
+  for (const char* part :
+       {"[460, 460]", "[0, 460, 300, 200]", "[460, 460, 0, 200]", "[460, 0, 300, 200]"})
+    EXPECT_NE(
+        refusal({std::string("cameras.1.intrinsics=") + part}).find("cameras.1.intrinsics is ["),
+        std::string::npos)
+        << part;
+  EXPECT_NE(refusal({"cameras.0.distortion=[-0.2, 0.05]"})
+                .find("cameras.0.distortion is given without cameras.0.intrinsics"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal({"cameras.1.model=pinhole-equidistant", "cameras.1.intrinsics=[300, 301, 322, 241]",
+               "cameras.1.distortion=[0, 0, 0, 0, 0.01]"})
+          .find("cameras.1.distortion has five"),
+      std::string::npos);
+}
+
 TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
   EXPECT_NE(refusal({"cameras.1.T_camera_left.3=0.75", "cameras.1.T_camera_left.0=1",
                      "cameras.1.T_camera_left.5=1", "cameras.1.T_camera_left.10=1"})
