@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <optional>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -31,6 +33,45 @@ std::string rows(const Transform& T) {
   return out;
 }
 
+/// The truth at the stamps of frames.
+///
+/// A frame's stamp is measured by the devices' clocks, the mock's truth has the exact one: the
+/// first or last frame may lie some 0.1 ms outside the truth that was made for it. Up to 1 ms
+/// beyond an end, far less than the time between two frames, the motion of the interval there is
+/// carried on. That is off by a/2 · 1 ms · 201 ms = 1 mm in a vehicle that brakes with a = 10 m/s²;
+/// the end's own pose would be off by 40 mm at 40 m/s.
+class Truth {
+ public:
+  explicit Truth(const Trajectory& poses) : poses_(poses), track_(poses, kWidestHole) {}
+
+  [[nodiscard]] std::optional<Transform> at(Stamp stamp) const {
+    if (poses_.size() < 2) return track_.at(stamp);
+    if (stamp < poses_.front().stamp) return carried_on(poses_[1], poses_[0], stamp);
+    if (stamp > poses_.back().stamp)
+      return carried_on(poses_[poses_.size() - 2], poses_.back(), stamp);
+    return track_.at(stamp);
+  }
+  [[nodiscard]] bool empty() const noexcept { return poses_.empty(); }
+
+ private:
+  static constexpr Duration kWidestHole = Duration::milliseconds(200);
+  static constexpr Duration kBeyond = Duration::milliseconds(1);
+
+  /// From one pose to the end and on.
+  [[nodiscard]] static std::optional<Transform> carried_on(const StampedPose& from,
+                                                           const StampedPose& end, Stamp stamp) {
+    const double beyond = std::abs((stamp - end.stamp).to_seconds()),
+                 step = std::abs((end.stamp - from.stamp).to_seconds());
+    if (beyond > kBeyond.to_seconds() || step > kWidestHole.to_seconds()) return std::nullopt;
+    // The arc from one rotation to the other has no end at the second one: a share above 1 is on
+    // it.
+    return interpolate(from.T_world_body, end.T_world_body, 1 + beyond / step);
+  }
+
+  const Trajectory& poses_;
+  ReferenceTrack track_;
+};
+
 /// One layout: where images go, and what its text files hold.
 class Writer {
  public:
@@ -38,7 +79,7 @@ class Writer {
   [[nodiscard]] virtual fs::path image(std::size_t index, Stamp stamp, std::size_t camera) = 0;
   virtual void note(Stamp stamp) = 0;
   /// Text files, when all images are there.
-  virtual void finish(const ReferenceTrack& truth, ExportResult* result) = 0;
+  virtual void finish(const Truth& truth, ExportResult* result) = 0;
 };
 
 class FolderWriter final : public Writer {
@@ -50,7 +91,7 @@ class FolderWriter final : public Writer {
     return request_.out / (camera == 0 ? "left" : "right") / fmt::format("{:06}.png", index);
   }
   void note(Stamp stamp) override { times_ += fmt::format("{}\n", stamp.ns()); }
-  void finish(const ReferenceTrack& /*truth*/, ExportResult* /*result*/) override {
+  void finish(const Truth& /*truth*/, ExportResult* /*result*/) override {
     replace_durably(request_.out / "times.txt", times_);
     write_calibration(request_.out / "calibration.yaml", request_.calibration);
     std::string tum;
@@ -81,13 +122,13 @@ class EurocWriter final : public Writer {
     index_ += fmt::format("{0},{0}.png\n", stamp.ns());
     stamps_.push_back(stamp);
   }
-  void finish(const ReferenceTrack& truth, ExportResult* /*result*/) override {
+  void finish(const Truth& truth, ExportResult* result) override {
     for (std::size_t k = 0; k < 2; ++k) {
       const fs::path camera = root() / (k == 0 ? "cam0" : "cam1");
       replace_durably(camera / "data.csv", "#timestamp [ns],filename\n" + index_);
       replace_durably(camera / "sensor.yaml", sensor(k));
     }
-    write_truth(truth);
+    write_truth(truth, result);
   }
 
  private:
@@ -112,15 +153,22 @@ class EurocWriter final : public Writer {
         lens.cy, radtan ? "radial-tangential" : "equidistant", coefficients);
   }
 
-  void write_truth(const ReferenceTrack& truth) const {
+  void write_truth(const Truth& truth, ExportResult* result) const {
     std::string csv;
+    std::size_t without = 0;
     for (const Stamp stamp : stamps_) {
       const auto T = truth.at(stamp);
-      if (!T) continue;
+      if (!T) {
+        ++without;
+        continue;
+      }
       const Eigen::Quaterniond q = quaternion(T->R);
       csv += fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp.ns(),
                          T->t.x(), T->t.y(), T->t.z(), q.w(), q.x(), q.y(), q.z());
     }
+    if (without > 0 && !truth.empty())
+      result->remarks.push_back(
+          fmt::format("{} of {} frames have no truth", without, stamps_.size()));
     if (csv.empty()) return;
     const fs::path folder = root() / "state_groundtruth_estimate0";
     make_folder(folder);
@@ -153,21 +201,25 @@ class KittiWriter final : public Writer {
     return request_.out / (camera == 0 ? "image_0" : "image_1") / fmt::format("{:06}.png", index);
   }
   void note(Stamp stamp) override { stamps_.push_back(stamp); }
-  void finish(const ReferenceTrack& truth, ExportResult* result) override {
+  void finish(const Truth& truth, ExportResult* result) override {
     std::string times, poses;
-    bool whole = true;
+    std::size_t without = 0;
     for (const Stamp stamp : stamps_) {
       times += format_seconds((stamp - stamps_.front()).ns()) + "\n";
       const auto T = truth.at(stamp);
-      whole = whole && T.has_value();
-      if (T) poses += rows(*T) + "\n";
+      if (T)
+        poses += rows(*T) + "\n";
+      else
+        ++without;
     }
     replace_durably(request_.out / "times.txt", times);
     replace_durably(request_.out / "calib.txt", calib());
-    if (whole)
+    if (without == 0)
       replace_durably(request_.out / "poses.txt", poses);
-    else if (!request_.truth.empty())
-      result->remarks.push_back("poses.txt is not written: the truth does not have every frame");
+    else if (!truth.empty())
+      result->remarks.push_back(fmt::format(
+          "poses.txt, which has a pose for every frame, is not written: {} of {} have no truth",
+          without, stamps_.size()));
   }
 
  private:
@@ -273,7 +325,7 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
   }
   if (result.frames == 0)
     throw InputError("no frame has two images that read back; nothing is exported");
-  writer->finish(ReferenceTrack(request.truth), &result);
+  writer->finish(Truth(request.truth), &result);
   return result;
 }
 

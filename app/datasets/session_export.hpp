@@ -35,6 +35,7 @@ struct ExportResult {
 ///   kitti   image_0, image_1, times.txt, calib.txt; poses.txt where there is truth for every
 ///   frame.
 ///           KITTI has rectified images: lenses with distortion and turned cameras are refused.
+/// A frame up to 1 ms beyond the truth's end has its motion carried on.
 /// The first two cameras of a rig with more. `progress` is called with the frames done.
 /// InputError: a disk that takes no more; before anything is written, a calibration of images of
 /// another size, a rig that the format cannot hold, no pair at all.

@@ -4,12 +4,15 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "app/datasets/decimal.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/support/recording_reader.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -272,6 +275,52 @@ TEST(Recorded, aLiveDriveWithoutTimeForItsWorkReplaysBitForBit) {
     EXPECT_EQ(live["work_dropped"][what], again["work_dropped"][what]) << what;
   EXPECT_NE(text_of(folder / "drive" / "events.jsonl").find("work_dropped"), std::string::npos);
   expect_same_poses(folder / "drive", folder / "again");
+}
+
+/// A rectified drive with a truth that is a straight drive at constant speed and ends `short_ns`
+/// before the last frame.
+constexpr double kSpeed = 40;  // m/s
+void drive_with_truth(const std::filesystem::path& session, std::int64_t short_ns) {
+  const Outcome o =
+      drive(session, "--fast --duration 2 --set rig.nominal.k1=0 --set rig.nominal.k2=0");
+  ASSERT_LE(o.code, 1) << o.err;
+  const std::int64_t end = app::read_tum(session / "trajectory.tum").back().stamp.ns() - short_ns;
+  std::ofstream truth(session / "truth.tum");
+  for (std::int64_t k = 60; k >= 0; --k) {
+    const std::int64_t before_ns = k * 50'000'000;
+    truth << app::format_seconds(end - before_ns) << " 0 0 "
+          << -kSpeed * static_cast<double>(before_ns) * 1e-9 << " 0 0 0 1\n";
+  }
+}
+
+// The stamps of frames are measured, those of the truth exact: 8 µs are 0.3 mm.
+TEST(RecordedTruth, reachesAFrameThatIsStampedMicrosecondsAfterItsEnd) {
+  const TemporaryFolder folder;
+  constexpr std::int64_t kShort = 8'000;  // ns
+  drive_with_truth(folder / "s", kShort);
+  for (const std::string format : {"kitti", "euroc"}) {
+    const Outcome o = export_to(folder / format, folder / "s", "--format " + format);
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(o.err.find("truth"), std::string::npos) << o.err;
+    ASSERT_TRUE(app::find_truth(folder / format)) << format;
+    const auto truth = app::read_truth(*app::find_truth(folder / format));
+    EXPECT_EQ(std::ssize(truth), summary_of(folder / "s")["frames"]["read"].get<int>());
+    // Carried on at its speed, not held; the files have nine decimals.
+    EXPECT_NEAR(truth.back().T_world_body.t.z(), kSpeed * static_cast<double>(kShort) * 1e-9, 1e-9);
+    EXPECT_LE(replay(folder / format, folder / ("of-" + format)).code, 1);
+  }
+}
+
+TEST(RecordedTruth, isNotCarriedOnForMilliseconds) {
+  const TemporaryFolder folder;
+  drive_with_truth(folder / "s", 2'000'000);
+  const Outcome kitti = export_to(folder / "kitti", folder / "s", "--format kitti");
+  EXPECT_EQ(kitti.code, 0) << kitti.err;
+  EXPECT_NE(kitti.err.find("is not written: 1 of "), std::string::npos) << kitti.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "kitti" / "poses.txt"));
+  const Outcome euroc = export_to(folder / "euroc", folder / "s", "--format euroc");
+  EXPECT_EQ(euroc.code, 0) << euroc.err;
+  EXPECT_NE(euroc.err.find("frames have no truth"), std::string::npos) << euroc.err;
 }
 
 TEST(Recorded, aReplayOfAReplayedRecordingIsTheSame) {
