@@ -27,8 +27,15 @@ bool is_rectified(std::string_view topic) {
 
 std::string list_of_image_topics(const BagIndex& bag) {
   std::string list;
-  for (const auto& [name, topic] : bag.images)
-    list += fmt::format("{}{} ({} images)", list.empty() ? "" : ", ", name, topic.images.size());
+  std::size_t unreadable = 0;
+  for (const auto& [name, topic] : bag.images) {
+    const std::size_t other = topic.left_out.unreadable;
+    list += fmt::format("{}{} ({} images{})", list.empty() ? "" : ", ", name, topic.images.size(),
+                        other > 0 ? fmt::format(", {} that cannot be read", other) : "");
+    unreadable += other;
+  }
+  if (unreadable > 0)
+    list += "; encodings that can be read: mono8, rgb8, bgr8, bayer_*8, and PNG and JPEG";
   return list.empty() ? "none" : list;
 }
 

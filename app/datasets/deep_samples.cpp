@@ -1,6 +1,7 @@
 #include "app/datasets/deep_samples.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -10,24 +11,31 @@ namespace {
 
 constexpr std::size_t kLooks = 5;  // pairs, spread over the drive: a tunnel is not all of it
 
-std::uint16_t peak_of(const StereoSequence& s, const std::string& name,
-                      std::vector<std::uint8_t>* bytes) {
-  if (name.empty() || read_image_file(s.root / name, bytes) != ImageFileStatus::ok) return 0;
-  return peak_of_deep_image(*bytes);
+/// Nothing: an image of another kind. 0: one that says nothing, for it is missing, torn or black.
+std::optional<std::uint16_t> peak_of(const StereoSequence& s, const std::string& name,
+                                     std::vector<std::uint8_t>* bytes) {
+  if (name.empty()) return std::uint16_t{0};
+  const ImageFileStatus status =
+      s.store ? s.store->encoded(name, bytes) : read_image_file(s.root / name, bytes);
+  if (status == ImageFileStatus::not_an_image) return std::nullopt;
+  return status == ImageFileStatus::ok ? peak_of_deep_image(*bytes) : std::uint16_t{0};
 }
 
 }  // namespace
 
 void find_deep_bits(StereoSequence* sequence) {
-  if (sequence->store || sequence->pairs.empty()) return;
+  if (sequence->pairs.empty()) return;
   std::vector<std::uint8_t> bytes;
   std::uint16_t peak = 0;
   for (std::size_t i = 0; i < kLooks; ++i) {
     const StereoPair& pair = sequence->pairs[i * (sequence->pairs.size() - 1) / (kLooks - 1)];
-    for (const std::string& name : pair.file)
-      peak = std::max(peak, peak_of(*sequence, name, &bytes));
-    if (peak == 0) return;  // other images
+    for (const std::string& name : pair.file) {
+      const auto found = peak_of(*sequence, name, &bytes);
+      if (!found) return;
+      peak = std::max(peak, *found);
+    }
   }
+  if (peak == 0) return;
   for (const int bits : {10, 12, 14})
     if (peak < 1U << static_cast<unsigned>(bits)) {
       sequence->deep_bits = bits;

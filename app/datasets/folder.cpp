@@ -5,6 +5,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/name_order.hpp"
 #include "app/datasets/exif.hpp"
 #include "app/datasets/text_file.hpp"
 
@@ -32,8 +33,18 @@ std::array<std::string, 2> names_of(const std::filesystem::path& file, std::size
   return names;
 }
 
+/// Whether the stamps of a times.txt are seconds. One with a point or an exponent says it of all:
+/// programs print 1403636584 where the next is 1403636584.1.
+bool in_seconds(const std::string& text) {
+  Lines lines(text);
+  for (std::string_view line; lines.next(&line);)
+    if (line.substr(0, line.find(',')).find_first_of(".eE") != std::string_view::npos) return true;
+  return false;
+}
+
 std::vector<Line> read_times(const std::filesystem::path& file) {
   const std::string text = read_text(file);
+  const bool seconds = in_seconds(text);
   Lines lines(text);
   std::vector<Line> times;
   for (std::string_view line; lines.next(&line);) {
@@ -42,8 +53,7 @@ std::vector<Line> read_times(const std::filesystem::path& file) {
     if (count > fields.size())
       refuse(file, lines.number(),
              "has " + std::to_string(count) + " columns; stamp[,file[,right file]] is expected");
-    const auto ns = fields[0].find('.') != std::string_view::npos ? parse_seconds_ns(fields[0])
-                                                                  : parse_integer(fields[0]);
+    const auto ns = seconds ? parse_seconds_ns(fields[0]) : parse_integer(fields[0]);
     if (!ns)
       refuse(file, lines.number(),
              "`" + std::string(fields[0].substr(0, 40)) +
@@ -63,15 +73,13 @@ std::vector<Line> read_times(const std::filesystem::path& file) {
 
 /// Where nobody wrote down when: motion is predicted by frames, so a rate that is wrong spoils no
 /// pose, but every stamp.
-std::vector<Line> assumed_times(std::size_t count, std::vector<std::string>* remarks) {
+void assume_times(StereoSequence* sequence) {
   constexpr std::int64_t kStep = 100'000'000;  // ns
-  std::vector<Line> times(count);
-  for (std::size_t i = 0; i < count; ++i)
-    times[i].stamp = Stamp(static_cast<std::int64_t>(i) * kStep);
-  remarks->emplace_back(
+  for (std::size_t i = 0; i < sequence->pairs.size(); ++i)
+    sequence->pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kStep);
+  sequence->remarks.emplace_back(
       "there is no times.txt: pairs are taken to be 0.1 s apart; write one line a pair, seconds "
       "with a point or whole nanoseconds");
-  return times;
 }
 
 std::string stem(const std::string& name) { return std::filesystem::path(name).stem().string(); }
@@ -84,9 +92,9 @@ std::vector<StereoPair> pair_by_name(const std::vector<std::string>& left,
   std::size_t l = 0, r = 0;
   while (l < left.size() || r < right.size()) {
     const bool have_left =
-        l < left.size() && (r == right.size() || stem(left[l]) <= stem(right[r]));
+        l < left.size() && (r == right.size() || !in_name_order(stem(right[r]), stem(left[l])));
     const bool have_right =
-        r < right.size() && (l == left.size() || stem(right[r]) <= stem(left[l]));
+        r < right.size() && (l == left.size() || !in_name_order(stem(left[l]), stem(right[r])));
     StereoPair pair;
     pair.file[0] =
         have_left ? left[l] : "left/" + std::filesystem::path(right[r]).filename().string();
@@ -122,13 +130,47 @@ std::vector<StereoPair> pair_as_named(const std::filesystem::path& folder,
   for (std::size_t k = 0; k < 2; ++k)
     if (std::none_of(times.begin(), times.end(), [&](const Line& line) {
           return std::binary_search(there[k].begin(), there[k].end(),
-                                    in_folders(line.name, side_by_side)[k]);
+                                    in_folders(line.name, side_by_side)[k], in_name_order);
         }))
       refuse(folder / "times.txt", 0,
              "names no image that is there: the first is " +
                  in_folders(times.front().name, side_by_side)[k] + ", the folder has " +
                  there[k].front());
   return pairs;
+}
+
+/// By equal names, where these give as many pairs as there are times: a name that only one side has
+/// is an image that the other lost. Else in order of name, where there is one of each a pair.
+std::vector<StereoPair> pair_with_times(const std::filesystem::path& folder,
+                                        const std::vector<Line>& times,
+                                        const std::vector<std::string>& left,
+                                        const std::vector<std::string>& right) {
+  std::vector<StereoPair> pairs = pair_by_name(left, right);
+  if (pairs.size() != times.size() && left.size() == right.size())
+    pairs = pair_in_order(left, right);
+  if (pairs.size() != times.size())
+    refuse(folder, 0,
+           "has " + std::to_string(left.size()) + " images in left/, " +
+               std::to_string(right.size()) + " in right/ and " + std::to_string(times.size()) +
+               " lines in times.txt; one of each a pair is expected (a line may name its image: "
+               "stamp,file)");
+  for (std::size_t i = 0; i < times.size(); ++i) pairs[i].stamp = times[i].stamp;
+  return pairs;
+}
+
+/// By equal names; in order where no name is on both sides.
+std::vector<StereoPair> pair_without_times(const std::filesystem::path& folder,
+                                           const std::vector<std::string>& left,
+                                           const std::vector<std::string>& right) {
+  std::vector<StereoPair> pairs = pair_by_name(left, right);
+  if (pairs.size() < left.size() + right.size()) return pairs;
+  if (left.size() != right.size())
+    refuse(folder, 0,
+           "has " + std::to_string(left.size()) + " images in left/ and " +
+               std::to_string(right.size()) +
+               " in right/, without a name that is in both; give the images of a pair one name, or "
+               "write a times.txt whose lines name them: stamp,left file,right file");
+  return pair_in_order(left, right);
 }
 
 /// What is said where images ask to be turned.
@@ -155,24 +197,14 @@ StereoSequence open_folder(const std::filesystem::path& folder, bool given,
   const auto left = list_images(folder, sequence.side_by_side ? "both" : "left");
   const auto right = sequence.side_by_side ? left : list_images(folder, "right");
   sequence.times = folder / "times.txt";
-  const std::vector<Line> times =
-      std::filesystem::exists(sequence.times)
-          ? read_times(sequence.times)
-          : assumed_times(std::max(left.size(), right.size()), &sequence.remarks);
-  if (!times.front().name[0].empty()) {
-    sequence.pairs = pair_as_named(folder, times, {left, right}, sequence.side_by_side);
+  if (std::filesystem::exists(sequence.times)) {
+    const std::vector<Line> times = read_times(sequence.times);
+    sequence.pairs = times.front().name[0].empty()
+                         ? pair_with_times(folder, times, left, right)
+                         : pair_as_named(folder, times, {left, right}, sequence.side_by_side);
   } else {
-    // In order of name as long as the numbers agree; else a name that only one side has is an image
-    // that the other lost.
-    const bool in_order = left.size() == right.size() && left.size() == times.size();
-    sequence.pairs = in_order ? pair_in_order(left, right) : pair_by_name(left, right);
-    if (sequence.pairs.size() != times.size())
-      refuse(folder, 0,
-             "has " + std::to_string(left.size()) + " images in left/, " +
-                 std::to_string(right.size()) + " in right/ and " + std::to_string(times.size()) +
-                 " lines in times.txt; one of each a pair is expected (a line may name its image: "
-                 "stamp,file)");
-    for (std::size_t i = 0; i < times.size(); ++i) sequence.pairs[i].stamp = times[i].stamp;
+    sequence.pairs = pair_without_times(folder, left, right);
+    assume_times(&sequence);
   }
   if (std::string turned = orientation_remark(folder / left.front()); !turned.empty())
     sequence.remarks.push_back(std::move(turned));

@@ -113,6 +113,12 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
                      index, format_seconds(listed.stamp.ns()), format_seconds(newest_.ns())));
     return pair;
   }
+  if (!listed.in_order) {
+    note(&pair, "time_ahead",
+         fmt::format("frame {} skipped: its time {} is later than those of the frames after it",
+                     index, format_seconds(listed.stamp.ns())));
+    return pair;
+  }
   newest_ = listed.stamp;
   any_ = true;
   std::array<ImageFileStatus, 2> status{};
@@ -145,7 +151,8 @@ ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Work
   const std::size_t stride = FramePool::stride(size.width);
   std::uint8_t* out = pool_.writable(slot).data();
   try {
-    if (sequence_.store) return sequence_.store->decode(name, size, out, stride, &work->bytes);
+    if (sequence_.store)
+      return sequence_.store->decode(name, size, out, stride, sequence_.deep_bits, &work->bytes);
     if (const auto status = read_image_file(sequence_.root / name, &work->bytes);
         status != ImageFileStatus::ok)
       return status;

@@ -30,8 +30,9 @@ struct DecodedPair {
 /// side by side on two threads of its own.
 ///
 /// A frame is skipped when an image is missing, unreadable or torn, when its size has changed since
-/// it was checked, or when its stamp is not later than every stamp before it. Skipped frames come
-/// through the ring in their turn, so events stay in order.
+/// it was checked, or when its stamp does not go forward with those around it
+/// (StereoPair::in_order). Skipped frames come through the ring in their turn, so events stay in
+/// order.
 ///
 /// Ownership  A decoded pair's slots are the consumer's until release(). Sequence and pool outlive
 ///            the decoder.

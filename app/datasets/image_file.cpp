@@ -121,12 +121,12 @@ ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size
   return detail::is_png(bytes) ? detail::check_png(bytes) : detail::check_jpeg(bytes);
 }
 
-std::uint16_t peak_of_deep_image(std::span<const std::uint8_t> bytes) {
+std::optional<std::uint16_t> peak_of_deep_image(std::span<const std::uint8_t> bytes) {
   ImageSize size;
   constexpr std::size_t kDepthAt = 24;  // of the header: other depths are not worth decoding
-  if (check_image(bytes, &size) != ImageFileStatus::ok || !detail::is_png(bytes) ||
-      bytes.size() <= kDepthAt || bytes[kDepthAt] != 16)
-    return 0;
+  if (check_image(bytes, &size) != ImageFileStatus::ok) return std::uint16_t{0};
+  if (!detail::is_png(bytes) || bytes.size() <= kDepthAt || bytes[kDepthAt] != 16)
+    return std::nullopt;
   const auto width = static_cast<std::size_t>(size.width);
   std::vector<std::uint8_t> pixels(width * static_cast<std::size_t>(size.height));
   detail::DeepSamples deep;

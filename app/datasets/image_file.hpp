@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,9 +48,9 @@ struct ImageSize {
 [[nodiscard]] ImageFileStatus check_image(std::span<const std::uint8_t> bytes,
                                           ImageSize* size) noexcept;
 
-/// The greatest sample of a grey PNG of 16 bits; 0 for other images and such that cannot be
-/// decoded. Takes memory for the image.
-[[nodiscard]] std::uint16_t peak_of_deep_image(std::span<const std::uint8_t> bytes);
+/// The greatest sample of a grey PNG of 16 bits; nothing: another kind of image. One that cannot be
+/// decoded has 0, as a black one. Takes memory for the image.
+[[nodiscard]] std::optional<std::uint16_t> peak_of_deep_image(std::span<const std::uint8_t> bytes);
 
 /// PNG of any depth and colour, JPEG of grey or three colours, or 8-bit grey BMP → 8-bit grey, into
 /// size.height rows of `stride` bytes at `out`; no other copy is made. Any number of threads at

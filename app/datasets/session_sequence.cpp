@@ -28,8 +28,12 @@ class SessionImages final : public ImageStore {
     *size = {frame->images[camera].width, frame->images[camera].height};
     return ImageFileStatus::ok;
   }
+  [[nodiscard]] ImageFileStatus encoded(const std::string& /*name*/,
+                                        std::vector<std::uint8_t>* /*bytes*/) const override {
+    return ImageFileStatus::not_an_image;
+  }
   [[nodiscard]] ImageFileStatus decode(const std::string& name, ImageSize size, std::uint8_t* out,
-                                       std::size_t stride,
+                                       std::size_t stride, int /*deep_bits*/,
                                        std::vector<std::uint8_t>* /*work*/) const override {
     const auto [frame, camera] = find(name);
     if (frame == nullptr) return ImageFileStatus::missing;

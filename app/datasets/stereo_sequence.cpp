@@ -5,8 +5,10 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/deep_samples.hpp"
+#include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/kitti_raw.hpp"
+#include "app/datasets/detail/name_order.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
 
@@ -74,9 +76,21 @@ StereoSequence open_sequence(SequenceFormat format, const std::filesystem::path&
 
 namespace {
 
+/// One stamp that leaps ahead costs its frame, not all those after it.
+void mark_out_of_order(std::vector<StereoPair>* pairs) {
+  std::vector<Stamp> stamps;
+  stamps.reserve(pairs->size());
+  for (StereoPair& pair : *pairs) {
+    stamps.push_back(pair.stamp);
+    pair.in_order = false;
+  }
+  for (const std::size_t kept : detail::ascending(stamps)) (*pairs)[kept].in_order = true;
+}
+
 StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source,
                        const CalibrationUse& use) {
   check_times(sequence);
+  mark_out_of_order(&sequence.pairs);
   apply_use(use, &sequence.calibration);
   if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->sentence);
   if (sequence.calibration.cameras != 2)
@@ -98,10 +112,27 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
 }  // namespace
 
 std::optional<SequenceFormat> bag_format(const std::filesystem::path& file) {
-  if (file.extension() == ".mcap") return SequenceFormat::mcap;
-  if (file.extension() == ".bag") return SequenceFormat::rosbag;
+  const std::string name = file.filename().string();
+  if (name.ends_with(".mcap")) return SequenceFormat::mcap;
+  // As rosbag calls one that it is recording, or that it was when the power went.
+  if (name.ends_with(".bag") || name.ends_with(".bag.active")) return SequenceFormat::rosbag;
   return std::nullopt;
 }
+
+namespace {
+
+/// Of a folder with bags of both kinds those of ROS 2, in whatever order the disk lists them.
+std::optional<SequenceFormat> bag_format_within(const std::filesystem::path& folder) {
+  std::optional<SequenceFormat> found;
+  std::error_code ignored;
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
+       it.increment(ignored))
+    if (const auto format = bag_format(it->path()); format && found != SequenceFormat::mcap)
+      found = format;
+  return found;
+}
+
+}  // namespace
 
 std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   std::error_code ignored;
@@ -118,9 +149,7 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
        it.increment(ignored))
     if (it->path().filename().string().ends_with("_MultiCamera0.log"))
       return SequenceFormat::st_lucia;
-  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
-       it.increment(ignored))
-    if (const auto bag = bag_format(it->path())) return bag;
+  if (const auto bag = bag_format_within(folder)) return bag;
   if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
   return std::nullopt;
 }
@@ -190,7 +219,7 @@ std::vector<std::string> list_images(const std::filesystem::path& root, const st
   }
   if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
   if (names.empty()) refuse(folder, 0, "holds no PNG or JPEG image");
-  std::sort(names.begin(), names.end());
+  std::sort(names.begin(), names.end(), in_name_order);
   return names;
 }
 

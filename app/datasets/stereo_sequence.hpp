@@ -38,13 +38,15 @@ struct StereoPair {
   Stamp stamp{};
   std::array<std::string, 2> file;  // left, right: relative to StereoSequence::root, or names in
                                     // its store; empty: the data set lists none
+  bool in_order = true;  // false: skipped, for its stamp does not go with those around it
 };
 
 /// A whole drive but its pixels.
 ///
-/// pairs        In the order of the data set; stamps as they are, so they may go backwards. Files
-/// may be missing or torn:
-///              who decodes them finds out, skips the frame and says so.
+/// pairs        In the order of the data set; stamps as they are, so they may go backwards or leap
+///              ahead: the fewest that have to be left out for the others to go forward are not
+///              `in_order`. Files may be missing or torn: who decodes them finds out, skips the
+///              frame and says so.
 /// calibration  Two cameras; from the data set's own files unless one was given.
 struct StereoSequence {
   std::filesystem::path root;
@@ -101,14 +103,16 @@ struct BagTopics {
 ///           stamps, that of the left camera counts; raw or rectified images, told by their size.
 ///           `folder` is the drive, its date, or above
 ///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by
-///   equal stamps; raw images folder  left/, right/ paired in order of name (or both/ with both
-///   images in each file, side by side), times.txt (a line a pair: integer nanoseconds, or seconds
-///   if it has a
-///           point), calibration.yaml. Where one side lacks images that the other has, pairing goes
-///           by equal names; where the lines of times.txt name their images, `stamp,file` or
-///           `stamp,left file,right file`, by these. An optional reference lies beside them:
-///           truth.tum, or poses.txt as KITTI has it, a line a pair (the left camera's; replay
-///           reads it). Without times.txt pairs are taken to be 0.1 s apart, which is a remark.
+///   equal stamps; raw images
+///   folder  left/, right/ (or both/ with both images in each file, side by side), times.txt (a
+///   line
+///           a pair: integer nanoseconds, or seconds if one of them has a point), calibration.yaml.
+///           Paired by equal names, where a name that one side lacks is an image that was lost; in
+///           order of name (2 before 10) where that makes no pair a line of times.txt; where the
+///           lines of times.txt name their images, `stamp,file` or `stamp,left file,right file`, by
+///           these. An optional reference lies beside them: truth.tum, or poses.txt as KITTI has
+///           it, a line a pair (the left camera's; replay reads it). Without times.txt pairs are
+///           taken to be 0.1 s apart, which is a remark.
 ///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line,
 ///   stamp of the left camera; raw Bayer BMP;
 ///           the calibration published with the data set

@@ -80,6 +80,9 @@ constexpr std::array kSkipped{
     Advice{"time_backwards",
            "The times of these frames are not later than those before them: look at the order of "
            "times.txt and of the files."},
+    Advice{"time_ahead",
+           "The times of these frames are later than those after them: look at these lines of "
+           "times.txt."},
     Advice{"image_missing",
            "An image that the recording lists is not there: copy the folder again, or leave the "
            "pair out on both sides."},

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "app/report/advice.hpp"
+#include "app/report/outages.hpp"
 #include "app/report/svg.hpp"
 #include "app/report/tables.hpp"
 
@@ -44,6 +45,7 @@ constexpr std::array kSaid{
     Word{"needs_texture", "no calibration: nothing to match"},
     Word{"unproven_pairing", "what proves the pairing contradicted itself"},
     Word{"time_backwards", "skipped: time not later than before"},
+    Word{"time_ahead", "skipped: time later than after"},
     Word{"image_missing", "skipped: an image is missing"},
     Word{"image_torn", "skipped: an image file is torn"},
     Word{"image_size", "skipped: an image of another size"},
@@ -107,6 +109,18 @@ Row row_of_events(const Session& s, std::string_view kind, bool sentence) {
   return row;
 }
 
+/// Devices that were away, a row for those that went together.
+std::vector<Row> rows_of_outages(const Session& s, const Analysis& a) {
+  std::vector<Row> rows;
+  for (const OutageSum& sum : summed(outages_of(s.events))) {
+    const double to_s = sum.to ? since_start(s, *sum.to) : a.duration_s;
+    const double from_s = since_start(s, sum.from);
+    rows.push_back({gone_sentence(sum.devices) + (sum.to ? "" : " to the end"), sum.count, from_s,
+                    std::max(from_s, to_s), false});
+  }
+  return rows;
+}
+
 std::string when(const Row& row) {
   const std::string from = time_label(row.from_s, 0.1), to = time_label(row.to_s, 0.1);
   return (from == to ? from : from + " … " + to) + (row.to_s < 60 ? " s" : "");
@@ -116,11 +130,13 @@ std::string when(const Row& row) {
 
 std::string happenings_table(const Session& session, const Analysis& analysis) {
   constexpr std::size_t kMost = 10;
+  const std::vector<Row> outages = rows_of_outages(session, analysis);
   std::vector<Row> rows = rows_of_frames(session, analysis);
   for (const Advice& skip : skip_advice()) rows.push_back(row_of_events(session, skip.word, false));
   std::erase_if(rows, [](const Row& r) { return r.count == 0; });
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Row& a, const Row& b) { return a.count > b.count; });
+  rows.insert(rows.begin(), outages.begin(), outages.end());  // the cause of many others
   for (const std::string_view kind : kTold) rows.push_back(row_of_events(session, kind, true));
   std::erase_if(rows, [](const Row& r) { return r.count == 0; });
   if (rows.empty()) return "";

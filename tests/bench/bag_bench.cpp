@@ -71,7 +71,7 @@ void measure(const BagKind& kind, const std::vector<std::string>& pictures, std:
   const auto begin = std::chrono::steady_clock::now();
   for (const StereoPair& pair : s.pairs)
     for (const std::string& name : pair.file)
-      if (s.store->decode(name, {kWidth, kHeight}, out.data(), kWidth, &work) !=
+      if (s.store->decode(name, {kWidth, kHeight}, out.data(), kWidth, 16, &work) !=
           ImageFileStatus::ok)
         std::printf("%s cannot be decoded\n", name.c_str());
   std::printf("%-7s %-5s %5zu pairs %7.1f MB   index %8.1f ms   images %8.1f ms\n", kind.container,

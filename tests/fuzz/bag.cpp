@@ -34,7 +34,7 @@ void check(const StereoSequence& s) {
                  height = static_cast<std::size_t>(image.height);
       if (width * height > kMostPixels) continue;
       out.resize(width * height);
-      (void)s.store->decode(name, image, out.data(), width, &work);
+      (void)s.store->decode(name, image, out.data(), width, 16, &work);
     }
 }
 

@@ -77,8 +77,18 @@ bool BagImages::load(const BagImage& entry, std::vector<std::uint8_t>* data) con
   return records && MemoryBytes(*records).read(offset, *data);
 }
 
+ImageFileStatus BagImages::encoded(const std::string& name,
+                                   std::vector<std::uint8_t>* bytes) const {
+  std::size_t camera = 0;
+  const BagImage* entry = find(name, &camera);
+  if (entry == nullptr) return ImageFileStatus::missing;
+  if (entry->image.layout != PixelLayout::encoded) return ImageFileStatus::not_an_image;
+  return load(*entry, bytes) ? ImageFileStatus::ok : ImageFileStatus::unreadable;
+}
+
 ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::uint8_t* out,
-                                  std::size_t stride, std::vector<std::uint8_t>* work) const {
+                                  std::size_t stride, int deep_bits,
+                                  std::vector<std::uint8_t>* work) const {
   std::size_t camera = 0;
   const BagImage* entry = find(name, &camera);
   if (entry == nullptr) return ImageFileStatus::missing;
@@ -88,7 +98,7 @@ ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::
   const std::uint8_t* in = work->data();
   switch (image.layout) {
     case PixelLayout::encoded:
-      return decode_grey(*work, size, out, stride);
+      return decode_grey(*work, size, out, stride, deep_bits);
     case PixelLayout::bayer:
       bayer_to_grey(in, image.step, size.width, size.height, out,
                     static_cast<std::ptrdiff_t>(stride));

@@ -8,7 +8,9 @@
 
 #include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/jpeg.hpp"
+#include "app/datasets/detail/name_order.hpp"
 #include "app/datasets/recorded_ins.hpp"
+#include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
@@ -24,6 +26,8 @@ constexpr std::size_t kMostBytes = 65536;          // of a CameraInfo and of a r
 
 std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
   const std::string ending = format == BagFormat::mcap ? ".mcap" : ".bag";
+  const SequenceFormat wanted =
+      format == BagFormat::mcap ? SequenceFormat::mcap : SequenceFormat::rosbag;
   std::error_code error;
   if (!fs::is_directory(bag, error)) {
     if (!fs::exists(bag, error))
@@ -32,18 +36,16 @@ std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
   }
   std::vector<fs::path> files;
   for (fs::directory_iterator it(bag, error), end; !error && it != end; it.increment(error))
-    if (it->path().extension() == ending) files.push_back(it->path());
+    if (bag_format(it->path()) == wanted) files.push_back(it->path());
   if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "): check its permissions");
   if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
   if (files.size() > kMostFiles)
     refuse(bag, 0,
            fmt::format("holds {} {} files; at most {} are read", files.size(), ending, kMostFiles));
   // Recorders count without leading zeros: drive_2.mcap stands before drive_10.mcap.
-  const auto order = [](const fs::path& a, const fs::path& b) {
-    const std::string l = a.filename().string(), r = b.filename().string();
-    return l.size() != r.size() ? l.size() < r.size() : l < r;
-  };
-  std::sort(files.begin(), files.end(), order);
+  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+    return in_name_order(a.filename().string(), b.filename().string());
+  });
   return files;
 }
 

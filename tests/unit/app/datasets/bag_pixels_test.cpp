@@ -6,6 +6,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "app/datasets/deep_samples.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/types/bayer.hpp"
@@ -42,24 +43,31 @@ ImageMessage image_of(const char* encoding, int channels) {
 
 class BagPixels : public ::testing::TestWithParam<BagKind> {
  protected:
-  /// The same message left and right; grey of the right one. Empty: no pair.
-  [[nodiscard]] Grey grey_of(const char* type, const std::string& message) {
+  /// The same message left and right.
+  [[nodiscard]] static StereoSequence sequence_of(const char* type, const std::string& message) {
     const auto writer = GetParam().writer();
     writer->channel(1, "/left/image", type);
     writer->channel(2, "/right/image", type);
     for (const std::uint16_t k : kSides) writer->message(k, kStart, message);
     writer->finish();
-    StereoSequence s;
+    return test::bag_in_memory(GetParam().is_mcap(), writer->bytes());
+  }
+  /// Grey of the right image.
+  [[nodiscard]] static Grey right_of(const StereoSequence& s) {
+    Grey out(std::size_t{kWidth} * kHeight), work;
+    EXPECT_EQ(s.store->decode(s.pairs.at(0).file[1], {kWidth, kHeight}, out.data(), kWidth,
+                              s.deep_bits, &work),
+              ImageFileStatus::ok);
+    return out;
+  }
+  /// Empty: no pair.
+  [[nodiscard]] Grey grey_of(const char* type, const std::string& message) {
     try {
-      s = test::bag_in_memory(GetParam().is_mcap(), writer->bytes());
+      return right_of(sequence_of(type, message));
     } catch (const InputError& e) {
       refusal_ = e.what();
       return {};
     }
-    Grey out(std::size_t{kWidth} * kHeight), work;
-    EXPECT_EQ(s.store->decode(s.pairs.at(0).file[1], {kWidth, kHeight}, out.data(), kWidth, &work),
-              ImageFileStatus::ok);
-    return out;
   }
   [[nodiscard]] Grey grey_of(const ImageMessage& image) {
     return grey_of("sensor_msgs/Image", image_message(GetParam().wire(), kStart, image));
@@ -113,7 +121,8 @@ TEST_P(BagPixels, MosaicsGoTheWayOfTheCameras) {
 
 TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
   EXPECT_TRUE(grey_of(image_of("mono16", 2)).empty());
-  EXPECT_NE(refusal_.find("/left/image (0 images)"), std::string::npos) << refusal_;
+  EXPECT_NE(refusal_.find("/left/image (0 images, 1 that cannot be read)"), std::string::npos)
+      << refusal_;
   ImageMessage image = image_of("mono8", 1);
   image.data.pop_back();
   EXPECT_TRUE(grey_of(image).empty());
@@ -140,6 +149,25 @@ TEST_P(BagPixels, PngAndJpegAreToldByTheirBytes) {
             << ending;
   }
   EXPECT_TRUE(grey_of_file("png", "no image at all").empty());
+}
+
+// As image_transport packs mono16 of cameras of 12 bits.
+TEST_P(BagPixels, PngOfTwelveBitsInSixteenIsTakenForWhatItIs) {
+  cv::Mat picture(kHeight, kWidth, CV_16U);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      picture.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(16 * value(x, y, 0) + 15);
+  std::vector<std::uint8_t> file;
+  ASSERT_TRUE(cv::imencode(".png", picture, file));
+  const std::string message = compressed_message(
+      GetParam().wire(), kStart, "mono16; compressed png", std::string(file.begin(), file.end()));
+  StereoSequence s = sequence_of("sensor_msgs/CompressedImage", message);
+  find_deep_bits(&s);
+  EXPECT_EQ(s.deep_bits, 12);
+  const Grey out = right_of(s);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, 0));
 }
 
 INSTANTIATE_TEST_SUITE_P(Containers, BagPixels,

@@ -91,15 +91,29 @@ TEST_P(Bag, PairsCalibrationAndPixelsAreThoseOfTheMessages) {
   EXPECT_NEAR((s.calibration.T_camera_left[1].t - Vec3(-0.12, 0, 0)).norm(), 0, 1e-15);
   std::vector<std::uint8_t> out(std::size_t{kWidth} * kHeight), work;
   for (const std::string& name : s.pairs[3].file) {
-    ASSERT_EQ(s.store->decode(name, {kWidth, kHeight}, out.data(), kWidth, &work),
+    ASSERT_EQ(s.store->decode(name, {kWidth, kHeight}, out.data(), kWidth, 16, &work),
               ImageFileStatus::ok)
         << name;
     for (std::uint32_t y = 0; y < kHeight; ++y)
       for (std::uint32_t x = 0; x < kWidth; ++x)
         ASSERT_EQ(out[y * kWidth + x], static_cast<std::uint8_t>(pixel(x, y)));
   }
-  EXPECT_EQ(s.store->decode("left/image_raw#4", {kWidth, kHeight}, out.data(), kWidth, &work),
+  EXPECT_EQ(s.store->decode("left/image_raw#4", {kWidth, kHeight}, out.data(), kWidth, 16, &work),
             ImageFileStatus::missing);
+}
+
+// That of a recorder whose power went; and both kinds in one folder.
+TEST_P(Bag, OneThatIsStillCalledActiveIsReadAndOfBothKindsTheNewerOne) {
+  frame(0);
+  writer_->finish();
+  const std::string name = GetParam().is_mcap() ? "drive_0.mcap" : "drive_0.bag.active";
+  folder_.write("drive/" + name, writer_->bytes());
+  EXPECT_EQ(find_format(folder_ / "drive" / name), format());
+  EXPECT_EQ(find_format(folder_ / "drive"), format());
+  EXPECT_EQ(open_sequence(format(), folder_ / "drive").pairs.size(), 1U);
+  folder_.write("drive/a.mcap", "");
+  folder_.write("drive/z.bag", "");
+  EXPECT_EQ(find_format(folder_ / "drive"), SequenceFormat::mcap);
 }
 
 TEST_P(Bag, ImagesOfAnotherSizeOrGoingBackAreLeftOutAndCounted) {

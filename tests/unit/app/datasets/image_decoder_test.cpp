@@ -126,7 +126,7 @@ TEST(PngDecoder, ofSixteenBitsThoseThatAreUsedAreTakenAndWhatIsBeyondIsWhite) {
             << "bits " << bits << " column " << x << " interlaced " << interlaced;
     }
   }
-  EXPECT_EQ(peak_of_deep_image(noisy_png({0, 8, false}, {}, false)), 0);
+  EXPECT_EQ(peak_of_deep_image(noisy_png({0, 8, false}, {}, false)), std::nullopt);
   EXPECT_EQ(peak_of_deep_image({}), 0);
 }
 

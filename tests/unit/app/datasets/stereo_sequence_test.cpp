@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "app/runtime/errors.hpp"
@@ -143,16 +144,38 @@ TEST_F(Sequence, eurocSaysWhatIsWrong) {
                    {"sensor.yaml", "80x48", "one size"}));
 }
 
-TEST_F(Sequence, folderPairsInOrderOfNameAndReadsBothKindsOfTime) {
+TEST_F(Sequence, folderPairsInOrderOfNameWhereNamesMakeNoPairALine) {
   test::write_tiny_folder(folder_, 2);
   std::filesystem::rename(folder_ / "right/001.png", folder_ / "right/zz.png");
-  folder_.write("times.txt", "5\n1.5\n");
   const auto s = open_sequence(SequenceFormat::folder, folder_.path());
   ASSERT_EQ(s.pairs.size(), 2U);
-  EXPECT_EQ(s.pairs[0].stamp.ns(), 5);
-  EXPECT_EQ(s.pairs[1].stamp.ns(), 1500000000);
+  EXPECT_EQ(s.pairs[0].stamp.ns(), test::kTinyStart);
   EXPECT_EQ(s.pairs[1].file[0], "left/001.png");
   EXPECT_EQ(s.pairs[1].file[1], "right/zz.png");
+}
+
+// As `cout << t` and `%g` print them.
+TEST_F(Sequence, wholeSecondsAmongSecondsWithAPointAreSeconds) {
+  test::write_tiny_folder(folder_, 4);
+  folder_.write("times.txt", "1403636584\n1403636584.1\n1.4036365842e9\n1403636585\n");
+  const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 4U);
+  EXPECT_EQ(s.pairs[0].stamp.ns(), 1403636584000000000);
+  EXPECT_EQ(s.pairs[1].stamp.ns(), 1403636584100000000);
+  EXPECT_EQ(s.pairs[2].stamp.ns(), 1403636584200000000);
+  EXPECT_EQ(s.pairs[3].stamp.ns(), 1403636585000000000);
+}
+
+TEST_F(Sequence, namesWithoutLeadingZerosCountAsNumbers) {
+  test::write_tiny_folder(folder_, 12);
+  for (int i = 0; i < 12; ++i)
+    for (int k = 0; k < 2; ++k)
+      std::filesystem::rename(folder_ / test::folder_name(k, i),
+                              folder_ / fmt::format("{}/{}.png", k == 0 ? "left" : "right", i));
+  const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 12U);
+  for (std::size_t i = 0; i < 12; ++i)
+    EXPECT_EQ(s.pairs[i].file[1], fmt::format("right/{}.png", i));
 }
 
 TEST_F(Sequence, folderWhoseTimesNameTheirImages) {
@@ -250,6 +273,38 @@ TEST_F(Sequence, folderWithALostImagePairsTheRestByName) {
   EXPECT_EQ(s.pairs[2].file[1], "right/002.png");
 }
 
+// With and without times: equal numbers of images on both sides are no proof of an order.
+TEST_F(Sequence, folderThatLostAnImageOnEachSidePairsTheRestByName) {
+  for (const bool times : {true, false}) {
+    test::write_tiny_folder(folder_, 5);
+    if (!times) std::filesystem::remove(folder_ / "times.txt");
+    std::filesystem::remove(folder_ / "left/001.png");
+    std::filesystem::remove(folder_ / "right/003.png");
+    for (const std::size_t lost : {1U, 2U}) {
+      if (lost == 2) std::filesystem::remove(folder_ / "right/004.png");
+      const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+      ASSERT_EQ(s.pairs.size(), 5U) << times << lost;
+      for (int i = 0; i < 5; ++i)
+        for (int k = 0; k < 2; ++k)
+          EXPECT_EQ(s.pairs[static_cast<std::size_t>(i)].file[static_cast<std::size_t>(k)],
+                    test::folder_name(k, i));
+    }
+  }
+}
+
+TEST_F(Sequence, folderOfForeignNamesNeedsOneOfEach) {
+  test::write_tiny_folder(folder_, 3);
+  std::filesystem::remove(folder_ / "times.txt");
+  for (int i = 0; i < 3; ++i)
+    std::filesystem::rename(folder_ / test::folder_name(1, i),
+                            folder_ / fmt::format("right/r{}.png", i));
+  EXPECT_EQ(open_sequence(SequenceFormat::folder, folder_.path()).pairs.at(2).file[1],
+            "right/r2.png");
+  std::filesystem::remove(folder_ / "right/r1.png");
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()),
+                   {"3 images in left/ and 2 in right/", "stamp,left file,right file"}));
+}
+
 TEST_F(Sequence, folderCountsThatDoNotGoTogetherAreRefused) {
   test::write_tiny_folder(folder_, 3);
   folder_.write("times.txt", "1\n2\n3\n4\n");
@@ -301,6 +356,23 @@ TEST_F(Sequence, imagesOfTwelveBitsInSixteenAreTakenForWhatTheyAreAndItIsSaid) {
   test::write_tiny_folder(folder_, 7);
   EXPECT_EQ(open_sequence(SequenceFormat::folder, folder_.path()).deep_bits, 16)
       << "8-bit images have none";
+}
+
+// A disk that was full, a shutter that was shut: they say nothing of the others.
+TEST_F(Sequence, aTornOrBlackImageSaysNothingOfTheBitsThatAreUsed) {
+  const auto bits = [&] { return open_sequence(SequenceFormat::folder, folder_.path()).deep_bits; };
+  test::write_tiny_folder(folder_, 9);
+  make_deep(folder_, 9, 4095);
+  test::truncate_file(folder_ / test::folder_name(0, 0), 0.5);
+  EXPECT_EQ(bits(), 12);
+  make_deep(folder_, 1, 0);
+  EXPECT_EQ(bits(), 12);
+  std::filesystem::remove(folder_ / test::folder_name(1, 8));
+  EXPECT_EQ(bits(), 12);
+  make_deep(folder_, 8, 0);
+  EXPECT_EQ(bits(), 12) << "the left image of the last pair";
+  make_deep(folder_, 9, 0);
+  EXPECT_EQ(bits(), 16) << "all black: nobody knows";
 }
 
 TEST_F(Sequence, oneBrightImageOfThoseLookedAtIsEnoughForSixteenBits) {
