@@ -46,10 +46,12 @@ void list(const DevicesArguments& a, bool rules_asked) {
     throw InputError("--rig says whose rules are written; add --write-udev");
   InventoryOptions options;
   options.probe = a.probe;
-  const Inventory inventory = take_inventory(Machine::here(), options);
+  const Machine machine = Machine::here();
+  const Inventory inventory = take_inventory(machine, options);
   std::string rules;
   if (rules_asked)
-    rules = needs.given ? udev_rules(rig_devices(inventory, needs)) : udev_rules(inventory);
+    rules = needs.given ? udev_rules(rig_devices(inventory, with_nodes(needs, machine)))
+                        : udev_rules(inventory);
   const bool to_stdout = a.rules == "-";
   if (rules_asked && !to_stdout) write_rules(a.rules, rules);
   if (a.json)

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,13 @@ struct CheckContext {
   const Machine& machine;
   const Inventory& inventory;
   const Needs& needs;
-  std::filesystem::path out = ".";  // where sessions go
+  std::filesystem::path out = ".";           // where sessions go
+  std::filesystem::path configuration = {};  // the file that `needs` are of; empty: none
+
+  /// The configuration is the service's, which is installed: not this user is to drive with it.
+  [[nodiscard]] bool is_of_service() const;
+  /// A key of the service, `LimitRTPRIO`, as unit and drop-ins have it; nothing: no word of it.
+  [[nodiscard]] std::optional<std::string> service_setting(const std::string& key) const;
 };
 
 /// All checks; those about devices that neither are there nor are asked for say nothing. Problems

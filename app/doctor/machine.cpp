@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cstring>
 #include <fstream>
@@ -95,14 +96,31 @@ std::string group_of_node(const std::string& node) {
   return group_name(s.st_gid);
 }
 
-std::optional<std::uint64_t> free_bytes_of(const fs::path& folder) {
-  // The folder may still have to be made: what counts is the disk that it will be on.
+std::optional<unsigned> mode_of_node(const std::string& node) {
+  struct stat s {};
+  if (::stat(node.c_str(), &s) != 0) return std::nullopt;
+  return s.st_mode & 07777U;
+}
+
+std::optional<DiskRoom> room_of(const fs::path& folder) {
+  // The folder may still have to be made, or be closed to this user: what counts is the disk that
+  // it will be on, by the first folder above it that tells.
   std::error_code error;
   fs::path at = fs::absolute(folder, error);
-  while (!error && at.has_relative_path() && !fs::exists(at, error)) at = at.parent_path();
+  if (error) return std::nullopt;
   struct statvfs s {};
-  if (::statvfs(at.c_str(), &s) != 0) return std::nullopt;
-  return static_cast<std::uint64_t>(s.f_bavail) * s.f_frsize;
+  bool closed = false;
+  while (::statvfs(at.c_str(), &s) != 0) {
+    closed = closed || errno == EACCES;
+    if (!at.has_relative_path()) return std::nullopt;
+    at = at.parent_path();
+  }
+  DiskRoom room;
+  room.bytes = static_cast<std::uint64_t>(s.f_bavail) * s.f_frsize;
+  if (s.f_files != 0) room.files = s.f_favail;  // FAT and Btrfs count none
+  room.read_only = (s.f_flag & ST_RDONLY) != 0;
+  room.may_write = !closed && ::access(at.c_str(), W_OK | X_OK) == 0;
+  return room;
 }
 
 std::optional<bool> kernel_clock_synchronised() {
@@ -121,7 +139,8 @@ Machine Machine::here() {
   m.addresses = own_addresses();
   m.may_use = [](const std::string& node) { return ::access(node.c_str(), R_OK | W_OK) == 0; };
   m.group_of = group_of_node;
-  m.free_bytes = free_bytes_of;
+  m.mode_of = mode_of_node;
+  m.room_at = room_of;
   m.clock_synchronised = kernel_clock_synchronised();
   return m;
 }
@@ -171,6 +190,15 @@ std::vector<std::string> Machine::names(const std::string& path) const {
 bool Machine::exists(const std::string& path) const {
   std::error_code error;
   return fs::exists(at(path), error);
+}
+
+std::string Machine::target(const std::string& path) const {
+  std::error_code error;
+  const fs::path inside = fs::canonical(root, error);
+  if (error) return path;
+  const fs::path end = fs::canonical(at(path), error).lexically_relative(inside);
+  if (error || end.empty() || *end.begin() == "..") return path;
+  return (fs::path("/") / end).string();
 }
 
 bool Machine::runs(const std::string& name) const {

@@ -14,6 +14,15 @@ struct InterfaceAddress {
   std::uint32_t address = 0, mask = 0;
 };
 
+/// What a folder's file system takes of this process.
+struct DiskRoom {
+  std::uint64_t bytes = 0;  // free
+  std::optional<std::uint64_t>
+      files;  // that may still be made; nothing: the file system has no limit
+  bool read_only = false;
+  bool may_write = true;  // by owner and mode
+};
+
 /// A machine as its own files tell it, and what this process may do on it. Everything that `doctor`
 /// judges is read through this, so that a folder of small files stands for any machine in tests.
 ///
@@ -30,8 +39,9 @@ struct Machine {
   std::vector<InterfaceAddress> addresses;
   std::function<bool(const std::string& node)> may_use;  // may this process read and write it?
   std::function<std::string(const std::string& node)> group_of;  // of a node; empty: not known
-  std::function<std::optional<std::uint64_t>(const std::filesystem::path& folder)>
-      free_bytes;                          // for this user
+  std::function<std::optional<unsigned>(const std::string& node)> mode_of;  // 0660
+  /// For this user; of a folder that is not there yet, where it would be made.
+  std::function<std::optional<DiskRoom>(const std::filesystem::path& folder)> room_at;
   std::optional<bool> clock_synchronised;  // as the kernel was told
 
   /// The one that this runs on.
@@ -48,6 +58,9 @@ struct Machine {
   /// Names in a folder, sorted; at most kMostNames.
   [[nodiscard]] std::vector<std::string> names(const std::string& path) const;
   [[nodiscard]] bool exists(const std::string& path) const;
+  /// What a path is in the end, links followed: `/dev/ttyUSB0`. The path itself where nothing is
+  /// there, or what it leads to is outside of this machine.
+  [[nodiscard]] std::string target(const std::string& path) const;
 
   /// Whether a process with that name runs (the first 15 letters count).
   [[nodiscard]] bool runs(const std::string& name) const;

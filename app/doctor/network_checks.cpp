@@ -114,9 +114,10 @@ void check_receive_buffer(const CheckContext& p, std::vector<Finding>* findings)
       f.state = FindingState::ok;
       f.sentence += "; this user may go beyond it";
     } else {
+      // Sorted behind the package's own file: the last one counts.
       f.mend = {
           fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
-          fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/60-vergence-rmem.conf",
+          fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/90-vergence-rmem.conf",
                       advised)};
     }
   }
@@ -301,7 +302,7 @@ void check_rp_filter(const CheckContext& p, const std::vector<Reached>& cameras,
          strict ? std::vector{fmt::format("sudo sysctl -w net.ipv4.conf.{}.rp_filter=2",
                                           r.through->name),
                               fmt::format("echo net.ipv4.conf.{}.rp_filter=2 | sudo tee "
-                                          "/etc/sysctl.d/60-vergence-rp-filter.conf",
+                                          "/etc/sysctl.d/90-vergence-rp-filter.conf",
                                           r.through->name)}
                 : std::vector<std::string>{}});
   }

@@ -95,6 +95,12 @@ void add_camera(const Inventory& found, const CameraNeed& need, RigDevices* rig)
 
 }  // namespace
 
+Needs with_nodes(Needs needs, const Machine& machine) {
+  for (std::string* port : {&needs.ins_port, &needs.trigger_port})
+    if (port->starts_with("/")) *port = machine.target(*port);
+  return needs;
+}
+
 bool names_port(const std::string& key, const FoundPort& port) {
   if (key.empty()) return port.info.usb_vendor != 0;
   const std::string name = std::filesystem::path(key).filename();

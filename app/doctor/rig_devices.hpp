@@ -7,8 +7,11 @@
 
 namespace vergence::app {
 
+/// Ports that a configuration names by links, whatever their names, by the nodes they lead to.
+[[nodiscard]] Needs with_nodes(Needs needs, const Machine& machine);
+
 /// Whether a configuration's `port` means this port: by its name, a link to it, or its adapter's
-/// serial number. An empty one means any port on USB.
+/// serial number. Other links: with_nodes() first. An empty one means any port on USB.
 [[nodiscard]] bool names_port(const std::string& key, const FoundPort& port);
 
 /// What is plugged in, as far as a rig is concerned.

@@ -1,5 +1,8 @@
 #include <algorithm>
 #include <filesystem>
+#include <set>
+#include <sstream>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -120,14 +123,63 @@ void check_modem_manager(const CheckContext& p, std::vector<Finding>* findings) 
                        std::move(mend)});
 }
 
+/// The kernel writes its messages there, and systemd then starts a login by itself.
+bool is_console(const Machine& m, const std::string& node) {
+  constexpr std::string_view kKey = "console=";
+  std::istringstream words(m.line("/proc/cmdline").value_or(""));
+  for (std::string word; words >> word;)
+    if (word.starts_with(kKey) &&
+        m.target("/dev/" + word.substr(kKey.size(), word.find(',') - kKey.size())) == node)
+      return true;
+  return false;
+}
+
+/// A port of the board itself: Debian gives it to dialout, a login that runs there takes it away.
+NodesToOpen built_in_port(const Machine& m, const std::string& node) {
+  const std::string name = std::filesystem::path(node).filename();
+  NodesToOpen one{"serial_permission", "dialout", {node}};
+  one.because = "a serial console (getty) may hold it";
+  const bool console = is_console(m, node);
+  if (console)
+    one.because += ", since console= of the kernel's command line names it: take that out";
+  // What a generator starts at every boot can only be masked.
+  one.mend = {
+      fmt::format("sudo systemctl {} --now serial-getty@{}", console ? "mask" : "disable", name),
+      "sudo udevadm trigger --name-match=" + name};
+  return one;
+}
+
+void check_permissions(const CheckContext& p, std::vector<Finding>* findings) {
+  NodesToOpen on_usb{"serial_permission", "dialout", {}};
+  std::set<std::string> built_in;
+  for (const FoundPort* port : ports_of(p))
+    if (port->info.usb_vendor != 0)
+      on_usb.nodes.push_back(port->info.port);
+    else
+      built_in.insert(port->info.port);
+  // Nodes that no list of ports has are asked for all the same.
+  const auto add = [&](const std::string& driver, const std::string& port) {
+    const bool listed = std::any_of(p.inventory.ports.begin(), p.inventory.ports.end(),
+                                    [&](const FoundPort& f) { return names_port(port, f); });
+    if (is_real(driver) && port.starts_with("/") && !listed && p.machine.exists(port))
+      built_in.insert(port);
+  };
+  add(p.needs.ins_driver, p.needs.ins_port);
+  add(p.needs.trigger_driver, p.needs.trigger_port);
+  check_nodes(p, on_usb, findings);
+  for (const std::string& node : built_in) check_nodes(p, built_in_port(p.machine, node), findings);
+}
+
 }  // namespace
 
-void check_serial(const CheckContext& p, std::vector<Finding>* findings) {
-  NodesToOpen nodes{"serial_permission", "dialout", {}};
-  for (const FoundPort* port : ports_of(p)) nodes.nodes.push_back(port->info.port);
-  check_presence(p, "ins", p.needs.ins_driver, p.needs.ins_port, findings);
-  check_presence(p, "trigger", p.needs.trigger_driver, p.needs.trigger_port, findings);
-  check_nodes(p, nodes, findings);
+void check_serial(const CheckContext& context, std::vector<Finding>* findings) {
+  const Needs& named = context.needs;
+  check_presence(context, "ins", named.ins_driver, named.ins_port, findings);
+  check_presence(context, "trigger", named.trigger_driver, named.trigger_port, findings);
+  const Needs needs = with_nodes(named, context.machine);
+  const CheckContext p{context.machine, context.inventory, needs, context.out,
+                       context.configuration};
+  check_permissions(p, findings);
   check_latency(p, findings);
   check_modem_manager(p, findings);
 }

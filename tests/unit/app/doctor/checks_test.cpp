@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 
 #include "tests/unit/app/doctor/fake_machine.hpp"
@@ -10,17 +11,11 @@
 namespace vergence::app {
 namespace {
 
+using test::contains;
 using test::FakeMachine;
+using test::mends_with;
 
 constexpr std::uint32_t kHost = 0xC0A80A01U, kMask24 = 0xFFFFFF00U;  // 192.168.10.1/24
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-bool mends_with(const Finding& f, const std::string& part) {
-  return std::any_of(f.mend.begin(), f.mend.end(),
-                     [&](const std::string& c) { return contains(c, part); });
-}
 
 /// A GigE camera of 1280 x 960 at 30 Hz on eth1.
 void put_gige(FakeMachine* f) {
@@ -79,9 +74,24 @@ TEST(DoctorNetwork, theReceiveBufferIsHeldAgainstTheImages) {
   EXPECT_EQ(bad.state, FindingState::problem);
   ASSERT_EQ(bad.mend.size(), 2U);
   EXPECT_EQ(bad.mend[0], "sudo sysctl -w net.core.rmem_max=10485760");
-  EXPECT_TRUE(contains(bad.mend[1], "/etc/sysctl.d/"));
+  EXPECT_TRUE(contains(bad.mend[1], "/etc/sysctl.d/90-vergence-rmem.conf"));
   f.file("/proc/self/status", "CapEff:\t0000000000001000\n");  // CAP_NET_ADMIN
   EXPECT_EQ(f.of("receive_buffer")[0].state, FindingState::ok);
+}
+
+TEST(DoctorNetwork, whatLastsIsReadAfterThePackagesOwnSetting) {
+  FakeMachine f;
+  put_gige(&f);
+  f.file("/proc/sys/net/core/rmem_max", "212992\n");
+  const std::string command = f.of("receive_buffer")[0].mend.back();
+  const std::string name = std::filesystem::path(command).filename();
+  int files = 0;
+  for (const auto& file : std::filesystem::directory_iterator(VERGENCE_SOURCE_DIR "/packaging")) {
+    if (file.path().extension() != ".conf") continue;
+    ++files;
+    EXPECT_GT(name, file.path().filename().string()) << "the last one counts";
+  }
+  EXPECT_GT(files, 0);
 }
 
 TEST(DoctorNetwork, aLargerImageNeedsMoreThanTheUsualAdvice) {
@@ -198,6 +208,23 @@ TEST(DoctorCameras, permissionsSayWhichOfThreeThingsIsMissing) {
   EXPECT_TRUE(mends_with(found[0], "vergence devices --write-udev"));
 }
 
+TEST(DoctorCameras, aClosedNodeIsAProblemWhateverTheGroupsSay) {
+  FakeMachine f;
+  f.file("/sys/class/video4linux/video0/index", "0");
+  f.file("/dev/video0", "");
+  f.closed = {"/dev/video0"};
+  f.machine.groups = {"video"};
+  f.mode = 0640;
+  ASSERT_EQ(f.of("camera_permission").size(), 1U);
+  const Finding narrow = f.of("camera_permission")[0];
+  EXPECT_EQ(narrow.state, FindingState::problem);
+  EXPECT_TRUE(contains(narrow.sentence, "its mode is 0640; rw for the group is needed"));
+  EXPECT_TRUE(mends_with(narrow, "vergence devices --write-udev"));
+  f.mode = 0660;
+  ASSERT_EQ(f.of("camera_permission").size(), 1U);
+  EXPECT_EQ(f.of("camera_permission")[0].state, FindingState::problem) << "by an access list";
+}
+
 TEST(DoctorCameras, nodesThatNobodyAsksForAreNobodysProblem) {
   FakeMachine f;
   f.file("/sys/class/video4linux/video0/index", "0");
@@ -304,126 +331,6 @@ TEST(DoctorFirewire, anImageThatNeverFitsIsSaidToBeThat) {
   f.file("/sys/bus/firewire/devices/fw0/guid", "0x1");
   f.need("iidc-1394", "", 4000, 3000, 60);
   EXPECT_EQ(f.of("firewire_bus")[0].state, FindingState::problem);
-}
-
-FoundPort ftdi(const std::string& port, int latency) {
-  FoundPort p;
-  p.info = {port, "FT232R USB UART", 0x0403, 0x6001, "A1", latency};
-  p.kind = serial_kind(0x0403, 0x6001);
-  p.by_id = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A1-if00-port0";
-  return p;
-}
-
-TEST(DoctorSerial, theLatencyTimerOfAnInsIsSixteen) {
-  FakeMachine f;
-  f.inventory.ports = {ftdi("/dev/ttyUSB0", 1)};
-  ASSERT_EQ(f.of("latency_timer").size(), 1U);
-  EXPECT_EQ(f.of("latency_timer")[0].state, FindingState::advice);
-  EXPECT_EQ(f.of("latency_timer")[0].mend[0],
-            "echo 16 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer");
-  f.inventory.ports = {ftdi("/dev/ttyUSB0", 16)};
-  EXPECT_EQ(f.of("latency_timer")[0].state, FindingState::ok);
-  f.needs.given = true;
-  f.needs.ins_driver = "xsens";
-  f.needs.ins_port = "/dev/ttyUSB1";
-  EXPECT_TRUE(f.of("latency_timer").empty()) << "somebody else's converter";
-}
-
-TEST(DoctorSerial, aPortThatIsConfiguredAndNotThereIsAProblem) {
-  FakeMachine f;
-  f.needs.given = true;
-  f.needs.ins_driver = "xsens";
-  EXPECT_TRUE(contains(f.of("ins")[0].sentence, "no serial port on USB"));
-  f.needs.ins_port = "/dev/ttyUSB7";
-  EXPECT_TRUE(contains(f.of("ins")[0].sentence, "/dev/ttyUSB7 is not there"));
-  f.file("/dev/ttyUSB7", "");
-  EXPECT_TRUE(f.of("ins").empty());
-}
-
-TEST(DoctorSerial, modemManagerIsLeftAloneWhereARuleKeepsItAway) {
-  FakeMachine f;
-  f.inventory.ports = {ftdi("/dev/ttyUSB0", 16)};
-  EXPECT_TRUE(f.of("modem_manager").empty()) << "it does not run";
-  f.file("/proc/9/comm", "ModemManager\n");
-  EXPECT_EQ(f.of("modem_manager")[0].state, FindingState::advice);
-  f.file("/sys/class/tty/ttyUSB0/dev", "188:0\n");
-  f.file("/run/udev/data/c188:0", "S:ttyUSB0\nE:ID_MM_PORT_IGNORE=1\n");
-  EXPECT_EQ(f.of("modem_manager")[0].state, FindingState::ok);
-  f.inventory.ports.clear();
-  EXPECT_TRUE(f.of("modem_manager").empty());
-}
-
-TEST(DoctorSerial, permissionIsByGroupDialout) {
-  FakeMachine f;
-  f.group = "dialout";
-  f.inventory.ports = {ftdi("/dev/ttyUSB0", 16)};
-  f.closed = {"/dev/ttyUSB0"};
-  EXPECT_TRUE(mends_with(f.of("serial_permission")[0], "sudo usermod -aG dialout driver"));
-}
-
-TEST(DoctorSerial, portsThatNobodyAsksForAreNobodysProblem) {
-  FakeMachine f;
-  f.inventory.ports = {ftdi("/dev/ttyUSB0", 1)};
-  f.closed = {"/dev/ttyUSB0"};
-  f.file("/proc/9/comm", "ModemManager\n");
-  f.needs.given = true;
-  for (const char* check : {"serial_permission", "latency_timer", "modem_manager"})
-    EXPECT_TRUE(f.of(check).empty()) << check;
-  f.needs.trigger_driver = "board";
-  EXPECT_FALSE(f.of("serial_permission").empty());
-  EXPECT_TRUE(f.of("latency_timer").empty()) << "a board's stamps do not rest on it";
-  f.needs.ins_driver = "xsens";
-  f.needs.ins_port = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A1-if00-port0";
-  EXPECT_FALSE(f.of("latency_timer").empty());
-}
-
-TEST(DoctorSystem, aGovernorThatKeepsProcessorsSlowIsTold) {
-  FakeMachine f;
-  f.file("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "powersave\n");
-  f.file("/sys/devices/system/cpu/cpu0/cpufreq/scaling_driver", "intel_pstate\n");
-  EXPECT_EQ(f.of("governor")[0].state, FindingState::ok) << "there powersave goes with the load";
-  f.file("/sys/devices/system/cpu/cpu0/cpufreq/scaling_driver", "acpi-cpufreq\n");
-  EXPECT_EQ(f.of("governor")[0].state, FindingState::advice);
-  f.file("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n");
-  EXPECT_EQ(f.of("governor")[0].state, FindingState::ok);
-}
-
-TEST(DoctorSystem, realTimeLimitsMatterWhenThreadsAskForThem) {
-  FakeMachine f;
-  f.file("/proc/self/limits",
-         "Max realtime priority     0                    0\nMax locked memory         8388608    "
-         "8388608   bytes\n");
-  EXPECT_TRUE(f.of("realtime").empty());
-  f.needs.realtime_priority = 50;
-  EXPECT_EQ(f.of("realtime")[0].state, FindingState::problem);
-  EXPECT_TRUE(mends_with(f.of("realtime")[0], "driver - rtprio 50"));
-  EXPECT_TRUE(f.of("memory_lock").empty());
-  f.needs.lock_memory = true;
-  EXPECT_EQ(f.of("memory_lock")[0].state, FindingState::advice);
-}
-
-TEST(DoctorSystem, clocksAreTold) {
-  FakeMachine f;
-  f.file("/sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc\n");
-  EXPECT_TRUE(f.of("clock_source").empty());
-  f.file("/sys/devices/system/clocksource/clocksource0/current_clocksource", "hpet\n");
-  EXPECT_EQ(f.of("clock_source")[0].state, FindingState::advice);
-  f.machine.clock_synchronised = false;
-  EXPECT_EQ(f.of("clock")[0].state, FindingState::advice);
-  f.file("/proc/5/comm", "chronyd\n");
-  EXPECT_EQ(f.of("clock")[0].state, FindingState::ok);
-  f.file("/proc/6/comm", "systemd-timesyn\n");
-  EXPECT_TRUE(contains(f.of("clock")[0].sentence, "keep one"));
-}
-
-TEST(DoctorSystem, theDiskNeedsRoom) {
-  FakeMachine f;
-  f.free = std::uint64_t{1} << 30;
-  EXPECT_EQ(f.of("disk")[0].state, FindingState::advice);
-  f.free = 1000;
-  EXPECT_EQ(f.of("disk")[0].state, FindingState::problem);
-  f.free.reset();
-  EXPECT_TRUE(f.of("disk").empty());
 }
 
 TEST(Needs, aConfigurationBecomesBytesAndRates) {

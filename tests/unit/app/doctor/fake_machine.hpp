@@ -18,7 +18,8 @@ struct FakeMachine {
       return std::find(closed.begin(), closed.end(), node) == closed.end();
     };
     machine.group_of = [this](const std::string&) { return group; };
-    machine.free_bytes = [this](const std::filesystem::path&) { return free; };
+    machine.mode_of = [this](const std::string&) { return mode; };
+    machine.room_at = [this](const std::filesystem::path&) { return room; };
     machine.clock_synchronised = true;
   }
   FakeMachine(const FakeMachine&) = delete;
@@ -61,7 +62,7 @@ struct FakeMachine {
     machine.addresses.push_back({name, a, mask});
   }
   [[nodiscard]] std::vector<app::Finding> examined() const {
-    return app::run_checks({machine, inventory, needs, "."});
+    return app::run_checks({machine, inventory, needs, ".", configuration});
   }
   /// The findings of one check, the worst first.
   [[nodiscard]] std::vector<app::Finding> of(const std::string& check) const {
@@ -77,7 +78,18 @@ struct FakeMachine {
   app::Needs needs;
   std::vector<std::string> closed;  // nodes that may not be opened
   std::string group = "video";      // of all nodes
-  std::optional<std::uint64_t> free = std::uint64_t{1} << 40;
+  unsigned mode = 0660;             // likewise
+  std::optional<app::DiskRoom> room = app::DiskRoom{std::uint64_t{1} << 40, 1'000'000};
+  std::filesystem::path configuration;  // that `needs` are of
 };
+
+inline bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+/// One of the commands that mend it has that part.
+inline bool mends_with(const app::Finding& f, const std::string& part) {
+  return std::any_of(f.mend.begin(), f.mend.end(),
+                     [&](const std::string& c) { return contains(c, part); });
+}
 
 }  // namespace vergence::test

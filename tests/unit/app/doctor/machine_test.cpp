@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <string>
 
 #include "app/doctor/serial_kind.hpp"
@@ -94,9 +97,50 @@ TEST(Machine, theOneThisRunsOnAnswers) {
   const Machine m = Machine::here();
   EXPECT_FALSE(m.user.empty());
   EXPECT_TRUE(m.limit("Max open files"));
-  EXPECT_TRUE(m.free_bytes("/there/is/no/such/folder")) << "the disk that it would be on";
+  EXPECT_TRUE(m.room_at("/there/is/no/such/folder")) << "the disk that it would be on";
   EXPECT_TRUE(m.may_use("/dev/null"));
   EXPECT_FALSE(m.may_use("/dev/there-is-no-such-node"));
+}
+
+TEST(Machine, aLinkIsWhatItLeadsTo) {
+  const FakeMachine f;
+  f.file("/dev/ttyUSB0", "");
+  std::filesystem::create_symlink("ttyUSB0", f.folder / "dev/ins");
+  std::filesystem::create_symlink("nothing", f.folder / "dev/dangling");
+  std::filesystem::create_symlink("/", f.folder / "dev/outside");
+  EXPECT_EQ(f.machine.target("/dev/ins"), "/dev/ttyUSB0");
+  EXPECT_EQ(f.machine.target("/dev/ttyUSB0"), "/dev/ttyUSB0");
+  for (const char* path : {"/dev/dangling", "/dev/outside", "/dev/missing"})
+    EXPECT_EQ(f.machine.target(path), path);
+  EXPECT_EQ(Machine::here().target("/dev/null"), "/dev/null");
+}
+
+TEST(Machine, roomIsThatOfTheFirstFolderThatTells) {
+  const Machine m = Machine::here();
+  const test::TemporaryFolder folder;
+  const auto room = m.room_at(folder / "not/there/yet");
+  ASSERT_TRUE(room);
+  EXPECT_FALSE(room->read_only);
+  EXPECT_TRUE(room->may_write);
+}
+
+TEST(Machine, roomBehindAClosedFolderIsToldAndNotThisUsersToWrite) {
+  const test::TemporaryFolder folder;
+  (void)folder.write("closed/a/b/file", "");
+  ASSERT_EQ(::chmod(folder.path().c_str(), 0755), 0);
+  ASSERT_EQ(::chmod((folder / "closed").c_str(), 0), 0);
+  const pid_t child = ::fork();  // root may go anywhere, so somebody else looks
+  if (child == 0) {
+    constexpr uid_t kNobody = 65534;
+    if (::geteuid() == 0 && (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) ::_exit(3);
+    const auto room = Machine::here().room_at(folder / "closed/a/b/c");
+    ::_exit(!room ? 2 : room->may_write ? 1 : 0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  (void)::chmod((folder / "closed").c_str(), 0700);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0) << "1: it may write; 2: not told; 3: no other user here";
 }
 
 TEST(UsbTree, listsDevicesAndPassesOverWhatMakesNoSense) {

@@ -15,9 +15,7 @@
 namespace vergence::app {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+using test::contains;
 
 /// The house's own check of udev rules.
 testing::AssertionResult holds_as_rules(const std::string& rules) {
@@ -154,6 +152,20 @@ TEST(UdevRules, aPortIsNamedInManyWays) {
     EXPECT_TRUE(names_port(key, p)) << key;
   for (const char* key : {"/dev/ttyUSB1", "A", "/dev/vergence/ins-A2"})
     EXPECT_FALSE(names_port(key, p)) << key;
+}
+
+TEST(UdevRules, aRigsPortMayBeNamedByAnyLink) {
+  const test::FakeMachine f;
+  f.file("/dev/ttyUSB1", "");
+  f.file("/dev/vehicle/other", "");
+  std::filesystem::create_symlink("../ttyUSB1", f.folder / "dev/vehicle/imu");
+  Needs needs;
+  needs.given = true;
+  needs.ins_driver = "xsens";
+  needs.ins_port = "/dev/vehicle/imu";
+  const RigDevices rig = rig_devices(two_rigs(), with_nodes(needs, f.machine));
+  EXPECT_TRUE(rig.missing.empty()) << rig.missing.front();
+  EXPECT_TRUE(contains(udev_rules(rig), "vergence/ins-B2"));
 }
 
 TEST(UdevRules, aBuiltInPortNeedsNone) {
