@@ -85,7 +85,8 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   command->add_option("ESTIMATE", a->estimate, "TUM file, session folder, or data set")->required();
   command->add_option(
       "REFERENCE", a->reference,
-      "TUM file, KITTI or EuRoC data-set folder, or its truth file; ins.csv of a session");
+      "TUM file, KITTI or EuRoC data-set folder, or its truth file; ins.csv of a session, which is "
+      "brought to the left camera by the session's mount");
   command->add_flag("--json", a->json, "The figures as JSON");
   command->add_option(
       "--lengths", a->lengths,

@@ -1,6 +1,7 @@
 #include "app/evaluation/evaluation.hpp"
 
 #include <iostream>
+#include <optional>
 #include <system_error>
 #include <vector>
 
@@ -8,6 +9,7 @@
 
 #include "app/datasets/trajectory_files.hpp"
 #include "app/evaluation/evaluation_report.hpp"
+#include "app/evaluation/ins_mount.hpp"
 #include "app/evaluation/mount_report.hpp"
 #include "app/recorder/ins_file.hpp"
 
@@ -47,25 +49,66 @@ Reference reference_of(const EvaluationRequest& a) {
   return {path, false};
 }
 
-/// The reference's poses, brought to the estimate's body if that is asked for; *mount then tells
-/// how.
-Trajectory read_reference(const EvaluationRequest& a, const Reference& from,
-                          const Trajectory& estimate, FoundMount* mount) {
-  Trajectory reference;
+/// A reference at the estimate's body, and how it came there.
+struct Brought {
+  Trajectory poses{};
+  FoundMount found{};              // where a mount is asked for; not ok: there are no poses
+  std::optional<InsMount> told{};  // of an INS's readings, else
+};
+
+Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readings,
+                  const Trajectory& estimate) {
+  const std::vector<MountReference> moments = ins_moments(read_ins_file(readings));
+  if (moments.empty())
+    throw InputError(readings.string() + ": has no reading with an attitude and a satellites' fix");
+  Brought out;
+  out.poses = poses_of(moments);
+  if (a.estimate_mount)
+    out.found = find_ins_mount(estimate, moments);
+  else if (a.options.axes == BodyAxes::camera)  // else both are forward, left, up
+    out.told = ins_mount_of(a.estimate, readings);
+  return out;
+}
+
+Brought bring_reference(const EvaluationRequest& a, const Reference& from,
+                        const Trajectory& estimate) {
+  Brought out;
   if (from.is_ins) {
-    const std::vector<MountReference> moments = ins_moments(read_ins_file(from.path));
-    if (moments.empty())
-      throw InputError(from.path.string() +
-                       ": has no reading with an attitude and a satellites' fix");
-    reference = poses_of(moments);
-    if (a.estimate_mount) *mount = find_ins_mount(estimate, moments);
+    out = bring_ins(a, from.path, estimate);
   } else {
-    reference = read_trajectory(from.path);
-    if (a.estimate_mount) *mount = find_mount(estimate, reference);
+    out.poses = read_trajectory(from.path);
+    if (a.estimate_mount) out.found = find_mount(estimate, out.poses);
   }
-  if (a.estimate_mount && mount->status == MountStatus::ok)
-    reference = brought_over(reference, mount->mount);
-  return reference;
+  if (a.estimate_mount && out.found.status == MountStatus::ok)
+    out.poses = brought_over(out.poses, out.found.mount.T_ref_est);
+  if (out.told) out.poses = brought_over(out.poses, out.told->T_ins_left);
+  return out;
+}
+
+/// Without a mount nothing can be compared.
+ExitCode tell_no_mount(const EvaluationRequest& a, const Reference& from, const FoundMount& found) {
+  if (a.json) {
+    nlohmann::ordered_json out;
+    out["mount"] = mount_json(found);
+    std::cout << out.dump(1) << '\n';
+  }
+  std::cerr << "vergence: no mount between " << a.estimate.string() << " and " << from.path.string()
+            << ": " << mount_problem(found.status) << '\n';
+  return ExitCode::not_usable;
+}
+
+void print(const EvaluationRequest& a, const EvaluationOptions& options, const Brought& reference,
+           const TrajectoryEvaluation& evaluation) {
+  if (a.json) {
+    nlohmann::ordered_json out = evaluation_json(evaluation, options);
+    if (a.estimate_mount) out["mount"] = mount_json(reference.found);
+    if (reference.told) out["ins_mount"] = ins_mount_json(*reference.told);
+    std::cout << out.dump(1) << '\n';
+    return;
+  }
+  if (a.estimate_mount) std::cout << mount_text(reference.found);
+  if (reference.told) std::cout << ins_mount_text(*reference.told) << '\n';
+  std::cout << evaluation_text(evaluation, options);
 }
 
 }  // namespace
@@ -74,24 +117,12 @@ ExitCode run_evaluation(const EvaluationRequest& a) {
   EvaluationOptions options = a.options;
   const Reference from = reference_of(a);
   const Trajectory estimate = read_trajectory(a.estimate);
-  FoundMount mount;
-  const Trajectory reference = read_reference(a, from, estimate, &mount);
-  TrajectoryEvaluation evaluation = evaluate(estimate, reference, options);
+  const Brought reference = bring_reference(a, from, estimate);
+  if (a.estimate_mount && reference.found.status != MountStatus::ok)
+    return tell_no_mount(a, from, reference.found);
+  TrajectoryEvaluation evaluation = evaluate(estimate, reference.poses, options);
   if (a.usual_lengths) keep_longest(&evaluation, &options);
-  if (a.json) {
-    nlohmann::ordered_json out = evaluation_json(evaluation, options);
-    if (a.estimate_mount) out["mount"] = mount_json(mount);
-    std::cout << out.dump(1) << '\n';
-  } else {
-    std::cout << (a.estimate_mount ? mount_text(mount) : "")
-              << evaluation_text(evaluation, options);
-  }
-  if (a.estimate_mount && mount.status != MountStatus::ok) {
-    std::cerr << "vergence: no mount between " << a.estimate.string() << " and "
-              << from.path.string() << ": " << mount_json(mount)["status"].get<std::string>()
-              << '\n';
-    return ExitCode::not_usable;
-  }
+  print(a, options, reference, evaluation);
   if (evaluation.status == EvaluationStatus::ok) return ExitCode::done;
   std::cerr << "vergence: " << a.estimate.string() << " against " << from.path.string() << ": "
             << evaluation_problem(evaluation, options) << '\n';

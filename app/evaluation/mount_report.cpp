@@ -31,7 +31,20 @@ std::string row(const char* what, const MountValue& v, double unit, const char* 
   return fmt::format("  {:<34}{:>11.4f} ± {:.4f} {}\n", what, v.value * unit, v.sigma * unit, name);
 }
 
-const char* problem(MountStatus status) {
+/// What `ins.boresight_deg` would be: roll, pitch, yaw. Nothing: it is no INS's mount, or a part of
+/// it does not show.
+std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
+  const auto& r = found.mount.rotation;
+  if (!found.of_ins ||
+      !std::all_of(r.begin(), r.end(), [](const MountValue& v) { return v.observable; }))
+    return std::nullopt;
+  const Vec3 turn = boresight_of(found.mount.T_ref_est.R) * kDegreesPerRadian;
+  return std::array{turn.x(), turn.y(), turn.z()};
+}
+
+}  // namespace
+
+const char* mount_problem(MountStatus status) {
   switch (status) {
     case MountStatus::too_few:
       return "fewer than 20 moments in common; give a longer drive, or check that both have the "
@@ -46,19 +59,6 @@ const char* problem(MountStatus status) {
   }
   return "";
 }
-
-/// What `ins.boresight_deg` would be: roll, pitch, yaw. Nothing: it is no INS's mount, or a part of
-/// it does not show.
-std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
-  const auto& r = found.mount.rotation;
-  if (!found.of_ins ||
-      !std::all_of(r.begin(), r.end(), [](const MountValue& v) { return v.observable; }))
-    return std::nullopt;
-  const Vec3 turn = boresight_of(found.mount.T_ref_est.R) * kDegreesPerRadian;
-  return std::array{turn.x(), turn.y(), turn.z()};
-}
-
-}  // namespace
 
 std::vector<MountReference> ins_moments(std::span<const InsRecord> readings) {
   const auto placed = [](const InsRecord& r) {
@@ -125,15 +125,15 @@ FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference) {
   return best;
 }
 
-Trajectory brought_over(const Trajectory& reference, const Mount& mount) {
+Trajectory brought_over(const Trajectory& reference, const Transform& T_ref_est) {
   Trajectory out = reference;
-  for (StampedPose& pose : out) pose.T_world_body = pose.T_world_body * mount.T_ref_est;
+  for (StampedPose& pose : out) pose.T_world_body = pose.T_world_body * T_ref_est;
   return out;
 }
 
 Json mount_json(const FoundMount& found) {
   Json out;
-  out["status"] = found.status == MountStatus::ok ? "ok" : problem(found.status);
+  out["status"] = found.status == MountStatus::ok ? "ok" : mount_problem(found.status);
   if (found.status != MountStatus::ok) return out;
   const Mount& m = found.mount;
   constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};
@@ -150,7 +150,6 @@ Json mount_json(const FoundMount& found) {
 }
 
 std::string mount_text(const FoundMount& found) {
-  if (found.status != MountStatus::ok) return fmt::format("mount: {}\n\n", problem(found.status));
   const Mount& m = found.mount;
   std::string out = fmt::format(
       "mount of the {}, from {} moments (residuals {:.3f} deg, {:.3f} m)\n",

@@ -32,13 +32,14 @@ struct FoundMount {
 /// The poses of the moments.
 [[nodiscard]] Trajectory poses_of(std::span<const MountReference> moments);
 
-/// The reference brought to the estimate's body by what is observable of the mount, the rest by the
-/// drawing. Stamps stay: the clock offset is told, not applied.
-[[nodiscard]] Trajectory brought_over(const Trajectory& reference, const Mount& mount);
+/// The reference brought to the estimate's body. Stamps stay: a clock offset is told, not applied.
+[[nodiscard]] Trajectory brought_over(const Trajectory& reference, const Transform& T_ref_est);
 
 /// For a machine; what is not observable is null, with its sigma beside it.
 [[nodiscard]] nlohmann::ordered_json mount_json(const FoundMount& found);
-/// For a person, lines with their ends.
+/// Why there is none, a few words. Precondition: the status is not ok.
+[[nodiscard]] const char* mount_problem(MountStatus status);
+/// For a person, lines with their ends. Precondition: the status is ok.
 [[nodiscard]] std::string mount_text(const FoundMount& found);
 
 }  // namespace vergence::app
