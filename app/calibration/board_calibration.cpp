@@ -24,6 +24,15 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// Sigmas of a lens: views may have more in common than the noise of their corners, and then what
+/// the jackknife says is the one to believe. With hardly any views it says nothing, or anything.
+void set_lens_sigmas(const BoardCameraResult& camera, Intrinsics* lens) {
+  for (std::size_t i = 0; i < camera.noise.size(); ++i)
+    (i < 4 ? lens->sigma[i] : lens->distortion_sigma[i - 4]) =
+        std::isfinite(camera.between[i]) ? std::max(camera.noise[i], camera.between[i])
+                                         : camera.noise[i];
+}
+
 /// Views with indices into what was given, those in use only.
 class Calibrator {
  public:
@@ -199,13 +208,10 @@ bool Calibrator::adjust() {
       const int lens = layout.lens(static_cast<int>(k));
       for (int i = 0; i < layout.lens_size(); ++i) {
         const auto at = static_cast<std::size_t>(i);
-        const double sigma = std::sqrt(variance(lens + i));
-        if (i < 4)
-          result_.rig.intrinsics[k].sigma[at] = sigma;
-        else
-          camera.distortion_sigma[at - 4] = sigma;
+        camera.noise[at] = std::sqrt(variance(lens + i));
         camera.between[at] = between(unit(lens + i));
       }
+      set_lens_sigmas(camera, &result_.rig.intrinsics[k]);
       if (k == 0) continue;
       const int place = layout.place(static_cast<int>(k));
       result_.rig.covariance_wide[k] = s.covariance.block<6, 6>(place, place);

@@ -25,15 +25,15 @@ struct BoardViewResult {
 
 struct BoardCameraResult {
   int images = 0;
-  double alone_rms_px = 0;                   // the camera calibrated for itself
-  double rms_px = 0;                         // all together
-  std::array<double, 5> distortion_sigma{};  // as Intrinsics::distortion
-  std::array<double, 9> between{};           // jackknife over views: fx fy cx cy d0 … d4
+  double alone_rms_px = 0;          // the camera calibrated for itself
+  double rms_px = 0;                // all together
+  std::array<double, 9> noise{};    // sigmas of fx fy cx cy d0 … d4 from (JᵀJ)⁻¹
+  std::array<double, 9> between{};  // the same by jackknife over views
 };
 
 struct BoardCalibration {
-  RigCalibration
-      rig{};  // sigmas from (JᵀJ)⁻¹; noise: lenses held, wide: lenses estimated with the places
+  RigCalibration rig{};  // sigmas of places from (JᵀJ)⁻¹; noise: lenses held, wide: lenses
+                         // estimated with the places; of lenses the larger of noise and jackknife
   std::vector<BoardViewResult> views{};
   std::vector<Transform> T_left_board{};  // of every view; of refused ones as a first guess has it
   std::array<BoardCameraResult, kMaxCameras> cameras{};

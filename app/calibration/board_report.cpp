@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -25,7 +26,7 @@ std::vector<std::string> lens_numbers(const BoardReport& r) {
     names.insert(names.end(), {"k1", "k2", "p1", "p2"});
   else
     names.insert(names.end(), {"k1", "k2", "k3", "k4"});
-  if (radtan && r.found.cameras[0].distortion_sigma[4] > 0) names.emplace_back("k3");
+  if (radtan && r.found.cameras[0].noise[8] > 0) names.emplace_back("k3");
   return names;
 }
 
@@ -44,7 +45,7 @@ std::string lens_table(const BoardReport& r) {
     text += fmt::format("{:<14}", names[i]);
     for (std::size_t k = 0; k < cameras; ++k) {
       const Intrinsics& lens = r.file.rig.intrinsics[k];
-      const double sigma = i < 4 ? lens.sigma[i] : r.found.cameras[k].distortion_sigma[i - 4];
+      const double sigma = r.found.cameras[k].noise[i];
       const int digits = digits_for(sigma);
       text += fmt::format(
           "{:>36}", fmt::format("{:.{}f} ± {:.{}f} ({:.{}f})", lens_value(lens, i), digits, sigma,
@@ -131,6 +132,15 @@ std::string worst_views(const BoardReport& r) {
   return shown == 0 ? "" : text + "\n";
 }
 
+/// fx fy cx cy.
+std::span<const double> of_pinhole(const std::array<double, 9>& of_lens) {
+  return std::span(of_lens).first(4);
+}
+/// d0 … d4.
+std::span<const double> of_distortion(const std::array<double, 9>& of_lens) {
+  return std::span(of_lens).subspan(4);
+}
+
 }  // namespace
 
 std::string format_report(const BoardReport& r) {
@@ -180,19 +190,21 @@ nlohmann::ordered_json json_report(const BoardReport& r) {
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
     const Intrinsics& lens = rig.intrinsics[k];
     const BoardCameraResult& c = r.found.cameras[k];
-    Json camera{
-        {"name", r.file.names[k]},
-        {"size", {lens.width, lens.height}},
-        {"model",
-         lens.kind == CameraModelKind::pinhole_radtan ? "pinhole-radtan" : "pinhole-equidistant"},
-        {"images", c.images},
-        {"rms_px", c.rms_px},
-        {"alone_rms_px", c.alone_rms_px},
-        {"intrinsics", {lens.fx, lens.fy, lens.cx, lens.cy}},
-        {"intrinsics_sigma", lens.sigma},
-        {"intrinsics_between", std::array{c.between[0], c.between[1], c.between[2], c.between[3]}},
-        {"distortion", lens.distortion},
-        {"distortion_sigma", c.distortion_sigma}};
+    Json camera{{"name", r.file.names[k]},
+                {"size", {lens.width, lens.height}},
+                {"model", lens.kind == CameraModelKind::pinhole_radtan ? "pinhole-radtan"
+                                                                       : "pinhole-equidistant"},
+                {"images", c.images},
+                {"rms_px", c.rms_px},
+                {"alone_rms_px", c.alone_rms_px},
+                {"intrinsics", {lens.fx, lens.fy, lens.cx, lens.cy}},
+                {"intrinsics_sigma", lens.sigma},
+                {"intrinsics_noise", of_pinhole(c.noise)},
+                {"intrinsics_between", of_pinhole(c.between)},
+                {"distortion", lens.distortion},
+                {"distortion_sigma", lens.distortion_sigma},
+                {"distortion_noise", of_distortion(c.noise)},
+                {"distortion_between", of_distortion(c.between)}};
     if (k > 0) {
       const Transform& T = rig.T_camera_left[k];
       const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;

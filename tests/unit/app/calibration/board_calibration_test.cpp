@@ -7,6 +7,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "app/config/calibration_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/unit/app/calibration/board_scene.hpp"
 
@@ -22,7 +23,7 @@ using test::place_error;
 const BoardPattern kBoard = parse_checkerboard("9x6", 0.04);
 constexpr double kNoise = 0.1;  // px
 
-/// Every number of the rig within so many of its own sigmas.
+/// Every number of the rig within so many of its own sigmas, those by noise.
 void expect_recovered(const BoardCalibration& c, const RigCalibration& truth, double sigmas) {
   ASSERT_EQ(c.error, "");
   for (std::size_t k = 0; k < static_cast<std::size_t>(truth.cameras); ++k) {
@@ -30,10 +31,11 @@ void expect_recovered(const BoardCalibration& c, const RigCalibration& truth, do
     const std::array off{found.fx - real.fx, found.fy - real.fy, found.cx - real.cx,
                          found.cy - real.cy};
     for (std::size_t i = 0; i < 4; ++i)
-      EXPECT_LT(std::abs(off[i]), sigmas * found.sigma[i]) << "camera " << k << " intrinsics " << i;
+      EXPECT_LT(std::abs(off[i]), sigmas * c.cameras[k].noise[i])
+          << "camera " << k << " intrinsics " << i;
     for (std::size_t i = 0; i < 4; ++i)
       EXPECT_LT(std::abs(found.distortion[i] - real.distortion[i]),
-                sigmas * c.cameras[k].distortion_sigma[i])
+                sigmas * c.cameras[k].noise[4 + i])
           << k << " " << i;
     if (k == 0) continue;
     const Vec6 e = place_error(c.rig.T_camera_left[k], truth.T_camera_left[k]);
@@ -110,6 +112,34 @@ TEST(BoardCalibration, theJackknifeAgreesWithTheSigmasWhereNoiseIsAllThereIs) {
     EXPECT_GT(c.between[1][i], 0.5 * c.rig.sigma_wide[1][i]) << i;
     EXPECT_LT(c.between[1][i], 2.0 * c.rig.sigma_wide[1][i]) << i;
   }
+}
+
+/// What corners of one view have in common is no noise: here every left image is stretched by some
+/// amount of its own.
+TEST(BoardCalibration, aLensIsKnownAsWellAsNoiseAndViewsSayInTheFileToo) {
+  const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
+  BoardScene scene = board_scene(truth, kBoard, 15, 0.02, 21);
+  Random random(3, 1);
+  for (BoardView& view : scene.views) {
+    const Vec2 stretch = Vec2(1, 1) + 5e-4 * Vec2(random.normal(), random.normal());
+    for (BoardCorner& corner : view.corners[0]) corner.pixel = corner.pixel.cwiseProduct(stretch);
+  }
+  const BoardCalibration c = calibrate_boards(scene.views, board_options(truth, kBoard));
+  ASSERT_EQ(c.error, "");
+  CalibrationFile file;
+  file.rig = c.rig;
+  const RigCalibration back = parse_calibration(format_calibration(file), "c.yaml").rig;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Intrinsics& lens = back.intrinsics[k];
+    const BoardCameraResult& camera = c.cameras[k];
+    for (std::size_t i = 0; i < 8; ++i) {
+      const double sigma = i < 4 ? lens.sigma[i] : lens.distortion_sigma[i - 4];
+      EXPECT_GT(camera.noise[i], 0);
+      EXPECT_NEAR(sigma / std::max(camera.noise[i], camera.between[i]), 1, 1e-6) << k << " " << i;
+    }
+    EXPECT_EQ(lens.distortion_sigma[4], 0) << "k3 is not estimated";
+  }
+  EXPECT_GT(c.cameras[0].between[0], 1.2 * c.cameras[0].noise[0]) << "nothing is tested";
 }
 
 TEST(BoardCalibration, theJackknifeIsWhatLeavingOutViewsDoes) {
