@@ -14,6 +14,7 @@
 #include "app/checkerboard/calibrate_session.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/drive_devices.hpp"
+#include "app/runtime/distinct_names.hpp"
 #include "app/runtime/signals.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 #include "drivers/clock.hpp"
@@ -182,6 +183,7 @@ CalibratedRig rig_of(const Configuration& c, const DriveDevices& devices) {
     rig.serials.push_back(devices.cameras()[k]->info().serial);
     rig.sizes.push_back({s.width, s.height});
   }
+  rig.names = distinct_names(rig.names);  // the files of --keep-views are called like this
   return rig;
 }
 

@@ -24,7 +24,8 @@ namespace vergence::app {
 using Remarks = std::vector<std::string>;
 
 /// Kalibr's camchain: cam0, cam1 … with T_cn_cnm1, X_cn = T_cn_cnm1 X_cn-1; pinhole with radtan,
-/// equidistant or none. A camera's name is the first part of its rostopic.
+/// equidistant or none. A camera's name is the part of its rostopic before the
+/// image.
 [[nodiscard]] CalibrationFile read_kalibr(const YamlFile& file, Remarks* remarks);
 [[nodiscard]] std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks);
 

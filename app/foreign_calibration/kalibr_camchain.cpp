@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <sstream>
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
@@ -10,11 +11,16 @@
 namespace vergence::app {
 namespace {
 
-/// `/left/image_raw` → `left`.
+/// What stands before the image, which cameras of a rig do not share: `/stereo/left/image_raw` →
+/// `left`; where no part is called an image, the last one. Empty: nothing stands there.
 std::string name_in(const std::string& topic) {
-  const std::size_t begin = topic.find_first_not_of('/');
-  if (begin == std::string::npos) return {};
-  return topic.substr(begin, topic.find('/', begin) - begin);
+  std::string name;
+  std::istringstream parts(topic);
+  for (std::string part; std::getline(parts, part, '/');) {
+    if (part.starts_with("image")) return name;
+    if (!part.empty()) name = part;
+  }
+  return name;
 }
 
 Intrinsics read_lens(const YamlFile& file, const YAML::Node& camera, const std::string& name) {

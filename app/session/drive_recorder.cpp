@@ -23,7 +23,7 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
                              const SolverWatch& watch)
     : settings_(configuration.record),
       watch_(watch),
-      frames_(facts.begin.file.names),
+      frames_(recorded_names(facts.begin.file)),
       recording_(folder, recording_options(configuration, facts)),
       rig_(facts.begin.file.rig),
       calibrated_(facts.begin.trust != CalibrationTrust::none) {

@@ -69,7 +69,7 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
 
   const RecordSettings& settings_;
   const SolverWatch& watch_;
-  std::array<std::string, kMaxCameras> frames_;  // of reference, of the cameras
+  std::vector<std::string> frames_;  // of reference, of the cameras
   std::array<std::string_view, kMaxCameras> frame_names_{};
   Recording recording_;
   std::optional<ImageEncoder> encoder_;  // record.image_format: png

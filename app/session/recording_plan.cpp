@@ -11,6 +11,7 @@
 #include "app/config/schema.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
+#include "app/runtime/distinct_names.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/version.hpp"
 
@@ -38,12 +39,12 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file, bool png) {
                                  {"/trigger_board/line", RosType::line_event, false},
                                  {"/vergence/device_gone", RosType::device_gone, false},
                                  {"/vergence/set", RosType::rig_set, false}};
-  for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
-    const std::string images = "/" + file.names[k] + "/image_raw";
+  for (const std::string& name : recorded_names(file)) {
+    const std::string images = "/" + name + "/image_raw";
     out.push_back(png ? RecordedTopic{images + "/compressed", RosType::compressed_image, false}
                       : RecordedTopic{images, RosType::image, false});
-    out.push_back({"/" + file.names[k] + "/camera_info", RosType::camera_info, false});
-    out.push_back({"/" + file.names[k] + "/device_frame", RosType::device_frame, false});
+    out.push_back({"/" + name + "/camera_info", RosType::camera_info, false});
+    out.push_back({"/" + name + "/device_frame", RosType::device_frame, false});
   }
   return out;
 }
@@ -128,6 +129,10 @@ Recording::WhenFull when_full(const SourceFacts& facts) {
 }
 
 }  // namespace
+
+std::vector<std::string> recorded_names(const CalibrationFile& file) {
+  return distinct_names({file.names.begin(), file.names.begin() + file.rig.cameras});
+}
 
 bool as_png(const RecordSettings& settings) noexcept {
   return settings.images != 0 && settings.image_format == RecordSettings::kPngImages;

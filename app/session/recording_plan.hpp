@@ -1,5 +1,7 @@
 #pragma once
 #include <cstddef>
+#include <string>
+#include <vector>
 
 #include "app/config/configuration.hpp"
 #include "app/recording/image_encoder.hpp"
@@ -37,6 +39,9 @@ enum Topic : std::size_t {
 constexpr std::size_t image_topic(std::size_t camera) noexcept {
   return first_camera_topic + 3 * camera;
 }
+
+/// Names of the cameras in topics and as frames of reference: those of the calibration, each once.
+[[nodiscard]] std::vector<std::string> recorded_names(const CalibrationFile& file);
 
 /// Images are recorded, and as PNG.
 [[nodiscard]] bool as_png(const RecordSettings& settings) noexcept;

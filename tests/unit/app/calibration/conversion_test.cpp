@@ -133,6 +133,12 @@ std::vector<Reference> reference_of_camchain(const std::string& text) {
   return references;
 }
 
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  const auto at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return at == std::string::npos ? text : text.replace(at, what.size(), by);
+}
+
 const std::string kCamchain = R"(cam0:
   T_cam_imu:
   - [0.0148, -0.9998, 0.0041, -0.0216]
@@ -170,6 +176,20 @@ TEST(Kalibr, aCamchainIsReadAsItsOwnDefinitionProjects) {
   EXPECT_EQ(c.rig.intrinsics[1].width, 752);
   ASSERT_EQ(remarks.size(), 1U);
   EXPECT_NE(remarks[0].find("T_cam_imu"), std::string::npos);
+}
+
+TEST(Kalibr, aNameIsWhatStandsBeforeTheImageInATopic) {
+  const auto names = [](const std::string& left, const std::string& right) {
+    const std::string chain =
+        replaced(replaced(kCamchain, "/left/image_raw", left), "/cam1/image_raw", right);
+    Remarks remarks;
+    const auto all = read_kalibr(YamlFile::parse(chain, "camchain.yaml"), &remarks).names;
+    return all[0] + " " + all[1];
+  };
+  EXPECT_EQ(names("/stereo/left/image_raw", "/stereo/right/image_raw"), "left right");
+  EXPECT_EQ(names("/rig/port/image_rect_raw/compressed", "starboard/image"), "port starboard");
+  EXPECT_EQ(names("/cam_a", "/rig/cam_b"), "cam_a cam_b");
+  EXPECT_EQ(names("/image_raw", "//"), "left right") << "names of their own, as without a topic";
 }
 
 TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
@@ -452,12 +472,6 @@ std::string last_error(const std::function<void()>& f) {
     return error.what();
   }
   return "";
-}
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const auto at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return at == std::string::npos ? text : text.replace(at, what.size(), by);
 }
 
 TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
