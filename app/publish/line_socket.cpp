@@ -35,7 +35,12 @@ void remove_stale(const sockaddr_un& address, std::string_view key) {
       errno == EAGAIN)
     throw InputError(fmt::format("{}: another program sends its lines to {}; name another path",
                                  key, address.sun_path));
-  (void)::unlink(address.sun_path);
+  // Only this says that nobody listens: a socket of datagrams or one of another user may live.
+  if (errno == ECONNREFUSED)
+    (void)::unlink(address.sun_path);
+  else if (errno != ENOENT)
+    throw InputError(fmt::format("{}: {} is a socket of another program ({}); name another path",
+                                 key, address.sun_path, std::strerror(errno)));
 }
 
 /// A stream, not datagrams: readers come and go as they like without an address of their own, any
