@@ -1,9 +1,15 @@
 #include "app/publish/address.hpp"
 
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netdb.h>
+#include <netinet/in.h>
 #include <sys/un.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <memory>
 
 #include <fmt/format.h>
 
@@ -13,6 +19,7 @@ namespace vergence::app {
 namespace {
 
 constexpr std::size_t kLongestHost = 253;  // a name of the domain name system
+constexpr std::size_t kMostAddresses = 8;  // lines that a person reads
 
 bool host_letter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
@@ -22,6 +29,25 @@ bool host_letter(char c) {
 bool address_letter(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F') || c == ':' ||
          c == '.';
+}
+
+/// Whether a person can type it: one of the link alone wants the name of an interface behind it.
+bool typed(const ifaddrs& interface, bool v6_too) {
+  if (interface.ifa_addr == nullptr || (interface.ifa_flags & IFF_UP) == 0 ||
+      (interface.ifa_flags & IFF_LOOPBACK) != 0)
+    return false;
+  if (interface.ifa_addr->sa_family == AF_INET) return true;
+  if (interface.ifa_addr->sa_family != AF_INET6 || !v6_too) return false;
+  const auto* v6 = reinterpret_cast<const sockaddr_in6*>(interface.ifa_addr);
+  return !IN6_IS_ADDR_LINKLOCAL(&v6->sin6_addr);
+}
+
+std::string digits_of(const sockaddr& address) {
+  std::array<char, NI_MAXHOST> text{};
+  const socklen_t size = address.sa_family == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6);
+  const int error =
+      ::getnameinfo(&address, size, text.data(), text.size(), nullptr, 0, NI_NUMERICHOST);
+  return error == 0 ? text.data() : "";
 }
 
 }  // namespace
@@ -55,6 +81,22 @@ HostPort parse_host_port(std::string_view text, std::string_view key) {
   const auto [read, error] = std::from_chars(digits.data(), end, port);
   if (error != std::errc() || read != end || port < 1 || port > 65535) return refuse();
   return {std::string(host), static_cast<std::uint16_t>(port)};
+}
+
+std::vector<HostPort> addresses_of(const HostPort& address) {
+  const bool every_v6 = address.host == "::";
+  if (address.host != "0.0.0.0" && !every_v6) return {address};
+  std::vector<HostPort> out;
+  ifaddrs* found = nullptr;
+  if (::getifaddrs(&found) == 0) {
+    const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(found, ::freeifaddrs);
+    for (const ifaddrs* i = found; i != nullptr && out.size() < kMostAddresses; i = i->ifa_next)
+      if (typed(*i, every_v6))
+        if (const std::string host = digits_of(*i->ifa_addr); !host.empty())
+          out.push_back({host, address.port});
+  }
+  if (out.empty()) out.push_back({every_v6 ? "::1" : "127.0.0.1", address.port});
+  return out;
 }
 
 LineAddress parse_line_address(std::string_view text, std::string_view key) {

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace vergence::app {
 
@@ -15,6 +16,10 @@ struct HostPort {
   /// As it stands in a URL: brackets around an IPv6 address.
   [[nodiscard]] std::string text() const;
 };
+
+/// What others open to come to this machine: where the host is every address (0.0.0.0, ::), those
+/// of its interfaces, at most eight of them; otherwise the host itself.
+[[nodiscard]] std::vector<HostPort> addresses_of(const HostPort& address);
 
 /// Where the lines go.
 struct LineAddress {

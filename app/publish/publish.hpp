@@ -1,6 +1,7 @@
 #pragma once
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "app/config/configuration.hpp"
 #include "app/publish/line_publisher.hpp"
@@ -28,7 +29,7 @@ class Publishing {
   SessionRequests requests_;
   std::unique_ptr<LinePublisher> lines_;  // outlives the page, which shows its latency
   std::unique_ptr<LivePage> page_;
-  std::string address_{};  // of the page, for a person to open
+  std::vector<std::string> links_{};  // to the page, for a person to open
 };
 
 /// `--page`: the live page on this machine, where the configuration names no address.
