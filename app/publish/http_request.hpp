@@ -11,7 +11,7 @@ namespace vergence::app {
 /// The head of one HTTP request, as far as the live page needs it: views of the bytes received.
 struct HttpRequest {
   std::string_view method{}, path{};  // path without the query
-  std::string_view token{};           // of the query `token=`, or the header X-Vergence-Token
+  std::string_view token{};           // of the header X-Vergence-Token, or the query `token=`
   std::string_view host{}, origin{};
   bool token_in_header = false;
   std::uint64_t content_length = 0;

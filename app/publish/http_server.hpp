@@ -26,8 +26,9 @@ struct HttpCounters {
 ///     HttpServer server(address, policy, page, 4, [&](HttpRoute route) { act(route); });
 ///     while (!ended) {
 ///       server.step(std::chrono::milliseconds(100));
-///       server.greet("hello", [&] { return state.hello(); });
-///       server.broadcast("update", state.update(-1), HttpServer::Skipped::greet_again);
+///       const HostStamp now = monotonic_now();
+///       server.greet("hello", [&] { return state.hello(now); });
+///       server.broadcast("update", state.update(now, -1), HttpServer::Skipped::greet_again);
 ///     }
 ///
 /// Own code, because Debian's cpp-httplib is a compiled library that brings OpenSSL and brotli: six

@@ -134,9 +134,10 @@ void LivePage::show() {
   shown_ = std::max(shown_ + kBetweenUpdates, Clock::now() - kBetweenUpdates / 2);
   if (!begun_) return;  // the mock's world takes its time; viewers wait for the session
   counts_.updates.fetch_add(1, std::memory_order_relaxed);
-  server_.broadcast("update", state_.update(line_age_ms_()), HttpServer::Skipped::greet_again);
+  const HostStamp now = monotonic_now();
+  server_.broadcast("update", state_.update(now, line_age_ms_()), HttpServer::Skipped::greet_again);
   // After the update: what a greeting has is not told again.
-  server_.greet("hello", [this] { return state_.hello(); });
+  server_.greet("hello", [this, now] { return state_.hello(now); });
   if (images_.ready()) {
     show_images();
     images_.done();

@@ -78,12 +78,31 @@ json temperatures_json(const std::array<std::optional<float>, kMaxCameras>& cels
   return out;
 }
 
+constexpr double kSilence_s = 1;      // without a frame: nobody reads an old status as today's …
+constexpr double kMostIntervals = 3;  // … unless frames are that rare
+constexpr double kSmoothing = 8;      // frames
+
+/// Steps of the map that an extent is worth: fewer would show no way any more.
+constexpr float kLeastSteps = 100;
+
+float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
+
 }  // namespace
 
 void LiveState::add(const LiveFrame& frame) {
+  if (any_) take_interval(frame.pose.out);
   newest_ = frame;
   any_ = true;
   estimate_.add(static_cast<double>(frame.pose.estimate_ms));
+}
+
+/// A gap counts as twice the interval at most: an outage does not make the next one unseen.
+void LiveState::take_interval(HostStamp out) noexcept {
+  const double gap = (out - newest_.pose.out).to_seconds();
+  if (interval_s_ <= 0) interval_s_ = gap;
+  interval_s_ += (std::min(gap, 2 * interval_s_) - interval_s_) / kSmoothing;
 }
 
 void LiveState::add(const PoseRecord& compared) {
@@ -100,25 +119,49 @@ void LiveState::add(const PoseRecord& compared) {
 }
 
 void LiveState::Trail::add(const Place& place) {
-  if (!places_.empty()) {
-    const Place& last = places_.back();
-    const float moved = std::hypot(place.world[0] - last.world[0], place.world[1] - last.world[1],
-                                   place.world[2] - last.world[2]);
-    if (moved < least_step_m_ && place.status == last.status) return;
-  }
-  if (places_.size() == kTrail) {
-    for (std::size_t i = 0; i < kTrail / 2; ++i) places_[i] = places_[2 * i];
-    places_.resize(kTrail / 2);
-    least_step_m_ *= 2;
-    thinned_ = true;
-  }
-  places_.push_back(place);
+  if (places_.size() == kTrail) thin();
+  if (places_.empty() || distance(place.world, places_.back().world) >= least_step_m_)
+    return places_.push_back(place);
+  // A rig that stands for weeks uses up no places, whatever its status does.
+  Place& last = places_.back();
+  if (place.status <= last.status) return;
+  last.status = place.status;
+  shown_ = std::min(shown_, places_.size() - 1);
 }
 
-std::size_t LiveState::Trail::take_new(bool* thinned) noexcept {
-  *thinned = std::exchange(thinned_, false);
-  const std::size_t shown = std::exchange(shown_, places_.size());
-  return *thinned ? 0 : shown;
+void LiveState::Trail::thin() {
+  shown_ = 0;
+  while (places_.size() > kTrail / 2) {
+    if (2 * least_step_m_ * kLeastSteps > extent()) {
+      // Round and round a yard: what was driven first lies under what came later.
+      places_.erase(places_.begin(), places_.begin() + kTrail / 2);
+      return;
+    }
+    least_step_m_ *= 2;
+    drop_near();
+  }
+}
+
+void LiveState::Trail::drop_near() {
+  std::size_t kept = 0;
+  for (std::size_t i = 1; i < places_.size(); ++i) {
+    if (distance(places_[i].world, places_[kept].world) >= least_step_m_)
+      places_[++kept] = places_[i];
+    else
+      places_[kept].status = std::max(places_[kept].status, places_[i].status);
+  }
+  places_.resize(kept + 1);
+}
+
+float LiveState::Trail::extent() const {
+  float longest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto [least, most] = std::minmax_element(
+        places_.begin(), places_.end(),
+        [axis](const Place& a, const Place& b) { return a.world[axis] < b.world[axis]; });
+    longest = std::max(longest, most->world[axis] - least->world[axis]);
+  }
+  return longest;
 }
 
 void LiveState::add(const EventRecord& event) {
@@ -150,12 +193,15 @@ void LiveState::add(const PublishedPlacement& placement) {
   placement_new_ = true;
 }
 
-json LiveState::frame_json() const {
+json LiveState::frame_json(HostStamp now) const {
   const LiveFrame& f = newest_;
+  const double silence = (now - f.pose.out).to_seconds();
   const PublishedPose& p = f.pose;
   const std::string_view reason = to_string(p.reason);
   json out{{"frame", p.frame},
            {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
+           {"since_s", rounded(silence, 1)},  // when it came
+           {"silent", silence > std::max(kSilence_s, kMostIntervals * interval_s_)},
            {"state", to_string(p.state)},
            {"status", to_string(p.status)},
            {"reason", reason},
@@ -245,7 +291,7 @@ json LiveState::place_json(const Place& p) {
   return out;
 }
 
-std::string LiveState::hello() const {
+std::string LiveState::hello(HostStamp now) const {
   json out{{"session", start_.name},
            {"frames", start_.frames},
            {"can_recalibrate", start_.can_recalibrate},
@@ -257,19 +303,17 @@ std::string LiveState::hello() const {
   for (const EventRecord& event : events_) events.push_back(event_json(event, start_.first));
   out["calibration"] = calibration_json();
   if (placement_) out["placement"] = placement_json(*placement_);
-  if (any_) out["now"] = frame_json();
+  if (any_) out["now"] = frame_json(now);
   return text_of(out);
 }
 
-std::string LiveState::update(double line_age_ms) {
+std::string LiveState::update(HostStamp now, double line_age_ms) {
   json out{{"ended", ended_}};
-  if (any_) out["now"] = frame_json();
+  if (any_) out["now"] = frame_json(now);
   if (any_)
     out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
-  // Thinned, the places are others than those that were shown: all of them anew.
-  bool thinned = false;
-  const std::size_t first = trail_.take_new(&thinned);
-  if (thinned) out["trail_anew"] = true;
+  const std::size_t first = trail_.take_new();
+  out["trail_from"] = first;
   json& trail = out["trail"] = json::array();
   const std::vector<Place>& places = trail_.places();
   for (std::size_t i = first; i < places.size(); ++i) trail.push_back(place_json(places[i]));

@@ -4,6 +4,7 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -29,8 +30,8 @@ struct LiveFrame {
 
 /// What the live page shows, kept so that a viewer who comes late sees the whole drive.
 ///
-/// Threads  One. Memory  Bounded: the trail is thinned by half when it is full, of events and
-///          calibrations the newest stay.
+/// Threads  One. Memory  Bounded: the trail is thinned when it is full, of events and calibrations
+///          the newest stay.
 class LiveState {
  public:
   static constexpr std::size_t kTrail = 4000;  // points of the map
@@ -50,11 +51,11 @@ class LiveState {
   /// The rig in use, for the judgement of points; not known yet: nullptr.
   [[nodiscard]] const RigCalibration* rig() const noexcept { return rig_ ? &*rig_ : nullptr; }
 
-  /// All there is to know, for a viewer who has just come.
-  [[nodiscard]] std::string hello() const;
+  /// All there is to know, for a viewer who has just come. `now` tells whether frames still come.
+  [[nodiscard]] std::string hello(HostStamp now) const;
   /// What is new since the last call, for the others. `line_age_ms`: of the pose lines, 99th
   /// percentile; negative: none.
-  [[nodiscard]] std::string update(double line_age_ms);
+  [[nodiscard]] std::string update(HostStamp now, double line_age_ms);
 
  private:
   struct Place {
@@ -63,27 +64,33 @@ class LiveState {
     std::uint8_t status = 0;
   };
 
-  /// The points of the map, farther apart as the drive grows longer.
+  /// The points of the map, farther apart as the drive grows longer. A place has the worst status
+  /// of all that was driven up to the next one.
   class Trail {
    public:
     void add(const Place& place);
     [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
-    /// Where the places begin that the last call has not had; *thinned: it has to forget those.
-    [[nodiscard]] std::size_t take_new(bool* thinned) noexcept;
+    /// Where the places begin that the last call has not had, or not as they are.
+    [[nodiscard]] std::size_t take_new() noexcept { return std::exchange(shown_, places_.size()); }
 
    private:
+    void thin();
+    void drop_near();
+    [[nodiscard]] float extent() const;
+
     std::vector<Place> places_{};
     float least_step_m_ = 0.5F;
-    std::size_t shown_ = 0;  // places that the last take_new() had
-    bool thinned_ = false;   // since then
+    std::size_t shown_ = 0;  // places that a viewer has as they are
   };
 
   [[nodiscard]] static nlohmann::json place_json(const Place& place);
-  [[nodiscard]] nlohmann::json frame_json() const;
+  void take_interval(HostStamp out) noexcept;
+  [[nodiscard]] nlohmann::json frame_json(HostStamp now) const;
   [[nodiscard]] nlohmann::json calibration_json() const;
 
   SessionStart start_{};
   LiveFrame newest_{};
+  double interval_s_ = 0;  // between frames, on the host's clock
   std::array<std::optional<float>, kMaxCameras> temperatures_{};  // °C
   bool any_ = false, ended_ = false;
   TimeHistogram estimate_;

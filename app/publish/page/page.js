@@ -8,22 +8,41 @@ const colour = name => getComputedStyle(document.documentElement).getPropertyVal
 
 const STATES = {initialising: "starting", parallel_monocular: "without a calibration, cameras apart", calibrating: "calibrating",
                 stereo_odometry: "stereo odometry", recalibrating: "calibrating anew", lost: "lost"};
-const token = () => decodeURIComponent(location.hash.slice(1));
+const token = () => location.hash.slice(1).replace(/[^\w-]/g, "");
 const CAUSES = {given: "given", state_file: "from the last drive", whole_drive: "from the whole drive", knock: "found anew after a knock",
                 collapse: "found anew after a hard knock", drift: "found anew after a drift"};
 const drive = {trail: [], placement: null, rig: [], now: null, can: {}, ended: false};
+const BLANK = new Map(["status", "state", "why", "frame", "frames", "path", "from_ins", "ins_more", "inliers", "stereo", "ms", "ms_more",
+                       "age", "image_frame"].map(id => [id, $(id).textContent]));
 let picture = null, hover = null, drawing = false;
 
 // ---- figures
 
-function showNow(now) {
-  drive.now = now;
+function tone(name) {
   $("band").classList.remove("tone-none", "tone-ok", "tone-degraded", "tone-lost");
-  $("band").classList.add("tone-" + now.status);
+  $("band").classList.add("tone-" + name);
+}
+
+function showStatus(now) {
+  tone(now.status);
   show("status", now.status.toUpperCase());
   show("state", STATES[now.state] || now.state);
   const words = now.reason && now.reason !== "none" ? now.reason.replaceAll("_", " ") : "";
   show("why", words + (now.advice ? (words ? ": " : "") + now.advice : ""));
+}
+
+const lasting = s => s < 120 ? number(s, 0) + " s" : number(s / 60, 0) + " min";
+
+function showSilence(now) {
+  tone("none");
+  show("status", "NO FRAMES");
+  show("state", "for " + lasting(now.since_s));
+  show("why", `the last one was ${now.status.toUpperCase()}; the events tell what is gone`);
+}
+
+function showNow(now) {
+  drive.now = now;
+  if (now.silent && !drive.ended) showSilence(now); else showStatus(now);
   show("frame", now.frame);
   show("frames", drive.frames ? "of " + drive.frames : "at " + number(now.s, 1) + " s");
   show("path", number(now.path_m, 1));
@@ -121,6 +140,7 @@ function drawMap() {
   const canvas = $("map"), ratio = fit(canvas), g = canvas.getContext("2d");
   g.clearRect(0, 0, canvas.width, canvas.height);
   const ours = drive.trail.map(onEarth), theirs = drive.placement ? drive.trail.filter(p => p.length > 4).map(p => [p[4], p[5]]) : [];
+  if (drive.now && drive.now.position_m) ours.push(onEarth(drive.now.position_m));  // steps of the trail are long after a long drive
   show("map_words", drive.placement ? "north is up" : "left camera's start looks up; the INS comes once the drive is placed on the earth");
   if (!ours.length) return;
   let [l, b, r, t] = [Infinity, Infinity, -Infinity, -Infinity];
@@ -136,7 +156,7 @@ function drawMap() {
   line(theirs, "theirs", 4, [10, 6]);
   line(ours, "ours", 2.5, []);
   g.fillStyle = colour("care");
-  drive.trail.forEach((p, i) => { if (p[3] === 1) { const [x, y] = at(ours[i]); g.fillRect(x - 2 * ratio, y - 2 * ratio, 4 * ratio, 4 * ratio); } });
+  drive.trail.forEach((p, i) => { if (p[3] > 0) { const [x, y] = at(ours[i]); g.fillRect(x - 2 * ratio, y - 2 * ratio, 4 * ratio, 4 * ratio); } });
   const [x, y] = at(ours[ours.length - 1]);
   g.beginPath(); g.arc(x, y, 7 * ratio, 0, 7); g.fillStyle = colour("ours"); g.fill();
   g.lineWidth = 2 * ratio; g.strokeStyle = colour("panel"); g.stroke();
@@ -274,9 +294,14 @@ function redraw() {
 window.addEventListener("resize", redraw);
 matchMedia("(prefers-color-scheme:dark)").addEventListener("change", redraw);
 
+function forgetPicture() {
+  if (picture) for (const i of picture.images) if (i.bitmap) i.bitmap.close();
+  picture = null;
+}
+
 async function showImages(message) {
   const bitmaps = await Promise.all(message.images.map(i => decode(i.jpeg)));
-  if (picture) for (const i of picture.images) if (i.bitmap) i.bitmap.close();
+  forgetPicture();
   picture = {frame: message.frame, images: message.images.map((i, k) => ({width: i.width, height: i.height, bitmap: bitmaps[k]})),
              points: message.points.map(p => ({left: [p[0] / 10, p[1] / 10], rejected: p[2] === 1, depth: p[3] / 10, right: p.length > 4 ? [p[4] / 10, p[5] / 10] : null}))};
   show("image_frame", "frame " + message.frame + " · " + picture.points.length + " points");
@@ -285,50 +310,109 @@ async function showImages(message) {
 
 // ---- the program
 
-// Nobody is to read an OK of a minute ago as one of now: without news the band is grey.
+// Nobody is to read an OK of a minute ago as one of now: without news band and pictures are grey.
 function link(words, bad, past) {
   $("band").classList.toggle("past", past);
   show("link", words);
   $("link").className = bad ? "off" : "soft";
 }
 
+// Of another drive nothing may stay: its OK would be read as this one's.
+function blank() {
+  tone("none");
+  for (const [id, words] of BLANK) show(id, words);
+  $("times").replaceChildren();
+  for (const id of ["left", "right"]) $(id).getContext("2d").clearRect(0, 0, $(id).width, $(id).height);
+  forgetPicture();
+  hover = drive.now = null;
+}
+
+function begin(message) {
+  greeted = true;
+  if (!message.now || message.session !== drive.session) blank();
+  Object.assign(drive, {session: message.session, frames: message.frames, trail: [], placement: null});
+  document.title = "vergence · " + message.session;
+  for (const button of document.querySelectorAll("button")) button.disabled = !token()
+    || (button.dataset.action === "recalibrate" && !message.can_recalibrate) || (button.dataset.action === "stop-recording" && !message.recording);
+  show("action_words", token() ? "" : "actions need the token: open the link that the program shows when it starts");
+  showEvents(message.events, true);
+  take(message);
+}
+
 function take(message) {
   if (message.placement) drive.placement = message.placement;
   if (message.calibration) showCalibration(message.calibration);
-  if (message.trail_anew) drive.trail = [];
-  drive.trail.push(...message.trail);
-  if (message.now) showNow(message.now);
+  drive.trail.splice(message.trail_from || 0, Infinity, ...message.trail);
   drive.ended = message.ended;
-  link((drive.ended ? "the drive is over · " : "live · ") + drive.session, false, drive.ended);
+  if (message.now) showNow(message.now);
+  const silent = drive.now && drive.now.silent;
+  const words = drive.ended ? "the drive is over" : !drive.now ? "waiting for the first frame" : silent ? "no frame comes" : "live";
+  link(words + " · " + drive.session, !drive.ended && silent, drive.ended || !drive.now || silent);
   redraw();
 }
 
-function connect() {
-  const source = new EventSource("/events?token=" + encodeURIComponent(token()));
-  source.addEventListener("hello", e => {
-    const message = JSON.parse(e.data);
-    Object.assign(drive, {session: message.session, frames: message.frames, trail: [], placement: null});
-    document.title = "vergence · " + message.session;
-    for (const button of document.querySelectorAll("button")) button.disabled = !token()
-      || (button.dataset.action === "recalibrate" && !message.can_recalibrate) || (button.dataset.action === "stop-recording" && !message.recording);
-    show("action_words", token() ? "" : "actions need the token: open the link that the program shows when it starts");
-    showEvents(message.events, true);
-    take(message);
-  });
-  source.addEventListener("update", e => {
-    const message = JSON.parse(e.data);
-    showEvents(message.events, false);
-    take(message);
-    ++window.updates;
-  });
-  source.addEventListener("images", e => { showImages(JSON.parse(e.data)); });
-  source.onopen = () => link("connected, waiting for the session to begin", false, true);
-  source.onerror = () => {
-    link(drive.ended ? "the drive is over; the page waits for the next one" : "no connection: trying again", !drive.ended, true);
-    // A refusal ends the stream for good; the next drive may let us in.
-    if (source.readyState === EventSource.CLOSED) setTimeout(connect, 2000);
-  };
+const TAKERS = {
+  hello: begin,
+  update: message => { showEvents(message.events, false); take(message); ++window.updates; },
+  images: showImages,
+};
+
+const AGAIN_MS = 1000, REFUSED_MS = 2000;    // until the next attempt
+const QUIET_MS = 3000, GIVEN_UP_MS = 15000;  // news come ten times a second
+let stream = null, greeted = false, heard = 0;
+
+// Events of a stream, each a name and JSON; what is cut waits for its rest.
+async function read(body) {
+  const reader = body.getReader(), decoder = new TextDecoder();
+  for (let rest = "";;) {
+    const {value, done} = await reader.read();
+    if (done) return;
+    heard = performance.now();
+    const events = (rest + decoder.decode(value, {stream: true})).split("\n\n");
+    rest = events.pop();
+    for (const event of events) {
+      const [, name, data] = /^event: (.*)\ndata: (.*)$/.exec(event) || [];
+      if (name in TAKERS) handle(name, data);
+    }
+  }
 }
+
+function handle(name, data) {
+  try {
+    TAKERS[name](JSON.parse(data));
+  } catch (error) {
+    console.error(error);  // a mistake of the page's is not to look like a lost connection
+  }
+}
+
+// By fetch and not an EventSource, which has no header for the token and does not tell why it was refused.
+async function look() {
+  stream = new AbortController();
+  greeted = false;
+  heard = performance.now();
+  const answer = await fetch("/events", {headers: token() ? {"X-Vergence-Token": token()} : {}, signal: stream.signal});
+  if (answer.ok) {
+    link("connected, waiting for the session to begin", false, true);
+    return read(answer.body);
+  }
+  const sentence = (await answer.text()).trim();
+  link(`refused (${answer.status}): ${sentence}${answer.status === 403 ? "; open the link that the program shows when it starts" : ""}`, true, true);
+  return REFUSED_MS;
+}
+
+async function connect() {
+  const wait = await look().catch(() => 0);
+  stream = null;
+  if (!wait) link(drive.ended ? "the drive is over; the page waits for the next one" : "no connection: trying again", !drive.ended, true);
+  setTimeout(connect, wait || AGAIN_MS);
+}
+
+// A network that has gone, or a program that hangs, ends no stream.
+setInterval(() => {
+  const quiet = performance.now() - heard;
+  if (stream && greeted && quiet > QUIET_MS) link(`nothing heard for ${lasting(quiet / 1000)}: is the network there?`, true, true);
+  if (stream && quiet > GIVEN_UP_MS) stream.abort();
+}, 500);
 
 for (const button of document.querySelectorAll("button")) button.addEventListener("click", async () => {
   const answer = await fetch("/" + button.dataset.action, {method: "POST", headers: {"X-Vergence-Token": token()}}).catch(() => null);

@@ -6,7 +6,7 @@ CONTEXTS = {
         ("drivers/acquisition/acquisition.hpp",),
         "const Configuration& configuration, const ReplayedDrive& drive, const ReplayedDevices::Pixels& pixels"),
     "app/publish/http_server.hpp": (
-        ("app/publish/live_state.hpp",),
+        ("app/publish/live_state.hpp", "drivers/clock.hpp"),
         "const HostPort& address, const HttpPolicy& policy, std::string_view page, LiveState& state, bool ended, void (*act)(HttpRoute)"),
     "app/recorder/recorder.hpp": ((), "const PoseSample& sample"),
     "app/recording/mcap_file.hpp": (

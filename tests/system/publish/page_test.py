@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The live page of a mock drive in headless Chromium: its figures are the session's, in both themes, on desktop and phone, with nothing on
-the console; it comes back after the program restarts; actions need the token; garbage, viewers that never read and a thousand connections
-leave the drive as it was; a port in use is a sentence. --pictures DIR keeps what was seen. Exit code 77 without Chromium."""
+the console; it comes back after the program restarts, with nothing of the drive before; frames that stop and a program that hangs leave no
+OK; refusals say why; actions need the token; garbage, viewers that never read and a thousand connections leave the drive as it was; a port
+in use is a sentence. --pictures DIR keeps what was seen. Exit code 77 without Chromium."""
 import argparse
 import base64
 import http.client
@@ -11,6 +12,7 @@ import pathlib
 import random
 import resource
 import shutil
+import signal
 import socket
 import sys
 import tempfile
@@ -31,7 +33,8 @@ const rotation = [...document.querySelectorAll('#calibration tr')].map(r => [...
 const lit = c => { const shown = document.getElementById(c), d = document.createElement('canvas'); d.width = shown.width; d.height = shown.height;
   const g = d.getContext('2d', {willReadFrequently: true}); g.drawImage(shown, 0, 0); const p = g.getImageData(0, 0, d.width, d.height).data;
   let n = 0; for (let i = 0; i < p.length; i += 4) if (p[i] + p[i + 1] + p[i + 2] > 0) ++n; return n / (p.length / 4); };
-return {status: t('status'), frame: t('frame'), path: t('path'), inliers: t('inliers'), link: t('link'), events: t('events'), cells, rotation,
+return {status: t('status'), state: t('state'), band: document.getElementById('band').className, pale: getComputedStyle(document.getElementById('left')).filter,
+        frame: t('frame'), path: t('path'), inliers: t('inliers'), link: t('link'), events: t('events'), cells, rotation,
         buttons: [...document.querySelectorAll('button')].map(b => b.disabled), lit: [lit('left'), lit('right')], updates: window.updates,
         image: t('image_frame'), action: t('action_words')};
 """
@@ -44,8 +47,7 @@ def looks(driver, url, problems, pictures):
         for theme in ("light", "dark"):
             driver.devtools("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone)
             driver.devtools("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
-            driver.word("POST", "/url", {"url": "about:blank"})
-            driver.word("POST", "/url", {"url": url})
+            open_anew(driver, url)
             time.sleep(2)
             seen = driver.word("POST", "/execute/sync", {"script": browser.PROBE, "args": []})
             backgrounds.add(seen["background"])
@@ -64,6 +66,20 @@ def looks(driver, url, problems, pictures):
 
 def figures(driver):
     return driver.word("POST", "/execute/sync", {"script": FIGURES, "args": []})
+
+
+def figures_when(driver, what, seconds):
+    """As soon as they are so, else the last ones."""
+    until = time.monotonic() + seconds
+    while not what(seen := figures(driver)) and time.monotonic() < until:
+        time.sleep(0.1)
+    return seen
+
+
+def open_anew(driver, url):
+    """Another # alone would load nothing."""
+    driver.word("POST", "/url", {"url": "about:blank"})
+    driver.word("POST", "/url", {"url": url})
 
 
 def figures_are_the_sessions(seen, run, problems):
@@ -87,10 +103,22 @@ def figures_are_the_sessions(seen, run, problems):
         problems.append(f"the page does not know that the drive is over: {seen['link']}")
 
 
-def ask(port, method, path, **headers):
+def answer(port, method, path, **headers):
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
     connection.request(method, path, headers=headers)
-    return connection.getresponse().status
+    return connection.getresponse()
+
+
+def ask(port, method, path, **headers):
+    return answer(port, method, path, **headers).status
+
+
+def stream_of(port, token):
+    """A viewer that never reads."""
+    viewer = socket.create_connection(("127.0.0.1", port), 20)
+    viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    viewer.sendall(f"GET /events HTTP/1.1\r\nHost: localhost\r\nX-Vergence-Token: {token}\r\n\r\n".encode())
+    return viewer
 
 
 def misuse(port, token, problems):
@@ -103,6 +131,8 @@ def misuse(port, token, problems):
         got = ask(port, method, path, **headers)
         if got != status:
             problems.append(f"{method} {path} {headers}: {got}, not {status}")
+    if b"token=" in answer(port, "GET", "/").read():
+        problems.append("the page puts the token into an address that it asks for")
     chance = random.Random(3)
     sockets = []
     for _ in range(100):
@@ -112,11 +142,7 @@ def misuse(port, token, problems):
         except OSError:
             pass  # it was closed on us, as it should be
         s.close()
-    for _ in range(3):  # they look, and never read
-        s = socket.create_connection(("127.0.0.1", port), 20)
-        s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        s.sendall(b"GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n")
-        sockets.append(s)
+    sockets += [stream_of(port, token) for _ in range(3)]
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 4096), hard))
     for _ in range(CONNECTIONS):
@@ -164,21 +190,64 @@ def first_drive(driver, below, port, problems, pictures):
 
 
 def second_drive(driver, below, port, problems):
-    """The page that is still open comes back, and a port that is taken is a sentence."""
+    """The page that is still open comes back, without the last drive's OK where there is no frame yet; a port that is taken is a sentence."""
     for entry in driver.word("POST", "/se/log", {"type": "browser"}):
         if "/events" not in entry["message"]:  # that the program has gone is no fault of the page
             problems.append(f"console says {entry['message'][:200]}")
-    run = d.Drive(below / "second", 9, "--set", f"publish.http=127.0.0.1:{port}")
+    run = d.Drive(below / "second", 60, "--set", f"publish.http=127.0.0.1:{port}", "--fault", "camera_gone@0 camera=-1 duration_s=0")
     run.wait_for(r"live page: (http://\S+)")
     other = d.Drive(below / "other", 1, "--fast", "--set", f"publish.http=127.0.0.1:{port}")
     if other.end() != 0 or "another program has the port" not in other.messages() or "goes on without its page" not in other.messages():
         problems.append(f"a port in use: {other.messages()}")
-    until = time.monotonic() + 8
-    while "second" not in figures(driver)["link"] and time.monotonic() < until:
-        time.sleep(0.2)
-    seen = figures(driver)
-    if "live · second" not in seen["link"]:
+    seen = figures_when(driver, lambda seen: "second" in seen["link"], 20)
+    if seen["link"] != "waiting for the first frame · second":
         problems.append(f"the page has not come back: {seen['link']}")
+    if (seen["status"], seen["frame"], seen["path"], seen["cells"]) != ("WAITING", "–", "–", {}) or "tone-none" not in seen["band"] or max(seen["lit"]) > 0:
+        problems.append(f"something of the drive before is left: {seen}")
+    run.stop()
+
+
+def frames_stop(driver, below, port, problems):
+    """Nothing that is past looks like now: while the program hangs, and when no camera is left."""
+    run = d.Drive(below / "third", 120, "--set", f"publish.http=127.0.0.1:{port}", "--fault", "camera_gone@12 camera=-1 duration_s=0")
+    seen = figures_when(driver, lambda seen: seen["link"] == "live · third" and min(seen["lit"]) > 0.9, 40)
+    if seen["link"] != "live · third" or "past" in seen["band"] or seen["pale"] != "none":
+        problems.append(f"the page is not live: {seen}")
+    run.process.send_signal(signal.SIGSTOP)
+    seen = figures_when(driver, lambda seen: "nothing heard" in seen["link"], 10)
+    run.process.send_signal(signal.SIGCONT)
+    if "nothing heard" not in seen["link"] or "past" not in seen["band"] or "grayscale" not in seen["pale"]:
+        problems.append(f"a program that hangs looks alive: {seen}")
+    seen = figures_when(driver, lambda seen: seen["status"] == "NO FRAMES", 40)
+    if seen["status"] != "NO FRAMES" or not seen["state"].startswith("for ") or seen["link"] != "no frame comes · third":
+        problems.append(f"frames have stopped, and the page says {seen}")
+    if "past" not in seen["band"] or "tone-none" not in seen["band"] or "grayscale" not in seen["pale"]:
+        problems.append(f"frames have stopped, and the page is in colour: {seen}")
+    run.stop()
+
+
+def beyond_this_machine(driver, below, problems):
+    """The link is one that others can open; who is refused reads why, and is let in when that has passed."""
+    port = d.free_port()
+    run = d.Drive(below / "fourth", 120, "--set", f"publish.http=0.0.0.0:{port}", "--set", "publish.viewers=1")
+    token = run.wait_for(r"live page: http://\S+#(\S+)")
+    if "0.0.0.0" in run.messages():
+        problems.append(f"nobody can open that: {run.messages()}")
+    page = f"http://127.0.0.1:{port}/"
+    open_anew(driver, page)
+    seen = figures_when(driver, lambda seen: "refused" in seen["link"], 10)
+    if "the token is not that of this session" not in seen["link"]:
+        problems.append(f"without the token the page says {seen['link']}")
+    other = stream_of(port, token)
+    time.sleep(0.5)
+    open_anew(driver, f"{page}#{token}")
+    seen = figures_when(driver, lambda seen: "refused" in seen["link"], 10)
+    if "as many as publish.viewers allows" not in seen["link"]:
+        problems.append(f"beyond publish.viewers the page says {seen['link']}")
+    other.close()
+    seen = figures_when(driver, lambda seen: "fourth" in seen["link"], 20)
+    if "fourth" not in seen["link"]:
+        problems.append(f"with the token, and a place free, the page says {seen['link']}")
     run.stop()
 
 
@@ -197,6 +266,8 @@ def main():
         try:
             first_drive(driver, below, port, problems, pictures)
             second_drive(driver, below, port, problems)
+            frames_stop(driver, below, port, problems)
+            beyond_this_machine(driver, below, problems)
         finally:
             driver.close()
     print("\n".join(problems) if problems else "the page is as it should be")

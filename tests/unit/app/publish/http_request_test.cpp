@@ -76,6 +76,9 @@ TEST(HttpPolicy, beyondThisMachineTheTokenIsNeeded) {
   EXPECT_EQ(answer(get("/events", "rig.local"), kBeyond).status, 403);
   EXPECT_EQ(answer(get("/events?token=" + kToken.substr(1), "rig.local"), kBeyond).status, 403);
   EXPECT_EQ(answer(get("/events?token=" + kToken, "rig.local"), kBeyond).route, HttpRoute::events);
+  const std::string head = "GET /events HTTP/1.1\r\nHost: rig.local\r\nX-Vergence-Token: ";
+  EXPECT_EQ(answer(head + kToken + "\r\n\r\n", kBeyond).route, HttpRoute::events);
+  EXPECT_EQ(answer(head + kToken.substr(1) + "\r\n\r\n", kBeyond).status, 403);
 }
 
 TEST(HttpPolicy, actionsNeedAHeaderThatNoOtherSiteCanSend) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -11,6 +13,8 @@ namespace vergence::app {
 namespace {
 
 using nlohmann::json;
+
+constexpr HostStamp kNow(1'000'000'000'000);
 
 PoseRecord at(double metres, PoseStatus status = PoseStatus::ok) {
   PoseRecord r;
@@ -56,7 +60,7 @@ TEST(LiveState, tellsWhatIsNewOnceAndALateViewerEverything) {
   state.add(at(1));
   state.add(event("mark", "a <b>mark</b> \xff"));
   state.set_temperature(1, 41.26F);
-  const json first = json::parse(state.update(-1));
+  const json first = json::parse(state.update(kNow, -1));
   EXPECT_EQ(first["now"]["temperatures_c"], json::parse("[null, 41.3]"));
   EXPECT_EQ(first["now"]["frame"], 41);
   EXPECT_EQ(first["now"]["read"], 3);
@@ -66,11 +70,11 @@ TEST(LiveState, tellsWhatIsNewOnceAndALateViewerEverything) {
   EXPECT_EQ(first["trail"].size(), 2U);
   EXPECT_EQ(first["events"].size(), 1U);
   state.add(at(2));
-  const json second = json::parse(state.update(3.25));
+  const json second = json::parse(state.update(kNow, 3.25));
   EXPECT_EQ(second["trail"], json::parse("[[0.0,0.0,2.0,0]]"));
   EXPECT_TRUE(second["events"].empty());
   EXPECT_EQ(second["now"]["line_age_p99_ms"], 3.25);
-  const json hello = json::parse(state.hello());
+  const json hello = json::parse(state.hello(kNow));
   EXPECT_EQ(hello["session"], "a drive");
   EXPECT_EQ(hello["trail"].size(), 3U);
   EXPECT_EQ(hello["events"].size(), 1U);
@@ -82,7 +86,7 @@ TEST(LiveState, aLateViewerReadsWhereACalibrationIsFromWhenItsSourceIsGone) {
   auto source = std::make_unique<std::string>("a calibration file of some other day");
   state.add(CalibrationRecord::begin({}, Stamp(), "given", *source));
   source.reset();
-  const json hello = json::parse(state.hello());
+  const json hello = json::parse(state.hello(kNow));
   EXPECT_EQ(hello["calibration"]["history"][0]["reason"], "a calibration file of some other day");
 }
 
@@ -91,7 +95,7 @@ TEST(LiveState, anOriginThatIsTooLongIsCutAtAWholeCharacter) {
   path += "\xc3\xa4";  // the second byte would be the array's last
   LiveState state;
   state.add(CalibrationRecord::begin({}, Stamp(), "state_file", path));
-  const json hello = json::parse(state.hello());
+  const json hello = json::parse(state.hello(kNow));
   EXPECT_EQ(hello["calibration"]["history"][0]["reason"], std::string(254, '/'));
 }
 
@@ -102,11 +106,12 @@ TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
   for (int i = 0; i < 50'000; ++i) {
     state.add(at(i));
     if (i % 100 != 0) continue;
-    const json update = json::parse(state.update(-1));
-    if (update.contains("trail_anew")) told = 0, anew = true;
-    told += update["trail"].size();
+    const json update = json::parse(state.update(kNow, -1));
+    const auto from = update["trail_from"].get<std::size_t>();
+    anew = anew || from < told;
+    told = from + update["trail"].size();
   }
-  const json trail = json::parse(state.hello())["trail"];
+  const json trail = json::parse(state.hello(kNow))["trail"];
   EXPECT_TRUE(anew);
   EXPECT_LE(trail.size(), LiveState::kTrail);
   EXPECT_GE(trail.size(), LiveState::kTrail / 2);
@@ -115,33 +120,128 @@ TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
   EXPECT_GE(told + 100, trail.size()) << "a viewer who was there has as much";
 }
 
+/// How many places of the map have a status, and the longest step between two of them.
+struct Map {
+  std::size_t places = 0, degraded = 0;
+  double longest_m = 0;
+};
+
+Map map_of(const LiveState& state) {
+  Map out;
+  const json trail = json::parse(state.hello(kNow))["trail"];
+  out.places = trail.size();
+  for (std::size_t i = 0; i < trail.size(); ++i) {
+    if (trail[i][3] == 1) ++out.degraded;
+    if (i > 0) {
+      const double step = trail[i][2].get<double>() - trail[i - 1][2].get<double>();
+      out.longest_m = std::max(out.longest_m, step);
+    }
+  }
+  return out;
+}
+
+TEST(LiveState, aRigThatStandsKeepsItsMapWhateverItsStatusDoes) {
+  LiveState state;
+  double metres = 0;
+  for (int i = 0; i < 2000; ++i) state.add(at(metres += 0.5));
+  for (int i = 0; i < 36'000; ++i)
+    state.add(at(metres, i % 2 == 0 ? PoseStatus::ok : PoseStatus::degraded));
+  Map map = map_of(state);
+  EXPECT_EQ(map.places, 2000U);
+  EXPECT_EQ(map.longest_m, 0.5);
+  EXPECT_EQ(map.degraded, 1U) << "the worst of where it stood";
+  for (int i = 0; i < 2000; ++i) state.add(at(metres += 0.5));
+  map = map_of(state);
+  EXPECT_LE(map.longest_m, 1.0);
+  EXPECT_EQ(map.degraded, 1U);
+}
+
+TEST(LiveState, aPlaceThatBecomesWorseIsToldAnew) {
+  LiveState state;
+  state.add(at(0));
+  state.add(at(1));
+  (void)state.update(kNow, -1);
+  state.add(at(1.1, PoseStatus::degraded));
+  const json worse = json::parse(state.update(kNow, -1));
+  EXPECT_EQ(worse["trail_from"], 1);
+  EXPECT_EQ(worse["trail"], json::parse("[[0.0,0.0,1.0,1]]"));
+  state.add(at(1.2));
+  EXPECT_TRUE(json::parse(state.update(kNow, -1))["trail"].empty()) << "better is no news";
+}
+
+TEST(LiveState, weeksInAYardLeaveItsNewestWay) {
+  LiveState state;
+  for (int i = 0; i < 200'000; ++i) {
+    PoseRecord pose = at(25 * std::sin(i * 0.02));
+    pose.world_left.t[0] = 25 * std::cos(i * 0.02);
+    state.add(pose);
+  }
+  const json trail = json::parse(state.hello(kNow))["trail"];
+  EXPECT_GE(trail.size(), LiveState::kTrail / 2);
+}
+
+LiveFrame come(double seconds) {
+  LiveFrame frame;
+  frame.pose.out = HostStamp(Duration::seconds(seconds).ns());
+  frame.pose.status = PoseStatus::ok;
+  return frame;
+}
+
+TEST(LiveState, framesThatStopAreSilenceAfterASecond) {
+  LiveState state;
+  for (int i = 0; i < 100; ++i) state.add(come(50 + 0.05 * i));
+  const auto now = [&](double seconds) {
+    return json::parse(state.update(HostStamp(Duration::seconds(seconds).ns()), -1))["now"];
+  };
+  EXPECT_FALSE(now(55.5)["silent"].get<bool>());
+  const json silent = now(67.95);
+  EXPECT_TRUE(silent["silent"].get<bool>());
+  EXPECT_EQ(silent["since_s"], 13.0);
+  EXPECT_TRUE(json::parse(state.hello(kNow))["now"]["silent"].get<bool>()) << "who comes late, too";
+  state.add(come(68));
+  EXPECT_FALSE(now(68.5)["silent"].get<bool>());
+  EXPECT_TRUE(now(69.5)["silent"].get<bool>()) << "an outage is no interval";
+}
+
+TEST(LiveState, rareFramesAreNoSilence) {
+  LiveState state;
+  for (int i = 0; i < 20; ++i) state.add(come(2.0 * i));
+  const auto silent = [&](double seconds) {
+    const HostStamp now(Duration::seconds(seconds).ns());
+    return json::parse(state.update(now, -1))["now"]["silent"].get<bool>();
+  };
+  EXPECT_FALSE(silent(42));
+  EXPECT_TRUE(silent(45));
+}
+
 TEST(LiveState, eventsAndCalibrationsAreTheNewest) {
   LiveState state;
   for (int i = 0; i < 1000; ++i) state.add(event("mark", std::to_string(i)));
-  const json events = json::parse(state.update(-1))["events"];
+  const json events = json::parse(state.update(kNow, -1))["events"];
   EXPECT_EQ(events.size(), LiveState::kEvents);
   EXPECT_EQ(events.back()["sentence"], "999");
   for (int i = 0; i < 100; ++i) state.add(calibration(true, -0.5));
-  EXPECT_EQ(json::parse(state.hello())["calibration"]["history"].size(), LiveState::kCalibrations);
+  EXPECT_EQ(json::parse(state.hello(kNow))["calibration"]["history"].size(),
+            LiveState::kCalibrations);
 }
 
 TEST(LiveState, aCalibrationStandsWithTwoSigmaAndWhatTheDriveMeasuredBesideIt) {
   LiveState state;
   EXPECT_EQ(state.rig(), nullptr);
   state.add(calibration(false, -0.75));
-  json c = json::parse(state.update(-1))["calibration"];
+  json c = json::parse(state.update(kNow, -1))["calibration"];
   EXPECT_FALSE(c["confirmed"].get<bool>());
   EXPECT_EQ(c["cameras"][1]["figures"][3][0], -750.0);
   EXPECT_TRUE(c["cameras"][1]["figures"][3][1].is_null()) << "given without a sigma";
   EXPECT_FALSE(c.contains("measured"));
   state.add(event("calibration_confirmed", ""));
   state.add(calibration(true, -0.751));
-  c = json::parse(state.update(-1))["calibration"];
+  c = json::parse(state.update(kNow, -1))["calibration"];
   EXPECT_TRUE(c["confirmed"].get<bool>());
   EXPECT_EQ(c["cameras"][1]["figures"][3][0], -750.0) << "what is in use stays";
   EXPECT_EQ(c["measured"][1]["figures"][3][0], -751.0);
   EXPECT_EQ(c["measured"][1]["figures"][3][1], 2.0);
-  EXPECT_FALSE(json::parse(state.update(-1)).contains("calibration")) << "told once";
+  EXPECT_FALSE(json::parse(state.update(kNow, -1)).contains("calibration")) << "told once";
   ASSERT_NE(state.rig(), nullptr);
 }
 
