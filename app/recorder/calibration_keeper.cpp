@@ -6,12 +6,11 @@
 
 namespace vergence::app {
 
-CalibrationKeeper::CalibrationKeeper(std::function<Kept(const RigCalibration&)> keep,
-                                     WakeEvent* wake)
+CalibrationKeeper::CalibrationKeeper(KeepCalibration keep, WakeEvent* wake)
     : keep_(std::move(keep)), wake_(wake), thread_([this] { work(); }) {}
 
-bool CalibrationKeeper::post(Stamp stamp, const RigNumbers& rig) noexcept {
-  if (!waiting_.push({stamp, rig})) return false;
+bool CalibrationKeeper::post(Stamp stamp, const RigNumbers& rig, bool found) noexcept {
+  if (!waiting_.push({stamp, rig, found})) return false;
   filled_.signal();
   return true;
 }
@@ -38,7 +37,7 @@ void CalibrationKeeper::work() {
 }
 
 void CalibrationKeeper::keep(const Waiting& waiting) {
-  const Kept kept = keep_(waiting.rig.rig());
+  const Kept kept = keep_(waiting.rig.rig(), waiting.found);
   if (kept.sentence.empty()) return;
   Outcome outcome;
   outcome.failed = kept.failed;

@@ -18,6 +18,10 @@ struct Kept {
   std::string sentence{};  // empty: nothing to tell
 };
 
+/// Keeps a calibration. `found`: by the drive; else it is the one that the drive began with and has
+/// confirmed.
+using KeepCalibration = std::function<Kept(const RigCalibration& rig, bool found)>;
+
 /// Keeps calibrations for the next drive, on a thread of its own (`vergence-keep`): making YAML
 /// takes heap memory, and its files wait for the disk, which the recorder's thread does not.
 ///
@@ -35,13 +39,13 @@ class CalibrationKeeper {
   };
 
   /// `keep` is called on the keeper's thread; *wake is signalled when next() has something.
-  CalibrationKeeper(std::function<Kept(const RigCalibration&)> keep, WakeEvent* wake);
+  CalibrationKeeper(KeepCalibration keep, WakeEvent* wake);
   ~CalibrationKeeper() { stop(); }
   CalibrationKeeper(const CalibrationKeeper&) = delete;
   CalibrationKeeper& operator=(const CalibrationKeeper&) = delete;
 
   /// False: too many wait; it is not kept.
-  [[nodiscard]] bool post(Stamp stamp, const RigNumbers& rig) noexcept;
+  [[nodiscard]] bool post(Stamp stamp, const RigNumbers& rig, bool found) noexcept;
   /// The oldest outcome that nobody has taken yet. False: there is none.
   [[nodiscard]] bool next(Outcome* outcome) noexcept { return outcomes_.pop(outcome); }
   /// Keeps what is waiting and ends the thread. Twice is harmless.
@@ -51,12 +55,13 @@ class CalibrationKeeper {
   struct Waiting {
     Stamp stamp{};
     RigNumbers rig{};
+    bool found = true;
   };
 
   void work();
   void keep(const Waiting& waiting);
 
-  std::function<Kept(const RigCalibration&)> keep_;
+  KeepCalibration keep_;
   WakeEvent* wake_;
   Ring<Waiting, kMostWaiting> waiting_;
   Ring<Outcome, 2 * kMostWaiting>

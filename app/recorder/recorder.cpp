@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstring>
 #include <optional>
+#include <string_view>
 #include <system_error>
 #include <type_traits>
 
@@ -24,15 +25,15 @@ namespace vergence::app {
 static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_copyable_v<InsRecord>);
 
 struct Recorder::Files {
-  Files(const std::filesystem::path& folder, bool with_ins)
-      : trajectory(folder / "trajectory.tum"),
-        reference(folder / "reference.tum"),
-        poses(folder / "poses.csv"),
-        calibrations(folder / "calibrations.csv"),
-        events(folder / "events.jsonl"),
+  Files(const std::filesystem::path& folder, bool with_ins, LineFile::Away away)
+      : trajectory(folder / "trajectory.tum", LineFile::kPending, away),
+        reference(folder / "reference.tum", LineFile::kPending, away),
+        poses(folder / "poses.csv", LineFile::kPending, away),
+        calibrations(folder / "calibrations.csv", LineFile::kPending, away),
+        events(folder / "events.jsonl", LineFile::kPending, away),
         all{&trajectory, &reference, &poses, &calibrations, &events} {
     constexpr std::size_t kMinutes = std::size_t{16} << 20;  // bytes: readings are many
-    if (with_ins) all.push_back(&ins.emplace(folder / "ins.csv", kMinutes));
+    if (with_ins) all.push_back(&ins.emplace(folder / "ins.csv", kMinutes, away));
     reported.resize(all.size());
   }
   /// The first line of a table; empty: the file has none.
@@ -51,19 +52,23 @@ struct Recorder::Files {
 
 namespace {
 
+constexpr std::string_view kConfirmed = "calibration_confirmed";  // an event's kind
 constexpr std::size_t kLongestLine = 2048;  // bytes: calibrations.csv has the longest, some 800
 
 }  // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options),
-      files_(std::make_unique<Files>(folder, options.ins)),
+      mark_(options.number),
       totals_(!options.keep_trajectory      ? 0
               : options.expected_frames > 0 ? options.expected_frames
                                             : kMostStatuses),
+      folder_fault_(options.folder_fault),
       newest_(options.first) {
   line_.reserve(kLongestLine);
   folder_ = folder.string();
+  mark_.put_on(folder_.c_str());
+  files_ = std::make_unique<Files>(folder, options.ins, options.disk_away);
   if (options.keep) keeper_ = std::make_unique<CalibrationKeeper>(options.keep, &filled_);
   memory_ = totals_.memory();
   for (LineFile* file : files_->all) {
@@ -155,6 +160,9 @@ void Recorder::write(const EventRecord& e) {
   totals_.add(e);
   format_event(e, &line_);
   files_->events.append(line_);
+  if (!unconfirmed_ || std::string_view(e.kind) != kConfirmed) return;
+  keep(e.stamp, *unconfirmed_, false);
+  unconfirmed_.reset();
 }
 
 void Recorder::write(const CalibrationRecord& c) {
@@ -162,8 +170,14 @@ void Recorder::write(const CalibrationRecord& c) {
     format_calibration(c, k, &line_);
     files_->calibrations.append(line_);
   }
-  if (!c.decided || !totals_.add(c) || keeper_ == nullptr) return;
-  if (!keeper_->post(c.stamp, c.rig))
+  if (!c.decided) unconfirmed_ = c.rig;
+  if (!c.decided || !totals_.add(c)) return;
+  unconfirmed_.reset();
+  keep(c.stamp, c.rig, true);
+}
+
+void Recorder::keep(Stamp stamp, const RigNumbers& rig, bool found) {
+  if (keeper_ != nullptr && !keeper_->post(stamp, rig, found))
     report_error("a calibration is not kept: the disk has not taken those before it");
 }
 
@@ -194,7 +208,17 @@ bool Recorder::take_outcome() {
 /// have it again. False: not all was taken.
 bool Recorder::flush(LineFile* file, bool anew) {
   if (file->flush()) return true;
-  return anew && file->out_of_reach() && open_anew(file) && file->flush();
+  if (!anew || folder_fault_ != 0 || !file->out_of_reach() || !open_anew(file)) return false;
+  mark_.put_on(folder_.c_str());  // its folder may be another one since
+  return file->flush();
+}
+
+/// Only one that never was there is made: below a disk that is unmounted for a while another one
+/// would come to lie.
+void Recorder::come_to_folder() {
+  if (folder_fault_ == 0) return;
+  folder_fault_ = make_folders(folder_.c_str());
+  if (folder_fault_ == 0) mark_.put_on(folder_.c_str());
 }
 
 void Recorder::flush() {
@@ -203,11 +227,12 @@ void Recorder::flush() {
   const auto now = std::chrono::steady_clock::now();
   const bool anew = now >= files_->anew_due;
   if (anew) files_->anew_due = now + kAnew;
+  if (anew) come_to_folder();
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (flush(files[i], anew)) {
       files_->reported[i] = 0;
       if (files[i]->reopen_due()) reopen(files[i]);
-    } else if (files_->reported[i] != files[i]->fault()) {
+    } else if (folder_fault_ == 0 && files_->reported[i] != files[i]->fault()) {
       files_->reported[i] = files[i]->fault();
       report_error(*files[i]);
     }
@@ -273,8 +298,9 @@ void Recorder::note_disk(bool full) {
   std::array<char, 96> room{};
   (void)fmt::format_to_n(room.begin(), room.size() - 1, "the disk takes lines again; {} were lost",
                          lost_lines());
-  const bool away = std::any_of(files_->all.begin(), files_->all.end(),
-                                [](const LineFile* f) { return f->out_of_reach(); });
+  const bool away = std::any_of(files_->all.begin(), files_->all.end(), [](const LineFile* f) {
+    return f->fault() != 0 && !f->wants_room();
+  });
   event.set_sentence(!full  ? room.data()
                      : away ? "the disk of the session takes nothing: lines wait in memory"
                             : "the disk of the session has no room: lines wait in memory");
@@ -291,7 +317,7 @@ void Recorder::report_error(const LineFile& file) {
   const char* words = ::strerrordesc_np(file.fault());  // strerror() may take memory
   report_error("{}: cannot be written ({}); the session goes on, lines wait in memory: {}",
                file.path().native(), words != nullptr ? words : "unknown error",
-               file.out_of_reach() ? "check that disk" : "make room on that disk");
+               file.wants_room() ? "make room on that disk" : "check that disk");
 }
 
 template <class... Arguments>
@@ -330,14 +356,15 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   if (keeper_ != nullptr) keeper_->stop();
   while (take_outcome()) {
   }
+  come_to_folder();
   for (LineFile* file : files_->all) {
     if (file->reopen_due()) reopen(file);
     (void)flush(file, true);
     const bool good = file->close();
     totals.lost_lines += file->lost_lines();
+    const int fault = folder_fault_ != 0 ? folder_fault_ : file->fault();
     if (!good)
-      totals.faults.push_back(file->path().string() + ": is not complete (" +
-                              std::strerror(file->fault()) +
+      totals.faults.push_back(file->path().string() + ": is not complete (" + std::strerror(fault) +
                               "); make room on that disk and repeat the drive");
     else if (file->lost_lines() > 0)
       errors_.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +

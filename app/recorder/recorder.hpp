@@ -5,12 +5,14 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "app/recorder/calibration_keeper.hpp"
 #include "app/recorder/ins_file.hpp"
+#include "app/recorder/line_file.hpp"
 #include "app/recorder/records.hpp"
 #include "app/recorder/session_folder.hpp"
 #include "app/recorder/session_totals.hpp"
@@ -67,15 +69,21 @@ class Recorder {
     std::size_t expected_frames = 0;  // 0: nobody knows
     bool ins = false;                 // readings are posted: ins.csv is there
     Stamp first{};                    // of the recorder's own events before the first pose
-    /// Called on a thread of its own with every calibration that was accepted while driving: files
-    /// may be written there. May be empty.
-    std::function<Kept(const RigCalibration&)> keep{};
+    std::uint64_t number = 0;         // of SessionMark
+    /// A disk that is away at the beginning is none to wait for: poses go on as when it goes away
+    /// later. `folder_fault`: what try_session_folder() said; the recorder makes the folder then.
+    LineFile::Away disk_away = LineFile::Away::refuse;
+    int folder_fault = 0;
+    /// Called on a thread of its own with every calibration that was accepted while driving, and
+    /// with the one that the drive began with when it is confirmed first: files may be written
+    /// there. May be empty.
+    KeepCalibration keep{};
     /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault
     /// says. Called on the recorder's thread with the stamp of every pose. May be empty.
     std::function<bool(Stamp)> disk_full{};
   };
 
-  /// `folder` exists: make_session_folder().
+  /// `folder` exists: make_session_folder(). It bears a SessionMark until the destructor.
   Recorder(const std::filesystem::path& folder, const Options& options);
   ~Recorder();
   Recorder(const Recorder&) = delete;
@@ -114,8 +122,10 @@ class Recorder {
   void write(const EventRecord& event);
   void write(const CalibrationRecord& calibration);
   void write(const InsRecord& reading);
+  void keep(Stamp stamp, const RigNumbers& rig, bool found);
   void flush();
   [[nodiscard]] bool flush(LineFile* file, bool anew);
+  void come_to_folder();
   void reopen_files();
   [[nodiscard]] bool open_anew(LineFile* file);
   void reopen(LineFile* file);
@@ -131,13 +141,17 @@ class Recorder {
 
   struct Files;
   Options options_;
+  SessionMark mark_;  // before any file is there
   std::unique_ptr<Files> files_;
   TotalsBuilder totals_;
-  std::string line_;    // being formatted
-  std::string folder_;  // for sentences
+  std::string line_;  // being formatted
+  std::string folder_;
+  int folder_fault_ = 0;  // errno: it is not there yet
   std::size_t memory_ = 0;
   Stamp newest_;  // of the poses
   bool disk_full_ = false, pretended_ = false;
+  std::optional<RigNumbers> unconfirmed_;  // what the drive began with, until it is confirmed or
+                                           // another one is accepted
 
   Queue<Record, kRing> records_;
   Queue<InsRecord, kReadings> readings_;

@@ -30,16 +30,16 @@ void write_session_calibration(const std::filesystem::path& session,
   }
 }
 
-std::function<Kept(const RigCalibration&)> calibration_keeper(
-    const std::filesystem::path& session, const CalibrationFile& words,
-    const std::optional<std::filesystem::path>& state) {
-  return [session, words, state](const RigCalibration& rig) -> Kept {
+KeepCalibration calibration_keeper(const std::filesystem::path& session,
+                                   const CalibrationFile& words,
+                                   const std::optional<std::filesystem::path>& state) {
+  return [session, words, state](const RigCalibration& rig, bool found) -> Kept {
     CalibrationFile file = words;
     file.rig = rig;
-    file.source = "online";
+    if (found) file.source = "online";
     Kept kept;
     std::vector<std::string> faults;
-    write_session_calibration(session, file, &faults);
+    if (found) write_session_calibration(session, file, &faults);
     if (state) {
       try {
         write_state(*state, file);

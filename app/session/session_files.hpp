@@ -1,7 +1,6 @@
 #pragma once
 #include <cstddef>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,11 +31,13 @@ void write_session_calibration(const std::filesystem::path& session,
                                std::vector<std::string>* faults);
 
 /// What the recorder does with a calibration found while driving: calibration.yaml of the session
-/// at once, so that a session that is killed has it, and the state file, if there is to be one.
-/// `words`: names and serials of the cameras.
-[[nodiscard]] std::function<Kept(const RigCalibration&)> calibration_keeper(
-    const std::filesystem::path& session, const CalibrationFile& words,
-    const std::optional<std::filesystem::path>& state);
+/// at once, so that a session that is killed has it, and the state file, if there is to be one. One
+/// that the drive began with and has confirmed goes to the state file alone.
+/// `words`: names and serials of the cameras, what the configuration says, and where the first is
+/// from.
+[[nodiscard]] KeepCalibration calibration_keeper(const std::filesystem::path& session,
+                                                 const CalibrationFile& words,
+                                                 const std::optional<std::filesystem::path>& state);
 
 /// The session's first files: calibrations.csv and calibration.yaml have what the drive begins
 /// with, if there is anything.

@@ -120,6 +120,16 @@ TEST(Recorder, theFirstConfirmationAndTheFirstContradictionAreInTheTotals) {
   }
 }
 
+TEST(TotalsBuilder, camerasThatAreInStepAgainConfirmNoCalibration) {
+  TotalsBuilder builder(0);
+  const EventRecord in_step = event_at(700, EstimatorEvent::Kind::in_step, 0);
+  EXPECT_STREQ(in_step.kind, "in_step");
+  builder.add(in_step);
+  EXPECT_FALSE(builder.totals().confirmed);
+  builder.add(event_at(900, EstimatorEvent::Kind::calibration_confirmed, 0.3));
+  EXPECT_EQ(builder.totals().confirmed, Stamp(900));
+}
+
 TEST(RigNumbers, thereAndBackAreTheSameDoubles) {
   RigCalibration rig = two_cameras();
   rig.cameras = 3;
@@ -146,8 +156,9 @@ TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndA
     std::thread::id where;
     int calls = 0;
     Recorder::Options options;
-    options.keep = [&](const RigCalibration& rig) {
+    options.keep = [&](const RigCalibration& rig, bool found) {
       ++calls;
+      EXPECT_TRUE(found);
       where = std::this_thread::get_id();
       EXPECT_EQ(rig.frames, 60);
       return Kept{fails, fails ? "state: no room" : "kept"};
@@ -164,6 +175,30 @@ TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndA
     const auto event = nlohmann::json::parse(events[0]);
     EXPECT_EQ(event["kind"], fails ? "calibration_not_kept" : "calibration_kept");
     EXPECT_EQ(recorder.take_errors().size(), fails ? 1U : 0U);
+  }
+}
+
+TEST(Recorder, whatTheDriveBeganWithIsKeptOnceItIsConfirmedUnlessAnotherWasFoundBefore) {
+  using Kind = EstimatorEvent::Kind;
+  for (const bool found_before : {false, true}) {
+    const test::TemporaryFolder folder;
+    std::vector<bool> kept;
+    Recorder::Options options;
+    options.keep = [&kept](const RigCalibration& rig, bool found) {
+      kept.push_back(found);
+      EXPECT_EQ(rig.frames == 60, found) << "which of the two it is";
+      return Kept{false, "kept"};
+    };
+    Recorder recorder(folder.path(), options);
+    RigCalibration given = two_cameras();
+    given.frames = 7;
+    recorder.post(CalibrationRecord::begin(given, Stamp(kStamp), "given", "mine.yaml"));
+    recorder.post(CalibrationRecord::of(decision(false)));
+    if (found_before) recorder.post(CalibrationRecord::of(decision(true)));
+    recorder.post(event_at(700, Kind::calibration_confirmed, 0.3));
+    recorder.post(event_at(900, Kind::calibration_confirmed, 0.3));
+    (void)recorder.close();
+    EXPECT_EQ(kept, std::vector<bool>{found_before});
   }
 }
 
