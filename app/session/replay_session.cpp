@@ -109,8 +109,13 @@ std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
   StartingCalibration begin = recorded_beginning(session.description(), request.data.string());
   if (request.calibration) {
     const Intrinsics& lens = begin.file.rig.intrinsics[0];
+    const int recorded = begin.file.rig.cameras;
     begin.file = read_given_calibration(*request.calibration, use,
                                         ImageSize{lens.width, lens.height}, &begin.remarks);
+    if (begin.file.rig.cameras != recorded)
+      throw InputError(fmt::format("{}: is of {} cameras, {} was recorded with {}",
+                                   *request.calibration, begin.file.rig.cameras,
+                                   request.data.string(), recorded));
     begin.source = std::filesystem::path(*request.calibration).filename().string();
     for (const std::string& sentence : begin.remarks)
       if (!request.session.quiet) fmt::print(stderr, "vergence: {}\n", sentence);
