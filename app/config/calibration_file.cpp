@@ -212,7 +212,8 @@ YAML::Node locate(const YAML::Node& root, const std::string& field) {
 
 CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
   if (file.root().IsNull()) throw InputError(file.name() + ": is empty; a calibration is expected");
-  const Section top(file, file.root(), "", {"version", "rig", "cameras", "covariance", "found"});
+  const Section top(file, file.root(), "",
+                    {"version", "rig", "cameras", "covariance", "found", "configured"});
   if (const auto version = file.integer(top.need("version"), "version", 1, 1'000'000);
       version != kVersion)
     file.fail(top.need("version"),
@@ -240,6 +241,7 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
     rig.baseline = about.number("baseline", rig.baseline);
     rig.baseline_sigma = about.number("baseline_sigma", 0);
   }
+  if (top.has("configured")) calibration.configured = read_configured(file, top.need("configured"));
   if (top.has("found")) read_found(file, top.need("found"), &calibration);
   if (use.length_only && !(use.baseline > 0) && !(rig.baseline > 0))
     file.fail(file.root(),

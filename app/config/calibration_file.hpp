@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "app/config/configured_rig.hpp"
 #include "core/types/calibration.hpp"
 
 namespace vergence::app {
@@ -16,6 +17,7 @@ struct CalibrationFile {
   std::array<std::string, kMaxCameras> names{"left", "right", "camera2", "camera3"};
   std::array<std::string, kMaxCameras> serials{};  // empty: not known
   std::string source{};  // what found it: `given`, `online`, `checkerboard`; empty: not said
+  std::optional<ConfiguredRig> configured{};  // what it was found under; the state file keeps it
 };
 
 /// What of a calibration is wanted.
@@ -61,6 +63,7 @@ void make_parallel(RigCalibration* rig);
 /// read(write(c)) has the same doubles. Whole or not at all, see replace_durably(). Errors
 /// InputError when it cannot be written.
 void write_calibration(const std::filesystem::path& path, const CalibrationFile& calibration);
+/// Without what the configuration said, which is the state file's.
 [[nodiscard]] std::string format_calibration(const CalibrationFile& calibration);
 
 }  // namespace vergence::app

@@ -32,26 +32,52 @@ std::optional<std::filesystem::path> folder_of(const char* variable) {
   return std::filesystem::path(value);
 }
 
+/// Older releases named a camera by what the configuration asks for it with, which may be an
+/// address.
+bool same_camera(const CalibrationFile& found, const CalibrationFile& expected, std::size_t k) {
+  if (found.serials[k] == expected.serials[k]) return true;
+  return !found.configured && expected.configured && !found.serials[k].empty() &&
+         found.serials[k] == expected.configured->cameras[k].serial_key;
+}
+
+/// Why a calibration was found under another configuration; empty: it was not.
+std::string other_configuration(const CalibrationFile& found, const CalibrationFile& expected) {
+  if (std::string change = find_change(*found.configured, *expected.configured); !change.empty())
+    return change;
+  // Of a drive that was given one with --calibration. Images cannot tell which length is right.
+  const double had = found.rig.baseline, says = expected.rig.baseline;
+  if (std::abs(had - says) >= kOtherLength * says)
+    return fmt::format("its baseline is {:g} m, the configuration's {:g} m", had, says);
+  return "";
+}
+
+/// The same of a file that does not say what it was found under.
+std::string other_numbers(const RigCalibration& found, const RigCalibration& expected) {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(found.cameras); ++k)
+    if (found.intrinsics[k].kind != expected.intrinsics[k].kind)
+      return fmt::format("its camera {} has another lens model than the configuration's", k);
+  if (!(std::abs(found.baseline - expected.baseline) <= kSameLength * expected.baseline))
+    return fmt::format("it was found with a baseline of {:g} m, the configuration says {:g} m",
+                       found.baseline, expected.baseline);
+  return "";
+}
+
 /// Why a calibration is not of this rig; empty: it is.
 std::string mismatch(const CalibrationFile& found, const CalibrationFile& expected) {
   const RigCalibration &a = found.rig, &b = expected.rig;
   if (a.cameras != b.cameras)
     return fmt::format("it is of {} cameras, the configuration has {}", a.cameras, b.cameras);
   for (std::size_t k = 0; k < static_cast<std::size_t>(a.cameras); ++k) {
-    if (found.serials[k] != expected.serials[k])
-      return fmt::format("its camera {} has the serial \"{}\", the configuration's \"{}\"", k,
+    if (!same_camera(found, expected, k))
+      return fmt::format("its camera {} has the serial \"{}\", the one that is there \"{}\"", k,
                          found.serials[k], expected.serials[k]);
     const Intrinsics &x = a.intrinsics[k], &y = b.intrinsics[k];
     if (x.width != y.width || x.height != y.height)
       return fmt::format("its camera {} has {} x {} pixels, the configuration's {} x {}", k,
                          x.width, x.height, y.width, y.height);
-    if (x.kind != y.kind)
-      return fmt::format("its camera {} has another lens model than the configuration's", k);
   }
-  if (!(std::abs(a.baseline - b.baseline) <= kSameLength * b.baseline))
-    return fmt::format("it was found with a baseline of {:g} m, the configuration says {:g} m",
-                       a.baseline, b.baseline);
-  return "";
+  return found.configured && expected.configured ? other_configuration(found, expected)
+                                                 : other_numbers(a, b);
 }
 
 }  // namespace
@@ -93,7 +119,9 @@ void write_state(const std::filesystem::path& file, const CalibrationFile& calib
   if (error)
     throw InputError(file.parent_path().string() + ": cannot be made (" + error.message() +
                      "): set rig.state_dir to a folder that can, or to none");
-  write_calibration(file, calibration);
+  std::string text = format_calibration(calibration);
+  if (calibration.configured) text += format_configured(*calibration.configured);
+  replace_durably(file, text);
 }
 
 }  // namespace vergence::app

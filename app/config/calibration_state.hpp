@@ -6,7 +6,8 @@
 #include "app/config/calibration_file.hpp"
 #include "app/config/configuration.hpp"
 
-/// The state file (DESIGN §6): the last calibration a drive accepted, where the next one begins.
+/// The state file (DESIGN §6): the last calibration that a drive accepted or confirmed, where the
+/// next one begins.
 namespace vergence::app {
 
 /// Where the state file of this rig lies: `calibration_state.yaml` in `rig.state_dir`, or in
@@ -14,6 +15,9 @@ namespace vergence::app {
 /// `none`, or the user has no home. Characters of the rig's name that a folder's should not have
 /// become `_`; a rig without a name is `rig`.
 [[nodiscard]] std::optional<std::filesystem::path> state_file(const RigSettings& rig);
+
+/// Relative: from here on a calibration's baseline and the configuration's are two lengths.
+inline constexpr double kOtherLength = 0.02;
 
 /// What a state file came to.
 struct CalibrationState {
@@ -23,9 +27,12 @@ struct CalibrationState {
 };
 
 /// Reads the file if there is one. It is used for the rig it was found on: as many cameras of the
-/// same sizes and lens models, the same
-/// serials in the same order, the same measured length of the baseline (to a thousandth). Errors
-/// None: a sentence.
+/// same sizes, the same serials in the same order, and a configuration that says what it said then
+/// of lenses, read-out regions, places and the baseline, which the one found differs from by less
+/// than kOtherLength. A file without what the configuration said, of an older release: the same
+/// lens models, the same measured length of the baseline (to a thousandth), and a camera may bear
+/// the configuration's `serial`.
+/// Errors  None: a sentence.
 [[nodiscard]] CalibrationState read_state(const std::filesystem::path& file,
                                           const CalibrationFile& expected);
 

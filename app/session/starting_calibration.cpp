@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "app/config/calibration_state.hpp"
+#include "app/config/configured_rig.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/session/given_calibration.hpp"
@@ -15,17 +16,33 @@
 namespace vergence::app {
 namespace {
 
-/// The configuration's words around the numbers.
+/// The device's own serial says which camera it is: what the configuration finds it by may be an
+/// address or a path, behind which it can be exchanged. A mock's camera is the one asked for.
+std::string serial_of(const CameraSettings& camera, const std::string& own) {
+  return own.empty() || (camera.driver == "mock" && !camera.serial.empty()) ? camera.serial : own;
+}
+
+/// The configuration's words around the numbers, and the cameras that are there.
 void name_cameras(const Configuration& c, const std::vector<std::string>& serials,
                   CalibrationFile* file) {
   if (!c.rig.name.empty()) file->rig_name = c.rig.name;
   for (std::size_t k = 0; k < static_cast<std::size_t>(file->rig.cameras); ++k) {
     if (!c.cameras[k].name.empty()) file->names[k] = c.cameras[k].name;
-    if (!c.cameras[k].serial.empty())
-      file->serials[k] = c.cameras[k].serial;
-    else if (k < serials.size() && !serials[k].empty())
-      file->serials[k] = serials[k];
+    const std::string serial = serial_of(c.cameras[k], k < serials.size() ? serials[k] : "");
+    if (!serial.empty()) file->serials[k] = serial;
   }
+}
+
+ConfiguredRig configured_rig(const Configuration& c, const RigCalibration& nominal) {
+  ConfiguredRig rig;
+  rig.baseline = nominal.baseline;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(nominal.cameras); ++k) {
+    rig.cameras.push_back(ConfiguredCamera::of(nominal.intrinsics[k], nominal.T_camera_left[k]));
+    rig.cameras[k].serial_key = c.cameras[k].serial;
+    rig.cameras[k].offset = {static_cast<double>(c.cameras[k].offset_x),
+                             static_cast<double>(c.cameras[k].offset_y)};
+  }
+  return rig;
 }
 
 /// Whether the configuration says where the cameras sit. The mock's rig is what it says, also when
@@ -54,11 +71,18 @@ void check_same_rig(const std::string& name, const CalibrationFile& file,
           fmt::format("{}: is for images of {} x {} pixels, cameras.{}.size is {} x {}", name,
                       theirs.width, theirs.height, k, ours.width, ours.height));
     if (!file.serials[k].empty() && !configured.serials[k].empty() &&
-        file.serials[k] != configured.serials[k])
-      remarks->push_back(
-          fmt::format("{}: is of a camera {} with the serial \"{}\"; the configuration's is \"{}\"",
-                      name, k, file.serials[k], configured.serials[k]));
+        file.serials[k] != configured.serials[k] &&
+        file.serials[k] != configured.configured->cameras[k].serial_key)  // of an older release
+      remarks->push_back(fmt::format(
+          "{}: is of a camera {} with the serial \"{}\"; the one that is there has \"{}\"", name, k,
+          file.serials[k], configured.serials[k]));
   }
+  // Images show no length.
+  const double had = file.rig.baseline, says = configured.rig.baseline;
+  if (std::abs(had - says) >= kOtherLength * says)
+    remarks->push_back(fmt::format(
+        "{}: has a baseline of {:g} m, the configuration says {:g} m: all lengths go by the file",
+        name, had, says));
 }
 
 double angle_between(const Vec3& a, const Vec3& b) {
@@ -91,6 +115,7 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
   configured.rig = nominal_rig(c);
   configured.source = "given";
   name_cameras(c, serials, &configured);
+  configured.configured = configured_rig(c, configured.rig);
   start.file = configured;
   start.source = "the configuration";
   start.state = state_file(c.rig);
@@ -120,6 +145,7 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
     start.trust = CalibrationTrust::none;
     start.source = "none";
   }
+  start.file.configured = configured.configured;
   start.nominal = nominal_geometry(start.file.rig, mounted_rig(c), c.calibration);
   return start;
 }

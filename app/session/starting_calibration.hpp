@@ -22,8 +22,9 @@ struct CalibrationSource {
 };
 
 struct StartingCalibration {
-  CalibrationFile file{};  // what the estimator is given, with the cameras' names and serials; from
-                           // scratch T_camera_left is parallel
+  CalibrationFile file{};  // what the estimator is given, with the cameras' names and serials, and
+                           // of a drive what the configuration says; from scratch T_camera_left is
+                           // parallel
   RigCalibration nominal{};  // what the gates compare with
   CalibrationTrust trust = CalibrationTrust::given;
   const char* cause = "given";                   // of calibrations.csv
@@ -32,8 +33,8 @@ struct StartingCalibration {
   std::optional<std::filesystem::path> state{};  // where an accepted one is kept; nothing: nowhere
 };
 
-/// Of a drive. `serials`: of the cameras that are there, for those that the configuration does
-/// not name. From scratch, too, where the
+/// Of a drive. `serials`: the cameras' own, as far as they have one; else the configuration names
+/// them. From scratch, too, where the
 /// cameras are real and neither a file nor the configuration says where they sit. Errors
 /// InputError: a file that is damaged or of another rig. A state file that is not used is a remark.
 [[nodiscard]] StartingCalibration starting_calibration(const Configuration& configuration,

@@ -104,8 +104,9 @@ TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
   EXPECT_GT(found.rig.scale_sigma, 0);
   EXPECT_GT(found.rig.sigma_wide[1][4], 0);
   EXPECT_EQ(events("s", "calibration_kept").size(), 1U);
-  EXPECT_EQ(read_file(state()), read_file(session("s") / "calibration.yaml"))
-      << "what is kept is what is in use";
+  EXPECT_TRUE(
+      read_file(state()).starts_with(read_file(session("s") / "calibration.yaml") + "configured:"))
+      << "what is kept is what is in use, and what it was found under";
 }
 
 TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreOthers) {
@@ -127,6 +128,11 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
       << "told why it is not used: " << other.err;
   EXPECT_NE(lines("other", "calibrations.csv").at(1).find(",accepted,given,"), std::string::npos);
   EXPECT_EQ(read_file(state()), kept) << "nothing was accepted since";
+
+  const Outcome lenses = drive("lenses", "--duration 1 --set rig.nominal.focal_px=250");
+  EXPECT_NE(lenses.err.find("is not used: when it was found the configuration had the intrinsics"),
+            std::string::npos)
+      << lenses.err;
 }
 
 TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEnd) {
@@ -163,6 +169,39 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
                              mine.string()));
   EXPECT_EQ(refused.code, 2);
   EXPECT_NE(refused.err.find("cameras.0.size is 640 x 480"), std::string::npos) << refused.err;
+}
+
+TEST_F(CalibrationCli, aGivenCalibrationThatTheDriveConfirmsIsWhereTheNextBegins) {
+  ASSERT_EQ(drive("first", std::string("--from-scratch ") + kLongEnough).code, 0);
+  app::CalibrationFile mine = app::read_calibration(state());
+  mine.rig.T_camera_left[1] = {Mat3::Identity(), Vec3(-0.75, 0.0001, 0)};
+  mine.rig.found = Stamp();
+  app::write_calibration(folder_ / "mine.yaml", mine);
+  const std::string given = fmt::format("--calibration '{}' ", (folder_ / "mine.yaml").string());
+  ASSERT_EQ(drive("short", given + "--duration 1").code, 0);
+  EXPECT_NE(app::read_calibration(state()).rig.found, Stamp()) << "not confirmed, not kept";
+  ASSERT_EQ(drive("second", given + kLongEnough).code, 0);
+  ASSERT_EQ(events("second", "calibration_confirmed").size(), 1U);
+  EXPECT_EQ(events("second", "calibration_accepted").size(), 0U);
+  EXPECT_EQ(app::read_calibration(state()).rig.T_camera_left[1].t.y(), 0.0001);
+  ASSERT_EQ(drive("third", "--duration 1").code, 0);
+  EXPECT_NE(lines("third", "calibrations.csv").at(1).find(",accepted,state_file,"),
+            std::string::npos);
+}
+
+TEST_F(CalibrationCli, aRecordedSessionIsReplayedWithAFileOfItsOwnNumberOfCameras) {
+  ASSERT_EQ(drive("first", "--duration 1 --set record.images=on").code, 0);
+  app::CalibrationFile file = app::read_calibration(session("first") / "calibration.yaml");
+  file.rig.cameras = 3;
+  file.rig.intrinsics[2] = file.rig.intrinsics[1];
+  file.rig.T_camera_left[2].t = 2 * file.rig.T_camera_left[1].t;
+  app::write_calibration(folder_ / "three.yaml", file);
+  const Outcome o = run_vergence(fmt::format(
+      "replay '{}' --format session --quiet --out '{}' --calibration '{}'",
+      session("first").string(), session("s").string(), (folder_ / "three.yaml").string()));
+  EXPECT_EQ(o.code, 2);
+  EXPECT_NE(o.err.find("three.yaml: is of 3 cameras"), std::string::npos) << o.err;
+  EXPECT_FALSE(fs::exists(session("s")));
 }
 
 TEST_F(CalibrationCli, aScheduledWishRecalibrates) {

@@ -105,7 +105,7 @@ TEST(StateFile, OfAnotherRigIsNotUsedAndTheSentenceSaysWhy) {
     EXPECT_NE(state.sentence.find("calibration_state.yaml: is not used"), std::string::npos)
         << state.sentence;
   };
-  refused("serial \"102\", the configuration's \"103\"",
+  refused("serial \"102\", the one that is there \"103\"",
           [](CalibrationFile* c) { c->serials[1] = "103"; });
   refused("2 cameras, the configuration has 3", [](CalibrationFile* c) { c->rig.cameras = 3; });
   refused("640 x 480", [](CalibrationFile* c) { c->rig.intrinsics[0].width = 1280; });
@@ -114,6 +114,94 @@ TEST(StateFile, OfAnotherRigIsNotUsedAndTheSentenceSaysWhy) {
   });
   refused("baseline of 0.75 m, the configuration says 0.76 m",
           [](CalibrationFile* c) { c->rig.baseline = 0.76; });
+}
+
+/// The same with what the configuration says of it, in which cameras are asked for by address.
+CalibrationFile configured() {
+  CalibrationFile file = two_cameras();
+  file.configured.emplace().baseline = 0.75;
+  for (std::size_t k = 0; k < 2; ++k) {
+    file.configured->cameras.push_back(
+        ConfiguredCamera::of(file.rig.intrinsics[k], file.rig.T_camera_left[k]));
+    file.configured->cameras[k].serial_key = k == 0 ? "192.168.7.2" : "192.168.7.3";
+  }
+  return file;
+}
+
+TEST(StateFile, FoundUnderAnotherConfigurationItIsNotUsedAndTheSentenceSaysWhatChanged) {
+  const test::TemporaryFolder folder;
+  const auto path = folder / "calibration_state.yaml";
+  write_state(path, configured());
+  const CalibrationState same = read_state(path, configured());
+  ASSERT_TRUE(same.calibration) << same.sentence;
+  EXPECT_EQ(same.calibration->configured->cameras[1].T_camera_left,
+            configured().configured->cameras[1].T_camera_left);
+  const auto refused = [&](const char* why, const auto& change) {
+    CalibrationFile expected = configured();
+    change(&*expected.configured);
+    const CalibrationState state = read_state(path, expected);
+    EXPECT_FALSE(state.calibration) << why;
+    EXPECT_NE(state.sentence.find(why), std::string::npos) << state.sentence;
+  };
+  refused("intrinsics [460, 460, 320, 240] for camera 1, it has [500, 460, 320, 240] now",
+          [](ConfiguredRig* rig) { rig->cameras[1].intrinsics[0] = 500; });
+  refused("distortion [0, 0, 0, 0, 0] for camera 0, it has [-0.2, 0, 0, 0, 0] now",
+          [](ConfiguredRig* rig) { rig->cameras[0].distortion[0] = -0.2; });
+  refused("offset [0, 0] for camera 0, it has [200, 100] now", [](ConfiguredRig* rig) {
+    rig->cameras[0].offset = {200, 100};
+  });
+  refused("another place for camera 1",
+          [](ConfiguredRig* rig) { rig->cameras[1].T_camera_left[2] = 0.087; });
+  refused("model pinhole-radtan for camera 1, it has pinhole-equidistant now",
+          [](ConfiguredRig* rig) { rig->cameras[1].model = CameraModelKind::pinhole_equidistant; });
+  refused("baseline of 0.75 m, the configuration says 0.7512 m",
+          [](ConfiguredRig* rig) { rig->baseline = 0.7512; });
+}
+
+TEST(StateFile, WhatAGivenCalibrationHadOtherwiseThanTheConfigurationIsNoChangeOfIt) {
+  const test::TemporaryFolder folder;
+  const auto path = folder / "calibration_state.yaml";
+  CalibrationFile found = configured();
+  found.rig.T_camera_left[1].t *= 0.7512 / 0.75;
+  found.rig.baseline = 0.7512;
+  for (Intrinsics& lens : found.rig.intrinsics) lens.kind = CameraModelKind::pinhole_equidistant;
+  write_state(path, found);
+  EXPECT_TRUE(read_state(path, configured()).calibration)
+      << read_state(path, configured()).sentence;
+
+  found.rig.T_camera_left[1].t *= 0.3 / 0.7512;
+  found.rig.baseline = 0.3;
+  write_state(path, found);
+  const CalibrationState state = read_state(path, configured());
+  EXPECT_FALSE(state.calibration) << "nobody named that file for this drive";
+  EXPECT_NE(state.sentence.find("baseline is 0.3 m, the configuration's 0.75 m"), std::string::npos)
+      << state.sentence;
+}
+
+TEST(StateFile, OfAnOlderReleaseACameraMayBearWhatItIsAskedForWith) {
+  const test::TemporaryFolder folder;
+  const auto path = folder / "calibration_state.yaml";
+  CalibrationFile old = two_cameras();
+  old.serials = {"192.168.7.2", "102", "", ""};
+  write_state(path, old);
+  EXPECT_TRUE(read_state(path, configured()).calibration)
+      << read_state(path, configured()).sentence;
+  old.configured = configured().configured;
+  write_state(path, old);
+  EXPECT_FALSE(read_state(path, configured()).calibration) << "this release writes serials";
+}
+
+TEST(StateFile, IsACalibrationThatCanBeGiven) {
+  const test::TemporaryFolder folder;
+  write_state(folder / "calibration_state.yaml", configured());
+  const CalibrationFile given = read_calibration(folder / "calibration_state.yaml");
+  EXPECT_EQ(given.rig.baseline, 0.75);
+  EXPECT_EQ(format_calibration(given), format_calibration(two_cameras()));
+  for (const char* part : {"baseline", "model", "offset", "T_camera_left"}) {
+    std::string text = test::read_file(folder / "calibration_state.yaml");
+    text.replace(text.find(part, text.find("\nconfigured:")), 3, "xyz");
+    EXPECT_THROW((void)parse_calibration(text, "c.yaml"), InputError) << part;
+  }
 }
 
 TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {

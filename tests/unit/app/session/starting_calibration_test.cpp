@@ -46,7 +46,7 @@ TEST(StartingCalibration, isTheConfigurationsWhereNothingElseIsSaid) {
   EXPECT_EQ(start.file.rig.T_camera_left[1].t, Vec3(-0.75, 0.001, 0.002));
   EXPECT_EQ(start.file.names[0], "links");
   EXPECT_EQ(start.file.names[1], "right");
-  EXPECT_EQ(start.file.serials[0], "A1") << "the configuration's";
+  EXPECT_EQ(start.file.serials[0], "A1") << "a mock is the camera that is asked for";
   EXPECT_EQ(start.file.serials[1], "m-1") << "the device's";
   EXPECT_EQ(start.state, folder / "calibration_state.yaml");
   EXPECT_TRUE(start.remarks.empty());
@@ -89,6 +89,78 @@ TEST(StartingCalibration, aStateOfOtherCamerasIsARemarkAndNotUsed) {
   EXPECT_EQ(start.file.rig.T_camera_left[1].t.y(), 0.001);
   ASSERT_EQ(start.remarks.size(), 1U);
   EXPECT_NE(start.remarks[0].find("another"), std::string::npos) << start.remarks[0];
+}
+
+TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
+  const test::TemporaryFolder folder;
+  Configuration c = configuration(folder, "gige");
+  c.cameras[0].serial = "192.168.7.2";
+  const StartingCalibration first = starting_calibration(c, {}, {"4711", ""});
+  EXPECT_EQ(first.file.serials[0], "4711") << "the device's own, not its address";
+  c.cameras[1].serial = "/dev/video1";
+  EXPECT_EQ(starting_calibration(c, {}, {"4711", ""}).file.serials[1], "/dev/video1")
+      << "one without a serial is what it is asked for";
+
+  const auto drive = [&](const char* own) { return starting_calibration(c, {}, {own, ""}); };
+  write_state(folder / "calibration_state.yaml", drive("4711").file);
+  EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
+  const StartingCalibration other = drive("4712");
+  EXPECT_EQ(other.trust, CalibrationTrust::given);
+  ASSERT_EQ(other.remarks.size(), 1U);
+  EXPECT_NE(other.remarks[0].find("\"4711\", the one that is there \"4712\""), std::string::npos)
+      << other.remarks[0];
+
+  // Files of older releases have the address: no word of them, for ever.
+  CalibrationFile old = drive("4711").file;
+  old.serials[0] = "192.168.7.2";
+  write_calibration(folder / "old.yaml", old);
+  EXPECT_TRUE(starting_calibration(c, {.file = folder / "old.yaml"}, {"4711", ""}).remarks.empty());
+  write_calibration(folder / "calibration_state.yaml", old);
+  EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
+}
+
+TEST(StartingCalibration, aStateFoundUnderAnotherConfigurationIsARemarkAndNotUsed) {
+  const test::TemporaryFolder folder;
+  const Configuration then = configuration(folder);
+  write_state(folder / "calibration_state.yaml", found(then, 0.011));
+  const auto refused = [](const Configuration& now, const char* why) {
+    const StartingCalibration start = starting_calibration(now, {}, kSerials);
+    EXPECT_EQ(start.trust, CalibrationTrust::given) << why;
+    ASSERT_EQ(start.remarks.size(), 1U) << why;
+    EXPECT_NE(start.remarks[0].find(why), std::string::npos) << start.remarks[0];
+  };
+  Configuration now = then;
+  now.cameras[1].intrinsics = {500, 500, 320, 240};
+  refused(now, "intrinsics");
+  now = then;
+  now.cameras[0].offset_x = 200;
+  refused(now, "offset");
+  now = then;
+  const Mat3 R = exp_so3({0, 0.087, 0});
+  for (std::size_t i = 0; i < 9; ++i)
+    now.cameras[1].T_camera_left[i / 3 * 4 + i % 3] =
+        R(static_cast<int>(i / 3), static_cast<int>(i % 3));
+  refused(now, "another place for camera 1");
+  now = then;
+  for (auto& camera : now.cameras) camera.model = CameraModelKind::pinhole_equidistant;
+  refused(now, "model");
+}
+
+TEST(StartingCalibration, ofAFileWithAnotherBaselineTheUserHears) {
+  const test::TemporaryFolder folder;
+  const Configuration c = configuration(folder);
+  const auto remarks_for = [&](double baseline) {
+    CalibrationFile file = found(c, 0);
+    apply_use({.baseline = baseline}, &file.rig);
+    write_calibration(folder / "mine.yaml", file);
+    return starting_calibration(c, {.file = folder / "mine.yaml"}, kSerials).remarks;
+  };
+  EXPECT_TRUE(remarks_for(0.755).empty());
+  ASSERT_EQ(remarks_for(0.3).size(), 1U);
+  EXPECT_NE(remarks_for(0.3)[0].find("mine.yaml: has a baseline of 0.3 m, the configuration says "
+                                     "0.750003 m: all lengths go by the file"),
+            std::string::npos)
+      << remarks_for(0.3)[0];
 }
 
 TEST(StartingCalibration, aFileOfAnotherRigIsRefused) {
