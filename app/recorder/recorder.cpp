@@ -25,15 +25,15 @@ namespace vergence::app {
 static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_copyable_v<InsRecord>);
 
 struct Recorder::Files {
-  Files(const std::filesystem::path& folder, bool with_ins, LineFile::Away away)
-      : trajectory(folder / "trajectory.tum", LineFile::kPending, away),
-        reference(folder / "reference.tum", LineFile::kPending, away),
-        poses(folder / "poses.csv", LineFile::kPending, away),
-        calibrations(folder / "calibrations.csv", LineFile::kPending, away),
-        events(folder / "events.jsonl", LineFile::kPending, away),
+  Files(const std::filesystem::path& folder, bool with_ins)
+      : trajectory(folder / "trajectory.tum"),
+        reference(folder / "reference.tum"),
+        poses(folder / "poses.csv"),
+        calibrations(folder / "calibrations.csv"),
+        events(folder / "events.jsonl"),
         all{&trajectory, &reference, &poses, &calibrations, &events} {
     constexpr std::size_t kMinutes = std::size_t{16} << 20;  // bytes: readings are many
-    if (with_ins) all.push_back(&ins.emplace(folder / "ins.csv", kMinutes, away));
+    if (with_ins) all.push_back(&ins.emplace(folder / "ins.csv", kMinutes));
     reported.resize(all.size());
   }
   /// The first line of a table; empty: the file has none.
@@ -59,16 +59,13 @@ constexpr std::size_t kLongestLine = 2048;  // bytes: calibrations.csv has the l
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options),
-      mark_(options.number),
+      files_(std::make_unique<Files>(folder, options.ins)),
       totals_(!options.keep_trajectory      ? 0
               : options.expected_frames > 0 ? options.expected_frames
                                             : kMostStatuses),
-      folder_fault_(options.folder_fault),
       newest_(options.first) {
   line_.reserve(kLongestLine);
   folder_ = folder.string();
-  mark_.put_on(folder_.c_str());
-  files_ = std::make_unique<Files>(folder, options.ins, options.disk_away);
   if (options.keep) keeper_ = std::make_unique<CalibrationKeeper>(options.keep, &filled_);
   memory_ = totals_.memory();
   for (LineFile* file : files_->all) {
@@ -208,17 +205,7 @@ bool Recorder::take_outcome() {
 /// have it again. False: not all was taken.
 bool Recorder::flush(LineFile* file, bool anew) {
   if (file->flush()) return true;
-  if (!anew || folder_fault_ != 0 || !file->out_of_reach() || !open_anew(file)) return false;
-  mark_.put_on(folder_.c_str());  // its folder may be another one since
-  return file->flush();
-}
-
-/// Only one that never was there is made: below a disk that is unmounted for a while another one
-/// would come to lie.
-void Recorder::come_to_folder() {
-  if (folder_fault_ == 0) return;
-  folder_fault_ = make_folders(folder_.c_str());
-  if (folder_fault_ == 0) mark_.put_on(folder_.c_str());
+  return anew && file->out_of_reach() && open_anew(file) && file->flush();
 }
 
 void Recorder::flush() {
@@ -227,12 +214,11 @@ void Recorder::flush() {
   const auto now = std::chrono::steady_clock::now();
   const bool anew = now >= files_->anew_due;
   if (anew) files_->anew_due = now + kAnew;
-  if (anew) come_to_folder();
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (flush(files[i], anew)) {
       files_->reported[i] = 0;
       if (files[i]->reopen_due()) reopen(files[i]);
-    } else if (folder_fault_ == 0 && files_->reported[i] != files[i]->fault()) {
+    } else if (files_->reported[i] != files[i]->fault()) {
       files_->reported[i] = files[i]->fault();
       report_error(*files[i]);
     }
@@ -298,9 +284,8 @@ void Recorder::note_disk(bool full) {
   std::array<char, 96> room{};
   (void)fmt::format_to_n(room.begin(), room.size() - 1, "the disk takes lines again; {} were lost",
                          lost_lines());
-  const bool away = std::any_of(files_->all.begin(), files_->all.end(), [](const LineFile* f) {
-    return f->fault() != 0 && !f->wants_room();
-  });
+  const bool away = std::any_of(files_->all.begin(), files_->all.end(),
+                                [](const LineFile* f) { return f->out_of_reach(); });
   event.set_sentence(!full  ? room.data()
                      : away ? "the disk of the session takes nothing: lines wait in memory"
                             : "the disk of the session has no room: lines wait in memory");
@@ -317,7 +302,7 @@ void Recorder::report_error(const LineFile& file) {
   const char* words = ::strerrordesc_np(file.fault());  // strerror() may take memory
   report_error("{}: cannot be written ({}); the session goes on, lines wait in memory: {}",
                file.path().native(), words != nullptr ? words : "unknown error",
-               file.wants_room() ? "make room on that disk" : "check that disk");
+               file.out_of_reach() ? "check that disk" : "make room on that disk");
 }
 
 template <class... Arguments>
@@ -356,15 +341,14 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   if (keeper_ != nullptr) keeper_->stop();
   while (take_outcome()) {
   }
-  come_to_folder();
   for (LineFile* file : files_->all) {
     if (file->reopen_due()) reopen(file);
     (void)flush(file, true);
     const bool good = file->close();
     totals.lost_lines += file->lost_lines();
-    const int fault = folder_fault_ != 0 ? folder_fault_ : file->fault();
     if (!good)
-      totals.faults.push_back(file->path().string() + ": is not complete (" + std::strerror(fault) +
+      totals.faults.push_back(file->path().string() + ": is not complete (" +
+                              std::strerror(file->fault()) +
                               "); make room on that disk and repeat the drive");
     else if (file->lost_lines() > 0)
       errors_.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +

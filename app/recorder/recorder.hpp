@@ -12,7 +12,6 @@
 
 #include "app/recorder/calibration_keeper.hpp"
 #include "app/recorder/ins_file.hpp"
-#include "app/recorder/line_file.hpp"
 #include "app/recorder/records.hpp"
 #include "app/recorder/session_folder.hpp"
 #include "app/recorder/session_totals.hpp"
@@ -69,11 +68,6 @@ class Recorder {
     std::size_t expected_frames = 0;  // 0: nobody knows
     bool ins = false;                 // readings are posted: ins.csv is there
     Stamp first{};                    // of the recorder's own events before the first pose
-    std::uint64_t number = 0;         // of SessionMark
-    /// A disk that is away at the beginning is none to wait for: poses go on as when it goes away
-    /// later. `folder_fault`: what try_session_folder() said; the recorder makes the folder then.
-    LineFile::Away disk_away = LineFile::Away::refuse;
-    int folder_fault = 0;
     /// Called on a thread of its own with every calibration that was accepted while driving, and
     /// with the one that the drive began with when it is confirmed first: files may be written
     /// there. May be empty.
@@ -83,7 +77,7 @@ class Recorder {
     std::function<bool(Stamp)> disk_full{};
   };
 
-  /// `folder` exists: make_session_folder(). It bears a SessionMark until the destructor.
+  /// `folder` exists: make_session_folder().
   Recorder(const std::filesystem::path& folder, const Options& options);
   ~Recorder();
   Recorder(const Recorder&) = delete;
@@ -125,7 +119,6 @@ class Recorder {
   void keep(Stamp stamp, const RigNumbers& rig, bool found);
   void flush();
   [[nodiscard]] bool flush(LineFile* file, bool anew);
-  void come_to_folder();
   void reopen_files();
   [[nodiscard]] bool open_anew(LineFile* file);
   void reopen(LineFile* file);
@@ -141,12 +134,10 @@ class Recorder {
 
   struct Files;
   Options options_;
-  SessionMark mark_;  // before any file is there
   std::unique_ptr<Files> files_;
   TotalsBuilder totals_;
-  std::string line_;  // being formatted
-  std::string folder_;
-  int folder_fault_ = 0;  // errno: it is not there yet
+  std::string line_;    // being formatted
+  std::string folder_;  // for sentences
   std::size_t memory_ = 0;
   Stamp newest_;  // of the poses
   bool disk_full_ = false, pretended_ = false;
