@@ -17,7 +17,7 @@ namespace vergence::app {
 namespace {
 
 /// The device's own serial says which camera it is: what the configuration finds it by may be an
-/// address or a path, behind which it can be exchanged. A mock's camera is the one asked for.
+/// address, behind which it can be exchanged. A mock's camera is the one asked for.
 std::string serial_of(const CameraSettings& camera, const std::string& own) {
   return own.empty() || (camera.driver == "mock" && !camera.serial.empty()) ? camera.serial : own;
 }
