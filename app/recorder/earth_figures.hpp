@@ -24,7 +24,7 @@ struct PlacementRecord {
 /// Errors against the INS after the placement, over the poses that were compared.
 struct EarthErrors {
   std::uint64_t poses = 0;
-  double way_m = 0;  // of the INS from its first fix on, straight across holes
+  double way_m = 0;  // of the INS across the ground from its first fix on, straight across holes
   double horizontal_rms_m = 0, horizontal_most_m = 0, horizontal_end_m = 0;
   double up_rms_m = 0, up_end_m = 0;                                      // ours − INS
   double heading_rms_deg = 0, heading_most_deg = 0, heading_end_deg = 0;  // the end clockwise

@@ -47,7 +47,8 @@ class InsComparison {
   [[nodiscard]] EarthFigures earth(const std::string& mount_source) const;
 
  private:
-  void measure(const ComparedPose& pose) noexcept;
+  void measure_way(const ComparedPose& pose) noexcept;
+  void measure_errors(const ComparedPose& pose) noexcept;
   void take_placement(Stamp stamp) noexcept;
   const Transform T_ins_left_;
   Comparison comparison_;
@@ -61,7 +62,8 @@ class InsComparison {
   std::vector<PlacementRecord> placements_;  // its memory is taken at construction
   EarthErrors errors_{};                     // means and roots are squares' sums until earth()
   bool on_way_ = false;                      // last_place_ means something
-  Vec3 last_place_ = Vec3::Zero();
+  Vec2 last_place_ = Vec2::Zero();           // where the newest whole step of the way ended
+  double beyond_ = 0;                        // m from there to the newest place
   Stamp newest_stamp_{};
 };
 

@@ -113,6 +113,7 @@ bool Comparison::next(ComparedPose* out) noexcept {
   if (c.ins_valid) {
     c.reference = on_earth(reference.T_enu_left);
     c.ins_stamp_error = reference.stamp_error;
+    c.ins_position_sigma = reference.sigmas.position;
   } else {
     ++counters_.without_ins;
   }

@@ -88,6 +88,7 @@ struct ComparedPose {
   EarthPose ours{};
   EarthPose reference{};          // the INS brought to the left camera and to the frame's stamp
   Duration ins_stamp_error{};     // the larger of the two samples' around the frame
+  double ins_position_sigma = 0;  // m, horizontal, each axis: likewise
   Vec3 error_enu = Vec3::Zero();  // m, ours − INS
   double error_yaw = 0;           // rad, in (−π, π], counter-clockwise from above positive
   double path_ratio = 0;          // ours / INS over the newest scale_stretch_m; 0: not yet that far
