@@ -51,8 +51,8 @@ void InsComparison::finish() noexcept {
 /// The way is summed across the ground, straight across holes, in steps of four sigmas of a
 /// reading: so far apart are two readings at a standstill exp(-4) of the time. A step of length L
 /// that errs by e across is e²/2L too long; an MTi-G's place wanders by half a metre in the 1.5 s
-/// of a step, which is 0.2 %. A bend of radius R is cut by L²/24R², 0.3 % of steps of 8.5 m at 30
-/// m.
+/// of a step, which is 0.2 %. A bend of radius R is cut by L²/24R²: at 30 m, by 0.3 % in steps of
+/// 8.5 m.
 void InsComparison::measure_way(const ComparedPose& pose) noexcept {
   constexpr double kSigmas = 4, kLeast = 0.5, kMost = 20;  // m: longer ones cut corners
   if (!pose.ins_valid) return;
