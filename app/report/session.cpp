@@ -31,13 +31,11 @@ std::optional<Event> parse_event(std::string_view line) {
 }
 
 void read_events(const fs::path& folder, Session* session) {
-  const auto text = read_part(folder / "events.jsonl", std::size_t{1} << 30U,
-                              "what happened during the drive is not known", session);
-  if (!text) return;
-  const std::string_view whole = whole_lines(*text);
-  Lines lines(whole);
+  auto lines =
+      open_part(folder / "events.jsonl", "what happened during the drive is not known", session);
+  if (!lines) return;
   std::size_t damaged = 0;
-  for (std::string_view line; lines.next(&line);) {
+  for (std::string_view line; lines->next(&line);) {
     if (session->events.size() == kMostEvents) {
       ++session->events_dropped;
     } else if (auto event = parse_event(line)) {
@@ -46,7 +44,7 @@ void read_events(const fs::path& folder, Session* session) {
       ++damaged;
     }
   }
-  report_damage("events.jsonl", damaged, whole.size() != text->size(), 0, session);
+  report_damage("events.jsonl", *lines, damaged, 0, session);
 }
 
 void read_summary(const fs::path& folder, Session* session) {
@@ -105,10 +103,10 @@ const nlohmann::json* find_path(const nlohmann::json& json, std::string_view pat
   return at;
 }
 
-}  // namespace
-
-std::optional<std::string> read_part(const fs::path& file, std::size_t limit,
-                                     const char* consequence, Session* session) {
+/// What `read` gives, or a sentence in `missing`.
+template <class Read>
+auto part_of(const fs::path& file, const char* consequence, Session* session, const Read& read)
+    -> std::optional<decltype(read())> {
   std::error_code error;
   if (!fs::exists(file, error)) {
     session->missing.push_back(
@@ -116,19 +114,39 @@ std::optional<std::string> read_part(const fs::path& file, std::size_t limit,
     return std::nullopt;
   }
   try {
-    return read_text(file, limit);
+    return read();
   } catch (const InputError& e) {
     session->missing.push_back(fmt::format("{}; {}", e.what(), consequence));
     return std::nullopt;
   }
 }
 
-void report_damage(const char* file, std::size_t rows, bool tail, std::size_t disordered,
-                   Session* session) {
+}  // namespace
+
+std::optional<std::string> read_part(const fs::path& file, std::size_t limit,
+                                     const char* consequence, Session* session) {
+  return part_of(file, consequence, session, [&] { return read_text(file, limit); });
+}
+
+std::optional<FileLines> open_part(const fs::path& file, const char* consequence,
+                                   Session* session) {
+  return part_of(file, consequence, session, [&] { return FileLines(file); });
+}
+
+void leave_out(const char* file, std::size_t most, Session* session) {
+  session->left_out.push_back(
+      fmt::format("{} has more than {} lines; the rest is left out", file, most));
+}
+
+void report_damage(const char* file, const FileLines& lines, std::size_t rows,
+                   std::size_t disordered, Session* session) {
   if (rows > 0)
     session->missing.push_back(
         fmt::format("{}: {} damaged line{} left out", file, rows, rows == 1 ? "" : "s"));
-  if (tail)
+  if (lines.failed())
+    session->missing.push_back(
+        fmt::format("{}: reading it failed half way; the rest is left out", file));
+  else if (lines.torn())
     session->missing.push_back(fmt::format(
         "{}: the last line is torn and was left out; the session was not closed", file));
   if (disordered > 0)
@@ -156,7 +174,13 @@ std::string text_at(const nlohmann::json& json, std::string_view path) {
              : std::string();
 }
 
-Session read_session(const fs::path& folder) {
+bool is_live(const Session& session) {
+  // Only what devices give has figures of their clocks.
+  return session.summary.is_object() && session.summary.contains("time") &&
+         session.summary["time"].is_object();
+}
+
+Session read_session(const fs::path& folder, std::size_t most_frames) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
     throw InputError(
@@ -170,12 +194,13 @@ Session read_session(const fs::path& folder) {
   Session session;
   session.name = fs::weakly_canonical(folder, error).filename().string();
   read_summary(folder, &session);
-  if (!read_poses(folder, &session) || session.frames.empty())
-    frames_from_trajectory(folder, &session);
+  if (!read_poses(folder, most_frames, &session) || session.frames.empty())
+    frames_from_trajectory(folder, most_frames, &session);
   // Where there was nothing to compare with there is no such file.
   if (fs::exists(folder / "reference.tum", error) || number_at(session.summary, "metrics.ate_m"))
-    session.reference = read_trajectory_part(
-        folder, "reference.tum", "there is nothing to compare the trajectory with", &session);
+    session.reference = read_trajectory_part(folder, "reference.tum",
+                                             "there is nothing to compare the trajectory with",
+                                             most_frames, &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
   read_residuals(folder, &session);

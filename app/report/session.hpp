@@ -92,7 +92,8 @@ struct Session {
   std::size_t events_dropped = 0;  // beyond kMostEvents
   nlohmann::json summary{};        // null when it is missing or no JSON
   std::optional<CalibrationFile> calibration{};
-  std::vector<std::string> missing{};  // sentences
+  std::vector<std::string> missing{};   // sentences
+  std::vector<std::string> left_out{};  // the same of files that are longer than is read
 };
 
 inline constexpr std::size_t kMostFrames =
@@ -103,9 +104,13 @@ inline constexpr std::size_t kMostResiduals = 4'000;
 inline constexpr std::size_t kLongestText =
     300;  // characters kept of a word or sentence from outside
 
-/// Reads what is there. Errors  InputError: `folder` is no folder, or none of a session's files is
-/// in it.
-[[nodiscard]] Session read_session(const std::filesystem::path& folder);
+/// Reads what is there, line by line: no file is held in memory. Errors  InputError: `folder` is no
+/// folder, or none of a session's files is in it.
+[[nodiscard]] Session read_session(const std::filesystem::path& folder,
+                                   std::size_t most_frames = kMostFrames);
+
+/// It was recorded from devices; else it is a replay, or nobody knows.
+[[nodiscard]] bool is_live(const Session& session);
 
 /// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no
 /// number.

@@ -4,7 +4,6 @@
 #include <string>
 #include <utility>
 
-#include "app/datasets/text_file.hpp"
 #include "app/report/csv.hpp"
 #include "app/report/detail/session_parts.hpp"
 
@@ -59,13 +58,16 @@ std::optional<ResidualRow> parse_residual(const CsvRows& rows) {
 }  // namespace
 
 void read_calibrations(const fs::path& folder, Session* session) {
-  const auto text = read_part(folder / "calibrations.csv", std::size_t{256} << 20U,
-                              "how the calibration changed is not known", session);
-  if (!text) return;
-  const std::string_view whole = whole_lines(*text);
-  CsvRows rows(whole);
+  auto lines =
+      open_part(folder / "calibrations.csv", "how the calibration changed is not known", session);
+  if (!lines) return;
+  CsvRows rows([&lines](std::string_view* line) { return lines->next(line); });
   std::size_t unreadable = 0;
-  while (rows.next() && session->calibrations.size() < kMostCalibrations) {
+  while (rows.next()) {
+    if (session->calibrations.size() == kMostCalibrations) {
+      leave_out("calibrations.csv", kMostCalibrations, session);
+      break;
+    }
     CalibrationRow c;
     const auto stamp = rows.integer(rows.column("stamp_ns"));
     const auto camera = rows.integer(rows.column("camera"));
@@ -93,18 +95,16 @@ void read_calibrations(const fs::path& folder, Session* session) {
     c.has_sigma = read_six(rows, "wide_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
     session->calibrations.push_back(std::move(c));
   }
-  report_damage("calibrations.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0,
-                session);
+  report_damage("calibrations.csv", *lines, rows.torn_rows() + unreadable, 0, session);
 }
 
 void read_residuals(const fs::path& folder, Session* session) {
   std::error_code error;
   if (!fs::exists(folder / "residuals.csv", error)) return;
-  const auto text = read_part(folder / "residuals.csv", std::size_t{4} << 20U,
-                              "how the calibration fits the images is not known", session);
-  if (!text) return;
-  const std::string_view whole = whole_lines(*text);
-  CsvRows rows(whole);
+  auto lines = open_part(folder / "residuals.csv",
+                         "how the calibration fits the images is not known", session);
+  if (!lines) return;
+  CsvRows rows([&lines](std::string_view* line) { return lines->next(line); });
   std::size_t unreadable = 0;
   while (rows.next() && session->residuals.size() < kMostResiduals) {
     if (const auto row = parse_residual(rows))
@@ -112,8 +112,7 @@ void read_residuals(const fs::path& folder, Session* session) {
     else
       ++unreadable;
   }
-  report_damage("residuals.csv", rows.torn_rows() + unreadable, whole.size() != text->size(), 0,
-                session);
+  report_damage("residuals.csv", *lines, rows.torn_rows() + unreadable, 0, session);
 }
 
 }  // namespace vergence::app::report

@@ -124,12 +124,11 @@ std::optional<StampedPose> tum_pose(std::string_view line) {
 
 }  // namespace
 
-bool read_poses(const fs::path& folder, Session* session) {
-  const auto text = read_part(folder / "poses.csv", std::size_t{2} << 30U,
-                              "status, inliers and times of the frames are not known", session);
-  if (!text) return false;
-  const std::string_view whole = whole_lines(*text);
-  CsvRows rows(whole);
+bool read_poses(const fs::path& folder, std::size_t most, Session* session) {
+  auto lines = open_part(folder / "poses.csv",
+                         "status, inliers and times of the frames are not known", session);
+  if (!lines) return false;
+  CsvRows rows([&lines](std::string_view* line) { return lines->next(line); });
   if (!rows.column("stamp_ns")) {
     session->missing.emplace_back(
         "poses.csv has no head that names its columns: status, inliers and times of the frames are "
@@ -137,12 +136,14 @@ bool read_poses(const fs::path& folder, Session* session) {
     return false;
   }
   const PoseColumns columns(rows);
+  constexpr std::uintmax_t kLine = 200;  // bytes, about
+  std::error_code error;
+  if (const auto size = fs::file_size(folder / "poses.csv", error); !error)
+    session->frames.reserve(std::min(most, static_cast<std::size_t>(size / kLine)));
   std::size_t unreadable = 0, disordered = 0;
-  session->frames.reserve(std::min(kMostFrames, whole.size() / 200));
   while (rows.next()) {
-    if (session->frames.size() == kMostFrames) {
-      session->missing.push_back(
-          fmt::format("poses.csv has more than {} lines; the rest is left out", kMostFrames));
+    if (session->frames.size() == most) {
+      leave_out("poses.csv", most, session);
       break;
     }
     const auto frame = columns.read(rows, session);
@@ -153,20 +154,22 @@ bool read_poses(const fs::path& folder, Session* session) {
     else
       session->frames.push_back(*frame);
   }
-  report_damage("poses.csv", rows.torn_rows() + unreadable, whole.size() != text->size(),
-                disordered, session);
+  report_damage("poses.csv", *lines, rows.torn_rows() + unreadable, disordered, session);
   return true;
 }
 
 std::vector<StampedPose> read_trajectory_part(const fs::path& folder, const char* name,
-                                              const char* consequence, Session* session) {
+                                              const char* consequence, std::size_t most,
+                                              Session* session) {
   std::vector<StampedPose> poses;
-  const auto text = read_part(folder / name, std::size_t{1} << 30U, consequence, session);
-  if (!text) return poses;
-  const std::string_view whole = whole_lines(*text);
-  Lines lines(whole);
+  auto lines = open_part(folder / name, consequence, session);
+  if (!lines) return poses;
   std::size_t damaged = 0, disordered = 0;
-  for (std::string_view line; lines.next(&line) && poses.size() < kMostFrames;) {
+  for (std::string_view line; lines->next(&line);) {
+    if (poses.size() == most) {
+      leave_out(name, most, session);
+      break;
+    }
     const auto pose = tum_pose(line);
     if (!pose)
       ++damaged;
@@ -175,13 +178,13 @@ std::vector<StampedPose> read_trajectory_part(const fs::path& folder, const char
     else
       poses.push_back(*pose);
   }
-  report_damage(name, damaged, whole.size() != text->size(), disordered, session);
+  report_damage(name, *lines, damaged, disordered, session);
   return poses;
 }
 
-void frames_from_trajectory(const fs::path& folder, Session* session) {
+void frames_from_trajectory(const fs::path& folder, std::size_t most, Session* session) {
   for (const StampedPose& p :
-       read_trajectory_part(folder, "trajectory.tum", "there is no trajectory", session)) {
+       read_trajectory_part(folder, "trajectory.tum", "there is no trajectory", most, session)) {
     Frame f;
     f.stamp = p.stamp;
     f.posed = true;

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <string_view>
 
+#include "app/datasets/text_file.hpp"
 #include "app/report/csv.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/session_writer.hpp"
@@ -27,15 +30,53 @@ Session with_poses(const std::string& text) {
   return read_session(folder.path());
 }
 
-TEST(WholeLines, whatFollowsTheLastLineEndIsTorn) {
-  EXPECT_EQ(whole_lines("a\nb\nc"), "a\nb\n");
-  EXPECT_EQ(whole_lines("a\n"), "a\n");
-  EXPECT_EQ(whole_lines("abc"), "");
-  EXPECT_EQ(whole_lines(""), "");
+std::vector<std::string> lines_of(const std::string& text, bool* torn) {
+  const test::TemporaryFolder folder;
+  FileLines lines(folder.write("lines", text));
+  std::vector<std::string> all;
+  for (std::string_view line; lines.next(&line);) all.emplace_back(line);
+  *torn = lines.torn();
+  EXPECT_FALSE(lines.failed());
+  return all;
+}
+
+TEST(FileLines, whatFollowsTheLastLineEndIsTorn) {
+  bool torn = false;
+  using All = std::vector<std::string>;
+  EXPECT_EQ(lines_of("\xEF\xBB\xBF a\r\n\n# no\nb\nc", &torn), (All{"a", "b"}));
+  EXPECT_TRUE(torn);
+  EXPECT_EQ(lines_of("a\n", &torn), All{"a"});
+  EXPECT_FALSE(torn);
+  EXPECT_EQ(lines_of("abc", &torn), All{});
+  EXPECT_TRUE(torn);
+  EXPECT_EQ(lines_of("", &torn), All{});
+  EXPECT_FALSE(torn);
+}
+
+TEST(FileLines, areTheSameWhereverABlockEnds) {
+  std::string text;
+  std::vector<std::string> expected;
+  for (int i = 0; i < 40'000; ++i) {
+    expected.push_back(std::to_string(i) + std::string(static_cast<std::size_t>(i % 11), 'x'));
+    text += expected.back() + '\n';
+  }
+  bool torn = false;
+  EXPECT_EQ(lines_of(text, &torn), expected);
+  EXPECT_FALSE(torn);
+}
+
+TEST(FileLines, aLineWithoutAnEndTakesNoMoreMemoryThanAnother) {
+  bool torn = false;
+  const auto all = lines_of("a\n" + std::string(3 * FileLines::kLongestLine, 'x') + "\nb\n", &torn);
+  ASSERT_EQ(all.size(), 3U);
+  EXPECT_LT(all[1].size(), FileLines::kLongestLine + 100'000);
+  EXPECT_EQ(all[2], "b");
+  EXPECT_THROW(FileLines("/"), InputError);
 }
 
 TEST(CsvRows, columnsAreFoundByNameAndDamagedRowsAreCounted) {
-  CsvRows rows("a,b,c\n1,,x\n1,2\n3,4.5,y,z\n7,8,\n");
+  Lines lines("a,b,c\n1,,x\n1,2\n3,4.5,y,z\n7,8,\n");
+  CsvRows rows([&lines](std::string_view* line) { return lines.next(line); });
   ASSERT_TRUE(rows.next());
   EXPECT_EQ(rows.integer(rows.column("a")), 1);
   EXPECT_FALSE(rows.number(rows.column("b")));
@@ -91,6 +132,22 @@ TEST(ReadSession, aFolderThatIsNoSessionIsRefused) {
   EXPECT_THROW((void)read_session(folder.path()), InputError);
   EXPECT_THROW((void)read_session(folder / "nowhere"), InputError);
   EXPECT_THROW((void)read_session(folder.write("file", "x")), InputError);
+}
+
+TEST(ReadSession, ofADriveOfDaysItsBeginningIsReadAndThatIsTold) {
+  const test::TemporaryFolder folder;
+  test::SessionWriter writer;
+  writer.frames = 400;
+  writer.write(folder.path());
+  const Session s = read_session(folder.path(), 100);
+  EXPECT_EQ(s.frames.size(), 100U);
+  EXPECT_EQ(s.reference.size(), 100U);
+  EXPECT_EQ(s.missing, std::vector<std::string>{}) << "its files are whole";
+  ASSERT_EQ(s.left_out.size(), 2U);
+  EXPECT_EQ(s.left_out[0], "poses.csv has more than 100 lines; the rest is left out");
+  EXPECT_EQ(read_session(folder.path(), 400).left_out, std::vector<std::string>{});
+  std::filesystem::remove(folder / "poses.csv");
+  EXPECT_EQ(read_session(folder.path(), 50).frames.size(), 50U) << "of trajectory.tum";
 }
 
 TEST(ReadSession, everyFileThatIsMissingIsSaid) {
