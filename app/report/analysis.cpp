@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "app/report/decimation.hpp"
+#include "app/report/svg.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
@@ -79,6 +80,19 @@ void count_waiting(const Session& s, Analysis* a) {
   }
 }
 
+/// By the gaps of their numbers, of which no damaged one counts for more than there was time for.
+std::size_t missing_frames(const Session& s, const Analysis& a) {
+  if (!(a.interval_s > 0)) return 0;
+  double missing = 0;
+  for (std::size_t i = 1; i < s.frames.size(); ++i) {
+    const std::int64_t before = s.frames[i - 1].number, number = s.frames[i].number;
+    if (before < 0 || number <= before) continue;
+    const double steps = std::round((a.time_s[i] - a.time_s[i - 1]) / a.interval_s);
+    missing += std::max(0.0, std::min(static_cast<double>(number - before), steps) - 1);
+  }
+  return static_cast<std::size_t>(missing);
+}
+
 void count_frames(const Session& s, Analysis* a) {
   a->by_reason.assign(s.reasons.size(), 0);
   a->read = s.frames.size();
@@ -91,8 +105,10 @@ void count_frames(const Session& s, Analysis* a) {
                                              : a->lost);
     if (f.status && *f.status != PoseStatus::ok) ++a->by_reason[f.reason];
   }
-  a->skipped = static_cast<std::size_t>(
-      std::clamp(number_at(s.summary, "frames.skipped").value_or(0.0), 0.0, 1e12));
+  a->skipped = s.summary.is_object()
+                   ? static_cast<std::size_t>(std::clamp(
+                         number_at(s.summary, "frames.skipped").value_or(0.0), 0.0, 1e12))
+                   : missing_frames(s, *a);
   if (a->read > a->unknown)
     a->ok_share = static_cast<double>(a->ok) / static_cast<double>(a->read + a->skipped);
 }
@@ -149,10 +165,10 @@ Point on_map(const Vec3& p, bool up_is_z) {
   return up_is_z ? Point{p.x(), p.y()} : Point{p.x(), p.z()};
 }
 
-/// Direction of view in the map, rad, counter-clockwise from the right.
+/// Direction of view in the map, rad, as a compass counts: clockwise, here from up.
 double view_angle(const Mat3& R, bool up_is_z) {
   const Point v = on_map(R.col(2), up_is_z);
-  return std::atan2(v.y, v.x);
+  return std::atan2(v.x, v.y);
 }
 
 void compare_with_reference(const Session& s, const MatchedTrajectories& m, const Laid& laid,
@@ -201,8 +217,39 @@ void take_reference(const Session& s, Analysis* a) {
   compare_with_reference(s, m, laid, up_is_z, a);
 }
 
+/// Where the way broke off the drive is placed on the earth anew: its positions step there.
+void find_placements(const Session& s, Analysis* a) {
+  std::vector<Stamp> stamps;
+  for (const Event& e : s.events)
+    if (e.kind == "placement") stamps.push_back(e.stamp);
+  std::sort(stamps.begin(), stamps.end());
+  a->placed_anew.assign(s.frames.size(), 0);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < s.frames.size(); ++i) {
+    const std::size_t before = next;
+    while (next < stamps.size() && stamps[next] <= s.frames[i].stamp) ++next;
+    if (a->placed_s.empty()) {
+      if (s.frames[i].placed) a->placed_s.push_back(a->time_s[i]);
+    } else if (next > before) {
+      a->placed_anew[i] = 1;
+      a->placed_s.push_back(a->time_s[i]);
+    }
+  }
+}
+
+std::string placement_words(const Analysis& a) {
+  constexpr std::size_t kTold = 5;
+  if (a.placed_s.size() < 2) return ", which was fitted at the start and then frozen";
+  std::string words = fmt::format(", which was placed {} times, at ", a.placed_s.size());
+  for (std::size_t i = 0; i < std::min(kTold, a.placed_s.size()); ++i)
+    words += (i > 0 ? ", " : "") + duration_text(a.placed_s[i], 0.1);
+  return words + (a.placed_s.size() > kTold ? ", …" : "") +
+         ", where the way had broken off: errors and positions step there";
+}
+
 void take_ins(const Session& s, Analysis* a) {
   a->map_is_enu = true;
+  find_placements(s, a);
   bool compared = false;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
@@ -220,10 +267,8 @@ void take_ins(const Session& s, Analysis* a) {
     return;
   }
   a->source = ErrorSource::ins;
-  a->source_sentence =
-      "Errors against the INS after the placement on the earth, which was fitted at the start and "
-      "then frozen; they hold the INS's own "
-      "errors, too.";
+  a->source_sentence = "Errors against the INS after the placement on the earth" +
+                       placement_words(*a) + "; they hold the INS's own errors, too.";
 }
 
 void take_world(const Session& s, Analysis* a) {

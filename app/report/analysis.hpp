@@ -35,10 +35,13 @@ struct Analysis {
   };
   Spread horizontal, vertical, heading;
 
-  bool map_is_enu = false;                                 // east to the right, north up
+  std::vector<double> placed_s;           // when the drive was placed on the earth, each time
+  std::vector<std::uint8_t> placed_anew;  // this frame is the first one on a further placement
+  bool map_is_enu = false;                // east to the right, north up
   std::vector<double> ours_x, ours_y, theirs_x, theirs_y;  // m
 
-  std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0, skipped = 0;  // frames
+  std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0;  // frames
+  std::size_t skipped = 0;             // without a summary those that are missing by their numbers
   std::vector<std::size_t> by_reason;  // frames that were not ok, by Session::reasons
   // Of the degraded ones, and of by_reason: without another fault than that the drive had not yet
   // found or confirmed its calibration. A drive is not judged by that wait.

@@ -53,9 +53,17 @@ std::vector<double> placed(const std::vector<double>& values, const MapScale& s,
 }
 
 void draw_path(const char* css, const std::vector<double>& x, const std::vector<double>& y,
-               const Analysis& a, const MapScale& s, Svg* svg) {
+               const std::vector<std::uint8_t>& breaks, const MapScale& s, Svg* svg) {
   const std::vector<double> on_x = placed(x, s, false), on_y = placed(y, s, true);
-  svg->lines(css, thin(on_x, on_y, a.breaks, kThin, kMostPoints));
+  svg->lines(css, thin(on_x, on_y, breaks, kThin, kMostPoints));
+}
+
+/// Our way also breaks off where the drive was placed on the earth anew: that step was not driven.
+std::vector<std::uint8_t> breaks_of_ours(const Analysis& a) {
+  std::vector<std::uint8_t> breaks = a.breaks;
+  for (std::size_t i = 0; i < std::min(breaks.size(), a.placed_anew.size()); ++i)
+    if (a.placed_anew[i] != 0) breaks[i] = 1;
+  return breaks;
 }
 
 /// Where the path breaks off because there was no pose, a small red mark.
@@ -79,7 +87,7 @@ void draw_degraded(const Analysis& a, std::span<const Frame> frames, const MapSc
   std::vector<double> x = a.ours_x;
   for (std::size_t i = 0; i < x.size(); ++i)
     if (frames[i].status != PoseStatus::degraded) x[i] = kNone;
-  draw_path("curve map-care s-care", x, a.ours_y, a, s, svg);
+  draw_path("curve map-care s-care", x, a.ours_y, breaks_of_ours(a), s, svg);
 }
 
 void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {
@@ -121,9 +129,10 @@ std::string map_picture(const Analysis& analysis, std::span<const Frame> frames)
   if (!bounds.any) return {};
   const MapScale scale = scale_for(bounds);
   Svg svg(kPlotWidth, scale.height, "The drive from above");
-  draw_path("curve map-theirs s-theirs", analysis.theirs_x, analysis.theirs_y, analysis, scale,
-            &svg);
-  draw_path("curve map-ours s-ours", analysis.ours_x, analysis.ours_y, analysis, scale, &svg);
+  draw_path("curve map-theirs s-theirs", analysis.theirs_x, analysis.theirs_y, analysis.breaks,
+            scale, &svg);
+  draw_path("curve map-ours s-ours", analysis.ours_x, analysis.ours_y, breaks_of_ours(analysis),
+            scale, &svg);
   draw_degraded(analysis, frames, scale, &svg);
   draw_breaks(analysis, scale, &svg);
   draw_ends(analysis, scale, &svg);

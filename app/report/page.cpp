@@ -53,8 +53,7 @@ std::string title_line(const Session& s, const Analysis& a) {
       line += " · " + date;
   line += a.path_m >= 1000 ? fmt::format(" · {:.2f} km", a.path_m / 1000)
                            : fmt::format(" · {:.0f} m", a.path_m);
-  if (a.duration_s > 0)
-    line += fmt::format(" in {}{}", time_label(a.duration_s, 1), a.duration_s < 60 ? " s" : " min");
+  if (a.duration_s > 0) line += " in " + duration_text(a.duration_s, 1);
   return line;
 }
 
@@ -82,11 +81,15 @@ std::string error_card(const Analysis& a) {
                      "horizontal, rms; " + metres(a.horizontal.max) + " at most");
 }
 
-std::string ok_card(const Analysis& a) {
-  if (!a.ok_share) return number_card("not known", "Frames ok", "poses.csv is missing");
+std::string ok_card(const Session& s, const Analysis& a) {
+  if (!a.ok_share)
+    return number_card("not known", "Frames ok",
+                       a.read > 0 ? "poses.csv is missing" : "there was no frame");
   // Rounded down: 100 % is said of nothing less.
   const double percent = std::floor(*a.ok_share * 1000) / 10;
-  const std::string skipped = a.skipped > 0 ? fmt::format(", {} skipped", grouped(a.skipped)) : "";
+  const std::string skipped = a.skipped > 0 ? fmt::format(", {} {}", grouped(a.skipped),
+                                                          is_live(s) ? "never came" : "skipped")
+                                            : "";
   const std::string waited =
       a.waited > 0 ? fmt::format(" ({} until the calibration was confirmed)", grouped(a.waited))
                    : "";
@@ -95,7 +98,7 @@ std::string ok_card(const Analysis& a) {
                                  grouped(a.degraded), waited, grouped(a.lost), skipped));
 }
 
-std::string verdict_section(const Analysis& a, const Verdict& v) {
+std::string verdict_section(const Session& s, const Analysis& a, const Verdict& v) {
   constexpr std::array<const char*, 3> kTones{"tone-good", "tone-care", "tone-bad"};
   constexpr std::array<const char*, 3> kMarks{"✔", "!", "✖"};
   const auto i = static_cast<std::size_t>(v.grade);
@@ -103,7 +106,7 @@ std::string verdict_section(const Analysis& a, const Verdict& v) {
       "<section class=\"verdict {}\"><p class=\"word\">{} {}</p><p>{}</p><div "
       "class=\"numbers\">{}{}{}</div></section>\n",
       kTones[i], kMarks[i], to_words(v.grade), escape(v.sentence, 600), drift_card(a),
-      error_card(a), ok_card(a));
+      error_card(a), ok_card(s, a));
 }
 
 std::string map_section(const Session& s, const Analysis& a) {
@@ -118,7 +121,8 @@ std::string map_section(const Session& s, const Analysis& a) {
                           a.map_is_enu ? "INS" : "reference");
   if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>ours, degraded</span>";
   if (a.lost > 0) legend += "<span>× no pose from here</span>";
-  if (a.map_is_enu) legend += "<br/>Ours begins where the drive was placed on the earth.";
+  if (a.map_is_enu) legend += "<br/>Ours begins where the drive was placed on the earth";
+  if (a.map_is_enu) legend += a.placed_s.size() > 1 ? ", and anew where it was placed again." : ".";
   return section("tall", "Map", map + legend + "</p>");
 }
 
@@ -132,7 +136,8 @@ void error_plots(const Session& s, const Analysis& a, std::string* out) {
   const std::array kinds{
       Kind{"Horizontal error, m", &a.horizontal_m, "curve s-ours", true},
       Kind{"Vertical error, m (ours above is positive)", &a.vertical_m, "curve s-theirs", false},
-      Kind{"Heading error, degrees", &a.heading_deg, "curve s-third", false}};
+      Kind{"Heading error, degrees (clockwise is positive)", &a.heading_deg, "curve s-third",
+           false}};
   for (const Kind& k : kinds) {
     const std::string over_time = curve_plot(
         {k.caption, XAxis::time_s, a.time_s, *k.values, a.breaks, k.css, k.from_zero}, a, s.frames);
@@ -265,13 +270,15 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"/>"
       "<link rel=\"icon\" href=\"data:,\"/><title>" +
       title + "</title><style>" + style_sheet() + "</style></head><body><main>\n";
-  out += "<h1>" + title + "</h1>\n" + verdict_section(analysis, verdict) + "<div class=\"grid\">\n";
+  out += "<h1>" + title + "</h1>\n" + verdict_section(session, analysis, verdict) +
+         "<div class=\"grid\">\n";
   if (verdict.grade != Grade::good)
     if (const std::string happened = happenings_table(session, analysis); !happened.empty())
       out += section("wide", "What happened", happened);
   if (!verdict.advice.empty()) out += section("wide", "What to do next", list(verdict.advice));
-  if (!session.missing.empty())
-    out += section("wide", "What is missing in this session", list(session.missing));
+  std::vector<std::string> missing = session.left_out;
+  missing.insert(missing.end(), session.missing.begin(), session.missing.end());
+  if (!missing.empty()) out += section("wide", "What is missing in this session", list(missing));
   out += map_section(session, analysis);
   std::string running;
   running_plots(session, analysis, timing, &running);

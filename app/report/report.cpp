@@ -30,7 +30,8 @@ ReportOutcome write_report(const std::filesystem::path& session_folder) {
   outcome.headline = std::string(report::to_words(verdict.grade)) + ": " + verdict.sentence;
   outcome.usable = verdict.usable;
   outcome.main_reason = verdict.main_reason;
-  outcome.missing = std::move(session.missing);
+  outcome.missing = std::move(session.left_out);
+  outcome.missing.insert(outcome.missing.end(), session.missing.begin(), session.missing.end());
   outcome.grade = report::to_words(verdict.grade);
   outcome.reasons = verdict.reasons;
   outcome.advice = verdict.advice;

@@ -15,7 +15,8 @@ struct ReportOutcome {
   std::string grade{};         // the headline's beginning
   std::vector<std::string> reasons{};  // half sentences, the worst first
   std::vector<std::string> advice{};   // what to do next, whole sentences
-  std::vector<std::string> missing{};  // sentences: files or lines that were not there or not whole
+  std::vector<std::string> missing{};  // sentences: files or lines that were not there, not whole
+                                       // or not read
 };
 
 /// The end of a drive for a terminal, three lines: usable or not and why, what to do, where the

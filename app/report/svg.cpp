@@ -151,6 +151,13 @@ std::string time_label(double seconds, double step) {
   return fmt::format("{}{}:{:02}:{:02}", sign, whole / 3600, whole / 60 % 60, whole % 60);
 }
 
+std::string duration_text(double seconds, double step) {
+  constexpr double kHour = 3600, kDay = 86400, kMost = 1e7;  // s
+  if (seconds > kMost) return fmt::format("{:.0f} days", seconds / kDay);
+  const char* unit = seconds < 60 ? " s" : std::round(seconds) < kHour ? " min" : " h";
+  return time_label(seconds, step) + unit;
+}
+
 Svg::Svg(double width, double height, std::string_view description) {
   out_ = fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="{}">)", coordinate(width),
                      coordinate(height), escape(description));

@@ -27,6 +27,8 @@ namespace vergence::app::report {
 [[nodiscard]] std::string tick_label(double value, double step);
 /// Seconds as `8`, `1:05`, `2:03:00`; below a minute with the decimals that `step` needs.
 [[nodiscard]] std::string time_label(double seconds, double step);
+/// The same with its unit: `8 s`, `1:05 min`, `2:03:00 h`, `139 days`.
+[[nodiscard]] std::string duration_text(double seconds, double step);
 
 enum class Anchor : std::uint8_t { start, middle, end };
 

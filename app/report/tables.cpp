@@ -43,6 +43,11 @@ std::optional<double> times(std::optional<double> value, double factor) {
   return value ? std::optional(*value * factor) : std::nullopt;
 }
 
+const char* name_of_skipped(const Session& s) {
+  if (!s.summary.is_object()) return "missing by their numbers";
+  return is_live(s) ? "never came, or were dropped" : "skipped (not readable)";
+}
+
 void frames_group(const Session& s, const Analysis& a, Figures* f) {
   f->group("Frames");
   f->row("read", grouped(a.read));
@@ -51,7 +56,7 @@ void frames_group(const Session& s, const Analysis& a, Figures* f) {
     f->row("degraded", grouped(a.degraded));
     f->row("lost", grouped(a.lost));
   }
-  if (s.summary.is_object()) f->row("skipped (not readable)", grouped(a.skipped));
+  if (s.summary.is_object() || a.skipped > 0) f->row(name_of_skipped(s), grouped(a.skipped));
   for (std::size_t i = 1; i < a.by_reason.size(); ++i)
     if (a.by_reason[i] > 0) f->row("reason " + s.reasons[i], grouped(a.by_reason[i]));
   if (a.interval_s > 0) f->row("frame interval", fmt::format("{:.1f} ms", a.interval_s * 1e3));
@@ -91,9 +96,7 @@ void timing_group(const Session& s, const TimingPicture& timing, Figures* f) {
 void verification_rows(const Session& s, const Analysis& a, Figures* f) {
   if (const auto verified = flag_at(s.summary, "calibration.verified"))
     f->row("verified by the drive", *verified ? "yes" : "not verified");
-  if (a.confirmed_s)
-    f->row("first verified after",
-           time_label(*a.confirmed_s, 0.1) + (*a.confirmed_s < 60 ? " s" : ""));
+  if (a.confirmed_s) f->row("first verified after", duration_text(*a.confirmed_s, 0.1));
   f->row("contradicted: depths were off by",
          number_at(s.summary, "calibration.contradicted.depth_percent"), "{:.1f} %");
   const auto newest =
@@ -130,35 +133,44 @@ void calibration_group(const Session& s, const Analysis& a, Figures* f) {
            number_at(s.summary, std::string("calibration.depth_error_percent.") + z), "{:.1f} %");
 }
 
+/// Counters in full, other numbers with `digits`.
+std::string number_text(const nlohmann::json& value, int digits) {
+  if (value.is_number_unsigned()) return grouped(value.get<std::uint64_t>());
+  if (value.is_number_integer()) {
+    const auto v = value.get<std::int64_t>();
+    return v < 0 ? "-" + grouped(std::uint64_t{0} - static_cast<std::uint64_t>(v))
+                 : grouped(static_cast<std::uint64_t>(v));
+  }
+  return fmt::format("{:.{}g}", value.get<double>(), digits);
+}
+
 /// `1.2, -0.3, 4`; empty for anything but a short row of numbers.
 std::string numbers_text(const nlohmann::json& value) {
   constexpr std::size_t kMostNumbers = 8;
-  if (value.is_number()) return fmt::format("{:.5g}", value.get<double>());
+  if (value.is_number()) return number_text(value, 5);
   std::string text;
   if (!value.is_array() || value.size() > kMostNumbers) return text;
   for (const auto& item : value) {
     if (!item.is_number()) return "";
-    text += fmt::format("{}{:.3g}", text.empty() ? "" : ", ", item.get<double>());
+    text += (text.empty() ? "" : ", ") + number_text(item, 3);
   }
   return text;
 }
 
-/// Numbers below an object, its keys as names; for blocks whose keys are not fixed.
+/// Numbers below an object, its keys as names; for blocks whose keys are not fixed. Beyond
+/// kMostRows they are only counted.
 // NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
 void flatten(const nlohmann::json& json, const std::string& prefix, int depth, std::size_t* rows,
              Figures* f) {
   constexpr int kDeepest = 3;
   if (!json.is_object() || depth > kDeepest) return;
   for (const auto& [key, value] : json.items()) {
-    if (*rows >= kMostRows) return;
     std::string name = prefix + key.substr(0, 60);
     std::replace(name.begin(), name.end(), '_', ' ');
-    if (const std::string text = numbers_text(value); !text.empty()) {
-      ++*rows;
-      f->row(name, text);
-    } else {
+    if (const std::string text = numbers_text(value); text.empty())
       flatten(value, name + " ", depth + 1, rows, f);
-    }
+    else if (++*rows <= kMostRows)
+      f->row(name, text);
   }
 }
 
@@ -167,6 +179,8 @@ void block_group(const Session& s, const char* key, const char* head, Figures* f
   f->group(head);
   std::size_t rows = 0;
   flatten(s.summary[key], "", 0, &rows, f);
+  if (rows > kMostRows)
+    f->row(fmt::format("… {} more in summary.json", grouped(rows - kMostRows)), "");
 }
 
 void memory_group(const Session& s, Figures* f) {
@@ -237,9 +251,7 @@ std::string figures_table(const Session& session, const Analysis& analysis,
                           const TimingPicture& timing) {
   Figures f;
   f.group("Drive");
-  if (analysis.duration_s > 0)
-    f.row("duration",
-          time_label(analysis.duration_s, 0.1) + (analysis.duration_s < 60 ? " s" : ""));
+  if (analysis.duration_s > 0) f.row("duration", duration_text(analysis.duration_s, 0.1));
   f.row("way", fmt::format("{:.1f} m", analysis.path_m));
   frames_group(session, analysis, &f);
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);

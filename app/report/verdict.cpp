@@ -10,6 +10,7 @@
 #include "app/report/advice.hpp"
 #include "app/report/calibration_findings.hpp"
 #include "app/report/findings.hpp"
+#include "app/report/outages.hpp"
 #include "app/report/usability.hpp"
 
 namespace vergence::app::report {
@@ -50,7 +51,8 @@ void judge_frames(const Session& s, const Analysis& a, const Usability& use, Fin
     j->find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
 }
 
-void judge_drift(const Analysis& a, Findings* j) {
+/// `broken`: outages broke the way.
+void judge_drift(const Analysis& a, bool broken, Findings* j) {
   if (a.ins_unplaced) {
     j->find(Grade::care,
             "nothing says how far it drifted: the drive was not placed on the earth with its INS");
@@ -70,10 +72,11 @@ void judge_drift(const Analysis& a, Findings* j) {
     j->find(Grade::care, "the drive is too short to measure its drift");
   else if (*a.drift > kGoodDrift)
     j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care,
-            fmt::format("it drifts by {} of the distance{}", percent(*a.drift),
-                        a.source == ErrorSource::ins ? " against the INS" : ""));
+            fmt::format("it drifts by {} of the distance{}{}", percent(*a.drift),
+                        a.source == ErrorSource::ins ? " against the INS" : "",
+                        broken ? ", across outages" : ""));
   const double off = a.scale ? std::abs(*a.scale - 1) : 0;
-  if (off > kGoodScale) {
+  if (off > kGoodScale && !broken) {
     j->find(
         off > kWorstScale ? Grade::bad : Grade::care,
         fmt::format("lengths come out {} too {}", percent(off), *a.scale < 1 ? "long" : "short"));
@@ -84,6 +87,8 @@ void judge_drift(const Analysis& a, Findings* j) {
 
 void judge_session(const Session& s, const Analysis& a, Findings* j) {
   if (!s.missing.empty()) j->find(Grade::care, "the session's files are not whole");
+  if (!s.left_out.empty())
+    j->find(Grade::care, "the drive is longer than the report reads: this is of its beginning");
   if (!s.summary.is_object() && !s.missing.empty())
     j->advise(
         "The session was not closed: stop with Ctrl-C and wait for the last message; check power "
@@ -153,16 +158,20 @@ const char* to_words(Grade grade) noexcept {
 Verdict judge(const Session& session, const Analysis& analysis) {
   Findings j;
   const Usability use = usability_of(session, analysis);
+  const std::vector<Outage> outages = outages_of(session.events);
+  const bool broken = break_the_way(outages, session, analysis);
+  judge_outages(outages, session, analysis, &j);
   judge_mistake(session, analysis, &j);
   judge_focal_length(session, &j);
-  judge_frames(session, analysis, use, &j);
-  if (analysis.source != ErrorSource::none) judge_drift(analysis, &j);
+  if (analysis.read > 0 || outages.empty()) judge_frames(session, analysis, use, &j);
+  if (analysis.source != ErrorSource::none) judge_drift(analysis, broken, &j);
   judge_calibration(session, use, &j);
   judge_lenses(session, analysis, &j);
-  judge_verification(session, analysis, use, &j);
+  // Of a drive without a frame nothing else is to be asked.
+  if (analysis.read > 0) judge_verification(session, analysis, use, &j);
   advise_on_events(session, &j);
   judge_session(session, analysis, &j);
-  if (analysis.source == ErrorSource::none) judge_drift(analysis, &j);
+  if (analysis.source == ErrorSource::none && analysis.read > 0) judge_drift(analysis, broken, &j);
   advise_by_reasons(session, analysis, &j);
   Verdict v = j.verdict();
   for (const std::string& reason : v.reasons)

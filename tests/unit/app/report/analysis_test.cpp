@@ -60,7 +60,7 @@ TEST(Analysis, driftAfterTheFirstHundredMetresShowsInFullAndWithItsSign) {
   const Analysis a = analyse(s);
   EXPECT_NEAR(a.vertical_m[399], 0, 1e-9);
   EXPECT_NEAR(a.vertical_m[400], 2, 1e-9);
-  EXPECT_NEAR(a.heading_deg[599], 3, 1e-6);
+  EXPECT_NEAR(a.heading_deg[599], -3, 1e-6) << "clockwise is positive, as against an INS";
   EXPECT_NEAR(a.vertical.end, 2, 1e-9);
 }
 
@@ -156,6 +156,48 @@ TEST(Analysis, skippedFramesCountAgainstTheShare) {
   Session s = bent_drive(90);
   s.summary = {{"frames", {{"skipped", 10}}}};
   EXPECT_NEAR(analyse(s).ok_share.value(), 0.9, 1e-12);
+}
+
+TEST(Analysis, turnedRightIsAPositiveHeadingErrorWhicheverWayUpTheReferenceHasIt) {
+  Mat3 up;
+  up << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  for (const Mat3& axes : {Mat3(Mat3::Identity()), up}) {
+    Session s = with_reference(bent_drive(600), {axes, Vec3::Zero()});
+    for (std::size_t i = 400; i < 600; ++i)
+      s.frames[i].T_world_left.R = exp_so3({0, 2 * kDegree, 0}) * s.frames[i].T_world_left.R;
+    EXPECT_NEAR(analyse(s).heading.end, 2, 1e-6);
+  }
+}
+
+TEST(Analysis, withoutASummaryFramesAreMissedByTheirNumbers) {
+  Session s = bent_drive(100);
+  for (std::size_t i = 0; i < 100; ++i) s.frames[i].number = static_cast<std::int64_t>(i) + 7;
+  s.frames.erase(s.frames.begin() + 70, s.frames.begin() + 80);
+  s.frames.back().number = std::numeric_limits<std::int64_t>::max();
+  const Analysis a = analyse(s);
+  EXPECT_EQ(a.skipped, 10U) << "the number of the last one is damage: there was no time";
+  EXPECT_NEAR(a.ok_share.value(), 0.9, 1e-12);
+  s.summary = {{"frames", {{"skipped", 3}}}};
+  EXPECT_EQ(analyse(s).skipped, 3U);
+}
+
+TEST(Analysis, aSecondPlacementIsToldWithItsTime) {
+  Session s = bent_drive(100);
+  for (std::size_t i = 10; i < 100; ++i) {
+    s.frames[i].placed = s.frames[i].has_ins = s.frames[i].compared = true;
+    s.frames[i].enu = {i < 60 ? 100.0 : 0.0, 0.5 * static_cast<double>(i), 0};
+  }
+  s.events = {{s.frames[10].stamp, "placement", ""}};
+  Analysis a = analyse(s);
+  EXPECT_EQ(std::count(a.placed_anew.begin(), a.placed_anew.end(), 1), 0);
+  EXPECT_NE(a.source_sentence.find("then frozen"), std::string::npos);
+  s.events.push_back({s.frames[60].stamp, "placement", ""});
+  a = analyse(s);
+  EXPECT_EQ(a.placed_anew[60], 1);
+  EXPECT_EQ(std::count(a.placed_anew.begin(), a.placed_anew.end(), 1), 1);
+  EXPECT_EQ(a.source_sentence.find("frozen"), std::string::npos);
+  EXPECT_NE(a.source_sentence.find("placed 2 times, at 1.0 s, 6.0 s"), std::string::npos)
+      << a.source_sentence;
 }
 
 TEST(Analysis, errorsToTheInsAreThoseOfTheFile) {

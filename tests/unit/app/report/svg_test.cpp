@@ -81,6 +81,14 @@ TEST(Ticks, labelsHaveTheDecimalsTheyNeed) {
   EXPECT_EQ(time_label(4.5, 0.5), "4.5");
 }
 
+TEST(Durations, haveTheUnitOfWhatTheyShow) {
+  EXPECT_EQ(duration_text(8, 1), "8 s");
+  EXPECT_EQ(duration_text(65, 1), "1:05 min");
+  EXPECT_EQ(duration_text(3599.7, 1), "1:00:00 h");
+  EXPECT_EQ(duration_text(3717, 1), "1:01:57 h");
+  EXPECT_EQ(duration_text(1.2e7, 1), "139 days");
+}
+
 TEST(SvgElement, isWellFormedWhateverGoesIn) {
   Svg svg(100, 50, "a \"quoted\" <name>");
   svg.line("axis", 0, 0, std::nan(""), 1);
