@@ -5,6 +5,7 @@
 #include <cstring>
 #include <iterator>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -83,8 +84,9 @@ struct Stretch {
   Stamp first{}, last{};
 };
 
-/// Calls `take` with every stretch of one status. The next one begins where the last one ended,
-/// unless poses were lost in between.
+/// Calls `take` with every stretch of one status and placement. The next one begins where the last
+/// one ended, unless poses were lost in between or the drive was placed anew: no one drove the step
+/// from one placement to the next.
 template <class Take>
 void for_each_stretch(const SessionTotals& totals, const EarthFigures& earth, const Take& take) {
   constexpr std::size_t kLongest =
@@ -96,14 +98,17 @@ void for_each_stretch(const SessionTotals& totals, const EarthFigures& earth, co
     now.places.clear();
   };
   std::size_t next = 0;
+  const Transform* T_enu_world = nullptr;
   for (const PoseStatus status : totals.statuses) {
     if (status == PoseStatus::lost || next == totals.trajectory.size()) {
       end();
       continue;
     }
     const StampedPose& pose = totals.trajectory[next++];
-    const Geodetic place =
-        plane.to_geodetic(*placement_at(earth.placements, pose.stamp) * pose.T_world_body.t);
+    const Transform* before =
+        std::exchange(T_enu_world, placement_at(earth.placements, pose.stamp));
+    if (T_enu_world != before) end();
+    const Geodetic place = plane.to_geodetic(*T_enu_world * pose.T_world_body.t);
     if (!now.places.empty() && (status != now.status || now.places.size() == kLongest)) {
       const Geodetic joint = now.places.back();
       const Stamp at = now.last;
@@ -195,6 +200,23 @@ void write_kml(const SessionTotals& totals, const EarthFigures& earth, Pieces* o
 
 const FormatRow& row_of(OtherFormat format) { return kFormats[static_cast<std::size_t>(format)]; }
 
+/// Why a format cannot be written.
+std::string why_not(const SessionTotals& totals) {
+  return totals.trajectory.empty() ? "there never was a pose"
+                                   : "the drive was never placed on the earth by an INS";
+}
+
+/// Nothing where statuses are of the whole drive.
+std::optional<std::string> what_is_left_out(OtherFormat format, const SessionTotals& totals) {
+  const bool by_status = format == OtherFormat::geojson || format == OtherFormat::kml;
+  if (!by_status || totals.statuses_left_out == 0) return std::nullopt;
+  return fmt::format(
+      "{} ends before the drive: the statuses of its last {} frames had no room; trajectory.tum "
+      "has "
+      "them all",
+      row_of(format).file, totals.statuses_left_out);
+}
+
 }  // namespace
 
 std::vector<OtherFormat> parse_other_formats(std::string_view words) {
@@ -222,13 +244,16 @@ std::vector<std::string> write_other_formats(const std::filesystem::path& sessio
   for (const OtherFormat format : formats) {
     const char* name = row_of(format).file;
     const bool on_earth = format != OtherFormat::kitti;
-    if (totals.trajectory.empty() || (on_earth && (earth.placements.empty() || !earth.origin))) {
-      said.push_back(fmt::format("{} is not written: {}", name,
-                                 totals.trajectory.empty()
-                                     ? "there never was a pose"
-                                     : "the drive was never placed on the earth by an INS"));
+    if (totals.trajectory.empty() && totals.ok + totals.degraded > 0) {
+      faults->push_back(fmt::format("{} is not written: trajectory.tum could not be read back",
+                                    (session / name).string()));
       continue;
     }
+    if (totals.trajectory.empty() || (on_earth && (earth.placements.empty() || !earth.origin))) {
+      said.push_back(fmt::format("{} is not written: {}", name, why_not(totals)));
+      continue;
+    }
+    if (auto sentence = what_is_left_out(format, totals)) said.push_back(*std::move(sentence));
     try {
       Pieces out(session / name);
       if (format == OtherFormat::kitti) write_kitti(totals.trajectory, &out);

@@ -1,5 +1,6 @@
 #include "app/recorder/session_totals.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace vergence::app {
@@ -41,6 +42,8 @@ void TotalsBuilder::add(const PoseRecord& p, bool in_trajectory) {
     totals_.stages[i].add(static_cast<double>(p.stage_ms[i]));
   if (totals_.statuses.size() < totals_.statuses.capacity())
     totals_.statuses.push_back(in_trajectory ? p.status : PoseStatus::lost);
+  else if (totals_.statuses.capacity() > 0)
+    ++totals_.statuses_left_out;
   if (p.status == PoseStatus::lost) return;
   const auto& t = p.world_left.t;
   if (last_pose_)
@@ -50,6 +53,12 @@ void TotalsBuilder::add(const PoseRecord& p, bool in_trajectory) {
 }
 
 void TotalsBuilder::trajectory_begins_anew(std::size_t waiting) noexcept {
+  if (totals_.statuses_left_out > 0) {
+    // Nobody knows those of the lines that wait, some seconds of them.
+    totals_.statuses.assign(std::min(waiting, totals_.statuses.capacity()), PoseStatus::degraded);
+    totals_.statuses_left_out = 0;
+    return;
+  }
   auto first = totals_.statuses.end();
   while (waiting > 0 && first != totals_.statuses.begin())
     waiting -= *--first != PoseStatus::lost ? 1 : 0;

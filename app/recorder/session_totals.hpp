@@ -57,11 +57,12 @@ struct SessionTotals {
   double path_m = 0;                    // sum of the steps between successive poses
   std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum, read back
   std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
-  std::vector<PoseStatus> statuses;   // if asked for: of every frame read, as far as there is room;
-                                      // those that are not lost have their pose in trajectory
-  std::uint64_t dropped_records = 0;  // the ring was full (live only)
-  std::uint64_t dropped_readings = 0;  // theirs was
-  std::uint64_t lost_lines = 0;        // the disk took no more
+  std::vector<PoseStatus> statuses;  // if asked for: of every frame read, as far as there is room;
+                                     // those that are not lost have their pose in trajectory
+  std::uint64_t statuses_left_out = 0;  // of the newest frames: there was no room
+  std::uint64_t dropped_records = 0;    // the ring was full (live only)
+  std::uint64_t dropped_readings = 0;   // theirs was
+  std::uint64_t lost_lines = 0;         // the disk took no more
   WorkDropped work_dropped{};
   std::size_t ring_high_water = 0;
   std::vector<std::string> faults;  // a sentence for each file that is not whole
