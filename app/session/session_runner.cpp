@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -299,12 +300,14 @@ void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInpu
 
 ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<std::string>& faults,
                                 Progress* progress) const {
+  // Of a drive without a pose, too, the user is told which device was gone.
+  const std::optional<ExitCode> of_source = source_.verdict(progress);
   if (totals.ok + totals.degraded == 0) {
     progress->say("vergence: there never was a pose; events.jsonl and poses.csv in " +
                   request_.out.string() + " say why");
     return ExitCode::not_usable;
   }
-  if (const auto code = source_.verdict(progress)) return *code;
+  if (of_source) return *of_source;
   if (loop_.comparison() != nullptr && loop_.comparison()->matches() == 0) {
     progress->say(
         "vergence: the INS never had a position for a frame: nothing is compared; the poses are "

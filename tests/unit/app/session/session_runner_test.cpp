@@ -81,7 +81,8 @@ class BlackSource final : public FrameSource {
   }
   void print_figures(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
                      Progress* /*progress*/) const override {}
-  [[nodiscard]] std::optional<ExitCode> verdict(Progress* /*progress*/) const override {
+  [[nodiscard]] std::optional<ExitCode> verdict(Progress* progress) const override {
+    progress->say("camera 0 was gone");
     return ExitCode::device_failed;
   }
 
@@ -137,7 +138,7 @@ class Notebook final : public SessionObserver {
 
 struct Ran {
   ExitCode code = ExitCode::done;
-  std::string order, other;
+  std::string order, other, said;
   int images = 0, held = 0, finished = 0;
 };
 
@@ -153,7 +154,7 @@ Ran run_black(int frames) {
   Ran ran;
   testing::internal::CaptureStderr();
   ran.code = run_session(source, load_configuration(std::nullopt, {}), options, signals);
-  (void)testing::internal::GetCapturedStderr();
+  ran.said = testing::internal::GetCapturedStderr();
   for (const char* file : {"poses.csv", "events.jsonl", "summary.json", "report.html"})
     EXPECT_TRUE(std::filesystem::exists(options.out / file)) << file;
   ran.order = first.order();
@@ -334,8 +335,11 @@ TEST(SessionRunner, aSessionThatCannotBeRecordedLeavesNoFolder) {
   EXPECT_FALSE(std::filesystem::exists(options.out));
 }
 
-TEST(SessionRunner, withoutAPoseThatIsTheVerdictWhateverTheSourceThinks) {
-  EXPECT_EQ(run_black(3).code, ExitCode::not_usable);
+TEST(SessionRunner, withoutAPoseThatIsTheVerdictButTheSourceIsHeardToo) {
+  const Ran ran = run_black(3);
+  EXPECT_EQ(ran.code, ExitCode::not_usable);
+  EXPECT_NE(ran.said.find("camera 0 was gone"), std::string::npos) << ran.said;
+  EXPECT_NE(ran.said.find("there never was a pose"), std::string::npos) << ran.said;
 }
 
 }  // namespace
