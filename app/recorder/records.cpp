@@ -22,6 +22,8 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
       return "dropped";
     case EstimatorEvent::Kind::rig_changed:
       return "rig_changed";
+    case EstimatorEvent::Kind::in_step:
+      return "in_step";
     case EstimatorEvent::Kind::calibration_confirmed:
       return "calibration_confirmed";
     case EstimatorEvent::Kind::calibration_contradicted:

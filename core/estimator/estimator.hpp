@@ -57,6 +57,7 @@ struct EstimatorEvent {
     dropped,
     rig_changed,  // the monitor raised; value: frames since the onset, or the lag in frames of
                   // cameras out of step
+    in_step,      // cameras that were out of step are so no more
     calibration_confirmed,      // the drive has confirmed the calibration in use; value: its depth
                                 // error, %
     calibration_contradicted,   // the drive has shown that it is not the rig's; value: how far off

@@ -110,8 +110,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     // A rig out of step fits no calibration: what else the monitor says is of no use until that is
     // over.
     if (v.in_step && --out_of_step == 0) {
-      note(EstimatorEvent::Kind::calibration_confirmed, frame.stamp,
-           "the cameras are in step again", 0);
+      note(EstimatorEvent::Kind::in_step, frame.stamp, "the cameras are in step again", 0);
       calibrator.forget_frames();
     }
     return;

@@ -54,6 +54,19 @@ INSTANTIATE_TEST_SUITE_P(Alone, Faults, ::testing::ValuesIn(single_faults()), []
   return name;
 });
 
+// The end of a lag is an event of its own: who waits for a calibration to be confirmed must not
+// take it for that.
+TEST(FaultEvents, camerasThatAreInStepAgainConfirmNoCalibration) {
+  const auto& alone = single_faults();
+  const auto lag = std::find_if(alone.begin(), alone.end(), [](const FaultCase& c) {
+    return c.name == "one camera a frame late";
+  });
+  ASSERT_NE(lag, alone.end());
+  FaultDrive drive = drive_with_faults(*lag);
+  EXPECT_EQ(drive.events["in_step"], 1) << drive.err;
+  EXPECT_EQ(drive.events["calibration_confirmed"], 1) << drive.err;
+}
+
 // Where the image that would come twice is lost, only how uncertain the motions become tells at
 // once that a camera is an exposure behind.
 TEST(FaultPairs, anImageLateFromALostOneOnIsNotOk) {

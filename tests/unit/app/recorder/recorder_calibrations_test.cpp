@@ -120,6 +120,16 @@ TEST(Recorder, theFirstConfirmationAndTheFirstContradictionAreInTheTotals) {
   }
 }
 
+TEST(TotalsBuilder, camerasThatAreInStepAgainConfirmNoCalibration) {
+  TotalsBuilder builder(0);
+  const EventRecord in_step = event_at(700, EstimatorEvent::Kind::in_step, 0);
+  EXPECT_STREQ(in_step.kind, "in_step");
+  builder.add(in_step);
+  EXPECT_FALSE(builder.totals().confirmed);
+  builder.add(event_at(900, EstimatorEvent::Kind::calibration_confirmed, 0.3));
+  EXPECT_EQ(builder.totals().confirmed, Stamp(900));
+}
+
 TEST(RigNumbers, thereAndBackAreTheSameDoubles) {
   RigCalibration rig = two_cameras();
   rig.cameras = 3;
