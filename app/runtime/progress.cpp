@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <iostream>
+#include <memory>
+#include <ostream>
 
 #include <fmt/format.h>
 
+#include "app/runtime/progress_output.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -53,14 +55,30 @@ Progress::Mode mode_of_stderr(bool quiet) {
   return ::isatty(STDERR_FILENO) == 1 && !dumb ? Progress::Mode::terminal : Progress::Mode::lines;
 }
 
+Progress::Output output_to(std::ostream& out) {
+  return [&out](std::string_view text, bool /*may_wait*/) {
+    out << text << std::flush;
+    return true;
+  };
+}
+
+Progress::Output output_to_stderr() {
+  return [out = std::make_shared<ProgressOutput>(STDERR_FILENO)](
+             std::string_view text, bool may_wait) { return out->write(text, may_wait); };
+}
+
 }  // namespace
+
+Progress::Progress(Output out, Mode mode, std::function<HostStamp()> clock,
+                   std::function<int()> width)
+    : out_(std::move(out)), mode_(mode), clock_(std::move(clock)), width_(std::move(width)) {}
 
 Progress::Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock,
                    std::function<int()> width)
-    : out_(out), mode_(mode), clock_(std::move(clock)), width_(std::move(width)) {}
+    : Progress(output_to(out), mode, std::move(clock), std::move(width)) {}
 
 Progress Progress::on_stderr(bool quiet) {
-  return {std::cerr, mode_of_stderr(quiet), monotonic_now, width_of_stderr};
+  return {output_to_stderr(), mode_of_stderr(quiet), monotonic_now, width_of_stderr};
 }
 
 Progress::~Progress() { finish(); }
@@ -86,16 +104,28 @@ void Progress::update(const ProgressState& state) {
 }
 
 void Progress::say(std::string_view sentence) {
-  const bool redraw = columns_ > 0;
-  wipe();
-  out_ << sentence << '\n' << std::flush;
-  if (redraw) draw(clock_());
+  const bool drawn = columns_ > 0;
+  put_line(sentence);
+  if (drawn) draw(clock_());
+}
+
+void Progress::put_line(std::string_view line) {
+  std::string text = wiped();
+  if (untaken_ > 0)
+    text += fmt::format("vergence: lines that were not taken before this one: {}\n", untaken_);
+  text.append(line).append(1, '\n');
+  if (!out_(text, true)) {
+    ++untaken_;
+    return;
+  }
+  columns_ = 0;
+  untaken_ = 0;
 }
 
 void Progress::finish() {
   if (!started_) return;
   if (!drawn_) draw(clock_());
-  if (mode_ == Mode::terminal) out_ << '\n' << std::flush;
+  if (mode_ == Mode::terminal) (void)out_("\n", true);
   columns_ = 0;
   started_ = false;
 }
@@ -126,27 +156,29 @@ std::string Progress::line(HostStamp now) const {
 void Progress::draw(HostStamp now) {
   drawn_time_ = now;
   drawn_ = true;
-  const std::string whole = line(now);
-  if (mode_ == Mode::lines) {
-    out_ << whole << '\n' << std::flush;
-    return;
-  }
+  if (mode_ == Mode::lines)
+    put_line(line(now));
+  else
+    redraw(line(now));
+}
+
+void Progress::redraw(const std::string& whole) {
   const int width = width_();
   // One column stays free: a terminal that has just filled its last one may already have begun the
   // next line.
   const auto room = static_cast<std::size_t>(std::max(1, (width < 1 ? kUnknownWidth : width) - 1));
   const std::string_view shown = cut(whole, room);
   const std::size_t columns = columns_of(shown);
-  out_ << '\r' << shown
-       << std::string(columns_ > columns ? std::min(columns_, room) - columns : 0, ' ')
-       << std::flush;
-  columns_ = columns;
+  std::string text = "\r";
+  text += shown;
+  if (columns_ > columns) text.append(std::min(columns_, room) - columns, ' ');
+  drawn_ = out_(text, false);
+  if (drawn_) columns_ = columns;
 }
 
-void Progress::wipe() {
-  if (columns_ == 0) return;
-  out_ << '\r' << std::string(columns_, ' ') << '\r';
-  columns_ = 0;
+/// What takes the line off the terminal.
+std::string Progress::wiped() const {
+  return columns_ > 0 ? '\r' + std::string(columns_, ' ') + '\r' : "";
 }
 
 }  // namespace vergence::app

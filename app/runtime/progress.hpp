@@ -30,14 +30,18 @@ struct ProgressState {
 /// lines     one line every 10 s, the last one at finish(): for files and pipes
 /// quiet     nothing
 /// Threads   One caller. Time  Monotonic, from the clock handed in. Errors  A stream that fails is
-/// ignored.
+///           ignored. One that takes nothing for a while holds nobody up (ProgressOutput): lines are
+///           dropped, and how many is said where the next one is taken.
 class Progress {
  public:
   enum class Mode : std::uint8_t { terminal, lines, quiet };
+  /// Takes all of a text, or none (false). `may_wait`: for a while; else it is taken now or never.
+  using Output = std::function<bool(std::string_view text, bool may_wait)>;
 
   /// `width` in columns is asked at every redraw, as a terminal may be resized; < 1: not known, 80.
   Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock,
            std::function<int()> width);
+  Progress(Output out, Mode mode, std::function<HostStamp()> clock, std::function<int()> width);
   /// On standard error with the machine's clock: terminal or lines by what standard error is.
   [[nodiscard]] static Progress on_stderr(bool quiet);
   /// Ends the line as finish() does.
@@ -56,9 +60,11 @@ class Progress {
  private:
   [[nodiscard]] std::string line(HostStamp now) const;
   void draw(HostStamp now);
-  void wipe();
+  void redraw(const std::string& whole);
+  [[nodiscard]] std::string wiped() const;
+  void put_line(std::string_view line);
 
-  std::ostream& out_;
+  Output out_;
   Mode mode_;
   std::function<HostStamp()> clock_;
   std::function<int()> width_;
@@ -68,7 +74,8 @@ class Progress {
   bool drawn_ = false;                  // the last update is on the screen
   HostStamp first_time_{}, drawn_time_{};
   std::uint64_t first_frame_ = 0;
-  std::size_t columns_ = 0;  // of the line on the terminal now
+  std::size_t columns_ = 0;    // of the line on the terminal now
+  std::uint64_t untaken_ = 0;  // lines, since one was taken
 };
 
 }  // namespace vergence::app

@@ -181,6 +181,29 @@ TEST_F(ProgressTest, QuietWritesNothingButSentences) {
   EXPECT_EQ(out.str(), "frame 5 is skipped\n");
 }
 
+TEST_F(ProgressTest, LinesThatWereNotTakenAreCountedWhereOneIs) {
+  bool takes = false;
+  std::string taken;
+  Progress p(
+      [&](std::string_view text, bool may_wait) {
+        EXPECT_TRUE(may_wait || text.find('\n') == std::string_view::npos) << text;
+        if (takes) taken += text;
+        return takes;
+      },
+      Progress::Mode::terminal, [this] { return now; }, [this] { return width; });
+  p.update(at(5, 10));
+  p.say("camera 0 is gone");
+  p.say("camera 1 is gone");
+  takes = true;
+  p.say("both are back");
+  p.finish();
+  const Screen screen = show(taken);
+  ASSERT_EQ(screen.rows.size(), 3U);
+  EXPECT_EQ(screen.rows[0], "vergence: lines that were not taken before this one: 2");
+  EXPECT_EQ(screen.rows[1], "both are back");
+  EXPECT_EQ(screen.rows[2].substr(0, 6), "stereo") << "what was not drawn before is at the end";
+}
+
 TEST_F(ProgressTest, AnUnknownWidthIsTakenAsEightyColumns) {
   width = 0;
   auto p = progress(Progress::Mode::terminal);
