@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "app/runtime/disk_errors.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -50,10 +51,12 @@ bool cut_half_line(const std::filesystem::path& file) {
 
 }  // namespace
 
-LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
+LineFile::LineFile(const std::filesystem::path& file, std::size_t pending, Away away)
     : path_(file), pending_(pending), fd_(open_for_lines(file)) {
-  if (fd_ < 0)
-    throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) +
+  fault_ = fd_ < 0 ? errno : 0;
+  const bool may_come = disk_is_away(fault_) || fault_ == ENOENT;
+  if (fault_ != 0 && (away == Away::refuse || !may_come))
+    throw InputError(file.string() + ": cannot be written (" + std::strerror(fault_) +
                      "): check the folder's permissions");
   waiting_.reserve(pending_ + kLongestHead);
 }
@@ -72,6 +75,7 @@ bool LineFile::append(std::string_view line) {
 }
 
 bool LineFile::flush() {
+  if (fd_ < 0) return false;
   std::size_t done = 0;
   int error = pretend_full_ && !waiting_.empty() ? ENOSPC : 0;
   while (done < waiting_.size() && error == 0) {
@@ -99,11 +103,13 @@ bool LineFile::reopen(bool* fresh) {
   if (reopen_due_) return false;
   const int fd = open_for_lines(path_);
   if (fd < 0) {
-    if (flushed) fault_ = errno;  // else the old one's stands
+    if (flushed || fd_ < 0) fault_ = errno;  // else the old one's stands
     return false;
   }
-  (void)::fdatasync(fd_);
-  (void)::close(fd_);
+  if (fd_ >= 0) {
+    (void)::fdatasync(fd_);
+    (void)::close(fd_);
+  }
   fd_ = fd;
   if (!flushed) give_up_cut_line();
   struct stat status {};
@@ -117,7 +123,9 @@ void LineFile::give_up_cut_line() noexcept {
   half_written_ = false;
 }
 
-bool LineFile::out_of_reach() const noexcept { return fault_ != 0 && !lacks_room(fault_); }
+bool LineFile::wants_room() const noexcept { return lacks_room(fault_); }
+
+bool LineFile::out_of_reach() const noexcept { return fd_ < 0 || (fault_ != 0 && !wants_room()); }
 
 std::size_t LineFile::waiting_lines() const noexcept {
   return static_cast<std::size_t>(std::count(waiting_.begin(), waiting_.end(), '\n'));

@@ -16,14 +16,19 @@ namespace vergence::app {
 /// the old descriptor errors for ever: out_of_reach() says so, reopen() finds the file by its name.
 ///
 /// Threads  One. Memory  A buffer of `pending` bytes, taken at the beginning.
-/// Errors   The constructor throws InputError. Afterwards nothing throws: a failure is kept in
-///          fault().
+/// Errors   The constructor throws InputError, unless told to wait for the disk. Afterwards nothing
+///          throws: a failure is kept in fault().
 class LineFile {
  public:
   static constexpr std::size_t kPending = std::size_t{1} << 20;  // bytes: minutes of poses
 
-  /// Opens for appending; made when it is not there. `pending`: bytes that may wait.
-  explicit LineFile(const std::filesystem::path& file, std::size_t pending = kPending);
+  enum class Away : std::uint8_t { refuse, wait };
+
+  /// Opens for appending; made when it is not there. `pending`: bytes that may wait. `away`: what
+  /// to do where the disk is (disk_is_away()), or the folder not there yet; wait: as one that went
+  /// out of reach.
+  explicit LineFile(const std::filesystem::path& file, std::size_t pending = kPending,
+                    Away away = Away::refuse);
   ~LineFile();
   LineFile(const LineFile&) = delete;
   LineFile& operator=(const LineFile&) = delete;
@@ -44,7 +49,10 @@ class LineFile {
   bool reopen(bool* fresh);
   /// The last reopen() had to wait: to be called again once flush() says true.
   [[nodiscard]] bool reopen_due() const noexcept { return reopen_due_; }
+  /// The last flush() failed for want of room.
+  [[nodiscard]] bool wants_room() const noexcept;
   /// The last flush() failed, and not for want of room: the descriptor may never take a line again.
+  /// Or there is none yet.
   [[nodiscard]] bool out_of_reach() const noexcept;
   /// Before all that waits: the first line of a file that reopen() found empty. Once is enough.
   void begin_with(std::string_view head) {

@@ -25,15 +25,18 @@ namespace vergence::app {
 static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_copyable_v<InsRecord>);
 
 struct Recorder::Files {
-  Files(const std::filesystem::path& folder, bool with_ins)
-      : trajectory(folder / "trajectory.tum"),
-        reference(folder / "reference.tum"),
-        poses(folder / "poses.csv"),
-        calibrations(folder / "calibrations.csv"),
-        events(folder / "events.jsonl"),
+  Files(const std::filesystem::path& session, const Options& options)
+      : folder(session.string()),
+        folder_fault(options.folder_fault),
+        mark(options.number, folder.c_str()),
+        trajectory(session / "trajectory.tum", LineFile::kPending, options.disk_away),
+        reference(session / "reference.tum", LineFile::kPending, options.disk_away),
+        poses(session / "poses.csv", LineFile::kPending, options.disk_away),
+        calibrations(session / "calibrations.csv", LineFile::kPending, options.disk_away),
+        events(session / "events.jsonl", LineFile::kPending, options.disk_away),
         all{&trajectory, &reference, &poses, &calibrations, &events} {
     constexpr std::size_t kMinutes = std::size_t{16} << 20;  // bytes: readings are many
-    if (with_ins) all.push_back(&ins.emplace(folder / "ins.csv", kMinutes));
+    if (options.ins) all.push_back(&ins.emplace(session / "ins.csv", kMinutes, options.disk_away));
     reported.resize(all.size());
   }
   /// The first line of a table; empty: the file has none.
@@ -42,6 +45,16 @@ struct Recorder::Files {
     if (file == &calibrations) return std::string(kCalibrationsHeader) + "\n";
     return ins && file == &*ins ? std::string(kInsHeader) + "\n" : "";
   }
+  /// Makes the folder where the disk was away. Only one that never was there: below a disk that is
+  /// unmounted for a while another one would come to lie.
+  void come_to_folder() {
+    if (folder_fault == 0) return;
+    folder_fault = make_folders(folder.c_str());
+    if (folder_fault == 0) mark.put_on(folder.c_str());
+  }
+  std::string folder;
+  int folder_fault;  // errno: it is not there yet
+  SessionMark mark;  // before any file is there
   LineFile trajectory, reference, poses, calibrations, events;
   std::optional<LineFile> ins{};
   bool has_reference = false;  // a line was written there
@@ -59,13 +72,12 @@ constexpr std::size_t kLongestLine = 2048;  // bytes: calibrations.csv has the l
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options),
-      files_(std::make_unique<Files>(folder, options.ins)),
+      files_(std::make_unique<Files>(folder, options)),
       totals_(!options.keep_trajectory      ? 0
               : options.expected_frames > 0 ? options.expected_frames
                                             : kMostStatuses),
       newest_(options.first) {
   line_.reserve(kLongestLine);
-  folder_ = folder.string();
   if (options.keep) keeper_ = std::make_unique<CalibrationKeeper>(options.keep, &filled_);
   memory_ = totals_.memory();
   for (LineFile* file : files_->all) {
@@ -205,12 +217,15 @@ bool Recorder::take_outcome() {
 /// have it again. False: not all was taken.
 bool Recorder::flush(LineFile* file, bool anew) {
   if (file->flush()) return true;
-  return anew && file->out_of_reach() && open_anew(file) && file->flush();
+  if (!anew || files_->folder_fault != 0 || !file->out_of_reach() || !open_anew(file)) return false;
+  files_->mark.put_on(files_->folder.c_str());  // its folder may be another one since
+  return file->flush();
 }
 
 void Recorder::flush() {
   constexpr std::chrono::seconds kAnew{3};
   const auto& files = files_->all;
+  if (anew) files_->come_to_folder();
   const auto now = std::chrono::steady_clock::now();
   const bool anew = now >= files_->anew_due;
   if (anew) files_->anew_due = now + kAnew;
@@ -218,7 +233,7 @@ void Recorder::flush() {
     if (flush(files[i], anew)) {
       files_->reported[i] = 0;
       if (files[i]->reopen_due()) reopen(files[i]);
-    } else if (files_->reported[i] != files[i]->fault()) {
+    } else if (files_->folder_fault == 0 && files_->reported[i] != files[i]->fault()) {
       files_->reported[i] = files[i]->fault();
       report_error(*files[i]);
     }
@@ -270,7 +285,7 @@ void Recorder::pretend(Stamp stamp) {
     report_error(
         "{}: the disk has no room, as the drive's faults want it; the session goes on, lines wait "
         "in memory",
-        folder_);
+        files_->folder);
   flush();
 }
 
@@ -284,8 +299,9 @@ void Recorder::note_disk(bool full) {
   std::array<char, 96> room{};
   (void)fmt::format_to_n(room.begin(), room.size() - 1, "the disk takes lines again; {} were lost",
                          lost_lines());
-  const bool away = std::any_of(files_->all.begin(), files_->all.end(),
-                                [](const LineFile* f) { return f->out_of_reach(); });
+  const bool away = std::any_of(files_->all.begin(), files_->all.end(), [](const LineFile* f) {
+    return f->fault() != 0 && !f->wants_room();
+  });
   event.set_sentence(!full  ? room.data()
                      : away ? "the disk of the session takes nothing: lines wait in memory"
                             : "the disk of the session has no room: lines wait in memory");
@@ -302,7 +318,7 @@ void Recorder::report_error(const LineFile& file) {
   const char* words = ::strerrordesc_np(file.fault());  // strerror() may take memory
   report_error("{}: cannot be written ({}); the session goes on, lines wait in memory: {}",
                file.path().native(), words != nullptr ? words : "unknown error",
-               file.out_of_reach() ? "check that disk" : "make room on that disk");
+               file.wants_room() ? "make room on that disk" : "check that disk");
 }
 
 template <class... Arguments>
@@ -338,17 +354,18 @@ void Recorder::read_back() {
 std::unique_ptr<SessionTotals> Recorder::close() {
   stop_and_join();
   SessionTotals& totals = totals_.totals();
+  files_->come_to_folder();
   if (keeper_ != nullptr) keeper_->stop();
   while (take_outcome()) {
   }
   for (LineFile* file : files_->all) {
     if (file->reopen_due()) reopen(file);
+    const int fault = files_->folder_fault != 0 ? files_->folder_fault : file->fault();
     (void)flush(file, true);
     const bool good = file->close();
     totals.lost_lines += file->lost_lines();
     if (!good)
-      totals.faults.push_back(file->path().string() + ": is not complete (" +
-                              std::strerror(file->fault()) +
+      totals.faults.push_back(file->path().string() + ": is not complete (" + std::strerror(fault) +
                               "); make room on that disk and repeat the drive");
     else if (file->lost_lines() > 0)
       errors_.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +

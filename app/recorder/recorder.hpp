@@ -5,13 +5,13 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "app/recorder/calibration_keeper.hpp"
 #include "app/recorder/ins_file.hpp"
+#include "app/recorder/line_file.hpp"
 #include "app/recorder/records.hpp"
 #include "app/recorder/session_folder.hpp"
 #include "app/recorder/session_totals.hpp"
@@ -68,6 +68,11 @@ class Recorder {
     std::size_t expected_frames = 0;  // 0: nobody knows
     bool ins = false;                 // readings are posted: ins.csv is there
     Stamp first{};                    // of the recorder's own events before the first pose
+    std::uint64_t number = 0;         // of SessionMark
+    /// A disk that is away at the beginning is none to wait for: poses go on as when it goes away
+    /// later. `folder_fault`: what try_session_folder() said; the recorder makes the folder then.
+    LineFile::Away disk_away = LineFile::Away::refuse;
+    int folder_fault = 0;
     /// Called on a thread of its own with every calibration that was accepted while driving, and
     /// with the one that the drive began with when it is confirmed first: files may be written
     /// there. May be empty.
@@ -77,7 +82,7 @@ class Recorder {
     std::function<bool(Stamp)> disk_full{};
   };
 
-  /// `folder` exists: make_session_folder().
+  /// `folder` exists: make_session_folder(). It bears a SessionMark until the destructor.
   Recorder(const std::filesystem::path& folder, const Options& options);
   ~Recorder();
   Recorder(const Recorder&) = delete;
@@ -136,8 +141,7 @@ class Recorder {
   Options options_;
   std::unique_ptr<Files> files_;
   TotalsBuilder totals_;
-  std::string line_;    // being formatted
-  std::string folder_;  // for sentences
+  std::string line_;  // being formatted
   std::size_t memory_ = 0;
   Stamp newest_;  // of the poses
   bool disk_full_ = false, pretended_ = false;

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "app/runtime/disk_errors.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/version.hpp"
 #include "drivers/clock.hpp"
@@ -56,7 +57,8 @@ RecordingFiles::RecordingFiles(const std::filesystem::path& folder, const Option
     preamble_.insert(preamble_.end(), head.begin(), head.end());
     preamble_.insert(preamble_.end(), p.message.begin(), p.message.end());
   }
-  if (open()) return;
+  const int error = open();
+  if (error == 0 || (options.wait_for_disk && (disk_is_away(error) || error == ENOENT))) return;
   const auto sentences = take_errors();
   throw InputError(sentences.empty() ? folder_ + ": nothing can be recorded there"
                                      : sentences.front());
@@ -70,7 +72,7 @@ bool RecordingFiles::resting() const noexcept {
 
 std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
                                      std::uint64_t lost) noexcept {
-  if (!file_.open() && !open()) return 0;
+  if (!file_.open() && open() != 0) return 0;
   const std::int64_t begun = monotonic_now().ns();
   const std::uint64_t before = file_.size();
   int error = preamble_due_ ? write_preamble(first) : 0;
@@ -94,14 +96,14 @@ void RecordingFiles::finish(std::uint64_t time) noexcept {
   if (error != 0) (void)notices_.push({Notice::Kind::unfinished, -error, 0, number_});
 }
 
-bool RecordingFiles::open() noexcept {
+int RecordingFiles::open() noexcept {
   if (const int error = file_.create(path(&path_)); error != 0) {
     fail(-error);
-    return false;
+    return -error;
   }
   files_.fetch_add(1, std::memory_order_relaxed);
   preamble_due_ = !preamble_.empty();
-  return true;
+  return 0;
 }
 
 /// In front of the first chunk of a file, at its time: before it nobody knows when the file begins.

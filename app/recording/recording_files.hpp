@@ -44,10 +44,12 @@ class RecordingFiles {
     std::uint64_t roll_bytes = 0;  // a file is ended when it has so many; 0: never
     Duration roll_time{};          // … or when its messages span so long; 0: never
     Disk* disk = nullptr;          // null: the system's
+    bool wait_for_disk = false;    // one that is away at the beginning (disk_is_away(), or the
+                                   // folder not there yet) is as one that goes away later
   };
   using Parts = std::span<const std::span<const std::uint8_t>>;
 
-  /// `folder` exists. Throws InputError: no file can be made there.
+  /// `folder` exists. Throws InputError: no file can be made there, and it does not wait for one.
   RecordingFiles(const std::filesystem::path& folder, const Options& options);
 
   /// As McapFile::write_chunk(), in a new file where none is open. `first`: time of its first
@@ -76,7 +78,8 @@ class RecordingFiles {
     int file = 0;
   };
 
-  [[nodiscard]] bool open() noexcept;
+  /// → errno; 0: open
+  [[nodiscard]] int open() noexcept;
   [[nodiscard]] int write_preamble(std::uint64_t time) noexcept;
   void fail(int error) noexcept;
   void begin_next_number() noexcept;

@@ -159,6 +159,7 @@ Recording::Options recording_options(const Configuration& c, const SourceFacts& 
   if (png) o.queues.push_back(queue_bytes(c, facts));
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
+  o.files.wait_for_disk = facts.when_full == Recorder::WhenFull::drop;
   o.files.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
   o.files.roll_time = Duration::seconds(c.record.roll_s);
   o.keep = Duration::seconds(c.record.keep_s);

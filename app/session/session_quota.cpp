@@ -1,15 +1,20 @@
 #include "app/session/session_quota.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
 #include <algorithm>
-#include <chrono>
+#include <cerrno>
 #include <fstream>
-#include <optional>
 #include <string_view>
 #include <system_error>
+#include <tuple>
 
 #include <fmt/format.h>
 
 #include "app/recorder/pose_line.hpp"
+#include "app/recorder/session_folder.hpp"
 
 namespace vergence::app {
 namespace {
@@ -18,6 +23,7 @@ namespace fs = std::filesystem;
 
 struct OldSession {
   fs::path folder;
+  std::uint64_t number = 0;  // 0: it has none
   fs::file_time_type written{};
   std::uint64_t bytes = 0;
 };
@@ -29,26 +35,35 @@ bool has_poses(const fs::path& folder) {
   return in && head == kPosesHeader;
 }
 
-/// When the newest of its files was written: while the cameras are gone a drive writes others than
-/// poses.csv.
-std::optional<fs::file_time_type> last_written(const fs::path& folder) {
-  std::optional<fs::file_time_type> newest;
+/// When the newest of its files was.
+fs::file_time_type last_written(const fs::path& folder) {
+  fs::file_time_type newest = fs::file_time_type::min();
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     std::error_code ignored;
     if (!at->is_regular_file(ignored) || at->is_symlink(ignored)) continue;
     const auto written = fs::last_write_time(at->path(), ignored);
-    if (!ignored && (!newest || written > *newest)) newest = written;
+    if (!ignored && written > newest) newest = written;
   }
   return newest;
 }
 
-/// What was written an hour ahead was cut off before a clock without a battery began anew.
-bool may_go_on(const fs::path& folder, fs::file_time_type written) {
-  std::error_code error;
-  const auto age = fs::file_time_type::clock::now() - written;
-  return !fs::exists(folder / "summary.json", error) &&
-         std::chrono::abs(age) < std::chrono::hours(1);
+/// 0: it has none, or none that can be.
+std::uint64_t number_of(const fs::path& folder) {
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 53U;
+  std::ifstream in(folder / SessionMark::kFile);
+  std::uint64_t number = 0;
+  return in >> number && number < kMost ? number : 0;
+}
+
+/// Whether somebody holds its lock. Where there are no locks: whether it was never ended.
+bool is_being_written(const fs::path& folder) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return false;
+  const int error = ::flock(fd, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
+  (void)::close(fd);
+  std::error_code ignored;
+  return error == EWOULDBLOCK || (error != 0 && !fs::exists(folder / "summary.json", ignored));
 }
 
 std::uint64_t bytes_in(const fs::path& folder) {
@@ -86,27 +101,40 @@ std::error_code remove_session(const fs::path& folder) {
   return first;
 }
 
-/// Oldest first.
-std::vector<OldSession> sessions_beside(const fs::path& session) {
-  std::vector<OldSession> found;
+/// Folders beside it.
+std::vector<fs::path> folders_beside(const fs::path& session) {
+  std::vector<fs::path> found;
   std::error_code error;
   for (fs::directory_iterator at(folder_above(session), error), end; !error && at != end;
        at.increment(error)) {
     std::error_code ignored;
-    if (at->is_symlink(ignored) || !at->is_directory(ignored) ||
-        fs::equivalent(at->path(), session, ignored) || !has_poses(at->path()))
-      continue;
-    const auto written = last_written(at->path());
-    if (!written || may_go_on(at->path(), *written)) continue;
-    found.push_back({at->path(), *written, bytes_in(at->path())});
+    if (!at->is_symlink(ignored) && at->is_directory(ignored) &&
+        !fs::equivalent(at->path(), session, ignored))
+      found.push_back(at->path());
   }
+  return found;
+}
+
+/// Oldest first.
+std::vector<OldSession> sessions_beside(const fs::path& session) {
+  std::vector<OldSession> found;
+  for (const fs::path& folder : folders_beside(session))
+    if (has_poses(folder) && !is_being_written(folder))
+      found.push_back({folder, number_of(folder), last_written(folder), bytes_in(folder)});
   std::sort(found.begin(), found.end(), [](const OldSession& a, const OldSession& b) {
-    return a.written != b.written ? a.written < b.written : a.folder < b.folder;
+    return std::tie(a.number, a.written, a.folder) < std::tie(b.number, b.written, b.folder);
   });
   return found;
 }
 
 }  // namespace
+
+std::uint64_t next_session_number(const fs::path& session) {
+  std::uint64_t greatest = 0;
+  for (const fs::path& folder : folders_beside(session))
+    greatest = std::max(greatest, number_of(folder));
+  return greatest + 1;
+}
 
 std::vector<std::string> keep_session_quota(const fs::path& session, std::uint64_t most_bytes) {
   const std::vector<OldSession> sessions = sessions_beside(session);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstring>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -38,6 +39,7 @@ class SessionRunner {
 
  private:
   void open(std::vector<std::string>* faults);
+  void make_folder();
   void open_files(std::vector<std::string>* faults);
   [[nodiscard]] SessionStart session_start() const;
   void say_remarks(Progress* progress);
@@ -74,7 +76,11 @@ class SessionRunner {
   std::mutex mutex_;  // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
-  bool made_folder_ = false;   // it was not there before
+  struct {
+    std::uint64_t number = 0;  // SessionMark
+    bool made = false;         // it was not there before
+    int fault = 0;             // errno: it is not there yet
+  } folder_;
   bool halted_ = false;        // the caller's thread alone
   ResidentMemory resident_{};  // at the drive's end
   DriveThreads threads_;       // of the caller's thread
@@ -160,10 +166,12 @@ void SessionRunner::start_source(std::vector<std::string>* faults) {
 void SessionRunner::leave_no_folder() {
   if (recording_) recording_->close();
   if (recorder_) (void)recorder_->close();
-  discard_session_folder(request_.out, made_folder_);
+  discard_session_folder(request_.out, folder_.made);
 }
 
 void SessionRunner::say_recording_errors(Progress* progress) {
+  for (const std::string& sentence : recorder_->take_errors())
+    progress->say("vergence: " + sentence);
   if (!recording_) return;
   for (const std::string& sentence : recording_->take_errors())
     progress->say("vergence: " + sentence);
@@ -175,13 +183,22 @@ void SessionRunner::open(std::vector<std::string>* faults) {
   (void)check_session_folder(request_.out);
   if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
     removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
-  made_folder_ = make_session_folder(request_.out);
+  make_folder();
   try {
     open_files(faults);
   } catch (const std::exception&) {
     leave_no_folder();
     throw;
   }
+}
+
+/// Poses that others drive by wait for no disk: they are published while their lines wait.
+void SessionRunner::make_folder() {
+  folder_.number = next_session_number(request_.out);
+  if (facts_.when_full == Recorder::WhenFull::drop)
+    folder_.fault = try_session_folder(request_.out, &folder_.made);
+  else
+    folder_.made = make_session_folder(request_.out);
 }
 
 void SessionRunner::open_files(std::vector<std::string>* faults) {
@@ -192,6 +209,9 @@ void SessionRunner::open_files(std::vector<std::string>* faults) {
   to_record.ins = loop_.comparison() != nullptr;
   to_record.keep = calibration_keeper(request_.out, facts_.begin.file, facts_.begin.state);
   to_record.disk_full = facts_.disk_full;
+  to_record.number = folder_.number;
+  to_record.folder_fault = folder_.fault;
+  if (facts_.when_full == Recorder::WhenFull::drop) to_record.disk_away = LineFile::Away::wait;
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
   observers_ = request_.observers;
   if (configuration_.record.any()) {
@@ -224,6 +244,11 @@ SessionStart SessionRunner::session_start() const {
 }
 
 void SessionRunner::say_remarks(Progress* progress) {
+  if (folder_.fault != 0)
+    progress->say(fmt::format(
+        "vergence: {}: cannot be made ({}); the drive goes on, lines wait in memory and the folder "
+        "is tried again: make room on that disk, or check it",
+        request_.out.string(), std::strerror(folder_.fault)));
   for (const std::string& sentence : removed_) {
     progress->say("vergence: " + sentence);
     loop_.event_log().log(facts_.first, "session_removed", sentence, false);

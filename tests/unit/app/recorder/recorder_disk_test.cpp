@@ -1,13 +1,22 @@
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <thread>
 
 #include <nlohmann/json.hpp>
 
+#include "app/recorder/pose_line.hpp"
 #include "app/recorder/recorder.hpp"
+#include "app/recorder/session_folder.hpp"
+#include "app/runtime/disk_errors.hpp"
+#include "app/runtime/errors.hpp"
+#include "tests/support/small_disk.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/recorder/broken_descriptor.hpp"
 #include "tests/unit/app/recorder/recorder_inputs.hpp"
@@ -169,6 +178,102 @@ TEST(Recorder, aDiskThatIsFullToTheEndLeavesFilesThatAreNotWholeAndNamesThem) {
   const auto totals = recorder.close();
   EXPECT_GE(totals->faults.size(), 2U);
   EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 10U);
+}
+
+/// A drive of so many frames whose disk is away where the folder is to be made; `then` is done
+/// before the last of them.
+struct AwayAtTheStart {
+  std::unique_ptr<SessionTotals> totals;
+  std::vector<std::string> errors;
+};
+AwayAtTheStart drive_with_disk_away(const std::filesystem::path& session,
+                                    const std::function<void()>& then) {
+  bool made = false;
+  Recorder::Options options;
+  options.number = 7;
+  options.disk_away = LineFile::Away::wait;
+  options.folder_fault = try_session_folder(session, &made);
+  EXPECT_TRUE(made) << "it was not there before";
+  EXPECT_TRUE(disk_is_away(options.folder_fault)) << options.folder_fault;
+  Recorder recorder(session, options);
+  recorder.post(pose(0, PoseStatus::ok, 0));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  then();
+  for (std::uint64_t i = 1; i < 10; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1));
+  AwayAtTheStart drive;
+  drive.totals = recorder.close();
+  drive.errors = recorder.take_errors();
+  return drive;
+}
+
+TEST(Recorder, aDiskThatIsFullAtTheBeginningHasEveryLineWhenThereIsRoom) {
+  const test::TemporaryFolder folder;
+  const test::SmallDisk disk(folder.path(), "nr_inodes=1");
+  if (!disk.ready()) GTEST_SKIP() << "no file system may be mounted here";
+  const auto session = folder / "sessions" / "monday";
+  EXPECT_THROW((void)make_session_folder(session), InputError);
+  const auto drive =
+      drive_with_disk_away(session, [&] { ASSERT_TRUE(disk.change("nr_inodes=100")); });
+  EXPECT_TRUE(drive.totals->faults.empty());
+  EXPECT_TRUE(drive.errors.empty()) << drive.errors.front();
+  EXPECT_EQ(lines_of(session / "poses.csv").size(), 11U);
+  EXPECT_EQ(lines_of(session / "poses.csv").front(), kPosesHeader);
+  EXPECT_EQ(lines_of(session / "trajectory.tum").size(), 10U);
+  EXPECT_EQ(drive.totals->statuses.size(), 10U);
+  EXPECT_EQ(told(session, "disk_full").size(), 1U);
+  EXPECT_EQ(test::read_file(session / SessionMark::kFile), "7\n");
+}
+
+TEST(Recorder, aDiskThatIsReadOnlyToTheEndIsAFaultOfEveryFile) {
+  const test::TemporaryFolder folder;
+  const test::SmallDisk disk(folder.path(), "");
+  if (!disk.ready() || !disk.make_read_only()) GTEST_SKIP() << "no file system may be mounted here";
+  const auto drive = drive_with_disk_away(folder / "monday", [] {});
+  ASSERT_GE(drive.totals->faults.size(), 4U);
+  EXPECT_NE(drive.totals->faults[0].find("is not complete (Read-only file system)"),
+            std::string::npos)
+      << drive.totals->faults[0];
+  EXPECT_EQ(drive.totals->ok, 10U);
+}
+
+TEST(Recorder, aFolderOnADiskThatTakesNoNewFileIsASentenceForEach) {
+  const test::TemporaryFolder folder;
+  const test::SmallDisk disk(folder.path(), "nr_inodes=1");
+  if (!disk.ready()) GTEST_SKIP() << "no file system may be mounted here";
+  EXPECT_THROW(Recorder(folder.path(), {}), InputError);
+  Recorder::Options options;
+  options.disk_away = LineFile::Away::wait;
+  Recorder recorder(folder.path(), options);
+  recorder.post(pose(0, PoseStatus::ok, 0));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  ASSERT_TRUE(disk.change("nr_inodes=100"));
+  const auto totals = recorder.close();
+  EXPECT_TRUE(totals->faults.empty());
+  const auto errors = recorder.take_errors();
+  ASSERT_FALSE(errors.empty());
+  EXPECT_NE(errors[0].find("make room on that disk"), std::string::npos) << errors[0];
+  EXPECT_EQ(lines_of(folder / "poses.csv").size(), 2U);
+}
+
+TEST(Recorder, aSessionIsLockedUntilItsRecorderGoes) {
+  const test::TemporaryFolder folder;
+  const auto is_free = [&folder] {
+    const int fd = ::open(folder.path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) != 0;
+    (void)::close(fd);
+    return !locked;
+  };
+  {
+    Recorder recorder(folder.path(), {});
+    EXPECT_FALSE(is_free());
+    recorder.reopen();
+    while (told(folder.path(), "files_reopened").empty())
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_FALSE(is_free());
+    (void)recorder.close();
+    EXPECT_FALSE(is_free()) << "summary and report are to come";
+  }
+  EXPECT_TRUE(is_free());
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "app/recording/recording.hpp"
 
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <string>
@@ -258,6 +259,32 @@ TEST(Recording, aDiskWithoutRoomForTheNextFileHasNoEmptyOnes) {
   EXPECT_EQ(numbers(folder / "drive_0.mcap"), sequence(0, 101));
   EXPECT_EQ(numbers(folder / "drive_1.mcap"), sequence(101, 200));
   EXPECT_FALSE(std::filesystem::exists(folder / "drive_2.mcap"));
+}
+
+TEST(Recording, aDiskThatIsAwayAtTheBeginningIsRefusedOrWaitedFor) {
+  const TemporaryFolder folder;
+  for (const int error : {ENOSPC, EROFS, EIO, ENOENT}) {
+    FaultyDisk disk;
+    disk.error = error;
+    Recording::Options o = options();
+    o.files.disk = &disk;
+    EXPECT_THROW(Recording(folder.path(), o), InputError) << error;
+    o.files.wait_for_disk = true;
+    const auto below = folder / std::to_string(error);
+    std::filesystem::create_directory(below);
+    Recording recording(below, o);
+    EXPECT_EQ(recording.take_errors().size(), 1U) << error;
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
+    disk.error = 0;
+    recording.close();
+    EXPECT_EQ(numbers(below / "drive.mcap"), sequence(0, 100)) << error;
+  }
+  FaultyDisk forbidden;
+  forbidden.error = EACCES;
+  Recording::Options o = options();
+  o.files.disk = &forbidden;
+  o.files.wait_for_disk = true;
+  EXPECT_THROW(Recording(folder.path(), o), InputError);
 }
 
 TEST(Recording, aStalledDiskKeepsNobodyWaitingAndLosesNothingThatHasRoom) {

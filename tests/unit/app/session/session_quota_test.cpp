@@ -8,6 +8,7 @@
 #include <string>
 
 #include "app/recorder/pose_line.hpp"
+#include "app/recorder/session_folder.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -46,6 +47,7 @@ TEST(SessionQuota, whatIsNoSessionARunningDriveALinkAndTheSessionItselfStay) {
   const test::TemporaryFolder folder;
   make_session(folder / "elsewhere" / "linked", 9);
   make_session(folder / "sessions" / "running", 0, false);
+  const SessionMark running(0, (folder / "sessions" / "running").c_str());
   make_session(folder / "sessions" / "now", 8);
   make_session(folder / "sessions" / "killed", 5, false);
   fs::create_directories(folder / "sessions" / "photos");
@@ -59,15 +61,56 @@ TEST(SessionQuota, whatIsNoSessionARunningDriveALinkAndTheSessionItselfStay) {
   EXPECT_TRUE(fs::exists(folder / "elsewhere" / "linked" / "poses.csv"));
 }
 
-TEST(SessionQuota, aSessionCutOffBeforeTheClockWasSetBackGoesAndADriveWithoutCamerasStays) {
+// A board without a clock of its own begins at the same date with every boot.
+TEST(SessionQuota, aSessionCutOffAMomentAgoByAPowerCutGoes) {
   const test::TemporaryFolder folder;
+  make_session(folder / "a_moment_ago", 0, false);
   make_session(folder / "ahead", -48, false);
-  make_session(folder / "no_cameras", 2, false);
-  std::ofstream(folder / "no_cameras" / "ins.csv") << "stamp_ns\n";  // a moment ago
-  const auto sentences = keep_session_quota(folder / "now", 0);
-  ASSERT_EQ(sentences.size(), 1U);
+  EXPECT_EQ(keep_session_quota(folder / "now", 0).size(), 2U);
+  EXPECT_FALSE(fs::exists(folder / "a_moment_ago"));
   EXPECT_FALSE(fs::exists(folder / "ahead"));
-  EXPECT_TRUE(fs::exists(folder / "no_cameras"));
+}
+
+TEST(SessionQuota, aSessionThatIsLockedStaysHoweverOld) {
+  const test::TemporaryFolder folder;
+  for (const bool ended : {false, true}) {
+    make_session(folder / "locked", 1000, ended);
+    {
+      const SessionMark mark(0, (folder / "locked").c_str());
+      EXPECT_TRUE(keep_session_quota(folder / "now", 0).empty());
+      EXPECT_TRUE(fs::exists(folder / "locked" / "poses.csv"));
+    }
+    EXPECT_EQ(keep_session_quota(folder / "now", 0).size(), 1U) << "its lock goes with it";
+    EXPECT_FALSE(fs::exists(folder / "locked"));
+  }
+}
+
+TEST(SessionQuota, theOrderIsThatOfDrivingWhateverTheClockSaid) {
+  const test::TemporaryFolder folder;
+  const auto numbered = [&folder](const char* name, std::uint64_t number, int hours) {
+    make_session(folder / name, hours);
+    const SessionMark mark(number, (folder / name).c_str());
+  };
+  numbered("first", 9, 1);
+  numbered("second", 10, 2000);
+  numbered("third", 11, 500);
+  make_session(folder / "of_old", 3);
+  std::ofstream(folder / "of_old" / SessionMark::kFile);  // a power cut left nothing in it
+  EXPECT_EQ(next_session_number(folder / "now"), 12U);
+  EXPECT_EQ(keep_session_quota(folder / "now", 2 * kSize + 5000).size(), 2U);
+  EXPECT_FALSE(fs::exists(folder / "of_old"));
+  EXPECT_FALSE(fs::exists(folder / "first"));
+  EXPECT_EQ(keep_session_quota(folder / "now", kSize + 5000).size(), 1U);
+  EXPECT_FALSE(fs::exists(folder / "second"));
+  EXPECT_TRUE(fs::exists(folder / "third"));
+}
+
+TEST(SessionQuota, theFirstSessionHasNumberOneAndANumberThatCannotBeCountsAsNone) {
+  const test::TemporaryFolder folder;
+  EXPECT_EQ(next_session_number(folder / "now"), 1U);
+  folder.write("odd/session_number", "18446744073709551615\n");
+  folder.write("words/session_number", "many\n");
+  EXPECT_EQ(next_session_number(folder / "now/"), 1U);
 }
 
 TEST(SessionQuota, aPathThatEndsWithASlashIsTheSameSession) {
