@@ -208,14 +208,20 @@ void LiveSource::done(const PoseSample& sample) noexcept {
 void LiveSource::look() {
   // Of simulated devices one always has something to come, and in virtual time a look is an order.
   if (devices_.mock() == nullptr) acquisition_->look_again();
-  // Real cameras do not end by themselves.
-  if (devices_.mock() == nullptr && request_.duration_s &&
-      std::chrono::steady_clock::now() - begun_ >
-          std::chrono::duration<double>(*request_.duration_s))
+  if (request_.duration_s && !request_.fast && std::chrono::steady_clock::now() > end())
     acquisition_->stop();
 }
 
 void LiveSource::halt() noexcept { acquisition_->join(); }
+/// Real cameras do not end by themselves. A mock's do, after their last pulse, which a loaded
+/// machine brings late; but not where they are gone by then.
+std::chrono::steady_clock::time_point LiveSource::end() const {
+  constexpr std::chrono::seconds kLate{3};
+  const std::chrono::duration<double> drive(*request_.duration_s);
+  return begun_ + std::chrono::ceil<std::chrono::steady_clock::duration>(drive) +
+         (devices_.mock() != nullptr ? kLate : std::chrono::seconds(0));
+}
+
 
 void LiveSource::finish(Progress* progress, std::vector<std::string>* faults) {
   if (devices_.mock() != nullptr &&

@@ -45,6 +45,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] std::optional<ExitCode> verdict(Progress* progress) const override;
 
  private:
+  [[nodiscard]] std::chrono::steady_clock::time_point end() const;  // with a duration
   void make_facts();
   void make_acquisition();
   /// An event that goes before the frame in hand. False: none is left.

@@ -1,0 +1,122 @@
+// Drives whose terminal or disk takes nothing, and whose cameras give nothing.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <string>
+
+#include "tests/support/small_disk.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/system/run/live_drive.hpp"
+
+namespace vergence {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+using test::Drive;
+using test::lines_of;
+using test::within;
+
+class Pipe {
+ public:
+  Pipe() { (void)::pipe2(ends_.data(), O_CLOEXEC); }
+  ~Pipe() {
+    for (const int end : ends_) (void)::close(end);
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+
+  [[nodiscard]] int input() const { return ends_[1]; }
+  void fill() const {
+    (void)::fcntl(ends_[1], F_SETFL, O_NONBLOCK);
+    while (::write(ends_[1], "x", 1) == 1) {
+    }
+    (void)::fcntl(ends_[1], F_SETFL, 0);
+  }
+  /// Reads until it has come across those words.
+  [[nodiscard]] bool says(const std::string& words, std::chrono::seconds limit) const {
+    std::string text;
+    return within(limit, [&] {
+      std::array<char, 4096> piece{};
+      pollfd asked{ends_[0], POLLIN, 0};
+      if (::poll(&asked, 1, 0) > 0)
+        if (const ssize_t n = ::read(ends_[0], piece.data(), piece.size()); n > 0)
+          text.append(piece.data(), static_cast<std::size_t>(n));
+      return text.find(words) != std::string::npos;
+    });
+  }
+
+ private:
+  std::array<int, 2> ends_{-1, -1};
+};
+
+void expect_whole(const fs::path& session) {
+  EXPECT_GT(test::summary_of(session)["frames"]["posed"].get<int>(), 0);
+  EXPECT_TRUE(fs::exists(session / "report.html"));
+}
+
+TEST(Run, aTerminalThatTakesNothingHoldsUpNeitherSigtermNorTheEnd) {
+  const test::TemporaryFolder folder;
+  const Pipe errors;
+  errors.fill();
+  Drive stopped(folder / "s", false, 600, {}, errors.input());
+  ASSERT_TRUE(within(60s, [&] { return lines_of(folder / "s" / "poses.csv") > 5; }));
+  stopped.signal(SIGTERM);
+  EXPECT_EQ(stopped.wait(30s), 143);
+  expect_whole(folder / "s");
+  Drive ended(folder / "e", false, 4, {}, errors.input());
+  EXPECT_GE(ended.wait(60s), 0) << "it hangs";
+  expect_whole(folder / "e");
+}
+
+TEST(Run, aTerminalStoppedByCtrlSHoldsUpNoSigterm) {
+  const test::TemporaryFolder folder;
+  Drive drive(folder / "s", true, 600, {});
+  ASSERT_TRUE(within(60s, [&] { return lines_of(folder / "s" / "poses.csv") > 5; }));
+  ASSERT_EQ(::write(drive.terminal(), "\x13", 1), 1);
+  std::this_thread::sleep_for(500ms);
+  drive.signal(SIGTERM);
+  EXPECT_EQ(drive.wait(30s), 143);
+  expect_whole(folder / "s");
+}
+
+TEST(Run, aDiskThatIsFullAtTheStartCostsNoPose) {
+  const test::TemporaryFolder folder;
+  const test::SmallDisk disk(folder.path(), "nr_inodes=1");
+  if (!disk.ready()) GTEST_SKIP() << "no file system may be mounted here";
+  const Pipe errors;
+  const fs::path session = folder / "sessions" / "s";
+  Drive drive(session, false, 600, {}, errors.input());
+  ASSERT_TRUE(errors.says(session.string() + ": cannot be made (No space left on device)", 60s));
+  std::this_thread::sleep_for(2s);
+  ASSERT_FALSE(fs::exists(session));
+  ASSERT_TRUE(disk.change("nr_inodes=1000"));
+  ASSERT_TRUE(within(60s, [&] { return lines_of(session / "poses.csv") > 5; }));
+  drive.signal(SIGTERM);
+  EXPECT_EQ(drive.wait(60s), 143);
+  expect_whole(session);
+  EXPECT_EQ(lines_of(session / "poses.csv"),
+            test::summary_of(session)["frames"]["read"].get<std::size_t>() + 1);
+  EXPECT_EQ(test::events(session, "disk_full").size(), 1U);
+  EXPECT_EQ(test::events(session, "disk_room"),
+            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
+  EXPECT_GT(fs::file_size(session / "drive.mcap"), 0U);
+}
+
+TEST(Run, aDriveInRealTimeEndsByTheClockWhereEveryCameraIsGone) {
+  const test::TemporaryFolder folder;
+  Drive drive(folder / "s", false, 4,
+              {"--quiet", "--fault", "camera_gone@2 camera=-1 duration_s=0"});
+  EXPECT_EQ(drive.wait(60s), 3);
+  expect_whole(folder / "s");
+}
+
+}  // namespace
+}  // namespace vergence
