@@ -245,5 +245,17 @@ TEST(LiveState, aCalibrationStandsWithTwoSigmaAndWhatTheDriveMeasuredBesideIt) {
   ASSERT_NE(state.rig(), nullptr);
 }
 
+TEST(LiveState, camerasThatAreInStepAgainLeaveTheCalibrationAsItWas) {
+  for (const bool before : {false, true}) {
+    LiveState state;
+    state.add(calibration(false, -0.75));
+    if (before) state.add(event("calibration_confirmed", ""));
+    state.add(event("rig_changed", "the cameras' images are not of the same instant"));
+    EXPECT_FALSE(json::parse(state.update(kNow, -1))["calibration"]["confirmed"].get<bool>());
+    state.add(event("in_step", "the cameras are in step again"));
+    EXPECT_EQ(json::parse(state.update(kNow, -1))["calibration"]["confirmed"].get<bool>(), before);
+  }
+}
+
 }  // namespace
 }  // namespace vergence::app
