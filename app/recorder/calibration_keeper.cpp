@@ -9,8 +9,20 @@ namespace vergence::app {
 CalibrationKeeper::CalibrationKeeper(KeepCalibration keep, WakeEvent* wake)
     : keep_(std::move(keep)), wake_(wake), thread_([this] { work(); }) {}
 
-bool CalibrationKeeper::post(Stamp stamp, const RigNumbers& rig, bool found) noexcept {
-  if (!waiting_.push({stamp, rig, found})) return false;
+bool CalibrationKeeper::confirmed(Stamp stamp) noexcept {
+  if (!unconfirmed_) return true;
+  const Waiting begun_with{stamp, *unconfirmed_, false};
+  unconfirmed_.reset();
+  return post(begun_with);
+}
+
+bool CalibrationKeeper::found(Stamp stamp, const RigNumbers& rig) noexcept {
+  unconfirmed_.reset();
+  return post({stamp, rig, true});
+}
+
+bool CalibrationKeeper::post(const Waiting& waiting) noexcept {
+  if (!waiting_.push(waiting)) return false;
   filled_.signal();
   return true;
 }

@@ -2,6 +2,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -25,7 +26,7 @@ using KeepCalibration = std::function<Kept(const RigCalibration& rig, bool found
 /// Keeps calibrations for the next drive, on a thread of its own (`vergence-keep`): making YAML
 /// takes heap memory, and its files wait for the disk, which the recorder's thread does not.
 ///
-/// Threads  post(), next(): one, the recorder's. stop(): after the last post().
+/// Threads  One, the recorder's; stop() after the last to be kept.
 /// Memory   Fixed for the recorder's thread; what `keep` takes is its thread's.
 /// Full     While kMostWaiting wait for the disk a further one is refused.
 class CalibrationKeeper {
@@ -44,8 +45,12 @@ class CalibrationKeeper {
   CalibrationKeeper(const CalibrationKeeper&) = delete;
   CalibrationKeeper& operator=(const CalibrationKeeper&) = delete;
 
-  /// False: too many wait; it is not kept.
-  [[nodiscard]] bool post(Stamp stamp, const RigNumbers& rig, bool found) noexcept;
+  /// What the drive begins with. It is kept when it is confirmed before another one is found.
+  void begin_with(const RigNumbers& rig) noexcept { unconfirmed_ = rig; }
+  /// The drive has confirmed what is in use. False: too many wait; it is not kept.
+  [[nodiscard]] bool confirmed(Stamp stamp) noexcept;
+  /// The drive has found one. False: too many wait; it is not kept.
+  [[nodiscard]] bool found(Stamp stamp, const RigNumbers& rig) noexcept;
   /// The oldest outcome that nobody has taken yet. False: there is none.
   [[nodiscard]] bool next(Outcome* outcome) noexcept { return outcomes_.pop(outcome); }
   /// Keeps what is waiting and ends the thread. Twice is harmless.
@@ -58,11 +63,13 @@ class CalibrationKeeper {
     bool found = true;
   };
 
+  [[nodiscard]] bool post(const Waiting& waiting) noexcept;
   void work();
   void keep(const Waiting& waiting);
 
   KeepCalibration keep_;
   WakeEvent* wake_;
+  std::optional<RigNumbers> unconfirmed_{};  // the poster's; empty: kept, or not in use any more
   Ring<Waiting, kMostWaiting> waiting_;
   Ring<Outcome, 2 * kMostWaiting>
       outcomes_;  // full: the recorder hangs, its events are lost anyway
