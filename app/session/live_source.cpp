@@ -100,7 +100,8 @@ void LiveSource::make_facts() {
         return is_full(f) && f.active(stamp - start_);
       });
     };
-  for (const std::string& sentence : facts_.begin.remarks) facts_.remarks.push_back({sentence});
+  for (const std::string& sentence : facts_.begin.remarks)
+    facts_.remarks.push_back({sentence, "calibration"});
   for (const std::string& sentence : devices_.remarks())
     facts_.remarks.push_back({sentence, "device"});
   const SyncMode mode = devices_.sync().mode;

@@ -129,6 +129,8 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
   EXPECT_NE(lines("other", "calibrations.csv").at(1).find(",accepted,given,"), std::string::npos);
   EXPECT_EQ(read_file(state()), kept) << "nothing was accepted since";
 
+  EXPECT_EQ(events("other", "calibration").size(), 1U) << "and its session has the sentence, too";
+
   const Outcome lenses = drive("lenses", "--duration 1 --set rig.nominal.focal_px=250");
   EXPECT_NE(lenses.err.find("is not used: when it was found the configuration had the intrinsics"),
             std::string::npos)
