@@ -169,9 +169,8 @@ void Recorder::write(const EventRecord& e) {
   totals_.add(e);
   format_event(e, &line_);
   files_->events.append(line_);
-  if (!unconfirmed_ || std::string_view(e.kind) != kConfirmed) return;
-  keep(e.stamp, *unconfirmed_, false);
-  unconfirmed_.reset();
+  if (keeper_ != nullptr && std::string_view(e.kind) == kConfirmed)
+    report_kept(keeper_->confirmed(e.stamp));
 }
 
 void Recorder::write(const CalibrationRecord& c) {
@@ -179,15 +178,13 @@ void Recorder::write(const CalibrationRecord& c) {
     format_calibration(c, k, &line_);
     files_->calibrations.append(line_);
   }
-  if (!c.decided) unconfirmed_ = c.rig;
-  if (!c.decided || !totals_.add(c)) return;
-  unconfirmed_.reset();
-  keep(c.stamp, c.rig, true);
+  if (!c.decided && keeper_ != nullptr) keeper_->begin_with(c.rig);
+  if (!c.decided || !totals_.add(c) || keeper_ == nullptr) return;
+  report_kept(keeper_->found(c.stamp, c.rig));
 }
 
-void Recorder::keep(Stamp stamp, const RigNumbers& rig, bool found) {
-  if (keeper_ != nullptr && !keeper_->post(stamp, rig, found))
-    report_error("a calibration is not kept: the disk has not taken those before it");
+void Recorder::report_kept(bool kept) noexcept {
+  if (!kept) report_error("a calibration is not kept: the disk has not taken those before it");
 }
 
 void Recorder::write(const PoseRecord& p) {
@@ -225,10 +222,10 @@ bool Recorder::flush(LineFile* file, bool anew) {
 void Recorder::flush() {
   constexpr std::chrono::seconds kAnew{3};
   const auto& files = files_->all;
-  if (anew) files_->come_to_folder();
   const auto now = std::chrono::steady_clock::now();
   const bool anew = now >= files_->anew_due;
   if (anew) files_->anew_due = now + kAnew;
+  if (anew) files_->come_to_folder();
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (flush(files[i], anew)) {
       files_->reported[i] = 0;
@@ -248,7 +245,7 @@ void Recorder::reopen() noexcept {
 }
 
 void Recorder::reopen(LineFile* file) {
-  if (!open_anew(file)) report_error(*file);
+  if (files_->folder_fault == 0 && !open_anew(file)) report_error(*file);
 }
 
 bool Recorder::open_anew(LineFile* file) {
@@ -354,16 +351,16 @@ void Recorder::read_back() {
 std::unique_ptr<SessionTotals> Recorder::close() {
   stop_and_join();
   SessionTotals& totals = totals_.totals();
-  files_->come_to_folder();
   if (keeper_ != nullptr) keeper_->stop();
   while (take_outcome()) {
   }
+  files_->come_to_folder();
   for (LineFile* file : files_->all) {
     if (file->reopen_due()) reopen(file);
-    const int fault = files_->folder_fault != 0 ? files_->folder_fault : file->fault();
     (void)flush(file, true);
     const bool good = file->close();
     totals.lost_lines += file->lost_lines();
+    const int fault = files_->folder_fault != 0 ? files_->folder_fault : file->fault();
     if (!good)
       totals.faults.push_back(file->path().string() + ": is not complete (" + std::strerror(fault) +
                               "); make room on that disk and repeat the drive");

@@ -121,7 +121,7 @@ class Recorder {
   void write(const EventRecord& event);
   void write(const CalibrationRecord& calibration);
   void write(const InsRecord& reading);
-  void keep(Stamp stamp, const RigNumbers& rig, bool found);
+  void report_kept(bool kept) noexcept;
   void flush();
   [[nodiscard]] bool flush(LineFile* file, bool anew);
   void reopen_files();
@@ -145,8 +145,6 @@ class Recorder {
   std::size_t memory_ = 0;
   Stamp newest_;  // of the poses
   bool disk_full_ = false, pretended_ = false;
-  std::optional<RigNumbers> unconfirmed_;  // what the drive began with, until it is confirmed or
-                                           // another one is accepted
 
   Queue<Record, kRing> records_;
   Queue<InsRecord, kReadings> readings_;

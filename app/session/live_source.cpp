@@ -213,7 +213,6 @@ void LiveSource::look() {
     acquisition_->stop();
 }
 
-void LiveSource::halt() noexcept { acquisition_->join(); }
 /// Real cameras do not end by themselves. A mock's do, after their last pulse, which a loaded
 /// machine brings late; but not where they are gone by then.
 std::chrono::steady_clock::time_point LiveSource::end() const {
@@ -223,6 +222,7 @@ std::chrono::steady_clock::time_point LiveSource::end() const {
          (devices_.mock() != nullptr ? kLate : std::chrono::seconds(0));
 }
 
+void LiveSource::halt() noexcept { acquisition_->join(); }
 
 void LiveSource::finish(Progress* progress, std::vector<std::string>* faults) {
   if (devices_.mock() != nullptr &&
