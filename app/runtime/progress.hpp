@@ -30,8 +30,8 @@ struct ProgressState {
 /// lines     one line every 10 s, the last one at finish(): for files and pipes
 /// quiet     nothing
 /// Threads   One caller. Time  Monotonic, from the clock handed in. Errors  A stream that fails is
-///           ignored. One that takes nothing for a while holds nobody up (ProgressOutput): lines are
-///           dropped, and how many is said where the next one is taken.
+///           ignored. One that takes nothing for a while holds nobody up (ProgressOutput): lines
+///           are dropped, and how many is said where the next one is taken.
 class Progress {
  public:
   enum class Mode : std::uint8_t { terminal, lines, quiet };

@@ -90,7 +90,7 @@ TEST(DoctorSystem, theServiceDrivesWithItsOwnLimits) {
   EXPECT_TRUE(mends_with(f.of("realtime")[0], "LimitRTPRIO=95"));
   f.file("/etc/systemd/system/vergence.service.d/realtime.conf", "[Service]\nLimitRTPRIO=95\n");
   EXPECT_EQ(f.of("realtime")[0].state, FindingState::advice);
-  f.configuration = "/home/driver/rig.yaml";
+  f.configuration = "rig.yaml";
   EXPECT_EQ(f.of("realtime")[0].state, FindingState::problem);
 }
 

@@ -34,17 +34,25 @@ InsRecord reading(const LocalTangentPlane& plane, double t, const Vec3& place) {
   return r;
 }
 
+/// A comparison as a session has it: with a recorder and a log of events.
+struct ComparedSession {
+  ComparedSession() {
+    log->open(&output, at(0));
+    comparison.open(&output);
+  }
+  const test::TemporaryFolder folder;
+  Recorder recorder{folder.path(), {.ins = true}};
+  SessionOutput output{&recorder, {}};
+  const std::unique_ptr<EventLog> log = std::make_unique<EventLog>();
+  const ComparisonOptions options{};
+  Arena arena{Comparison::bytes_needed(options)};
+  InsComparison comparison{options, InsSource::device, arena, *log};
+};
+
 /// A drive whose scene is begun anew after every tunnel: each time it is placed on the earth anew.
 TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
-  const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {.ins = true});
-  SessionOutput output(&recorder, {});
-  const auto log = std::make_unique<EventLog>();
-  log->open(&output, at(0));
-  const ComparisonOptions options;
-  Arena arena(Comparison::bytes_needed(options));
-  InsComparison comparison(options, InsSource::device, arena, *log);
-  comparison.open(&output);
+  ComparedSession session;
+  InsComparison& comparison = session.comparison;
   const LocalTangentPlane plane(Geodetic{48, 11, 500});
   constexpr int kPoses = static_cast<int>(kBetween / kSpeed * 10);  // of a scene, at 10 Hz
   for (int i = 0; i < kPoses * (kRestarts + 1); ++i) {
@@ -69,7 +77,7 @@ TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
       EXPECT_EQ(count, earth.placements.size());
     }
   }
-  (void)recorder.close();
+  (void)session.recorder.close();
 }
 
 /// A place that wanders as an MTi-G's: each axis keeps exp(-dt / 60 s) of its error.
@@ -94,15 +102,8 @@ class WanderingPlace {
 
 /// The way that is told of a drive along `place_at`, of an INS at 100 Hz.
 double way_of(const std::function<Vec3(double)>& place_at, double seconds, std::uint64_t seed) {
-  const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {.ins = true});
-  SessionOutput output(&recorder, {});
-  const auto log = std::make_unique<EventLog>();
-  log->open(&output, at(0));
-  const ComparisonOptions options;
-  Arena arena(Comparison::bytes_needed(options));
-  InsComparison comparison(options, InsSource::device, arena, *log);
-  comparison.open(&output);
+  ComparedSession session;
+  InsComparison& comparison = session.comparison;
   const LocalTangentPlane plane(Geodetic{48, 11, 500});
   WanderingPlace wandering(seed);
   constexpr double kStep = 0.01;  // s
@@ -120,7 +121,7 @@ double way_of(const std::function<Vec3(double)>& place_at, double seconds, std::
     comparison.drain();
   }
   comparison.finish();
-  (void)recorder.close();
+  (void)session.recorder.close();
   return comparison.earth("the test").errors.way_m;
 }
 
