@@ -9,7 +9,8 @@ if ! systemd-analyze security --help >/dev/null 2>&1; then
   exit 77
 fi
 work="$(mktemp -d)"
-trap 'rm -rf "$work"' EXIT
+disk="$work/disk"
+trap 'umount "$disk" 2>/dev/null || true; rm -rf "$work"' EXIT
 
 systemd-analyze security --offline=true --threshold=30 --no-pager "$packaging/vergence.service" | tail -n 1
 
@@ -27,4 +28,13 @@ for _ in 1 2 3; do
   esac
   mkdir -p "$(dirname "$folder")"
   mkdir "$folder" || { echo "$folder is used twice"; exit 1; }
+done
+
+# A disk that is full or read-only ends no start: the program drives without it. Root may mount one.
+mkdir "$disk"
+export STATE_DIRECTORY="$disk"
+for options in nr_inodes=1 ro; do
+  mount -t tmpfs -o "$options" none "$disk" 2>/dev/null || continue
+  sh "$work/start" | grep -q "^run /etc/vergence/rig.yaml --out $disk/sessions/20" || { echo "nothing is started on a disk with $options"; exit 1; }
+  umount "$disk"
 done
