@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -101,6 +102,14 @@ std::error_code remove_session(const fs::path& folder) {
   return first;
 }
 
+/// Another file system begins there: no session, and one that is away would hold up the drive.
+bool is_mounted(const fs::path& folder) {
+  constexpr int kAskNobody = AT_STATX_DONT_SYNC | AT_NO_AUTOMOUNT | AT_SYMLINK_NOFOLLOW;
+  struct statx status {};
+  return ::statx(AT_FDCWD, folder.c_str(), kAskNobody, STATX_TYPE, &status) == 0 &&
+         (status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0;
+}
+
 /// Folders beside it.
 std::vector<fs::path> folders_beside(const fs::path& session) {
   std::vector<fs::path> found;
@@ -108,7 +117,7 @@ std::vector<fs::path> folders_beside(const fs::path& session) {
   for (fs::directory_iterator at(folder_above(session), error), end; !error && at != end;
        at.increment(error)) {
     std::error_code ignored;
-    if (!at->is_symlink(ignored) && at->is_directory(ignored) &&
+    if (!is_mounted(at->path()) && !at->is_symlink(ignored) && at->is_directory(ignored) &&
         !fs::equivalent(at->path(), session, ignored))
       found.push_back(at->path());
   }

@@ -9,6 +9,7 @@
 
 #include "app/recorder/pose_line.hpp"
 #include "app/recorder/session_folder.hpp"
+#include "tests/support/small_disk.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -111,6 +112,19 @@ TEST(SessionQuota, theFirstSessionHasNumberOneAndANumberThatCannotBeCountsAsNone
   folder.write("odd/session_number", "18446744073709551615\n");
   folder.write("words/session_number", "many\n");
   EXPECT_EQ(next_session_number(folder / "now/"), 1U);
+}
+
+// Nor is it looked into: a server that does not answer would hold up every drive beside it.
+TEST(SessionQuota, whatIsMountedBesideItIsNoSession) {
+  const test::TemporaryFolder folder;
+  fs::create_directory(folder / "mounted");
+  const test::SmallDisk disk(folder / "mounted", "");
+  if (!disk.ready()) GTEST_SKIP() << "no file system may be mounted here";
+  make_session(folder / "mounted", 3);
+  folder.write("mounted/session_number", "5\n");
+  EXPECT_EQ(next_session_number(folder / "now"), 1U);
+  EXPECT_TRUE(keep_session_quota(folder / "now", 0).empty());
+  EXPECT_TRUE(fs::exists(folder / "mounted" / "poses.csv"));
 }
 
 TEST(SessionQuota, aPathThatEndsWithASlashIsTheSameSession) {
