@@ -82,25 +82,17 @@ constexpr double kSilence_s = 1;      // without a frame: nobody reads an old st
 constexpr double kMostIntervals = 3;  // … unless frames are that rare
 constexpr double kSmoothing = 8;      // frames
 
-/// Steps of the map that an extent is worth: fewer would show no way any more.
-constexpr float kLeastSteps = 100;
-
-float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-}
-
 }  // namespace
 
 void LiveState::add(const LiveFrame& frame) {
-  if (any_) take_interval(frame.pose.out);
+  if (newest_) take_interval(frame.pose.out);
   newest_ = frame;
-  any_ = true;
   estimate_.add(static_cast<double>(frame.pose.estimate_ms));
 }
 
 /// A gap counts as twice the interval at most: an outage does not make the next one unseen.
 void LiveState::take_interval(HostStamp out) noexcept {
-  const double gap = (out - newest_.pose.out).to_seconds();
+  const double gap = (out - newest_->pose.out).to_seconds();
   if (interval_s_ <= 0) interval_s_ = gap;
   interval_s_ += (std::min(gap, 2 * interval_s_) - interval_s_) / kSmoothing;
 }
@@ -108,7 +100,7 @@ void LiveState::take_interval(HostStamp out) noexcept {
 void LiveState::add(const PoseRecord& compared) {
   compared_ = compared;
   if (compared.status == PoseStatus::lost && !compared.ins_valid) return;
-  Place place;
+  LiveTrail::Place place;
   for (std::size_t i = 0; i < 3; ++i) place.world[i] = static_cast<float>(compared.world_left.t[i]);
   place.status = static_cast<std::uint8_t>(compared.status);
   if (compared.status == PoseStatus::lost && !trail_.places().empty())
@@ -116,52 +108,6 @@ void LiveState::add(const PoseRecord& compared) {
   if (compared.ins_valid)
     place.ins = {static_cast<float>(compared.ins.enu[0]), static_cast<float>(compared.ins.enu[1])};
   trail_.add(place);
-}
-
-void LiveState::Trail::add(const Place& place) {
-  if (places_.size() == kTrail) thin();
-  if (places_.empty() || distance(place.world, places_.back().world) >= least_step_m_)
-    return places_.push_back(place);
-  // A rig that stands for weeks uses up no places, whatever its status does.
-  Place& last = places_.back();
-  if (place.status <= last.status) return;
-  last.status = place.status;
-  shown_ = std::min(shown_, places_.size() - 1);
-}
-
-void LiveState::Trail::thin() {
-  shown_ = 0;
-  while (places_.size() > kTrail / 2) {
-    if (2 * least_step_m_ * kLeastSteps > extent()) {
-      // Round and round a yard: what was driven first lies under what came later.
-      places_.erase(places_.begin(), places_.begin() + kTrail / 2);
-      return;
-    }
-    least_step_m_ *= 2;
-    drop_near();
-  }
-}
-
-void LiveState::Trail::drop_near() {
-  std::size_t kept = 0;
-  for (std::size_t i = 1; i < places_.size(); ++i) {
-    if (distance(places_[i].world, places_[kept].world) >= least_step_m_)
-      places_[++kept] = places_[i];
-    else
-      places_[kept].status = std::max(places_[kept].status, places_[i].status);
-  }
-  places_.resize(kept + 1);
-}
-
-float LiveState::Trail::extent() const {
-  float longest = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto [least, most] = std::minmax_element(
-        places_.begin(), places_.end(),
-        [axis](const Place& a, const Place& b) { return a.world[axis] < b.world[axis]; });
-    longest = std::max(longest, most->world[axis] - least->world[axis]);
-  }
-  return longest;
 }
 
 void LiveState::add(const EventRecord& event) {
@@ -198,7 +144,7 @@ void LiveState::add(const PublishedPlacement& placement) {
 }
 
 json LiveState::frame_json(HostStamp now) const {
-  const LiveFrame& f = newest_;
+  const LiveFrame& f = *newest_;
   const double silence = (now - f.pose.out).to_seconds();
   const PublishedPose& p = f.pose;
   const std::string_view reason = to_string(p.reason);
@@ -287,7 +233,7 @@ json placement_json(const PublishedPlacement& placement) {
 
 }  // namespace
 
-json LiveState::place_json(const Place& p) {
+json LiveState::place_json(const LiveTrail::Place& p) {
   json out{rounded(static_cast<double>(p.world[0]), 2), rounded(static_cast<double>(p.world[1]), 2),
            rounded(static_cast<double>(p.world[2]), 2), p.status};
   if (p.ins)
@@ -302,24 +248,24 @@ std::string LiveState::hello(HostStamp now) const {
            {"recording", start_.recording},
            {"ended", ended_}};
   json& trail = out["trail"] = json::array();
-  for (const Place& p : trail_.places()) trail.push_back(place_json(p));
+  for (const LiveTrail::Place& p : trail_.places()) trail.push_back(place_json(p));
   json& events = out["events"] = json::array();
   for (const EventRecord& event : events_) events.push_back(event_json(event, start_.first));
   out["calibration"] = calibration_json();
   if (placement_) out["placement"] = placement_json(*placement_);
-  if (any_) out["now"] = frame_json(now);
+  if (newest_) out["now"] = frame_json(now);
   return text_of(out);
 }
 
 std::string LiveState::update(HostStamp now, double line_age_ms) {
   json out{{"ended", ended_}};
-  if (any_) out["now"] = frame_json(now);
-  if (any_)
+  if (newest_) out["now"] = frame_json(now);
+  if (newest_)
     out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
   const std::size_t first = trail_.take_new();
   out["trail_from"] = first;
   json& trail = out["trail"] = json::array();
-  const std::vector<Place>& places = trail_.places();
+  const std::vector<LiveTrail::Place>& places = trail_.places();
   for (std::size_t i = first; i < places.size(); ++i) trail.push_back(place_json(places[i]));
   json& events = out["events"] = json::array();
   const auto fresh = std::min<std::uint64_t>(events_seen_ - events_shown_, events_.size());

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "app/publish/live_trail.hpp"
 #include "app/publish/pose_line.hpp"
 #include "app/recorder/histogram.hpp"
 #include "app/recorder/records.hpp"
@@ -34,7 +35,6 @@ struct LiveFrame {
 ///          the newest stay.
 class LiveState {
  public:
-  static constexpr std::size_t kTrail = 4000;  // points of the map
   static constexpr std::size_t kEvents = 60, kCalibrations = 30;
 
   void begin(const SessionStart& start) { start_ = start; }
@@ -58,44 +58,19 @@ class LiveState {
   [[nodiscard]] std::string update(HostStamp now, double line_age_ms);
 
  private:
-  struct Place {
-    std::array<float, 3> world{};
-    std::optional<std::array<float, 2>> ins{};  // east, north
-    std::uint8_t status = 0;
-  };
-
-  /// The points of the map, farther apart as the drive grows longer. A place has the worst status
-  /// of all that was driven up to the next one.
-  class Trail {
-   public:
-    void add(const Place& place);
-    [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
-    /// Where the places begin that the last call has not had, or not as they are.
-    [[nodiscard]] std::size_t take_new() noexcept { return std::exchange(shown_, places_.size()); }
-
-   private:
-    void thin();
-    void drop_near();
-    [[nodiscard]] float extent() const;
-
-    std::vector<Place> places_{};
-    float least_step_m_ = 0.5F;
-    std::size_t shown_ = 0;  // places that a viewer has as they are
-  };
-
-  [[nodiscard]] static nlohmann::json place_json(const Place& place);
+  [[nodiscard]] static nlohmann::json place_json(const LiveTrail::Place& place);
   void take_interval(HostStamp out) noexcept;
-  [[nodiscard]] nlohmann::json frame_json(HostStamp now) const;
+  [[nodiscard]] nlohmann::json frame_json(HostStamp now) const;  // there is one
   [[nodiscard]] nlohmann::json calibration_json() const;
 
   SessionStart start_{};
-  LiveFrame newest_{};
+  std::optional<LiveFrame> newest_{};
   double interval_s_ = 0;  // between frames, on the host's clock
   std::array<std::optional<float>, kMaxCameras> temperatures_{};  // °C
-  bool any_ = false, ended_ = false;
+  bool ended_ = false;
   TimeHistogram estimate_;
   std::optional<PoseRecord> compared_{};
-  Trail trail_;
+  LiveTrail trail_;
   std::deque<EventRecord> events_{};
   std::uint64_t events_seen_ = 0, events_shown_ = 0;
   std::deque<CalibrationRecord> calibrations_{};

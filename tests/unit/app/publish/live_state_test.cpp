@@ -113,8 +113,8 @@ TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
   }
   const json trail = json::parse(state.hello(kNow))["trail"];
   EXPECT_TRUE(anew);
-  EXPECT_LE(trail.size(), LiveState::kTrail);
-  EXPECT_GE(trail.size(), LiveState::kTrail / 2);
+  EXPECT_LE(trail.size(), LiveTrail::kMost);
+  EXPECT_GE(trail.size(), LiveTrail::kMost / 2);
   EXPECT_EQ(trail.front()[2], 0.0);
   EXPECT_GE(trail.back()[2].get<double>(), 49'900.0);
   EXPECT_GE(told + 100, trail.size()) << "a viewer who was there has as much";
@@ -177,7 +177,7 @@ TEST(LiveState, weeksInAYardLeaveItsNewestWay) {
     state.add(pose);
   }
   const json trail = json::parse(state.hello(kNow))["trail"];
-  EXPECT_GE(trail.size(), LiveState::kTrail / 2);
+  EXPECT_GE(trail.size(), LiveTrail::kMost / 2);
 }
 
 LiveFrame come(double seconds) {
