@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -43,14 +44,14 @@ ImageMessage image_of(const char* encoding, int channels) {
 
 class BagPixels : public ::testing::TestWithParam<BagKind> {
  protected:
-  /// The same message left and right.
-  [[nodiscard]] static StereoSequence sequence_of(const char* type, const std::string& message) {
-    const auto writer = GetParam().writer();
-    writer->channel(1, "/left/image", type);
-    writer->channel(2, "/right/image", type);
-    for (const std::uint16_t k : kSides) writer->message(k, kStart, message);
-    writer->finish();
-    return test::bag_in_memory(GetParam().is_mcap(), writer->bytes());
+  /// The same message left and right; until the next one.
+  [[nodiscard]] StereoSequence sequence_of(const char* type, const std::string& message) {
+    writer_ = GetParam().writer();
+    writer_->channel(1, "/left/image", type);
+    writer_->channel(2, "/right/image", type);
+    for (const std::uint16_t k : kSides) writer_->message(k, kStart, message);
+    writer_->finish();
+    return test::bag_in_memory(GetParam().is_mcap(), writer_->bytes());
   }
   /// Grey of the right image.
   [[nodiscard]] static Grey right_of(const StereoSequence& s) {
@@ -77,6 +78,7 @@ class BagPixels : public ::testing::TestWithParam<BagKind> {
                    compressed_message(GetParam().wire(), kStart, format, file));
   }
 
+  std::unique_ptr<test::BagWriter> writer_;  // holds the bag's bytes
   std::string refusal_;
 };
 
