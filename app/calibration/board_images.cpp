@@ -128,8 +128,8 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
   });
   if (same_length && (alone.empty() || 2 * views.size() < cameras[0].size())) {
     if (!all_numbered) return by_order(cameras);
-    std::vector<std::vector<fs::path>> in_order;
-    for (const Numbered& n : numbers) in_order.push_back(files_of(n));
+    std::vector<std::vector<fs::path>> in_order(numbers.size());
+    std::transform(numbers.begin(), numbers.end(), in_order.begin(), files_of);
     return by_order(in_order);
   }
   if (views.empty()) {

@@ -78,9 +78,9 @@ json temperatures_json(const std::array<std::optional<float>, kMaxCameras>& cels
   return out;
 }
 
-constexpr double kSilence_s = 1;      // without a frame: nobody reads an old status as today's …
-constexpr double kMostIntervals = 3;  // … unless frames are that rare
-constexpr double kSmoothing = 8;      // frames
+constexpr double kSilenceSeconds = 1;  // without a frame: nobody reads an old status as today's …
+constexpr double kMostIntervals = 3;   // … unless frames are that rare
+constexpr double kSmoothing = 8;       // frames
 
 }  // namespace
 
@@ -151,7 +151,7 @@ json LiveState::frame_json(HostStamp now) const {
   json out{{"frame", p.frame},
            {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
            {"since_s", rounded(silence, 1)},  // when it came
-           {"silent", silence > std::max(kSilence_s, kMostIntervals * interval_s_)},
+           {"silent", silence > std::max(kSilenceSeconds, kMostIntervals * interval_s_)},
            {"state", to_string(p.state)},
            {"status", to_string(p.status)},
            {"reason", reason},
