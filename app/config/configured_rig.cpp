@@ -43,9 +43,11 @@ ConfiguredCamera read_configured_camera(const YamlFile& file, const YAML::Node& 
   };
   ConfiguredCamera camera;
   const YAML::Node model = need_key(file, node, name, "model");
-  for (const CameraModelKind kind :
-       {CameraModelKind::pinhole_radtan, CameraModelKind::pinhole_equidistant})
-    if (file.text(model, name + ".model") == model_word(kind)) camera.model = kind;
+  const std::string word = file.text(model, name + ".model");
+  if (word == model_word(CameraModelKind::pinhole_equidistant))
+    camera.model = CameraModelKind::pinhole_equidistant;
+  else if (word != model_word(CameraModelKind::pinhole_radtan))
+    file.fail(model, name + ".model is neither pinhole-radtan nor pinhole-equidistant");
   read("offset", &camera.offset);
   read("intrinsics", &camera.intrinsics);
   read("distortion", &camera.distortion);

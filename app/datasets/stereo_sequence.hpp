@@ -97,31 +97,27 @@ struct BagTopics {
 /// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data
 /// set's own.
 ///
-///   kitti   calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N
-///   belongs to line N of times.txt kitti_raw  DATE_drive_NNNN_sync or _extract with image_NN/data
-///   and image_NN/timestamps.txt, the date's calib_*.txt above it; paired by
-///           stamps, that of the left camera counts; raw or rectified images, told by their size.
-///           `folder` is the drive, its date, or above
-///   euroc   mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by
-///   equal stamps; raw images
-///   folder  left/, right/ (or both/ with both images in each file, side by side), times.txt (a
-///   line
-///           a pair: integer nanoseconds, or seconds if one of them has a point), calibration.yaml.
-///           Paired by equal names, where a name that one side lacks is an image that was lost; in
-///           order of name (2 before 10) where that makes no pair a line of times.txt; where the
-///           lines of times.txt name their images, `stamp,file` or `stamp,left file,right file`, by
-///           these. An optional reference lies beside them: truth.tum, or poses.txt as KITTI has
-///           it, a line a pair (the left camera's; replay reads it). Without times.txt pairs are
-///           taken to be 0.1 s apart, which is a remark.
-///   st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line,
-///   stamp of the left camera; raw Bayer BMP;
-///           the calibration published with the data set
-///   mcap, rosbag  a .mcap or .bag file, or a folder with some: a bag of ROS 2 or ROS 1
-///           (docs/bags.md); paired by the nearest header.stamp, that of the left camera counts;
-///           CameraInfo beside the images, and the INS
-///
-///   session  a session's folder with drive.mcap (docs/recording.md); the pairs that have both
-///           images, and the INS
+/// kitti     calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N
+///           belongs to line N of times.txt.
+/// kitti_raw DATE_drive_NNNN_sync or _extract with image_NN/data and image_NN/timestamps.txt, the
+///           date's calib_*.txt above it; paired by stamps, that of the left camera counts; raw or
+///           rectified images, told by their size. `folder` is the drive, its date, or above.
+/// euroc     mav0/cam0, mav0/cam1 with data.csv and sensor.yaml, or that mav0 itself; paired by
+///           equal stamps; raw images.
+/// folder    left/, right/ (or both/ with both images in each file, side by side), times.txt (one
+///           line a pair: integer nanoseconds, or seconds if one of them has a point),
+///           calibration.yaml. Paired by equal names, where a name that one side lacks is an image
+///           that was lost; in order of name (2 before 10) where names make no pair a line; as the
+///           lines of times.txt name them, `stamp,file` or `stamp,left file,right file`, if they
+///           do. A reference may lie beside them: truth.tum, or poses.txt as KITTI has it, of the
+///           left camera. Without times.txt pairs are taken to be 0.1 s apart, which is a remark.
+/// st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, by
+///           the left camera's stamp; raw Bayer BMP; the calibration published with the data set.
+/// mcap,     A .mcap or .bag file, or a folder with some: a bag of ROS 2 or ROS 1 (docs/bags.md);
+/// rosbag    paired by the nearest header.stamp, that of the left camera counts; CameraInfo beside
+///           the images, and the INS.
+/// session   A session's folder with drive.mcap (docs/recording.md); the pairs that have both
+///           images, and the INS.
 ///
 /// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data
 /// set that has more than two (kitti_raw).

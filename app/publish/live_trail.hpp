@@ -9,9 +9,11 @@
 namespace vergence::app {
 
 /// The points of the live page's map, farther apart as the drive grows longer. A place has the
-/// worst status of all that was driven up to the next one. Memory  kMost places: then those that
-/// are near others go, or, where the drive goes round and
-///         round, the oldest.
+/// worst status of all that was driven up to the next one.
+///
+/// Threads  One.
+/// Full     After kMost places those that are near others go; where the drive goes round and round,
+///          the oldest do.
 class LiveTrail {
  public:
   static constexpr std::size_t kMost = 4000;

@@ -15,7 +15,8 @@ namespace vergence::app::report {
 /// Devices that gave nothing for a while, as the events camera_gone, camera_back, board_gone and
 /// board_back say.
 struct Outage {
-  std::uint32_t devices = 0;  // a bit each, for names_of()
+  std::uint32_t devices = 0;  // bit k: camera k; kMaxCameras: the trigger board; the one above: a
+                              // camera that its event does not name
   Stamp from{};
   std::optional<Stamp> to{};  // nothing: they never came back
 };
@@ -25,7 +26,7 @@ struct Outage {
 
 /// All outages of the same devices.
 struct OutageSum {
-  std::uint32_t devices = 0;
+  std::uint32_t devices = 0;  // as Outage
   std::size_t count = 0;
   Stamp from{};               // of the first
   std::optional<Stamp> to{};  // of the last; nothing: they never came back

@@ -276,9 +276,8 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
     if (const std::string happened = happenings_table(session, analysis); !happened.empty())
       out += section("wide", "What happened", happened);
   if (!verdict.advice.empty()) out += section("wide", "What to do next", list(verdict.advice));
-  std::vector<std::string> missing = session.left_out;
-  missing.insert(missing.end(), session.missing.begin(), session.missing.end());
-  if (!missing.empty()) out += section("wide", "What is missing in this session", list(missing));
+  if (const std::vector<std::string> missing = session.not_had(); !missing.empty())
+    out += section("wide", "What is missing in this session", list(missing));
   out += map_section(session, analysis);
   std::string running;
   running_plots(session, analysis, timing, &running);

@@ -21,7 +21,7 @@ std::string first_of(const std::vector<std::string>& sentences, const char* none
 }  // namespace
 
 ReportOutcome write_report(const std::filesystem::path& session_folder) {
-  report::Session session = report::read_session(session_folder);
+  const report::Session session = report::read_session(session_folder);
   const report::Analysis analysis = report::analyse(session);
   const report::Verdict verdict = report::judge(session, analysis);
   ReportOutcome outcome;
@@ -30,8 +30,7 @@ ReportOutcome write_report(const std::filesystem::path& session_folder) {
   outcome.headline = std::string(report::to_words(verdict.grade)) + ": " + verdict.sentence;
   outcome.usable = verdict.usable;
   outcome.main_reason = verdict.main_reason;
-  outcome.missing = std::move(session.left_out);
-  outcome.missing.insert(outcome.missing.end(), session.missing.begin(), session.missing.end());
+  outcome.missing = session.not_had();
   outcome.grade = report::to_words(verdict.grade);
   outcome.reasons = verdict.reasons;
   outcome.advice = verdict.advice;

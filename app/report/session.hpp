@@ -94,6 +94,13 @@ struct Session {
   std::optional<CalibrationFile> calibration{};
   std::vector<std::string> missing{};   // sentences
   std::vector<std::string> left_out{};  // the same of files that are longer than is read
+
+  /// All that the report does not have: what was left out first.
+  [[nodiscard]] std::vector<std::string> not_had() const {
+    std::vector<std::string> sentences = left_out;
+    sentences.insert(sentences.end(), missing.begin(), missing.end());
+    return sentences;
+  }
 };
 
 inline constexpr std::size_t kMostFrames =

@@ -202,6 +202,9 @@ TEST(StateFile, IsACalibrationThatCanBeGiven) {
     text.replace(text.find(part, text.find("\nconfigured:")), 3, "xyz");
     EXPECT_THROW((void)parse_calibration(text, "c.yaml"), InputError) << part;
   }
+  std::string text = test::read_file(folder / "calibration_state.yaml");
+  text.replace(text.find("pinhole-radtan", text.find("\nconfigured:")), 14, "pinhole-foo");
+  EXPECT_THROW((void)parse_calibration(text, "c.yaml"), InputError) << "a model nobody knows";
 }
 
 TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
