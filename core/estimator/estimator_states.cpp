@@ -93,19 +93,25 @@ void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* 
   const double length_sigma = 0.01 * length_sigma_percent;
   const Mat6 motion = motion_of(out);
   grade_motion(out, motion, drift.motion_to(out.T_left_world).t.norm(), sample);
-  drift.step(out.T_left_world, motion, length_sigma, out.keyframe);
+  const Mat6 told = motion + odometry::correction_covariance(out.corrected);
+  drift.step(out.T_left_world, told, length_sigma, out.keyframe);
   sample->covariance = upper_triangle(drift.pose());
-  sample->motion_covariance = upper_triangle(motion);
+  sample->motion_covariance = upper_triangle(told);
+  sample->corrected_m = static_cast<float>(out.corrected.t.norm());
   sample->length_sigma = static_cast<float>(length_sigma);
 }
 
-/// Against the drive's other motions, where nothing else is known to be wrong.
+/// Against the drive's other motions and what the window made of it, where nothing else is known to
+/// be wrong.
 void Estimator::Parts::grade_motion(const odometry::FrameOutcome& out, const Mat6& motion,
                                     double step_m, PoseSample* sample) noexcept {
   const bool doubted = out_of_step > 0 || may_lag > 0 || undecided || state == State::recalibrating;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
-  if (out.status != PoseStatus::ok || doubted || !usual.judges(step_m, sigma_m)) return;
-  if (!usual.unusual(sigma_m) || sample->status != PoseStatus::ok) return;
+  if (out.status != PoseStatus::ok || doubted) return;
+  const WindowCorrection correction{out.corrected.t.norm(), step_m, sigma_m};
+  const bool unusual = usual.judges(step_m, sigma_m) && usual.unusual(sigma_m);
+  if (!unusual && !correction.spoils_motion()) return;
+  if (sample->status != PoseStatus::ok) return;
   sample->status = PoseStatus::degraded;
   sample->reason = Reason::weak_geometry;
 }

@@ -60,6 +60,12 @@ Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
   return Q;
 }
 
+Mat6 correction_covariance(const Transform& T_adjusted_fitted) noexcept {
+  Vec6 e;
+  e << T_adjusted_fitted.t, log_so3(T_adjusted_fitted.R);
+  return e * e.transpose();
+}
+
 bool may_be_none(const Transform& T_now_before, const Mat6& motion) noexcept {
   constexpr double kSigmas = 3;
   Vec6 e;

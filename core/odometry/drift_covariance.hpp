@@ -16,6 +16,10 @@ inline constexpr double kLongestExtrapolation =
 /// kLongestExtrapolation. Threads pure.
 [[nodiscard]] Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                                      double extrapolated_s) noexcept;
+/// What the window's correction of a pose makes of the motion to it: off by as much, since what it
+/// takes back was said of motions before. T_adjusted_fitted as FrameOutcome::corrected; translation
+/// (m) first, then rotation (rad), about the left camera's axes. Threads pure.
+[[nodiscard]] Mat6 correction_covariance(const Transform& T_adjusted_fitted) noexcept;
 
 /// Whether a motion may as well be none, `motion` its covariance: within three sigmas, together
 /// those of all six. Of two fits of a rig that stands one in a million is not, as they are

@@ -99,6 +99,7 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
     window = window_.adjust(map_, out->effort);
     if (window.usable)
       std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
+    out->corrected = map_.keyframe(slot).T_left_world * motion_.T_left_world().inverse();
   } else {
     window = window_.adjust_unlinked(map_, out->effort);
     out->scale = renew_scale(slot);

@@ -43,6 +43,7 @@ struct FrameOutcome {
                         // the one may be an exposure behind
   double scale =
       1;  // everything of the world was scaled by this about the left camera, to the known baseline
+  Transform corrected{};  // T_adjusted_fitted: what the window moved this frame's fitted pose by
   std::array<float, kStages> stage_ms{};
 
   void expect(double since_s, const Transform& T_now_before) noexcept {

@@ -42,7 +42,8 @@ enum class Reason : std::uint8_t {
   no_pose,            // tracking failed
   time_gap,           // no frame for longer than motion can be predicted, up to ten frames ago
   scene_restarted,    // the map was rebuilt; the motion across the gap was extrapolated
-  weak_geometry,      // the points do not hold the pose well, or several times worse than usual
+  weak_geometry,      // the points do not hold the pose well, or several times worse than usual,
+                      // or the window moved the pose far
   moving_scene,       // more outliers than a rigid scene has
   unconfirmed,        // calibration from a state file that the drive has not confirmed yet
   unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands
@@ -83,6 +84,7 @@ struct PoseSample {
   Covariance6 motion_covariance{};  // of the motion since the last pose: translation (m), rotation
                                     // (rad), about the left camera's axes; without …
   float length_sigma = 0;  // … the relative error that all lengths share, 1 σ: the calibration's
+  float corrected_m = 0;   // that the window moved the pose by after its fit; in the covariances
   int inliers = 0;         // points that support the pose
   int stereo_inliers = 0;  // of these, seen by a second camera in this frame
   double reprojection_px = 0;  // rms of the inliers' residuals, per coordinate

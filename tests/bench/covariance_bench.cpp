@@ -9,7 +9,8 @@
 // errors of its own, which are added to the covariance: of KITTI's GPS/INS 2 cm and 0.1° (Geiger,
 // Lenz, Urtasun, CVPR 2012), of EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where
 // nothing is stated, an assumed 0.05°. The last line of a drive tells how uncertain its most
-// uncertain motion is, times the usual one.
+// uncertain motion is, times the usual one, and the largest share of a motion that the window
+// corrected by more than the motion's fit can be off by.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -22,6 +23,7 @@
 
 #include "app/session/drive_calibration.hpp"
 #include "core/estimator/detail/usual_spread.hpp"
+#include "core/estimator/detail/window_correction.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/odometry/drift_covariance.hpp"
 #include "tests/support/honesty.hpp"
@@ -143,18 +145,27 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
   return poses;
 }
 
-/// The most uncertain motion, times what is usual.
-double most_unusual(std::span<const Posed> poses) {
+/// What is told of a drive's motions when they are judged.
+struct Judged {
+  double most_unusual = 0;   // the most uncertain motion, times what is usual
+  double largest_share = 0;  // of a motion that the window corrected by more than it can be off by
+};
+
+Judged judged(std::span<const Posed> poses) {
   UsualSpread usual;
-  double most = 0;
+  Judged most;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const Transform motion =
         poses[i - 1].sample.T_world_left.inverse() * poses[i].sample.T_world_left;
     const Mat6 C = full(poses[i].sample.motion_covariance);
-    const double sigma_m = std::sqrt(C.topLeftCorner<3, 3>().trace());
+    const auto moved_m = static_cast<double>(poses[i].sample.corrected_m);
+    const double sigma_m =
+        std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace() - moved_m * moved_m));
+    if (WindowCorrection{moved_m, motion.t.norm(), sigma_m}.significant())
+      most.largest_share = std::max(most.largest_share, moved_m / motion.t.norm());
     if (!usual.judges(motion.t.norm(), sigma_m)) continue;
     (void)usual.unusual(sigma_m);
-    most = std::max(most, usual.times_usual());
+    most.most_unusual = std::max(most.most_unusual, usual.times_usual());
   }
   return most;
 }
@@ -172,8 +183,11 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
   for (std::size_t i = 10; i < poses.size(); ++i)
     add_motion(poses[0], poses[i], sigma, full(poses[i].sample.covariance), &all);
   all.print(name, "all");
-  fmt::print("{:12s} most uncertain motion: {:.1f} times as the usual one\n", name,
-             most_unusual(poses));
+  const Judged most = judged(poses);
+  fmt::print(
+      "{:12s} most uncertain motion: {:.1f} times as the usual one; the window's largest "
+      "correction beyond {:g} sigmas: {:.1f} % of the motion\n",
+      name, most.most_unusual, WindowCorrection::kSigmas, 100 * most.largest_share);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "core/estimator/detail/usual_spread.hpp"
+#include "core/estimator/detail/window_correction.hpp"
 #include "core/estimator/detail/window_doubt.hpp"
 #include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"

@@ -6,11 +6,6 @@
 namespace vergence::test {
 namespace {
 
-/// docs/faults.md tells what it is: the one frame of all pairs.
-int known_wrong(const FaultCase& c) {
-  return c.name == "board gone, pulses on; one side dark" ? 1 : 0;
-}
-
 void expect_honest(const std::vector<FaultCase>& cases) {
   const FaultDrive untouched = drive_with_faults(no_fault());
   const NormalError normal = normal_error_there(untouched.poses, untouched.truth);
@@ -19,7 +14,7 @@ void expect_honest(const std::vector<FaultCase>& cases) {
     SCOPED_TRACE(fault_table_line(c, drive, result) + drive.err);
     EXPECT_EQ(drive.code, 0);
     EXPECT_TRUE(drive.whole);
-    EXPECT_LE(result.honesty.wrong, known_wrong(c)) << "from line " << result.honesty.first_wrong;
+    EXPECT_EQ(result.honesty.wrong, 0) << "from line " << result.honesty.first_wrong;
     EXPECT_TRUE(result.recovery_s) << "not usable any more";
   }
 }

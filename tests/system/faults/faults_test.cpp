@@ -84,6 +84,8 @@ TEST_P(RandomFaults, leaveNoWrongOkAndAWholeSession) { expect_honest(random_faul
 
 // In the 22nd a camera falls behind while a calibration is sought.
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomFaults, ::testing::Range<std::uint64_t>(1, 23));
+// After frames of one image the window takes back 10 cm in one frame, 15 cm in two.
+INSTANTIATE_TEST_SUITE_P(DriftTakenBack, RandomFaults, ::testing::Values(301, 359));
 
 }  // namespace
 }  // namespace vergence::test

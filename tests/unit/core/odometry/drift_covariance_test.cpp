@@ -148,6 +148,15 @@ TEST(MotionCovariance, containsWhatIsNotCarriedOn) {
   EXPECT_NEAR(std::sqrt(whole(2, 2)), std::hypot(25, 2), 1e-12);
 }
 
+TEST(CorrectionCovariance, isTheCorrectionAsOneSigma) {
+  const Transform correction{exp_so3({0, 0.003, 0}), {0.1, 0, -0.2}};
+  const Mat6 C = correction_covariance(correction);
+  EXPECT_NEAR(std::sqrt(C(0, 0)), 0.1, 1e-12);
+  EXPECT_NEAR(C(0, 2), -0.02, 1e-12);
+  EXPECT_NEAR(std::sqrt(C(4, 4)), 0.003, 1e-12);
+  EXPECT_TRUE(correction_covariance({}).isZero());
+}
+
 TEST(MotionCovariance, hasTranslationFirst) {
   Mat6 fit = Mat6::Zero();
   fit(0, 0) = 4;  // rotation about x

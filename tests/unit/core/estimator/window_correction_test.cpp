@@ -1,0 +1,30 @@
+#include "core/estimator/detail/window_correction.hpp"
+
+#include <gtest/gtest.h>
+
+namespace vergence {
+namespace {
+
+// Half a metre a frame; a fit that is off by a centimetre.
+WindowCorrection of(double moved_m) { return {moved_m, 0.5, 0.01}; }
+
+TEST(WindowCorrection, spoilsTheMotionWhereItIsBeyondSigmasAndShare) {
+  EXPECT_FALSE(of(0.0).spoils_motion());
+  EXPECT_FALSE(of(0.0249).spoils_motion());  // 2.49 sigmas, 4.98 %
+  EXPECT_TRUE(of(0.0251).spoils_motion());
+}
+
+TEST(WindowCorrection, ofAFewSigmasOnALongWayDoesNot) {
+  const WindowCorrection highway{0.035, 2.4, 0.01};
+  EXPECT_TRUE(highway.significant());
+  EXPECT_FALSE(highway.spoils_motion());
+}
+
+TEST(WindowCorrection, withinWhatTheFitIsOffByDoesNot) {
+  const WindowCorrection creeping{0.02, 0.03, 0.01};
+  EXPECT_FALSE(creeping.significant());
+  EXPECT_FALSE(creeping.spoils_motion());
+}
+
+}  // namespace
+}  // namespace vergence
