@@ -128,12 +128,12 @@ void V4l2Camera::close_node() noexcept {
 DeviceStatus V4l2Camera::open_again() {
   close_node();
   Node node;
-  const DeviceStatus found = find_node(info_.serial, &fd_, &node);
+  const DeviceStatus found = find_node(node_.found_by, &fd_, &node);
   if (found == DeviceStatus::no_permission)
     return refuse(found, node_.path + ": no permission; add the user to the group video");
   if (found != DeviceStatus::ok)
     return refuse(DeviceStatus::gone,
-                  "there is no camera " + info_.serial + " any more: check its cable");
+                  "there is no camera " + node_.found_by + " any more: check its cable");
   node_ = std::move(node);
   info_.place = node_.path;
   lost_node_ = false;

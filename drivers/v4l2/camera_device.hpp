@@ -20,7 +20,7 @@ namespace vergence::v4l2 {
 /// passes between them, the consumer and the releaser goes through the FrameExchange.
 class V4l2Camera final : public CameraDevice {
  public:
-  /// An open node; `node.serial` is what it is found by after an unplug.
+  /// An open node; `node.found_by` is what it is found by after an unplug.
   V4l2Camera(UniqueFd fd, Node node);
   ~V4l2Camera() override;
 

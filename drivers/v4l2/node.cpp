@@ -55,6 +55,11 @@ std::vector<int> node_numbers() {
   return numbers;
 }
 
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  return fs::equivalent(a, b, error) && !error;
+}
+
 }  // namespace
 
 void UniqueFd::reset(int fd) noexcept {
@@ -130,15 +135,17 @@ NodeList list_nodes() {
 DeviceStatus find_node(std::string_view serial, UniqueFd* fd, Node* node) {
   if (serial.starts_with(std::string(kDevices) + "/")) {
     const DeviceStatus status = open_node(std::string(serial), fd, node);
-    if (status == DeviceStatus::ok)
-      node->serial = serial;  // what it is found by again after an unplug
+    if (status != DeviceStatus::ok) return status;
+    for (const Node& n : list_nodes().nodes)  // the one there, of several of one serial, too
+      if (same_file(n.path, node->path)) node->serial = n.serial;
+    node->found_by = serial;
     return status;
   }
   const NodeList list = list_nodes();
   for (const Node& n : list.nodes) {
     if (!serial.empty() && n.serial != serial) continue;
     const DeviceStatus status = open_node(n.path, fd, node);
-    if (status == DeviceStatus::ok) node->serial = n.serial;
+    if (status == DeviceStatus::ok) node->serial = node->found_by = n.serial;
     return status;
   }
   return list.closed.empty() ? DeviceStatus::not_found : DeviceStatus::no_permission;

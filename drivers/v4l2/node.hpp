@@ -36,7 +36,8 @@ class UniqueFd {
 /// A node that captures and streams.
 struct Node {
   std::string path;        // /dev/video0
-  std::string serial;      // as DeviceInfo
+  std::string serial;      // as DeviceInfo: the camera's own, whatever it is found by
+  std::string found_by;    // find_node()'s: its serial or a path under /dev
   std::string card;        // the device's name
   std::string bus;         // as the kernel names it
   std::uint32_t type = 0;  // of buffers: V4L2_BUF_TYPE_VIDEO_CAPTURE or …_MPLANE

@@ -11,7 +11,8 @@ namespace vergence::v4l2 {
 ///
 /// Serials    The USB serial number where the camera has one, else the bus the kernel names
 ///            (platform:…, usb-…); a second camera of the same serial gets "#1". open() takes a
-///            path under /dev as well (also of /dev/v4l/by-path).
+///            path under /dev as well (also of /dev/v4l/by-path); info() has the camera's own then,
+///            too.
 /// Slots      The kernel's own buffers, mapped, for GREY and formats that begin with a luma plane
 ///            (NV12, NV21, YU12, YV12, NV16, 422P): no copy, rows as the driver lays them. Other
 ///            formats are turned to 8-bit grey into a FramePool slot, and the buffer goes back.

@@ -86,6 +86,7 @@ TEST_F(V4l2Rig, camerasAreListedAndOpenedBySerialOrPath) {
   const auto by_path = driver_->open("/dev/video1", &status);
   ASSERT_NE(by_path, nullptr);
   EXPECT_EQ(by_path->info().place, "/dev/video1");
+  EXPECT_EQ(by_path->info().serial, serials_[1]) << "its own, which tells an exchanged one";
   const auto first = driver_->open("", &status);
   ASSERT_NE(first, nullptr);
   EXPECT_EQ(first->info().serial, serials_[0]);
