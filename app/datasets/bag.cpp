@@ -35,7 +35,7 @@ std::string list_of_image_topics(const BagIndex& bag) {
     unreadable += other;
   }
   if (unreadable > 0)
-    list += "; encodings that can be read: mono8, rgb8, bgr8, bayer_*8, and PNG and JPEG";
+    list += "; encodings that can be read: mono8, mono16, rgb8, bgr8, bayer_*8, and PNG and JPEG";
   return list.empty() ? "none" : list;
 }
 

@@ -15,10 +15,9 @@ constexpr std::size_t kLooks = 5;  // pairs, spread over the drive: a tunnel is 
 std::optional<std::uint16_t> peak_of(const StereoSequence& s, const std::string& name,
                                      std::vector<std::uint8_t>* bytes) {
   if (name.empty()) return std::uint16_t{0};
-  const ImageFileStatus status =
-      s.store ? s.store->encoded(name, bytes) : read_image_file(s.root / name, bytes);
-  if (status == ImageFileStatus::not_an_image) return std::nullopt;
-  return status == ImageFileStatus::ok ? peak_of_deep_image(*bytes) : std::uint16_t{0};
+  if (s.store) return s.store->peak(name, bytes);
+  return read_image_file(s.root / name, bytes) == ImageFileStatus::ok ? peak_of_deep_image(*bytes)
+                                                                      : std::uint16_t{0};
 }
 
 }  // namespace

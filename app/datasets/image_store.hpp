@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,10 +17,10 @@ class ImageStore {
   virtual ~ImageStore() = default;
   /// → ok, missing
   [[nodiscard]] virtual ImageFileStatus size(const std::string& name, ImageSize* size) const = 0;
-  /// The image's file, where it is kept as one: PNG or JPEG. → ok, missing, unreadable;
-  /// not_an_image: it is kept as pixels
-  [[nodiscard]] virtual ImageFileStatus encoded(const std::string& name,
-                                                std::vector<std::uint8_t>* bytes) const = 0;
+  /// Its greatest sample, where those have 16 bits; nothing: another kind of image. 0: one that
+  /// says nothing, for it is missing, torn or black. *work: room that is used again.
+  [[nodiscard]] virtual std::optional<std::uint16_t> peak(
+      const std::string& name, std::vector<std::uint8_t>* work) const = 0;
   /// As decode_grey(); *work: room that is used again.
   [[nodiscard]] virtual ImageFileStatus decode(const std::string& name, ImageSize size,
                                                std::uint8_t* out, std::size_t stride, int deep_bits,

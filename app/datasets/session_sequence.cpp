@@ -28,9 +28,9 @@ class SessionImages final : public ImageStore {
     *size = {frame->images[camera].width, frame->images[camera].height};
     return ImageFileStatus::ok;
   }
-  [[nodiscard]] ImageFileStatus encoded(const std::string& /*name*/,
-                                        std::vector<std::uint8_t>* /*bytes*/) const override {
-    return ImageFileStatus::not_an_image;
+  [[nodiscard]] std::optional<std::uint16_t> peak(
+      const std::string& /*name*/, std::vector<std::uint8_t>* /*work*/) const override {
+    return std::nullopt;
   }
   [[nodiscard]] ImageFileStatus decode(const std::string& name, ImageSize size, std::uint8_t* out,
                                        std::size_t stride, int /*deep_bits*/,

@@ -18,7 +18,7 @@ std::string image_message(Wire wire, std::int64_t stamp, const ImageMessage& ima
       .put(image.height)
       .put(image.width)
       .text(image.encoding)
-      .put(std::uint8_t{0})
+      .put(static_cast<std::uint8_t>(image.big_endian))
       .put(image.step)
       .blob(image.data)
       .bytes();

@@ -15,6 +15,7 @@ struct ImageMessage {
   std::uint32_t step = 0;               // bytes a row
   std::string encoding = "mono8";
   std::string data{};
+  bool big_endian = false;
 };
 [[nodiscard]] std::string image_message(Wire wire, std::int64_t stamp, const ImageMessage& image);
 [[nodiscard]] std::string compressed_message(Wire wire, std::int64_t stamp, std::string_view format,

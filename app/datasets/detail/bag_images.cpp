@@ -3,10 +3,16 @@
 #include <algorithm>
 #include <charconv>
 
+#include "app/datasets/detail/png.hpp"
 #include "core/types/bayer.hpp"
 
 namespace vergence::app::detail {
 namespace {
+
+std::uint16_t sample_at(const std::uint8_t* row, int x, bool big_endian) noexcept {
+  const std::uint8_t* at = row + std::size_t{2} * static_cast<std::size_t>(x);
+  return static_cast<std::uint16_t>(at[big_endian ? 0 : 1] << 8U | at[big_endian ? 1 : 0]);
+}
 
 /// Luminance of ITU-R BT.601 in 8 bits, as JPEG has it. `red`, `blue`: place of the colours in a
 /// pixel.
@@ -77,13 +83,22 @@ bool BagImages::load(const BagImage& entry, std::vector<std::uint8_t>* data) con
   return records && MemoryBytes(*records).read(offset, *data);
 }
 
-ImageFileStatus BagImages::encoded(const std::string& name,
-                                   std::vector<std::uint8_t>* bytes) const {
+std::optional<std::uint16_t> BagImages::peak(const std::string& name,
+                                             std::vector<std::uint8_t>* work) const {
   std::size_t camera = 0;
   const BagImage* entry = find(name, &camera);
-  if (entry == nullptr) return ImageFileStatus::missing;
-  if (entry->image.layout != PixelLayout::encoded) return ImageFileStatus::not_an_image;
-  return load(*entry, bytes) ? ImageFileStatus::ok : ImageFileStatus::unreadable;
+  if (entry == nullptr) return std::uint16_t{0};
+  const RosImage& image = entry->image;
+  if (image.layout != PixelLayout::encoded && image.layout != PixelLayout::grey16)
+    return std::nullopt;
+  if (!load(*entry, work)) return std::uint16_t{0};
+  if (image.layout == PixelLayout::encoded) return peak_of_deep_image(*work);
+  std::uint16_t peak = 0;
+  const std::uint8_t* row = work->data();
+  for (int y = 0; y < image.size.height; ++y, row += image.step)
+    for (int x = 0; x < image.size.width; ++x)
+      peak = std::max(peak, sample_at(row, x, image.big_endian));
+  return peak;
 }
 
 ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::uint8_t* out,
@@ -104,6 +119,7 @@ ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::
                     static_cast<std::ptrdiff_t>(stride));
       return ImageFileStatus::ok;
     case PixelLayout::grey:
+    case PixelLayout::grey16:
     case PixelLayout::rgb:
     case PixelLayout::bgr:
       break;
@@ -111,6 +127,9 @@ ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::
   for (int y = 0; y < size.height; ++y, in += image.step, out += stride) {
     if (image.layout == PixelLayout::grey)
       std::copy_n(in, size.width, out);
+    else if (image.layout == PixelLayout::grey16)
+      for (int x = 0; x < size.width; ++x)
+        out[x] = narrowed(sample_at(in, x, image.big_endian), deep_bits);
     else
       colour_to_grey(in, size.width, image.layout == PixelLayout::rgb ? 0 : 2,
                      image.layout == PixelLayout::rgb ? 2 : 0, out);

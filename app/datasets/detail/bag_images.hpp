@@ -23,8 +23,8 @@ class BagImages final : public ImageStore {
   /// What names image `index` of camera `camera`: `left/image_raw#12`.
   [[nodiscard]] std::string name(std::size_t camera, std::size_t index) const;
   [[nodiscard]] ImageFileStatus size(const std::string& name, ImageSize* size) const override;
-  [[nodiscard]] ImageFileStatus encoded(const std::string& name,
-                                        std::vector<std::uint8_t>* bytes) const override;
+  [[nodiscard]] std::optional<std::uint16_t> peak(const std::string& name,
+                                                  std::vector<std::uint8_t>* work) const override;
   [[nodiscard]] ImageFileStatus decode(const std::string& name, ImageSize size, std::uint8_t* out,
                                        std::size_t stride, int deep_bits,
                                        std::vector<std::uint8_t>* work) const override;

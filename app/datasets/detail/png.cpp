@@ -55,11 +55,10 @@ struct Reader {
 void narrow_row(png_structp png, png_row_infop row, png_bytep data) {
   if (row->bit_depth != 16) return;
   auto* deep = static_cast<DeepSamples*>(png_get_user_transform_ptr(png));
-  const auto shift = static_cast<unsigned>(deep->bits - 8);
   for (std::size_t i = 0; i < row->width; ++i) {
     const auto sample = static_cast<std::uint16_t>(data[2 * i] << 8U | data[2 * i + 1]);
     deep->peak = std::max(deep->peak, sample);
-    data[i] = static_cast<png_byte>(std::min(sample >> shift, 255));
+    data[i] = narrowed(sample, deep->bits);
   }
 }
 

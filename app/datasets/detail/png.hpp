@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -39,9 +40,14 @@ inline constexpr std::size_t kPngChunks = 8;  // bytes before the first chunk
 [[nodiscard]] bool next_chunk(std::span<const std::uint8_t> png, std::size_t* at,
                               PngChunk* chunk) noexcept;
 
+/// The upper 8 of the lower `bits` (8 … 16) of a grey sample; what is beyond them is white.
+[[nodiscard]] inline std::uint8_t narrowed(std::uint16_t sample, int bits) noexcept {
+  return static_cast<std::uint8_t>(std::min(sample >> static_cast<unsigned>(bits - 8), 255));
+}
+
 /// What is done with grey samples of 16 bits; of colours the upper 8 are taken.
 struct DeepSamples {
-  int bits = 16;           // 8 … 16, of which the upper 8 are taken; what is beyond them is white
+  int bits = 16;           // as narrowed()'s
   std::uint16_t peak = 0;  // set: the greatest sample; 0 where the file has other samples
 };
 

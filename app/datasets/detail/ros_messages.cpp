@@ -21,7 +21,8 @@ constexpr std::array kEncodings{
     Encoding{"mono8", PixelLayout::grey, 1},        Encoding{"8UC1", PixelLayout::grey, 1},
     Encoding{"bayer_rggb8", PixelLayout::bayer, 1}, Encoding{"bayer_bggr8", PixelLayout::bayer, 1},
     Encoding{"bayer_gbrg8", PixelLayout::bayer, 1}, Encoding{"bayer_grbg8", PixelLayout::bayer, 1},
-    Encoding{"rgb8", PixelLayout::rgb, 3},          Encoding{"bgr8", PixelLayout::bgr, 3}};
+    Encoding{"rgb8", PixelLayout::rgb, 3},          Encoding{"bgr8", PixelLayout::bgr, 3},
+    Encoding{"mono16", PixelLayout::grey16, 2},     Encoding{"16UC1", PixelLayout::grey16, 2}};
 
 bool is_rotation(const Mat3& R) {
   return (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() <= 1e-3;
@@ -36,7 +37,7 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
   image.stamp = in.header();
   const auto height = in.get<std::uint32_t>(), width = in.get<std::uint32_t>();
   const std::string pixels = in.text();
-  (void)in.get<std::uint8_t>();  // bytes of 8 bits have no order
+  image.big_endian = in.get<std::uint8_t>() != 0;
   image.step = in.get<std::uint32_t>();
   image.bytes = in.get<std::uint32_t>();
   if (!in.ok() || width < 2 || height < 2 ||

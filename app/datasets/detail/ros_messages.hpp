@@ -15,12 +15,13 @@
 /// the bytes are no such message.
 namespace vergence::app::detail {
 
-enum class PixelLayout : std::uint8_t { grey, bayer, rgb, bgr, encoded };
+enum class PixelLayout : std::uint8_t { grey, grey16, bayer, rgb, bgr, encoded };
 
 struct RosImage {
   Stamp stamp{};
   ImageSize size{};
   PixelLayout layout = PixelLayout::grey;
+  bool big_endian = false;   // of samples of 16 bits
   std::uint32_t step = 0;    // bytes a row; 0: encoded
   std::uint32_t offset = 0;  // of the data in the message
   std::uint32_t bytes = 0;   // of the data
@@ -29,7 +30,8 @@ struct RosImage {
 inline constexpr std::size_t kRosImageHead =
     4096;  // bytes in which an image's own fields have to end
 
-/// `head`: the first bytes of a message of `size` bytes. Also nothing: mono16 and other encodings.
+/// `head`: the first bytes of a message of `size` bytes. Also nothing: other encodings than
+/// those of docs/bags.md.
 [[nodiscard]] std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head,
                                                      std::size_t size, MessageEncoding encoding);
 /// The head of the PNG or JPEG has to lie in `head`, too.

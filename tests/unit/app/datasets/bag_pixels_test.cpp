@@ -122,7 +122,7 @@ TEST_P(BagPixels, MosaicsGoTheWayOfTheCameras) {
 }
 
 TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
-  EXPECT_TRUE(grey_of(image_of("mono16", 2)).empty());
+  EXPECT_TRUE(grey_of(image_of("32FC1", 4)).empty());
   EXPECT_NE(refusal_.find("/left/image (0 images, 1 that cannot be read)"), std::string::npos)
       << refusal_;
   ImageMessage image = image_of("mono8", 1);
@@ -130,6 +130,7 @@ TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
   EXPECT_TRUE(grey_of(image).empty());
   image = image_of("rgb8", 1);  // rows too short for three bytes a pixel
   EXPECT_TRUE(grey_of(image).empty());
+  EXPECT_TRUE(grey_of(image_of("mono16", 1)).empty());
 }
 
 TEST_P(BagPixels, PngAndJpegAreToldByTheirBytes) {
@@ -170,6 +171,34 @@ TEST_P(BagPixels, PngOfTwelveBitsInSixteenIsTakenForWhatItIs) {
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
       ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, 0));
+}
+
+// TUM VI's and many industrial cameras' way.
+TEST_P(BagPixels, SixteenBitsAreReadInEitherByteOrderAndAsManyAsAreUsed) {
+  for (const char* encoding : {"mono16", "16UC1"})
+    for (const bool big_endian : {false, true})
+      for (const int bits : {12, 16}) {
+        const int step = 2 * kWidth + 6;
+        ImageMessage image{kWidth, kHeight, static_cast<std::uint32_t>(step), encoding, {}};
+        image.big_endian = big_endian;
+        image.data.assign(static_cast<std::size_t>(step * kHeight), '\xff');
+        for (int y = 0; y < kHeight; ++y)
+          for (int x = 0; x < kWidth; ++x) {
+            const int sample = value(x, y, 0) << (bits - 8);
+            const auto at = static_cast<std::size_t>(y * step + 2 * x);
+            image.data[at + (big_endian ? 0 : 1)] = static_cast<char>(sample >> 8);
+            image.data[at + (big_endian ? 1 : 0)] = static_cast<char>(sample & 255);
+          }
+        StereoSequence s =
+            sequence_of("sensor_msgs/Image", image_message(GetParam().wire(), kStart, image));
+        find_deep_bits(&s);
+        EXPECT_EQ(s.deep_bits, bits);
+        const Grey out = right_of(s);
+        for (int y = 0; y < kHeight; ++y)
+          for (int x = 0; x < kWidth; ++x)
+            ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, 0))
+                << encoding << big_endian << bits;
+      }
 }
 
 INSTANTIATE_TEST_SUITE_P(Containers, BagPixels,
