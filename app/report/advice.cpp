@@ -41,10 +41,11 @@ constexpr std::array kPose{
         "Frames are missing: check cables, trigger and the disk's speed; see the events for when."},
     Advice{"scene_restarted",
            "After a gap the motion across it was extrapolated: do not use distances that span it."},
-    Advice{"weak_geometry",
-           "The points did not hold the pose well or much worse than usual, or a pose was corrected "
-           "far: expect it in tunnels, open fields and beside walls; elsewhere check that the "
-           "cameras are in step."},
+    Advice{
+        "weak_geometry",
+        "The points did not hold the pose well or much worse than usual, or a pose was corrected "
+        "far: expect it in tunnels, open fields and beside walls; elsewhere check that the "
+        "cameras are in step."},
     Advice{"moving_scene",
            "Much of the picture moved by itself, as behind a bus: compare those stretches with the "
            "map before use."},
