@@ -11,6 +11,7 @@ namespace {
 
 constexpr const char* kWho = "pose refinement";
 constexpr double kRayleighMedian = 1.1774100225154747;  // √(2 ln 2)
+constexpr int kLeastObservations = 3;
 constexpr int kRescaleAfter = 2;        // steps: by then the pose is within a sigma or two
 constexpr double kFirstDamping = 1e-4;  // relative to the diagonal, once a plain step has failed
 constexpr int kMaxFailures = 6;         // damping grows tenfold a time: beyond, rounding decides
@@ -19,7 +20,7 @@ constexpr double kMaxCondition =
 
 [[nodiscard]] bool valid(const PoseRefineOptions& o) noexcept {
   return o.max_steps >= 1 && o.max_steps <= 10 && o.huber > 0 && o.min_scale > 0 &&
-         o.inlier_chi2 > 0 && o.small_update >= 0;
+         o.inlier_chi2 > 0 && o.gross_chi2 > 0 && o.small_update >= 0;
 }
 
 [[nodiscard]] bool small(const Vec6& delta, double limit) noexcept {
@@ -39,20 +40,94 @@ PoseRefiner::PoseRefiner(std::size_t capacity, Arena& arena)
       sorted_(arena.make<double>(static_cast<std::size_t>(kMaxCameras) * capacity, kWho)),
       flags_(arena.make<std::uint8_t>(capacity, kWho)) {}
 
-double PoseRefiner::residual_scale(const Transform& T, std::span<const std::uint8_t> use,
-                                   double floor) noexcept {
+double PoseRefiner::residual_scale(const Transform& T, double floor) noexcept {
   problem_.evaluate(T);
   std::size_t n = 0;
   for (int k = 0; k < problem_.cameras(); ++k) {
     const std::span<const double> errors = problem_.errors(k);
     for (std::size_t i = 0; i < errors.size(); ++i)
-      if (use.empty() || ((use[problem_.point(k, i)] >> k) & 1U) != 0) sorted_[n++] = errors[i];
+      if (problem_.counts(k, i)) sorted_[n++] = errors[i];
   }
   if (n == 0) return floor;
   const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(n / 2);
   std::nth_element(sorted_.begin(), middle, sorted_.begin() + static_cast<std::ptrdiff_t>(n));
   const double scale = std::sqrt(*middle) / kRayleighMedian;
   return std::isfinite(scale) ? std::max(floor, scale) : floor;
+}
+
+int PoseRefiner::counted() const noexcept {
+  int n = 0;
+  for (int k = 0; k < problem_.cameras(); ++k)
+    for (std::size_t i = 0; i < problem_.count(k); ++i) n += problem_.counts(k, i) ? 1 : 0;
+  return n;
+}
+
+bool PoseRefiner::drop_gross(const RefinedPose& pose, const PoseRefineOptions& options) noexcept {
+  problem_.evaluate(pose.T_left_world);
+  const double limit = options.gross_chi2 * pose.scale * pose.scale;
+  bool dropped = false;
+  for (int k = 0; k < problem_.cameras(); ++k) {
+    const std::span<const double> errors = problem_.errors(k);
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      if (!problem_.counts(k, i) || errors[i] < limit) continue;
+      problem_.use(k, i, false);
+      dropped = true;
+    }
+  }
+  return dropped && counted() >= kLeastObservations;
+}
+
+bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) noexcept {
+  pose->scale = residual_scale(pose->T_left_world, options.min_scale);
+  detail::PoseProblem::Sums now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
+  pose->status = PoseRefineStatus::max_steps;
+  double damping = 0;
+  int failures = 0, steps = 0;
+  while (steps < options.max_steps) {
+    if (steps == kRescaleAfter && failures == 0) {
+      pose->scale = residual_scale(pose->T_left_world, options.min_scale);
+      now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
+    }
+    ++steps;
+    Mat6 H = now.H;
+    H.diagonal() *= 1.0 + damping;
+    Vec6 delta;
+    if (!detail::solve_normal(H, now.g, &delta)) {
+      if (++failures > kMaxFailures) return false;
+      damping = damping > 0 ? 10.0 * damping : kFirstDamping;
+      continue;
+    }
+    const Transform next = detail::moved(pose->T_left_world, delta);
+    const detail::PoseProblem::Sums then = problem_.sums(next, pose->scale, options.huber);
+    // Rounding of the sum is forgiven: at the optimum steps neither help nor hurt.
+    if (!(then.cost <= now.cost * (1.0 + 1e-12)) || !next.finite()) {
+      if (small(delta, options.small_update)) {
+        pose->status = PoseRefineStatus::small_update;
+        break;
+      }
+      if (++failures > kMaxFailures) break;
+      damping = damping > 0 ? 10.0 * damping : kFirstDamping;
+      continue;
+    }
+    const bool converged = small(delta, options.small_update);
+    pose->T_left_world = next;
+    now = then;
+    damping *= 0.1;
+    if (damping < 1e-9) damping = 0;
+    failures = 0;
+    if (converged) {
+      pose->status = PoseRefineStatus::small_update;
+      break;
+    }
+  }
+  // The scale at the end is the one that information and flags are in.
+  if (steps <= kRescaleAfter) {
+    pose->scale = residual_scale(pose->T_left_world, options.min_scale);
+    now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
+  }
+  pose->steps += steps;
+  pose->information = now.H;
+  return true;
 }
 
 void PoseRefiner::describe(const RigObservations& o, const PoseRefineOptions& options,
@@ -95,63 +170,16 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
   std::fill_n(flags_.begin(), points_, std::uint8_t{0});
   problem_.gather(o);
   out.observations = static_cast<int>(problem_.observations());
-  int used = 0;
   for (int k = 0; k < problem_.cameras(); ++k)
     for (std::size_t i = 0; i < problem_.count(k); ++i) {
       const bool counts = use.empty() || ((use[problem_.point(k, i)] >> k) & 1U) != 0;
       if (!counts) problem_.use(k, i, false);
-      used += counts ? 1 : 0;
     }
-  if (used < 3) return refuse(PoseRefineStatus::too_few);
+  if (counted() < kLeastObservations) return refuse(PoseRefineStatus::too_few);
 
-  out.scale = residual_scale(start, use, options.min_scale);
-  detail::PoseProblem::Sums now = problem_.sums(out.T_left_world, out.scale, options.huber);
-  out.status = PoseRefineStatus::max_steps;
-  double damping = 0;
-  int failures = 0;
-  while (out.steps < options.max_steps) {
-    if (out.steps == kRescaleAfter && failures == 0) {
-      out.scale = residual_scale(out.T_left_world, use, options.min_scale);
-      now = problem_.sums(out.T_left_world, out.scale, options.huber);
-    }
-    ++out.steps;
-    Mat6 H = now.H;
-    H.diagonal() *= 1.0 + damping;
-    Vec6 delta;
-    if (!detail::solve_normal(H, now.g, &delta)) {
-      if (++failures > kMaxFailures) return refuse(PoseRefineStatus::rank_deficient);
-      damping = damping > 0 ? 10.0 * damping : kFirstDamping;
-      continue;
-    }
-    const Transform next = detail::moved(out.T_left_world, delta);
-    const detail::PoseProblem::Sums then = problem_.sums(next, out.scale, options.huber);
-    // Rounding of the sum is forgiven: at the optimum steps neither help nor hurt.
-    if (!(then.cost <= now.cost * (1.0 + 1e-12)) || !next.finite()) {
-      if (small(delta, options.small_update)) {
-        out.status = PoseRefineStatus::small_update;
-        break;
-      }
-      if (++failures > kMaxFailures) break;
-      damping = damping > 0 ? 10.0 * damping : kFirstDamping;
-      continue;
-    }
-    const bool converged = small(delta, options.small_update);
-    out.T_left_world = next;
-    now = then;
-    damping *= 0.1;
-    if (damping < 1e-9) damping = 0;
-    failures = 0;
-    if (converged) {
-      out.status = PoseRefineStatus::small_update;
-      break;
-    }
-  }
-  if (out.steps <=
-      kRescaleAfter) {  // the scale at the end is the one that information and flags are in
-    out.scale = residual_scale(out.T_left_world, use, options.min_scale);
-    now = problem_.sums(out.T_left_world, out.scale, options.huber);
-  }
-  out.information = now.H;
+  bool solved = descend(options, &out);
+  if (solved && drop_gross(out, options)) solved = descend(options, &out);
+  if (!solved) return refuse(PoseRefineStatus::rank_deficient);
   describe(o, options, &out);
 
   Vec6 d;

@@ -8,11 +8,13 @@
 namespace vergence {
 
 struct PoseRefineOptions {
-  int max_steps = 10;  // solver steps, 1 … 10; four are usual
+  int max_steps = 10;  // solver steps a round, 1 … 10; four are usual
   double huber = 2.0;  // threshold in scaled sigmas, > 0
   double min_scale =
       1.0;  // floor of the residual scale in given sigmas: a good frame is not believed beyond them
   double inlier_chi2 = 9.21;   // squared scaled sigmas: χ² of two coordinates at 99 %
+  double gross_chi2 = 36.0;    // squared scaled sigmas: beyond it an observation does not count in
+                               // the second round; > 0
   double small_update = 1e-7;  // rad and m: converged below it
 };
 
@@ -55,6 +57,10 @@ struct RefinedPose {
 /// residuals). s is taken at the start and again after the first steps, when a rough start no
 /// longer inflates it.
 ///
+/// Where observations are gross then (gross_chi2), a second round goes on without them: Huber's
+/// loss bounds an outlier's pull but never ends it, and a wrong point 5 m away weighs as much as
+/// hundreds of right ones at 50 m: three of them move a pose by a decimetre.
+///
 /// Ownership  Workspace in the arena. flags() stay valid until the next refine().
 /// Threads    One caller per object. Memory: all at construction.
 /// Errors     By status; nothing that comes out is NaN. Same input, same result, on every
@@ -79,8 +85,13 @@ class PoseRefiner {
   }
 
  private:
-  [[nodiscard]] double residual_scale(const Transform& T_left_world,
-                                      std::span<const std::uint8_t> use, double floor) noexcept;
+  /// Over the observations that count.
+  [[nodiscard]] double residual_scale(const Transform& T_left_world, double floor) noexcept;
+  [[nodiscard]] int counted() const noexcept;
+  /// Gross observations no longer count. True: there were some, and enough are left.
+  [[nodiscard]] bool drop_gross(const RefinedPose& pose, const PoseRefineOptions& options) noexcept;
+  /// One round from pose->T_left_world; adds its steps. False: rank deficient.
+  [[nodiscard]] bool descend(const PoseRefineOptions& options, RefinedPose* pose) noexcept;
   void describe(const RigObservations& observations, const PoseRefineOptions& options,
                 RefinedPose* pose) noexcept;
 

@@ -35,6 +35,9 @@ class PoseProblem {
   void gather(const RigObservations& observations) noexcept;
   /// Observation i of camera k counts (or not) from now on; all count after gather().
   void use(int camera, std::size_t i, bool counts) noexcept;
+  [[nodiscard]] bool counts(int camera, std::size_t i) const noexcept {
+    return sets_[static_cast<std::size_t>(camera)].weight[i] > 0.0;
+  }
 
   [[nodiscard]] Sums sums(const Transform& T_left_world, double scale, double huber) const noexcept;
   /// |r|²/σ² of every usable observation, infinity behind a camera; read back by errors().
