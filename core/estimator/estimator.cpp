@@ -102,6 +102,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
 
   if (p.relinked && std::exchange(p.superseded, false) && p.calibrator.verified())
     p.notify_confirmed(frame.stamp);
+  p.odometry.trust_rig(!p.options.online || p.calibrator.verified());
   odometry::FrameOutcome out = p.odometry.process(frame, p.options.frame_budget);
   p.follow(out, frame);
   if (p.options.online) {

@@ -100,6 +100,9 @@ class Odometry {
   /// finding it.
   void reset_extrinsics() noexcept;
   [[nodiscard]] Link linked() const noexcept { return link_; }
+  /// From the next frame on: nothing is known against the calibration, so what is grossly off is a
+  /// wrong point. So it begins. While a calibration is a claim, that may be its own error.
+  void trust_rig(bool trusted) noexcept { poses_.drop_gross(trusted); }
 
   [[nodiscard]] const RigCalibration& rig() const noexcept { return rig_; }
   [[nodiscard]] const Map& map() const noexcept { return map_; }

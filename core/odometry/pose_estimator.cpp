@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -75,6 +76,14 @@ void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
   }
 }
 
+PoseRefineOptions PoseEstimator::how_to_refine() const noexcept {
+  PoseRefineOptions o;
+  o.huber = options_.huber;
+  o.inlier_chi2 = kOutlier;
+  if (!drop_gross_) o.gross_chi2 = std::numeric_limits<double>::max();
+  return o;
+}
+
 PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample) noexcept {
   Solved s;
   if (table_.size() < 3) return s;
@@ -86,11 +95,9 @@ PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample) 
     if (m.status != MlesacStatus::ok) return s;
     s.T = m.T_left_world;
   }
-  PoseRefineOptions refine;
-  refine.huber = options_.huber;
-  refine.inlier_chi2 = kOutlier;
-  const RefinedPose r = refiner_.refine(
-      table_.view(), s.T, sample ? mlesac_.flags() : std::span<const std::uint8_t>{}, refine);
+  const RefinedPose r =
+      refiner_.refine(table_.view(), s.T,
+                      sample ? mlesac_.flags() : std::span<const std::uint8_t>{}, how_to_refine());
   if (!r.usable()) return s;
   s.found = true;
   s.T = r.T_left_world;
@@ -154,11 +161,8 @@ PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept
   std::fill(agrees_.begin(), agrees_.end(), std::uint8_t{0});
   std::array<std::uint8_t, kMaxPoints> left;
   left.fill(1);
-  PoseRefineOptions refine;
-  refine.huber = options_.huber;
-  refine.inlier_chi2 = kOutlier;
   const RefinedPose r = refiner_.refine(
-      table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()), refine);
+      table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()), how_to_refine());
   if (!r.usable()) return fit;
   fit.T_left_world = r.T_left_world;
   fit.rms_px = r.rms_px;

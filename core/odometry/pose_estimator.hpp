@@ -50,6 +50,10 @@ class PoseEstimator {
   [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
                                 Transform* T_camera_world) noexcept;
 
+  /// From the next fit on: whether observations that are grossly off are left out (as they are to
+  /// begin with) or count as much as Huber's loss lets them.
+  void drop_gross(bool drop) noexcept { drop_gross_ = drop; }
+
   /// By map point: bit k set if camera k's observation agrees with the last fit, or with the one
   /// that prefer_left() let stand.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return agrees_; }
@@ -65,6 +69,7 @@ class PoseEstimator {
   void collect(const Map& map) noexcept;
   void collect_camera(const Map& map, int k) noexcept;
   [[nodiscard]] Solved solve(const Transform& start, bool sample) noexcept;
+  [[nodiscard]] PoseRefineOptions how_to_refine() const noexcept;
   void count(const Map& map, PoseFit* fit) const noexcept;
 
   const OdometryOptions& options_;
@@ -75,6 +80,7 @@ class PoseEstimator {
   BoundedVector<std::uint16_t> owner_;           // map index of each row of the table
   std::span<std::uint8_t> agrees_, agrees_all_;  // the latter while prefer_left() tries another
   Random random_;
+  bool drop_gross_ = true;
 };
 
 }  // namespace vergence::odometry
