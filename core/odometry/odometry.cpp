@@ -17,8 +17,6 @@ namespace {
 constexpr int kFramesUntilTrial =
     3;  // without new points, before some are made to be tried alone: no keyframe is made while
         // the rig stands, and it stands for whoever follows a truck alongside
-constexpr double kStereoShare =
-    0.5;  // of the points found in two cameras, in which both must agree with the pose
 constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
                                          // rig that fits, 0.12 to 0.2 a frame out of step
 constexpr int kFramesLostBeforeRestart = 3;
@@ -125,10 +123,6 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   out->keyframe = true;
 }
 
-bool Odometry::confirmed_stereo(const PoseFit& fit) noexcept {
-  return std::popcount(fit.cameras) >= 2 && fit.stereo >= kStereoShare * fit.stereo_found;
-}
-
 Reason Odometry::weakness(const ImageCheck& images) const noexcept {
   const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(rig_.cameras)) - 1U);
   if (images.given != all) return Reason::no_image;
@@ -136,9 +130,9 @@ Reason Odometry::weakness(const ImageCheck& images) const noexcept {
   return images.structured != all ? Reason::image_dark : Reason::none;
 }
 
-void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
-                     FrameOutcome* out) const noexcept {
+void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept {
   out->status = PoseStatus::degraded;
+  moving_.judge(fit.inliers < kRigidShare * fit.given, link_ == Link::linked);
   const Reason of_images = weakness(images);
   if (restart_cooldown_ > 0)
     out->reason = Reason::scene_restarted;
@@ -148,11 +142,11 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images,
     out->reason = Reason::time_gap;
   else if (std::popcount(fit.cameras) < 2)
     out->reason = Reason::one_camera;
-  else if (stereo_fails_ || !confirmed_stereo(fit))
+  else if (stereo_fails_ || !fit.confirmed_stereo())
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
-  else if (fit.inliers < kRigidShare * fit.given || (link_ == Link::linked && new_points_.lost()))
+  else if (moving_.told())
     out->reason = Reason::moving_scene;
   else if (fit.near < kNearEnough)
     out->reason = Reason::weak_geometry;
@@ -219,9 +213,9 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
   if (next_rig_ && weakness(images) == Reason::none) {
     out.relink_due = true;
-  } else if (gaps_.renewal_due() && out.images_good && confirmed_stereo(fit)) {
+  } else if (gaps_.renewal_due() && out.images_good && fit.confirmed_stereo()) {
     out.renewal_due = true;
-  } else if (confirmed_stereo(fit) && !images.repeated && wants_keyframe()) {
+  } else if (fit.confirmed_stereo() && !images.repeated && wants_keyframe()) {
     out.effort = effort;
     make_keyframe(fit, frame.stamp, &out);
     out.T_left_world = motion_.T_left_world();

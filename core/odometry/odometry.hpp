@@ -5,7 +5,7 @@
 #include "core/odometry/gap_watch.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/motion_model.hpp"
-#include "core/odometry/new_points.hpp"
+#include "core/odometry/moving_scene.hpp"
 #include "core/odometry/pose_estimator.hpp"
 #include "core/odometry/rig_initialiser.hpp"
 #include "core/odometry/window.hpp"
@@ -135,11 +135,9 @@ class Odometry {
   /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
   /// again.
   void lose_scene() noexcept;
-  /// The cameras agree about the scene: only then does a frame shape the map.
-  [[nodiscard]] static bool confirmed_stereo(const PoseFit& fit) noexcept;
   /// What is wrong with the images themselves, `none` if nothing.
   [[nodiscard]] Reason weakness(const ImageCheck& images) const noexcept;
-  void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) const noexcept;
+  void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;
 
   const OdometryOptions& options_;
   RigCalibration rig_;
@@ -154,7 +152,7 @@ class Odometry {
   RigInitialiser initialiser_;
   MotionModel motion_;
   GapWatch gaps_;
-  NewPoints new_points_;
+  MovingScene moving_;
 
   int frames_lost_ = 0;        // in a row, with images that show something
   bool stereo_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything

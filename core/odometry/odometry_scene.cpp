@@ -62,7 +62,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
     out->reason = Reason::weak_geometry;
   else {
     stereo_fails_ = false;
-    new_points_.forget();
+    moving_.forget_points();
     gaps_.forget();
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     map_.keyframe(slot).T_camera_left = rig_.T_camera_left;

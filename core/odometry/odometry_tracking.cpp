@@ -41,7 +41,7 @@ bool sample_agrees(const PoseFit& fit, double share) noexcept {
 PoseFit Odometry::fit(const Transform& start, bool sample) noexcept {
   if (link_ == Link::unlinked) return poses_.fit_unlinked(map_, start, sample, rig_.T_camera_left);
   PoseFit all = poses_.fit_linked(map_, start, sample);
-  if (!all.found || confirmed_stereo(all) || all.stereo_found == 0) return all;
+  if (!all.found || all.confirmed_stereo() || all.stereo_found == 0) return all;
   return poses_.prefer_left(map_, start, all);
 }
 
@@ -173,7 +173,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     else if (p.missed > kMissesAllowed)
       p.stage = PointStage::dormant;
   }
-  new_points_.add(tried, kept);
+  moving_.add(tried, kept);
   frames_untried_ = tried > 0 ? 0 : frames_untried_ + 1;
   if (cursor_before_trial_) map_.rewind(*cursor_before_trial_);
   cursor_before_trial_.reset();

@@ -12,8 +12,10 @@ namespace vergence::odometry {
 namespace {
 
 constexpr double kOutlier = 9.21;  // squared sigmas, two coordinates at 99 %
-constexpr int kCameraHolds = 8;    // inliers for a camera to count as one that supports the pose
-constexpr int kCameraAlone = 12;   // inliers for a camera's own pose to be believed
+constexpr double kStereoShare =
+    0.5;  // of the points found in two cameras, in which both must agree with the pose
+constexpr int kCameraHolds = 8;   // inliers for a camera to count as one that supports the pose
+constexpr int kCameraAlone = 12;  // inliers for a camera's own pose to be believed
 
 /// Zero where the observations hold no pose.
 Mat6 covariance_of(const RefinedPose& pose) noexcept {
@@ -23,6 +25,10 @@ Mat6 covariance_of(const RefinedPose& pose) noexcept {
 }
 
 }  // namespace
+
+bool PoseFit::confirmed_stereo() const noexcept {
+  return std::popcount(cameras) >= 2 && stereo >= kStereoShare * stereo_found;
+}
 
 std::size_t PoseEstimator::memory_needed() noexcept {
   return RigObservationTable::memory_needed(kMaxPoints) + RigMlesac::memory_needed(kMaxPoints) +

@@ -19,6 +19,8 @@ struct PoseFit {
   std::uint8_t cameras = 0;        // bit k: camera k holds at least a few of the inliers
   Mat6 covariance = Mat6::Zero();  // of T_left_world with the points held: left perturbation (φ
                                    // rad, τ m), about the left camera
+  /// The cameras agree about the scene: only then does a frame shape the map.
+  [[nodiscard]] bool confirmed_stereo() const noexcept;
 };
 
 /// Poses from points: three points in MLESAC, then all of them (METHOD §3).

@@ -50,7 +50,7 @@ const std::vector<Kind>& kinds() {
       {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0},
       {"a bus in the way", "occluder", "", 5, 9},
       {"disk full", "disk_full", "", 3},
-      {"recalibration asked for", "recalibrate", "", 0, 5},
+      {"recalibration asked for", "recalibrate", "", 0, 6},
   };
   return all;
 }
