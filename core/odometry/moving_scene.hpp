@@ -20,15 +20,17 @@ class MovingScene {
     new_lost_ = kept_ < kKept * tried_;
     tried_ = kept_ = 0;
   }
-  /// Of every frame with a pose, after its new points. `linked`: new points are made by a
-  /// calibration, and can be judged.
-  void judge(bool points_disagree, bool linked) noexcept {
-    if (points_disagree || (linked && new_lost_))
-      frames_left_ = kFrames;
-    else if (frames_left_ > 0)
-      --frames_left_;
+  /// Of every frame with a pose, after its new points: is it to be told? `linked`: new points are
+  /// made by a calibration, and can be judged.
+  [[nodiscard]] bool judge(bool points_disagree, bool linked) noexcept {
+    now_ = points_disagree || (linked && new_lost_);
+    if (frames_left_ > 0) --frames_left_;
+    return now_ || frames_left_ > 0;
   }
-  [[nodiscard]] bool told() const noexcept { return frames_left_ > 0; }
+  /// The frame judged last had no other reason, such as a gap, after which points disagree, too.
+  void tell() noexcept {
+    if (now_) frames_left_ = kFrames;
+  }
   /// The map is made anew; what moves is still there.
   void forget_points() noexcept {
     tried_ = kept_ = 0;
@@ -44,7 +46,8 @@ class MovingScene {
 
   int tried_ = 0, kept_ = 0;  // since they were judged
   bool new_lost_ = false;     // most of those judged last
-  int frames_left_ = 0;       // to be told
+  bool now_ = false;          // the frame judged last, by itself
+  int frames_left_ = 0;       // to be told, from the one that began it
 };
 
 }  // namespace vergence::odometry

@@ -132,7 +132,7 @@ Reason Odometry::weakness(const ImageCheck& images) const noexcept {
 
 void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept {
   out->status = PoseStatus::degraded;
-  moving_.judge(fit.inliers < kRigidShare * fit.given, link_ == Link::linked);
+  const bool moving = moving_.judge(fit.inliers < kRigidShare * fit.given, link_ == Link::linked);
   const Reason of_images = weakness(images);
   if (restart_cooldown_ > 0)
     out->reason = Reason::scene_restarted;
@@ -146,9 +146,10 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome*
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
-  else if (moving_.told())
+  else if (moving) {
     out->reason = Reason::moving_scene;
-  else if (fit.near < kNearEnough)
+    moving_.tell();
+  } else if (fit.near < kNearEnough)
     out->reason = Reason::weak_geometry;
   else if (link_ == Link::unlinked)
     out->reason = Reason::uncalibrated;

@@ -1,4 +1,5 @@
 #pragma once
+#include <bitset>
 #include <optional>
 
 #include "core/odometry/front_end.hpp"
@@ -116,7 +117,8 @@ class Odometry {
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured,
                               FrameOutcome* out) noexcept;
   [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
-  [[nodiscard]] PoseFit relocalise(FrameOutcome* out) noexcept;
+  /// Seeks the place among all points; those long out of sight are followed again, and *revived.
+  [[nodiscard]] PoseFit relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived) noexcept;
   /// Cameras whose own pose was not found are sought by what the points look like.
   void recover_cameras(const PoseFit& fit) noexcept;
   void settle_points(const PoseFit& fit) noexcept;

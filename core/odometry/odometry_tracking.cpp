@@ -68,8 +68,9 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   }
   fit = best;
   bool doubtful = frames_lost_ > 0 || out->gap_s > 0;
+  std::bitset<kMaxPoints> revived;
   if (!sample_agrees(fit, kLeastSampleShare)) {
-    fit = relocalise(out);
+    fit = relocalise(out, &revived);
     if (!fit.found) return fit;
     doubtful = true;
   }
@@ -81,8 +82,12 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
   // One facade looks like the next: a place is believed again only if most of what should be seen
   // from there is.
-  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
+  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world)) {
     fit.found = false;
+    // Left active they would be missing from every place that is believed or not after this one.
+    for (std::size_t i = 0; i < map_.points().size(); ++i)
+      if (revived[i]) map_.points()[i].stage = PointStage::dormant;
+  }
   clock.mark(Stage::pose);
   return fit;
 }
@@ -114,7 +119,7 @@ int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
   return n;
 }
 
-PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
+PoseFit Odometry::relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived) noexcept {
   StageClock clock(out);
   for (MapPoint& p : map_.points()) p.now.cameras = 0;
   const int candidates = front_end_.relocalise(map_, 0);
@@ -126,11 +131,13 @@ PoseFit Odometry::relocalise(FrameOutcome* out) noexcept {
   fit.found = fit.inliers >= kRelocaliseInliers;
   if (!fit.found) return fit;
   out->relocalised = true;
-  // Points long out of sight are followed again; those that do not show are dropped as any other.
-  for (MapPoint& p : map_.points()) {
+  // Those that do not show are dropped as any other.
+  for (std::size_t i = 0; i < map_.points().size(); ++i) {
+    MapPoint& p = map_.points()[i];
     if (p.stage != PointStage::dormant) continue;
     p.stage = PointStage::active;
     p.missed = 0;
+    revived->set(i);
   }
   return fit;
 }

@@ -82,11 +82,11 @@ void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
   }
 }
 
-PoseRefineOptions PoseEstimator::how_to_refine() const noexcept {
+PoseRefineOptions PoseEstimator::how_to_refine(bool rough) const noexcept {
   PoseRefineOptions o;
   o.huber = options_.huber;
   o.inlier_chi2 = kOutlier;
-  if (!drop_gross_) o.gross_chi2 = std::numeric_limits<double>::max();
+  if (rough || !drop_gross_) o.gross_chi2 = std::numeric_limits<double>::max();
   return o;
 }
 
@@ -101,9 +101,9 @@ PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample) 
     if (m.status != MlesacStatus::ok) return s;
     s.T = m.T_left_world;
   }
-  const RefinedPose r =
-      refiner_.refine(table_.view(), s.T,
-                      sample ? mlesac_.flags() : std::span<const std::uint8_t>{}, how_to_refine());
+  const RefinedPose r = refiner_.refine(table_.view(), s.T,
+                                        sample ? mlesac_.flags() : std::span<const std::uint8_t>{},
+                                        how_to_refine(sample));
   if (!r.usable()) return s;
   s.found = true;
   s.T = r.T_left_world;
@@ -167,8 +167,9 @@ PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept
   std::fill(agrees_.begin(), agrees_.end(), std::uint8_t{0});
   std::array<std::uint8_t, kMaxPoints> left;
   left.fill(1);
-  const RefinedPose r = refiner_.refine(
-      table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()), how_to_refine());
+  const RefinedPose r =
+      refiner_.refine(table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()),
+                      how_to_refine(false));
   if (!r.usable()) return fit;
   fit.T_left_world = r.T_left_world;
   fit.rms_px = r.rms_px;

@@ -52,8 +52,9 @@ class PoseEstimator {
   [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
                                 Transform* T_camera_world) noexcept;
 
-  /// From the next fit on: whether observations that are grossly off are left out (as they are to
-  /// begin with) or count as much as Huber's loss lets them.
+  /// From the next fit on: whether observations that are grossly off are left out of a fit by
+  /// refinement alone (as they are to begin with) or count as much as Huber's loss lets them. What
+  /// sampling began with is rough: there they always count.
   void drop_gross(bool drop) noexcept { drop_gross_ = drop; }
 
   /// By map point: bit k set if camera k's observation agrees with the last fit, or with the one
@@ -71,7 +72,7 @@ class PoseEstimator {
   void collect(const Map& map) noexcept;
   void collect_camera(const Map& map, int k) noexcept;
   [[nodiscard]] Solved solve(const Transform& start, bool sample) noexcept;
-  [[nodiscard]] PoseRefineOptions how_to_refine() const noexcept;
+  [[nodiscard]] PoseRefineOptions how_to_refine(bool rough) const noexcept;
   void count(const Map& map, PoseFit* fit) const noexcept;
 
   const OdometryOptions& options_;

@@ -6,10 +6,7 @@ namespace vergence::odometry {
 namespace {
 
 /// Whether a frame whose points agree is told, of a scene that was never told before.
-bool tells(MovingScene scene) {
-  scene.judge(false, true);
-  return scene.told();
-}
+bool tells(MovingScene scene) { return scene.judge(false, true); }
 
 TEST(MovingScene, newPointsAreLostWhereFewerThanThreeInTenAreKept) {
   MovingScene scene;
@@ -39,24 +36,27 @@ TEST(MovingScene, fewNewPointsAtATimeAreJudgedTogether) {
 
 TEST(MovingScene, isToldForTenFramesAlsoWhenTheMapIsMadeAnew) {
   MovingScene scene;
-  scene.judge(true, true);
-  EXPECT_TRUE(scene.told());
+  EXPECT_TRUE(scene.judge(true, true));
+  scene.tell();
   scene.forget_points();
   for (int i = 0; i < 9; ++i) {
-    scene.judge(false, true);
-    EXPECT_TRUE(scene.told()) << i;
+    EXPECT_TRUE(scene.judge(false, true)) << i;
+    scene.tell();
   }
-  scene.judge(false, true);
-  EXPECT_FALSE(scene.told());
+  EXPECT_FALSE(scene.judge(false, true));
+}
+
+TEST(MovingScene, aFrameThatHadAnotherReasonIsToldAlone) {
+  MovingScene scene;
+  EXPECT_TRUE(scene.judge(true, true));
+  EXPECT_FALSE(scene.judge(false, true));
 }
 
 TEST(MovingScene, newPointsSayNothingWithoutACalibration) {
   MovingScene scene;
   scene.add(100, 0);
-  scene.judge(false, false);
-  EXPECT_FALSE(scene.told());
-  scene.judge(true, false);
-  EXPECT_TRUE(scene.told());
+  EXPECT_FALSE(scene.judge(false, false));
+  EXPECT_TRUE(scene.judge(true, false));
 }
 
 }  // namespace
