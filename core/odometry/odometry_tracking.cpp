@@ -82,12 +82,11 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
   // One facade looks like the next: a place is believed again only if most of what should be seen
   // from there is.
-  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world)) {
+  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
     fit.found = false;
-    // Left active they would be missing from every place that is believed or not after this one.
-    for (std::size_t i = 0; i < map_.points().size(); ++i)
-      if (revived[i]) map_.points()[i].stage = PointStage::dormant;
-  }
+  // Left active, they would count as missing at the next place that is tried.
+  for (std::size_t i = 0; !fit.found && i < map_.points().size(); ++i)
+    if (revived[i]) map_.points()[i].stage = PointStage::dormant;
   clock.mark(Stage::pose);
   return fit;
 }
