@@ -10,7 +10,7 @@
 // Lenz, Urtasun, CVPR 2012), of EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where
 // nothing is stated, an assumed 0.05°. The last line of a drive tells how uncertain its most
 // uncertain motion is, times the usual one, and the largest share of a motion that the window
-// corrected by more than the motion's fit can be off by.
+// corrected by more than the sigma of the motion's fit.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -148,7 +148,7 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
 /// What is told of a drive's motions when they are judged.
 struct Judged {
   double most_unusual = 0;   // the most uncertain motion, times what is usual
-  double largest_share = 0;  // of a motion that the window corrected by more than it can be off by
+  double largest_share = 0;  // of a motion that the window corrected by more than its sigma
 };
 
 Judged judged(std::span<const Posed> poses) {
@@ -186,8 +186,8 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
   const Judged most = judged(poses);
   fmt::print(
       "{:12s} most uncertain motion: {:.1f} times as the usual one; the window's largest "
-      "correction beyond {:g} sigmas: {:.1f} % of the motion\n",
-      name, most.most_unusual, WindowCorrection::kSigmas, 100 * most.largest_share);
+      "correction beyond the fit's sigma: {:.1f} % of the motion\n",
+      name, most.most_unusual, 100 * most.largest_share);
 }
 
 }  // namespace
