@@ -1,7 +1,6 @@
 // `vergence run` on V4L2 cameras that look at a rendered drive, inside the rig's kernel.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +22,7 @@
 #include "app/datasets/trajectory_files.hpp"
 #include "tests/rigs/film.hpp"
 #include "tests/rigs/vivid.hpp"
+#include "tests/support/child_program.hpp"
 #include "tests/support/gnss_bytes.hpp"
 #include "tests/support/receiver_terminal.hpp"
 #include "tests/support/thread_allocations.hpp"
@@ -33,42 +33,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::int64_t kInterval_ns = 100'000'000;
-
-/// The program as a child; ended by the destructor.
-class Program {
- public:
-  explicit Program(std::vector<std::string> words) {
-    words.insert(words.begin(), VERGENCE_PROGRAM);
-    std::vector<char*> pointers;
-    for (std::string& w : words) pointers.push_back(w.data());
-    pointers.push_back(nullptr);
-    pid_ = ::fork();
-    if (pid_ != 0) return;
-    (void)::execv(pointers.front(), pointers.data());
-    ::_exit(127);
-  }
-  ~Program() {
-    if (pid_ > 0) (void)finish(SIGKILL, 5s);
-  }
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
-
-  /// → exit code; 128 + the signal's number; −1: it did not end in time.
-  int finish(int with_signal, std::chrono::seconds limit) {
-    if (with_signal != 0) (void)::kill(pid_, with_signal);
-    const auto end = std::chrono::steady_clock::now() + limit;
-    for (int status = 0; std::chrono::steady_clock::now() < end;
-         std::this_thread::sleep_for(20ms)) {
-      if (::waitpid(pid_, &status, WNOHANG) != pid_) continue;
-      pid_ = -1;
-      return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    }
-    return -1;
-  }
-
- private:
-  pid_t pid_ = -1;
-};
 
 std::size_t lines_of(const std::filesystem::path& file) {
   std::ifstream in(file);
@@ -114,7 +78,7 @@ class V4l2Run : public ::testing::Test {
     std::atomic<bool> rolls_{false};
     std::atomic<std::int64_t> began_{-1};
   };
-  void drive(Program* program, Roll* roll, const test::Film& film) const {
+  void drive(test::ChildProgram* program, Roll* roll, const test::Film& film) const {
     for (const auto end = std::chrono::steady_clock::now() + 60s;
          lines_of(session_ + "/poses.csv") < 6;) {
       ASSERT_LT(std::chrono::steady_clock::now(), end) << "no pose in a minute";
@@ -123,7 +87,8 @@ class V4l2Run : public ::testing::Test {
     roll->begin();
     std::this_thread::sleep_for(std::chrono::nanoseconds(kInterval_ns) *
                                 (static_cast<int>(film.pairs()) + 20));
-    EXPECT_EQ(program->finish(SIGINT, 30s), 130) << "ended by the signal, session closed";
+    program->signal(SIGINT);
+    EXPECT_EQ(program->wait(30s), 130) << "ended by the signal, session closed";
   }
   nlohmann::json summary() const {
     return nlohmann::json::parse(text_of(session_ + "/summary.json"));
@@ -183,7 +148,7 @@ TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
         const auto shown = film.image(output, roll.image(number));
         std::copy(shown.begin(), shown.end(), image.begin());
       });
-  Program program(words());
+  test::ChildProgram program(words());
   ASSERT_NO_FATAL_FAILURE(drive(&program, &roll, film));
   const nlohmann::json s = summary();
   expect_the_drive(film, s);
@@ -250,7 +215,7 @@ TEST_F(V4l2Run, theDriveIsComparedWithASatelliteReceiver) {
     all.emplace_back("--set");
     all.push_back(setting);
   }
-  Program program(all);
+  test::ChildProgram program(all);
   ASSERT_NO_FATAL_FAILURE(drive(&program, &roll, film));
   const nlohmann::json s = summary();
   expect_the_drive(film, s);
@@ -286,7 +251,7 @@ TEST_F(V4l2Run, theSameDriveComesOutOfOneCameraWithBothImagesInItsPicture) {
         }
       },
       kSize);
-  Program program(one_picture());
+  test::ChildProgram program(one_picture());
   ASSERT_NO_FATAL_FAILURE(drive(&program, &roll, film));
   const nlohmann::json s = summary();
   expect_the_drive(film, s);
@@ -297,16 +262,16 @@ TEST_F(V4l2Run, theSameDriveComesOutOfOneCameraWithBothImagesInItsPicture) {
 TEST_F(V4l2Run, aCameraThatIsNotThereIsOneSentence) {
   auto w = words();
   w.insert(w.end(), {"--set", "cameras.1.serial=/dev/video9"});
-  Program program(w);
-  EXPECT_EQ(program.finish(0, 30s), 3);
+  test::ChildProgram program(w);
+  EXPECT_EQ(program.wait(30s), 3);
   EXPECT_FALSE(std::filesystem::exists(session_ + "/poses.csv"));
 }
 
 TEST_F(V4l2Run, whatTheCameraCannotDoIsRefused) {
   auto w = words();
   w.insert(w.end(), {"--set", "cameras.0.trigger=hardware", "--set", "cameras.1.trigger=hardware"});
-  Program program(w);
-  EXPECT_EQ(program.finish(0, 30s), 2);
+  test::ChildProgram program(w);
+  EXPECT_EQ(program.wait(30s), 2);
 }
 
 }  // namespace
