@@ -30,7 +30,7 @@ Group odometry() {
       .number("nearest_baselines", &O::nearest_baselines, 1, 50, "baselines",
               "Nearest depth at which a point is looked for in the other image, as a multiple of "
               "the baseline; nearer ones are not found.")
-      .number("band_px", &O::band_px, 0.5, 20, "px",
+      .number("band_px", &O::band_px, 0.5, 5, "px",
               "Half the width of the band along the epipolar line in which a match across is "
               "sought: wide for a poor calibration.")
       .number("match_zncc", &O::match_zncc, 0.5, 0.99, "",

@@ -52,10 +52,9 @@ float zncc(const Block& b, const BlockSums& s) noexcept {
 SearchResult search_along(const Patch& patch, const Pyramid& image, const EpipolarCurve& curve,
                           const EpipolarSearchOptions& options) noexcept {
   SearchResult result;
-  const int level = std::min({options.level, image.levels() - 1, patch.levels - 1});
+  const int coarsest = std::min<int>(image.levels(), patch.levels) - 1;
+  int level = std::min(options.level, coarsest);
   if (level < 0) return result;
-  const ImageView& view = image.level(level);
-  const double scale = std::ldexp(1.0, -level);
   Vec2 first, last;
   if (curve.at(options.rho_first, &first, nullptr) != ProjectStatus::ok) return result;
   // The near end may lie beyond the lens: come back until it does not.
@@ -66,8 +65,11 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
     rho_last = options.rho_first + 0.6 * (rho_last - options.rho_first);
   if (halvings > kHalvings) return result;
 
-  const int steps = std::clamp(static_cast<int>(std::ceil((last - first).norm() * scale)), 1,
-                               kMaxSearchSteps - 1);
+  const double length = (last - first).norm();
+  while (level < coarsest && std::ldexp(length, -level) > kMaxSearchSteps - 1) ++level;
+  const ImageView& view = image.level(level);
+  const double scale = std::ldexp(1.0, -level);
+  const int steps = std::clamp(static_cast<int>(std::ceil(length * scale)), 1, kMaxSearchSteps - 1);
   const Vec2 along = (last - first).normalized();
   const bool horizontal = std::abs(along.x()) >= std::abs(along.y());
   const int band = std::clamp(options.band, 0, kMaxBand);

@@ -69,7 +69,7 @@ bool PoseRefiner::drop_gross(const RefinedPose& pose, const PoseRefineOptions& o
   for (int k = 0; k < problem_.cameras(); ++k) {
     const std::span<const double> errors = problem_.errors(k);
     for (std::size_t i = 0; i < errors.size(); ++i) {
-      if (!problem_.counts(k, i) || errors[i] < limit) continue;
+      if (!problem_.counts(k, i) || !(errors[i] > limit)) continue;
       problem_.use(k, i, false);
       dropped = true;
     }
@@ -177,9 +177,12 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
     }
   if (counted() < kLeastObservations) return refuse(PoseRefineStatus::too_few);
 
-  bool solved = descend(options, &out);
-  if (solved && drop_gross(out, options)) solved = descend(options, &out);
-  if (!solved) return refuse(PoseRefineStatus::rank_deficient);
+  if (!descend(options, &out)) return refuse(PoseRefineStatus::rank_deficient);
+  if (drop_gross(out, options)) {
+    // Where what is left does not hold the pose, it is that of all.
+    const RefinedPose of_all = out;
+    if (!descend(options, &out)) out = of_all;
+  }
   describe(o, options, &out);
 
   Vec6 d;

@@ -94,9 +94,10 @@ class FrontEnd {
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
   /// New corners of `left` where there are no points, matched across, as points of the given stage,
-  /// each with its observation in `now`.
+  /// each with its observation in `now`. As many as there is room for, by the effort, and
+  /// `at_least` so many whatever that is.
   StereoCount add_points(Map& map, const Transform& T_left_world, PointStage stage,
-                         const FrameEffort& effort = {}) noexcept;
+                         const FrameEffort& effort = {}, int at_least = 0) noexcept;
 
   /// How many corners of the last add_points() match where points of a rig with exchanged cameras
   /// would lie: behind it.

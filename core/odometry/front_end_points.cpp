@@ -101,7 +101,7 @@ void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchang
 }
 
 StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointStage stage,
-                                 const FrameEffort& effort) noexcept {
+                                 const FrameEffort& effort, int at_least) noexcept {
   StereoCount count;
   corners_.clear();
   // Without a left image the pyramid still looks at the last one, whose memory its camera may have
@@ -114,7 +114,7 @@ StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
   features::find_corners(pyramids_[0].level(0), corner_options(0), taken_.span(), runner_,
                          &corners_);
   const auto room = static_cast<std::size_t>(std::max(
-      0, options_.features * effort.points_percent / 100 - static_cast<int>(taken_.size())));
+      at_least, options_.features * effort.points_percent / 100 - static_cast<int>(taken_.size())));
   if (corners_.size() > room) corners_.truncate(room);
   detect_ms_ = milliseconds_since(start);
 

@@ -1,4 +1,7 @@
 #pragma once
+#include <optional>
+
+#include "core/types/time.hpp"
 
 namespace vergence::odometry {
 
@@ -11,10 +14,16 @@ namespace vergence::odometry {
 /// Threads  One. Memory: none of the heap.
 class GapWatch {
  public:
-  /// A frame `dt` seconds after the last pose. `first`: none without a pose lies between. `renew`:
-  /// the scene could be made anew. → dt where it is a gap, else 0
-  [[nodiscard]] double note(double dt, double longest, bool first, bool renew) noexcept {
-    const bool gap = first && dt > longest;
+  /// Of every frame: seconds since the one before; 0: there was none.
+  [[nodiscard]] double since_frame(Stamp frame) noexcept {
+    const double since = last_ ? (frame - *last_).to_seconds() : 0;
+    last_ = frame;
+    return since;
+  }
+  /// A frame `dt` seconds after the last pose, or after the last frame where that showed something
+  /// and had no pose. `renew`: the scene could be made anew. → dt where it is a gap, else 0
+  [[nodiscard]] double note(double dt, double longest, bool renew) noexcept {
+    const bool gap = dt > longest;
     if (gap && !before_ && renew) due_ = true;
     before_ = gap;
     return gap ? dt : 0;
@@ -24,6 +33,7 @@ class GapWatch {
   void forget() noexcept { due_ = false; }
 
  private:
+  std::optional<Stamp> last_{};
   bool before_ = false;  // the newest frame came after a gap
   bool due_ = false;
 };

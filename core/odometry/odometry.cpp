@@ -17,6 +17,7 @@ namespace {
 constexpr int kFramesUntilTrial =
     3;  // without new points, before some are made to be tried alone: no keyframe is made while
         // the rig stands, and it stands for whoever follows a truck alongside
+constexpr int kTrialPoints = 40;  // of them, however little time there is: enough to judge from
 constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
                                          // rig that fits, 0.12 to 0.2 a frame out of step
 constexpr int kFramesLostBeforeRestart = 3;
@@ -107,20 +108,26 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   const auto keyframes = std::min<std::size_t>(map_.order().size(), out->effort.window_keyframes);
   budget_.window_took(static_cast<double>(clock.mark(Stage::window)), static_cast<int>(keyframes),
                       window.steps);
-  const StereoCount stereo =
-      front_end_.add_points(map_, motion_.T_left_world(), PointStage::candidate, out->effort);
-  // Of all that the left image offers, how much the other cameras confirm.
-  stereo_fails_ = stereo.matched + fit.stereo < kConfirmedShare * (stereo.corners + fit.inliers);
+  budget_.points_took(new_points(fit, 0, out), out->effort);
   keyframe_points_ = 0;
   for (MapPoint& p : map_.points()) {
     if (!p.followed()) continue;
     p.seen[slot] = p.now;
     if (p.now.by(0)) ++keyframe_points_;
   }
-  budget_.points_took(static_cast<double>(clock.mark(Stage::match)), out->effort);
+  out->keyframe = true;
+}
+
+double Odometry::new_points(const PoseFit& fit, int at_least, FrameOutcome* out) noexcept {
+  StageClock clock(out);
+  const StereoCount stereo = front_end_.add_points(map_, motion_.T_left_world(),
+                                                   PointStage::candidate, out->effort, at_least);
+  // Of all that the left image offers, how much the other cameras confirm.
+  stereo_fails_ = stereo.matched + fit.stereo < kConfirmedShare * (stereo.corners + fit.inliers);
+  const float ms = clock.mark(Stage::match);
   out->stage_ms[static_cast<std::size_t>(Stage::match)] -= front_end_.detect_ms();
   out->stage_ms[static_cast<std::size_t>(Stage::detect)] += front_end_.detect_ms();
-  out->keyframe = true;
+  return static_cast<double>(ms);
 }
 
 Reason Odometry::weakness(const ImageCheck& images) const noexcept {
@@ -159,11 +166,6 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome*
   }
 }
 
-void Odometry::try_points() noexcept {
-  cursor_before_trial_ = map_.cursor();
-  (void)front_end_.add_points(map_, motion_.T_left_world(), PointStage::candidate);
-}
-
 FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept {
   FrameOutcome out;
   StageClock clock(&out);
@@ -172,6 +174,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   clock.mark(Stage::pyramid);
   out.images_good = weakness(images) == Reason::none;
   out.uneven = images.uneven;
+  const double since_frame = gaps_.since_frame(frame.stamp);
   const double dt = motion_.any() ? (frame.stamp - motion_.stamp()).to_seconds() : 0.0;
   const Transform predicted =
       motion_.any() ? motion_.predict(std::min(dt, kLongestExtrapolation)) : Transform{};
@@ -185,7 +188,8 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     return out;
   }
 
-  out.gap_s = gaps_.note(dt, options_.max_gap_s, frames_lost_ == 0, link_ == Link::linked);
+  out.gap_s =
+      gaps_.note(frames_lost_ == 0 ? dt : since_frame, options_.max_gap_s, link_ == Link::linked);
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
     out.reason = weakness(images) != Reason::none ? weakness(images)
@@ -212,17 +216,26 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const FrameEffort effort =
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
-  if (next_rig_ && weakness(images) == Reason::none) {
+  // A scene that could not be begun with this frame is not given away for a better calibration.
+  const bool could_begin = out.images_good && fit.confirmed_stereo() && fit.near >= kNearEnough;
+  if (next_rig_ && (link_ == Link::linked ? could_begin : out.images_good)) {
     out.relink_due = true;
-  } else if (gaps_.renewal_due() && out.images_good && fit.confirmed_stereo()) {
+  } else if (gaps_.renewal_due() && could_begin) {
     out.renewal_due = true;
   } else if (fit.confirmed_stereo() && !images.repeated && wants_keyframe()) {
     out.effort = effort;
     make_keyframe(fit, frame.stamp, &out);
     out.T_left_world = motion_.T_left_world();
   } else if (frames_untried_ >= kFramesUntilTrial && out.images_good && link_ == Link::linked) {
+    cursor_before_trial_ = map_.cursor();
+    frames_untried_ = 0;
     out.effort.points_percent = effort.points_percent;
-    if (effort.points_percent == 100) try_points();
+    (void)new_points(fit, kTrialPoints, &out);
+  }
+  // By this frame's new points, of which judge() could not know.
+  if (stereo_fails_ && out.status == PoseStatus::ok) {
+    out.status = PoseStatus::degraded;
+    out.reason = Reason::no_stereo_matches;
   }
   if (restart_cooldown_ > 0) --restart_cooldown_;
   return out;

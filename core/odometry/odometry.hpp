@@ -124,7 +124,8 @@ class Odometry {
   void settle_points(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
-  void try_points() noexcept;
+  /// Points to be tried, and whether the cameras confirm what there is; what it took, ms.
+  double new_points(const PoseFit& fit, int at_least, FrameOutcome* out) noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
   [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp,
@@ -157,7 +158,7 @@ class Odometry {
   MovingScene moving_;
 
   int frames_lost_ = 0;        // in a row, with images that show something
-  bool stereo_fails_ = false;  // at the last keyframe the other cameras confirmed hardly anything
+  bool stereo_fails_ = false;  // of the last new points the other cameras confirmed hardly any
   // There are candidates, made to be tried, that belong to no keyframe; where they begin.
   std::optional<std::size_t> cursor_before_trial_;
   int frames_untried_ = 0;    // since new points were tried

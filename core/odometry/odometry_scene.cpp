@@ -105,6 +105,10 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
     out->status = PoseStatus::degraded;
     out->reason = Reason::uncalibrated;
   }
+  if (weakness(images) != Reason::none) {  // begun by the other cameras
+    out->status = PoseStatus::degraded;
+    out->reason = weakness(images);
+  }
   if (motion_.any()) {
     out->restarted = true;
     out->gap_s = dt;
@@ -151,10 +155,12 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
 
 void Odometry::renew_scene(FrameOutcome* out) noexcept {
   FrameOutcome built;
-  if (start_scene(motion_.T_left_world(), motion_.stamp(), &built))
+  if (start_scene(motion_.T_left_world(), motion_.stamp(), &built)) {
     out->keyframe = true;
-  else
+  } else {
+    out->status = PoseStatus::degraded;
     out->reason = built.reason;
+  }
   for (std::size_t i = 0; i < out->stage_ms.size(); ++i) out->stage_ms[i] += built.stage_ms[i];
 }
 

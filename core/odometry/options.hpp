@@ -14,7 +14,7 @@ struct OdometryOptions {
       15.0;  // least eigenvalue of the structure tensor's mean, grey levels² / px², > 0
   double nearest_baselines =
       4.0;  // nearest depth looked for across, in baselines: sets the largest disparity, 1 … 50
-  double band_px = 2.0;       // half width of the band about the epipolar line across, 0.5 … 20
+  double band_px = 2.0;       // half width of the band about the epipolar line across, 0.5 … 5
   double match_zncc = 0.8;    // least normalised correlation of a stereo match, 0.5 … 0.99
   double pixel_sigma = 0.15;  // px, of one coordinate of a tracked corner, level 0; also the floor
                               // of the residual scale (METHOD §2)

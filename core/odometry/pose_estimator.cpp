@@ -86,7 +86,7 @@ PoseRefineOptions PoseEstimator::how_to_refine(bool rough) const noexcept {
   PoseRefineOptions o;
   o.huber = options_.huber;
   o.inlier_chi2 = kOutlier;
-  if (rough || !drop_gross_) o.gross_chi2 = std::numeric_limits<double>::max();
+  if (rough || !drop_gross_) o.gross_chi2 = std::numeric_limits<double>::infinity();
   return o;
 }
 

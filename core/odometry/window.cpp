@@ -218,6 +218,9 @@ WindowOutcome WindowAdjuster::adjust_unlinked(Map& map, const FrameEffort& effor
     const Transform& left = poses_[i * images];
     keyframe.T_left_world = {normalised(left.R), left.t};
     for (std::size_t k = 1; k < images; ++k) {
+      // Held where it was in the world, an image that saw nothing would take on the left one's
+      // correction.
+      if (constant_[i * images + k] != 0) continue;
       const Transform T = poses_[i * images + k] * left.inverse();
       keyframe.T_camera_left[k] = {normalised(T.R), T.t};
     }

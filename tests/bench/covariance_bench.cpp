@@ -10,7 +10,7 @@
 // Lenz, Urtasun, CVPR 2012), of EuRoC's Leica and IMU 1 mm (Burri et al., IJRR 2016) and, where
 // nothing is stated, an assumed 0.05°. The last line of a drive tells how uncertain its most
 // uncertain motion is, times the usual one, and the largest share of a motion that the window
-// corrected by more than the sigma of the motion's fit.
+// corrected by more than the motion's sigma.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -186,7 +186,7 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
   const Judged most = judged(poses);
   fmt::print(
       "{:12s} most uncertain motion: {:.1f} times as the usual one; the window's largest "
-      "correction beyond the fit's sigma: {:.1f} % of the motion\n",
+      "correction beyond a motion's sigma: {:.1f} % of the motion\n",
       name, most.most_unusual, 100 * most.largest_share);
 }
 

@@ -14,7 +14,7 @@ struct WindowCorrection {
 
   double moved_m = 0;
   double step_m = 0;   // the motion since the last pose
-  double sigma_m = 0;  // of that motion's fit
+  double sigma_m = 0;  // of that motion, as it is published: three times its fit's
 
   [[nodiscard]] bool significant() const noexcept { return moved_m > sigma_m; }
   [[nodiscard]] bool spoils_motion() const noexcept {

@@ -142,7 +142,7 @@ TEST_F(PoseRefinerTest, grossPointsNearByDoNotMoveThePose) {
     EXPECT_EQ(found.observations, 306);
 
     PoseRefineOptions one_round;
-    one_round.gross_chi2 = std::numeric_limits<double>::max();
+    one_round.gross_chi2 = std::numeric_limits<double>::infinity();
     const RefinedPose pulled = refiner_.refine(table_.view(), Transform{}, {}, one_round);
     EXPECT_GT((pulled.T_left_world.centre() - without.T_left_world.centre()).norm(),
               2.5 * without.translation_sigma)

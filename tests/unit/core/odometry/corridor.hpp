@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/math/random.hpp"
+#include "core/odometry/odometry.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/rig_frame.hpp"
 #include "tests/unit/core/features/texture.hpp"
@@ -114,6 +115,16 @@ class Corridor {
       features::test::Texture(11, 0.7, 2.0), features::test::Texture(12, 0.25, 0.8),
       features::test::Texture(13, 0.25, 0.8), features::test::Texture(14, 0.25, 0.8),
       features::test::Texture(15, 0.25, 0.8)};
+};
+
+/// An odometry of a calibrated rig.
+struct LinkedOdometry {
+  explicit LinkedOdometry(const RigCalibration& rig)
+      : arena(Odometry::memory_needed(options, rig)), odometry(options, rig, true, arena, runner) {}
+  OdometryOptions options;
+  SequentialRunner runner;
+  Arena arena;
+  Odometry odometry;
 };
 
 }  // namespace vergence::odometry::test

@@ -11,16 +11,13 @@ namespace {
 // look like its own; three frames later new ones are tried.
 constexpr int kFound = 8;
 
-TEST(OdometryMoving, aPanelThatDrivesAlongIsNotTakenForTheScene) {
+void expect_the_panel_is_told(Duration budget) {
   test::Corridor corridor;
-  const OdometryOptions options;
-  Arena arena(Odometry::memory_needed(options, corridor.rig()));
-  SequentialRunner runner;
-  Odometry odometry(options, corridor.rig(), true, arena, runner);
+  test::LinkedOdometry f(corridor.rig());
   corridor.show_panel();
   int followed = 0;
   for (int i = 0; i < 20; ++i) {
-    const FrameOutcome out = odometry.process(corridor.frame(i));
+    const FrameOutcome out = f.odometry.process(corridor.frame(i), budget);
     if (i < kFound || !out.posed) continue;
     const double travelled =
         (test::Corridor::T_world_left(i).t - test::Corridor::T_world_left(0).t).norm();
@@ -30,6 +27,14 @@ TEST(OdometryMoving, aPanelThatDrivesAlongIsNotTakenForTheScene) {
     EXPECT_EQ(out.reason, Reason::moving_scene) << i;
   }
   EXPECT_GT(followed, 5) << "the panel is not large enough to be followed: nothing was tested";
+}
+
+TEST(OdometryMoving, aPanelThatDrivesAlongIsNotTakenForTheScene) {
+  expect_the_panel_is_told(Duration{});
+}
+
+TEST(OdometryMoving, aPanelIsToldHoweverLittleTimeThereIs) {
+  expect_the_panel_is_told(Duration::milliseconds(1));
 }
 
 }  // namespace

@@ -10,15 +10,6 @@
 namespace vergence::odometry {
 namespace {
 
-struct Fixture {
-  explicit Fixture(const RigCalibration& rig)
-      : arena(Odometry::memory_needed(options, rig)), odometry(options, rig, true, arena, runner) {}
-  OdometryOptions options;
-  SequentialRunner runner;
-  Arena arena;
-  Odometry odometry;
-};
-
 /// An image in memory of its own that can be taken away, as a camera's driver does when it begins
 /// anew.
 class LentImage {
@@ -48,7 +39,7 @@ class LentImage {
 TEST(OdometryStart, aLeftCameraThatIsGoneIsNotLookedAtInTheMemoryItHad) {
   constexpr int kGone = 6, kBack = 60;
   test::Corridor corridor;
-  Fixture f(corridor.rig());
+  test::LinkedOdometry f(corridor.rig());
   RigFrame frame;
   for (int i = 0; i < kGone; ++i) {
     frame = corridor.frame(i);
@@ -73,13 +64,24 @@ TEST(OdometryStart, aLeftCameraThatIsGoneIsNotLookedAtInTheMemoryItHad) {
   EXPECT_GT(posed, 15);
 }
 
+TEST(OdometryStart, bySomeOfTheCamerasIsNotOk) {
+  test::Corridor corridor(3);
+  test::LinkedOdometry f(corridor.rig());
+  RigFrame frame = corridor.frame(0);
+  frame.images[2] = {};
+  const FrameOutcome out = f.odometry.process(frame);
+  EXPECT_TRUE(out.posed);
+  EXPECT_EQ(out.status, PoseStatus::degraded);
+  EXPECT_EQ(out.reason, Reason::no_image);
+}
+
 // 20 mm of baseline: everything matches, nearly all of it with a disparity that measures no depth.
 TEST(OdometryStart, whereAllIsFarTheRigIsNotSaidToBeUnfit) {
   test::Corridor corridor;
   RigCalibration rig = corridor.rig();
   rig.T_camera_left[1].t *= 0.02 / rig.baseline;
   rig.baseline = 0.02;
-  Fixture f(rig);
+  test::LinkedOdometry f(rig);
   for (int i = 0; i < 10; ++i) {
     const FrameOutcome out = f.odometry.process(corridor.frame(i, rig.T_camera_left));
     EXPECT_FALSE(out.posed) << i;

@@ -168,6 +168,21 @@ TEST(WindowAdjuster, oneKeyframeOrNoPointsChangeNothing) {
   EXPECT_EQ(b.map.keyframe(b.map.order()[0]).T_left_world.t, b.poses[1].t);
 }
 
+TEST(WindowAdjuster, unlinkedAnImageThatSawNothingKeepsItsPlaceBesideTheLeftOne) {
+  Bend b;
+  for (MapPoint& p : b.map.points())
+    for (const std::uint8_t slot : b.map.order()) p.seen[slot].drop(1);
+  for (const std::uint8_t slot : b.map.order())
+    b.map.keyframe(slot).T_camera_left = b.calibration.T_camera_left;
+  b.disturb();
+  ASSERT_TRUE(b.adjuster.adjust_unlinked(b.map).usable);
+  for (const std::uint8_t slot : b.map.order()) {
+    const Transform& T = b.map.keyframe(slot).T_camera_left[1];
+    EXPECT_EQ(T.t, b.calibration.T_camera_left[1].t);
+    EXPECT_EQ(T.R, b.calibration.T_camera_left[1].R);
+  }
+}
+
 /// The turn about the camera's y by which the adjuster's rig differs from the one that the
 /// observations were made with.
 double turn_left(const Bend& b) {

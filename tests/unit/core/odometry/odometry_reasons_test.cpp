@@ -1,0 +1,82 @@
+// What speaks against a pose is told as soon as it is seen, and no longer.
+#include <gtest/gtest.h>
+
+#include "core/odometry/odometry.hpp"
+#include "tests/unit/core/odometry/corridor.hpp"
+
+namespace vergence::odometry {
+namespace {
+
+constexpr int kSettled = 10;  // frames
+
+/// An image of nothing known.
+features::test::Image noise(const ImageView& like) {
+  features::test::Image image(like.width, like.height);
+  Random random(5);
+  for (int y = 0; y < like.height; ++y)
+    for (int x = 0; x < like.width; ++x)
+      image.at(x, y) = static_cast<std::uint8_t>(random.below(256));
+  return image;
+}
+
+TEST(OdometryReasons, aGapAfterAFrameWithoutAPoseIsAGap) {
+  test::Corridor corridor;
+  test::LinkedOdometry f(corridor.rig());
+  for (int i = 0; i < kSettled; ++i) ASSERT_TRUE(f.odometry.process(corridor.frame(i)).posed);
+  RigFrame frame = corridor.frame(kSettled);
+  const features::test::Image nothing = noise(frame.images[0]);
+  frame.images[0] = frame.images[1] = nothing.view();
+  ASSERT_FALSE(f.odometry.process(frame).posed);
+
+  constexpr double kGap = 4;  // s
+  frame = corridor.frame_at(kSettled + 1, kSettled);
+  frame.stamp = frame.stamp + Duration::seconds(kGap);
+  FrameOutcome out = f.odometry.process(frame);
+  ASSERT_TRUE(out.posed);
+  EXPECT_NEAR(out.gap_s, kGap, 0.1);
+  EXPECT_EQ(out.reason, Reason::time_gap);
+  EXPECT_TRUE(out.renewal_due);
+}
+
+// The right camera's image confirms little of the left one's at a keyframe, and the rig stands from
+// then on: there is no further keyframe to take that back.
+TEST(OdometryReasons, camerasThatDoNotConfirmEachOtherAreToldAtOnceAndNoLonger) {
+  test::Corridor corridor;
+  test::LinkedOdometry f(corridor.rig());
+  for (int i = 0; i < kSettled; ++i) ASSERT_TRUE(f.odometry.process(corridor.frame(i)).posed);
+  int told = 0;
+  for (int i = kSettled; i < kSettled + 4; ++i) {
+    RigFrame frame = corridor.frame(i);
+    features::test::Image half = noise(frame.images[1]);
+    for (int y = 0; y < half.view().height; ++y)
+      for (int x = 0; x < half.view().width / 4; ++x) half.at(x, y) = frame.images[1].row(y)[x];
+    frame.images[1] = half.view();
+    const FrameOutcome out = f.odometry.process(frame);
+    if (out.reason == Reason::no_stereo_matches) ++told;
+    EXPECT_NE(out.status, PoseStatus::ok) << i;
+  }
+  EXPECT_GT(told, 0);
+  FrameOutcome out;
+  for (int i = 0; i < 10; ++i)
+    out = f.odometry.process(corridor.frame_at(kSettled + 4 + i, kSettled + 3));
+  EXPECT_FALSE(out.keyframe) << "nothing was tested";
+  EXPECT_EQ(out.status, PoseStatus::ok) << to_string(out.reason);
+}
+
+TEST(OdometryReasons, aSceneThatCannotBeMadeAnewIsNotOk) {
+  test::Corridor corridor;
+  test::LinkedOdometry f(corridor.rig());
+  for (int i = 0; i < kSettled; ++i) ASSERT_TRUE(f.odometry.process(corridor.frame(i)).posed);
+  RigCalibration rig = corridor.rig();  // of which nothing matches
+  rig.T_camera_left[1].R = exp_so3({0.2, 0, 0}) * rig.T_camera_left[1].R;
+  f.odometry.link(rig);
+  FrameOutcome out = f.odometry.process(corridor.frame(kSettled));
+  ASSERT_EQ(out.status, PoseStatus::ok);
+  ASSERT_TRUE(out.relink_due);
+  f.odometry.rebuild(&out);
+  EXPECT_EQ(out.status, PoseStatus::degraded);
+  EXPECT_NE(out.reason, Reason::none);
+}
+
+}  // namespace
+}  // namespace vergence::odometry
