@@ -119,10 +119,10 @@ TEST(EpipolarSearch, findsTheDepthToAPixelOfItsLevel) {
 }
 
 TEST(EpipolarSearch, aLongCurveIsSearchedWithoutPassingMatchesBy) {
-  // From infinity to 0.1 m the curve is 2000 px long, 1000 of level 1.
-  const Wall wall(Texture(7, 6, 14), 20.0, false, beside());
+  // From infinity to 1/6 m the curve is 1200 px long, 600 of level 1.
+  const Wall wall(Texture(7, 8, 20), 20.0, false, beside());
   EpipolarSearchOptions usual, near;
-  near.rho_last = 10;
+  near.rho_last = 6;
   near.unique = usual.unique = 1.F;
   int found = 0, found_usual = 0;
   for (double y = 40; y < kHeight - 40; y += 20)
