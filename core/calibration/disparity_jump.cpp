@@ -20,6 +20,7 @@ constexpr int kFirstFrames = 5;       // measured, before the scatter is known
 constexpr int kScatterFrames = 20;    // that the mean square is reckoned over, about
 constexpr double kGoesBack = 0.5;  // of the shift: more taken back by the next frame is no change
 constexpr int kUnmeasured = 2;     // frames without enough tracks after it: it was a change
+constexpr int kMostSkipped = 3;    // frames, over which the same points are compared
 constexpr double kLeastParallax = 1e-4;  // rad: further points say the same at any depth
 
 Vec3 ray(const Pinhole& k, const Vec2& pixel) noexcept {
@@ -66,6 +67,13 @@ void DisparityJumpDetector::rebase(const Transform& T_camera_left, const Pinhole
   left_ = left;
   camera_ = camera;
   count_ = take(stereo, before_);
+  T_now_before_ = {};
+  skipped_ = 0;
+}
+
+void DisparityJumpDetector::skip(const Transform& T_now_previous) noexcept {
+  T_now_before_ = T_now_previous * T_now_before_;
+  if (++skipped_ > kMostSkipped) count_ = 0;
 }
 
 std::size_t DisparityJumpDetector::take(std::span<const StereoObservation> stereo,
@@ -172,6 +180,9 @@ DisparityJump DisparityJumpDetector::next(std::uint64_t frame,
                                           std::span<const StereoObservation> stereo,
                                           const Transform& T_now_previous) noexcept {
   const std::size_t n = take(stereo, now_);
+  const Transform T_now_before = T_now_previous * T_now_before_;
+  T_now_before_ = {};
+  skipped_ = 0;
   std::size_t rows = 0;
   for (std::size_t i = 0, j = 0; i < count_ && j < n;) {
     if (before_[i].track < now_[j].track) {
@@ -179,7 +190,7 @@ DisparityJump DisparityJumpDetector::next(std::uint64_t frame,
     } else if (now_[j].track < before_[i].track) {
       ++j;
     } else {
-      if (row(before_[i++], now_[j++], T_now_previous, &rows_[rows])) ++rows;
+      if (row(before_[i++], now_[j++], T_now_before, &rows_[rows])) ++rows;
     }
   }
   DisparityJump jump = fit(rows_.first(rows));

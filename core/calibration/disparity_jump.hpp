@@ -53,11 +53,17 @@ class DisparityJumpDetector {
   void reset() noexcept {
     count_ = 0;
     pending_ = Pending{};
+    T_now_before_ = {};
+    skipped_ = 0;
   }
 
   /// Frames in order, each with the motion of the left camera since the one before.
   [[nodiscard]] DisparityJump next(std::uint64_t frame, std::span<const StereoObservation> stereo,
                                    const Transform& T_now_previous) noexcept;
+  /// Of a frame in which one of the two cameras showed nothing: the next is compared with the one
+  /// before it. Where too many are skipped there is nothing to compare with, and a shift that
+  /// waits is a change.
+  void skip(const Transform& T_now_previous) noexcept;
 
  private:
   struct Row {
@@ -86,7 +92,9 @@ class DisparityJumpDetector {
   std::span<StereoObservation> before_, now_;  // sorted by track
   std::span<Row> rows_;
   std::span<double> scratch_;
-  std::size_t count_ = 0;  // of before_
+  std::size_t count_ = 0;     // of before_
+  Transform T_now_before_{};  // over the frames skipped since then
+  int skipped_ = 0;
   Pending pending_{};
   int measured_ = 0;        // frames, up to kScatterFrames
   double mean_square_ = 0;  // px², of the shifts that were no jump

@@ -153,14 +153,19 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
                   const TrackLog& log, std::uint64_t after, const CalibrationOptions& o,
                   double pixel_sigma) noexcept {
   Assessment a;
-  double worst = -1;
+  double worst = -1, told = -1;
   for (int k = 1; k < measured.cameras; ++k) {
     const double depth = judged_depth_m(measured, k, o, pixel_sigma);
     const double sigma = depth_error_percent(measured, k, depth),
                  difference = depth_difference_percent(measured, claimed, k, depth);
     const double all = std::hypot(sigma, difference);
-    if (all <= worst) continue;
-    worst = all;
+    worst = std::max(worst, all);
+    // What is known against one camera is told before what is not known of another.
+    const bool contradicted =
+        difference > o.tolerated_depth_percent && difference > kCertain * sigma;
+    if (contradicted == a.contradicted ? all <= told : a.contradicted) continue;
+    told = all;
+    a.contradicted = contradicted;
     a.depth_m = depth;
     a.sigma_percent = sigma;
     a.difference_percent = difference;
@@ -168,8 +173,6 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
   a.better = fits_better(log, after, measured, claimed, kRareChance);
   a.worse = fits_better(log, after, claimed, measured);
   a.confirmed = worst <= o.tolerated_depth_percent;
-  a.contradicted = a.difference_percent > o.tolerated_depth_percent &&
-                   a.difference_percent > kCertain * a.sigma_percent;
   return a;
 }
 

@@ -180,10 +180,11 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
   latest.frames = standing_over;
 }
 
-/// Of frames that measured it: while standing, or where hardly anything matches, `latest` is of
+/// The lag is estimated beside the rig's offset, so a knock meanwhile hides none. Of frames that
+/// measured it: while standing, or where hardly anything matches, `latest` is of
 /// frames before.
 bool Monitor::Parts::in_step() const noexcept {
-  return measured_lag && latest.kind == Kind::quiet && !latest.undecided &&
+  return measured_lag && latest.kind != Kind::out_of_step && !latest.undecided &&
          std::abs(latest.lag) < kNoLag * options.lag_frames &&
          latest.lag_sigma < kLagSigma * std::max(lag_found, options.lag_frames);
 }

@@ -25,6 +25,13 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept 
       .count();
 }
 
+/// A camera whose pose was not found yet lies where the left one is.
+bool all_placed(const LoggedFrame& f, int cameras) noexcept {
+  for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k)
+    if (!f.T_camera_left[k].finite() || !(f.T_camera_left[k].t.norm() > 0)) return false;
+  return true;
+}
+
 }  // namespace
 
 BundleCapacities RigSolver::capacities(const CalibrationOptions& options, int cameras,
@@ -85,7 +92,7 @@ bool RigSolver::choose_candidate(const RigCalibration& rig) noexcept {
   const LoggedFrame* best = nullptr;
   for (std::size_t i = 0; i < log_.size(); ++i) {
     const LoggedFrame& f = log_.frame(i);
-    if (!f.unlinked || f.stereo < kLeastCandidateMatches) continue;
+    if (!f.unlinked || f.stereo < kLeastCandidateMatches || !all_placed(f, count_)) continue;
     if (best == nullptr || f.reprojection_px < best->reprojection_px) best = &f;
   }
   if (best == nullptr) return false;
@@ -93,7 +100,6 @@ bool RigSolver::choose_candidate(const RigCalibration& rig) noexcept {
     const auto c = static_cast<std::size_t>(k);
     T_camera_left_[c] = best->T_camera_left[c];
     T_camera_left_[c].R = normalised(T_camera_left_[c].R);
-    if (!T_camera_left_[c].finite() || !(T_camera_left_[c].t.norm() > 0)) return false;
   }
   // The known length is camera 1's; what the others were measured to goes with it.
   const double factor = rig.baseline / T_camera_left_[1].t.norm();

@@ -111,7 +111,9 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
       if (!linked && (p.calibrator.seeking() || p.calibrator.monitor().scene_pending()))
         p.watch_sought(out, frame);
-      p.calibrator.frames().take(p.odometry, out, frame);
+      // Of cameras out of step there is no calibration, also where no lag shows for a while.
+      if (p.out_of_step == 0 || p.state != State::stereo_odometry)
+        p.calibrator.frames().take(p.odometry, out, frame);
     }
   }
   p.odometry.rebuild(&out);

@@ -90,6 +90,16 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
   odometry.unlink();
 }
 
+void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept {
+  if (out_of_step == 0)
+    note(EstimatorEvent::Kind::rig_changed, stamp, sentence_of(CalibrationCause::out_of_step),
+         lag_frames);
+  out_of_step = kInStepAfter;
+  // Frames out of step would speak for a lag in the monitor's windows long after its end; those
+  // logged for a calibration are dropped with them.
+  calibrator.forget_frames();
+}
+
 /// What the monitors say of a frame posed with the calibration in use.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorVerdict::Kind;
@@ -97,13 +107,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
   undecided = v.undecided;
   shows_no_lag = v.shows_no_lag;
   if (v.kind == K::out_of_step) {
-    if (out_of_step == 0)
-      note(EstimatorEvent::Kind::rig_changed, frame.stamp,
-           sentence_of(CalibrationCause::out_of_step), v.lag_frames);
-    out_of_step = kInStepAfter;
-    // Frames out of step would speak for a lag in the monitor's windows long after its end; those
-    // logged for a calibration are dropped with them.
-    calibrator.forget_frames();
+    note_out_of_step(frame.stamp, v.lag_frames);
     return;
   }
   if (out_of_step > 0) {
@@ -170,6 +174,7 @@ void Estimator::Parts::note_length_sigma(const CalibrationDecision& decision) no
 
 /// What the drive has measured of the rig while it went on.
 void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept {
+  if (calibrator.last_gate() == calibration::Gate::out_of_step) return note_out_of_step(stamp, 0);
   if (decision.cause == CalibrationCause::contradicted && !verified)
     note(EstimatorEvent::Kind::calibration_contradicted, stamp,
          "the calibration in use is not that of the rig", decision.depth_difference_percent);

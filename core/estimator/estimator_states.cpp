@@ -45,7 +45,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     if (calibrator.seeking()) seek_anew(std::nullopt, frame.number, frame);
   }
   moves = out.posed && !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_of(out));
-  shows_no_lag = moves;  // where no monitor watches, as far as anything does
+  shows_no_lag = moves && !options.online;  // where there is no monitor, as far as anything does
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);

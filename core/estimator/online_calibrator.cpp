@@ -58,6 +58,9 @@ void OnlineCalibrator::use(const RigCalibration& rig, bool lenses) noexcept {
 
 void OnlineCalibrator::keep() noexcept {
   monitor_.expect_rebuilt_scene();
+  // What was learnt before the rig was doubted, or before an outage, is no witness of it as it is.
+  if (search_.cause != CalibrationCause::requested || !(watched_ || learnt_since_outage_))
+    forget_rig(&learnt_);
   watched_ = true;
   seeking_ = false;
   frames_.begin_segment();
@@ -283,6 +286,8 @@ void OnlineCalibrator::plan_learning(const RigSolution& found) noexcept {
   const bool usable = gate_ == Gate::open || gate_ == Gate::no_better;
   if (gate_ == Gate::does_not_fit) {
     frames_.begin_segment(found.newest + 1);
+  } else if (gate_ == Gate::rig_changed) {
+    frames_.begin_segment(found.changed_at);
   } else if (frames_.solved_frames() >= frames_.most()) {
     if (usable) {
       learnt_ = found.rig;

@@ -56,6 +56,12 @@ const Transform& transform(const RigCalibration& rig, int k) noexcept {
   return rig.T_camera_left[static_cast<std::size_t>(k)];
 }
 
+/// The left camera and camera k.
+bool both_show(const odometry::FrameOutcome& outcome, int k) noexcept {
+  return (outcome.structured & 1U) != 0 &&
+         ((outcome.structured >> static_cast<unsigned>(k)) & 1U) != 0;
+}
+
 }  // namespace
 
 std::size_t RigMonitor::memory_needed(const calibration::MonitorOptions& options, int cameras,
@@ -195,6 +201,10 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
   for (int k = 1; k < cameras_; ++k) {
     Watched& w = camera(k);
     if (first) w.jumps.reset();
+    if (!both_show(outcome, k)) {
+      w.jumps.skip(step);
+      continue;
+    }
     (void)collect_stereo(odometry.map(), k, kWitness);
     w.jumps.set_transform(w.T_camera_left_before);
     const calibration::DisparityJump jump = w.jumps.next(number, stereo_.span(), step);
@@ -225,15 +235,17 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
                                   const odometry::FrameOutcome& outcome,
                                   const RigFrame& frame) noexcept {
   MonitorVerdict worst;
-  bool in_step = true, no_lag = true;
+  bool in_step = true, no_lag = true, undecided = false, any_measures = false;
   const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < cameras_; ++k) {
     const int found = collect_stereo(odometry.map(), k, kWitness);
-    const calibration::DisparityJump jump =
-        camera(k).jumps.next(frame.number, stereo_.span(), step);
+    calibration::DisparityJump jump;
+    if (both_show(outcome, k))
+      jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
+    else
+      camera(k).jumps.skip(step);
     if (scene_pending_) {
-      worst.undecided = worst.undecided || jump.suspected;
-      in_step = no_lag = false;
+      undecided = undecided || jump.suspected;
       if (jump.confirmed) {
         worst.kind = MonitorVerdict::Kind::knock;
         worst.onset_frame = jump.onset_frame;
@@ -241,19 +253,24 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
       continue;
     }
     MonitorVerdict v = monitor_verdict(k, odometry, outcome, frame, found, step);
-    in_step = in_step && v.in_step;
-    no_lag = no_lag && v.shows_no_lag;
+    // One that shares no view with the left one says nothing of itself, nor for the others.
+    if (!v.needs_texture) {
+      any_measures = true;
+      in_step = in_step && v.in_step;
+      no_lag = no_lag && v.shows_no_lag;
+    }
     if (jump.confirmed && rank(v.kind) < rank(MonitorVerdict::Kind::knock)) {
       v.kind = MonitorVerdict::Kind::knock;
       v.onset_frame = jump.onset_frame;
     }
-    v.undecided = v.undecided || jump.suspected;
+    undecided = undecided || v.undecided || jump.suspected;
     if (rank(v.kind) > rank(worst.kind) ||
-        (rank(v.kind) == rank(worst.kind) && (v.undecided || v.statistic > worst.statistic)))
+        (rank(v.kind) == rank(worst.kind) && v.statistic > worst.statistic))
       worst = v;
   }
-  worst.in_step = in_step;
-  worst.shows_no_lag = no_lag;
+  worst.undecided = undecided;
+  worst.in_step = any_measures && in_step;
+  worst.shows_no_lag = any_measures && no_lag;
   return worst;
 }
 

@@ -17,7 +17,12 @@ Gate SolutionReview::gate(const RigSolution& found, bool must_be_better) const n
   q.may_have_changed = context_.may_have_changed;
   q.must_be_better = must_be_better;
   q.window_full = context_.last || found.frames >= context_.options.calibration.max_frames;
-  return calibration::check_acceptance(q, context_.options.calibration);
+  const Gate gate = calibration::check_acceptance(q, context_.options.calibration);
+  if (gate != Gate::no_better) return gate;
+  // A yaw hardly shows beside the epipolar lines that the gate asks about, and in the depth it
+  // does.
+  const calibration::Assessment a = assess(found, *context_.in_use, found.newest);
+  return a.contradicted && !a.worse ? Gate::open : gate;
 }
 
 bool SolutionReview::held_out_enough() const noexcept {

@@ -172,6 +172,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   budget_.begin(budget);
   const ImageCheck images = front_end_.begin(frame);
   clock.mark(Stage::pyramid);
+  out.structured = images.structured;
   out.images_good = weakness(images) == Reason::none;
   out.uneven = images.uneven;
   const double since_frame = gaps_.since_frame(frame.stamp);

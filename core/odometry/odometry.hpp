@@ -39,7 +39,8 @@ struct FrameOutcome {
   bool renewed = false;      // it did
   bool initialised = false;  // the rig's transform was found from this frame's images alone
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
-  bool images_good = false;  // every camera gave an image, new and with structure
+  std::uint8_t structured = 0;  // bit k: camera k gave an image that shows something new
+  bool images_good = false;     // every camera gave an image, new and with structure
   bool uneven = false;  // a camera gave an older image again and another a new one: from here on
                         // the one may be an exposure behind
   double scale =

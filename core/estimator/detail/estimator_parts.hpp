@@ -59,6 +59,7 @@ struct Estimator::Parts {
   void seek_anew(std::optional<CalibrationCause> cause, std::uint64_t onset,
                  const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
+  void note_out_of_step(Stamp stamp, double lag_frames) noexcept;
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
