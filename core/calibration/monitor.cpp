@@ -22,8 +22,9 @@ constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hu
                                          // less normal than the sum of many frames'
 constexpr double kAgrees = 0.5;          // of the threshold: below, a frame agrees
 // There is no lag: less than this of the smallest that is called one, with a sigma of less than
-// that of the last one found.
-constexpr double kNoLag = 0.5, kLagSigma = 0.6;
+// that of the last one found; a smaller one where the rig has changed meanwhile, too, and no quiet
+// windows speak for it.
+constexpr double kNoLag = 0.5, kLagSigma = 0.6, kLagSigmaOfAKnock = 0.25;
 
 void check(bool good, const char* name, const char* range) {
   if (!good)
@@ -186,7 +187,8 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
 bool Monitor::Parts::in_step() const noexcept {
   return measured_lag && latest.kind != Kind::out_of_step && !latest.undecided &&
          std::abs(latest.lag) < kNoLag * options.lag_frames &&
-         latest.lag_sigma < kLagSigma * std::max(lag_found, options.lag_frames);
+         latest.lag_sigma < (latest.kind == Kind::quiet ? kLagSigma : kLagSigmaOfAKnock) *
+                                std::max(lag_found, options.lag_frames);
 }
 
 MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {

@@ -35,9 +35,11 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kUnmatchedAfter) {
     unmatched_frames = 0;
-    // Good images of which no scene can be made: then it is the rig that does not fit.
-    give_up_calibration(frame, kUnmatchedAfter);
-    odometry.reset_extrinsics();
+    // Good images of which no scene can be made: before a wall, or it is the rig that does not fit.
+    if (!odometry.too_near()) {
+      give_up_calibration(frame, kUnmatchedAfter);
+      odometry.reset_extrinsics();
+    }
   }
   if (out.uneven) {
     may_lag = kLagShownAfter;

@@ -93,6 +93,11 @@ class FrontEnd {
   /// times that. Valid until the next call.
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
+  /// What the first two cameras share is nearer than points are looked for, by the calibration:
+  /// most free matches lie along its epipolar lines, and before that depth. As long as
+  /// match_free().
+  [[nodiscard]] bool too_near() noexcept;
+
   /// New corners of `left` where there are no points, matched across, as points of the given stage,
   /// each with its observation in `now`. As many as there is room for, by the effort, and
   /// `at_least` so many whatever that is.

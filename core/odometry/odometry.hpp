@@ -98,6 +98,8 @@ class Odometry {
   void rebuild(FrameOutcome* out) noexcept;
   /// From the next frame on the cameras are not linked; the scene stays.
   void unlink() noexcept;
+  /// No scene can be made of the newest frame although its calibration fits: all is too near.
+  [[nodiscard]] bool too_near() noexcept { return front_end_.too_near(); }
   /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with
   /// finding it.
   void reset_extrinsics() noexcept;

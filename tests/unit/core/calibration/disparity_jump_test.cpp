@@ -33,11 +33,9 @@ class Street {
   }
 
   DisparityJump drive(const Transform& T_right_left, double noise = kNoise) {
-    const Transform step{exp_so3(Vec3(0.002, 0.01, 0.001)), Vec3(0.02, 0.01, -0.9)};
     std::vector<StereoObservation> seen;
-    for (Point& p : points_) {
-      p.at = step * p.at;
-      if (p.at.z() < 4) p = fresh();
+    move();
+    for (const Point& p : points_) {
       const Vec3 r = T_right_left * p.at;
       StereoObservation s;
       s.left = pixel(p.at, noise);
@@ -46,7 +44,13 @@ class Street {
       s.track = p.track;
       seen.push_back(s);
     }
-    return detector_.next(frame_++, seen, step);
+    return detector_.next(frame_++, seen, step_);
+  }
+  /// Without an image of the right camera.
+  void drive_unseen() {
+    move();
+    detector_.skip(step_);
+    ++frame_;
   }
 
  private:
@@ -54,6 +58,12 @@ class Street {
     Vec3 at;
     std::uint32_t track;
   };
+  void move() {
+    for (Point& p : points_) {
+      p.at = step_ * p.at;
+      if (p.at.z() < 4) p = fresh();
+    }
+  }
   Point fresh() {
     return {Vec3(random_.uniform(-12, 12), random_.uniform(-3, 2), random_.uniform(6, 40)),
             next_track_++};
@@ -63,6 +73,7 @@ class Street {
             kPinhole.fy * p.y() / p.z() + kPinhole.cy + noise * random_.normal()};
   }
 
+  const Transform step_{exp_so3(Vec3(0.002, 0.01, 0.001)), Vec3(0.02, 0.01, -0.9)};
   Arena arena_;
   DisparityJumpDetector detector_;
   Random random_;
@@ -110,6 +121,30 @@ TEST(DisparityJump, OneSpoiltImageIsSuspectedAndNotConfirmed) {
   EXPECT_FALSE(back.suspected);
   EXPECT_FALSE(back.confirmed);
   EXPECT_FALSE(street.drive(rig(0)).confirmed);
+}
+
+TEST(DisparityJump, AMissingImageAfterASpoiltOneIsNoChangeAndDoesNotHideOne) {
+  Street spoilt(rig(0));
+  for (int i = 0; i < 20; ++i) (void)spoilt.drive(rig(0));
+  EXPECT_TRUE(spoilt.drive(rig(0.3)).suspected);
+  spoilt.drive_unseen();
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(spoilt.drive(rig(0)).confirmed) << i;
+
+  Street turned(rig(0));
+  for (int i = 0; i < 20; ++i) (void)turned.drive(rig(0));
+  EXPECT_TRUE(turned.drive(rig(0.3)).suspected);
+  turned.drive_unseen();
+  const DisparityJump jump = turned.drive(rig(0.3));
+  EXPECT_TRUE(jump.confirmed);
+  EXPECT_EQ(jump.onset_frame, 20U);
+}
+
+TEST(DisparityJump, ATurnWhileTheImageIsMissingIsSeenAfterIt) {
+  Street street(rig(0));
+  for (int i = 0; i < 20; ++i) (void)street.drive(rig(0));
+  for (int i = 0; i < 2; ++i) street.drive_unseen();
+  EXPECT_TRUE(street.drive(rig(0.3)).suspected);
+  EXPECT_TRUE(street.drive(rig(0.3)).confirmed);
 }
 
 // 0.03° are 0.38 px: shaken by that, 1 px is within five times the scatter (1.9 px), and eight calm

@@ -212,6 +212,23 @@ TEST(Gates, aKnockOfOneCameraIsMendedThoughAnotherOneIsHeldALittleLessWell) {
   }
 }
 
+TEST(Gates, whatContradictsOneCameraIsNotHiddenByWhatIsNotKnownOfAnother) {
+  for (const std::size_t wrong : {1U, 2U}) {
+    Case c(kThird);
+    const std::size_t poor = 3 - wrong;
+    const int yaw = extrinsic_row(static_cast<int>(poor)) + 1;
+    constexpr double kUnknown = 0.01;  // rad: more than the turn
+    c.solution.rig.covariance.set(yaw, yaw, kUnknown * kUnknown);
+    const auto assessed = [&] {
+      return assess(c.solution.rig, c.in_use, c.log, c.solution.newest, c.options, 0.15);
+    };
+    ASSERT_FALSE(assessed().contradicted);
+    c.turn(&c.in_use, {0, 0.3, 0}, wrong);
+    EXPECT_TRUE(assessed().contradicted) << wrong;
+    EXPECT_FALSE(assessed().confirmed);
+  }
+}
+
 TEST(Gates, aThirdCameraThatFramesNotUsedContradictIsNotAdopted) {
   Case c(kThird);
   EXPECT_EQ(c.ask(), Gate::open);

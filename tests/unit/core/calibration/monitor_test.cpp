@@ -144,13 +144,16 @@ TEST(Monitor, findsACameraOneFrameOutOfStepWithinASecond) {
       }
 }
 
-TEST(Monitor, saysInStepOnlyOnceALagHasEnded) {
-  constexpr std::uint64_t kFrom = 150, kUntil = 240;
+/// `turned_deg`: by which the camera is not put back as it was, while it lags.
+void expect_in_step_only_after_a_lag(double turned_deg) {
+  constexpr std::uint64_t kFrom = 150, kTurned = 200, kUntil = 240;
   for (const double speed : {3.0, 8.0, 15.0})
     for (const double lag : {1.0, -1.0}) {
       SCOPED_TRACE(testing::Message() << lag << " frames at " << speed << " m/s");
       FeatureDriveOptions o = street(speed, 3, 300);
       o.lags = {{kFrom, lag}, {kUntil, 0.0}};
+      if (turned_deg > 0)
+        o.changes = {{kTurned, Vec3(turned_deg / 57.29578, 0, 0), Vec3::Zero(), 0}};
       MonitorTrial trial(o);
       for (std::uint64_t i = 0; i < kFrom; ++i) (void)trial.step();
       ASSERT_TRUE(trial.frames_until(30, Kind::out_of_step).has_value());
@@ -168,6 +171,10 @@ TEST(Monitor, saysInStepOnlyOnceALagHasEnded) {
                             << trial.verdict().lag_sigma;
     }
 }
+
+TEST(Monitor, saysInStepOnlyOnceALagHasEnded) { expect_in_step_only_after_a_lag(0); }
+
+TEST(Monitor, saysInStepOfACameraThatWasTurnedMeanwhile) { expect_in_step_only_after_a_lag(0.3); }
 
 TEST(Monitor, saysInStepOfAFrameThatMovesOnly) {
   MonitorTrial trial(street(8, 3, 300));

@@ -167,6 +167,16 @@ TEST(Verifying, aYawKnockedAfterARigWasLearntIsMendedOnceAndNotDrawnBack) {
   expect_mended_once(0.004);
 }
 
+// A garage: everything is nearer than points are looked for, and that is no fault of the rig.
+TEST(Verifying, aCalibrationIsNotGivenUpWhereAllIsTooNear) {
+  Claim c;
+  c.options.odometry.nearest_baselines = 50;  // 25 m; the corridor ends at 24
+  c.drive(40);
+  EXPECT_EQ(c.first(Kind::calibration_contradicted), -1) << c.story;
+  EXPECT_EQ(c.first(Kind::rig_changed), -1) << c.story;
+  EXPECT_EQ(c.samples.back().reason, Reason::no_stereo_matches) << c.story;
+}
+
 TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
   Claim c;
   const Transform truth = c.given.T_camera_left[1];
