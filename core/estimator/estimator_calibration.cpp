@@ -174,7 +174,10 @@ void Estimator::Parts::note_length_sigma(const CalibrationDecision& decision) no
 
 /// What the drive has measured of the rig while it went on.
 void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept {
-  if (calibrator.last_gate() == calibration::Gate::out_of_step) return note_out_of_step(stamp, 0);
+  if (calibrator.last_gate() == calibration::Gate::out_of_step) {
+    verified = calibrator.verified();
+    return note_out_of_step(stamp, 0);
+  }
   if (decision.cause == CalibrationCause::contradicted && !verified)
     note(EstimatorEvent::Kind::calibration_contradicted, stamp,
          "the calibration in use is not that of the rig", decision.depth_difference_percent);
