@@ -11,12 +11,14 @@ namespace vergence::odometry {
 using detail::kNearEnough;
 using detail::kRigidShare;
 using detail::StageClock;
+using detail::weakness;
 
 namespace {
 
 constexpr int kFramesUntilTrial =
     3;  // without new points, before some are made to be tried alone: no keyframe is made while
         // the rig stands, and it stands for whoever follows a truck alongside
+constexpr int kRelinkWaits = 60;  // frames, for something near to begin a scene with
 constexpr int kTrialPoints = 40;  // of them, however little time there is: enough to judge from
 constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
                                          // rig that fits, 0.12 to 0.2 a frame out of step
@@ -51,7 +53,7 @@ Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bo
   reset_extrinsics();
 }
 
-void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = rig; }
+void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = {rig, 0}; }
 
 void Odometry::unlink() noexcept {
   link_ = Link::unlinked;
@@ -130,17 +132,10 @@ double Odometry::new_points(const PoseFit& fit, int at_least, FrameOutcome* out)
   return static_cast<double>(ms);
 }
 
-Reason Odometry::weakness(const ImageCheck& images) const noexcept {
-  const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(rig_.cameras)) - 1U);
-  if (images.given != all) return Reason::no_image;
-  if (images.repeated) return Reason::image_repeated;
-  return images.structured != all ? Reason::image_dark : Reason::none;
-}
-
 void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept {
   out->status = PoseStatus::degraded;
   const bool moving = moving_.judge(fit.inliers < kRigidShare * fit.given, link_ == Link::linked);
-  const Reason of_images = weakness(images);
+  const Reason of_images = weakness(images, rig_.cameras);
   if (restart_cooldown_ > 0)
     out->reason = Reason::scene_restarted;
   else if (of_images != Reason::none)
@@ -173,7 +168,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const ImageCheck images = front_end_.begin(frame);
   clock.mark(Stage::pyramid);
   out.structured = images.structured;
-  out.images_good = weakness(images) == Reason::none;
+  out.images_good = weakness(images, rig_.cameras) == Reason::none;
   out.uneven = images.uneven;
   const double since_frame = gaps_.since_frame(frame.stamp);
   const double dt = motion_.any() ? (frame.stamp - motion_.stamp()).to_seconds() : 0.0;
@@ -193,9 +188,9 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
       gaps_.note(frames_lost_ == 0 ? dt : since_frame, options_.max_gap_s, link_ == Link::linked);
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
-    out.reason = weakness(images) != Reason::none ? weakness(images)
-                 : out.gap_s > 0                  ? Reason::time_gap
-                                                  : Reason::no_pose;
+    out.reason = weakness(images, rig_.cameras) != Reason::none ? weakness(images, rig_.cameras)
+                 : out.gap_s > 0                                ? Reason::time_gap
+                                                                : Reason::no_pose;
     if (images.structured != 0 && ++frames_lost_ >= kFramesLostBeforeRestart) lose_scene();
     return out;
   }
@@ -217,11 +212,13 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const FrameEffort effort =
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
-  // A scene that could not be begun with this frame is not given away for a better calibration.
-  const bool could_begin = out.images_good && fit.confirmed_stereo() && fit.near >= kNearEnough;
-  if (next_rig_ && (link_ == Link::linked ? could_begin : out.images_good)) {
+  // Far things alone carry a scene on and begin none: for a better calibration it is not given away
+  // at once. Not for ever: with a wrong one near things look far.
+  const bool all_far = link_ == Link::linked && fit.confirmed_stereo() && fit.near < kNearEnough;
+  const bool waits = next_rig_ && all_far && next_rig_->waited++ < kRelinkWaits;
+  if (next_rig_ && out.images_good && !waits) {
     out.relink_due = true;
-  } else if (gaps_.renewal_due() && could_begin) {
+  } else if (gaps_.renewal_due() && out.images_good && fit.confirmed_stereo() && !all_far) {
     out.renewal_due = true;
   } else if (fit.confirmed_stereo() && !images.repeated && wants_keyframe()) {
     out.effort = effort;

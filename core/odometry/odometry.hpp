@@ -141,15 +141,17 @@ class Odometry {
   /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
   /// again.
   void lose_scene() noexcept;
-  /// What is wrong with the images themselves, `none` if nothing.
-  [[nodiscard]] Reason weakness(const ImageCheck& images) const noexcept;
   void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;
 
   const OdometryOptions& options_;
   RigCalibration rig_;
   Link link_;
-  bool rig_known_;                          // rig_ has a transform to begin with
-  std::optional<RigCalibration> next_rig_;  // waits for the next pose
+  bool rig_known_;  // rig_ has a transform to begin with
+  struct Next {
+    RigCalibration rig;
+    int waited;  // frames
+  };
+  std::optional<Next> next_rig_;  // taken up with a pose to come
   FrontEnd front_end_;
   Map map_;
   WindowAdjuster window_;

@@ -10,6 +10,7 @@ namespace vergence::odometry {
 using detail::kNearEnough;
 using detail::kRigidShare;
 using detail::StageClock;
+using detail::weakness;
 
 namespace {
 
@@ -91,7 +92,8 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
   bool started = !initialise || initialise_rig(out);
   if (started && !start_scene(predicted, frame.stamp, out)) started = false;
   if (!started) {
-    if (weakness(images) != Reason::none) out->reason = weakness(images);
+    if (weakness(images, rig_.cameras) != Reason::none)
+      out->reason = weakness(images, rig_.cameras);
     return;
   }
   if (link_ == Link::unlinked) {
@@ -105,9 +107,9 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
     out->status = PoseStatus::degraded;
     out->reason = Reason::uncalibrated;
   }
-  if (weakness(images) != Reason::none) {  // begun by the other cameras
+  if (weakness(images, rig_.cameras) != Reason::none) {  // begun by the other cameras
     out->status = PoseStatus::degraded;
-    out->reason = weakness(images);
+    out->reason = weakness(images, rig_.cameras);
   }
   if (motion_.any()) {
     out->restarted = true;
@@ -134,7 +136,7 @@ void Odometry::reset_extrinsics() noexcept {
 
 void Odometry::take_up_link() noexcept {
   link_ = Link::linked;
-  rig_ = *next_rig_;
+  rig_ = next_rig_->rig;
   next_rig_.reset();
   rig_known_ = true;
   front_end_.rebuild_lenses();

@@ -10,6 +10,14 @@ inline constexpr int kNearEnough = 10;  // near points that keep the scale
 inline constexpr double kRigidShare =
     0.4;  // of the points found that must agree: below it something else moves
 
+/// What is wrong with a frame's images themselves, `none` if nothing.
+inline Reason weakness(const ImageCheck& images, int cameras) noexcept {
+  const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(cameras)) - 1U);
+  if (images.given != all) return Reason::no_image;
+  if (images.repeated) return Reason::image_repeated;
+  return images.structured != all ? Reason::image_dark : Reason::none;
+}
+
 /// Times of a frame's stages.
 class StageClock {
  public:
