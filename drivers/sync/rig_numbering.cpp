@@ -11,9 +11,10 @@ RigSynchronizer::Step RigSynchronizer::number_of(const SyncFrame& frame, std::ui
   if (proves_numbers(options_.mode)) return number_by_pulse(frame, number, image);
   if (pairs_by_time(options_.mode)) {
     image->time = by_time_.time_of(frame, sets_);
-    const TimeNumbering::Number found = by_time_.number_of(image->time, &sets_);
-    counters_.contradictions[k] += found.clock_set_back ? 1 : 0;
-    *number = found.number;
+    const TimeNumbering::Number found = by_time_.number_of(k, image->time, &sets_);
+    counters_.contradictions[k] += found.clock_set ? 1 : 0;
+    if (!found.number) return Step::late;
+    *number = *found.number;
   } else {
     *number = by_counter_.number_of(k, frame.counter, frame.middle.host);
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstdlib>
 
 #include "drivers/sync/durations.hpp"
 
@@ -27,6 +28,10 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   std::uint64_t number = 0;
   const Step step = number_of(frame, &number, &image);
   if (step == Step::acquiring) return SyncVerdict::acquiring;
+  if (step == Step::late) {
+    ++counters_.late[k];
+    return SyncVerdict::late;
+  }
   if (sets_.is_out(number)) return verdict_on_late(k, number, step, image);
   OpenSet* open = sets_.find(number);
   if (step == Step::again || (open != nullptr && open->set.present[k])) {
@@ -54,8 +59,8 @@ SyncVerdict RigSynchronizer::verdict_on_late(std::size_t camera, std::uint64_t n
     ++counters_.acquiring[camera];
     return SyncVerdict::acquiring;
   }
-  const bool of_it =
-      !pairs_by_time(options_.mode) || image.time - sets_.last_time() >= -options_.tolerance.ns();
+  const bool of_it = !pairs_by_time(options_.mode) ||
+                     std::abs(image.time - sets_.last_time()) <= options_.tolerance.ns();
   const bool given = step == Step::again || (of_it && sets_.went_out_with(number, camera));
   ++(given ? counters_.duplicate : counters_.late)[camera];
   return given ? SyncVerdict::duplicate : SyncVerdict::late;
@@ -171,7 +176,7 @@ void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
       // A clock that is common no more (no master, two of them) pairs one exposure with the next
       // once it has drifted apart by an interval; the host's stamps know better.
       set->proof = SyncProof::common_clock;
-      if (!host_stamps_agree(*set)) doubt(set);
+      if (!host_stamps_agree(*set) || a_clock_is_apart()) doubt(set);
       return;
     case SyncMode::board:
     case SyncMode::ins_syncout:
@@ -195,6 +200,12 @@ void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
 /// True also of a single image, whose spread is none.
 bool RigSynchronizer::host_stamps_agree(const SyncedSet& set) const noexcept {
   return set.spread * 2 <= options_.interval;
+}
+
+bool RigSynchronizer::a_clock_is_apart() const noexcept {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k)
+    if (sources_[k].here && by_time_.apart(k)) return true;
+  return false;
 }
 
 void RigSynchronizer::doubt(SyncedSet* set) noexcept {

@@ -38,7 +38,8 @@ namespace vergence {
 ///            again. A frame that comes before its pulse's report is given the pulse's number all
 ///            the same; the report then confirms it, or the set is `unproven`.
 /// One clock  Of a set paired by stamps of one bus or PTP clock the host's stamps must agree within
-///            half an interval, else it is `unproven`.
+///            half an interval, else it is `unproven`; so is every set while a camera that is there
+///            has a clock far from the others'.
 /// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot
 ///            be told here.
 /// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the
@@ -93,7 +94,7 @@ class RigSynchronizer {
     std::uint64_t newest = 0;  // number
     std::uint64_t from = 0;    // number; sets below did not wait for it, as it was acquiring
   };
-  enum class Step : std::uint8_t { numbered, again, acquiring };
+  enum class Step : std::uint8_t { numbered, again, acquiring, late };
 
   // By counter, by time, by pulses: the number of a frame's set.
   [[nodiscard]] Step number_of(const SyncFrame& frame, std::uint64_t* number,
@@ -111,6 +112,7 @@ class RigSynchronizer {
 
   void prove(OpenSet* open, SyncedSet* set) noexcept;
   [[nodiscard]] bool host_stamps_agree(const SyncedSet& set) const noexcept;
+  [[nodiscard]] bool a_clock_is_apart() const noexcept;
   void doubt(SyncedSet* set) noexcept;
   [[nodiscard]] bool ready(const OpenSet& open) const noexcept;
   [[nodiscard]] bool waited_for(std::size_t camera) const noexcept;

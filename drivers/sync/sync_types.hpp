@@ -90,8 +90,9 @@ struct SyncFrame {
 enum class SyncProof : std::uint8_t {
   counted,       // paired by counter, and the stamps agree within half an interval (also: one image
                  // only)
-  unproven,      // paired by counter or a common clock, and the host's stamps do not agree; or a
-                 // pulse's report contradicts: do not estimate from it
+  unproven,      // paired by counter or a common clock, and the host's stamps do not agree, or a
+                 // camera's clock is not the others'; or a pulse's report contradicts: do not
+                 // estimate from it
   by_time,       // paired by the host's stamps
   numbered,      // every image belongs to this numbered pulse, as its camera's own intervals proved
   master,        // the same with camera 0's exposures for pulses
@@ -124,7 +125,8 @@ struct SyncedSet {
 enum class SyncVerdict : std::uint8_t {
   taken,      // the slot comes out with its set
   duplicate,  // that camera has given this pulse already; the slot stays the caller's
-  late,       // its set has gone out without it; the slot stays the caller's
+  late,       // its set has gone out without it, or by its stamp it is of none; the slot stays the
+              // caller's
   acquiring,  // nothing proves yet which pulse it is of; the slot stays the caller's
 };
 

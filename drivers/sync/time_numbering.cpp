@@ -9,6 +9,51 @@ namespace {
 
 constexpr std::int64_t kBusWrap = 128'000'000'000;  // ns, of the IEEE 1394 cycle timer
 
+/// The sets whose times are of the clock that counts now: those that are open, and the last that
+/// went out, unless a flush has ended their count.
+class Counted {
+ public:
+  explicit Counted(const OpenSets& sets) noexcept
+      : out_(sets.any_out() && sets.last_out() >= sets.flushed_below()) {
+    if (out_) add(sets.last_out(), sets.last_time());
+    for (const OpenSet& o : sets.slots())
+      if (o.used && o.set.number >= sets.flushed_below())
+        add(o.set.number, o.images[o.base()].time);
+  }
+
+  [[nodiscard]] bool any() const noexcept { return any_; }
+  /// The last that went out is one of them.
+  [[nodiscard]] bool out() const noexcept { return out_; }
+  // Precondition: any().
+  [[nodiscard]] std::uint64_t newest() const noexcept { return newest_; }
+  [[nodiscard]] std::int64_t newest_time() const noexcept { return newest_time_; }
+
+  [[nodiscard]] bool astray(std::int64_t time, Duration interval) const noexcept {
+    constexpr double kFarBack = 2e9;   // ns: no frame is late by that
+    constexpr double kLeap = 100'000;  // intervals: over an hour of silence, or the clock was set
+    // Stamps of two clocks may be too far apart for integers.
+    const auto from = [time](std::int64_t reference) {
+      return static_cast<double>(time) - static_cast<double>(reference);
+    };
+    return any_ && (from(oldest_time_) < -kFarBack ||
+                    from(newest_time_) > kLeap * static_cast<double>(interval.ns()));
+  }
+
+ private:
+  void add(std::uint64_t number, std::int64_t time) noexcept {
+    if (!any_ || number >= newest_) {
+      newest_ = number;
+      newest_time_ = time;
+    }
+    oldest_time_ = any_ ? std::min(oldest_time_, time) : time;
+    any_ = true;
+  }
+
+  bool any_ = false, out_;
+  std::uint64_t newest_ = 0;
+  std::int64_t newest_time_ = 0, oldest_time_ = 0;
+};
+
 }  // namespace
 
 std::int64_t TimeNumbering::time_of(const SyncFrame& frame, const OpenSets& sets) const noexcept {
@@ -24,58 +69,43 @@ std::int64_t TimeNumbering::time_of(const SyncFrame& frame, const OpenSets& sets
                                               : apart);
 }
 
-/// A common clock that has been set back would make everything late for ever.
-bool TimeNumbering::ran_back(std::int64_t time, const OpenSets& sets) noexcept {
-  constexpr int kBelieved = 3;
-  constexpr std::int64_t kFarBack = 2'000'000'000;  // ns: no frame is late by that
-  back_ = sets.any_out() && sets.last_time() - time > kFarBack ? back_ + 1 : 0;
-  if (back_ < kBelieved) return false;
-  back_ = 0;
-  return true;
-}
-
-TimeNumbering::Number TimeNumbering::number_of(std::int64_t time, OpenSets* sets) noexcept {
-  Number n;
-  n.clock_set_back = ran_back(time, *sets);
-  if (n.clock_set_back) {
-    sets->flush();
-    new_clock_ = true;
+TimeNumbering::Number TimeNumbering::number_of(std::size_t camera, std::int64_t time,
+                                               OpenSets* sets) noexcept {
+  if (!Counted(*sets).astray(time, interval_)) {
+    astray_[camera] = astray_in_a_row_ = 0;
+    return {place(time, *sets), false};
   }
-  n.number = place(time, *sets);
-  return n;
+  ++astray_[camera];
+  if (++astray_in_a_row_ < kBelieved) return {};
+  astray_ = {};
+  astray_in_a_row_ = 0;
+  sets->flush();
+  return {sets->flushed_below(), true};
 }
 
-std::uint64_t TimeNumbering::place(std::int64_t time, const OpenSets& sets) noexcept {
-  const OpenSet *best = nullptr, *newest = nullptr;
+std::optional<std::uint64_t> TimeNumbering::place(std::int64_t time,
+                                                  const OpenSets& sets) const noexcept {
+  const OpenSet* best = nullptr;
   std::int64_t nearest = tolerance_.ns();
   for (const OpenSet& o : sets.slots()) {
     if (!o.used || o.set.number < sets.flushed_below()) continue;
-    if (newest == nullptr || o.set.number > newest->set.number) newest = &o;
     const std::int64_t distance = std::abs(time - o.images[o.base()].time);
     if (distance > nearest) continue;
     nearest = distance;
     best = &o;
   }
   if (best != nullptr) return best->set.number;
-  if (new_clock_) {
-    new_clock_ = false;
-    return sets.flushed_below();
-  }
-  if (sets.any_out() && sets.last_out() >= sets.flushed_below() &&
-      time - sets.last_time() <= tolerance_.ns())
-    return sets.last_out();
-  if (newest == nullptr && !sets.any_out()) return 0;
-  const std::uint64_t reference = newest != nullptr ? newest->set.number : sets.last_out();
-  const std::int64_t reference_time =
-      newest != nullptr ? newest->images[newest->base()].time : sets.last_time();
-  const std::int64_t steps = std::llround(static_cast<double>(time - reference_time) /
+  const Counted counted(sets);
+  if (!counted.any()) return sets.first_free();
+  if (counted.out() && time - sets.last_time() <= tolerance_.ns()) return sets.last_out();
+  const std::int64_t steps = std::llround(static_cast<double>(time - counted.newest_time()) /
                                           static_cast<double>(interval_.ns()));
-  const bool after = time > reference_time;
+  const bool after = time > counted.newest_time();
   const std::int64_t number =
-      static_cast<std::int64_t>(reference) +
+      static_cast<std::int64_t>(counted.newest()) +
       (after ? std::max<std::int64_t>(steps, 1) : std::min<std::int64_t>(steps, -1));
-  const bool taken = number < 0 || sets.find(static_cast<std::uint64_t>(number)) != nullptr;
-  return taken ? sets.last_out() : static_cast<std::uint64_t>(number);
+  if (number < 0 || sets.find(static_cast<std::uint64_t>(number)) != nullptr) return std::nullopt;
+  return static_cast<std::uint64_t>(number);
 }
 
 }  // namespace vergence

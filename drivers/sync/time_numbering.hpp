@@ -1,6 +1,9 @@
 #pragma once
+#include <array>
 #include <cstdint>
+#include <optional>
 
+#include "core/types/calibration.hpp"
 #include "drivers/sync/open_sets.hpp"
 #include "drivers/sync/sync_types.hpp"
 
@@ -9,17 +12,22 @@ namespace vergence {
 /// The numbers of sets from stamps of one clock: for the modes software, bus, ptp and one_picture.
 ///
 /// What was exposed within the tolerance of an open set is of that set; anything else begins one,
-/// so many intervals after the newest or before it. A clock that is set back by more than any frame
-/// can be late, several frames in a row, begins a new count: what is open then waits for nobody.
+/// so many intervals after the newest or before it. What would be before the first set, or between
+/// two that are open, is of none.
+///
+/// Astray   A frame that is farther back than any can be late, or over an hour of intervals ahead,
+///          has another clock than the others. Several in a row, of whatever camera, and the common
+///          clock was set: a new count begins, at the next number, and what is open waits for
+///          nobody. Where other cameras' frames fit meanwhile, that camera's clock is apart.
 ///
 /// Threads  One caller. Memory: in place. Time: constant a call.
 /// Units    Times are ns of the clock that pairs: the host's, the bus's, PTP's.
-/// Errors   None; a clock that was set back is told.
+/// Errors   None; a clock that was set, or is apart, is told.
 class TimeNumbering {
  public:
   struct Number {
-    std::uint64_t number = 0;  // one that has gone out: too late
-    bool clock_set_back = false;
+    std::optional<std::uint64_t> number;  // none, or one that has gone out: too late
+    bool clock_set = false;
   };
 
   explicit TimeNumbering(const SyncOptions& options) noexcept
@@ -29,17 +37,23 @@ class TimeNumbering {
   /// cameras' drivers that nearest to the newest set's is meant.
   [[nodiscard]] std::int64_t time_of(const SyncFrame& frame, const OpenSets& sets) const noexcept;
   /// The number of the open set that it fits into, or a new one in the order of time. Flushes the
-  /// sets where the clock was set back.
-  [[nodiscard]] Number number_of(std::int64_t time, OpenSets* sets) noexcept;
+  /// sets where the clock was set.
+  [[nodiscard]] Number number_of(std::size_t camera, std::int64_t time, OpenSets* sets) noexcept;
+  /// This camera's newest frames are all astray, while others' fit.
+  [[nodiscard]] bool apart(std::size_t camera) const noexcept {
+    return astray_[camera] >= kBelieved;
+  }
 
  private:
-  [[nodiscard]] bool ran_back(std::int64_t time, const OpenSets& sets) noexcept;
-  [[nodiscard]] std::uint64_t place(std::int64_t time, const OpenSets& sets) noexcept;
+  static constexpr int kBelieved = 3;  // frames in a row: more than a stamp that is broken
+
+  [[nodiscard]] std::optional<std::uint64_t> place(std::int64_t time,
+                                                   const OpenSets& sets) const noexcept;
 
   SyncMode mode_;
   Duration interval_, tolerance_;
-  int back_ = 0;            // frames in a row whose common clock has run back
-  bool new_clock_ = false;  // … and was set: the next frame begins a new count of time
+  std::array<int, kMaxCameras> astray_{};  // newest frames of each that are
+  int astray_in_a_row_ = 0;                // of all cameras
 };
 
 }  // namespace vergence

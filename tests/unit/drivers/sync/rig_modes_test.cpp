@@ -11,171 +11,32 @@
 #include "drivers/sync/rig_synchronizer.hpp"
 #include "drivers/sync/sync_out_pulses.hpp"
 #include "firmware_iface/trigger/trigger.h"
+#include "tests/unit/drivers/sync/rig_frames.hpp"
 
-/// The modes beside `board`: a common clock, the INS's pulses, one camera that triggers the others.
+/// The modes with other pulses than a board's: the INS's, those of one camera that triggers the
+/// others; and what all with pulses share.
 namespace vergence {
 namespace {
 
-constexpr Duration kInterval = Duration::milliseconds(40);
-constexpr Duration kExposure = Duration::milliseconds(6);
-
-struct Out {
-  std::vector<SyncedSet> sets;
-
-  void drain(RigSynchronizer* sync) {
-    for (SyncedSet set; sync->next(&set);) sets.push_back(set);
-  }
-  [[nodiscard]] std::size_t complete() const {
-    return static_cast<std::size_t>(
-        std::count_if(sets.begin(), sets.end(), [](const SyncedSet& s) { return s.complete; }));
-  }
-  /// Slots carry the pulse in every test here.
-  void expect_pairs() const {
-    for (const SyncedSet& s : sets) {
-      if (s.present[0] && s.present[1]) {
-        EXPECT_EQ(s.slots[0], s.slots[1]) << s.number;
-      }
-    }
-  }
-};
-
-SyncFrame frame(int camera, int pulse, std::uint64_t counter, HostStamp start,
-                DeviceStamp by_camera, Duration delay = Duration::milliseconds(30)) {
-  SyncFrame f;
-  f.camera = camera;
-  f.slot = static_cast<FrameSlot>(pulse);
-  f.counter = counter;
-  f.exposure_start = by_camera;
-  f.exposure = kExposure;
-  f.middle = {start + kExposure / 2, Duration::microseconds(300)};
-  f.arrival = start + delay + Duration::microseconds(100 * camera);
-  return f;
-}
-
-HostStamp host_at(int pulse) { return HostStamp(77'000'000'000) + kInterval * pulse; }
-
-SyncOptions options(SyncMode mode) {
-  SyncOptions o;
-  o.mode = mode;
-  o.interval = kInterval;
-  return o;
-}
-
-// ---- one common clock ----
-
-struct CommonClock : ::testing::TestWithParam<SyncMode> {};
-
-TEST_P(CommonClock, pairsByItsOwnStampsWhateverTheHostsAre) {
-  RigSynchronizer sync(options(GetParam()));
-  Out out;
-  Random random(3);
-  for (int n = 0; n < 6000; ++n) {  // four minutes: the bus's clock wraps once
-    const DeviceStamp t(50'000'000'000 + (kInterval * n).ns());
-    // Counters mean nothing, and the host's stamps are off by nearly half an interval.
-    for (int k = 0; k < 2; ++k) {
-      if (n == 100 && k == 1) continue;
-      SyncFrame f = frame(k, n, random.next(), host_at(n), t + Duration::microseconds(k * 80));
-      f.middle.host = f.middle.host + Duration::milliseconds(19 * k);
-      EXPECT_EQ(sync.offer(f), SyncVerdict::taken) << n;
-      out.drain(&sync);
-    }
-  }
-  sync.finish();
-  out.drain(&sync);
-  out.expect_pairs();
-  EXPECT_EQ(out.complete(), 5999U);
-  EXPECT_EQ(sync.counters().lost[1], 1U);
-  for (const SyncedSet& s : out.sets) EXPECT_EQ(s.proof, SyncProof::common_clock);
-  EXPECT_TRUE(sync.proven(0));
-}
-
-TEST_P(CommonClock, whatIsTooFarApartIsNotPaired) {
-  RigSynchronizer sync(options(GetParam()));
-  Out out;
-  for (int n = 0; n < 50; ++n)
-    for (int k = 0; k < 2; ++k) {
-      (void)sync.offer(frame(k, n, 0, host_at(n),
-                             DeviceStamp((kInterval * n).ns()) + Duration::milliseconds(15 * k)));
-      out.drain(&sync);
-    }
-  EXPECT_EQ(out.complete(), 0U);
-}
-
-TEST_P(CommonClock, thatDriftsApartByAnIntervalProvesNothing) {
-  RigSynchronizer sync(options(GetParam()));
-  Out out;
-  // Camera 1's clock loses its master at n = 500 and gains 2 ms a second from then on: a whole
-  // interval after 20 s.
-  for (int n = 0; n < 1200; ++n)
-    for (int k = 0; k < 2; ++k) {
-      const Duration ahead = Duration::microseconds(k == 1 && n > 500 ? 80 * (n - 500) : 0);
-      (void)sync.offer(
-          frame(k, n, 0, host_at(n), DeviceStamp(90'000'000'000 + (kInterval * n).ns()) + ahead));
-      out.drain(&sync);
-    }
-  sync.finish();
-  out.drain(&sync);
-  std::uint64_t doubted = 0;
-  for (const SyncedSet& s : out.sets) {
-    const bool together = s.spread < kInterval / 2;
-    EXPECT_EQ(s.proof, together ? SyncProof::common_clock : SyncProof::unproven) << s.number;
-    doubted += together ? 0 : 1;
-  }
-  EXPECT_GT(doubted, 40U) << "an exposure and the next";
-  EXPECT_EQ(sync.counters().unproven, doubted);
-}
-
-TEST_P(CommonClock, thatIsSetBackIsFollowedAfterThreeFrames) {
-  RigSynchronizer sync(options(GetParam()));
-  Out out;
-  for (int n = 0; n < 400; ++n) {
-    const std::int64_t set = n < 200 ? 0 : -20'000'000'000;
-    for (int k = 0; k < 2; ++k) {
-      (void)sync.offer(
-          frame(k, n, 0, host_at(n), DeviceStamp(90'000'000'000 + (kInterval * n).ns() + set)));
-      out.drain(&sync);
-    }
-  }
-  sync.finish();
-  out.drain(&sync);
-  out.expect_pairs();
-  EXPECT_GE(out.complete(), 397U);
-  EXPECT_EQ(sync.counters().contradictions[0] + sync.counters().contradictions[1], 1U);
-  for (std::size_t i = 1; i < out.sets.size(); ++i)
-    EXPECT_GT(out.sets[i].number, out.sets[i - 1].number);
-}
-
-INSTANTIATE_TEST_SUITE_P(Modes, CommonClock, ::testing::Values(SyncMode::bus, SyncMode::ptp));
-
-TEST(RigModes, camerasOnABusThatUnwrappedItsClockDifferentlyArePairedModulo128Seconds) {
-  for (const std::int64_t wraps : {-3, -1, 1, 2}) {
-    RigSynchronizer sync(options(SyncMode::bus));
-    Out out;
-    for (int n = 0; n < 7000; ++n)
-      for (int k = 0; k < 2; ++k) {
-        const std::int64_t t = 120'000'000'000 + (kInterval * n).ns() + k * wraps * 128'000'000'000;
-        (void)sync.offer(frame(k, n, 0, host_at(n), DeviceStamp(t)));
-        out.drain(&sync);
-      }
-    out.expect_pairs();
-    EXPECT_GE(out.complete(), 6999U) << wraps;
-  }
-}
+using testing::kRigInterval;
+using testing::rig_frame;
+using testing::rig_options;
+using testing::RigSets;
 
 // ---- the INS's SyncOut ----
 
 /// Cameras triggered by an INS at 100 Hz that sends a pulse every fourth sample. Even intervals:
 /// only a gap proves.
 TEST(RigModes, syncOutIsProvenByAGapBeforeTheDrive) {
-  SyncOptions o = options(SyncMode::ins_syncout);
+  SyncOptions o = rig_options(SyncMode::ins_syncout);
   RigSynchronizer sync(o);
-  SyncOutPulses pulses(kInterval);
-  Out out;
+  SyncOutPulses pulses(kRigInterval);
+  RigSets out;
   std::array<std::uint64_t, 2> counters{3, 900};
   HostStamp t(50'000'000'000);
   int pulse = 0;
   bool asked = false;
-  for (int sample = 0; sample < 4000; ++sample, t = t + kInterval / 4) {
+  for (int sample = 0; sample < 4000; ++sample, t = t + kRigInterval / 4) {
     if (sync.wants_pause() > 0) {
       EXPECT_FALSE(asked);
       asked = true;
@@ -198,9 +59,9 @@ TEST(RigModes, syncOutIsProvenByAGapBeforeTheDrive) {
     if (!pulsed) continue;
     for (int k = 0; k < 2; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      (void)sync.offer(frame(k, pulse, counters[i]++, t,
-                             DeviceStamp(t.ns() / (k + 1) * (k + 1) - 7'000'000 * k),
-                             Duration::milliseconds(9)));
+      (void)sync.offer(rig_frame(k, pulse, counters[i]++, t,
+                                 DeviceStamp(t.ns() / (k + 1) * (k + 1) - 7'000'000 * k),
+                                 Duration::milliseconds(9)));
       out.drain(&sync);
     }
     ++pulse;
@@ -218,7 +79,7 @@ TEST(RigModes, syncOutIsProvenByAGapBeforeTheDrive) {
 
 TEST(RigModes, marksOnTheSampleAfterThePulseAreReckonedFromTheEarliest) {
   // Pulses every 40 ms, samples every 15: a mark is up to 15 ms late, and once in three exact.
-  SyncOutPulses pulses(kInterval);
+  SyncOutPulses pulses(kRigInterval);
   int exact = 0;
   for (int n = 0; n < 300; ++n) {
     if (n % 50 == 17) continue;  // its reading was lost
@@ -240,7 +101,8 @@ TEST(RigModes, marksOnTheSampleAfterThePulseAreReckonedFromTheEarliest) {
 // ---- one camera triggers the other ----
 
 struct MasterRig {
-  explicit MasterRig(std::uint64_t seed) : sync(options(SyncMode::master_strobe)), random(seed) {}
+  explicit MasterRig(std::uint64_t seed)
+      : sync(rig_options(SyncMode::master_strobe)), random(seed) {}
 
   void pulse() {
     const HostStamp start = HostStamp(9'000'000'000) + time;
@@ -248,7 +110,7 @@ struct MasterRig {
                missed1 = std::exchange(miss, false);
     lost[0] += lost0 ? 1 : 0;
     if (!lost0)
-      offer(frame(0, number, counters[0], start, DeviceStamp(start.ns() + 5'000'000'000)));
+      offer(rig_frame(0, number, counters[0], start, DeviceStamp(start.ns() + 5'000'000'000)));
     ++counters[0];
     if (slave_here) {
       missed[1] += missed1 ? 1 : 0;
@@ -256,13 +118,13 @@ struct MasterRig {
         lost[1] += lost1 ? 1 : 0;
         // 20 ppm faster.
         if (!lost1)
-          offer(frame(1, number, counters[1], start,
-                      DeviceStamp(start.ns() + start.ns() / 50'000 - slave_offset)));
+          offer(rig_frame(1, number, counters[1], start,
+                          DeviceStamp(start.ns() + start.ns() / 50'000 - slave_offset)));
         ++counters[1];
       }
     }
     ++number;
-    time = time + kInterval;
+    time = time + kRigInterval;
   }
   void offer(const SyncFrame& f) {
     (void)sync.offer(f);
@@ -279,7 +141,7 @@ struct MasterRig {
 
   RigSynchronizer sync;
   Random random;
-  Out out;
+  RigSets out;
   Duration time{};
   int number = 0, pauses = 0;
   std::array<std::uint64_t, 2> counters{}, lost{}, missed{};
@@ -343,15 +205,15 @@ Pulse pulse_at(std::uint64_t number, HostStamp at) {
 
 /// Varied by a millisecond, as the board does it.
 Duration varied(std::uint64_t n) {
-  return kInterval +
+  return kRigInterval +
          Duration::milliseconds(trigger_interval_is_longer(static_cast<std::uint32_t>(n)) ? 1 : -1);
 }
 
 TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) {
-  SyncOptions o = options(SyncMode::board);
+  SyncOptions o = rig_options(SyncMode::board);
   o.camera[0].delay = Duration::microseconds(30);
   RigSynchronizer sync(o);
-  Out out;
+  RigSets out;
   HostStamp t(80'000'000'000);
   std::vector<HostStamp> edges;
   for (std::uint64_t n = 0; n < 60; ++n) {
@@ -361,7 +223,8 @@ TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) 
     sync.pulse(p);
     out.drain(&sync);
     for (int k = 0; k < 2; ++k) {
-      SyncFrame f = frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns() + k * 1'000'000'000));
+      SyncFrame f =
+          rig_frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns() + k * 1'000'000'000));
       if (k == 1) f.exposure = Duration::milliseconds(4);
       (void)sync.offer(f);
       out.drain(&sync);
@@ -382,20 +245,21 @@ TEST(RigModes, oneStampForAllFromTheMeasuredExposureOrFromEdgeDelayAndExposure) 
 }
 
 TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
-  RigSynchronizer sync(options(SyncMode::board));
-  Out out;
+  RigSynchronizer sync(rig_options(SyncMode::board));
+  RigSets out;
   HostStamp t(80'000'000'000);
   for (std::uint64_t n = 0; n < 40; ++n) {
     sync.pulse(pulse_at(n, t));
     for (int k = 0; k < 2; ++k)
-      (void)sync.offer(frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns()))), out.drain(&sync);
+      (void)sync.offer(rig_frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns()))),
+          out.drain(&sync);
     t = t + varied(n);
   }
   ASSERT_TRUE(sync.proven(0) && sync.proven(1));
   // The frames come first; the report then says that the pulse went out 700 µs earlier than their
   // stamps do.
   for (int k = 0; k < 2; ++k)
-    (void)sync.offer(frame(k, 40, 40, t, DeviceStamp(t.ns()))), out.drain(&sync);
+    (void)sync.offer(rig_frame(k, 40, 40, t, DeviceStamp(t.ns()))), out.drain(&sync);
   const std::size_t before = out.sets.size();
   sync.pulse(pulse_at(40, t - Duration::microseconds(700)));
   out.drain(&sync);
@@ -408,7 +272,7 @@ TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
 
 TEST(RigModes, nothingIsTakenFromTheHeap) {
   if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own heap";
-  RigSynchronizer sync(options(SyncMode::board));
+  RigSynchronizer sync(rig_options(SyncMode::board));
   ClockMapper clock{ClockMapperOptions{}};
   const std::uint64_t before = AllocationGuard::allocations_after_seal();
   HostStamp t(80'000'000'000);
@@ -422,8 +286,8 @@ TEST(RigModes, nothingIsTakenFromTheHeap) {
       if (n == 200) sync.restarted(1);
       sync.pulse(pulse_at(n, t));
       for (int k = 0; k < 2; ++k) {
-        (void)sync.offer(frame(k, static_cast<int>(n), n, t,
-                               DeviceStamp(t.ns() * (n < 300 || k == 1 ? 1 : -1))));
+        (void)sync.offer(rig_frame(k, static_cast<int>(n), n, t,
+                                   DeviceStamp(t.ns() * (n < 300 || k == 1 ? 1 : -1))));
         for (SyncedSet set; sync.next(&set);) ++sets;
       }
       (void)sync.wants_pause();
@@ -439,19 +303,19 @@ TEST(RigModes, modesHaveNamesAndNonsenseIsNamed) {
        {SyncMode::counter, SyncMode::software, SyncMode::board, SyncMode::ins_syncout,
         SyncMode::master_strobe, SyncMode::bus, SyncMode::ptp}) {
     EXPECT_STRNE(to_string(m), "");
-    EXPECT_EQ(options(m).validate(), nullptr);
+    EXPECT_EQ(rig_options(m).validate(), nullptr);
   }
-  SyncOptions o = options(SyncMode::board);
+  SyncOptions o = rig_options(SyncMode::board);
   o.camera[1].jitter = Duration::milliseconds(6);
   EXPECT_NE(o.validate(), nullptr) << "an eighth of the interval and more";
   o.camera[1].jitter = Duration::milliseconds(4);
   EXPECT_EQ(o.validate(), nullptr);
   o.camera[0].delay = Duration::milliseconds(40);
   EXPECT_NE(o.validate(), nullptr);
-  o = options(SyncMode::bus);
+  o = rig_options(SyncMode::bus);
   o.tolerance = Duration::milliseconds(21);
   EXPECT_NE(o.validate(), nullptr);
-  o = options(SyncMode::master_strobe);
+  o = rig_options(SyncMode::master_strobe);
   o.cameras = 1;
   EXPECT_NE(o.validate(), nullptr);
 }

@@ -1,0 +1,202 @@
+#include <gtest/gtest.h>
+
+#include <cstdint>
+
+#include "core/math/random.hpp"
+#include "drivers/sync/rig_synchronizer.hpp"
+#include "tests/unit/drivers/sync/rig_frames.hpp"
+
+/// Pairing by the stamps of one clock: the bus's, PTP's, the host's.
+namespace vergence {
+namespace {
+
+using testing::kRigInterval;
+using testing::rig_frame;
+using testing::rig_options;
+using testing::rig_time;
+using testing::RigSets;
+
+struct CommonClock : ::testing::TestWithParam<SyncMode> {};
+
+TEST_P(CommonClock, pairsByItsOwnStampsWhateverTheHostsAre) {
+  RigSynchronizer sync(rig_options(GetParam()));
+  RigSets out;
+  Random random(3);
+  for (int n = 0; n < 6000; ++n) {  // four minutes: the bus's clock wraps once
+    const DeviceStamp t(50'000'000'000 + (kRigInterval * n).ns());
+    // Counters mean nothing, and the host's stamps are off by nearly half an interval.
+    for (int k = 0; k < 2; ++k) {
+      if (n == 100 && k == 1) continue;
+      SyncFrame f = rig_frame(k, n, random.next(), rig_time(n), t + Duration::microseconds(k * 80));
+      f.middle.host = f.middle.host + Duration::milliseconds(19 * k);
+      EXPECT_EQ(sync.offer(f), SyncVerdict::taken) << n;
+      out.drain(&sync);
+    }
+  }
+  sync.finish();
+  out.drain(&sync);
+  out.expect_pairs();
+  EXPECT_EQ(out.complete(), 5999U);
+  EXPECT_EQ(sync.counters().lost[1], 1U);
+  for (const SyncedSet& s : out.sets) EXPECT_EQ(s.proof, SyncProof::common_clock);
+  EXPECT_TRUE(sync.proven(0));
+}
+
+TEST_P(CommonClock, whatIsTooFarApartIsNotPaired) {
+  RigSynchronizer sync(rig_options(GetParam()));
+  RigSets out;
+  for (int n = 0; n < 50; ++n)
+    for (int k = 0; k < 2; ++k) {
+      (void)sync.offer(
+          rig_frame(k, n, 0, rig_time(n),
+                    DeviceStamp((kRigInterval * n).ns()) + Duration::milliseconds(15 * k)));
+      out.drain(&sync);
+    }
+  EXPECT_EQ(out.complete(), 0U);
+}
+
+TEST_P(CommonClock, thatDriftsApartByAnIntervalProvesNothing) {
+  RigSynchronizer sync(rig_options(GetParam()));
+  RigSets out;
+  // Camera 1's clock loses its master at n = 500 and gains 2 ms a second from then on: a whole
+  // interval after 20 s.
+  for (int n = 0; n < 1200; ++n)
+    for (int k = 0; k < 2; ++k) {
+      const Duration ahead = Duration::microseconds(k == 1 && n > 500 ? 80 * (n - 500) : 0);
+      (void)sync.offer(rig_frame(k, n, 0, rig_time(n),
+                                 DeviceStamp(90'000'000'000 + (kRigInterval * n).ns()) + ahead));
+      out.drain(&sync);
+    }
+  sync.finish();
+  out.drain(&sync);
+  std::uint64_t doubted = 0;
+  for (const SyncedSet& s : out.sets) {
+    const bool together = s.spread < kRigInterval / 2;
+    EXPECT_EQ(s.proof, together ? SyncProof::common_clock : SyncProof::unproven) << s.number;
+    doubted += together ? 0 : 1;
+  }
+  EXPECT_GT(doubted, 40U) << "an exposure and the next";
+  EXPECT_EQ(sync.counters().unproven, doubted);
+}
+
+/// Both cameras' clock is set by so much between two of 400 pulses.
+void expect_followed_after_three_frames(SyncMode mode, std::int64_t step) {
+  RigSynchronizer sync(rig_options(mode));
+  RigSets out;
+  for (int n = 0; n < 400; ++n) {
+    const std::int64_t set = n < 200 ? 0 : step;
+    for (int k = 0; k < 2; ++k) {
+      (void)sync.offer(rig_frame(k, n, 0, rig_time(n),
+                                 DeviceStamp(90'000'000'000 + (kRigInterval * n).ns() + set)));
+      out.drain(&sync);
+    }
+  }
+  sync.finish();
+  out.drain(&sync);
+  out.expect_pairs();
+  EXPECT_GE(out.complete(), 397U);
+  EXPECT_EQ(sync.counters().contradictions[0] + sync.counters().contradictions[1], 1U);
+  EXPECT_EQ(sync.counters().missed, 0U) << "a clock that was set tells of no pulses";
+  for (std::size_t i = 1; i < out.sets.size(); ++i)
+    EXPECT_EQ(out.sets[i].number, out.sets[i - 1].number + 1);
+}
+
+TEST_P(CommonClock, thatIsSetBackIsFollowedAfterThreeFrames) {
+  expect_followed_after_three_frames(GetParam(), -20'000'000'000);
+}
+
+TEST(OneClock, aClockThatIsSetToItsEpochIsFollowedAndLeapsOverNoNumbers) {
+  expect_followed_after_three_frames(SyncMode::ptp, 1'700'000'000'000'000'000);
+}
+
+TEST(OneClock, whileOneCameraAloneHasAnotherClockNothingIsProven) {
+  for (const std::int64_t step : {-50'000'000'000, 1'700'000'000'000'000'000}) {
+    RigSynchronizer sync(rig_options(SyncMode::ptp));
+    RigSets out;
+    std::size_t at_step = 0, at_return = 0;
+    for (int n = 0; n < 300; ++n) {
+      if (n == 100) at_step = out.sets.size();
+      if (n == 200) at_return = out.sets.size();
+      for (int k = 0; k < 2; ++k) {
+        const std::int64_t set = k == 1 && n >= 100 && n < 200 ? step : 0;
+        (void)sync.offer(rig_frame(k, n, 0, rig_time(n),
+                                   DeviceStamp(90'000'000'000 + (kRigInterval * n).ns() + set)));
+        out.drain(&sync);
+      }
+    }
+    sync.finish();
+    out.drain(&sync);
+    for (std::size_t i = 0; i < out.sets.size(); ++i) {
+      const bool apart = i >= at_step + 3 && i < at_return;
+      const bool unsure =
+          (i >= at_step && i < at_step + 3) || (i >= at_return && i < at_return + 5);
+      if (unsure) continue;
+      EXPECT_EQ(out.sets[i].proof, apart ? SyncProof::unproven : SyncProof::common_clock) << i;
+    }
+    EXPECT_EQ(out.complete(), 200U);
+    EXPECT_EQ(sync.counters().missed, 0U);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, CommonClock, ::testing::Values(SyncMode::bus, SyncMode::ptp));
+
+// ---- before any set has gone out ----
+
+struct FirstSets : ::testing::TestWithParam<SyncMode> {
+  /// An image whose exposure begins then, by every clock; it comes after the one before it.
+  SyncVerdict offer(int camera, std::int64_t ms) {
+    const Duration at = Duration::milliseconds(ms);
+    SyncFrame f = rig_frame(camera, 0, 0, HostStamp(0) + at, DeviceStamp(0) + at);
+    arrival = arrival + Duration::microseconds(100);
+    f.arrival = arrival;
+    return sync.offer(f);
+  }
+
+  RigSynchronizer sync{rig_options(GetParam())};
+  HostStamp arrival{9'000'000'000};
+};
+
+TEST_P(FirstSets, whatWasExposedBeforeThemJoinsNone) {
+  EXPECT_EQ(offer(0, 8000), SyncVerdict::taken);
+  EXPECT_EQ(offer(1, 7980), SyncVerdict::late);
+  EXPECT_EQ(offer(1, 3000), SyncVerdict::late);
+  EXPECT_EQ(sync.counters().late[1], 2U);
+  EXPECT_EQ(offer(1, 8001), SyncVerdict::taken);
+  RigSets out;
+  out.drain(&sync);
+  ASSERT_EQ(out.complete(), 1U);
+  EXPECT_LE(out.sets[0].spread, rig_options(GetParam()).tolerance);
+}
+
+TEST_P(FirstSets, whatWasExposedBetweenThemJoinsNone) {
+  EXPECT_EQ(offer(0, 8000), SyncVerdict::taken);
+  EXPECT_EQ(offer(0, 8040), SyncVerdict::taken);
+  EXPECT_EQ(offer(1, 8016), SyncVerdict::late);
+  sync.finish();
+  RigSets out;
+  out.drain(&sync);
+  EXPECT_EQ(out.sets.size(), 2U);
+  EXPECT_EQ(out.complete(), 0U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, FirstSets,
+                         ::testing::Values(SyncMode::ptp, SyncMode::bus, SyncMode::software));
+
+TEST(OneClock, camerasOnABusThatUnwrappedItsClockDifferentlyArePairedModulo128Seconds) {
+  for (const std::int64_t wraps : {-3, -1, 1, 2}) {
+    RigSynchronizer sync(rig_options(SyncMode::bus));
+    RigSets out;
+    for (int n = 0; n < 7000; ++n)
+      for (int k = 0; k < 2; ++k) {
+        const std::int64_t t =
+            120'000'000'000 + (kRigInterval * n).ns() + k * wraps * 128'000'000'000;
+        (void)sync.offer(rig_frame(k, n, 0, rig_time(n), DeviceStamp(t)));
+        out.drain(&sync);
+      }
+    out.expect_pairs();
+    EXPECT_GE(out.complete(), 6999U) << wraps;
+  }
+}
+
+}  // namespace
+}  // namespace vergence
