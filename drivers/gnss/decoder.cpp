@@ -85,6 +85,7 @@ void Decoder::begin(std::uint32_t baud) noexcept {
   at_ = size_ = 0;
   quiet_ = false;
   any_ = false;
+  period_ = {};  // the receiver may be back at another rate
 }
 
 void Decoder::accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept {
@@ -147,9 +148,21 @@ bool Decoder::next_ubx(Fix* fix) noexcept {
   return false;
 }
 
+void Decoder::Period::note(Duration step) noexcept {
+  constexpr int kBelieved = 3;
+  constexpr double kAlike = 0.25;
+  const double apart = std::abs(step.to_seconds() - newest_.to_seconds());
+  alike_ = alike_ > 0 && apart <= kAlike * newest_.to_seconds() ? alike_ + 1 : 1;
+  newest_ = step;
+  const bool believed = alike_ >= kBelieved;
+  if (interval_ == Duration{} || (believed && (!sure_ || step < interval_))) interval_ = step;
+  sure_ = sure_ || believed;
+}
+
 void Decoder::count(Duration step) noexcept {
-  if (step >= kShortest && (period_ == Duration{} || step < period_)) period_ = step;
-  const double periods = period_ == Duration{} ? 1 : step.to_seconds() / period_.to_seconds();
+  if (step >= kShortest) period_.note(step);
+  const Duration period = period_.interval();
+  const double periods = period == Duration{} ? 1 : step.to_seconds() / period.to_seconds();
   const auto steps = static_cast<std::uint64_t>(std::llround(std::clamp(periods, 1.0, kMostLost)));
   number_ += steps;
   counters_.lost += steps - 1;

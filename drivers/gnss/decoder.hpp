@@ -13,7 +13,7 @@ namespace vergence::gnss {
 /// Counters of a stream; all only grow.
 struct DecoderCounters {
   std::uint64_t readings = 0;
-  std::uint64_t lost = 0;       // epochs missing between two, by the shortest interval seen
+  std::uint64_t lost = 0;       // epochs missing between two, by the receiver's interval
   std::uint64_t malformed = 0;  // sentences and frames that made no sense
   std::uint64_t backward = 0;   // fixes not newer than the one before
   std::uint64_t untimed = 0;    // fixes without a time: not handed out
@@ -43,8 +43,9 @@ class Decoder {
   /// The line was quiet for longer than a pause within an epoch: what waits is complete.
   void quiet() noexcept { quiet_ = true; }
 
-  /// The shortest interval between two fixes; 0: not known yet.
-  [[nodiscard]] Duration period() const noexcept { return period_; }
+  /// The receiver's interval since begin(): the shortest between two fixes that came several times
+  /// in a row, until then the first; 0: not known yet.
+  [[nodiscard]] Duration period() const noexcept { return period_.interval(); }
   /// Whole messages of either protocol, right in checksum.
   [[nodiscard]] std::uint64_t sentences() const noexcept { return nmea_.counters().sentences; }
   [[nodiscard]] std::uint64_t frames() const noexcept { return ubx_.counters().frames; }
@@ -54,6 +55,18 @@ class Decoder {
   [[nodiscard]] DecoderCounters counters() const noexcept;
 
  private:
+  /// The receiver's interval. A single short step, as where a fix is acquired again, is none.
+  class Period {
+   public:
+    void note(Duration step) noexcept;
+    [[nodiscard]] Duration interval() const noexcept { return interval_; }
+
+   private:
+    Duration interval_{}, newest_{};
+    int alike_ = 0;      // newest steps
+    bool sure_ = false;  // the interval came several times in a row
+  };
+
   [[nodiscard]] bool next_nmea(Fix* fix) noexcept;
   [[nodiscard]] bool next_ubx(Fix* fix) noexcept;
   [[nodiscard]] bool map(const Fix& fix, InsReading* reading) noexcept;
@@ -73,7 +86,7 @@ class Decoder {
   DecoderCounters counters_{};
   std::uint64_t fixes_ = 0, number_ = 0;
   HeadingSource best_heading_ = HeadingSource::none;
-  Duration period_{};
+  Period period_;
   bool any_ = false;
   DeviceStamp last_{};
   HostStamp last_host_{};
