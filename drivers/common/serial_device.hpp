@@ -22,7 +22,8 @@ namespace vergence {
 ///
 /// States     The thread begins (begin(): the device streams), reads (read_on()), and on anything
 ///            but `stopped` and `ended` reports `gone` once and reopens every kReopenInterval until
-///            the device is back; `back` precedes its next reading.
+///            the device is back, also where it opens but does not begin; `back` precedes its next
+///            reading.
 /// Ownership  The derived class calls stop_thread() in its destructor: the hooks are its own.
 /// Threads    Owner's thread: the protected functions named so. The hooks run on the device's
 ///            thread, which owns line() from start_thread() to stop_thread().
@@ -161,6 +162,7 @@ class SerialDevice {
     while (!stop_requested()) {
       DeviceStatus status = line_ != nullptr ? begin() : DeviceStatus::gone;
       HostStamp when = line_ != nullptr ? line_->now() : HostStamp{};
+      const bool refused = line_ != nullptr && status != DeviceStatus::ok;
       if (status == DeviceStatus::ok) {
         report_streaming(when);
         status = read_on();
@@ -175,6 +177,9 @@ class SerialDevice {
       }
       away_.store(true, std::memory_order_release);
       if (!std::exchange(reported_gone_, true)) push({Item::What::gone, when, {}}, true);
+      close_line();
+      // It opens well and answers at once: without a pause it would be asked as fast as it answers.
+      if (refused) rest(kReopenInterval);
       if (!come_back()) break;
     }
     finished();
@@ -182,7 +187,6 @@ class SerialDevice {
 
   /// False: stopped.
   [[nodiscard]] bool come_back() noexcept {
-    close_line();
     while (!stop_requested()) {
       if (place_->exhausted()) {
         push({Item::What::end, HostStamp{}, {}}, true);

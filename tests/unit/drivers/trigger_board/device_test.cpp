@@ -385,6 +385,37 @@ TEST(Board, anotherOneInItsPlaceIsNotTaken) {
   EXPECT_GT(rig.truth(all.back()), at_s(59));
 }
 
+TEST(Board, oneThatRefusesItsConfigurationIsOpenedTwiceASecond) {
+  // It has begun anew, and does not take its configuration for five seconds.
+  mock::BoardSimulatorOptions board = board_for(Duration::seconds(20));
+  board.reboots = {at_s(5)};
+  std::uint8_t configuring = 0;
+  int refused = 0;
+  BoardRig rig(board, direct_line(), {}, [&](HostStamp at, std::vector<std::uint8_t>* bytes) {
+    TriggerFrame f = opened(*bytes);
+    if (f.type != trigger_status || f.sequence != configuring || at < at_s(5) || at > at_s(10))
+      return;
+    ++refused;
+    const TriggerError error{trigger_config, trigger_error_line};
+    f.type = trigger_error;
+    f.size = trigger_error_payload_size;
+    trigger_put_error(&error, f.payload);
+    *bytes = closed(f);
+  });
+  rig.between->lose([&](HostStamp, std::span<const std::uint8_t> bytes) {
+    const TriggerFrame f = opened({bytes.begin(), bytes.end()});
+    if (f.type == trigger_config) configuring = f.sequence;
+    return false;
+  });
+  ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok);
+  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  const auto all = rig.pulses();
+  EXPECT_EQ(rig.times_gone, 1);
+  EXPECT_GE(refused, 8);
+  EXPECT_LE(refused, 11);
+  EXPECT_GT(rig.truth(all.back()), at_s(19));
+}
+
 // ---- what is asked
 
 struct Refusal {
