@@ -13,7 +13,8 @@ void Acquisition::take_board() {
     head.gone = true;
     if (options_.observer != nullptr)
       options_.observer->on_device_gone(AcquisitionObserver::kTrigger, head.value.arrival);
-    push_event(DeviceEvent::Kind::board_gone, head.value.arrival);
+    // As a camera: one that started and gave nothing is not gone once more.
+    if (!head.back) push_event(DeviceEvent::Kind::board_gone, head.value.arrival);
     return;
   }
   if (head.back) {

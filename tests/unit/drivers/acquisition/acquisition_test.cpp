@@ -225,15 +225,40 @@ class EmptyCamera final : public CameraDevice {
   DeviceInfo info_;
 };
 
-TEST(Acquisition, aCameraThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
+/// The same of a board.
+class EmptyBoard final : public TriggerDevice {
+ public:
+  const DeviceInfo& info() const noexcept override { return info_; }
+  DeviceStatus configure(const TriggerConfiguration&, TriggerConfiguration*) noexcept override {
+    return DeviceStatus::ok;
+  }
+  DeviceStatus start(Notifier*) noexcept override {
+    starts.fetch_add(1);
+    return DeviceStatus::ok;
+  }
+  DeviceStatus wait(Duration, Pulse* pulse) noexcept override {
+    pulse->arrival = HostStamp(starts.load());
+    return DeviceStatus::gone;
+  }
+  void stop() noexcept override {}
+  TriggerStatistics statistics() const noexcept override { return {}; }
+
+  std::atomic<int> starts{0};
+
+ private:
+  DeviceInfo info_;
+};
+
+TEST(Acquisition, aDeviceThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
   EmptyCamera left, right;
+  EmptyBoard board;
   Acquisition::Options options;
   options.sync.interval = Duration::milliseconds(50);
   options.sync.mode = SyncMode::software;
-  Acquisition source({&left, &right}, nullptr, nullptr, options);
+  Acquisition source({&left, &right}, nullptr, &board, options);
   ASSERT_FALSE(source.start());
   constexpr int kTwiceAgain = 3;  // starts
-  while (left.starts < kTwiceAgain || right.starts < kTwiceAgain) {
+  while (left.starts < kTwiceAgain || right.starts < kTwiceAgain || board.starts < kTwiceAgain) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     source.look_again();
   }
@@ -242,6 +267,7 @@ TEST(Acquisition, aCameraThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
   for (Acquired item; source.next(&item);) items.push_back(item);
   source.join();
   EXPECT_EQ(count(items, DeviceEvent::Kind::camera_gone), 2) << "each once";
+  EXPECT_EQ(count(items, DeviceEvent::Kind::board_gone), 1);
 }
 
 TEST(Acquisition, everySlotComesBack) {
