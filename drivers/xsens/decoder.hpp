@@ -62,6 +62,8 @@ class Decoder {
   /// the last call for that. The first reading after it goes on is `resumed`.
   [[nodiscard]] bool answered(xbus::MessageId request) noexcept;
 
+  /// When the newest sample arrived; zero: none since begin().
+  [[nodiscard]] HostStamp last_sample() const noexcept { return last_sample_; }
   [[nodiscard]] const DecoderCounters& counters() const noexcept { return counters_; }
   [[nodiscard]] const xbus::StreamCounters& line_counters() const noexcept {
     return stream_.counters();

@@ -137,7 +137,7 @@ DeviceStatus Device::begin() noexcept {
 }
 
 DeviceStatus Device::read_on() noexcept {
-  last_received_ = line()->now();
+  last_sample_ = line()->now();
   gap_ns_.store(0, std::memory_order_relaxed);  // what was wanted before is past
   for (;;) {
     if (stop_requested()) return DeviceStatus::stopped;
@@ -146,15 +146,20 @@ DeviceStatus Device::read_on() noexcept {
         gap > 0 && status != DeviceStatus::gone)
       status = make_gap(Duration::nanoseconds(gap));
     if (status != DeviceStatus::ok && status != DeviceStatus::timeout) return status;
-    // No whole frame for that long, be it silence or noise.
-    if (line()->now() - last_received_ > kSilent) return DeviceStatus::gone;
+    // Opened again it is set again: a restart may have cost it its settings.
+    if (decoder_.woke()) return DeviceStatus::gone;
+    if (line()->now() - last_sample_ > silent_after()) return DeviceStatus::gone;
   }
+}
+
+Duration Device::silent_after() const noexcept {
+  constexpr double kIntervals = 4;  // at 1 Hz a single lost message is no silence
+  return std::max(kSilent, Duration::seconds(kIntervals / set_.rate_hz()));
 }
 
 /// Hands out what a read brings. → ok, timeout (also where it was woken), ended, gone, failed
 DeviceStatus Device::read_once(Duration limit) noexcept {
   std::array<std::uint8_t, Decoder::kMostBytes> bytes{};
-  const std::uint64_t before = decoder_.line_counters().messages;
   const LineRead r = line()->read(bytes, limit);
   if (r.status == DeviceStatus::timeout) decoder_.quiet();
   if (r.status == DeviceStatus::stopped) return DeviceStatus::timeout;
@@ -162,7 +167,7 @@ DeviceStatus Device::read_once(Duration limit) noexcept {
   decoder_.accept(std::span(bytes).first(r.size), r.arrival);
   for (InsReading reading; decoder_.next(&reading);) hand_out(reading, reading.arrival);
   count_decoded();
-  if (decoder_.line_counters().messages != before) last_received_ = r.arrival;
+  last_sample_ = std::max(last_sample_, decoder_.last_sample());
   return r.status;
 }
 
@@ -183,7 +188,7 @@ DeviceStatus Device::make_gap(Duration gap) noexcept {
     const DeviceStatus s = read_once(std::min(kRead, end - line()->now()));
     if (s != DeviceStatus::ok && s != DeviceStatus::timeout) return s;
   }
-  last_received_ = line()->now();  // it was silent because it was told to be
+  last_sample_ = line()->now();  // it was silent because it was told to be
   return tell(xbus::MessageId::go_to_measurement);
 }
 

@@ -15,7 +15,8 @@ namespace vergence::xsens {
 /// As InsDevice says. configure() finds the device (baud scan), sets what differs, and may take
 /// seconds; so the owner calls it before the drive. start() never waits: a thread of the device's
 /// own puts it into measurement, reads, and after `gone` opens and sets it again until it is back.
-/// A silent device (kSilent) is one that is gone.
+/// A device that sends no sample for kSilent, or four of its intervals, is one that is gone, also
+/// where it sends something else: it may have lost its settings. So is one that tells of a restart.
 /// Time  Readings are mapped: `host` and `host_error` are set (decoder.hpp).
 class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 Hz
  public:
@@ -46,13 +47,14 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
   [[nodiscard]] DeviceStatus read_once(Duration limit) noexcept;
   [[nodiscard]] DeviceStatus make_gap(Duration gap) noexcept;
   [[nodiscard]] DeviceStatus tell(xbus::MessageId request) noexcept;
+  [[nodiscard]] Duration silent_after() const noexcept;
   void count_decoded() noexcept;
 
   const Options options_;
   Identity identity_{};
   StreamSettings set_{};
   Decoder decoder_;                      // of the thread while it runs, else the owner's
-  HostStamp last_received_{};            // the thread's, a whole message
+  HostStamp last_sample_{};              // the thread's: its arrival, or when it was waited for
   std::atomic<std::int64_t> gap_ns_{0};  // that is to be made; 0: none
 };
 

@@ -1,6 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -10,38 +9,9 @@
 
 #include "drivers/mock/simulators/simulators.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
+#include "tests/support/tampered.hpp"
 
 namespace vergence::test {
-
-/// A board whose bytes somebody tampers with on their way to the host.
-class Tampered final : public mock::DeviceModel {
- public:
-  using Tamper = std::function<void(
-      HostStamp at, std::vector<std::uint8_t>* frame)>;  // a whole frame, its 00 included
-  Tampered(std::shared_ptr<mock::DeviceModel> device, Tamper tamper)
-      : device_(std::move(device)), tamper_(std::move(tamper)) {}
-  /// Of what the host sends; true: it is lost on the way.
-  using Loss = std::function<bool(HostStamp at, std::span<const std::uint8_t> bytes)>;
-  void lose(Loss loss) { loss_ = std::move(loss); }
-  void receive(std::span<const std::uint8_t> bytes, HostStamp at) override {
-    if (!loss_ || !loss_(at, bytes)) device_->receive(bytes, at);
-  }
-  std::optional<HostStamp> next() const override { return device_->next(); }
-  void produce(HostStamp at, std::vector<std::uint8_t>* out) override {
-    std::vector<std::uint8_t> frame;
-    device_->produce(at, &frame);
-    if (!frame.empty() && tamper_) tamper_(at, &frame);
-    out->insert(out->end(), frame.begin(), frame.end());
-  }
-  std::uint32_t baud() const override { return device_->baud(); }
-  void power_cycle(HostStamp at) override { device_->power_cycle(at); }
-  bool ended() const override { return device_->ended(); }
-
- private:
-  std::shared_ptr<mock::DeviceModel> device_;
-  Tamper tamper_;
-  Loss loss_;
-};
 
 /// A frame taken apart; type 0: it is none.
 [[nodiscard]] inline TriggerFrame opened(const std::vector<std::uint8_t>& bytes) {

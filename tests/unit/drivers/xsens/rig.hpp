@@ -7,6 +7,7 @@
 
 #include "drivers/mock/simulators/simulators.hpp"
 #include "drivers/xsens/device.hpp"
+#include "tests/support/tampered.hpp"
 
 namespace vergence::test {
 
@@ -41,10 +42,12 @@ struct XsensRig {
                     const mock::SimulatedLineOptions& line = {}, const xsens::Options& options = {},
                     mock::InsSource source = easy_drive)
       : simulator(std::make_shared<mock::XsensSimulator>(std::move(source), sensor)),
+        between(std::make_shared<Tampered>(simulator)),
         device(std::make_unique<xsens::Device>(
-            std::make_unique<mock::SimulatedPlace>(simulator, line), options)) {}
+            std::make_unique<mock::SimulatedPlace>(between, line), options)) {}
 
   std::shared_ptr<mock::XsensSimulator> simulator;
+  std::shared_ptr<Tampered> between;
   std::unique_ptr<xsens::Device> device;
 
   /// All readings until the device has no more, or this many; `gone` is passed over, the device is
