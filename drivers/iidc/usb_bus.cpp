@@ -131,6 +131,7 @@ DeviceStatus UsbBus::reopen() noexcept {
   try {
     const std::string mine = info_.serial;
     close_device();
+    let_go();
     const DeviceStatus status = open_device(mine);
     if (status != DeviceStatus::ok) {
       if (last_error_.empty()) last_error_ = "the camera is not plugged in";
@@ -165,6 +166,9 @@ DeviceStatus UsbBus::allocate(const StreamShape& shape) noexcept {
     transfer_bytes_ =
         super ? (shape.image_bytes + kSuperSpeedBlock - 1) / kSuperSpeedBlock * kSuperSpeedBlock
               : shape.frame_bytes;
+    if (abandoned()) {
+      if (const DeviceStatus status = reopen(); status != DeviceStatus::ok) return status;
+    }
     drop_memory();
     memory_ = std::make_unique<SlotMemory>();
     memory_->allocate(shape.buffers, transfer_bytes_);
@@ -193,6 +197,8 @@ int UsbBus::submit(Flight* flight) noexcept {
 DeviceStatus UsbBus::start(StreamSink* sink) noexcept {
   if (handle_ == nullptr) return DeviceStatus::gone;
   stop();
+  if (abandoned()) return DeviceStatus::gone;
+  flying_.store(0, std::memory_order_release);  // one given up that came back was subtracted twice
   sink_ = sink;
   errors_ = 0;
   stopping_.store(false, std::memory_order_release);
@@ -281,6 +287,22 @@ void UsbBus::land(Flight* flight) noexcept {
   memory_->release(flight->slot);
   libusb_free_transfer(flight->transfer);
   *flight = {};
+}
+
+/// libusb still has transfers of the stream before, given up by stop(): they may come back and find
+/// their flights.
+bool UsbBus::abandoned() const noexcept {
+  return std::any_of(flights_.begin(), flights_.end(), [](const Flight& f) { return f.flying; });
+}
+
+/// The device is closed: the kernel has no transfer any more, and none calls back. Those that were
+/// given up are not freed; libusb says of none what it still does with it.
+void UsbBus::let_go() noexcept {
+  for (Flight& f : flights_) {
+    if (!f.flying) continue;
+    memory_->release(f.slot);
+    f = {};
+  }
 }
 
 void UsbBus::lose() noexcept {

@@ -27,7 +27,7 @@ namespace vergence::iidc {
 ///            place, never at the same time.
 /// Stop       Transfers are cancelled, and waited for until each has come back, at most
 ///            kCancelLimit; those that have not are given up with their memory, never freed under
-///            the kernel's hands.
+///            the kernel's hands; then only reopen() goes on.
 /// Unplug     Seen by the transfers' ends. reopen() looks with a context of its own each time: it
 ///            needs no hot-plug events, which containers and small systems do not have.
 class UsbBus final : public CameraBus {
@@ -76,6 +76,8 @@ class UsbBus final : public CameraBus {
   void completed(Flight* flight) noexcept;
   void filled(Flight* flight) noexcept;
   void land(Flight* flight) noexcept;
+  [[nodiscard]] bool abandoned() const noexcept;
+  void let_go() noexcept;
   void lose() noexcept;
   void handle_events() noexcept;
   static void on_transfer(libusb_transfer* transfer);
