@@ -1,20 +1,14 @@
 #include "app/capture/taking.hpp"
 
-#include <time.h>
-
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
 
+#include "drivers/clock.hpp"
+
 namespace vergence::app {
 namespace {
-
-std::int64_t clock_ns(clockid_t clock) {
-  timespec t{};
-  (void)::clock_gettime(clock, &t);
-  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
-}
 
 /// Ends the stream when nothing has come for too long, or a signal has.
 class Watchdog {
@@ -76,8 +70,9 @@ Taking take_sets(DriveDevices& devices, const TakingOptions& options, const Sign
   taking.gone.assign(n, false);
   Acquisition::Options o = devices.acquisition_options();
   o.wait_when_full = devices.mock() != nullptr;
-  o.tie_stamp = Stamp(clock_ns(CLOCK_REALTIME));
-  o.tie_host = devices.mock() != nullptr ? devices.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
+  const HostMoment now = moment_now();
+  o.tie_stamp = now.day;
+  o.tie_host = devices.mock() != nullptr ? devices.start() : now.host;
   Acquisition source(devices.cameras(), devices.ins(), devices.trigger(), o);
   start_acquisition(&source);
   {

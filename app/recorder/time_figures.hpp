@@ -47,7 +47,7 @@ struct PairingFigures {
       sets{};  // that went out, and pulses, each class under its name
 };
 
-/// The INS's UTC against the host's, and what it said of itself.
+/// The session's stamps against the INS's UTC. They follow the host's clock as it was at the start.
 struct UtcFigures {
   std::uint64_t readings = 0;  // with a valid UTC
   double host_ahead_s = 0;     // mean

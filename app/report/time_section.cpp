@@ -164,8 +164,9 @@ std::string utc_words(const Json& time) {
   const auto least = number_at(time, "utc.least_s").value_or(*ahead),
              most = number_at(time, "utc.most_s").value_or(*ahead);
   return fmt::format(
-      "<p>The host's clock was {:.4f} s {} the INS's UTC ({:.4f} to {:.4f} s); stamps are the "
-      "host's.</p>\n",
+      "<p>The session's stamps were {:.4f} s {} the INS's UTC ({:.4f} to {:.4f} s); they follow "
+      "the "
+      "host's clock of the day as it was at the start.</p>\n",
       std::abs(*ahead), *ahead < 0 ? "behind" : "ahead of", least, most);
 }
 

@@ -1,7 +1,5 @@
 #include "app/session/live_source.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -17,6 +15,7 @@
 #include "app/devices/exposure_settings.hpp"
 #include "app/recorder/line_file.hpp"
 #include "app/session/session_files.hpp"
+#include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
@@ -24,12 +23,6 @@ namespace {
 constexpr Stamp kVirtualEpoch{
     1'577'836'800'000'000'000};  // 2020-01-01 00:00 UTC: a drive in virtual time has the same
                                  // stamps on every run
-
-std::int64_t clock_ns(clockid_t clock) {
-  timespec t{};
-  (void)::clock_gettime(clock, &t);
-  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
-}
 
 std::vector<std::string> serials_of(const std::vector<CameraDevice*>& cameras) {
   std::vector<std::string> serials;
@@ -65,8 +58,9 @@ void LiveSource::make_acquisition() {
   Acquisition::Options o = devices_.acquisition_options();
   o.wait_when_full = request_.fast;
   o.stamp_grid = stamp_grid(configuration_);
-  o.tie_stamp = request_.fast ? kVirtualEpoch : Stamp(clock_ns(CLOCK_REALTIME));
-  o.tie_host = request_.fast ? devices_.start() : HostStamp(clock_ns(CLOCK_MONOTONIC));
+  const HostMoment tie = request_.fast ? HostMoment{kVirtualEpoch, devices_.start()} : moment_now();
+  o.tie_stamp = tie.day;
+  o.tie_host = tie.host;
   if (exposes_by_itself(configuration_)) {
     const CameraSettings& c = configuration_.cameras[0];
     const CameraMasks masks(configuration_, facts_.begin.file.rig);
@@ -199,8 +193,7 @@ bool LiveSource::next_event(SourceItem* item) noexcept {
 
 void LiveSource::done(const PoseSample& sample) noexcept {
   const auto* frame = std::get_if<AcquiredFrame>(&in_hand_);
-  time_.note_pose(*frame, sample.estimate_ms,
-                  request_.fast ? HostStamp{} : HostStamp(clock_ns(CLOCK_MONOTONIC)));
+  time_.note_pose(*frame, sample.estimate_ms, request_.fast ? HostStamp{} : monotonic_now());
   acquisition_->release(*frame);
 }
 

@@ -146,7 +146,8 @@ TimingMonitor::Sentence TimingMonitor::of_utc(const AcquiredReading& reading) no
   utc_reported_ = true;
   reported_ahead_s_ = ahead;
   return sentence("utc", false,
-                  "the host's clock is %.4f s %s the INS's UTC; stamps are the host's",
+                  "the session's stamps are %.4f s %s the INS's UTC: they follow the host's clock "
+                  "of the day as it was at the start",
                   std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
 }
 

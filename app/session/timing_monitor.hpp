@@ -7,8 +7,8 @@
 
 namespace vergence::app {
 
-/// What a drive tells of time: clocks, pairing, latencies, the INS's UTC. Events as sentences,
-/// figures for summary.json.
+/// What a drive tells of time: clocks, pairing, latencies, its stamps against the INS's UTC. Events
+/// as sentences, figures for summary.json.
 ///
 /// Threads  note…(): the estimator's, sealed. figures(): any, after that has joined. Memory: fixed;
 ///          sentences are in place.
@@ -26,8 +26,8 @@ class TimingMonitor {
   [[nodiscard]] Sentence of_device(const DeviceEvent& event) const noexcept;
   /// A set that was handed out: tells when a run of unproven ones begins.
   [[nodiscard]] Sentence of_set(const SyncedSet& set) noexcept;
-  /// A reading: tells when what the receiver and the filter say has changed, and of the host's
-  /// clock against UTC.
+  /// A reading: tells when what the receiver and the filter say has changed, and of the
+  /// session's stamps against UTC.
   [[nodiscard]] Sentence of_reading(const AcquiredReading& reading) noexcept;
 
   /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock,

@@ -36,7 +36,7 @@ TEST(TimeSection, saysWhatProvesThePairsHowTheClocksWereAndWhatWasLost) {
   for (const char* part :
        {"Pairs are proven by &lt;numbers&gt;.", "0.62 s at most", "3 sets contradicted",
         "+12.4 ppm", "7.3 µs", "2.1 ms", "310 µs", "locked", "54.0 µs at worst", "found set: 2",
-        "missed trigger", "malformed 4", "0.0123 s behind"})
+        "missed trigger", "malformed 4", "The session's stamps were 0.0123 s behind the INS's UTC"})
     EXPECT_TRUE(contains(s.body, part)) << part << "\n" << s.body;
   EXPECT_FALSE(contains(s.body, "late")) << "what never happened has no row";
   EXPECT_EQ(test::XmlCheck::problem("<div>" + s.body + "</div>"), "");
