@@ -190,12 +190,9 @@ void Acquisition::take_frame(std::size_t k) {
   auto& head = heads_[k];
   head.held = false;
   const int camera = static_cast<int>(k);
+  pulses_without_[k] = 0;
   if (head.event) {
-    head.gone = true;
-    if (options_.observer != nullptr) options_.observer->on_device_gone(camera, head.value.arrival);
-    sync_.absent(camera);
-    // One that started and gave nothing has not been back: it is not gone once more.
-    if (!head.back) push_event(DeviceEvent::Kind::camera_gone, head.value.arrival, camera);
+    note_gone(camera, head.value.arrival);
     return;
   }
   if (head.back) {
@@ -230,6 +227,15 @@ void Acquisition::take_frame(std::size_t k) {
   refused.set.present[k] = true;
   refused.set.slots[k] = frame.slot;
   queue_.push(refused);
+}
+
+void Acquisition::note_gone(int camera, HostStamp when) {
+  auto& head = heads_[static_cast<std::size_t>(camera)];
+  head.gone = true;
+  if (options_.observer != nullptr) options_.observer->on_device_gone(camera, when);
+  sync_.absent(camera);
+  // One that started and gave nothing has not been back: it is not gone once more.
+  if (!head.back) push_event(DeviceEvent::Kind::camera_gone, when, camera);
 }
 
 void Acquisition::take_reading() {

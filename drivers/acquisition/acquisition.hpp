@@ -142,6 +142,10 @@ class Acquisition final : private Notifier {
   void take_pulse(const Pulse& pulse);
   /// Makes the gap that the synchroniser wants.
   void pause_pulses();
+  /// Cameras that have given nothing for ten seconds of pulses hang, whatever their drivers know:
+  /// they are stopped, and asked to come back like any that is gone.
+  void give_up_mute_cameras(HostStamp now);
+  void note_gone(int camera, HostStamp when);
   /// Tells of cameras whose pairing was proven, or is not any more.
   void note_proofs(HostStamp now);
   void hand_out_sets();
@@ -161,6 +165,7 @@ class Acquisition final : private Notifier {
   DeviceHead<TriggerDevice, Pulse> board_head_;
   std::optional<SyncOutPulses> sync_out_;
   PairingWatch pairing_;
+  std::array<std::int64_t, kMaxCameras> pulses_without_{};  // since each camera's newest frame
 
   AcquiredQueue queue_;
   WakeEvent wake_;

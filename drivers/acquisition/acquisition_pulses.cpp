@@ -39,6 +39,19 @@ void Acquisition::take_pulse(const Pulse& reported) {
   if (!wants_pulses(options_.sync.mode)) return;
   sync_.pulse(pulse);
   note_proofs(pulse.arrival);
+  give_up_mute_cameras(pulse.arrival);
+}
+
+void Acquisition::give_up_mute_cameras(HostStamp now) {
+  constexpr Duration kLongest = Duration::seconds(10);
+  for (std::size_t k = 0; k < cameras_.size(); ++k) {
+    auto& head = heads_[k];
+    if (head.gone || head.ended || head.held) continue;
+    if (options_.sync.interval * ++pulses_without_[k] <= kLongest) continue;
+    pulses_without_[k] = 0;
+    cameras_[k]->stop();
+    note_gone(static_cast<int>(k), now);
+  }
 }
 
 void Acquisition::pause_pulses() {

@@ -1,5 +1,7 @@
 #pragma once
 #include <array>
+#include <cstdint>
+#include <limits>
 
 #include "drivers/camera.hpp"
 
@@ -19,9 +21,16 @@ class WatchedCamera final : public CameraDevice {
     return camera_->configure(c, actual);
   }
   DeviceTiming timing() const noexcept override { return camera_->timing(); }
-  DeviceStatus start(Notifier* ready) noexcept override { return camera_->start(ready); }
+  DeviceStatus start(Notifier* ready) noexcept override {
+    if (++starts > 1) hangs_from = kNever;
+    return camera_->start(ready);
+  }
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
     const DeviceStatus status = camera_->wait(limit, frame);
+    if (status == DeviceStatus::ok && frame->arrival > hangs_from) {
+      camera_->release(frame->slot);
+      return DeviceStatus::timeout;
+    }
     if (status == DeviceStatus::ok)
       edge_of_slot[frame->slot] = frame->arrival - camera_->timing().least_delay;
     return status;
@@ -36,6 +45,10 @@ class WatchedCamera final : public CameraDevice {
 
   std::array<HostStamp, 64>
       edge_of_slot{};  // not before the true edge, and at most 1.9 ms after it: the mock's jitter
+
+  static constexpr HostStamp kNever{std::numeric_limits<std::int64_t>::max()};
+  HostStamp hangs_from = kNever;  // gives nothing from then on, until it is started again
+  int starts = 0;
 
  private:
   CameraDevice* camera_;

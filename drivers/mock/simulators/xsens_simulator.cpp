@@ -43,8 +43,9 @@ void XsensSimulator::wake(HostStamp at) {
   in_.reset();
   outgoing_.clear();
   mode_ = Mode::waking;
-  send(at + kStartTime, id_of(MessageId::wake_up), {});
-  waits_for_host_until_ = at + kStartTime + kWakeTime;
+  starts_at_ = at + kStartTime;
+  send(starts_at_, id_of(MessageId::wake_up), {});
+  waits_for_host_until_ = starts_at_ + kWakeTime;
 }
 
 void XsensSimulator::measure(HostStamp at) {
@@ -69,6 +70,7 @@ bool XsensSimulator::ended() const {
 
 void XsensSimulator::receive(std::span<const std::uint8_t> bytes, HostStamp at) {
   now_ = std::max(now_, at);
+  if (now_ < starts_at_) return;
   while (!bytes.empty()) {
     bytes = bytes.subspan(in_.accept(bytes));
     for (Message m; in_.next(&m);) handle(m);

@@ -83,6 +83,7 @@ class XsensSimulator final : public DeviceModel {
   xbus::FrameStream in_;
   HostStamp now_{};
   Mode mode_ = Mode::waking;
+  HostStamp starts_at_{};  // it hears nothing before
   HostStamp waits_for_host_until_{};
   std::optional<HostStamp> reset_at_{};
   std::deque<Outgoing> outgoing_;

@@ -270,6 +270,20 @@ TEST(Acquisition, aDeviceThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
   EXPECT_EQ(count(items, DeviceEvent::Kind::board_gone), 1);
 }
 
+TEST(Acquisition, aCameraThatGivesNothingThoughThereArePulsesIsStartedAgain) {
+  BenchOptions o;
+  o.mode = SyncMode::board;
+  o.seconds = 18;
+  Bench b({}, o);
+  b.watched[1]->hangs_from = b.rig->start() + Duration::seconds(4);
+  const std::vector<Acquired> items = b.drive();
+  EXPECT_EQ(b.watched[0]->starts, 1);
+  EXPECT_EQ(b.watched[1]->starts, 2);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_gone), 1);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_back), 1);
+  EXPECT_GE(b.pulses_of.back()[1], 0) << "it gives images again";
+}
+
 TEST(Acquisition, everySlotComesBack) {
   Bench b({"duplicate_frames@0 share=0.5 duration_s=0"});
   (void)b.drive();
