@@ -190,7 +190,7 @@ void Acquisition::take_frame(std::size_t k) {
   auto& head = heads_[k];
   head.held = false;
   const int camera = static_cast<int>(k);
-  pulses_without_[k] = 0;
+  head.pulses_without = 0;
   if (head.event) {
     note_gone(camera, head.value.arrival);
     return;

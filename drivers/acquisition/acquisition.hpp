@@ -165,7 +165,6 @@ class Acquisition final : private Notifier {
   DeviceHead<TriggerDevice, Pulse> board_head_;
   std::optional<SyncOutPulses> sync_out_;
   PairingWatch pairing_;
-  std::array<std::int64_t, kMaxCameras> pulses_without_{};  // since each camera's newest frame
 
   AcquiredQueue queue_;
   WakeEvent wake_;

@@ -47,8 +47,8 @@ void Acquisition::give_up_mute_cameras(HostStamp now) {
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     auto& head = heads_[k];
     if (head.gone || head.ended || head.held) continue;
-    if (options_.sync.interval * ++pulses_without_[k] <= kLongest) continue;
-    pulses_without_[k] = 0;
+    if (options_.sync.interval * ++head.pulses_without <= kLongest) continue;
+    head.pulses_without = 0;
     cameras_[k]->stop();
     note_gone(static_cast<int>(k), now);
   }
