@@ -57,6 +57,7 @@ void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = {rig, 0}; 
 
 void Odometry::unlink() noexcept {
   link_ = Link::unlinked;
+  stereo_fails_ = false;  // by the calibration that is not used any more
   gaps_.forget();
   next_rig_.reset();
   front_end_.set_band(std::max(options_.band_px, kUnlinkedBand));
