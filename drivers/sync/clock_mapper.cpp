@@ -123,7 +123,7 @@ MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
     // A stall or a clock set back: which, the next ones tell. What was held up arrives at once,
     // stamps of a clock that was set back arrive as evenly as before.
     if (behind_++ == 0) first_behind_ = device, first_behind_host_ = host;
-    const bool evenly = 2 * (host - first_behind_host_).ns() >= (device - first_behind_).ns();
+    const bool evenly = 2 * in_ns(host - first_behind_host_) >= in_ns(device - first_behind_);
     if (behind_ >= kBehind && evenly) {
       ++resets_;
       return begin_one_way(device, arrival);
