@@ -33,7 +33,7 @@ struct DeviceHead {
   bool back = false;  // it was started again, which nobody has been told yet
   bool ended = false;
   std::int64_t pulses_without = 0;  // reported, since a camera's newest frame
-  std::int64_t ask_ns = 0;  // when it is next asked to come back, steady clock
+  std::int64_t ask_ns = 0;          // when it is next asked to come back, steady clock
   Value value{};
 
   void look(const Look& l) {
