@@ -165,8 +165,7 @@ std::string utc_words(const Json& time) {
              most = number_at(time, "utc.most_s").value_or(*ahead);
   return fmt::format(
       "<p>The session's stamps were {:.4f} s {} the INS's UTC ({:.4f} to {:.4f} s); they follow "
-      "the "
-      "host's clock of the day as it was at the start.</p>\n",
+      "the host's clock of the day as it was at the start.</p>\n",
       std::abs(*ahead), *ahead < 0 ? "behind" : "ahead of", least, most);
 }
 

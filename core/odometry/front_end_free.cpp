@@ -85,7 +85,7 @@ std::span<const FreeMatch> FrontEnd::match_free(int k) noexcept {
 }
 
 bool FrontEnd::too_near() noexcept {
-  constexpr int kFewest = 30;
+  constexpr int kFewest = 30;  // matches, as a scene is begun from
   const Transform& T_right_left = rig_.T_camera_left[1];
   const double nearest = 1.0 / (options_.nearest_baselines * T_right_left.t.norm());
   const std::span<const FreeMatch> matches = match_free(1);

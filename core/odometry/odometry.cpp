@@ -168,8 +168,9 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   budget_.begin(budget);
   const ImageCheck images = front_end_.begin(frame);
   clock.mark(Stage::pyramid);
+  const Reason of_images = weakness(images, rig_.cameras);
   out.structured = images.structured;
-  out.images_good = weakness(images, rig_.cameras) == Reason::none;
+  out.images_good = of_images == Reason::none;
   out.uneven = images.uneven;
   const double since_frame = gaps_.since_frame(frame.stamp);
   const double dt = motion_.any() ? (frame.stamp - motion_.stamp()).to_seconds() : 0.0;
@@ -189,9 +190,9 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
       gaps_.note(frames_lost_ == 0 ? dt : since_frame, options_.max_gap_s, link_ == Link::linked);
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
-    out.reason = weakness(images, rig_.cameras) != Reason::none ? weakness(images, rig_.cameras)
-                 : out.gap_s > 0                                ? Reason::time_gap
-                                                                : Reason::no_pose;
+    out.reason = of_images != Reason::none ? of_images
+                 : out.gap_s > 0           ? Reason::time_gap
+                                           : Reason::no_pose;
     if (images.structured != 0 && ++frames_lost_ >= kFramesLostBeforeRestart) lose_scene();
     return out;
   }

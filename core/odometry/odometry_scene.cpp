@@ -88,12 +88,12 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
 void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
                            const Transform& predicted, double dt, FrameOutcome* out) noexcept {
   // Nothing to follow: this frame begins a scene, where the last one is thought to have ended.
+  const Reason of_images = weakness(images, rig_.cameras);
   const bool initialise = link_ == Link::unlinked && !rig_known_;
   bool started = !initialise || initialise_rig(out);
   if (started && !start_scene(predicted, frame.stamp, out)) started = false;
   if (!started) {
-    if (weakness(images, rig_.cameras) != Reason::none)
-      out->reason = weakness(images, rig_.cameras);
+    if (of_images != Reason::none) out->reason = of_images;
     return;
   }
   if (link_ == Link::unlinked) {
@@ -107,9 +107,9 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
     out->status = PoseStatus::degraded;
     out->reason = Reason::uncalibrated;
   }
-  if (weakness(images, rig_.cameras) != Reason::none) {  // begun by the other cameras
+  if (of_images != Reason::none) {  // begun by the other cameras
     out->status = PoseStatus::degraded;
-    out->reason = weakness(images, rig_.cameras);
+    out->reason = of_images;
   }
   if (motion_.any()) {
     out->restarted = true;
