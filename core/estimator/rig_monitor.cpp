@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/estimator/detail/rig_verdict.hpp"
+
 namespace vergence {
 namespace {
 
@@ -28,23 +30,6 @@ Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) n
   Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
   spread.tail<3>() *= baseline;
   return spread.cwiseAbs2().asDiagonal();
-}
-
-int rank(MonitorVerdict::Kind kind) noexcept {
-  using K = MonitorVerdict::Kind;
-  switch (kind) {
-    case K::quiet:
-      return 0;
-    case K::out_of_step:
-      return 1;
-    case K::drift:
-      return 2;
-    case K::knock:
-      return 3;
-    case K::collapse:
-      return 4;
-  }
-  return 0;
 }
 
 Pinhole pinhole(const RigCalibration& rig, int k) noexcept {
@@ -234,8 +219,7 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
 MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
                                   const odometry::FrameOutcome& outcome,
                                   const RigFrame& frame) noexcept {
-  MonitorVerdict worst;
-  bool in_step = true, no_lag = true, undecided = false, any_measures = false;
+  RigVerdict verdict;
   const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < cameras_; ++k) {
     const int found = collect_stereo(odometry.map(), k, kWitness);
@@ -244,34 +228,12 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
       jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
     else
       camera(k).jumps.skip(step);
-    if (scene_pending_) {
-      undecided = undecided || jump.suspected;
-      if (jump.confirmed) {
-        worst.kind = MonitorVerdict::Kind::knock;
-        worst.onset_frame = jump.onset_frame;
-      }
-      continue;
-    }
-    MonitorVerdict v = monitor_verdict(k, odometry, outcome, frame, found, step);
-    // One that shares no view with the left one says nothing of itself, nor for the others.
-    if (!v.needs_texture) {
-      any_measures = true;
-      in_step = in_step && v.in_step;
-      no_lag = no_lag && v.shows_no_lag;
-    }
-    if (jump.confirmed && rank(v.kind) < rank(MonitorVerdict::Kind::knock)) {
-      v.kind = MonitorVerdict::Kind::knock;
-      v.onset_frame = jump.onset_frame;
-    }
-    undecided = undecided || v.undecided || jump.suspected;
-    if (rank(v.kind) > rank(worst.kind) ||
-        (rank(v.kind) == rank(worst.kind) && v.statistic > worst.statistic))
-      worst = v;
+    if (scene_pending_)
+      verdict.add(jump);
+    else
+      verdict.add(monitor_verdict(k, odometry, outcome, frame, found, step), jump);
   }
-  worst.undecided = undecided;
-  worst.in_step = any_measures && in_step;
-  worst.shows_no_lag = any_measures && no_lag;
-  return worst;
+  return verdict.of_all();
 }
 
 }  // namespace vergence

@@ -1,0 +1,79 @@
+#include "core/estimator/detail/solution_review.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/core/calibration/feature_log.hpp"
+
+namespace vergence {
+namespace {
+
+using calibration::Gate;
+
+/// A solve that found the true rig, frames that it does not rest on, and a calibration in use that
+/// is turned from it.
+struct Review {
+  static constexpr std::uint64_t kNewest = 5;  // the last frame of the solve
+  static constexpr double kSigma = 1e-4;       // of the rotation found, rad
+
+  test::FeatureDriveOptions drive;
+  Arena arena{calibration::TrackLog::memory_needed(20, 300)};
+  calibration::TrackLog log{20, 300, arena};
+  EstimatorOptions options;
+  calibration::FocalCheck focal{false};
+  RigCalibration truth = test::rig_of(drive), in_use = truth;
+  BackgroundSolve::Solved solved;
+
+  explicit Review(const Vec3& turned) {
+    test::FeatureDrive d(drive);
+    test::log_drive(d, 20, {}, log);
+    in_use.T_camera_left[1].R = exp_so3(turned) * truth.T_camera_left[1].R;
+    calibration::RigSolution& s = solved.transforms;
+    s.status = calibration::RigSolveStatus::ok;
+    s.rig = truth;
+    s.newest = kNewest;
+    s.frames = options.calibration.max_frames;
+    s.travelled_m = 100;
+    s.near = 1000;
+    for (int row = extrinsic_row(1); row < extrinsic_row(1) + 3; ++row)
+      s.rig.covariance.set(row, row, kSigma * kSigma);
+  }
+  [[nodiscard]] Gate gate() const {
+    const SolutionReview review(solved, {options, truth, &in_use, log, focal});
+    return review.gate(solved.transforms);
+  }
+  [[nodiscard]] bool lines_tell() const {
+    return calibration::fits_better(log, kNewest, truth, in_use);
+  }
+};
+
+TEST(SolutionReview, theCalibrationInUseIsKeptWhereTheSolveFoundTheSame) {
+  EXPECT_EQ(Review(Vec3::Zero()).gate(), Gate::no_better);
+}
+
+TEST(SolutionReview, aPitchIsJudgedByEpipolarLines) {
+  const Review r({1e-3, 0, 0});  // 0.7 px of every row
+  EXPECT_TRUE(r.lines_tell());
+  EXPECT_EQ(r.gate(), Gate::open);
+}
+
+// 1 mrad is 2.7 % of the depth at 20 m, which the solve holds to 0.27 %; of epipolar lines it moves
+// those in the image's corners, by less than the matches scatter.
+TEST(SolutionReview, aYawThatNoEpipolarLineShowsIsJudgedByDepth) {
+  for (const double yaw : {1e-3, -1e-3}) {
+    const Review r({0, yaw, 0});
+    ASSERT_FALSE(r.lines_tell()) << yaw;
+    EXPECT_EQ(r.gate(), Gate::open) << yaw;
+  }
+}
+
+// And one that the depth does not contradict by more than chance leaves the calibration where it
+// is.
+TEST(SolutionReview, aYawWithinWhatIsToleratedChangesNothing) {
+  for (const double yaw : {3e-4, -3e-4})
+    EXPECT_EQ(Review({0, yaw, 0}).gate(), Gate::no_better) << yaw;
+}
+
+}  // namespace
+}  // namespace vergence
