@@ -237,6 +237,23 @@ TEST(RigSolver, aThirdCameraThatIsLateIsOutOfStep) {
   }
 }
 
+// Where camera 2 has no pose yet it lies where the left one is: such a frame is none to begin with,
+// however well it fits.
+TEST(RigSolver, aFrameInWhichOneCameraHasNoPoseYetIsNoCandidate) {
+  const FeatureDriveOptions drive = exact_drive();
+  const FurtherCamera second{2, {exp_so3({-6e-3, 4e-3, 2e-3}), {-0.4, -0.05, 0.01}}};
+  SolverInArena s(held(), 3);
+  FeatureDrive d(drive);
+  log_drive(d, 60, kRough, s.solver.log(), &second);
+  auto& unplaced = s.solver.log().frame(30);
+  unplaced.T_camera_left[2] = Transform{};
+  unplaced.reprojection_px = 0.1;
+  EXPECT_EQ(s.solver.solve(rig_of(drive, second)).status, RigSolveStatus::ok);
+  for (std::size_t i = 0; i < s.solver.log().size(); ++i)
+    s.solver.log().frame(i).T_camera_left[2] = Transform{};
+  EXPECT_EQ(s.solver.solve(rig_of(drive, second)).status, RigSolveStatus::no_candidate);
+}
+
 TEST(RigSolver, whatHoldsNoTransformSaysSo) {
   const FeatureDriveOptions drive = exact_drive();
   const RigCalibration rig = rig_of(drive);
