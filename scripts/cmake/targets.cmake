@@ -136,7 +136,7 @@ function(vergence_test name)
     foreach(shard RANGE 1 ${ARG_SHARDS})
       math(EXPR index "${shard} - 1")
       add_test(NAME ${name}.${shard}_of_${ARG_SHARDS} COMMAND ${name} --gtest_brief=1)
-      set_tests_properties(${name}.${shard}_of_${ARG_SHARDS} PROPERTIES ${properties}
+      set_tests_properties(${name}.${shard}_of_${ARG_SHARDS} PROPERTIES ${properties} COST 150
         ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index}")
     endforeach()
     return()
