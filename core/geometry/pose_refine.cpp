@@ -83,8 +83,10 @@ bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) n
   pose->status = PoseRefineStatus::max_steps;
   double damping = 0;
   int failures = 0, steps = 0;
+  bool rescaled = false;
   while (steps < options.max_steps) {
-    if (steps == kRescaleAfter && failures == 0) {
+    if (!rescaled && steps >= kRescaleAfter && failures == 0) {
+      rescaled = true;
       pose->scale = residual_scale(pose->T_left_world, options.min_scale);
       now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
     }
@@ -121,7 +123,7 @@ bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) n
     }
   }
   // The scale at the end is the one that information and flags are in.
-  if (steps <= kRescaleAfter) {
+  if (!rescaled) {
     pose->scale = residual_scale(pose->T_left_world, options.min_scale);
     now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
   }
