@@ -262,7 +262,7 @@ int run_knocks(const Arguments& a) {
         fmt::print("    decision {} frames {} held out {:.2f} -> {:.2f} px\n", d.reason,
                    d.calibration.frames, d.held_out_before_px, d.held_out_after_px);
         if (d.accepted) {
-          if (mended < 0) mended = i;
+          if (mended < 0 && n >= kKnockAt) mended = i;
           Found f{true, d.calibration, i, d.solve_ms, 0};
           print("    found", f, errors_of(d.calibration, after));
         }

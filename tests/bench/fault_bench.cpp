@@ -1,7 +1,8 @@
 // Drives of the mock with faults, as the table of docs/faults.md:
 //   fault_bench [single | long | pairs | random] [COUNT [FIRST] | part of a name]
 // The first 20 of `random`, all of the others, unless COUNT says how many, from FIRST (1) on.
-// Ends with 1 where an `ok` pose was wrong or a session is not whole.
+// Ends with 1 where an `ok` pose was wrong, a session is not whole, the program failed or is not
+// usable any more, and with 2 where there is nothing to drive or to judge by.
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
@@ -33,20 +34,29 @@ int main(int argc, char** argv) {
     cases.resize(std::min(number(2, cases.size()), cases.size()));
     std::erase_if(cases, [&](const FaultCase& c) { return c.name.find(filter) == c.name.npos; });
   }
-  const FaultDrive untouched = drive_with_faults(no_fault());
-  const NormalError normal = normal_error_there(untouched.poses, untouched.truth);
+  if (cases.empty() ||
+      (what != "single" && what != "long" && what != "pairs" && what != "random")) {
+    fmt::print(stderr, "fault_bench: no such drives\n");
+    return 2;
+  }
+  const Untouched untouched = untouched_drive();
+  if (!untouched.unfit.empty()) {
+    fmt::print(stderr, "fault_bench: nothing can be judged by {}\n", untouched.unfit);
+    return 2;
+  }
   fmt::print("{}", fault_table_head());
   int bad = 0, unusable = 0;
   for (const FaultCase& c : cases) {
-    const auto [drive, result] = drive_until_recovered(c, normal);
+    const auto [drive, result] = drive_until_recovered(c, untouched.normal);
     fmt::print("{}", fault_table_line(c, drive, result));
     std::fflush(stdout);
-    bad += result.honesty.wrong > 0 || !drive.whole ? 1 : 0;
+    bad += is_bad(drive, result) ? 1 : 0;
     unusable += result.recovery_s ? 0 : 1;
   }
   fmt::print(
-      "\n{} of {} with a wrong `ok` or without a whole session, {} not usable any more within a "
-      "minute\n",
+      "\n{} of {} with a wrong `ok`, an `ok` at a time without truth, an exit that is not 0 or "
+      "without a "
+      "whole session, {} not usable any more within a minute\n",
       bad, cases.size(), unusable);
-  return bad > 0 ? 1 : 0;
+  return bad + unusable > 0 ? 1 : 0;
 }

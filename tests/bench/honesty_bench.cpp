@@ -66,10 +66,11 @@ std::vector<test::JudgedPose> judged(const Driven& d) {
 
 struct Tally {
   int runs = 0, wrong_runs = 0, wrong = 0, ok = 0;
+  int cut_short = 0;  // runs that have not a sample for every pair
 };
 
-void judge(const RecordedSequence& drive_of, const std::string& what, const Driven& d,
-           const test::NormalErrors& normal, Tally* tally) {
+void judge(const RecordedSequence& drive_of, const std::string& what, std::size_t pairs,
+           const Driven& d, const test::NormalErrors& normal, Tally* tally) {
   const test::Honesty h = test::judge_honesty(
       judged(d), [&](Stamp, std::size_t frames) { return normal[frames]; }, drive_of.truth);
   ++tally->runs;
@@ -78,6 +79,11 @@ void judge(const RecordedSequence& drive_of, const std::string& what, const Driv
   tally->wrong_runs += h.wrong > 0 ? 1 : 0;
   fmt::print("{:12s} {:46s} frames {:3d} ok {:3d} lost {:3d} knocks {}  most {:4.1f}",
              drive_of.name, what, d.samples.size(), h.ok, h.lost, d.knocks, h.most);
+  if (d.samples.size() != pairs) {
+    ++tally->cut_short;
+    fmt::print("  CUT SHORT: {} pairs", pairs);
+  }
+  if (h.unjudged > 0) fmt::print("  no truth for {}", h.unjudged);
   if (h.wrong_over_all > 0) fmt::print("  over 20 {}", h.wrong_over_all);
   if (h.wrong > 0) fmt::print("  WRONG {} from {}", h.wrong, h.first_wrong);
   fmt::print("\n");
@@ -93,15 +99,17 @@ void run(const RecordedSequence& d, const std::string& filter, bool events, Tall
   if (found.rig) own.file.rig = *found.rig;
   const auto normal = test::normal_errors(judged(drive(d.sequence, c, own)), d.truth);
   fmt::print("{:12s} normal error over {} frames: {:.3f} m\n", d.name, test::kHonestyFrames,
-             normal.back());
+             normal.back().way_m);
   for (const HonestyVariant& v : honesty_variants()) {
     if (v.name.find(filter) == std::string_view::npos) continue;
     const test::TemporaryFolder folder;
     const app::StereoSequence s = spoil(d, v, folder.path());
     const std::string name(v.name);
-    judge(d, name + ", given", drive(s, c, given, events), normal, tally);
-    if (found.rig) judge(d, name + ", own", drive(s, c, own, events), normal, tally);
-    judge(d, name + ", from scratch", drive(s, c, test::blank(given), events), normal, tally);
+    judge(d, name + ", given", s.pairs.size(), drive(s, c, given, events), normal, tally);
+    if (found.rig)
+      judge(d, name + ", own", s.pairs.size(), drive(s, c, own, events), normal, tally);
+    judge(d, name + ", from scratch", s.pairs.size(), drive(s, c, test::blank(given), events),
+          normal, tally);
   }
 }
 
@@ -122,7 +130,8 @@ int main(int argc, char** argv) {
     }
     bench::run(*d, filter, argc > 3, &tally);
   }
-  fmt::print("{} runs, {} poses ok, {} of them wrong, in {} runs\n", tally.runs, tally.ok,
-             tally.wrong, tally.wrong_runs);
-  return tally.wrong > 0 ? EXIT_FAILURE : EXIT_SUCCESS;
+  fmt::print("{} runs, {} poses ok, {} of them wrong, in {} runs; {} cut short\n", tally.runs,
+             tally.ok, tally.wrong, tally.wrong_runs, tally.cut_short);
+  if (tally.runs == 0) return 2;
+  return tally.wrong > 0 || tally.cut_short > 0 ? EXIT_FAILURE : EXIT_SUCCESS;
 }

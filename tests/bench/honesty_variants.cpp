@@ -244,7 +244,8 @@ app::StereoSequence spoil(const test::RecordedSequence& drive, const HonestyVari
     variant.image(&images[0], &images[1], i, s.pairs.size());
     for (std::size_t k = 0; k < 2; ++k) {
       const std::filesystem::path file = folder / fmt::format("{}_{:06d}.png", k, i);
-      cv::imwrite(file.string(), images[k], {cv::IMWRITE_PNG_COMPRESSION, 1});
+      if (!cv::imwrite(file.string(), images[k], {cv::IMWRITE_PNG_COMPRESSION, 1}))
+        throw std::runtime_error("cannot write " + file.string());
       s.pairs[i].file[k] = file.string();
     }
   }

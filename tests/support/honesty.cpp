@@ -1,18 +1,42 @@
 #include "tests/support/honesty.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
+
+#include "core/math/so3.hpp"
 
 namespace vergence::test {
 namespace {
 
-/// Error of the motion between two poses, m; negative: the truth is not known at one of them.
-double motion_error(const JudgedPose& from, const JudgedPose& to, const app::Trajectory& truth) {
+/// Error of the motion between two poses; none: one of them is lost, or its truth is not known.
+std::optional<MotionError> motion_error(const JudgedPose& from, const JudgedPose& to,
+                                        const app::Trajectory& truth) {
+  if (from.status == PoseStatus::lost || to.status == PoseStatus::lost) return {};
   const Transform *a = true_pose(truth, from.stamp), *b = true_pose(truth, to.stamp);
-  if (a == nullptr || b == nullptr) return -1;
-  const Vec3 estimate = (from.T_world_left.inverse() * to.T_world_left).t;
-  return (estimate - (a->inverse() * *b).t).norm();
+  if (a == nullptr || b == nullptr) return {};
+  const Transform estimate = from.T_world_left.inverse() * to.T_world_left, is = a->inverse() * *b;
+  return MotionError{(estimate.t - is.t).norm(), rotation_angle(estimate.R * is.R.transpose())};
 }
+
+/// The mean of errors.
+class Mean {
+ public:
+  void add(const std::optional<MotionError>& e) {
+    if (!e) return;
+    sum_.way_m += e->way_m;
+    sum_.turn_rad += e->turn_rad;
+    ++count_;
+  }
+  [[nodiscard]] MotionError value() const {
+    const double n = std::max(1, count_);
+    return {sum_.way_m / n, sum_.turn_rad / n};
+  }
+
+ private:
+  MotionError sum_;
+  int count_ = 0;
+};
 
 }  // namespace
 
@@ -27,34 +51,27 @@ const Transform* true_pose(const app::Trajectory& truth, Stamp stamp) {
 }
 
 NormalErrors normal_errors(std::span<const JudgedPose> poses, const app::Trajectory& truth) {
-  NormalErrors sum{};
+  NormalErrors errors{};
   for (std::size_t length = 1; length <= kHonestyFrames; ++length) {
-    int count = 0;
-    for (std::size_t i = length; i < poses.size(); ++i) {
-      const double error = motion_error(poses[i - length], poses[i], truth);
-      if (error < 0) continue;
-      sum[length] += error;
-      ++count;
-    }
-    sum[length] /= std::max(1, count);
+    Mean mean;
+    for (std::size_t i = length; i < poses.size(); ++i)
+      mean.add(motion_error(poses[i - length], poses[i], truth));
+    errors[length] = mean.value();
   }
-  return sum;
+  return errors;
 }
 
 NormalError normal_error_there(std::vector<JudgedPose> poses, app::Trajectory truth) {
   const NormalErrors mean = normal_errors(poses, truth);
   return [mean, poses = std::move(poses), truth = std::move(truth)](Stamp at, std::size_t frames) {
     constexpr Duration kAround = Duration::seconds(1.0);
-    double sum = 0;
-    int count = 0;
-    for (std::size_t i = frames; i < poses.size(); ++i) {
-      if (poses[i].stamp < at - kAround || poses[i].stamp > at + kAround) continue;
-      const double error = motion_error(poses[i - frames], poses[i], truth);
-      if (error < 0) continue;
-      sum += error;
-      ++count;
-    }
-    return count == 0 ? mean[frames] : std::max(mean[frames], sum / count);
+    Mean around;
+    for (std::size_t i = frames; i < poses.size(); ++i)
+      if (poses[i].stamp >= at - kAround && poses[i].stamp <= at + kAround)
+        around.add(motion_error(poses[i - frames], poses[i], truth));
+    const MotionError here = around.value();
+    return MotionError{std::max(mean[frames].way_m, here.way_m),
+                       std::max(mean[frames].turn_rad, here.turn_rad)};
   };
 }
 
@@ -69,17 +86,22 @@ Honesty judge_honesty(std::span<const JudgedPose> poses, const NormalError& norm
       continue;
     }
     ++h.ok;
-    const auto times = [&](std::size_t since) {
+    // Times the normal error; none: not known.
+    const auto times = [&](std::size_t since) -> std::optional<double> {
       const std::size_t from = std::max(since, i < kHonestyFrames ? 0 : i - kHonestyFrames);
-      return from == i
-                 ? 0.0
-                 : motion_error(poses[from], poses[i], truth) / normal(poses[i].stamp, i - from);
+      const auto error = motion_error(poses[from], poses[i], truth);
+      if (!error) return {};
+      if (from == i) return 0.0;
+      const MotionError usual = normal(poses[i].stamp, i - from);
+      return std::max(error->way_m / usual.way_m,
+                      error->turn_rad / std::max(usual.turn_rad, kLeastNormalTurn));
     };
-    const double claimed = times(ok_since);
-    h.most = std::max(h.most, claimed);
-    if (i >= ok_since + kHonestyFrames) h.most_full = std::max(h.most_full, claimed);
-    if (claimed > kHonestyTimes && h.wrong++ == 0) h.first_wrong = i;
-    h.wrong_over_all += times(posed_since) > kHonestyTimes ? 1 : 0;
+    const std::optional<double> claimed = times(ok_since);
+    h.unjudged += claimed ? 0 : 1;
+    h.most = std::max(h.most, claimed.value_or(0));
+    if (i >= ok_since + kHonestyFrames) h.most_full = std::max(h.most_full, claimed.value_or(0));
+    if (claimed.value_or(0) > kHonestyTimes && h.wrong++ == 0) h.first_wrong = i;
+    h.wrong_over_all += times(posed_since).value_or(0) > kHonestyTimes ? 1 : 0;
   }
   return h;
 }

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -18,6 +20,8 @@ namespace {
 
 constexpr Stamp kStart{1'577'836'800'000'000'000};  // of every --fast drive
 constexpr Duration kLongestDrive = Duration::seconds(86400.0);
+constexpr double kMinute = 60;
+constexpr double kStarting = 6;  // s of a drive in real time that may be gone before its first pose
 
 /// Of the drive with this first pose: in real time that is where it begins.
 Stamp start_of(Stamp first) { return first - kStart > kLongestDrive ? first : kStart; }
@@ -95,10 +99,11 @@ FaultDrive drive_with_faults(const FaultCase& c) {
     d.truth = app::read_tum(session / "truth.tum");
   // An error without truth beside it would be none.
   d.whole = d.whole && !d.truth.empty() && !d.poses.empty() &&
-            d.truth.back().stamp + Duration::seconds(1) >= d.poses.back().stamp;
+            d.truth.back().stamp + Duration::seconds(1) >= d.poses.back().stamp &&
+            d.at_s.back() >= c.duration_s - (c.system.empty() ? 1 : kStarting);
   if (d.whole) {
     std::ifstream in(session / "summary.json");
-    d.skipped = nlohmann::json::parse(in)["frames"]["skipped"].get<int>();
+    d.summary.assign(std::istreambuf_iterator<char>(in), {});
   }
   return d;
 }
@@ -125,13 +130,63 @@ FaultResult judge(const FaultCase& c, const FaultDrive& drive, const NormalError
   return r;
 }
 
+Untouched untouched_drive() {
+  // The untouched drive of a minute is normally off by 4.0 cm over 20 frames, 1067 of its 1184
+  // poses are `ok`, and none is lost. A judge that takes for normal what is worse sees less.
+  constexpr double kNormal = 0.05;
+  constexpr int kOk = 1000;
+  FaultCase none;
+  none.name = "none";
+  none.duration_s = kMinute;
+  Untouched u;
+  u.drive = drive_with_faults(none);
+  const auto& poses = u.drive.poses;
+  const auto count = [&poses](PoseStatus status) {
+    return std::count_if(poses.begin(), poses.end(),
+                         [status](const JudgedPose& p) { return p.status == status; });
+  };
+  u.normal = normal_error_there(poses, u.drive.truth);
+  const double usual = normal_errors(poses, u.drive.truth)[kHonestyFrames].way_m;
+  if (u.drive.code != 0 || !u.drive.whole || count(PoseStatus::lost) > 0 ||
+      count(PoseStatus::ok) < kOk || !(usual > 0) || usual > kNormal)
+    u.unfit = fmt::format("the untouched drive: exit {}, {}, {} ok, {} lost, {:.3f} m off\n{}",
+                          u.drive.code, u.drive.whole ? "whole" : "not whole",
+                          count(PoseStatus::ok), count(PoseStatus::lost), usual, u.drive.err);
+  return u;
+}
+
+std::string unsaid(const FaultCase& c, const FaultDrive& drive, const FaultDrive& untouched) {
+  if (c.said.empty()) {
+    for (std::size_t i = 0; i < std::min(drive.poses.size(), untouched.poses.size()); ++i)
+      if (drive.at_s[i] >= c.from_s &&
+          drive.poses[i].T_world_left.t != untouched.poses[i].T_world_left.t)
+        return "";
+    return "any difference from the untouched drive";
+  }
+  const auto summary = nlohmann::json::parse(drive.summary, nullptr, false);
+  std::string missing;
+  for (const std::string& what : c.said) {
+    const bool seen =
+        what.starts_with('/')
+            ? !summary.is_discarded() &&
+                  summary.value(nlohmann::json::json_pointer(what), std::int64_t{0}) > 0
+            : drive.events.count(what) > 0 || drive.reasons.count(what) > 0 ||
+                  drive.err.find(what + "\n") != std::string::npos;
+    if (!seen) missing += (missing.empty() ? "" : ", ") + what;
+  }
+  return missing;
+}
+
+bool is_bad(const FaultDrive& drive, const FaultResult& result) {
+  return drive.code != 0 || !drive.whole || result.honesty.wrong > 0 || result.honesty.unjudged > 0;
+}
+
 JudgedDrive drive_until_recovered(FaultCase c, const NormalError& normal) {
-  constexpr double kMinute = 60;
   for (;;) {  // twice at most
     JudgedDrive d;
     d.drive = drive_with_faults(c);
     d.result = judge(c, d.drive, normal);
-    if (d.result.recovery_s || c.duration_s >= kMinute) return d;
+    if (is_bad(d.drive, d.result) || d.result.recovery_s || c.duration_s >= kMinute) return d;
     c.duration_s = kMinute;
   }
 }
@@ -159,8 +214,13 @@ std::string fault_table_line(const FaultCase& c, const FaultDrive& drive,
   if (!reasons.empty()) seen += (seen.empty() ? "" : "; ") + reasons;
   const std::string after =
       result.recovery_s ? fmt::format("{:.2f} s", *result.recovery_s) : "not any more";
+  std::string wrong = std::to_string(result.honesty.wrong);
+  if (result.honesty.unjudged > 0)
+    wrong += fmt::format(", {} where there is no truth", result.honesty.unjudged);
+  if (result.honesty.wrong_over_all > 0)
+    wrong += fmt::format(" ({} over `degraded` ones)", result.honesty.wrong_over_all);
   return fmt::format("| {} | {} | {} | {} | {:.1f} | {} | {} |\n", c.name, faults, seen, after,
-                     result.error_after, result.honesty.wrong, drive.code);
+                     result.error_after, wrong, drive.code);
 }
 
 }  // namespace vergence::test

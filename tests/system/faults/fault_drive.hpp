@@ -14,7 +14,11 @@ struct FaultCase {
   std::string name;
   std::vector<std::string> faults{};  // as --fault takes them
   double from_s = 0, until_s = 0;     // of the drive: first fault's start, last one's end
-  std::string more{};                 // further arguments
+  /// What must be seen of them: kinds of events, reasons of frames, counters of summary.json
+  /// ("/devices/clock_resets") that are not 0, or lines on the terminal. None: poses that are not
+  /// those of the untouched drive.
+  std::vector<std::string> said{};
+  std::string more{};    // further arguments
   std::string system{};  // what goes wrong below the program, in real time (faulty_system.c)
   double duration_s = 20;
   double recovers_within_s = 0;
@@ -24,13 +28,15 @@ struct FaultCase {
 struct FaultDrive {
   int code = -1;  // the program's
   std::string err{};
-  bool whole = false;  // summary.json and report.html are there
+  /// summary.json and report.html are there, and poses to the end of the drive with the truth
+  /// beside them.
+  bool whole = false;
   std::vector<JudgedPose> poses{};
   std::vector<double> at_s{};  // of each pose, since the drive's start
   app::Trajectory truth{};
   std::map<std::string, int> events{};   // by kind
   std::map<std::string, int> reasons{};  // frames from the fault's start on that are not `ok`
-  int skipped = 0;                       // frames that were not used, of all
+  std::string summary{};                 // summary.json
 };
 
 struct FaultResult {
@@ -44,13 +50,31 @@ struct FaultResult {
 
 /// mock_board.yaml with a quarter of the pixels: every pair proven, or not used.
 [[nodiscard]] FaultDrive drive_with_faults(const FaultCase& c);
+
+/// The drive without any fault, as long as the longest of the others, and what is normal by it.
+struct Untouched {
+  FaultDrive drive{};
+  NormalError normal{};
+  /// Why nothing can be judged by it: it is not as good as it was when this was written. Empty: it
+  /// is.
+  std::string unfit{};
+};
+[[nodiscard]] Untouched untouched_drive();
+/// Of what must be said of these faults, what was not; empty: all was.
+[[nodiscard]] std::string unsaid(const FaultCase& c, const FaultDrive& drive,
+                                 const FaultDrive& untouched);
+/// Nothing of it may be: a wrong `ok`, one at a time at which there is no truth, a session that is
+/// not whole, a program that failed.
+[[nodiscard]] bool is_bad(const FaultDrive& drive, const FaultResult& result);
+
 [[nodiscard]] FaultResult judge(const FaultCase& c, const FaultDrive& drive,
                                 const NormalError& normal);
 struct JudgedDrive {
   FaultDrive drive{};
   FaultResult result{};
 };
-/// The case's drive; where that ends before the last fault is over with, one of a minute.
+/// The case's drive; where that is not bad and ends before the last fault is over with, one of a
+/// minute.
 [[nodiscard]] JudgedDrive drive_until_recovered(FaultCase c, const NormalError& normal);
 
 /// The faults of docs/mock.md, one at a time; begin at 9 s, when the calibration is confirmed.
@@ -62,8 +86,6 @@ struct JudgedDrive {
 /// A stand of ten minutes in virtual time; a disk that stalls and a host's clock that is set, in
 /// real time: of `system` the times are the process's, some seconds ahead of the drive's.
 [[nodiscard]] const std::vector<FaultCase>& long_faults();
-/// The drive without any.
-[[nodiscard]] FaultCase no_fault();
 
 /// Head and line of the table of docs/faults.md.
 [[nodiscard]] std::string fault_table_head();

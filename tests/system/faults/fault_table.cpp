@@ -14,43 +14,48 @@ constexpr double kAt = 9;  // s: the calibration is confirmed by then
 /// A fault without its times.
 struct Kind {
   const char* name;
-  const char* what;        // of --fault, before the @
-  const char* parameters;  // but duration_s
-  double seconds;          // 0: none, it is done at once and stays
+  const char* what;               // of --fault, before the @
+  const char* parameters;         // but duration_s
+  double seconds;                 // 0: none, it is done at once and stays
+  std::vector<std::string> said;  // FaultCase::said
   // s, within which poses are `ok` again for good: pairing proven, the calibration confirmed anew
   double recovers = 3;
 };
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all{
-      {"one camera gone", "camera_gone", "camera=1", 3},
-      {"both cameras gone", "camera_gone", "camera=-1", 3},
-      {"both cameras blink", "camera_gone", "camera=-1", 0.1},
-      {"INS gone", "ins_gone", "", 3},
-      {"no fix", "no_fix", "", 5},
-      {"INS position jumps", "position_jump", "east_m=100", 3},
-      {"board gone", "board_gone", "", 3},
-      {"board gone, pulses on", "board_gone", "powered=1", 3},
-      {"board restarts", "board_reboot", "", 0.5},
-      {"knock", "knock", "camera=1 pitch_deg=0.2", 0, 4},
-      {"one lens covered", "cover", "camera=1", 3},
-      {"both lenses covered", "cover", "camera=-1", 3},
-      {"night", "night", "", 5},
-      {"tunnel", "night", "factor=0.1", 5},
-      {"exposure stuck, too bright", "exposure", "factor=6", 5},
-      {"one side dark", "exposure", "camera=1 factor=0.1", 5},
-      {"30 % of the frames lost", "lose_frames", "share=0.3", 5},
-      {"30 % of the frames late", "late_frames", "share=0.3", 5},
-      {"30 % of the frames twice", "duplicate_frames", "share=0.3", 5},
-      {"pairs broken", "break_pairs", "share=1", 3},
-      {"one camera a frame late", "lag", "camera=1", 3, 5},
-      {"cables exchanged", "swap_cables", "", 3, 9},
-      {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0},
-      {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0},
-      {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0},
-      {"a bus in the way", "occluder", "", 5, 9},
-      {"disk full", "disk_full", "", 3},
-      {"recalibration asked for", "recalibrate", "", 0, 6},
+      {"one camera gone", "camera_gone", "camera=1", 3, {"camera_gone", "camera_back", "no_image"}},
+      {"both cameras gone", "camera_gone", "camera=-1", 3, {"camera_gone", "camera_back"}},
+      {"both cameras blink", "camera_gone", "camera=-1", 0.1, {"camera_gone", "camera_back"}},
+      {"INS gone", "ins_gone", "", 3, {"ins_silent", "ins_ok"}},
+      {"no fix", "no_fix", "", 5, {"ins_no_fix", "ins_ok"}},
+      {"INS position jumps", "position_jump", "east_m=100", 3, {"ins_jump"}},
+      {"board gone", "board_gone", "", 3, {"board_gone", "board_back"}},
+      {"board gone, pulses on", "board_gone", "powered=1", 3, {"board_gone", "board_back"}},
+      {"board restarts", "board_reboot", "", 0.5, {"board_rebooted"}},
+      {"knock", "knock", "camera=1 pitch_deg=0.2", 0, {"rig_changed", "recalibrating"}, 4},
+      {"one lens covered", "cover", "camera=1", 3, {"image_dark"}},
+      {"both lenses covered", "cover", "camera=-1", 3, {"image_dark"}},
+      {"night", "night", "", 5, {"image_dark"}},
+      {"tunnel", "night", "factor=0.1", 5, {"few_features"}},
+      {"exposure stuck, too bright", "exposure", "factor=6", 5, {"few_features"}},
+      {"one side dark", "exposure", "camera=1 factor=0.1", 5, {}},
+      {"30 % of the frames lost", "lose_frames", "share=0.3", 5, {"no_image"}},
+      {"30 % of the frames late", "late_frames", "share=0.3", 5, {"no_image"}},
+      {"30 % of the frames twice",
+       "duplicate_frames",
+       "share=0.3",
+       5,
+       {"/devices/camera0_duplicate", "/devices/camera1_duplicate"}},
+      {"pairs broken", "break_pairs", "share=1", 3, {"no_image"}},
+      {"one camera a frame late", "lag", "camera=1", 3, {"out_of_step", "in_step"}, 5},
+      {"cables exchanged", "swap_cables", "", 3, {"cameras_swapped", "rig_changed"}, 9},
+      {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0, {"no_image"}},
+      {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0, {"no_image"}},
+      {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0, {"/devices/clock_resets"}},
+      {"a bus in the way", "occluder", "", 5, {"no_stereo_matches"}, 9},
+      {"disk full", "disk_full", "", 3, {"disk_full", "disk_room"}},
+      {"recalibration asked for", "recalibrate", "", 0, {"rig_changed", "recalibrating"}, 6},
   };
   return all;
 }
@@ -78,10 +83,13 @@ const std::vector<FaultCase>& single_faults() {
     std::vector<FaultCase> cases;
     std::vector<Kind> alone = kinds();
     // Not one of kinds(): a seed of random drives stands for the same faults as before.
-    alone.insert(alone.begin() + 1, {"the left camera gone", "camera_gone", "camera=0", 3});
+    Kind left = alone.front();
+    left.name = "the left camera gone", left.parameters = "camera=0";
+    alone.insert(alone.begin() + 1, left);
     for (const Kind& kind : alone) {
       FaultCase c;
       c.name = kind.name;
+      c.said = kind.said;
       add(kind, kAt, &c);
       cases.push_back(c);
     }
@@ -105,6 +113,8 @@ const std::vector<FaultCase>& long_faults() {
     FaultCase set;
     set.name = "the host's clock set";
     set.system = "VERGENCE_CLOCK_SET='12 3600'";
+    stall.said = {"faulty_system: a write waits"};
+    set.said = {"faulty_system: the clock is set"};
     for (FaultCase* c : {&stall, &set})
       c->from_s = 9, c->until_s = 15, c->duration_s = 20, c->recovers_within_s = 2.5;
     return std::vector{stand, stall, set};
@@ -138,13 +148,6 @@ FaultCase random_faults(std::uint64_t seed) {
     add(kind, static_cast<double>(1000 + random.below(13'000)) / 1000, &c);
   }
   c.duration_s = std::max(c.duration_s, 12.0);  // the calibration is confirmed at 6 s
-  return c;
-}
-
-FaultCase no_fault() {
-  FaultCase c;
-  c.name = "none";
-  c.duration_s = 26;  // as long as any of the others
   return c;
 }
 
