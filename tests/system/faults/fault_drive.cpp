@@ -178,7 +178,9 @@ std::string unsaid(const FaultCase& c, const FaultDrive& drive, const FaultDrive
 }
 
 bool is_bad(const FaultDrive& drive, const FaultResult& result) {
-  return drive.code != 0 || !drive.whole || result.honesty.wrong > 0 || result.honesty.unjudged > 0;
+  // Exit 1: it ended before it was usable again, and says so.
+  const bool failed = drive.code != 0 && !(drive.code == 1 && !result.recovery_s);
+  return failed || !drive.whole || result.honesty.wrong > 0 || result.honesty.unjudged > 0;
 }
 
 JudgedDrive drive_until_recovered(FaultCase c, const NormalError& normal) {
