@@ -9,6 +9,11 @@
 namespace vergence::app {
 namespace {
 
+/// What says that it is asked in vain (a pipe, an old file system), not that something is lost.
+bool cannot_write_back(int error) noexcept {
+  return error == ESPIPE || error == EINVAL || error == ENOSYS;
+}
+
 class SystemDisk final : public Disk {
  public:
   [[nodiscard]] int create(const char* path) noexcept override {
@@ -32,12 +37,15 @@ class SystemDisk final : public Disk {
     (void)::sync_file_range(fd, static_cast<off64_t>(offset), static_cast<off64_t>(size),
                             SYNC_FILE_RANGE_WRITE);
   }
-  void finish_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept override {
-    (void)::sync_file_range(
+  [[nodiscard]] int finish_writeback(int fd, std::uint64_t offset,
+                                     std::uint64_t size) noexcept override {
+    const int done = ::sync_file_range(
         fd, static_cast<off64_t>(offset), static_cast<off64_t>(size),
         SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
+    const int error = done == 0 || cannot_write_back(errno) ? 0 : -errno;
     (void)::posix_fadvise(fd, static_cast<off_t>(offset), static_cast<off_t>(size),
                           POSIX_FADV_DONTNEED);
+    return error;
   }
   [[nodiscard]] int synchronise(int fd) noexcept override {
     return ::fdatasync(fd) == 0 || errno == EINVAL ? 0 : -errno;

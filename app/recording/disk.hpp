@@ -21,8 +21,10 @@ class Disk {
   /// Bytes of the file begin their way to the disk.
   virtual void start_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept = 0;
   /// Waits until bytes are with the disk, and lets the system forget them: pages that nobody reads
-  /// do not push out those that somebody does, and never more wait than the disk takes at once.
-  virtual void finish_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept = 0;
+  /// do not push out those that somebody does, and never more wait than the disk takes at once. The
+  /// system tells a descriptor of a failed writeback once: synchronise() does not repeat it. → 0
+  [[nodiscard]] virtual int finish_writeback(int fd, std::uint64_t offset,
+                                             std::uint64_t size) noexcept = 0;
   /// Contents and length are on the disk.
   [[nodiscard]] virtual int synchronise(int fd) noexcept = 0;
   virtual void close(int fd) noexcept = 0;

@@ -118,7 +118,7 @@ int McapFile::create(const char* path) noexcept {
   const int fd = disk_.create(path);
   if (fd < 0) return fd;
   fd_ = fd;
-  end_ = first_ = last_ = writeback_ = 0;
+  end_ = first_ = last_ = writeback_ = waiting_ = 0;
   chunks_.clear();
   counts_ = {};
   Appender out(this);
@@ -249,17 +249,30 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
   pieces[static_cast<std::size_t>(count++)] = {scratch_.data(), index.size()};
   if (const int error = append(pieces.data(), count); error != 0) return error;
 
-  // The disk writes this chunk while the next one is gathered; the one before is there by now.
-  disk_.start_writeback(fd_, chunk.offset, end_ - chunk.offset);
-  if (chunk.offset > writeback_) {
-    disk_.finish_writeback(fd_, writeback_, chunk.offset - writeback_);
-    writeback_ = chunk.offset;
-  }
+  write_back(chunk);
   for (const Entry& e : entries_) ++counts_[e.channel - 1U];
   first_ = chunks_.empty() ? chunk.start : std::min(first_, chunk.start);
   last_ = std::max(last_, chunk.end);
   chunks_.push_back(chunk);
   return 0;
+}
+
+/// The disk writes this chunk while the next one is gathered; the one before is there by now.
+void McapFile::write_back(const ChunkIndex& chunk) noexcept {
+  disk_.start_writeback(fd_, chunk.offset, end_ - chunk.offset);
+  if (chunk.offset > writeback_) {
+    note_unwritten(disk_.finish_writeback(fd_, writeback_, chunk.offset - writeback_));
+    writeback_ = chunk.offset;
+    waiting_ = 0;
+  }
+  waiting_ += entries_.size();
+}
+
+/// Which pages a failure was about nobody says: all that waited may be missing.
+void McapFile::note_unwritten(int error) noexcept {
+  if (error == 0) return;
+  if (unwritten_.error == 0) unwritten_.error = error;
+  unwritten_.messages += std::exchange(waiting_, 0);
 }
 
 void McapFile::write_statistics(Appender* out) const noexcept {
@@ -341,7 +354,9 @@ int McapFile::finish() noexcept {
   out.bytes(kMagic.data(), kMagic.size());
   out.flush();
   int error = out.error();
-  if (const int synchronised = disk_.synchronise(fd_); error == 0) error = synchronised;
+  const int synchronised = disk_.synchronise(fd_);
+  note_unwritten(synchronised);
+  if (error == 0) error = synchronised;
   abandon();
   return error;
 }

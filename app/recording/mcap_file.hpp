@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/recording/byte_writer.hpp"
@@ -72,7 +73,8 @@ class McapFile {
   /// Message records, of at most kMostMessages, in pieces that are whole records. Precondition:
   /// open, not full(). → 0, and then all of it is with the system
   [[nodiscard]] int write_chunk(std::span<const std::span<const std::uint8_t>> parts) noexcept;
-  /// Index and summary; the file is closed whatever comes of them. → 0
+  /// Index and summary; the file is closed whatever comes of them. → 0, and then the disk has all
+  /// but what take_unwritten() names
   [[nodiscard]] int finish() noexcept;
   /// Closed as it is: without an end.
   void abandon() noexcept;
@@ -83,6 +85,14 @@ class McapFile {
   [[nodiscard]] std::uint64_t size() const noexcept { return end_; }          // bytes that are good
   [[nodiscard]] std::uint64_t first_time() const noexcept { return first_; }  // ns; of the messages
   [[nodiscard]] std::uint64_t last_time() const noexcept { return last_; }
+
+  /// What the system had taken and then could not bring to the disk.
+  struct Unwritten {
+    int error = 0;               // negative errno, the first one; 0: nothing is missing
+    std::uint64_t messages = 0;  // of the chunks that the failure may have touched
+  };
+  /// Since the last call, of files that are closed meanwhile, too.
+  [[nodiscard]] Unwritten take_unwritten() noexcept { return std::exchange(unwritten_, {}); }
 
  private:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -100,6 +110,8 @@ class McapFile {
   class Appender;
 
   [[nodiscard]] int append(iovec* pieces, int count) noexcept;
+  void write_back(const ChunkIndex& chunk) noexcept;
+  void note_unwritten(int error) noexcept;
   void index_messages(std::span<const std::span<const std::uint8_t>> parts, ChunkIndex* chunk,
                       std::uint32_t* crc) noexcept;
   void write_schemas(Appender* out) const noexcept;
@@ -113,7 +125,9 @@ class McapFile {
   int fd_ = -1;
   std::uint64_t end_ = 0, first_ = 0, last_ = 0;
   std::uint64_t writeback_ = 0;  // offset up to which finish_writeback() was asked for
-  std::vector<Entry> entries_;   // of the chunk at hand
+  std::uint64_t waiting_ = 0;    // messages behind it
+  Unwritten unwritten_{};
+  std::vector<Entry> entries_;  // of the chunk at hand
   std::vector<ChunkIndex> chunks_;
   std::array<std::uint64_t, kMostChannels> counts_{};  // messages of each channel
   std::vector<std::uint8_t> scratch_;

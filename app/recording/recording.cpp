@@ -209,7 +209,7 @@ void Recording::make_room(bool hurried) noexcept {
 bool Recording::store(const Batch& batch) noexcept {
   const std::uint64_t bytes =
       files_.append(std::span(batch.parts).first(queues_.size()), batch.first,
-                    counts_.lost.load(std::memory_order_relaxed));
+                    counts_.lost.load(std::memory_order_relaxed) + files_.unwritten());
   if (bytes == 0) return false;
   counts_.messages.fetch_add(batch.messages, std::memory_order_relaxed);
   counts_.bytes.fetch_add(bytes, std::memory_order_relaxed);
@@ -237,7 +237,7 @@ RecordingCounters Recording::counters() const noexcept {
   c.messages = get(counts_.messages), c.bytes = get(counts_.bytes);
   c.chunks = get(counts_.chunks), c.files = files_.files();
   c.dropped = get(counts_.dropped), c.dropped_images = get(counts_.dropped_images);
-  c.lost = get(counts_.lost), c.passed_over = get(counts_.passed_over);
+  c.lost = get(counts_.lost) + files_.unwritten(), c.passed_over = get(counts_.passed_over);
   if (!queues_.empty()) {
     c.queue_bytes = queues_.front()->ring.capacity();
     c.queue_high_water = queues_.front()->ring.high_water();

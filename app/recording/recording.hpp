@@ -22,12 +22,13 @@ namespace vergence::app {
 
 /// Counters; exact after close().
 struct RecordingCounters {
-  std::uint64_t messages = 0, bytes = 0;  // in files
+  std::uint64_t messages = 0, bytes = 0;  // that files have taken
   std::uint64_t chunks = 0, files = 0;
   std::uint64_t dropped = 0;         // messages that found no room in their queue
   std::uint64_t dropped_images = 0;  // of these, the large ones
-  std::uint64_t lost = 0;            // messages that waited for a disk until there was no room
-  std::uint64_t passed_over = 0;     // messages older than what is kept before an event
+  std::uint64_t lost = 0;  // messages that waited for a disk until there was no room, or that it
+                           // had taken and did not keep
+  std::uint64_t passed_over = 0;  // messages older than what is kept before an event
   std::size_t queue_bytes = 0, queue_high_water = 0;  // of the first queue
 };
 

@@ -77,6 +77,7 @@ std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
   const std::uint64_t before = file_.size();
   int error = preamble_due_ ? write_preamble(first) : 0;
   if (error == 0) error = file_.write_chunk(parts);
+  note_unwritten();
   if (error != 0) {
     fail(-error);
     return 0;
@@ -92,8 +93,21 @@ std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
 
 void RecordingFiles::finish(std::uint64_t time) noexcept {
   if (file_.open() && preamble_due_) (void)write_preamble(time);
+  end_file();
+}
+
+void RecordingFiles::end_file() noexcept {
   const int error = file_.finish();
+  note_unwritten();
   if (error != 0) (void)notices_.push({Notice::Kind::unfinished, -error, 0, number_});
+}
+
+/// It is not tried again: the system has forgotten what it could not write.
+void RecordingFiles::note_unwritten() noexcept {
+  const McapFile::Unwritten missing = file_.take_unwritten();
+  if (missing.messages == 0) return;
+  unwritten_.fetch_add(missing.messages, std::memory_order_relaxed);
+  (void)notices_.push({Notice::Kind::unwritten, -missing.error, missing.messages, number_});
 }
 
 int RecordingFiles::open() noexcept {
@@ -140,8 +154,7 @@ void RecordingFiles::roll(bool asked) noexcept {
                       (roll_time_ > Duration{} && file_.last_time() - file_.first_time() >=
                                                       static_cast<std::uint64_t>(roll_time_.ns()));
   if (!wanted) return;
-  const int error = file_.finish();
-  if (error != 0) (void)notices_.push({Notice::Kind::unfinished, -error, 0, number_});
+  end_file();
   begin_next_number();
 }
 
@@ -197,6 +210,11 @@ std::string RecordingFiles::sentence(const Notice& n) const {
           "{}: file {} of the recording has no summary ({}); it reads back without, up to its "
           "last chunk",
           folder_, n.file, what);
+    case Notice::Kind::unwritten:
+      return fmt::format(
+          "{}: the disk did not keep what it had taken ({}): {} messages of file {} of the "
+          "recording are lost; look after that disk",
+          folder_, what, n.lost, n.file);
   }
   return {};
 }

@@ -31,7 +31,7 @@ struct RecordingPreamble {
 /// The files of a recording, one after the other, and how their disk is: `drive.mcap`, or once
 /// there is a second one `drive_0.mcap`, `drive_1.mcap`, …
 ///
-/// Threads  append(), roll(), finish(), resting(): the writer's. take_errors(), files(): any.
+/// Threads  append(), roll(), finish(), resting(): the writer's. Sentences and counters: any.
 /// Memory   All at construction.
 /// Errors   A write that fails is tried again by whoever has the data: at once in vain, as
 ///          resting() says. On a full disk in the same file, else in a new one. What is to be said
@@ -68,11 +68,15 @@ class RecordingFiles {
   [[nodiscard]] std::uint64_t files() const noexcept {
     return files_.load(std::memory_order_relaxed);
   }
+  /// Messages that append() had taken and the disk then did not.
+  [[nodiscard]] std::uint64_t unwritten() const noexcept {
+    return unwritten_.load(std::memory_order_relaxed);
+  }
 
  private:
   enum class DiskState : std::uint8_t { good, full, gone };
   struct Notice {
-    enum class Kind : std::uint8_t { good_again, full, gone, slow, unfinished } kind{};
+    enum class Kind : std::uint8_t { good_again, full, gone, slow, unfinished, unwritten } kind{};
     int error = 0;           // errno; of slow: ms
     std::uint64_t lost = 0;  // messages, so far
     int file = 0;
@@ -82,6 +86,8 @@ class RecordingFiles {
   [[nodiscard]] int open() noexcept;
   [[nodiscard]] int write_preamble(std::uint64_t time) noexcept;
   void fail(int error) noexcept;
+  void end_file() noexcept;
+  void note_unwritten() noexcept;
   void begin_next_number() noexcept;
   [[nodiscard]] const char* path(std::vector<char>* out) const noexcept;
   [[nodiscard]] std::string sentence(const Notice& notice) const;
@@ -102,7 +108,7 @@ class RecordingFiles {
   std::int64_t retry_ns_ = 0;  // monotonic
   std::vector<char> path_, other_path_;
 
-  std::atomic<std::uint64_t> files_{0};
+  std::atomic<std::uint64_t> files_{0}, unwritten_{0};
   Ring<Notice, 64> notices_;  // writer to take_errors()
   std::mutex errors_mutex_;   // of those who take
 };

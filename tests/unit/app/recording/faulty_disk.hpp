@@ -16,6 +16,7 @@ class FaultyDisk final : public app::Disk {
   std::atomic<std::uint64_t> room{~std::uint64_t{0}};  // bytes of a file; then ENOSPC
   std::atomic<int> error{0};                           // errno of every call from now on; 0: none
   std::atomic<int> stall_ms{0};                        // the next write waits so long
+  std::atomic<int> writeback_error{0};                 // errno of the next writeback; 0: none
   std::atomic<std::uint64_t> most{~std::uint64_t{0}};  // bytes that one write takes
 
   [[nodiscard]] int create(const char* path) noexcept override {
@@ -37,7 +38,9 @@ class FaultyDisk final : public app::Disk {
     return error != 0 ? -error : system_.truncate(fd, size);
   }
   void start_writeback(int, std::uint64_t, std::uint64_t) noexcept override {}
-  void finish_writeback(int, std::uint64_t, std::uint64_t) noexcept override {}
+  [[nodiscard]] int finish_writeback(int, std::uint64_t, std::uint64_t) noexcept override {
+    return -writeback_error.exchange(0);
+  }
   [[nodiscard]] int synchronise(int fd) noexcept override {
     return error != 0 ? -error : system_.synchronise(fd);
   }

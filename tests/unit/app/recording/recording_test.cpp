@@ -1,5 +1,8 @@
 #include "app/recording/recording.hpp"
 
+#include <unistd.h>
+
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -215,6 +218,43 @@ TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {
   ASSERT_EQ(errors.size(), 2U);
   EXPECT_NE(errors[1].find("no summary"), std::string::npos) << errors[1];
   EXPECT_TRUE(numbers(folder / "drive.mcap").empty());
+}
+
+void await_chunks(const Recording& recording, std::uint64_t chunks) {
+  while (recording.counters().chunks < chunks) std::this_thread::sleep_for(1ms);
+}
+
+// The system tells of it once, and the file's end finds nothing wrong.
+TEST(Recording, whatTheDiskTookAndDidNotKeepIsCountedAndSaid) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.files.disk = &disk;
+  Recording recording(folder.path(), o);
+  ASSERT_TRUE(post(&recording, 0));
+  await_chunks(recording, 1);
+  ASSERT_TRUE(post(&recording, 1));
+  await_chunks(recording, 2);
+  EXPECT_EQ(recording.counters().lost, 0U);
+  disk.writeback_error = EIO;
+  ASSERT_TRUE(post(&recording, 2));
+  recording.close();
+  EXPECT_EQ(recording.counters().lost, 1U) << "of the chunk before";
+  EXPECT_EQ(recording.counters().files, 1U);
+  const auto errors = recording.take_errors();
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_NE(errors[0].find("did not keep what it had taken (Input/output error): 1 messages"),
+            std::string::npos)
+      << errors[0];
+  EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
+}
+
+TEST(SystemDisk, saysWhatBecameOfAWritebackAndNothingWhereThereCanBeNone) {
+  EXPECT_EQ(system_disk().finish_writeback(-1, 0, 0), -EBADF);
+  std::array<int, 2> pipe{};
+  ASSERT_EQ(::pipe(pipe.data()), 0);
+  EXPECT_EQ(system_disk().finish_writeback(pipe[1], 0, 0), 0);
+  for (const int fd : pipe) system_disk().close(fd);
 }
 
 TEST(Recording, aDiskThatIsGoneIsTriedAgainWithANewFile) {
