@@ -25,6 +25,9 @@ int open_for_lines(const std::filesystem::path& file) {
   return ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
 }
 
+/// → errno. Files that cannot be synchronised (pipes) say EINVAL; that is no loss.
+int synchronise(int fd) { return ::fdatasync(fd) == 0 || errno == EINVAL ? 0 : errno; }
+
 /// Where the last whole line ends; −1: it cannot be read.
 off_t end_of_lines(int fd, off_t size) {
   std::array<char, 512> piece;
@@ -107,7 +110,8 @@ bool LineFile::reopen(bool* fresh) {
     return false;
   }
   if (fd_ >= 0) {
-    (void)::fdatasync(fd_);
+    // Of one that is given up it is known.
+    if (const int error = synchronise(fd_); error != 0 && flushed) left_fault_ = error;
     (void)::close(fd_);
   }
   fd_ = fd;
@@ -134,9 +138,8 @@ std::size_t LineFile::waiting_lines() const noexcept {
 bool LineFile::close() {
   if (fd_ < 0) return fault_ == 0;
   bool good = flush();
-  // Files that cannot be synchronised (pipes) say EINVAL; that is no loss.
-  if (good && ::fdatasync(fd_) != 0 && errno != EINVAL) {
-    fault_ = errno;
+  if (const int error = good ? synchronise(fd_) : 0; error != 0) {
+    fault_ = error;
     good = false;
   }
   if (::close(fd_) != 0 && good) {

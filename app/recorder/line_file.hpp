@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace vergence::app {
 
@@ -47,6 +48,9 @@ class LineFile {
   /// Out of reach, the old one is given up: whole lines that wait are for the file of that name,
   /// with the next flush(); a line that is cut, there or here, is lost and counted.
   bool reopen(bool* fresh);
+  /// errno of a file that reopen() left behind and that the disk may not have whole, since the last
+  /// call; 0: none.
+  [[nodiscard]] int take_left_fault() noexcept { return std::exchange(left_fault_, 0); }
   /// The last reopen() had to wait: to be called again once flush() says true.
   [[nodiscard]] bool reopen_due() const noexcept { return reopen_due_; }
   /// The last flush() failed for want of room.
@@ -78,7 +82,7 @@ class LineFile {
   std::filesystem::path path_;
   std::size_t pending_ = kPending;
   int fd_ = -1;
-  int fault_ = 0;
+  int fault_ = 0, left_fault_ = 0;
   bool pretend_full_ = false, reopen_due_ = false;
   bool half_written_ = false;  // waiting_ begins within a line
   std::uint64_t lost_lines_ = 0;

@@ -251,6 +251,11 @@ void Recorder::reopen(LineFile* file) {
 bool Recorder::open_anew(LineFile* file) {
   bool fresh = false;
   const bool opened = file->reopen(&fresh);
+  if (const int fault = file->take_left_fault(); fault != 0) {
+    const char* words = ::strerrordesc_np(fault);
+    report_error("{}: the file that had this name before is not complete ({}): check that disk",
+                 file->path().native(), words != nullptr ? words : "unknown error");
+  }
   if (!fresh) return opened;
   if (file == &files_->trajectory) totals_.trajectory_begins_anew(file->waiting_lines());
   file->begin_with(files_->head(file));

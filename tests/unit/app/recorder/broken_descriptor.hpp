@@ -9,8 +9,9 @@
 namespace vergence::test {
 
 /// Makes every descriptor of this process that is open on `file` one that refuses what is written,
-/// as one of a disk that went away. → how many there were.
-inline int break_descriptors_of(const std::filesystem::path& file) {
+/// as one of a disk that went away; with O_PATH also to bring to the disk what it had taken. → how
+/// many there were.
+inline int break_descriptors_of(const std::filesystem::path& file, int how = O_RDONLY) {
   namespace fs = std::filesystem;
   int broken = 0;
   for (const auto& entry : fs::directory_iterator("/proc/self/fd")) {
@@ -19,7 +20,7 @@ inline int break_descriptors_of(const std::filesystem::path& file) {
     const std::string name = entry.path().filename().string();
     int fd = -1;
     std::from_chars(name.data(), name.data() + name.size(), fd);
-    const int unwritable = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    const int unwritable = ::open("/dev/null", how | O_CLOEXEC);
     broken += ::dup2(unwritable, fd) == fd ? 1 : 0;
     (void)::close(unwritable);
   }

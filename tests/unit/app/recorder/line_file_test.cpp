@@ -123,6 +123,20 @@ TEST(LineFile, afterAMoveReopenBeginsANewFileAndLosesNoLine) {
   EXPECT_EQ(test::read_file(folder / "a.txt"), "three\n");
 }
 
+TEST(LineFile, aFileThatIsLeftAndThatTheDiskDidNotKeepIsKnown) {
+  const test::TemporaryFolder folder;
+  LineFile file(folder / "a.txt");
+  bool fresh = false;
+  EXPECT_TRUE(file.append("one\n"));
+  EXPECT_TRUE(file.reopen(&fresh));
+  EXPECT_EQ(file.take_left_fault(), 0);
+  ASSERT_EQ(test::break_descriptors_of(folder / "a.txt", O_PATH), 1);
+  EXPECT_TRUE(file.reopen(&fresh));
+  EXPECT_EQ(file.take_left_fault(), EBADF);
+  EXPECT_EQ(file.take_left_fault(), 0) << "once";
+  EXPECT_EQ(file.fault(), 0) << "the new one is good";
+}
+
 TEST(LineFile, onAFullDiskReopenWaitsUntilTheOldFileHasItsLinesWhole) {
   const test::TemporaryFolder folder;
   LineFile file(folder / "a.txt");
