@@ -64,7 +64,7 @@ SignalGuard::SignalGuard(OnHangup on_hangup) {
   else
     install(SIGHUP, note_signal, true, &former_hangup_);
   if (former_hangup_.sa_handler == SIG_IGN)  // nohup: the drive is to outlive its terminal
-    install(SIGHUP, SIG_IGN, false, &former_hangup_);
+    install(SIGHUP, SIG_IGN, false, nullptr);
   install(SIGUSR1, note_calibration_request, false, &former_user_);
   // A reader of our output that goes, a file at its limit: the write that fails says so.
   install(SIGPIPE, SIG_IGN, false, &former_pipe_);

@@ -69,6 +69,17 @@ TEST(SignalGuard, AClosedTerminalEndsTheSessionUnlessItIsToOutliveIt) {
   std::signal(SIGHUP, before);
 }
 
+TEST(SignalGuard, ADriveThatIsToOutliveItsTerminalDoesSoAlsoAfterAnotherGuard) {
+  auto* const before = std::signal(SIGHUP, SIG_IGN);
+  { const SignalGuard guard; }
+  {
+    const SignalGuard guard;
+    std::raise(SIGHUP);
+    EXPECT_FALSE(guard.stop_requested());
+  }
+  EXPECT_EQ(std::signal(SIGHUP, before), SIG_IGN);
+}
+
 TEST(SignalGuard, AHangupAsksForTheFilesToBeOpenedAgainWhereThatIsWanted) {
   const SignalGuard guard(SignalGuard::OnHangup::reopen);
   EXPECT_FALSE(guard.take_reopen_request());
