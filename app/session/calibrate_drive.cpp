@@ -27,14 +27,15 @@ ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
   for (const std::string& sentence : remarks) std::cerr << "vergence: " << sentence << '\n';
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration given = replayed_calibration(c, sequence, true);
+  const SignalGuard signals;
   Progress progress = Progress::on_stderr(r.quiet);
   for (const std::string& sentence : sequence.remarks) progress.say("vergence: " + sentence);
-  const DriveCalibration found =
-      calibrate_with_progress({sequence, c, 0, sequence.pairs.size(), {}, {}}, given, &progress);
+  const DriveCalibration found = calibrate_with_progress(
+      {sequence, c, 0, sequence.pairs.size(), {}, {}}, given, signals, &progress);
   if (!found.rig) {
     progress.say(fmt::format("vergence: {}: no calibration was found, nothing is written: {}",
                              r.data.string(), found.why));
-    return ExitCode::not_usable;
+    return signals.stop_code().value_or(ExitCode::not_usable);
   }
   CalibrationFile written = given.file;
   written.rig = *found.rig;

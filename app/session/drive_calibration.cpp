@@ -11,7 +11,6 @@
 #include "app/datasets/frame_decoder.hpp"
 #include "app/devices/camera_masks.hpp"
 #include "app/runtime/background_thread.hpp"
-#include "app/runtime/signals.hpp"
 #include "app/session/session_files.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/health.hpp"
@@ -23,6 +22,7 @@ namespace vergence::app {
 namespace {
 
 constexpr std::size_t kMiddleDepth = 2;  // of Agreement::kDepthM: 20 m
+constexpr const char* kInterrupted = "it was interrupted";
 constexpr int kMoreFeatures = 2,
               kMostFeatures = 1000;     // of a drive's own: nobody waits for a pose here
 constexpr int kObservations = 240'000;  // of a solve that nobody waits for
@@ -107,9 +107,10 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
     ++result.frames;
   });
   if (!first) {
-    result.why =
-        "from scratch no calibration was found: what the drive lacks, a replay with --from-scratch "
-        "says";
+    result.why = pass.stopped && pass.stopped()
+                     ? kInterrupted
+                     : "from scratch no calibration was found: what the drive lacks, a replay with "
+                       "--from-scratch says";
     return result;
   }
   StartingCalibration found = given;
@@ -145,7 +146,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
         note(alone.take(e.tracks()));
       });
   if (!second) {
-    result.why = "it was interrupted";
+    result.why = kInterrupted;
     return result;
   }
   keep(joined.end());
@@ -169,9 +170,8 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
 }
 
 DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCalibration& given,
-                                         Progress* progress) {
+                                         const SignalGuard& signals, Progress* progress) {
   constexpr std::size_t kPasses = 2;
-  const SignalGuard signals;
   std::size_t before = 0, last = 0;
   DrivePass watched = pass;
   watched.stopped = [&] { return signals.stop_requested(); };

@@ -7,6 +7,7 @@
 #include "app/config/configuration.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/progress.hpp"
+#include "app/runtime/signals.hpp"
 #include "app/session/starting_calibration.hpp"
 #include "core/calibration/agreement.hpp"
 #include "core/calibration/rig_solver.hpp"
@@ -49,9 +50,11 @@ struct DrivePass {
 [[nodiscard]] DriveCalibration calibrate_drive(const DrivePass& pass,
                                                const StartingCalibration& given);
 
-/// The same with a progress line, and stopped by signals.
+/// The same with a progress line, and stopped by signals: the caller's, whose own end they are,
+/// too.
 [[nodiscard]] DriveCalibration calibrate_with_progress(const DrivePass& pass,
                                                        const StartingCalibration& given,
+                                                       const SignalGuard& signals,
                                                        Progress* progress);
 
 /// What was found as lines for the terminal: each parameter with its sigma, the depth error, how

@@ -64,13 +64,13 @@ StereoSequence open_drive(const ReplayRequest& request) {
 
 /// What the drive itself says of its rig, in the place of what it came with; where nothing is found
 /// that stays, and the user hears why.
-bool calibrate_first(const ReplayRequest& request, const StereoSequence& sequence,
-                     StartingCalibration* begin) {
+bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
+                     const StereoSequence& sequence, StartingCalibration* begin) {
   Progress progress = Progress::on_stderr(request.session.quiet);
   const std::size_t count = std::min(request.frames.value_or(sequence.pairs.size()),
                                      sequence.pairs.size() - request.start);
   const DriveCalibration found = calibrate_with_progress(
-      {sequence, request.configuration, request.start, count, {}, {}}, *begin, &progress);
+      {sequence, request.configuration, request.start, count, {}, {}}, *begin, signals, &progress);
   if (!found.rig) {
     progress.say("vergence: the drive gives no calibration: " + found.why);
     return false;
@@ -85,9 +85,9 @@ bool calibrate_first(const ReplayRequest& request, const StereoSequence& sequenc
 
 /// Lenses are found from a beginning that is near enough. Of one that nobody knows anything of: no
 /// distortion, then that of a usual lens of 80 to 100 degrees.
-void calibrate_unknown(ReplayRequest request, StereoSequence* sequence,
+void calibrate_unknown(ReplayRequest request, const SignalGuard& signals, StereoSequence* sequence,
                        StartingCalibration* begin) {
-  if (calibrate_first(request, *sequence, begin)) return;
+  if (calibrate_first(request, signals, *sequence, begin) || signals.stop_requested()) return;
   if (!request.known || !request.known->distortion.empty() ||
       request.known->model != CameraModelKind::pinhole_radtan)
     return;
@@ -96,7 +96,7 @@ void calibrate_unknown(ReplayRequest request, StereoSequence* sequence,
   request.known->distortion = {-0.28, 0.07, 0, 0};
   StereoSequence wide = open_drive(request);
   StartingCalibration other = replayed_calibration(request.configuration, wide, true);
-  if (!calibrate_first(request, wide, &other)) return;
+  if (!calibrate_first(request, signals, wide, &other)) return;
   *sequence = std::move(wide);
   *begin = std::move(other);
 }
@@ -173,12 +173,14 @@ ExitCode run_replay(const ReplayRequest& request) {
       replayed_calibration(request.configuration, sequence, request.from_scratch || request.known);
   Trajectory truth = read_reference(request, sequence);
   ReplayedIns ins = replayed_ins(request, sequence);
-  if (request.calibrate_first) calibrate_unknown(request, &sequence, &begin);
+  // One for both: who stops the calibration does not want the drive.
+  const SignalGuard signals(SignalGuard::OnHangup::reopen);
+  if (request.calibrate_first) calibrate_unknown(request, signals, &sequence, &begin);
+  if (const auto stopped = signals.stop_code()) return *stopped;
   const auto source = in_words([&] {
     return std::make_unique<RecordedSource>(request, std::move(sequence), std::move(begin),
                                             std::move(truth), std::move(ins));
   });
-  const SignalGuard signals(SignalGuard::OnHangup::reopen);
   return run_session(*source, request.configuration, request.session, signals);
 }
 

@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -10,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "tests/support/child_program.hpp"
 #include "tests/system/replay/replayed_folder.hpp"
 
 namespace vergence::test {
@@ -106,6 +111,29 @@ TEST_F(ReplayedFolder, whatIsMissingNamesTheWayOut) {
   text.insert(at, "    T_left_camera: [1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0]\n");
   write("calibration.yaml", text);
   expect_refused("T_left_camera is the inverse of what is read: give T_camera_left");
+}
+
+/// → whether a terminal shows it before it closes.
+bool shows(int terminal, const std::string& words) {
+  std::string shown;
+  std::array<char, 256> piece;
+  while (shown.find(words) == std::string::npos) {
+    const auto n = ::read(terminal, piece.data(), piece.size());
+    if (n <= 0) return false;
+    shown.append(piece.data(), static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+TEST_F(ReplayedFolder, whoStopsTheCalibrationStopsTheReplay) {
+  for (const int number : {SIGINT, SIGTERM}) {
+    ChildProgram program(
+        {"replay", data(), "--format", "folder", "--calibrate-first", "--out", session()},
+        {.terminal = true});
+    ASSERT_TRUE(shows(program.terminal(), "calibrating from the drive"));
+    program.signal(number);
+    EXPECT_EQ(program.wait(), 128 + number);
+  }
 }
 
 TEST_F(ReplayedFolder, theLayoutIsFoundOut) {
