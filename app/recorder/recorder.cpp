@@ -22,7 +22,8 @@
 
 namespace vergence::app {
 
-static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_copyable_v<InsRecord>);
+static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_copyable_v<InsRecord> &&
+              std::is_trivially_copyable_v<CalibrationRecord>);
 
 struct Recorder::Files {
   Files(const std::filesystem::path& session, const Options& options)
@@ -97,23 +98,30 @@ void Recorder::stop_and_join() noexcept {
 }
 
 template <class Value, std::size_t N>
-void Recorder::push(Queue<Value, N>* queue, const Value& value) noexcept {
+bool Recorder::push(Queue<Value, N>* queue, const Value& value) noexcept {
   for (;;) {
     const WakeEvent::Ticket seen = freed_.ticket();
     if (queue->ring.push(value)) break;
     if (options_.when_full == WhenFull::drop) {
       queue->dropped.fetch_add(1, std::memory_order_relaxed);
-      return;
+      return false;
     }
     freed_.wait(seen);
   }
   queue->high_water = std::max(queue->high_water, queue->ring.size());
   filled_.signal();
+  return true;
 }
 
-void Recorder::post(const Record& record) noexcept { push(&records_, record); }
+void Recorder::post(const Record& record) noexcept {
+  if (push(&records_, record)) ++turn_.posted;
+}
 
-void Recorder::post(const InsRecord& reading) noexcept { push(&readings_, reading); }
+void Recorder::post(const InsRecord& reading) noexcept { (void)push(&readings_, reading); }
+
+void Recorder::post(const CalibrationRecord& calibration) noexcept {
+  (void)push(&calibrations_, {calibration, turn_.posted});
+}
 
 void Recorder::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-record");
@@ -148,16 +156,36 @@ void Recorder::work() {
   }
 }
 
-/// The oldest of both rings, as far as there are any. False: there were none.
+/// The oldest record and reading, as far as there are any, behind the calibrations whose turn it
+/// is. False: there were none.
 bool Recorder::take() {
   Record record;
   InsRecord reading;
   const bool one = records_.ring.pop(&record), other = readings_.ring.pop(&reading);
-  if (!one && !other) return false;
-  freed_.signal();
-  if (one) std::visit([this](const auto& r) { write(r); }, record);
+  if (one || other) freed_.signal();
+  // After the record: all that were posted before it are found.
+  const bool calibrated = take_calibrations();
+  if (one) {
+    std::visit([this](const auto& r) { write(r); }, record);
+    ++turn_.written;
+  }
   if (other) write(reading);
-  return true;
+  return one || other || calibrated;
+}
+
+/// Those that were posted before the next record that is written. False: there are none.
+bool Recorder::take_calibrations() {
+  for (bool any = false;; any = true) {
+    if (!turn_.next) {
+      Placed oldest;
+      if (!calibrations_.ring.pop(&oldest)) return any;
+      freed_.signal();
+      turn_.next = oldest;
+    }
+    if (turn_.next->after > turn_.written) return any;
+    write(turn_.next->calibration);
+    turn_.next.reset();
+  }
 }
 
 void Recorder::write(const InsRecord& reading) {
@@ -377,7 +405,8 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   std::error_code ignored;
   if (!files_->has_reference) std::filesystem::remove(files_->reference.path(), ignored);
   if (options_.keep_trajectory) read_back();
-  totals.dropped_records = records_.dropped.load(std::memory_order_relaxed);
+  totals.dropped_records = records_.dropped.load(std::memory_order_relaxed) +
+                           calibrations_.dropped.load(std::memory_order_relaxed);
   totals.dropped_readings = readings_.dropped.load(std::memory_order_relaxed);
   totals.ring_high_water = records_.high_water;
   return std::make_unique<SessionTotals>(std::move(totals));

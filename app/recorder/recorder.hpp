@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -54,7 +55,8 @@ inline constexpr const char* kCalibrationsHeader =
 /// Memory   Fixed, whatever the length of the drive; with keep_trajectory a byte for every frame
 ///          expected, or for kMostStatuses. close() reads the trajectories back from their files.
 /// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
-///          Readings have a ring of their own: they never push out a pose.
+///          Readings have a ring of their own: they never push out a pose. So have calibrations,
+///          which poses would push out while the disk stands still; they are written in their turn.
 /// Errors   The constructor throws InputError. A disk that takes no more: an error and an event
 ///          `disk_full`, the session goes on, see LineFile; an event `disk_room` when it takes
 ///          lines again says what was lost. Lines lost in between leave the session usable and are
@@ -89,6 +91,7 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   void post(const Record& record) noexcept;
+  void post(const CalibrationRecord& calibration) noexcept;
   /// Precondition: Options::ins.
   void post(const InsRecord& reading) noexcept;
   /// Bytes taken at the beginning: lines that may wait, statuses of the frames expected.
@@ -102,8 +105,9 @@ class Recorder {
   [[nodiscard]] std::unique_ptr<SessionTotals> close();
 
  private:
-  static constexpr std::size_t kRing = 128;       // records: seconds of frames with their events
-  static constexpr std::size_t kReadings = 1024;  // 2.5 s of the fastest INS
+  static constexpr std::size_t kRing = 128;        // records: seconds of frames with their events
+  static constexpr std::size_t kReadings = 1024;   // 2.5 s of the fastest INS
+  static constexpr std::size_t kCalibrations = 8;  // they come seconds apart
 
   /// What waits for the recorder's thread.
   template <class Value, std::size_t N>
@@ -112,10 +116,23 @@ class Recorder {
     std::atomic<std::uint64_t> dropped{0};
     std::size_t high_water = 0;  // the producer's
   };
+  /// A calibration, and how many records had been taken into their ring before it.
+  struct Placed {
+    CalibrationRecord calibration{};
+    std::uint64_t after = 0;
+  };
+  /// What keeps calibrations in their turn among the records.
+  struct Turn {
+    std::uint64_t posted = 0;      // records; the producer's
+    std::uint64_t written = 0;     // records; of the recorder's thread, as the next
+    std::optional<Placed> next{};  // whose turn has not come yet
+  };
+  /// False: dropped.
   template <class Value, std::size_t N>
-  void push(Queue<Value, N>* queue, const Value& value) noexcept;
+  bool push(Queue<Value, N>* queue, const Value& value) noexcept;
   void work();
   bool take();
+  bool take_calibrations();
   bool take_outcome();
   void write(const PoseRecord& pose);
   void write(const EventRecord& event);
@@ -148,6 +165,8 @@ class Recorder {
 
   Queue<Record, kRing> records_;
   Queue<InsRecord, kReadings> readings_;
+  Queue<Placed, kCalibrations> calibrations_;
+  Turn turn_;
   WakeEvent filled_, freed_;
   std::atomic<bool> stop_{false}, reopen_{false};
   Ring<ErrorSentence, 16> error_sentences_;    // full: the newest are lost

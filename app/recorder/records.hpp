@@ -12,7 +12,7 @@
 #include "core/types/pose_sample.hpp"
 #include "core/types/stamped_pose.hpp"
 
-/// What goes through the recorder's ring: plain values of fixed size, made on the estimator's
+/// What goes through the recorder's rings: plain values of fixed size, made on the estimator's
 /// thread without heap.
 namespace vergence::app {
 
@@ -129,6 +129,6 @@ struct CalibrationRecord {
   [[nodiscard]] const char* why() const noexcept { return decided ? reason : origin.data(); }
 };
 
-using Record = std::variant<PoseRecord, EventRecord, CalibrationRecord>;
+using Record = std::variant<PoseRecord, EventRecord>;
 
 }  // namespace vergence::app

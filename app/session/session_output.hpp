@@ -39,7 +39,7 @@ class SessionOutput {
     for (SessionObserver* o : observers_) o->on_event(event);
   }
   void post(const CalibrationRecord& calibration) noexcept {
-    recorder_->post(Record(calibration));
+    recorder_->post(calibration);
     for (SessionObserver* o : observers_) o->on_calibration(calibration);
   }
   /// Precondition: Recorder::Options::ins.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <thread>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -9,6 +10,7 @@
 #include "core/math/so3.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/recorder/recorder_inputs.hpp"
+#include "tests/unit/app/recorder/standing_file.hpp"
 
 namespace vergence::app {
 namespace {
@@ -176,6 +178,50 @@ TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndA
     EXPECT_EQ(event["kind"], fails ? "calibration_not_kept" : "calibration_kept");
     EXPECT_EQ(recorder.take_errors().size(), fails ? 1U : 0U);
   }
+}
+
+// What waits for a disk that stands still fills the poses' ring within seconds.
+TEST(Recorder, aCalibrationThatIsFoundWhileTheDiskStandsStillIsKept) {
+  const test::TemporaryFolder folder;
+  test::StandingFile poses(folder / "poses.csv");
+  std::vector<int> kept;
+  Recorder::Options options;
+  options.when_full = Recorder::WhenFull::drop;
+  options.keep = [&kept](const RigCalibration& rig, bool /*found*/) {
+    kept.push_back(rig.frames);
+    return Kept{false, "kept"};
+  };
+  Recorder recorder(folder.path(), options);
+  constexpr std::uint64_t kFrames = 300;
+  for (std::uint64_t i = 0; i < kFrames; ++i) recorder.post(pose(i, PoseStatus::ok, 0));
+  recorder.post(CalibrationRecord::of(decision(true)));
+  poses.take_all();
+  const auto totals = recorder.close();
+  EXPECT_EQ(kept, std::vector<int>{60});
+  EXPECT_EQ(totals->accepted, 1U);
+  EXPECT_GT(totals->dropped_records, 0U) << "poses, of which the next ones say the same";
+  EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
+}
+
+TEST(Recorder, calibrationsComeInTheirTurnAmongTheEvents) {
+  using Kind = EstimatorEvent::Kind;
+  const test::TemporaryFolder folder;
+  test::StandingFile poses(folder / "poses.csv");
+  std::vector<bool> kept;
+  Recorder::Options options;
+  options.keep = [&kept](const RigCalibration& /*rig*/, bool found) {
+    kept.push_back(found);
+    return Kept{false, "kept"};
+  };
+  Recorder recorder(folder.path(), options);
+  // All of this waits, and is taken at once.
+  recorder.post(event_at(600, Kind::calibration_confirmed, 0.3));
+  recorder.post(CalibrationRecord::begin(two_cameras(), Stamp(kStamp), "given", "mine.yaml"));
+  recorder.post(event_at(700, Kind::calibration_confirmed, 0.3));
+  recorder.post(CalibrationRecord::of(decision(true)));
+  poses.take_all();
+  (void)recorder.close();
+  EXPECT_EQ(kept, (std::vector<bool>{false, true}));
 }
 
 TEST(Recorder, whatTheDriveBeganWithIsKeptOnceItIsConfirmedUnlessAnotherWasFoundBefore) {
