@@ -3,7 +3,6 @@
 #include <cstring>
 #include <limits>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/config/calibration_file.hpp"
@@ -30,6 +29,19 @@ void write_session_calibration(const std::filesystem::path& session,
   }
 }
 
+namespace {
+
+Kept keep_state(const std::filesystem::path& state, const CalibrationFile& file) {
+  try {
+    write_state(state, file);
+    return {false, "the calibration is kept for the next drive: " + state.string()};
+  } catch (const InputError& e) {
+    return {true, std::string(e.what()) + "; the next drive will not know this calibration"};
+  }
+}
+
+}  // namespace
+
 KeepCalibration calibration_keeper(const std::filesystem::path& session,
                                    const CalibrationFile& words,
                                    const std::optional<std::filesystem::path>& state) {
@@ -37,19 +49,13 @@ KeepCalibration calibration_keeper(const std::filesystem::path& session,
     CalibrationFile file = words;
     file.rig = rig;
     if (found) file.source = "online";
-    Kept kept;
-    std::vector<std::string> faults;
-    if (found) write_session_calibration(session, file, &faults);
-    if (state) {
-      try {
-        write_state(*state, file);
-        kept.sentence = "the calibration is kept for the next drive: " + state->string();
-      } catch (const InputError& e) {
-        faults.insert(faults.begin(),
-                      std::string(e.what()) + "; the next drive will not know this calibration");
-      }
-    }
-    if (!faults.empty()) kept = {true, fmt::format("{}", fmt::join(faults, "; "))};
+    std::vector<std::string> of_session;
+    if (found) write_session_calibration(session, file, &of_session);
+    Kept kept{!of_session.empty(), {}};
+    if (state) kept = keep_state(*state, file);
+    // The session's own is written again at its end.
+    for (const std::string& fault : of_session)
+      kept.sentence += (kept.sentence.empty() ? "" : "; ") + fault;
     return kept;
   };
 }
