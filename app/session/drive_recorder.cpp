@@ -99,11 +99,19 @@ void DriveRecorder::post_image(const RigFrame& frame, std::size_t camera) noexce
 
 void DriveRecorder::post_rig(Stamp stamp) noexcept {
   const auto cameras = static_cast<std::size_t>(rig_.cameras);
+  const std::uint64_t files = recording_.counters().files;  // before: it is in that one or a later
   post(tf_static_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_rig_transforms(out, stamp, rig_, std::span(frame_names_).first(cameras));
+    rig_in_file_ = files;
     return std::size_t{0};
   });
-  rig_posted_ = true;
+}
+
+/// Who opens one file of several has no other. Where only what is around events is kept, each
+/// second may be the first that is.
+bool DriveRecorder::rig_is_due(bool each_second) const noexcept {
+  if (!calibrated_) return false;
+  return rig_in_file_ != recording_.counters().files || (each_second && settings_.keep_s > 0);
 }
 
 void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
@@ -114,7 +122,9 @@ void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
     return std::size_t{0};
   });
   if (settings_.poses == 0) return;
-  if (calibrated_ && !rig_posted_) post_rig(sample.stamp);
+  const bool health = frames_seen_ == 1 || sample.stamp - last_health_ >= kHealth ||
+                      sample.status != PoseStatus::ok;
+  if (rig_is_due(health)) post_rig(sample.stamp);
   post(odometry_topic, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
     write_odometry(out, sample);
     return std::size_t{0};
@@ -124,9 +134,7 @@ void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
       write_pose_transform(out, sample);
       return std::size_t{0};
     });
-  if (frames_seen_ == 1 || sample.stamp - last_health_ >= kHealth ||
-      sample.status != PoseStatus::ok)
-    post_health(sample);
+  if (health) post_health(sample);
 }
 
 /// Once a second, and with every pose that is not ok.

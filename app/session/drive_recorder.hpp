@@ -65,6 +65,7 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   [[nodiscard]] bool post_pixels(const RigFrame& frame, std::size_t camera) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
+  [[nodiscard]] bool rig_is_due(bool each_second) const noexcept;
   void post_health(const PoseSample& sample) noexcept;
 
   const RecordSettings& settings_;
@@ -76,7 +77,8 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
 
   // Of the estimator's thread.
   RigCalibration rig_;
-  bool calibrated_ = false, rig_posted_ = false, recalibrate_ = false;
+  bool calibrated_ = false, recalibrate_ = false;
+  std::optional<std::uint64_t> rig_in_file_{};  // how many there were when it was posted last
   std::atomic<bool> stopped_{false};
   FrameRecord frame_{};
   std::uint64_t frames_seen_ = 0;

@@ -1,0 +1,111 @@
+#include "app/session/drive_recorder.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/recording_reader.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct IdleSolver final : BackgroundRunner {
+  void start(TaskRef task) noexcept override { task(); }
+  [[nodiscard]] bool busy() noexcept override { return false; }
+  void wait() noexcept override {}
+};
+
+/// A recording of poses of a calibrated pair, 50 ms apart.
+class RecordedPoses {
+ public:
+  explicit RecordedPoses(const std::vector<std::string>& settings)
+      : configuration_(load_configuration(std::nullopt, settings)),
+        recorder_(folder_.path(), configuration_, facts_, watch_) {}
+
+  void drive(int frames) {
+    for (int i = 0; i < frames; ++i) {
+      RigFrame frame;
+      frame.number = number_;
+      frame.stamp = stamp();
+      frame.cameras = 2;
+      PoseSample sample;
+      sample.frame = number_++;
+      sample.stamp = frame.stamp;
+      sample.status = PoseStatus::ok;
+      recorder_.on_frame(frame);
+      recorder_.on_pose(sample);
+    }
+  }
+  void mark() {
+    EventRecord event;
+    event.stamp = stamp();
+    event.kind = "mark";
+    recorder_.on_event(event);
+  }
+  [[nodiscard]] DriveRecorder& recorder() { return recorder_; }
+  /// Messages of /tf_static of a file; none where it is not there.
+  [[nodiscard]] std::ptrdiff_t rigs(const std::string& file) const {
+    if (!std::filesystem::exists(folder_ / file)) return 0;
+    const auto messages = test::read_mcap(folder_ / file).messages;
+    return std::count_if(messages.begin(), messages.end(),
+                         [](const test::ReadMessage& m) { return m.topic == "/tf_static"; });
+  }
+
+ private:
+  [[nodiscard]] Stamp stamp() const {
+    return Stamp(1'577'836'800'000'000'000) +
+           Duration::milliseconds(50) * static_cast<std::int64_t>(number_);
+  }
+  static SourceFacts two_cameras() {
+    SourceFacts facts;
+    RigCalibration& rig = facts.begin.file.rig;
+    rig.cameras = 2;
+    for (std::size_t k = 0; k < 2; ++k)
+      rig.intrinsics[k] = {.width = 160, .height = 120, .fx = 100, .fy = 100, .cx = 80, .cy = 60};
+    rig.T_camera_left[1].t = {-0.5, 0, 0};
+    rig.baseline = 0.5;
+    facts.begin.nominal = rig;
+    return facts;
+  }
+
+  test::TemporaryFolder folder_;
+  IdleSolver solver_;
+  SolverWatch watch_{solver_};
+  SourceFacts facts_ = two_cameras();
+  Configuration configuration_;
+  DriveRecorder recorder_;
+  std::uint64_t number_ = 0;
+};
+
+TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
+  RecordedPoses drive({"record=[poses]"});
+  drive.drive(10);
+  drive.recorder().roll();
+  for (int i = 0; i < 1000 && drive.rigs("drive_1.mcap") == 0; ++i) {
+    drive.drive(1);
+    std::this_thread::sleep_for(5ms);
+  }
+  drive.recorder().close();
+  EXPECT_EQ(drive.rigs("drive_0.mcap"), 1);
+  EXPECT_EQ(drive.rigs("drive_1.mcap"), 1);
+}
+
+TEST(DriveRecorder, whatIsKeptAroundAnEventSaysWhereTheCamerasAre) {
+  RecordedPoses drive({"record=[poses]", "record.keep_s=3"});
+  drive.drive(200);                    // 10 s
+  std::this_thread::sleep_for(300ms);  // the writer passes over the first of them
+  drive.mark();
+  drive.drive(2);
+  drive.recorder().close();
+  EXPECT_GE(drive.rigs("drive.mcap"), 2);
+}
+
+}  // namespace
+}  // namespace vergence::app
