@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -47,6 +48,7 @@ class SessionRunner {
   void pass_on_temperatures();
   void watch(Progress* progress);
   void start_source(std::vector<std::string>* faults);
+  [[nodiscard]] std::thread start_estimating();
   void leave_no_folder();
   void halt_source() noexcept;
   void say_recording_errors(Progress* progress);
@@ -158,6 +160,21 @@ void SessionRunner::start_source(std::vector<std::string>* faults) {
     halt_source();  // of the devices that did start some already bring what is recorded
     leave_no_folder();
     throw;
+  }
+}
+
+/// Without it nobody takes what the devices bring by now.
+std::thread SessionRunner::start_estimating() {
+  try {
+    return std::thread([this] { estimate(); });
+  } catch (const std::system_error& e) {
+    source_.stop();
+    halt_source();
+    leave_no_folder();
+    throw InputError(fmt::format(
+        "the system gives no thread to the estimator ({}): raise the limit of processes (ulimit "
+        "-u, of a service TasksMax) or of memory",
+        e.code().message()));
   }
 }
 
@@ -355,7 +372,7 @@ ExitCode SessionRunner::run() {
   if (std::any_of(request_.observers.begin(), request_.observers.end(),
                   [](const SessionObserver* o) { return o->wants_temperatures(); }))
     temperatures_.begin();
-  std::thread estimating([this] { estimate(); });
+  std::thread estimating = start_estimating();
   service_.ready();
   watch(&progress);
   estimating.join();

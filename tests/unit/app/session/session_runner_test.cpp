@@ -1,6 +1,7 @@
 #include "app/session/session_runner.hpp"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -9,7 +10,9 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -49,7 +52,10 @@ class BlackSource final : public FrameSource {
   }
 
   [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
-  void start(std::vector<std::string>* /*faults*/) override {}
+  void start(std::vector<std::string>* /*faults*/) override {
+    if (started_) started_();
+  }
+  void halt() noexcept override { ++halted_; }
   [[nodiscard]] bool next(SourceItem* item) noexcept override {
     if (next_ == frames_) return false;
     if (next_ == 2 && !noted_) {
@@ -72,7 +78,7 @@ class BlackSource final : public FrameSource {
     return true;
   }
   void done(const PoseSample& /*sample*/) noexcept override { --held_; }
-  void stop() noexcept override {}
+  void stop() noexcept override { ++stopped_; }
   void finish(Progress* /*progress*/, std::vector<std::string>* /*faults*/) override {
     ++finished_;
   }
@@ -89,12 +95,17 @@ class BlackSource final : public FrameSource {
 
   void begin_from(const std::string& source) { facts_.begin.source = source; }
   void be_live() { facts_.when_full = Recorder::WhenFull::drop; }
+  /// Called when it has started.
+  void when_started(std::function<void()> started) { started_ = std::move(started); }
   [[nodiscard]] int held() const { return held_; }
   [[nodiscard]] int finished() const { return finished_; }
+  [[nodiscard]] int stopped() const { return stopped_; }
+  [[nodiscard]] int halted() const { return halted_; }
 
  private:
   SourceFacts facts_;
-  int frames_, next_ = 0, held_ = 0, finished_ = 0;
+  int frames_, next_ = 0, held_ = 0, finished_ = 0, stopped_ = 0, halted_ = 0;
+  std::function<void()> started_;
   bool noted_ = false;
   std::vector<std::uint8_t> pixels_;
 };
@@ -376,6 +387,44 @@ TEST(SessionRunner, aSessionThatCannotBeRecordedLeavesNoFolder) {
   const Configuration configuration = load_configuration(std::nullopt, {"record=[poses]"});
   const LargestFile limit(2000);
   EXPECT_THROW((void)run_session(source, configuration, options, signals), InputError);
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+}
+
+/// No thread begins while it lives: none has room for such a stack.
+class NoThreads {
+ public:
+  NoThreads() {
+    pthread_attr_t huge;
+    (void)::pthread_getattr_default_np(&before_);
+    (void)::pthread_getattr_default_np(&huge);
+    (void)::pthread_attr_setstacksize(&huge, std::size_t{1} << 50U);
+    (void)::pthread_setattr_default_np(&huge);
+    (void)::pthread_attr_destroy(&huge);
+  }
+  ~NoThreads() {
+    (void)::pthread_setattr_default_np(&before_);
+    (void)::pthread_attr_destroy(&before_);
+  }
+  NoThreads(const NoThreads&) = delete;
+  NoThreads& operator=(const NoThreads&) = delete;
+
+ private:
+  pthread_attr_t before_{};
+};
+
+TEST(SessionRunner, withoutAThreadForTheEstimatorTheDevicesAreStoppedAndNothingIsLeft) {
+  const test::TemporaryFolder folder;
+  BlackSource source(4);
+  std::optional<NoThreads> no_threads;
+  source.when_started([&no_threads] { no_threads.emplace(); });
+  SessionOptions options;
+  options.out = folder / "session";
+  options.quiet = true;
+  const SignalGuard signals;
+  EXPECT_THROW((void)run_session(source, load_configuration(std::nullopt, {}), options, signals),
+               InputError);
+  EXPECT_EQ(source.stopped(), 1);
+  EXPECT_EQ(source.halted(), 1);
   EXPECT_FALSE(std::filesystem::exists(options.out));
 }
 
