@@ -43,6 +43,9 @@ std::string read_text(const std::filesystem::path& file, std::size_t limit) {
   }
   std::string text;
   std::array<char, 1U << 16U> block;
+  // At once: what doubles as it grows takes twice of what there is.
+  if (const auto size = std::filesystem::file_size(file, ignored); !ignored && size <= limit)
+    text.reserve(size);
   while (in.read(block.data(), block.size()) || in.gcount() > 0) {
     text.append(block.data(), static_cast<std::size_t>(in.gcount()));
     if (text.size() > limit)

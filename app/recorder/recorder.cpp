@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <new>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -375,6 +376,10 @@ void Recorder::read_back() {
       *out = read_tum(file.path());
     } catch (const InputError& e) {
       errors_.push_back(std::string(e.what()) + "; the summary lacks what is made from it");
+    } catch (const std::bad_alloc&) {
+      errors_.push_back(file.path().string() +
+                        ": is too long for this machine's memory; the summary lacks what is made "
+                        "from it");
     }
   };
   if (totals.ok + totals.degraded > 0) read(files_->trajectory, &totals.trajectory);

@@ -108,6 +108,7 @@ void LiveSource::make_facts() {
   if (const InsDevice* ins = devices_.ins()) facts_.devices.ins = {ins->info(), ins->timing()};
   if (const TriggerDevice* trigger = devices_.trigger())
     facts_.devices.trigger = {trigger->info(), trigger->timing()};
+  facts_.knows_truth = devices_.mock() != nullptr;
   facts_.image_bytes = devices_.image_bytes();
   facts_.ring_bytes = sizeof(Acquisition);
   facts_.word_of_skipped = "dropped";

@@ -42,6 +42,7 @@ class SessionRunner {
   void open(std::vector<std::string>* faults);
   void make_folder();
   void open_files(std::vector<std::string>* faults);
+  [[nodiscard]] bool trajectory_is_asked_for() const;
   [[nodiscard]] SessionStart session_start() const;
   void say_remarks(Progress* progress);
   void estimate() noexcept;
@@ -223,6 +224,7 @@ void SessionRunner::open_files(std::vector<std::string>* faults) {
   to_record.first = facts_.first;
   to_record.when_full = facts_.when_full;
   to_record.expected_frames = facts_.expected_frames;
+  to_record.keep_trajectory = trajectory_is_asked_for();
   to_record.ins = loop_.comparison() != nullptr;
   to_record.keep = calibration_keeper(request_.out, facts_.begin.file, facts_.begin.state);
   to_record.disk_full = facts_.disk_full;
@@ -242,6 +244,12 @@ void SessionRunner::open_files(std::vector<std::string>* faults) {
   for (SessionObserver* observer : observers_) observer->on_start(start);
   loop_.open(SessionOutput(recorder_.get(), observers_), recording_.get());
   begin_session(request_.out, facts_.begin, facts_.first, &loop_.output(), faults);
+}
+
+/// Whether anything at the end is made of the whole drive's poses, which then are all in memory.
+bool SessionRunner::trajectory_is_asked_for() const {
+  return loop_.comparison() != nullptr || !facts_.truth.empty() || facts_.knows_truth ||
+         !request_.also.empty();
 }
 
 SessionStart SessionRunner::session_start() const {

@@ -1,10 +1,12 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <functional>
 #include <memory>
 #include <thread>
@@ -74,6 +76,51 @@ TEST(Recorder, statusesAreOfTheFileThatTheTrajectoryIsInAtTheEnd) {
   EXPECT_EQ(totals->trajectory.size(), 3U);
   EXPECT_EQ(totals->degraded, 5U) << "counts are of all";
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which take what they want
+
+/// The process has so many bytes more than it has now, while it lives.
+class LittleMemory {
+ public:
+  explicit LittleMemory(std::size_t more) {
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    (void)::getrlimit(RLIMIT_AS, &before_);
+    const rlimit little{pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + more,
+                        before_.rlim_max};
+    (void)::setrlimit(RLIMIT_AS, &little);
+  }
+  ~LittleMemory() { (void)::setrlimit(RLIMIT_AS, &before_); }
+  LittleMemory(const LittleMemory&) = delete;
+  LittleMemory& operator=(const LittleMemory&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST(Recorder, aTrajectoryThatIsTooLongForTheMemoryIsASentenceAndTheTotalsAreThere) {
+  constexpr std::size_t kLong = std::size_t{256} << 20, kMemory = std::size_t{32} << 20;  // bytes
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  for (std::uint64_t i = 0; i < 5; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1));
+  while (lines_of(folder / "trajectory.tum").size() < 5)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  std::filesystem::resize_file(folder / "trajectory.tum", kLong);
+  std::unique_ptr<SessionTotals> totals;
+  {
+    const LittleMemory memory(kMemory);
+    totals = recorder.close();
+  }
+  EXPECT_EQ(totals->ok, 5U);
+  EXPECT_TRUE(totals->trajectory.empty());
+  const auto errors = recorder.take_errors();
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_NE(errors[0].find("trajectory.tum: is too long for this machine's memory"),
+            std::string::npos)
+      << errors[0];
+}
+
+#endif
 
 TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
   const test::TemporaryFolder folder;

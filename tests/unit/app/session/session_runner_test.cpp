@@ -18,6 +18,8 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "app/recorder/pose_line.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "tests/support/small_disk.hpp"
@@ -388,6 +390,24 @@ TEST(SessionRunner, aSessionThatCannotBeRecordedLeavesNoFolder) {
   const LargestFile limit(2000);
   EXPECT_THROW((void)run_session(source, configuration, options, signals), InputError);
   EXPECT_FALSE(std::filesystem::exists(options.out));
+}
+
+TEST(SessionRunner, theWholeTrajectoryIsKeptOnlyWhereSomethingIsMadeOfIt) {
+  const auto bytes = [](const std::vector<OtherFormat>& also) {
+    const test::TemporaryFolder folder;
+    BlackSource source(64);
+    SessionOptions options;
+    options.out = folder / "session";
+    options.quiet = true;
+    options.also = also;
+    const SignalGuard signals;
+    testing::internal::CaptureStderr();
+    (void)run_session(source, load_configuration(std::nullopt, {}), options, signals);
+    (void)testing::internal::GetCapturedStderr();
+    const auto summary = nlohmann::json::parse(test::read_file(options.out / "summary.json"));
+    return summary["memory"]["recorder_bytes"].get<std::size_t>();
+  };
+  EXPECT_EQ(bytes({OtherFormat::kitti}) - bytes({}), 64U) << "a status for each frame";
 }
 
 /// No thread begins while it lives: none has room for such a stack.
