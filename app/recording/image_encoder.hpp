@@ -44,6 +44,8 @@ class ImageEncoder {
   [[nodiscard]] std::uint64_t dropped() const noexcept {
     return dropped_.load(std::memory_order_relaxed);
   }
+  /// Bytes of pixels that may wait, and of the file at hand.
+  [[nodiscard]] std::size_t memory() const noexcept { return ring_.capacity() + file_.size(); }
 
  private:
   void work() noexcept;

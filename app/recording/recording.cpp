@@ -238,9 +238,9 @@ RecordingCounters Recording::counters() const noexcept {
   c.chunks = get(counts_.chunks), c.files = files_.files();
   c.dropped = get(counts_.dropped), c.dropped_images = get(counts_.dropped_images);
   c.lost = get(counts_.lost) + files_.unwritten(), c.passed_over = get(counts_.passed_over);
-  if (!queues_.empty()) {
-    c.queue_bytes = queues_.front()->ring.capacity();
-    c.queue_high_water = queues_.front()->ring.high_water();
+  for (const auto& q : queues_) {
+    c.queue_bytes += q->ring.capacity();
+    c.queue_high_water += q->ring.high_water();
   }
   return c;
 }

@@ -29,7 +29,7 @@ struct RecordingCounters {
   std::uint64_t lost = 0;  // messages that waited for a disk until there was no room, or that it
                            // had taken and did not keep
   std::uint64_t passed_over = 0;  // messages older than what is kept before an event
-  std::size_t queue_bytes = 0, queue_high_water = 0;  // of the first queue
+  std::size_t queue_bytes = 0, queue_high_water = 0;  // of all queues, the most that waited in each
 };
 
 /// Messages into MCAP files `drive.mcap` on a thread of its own: who posts never waits for a disk.

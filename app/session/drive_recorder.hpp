@@ -24,7 +24,7 @@ namespace vergence::app {
 ///
 /// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
 ///            DeviceObserver, a queue each. The rest: the owner's.
-/// Memory     The recording's queue, at construction.
+/// Memory     The recording's queues and the encoder's, at construction.
 /// Errors     The constructor throws InputError: no room, no file. Afterwards sentences.
 class DriveRecorder final : public SessionObserver, public DeviceObserver {
  public:
@@ -53,7 +53,9 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   /// Nothing more is recorded. The estimator's thread.
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
-  [[nodiscard]] std::size_t memory() const noexcept { return recording_.counters().queue_bytes; }
+  [[nodiscard]] std::size_t memory() const noexcept {
+    return recording_.counters().queue_bytes + (encoder_ ? encoder_->memory() : 0);
+  }
 
  private:
   template <class Write>

@@ -161,6 +161,18 @@ TEST(Recording, aMessageLargerThanItsQueueIsDroppedAlsoWhenOneWaits) {
   EXPECT_EQ(recording.counters().dropped_images, 1U);
 }
 
+TEST(Recording, figuresOfItsQueuesAreOfAllOfThem) {
+  const TemporaryFolder folder;
+  Recording::Options o = options();
+  o.queues = {64U << 10U, 128U << 10U};
+  Recording recording(folder.path(), o);
+  EXPECT_EQ(recording.counters().queue_bytes, std::size_t{192} << 10U);
+  ASSERT_FALSE(recording.begin(1, kText, Stamp(1), 1000).empty());
+  recording.commit(1, 1000);
+  recording.close();
+  EXPECT_GE(recording.counters().queue_high_water, 1000U);
+}
+
 TEST(Recording, shortWritesLoseNothing) {
   const TemporaryFolder folder;
   FaultyDisk disk;

@@ -97,6 +97,14 @@ TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
   EXPECT_EQ(drive.rigs("drive_1.mcap"), 1);
 }
 
+TEST(DriveRecorder, itsMemoryIsThatOfAllQueuesAndOfTheEncoder) {
+  const std::vector<std::string> plain{"record=[images]", "record.memory_mb=64"};
+  std::vector<std::string> png = plain;
+  png.emplace_back("record.image_format=png");
+  EXPECT_GT(RecordedPoses(png).recorder().memory(), RecordedPoses(plain).recorder().memory())
+      << "the same images, and pixels that wait for the encoder";
+}
+
 TEST(DriveRecorder, whatIsKeptAroundAnEventSaysWhereTheCamerasAre) {
   RecordedPoses drive({"record=[poses]", "record.keep_s=3"});
   drive.drive(200);                    // 10 s
