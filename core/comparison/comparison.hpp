@@ -36,7 +36,7 @@ struct ComparisonOptions {
   /// A pose waits so long for the INS sample after it, by the stamps of the poses that follow; then
   /// it goes out without.
   Duration max_wait = Duration::milliseconds(500);
-  /// m: a step from sample to sample beyond this and 60 m/s is a jump: not interpolated across.
+  /// m: a step from fix to fix beyond this and 60 m/s is a jump: not interpolated across.
   double jump_m = 20.0;
   /// m: path lengths are compared over the newest stretch of this length; `scale_disagrees` beyond
   /// `scale_tolerance` and 4 sigma.

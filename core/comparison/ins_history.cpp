@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/comparison/comparison.hpp"
 
@@ -47,6 +48,7 @@ bool InsHistory::accept_stamp(Stamp stamp) noexcept {
     if (++backwards_ < kBackwardsForGood) return false;
     ++counters_.ins_restarts;
     begin_ = end_;
+    last_fix_.reset();
   }
   backwards_ = 0;
   return true;
@@ -76,6 +78,18 @@ void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {
   r->sigmas.tilt = attitude ? or_default(sample.tilt_sigma, options_.tilt_sigma_rad) : kLevelSigma;
 }
 
+/// A receiver often has no fix for a reading or more where its position leaps: the last place it
+/// had counts, and a vehicle may have driven since.
+bool InsHistory::leapt(const Reading& r) noexcept {
+  const std::optional<Fix> before = std::exchange(last_fix_, Fix{r.stamp, r.p_enu_ins});
+  if (!before) return false;
+  const double farthest = options_.jump_m + kFastest * (r.stamp - before->stamp).to_seconds();
+  if (!((r.p_enu_ins - before->p_enu_ins).norm() > farthest)) return false;
+  ++counters_.jumps;
+  leapt_at_ = r.stamp;
+  return true;
+}
+
 void InsHistory::add(const InsSample& sample) noexcept {
   ++counters_.ins_samples;
   if (!accept_stamp(sample.stamp)) return;
@@ -83,15 +97,7 @@ void InsHistory::add(const InsSample& sample) noexcept {
   r.stamp = sample.stamp;
   r.stamp_error = sample.stamp_error;
   locate(sample, &r);
-  if (r.valid && end_ > begin_ && reading(end_ - 1).valid) {
-    const Reading& before = reading(end_ - 1);
-    const double farthest = options_.jump_m + kFastest * (r.stamp - before.stamp).to_seconds();
-    r.jumped = (r.p_enu_ins - before.p_enu_ins).norm() > farthest;
-    if (r.jumped) {
-      ++counters_.jumps;
-      leapt_at_ = r.stamp;
-    }
-  }
+  if (r.valid) r.jumped = leapt(r);
   if (end_ - begin_ == readings_.size()) ++begin_;
   readings_[static_cast<std::size_t>(end_) & (readings_.size() - 1)] = r;
   ++end_;

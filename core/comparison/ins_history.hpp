@@ -51,10 +51,14 @@ class InsHistory {
     Stamp stamp{};
     Duration stamp_error{};
     bool valid = false;
-    bool jumped = false;  // against the reading before
+    bool jumped = false;  // against the last fix before
     Vec3 p_enu_ins = Vec3::Zero();
     Mat3 R_enu_ins = Mat3::Identity();
     Sigmas sigmas{};
+  };
+  struct Fix {
+    Stamp stamp{};
+    Vec3 p_enu_ins = Vec3::Zero();
   };
 
   [[nodiscard]] const Reading& reading(std::uint64_t i) const noexcept {
@@ -62,6 +66,8 @@ class InsHistory {
   }
   /// False: its stamp goes back.
   [[nodiscard]] bool accept_stamp(Stamp stamp) noexcept;
+  /// Whether a valid reading is farther from the last one than a vehicle drives; counted.
+  [[nodiscard]] bool leapt(const Reading& r) noexcept;
   /// The sample's place in enu, if it has one.
   void locate(const InsSample& sample, Reading* r) noexcept;
 
@@ -72,6 +78,7 @@ class InsHistory {
   std::span<Reading> readings_;
   std::uint64_t begin_ = 0, end_ = 0;  // numbers of the readings held
   int backwards_ = 0;                  // refused in a row for their stamps
+  std::optional<Fix> last_fix_;        // since the INS began or began anew
   std::optional<double> yaw_;          // rad, the newest of a sample without attitude
   std::optional<Stamp> leapt_at_;      // and nobody has taken it
 };

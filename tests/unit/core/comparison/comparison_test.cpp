@@ -289,21 +289,33 @@ TEST(Comparison, aJumpOf100MetresIsSaidAndNotInterpolatedAcross) {
   EXPECT_NEAR(b.out.back().error_enu.norm(), 100, 1e-2);
 }
 
+/// A drive whose position leaps after reading `last_before`, with `without_fix` readings in
+/// between.
+void expect_placed_behind_a_leap(int last_before, int without_fix) {
+  Bench b;
+  const Vec3 jump(30, 100, 0);
+  for (int i = 0; i <= 40 * 120; ++i) {
+    const double t = i / 120.0;
+    InsSample s = b.sample(t, i > last_before ? jump : Vec3::Zero());
+    if (i > last_before && i <= last_before + without_fix) s.fix = FixStatus::none;
+    b.comparison.add(s);
+    if (i % 3 == 1) b.comparison.add(b.pose(t - 0.004));
+    b.take();
+  }
+  EXPECT_EQ(b.comparison.counters().jumps, 1U);
+  ASSERT_TRUE(b.out.back().compared);
+  EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);
+  EXPECT_GT((b.comparison.placement().first - at(5.0)).ns(), 0);
+  for (const ComparedPose& c : b.out) EXPECT_FALSE(c.scale_disagrees);
+}
+
 TEST(Comparison, aJumpWhilePlacingBeginsThePlacementAnewWhetherOrNotAFrameFellIntoIt) {
   // Poses fall between readings 3n and 3n + 1: into the first jump, beside the second.
-  for (const int last_before : {600, 601}) {
-    Bench b;
-    const Vec3 jump(30, 100, 0);
-    for (int i = 0; i <= 40 * 120; ++i) {
-      const double t = i / 120.0;
-      b.comparison.add(b.sample(t, i > last_before ? jump : Vec3::Zero()));
-      if (i % 3 == 1) b.comparison.add(b.pose(t - 0.004));
-      b.take();
+  for (const int last_before : {600, 601})
+    for (const int without_fix : {0, 1, 3}) {
+      SCOPED_TRACE(testing::Message() << last_before << ", without a fix " << without_fix);
+      expect_placed_behind_a_leap(last_before, without_fix);
     }
-    ASSERT_TRUE(b.out.back().compared);
-    EXPECT_LT(b.out.back().error_enu.norm(), 1e-3) << last_before;
-    EXPECT_GT((b.comparison.placement().first - at(5.0)).ns(), 0) << last_before;
-  }
 }
 
 TEST(Comparison, aRestartedOdometryIsPlacedAnew) {
