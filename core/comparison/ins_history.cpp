@@ -86,7 +86,8 @@ bool InsHistory::leapt(const Reading& r) noexcept {
   const double farthest = options_.jump_m + kFastest * (r.stamp - before->stamp).to_seconds();
   if (!((r.p_enu_ins - before->p_enu_ins).norm() > farthest)) return false;
   ++counters_.jumps;
-  leapt_at_ = r.stamp;
+  leaps_ = leaps_ ? Leaps{std::min(leaps_->first, r.stamp), std::max(leaps_->last, r.stamp)}
+                  : Leaps{r.stamp, r.stamp};
   return true;
 }
 
@@ -108,8 +109,8 @@ bool InsHistory::reaches(Stamp stamp) const noexcept {
 }
 
 bool InsHistory::take_leap(Stamp now) noexcept {
-  if (!leapt_at_ || now < *leapt_at_) return false;
-  leapt_at_.reset();
+  if (!leaps_ || now < leaps_->first) return false;
+  if (now >= leaps_->last) leaps_.reset();
   return true;
 }
 

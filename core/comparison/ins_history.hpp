@@ -39,8 +39,9 @@ class InsHistory {
   [[nodiscard]] InsMatch reference_at(Stamp stamp, Reference* out) const noexcept;
   /// The newest sample is not older than this.
   [[nodiscard]] bool reaches(Stamp stamp) const noexcept;
-  /// Whether the position has leapt, by `now` at the latest; once for each leap, or for several
-  /// before one `now`.
+  /// Whether the position has leapt, by `now` at the latest; once for a leap, or for several before
+  /// one `now`. Between the first and the last of several it is true whenever it is asked: no two
+  /// places there need fit together.
   [[nodiscard]] bool take_leap(Stamp now) noexcept;
 
   [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
@@ -59,6 +60,9 @@ class InsHistory {
   struct Fix {
     Stamp stamp{};
     Vec3 p_enu_ins = Vec3::Zero();
+  };
+  struct Leaps {
+    Stamp first{}, last{};
   };
 
   [[nodiscard]] const Reading& reading(std::uint64_t i) const noexcept {
@@ -80,7 +84,7 @@ class InsHistory {
   int backwards_ = 0;                  // refused in a row for their stamps
   std::optional<Fix> last_fix_;        // since the INS began or began anew
   std::optional<double> yaw_;          // rad, the newest of a sample without attitude
-  std::optional<Stamp> leapt_at_;      // and nobody has taken it
+  std::optional<Leaps> leaps_;         // that nobody has taken
 };
 
 }  // namespace vergence

@@ -318,6 +318,28 @@ TEST(Comparison, aJumpWhilePlacingBeginsThePlacementAnewWhetherOrNotAFrameFellIn
     }
 }
 
+/// Poses a second behind the INS, so that several leaps are known before the first pose meets one.
+/// The placement's 100 metres are driven after 10.15 s: between the first leap and the last.
+TEST(Comparison, ofSeveralJumpsBeforeAPoseNoneIsForgotten) {
+  const Vec3 first(30, 100, 0), second(-60, -100, 0);
+  for (const Vec3& between : {first, second}) {
+    Bench b;
+    for (int i = 0; i <= 60 * 120; ++i) {
+      const double t = i / 120.0;
+      Vec3 shift = Vec3::Zero();
+      if (t > 9.9 && t < 10.6) shift = t < 10.3 ? first : between;
+      b.comparison.add(b.sample(t, shift));
+      if (t > 1 && i % 3 == 1) b.comparison.add(b.pose(t - 1.004));
+      b.take();
+    }
+    EXPECT_EQ(b.comparison.counters().jumps, between == first ? 2U : 3U);
+    ASSERT_TRUE(b.out.back().compared);
+    EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);
+    EXPECT_GT((b.comparison.placement().first - at(10.59)).ns(), 0);
+    for (const ComparedPose& c : b.out) EXPECT_FALSE(c.scale_disagrees);
+  }
+}
+
 TEST(Comparison, aRestartedOdometryIsPlacedAnew) {
   Bench b;
   const Transform elsewhere{exp_so3({0, 0.3, 0}), {5, 0, 5}};
