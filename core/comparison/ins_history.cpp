@@ -10,8 +10,10 @@ namespace vergence {
 namespace {
 
 constexpr double kFastest = 60.0;  // m/s: no vehicle that carries this rig
-// Samples in a row: a second of an INS whose clock has gone back and stays there.
-constexpr int kBackwardsForGood = 120;
+// An INS whose clock has gone back and stays there: its refused stamps go on for so long, whatever
+// its rate.
+constexpr Duration kBackForGood = Duration::seconds(1);
+constexpr int kLeastBack = 3;  // samples: two stamps are a mistake as soon as a clock
 constexpr double kQuaternionLength = 0.1;
 constexpr double kLevelSigma = 0.05;  // rad: slopes and suspension, where nobody measures tilt
 
@@ -45,13 +47,20 @@ std::size_t InsHistory::bytes_needed(const ComparisonOptions& options) noexcept 
 bool InsHistory::accept_stamp(Stamp stamp) noexcept {
   if (end_ > begin_ && stamp <= reading(end_ - 1).stamp) {
     ++counters_.ins_refused;
-    if (++backwards_ < kBackwardsForGood) return false;
+    if (!back_for_good(stamp)) return false;
     ++counters_.ins_restarts;
     begin_ = end_;
     last_fix_.reset();
   }
-  backwards_ = 0;
+  refused_ = {};
   return true;
+}
+
+bool InsHistory::back_for_good(Stamp stamp) noexcept {
+  if (refused_.count == 0 || stamp <= refused_.last) refused_ = {0, stamp, stamp};
+  ++refused_.count;
+  refused_.last = stamp;
+  return refused_.count >= kLeastBack && refused_.last - refused_.first >= kBackForGood;
 }
 
 void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {

@@ -61,6 +61,10 @@ class InsHistory {
     Stamp stamp{};
     Vec3 p_enu_ins = Vec3::Zero();
   };
+  struct Refused {  // in a row for their stamps, which ascend among themselves
+    int count = 0;
+    Stamp first{}, last{};
+  };
   struct Leaps {
     Stamp first{}, last{};
   };
@@ -70,6 +74,8 @@ class InsHistory {
   }
   /// False: its stamp goes back.
   [[nodiscard]] bool accept_stamp(Stamp stamp) noexcept;
+  /// With this refused stamp, too.
+  [[nodiscard]] bool back_for_good(Stamp stamp) noexcept;
   /// Whether a valid reading is farther from the last one than a vehicle drives; counted.
   [[nodiscard]] bool leapt(const Reading& r) noexcept;
   /// The sample's place in enu, if it has one.
@@ -81,10 +87,10 @@ class InsHistory {
   bool has_origin_ = false;
   std::span<Reading> readings_;
   std::uint64_t begin_ = 0, end_ = 0;  // numbers of the readings held
-  int backwards_ = 0;                  // refused in a row for their stamps
-  std::optional<Fix> last_fix_;        // since the INS began or began anew
-  std::optional<double> yaw_;          // rad, the newest of a sample without attitude
-  std::optional<Leaps> leaps_;         // that nobody has taken
+  Refused refused_{};
+  std::optional<Fix> last_fix_;  // since the INS began or began anew
+  std::optional<double> yaw_;    // rad, the newest of a sample without attitude
+  std::optional<Leaps> leaps_;   // that nobody has taken
 };
 
 }  // namespace vergence

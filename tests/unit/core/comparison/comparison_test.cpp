@@ -454,15 +454,36 @@ TEST(Comparison, samplesThatMeanNothingAreRefusedAndCounted) {
   EXPECT_EQ(b.out[0].ins, InsMatch::no_fix);
 }
 
-TEST(Comparison, anInsWhoseClockWentBackForGoodIsTakenUpAgain) {
+TEST(Comparison, anInsWhoseClockWentBackForGoodIsTakenUpAgainAfterASecondWhateverItsRate) {
+  for (const int rate : {1, 4, 120, 400}) {
+    SCOPED_TRACE(rate);
+    ComparisonOptions options = Bench::with_mount();
+    options.max_gap = Duration::seconds(1);
+    Bench b(options);
+    for (int i = 0; i < 10 * rate; ++i) b.comparison.add(b.sample(100 + double(i) / rate));
+    for (int i = 0; i < 10 * rate; ++i) b.comparison.add(b.sample(double(i) / rate));
+    EXPECT_EQ(b.comparison.counters().ins_restarts, 1U);
+    // A second and the reading that ends it; at 1 Hz the three that there have to be.
+    EXPECT_EQ(b.comparison.counters().ins_refused, static_cast<unsigned>(std::max(3, rate + 1)));
+    b.comparison.add(b.pose(5));
+    b.take();
+    ASSERT_EQ(b.out.size(), 1U);
+    EXPECT_EQ(b.out[0].ins, InsMatch::ok);
+  }
+}
+
+TEST(Comparison, refusedStampsThatDoNotAscendForASecondAreNoClockThatWentBack) {
   Bench b;
-  for (int i = 0; i < 1200; ++i) b.comparison.add(b.sample(100 + i / 120.0));
-  for (int i = 0; i < 1200; ++i) b.comparison.add(b.sample(i / 120.0));
-  EXPECT_EQ(b.comparison.counters().ins_restarts, 1U);
-  b.comparison.add(b.pose(5));
-  b.take();
-  ASSERT_EQ(b.out.size(), 1U);
-  EXPECT_EQ(b.out[0].ins, InsMatch::ok);
+  b.comparison.add(b.sample(100));
+  for (int i = 0; i < 1200; ++i) b.comparison.add(b.sample(60 + i % 120 / 120.0));
+  for (int i = 0; i < 1200; ++i) b.comparison.add(b.sample(50));
+  for (int i = 0; i < 1200; ++i) b.comparison.add(b.sample(50 - i / 120.0));
+  for (int i = 1; i < 1200; ++i) {  // between readings whose stamps go on
+    b.comparison.add(b.sample(30 + i / 120.0));
+    b.comparison.add(b.sample(100 + i / 120.0));
+  }
+  EXPECT_EQ(b.comparison.counters().ins_restarts, 0U);
+  EXPECT_EQ(b.comparison.counters().ins_refused, 3 * 1200U + 1199U);
 }
 
 /// Rows of `row,latitude,longitude,altitude,east,north,up`.
