@@ -55,15 +55,32 @@ State moved(const State& s, const Parameters& d) {
   return out;
 }
 
-/// Readings a step apart, with an estimate around each.
+/// Between two readings, as most are.
+Duration interval_of(std::span<const MountReference> reference) {
+  std::vector<std::int64_t> intervals;  // ns
+  intervals.reserve(reference.size());
+  for (std::size_t i = 1; i < reference.size(); ++i)
+    intervals.push_back((reference[i].stamp - reference[i - 1].stamp).ns());
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  return Duration::nanoseconds(std::max<std::int64_t>(1, *middle));
+}
+
+/// Between two moments: as many readings as come nearest to the step, one at least.
+Duration spacing_of(Duration interval, Duration step) {
+  return interval * std::max<std::int64_t>(1, (step + interval / 2).ns() / interval.ns());
+}
+
+/// Readings a step of `o` apart, which is of whole intervals, with an estimate around each.
 std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
-                               std::span<const MountReference> reference, const MountOptions& o) {
+                               std::span<const MountReference> reference, Duration interval,
+                               const MountOptions& o) {
   constexpr Duration kRoom = Duration::milliseconds(500);  // for the clock offset
   std::vector<Moment> moments;
   Transform unused;
   Stamp next = reference.front().stamp;
   for (const MountReference& r : reference) {
-    if (r.stamp < next) continue;
+    if (r.stamp < next - interval / 2) continue;  // stamps jitter
     if (!detail::pose_at(estimate, r.stamp - kRoom, o.max_gap, &unused) ||
         !detail::pose_at(estimate, r.stamp, o.max_gap, &unused) ||
         !detail::pose_at(estimate, r.stamp + kRoom, o.max_gap, &unused))
@@ -375,9 +392,15 @@ MountStatus estimate_mount(std::span<const StampedPose> estimate,
                            std::span<const MountReference> reference, const Mat3& nominal,
                            const MountOptions& options, Mount* mount) {
   if (estimate.size() < kMountMoments || reference.size() < 2) return MountStatus::too_few;
-  std::vector<Moment> moments = moments_of(estimate, reference, options);
-  if (moments.size() < kMountMoments) return MountStatus::too_few;
-  return Fit(std::move(moments), estimate, options).run(nominal, mount);
+  const Duration interval = interval_of(reference);
+  MountOptions spaced = options;
+  spaced.step = spacing_of(interval, options.step);
+  std::vector<Moment> moments = moments_of(estimate, reference, interval, spaced);
+  // How errors wander is learnt from one moment to the next: of too few they would seem to be none.
+  const auto following =
+      std::count_if(moments.begin(), moments.end(), [](const Moment& m) { return m.follows; });
+  if (static_cast<std::size_t>(following) < kMountMoments) return MountStatus::too_few;
+  return Fit(std::move(moments), estimate, spaced).run(nominal, mount);
 }
 
 }  // namespace vergence

@@ -35,7 +35,8 @@ struct MountReference {
 };
 
 struct MountOptions {
-  Duration step = Duration::milliseconds(500);     // between the moments that are compared
+  // Between the moments that are compared, as nearly as the reference's readings give it.
+  Duration step = Duration::milliseconds(500);
   Duration max_gap = Duration::milliseconds(200);  // of the estimate, that is bridged
   Duration least_correlation = Duration::seconds(
       60);  // of attitude and place: a drive is too short to tell how slowly they wander
@@ -54,7 +55,7 @@ struct MountValue {
 
 enum class MountStatus : std::uint8_t {
   ok,
-  too_few,        // fewer than kMountMoments moments in common
+  too_few,        // fewer than kMountMoments moments in common that follow on one another
   no_motion,      // nothing moved: nothing shows
   not_converged,  // no fit, or none that can be: a clock offset of 0.3 s, errors of 15 degrees
 };

@@ -42,7 +42,9 @@ struct How {
   std::uint64_t seed = 1;
   bool ideal = false;
   bool velocity = true;
-  double late_s = 0;  // of the reference's stamps
+  double late_s = 0;    // of the reference's stamps
+  double rate = 60;     // Hz, of the reference
+  double jitter_s = 0;  // of the reference's stamps, with what they stamp: either way at most
 };
 
 /// The left camera as an odometry would have it (in its own world, drifting a little), and the
@@ -59,7 +61,7 @@ Drove drove(const How& how) {
   const double length = truth.drive().duration().to_seconds();
   Drove d;
   Random random(how.seed, 40);
-  constexpr double kFrames = 20, kReadings = 60;  // Hz
+  constexpr double kFrames = 20;  // Hz
   const Transform T_enu_first = truth.camera_in_enu(0, {});
   Transform T_world_left, before = T_enu_first;
   for (double t = 0; t < length; t += 1 / kFrames) {
@@ -73,10 +75,12 @@ Drove drove(const How& how) {
     before = now;
     d.estimate.push_back({kStart + Duration::seconds(t), T_world_left});
   }
-  mock::InsModel ins({how.ideal, how.seed, kReadings}, truth);
+  mock::InsModel ins({how.ideal, how.seed, how.rate}, truth);
   const LocalTangentPlane plane(mock::kWorldOrigin);
   std::uint64_t number = 0;
-  for (double t = -1; t < length + 1; t += 1 / kReadings) {
+  Random jitter(how.seed, 41);
+  for (double even = -1; even < length + 1; even += 1 / how.rate) {
+    const double t = even + how.jitter_s * jitter.uniform(-1, 1);
     const InsSample s = ins.sample(number++, Duration::seconds(t));
     const Mat3 R_enu_local = plane.rotation_from(s.position);
     MountReference r;
@@ -114,6 +118,35 @@ TEST(Mount, anIdealReferenceGivesItsMount) {
       EXPECT_NEAR(m.lever_arm[k].value, kLever[static_cast<int>(k)], 0.02);
     ASSERT_TRUE(m.clock_offset.observable);
     EXPECT_NEAR(m.clock_offset.value, 0.012, 1e-3);
+  }
+}
+
+TEST(Mount, aSlowReferenceGivesItsMountAsAQuickOneDoes) {
+  struct Slow {
+    double rate, jitter_s;
+  };
+  // Readings that come every second, when the step is about over, and when none falls near its end.
+  for (const Slow slow : {Slow{0.5, 0}, Slow{1, 0}, Slow{1.33, 0.01}, Slow{2, 0}, Slow{2, 0.005},
+                          Slow{2.5, 0}, Slow{2.67, 0.005}, Slow{3, 0.005}}) {
+    SCOPED_TRACE(testing::Message() << slow.rate << " Hz, jitter " << slow.jitter_s);
+    How how;
+    how.ideal = true;
+    how.late_s = 0.012;
+    how.rate = slow.rate;
+    how.jitter_s = slow.jitter_s;
+    const Drove d = drove(how);
+    Mount m;
+    ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int i = static_cast<int>(k);
+      const MountValue &turn = m.rotation[k], &arm = m.lever_arm[k];
+      EXPECT_NEAR(turn.value, true_turn()[i], 3 * turn.sigma);
+      EXPECT_NEAR(arm.value, kLever[i], 3 * arm.sigma);
+      EXPECT_LT(turn.sigma, 1e-3);  // what poses are interpolated by between frames
+      EXPECT_LT(arm.sigma, 5e-3);
+    }
+    EXPECT_NEAR(m.clock_offset.value, 0.012, 3 * m.clock_offset.sigma);
+    EXPECT_LT(m.clock_offset.sigma, 1e-4);
   }
 }
 
@@ -269,6 +302,15 @@ TEST(Mount, whatCannotBeDoneIsToldAndLeavesTheResultAlone) {
   for (MountReference& r : d.reference) r.stamp = r.stamp + Duration::seconds(1e6);
   EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few)
       << "no time in common";
+  // Three readings a second apart, and none for a dozen seconds: eighteen follow on another.
+  How slow;
+  slow.rate = 1;
+  d = drove(slow);
+  std::vector<MountReference> apart;
+  for (std::size_t i = 0; i < d.reference.size(); ++i)
+    if (i % 15 < 3) apart.push_back(d.reference[i]);
+  d.reference = apart;
+  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few);
   EXPECT_EQ(m.moments, 77U);
 }
 
