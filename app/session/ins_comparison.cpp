@@ -37,7 +37,7 @@ void InsComparison::drain() noexcept {
     measure_errors(pose);
     event_log_.note_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
     take_placement(pose.pose.stamp);
-    if (pose.scale_disagrees) ++scale_disagreements_;
+    if (pose.ins_valid && pose.scale_disagrees) ++scale_disagreements_;
     events_.note(pose, matches_);
   }
 }

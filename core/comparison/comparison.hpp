@@ -91,7 +91,9 @@ struct ComparedPose {
   double ins_position_sigma = 0;  // m, horizontal, each axis: likewise
   Vec3 error_enu = Vec3::Zero();  // m, ours − INS
   double error_yaw = 0;           // rad, in (−π, π], counter-clockwise from above positive
-  double path_ratio = 0;          // ours / INS over the newest scale_stretch_m; 0: not yet that far
+  /// Ours / INS over the newest scale_stretch_m that have both; 0: not yet that far. It and what
+  /// it says stand while the INS is away.
+  double path_ratio = 0;
   bool scale_disagrees = false;
 };
 

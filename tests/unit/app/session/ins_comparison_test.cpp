@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <numbers>
+#include <string>
 
 #include "core/comparison/geodesy.hpp"
 #include "core/math/random.hpp"
@@ -77,6 +78,36 @@ TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
       EXPECT_EQ(count, earth.placements.size());
     }
   }
+  (void)session.recorder.close();
+}
+
+std::uint64_t counter(const InsComparison& comparison, const std::string& name) {
+  for (const auto& [key, count] : comparison.counters())
+    if (key == name) return count;
+  ADD_FAILURE() << name;
+  return 0;
+}
+
+/// A way a tenth too long, at 10 Hz for a minute, the last third of it without an INS.
+TEST(InsComparison, countsAScaleThatDisagreesOnlyWhereThereIsAnIns) {
+  ComparedSession session;
+  InsComparison& comparison = session.comparison;
+  const LocalTangentPlane plane(Geodetic{48, 11, 500});
+  constexpr double kGone = 40;  // s
+  for (int i = 0; i < 600; ++i) {
+    const double t = i / 10.0;
+    if (t < kGone) comparison.add(reading(plane, t, {kSpeed * t, 0, 0}));
+    PoseSample pose;
+    pose.stamp = at(t);
+    pose.status = PoseStatus::ok;
+    pose.T_world_left.t = {1.1 * kSpeed * t, 0, 0};
+    comparison.add(pose, 0);
+    comparison.drain();
+  }
+  comparison.finish();
+  // Steps are of 5 m or more, at 1.1 m a pose of 5.5 m: forty are driven with pose 200, and 399 is
+  // the last that has a reading.
+  EXPECT_EQ(counter(comparison, "scale_disagrees"), 200U);
   (void)session.recorder.close();
 }
 
