@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <future>
 #include <thread>
 
 #include <nlohmann/json.hpp>
@@ -186,12 +187,23 @@ TEST(Recorder, nothingIsLostWhenTheProducerOutrunsTheDisk) {
 
 TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(),
-                    {.when_full = Recorder::WhenFull::drop, .keep_trajectory = false});
-  constexpr std::uint64_t kFrames = 20000;
+  std::promise<void> posted;
+  Recorder::Options options{.when_full = Recorder::WhenFull::drop, .keep_trajectory = false};
+  // The recorder's thread hangs at the first pose until all are posted. A producer that waited for
+  // it would do so until it is let go after all, and nothing would be dropped.
+  options.disk_full = [all_posted = posted.get_future().share()](Stamp) {
+    (void)all_posted.wait_for(std::chrono::seconds(10));
+    return false;
+  };
+  Recorder recorder(folder.path(), options);
+  constexpr std::uint64_t kFrames = 1000;  // many times what may wait
   for (std::uint64_t i = 0; i < kFrames; ++i) recorder.post(pose(i, PoseStatus::ok, 0));
+  posted.set_value();
   const auto totals = recorder.close();
+  EXPECT_GT(totals->dropped_records, 0U);
+  EXPECT_GT(totals->read, 0U);
   EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
+  EXPECT_EQ(lines_of(folder / "poses.csv").size(), totals->read + 1);
   EXPECT_TRUE(totals->trajectory.empty());
 }
 
