@@ -6,6 +6,7 @@
 #include <chrono>
 #include <future>
 #include <thread>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -191,8 +192,8 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   Recorder::Options options{.when_full = Recorder::WhenFull::drop, .keep_trajectory = false};
   // The recorder's thread hangs at the first pose until all are posted. A producer that waited for
   // it would do so until it is let go after all, and nothing would be dropped.
-  options.disk_full = [all_posted = posted.get_future().share()](Stamp) {
-    (void)all_posted.wait_for(std::chrono::seconds(10));
+  options.disk_full = [all_posted = posted.get_future().share(), hung = false](Stamp) mutable {
+    if (!std::exchange(hung, true)) (void)all_posted.wait_for(std::chrono::seconds(10));
     return false;
   };
   Recorder recorder(folder.path(), options);
