@@ -39,6 +39,13 @@ if [ -n "$twice$odd" ]; then
   failures=$((failures + 1))
 fi
 
+# A name that no test has is a mistake, not a success.
+silent="$(grep -nE '^ *ctest ' "$source"/scripts/{test,sanitize,cross} | grep -vF -- --no-tests=error || true)"
+if [ -n "$silent" ]; then
+  echo "ctest without --no-tests=error: $silent"
+  failures=$((failures + 1))
+fi
+
 if command -v shellcheck >/dev/null; then
   shellcheck "$source"/scripts/{setup,demo,test,bench,cross,sysroot,deployment-test,fuzz,sanitize} "$source/.ci/run" "$source"/tests/system/{house,packages,deployment}/*.sh \
     "$source/packaging/vergence-session" "$source"/packaging/debian/{postinst,prerm,postrm} || failures=$((failures + 1))
