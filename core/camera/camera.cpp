@@ -9,7 +9,8 @@ namespace vergence {
 namespace {
 
 constexpr double kUnprojectTolerance = 1e-12;  // normalised units; 1e-9 px
-constexpr double kMaxRadius = 4.0;             // tan 76°: wider lenses want the equidistant model
+// tan 76°: with distortion of either model nothing farther off the axis is projected.
+constexpr double kMaxRadius = 4.0;
 
 struct Radial {
   double factor;      // distorted radius over undistorted radius
@@ -31,8 +32,8 @@ Equidistant equidistant_angle(const std::array<double, 5>& d, double theta) noex
           1.0 + t2 * (3.0 * d[0] + t2 * (5.0 * d[1] + t2 * (7.0 * d[2] + t2 * 9.0 * d[3])))};
 }
 
-/// Radius (squared) up to which the distorted radius grows with the undistorted one: beyond it the
-/// model folds back.
+/// Radius (squared) up to which the distorted radius grows with the undistorted one, kMaxRadius at
+/// most: beyond it the model folds back.
 double monotonic_radius2(const Intrinsics& k) noexcept {
   constexpr int kSteps = 400;
   for (int i = 1; i <= kSteps; ++i) {

@@ -30,7 +30,7 @@ enum class MlesacStatus : std::uint8_t {
 struct MlesacPose {
   MlesacStatus status = MlesacStatus::no_hypothesis;
   Transform T_left_world{};
-  int inliers = 0;              // points all of whose usable observations are within T²
+  int inliers = 0;              // points all of whose `seen` observations are usable, within T²
   int inlier_observations = 0;  // of `observations`
   int observations = 0;         // usable, of all cameras
   double score = 0;             // C below, lower is better
