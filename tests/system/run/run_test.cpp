@@ -95,6 +95,9 @@ TEST(Run, inRealTimeEveryFrameIsPosedOrCounted) {
   EXPECT_EQ(devices["camera0_delivered"].get<int>() + devices["camera0_lost"].get<int>() +
                 devices["camera0_underruns"].get<int>(),
             81);
+  const std::string poses = text_of(session / "poses.csv");
+  EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n') - 1,  // but for the head
+            read - summary["drops"]["lines"].get<int>());
   EXPECT_EQ(summary["allocations_after_seal"], 0);
   std::ifstream lines(session / "events.jsonl");
   int count = 0;
