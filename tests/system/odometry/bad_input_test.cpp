@@ -110,6 +110,20 @@ TEST(OdometryInBadConditions, aMissingImageIsDegradedAndTwoAreLost) {
   both.expect_recovery(kAfterRestart);
 }
 
+/// The map is tracked by one camera while the rig sees it: at 9 m/s a second or two, 40 frames.
+TEST(OdometryInBadConditions, aCameraThatIsAwayForLongLeavesPosesLostUntilItIsBack) {
+  constexpr std::size_t kMapHasPassed = kFirst + 40, kBack = kFirst + 60;
+  for (const int camera : {0, 1}) {
+    const Verdict v(take_away(camera, kFirst, kBack), kFirst, kBack);
+    v.expect_reason(Reason::no_image);
+    EXPECT_EQ(v.at(kFirst)->sample.status, PoseStatus::degraded);
+    for (std::size_t i = kMapHasPassed; i < kBack; ++i)
+      EXPECT_EQ(v.at(i)->sample.status, PoseStatus::lost) << i << '\n' << story(v.replayed.answers);
+    EXPECT_EQ(v.at(kBack)->sample.reason, Reason::scene_restarted);
+    EXPECT_EQ(v.replayed.answers.back().sample.status, PoseStatus::ok);
+  }
+}
+
 TEST(OdometryInBadConditions, aGlaredPairIsLost) {
   const auto white =
       std::make_shared<Picture>(drive().pairs[0][0].width, drive().pairs[0][0].height);
@@ -220,17 +234,23 @@ TEST(OdometryInBadConditions, aFrameThatComesAgainIsDegraded) {
 }
 
 TEST(OdometryInBadConditions, stampsThatGoBackAreLostAndDisturbNothing) {
-  const Replay plain = replay(drive());
   const Replay r = replay(drive(), [](std::size_t i, RigFrame* f) {
     if (i == kFirst || i == kFirst + 1) f->stamp = drive().stamps[10];
     return true;
   });
-  EXPECT_EQ(count_ok(r.answers, kFirst, kFirst + 2), 0);
-  EXPECT_EQ(r.answers[kFirst].sample.reason, Reason::time_gap);
+  for (const std::size_t frame : {kFirst, kFirst + 1}) {
+    EXPECT_EQ(r.answers[frame].sample.status, PoseStatus::lost) << story(r.answers);
+    EXPECT_EQ(r.answers[frame].sample.reason, Reason::time_gap) << story(r.answers);
+  }
   EXPECT_EQ(wrong_ok(r.answers, {}), "");
   EXPECT_EQ(count_ok(r.answers, kFirst + 2, drive().size()),
             static_cast<int>(drive().size() - kFirst - 2))
       << story(r.answers);
+  // As if the two frames had never been.
+  const Replay without = replay(drive(), leave_out(kFirst, kFirst + 2));
+  for (std::size_t i = kFirst + 2; i < drive().size(); ++i)
+    EXPECT_EQ(r.answers[i].sample.T_world_left.t, without.answers[i - 2].sample.T_world_left.t)
+        << i;
 }
 
 TEST(OdometryInBadConditions, aLongGapIsNowhereTakenForAPlaceThatLooksTheSame) {
@@ -241,10 +261,19 @@ TEST(OdometryInBadConditions, aLongGapIsNowhereTakenForAPlaceThatLooksTheSame) {
   }
 }
 
+constexpr std::size_t kConfirmed = 55;  // the first `ok` frame of the drive
+
 TEST(OdometryInBadConditions, exchangedCamerasLeaveNoTraceWhenTheyArePutBack) {
   for (const std::size_t from : {std::size_t{40}, std::size_t{70}, std::size_t{110}}) {
     const Replay r = replay(drive(), swap_cameras(from, from + 40));
     EXPECT_EQ(count_ok(r.answers, from, from + 40), 0) << story(r.answers);
+    // Where the rig was confirmed the cameras contradict each other, and the rig is sought anew.
+    for (std::size_t i = from; from > kConfirmed && i < from + 40; ++i) {
+      const Reason reason = r.answers[i].sample.reason;
+      EXPECT_TRUE(reason == Reason::one_camera || reason == Reason::recalibrating)
+          << i << '\n'
+          << story(r.answers);
+    }
     EXPECT_EQ(wrong_ok(r.answers, {}), "") << "exchanged from frame " << from << '\n'
                                            << story(r.answers);
   }
