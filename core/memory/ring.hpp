@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -43,7 +44,9 @@ class Ring {
   /// Exact for the producer (it can only become less full).
   [[nodiscard]] bool full() const noexcept { return size() == N; }
   [[nodiscard]] std::size_t size() const noexcept {
-    return tail_.load(std::memory_order_acquire) - head_.load(std::memory_order_acquire);
+    // Head first: it never passes a tail that is read after it. Both may go on in between.
+    const std::size_t head = head_.load(std::memory_order_acquire);
+    return std::min(tail_.load(std::memory_order_acquire) - head, N);
   }
   [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
 

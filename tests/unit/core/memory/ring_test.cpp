@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <thread>
@@ -80,6 +82,34 @@ TEST(Ring, betweenTwoThreadsNothingIsLostDoubledTornOrReordered) {
   producer.join();
   EXPECT_EQ(wrong, 0U);
   EXPECT_TRUE(ring.empty());
+}
+
+TEST(Ring, itsSizeIsNeverMoreThanItHoldsWhoeverAsks) {
+  constexpr int kMessages = 100'000;
+  Ring<int, 4> ring;
+  std::atomic<bool> done{false};
+  std::size_t most = 0;
+  std::thread asking([&] {
+    while (!done) most = std::max(most, ring.size());
+  });
+  std::thread producer([&] {
+    for (int i = 0; i < kMessages;) {
+      if (ring.push(i))
+        ++i;
+      else
+        std::this_thread::yield();
+    }
+  });
+  for (int i = 0, value = 0; i < kMessages;) {
+    if (ring.pop(&value))
+      ++i;
+    else
+      std::this_thread::yield();
+  }
+  done = true;
+  producer.join();
+  asking.join();
+  EXPECT_LE(most, ring.capacity());
 }
 
 }  // namespace
