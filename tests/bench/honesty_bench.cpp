@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -87,7 +88,9 @@ void judge(const RecordedSequence& drive_of, const std::string& what, std::size_
   }
   if (h.unjudged > 0) fmt::print("  no truth for {}", h.unjudged);
   if (h.wrong_over_all > 0) fmt::print("  over 20 {}", h.wrong_over_all);
-  if (h.wrong > 0) fmt::print("  WRONG {} from {}", h.wrong, h.first_wrong);
+  if (h.wrong > 0)
+    fmt::print("  WRONG {} from {}: {:.3f} m, {:.3f} deg over {} frames", h.wrong, h.first_wrong,
+               h.first_error.way_m, h.first_error.turn_rad * 180 / std::numbers::pi, h.first_over);
   fmt::print("\n");
   std::fflush(stdout);
 }
@@ -113,8 +116,9 @@ void run(const RecordedSequence& d, const std::string& filter, bool events, Tall
       app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
   if (found.rig) own.file.rig = *found.rig;
   const auto normal = test::normal_errors(judged(drive(d.sequence, c, own)), d.truth);
-  fmt::print("{:12s} normal error over {} frames: {:.3f} m\n", d.name, test::kHonestyFrames,
-             normal.back().way_m);
+  fmt::print("{:12s} normal error over {} frames: {:.3f} m, {:.3f} deg\n", d.name,
+             test::kHonestyFrames, normal.back().way_m,
+             normal.back().turn_rad * 180 / std::numbers::pi);
   if (!(normal.back().way_m < most_normal(d.name)) || !found.rig) {
     fmt::print("{}: NOTHING CAN BE JUDGED: {}\n", d.name,
                found.rig ? "that is more than it was" : "the drive gives no calibration");

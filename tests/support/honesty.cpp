@@ -19,6 +19,15 @@ std::optional<MotionError> motion_error(const JudgedPose& from, const JudgedPose
   return MotionError{(estimate.t - is.t).norm(), rotation_angle(estimate.R * is.R.transpose())};
 }
 
+/// 0: not known, or over no frames.
+double times_normal(const std::optional<MotionError>& error, Stamp at, std::size_t frames,
+                    const NormalError& normal) {
+  if (!error || frames == 0) return 0;
+  const MotionError usual = normal(at, frames);
+  return std::max(error->way_m / usual.way_m,
+                  error->turn_rad / std::max(usual.turn_rad, kLeastNormalTurn));
+}
+
 /// The mean of errors.
 class Mean {
  public:
@@ -86,22 +95,19 @@ Honesty judge_honesty(std::span<const JudgedPose> poses, const NormalError& norm
       continue;
     }
     ++h.ok;
-    // Times the normal error; none: not known.
-    const auto times = [&](std::size_t since) -> std::optional<double> {
-      const std::size_t from = std::max(since, i < kHonestyFrames ? 0 : i - kHonestyFrames);
-      const auto error = motion_error(poses[from], poses[i], truth);
-      if (!error) return {};
-      if (from == i) return 0.0;
-      const MotionError usual = normal(poses[i].stamp, i - from);
-      return std::max(error->way_m / usual.way_m,
-                      error->turn_rad / std::max(usual.turn_rad, kLeastNormalTurn));
-    };
-    const std::optional<double> claimed = times(ok_since);
-    h.unjudged += claimed ? 0 : 1;
-    h.most = std::max(h.most, claimed.value_or(0));
-    if (i >= ok_since + kHonestyFrames) h.most_full = std::max(h.most_full, claimed.value_or(0));
-    if (claimed.value_or(0) > kHonestyTimes && h.wrong++ == 0) h.first_wrong = i;
-    h.wrong_over_all += times(posed_since).value_or(0) > kHonestyTimes ? 1 : 0;
+    const std::size_t window = i < kHonestyFrames ? 0 : i - kHonestyFrames,
+                      from = std::max(ok_since, window);
+    const auto error = motion_error(poses[from], poses[i], truth);
+    h.unjudged += error ? 0 : 1;
+    const double claimed = times_normal(error, poses[i].stamp, i - from, normal);
+    h.most = std::max(h.most, claimed);
+    if (i >= ok_since + kHonestyFrames) h.most_full = std::max(h.most_full, claimed);
+    if (claimed > kHonestyTimes && h.wrong++ == 0)
+      h.first_wrong = i, h.first_error = *error, h.first_over = i - from;
+    const std::size_t over = std::max(posed_since, window);
+    if (times_normal(motion_error(poses[over], poses[i], truth), poses[i].stamp, i - over, normal) >
+        kHonestyTimes)
+      ++h.wrong_over_all;
   }
   return h;
 }

@@ -52,7 +52,10 @@ struct Honesty {
   int wrong_over_all = 0;  // `ok`, and wrong over its frames since the last that was `lost`
   int unjudged = 0;        // `ok`, and at its stamp or at that of the first pose it is held against
                            // there is no truth: it says where the rig was at another time
-  std::size_t first_wrong = 0;
+  std::size_t first_wrong =
+      0;  // index; with it what its motion is off by, and over how many frames
+  MotionError first_error{};
+  std::size_t first_over = 0;
   double most = 0;       // times the normal error, of those that `wrong` counts among
   double most_full = 0;  // the same of those over all kHonestyFrames
 };
