@@ -57,6 +57,11 @@ void DeliveryQueue::post(Parcel parcel) {
     senders_[static_cast<std::size_t>(parcel.device)].on_the_way.fetch_add(1);
   const std::lock_guard lock(mutex_);
   parcel.order = orders_++;
+  if (parcel.device >= 0) {
+    Sender& sender = senders_[static_cast<std::size_t>(parcel.device)];
+    if (parcel.frame.what == Delivery<Frame>::What::gone) ++sender.unplugged;
+    parcel.unplugged = sender.unplugged;
+  }
   parcels_.push(parcel);
   posted_.notify_all();
 }
@@ -134,21 +139,33 @@ void DeliveryQueue::deliver_frame(const Parcel& parcel, HostStamp arrival) {
   d.arrival = arrival;
   const auto k = static_cast<std::size_t>(parcel.device);
   if (d.what != Delivery<Frame>::What::item) {
+    senders_[k].known_gone = parcel.unplugged;
     (void)push_or_wait(&cameras_[k]->stream, d);
     return;
   }
   senders_[k].on_the_way.fetch_sub(1);
   const std::shared_lock memory(cameras_[k]->memory);
   if (parcel.generation != cameras_[k]->generation()) return;  // its memory is no more
+  // What was on the way as the camera was unplugged is lost with it: a stream has nothing but
+  // `back` behind a `gone`.
+  if (parcel.unplugged != senders_[k].known_gone) {
+    cameras_[k]->lost.fetch_add(1, std::memory_order_relaxed);
+    keep_spare(parcel);
+    return;
+  }
   // The stream is deeper than the slots: frames always find room while somebody takes them.
   if (k == 0) rig_.unseen.fetch_add(1);
   if (push_or_wait(&cameras_[k]->stream, d)) return;
   if (k == 0) rig_.unseen.fetch_sub(1);
+  keep_spare(parcel);
+}
+
+void DeliveryQueue::keep_spare(const Parcel& parcel) {
   const std::lock_guard lock(mutex_);
-  Sender& sender = senders_[k];
+  Sender& sender = senders_[static_cast<std::size_t>(parcel.device)];
   if (sender.spare_generation != parcel.generation) sender.spare.clear();
   sender.spare_generation = parcel.generation;
-  sender.spare.push_back(d.value.slot);
+  sender.spare.push_back(parcel.frame.value.slot);
 }
 
 }  // namespace vergence::mock

@@ -24,6 +24,7 @@ struct Parcel {
   Delivery<InsReading> reading{};
   Delivery<BoardReport> report{};
   std::uint32_t generation = 0;  // of the camera's memory that the frame is in
+  std::uint32_t unplugged = 0;   // times the camera had been when this was posted
   [[nodiscard]] bool operator<(const Parcel& o) const noexcept {  // the queue's top is the earliest
     return std::pair(arrival, order) > std::pair(o.arrival, o.order);
   }
@@ -67,6 +68,8 @@ class DeliveryQueue {
  private:
   struct Sender {
     std::atomic<int> on_the_way{0};
+    std::uint32_t unplugged = 0;   // by what was posted; under mutex_
+    std::uint32_t known_gone = 0;  // by what was delivered
     std::vector<FrameSlot> spare;  // of that generation; under mutex_
     std::uint32_t spare_generation = 0;
   };
@@ -74,6 +77,7 @@ class DeliveryQueue {
   void hand_out_in_time();
   void deliver(const Parcel& parcel, HostStamp arrival);
   void deliver_frame(const Parcel& parcel, HostStamp arrival);
+  void keep_spare(const Parcel& parcel);
   template <class S, class D>
   [[nodiscard]] bool push_or_wait(S* stream, const D& delivery);  // false: nobody takes it
   [[nodiscard]] bool stopping() const noexcept { return stop_.load(std::memory_order_acquire); }
