@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+#include <atomic>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -32,7 +34,8 @@ using FrameSlot = std::uint16_t;
 /// Memory     All of it from the arena in the constructor; neither lock nor system call afterwards.
 /// Full       With no slot free acquire() refuses; the caller's stated policy acts (replay waits,
 ///            live drops and counts).
-/// Errors     The constructor throws std::length_error when the arena is too small.
+/// Errors     The constructor throws std::length_error when the arena is too small. A slot that
+///            is not out is not released.
 class FramePool {
  public:
   static constexpr std::size_t kMaxSlots =
@@ -64,13 +67,16 @@ class FramePool {
   [[nodiscard]] std::optional<FrameSlot> acquire() noexcept {
     FrameSlot slot = 0;
     if (!free_.pop(&slot)) return std::nullopt;
+    out_[slot].store(true, std::memory_order_relaxed);
     return slot;
   }
-  /// Precondition: the slot was acquired and not yet released.
-  void release(FrameSlot slot) noexcept {
-    assert(slot < slots_);
+  /// False, and nothing changes: the slot is not out. Free twice it would be acquired twice, and
+  /// one image would overwrite another.
+  bool release(FrameSlot slot) noexcept {
+    if (slot >= slots_ || !out_[slot].exchange(false, std::memory_order_relaxed)) return false;
     [[maybe_unused]] const bool room = free_.push(slot);
     assert(room);
+    return true;
   }
 
   [[nodiscard]] ImageView view(FrameSlot slot) const noexcept {
@@ -98,7 +104,8 @@ class FramePool {
   int width_, height_;
   std::size_t slots_;
   std::span<std::uint8_t> bytes_;
-  Ring<FrameSlot, kMaxSlots> free_;
+  Ring<FrameSlot, kMaxSlots> free_;  // orders what is relaxed in out_
+  std::array<std::atomic<bool>, kMaxSlots> out_{};
 };
 
 }  // namespace vergence

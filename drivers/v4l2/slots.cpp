@@ -78,11 +78,11 @@ std::optional<FrameSlot> Slots::hold_pooled() noexcept {
 }
 
 std::optional<std::uint32_t> Slots::release(FrameSlot slot) noexcept {
-  --held_;
   if (!in_place()) {
-    pool_->release(slot);
+    if (pool_->release(slot)) --held_;
     return std::nullopt;
   }
+  --held_;
   Entry& e = entries_[slot];
   assert(e.held);
   e.held = false;

@@ -101,7 +101,7 @@ DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
 }
 
 void MockCamera::release(FrameSlot slot) noexcept {
-  pool_->release(slot);
+  if (!pool_->release(slot)) return;
   out_.fetch_sub(1);
   rig_->room.signal();
 }

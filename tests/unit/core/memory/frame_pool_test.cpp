@@ -44,6 +44,21 @@ TEST(FramePool, refusesWhenAllSlotsAreOutAndGoesOnAfterARelease) {
   EXPECT_EQ(pool.acquire(), b);
 }
 
+TEST(FramePool, aSlotIsReleasedOnce) {
+  Arena arena(FramePool::memory_needed(8, 8, 2));
+  FramePool pool(8, 8, 2, arena);
+  const auto a = pool.acquire();
+  ASSERT_TRUE(a);
+  EXPECT_TRUE(pool.release(*a));
+  EXPECT_FALSE(pool.release(*a));
+  EXPECT_FALSE(pool.release(2)) << "it has two";
+  EXPECT_EQ(pool.available(), 2U);
+  const auto b = pool.acquire(), c = pool.acquire();
+  ASSERT_TRUE(b && c);
+  EXPECT_NE(*b, *c);
+  EXPECT_FALSE(pool.acquire());
+}
+
 TEST(FramePool, anArenaThatIsTooSmallIsNamed) {
   Arena arena(FramePool::memory_needed(64, 8, 2) - 1);
   EXPECT_THROW(FramePool(64, 8, 2, arena), std::length_error);
