@@ -22,8 +22,12 @@ constexpr double kLearnedCovariance =
     1.5;                     // times the monitor's own: the scene it was measured in was one
 constexpr int kWitness = 2;  // frames: a point just made was searched for in the band of the
                              // calibration in use
-constexpr int kGraceFrames =
-    5;  // after a new reference: the monitor does not yet know how far matches spread
+// Frames after a new reference in which the monitor does not yet know how far matches spread: what
+// it says is a doubt, no verdict.
+constexpr int kGraceFrames = 5;
+// Frames after a scene was made in which too few of its points are witnesses: no knock shows. As
+// many more are doubted for what those left in the window; then one shows in its first frame.
+constexpr int kUnwatchedFrames = kWitness + 1;
 constexpr int kLearnFrames = 45;  // moving, in agreement
 
 Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
@@ -109,6 +113,7 @@ void RigMonitor::scene_rebuilt(const odometry::Map& map, const RigCalibration& r
                                bool confirmed) noexcept {
   scene_pending_ = false;
   watch(rig, confirmed);
+  for (int k = 1; k < cameras_; ++k) camera(k).unwatched = kUnwatchedFrames;
   scene_renewed(map);
 }
 
@@ -210,7 +215,13 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
   MonitorVerdict v = w.monitor.look(f);
   if (w.grace > 0) {
     --w.grace;
+    const bool doubted = v.undecided || v.kind != MonitorVerdict::Kind::quiet;
     v = MonitorVerdict{};
+    v.undecided = doubted;
+  }
+  if (w.unwatched > 0) {
+    --w.unwatched;
+    v.undecided = true;
   }
   learn_reference(k, v);
   return v;

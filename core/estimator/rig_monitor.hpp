@@ -66,7 +66,8 @@ class RigMonitor {
     calibration::MotionTrackBuilder tracks;
     calibration::DisparityJumpDetector jumps;
     bool learning = false;           // the monitor's reference is a claim, its own not yet measured
-    int grace = 0;                   // frames whose verdict does not count yet
+    int grace = 0;                   // frames whose verdict is no more than a doubt yet
+    int unwatched = 0;               // frames that would not show a knock yet: doubted, too
     Transform T_camera_left_before;  // with the cameras unlinked
   };
 

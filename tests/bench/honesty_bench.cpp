@@ -1,9 +1,9 @@
 // Wrong `ok` on recorded drives: each spoilt in many ways, driven with the given calibration, with
 // the drive's own and from scratch. A pose is wrong when the motion over the last 20 frames is off
-// by more than five times what it is off by on the mean of the drive as it was recorded. Counted as
-// WRONG are `ok` poses whose 20 frames, or as many as there were since the last pose that was not
-// `ok`, are; "over 20" says how many there are when poses before that count, too, although they
-// were told as `degraded`.
+// by more than five times what the drive as it was recorded is off by over as long a time, on its
+// mean or around the same place. Counted as WRONG are `ok` poses whose 20 frames, or as many as
+// there were since the last pose that was not `ok`, are; "over 20" says how many there are when
+// poses before that count, too, although they were told as `degraded`.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -34,6 +34,8 @@ struct Driven {
 
 /// What the estimator says after a frame, for who looks into why.
 void print_events(const Estimator& e, const PoseSample& sample) {
+  fmt::print("    frame {:3d} {} {}\n", sample.frame, to_string(sample.status),
+             to_string(sample.reason));
   for (const EstimatorEvent& event : e.events())
     fmt::print("    frame {:3d} event {} value {:.3f} {}\n", sample.frame,
                static_cast<int>(event.kind), event.value, event.why);
@@ -73,9 +75,8 @@ struct Tally {
 };
 
 void judge(const RecordedSequence& drive_of, const std::string& what, std::size_t pairs,
-           const Driven& d, const test::NormalErrors& normal, Tally* tally) {
-  const test::Honesty h = test::judge_honesty(
-      judged(d), [&](Stamp, std::size_t frames) { return normal[frames]; }, drive_of.truth);
+           const Driven& d, const test::NormalError& normal, Tally* tally) {
+  const test::Honesty h = test::judge_honesty(judged(d), normal, drive_of.truth);
   ++tally->runs;
   tally->ok += h.ok;
   tally->wrong += h.wrong;
@@ -108,6 +109,13 @@ double most_normal(const std::string& name) {
   return 0;
 }
 
+/// KITTI 00's truth begins with fifteen poses on one even arc, 0.86 m and 0.12° apart, which the
+/// images contradict by 0.15° and 0.19 m a frame: interpolated. It would make normal what is wrong.
+void leave_out_what_is_no_truth(RecordedSequence* d) {
+  constexpr std::ptrdiff_t kInterpolated = 15;
+  if (d->name == "kitti00_151") d->truth.erase(d->truth.begin(), d->truth.begin() + kInterpolated);
+}
+
 void run(const RecordedSequence& d, const std::string& filter, bool events, Tally* tally) {
   const app::Configuration c = app::load_configuration(std::nullopt, {});
   const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
@@ -115,16 +123,17 @@ void run(const RecordedSequence& d, const std::string& filter, bool events, Tall
   const app::DriveCalibration found =
       app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
   if (found.rig) own.file.rig = *found.rig;
-  const auto normal = test::normal_errors(judged(drive(d.sequence, c, own)), d.truth);
+  const std::vector<test::JudgedPose> untouched = judged(drive(d.sequence, c, own));
+  const test::MotionError usual = test::normal_errors(untouched, d.truth)[test::kHonestyFrames];
   fmt::print("{:12s} normal error over {} frames: {:.3f} m, {:.3f} deg\n", d.name,
-             test::kHonestyFrames, normal.back().way_m,
-             normal.back().turn_rad * 180 / std::numbers::pi);
-  if (!(normal.back().way_m < most_normal(d.name)) || !found.rig) {
+             test::kHonestyFrames, usual.way_m, usual.turn_rad * 180 / std::numbers::pi);
+  if (!(usual.way_m < most_normal(d.name)) || !found.rig) {
     fmt::print("{}: NOTHING CAN BE JUDGED: {}\n", d.name,
                found.rig ? "that is more than it was" : "the drive gives no calibration");
     ++tally->unfit;
     return;
   }
+  const test::NormalError normal = test::normal_error_there(untouched, d.truth);
   for (const HonestyVariant& v : honesty_variants()) {
     if (v.name.find(filter) == std::string_view::npos) continue;
     const test::TemporaryFolder folder;
@@ -148,11 +157,12 @@ int main(int argc, char** argv) {
   bench::Tally tally;
   for (const char* name : test::kRecordedSequences) {
     if (drive != "all" && drive != name) continue;
-    const auto d = test::open_recorded(name);
+    auto d = test::open_recorded(name);
     if (!d) {
       fmt::print("{}: VERGENCE_SHARED has no such data\n", name);
       continue;
     }
+    bench::leave_out_what_is_no_truth(&*d);
     bench::run(*d, filter, argc > 3, &tally);
   }
   fmt::print("{} runs, {} poses ok, {} of them wrong, in {} runs; {} cut short\n", tally.runs,

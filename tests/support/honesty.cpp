@@ -19,11 +19,11 @@ std::optional<MotionError> motion_error(const JudgedPose& from, const JudgedPose
   return MotionError{(estimate.t - is.t).norm(), rotation_angle(estimate.R * is.R.transpose())};
 }
 
-/// 0: not known, or over no frames.
-double times_normal(const std::optional<MotionError>& error, Stamp at, std::size_t frames,
-                    const NormalError& normal) {
-  if (!error || frames == 0) return 0;
-  const MotionError usual = normal(at, frames);
+/// 0: not known, or no motion.
+double times_normal(const std::optional<MotionError>& error, const JudgedPose& from,
+                    const JudgedPose& to, const NormalError& normal) {
+  if (!error || from.stamp == to.stamp) return 0;
+  const MotionError usual = normal(from.stamp, to.stamp);
   return std::max(error->way_m / usual.way_m,
                   error->turn_rad / std::max(usual.turn_rad, kLeastNormalTurn));
 }
@@ -61,7 +61,7 @@ const Transform* true_pose(const app::Trajectory& truth, Stamp stamp) {
 
 NormalErrors normal_errors(std::span<const JudgedPose> poses, const app::Trajectory& truth) {
   NormalErrors errors{};
-  for (std::size_t length = 1; length <= kHonestyFrames; ++length) {
+  for (std::size_t length = 1; length <= kLongestNormal; ++length) {
     Mean mean;
     for (std::size_t i = length; i < poses.size(); ++i)
       mean.add(motion_error(poses[i - length], poses[i], truth));
@@ -72,11 +72,17 @@ NormalErrors normal_errors(std::span<const JudgedPose> poses, const app::Traject
 
 NormalError normal_error_there(std::vector<JudgedPose> poses, app::Trajectory truth) {
   const NormalErrors mean = normal_errors(poses, truth);
-  return [mean, poses = std::move(poses), truth = std::move(truth)](Stamp at, std::size_t frames) {
+  return [mean, poses = std::move(poses), truth = std::move(truth)](Stamp from, Stamp to) {
     constexpr Duration kAround = Duration::seconds(1.0);
+    const auto between = [from, to](const JudgedPose& p) {
+      return p.stamp > from && p.stamp <= to;
+    };
+    const auto frames = std::clamp<std::size_t>(
+        static_cast<std::size_t>(std::count_if(poses.begin(), poses.end(), between)), 1,
+        kLongestNormal);
     Mean around;
     for (std::size_t i = frames; i < poses.size(); ++i)
-      if (poses[i].stamp >= at - kAround && poses[i].stamp <= at + kAround)
+      if (poses[i].stamp >= to - kAround && poses[i].stamp <= to + kAround)
         around.add(motion_error(poses[i - frames], poses[i], truth));
     const MotionError here = around.value();
     return MotionError{std::max(mean[frames].way_m, here.way_m),
@@ -99,13 +105,13 @@ Honesty judge_honesty(std::span<const JudgedPose> poses, const NormalError& norm
                       from = std::max(ok_since, window);
     const auto error = motion_error(poses[from], poses[i], truth);
     h.unjudged += error ? 0 : 1;
-    const double claimed = times_normal(error, poses[i].stamp, i - from, normal);
+    const double claimed = times_normal(error, poses[from], poses[i], normal);
     h.most = std::max(h.most, claimed);
     if (i >= ok_since + kHonestyFrames) h.most_full = std::max(h.most_full, claimed);
     if (claimed > kHonestyTimes && h.wrong++ == 0)
       h.first_wrong = i, h.first_error = *error, h.first_over = i - from;
     const std::size_t over = std::max(posed_since, window);
-    if (times_normal(motion_error(poses[over], poses[i], truth), poses[i].stamp, i - over, normal) >
+    if (times_normal(motion_error(poses[over], poses[i], truth), poses[over], poses[i], normal) >
         kHonestyTimes)
       ++h.wrong_over_all;
   }

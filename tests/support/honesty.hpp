@@ -12,12 +12,15 @@
 /// What makes an `ok` pose wrong, one definition for recorded drives and for the mock's faults.
 ///
 /// A pose is wrong when the motion over the last kHonestyFrames frames, its way or its turn, is off
-/// by more than kHonestyTimes what is normal: what it is off by on the mean of the untouched drive.
-/// Of the mock's, where corners are several times harder than the rest, the mean around the same
-/// place counts where that is more.
+/// by more than kHonestyTimes what is normal: what the untouched drive is off by over as long a
+/// time, on its mean or around the same place, whichever is more. Corners are several times harder
+/// than the rest: a focal length that is off turns every corner too far.
 namespace vergence::test {
 
 inline constexpr std::size_t kHonestyFrames = 20;  // fewer at the beginning
+/// Frames of the untouched drive that what is normal is known over: those between 20 of a drive
+/// that has every third.
+inline constexpr std::size_t kLongestNormal = 3 * kHonestyFrames;
 inline constexpr double kHonestyTimes = 5;
 /// A turn that is normal at least, rad: five times it are a tenth of a degree.
 inline constexpr double kLeastNormalTurn = 0.02 * std::numbers::pi / 180;
@@ -37,13 +40,14 @@ struct MotionError {
 };
 /// Mean error of the motion by the number of frames that it is over; of poses that are not `lost`
 /// and whose truth is known.
-using NormalErrors = std::array<MotionError, kHonestyFrames + 1>;
+using NormalErrors = std::array<MotionError, kLongestNormal + 1>;
 [[nodiscard]] NormalErrors normal_errors(std::span<const JudgedPose> poses,
                                          const app::Trajectory& truth);
 
-/// What is normal at a time of the drive over that many frames.
-using NormalError = std::function<MotionError(Stamp at, std::size_t frames)>;
-/// Of the untouched drive, the mean or that of a second around the same time, whichever is more.
+/// What is normal of the motion between two times of the drive.
+using NormalError = std::function<MotionError(Stamp from, Stamp to)>;
+/// Of the untouched drive, over as many of its frames as there are between them: the mean or that
+/// of the motions that end within a second of `to`, whichever is more.
 [[nodiscard]] NormalError normal_error_there(std::vector<JudgedPose> poses, app::Trajectory truth);
 
 struct Honesty {

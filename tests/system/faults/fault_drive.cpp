@@ -113,9 +113,7 @@ FaultResult judge(const FaultCase& c, const FaultDrive& drive, const NormalError
   if (drive.truth.empty()) return r;
   const Duration later =
       drive.poses.empty() ? Duration{} : start_of(drive.poses.front().stamp) - kStart;
-  const NormalError there = [&](Stamp at, std::size_t frames) {
-    return normal(at - later, frames);
-  };
+  const NormalError there = [&](Stamp from, Stamp to) { return normal(from - later, to - later); };
   r.honesty = judge_honesty(drive.poses, there, drive.truth);
   std::size_t first = 0, run = 0;
   for (std::size_t i = 0; i < drive.poses.size() && run < kHonestyFrames; ++i) {
