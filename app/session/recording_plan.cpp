@@ -21,6 +21,11 @@ namespace {
 constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue without images
 constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
 constexpr std::size_t kDeviceQueue = std::size_t{1} << 20;  // bytes
+// Bytes that are recorded of each, and some to spare: of a frame beside its images (1310), of a
+// reading of the INS (740) and its line (130), of a pulse and the frames it triggered (500) and the
+// board's line (1800).
+constexpr double kFrameRecords = 2048, kReadingRecords = 1024, kReadingLine = 512,
+                 kPulseRecords = 3072;
 
 std::vector<RecordedTopic> topics(const CalibrationFile& file, bool png) {
   std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
@@ -98,6 +103,17 @@ double frame_bytes(const SourceFacts& facts) {
   return bytes;
 }
 
+/// What an event would keep of records that small.
+double kept_bytes(const Configuration& c, double record_bytes, double rate) {
+  return c.record.keep_s * rate * record_bytes;
+}
+
+/// Of the estimator's thread without images: of frames, and of the INS as it was compared.
+double small_bytes(const Configuration& c) {
+  return kSmall + kept_bytes(c, kFrameRecords, c.trigger.rate) +
+         kept_bytes(c, kReadingRecords, c.ins.rate);
+}
+
 constexpr double kLeastHeld = 16;  // frames that wait: a replay waits for room
 
 /// What an address of this machine reaches; a 32-bit one's program has 3 GB for all.
@@ -106,11 +122,11 @@ constexpr double kMostQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
 /// Bytes of images a second, and how many seconds of them are held.
 double wanted_queue_bytes(const Configuration& c, const SourceFacts& facts) {
   if (c.record.memory_mb > 0) return static_cast<double>(c.record.memory_mb) * 0x1p20;
-  if (c.record.images == 0) return kSmall;
+  if (c.record.images == 0) return small_bytes(c);
   const double held = facts.when_full == Recorder::WhenFull::wait
                           ? kLeastHeld
                           : (kDiskS + c.record.keep_s) * c.trigger.rate;
-  return kSmall + frame_bytes(facts) * std::max(held, kLeastHeld);
+  return small_bytes(c) + frame_bytes(facts) * std::max(held, kLeastHeld);
 }
 
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
@@ -155,7 +171,10 @@ Recording::Options recording_options(const Configuration& c, const SourceFacts& 
   Recording::Options o;
   const bool png = as_png(c.record);
   o.files.topics = topics(facts.begin.file, png);
-  o.queues = {png ? kSmall : queue_bytes(c, facts), kDeviceQueue, kDeviceQueue, kDeviceQueue};
+  const auto device = [](double kept) { return kDeviceQueue + static_cast<std::size_t>(kept); };
+  const double pulses = kept_bytes(c, kPulseRecords, c.trigger.rate);
+  o.queues = {png ? static_cast<std::size_t>(small_bytes(c)) : queue_bytes(c, facts),
+              device(pulses), device(kept_bytes(c, kReadingLine, c.ins.rate)), device(pulses)};
   if (png) o.queues.push_back(queue_bytes(c, facts));
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;

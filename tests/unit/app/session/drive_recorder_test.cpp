@@ -50,12 +50,15 @@ class RecordedPoses {
     recorder_.on_event(event);
   }
   [[nodiscard]] DriveRecorder& recorder() { return recorder_; }
-  /// Messages of /tf_static of a file; none where it is not there.
-  [[nodiscard]] std::ptrdiff_t rigs(const std::string& file) const {
+  /// Messages of a topic in a file; none where it is not there.
+  [[nodiscard]] std::ptrdiff_t messages(const std::string& topic, const std::string& file) const {
     if (!std::filesystem::exists(folder_ / file)) return 0;
-    const auto messages = test::read_mcap(folder_ / file).messages;
-    return std::count_if(messages.begin(), messages.end(),
-                         [](const test::ReadMessage& m) { return m.topic == "/tf_static"; });
+    const auto all = test::read_mcap(folder_ / file).messages;
+    return std::count_if(all.begin(), all.end(),
+                         [&](const test::ReadMessage& m) { return m.topic == topic; });
+  }
+  [[nodiscard]] std::ptrdiff_t rigs(const std::string& file) const {
+    return messages("/tf_static", file);
   }
 
  private:
@@ -103,6 +106,18 @@ TEST(DriveRecorder, itsMemoryIsThatOfAllQueuesAndOfTheEncoder) {
   png.emplace_back("record.image_format=png");
   EXPECT_GT(RecordedPoses(png).recorder().memory(), RecordedPoses(plain).recorder().memory())
       << "the same images, and pixels that wait for the encoder";
+}
+
+// What is kept is bounded by the time asked for, not by how much of it fits a queue as large as
+// ever.
+TEST(DriveRecorder, allOfTheTimeBeforeAnEventIsKept) {
+  constexpr int kKept = 20 * 300;
+  RecordedPoses drive({"record=[poses]", "record.keep_s=300"});
+  drive.drive(kKept + 100);
+  drive.mark();
+  drive.drive(1);
+  drive.recorder().close();
+  EXPECT_GE(drive.messages("/vergence/odometry", "drive.mcap"), kKept);
 }
 
 TEST(DriveRecorder, whatIsKeptAroundAnEventSaysWhereTheCamerasAre) {
