@@ -1,8 +1,10 @@
 #include "core/estimator/rig_monitor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/estimator/detail/rig_verdict.hpp"
+#include "core/geometry/epipolar.hpp"
 
 namespace vergence {
 namespace {
@@ -23,11 +25,10 @@ constexpr double kLearnedCovariance =
 constexpr int kWitness = 2;  // frames: a point just made was searched for in the band of the
                              // calibration in use
 // Frames after a new reference in which the monitor does not yet know how far matches spread: what
-// it says is a doubt, no verdict.
+// it says is a doubt, no verdict. So is half of the matches this far from their epipolar lines, in
+// px: those of the recorded drives stay below 0.3; it shows a knock in its first frame.
 constexpr int kGraceFrames = 5;
-// Frames after a scene was made in which too few of its points are witnesses: no knock shows. As
-// many more are doubted for what those left in the window; then one shows in its first frame.
-constexpr int kUnwatchedFrames = kWitness + 1;
+constexpr double kFarFromLines = 0.5;
 constexpr int kLearnFrames = 45;  // moving, in agreement
 
 Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
@@ -59,7 +60,7 @@ std::size_t RigMonitor::memory_needed(const calibration::MonitorOptions& options
              (calibration::Monitor::memory_needed(options) +
               calibration::MotionTrackBuilder::memory_needed(capacity) +
               calibration::DisparityJumpDetector::memory_needed(capacity)) +
-         capacity * sizeof(calibration::StereoObservation) + kCacheLine;
+         capacity * (sizeof(calibration::StereoObservation) + sizeof(float)) + 2 * kCacheLine;
 }
 
 RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
@@ -69,6 +70,7 @@ RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
     watched_[static_cast<std::size_t>(k)].emplace(options, capacity, arena);
   stereo_ = BoundedVector<calibration::StereoObservation>(
       arena.make<calibration::StereoObservation>(capacity, "monitored matches"));
+  distances_ = BoundedVector<float>(arena.make<float>(capacity, "distances to the lines"));
 }
 
 void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
@@ -113,7 +115,6 @@ void RigMonitor::scene_rebuilt(const odometry::Map& map, const RigCalibration& r
                                bool confirmed) noexcept {
   scene_pending_ = false;
   watch(rig, confirmed);
-  for (int k = 1; k < cameras_; ++k) camera(k).unwatched = kUnwatchedFrames;
   scene_renewed(map);
 }
 
@@ -204,6 +205,24 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
   return onset;
 }
 
+double RigMonitor::distance_to_lines(int k) noexcept {
+  const EpipolarGeometry lines(transform(rig_, k));
+  const Pinhole left = pinhole(rig_, 0), right = pinhole(rig_, k);
+  distances_.clear();
+  for (const calibration::StereoObservation& o : stereo_) {
+    const Vec2 l((o.left.x() - left.cx) / left.fx, (o.left.y() - left.cy) / left.fy),
+        r((o.right.x() - right.cx) / right.fx, (o.right.y() - right.cy) / right.fy);
+    double distance = 0;
+    if (lines.sampson(l, r, &distance, nullptr) == EpipolarStatus::ok)
+      (void)distances_.push(static_cast<float>(std::abs(distance) * right.fx));
+  }
+  if (distances_.empty()) return 0;
+  const std::span<float> all = distances_.span();
+  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
+  std::nth_element(all.begin(), middle, all.end());
+  return *middle;
+}
+
 MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odometry,
                                            const odometry::FrameOutcome& outcome,
                                            const RigFrame& frame, int found,
@@ -215,13 +234,10 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
   MonitorVerdict v = w.monitor.look(f);
   if (w.grace > 0) {
     --w.grace;
-    const bool doubted = v.undecided || v.kind != MonitorVerdict::Kind::quiet;
+    const bool doubted = v.undecided || v.kind != MonitorVerdict::Kind::quiet ||
+                         distance_to_lines(k) > kFarFromLines;
     v = MonitorVerdict{};
     v.undecided = doubted;
-  }
-  if (w.unwatched > 0) {
-    --w.unwatched;
-    v.undecided = true;
   }
   learn_reference(k, v);
   return v;

@@ -67,7 +67,6 @@ class RigMonitor {
     calibration::DisparityJumpDetector jumps;
     bool learning = false;           // the monitor's reference is a claim, its own not yet measured
     int grace = 0;                   // frames whose verdict is no more than a doubt yet
-    int unwatched = 0;               // frames that would not show a knock yet: doubted, too
     Transform T_camera_left_before;  // with the cameras unlinked
   };
 
@@ -87,6 +86,9 @@ class RigMonitor {
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Camera k's matches into `stereo_`; how many of them hold poses.
   int collect_stereo(const odometry::Map& map, int k, int least_found) noexcept;
+  /// Median distance of the matches in `stereo_` to their epipolar lines of the calibration watched,
+  /// px; 0 without any.
+  [[nodiscard]] double distance_to_lines(int k) noexcept;
   [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
                                     const Transform& T_left_world) const noexcept;
 
@@ -94,6 +96,7 @@ class RigMonitor {
   const int cameras_;
   std::array<std::optional<Watched>, kMaxCameras> watched_;  // [k] of camera k ≥ 1
   BoundedVector<calibration::StereoObservation> stereo_;
+  BoundedVector<float> distances_;  // scratch of their median
   RigCalibration rig_{};  // the one watched
   std::optional<Transform> T_left_world_before_;
   bool scene_pending_ = false;

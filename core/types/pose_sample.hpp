@@ -48,7 +48,7 @@ enum class Reason : std::uint8_t {
   unconfirmed,        // calibration from a state file that the drive has not confirmed yet
   unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands
                            // on
-  recalibrating,           // the rig no longer fits, or what it fits is new; up to 10 frames ago
+  recalibrating,           // the rig no longer fits its calibration, up to ten frames ago
   uncalibrated,  // no calibration yet: each camera's pose is found for itself, the scale is the
                  // last pair's
   out_of_step,   // a camera's images are of another instant than the others'
