@@ -86,8 +86,8 @@ class RigMonitor {
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Camera k's matches into `stereo_`; how many of them hold poses.
   int collect_stereo(const odometry::Map& map, int k, int least_found) noexcept;
-  /// Median distance of the matches in `stereo_` to their epipolar lines of the calibration watched,
-  /// px; 0 without any.
+  /// Median distance of the matches in `stereo_` to their epipolar lines of the calibration
+  /// watched, px; 0 without any.
   [[nodiscard]] double distance_to_lines(int k) noexcept;
   [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
                                     const Transform& T_left_world) const noexcept;
@@ -97,7 +97,7 @@ class RigMonitor {
   std::array<std::optional<Watched>, kMaxCameras> watched_;  // [k] of camera k ≥ 1
   BoundedVector<calibration::StereoObservation> stereo_;
   BoundedVector<float> distances_;  // scratch of their median
-  RigCalibration rig_{};  // the one watched
+  RigCalibration rig_{};            // the one watched
   std::optional<Transform> T_left_world_before_;
   bool scene_pending_ = false;
 };
