@@ -75,6 +75,7 @@ RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
 
 void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
   rig_ = rig;
+  confirmed_ = confirmed;
   for (int k = 1; k < cameras_; ++k) {
     Watched& w = camera(k);
     w.learning = true;
@@ -234,8 +235,9 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
   MonitorVerdict v = w.monitor.look(f);
   if (w.grace > 0) {
     --w.grace;
-    const bool doubted = v.undecided || v.kind != MonitorVerdict::Kind::quiet ||
-                         distance_to_lines(k) > kFarFromLines;
+    // A claim that is off is no knock; nothing based on it is `ok`.
+    const bool doubted = confirmed_ && (v.undecided || v.kind != MonitorVerdict::Kind::quiet ||
+                                        distance_to_lines(k) > kFarFromLines);
     v = MonitorVerdict{};
     v.undecided = doubted;
   }

@@ -98,6 +98,7 @@ class RigMonitor {
   BoundedVector<calibration::StereoObservation> stereo_;
   BoundedVector<float> distances_;  // scratch of their median
   RigCalibration rig_{};            // the one watched
+  bool confirmed_ = false;          // by the drive
   std::optional<Transform> T_left_world_before_;
   bool scene_pending_ = false;
 };
