@@ -71,6 +71,7 @@ std::vector<test::JudgedPose> judged(const Driven& d) {
 struct Tally {
   int runs = 0, wrong_runs = 0, wrong = 0, ok = 0;
   int cut_short = 0;  // runs that have not a sample for every pair
+  int unjudged = 0;   // `ok` poses without truth to hold them against
   int unfit = 0;      // drives that give no measure of what is normal
 };
 
@@ -80,6 +81,7 @@ void judge(const RecordedSequence& drive_of, const std::string& what, std::size_
   ++tally->runs;
   tally->ok += h.ok;
   tally->wrong += h.wrong;
+  tally->unjudged += h.unjudged;
   tally->wrong_runs += h.wrong > 0 ? 1 : 0;
   fmt::print("{:12s} {:46s} frames {:3d} ok {:3d} lost {:3d} knocks {}  most {:4.1f}",
              drive_of.name, what, d.samples.size(), h.ok, h.lost, d.knocks, h.most);
@@ -165,8 +167,9 @@ int main(int argc, char** argv) {
     bench::leave_out_what_is_no_truth(&*d);
     bench::run(*d, filter, argc > 3, &tally);
   }
-  fmt::print("{} runs, {} poses ok, {} of them wrong, in {} runs; {} cut short\n", tally.runs,
-             tally.ok, tally.wrong, tally.wrong_runs, tally.cut_short);
+  fmt::print("{} runs, {} poses ok, {} of them wrong, in {} runs; {} without truth, {} cut short\n",
+             tally.runs, tally.ok, tally.wrong, tally.wrong_runs, tally.unjudged, tally.cut_short);
   if (tally.runs == 0) return 2;
-  return tally.wrong > 0 || tally.cut_short > 0 || tally.unfit > 0 ? EXIT_FAILURE : EXIT_SUCCESS;
+  return tally.wrong + tally.unjudged + tally.cut_short + tally.unfit > 0 ? EXIT_FAILURE
+                                                                          : EXIT_SUCCESS;
 }

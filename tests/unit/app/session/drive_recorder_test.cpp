@@ -108,8 +108,7 @@ TEST(DriveRecorder, itsMemoryIsThatOfAllQueuesAndOfTheEncoder) {
       << "the same images, and pixels that wait for the encoder";
 }
 
-// What is kept is bounded by the time asked for, not by how much of it fits a queue as large as
-// ever.
+// The queues are as large as the time asked for needs.
 TEST(DriveRecorder, allOfTheTimeBeforeAnEventIsKept) {
   constexpr int kKept = 20 * 300;
   RecordedPoses drive({"record=[poses]", "record.keep_s=300"});

@@ -244,8 +244,9 @@ TEST(Verifying, aYawKnockedBeforeTheClaimIsConfirmedIsSeenAtOnce) {
     EXPECT_NE(s.status, PoseStatus::ok) << s.frame << '\n' << c.story;
 }
 
-// For five frames after a calibration was adopted the monitor tells no knock, and yet none of them
-// is `ok` from its first frame on. 5 mrad of pitch are 1.4 px across the epipolar lines.
+// For five frames after a calibration was adopted the monitor tells no knock; a pose is not `ok`
+// from the knock's first frame on all the same. 5 mrad of pitch are 1.4 px across the epipolar
+// lines.
 TEST(Verifying, aPitchKnockedRightAfterACalibrationWasAdoptedIsNeverOk) {
   constexpr int kAdopted = 38, kKnock = kAdopted + 2;
   const Transform truth = Corridor().rig().T_camera_left[1];
