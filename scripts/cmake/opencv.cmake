@@ -1,5 +1,5 @@
 # OpenCV as Debian's component packages bring it: headers and libraries without a CMake package.
-# Makes opencv::NAME for each component of scripts/packages/develop.txt.
+# Makes opencv::NAME for each component of scripts/packages/tests.txt.
 find_path(VERGENCE_OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
 foreach(component core imgproc imgcodecs calib3d video aruco)
   find_library(VERGENCE_OPENCV_${component} opencv_${component} REQUIRED)

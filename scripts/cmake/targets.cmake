@@ -100,34 +100,81 @@ function(vergence_library name)
   endif()
 endfunction()
 
-# vergence_test(NAME SOURCES … [DEPENDS …] [LABELS slow …] [TIMEOUT s] [SERIAL] [SHARDS n] [WORKS]): one GoogleTest program, one ctest a case.
-# SERIAL: its tests run alone (image rate, timing of threads). SHARDS: n ctests named NAME.1_of_n and so on instead, for cases that share
-# what takes long to make. WORKS: what takes time is in its own files (pictures drawn, drives made): optimised under sanitizers, too.
-function(vergence_test name)
-  cmake_parse_arguments(ARG "SERIAL;WORKS" "TIMEOUT;SHARDS" "SOURCES;DEPENDS;LABELS" ${ARGN})
+# A test's own files are compiled less optimised than the product: what takes time is in the libraries. Under sanitizers they are not
+# optimised at all, as that takes as long again as compiling them.
+set(VERGENCE_TEST_OPTIMISATION $<IF:$<BOOL:${VERGENCE_SANITIZE}>,-O0,-O1>)
+
+# The tiers of tests (CONTRIBUTING.md); every test is in exactly one of them, which is its first label. Building tests_TIER builds what the
+# tests of a tier run; `all` builds none of them.
+set(VERGENCE_TIERS default rig statistics hardening deploy)
+if(VERGENCE_TESTS)
+  foreach(tier IN LISTS VERGENCE_TIERS)
+    add_custom_target(tests_${tier})
+  endforeach()
+endif()
+
+# vergence_labels(VARIABLE TIER): the labels of a test of this folder: its tier, and the folder below tests/ (core/bundle, system/run), by which
+# `scripts/test -L core/bundle` runs the tests of one folder.
+function(vergence_labels variable tier)
+  if(NOT tier IN_LIST VERGENCE_TIERS)
+    message(FATAL_ERROR "tests: ${tier} is not a tier; the tiers are ${VERGENCE_TIERS}")
+  endif()
+  file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR}/tests ${CMAKE_CURRENT_SOURCE_DIR})
+  string(REGEX REPLACE "^unit/" "" folder ${folder})
+  string(REGEX REPLACE "^([^/]+/[^/]+)/.*" "\\1" folder ${folder})
+  set(${variable} ${tier} ${folder} PARENT_SCOPE)
+endfunction()
+
+# vergence_test_program(NAME TIER SOURCES … [DEPENDS …] [PROGRAM]): an executable of tests in build/tests, built with its tier. PROGRAM: it runs
+# the built program, whose path it finds in the macro VERGENCE_PROGRAM.
+function(vergence_test_program name tier)
+  cmake_parse_arguments(ARG "PROGRAM;WORKS" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE vergence_options ${ARG_DEPENDS} GTest::gtest GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE vergence_options ${ARG_DEPENDS})
   if(VERGENCE_SANITIZE AND ARG_WORKS)
     vergence_read_precompiled(${name} vergence_headers ${ARG_SOURCES})
   else()
     vergence_read_precompiled(${name} vergence_test_headers ${ARG_SOURCES})
+    target_compile_options(${name} PRIVATE ${VERGENCE_TEST_OPTIMISATION})
   endif()
   if(VERGENCE_UNITY)
     vergence_unite(${name} ${ARG_SOURCES})
   endif()
-  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
-  if(VERGENCE_SANITIZE AND NOT ARG_WORKS) # optimising a test's own file takes as long again as compiling it, and warns of what the sanitizer put there
-    target_compile_options(${name} PRIVATE -O0)
+  if(ARG_PROGRAM)
+    target_compile_definitions(${name} PRIVATE VERGENCE_PROGRAM="$<TARGET_FILE:vergence>")
+    add_dependencies(${name} vergence)
   endif()
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
+  add_dependencies(tests_${tier} ${name})
+endfunction()
+
+# vergence_test(NAME SOURCES … [DEPENDS …] [TIER tier] [TIMEOUT s] [COST s] [SERIAL] [SHARDS n] [WORKS] [PROGRAM] [DEFINITIONS …]): one GoogleTest
+# program, one ctest a case. TIER: `default` if not given. SERIAL: its tests run alone (image rate, timing of threads). SHARDS: n ctests named
+# NAME.1_of_n and so on instead, for cases that share what takes long to make. COST: the seconds that each ctest takes, which order the tests
+# and divide a tier into shares. WORKS: its own files do the work (images rendered, sequences made) and are optimised like the product.
+function(vergence_test name)
+  cmake_parse_arguments(ARG "SERIAL;WORKS;PROGRAM" "TIER;TIMEOUT;COST;SHARDS" "SOURCES;DEPENDS;DEFINITIONS" ${ARGN})
+  if(NOT ARG_TIER)
+    set(ARG_TIER default)
+  endif()
+  set(options)
+  foreach(option PROGRAM WORKS)
+    if(ARG_${option})
+      list(APPEND options ${option})
+    endif()
+  endforeach()
+  vergence_test_program(${name} ${ARG_TIER} SOURCES ${ARG_SOURCES} DEPENDS ${ARG_DEPENDS} GTest::gtest GTest::gtest_main ${options})
+  target_compile_definitions(${name} PRIVATE ${ARG_DEFINITIONS})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
   if(CMAKE_CROSSCOMPILING OR VERGENCE_SANITIZE) # an emulator, or a sanitizer beside another test, takes some ten times as long
     math(EXPR ARG_TIMEOUT "5 * ${ARG_TIMEOUT}")
   endif()
+  vergence_labels(labels ${ARG_TIER})
   set(properties TIMEOUT ${ARG_TIMEOUT})
-  if(ARG_LABELS)
-    list(APPEND properties LABELS "${ARG_LABELS}")
+  if(ARG_COST)
+    list(APPEND properties COST ${ARG_COST})
   endif()
   if(ARG_SERIAL)
     list(APPEND properties RUN_SERIAL TRUE)
@@ -136,13 +183,21 @@ function(vergence_test name)
     foreach(shard RANGE 1 ${ARG_SHARDS})
       math(EXPR index "${shard} - 1")
       add_test(NAME ${name}.${shard}_of_${ARG_SHARDS} COMMAND ${name} --gtest_brief=1)
-      set_tests_properties(${name}.${shard}_of_${ARG_SHARDS} PROPERTIES ${properties} COST 150
+      set_tests_properties(${name}.${shard}_of_${ARG_SHARDS} PROPERTIES ${properties} LABELS "${labels}"
         ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index}")
     endforeach()
     return()
   endif()
   # Parameters that print as bytes would make a name of addresses.
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES PROPERTIES ${properties})
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES PROPERTIES ${properties} LABELS "${labels}")
+endfunction()
+
+# vergence_command_test(NAME name TIER tier COMMAND … [PROPERTIES …]): a ctest that runs a command.
+function(vergence_command_test)
+  cmake_parse_arguments(ARG "" "NAME;TIER" "COMMAND;PROPERTIES" ${ARGN})
+  add_test(NAME ${ARG_NAME} COMMAND ${ARG_COMMAND})
+  vergence_labels(labels ${ARG_TIER})
+  set_tests_properties(${ARG_NAME} PROPERTIES LABELS "${labels}" ${ARG_PROPERTIES})
 endfunction()
 
 # vergence_benchmark(NAME SOURCES … [DEPENDS …]): a program under build/bench, never run by ctest.
@@ -151,4 +206,5 @@ function(vergence_benchmark name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE vergence_options ${ARG_DEPENDS})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bench)
+  add_dependencies(benchmarks ${name})
 endfunction()

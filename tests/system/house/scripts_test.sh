@@ -23,6 +23,8 @@ expect_refusal() {  # words that the sentence holds, then the command
 expect_refusal "$work/nowhere is not a folder" "$source/scripts/demo" nowhere
 expect_refusal "$work/empty is neither KITTI" "$source/scripts/demo" empty
 expect_refusal "takes nothing, or the word program" "$source/scripts/setup" everything
+expect_refusal "takes nothing, or the word program" "$source/scripts/setup" tests slow
+expect_refusal "--tier takes default" "$source/scripts/test" --tier slow
 expect_refusal "takes arm64 or armhf" "$source/scripts/cross" riscv64
 expect_refusal "takes arm64 or armhf" "$source/scripts/sysroot" arm64 everything
 expect_refusal "ten is neither seconds nor a number of inputs" "$source/scripts/fuzz" ten

@@ -2,7 +2,7 @@
 """clang-tidy over the product, files of a folder together: most of its time goes into headers, which a batch reads once.
 
   tidy.py [PREFIX...] --root FOLDER --build FOLDER      files whose path begins with a PREFIX; without one: all
-  tidy.py --part N ...                                  one N-th of the batches, another one with every commit
+  tidy.py --part K/N ...                                the K-th of N parts of the batches
   tidy.py --self-test
 
 A batch is a file that includes sources of one folder with one compile command, and with no name in the unnamed namespaces of two of
@@ -146,15 +146,10 @@ def look(root, build, batch):
     return found
 
 
-def part_of(found, parts, turn):
-    """Every parts-th batch, which ones the turn decides: all of them in `parts` turns that follow one another."""
-    return [batch for i, batch in enumerate(found) if (i + turn) % parts == 0]
-
-
-def turn(root):
-    """From the commit's hash, which a shallow clone knows as well."""
-    commit = subprocess.run(["git", "-C", root, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
-    return int(commit.stdout, 16) if commit.returncode == 0 else 0
+def part_of(found, part):
+    """The K-th of N parts, which PART names as K/N."""
+    k, n = (int(number) for number in part.split("/"))
+    return found[k - 1::n]
 
 
 def without_repetition(found):
@@ -170,9 +165,9 @@ def without_repetition(found):
 def self_test():
     wrong = [] if without_repetition([]) == [] else ["nothing found is a finding"]
     found = list(range(23))
-    turns = [part_of(found, 5, t) for t in range(7, 12)]
-    if sorted(sum(turns, [])) != found:
-        wrong.append("parts: %s" % turns)
+    parts = [part_of(found, "%d/5" % k) for k in range(1, 6)]
+    if sorted(sum(parts, [])) != found:
+        wrong.append("parts: %s" % parts)
     if without_repetition(["a.hpp:1:2: error: x\n  code", "a.hpp:1:2: error: x\n  code\nb.hpp:1:2: error: x"]) != [
             "a.hpp:1:2: error: x\n  code", "b.hpp:1:2: error: x"]:
         wrong.append("repetitions")
@@ -218,7 +213,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", default=".")
     parser.add_argument("--build", default="build", help="a configured build, of which a folder `tidy` is made")
-    parser.add_argument("--part", type=int, default=1)
+    parser.add_argument("--part", default="1/1")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--self-test", action="store_true")
     parser.add_argument("prefixes", nargs="*")
@@ -229,7 +224,7 @@ def main():
         print("skipped: clang-tidy or clang++ is not installed")
         return SKIPPED
     else:
-        todo = part_of(batches(given.root, configured(given.root, given.build), given.prefixes), given.part, turn(given.root))
+        todo = part_of(batches(given.root, configured(given.root, given.build), given.prefixes), given.part)
         if not todo:
             print("no file begins with any of: %s" % " ".join(given.prefixes))
             return 1
