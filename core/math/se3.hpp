@@ -15,38 +15,23 @@ struct Transform {
   [[nodiscard]] Transform operator*(const Transform& o) const noexcept {
     return {R * o.R, R * o.t + t};
   }
-  [[nodiscard]] Transform inverse() const noexcept { return {R.transpose(), -(R.transpose() * t)}; }
+  [[nodiscard]] Transform inverse() const noexcept;
   /// Camera centre (or body origin) of a world-to-camera transform, in world.
-  [[nodiscard]] Vec3 centre() const noexcept { return -(R.transpose() * t); }
-  [[nodiscard]] bool finite() const noexcept { return R.allFinite() && t.allFinite(); }
+  [[nodiscard]] Vec3 centre() const noexcept;
+  [[nodiscard]] bool finite() const noexcept;
 };
 
 /// R ← Exp(φ) R, t ← t + τ.
-[[nodiscard]] inline Transform perturbed(const Transform& T, const Vec3& phi,
-                                         const Vec3& tau) noexcept {
-  return {normalised(exp_so3(phi) * T.R), T.t + tau};
-}
+[[nodiscard]] Transform perturbed(const Transform& T, const Vec3& phi, const Vec3& tau) noexcept;
 
 /// Unit quaternion of a rotation, w ≥ 0: one sign, so that files are reproducible.
-[[nodiscard]] inline Eigen::Quaterniond quaternion(const Mat3& R) noexcept {
-  Eigen::Quaterniond q(R);
-  q.normalize();
-  if (q.w() < 0) q.coeffs() *= -1.0;
-  return q;
-}
+[[nodiscard]] Eigen::Quaterniond quaternion(const Mat3& R) noexcept;
 
 /// The same camera after everything in the world has grown by `factor` about a place.
-[[nodiscard]] inline Transform scaled_about(const Transform& T_camera_world, const Vec3& centre,
-                                            double factor) noexcept {
-  return {T_camera_world.R,
-          -(T_camera_world.R * (centre + factor * (T_camera_world.centre() - centre)))};
-}
+[[nodiscard]] Transform scaled_about(const Transform& T_camera_world, const Vec3& centre,
+                                     double factor) noexcept;
 
 /// Position linear, rotation along the shorter arc; s in [0, 1] from a to b.
-[[nodiscard]] inline Transform interpolate(const Transform& a, const Transform& b,
-                                           double s) noexcept {
-  return {Eigen::Quaterniond(a.R).slerp(s, Eigen::Quaterniond(b.R)).normalized().toRotationMatrix(),
-          a.t + s * (b.t - a.t)};
-}
+[[nodiscard]] Transform interpolate(const Transform& a, const Transform& b, double s) noexcept;
 
 }  // namespace vergence

@@ -1,6 +1,4 @@
 #pragma once
-#include <cmath>
-
 #include <Eigen/Geometry>
 
 #include "core/math/types.hpp"
@@ -16,50 +14,19 @@ namespace vergence {
 
 /// Rotation vector (axis × angle, rad) → rotation matrix, Rodrigues; a series below 1e-4 rad where
 /// sin(θ)/θ loses digits.
-[[nodiscard]] inline Mat3 exp_so3(const Vec3& phi) noexcept {
-  const double theta2 = phi.squaredNorm();
-  double a, b;  // sin θ/θ, (1 − cos θ)/θ²
-  if (theta2 < 1e-8) {
-    a = 1.0 - theta2 / 6.0;
-    b = 0.5 - theta2 / 24.0;
-  } else {
-    const double theta = std::sqrt(theta2);
-    a = std::sin(theta) / theta;
-    const double s = std::sin(0.5 * theta);
-    b = 2.0 * s * s / theta2;
-  }
-  const Mat3 K = skew(phi);
-  return Mat3::Identity() + a * K + b * K * K;
-}
+[[nodiscard]] Mat3 exp_so3(const Vec3& phi) noexcept;
 
 /// Rotation matrix → rotation vector with angle in [0, π]. Through the quaternion, so that angles
 /// near π keep their digits.
-[[nodiscard]] inline Vec3 log_so3(const Mat3& R) noexcept {
-  Eigen::Quaterniond q(R);
-  if (q.w() < 0) q.coeffs() *= -1.0;
-  const double n = q.vec().norm();
-  if (n < 1e-12) return 2.0 * q.vec();
-  return (2.0 * std::atan2(n, q.w()) / n) * q.vec();
-}
+[[nodiscard]] Vec3 log_so3(const Mat3& R) noexcept;
 
 /// Angle of a rotation, rad, in [0, π].
-[[nodiscard]] inline double rotation_angle(const Mat3& R) noexcept { return log_so3(R).norm(); }
+[[nodiscard]] double rotation_angle(const Mat3& R) noexcept;
 
 /// Left Jacobian: Exp(φ + δ) ≈ Exp(Jl(φ) δ) Exp(φ).
-[[nodiscard]] inline Mat3 left_jacobian_so3(const Vec3& phi) noexcept {
-  const double theta2 = phi.squaredNorm();
-  const Mat3 K = skew(phi);
-  if (theta2 < 1e-8) return Mat3::Identity() + (0.5 - theta2 / 24.0) * K + K * K / 6.0;
-  const double theta = std::sqrt(theta2);
-  const double s =
-      std::sin(0.5 * theta);  // 1 − cos θ = 2 sin²(θ/2), which loses no digits at small angles
-  return Mat3::Identity() + 2.0 * s * s / theta2 * K +
-         (theta - std::sin(theta)) / (theta2 * theta) * K * K;
-}
+[[nodiscard]] Mat3 left_jacobian_so3(const Vec3& phi) noexcept;
 
 /// The rotation nearest to a matrix that has drifted from orthonormality by products.
-[[nodiscard]] inline Mat3 normalised(const Mat3& R) noexcept {
-  return Eigen::Quaterniond(R).normalized().toRotationMatrix();
-}
+[[nodiscard]] Mat3 normalised(const Mat3& R) noexcept;
 
 }  // namespace vergence

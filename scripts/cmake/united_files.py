@@ -14,7 +14,7 @@ import sys
 import tempfile
 
 STAYS_ALONE = ("hwy/foreach_target.h", "<asm/termbits.h>")
-MOST_LINES = 2500  # of a group: two processors are to end at the same time
+MOST_LINES = 5000  # of a group: larger ones leave one of two processors without work at the end
 
 UNNAMED = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.DOTALL | re.MULTILINE)
 DEFINITIONS = (
@@ -24,6 +24,7 @@ DEFINITIONS = (
     re.compile(r"^(?:template <.*?> ?)?(?:\[\[\w+\]\] )?[A-Za-z][\w:<>,&*\s]*?[\s&*](\w+)\([^;]*$"),
     re.compile(r"^(?:template <.*?> ?)?(?:\[\[\w+\]\] )?[A-Za-z][\w:<>,&*\s]*?[\s&*](\w+)\(.*\{"),
 )
+USED = re.compile(r"^using (?:\w+::)+(\w+);", re.MULTILINE)
 CONSTANTS = re.compile(r"^(?:constexpr|const) [^;]*;", re.MULTILINE)
 MORE_CONSTANTS = re.compile(r",\s*(k[A-Z]\w*)\s*[={\[]")
 LOCAL_CONSTANT = re.compile(r"^ +(?:static )?(?:constexpr|const) .*?\b(k[A-Z]\w*)\s*[={\[(]", re.MULTILINE)
@@ -47,10 +48,10 @@ def defined(text):
     return names
 
 
-def local_constants(text):
-    """Constants that functions and classes define."""
+def local_names(text):
+    """Names that a file may share with another such file, but not with a definition: constants of functions, using-declarations."""
     lines = (match.group(0) for match in LOCAL_CONSTANT.finditer(text))
-    return set(LOCAL_CONSTANT.findall(text)) | {name for line in lines for name in MORE_CONSTANTS.findall(line)}
+    return set(LOCAL_CONSTANT.findall(text)) | {name for line in lines for name in MORE_CONSTANTS.findall(line)} | set(USED.findall(text))
 
 
 def groups(folder, files):
@@ -62,7 +63,7 @@ def groups(folder, files):
         if any(word in text for word in STAYS_ALONE):
             found.append(([file], set(), set(), MOST_LINES))
             continue
-        names, inner, lines = defined(text), local_constants(text), text.count("\n")
+        names, inner, lines = defined(text), local_names(text), text.count("\n")
         for i, (members, taken, shadows, size) in enumerate(found):
             if size + lines <= MOST_LINES and not names & (taken | shadows) and not inner & taken:
                 found[i] = (members + [file], taken | names, shadows | inner, size + lines)
@@ -80,12 +81,12 @@ def self_test():
     if defined(text) != expected:
         return "found %s, expected %s" % (sorted(defined(text)), sorted(expected))
     with tempfile.TemporaryDirectory() as folder:
-        sources = {"a.cpp": text, "b.cpp": text, "c.cpp": "int other;\n", "d.cpp": "void d() {\n  constexpr int kA = 3;\n}\n", "k.cpp": '#include "hwy/foreach_target.h"\n', "long.cpp": "\n" * MOST_LINES}
+        sources = {"a.cpp": text, "b.cpp": text, "c.cpp": "int other;\n", "d.cpp": "void d() {\n  constexpr int kA = 3;\n}\n", "u.cpp": "using test::S;\n", "k.cpp": '#include "hwy/foreach_target.h"\n', "long.cpp": "\n" * MOST_LINES}
         for name, content in sources.items():
             with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
                 file.write(content)
         found = groups(folder, sorted(sources))
-    wanted = [["a.cpp", "c.cpp"], ["b.cpp"], ["d.cpp"], ["k.cpp"], ["long.cpp"]]
+    wanted = [["a.cpp", "c.cpp"], ["b.cpp"], ["d.cpp", "u.cpp"], ["k.cpp"], ["long.cpp"]]
     return None if found == wanted else "grouped %s, expected %s" % (found, wanted)
 
 
