@@ -2,10 +2,10 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <Eigen/SVD>
 
 #include "app/config/calibration_covariance.hpp"
 #include "app/config/calibration_file.hpp"
+#include "core/math/linear_solve.hpp"
 
 namespace vergence::app {
 namespace {
@@ -108,8 +108,8 @@ Finding check_rotation(Mat3* R, const std::string& field) {
   if (R->determinant() < 0)
     return finding(field, "has a rotation that mirrors (its determinant is -1)");
   if (off > kSameRotation) {
-    const Eigen::JacobiSVD<Mat3> svd(*R, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    *R = svd.matrixU() * svd.matrixV().transpose();
+    const Svd3 s = svd(*R);
+    *R = s.U * s.V.transpose();
   }
   return std::nullopt;
 }

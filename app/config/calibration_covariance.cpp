@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
-#include <Eigen/Cholesky>
 
 #include "app/runtime/nearest.hpp"
+#include "core/math/linear_solve.hpp"
 
 namespace vergence::app {
 namespace {
@@ -170,7 +170,7 @@ std::optional<std::string> find_flaw(const RigCovariance& covariance) {
     }
   // No eigenvalue is below −kRounding.
   correlation.diagonal().array() += kRounding;
-  if (correlation.llt().info() != Eigen::Success)
+  if (!positive_definite(correlation))
     return "is not positive semidefinite: some combination of its parameters has a negative "
            "variance";
   return std::nullopt;

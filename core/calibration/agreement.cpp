@@ -3,10 +3,9 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "core/calibration/detail/depth.hpp"
 #include "core/geometry/epipolar.hpp"
+#include "core/math/linear_solve.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::calibration {
@@ -67,7 +66,7 @@ Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noe
                 second.covariance(extrinsic_row(k) + i, extrinsic_row(k) + j);
   const Mat5 own = basis.transpose() * C * basis;
   const Vec5 d = basis.transpose() * way;
-  result.transform = d.dot(own.ldlt().solve(d)) / 5;
+  result.transform = d.dot(ldlt_solve(own, d)) / 5;
   const Intrinsics &la = a.intrinsics[c], &lb = b.intrinsics[c];
   const std::array difference = {lb.fx - la.fx, lb.fy - la.fy, lb.cx - la.cx, lb.cy - la.cy};
   for (int i = 0; i < 4; ++i) {

@@ -5,9 +5,10 @@
 #include <span>
 #include <vector>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "core/comparison/detail/pose_interpolation.hpp"
+#include "core/math/linear_solve.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence {
@@ -107,10 +108,10 @@ struct Block {
 Information scatter_of(std::span<const Block> blocks, const Information& whole) {
   Information sum = Information::Zero();
   if (blocks.size() < kBlocks) return sum;
-  const Information covariance = whole.ldlt().solve(Information::Identity());
+  const Information covariance = ldlt_inverse(whole);
   for (const Block& b : blocks) {
     const Information rest = Information::Identity() - b.information * covariance;
-    const Parameters g = rest.partialPivLu().solve(b.score);
+    const Parameters g = lu_solve(rest, b.score);
     sum += g * g.transpose();
   }
   const auto n = static_cast<double>(blocks.size());
@@ -203,9 +204,9 @@ bool Fit::start(const Mat3& nominal) {
   constexpr double kLeastWay = 10;  // m
   if (way < kLeastWay) return false;
   const auto rotation_of = [](const Mat3& M) {
-    const Eigen::JacobiSVD<Mat3> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Vec3 d(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant());
-    return Mat3(svd.matrixU() * d.asDiagonal() * svd.matrixV().transpose());
+    const Svd3 s = svd(M);
+    const Vec3 d(1, 1, (s.U * s.V.transpose()).determinant());
+    return Mat3(s.U * d.asDiagonal() * s.V.transpose());
   };
   // A thousandth of what was seen for the drawing: it decides only what nothing else does.
   state_.R_m = rotation_of(B + 1e-3 * B.norm() * nominal);
@@ -316,14 +317,14 @@ bool Fit::step(Parameters* d) {
   }
   information_ = H;
   scatter_ = scatter_of(blocks, H);
-  *d = -H.ldlt().solve(g);
+  *d = -ldlt_solve(H, g);
   return d->allFinite();
 }
 
 void Fit::report(const Mat3& nominal, Mount* mount) const {
   // By the model of the errors, or by how far blocks of the drive disagree, whichever is more: what
   // an estimate drifts by is no Gauss–Markov process.
-  const Information covariance = information_.ldlt().solve(Information::Identity());
+  const Information covariance = ldlt_inverse(information_);
   const Information by_blocks = covariance * scatter_ * covariance;
   const auto sigma = [&](int p) {
     return std::sqrt(std::max({0.0, covariance(p, p), by_blocks(p, p)}));

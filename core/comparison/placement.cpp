@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
+#include "core/math/linear_solve.hpp"
 
 namespace vergence {
 namespace {
@@ -98,9 +98,9 @@ PlacementStatus fit_placement(std::span<const PlacementPair> pairs, Duration cor
   Mat3 R = start(pairs, middle_world, middle_enu);
   Normal normal = normal_equations(pairs, R, middle_world, middle_enu, independent);
   for (int step = 0; step < kPlacementSteps; ++step) {
-    const Eigen::LDLT<Mat6> ldlt(normal.H);
-    if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return PlacementStatus::not_held;
-    const Vec6 delta = -ldlt.solve(normal.g);
+    Vec6 delta;
+    if (!ldlt_solve(normal.H, normal.g, &delta)) return PlacementStatus::not_held;
+    delta = -delta;
     if (!delta.allFinite()) return PlacementStatus::not_held;
     R = normalised(exp_so3(delta.head<3>()) * R);
     middle_enu += delta.tail<3>();
@@ -111,7 +111,7 @@ PlacementStatus fit_placement(std::span<const PlacementPair> pairs, Duration cor
   // Residuals larger than the sigmas say make the result worse by as much; smaller ones do not make
   // it better: they share their error.
   const double excess = std::max(1.0, normal.weighted / (3.0 * n));
-  const Mat6 covariance = excess * normal.H.ldlt().solve(Mat6::Identity());
+  const Mat6 covariance = excess * ldlt_inverse(normal.H);
   const Vec6 sigma = covariance.diagonal().cwiseSqrt();
   if (!sigma.allFinite() || !(sigma[2] < kWorstHeading)) return PlacementStatus::not_held;
 

@@ -4,7 +4,7 @@
 #include <cassert>
 #include <cmath>
 
-#include <Eigen/SVD>
+#include "core/math/linear_solve.hpp"
 
 namespace vergence {
 namespace {
@@ -182,24 +182,24 @@ Alignment align(std::span<const StampedPose> estimate, std::span<const StampedPo
 
   Alignment a;
   if (variance_e > 0 && variance_r > 0) {
-    const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const Svd3 s = svd(covariance);
     Vec3 sign = Vec3::Ones();  // the reflection of a best fit with det −1 is undone on the weakest
                                // direction
-    if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1.0;
-    a.R_reference_estimate = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-    const double trace = svd.singularValues().dot(sign);
+    if (s.U.determinant() * s.V.determinant() < 0) sign.z() = -1.0;
+    a.R_reference_estimate = s.U * sign.asDiagonal() * s.V.transpose();
+    const double trace = s.singular.dot(sign);
     if (scale == AlignmentScale::free) a.scale = trace / variance_e;
-    a.lateral_extent = std::sqrt(svd.singularValues()[1]);
+    a.lateral_extent = std::sqrt(s.singular[1]);
     // A roll about the main direction moves what is off it along the second into the third. What
     // the fit leaves there, against the lever arm, is about how far the roll may be wrong.
-    const Vec3 third = svd.matrixU().col(2);
+    const Vec3 third = s.U.col(2);
     double squares = 0;
     for (std::size_t i = 0; i < count; ++i) {
       const Vec3 e = estimate[i].T_world_body.t - mean_e, r = reference[i].T_world_body.t - mean_r;
       const double residual = third.dot(r - a.scale * (a.R_reference_estimate * e));
       squares += residual * residual;
     }
-    const double main_extent = std::sqrt(svd.singularValues()[0]);
+    const double main_extent = std::sqrt(s.singular[0]);
     a.roll_unobservable = !(std::sqrt(squares / n) < kMaxRollUncertainty * a.lateral_extent &&
                             a.lateral_extent > kStraight * main_extent);
   } else {

@@ -3,13 +3,13 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/geometry/detail/polynomial.hpp"
 #include "core/geometry/epipolar.hpp"
+#include "core/math/linear_solve.hpp"
 
 namespace vergence {
 namespace {
@@ -306,8 +306,7 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
 int decompose_essential(const Mat3& E, std::span<const Vec2> left, std::span<const Vec2> right,
                         double baseline, Transform* T_right_left) noexcept {
   if (!E.allFinite() || left.size() != right.size()) return 0;
-  const Eigen::JacobiSVD<Mat3> svd(E, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 U = svd.matrixU(), V = svd.matrixV();
+  auto [U, V, singular] = svd(E);
   if (U.determinant() < 0) U = -U;
   if (V.determinant() < 0) V = -V;
   Mat3 W;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/math/semidefinite.hpp"
+#include "core/math/linear_solve.hpp"
 
 namespace vergence {
 namespace {
@@ -197,8 +197,7 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
   const Vec6 scaled = semidefinite_eigenvalues(unit);
   if (!(scaled[5] > scaled[0] / kMaxCondition)) return refuse(PoseRefineStatus::rank_deficient);
   out.condition = scaled[0] / scaled[5];
-  const Mat6 covariance =
-      d.asDiagonal() * Mat6(Eigen::LLT<Mat6>(unit).solve(Mat6::Identity())) * d.asDiagonal();
+  const Mat6 covariance = d.asDiagonal() * Cholesky<6>(unit).inverse() * d.asDiagonal();
   const auto worst = [&covariance](int at) noexcept {
     const Mat3 block = covariance.block<3, 3>(at, at);
     return std::sqrt(semidefinite_eigenvalues(block)[0]);

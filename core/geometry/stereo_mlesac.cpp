@@ -10,7 +10,7 @@
 #include "core/geometry/detail/kernels.hpp"
 #include "core/geometry/five_point.hpp"
 #include "core/geometry/mlesac.hpp"
-#include "core/math/semidefinite.hpp"
+#include "core/math/linear_solve.hpp"
 
 namespace vergence {
 namespace {
@@ -147,8 +147,8 @@ bool StereoMlesac::polish(double cap, Transform* T) const noexcept {
   for (const double width : kPolishWidths) {
     Vec5 g;
     const Mat5 H = information(width * cap, next, &g);
-    const Eigen::LLT<Mat5> llt(H);
-    if (llt.info() != Eigen::Success) return false;
+    const Cholesky<5> llt(H);
+    if (!llt.ok()) return false;
     const Vec5 delta = llt.solve(g);
     if (!delta.allFinite() || !(delta.norm() < 1.0)) return false;
     next = moved_on_sphere(next, delta);
@@ -230,9 +230,9 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
   out.information = information(cap, out.T_right_left, &unused);
   out.rotation_sigma = out.direction_sigma = std::numeric_limits<double>::infinity();
   const Vec5 along = semidefinite_eigenvalues(out.information);
-  const Eigen::LLT<Mat5> factor(out.information);
-  if (along[4] > along[0] / kMaxCondition && factor.info() == Eigen::Success) {
-    const Mat5 covariance = factor.solve(Mat5::Identity());
+  const Cholesky<5> factor(out.information);
+  if (along[4] > along[0] / kMaxCondition && factor.ok()) {
+    const Mat5 covariance = factor.inverse();
     const Mat3 turn = covariance.topLeftCorner<3, 3>();
     const Mat2 direction = covariance.bottomRightCorner<2, 2>();
     out.rotation_sigma = std::sqrt(semidefinite_eigenvalues(turn)[0]);

@@ -1,8 +1,9 @@
 #include "core/geometry/triangulate.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "core/math/linear_solve.hpp"
 
 namespace vergence {
 namespace {
@@ -93,8 +94,8 @@ TriangulatedPoint triangulate(std::span<const RayView> views,
     return out;
   }
   for (int step = 0; step < options.max_steps; ++step) {
-    const Eigen::LLT<Mat3> llt(now.H);
-    if (llt.info() != Eigen::Success) break;
+    const Cholesky<3> llt(now.H);
+    if (!llt.ok()) break;
     const Vec3 delta = llt.solve(now.g);
     const Vec3 next = abr + delta;
     Reduced then;
@@ -104,10 +105,9 @@ TriangulatedPoint triangulate(std::span<const RayView> views,
     now = then;
     if (delta.norm() < kConverged) break;
   }
-  const Eigen::LLT<Mat3> llt(now.H);
-  const Mat3 S =
-      llt.info() == Eigen::Success ? Mat3(llt.solve(Mat3::Identity())) : Mat3(Mat3::Zero());
-  if (llt.info() != Eigen::Success || !S.allFinite() || !(S(2, 2) > 0)) {
+  const Cholesky<3> llt(now.H);
+  const Mat3 S = llt.ok() ? llt.inverse() : Mat3(Mat3::Zero());
+  if (!llt.ok() || !S.allFinite() || !(S(2, 2) > 0)) {
     out.status = TriangulateStatus::no_baseline;
     return out;
   }

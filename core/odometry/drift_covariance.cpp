@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include <Eigen/Cholesky>
+#include "core/math/linear_solve.hpp"
 
 namespace vergence::odometry {
 namespace {
@@ -71,8 +71,8 @@ bool may_be_none(const Transform& T_now_before, const Mat6& motion) noexcept {
   Vec6 e;
   e << T_now_before.t, log_so3(T_now_before.R);
   if (e.isZero(0)) return true;
-  const Eigen::LLT<Mat6> factor(motion);
-  return factor.info() == Eigen::Success && e.dot(factor.solve(e)) < kSigmas * kSigmas;
+  const Cholesky<6> factor(motion);
+  return factor.ok() && e.dot(factor.solve(e)) < kSigmas * kSigmas;
 }
 
 void DriftCovariance::step(const Transform& T_left_world, const Mat6& motion, double length_sigma,

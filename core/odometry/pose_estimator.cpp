@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Cholesky>
+#include "core/math/linear_solve.hpp"
 
 namespace vergence::odometry {
 namespace {
@@ -19,9 +19,9 @@ constexpr int kCameraAlone = 12;  // inliers for a camera's own pose to be belie
 
 /// Zero where the observations hold no pose.
 Mat6 covariance_of(const RefinedPose& pose) noexcept {
-  const Eigen::LLT<Mat6> factor(pose.information);
-  if (factor.info() != Eigen::Success) return Mat6::Zero();
-  return factor.solve(Mat6::Identity());
+  const Cholesky<6> factor(pose.information);
+  if (!factor.ok()) return Mat6::Zero();
+  return factor.inverse();
 }
 
 }  // namespace

@@ -1,10 +1,9 @@
 #include "core/calibration/detail/change_detector.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
+
+#include "core/math/linear_solve.hpp"
 
 namespace vergence::calibration::detail {
 namespace {
@@ -153,16 +152,16 @@ void ChangeDetector::learn(const TwoEvidences& window, Vec5* mean,
   if (past.motion.n > 0) e.add(past.motion, 1.0 / lambda_motion_);
   // (C⁻¹ + A)⁻¹, written so that neither need have an inverse.
   const Mat5 spread = Mat5::Identity() + covariance_ * fixed_block(e);
-  *covariance = Eigen::PartialPivLU<Mat5>(spread).solve(covariance_);
+  *covariance = lu_solve(spread, covariance_);
   *mean = *covariance * Eigen::Map<const Vec5>(e.g.data());
 }
 
 void ChangeDetector::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept {
   Mat5 A = fixed_block(e);
   A.diagonal().array() += 1.0 / (kPriorSigma * kPriorSigma);
-  const Eigen::LLT<Mat5> llt(A);
-  *covariance = llt.solve(Mat5::Identity());
-  *theta = llt.solve(Eigen::Map<const Vec5>(e.g.data()));
+  const Cholesky<5> factor(A);
+  *covariance = factor.inverse();
+  *theta = factor.solve(Vec5(Eigen::Map<const Vec5>(e.g.data())));
 }
 
 double ChangeDetector::single(const Evidence& stereo, double spread) const noexcept {

@@ -1,10 +1,9 @@
 #include "core/calibration/detail/monitor_residuals.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
+
+#include "core/math/linear_solve.hpp"
 
 namespace vergence::calibration::detail {
 namespace {
@@ -278,9 +277,9 @@ bool MonitorResiduals::motion_row(const Reference& c, const MonitorFrame& frame,
   J_pose.rightCols<3>() = -q.z() * M;
 
   const Mat3 C = n.covariance + D * b.covariance * D.transpose();  // of the gap, for 1 px
-  const Eigen::LLT<Mat3> llt(C);
-  if (llt.info() != Eigen::Success) return false;
-  const Mat3 whiten = llt.matrixL().solve(Mat3::Identity());
+  const Cholesky<3> factor(C);
+  if (!factor.ok()) return false;
+  const Mat3 whiten = factor.whitening();
   row->r.noalias() = whiten * gap;
   row->J_theta.noalias() = whiten * J_theta;
   row->J_pose.noalias() = whiten * J_pose;
@@ -299,7 +298,7 @@ MotionResiduals MonitorResiduals::motion(const Reference& c, const MonitorFrame&
 
   Vec6 pose = Vec6::Zero(), theta = Vec6::Zero(), g_theta, g_pose;
   Mat6 A_theta, A_pose, A_cross;  // A_cross: θ by pose
-  Eigen::LLT<Mat6> pose_factor;
+  Cholesky<6> pose_factor(Mat6::Identity());
   for (int round = 0; round < kMotionRounds; ++round) {
     const auto size2 = [&](const MotionRow& row) {
       return (row.r + row.J_theta * theta + row.J_pose * pose).squaredNorm() * row.inverse_sigma2;
@@ -321,9 +320,9 @@ MotionResiduals MonitorResiduals::motion(const Reference& c, const MonitorFrame&
       g_pose.noalias() -= weighted_pose.transpose() * row.r;
     }
     for (int i = 0; i < 6; ++i) A_pose(i, i) *= 1.0 + 1e-9;
-    pose_factor.compute(A_pose);
-    if (pose_factor.info() != Eigen::Success) return look;
-    const Mat6 eliminated = pose_factor.solve(A_cross.transpose());
+    pose_factor = Cholesky<6>(A_pose);
+    if (!pose_factor.ok()) return look;
+    const Mat6 eliminated = pose_factor.solve(Mat6(A_cross.transpose()));
     Mat6 A = A_theta - A_cross * eliminated;
     const Vec6 g = g_theta - eliminated.transpose() * g_pose;
     look.evidence = Evidence{};
@@ -335,11 +334,11 @@ MotionResiduals MonitorResiduals::motion(const Reference& c, const MonitorFrame&
     Mat6 regular = A;
     regular.diagonal().head<kFixed>().array() += 1.0 / (kFitSigma * kFitSigma);
     regular(kLag, kLag) += 1e12;
-    theta = Eigen::LDLT<Mat6>(regular).solve(g);
-    pose = pose_factor.solve(g_pose - A_cross.transpose() * theta);
+    theta = ldlt_solve(regular, g);
+    pose = pose_factor.solve(Vec6(g_pose - A_cross.transpose() * theta));
   }
   const Solved factor(look.evidence.A, look.evidence.g);
-  const Mat6 eliminated = pose_factor.solve(A_cross.transpose());
+  const Mat6 eliminated = pose_factor.solve(Mat6(A_cross.transpose()));
   double spread = 0;
   for (std::size_t i = 0; i < n; ++i) {
     const MotionRow& row = motion_[i];

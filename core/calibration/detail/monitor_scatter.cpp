@@ -1,6 +1,6 @@
 #include "core/calibration/detail/monitor_scatter.hpp"
 
-#include <Eigen/Cholesky>
+#include "core/math/linear_solve.hpp"
 
 namespace vergence::calibration::detail {
 namespace {
@@ -14,11 +14,11 @@ constexpr double kMostBlocks = 60;      // that are remembered: half a minute at
 void BlockScatter::add(const Evidence& block, const Evidence& past, double lambda) noexcept {
   if (!(block.n > 0) || !(past.n > 0)) return;
   const Mat5 A = fixed_block(block), P = fixed_block(past);
-  const Eigen::LLT<Mat5> of_block(A), of_past(P);
-  if (of_block.info() != Eigen::Success || of_past.info() != Eigen::Success) return;
-  const Vec5 d = of_block.solve(Eigen::Map<const Vec5>(block.g.data())) -
-                 of_past.solve(Eigen::Map<const Vec5>(past.g.data()));
-  const double by_noise = lambda * (kFixed + (A * of_past.solve(Mat5::Identity())).trace());
+  const Cholesky<5> of_block(A), of_past(P);
+  if (!of_block.ok() || !of_past.ok()) return;
+  const Vec5 d = of_block.solve(Vec5(Eigen::Map<const Vec5>(block.g.data()))) -
+                 of_past.solve(Vec5(Eigen::Map<const Vec5>(past.g.data())));
+  const double by_noise = lambda * (kFixed + (A * of_past.inverse()).trace());
   const double scatter = (d.dot(A * d) - by_noise) / (kFixed * block.n);
   const double most = kMostOfExpected * std::max(variance(), lambda / block.n);
   if (!(scatter < most)) return;  // also refuses NaN

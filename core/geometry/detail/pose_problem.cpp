@@ -1,10 +1,10 @@
 #include "core/geometry/detail/pose_problem.hpp"
 
-#include <Eigen/Cholesky>
 #include <cassert>
 #include <limits>
 
 #include "core/camera/camera.hpp"
+#include "core/math/linear_solve.hpp"
 
 namespace vergence::detail {
 namespace {
@@ -132,8 +132,8 @@ bool solve_normal(const Mat6& H, const Vec6& g, Vec6* delta) noexcept {
     d[i] = 1.0 / std::sqrt(H(i, i));
   }
   const Mat6 A = d.asDiagonal() * H * d.asDiagonal();
-  const Eigen::LLT<Mat6> llt(A);
-  if (llt.info() != Eigen::Success) return false;
+  const Cholesky<6> llt(A);
+  if (!llt.ok()) return false;
   const Vec6 x = d.asDiagonal() * llt.solve(Vec6(d.asDiagonal() * g));
   if (!x.allFinite()) return false;
   *delta = x;
