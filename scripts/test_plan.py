@@ -4,8 +4,8 @@
   test_plan.py costs BUILD                       the slowest tests and compile steps, and times by tier, folder and target
   test_plan.py share BUILD TIER TURN SECONDS     the argument of CTest's -I for one share of the tier
 
-A tier is divided, in CTest's order, into shares whose tests' COST properties (seconds; 1 where there is none) sum up to SECONDS at most, per
-processor. Turns follow one another through the shares. A test that costs more than a share is left out with a message on stderr.
+A tier is divided, in CTest's order, into shares that take SECONDS by their tests' COST properties (seconds; 1 where there is none). Turns follow
+one another through the shares. A test that costs more than a share is left out with a message on stderr; what a test requires is run with it.
 """
 import collections
 import json
@@ -14,34 +14,37 @@ import subprocess
 import sys
 
 SHOWN = 40
+CORES = os.cpu_count() or 1
 
 
 def listed(build):
-    """[(name, tier, folder, cost)] in CTest's order, which its -I counts from 1."""
+    """[(name, tier, folder, seconds of one processor)] in CTest's order, which its -I counts from 1."""
     shown = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], capture_output=True, text=True, check=True)
     found = []
     for test in json.loads(shown.stdout)["tests"]:
         properties = {p["name"]: p["value"] for p in test.get("properties", [])}
         labels = properties.get("LABELS", []) + ["", ""]
-        found.append((test["name"], labels[0], labels[1], float(properties.get("COST", 1))))
+        alone = properties.get("RUN_SERIAL", False) or properties.get("PROCESSORS", 1) > 1
+        found.append((test["name"], labels[0], labels[1], float(properties.get("COST", 1)) * (CORES if alone else 1)))
     return found
 
 
 def share(build, tier, turn, seconds):
-    budget = seconds * (os.cpu_count() or 1)
-    shares, used = [[]], 0.0
+    budget = seconds * CORES
+    shares, used, left_out = [[]], 0.0, []
     for number, (name, its_tier, _, cost) in enumerate(listed(build), 1):
         if its_tier != tier:
             continue
         if cost > budget:
-            print("test: %s takes some %.0f s and is left out of shares of %.0f s; run it with scripts/test --tier %s -R '^%s$'"
-                  % (name, cost, seconds, tier, name), file=sys.stderr)
+            left_out.append("%s (%.0f s)" % (name, cost / CORES))
             continue
         if used + cost > budget:
             shares.append([])
             used = 0.0
         shares[-1].append(number)
         used += cost
+    if left_out:
+        print("test: in no share, as they take more than %.0f s: %s" % (seconds, ", ".join(left_out)), file=sys.stderr)
     chosen = shares[turn % len(shares)]
     print("test: share %d of %d of the tier %s" % (turn % len(shares) + 1, len(shares), tier), file=sys.stderr)
     return "0,0,0," + ",".join(str(number) for number in chosen)
