@@ -2,9 +2,6 @@
 
 CONTEXTS = {
     "app/datasets/recorded_session.hpp": ((), "std::vector<std::uint8_t> pixels"),
-    "app/device_replay/replayed_devices.hpp": (
-        ("drivers/acquisition/acquisition.hpp",),
-        "const Configuration& configuration, const ReplayedDrive& drive, const ReplayedDevices::Pixels& pixels"),
     "app/publish/http_server.hpp": (
         ("app/publish/live_state.hpp", "drivers/clock.hpp"),
         "const HostPort& address, const HttpPolicy& policy, std::string_view page, LiveState& state, bool ended, void (*act)(HttpRoute)"),
@@ -13,7 +10,6 @@ CONTEXTS = {
         ("app/recording/disk.hpp",),
         "Disk& disk, std::span<const McapTopic> topics, std::vector<std::uint8_t> record, std::span<const std::uint8_t> body, "
         "std::span<const std::span<const std::uint8_t>> parts"),
-    "app/recording/png_encoder.hpp": ((), "const ImageView& image"),
     "app/recording/recording.hpp": (
         ("core/types/pose_sample.hpp",),
         "const Recording::Options& options, std::size_t kPose, Stamp stamp, const PoseSample& sample, "
