@@ -55,30 +55,4 @@ class Notifier {
   virtual void notify() noexcept = 0;
 };
 
-/// One step of the conversation on a device's line, as its driver made it. In their order these
-/// steps, with the bytes, are all that a driver on a line learns of its device.
-struct LineEvent {
-  enum class Kind : std::uint8_t {
-    opened,   // bytes: the place's name; value: its latency timer, µs
-    read,     // bytes; time: arrival of the last of them
-    written,  // bytes; time: what the driver's last look at the clock had told it
-    baud,     // value: to be spoken from now on
-    lost,     // value: the DeviceStatus that a read ended with
-    timeout,  // a read brought nothing; time: when it ended
-  } kind = Kind::read;
-  HostStamp time{};
-  std::uint32_t value = 0;
-  std::span<const std::uint8_t> bytes{};  // valid during the call
-};
-
-/// Sees the conversation on a device's line: for a record.
-///
-/// Threads  on_line_event() on the device's own, one device each; it does not wait. What was said
-///          before there was an observer: on the owner's.
-class LineObserver {
- public:
-  virtual ~LineObserver() = default;
-  virtual void on_line_event(const LineEvent& event) noexcept = 0;
-};
-
 }  // namespace vergence

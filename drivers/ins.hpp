@@ -84,10 +84,6 @@ class InsDevice {
   [[nodiscard]] virtual DeviceStatus pause(Duration /*gap*/) noexcept {
     return DeviceStatus::unsupported;
   }
-  /// Who sees the conversation on its line, which outlives it; null: nobody. Before the first
-  /// start(): also what was said since the device was opened. False: it has no line. Owner's
-  /// thread, while stopped.
-  virtual bool observe_line(LineObserver* /*observer*/) noexcept { return false; }
   /// One sentence about the last call that was not `ok`: what was refused, what to do. Empty: the
   /// status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }

@@ -89,10 +89,6 @@ class TriggerDevice {
   }
   /// No pulse after it returns.
   virtual void stop() noexcept = 0;
-  /// Who sees the conversation on its line, which outlives it; null: nobody. Before the first
-  /// start(): also what was said since the device was opened. False: it has no line. Owner's
-  /// thread, while stopped.
-  virtual bool observe_line(LineObserver* /*observer*/) noexcept { return false; }
   /// As those of InsDevice.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
   [[nodiscard]] virtual std::string remark() const { return {}; }

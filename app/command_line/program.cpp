@@ -12,6 +12,7 @@
 
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/version.hpp"
+#include "app/runtime/withdrawn.hpp"
 #include "core/features/simd_target.hpp"
 
 #include <CLI/Config.hpp>
@@ -57,9 +58,10 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
     const std::string& first = extras.front();
     const std::string name = first.substr(0, first.find('='));
     const bool option = name.size() > 1 && name.front() == '-';
+    const std::string why = why_withdrawn(Withdrawn::Kind::option, command.get_name() + " " + name);
     return who + (option ? "unknown option " : "unexpected argument ") + "\"" + name + "\"" +
-           (option ? did_you_mean(name, option_names(command)) : "") + " (" + help_hint(command) +
-           " understood)";
+           (option && why.empty() ? did_you_mean(name, option_names(command)) : why) + " (" +
+           help_hint(command) + " understood)";
   }
   return who + error.what() + " (" + help_hint(command) + " expected)";
 }
@@ -71,9 +73,11 @@ void check_first_word(CLI::App& root, int argc, const char* const* argv) {
   if (!word.empty() && word.front() == '-') return;
   auto words = command_words(root);
   words.insert(words.end(), {"help", "version"});
-  if (std::find(words.begin(), words.end(), word) == words.end())
-    throw InputError("unknown command \"" + word + "\"" + did_you_mean(word, words) +
-                     " ('vergence --help' lists the commands)");
+  if (std::find(words.begin(), words.end(), word) != words.end()) return;
+  const std::string why = why_withdrawn(Withdrawn::Kind::command, word);
+  throw InputError("unknown command \"" + word + "\"" +
+                   (why.empty() ? did_you_mean(word, words) : why) +
+                   " ('vergence --help' lists the commands)");
 }
 
 /// `help`, `help COMMAND` and `version` as the options that they stand for.

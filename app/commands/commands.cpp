@@ -1,7 +1,5 @@
 #include "app/commands/commands.hpp"
 
-#include "app/command_line/manual.hpp"
-
 namespace vergence::app {
 
 void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_code) {
@@ -15,7 +13,6 @@ void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_
   add_doctor(root, exit_code);
   add_snap(root, exit_code);
   add_calibrate(root, words, exit_code);
-  add_manual(root);
 }
 
 }  // namespace vergence::app

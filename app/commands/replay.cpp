@@ -23,8 +23,7 @@ struct ReplayArguments {
   std::optional<std::int64_t> frames;
   std::optional<double> baseline, focal;
   std::optional<std::string> distortion;
-  bool from_scratch = false, calibrate_first = false, memory = false, page = false,
-       through_devices = false;
+  bool from_scratch = false, calibrate_first = false, memory = false, page = false;
 };
 
 std::optional<KnownNumbers> known_numbers(const ReplayArguments& a) {
@@ -75,15 +74,9 @@ ReplayRequest replay_request(const ReplayArguments& a) {
   r.calibrate_first = a.calibrate_first || (r.known && !a.from_scratch);
   r.start = static_cast<std::size_t>(a.start);
   if (a.frames) r.frames = static_cast<std::size_t>(*a.frames);
-  if (a.through_devices && (r.format != SequenceFormat::session || r.calibrate_first))
-    throw InputError(
-        "--through-devices is for the recording of a live drive, and does not go with "
-        "--calibrate-first or --focal");
-  r.through_devices = a.through_devices;
-  r.configuration =
-      a.common.configuration(std::nullopt, r.format == SequenceFormat::session
-                                               ? recorded_settings(r.data, r.through_devices)
-                                               : std::vector<std::string>{});
+  r.configuration = a.common.configuration(std::nullopt, r.format == SequenceFormat::session
+                                                             ? recorded_settings(r.data)
+                                                             : std::vector<std::string>{});
   r.session.quiet = a.common.quiet;
   if (a.also) r.session.also = parse_other_formats(*a.also);
   r.session.print_memory = a.memory;
@@ -149,9 +142,6 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   command->add_flag("--calibrate-first", a->calibrate_first,
                     "Calibrate from the whole drive, lenses included, then drive with what was "
                     "found (twice the drive more)");
-  command->add_flag("--through-devices", a->through_devices,
-                    "Of a recorded session: bytes of INS and board through their drivers, frames "
-                    "and pulses through clocks and synchroniser, instead of what came out of them");
   declare_session_options(*command, &a->also, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {

@@ -76,7 +76,7 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option(
           "--record", a->record,
-          "What is recorded into drive.mcap, e.g. poses,ins,images,pulses,raw (docs/recording.md)")
+          "What is recorded into drive.mcap, e.g. poses,ins,images,pulses (docs/recording.md)")
       ->type_name("WORDS");
   declare_session_options(*command, &a->also, &a->memory, &a->page);
   a->common.declare(*command);

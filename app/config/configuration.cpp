@@ -14,6 +14,7 @@
 #include "app/config/yaml_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/withdrawn.hpp"
 
 namespace vergence::app {
 namespace {
@@ -134,7 +135,9 @@ std::string suggestion(const std::string& name) {
     if (find_key(entry.name.substr(0, dot)) != nullptr)
       throw InputError(entry.origin + ": " + entry.name.substr(0, dot) +
                        " takes one value, not a group or a list");
-  throw InputError(entry.origin + ": there is no key \"" + shown + "\"" + suggestion(entry.name));
+  const std::string why = why_withdrawn(Withdrawn::Kind::key, entry.name);
+  throw InputError(entry.origin + ": there is no key \"" + shown + "\"" +
+                   (why.empty() ? suggestion(entry.name) : why));
 }
 
 /// The rest of a sentence "it must be …".
@@ -290,11 +293,12 @@ std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
         entry.name.starts_with(kGroup) && entry.name.size() > kGroup.size() &&
         entry.name.find_first_not_of("0123456789", kGroup.size()) == std::string::npos;
     if (!item) continue;
-    const std::vector<std::string> words{"poses", "ins", "images", "pulses", "raw"};
+    const std::vector<std::string> words{"poses", "ins", "images", "pulses"};
     if (!entry.scalar || std::find(words.begin(), words.end(), entry.value) == words.end())
-      throw InputError(fmt::format("{}: record lists \"{}\"{}; it takes {}", entry.origin,
-                                   entry.value.substr(0, 60), did_you_mean(entry.value, words),
-                                   fmt::join(words, ", ")));
+      throw InputError(fmt::format("{}: record lists \"{}\"{}{}; it takes {}", entry.origin,
+                                   entry.value.substr(0, 60),
+                                   why_withdrawn(Withdrawn::Kind::record_topic, entry.value),
+                                   did_you_mean(entry.value, words), fmt::join(words, ", ")));
     entry.name = std::string(kGroup) + entry.value;
     entry.value = "on";
   }

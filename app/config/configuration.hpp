@@ -150,15 +150,14 @@ struct MockSettings {
 
 /// `record:` what goes into drive.mcap of a session (docs/recording.md).
 struct RecordSettings {
-  int poses = 0, ins = 0, images = 0, pulses = 0, raw = 0;  // 1: recorded
-  double keep_s = 0;                                        // 0: everything
-  int roll_mb = 0;                                          // 0: one file
-  double roll_s = 0;                                        // 0: one file
-  int memory_mb = 0;     // 0: as much as six seconds take, and keep_s
-  int image_format = 0;  // kRawImages …
+  int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
+  double keep_s = 0;                               // 0: everything
+  int roll_mb = 0;                                 // 0: one file
+  int memory_mb = 0;                               // 0: as much as six seconds take, and keep_s
+  int image_format = 0;                            // kRawImages …
   static constexpr int kRawImages = 0, kPngImages = 1;
 
-  [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses + raw > 0; }
+  [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
 };
 
 /// `sessions:` the folders that drives leave side by side.

@@ -47,17 +47,11 @@ Group record() {
       .choice("image_format", &R::image_format, {"raw", "png"},
               "`raw`: `sensor_msgs/Image`, as it is; `png`: `sensor_msgs/CompressedImage`, half of "
               "the disk for some of a processor (docs/recording.md).")
-      .choice("pulses", &R::pulses, off_on,
-              "Of a live drive: the trigger board's pulses and the cameras' frames by their own "
-              "counters and clocks, before they are paired.")
-      .choice("raw", &R::raw, off_on,
-              "Of a live drive: the bytes that came over the lines of INS and trigger board.")
+      .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
       .number("keep_s", &R::keep_s, 0, 3600, "s",
               "0: everything; else only what was so long before an event and so long after it.")
       .integer("roll_mb", &R::roll_mb, 0, 10'000'000, "MB",
-               "A file is ended when it has so many, and the next one begun; 0: by size never.")
-      .number("roll_s", &R::roll_s, 0, 86400, "s",
-              "A file is ended when it spans so long; 0: by time never.")
+               "Size at which a file ends and the next one begins; 0: one file.")
       .integer("memory_mb", &R::memory_mb, 0, 1'000'000, "MB",
                "What may wait for the disk, or for an event; 0: as much as six seconds take, and "
                "`keep_s`.")

@@ -6,7 +6,6 @@
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/name_order.hpp"
-#include "app/datasets/exif.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
@@ -173,18 +172,6 @@ std::vector<StereoPair> pair_without_times(const std::filesystem::path& folder,
   return pair_in_order(left, right);
 }
 
-/// What is said where images ask to be turned.
-std::string orientation_remark(const std::filesystem::path& file) {
-  std::vector<std::uint8_t> bytes;
-  if (read_image_file(file, &bytes) != ImageFileStatus::ok) return "";
-  const auto orientation = exif_orientation(bytes);
-  if (!orientation || *orientation == 1) return "";
-  return file.string() + " asks viewers to turn it (EXIF orientation " +
-         std::to_string(*orientation) +
-         "), which is ignored: pixels are taken as the camera wrote them, and so has to be its "
-         "calibration";
-}
-
 }  // namespace
 
 StereoSequence open_folder(const std::filesystem::path& folder, bool given,
@@ -206,8 +193,6 @@ StereoSequence open_folder(const std::filesystem::path& folder, bool given,
     sequence.pairs = pair_without_times(folder, left, right);
     assume_times(&sequence);
   }
-  if (std::string turned = orientation_remark(folder / left.front()); !turned.empty())
-    sequence.remarks.push_back(std::move(turned));
   if (given) return sequence;
   sequence.calibration = read_calibration(folder / "calibration.yaml", use).rig;
   sequence.calibration_source = "calibration.yaml";

@@ -87,8 +87,8 @@ const char* to_phrase(ImageFileStatus status) noexcept {
     case ImageFileStatus::torn:
       return "is torn: it ends before the image is complete, or its check sums fail";
     case ImageFileStatus::undecodable:
-      return "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours and BMP of "
-             "8-bit grey can";
+      return "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours and "
+             "uncompressed BMP of 8-bit grey or 24 bits can";
     case ImageFileStatus::wrong_size:
       return "has another size than the calibration";
   }

@@ -52,11 +52,11 @@ struct ImageSize {
 /// decoded has 0, as a black one. Takes memory for the image.
 [[nodiscard]] std::optional<std::uint16_t> peak_of_deep_image(std::span<const std::uint8_t> bytes);
 
-/// PNG of any depth and colour, JPEG of grey or three colours, or 8-bit grey BMP → 8-bit grey, into
-/// size.height rows of `stride` bytes at `out`; no other copy is made. Any number of threads at
-/// once. `deep_bits`: how many of the 16 bits of deep samples are used (8 … 16).
-/// Not `ok`: content of `out` undefined. Throws nothing.
-/// → ok, not_an_image, torn, undecodable, wrong_size
+/// PNG of any depth and colour, JPEG of grey or three colours, or BMP of 8-bit grey or 24 bits →
+/// 8-bit grey, into size.height rows of `stride` bytes at `out`; no other copy is made. Any number
+/// of threads at once. `deep_bits`: how many of the 16 bits of deep samples are used (8 … 16). Not
+/// `ok`: content of `out` undefined. Throws nothing. → ok, not_an_image, torn, undecodable,
+/// wrong_size
 [[nodiscard]] ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size,
                                           std::uint8_t* out, std::size_t stride,
                                           int deep_bits = 16) noexcept;

@@ -3,17 +3,16 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
-#include <mutex>
+#include <new>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "app/datasets/detail/bag_index.hpp"
-#include "app/datasets/detail/grey_png.hpp"
-#include "app/datasets/detail/png.hpp"
 #include "app/datasets/detail/ros_messages.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
+#include "app/datasets/image_file.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/version.hpp"
 
@@ -104,28 +103,23 @@ std::optional<RecordedReading> read_reading(std::span<const std::uint8_t> bytes)
   return r;
 }
 
+/// A PNG of the recording, decoded into rows without padding.
+bool read_png(const detail::ByteSource& file, const RecordedImage& image,
+              std::uint8_t* out) noexcept {
+  try {
+    std::vector<std::uint8_t> png(image.packed);
+    return file.read(image.offset, png) &&
+           decode_grey(png, {image.width, image.height}, out,
+                       static_cast<std::size_t>(image.width)) == ImageFileStatus::ok;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 struct RecordedSession::Files {
   std::vector<detail::BagFile> list;
-
-  // Where PNGs are read into and decoded: of the largest, so that read() takes no heap.
-  std::mutex decoding;
-  std::vector<std::uint8_t> packed;
-  detail::GreyPngDecoder decoder;
-
-  void reserve(const RecordedImage& image) {
-    if (image.packed > packed.size()) packed.resize(image.packed);
-    decoder.reserve(image.packed, {image.width, image.height});
-  }
-  [[nodiscard]] bool decode(const detail::ByteSource& file, const RecordedImage& image,
-                            std::uint8_t* out) noexcept {
-    const std::lock_guard lock(decoding);
-    const auto png = std::span(packed).first(image.packed);
-    return file.read(image.offset, png) && detail::check_png(png) == ImageFileStatus::ok &&
-           decoder.decode(png, {image.width, image.height}, out,
-                          static_cast<std::size_t>(image.width));
-  }
 };
 
 /// What a scan gathers.
@@ -202,7 +196,6 @@ struct RecordedSession::Reader {
           continue;
         }
         frame.images[k] = found->second;
-        session->files_->reserve(found->second);
       }
   }
 
@@ -300,7 +293,7 @@ bool RecordedSession::read(const RecordedFrame& frame, std::size_t camera, std::
   const auto size = width * static_cast<std::size_t>(image.height);
   const detail::ByteSource& file = *files_->list[image.file].bytes;
   // In one piece, so that the check sum is one; then the rows move apart, the last one first.
-  if (image.packed == 0 ? !file.read(image.offset, {out, size}) : !files_->decode(file, image, out))
+  if (image.packed == 0 ? !file.read(image.offset, {out, size}) : !read_png(file, image, out))
     return false;
   if (crc32_of({out, size}) != frame.given.image_crc[camera]) return false;
   if (stride != width)

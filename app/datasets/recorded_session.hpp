@@ -30,7 +30,7 @@ struct RecordedFrame {
 };
 
 /// A recording, opened. Memory  Some 400 bytes a frame and 250 a reading; pixels stay in the files.
-/// Threads  read(): any number at once; PNGs are decoded one at a time.
+/// Threads  read(): any number at once.
 ///
 ///     const RecordedSession session = RecordedSession::open("sessions/monday");
 ///     for (const RecordedFrame& frame : session.frames()) {
@@ -52,7 +52,7 @@ class RecordedSession {
   /// All images that the estimator had are here, and no frame is missing between two.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
   /// Pixels of a frame's image of camera `camera`, rows `stride` bytes apart. False: they cannot be
-  /// read, or are not those that were recorded. No heap.
+  /// read, or are not those that were recorded. Takes heap where the image is a PNG.
   [[nodiscard]] bool read(const RecordedFrame& frame, std::size_t camera, std::uint8_t* out,
                           std::size_t stride) const noexcept;
   /// Gives back what frames() and readings() take, and they are empty; all else stays.

@@ -62,10 +62,10 @@ Trajectory checked(const fs::path& file, Trajectory trajectory) {
 }
 
 Trajectory parse_tum(const fs::path& file, std::string_view text) {
-  constexpr std::size_t kShortest = 15;  // bytes of eight numbers
+  constexpr std::size_t kShortestLine = 15;  // bytes of eight numbers
   const auto ends = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
   Trajectory trajectory;
-  trajectory.reserve(std::min(ends, text.size() / kShortest) + 1);
+  trajectory.reserve(std::min(ends, text.size() / kShortestLine) + 1);
   Lines lines(text);
   std::string_view line;
   while (lines.next(&line)) {

@@ -75,7 +75,7 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
 
 }  // namespace
 
-void start_acquisition(Acquisition* acquisition, AcquisitionObserver* observer) {
+void start_acquisition(Acquisition* acquisition, PulseObserver* observer) {
   const auto failure = acquisition->start(observer);
   if (!failure) return;
   const std::string why = failure->message.empty()

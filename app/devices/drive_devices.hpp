@@ -77,6 +77,6 @@ class DriveDevices {
 };
 
 /// Acquisition::start(); refuse_device() names the device that cannot be started.
-void start_acquisition(Acquisition* acquisition, AcquisitionObserver* observer = nullptr);
+void start_acquisition(Acquisition* acquisition, PulseObserver* observer = nullptr);
 
 }  // namespace vergence::app

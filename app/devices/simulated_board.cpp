@@ -47,9 +47,6 @@ class SimulatedBoard final : public TriggerDevice {
     rig_->end_feed();
     rig_->trigger().stop();
   }
-  bool observe_line(LineObserver* observer) noexcept override {
-    return board_->observe_line(observer);
-  }
   std::string last_error() const override { return board_->last_error(); }
   std::string remark() const override { return board_->remark(); }
   TriggerStatistics statistics() const noexcept override { return board_->statistics(); }

@@ -3,6 +3,7 @@
 #include <pthread.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <new>
@@ -29,17 +30,15 @@ static_assert(std::is_trivially_copyable_v<Record> && std::is_trivially_copyable
 struct Recorder::Files {
   Files(const std::filesystem::path& session, const Options& options)
       : folder(session.string()),
-        folder_fault(options.folder_fault),
         mark(options.number, folder.c_str()),
-        trajectory(session / "trajectory.tum", LineFile::kPending, options.disk_away),
-        reference(session / "reference.tum", LineFile::kPending, options.disk_away),
-        poses(session / "poses.csv", LineFile::kPending, options.disk_away),
-        calibrations(session / "calibrations.csv", LineFile::kPending, options.disk_away),
-        events(session / "events.jsonl", LineFile::kPending, options.disk_away),
+        trajectory(session / "trajectory.tum"),
+        reference(session / "reference.tum"),
+        poses(session / "poses.csv"),
+        calibrations(session / "calibrations.csv"),
+        events(session / "events.jsonl"),
         all{&trajectory, &reference, &poses, &calibrations, &events} {
     constexpr std::size_t kMinutes = std::size_t{16} << 20;  // bytes: readings are many
-    if (options.ins) all.push_back(&ins.emplace(session / "ins.csv", kMinutes, options.disk_away));
-    reported.resize(all.size());
+    if (options.ins) all.push_back(&ins.emplace(session / "ins.csv", kMinutes));
   }
   /// The first line of a table; empty: the file has none.
   [[nodiscard]] std::string head(const LineFile* file) const {
@@ -47,22 +46,12 @@ struct Recorder::Files {
     if (file == &calibrations) return std::string(kCalibrationsHeader) + "\n";
     return ins && file == &*ins ? std::string(kInsHeader) + "\n" : "";
   }
-  /// Makes the folder where the disk was away. Only one that never was there: below a disk that is
-  /// unmounted for a while another one would come to lie.
-  void come_to_folder() {
-    if (folder_fault == 0) return;
-    folder_fault = make_folders(folder.c_str());
-    if (folder_fault == 0) mark.put_on(folder.c_str());
-  }
   std::string folder;
-  int folder_fault;  // errno: it is not there yet
   SessionMark mark;  // before any file is there
   LineFile trajectory, reference, poses, calibrations, events;
   std::optional<LineFile> ins{};
   bool has_reference = false;  // a line was written there
   std::vector<LineFile*> all;
-  std::vector<int> reported{};                       // errno that was reported, by all
-  std::chrono::steady_clock::time_point anew_due{};  // when files out of reach are opened again
 };
 
 namespace {
@@ -142,7 +131,6 @@ void Recorder::work() {
     const WakeEvent::Ticket seen = filled_.ticket();
     const bool stopping = stop_.load(
         std::memory_order_acquire);  // before the ring: what was posted before is still found
-    if (reopen_.exchange(false, std::memory_order_acquire)) reopen_files();
     const bool took = take(), decided = take_outcome();
     if (took || decided) {
       if (Clock::now() - flushed < kFlushAtLeast) continue;
@@ -239,71 +227,19 @@ bool Recorder::take_outcome() {
   return true;
 }
 
-/// `anew`: a file that is out of reach is looked for by its name, where a disk that was gone may
-/// have it again. False: not all was taken.
-bool Recorder::flush(LineFile* file, bool anew) {
-  if (file->flush()) return true;
-  if (!anew || files_->folder_fault != 0 || !file->out_of_reach() || !open_anew(file)) return false;
-  files_->mark.put_on(files_->folder.c_str());  // its folder may be another one since
-  return file->flush();
-}
-
+/// Writes what waits. After a failure no file is written again before kRetry has passed: every
+/// attempt may take a stalled disk seconds.
 void Recorder::flush() {
-  constexpr std::chrono::seconds kAnew{3};
-  const auto& files = files_->all;
   const auto now = std::chrono::steady_clock::now();
-  const bool anew = now >= files_->anew_due;
-  if (anew) files_->anew_due = now + kAnew;
-  if (anew) files_->come_to_folder();
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (flush(files[i], anew)) {
-      files_->reported[i] = 0;
-      if (files[i]->reopen_due()) reopen(files[i]);
-    } else if (files_->folder_fault == 0 && files_->reported[i] != files[i]->fault()) {
-      files_->reported[i] = files[i]->fault();
-      report_error(*files[i]);
-    }
-  }
-  note_disk(pretended_ || std::any_of(files.begin(), files.end(),
-                                      [](const LineFile* f) { return f->fault() != 0; }));
-}
-
-void Recorder::reopen() noexcept {
-  reopen_.store(true, std::memory_order_release);
-  filled_.signal();
-}
-
-void Recorder::reopen(LineFile* file) {
-  if (files_->folder_fault == 0 && !open_anew(file)) report_error(*file);
-}
-
-bool Recorder::open_anew(LineFile* file) {
-  bool fresh = false;
-  const bool opened = file->reopen(&fresh);
-  if (const int fault = file->take_left_fault(); fault != 0) {
-    const char* words = ::strerrordesc_np(fault);
-    report_error("{}: the file that had this name before is not complete ({}): check that disk",
-                 file->path().native(), words != nullptr ? words : "unknown error");
-  }
-  if (!fresh) return opened;
-  if (file == &files_->trajectory) totals_.trajectory_begins_anew(file->waiting_lines());
-  file->begin_with(files_->head(file));
-  return opened;
-}
-
-void Recorder::reopen_files() {
-  for (LineFile* file : files_->all) reopen(file);
-  EventRecord event;
-  event.stamp = newest_;
-  event.kind = "files_reopened";
-  const bool waits = std::any_of(files_->all.begin(), files_->all.end(),
-                                 [](const LineFile* f) { return f->reopen_due(); });
-  event.set_sentence(waits
-                         ? "the session's files are opened again by their names, as SIGHUP asked "
-                           "for, once the disk has room for the lines that wait"
-                         : "the session's files were opened again by their names, as SIGHUP asked "
-                           "for");
-  write(event);
+  if (disk_full_ && now < retry_due_) return;
+  retry_due_ = now + kRetry;
+  const LineFile* failed = nullptr;
+  for (LineFile* file : files_->all)
+    if (!file->flush() && failed == nullptr) failed = file;
+  if (failed != nullptr)
+    note_disk(failed, failed->fault());
+  else if (!pretended_)
+    note_disk(nullptr, 0);
 }
 
 void Recorder::pretend(Stamp stamp) {
@@ -312,30 +248,37 @@ void Recorder::pretend(Stamp stamp) {
   if (full) flush();  // what came before has found room
   pretended_ = full;
   for (LineFile* file : files_->all) file->pretend_full(full);
+  retry_due_ = {};
   if (full)
-    report_error(
-        "{}: the disk has no room, as the drive's faults want it; the session goes on, lines wait "
-        "in memory",
-        files_->folder);
-  flush();
+    note_disk(&files_->poses, ENOSPC);
+  else
+    flush();
 }
 
-/// An event where the disk begins to refuse, and where it takes lines again.
-void Recorder::note_disk(bool full) {
-  if (full == disk_full_) return;
-  disk_full_ = full;
+/// An error and an event when writing begins to fail, an event when all was written again.
+/// `failed`: a file that could not be written; null: all were.
+void Recorder::note_disk(const LineFile* failed, int fault) {
+  if ((failed != nullptr) == disk_full_) return;
+  disk_full_ = failed != nullptr;
   EventRecord event;
   event.stamp = newest_;
-  event.kind = full ? "disk_full" : "disk_room";
-  std::array<char, 96> room{};
-  (void)fmt::format_to_n(room.begin(), room.size() - 1, "the disk takes lines again; {} were lost",
-                         lost_lines());
-  const bool away = std::any_of(files_->all.begin(), files_->all.end(), [](const LineFile* f) {
-    return f->fault() != 0 && !f->wants_room();
-  });
-  event.set_sentence(!full  ? room.data()
-                     : away ? "the disk of the session takes nothing: lines wait in memory"
-                            : "the disk of the session has no room: lines wait in memory");
+  event.kind = disk_full_ ? "disk_full" : "disk_room";
+  std::array<char, 256> text{};
+  const auto out = text.begin();
+  if (disk_full_) {
+    const char* words = ::strerrordesc_np(fault);  // strerror() may take memory
+    if (words == nullptr) words = "unknown error";
+    report_error(
+        "{}: cannot be written ({}); the session goes on and writing is tried again every "
+        "{} s: check that disk",
+        failed->path().native(), words, kRetry.count());
+    (void)fmt::format_to_n(out, text.size() - 1, "the session's files cannot be written ({})",
+                           words);
+  } else {
+    (void)fmt::format_to_n(out, text.size() - 1, "the disk takes lines again; {} were lost",
+                           lost_lines());
+  }
+  event.set_sentence(text.data());
   write(event);
 }
 
@@ -343,13 +286,6 @@ std::uint64_t Recorder::lost_lines() const {
   std::uint64_t lines = 0;
   for (const LineFile* file : files_->all) lines += file->lost_lines();
   return lines;
-}
-
-void Recorder::report_error(const LineFile& file) {
-  const char* words = ::strerrordesc_np(file.fault());  // strerror() may take memory
-  report_error("{}: cannot be written ({}); the session goes on, lines wait in memory: {}",
-               file.path().native(), words != nullptr ? words : "unknown error",
-               file.wants_room() ? "make room on that disk" : "check that disk");
 }
 
 template <class... Arguments>
@@ -392,19 +328,14 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   if (keeper_ != nullptr) keeper_->stop();
   while (take_outcome()) {
   }
-  files_->come_to_folder();
   for (LineFile* file : files_->all) {
-    if (file->reopen_due()) reopen(file);
-    (void)flush(file, true);
     const bool good = file->close();
     totals.lost_lines += file->lost_lines();
-    const int fault = files_->folder_fault != 0 ? files_->folder_fault : file->fault();
-    if (!good)
-      totals.faults.push_back(file->path().string() + ": is not complete (" + std::strerror(fault) +
-                              "); make room on that disk and repeat the drive");
-    else if (file->lost_lines() > 0)
-      errors_.push_back(file->path().string() + ": lacks " + std::to_string(file->lost_lines()) +
-                        " lines that found no room on the disk in time; the others are all there");
+    if (good && file->lost_lines() == 0) continue;
+    const std::string why = good ? std::to_string(file->lost_lines()) + " lines are lost"
+                                 : std::strerror(file->fault());
+    totals.faults.push_back(file->path().string() + ": is not complete (" + why +
+                            "); check that disk and make room on it");
   }
   // A file that says nothing would look like a reference that was lost.
   std::error_code ignored;

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -57,10 +58,10 @@ inline constexpr const char* kCalibrationsHeader =
 /// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
 ///          Readings have a ring of their own: they never push out a pose. So have calibrations,
 ///          which poses would push out while the disk stands still; they are written in their turn.
-/// Errors   The constructor throws InputError. A disk that takes no more: an error and an event
-///          `disk_full`, the session goes on, see LineFile; an event `disk_room` when it takes
-///          lines again says what was lost. Lines lost in between leave the session usable and are
-///          an error of close(); a file that could not be ended is a fault of its totals.
+/// Errors   The constructor throws InputError. When the disk takes no more: an error and an event
+///          `disk_full`; lines wait as LineFile says, and are written again every kRetry to the
+///          files that were opened at the start. An event `disk_room` when all was taken, with the
+///          number of lines lost. A file that lacks lines is a fault of the totals.
 class Recorder {
  public:
   enum class WhenFull : std::uint8_t { wait, drop };
@@ -71,10 +72,6 @@ class Recorder {
     bool ins = false;                 // readings are posted: ins.csv is there
     Stamp first{};                    // of the recorder's own events before the first pose
     std::uint64_t number = 0;         // of SessionMark
-    /// A disk that is away at the beginning is none to wait for: poses go on as when it goes away
-    /// later. `folder_fault`: what try_session_folder() said; the recorder makes the folder then.
-    LineFile::Away disk_away = LineFile::Away::refuse;
-    int folder_fault = 0;
     /// Called on a thread of its own with every calibration that was accepted while driving, and
     /// with the one that the drive began with when it is confirmed first: files may be written
     /// there. May be empty.
@@ -96,18 +93,16 @@ class Recorder {
   void post(const InsRecord& reading) noexcept;
   /// Bytes taken at the beginning: lines that may wait, statuses of the frames expected.
   [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
-  /// Opens every file anew by its name, tables with their heads, as soon as the recorder's thread
-  /// comes to it; an event `files_reopened`. Any thread.
-  void reopen() noexcept;
   /// Sentences about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors();
   /// Writes what is waiting, closes the files. Once.
   [[nodiscard]] std::unique_ptr<SessionTotals> close();
 
  private:
-  static constexpr std::size_t kRing = 128;        // records: seconds of frames with their events
-  static constexpr std::size_t kReadings = 1024;   // 2.5 s of the fastest INS
-  static constexpr std::size_t kCalibrations = 8;  // they come seconds apart
+  static constexpr std::chrono::seconds kRetry{3};  // between two attempts to write
+  static constexpr std::size_t kRing = 128;         // records: seconds of frames with their events
+  static constexpr std::size_t kReadings = 1024;    // 2.5 s of the fastest INS
+  static constexpr std::size_t kCalibrations = 8;   // they come seconds apart
 
   /// What waits for the recorder's thread.
   template <class Value, std::size_t N>
@@ -140,16 +135,11 @@ class Recorder {
   void write(const InsRecord& reading);
   void report_kept(bool kept) noexcept;
   void flush();
-  [[nodiscard]] bool flush(LineFile* file, bool anew);
-  void reopen_files();
-  [[nodiscard]] bool open_anew(LineFile* file);
-  void reopen(LineFile* file);
   void pretend(Stamp stamp);
-  void note_disk(bool full);
+  void note_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
   void stop_and_join() noexcept;
   using ErrorSentence = std::array<char, 512>;  // ends with 0, cut at the array's end
-  void report_error(const LineFile& file);
   template <class... Arguments>
   void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
@@ -162,13 +152,14 @@ class Recorder {
   std::size_t memory_ = 0;
   Stamp newest_;  // of the poses
   bool disk_full_ = false, pretended_ = false;
+  std::chrono::steady_clock::time_point retry_due_{};  // while disk_full_
 
   Queue<Record, kRing> records_;
   Queue<InsRecord, kReadings> readings_;
   Queue<Placed, kCalibrations> calibrations_;
   Turn turn_;
   WakeEvent filled_, freed_;
-  std::atomic<bool> stop_{false}, reopen_{false};
+  std::atomic<bool> stop_{false};
   Ring<ErrorSentence, 16> error_sentences_;    // full: the newest are lost
   std::vector<std::string> errors_;            // of close()
   std::unique_ptr<CalibrationKeeper> keeper_;  // null: nothing is kept

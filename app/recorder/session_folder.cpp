@@ -2,18 +2,13 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
-#include <cerrno>
-#include <climits>
 #include <cstdio>
-#include <cstring>
 #include <string>
 #include <system_error>
 
-#include "app/runtime/disk_errors.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -33,11 +28,6 @@ void write_number(int folder, std::uint64_t number) noexcept {
   (void)::close(fd);
   if (!whole) (void)::unlinkat(folder, SessionMark::kFile, 0);
   (void)::fsync(folder);
-}
-
-InputError cannot_be_made(const std::filesystem::path& folder, int error) {
-  return InputError(folder.string() + ": cannot be made (" + std::strerror(error) +
-                    "): check the folder above it");
 }
 
 }  // namespace
@@ -63,35 +53,13 @@ bool check_session_folder(const std::filesystem::path& folder) {
 }
 
 bool make_session_folder(const std::filesystem::path& folder) {
-  bool made = false;
-  if (const int error = try_session_folder(folder, &made); error != 0)
-    throw cannot_be_made(folder, error);
-  return made;
-}
-
-int try_session_folder(const std::filesystem::path& folder, bool* made) {
-  *made = !check_session_folder(folder);
-  if (!*made) return 0;
+  if (check_session_folder(folder)) return false;
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error && !disk_is_away(error.value())) throw cannot_be_made(folder, error.value());
-  return error.value();
-}
-
-int make_folders(const char* folder) noexcept {
-  std::array<char, PATH_MAX> path{};
-  const std::size_t size = std::strlen(folder);
-  if (size == 0 || size >= path.size()) return ENAMETOOLONG;
-  for (std::size_t i = 0; i <= size; ++i) {
-    const bool ends = i > 0 && path[i - 1] != '/' && (folder[i] == '/' || folder[i] == '\0');
-    if (ends && ::mkdir(path.data(), 0777) != 0 && errno != EEXIST) {
-      struct stat status {};  // a read-only disk does not say of every folder that it is there
-      const int error = errno;
-      if (::stat(path.data(), &status) != 0) return error;
-    }
-    path[i] = folder[i];
-  }
-  return 0;
+  if (error)
+    throw InputError(folder.string() + ": cannot be made (" + error.message() +
+                     "): check that disk and the folder above it");
+  return true;
 }
 
 void discard_session_folder(const std::filesystem::path& folder, bool made) noexcept {
@@ -108,20 +76,15 @@ void discard_session_folder(const std::filesystem::path& folder, bool made) noex
   }
 }
 
-SessionMark::~SessionMark() {
-  if (fd_ >= 0) (void)::close(fd_);
+SessionMark::SessionMark(std::uint64_t number, const char* folder) noexcept
+    : fd_(::open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (fd_ < 0) return;
+  if (number > 0) write_number(fd_, number);
+  (void)::flock(fd_, LOCK_EX | LOCK_NB);
 }
 
-void SessionMark::put_on(const char* folder) noexcept {
-  const int fd = ::open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return;
-  if (number_ > 0) write_number(fd, number_);
-  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {  // it is this session's already
-    (void)::close(fd);
-    return;
-  }
+SessionMark::~SessionMark() {
   if (fd_ >= 0) (void)::close(fd_);
-  fd_ = fd;
 }
 
 }  // namespace vergence::app

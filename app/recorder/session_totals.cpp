@@ -1,6 +1,5 @@
 #include "app/recorder/session_totals.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace vergence::app {
@@ -50,19 +49,6 @@ void TotalsBuilder::add(const PoseRecord& p, bool in_trajectory) {
     totals_.path_m +=
         std::hypot(t[0] - last_pose_->t[0], t[1] - last_pose_->t[1], t[2] - last_pose_->t[2]);
   last_pose_ = p.world_left;
-}
-
-void TotalsBuilder::trajectory_begins_anew(std::size_t waiting) noexcept {
-  if (totals_.statuses_left_out > 0) {
-    // Nobody knows those of the lines that wait, some seconds of them.
-    totals_.statuses.assign(std::min(waiting, totals_.statuses.capacity()), PoseStatus::degraded);
-    totals_.statuses_left_out = 0;
-    return;
-  }
-  auto first = totals_.statuses.end();
-  while (waiting > 0 && first != totals_.statuses.begin())
-    waiting -= *--first != PoseStatus::lost ? 1 : 0;
-  totals_.statuses.erase(totals_.statuses.begin(), first);
 }
 
 /// An event comes before the pose of its frame, or after the last one.

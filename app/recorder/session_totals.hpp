@@ -85,10 +85,6 @@ class TotalsBuilder {
   /// An attempt that was decided. True: it was accepted.
   bool add(const CalibrationRecord& calibration);
 
-  /// What is in trajectory.tum from now on is all that there will be at the end. `waiting`: its
-  /// newest lines that are not in the file yet.
-  void trajectory_begins_anew(std::size_t waiting) noexcept;
-
   [[nodiscard]] std::size_t memory() const noexcept;
   [[nodiscard]] SessionTotals& totals() noexcept { return totals_; }
 

@@ -5,9 +5,10 @@
 #include <unistd.h>
 
 #include <cstring>
+#include <new>
 
 #include "app/recording/messages.hpp"
-#include "core/memory/allocation_guard.hpp"
+#include "app/recording/png_encoder.hpp"
 
 namespace vergence::app {
 namespace {
@@ -31,8 +32,6 @@ ImageEncoder::ImageEncoder(Recording& recording, const Options& options)
     : recording_(recording),
       options_(options),
       ring_(options.waiting),
-      png_(options.width, options.height),
-      file_(PngEncoder::most_bytes(options.width, options.height)),
       thread_([this] { work(); }) {}
 
 ImageEncoder::~ImageEncoder() { close(); }
@@ -73,7 +72,6 @@ void ImageEncoder::close() noexcept {
 void ImageEncoder::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-png");
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kEncoderNice);
-  const SealedScope sealed;
   for (;;) {
     const WakeEvent::Ticket seen = filled_.ticket();
     const bool last = stop_.load(std::memory_order_acquire);
@@ -94,14 +92,20 @@ void ImageEncoder::encode(std::span<const std::uint8_t> waiting) noexcept {
   Head head{};
   std::memcpy(&head, waiting.data(), sizeof head);
   const ImageView image{waiting.data() + sizeof head, head.width, head.height, head.width};
-  const std::size_t size = png_.encode(image, file_);
+  bool encoded = false;
+  try {
+    encoded = encode_png(image, &file_);
+  } catch (const std::bad_alloc&) {  // counted below
+  }
   ring_.release(sizeof head + head.pixels());
-  const auto room = size == 0 ? std::span<std::uint8_t>{}
-                              : recording_.begin(options_.queue, head.topic, head.stamp,
-                                                 kMessageRoom + head.frame.size() + size, true);
-  if (room.empty()) return;  // the recording has counted it
+  if (!encoded) dropped_.fetch_add(1, std::memory_order_relaxed);
+  const auto room = encoded
+                        ? recording_.begin(options_.queue, head.topic, head.stamp,
+                                           kMessageRoom + head.frame.size() + file_.size(), true)
+                        : std::span<std::uint8_t>{};
+  if (room.empty()) return;  // counted by the recording
   CdrWriter out(room);
-  write_compressed_image(&out, head.stamp, head.frame, "png", std::span(file_).first(size));
+  write_compressed_image(&out, head.stamp, head.frame, "png", file_);
   recording_.commit(options_.queue, out.ok() ? out.size() : 0);
 }
 

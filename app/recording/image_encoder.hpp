@@ -7,9 +7,9 @@
 #include <thread>
 #include <vector>
 
-#include "app/recording/png_encoder.hpp"
 #include "app/recording/record_ring.hpp"
 #include "app/recording/recording.hpp"
+#include "core/types/image.hpp"
 #include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
@@ -19,15 +19,14 @@ namespace vergence::app {
 ///
 /// Threads    post(): one. counters: any. close(): the owner's, after the last post() and before
 ///            the recording's close().
-/// Memory     All at construction; the thread takes no heap.
+/// Memory     What waits: at construction. The encoder's thread takes heap as libpng does.
 /// Full       As the recording: an image that finds no room is dropped and counted, or waited for.
 /// Errors     The constructor throws std::system_error, std::bad_alloc.
 class ImageEncoder {
  public:
   struct Options {
-    std::size_t queue = 0;      // of the recording, the encoder's alone
-    std::size_t waiting = 0;    // bytes of pixels that may wait to be encoded
-    int width = 0, height = 0;  // of the largest image, px
+    std::size_t queue = 0;    // of the recording, the encoder's alone
+    std::size_t waiting = 0;  // bytes of pixels that may wait to be encoded
     Recording::WhenFull when_full = Recording::WhenFull::drop;
   };
   /// `recording` outlives it.
@@ -44,8 +43,8 @@ class ImageEncoder {
   [[nodiscard]] std::uint64_t dropped() const noexcept {
     return dropped_.load(std::memory_order_relaxed);
   }
-  /// Bytes of pixels that may wait, and of the file at hand.
-  [[nodiscard]] std::size_t memory() const noexcept { return ring_.capacity() + file_.size(); }
+  /// Bytes of pixels that may wait.
+  [[nodiscard]] std::size_t memory() const noexcept { return ring_.capacity(); }
 
  private:
   void work() noexcept;
@@ -54,8 +53,7 @@ class ImageEncoder {
   Recording& recording_;
   const Options options_;
   RecordRing ring_;
-  PngEncoder png_;
-  std::vector<std::uint8_t> file_;
+  std::vector<std::uint8_t> file_;  // of the encoder's thread
   std::atomic<std::uint64_t> dropped_{0};
   std::atomic<bool> stop_{false};
   WakeEvent filled_, freed_;

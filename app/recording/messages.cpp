@@ -203,10 +203,6 @@ void write_diagnostics(CdrWriter* out, Stamp stamp, std::span<const Diagnostic> 
 
 void write_text(CdrWriter* out, std::string_view text) noexcept { out->text(text); }
 
-void write_bytes(CdrWriter* out, std::span<const std::uint8_t> bytes) noexcept {
-  out->count(0).put(std::uint32_t{0}).count(bytes.size()).raw(bytes);
-}
-
 void write_frame(CdrWriter* out, const FrameRecord& f) noexcept {
   out->header(f.stamp, "left").put(f.number).put(f.stamp.ns()).put(f.stamp_error.ns());
   out->put(f.spread.ns()).put(f.pairing).put(static_cast<std::uint8_t>(f.cameras));
@@ -222,13 +218,6 @@ void write_frame(CdrWriter* out, const FrameRecord& f) noexcept {
   put_crc(out);
 }
 
-void write_device_frame(CdrWriter* out, Stamp stamp, std::string_view name,
-                        const Frame& frame) noexcept {
-  out->header(stamp, name).put(frame.counter).put(frame.exposure_start.ns());
-  out->put(frame.arrival.ns()).put(frame.exposure.ns()).put(frame.gain_db);
-  out->boolean(frame.status == FrameStatus::complete);
-}
-
 void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse, Stamp edge) noexcept {
   out->header(stamp, "board").put(pulse.number).put(pulse.boot).put(pulse.edge.ns());
   out->put(pulse.arrival.ns()).boolean(pulse.resumed);
@@ -240,20 +229,6 @@ void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse, Stamp edge) no
   out->count(pulse.exposure.size());
   for (const PulseExposure& e : pulse.exposure) out->put(e.end.ns());
   out->boolean(pulse.mapped).put(edge.ns()).put(pulse.host_error.ns());
-}
-
-void write_device_gone(CdrWriter* out, Stamp stamp, int camera) noexcept {
-  out->put(stamp.ns()).put(static_cast<std::int32_t>(camera));
-}
-
-void write_line_event(CdrWriter* out, Stamp stamp, const LineEvent& event) noexcept {
-  out->put(stamp.ns()).put(static_cast<std::uint8_t>(event.kind)).put(event.value);
-  out->count(event.bytes.size()).raw(event.bytes);
-}
-
-void write_set(CdrWriter* out, Stamp stamp, const SetArrivals& set) noexcept {
-  out->header(stamp, "").put(set.number).count(set.at.size());
-  for (const Stamp& arrival : set.at) out->put(arrival.ns());
 }
 
 }  // namespace vergence::app

@@ -6,13 +6,11 @@
 #include <string_view>
 
 #include "app/recording/cdr_writer.hpp"
-#include "app/recording/device_records.hpp"
 #include "core/math/se3.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/image.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
-#include "drivers/camera.hpp"
 #include "drivers/ins.hpp"
 #include "drivers/trigger.hpp"
 
@@ -73,8 +71,7 @@ struct Diagnostic {
 };
 void write_diagnostics(CdrWriter* out, Stamp stamp, std::span<const Diagnostic> status) noexcept;
 
-void write_text(CdrWriter* out, std::string_view text) noexcept;             // std_msgs/String
-void write_bytes(CdrWriter* out, std::span<const std::uint8_t> b) noexcept;  // UInt8MultiArray
+void write_text(CdrWriter* out, std::string_view text) noexcept;  // std_msgs/String
 
 /// What one call of the estimator was given beside the images, and what came of it.
 struct FrameRecord {
@@ -91,16 +88,8 @@ struct FrameRecord {
   PoseSample sample{};
 };
 void write_frame(CdrWriter* out, const FrameRecord& frame) noexcept;
-/// A frame as its camera handed it out, `stamp` its arrival.
-void write_device_frame(CdrWriter* out, Stamp stamp, std::string_view name,
-                        const Frame& frame) noexcept;
 /// As the board reported it, `stamp` the arrival of that; `edge`: pulse.host on the session's
 /// clock.
 void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse, Stamp edge) noexcept;
-/// Camera `camera`, or −1 the trigger board, has gone.
-void write_device_gone(CdrWriter* out, Stamp stamp, int camera) noexcept;
-/// A step of a line's conversation that is not bytes read.
-void write_line_event(CdrWriter* out, Stamp stamp, const LineEvent& event) noexcept;
-void write_set(CdrWriter* out, Stamp stamp, const SetArrivals& set) noexcept;
 
 }  // namespace vergence::app

@@ -1,80 +1,72 @@
 #include "app/recording/png_encoder.hpp"
 
-#include <libdeflate.h>
+#include <png.h>
 
-#include <array>
-#include <cstring>
-#include <new>
+#include <csetjmp>
+#include <exception>
 
 namespace vergence::app {
 namespace {
 
-constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-constexpr std::size_t kHeader = 13;  // bytes of IHDR's content
-constexpr std::size_t kAround = 12;  // of a chunk: length and type before it, check sum behind it
-constexpr int kQuick = 1;            // compression, of 12
-constexpr std::uint8_t kSub = 1;     // filter: difference from the pixel to the left
+[[noreturn]] void fail(png_structp png, png_const_charp /*what*/) { png_longjmp(png, 1); }
+void ignore(png_structp /*png*/, png_const_charp /*what*/) noexcept {}
+void flush(png_structp /*png*/) noexcept {}
 
-std::size_t filtered_bytes(int width, int height) noexcept {
-  return (static_cast<std::size_t>(width) + 1) * static_cast<std::size_t>(height);
+struct Output {
+  std::vector<std::uint8_t>* file;
+  bool out_of_memory = false;
+};
+
+void append(png_structp png, png_bytep bytes, std::size_t size) {
+  auto* output = static_cast<Output*>(png_get_io_ptr(png));
+  try {
+    output->file->insert(output->file->end(), bytes, bytes + size);
+  } catch (const std::bad_alloc&) {  // an exception must not cross libpng's C frames
+    output->out_of_memory = true;
+  }
+  if (output->out_of_memory) png_error(png, "no memory");
 }
 
-void put_be32(std::uint32_t value, std::uint8_t* to) noexcept {
-  for (int i = 0; i < 4; ++i) to[i] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
-}
+struct Writer {
+  png_structp png = nullptr;
+  png_infop info = nullptr;
 
-/// Around a content of `size` bytes that lies at `chunk` + 8. → bytes of the chunk
-std::size_t close_chunk(const char* type, std::size_t size, std::uint8_t* chunk) noexcept {
-  put_be32(static_cast<std::uint32_t>(size), chunk);
-  std::memcpy(chunk + 4, type, 4);
-  put_be32(libdeflate_crc32(0, chunk + 4, 4 + size), chunk + 8 + size);
-  return kAround + size;
+  Writer() noexcept : png(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, fail, ignore)) {
+    if (png != nullptr) info = png_create_info_struct(png);
+  }
+  ~Writer() { png_destroy_write_struct(&png, &info); }
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+};
+
+/// No object with a destructor may live between setjmp and libpng's longjmp, so the caller owns
+/// them all.
+bool write_rows(const Writer& writer, Output* output, const ImageView& image) noexcept {
+  constexpr int kQuick = 1;  // compression, of 9
+  png_structp png = writer.png;
+  png_infop info = writer.info;
+  if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) return false;
+  png_set_write_fn(png, output, append, flush);
+  png_set_compression_level(png, kQuick);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width),
+               static_cast<png_uint_32>(image.height), 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(png, info);
+  for (int y = 0; y < image.height; ++y) png_write_row(png, image.row(y));
+  png_write_end(png, nullptr);
+  return true;
 }
 
 }  // namespace
 
-void PngEncoder::Release::operator()(libdeflate_compressor* c) const noexcept {
-  libdeflate_free_compressor(c);
-}
-
-PngEncoder::PngEncoder(int width, int height)
-    : filtered_(filtered_bytes(width, height)), deflate_(libdeflate_alloc_compressor(kQuick)) {
-  if (!deflate_) throw std::bad_alloc();
-}
-
-PngEncoder::~PngEncoder() = default;
-
-std::size_t PngEncoder::most_bytes(int width, int height) noexcept {
-  // Its bound does not depend on the compressor.
-  return kSignature.size() + 3 * kAround + kHeader +
-         libdeflate_zlib_compress_bound(nullptr, filtered_bytes(width, height));
-}
-
-std::size_t PngEncoder::encode(const ImageView& image, std::span<std::uint8_t> out) noexcept {
-  const std::size_t size = image.empty() ? 0 : filtered_bytes(image.width, image.height);
-  constexpr std::size_t kBefore = kSignature.size() + kAround + kHeader + 8;
-  if (size == 0 || size > filtered_.size() || out.size() < kBefore + 4 + kAround) return 0;
-  std::uint8_t* to = filtered_.data();
-  for (int y = 0; y < image.height; ++y) {
-    const std::uint8_t* from = image.row(y);
-    *to++ = kSub;
-    *to++ = from[0];
-    for (int x = 1; x < image.width; ++x) *to++ = static_cast<std::uint8_t>(from[x] - from[x - 1]);
-  }
-  std::uint8_t* at = out.data();
-  std::memcpy(at, kSignature.data(), kSignature.size());
-  at += kSignature.size();
-  put_be32(static_cast<std::uint32_t>(image.width), at + 8);
-  put_be32(static_cast<std::uint32_t>(image.height), at + 12);
-  constexpr std::array<std::uint8_t, 5> kGrey8{8, 0, 0, 0, 0};  // depth, colour, nothing special
-  std::memcpy(at + 16, kGrey8.data(), kGrey8.size());
-  at += close_chunk("IHDR", kHeader, at);
-  const std::size_t packed = libdeflate_zlib_compress(deflate_.get(), filtered_.data(), size,
-                                                      at + 8, out.size() - kBefore - 4 - kAround);
-  if (packed == 0) return 0;
-  at += close_chunk("IDAT", packed, at);
-  at += close_chunk("IEND", 0, at);
-  return static_cast<std::size_t>(at - out.data());
+bool encode_png(const ImageView& image, std::vector<std::uint8_t>* file) {
+  file->clear();
+  if (image.empty()) return false;
+  Output output{file};
+  const bool written = write_rows(Writer(), &output, image);
+  if (output.out_of_memory) throw std::bad_alloc();
+  return written;
 }
 
 }  // namespace vergence::app

@@ -137,7 +137,7 @@ void Recording::drain(bool at_once, bool last) noexcept {
     if (!last && files_.resting()) return make_room(at_once);
     if (store(batch)) {
       release(batch);
-      files_.roll(roll_asked_.exchange(false, std::memory_order_relaxed));
+      files_.roll();
       continue;
     }
     if (!last) return make_room(at_once);

@@ -42,9 +42,9 @@ struct RecordingCounters {
 /// Queues     One for each producer thread. What is posted lies there as it will lie in the file;
 ///            the thread takes all that waits every 20 ms and writes it as a chunk when its oldest
 ///            message has waited 40 ms. So a process that is killed loses the last 100 ms at most.
-/// Files      Rolled by size, by time, by roll() and when the index is full: drive.mcap becomes
-///            drive_0.mcap, the next is drive_1.mcap. Every file begins with all schemas, channels
-///            and the preamble.
+/// Files      Split by size and when the index is full: drive.mcap becomes drive_0.mcap, the next
+/// is
+///            drive_1.mcap. Every file begins with all schemas, channels and the preamble.
 /// Events     With keep > 0 only what was posted up to so long before an event and so long after
 ///            it is written; the rest is passed over.
 /// Threads    begin(), commit(): one thread a queue. mark_event(): any. take_errors(), counters():
@@ -52,10 +52,9 @@ struct RecordingCounters {
 /// Memory     All at construction; the writer's thread is sealed.
 /// Full       drop: begin() refuses, counted; what is bulky leaves room for the rest. wait:
 ///            begin() waits for room (virtual time, replay).
-/// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). A
-///            disk that takes no more, or is gone: the data wait in their queue while there is
-///            room, the disk is asked again every quarter of a second (a gone one for a new file),
-///            the drive goes on; sentences by take_errors().
+/// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). When
+///            a write fails the data wait in their queue while there is room and the same file is
+///            tried again every RecordingFiles::kRetry; sentences by take_errors().
 class Recording {
  public:
   enum class WhenFull : std::uint8_t { drop, wait };
@@ -81,9 +80,6 @@ class Recording {
   void commit(std::size_t queue, std::size_t size) noexcept;
   /// Something happened: what is around it is kept.
   void mark_event(Stamp stamp) noexcept;
-
-  /// The file at hand ends after its next chunk, and a new one begins. Any thread.
-  void roll() noexcept { roll_asked_.store(true, std::memory_order_relaxed); }
 
   /// Sentences about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors() { return files_.take_errors(); }
@@ -132,7 +128,6 @@ class Recording {
   std::int64_t waiting_since_ns_ = 0;  // monotonic; of the writer's thread
 
   std::atomic<std::int64_t> keep_until_ns_;
-  std::atomic<bool> roll_asked_{false};
   std::atomic<std::uint64_t> newest_ns_{0};  // of what was posted
   Counts counts_;
   std::mutex mutex_;  // with stop_ and hurry_, for the writer that sleeps

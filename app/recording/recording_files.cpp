@@ -1,22 +1,18 @@
 #include "app/recording/recording_files.hpp"
 
-#include <cerrno>
 #include <climits>
 #include <cstdio>
 #include <cstring>
+#include <utility>
 
 #include <fmt/format.h>
 
-#include "app/runtime/disk_errors.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/version.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
 namespace {
-
-constexpr std::int64_t kRetryNs = 250'000'000;   // until a disk is asked again
-constexpr std::int64_t kSlowNs = 1'000'000'000;  // a write that takes so long is said
 
 constexpr const char* kQosOf[] = {
     // reliable, keep last, volatile; and for what is latched: transient local
@@ -43,7 +39,6 @@ std::vector<McapTopic> described(const std::vector<RecordedTopic>& topics) {
 RecordingFiles::RecordingFiles(const std::filesystem::path& folder, const Options& options)
     : folder_(folder.string()),
       roll_bytes_(options.roll_bytes),
-      roll_time_(options.roll_time),
       topics_(described(options.topics)),
       disk_(options.disk != nullptr ? *options.disk : system_disk()),
       file_(disk_, topics_, "vergence " + std::string(version())),
@@ -57,23 +52,20 @@ RecordingFiles::RecordingFiles(const std::filesystem::path& folder, const Option
     preamble_.insert(preamble_.end(), head.begin(), head.end());
     preamble_.insert(preamble_.end(), p.message.begin(), p.message.end());
   }
-  const int error = open();
-  if (error == 0 || (options.wait_for_disk && (disk_is_away(error) || error == ENOENT))) return;
-  const auto sentences = take_errors();
-  throw InputError(sentences.empty() ? folder_ + ": nothing can be recorded there"
-                                     : sentences.front());
+  if (const int error = open(); error != 0)
+    throw InputError(folder_ + ": nothing can be recorded there (" + std::strerror(error) +
+                     "): check that disk and the folder's permissions");
 }
 
 // ---- the writer
 
 bool RecordingFiles::resting() const noexcept {
-  return state_ != DiskState::good && monotonic_now().ns() < retry_ns_;
+  return failing_ && monotonic_now().ns() < retry_ns_;
 }
 
 std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
                                      std::uint64_t lost) noexcept {
   if (!file_.open() && open() != 0) return 0;
-  const std::int64_t begun = monotonic_now().ns();
   const std::uint64_t before = file_.size();
   int error = preamble_due_ ? write_preamble(first) : 0;
   if (error == 0) error = file_.write_chunk(parts);
@@ -82,12 +74,8 @@ std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
     fail(-error);
     return 0;
   }
-  if (const std::int64_t took = monotonic_now().ns() - begun; took > kSlowNs)
-    (void)notices_.push({Notice::Kind::slow, static_cast<int>(took / 1'000'000), 0, number_});
-  if (state_ != DiskState::good) {
-    state_ = DiskState::good;
+  if (std::exchange(failing_, false))
     (void)notices_.push({Notice::Kind::good_again, 0, lost, number_});
-  }
   return file_.size() - before;
 }
 
@@ -135,25 +123,14 @@ int RecordingFiles::write_preamble(std::uint64_t time) noexcept {
   return error;
 }
 
-/// What the system said of a write. A full disk goes on with the same file; any other fault may
-/// mean that it is not there any more: with a new one.
 void RecordingFiles::fail(int error) noexcept {
-  const bool full = error == ENOSPC || error == EDQUOT;
-  if (!full && (file_.open() || error == EEXIST)) {
-    file_.abandon();
-    begin_next_number();
-  }
-  if (state_ == DiskState::good)
-    (void)notices_.push({full ? Notice::Kind::full : Notice::Kind::gone, error, 0, number_});
-  state_ = full ? DiskState::full : DiskState::gone;
-  retry_ns_ = monotonic_now().ns() + kRetryNs;
+  if (!std::exchange(failing_, true))
+    (void)notices_.push({Notice::Kind::failed, error, 0, number_});
+  retry_ns_ = (monotonic_now() + kRetry).ns();
 }
 
-void RecordingFiles::roll(bool asked) noexcept {
-  const bool wanted = asked || file_.full() || (roll_bytes_ > 0 && file_.size() >= roll_bytes_) ||
-                      (roll_time_ > Duration{} && file_.last_time() - file_.first_time() >=
-                                                      static_cast<std::uint64_t>(roll_time_.ns()));
-  if (!wanted) return;
+void RecordingFiles::roll() noexcept {
+  if (!file_.full() && (roll_bytes_ == 0 || file_.size() < roll_bytes_)) return;
   end_file();
   begin_next_number();
 }
@@ -190,21 +167,12 @@ std::string RecordingFiles::sentence(const Notice& n) const {
     case Notice::Kind::good_again:
       return fmt::format("{}: the disk takes the recording again; {} messages were lost", folder_,
                          n.lost);
-    case Notice::Kind::full:
+    case Notice::Kind::failed:
       return fmt::format(
-          "{}: the recording has no room ({}): the drive goes on, what is recorded waits in "
-          "memory and then is lost; make room on that disk",
-          folder_, what);
-    case Notice::Kind::gone:
-      return fmt::format(
-          "{}: the recording cannot be written ({}): the drive goes on, a new file is tried "
-          "four times a second; look after that disk",
-          folder_, what);
-    case Notice::Kind::slow:
-      return fmt::format(
-          "{}: the disk kept the recording waiting for {:.1f} s; what found no room in memory "
-          "meanwhile is counted as dropped",
-          folder_, n.error / 1000.0);
+          "{}: the recording cannot be written ({}); the session goes on and writing is tried "
+          "again "
+          "every {:.0f} s, what finds no room in memory is lost: check that disk",
+          folder_, what, kRetry.to_seconds());
     case Notice::Kind::unfinished:
       return fmt::format(
           "{}: file {} of the recording has no summary ({}); it reads back without, up to its "

@@ -33,31 +33,28 @@ struct RecordingPreamble {
 ///
 /// Threads  append(), roll(), finish(), resting(): the writer's. Sentences and counters: any.
 /// Memory   All at construction.
-/// Errors   A write that fails is tried again by whoever has the data: at once in vain, as
-///          resting() says. On a full disk in the same file, else in a new one. What is to be said
-///          of it: take_errors().
+/// Errors   A write that fails is tried again in the same file by whoever has the data, every
+///          kRetry: see resting(). Messages for the user: take_errors().
 class RecordingFiles {
  public:
+  static constexpr Duration kRetry = Duration::seconds(3);
   struct Options {
     std::vector<RecordedTopic> topics;
     std::vector<RecordingPreamble> preamble{};
     std::uint64_t roll_bytes = 0;  // a file is ended when it has so many; 0: never
-    Duration roll_time{};          // … or when its messages span so long; 0: never
     Disk* disk = nullptr;          // null: the system's
-    bool wait_for_disk = false;    // one that is away at the beginning (disk_is_away(), or the
-                                   // folder not there yet) is as one that goes away later
   };
   using Parts = std::span<const std::span<const std::uint8_t>>;
 
-  /// `folder` exists. Throws InputError: no file can be made there, and it does not wait for one.
+  /// `folder` exists. Throws InputError: no file can be made there.
   RecordingFiles(const std::filesystem::path& folder, const Options& options);
 
   /// As McapFile::write_chunk(), in a new file where none is open. `first`: time of its first
   /// message, ns; `lost`: messages, so far, because of the disk. → bytes that the file grew by; 0:
   /// failed
   [[nodiscard]] std::uint64_t append(Parts parts, std::uint64_t first, std::uint64_t lost) noexcept;
-  /// Ends the file where it is full, long enough, or `asked` for; the next append() begins another.
-  void roll(bool asked) noexcept;
+  /// Ends the file where it is full; the next append() begins another.
+  void roll() noexcept;
   /// Ends the last one. `time`: of a preamble that nothing followed, ns.
   void finish(std::uint64_t time) noexcept;
   /// The disk failed a moment ago, and is not to be asked again yet.
@@ -74,10 +71,9 @@ class RecordingFiles {
   }
 
  private:
-  enum class DiskState : std::uint8_t { good, full, gone };
   struct Notice {
-    enum class Kind : std::uint8_t { good_again, full, gone, slow, unfinished, unwritten } kind{};
-    int error = 0;           // errno; of slow: ms
+    enum class Kind : std::uint8_t { good_again, failed, unfinished, unwritten } kind{};
+    int error = 0;           // errno
     std::uint64_t lost = 0;  // messages, so far
     int file = 0;
   };
@@ -94,7 +90,6 @@ class RecordingFiles {
 
   const std::string folder_;
   const std::uint64_t roll_bytes_;
-  const Duration roll_time_;
   const std::vector<McapTopic> topics_;
   std::vector<std::uint8_t> preamble_;  // Message records
   Disk& disk_;
@@ -104,7 +99,7 @@ class RecordingFiles {
   int number_ = 0;             // of the file at hand
   bool several_ = false;       // files have numbers
   bool preamble_due_ = false;  // of the file at hand
-  DiskState state_ = DiskState::good;
+  bool failing_ = false;       // the last write failed
   std::int64_t retry_ns_ = 0;  // monotonic
   std::vector<char> path_, other_path_;
 

@@ -39,7 +39,6 @@ constexpr std::array kDefinitions{
                "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"},
     Definition{"tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
     Definition{"std_msgs/String", "string data\n"},
-    Definition{"std_msgs/UInt8MultiArray", "std_msgs/MultiArrayLayout layout\nuint8[] data\n"},
     // What one call of the estimator was given and what came of it: all that a replay needs beside
     // the images. `crc` is the CRC-32 of the message's bytes before it, `image_crc` that of pixels.
     Definition{"vergence_msgs/Frame",
@@ -64,19 +63,6 @@ constexpr std::array kDefinitions{
                "int64 arrival_host_ns\nbool resumed\nuint8 exposures_seen\n"
                "int64[] exposure_start_ns\nint64[] exposure_end_ns\nbool mapped\n"
                "int64 edge_ns\nint64 edge_error_ns\n"},
-    Definition{"vergence_msgs/DeviceFrame",
-               "std_msgs/Header header\nuint64 counter\nint64 exposure_start_device_ns\n"
-               "int64 arrival_host_ns\nint64 exposure_ns\nfloat64 gain_db\nbool complete\n"},
-    // Camera −1: the trigger board.
-    Definition{"vergence_msgs/DeviceGone", "int64 stamp_ns\nint32 camera\n"},
-    // A step of the conversation on a line but for the bytes that were read: `kind` 0 opened (data:
-    // the port, value: latency timer in µs), 2 written (data), 3 baud rate (value), 4 lost,
-    // 5 a read that brought nothing.
-    Definition{"vergence_msgs/LineEvent",
-               "int64 stamp_ns\nuint8 kind\nuint32 value\nuint8[] data\n"},
-    // The frames that a set was made of, by their arrivals; 0: none of that camera.
-    Definition{"vergence_msgs/RigSet",
-               "std_msgs/Header header\nuint64 number\nint64[] arrival_ns\n"},
     // What those are made of.
     Definition{"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},
     Definition{"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
@@ -103,9 +89,6 @@ constexpr std::array kDefinitions{
                "byte level\nstring name\nstring message\nstring hardware_id\n"
                "diagnostic_msgs/KeyValue[] values\n"},
     Definition{"diagnostic_msgs/KeyValue", "string key\nstring value\n"},
-    Definition{"std_msgs/MultiArrayLayout",
-               "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n"},
-    Definition{"std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride\n"},
 };
 
 constexpr std::array<std::string_view, kRosTypes> kNames{"sensor_msgs/msg/Image",
@@ -117,14 +100,9 @@ constexpr std::array<std::string_view, kRosTypes> kNames{"sensor_msgs/msg/Image"
                                                          "diagnostic_msgs/msg/DiagnosticArray",
                                                          "tf2_msgs/msg/TFMessage",
                                                          "std_msgs/msg/String",
-                                                         "std_msgs/msg/UInt8MultiArray",
                                                          "vergence_msgs/msg/Frame",
                                                          "vergence_msgs/msg/InsReading",
-                                                         "vergence_msgs/msg/Pulse",
-                                                         "vergence_msgs/msg/DeviceFrame",
-                                                         "vergence_msgs/msg/DeviceGone",
-                                                         "vergence_msgs/msg/LineEvent",
-                                                         "vergence_msgs/msg/RigSet"};
+                                                         "vergence_msgs/msg/Pulse"};
 
 const Definition* find(std::string_view name) {
   for (const Definition& d : kDefinitions)

@@ -18,16 +18,11 @@ enum class RosType : std::uint8_t {
   diagnostics,
   tf,
   text,
-  bytes,
-  frame,         // vergence_msgs/msg/Frame
-  ins_reading,   // vergence_msgs/msg/InsReading
-  pulse,         // vergence_msgs/msg/Pulse
-  device_frame,  // vergence_msgs/msg/DeviceFrame
-  device_gone,   // vergence_msgs/msg/DeviceGone
-  line_event,    // vergence_msgs/msg/LineEvent
-  rig_set,       // vergence_msgs/msg/RigSet
+  frame,        // vergence_msgs/msg/Frame
+  ins_reading,  // vergence_msgs/msg/InsReading
+  pulse,        // vergence_msgs/msg/Pulse
 };
-inline constexpr int kRosTypes = 17;
+inline constexpr int kRosTypes = 12;
 
 /// `sensor_msgs/msg/Image`.
 [[nodiscard]] std::string_view ros_type_name(RosType type) noexcept;

@@ -22,40 +22,6 @@ Enum value_of(const std::array<const char*, N>& words, const std::string& word,
                    "\", which no version of this program writes there");
 }
 
-nlohmann::json json_of(const RecordedDevice& d) {
-  return {{"driver", d.info.driver},
-          {"serial", d.info.serial},
-          {"model", d.info.model},
-          {"place", d.info.place},
-          {"least_delay_ns", d.timing.least_delay.ns()},
-          {"delay_spread_ns", d.timing.delay_spread.ns()},
-          {"resolution_ns", d.timing.resolution.ns()}};
-}
-
-RecordedDevice device_of(const nlohmann::json& j) {
-  const auto duration = [&](const char* key) {
-    return Duration::nanoseconds(j.at(key).get<std::int64_t>());
-  };
-  return {{j.at("driver"), j.at("serial"), j.at("model"), j.at("place")},
-          {duration("least_delay_ns"), duration("delay_spread_ns"), duration("resolution_ns")}};
-}
-
-nlohmann::json json_of(const RecordedDevices& d) {
-  nlohmann::json j{{"cameras", nlohmann::json::array()}};
-  for (const RecordedDevice& camera : d.cameras) j["cameras"].push_back(json_of(camera));
-  if (d.ins) j["ins"] = json_of(*d.ins);
-  if (d.trigger) j["trigger"] = json_of(*d.trigger);
-  return j;
-}
-
-RecordedDevices devices_of(const nlohmann::json& j) {
-  RecordedDevices d;
-  for (const auto& camera : j.at("cameras")) d.cameras.push_back(device_of(camera));
-  if (j.contains("ins")) d.ins = device_of(j["ins"]);
-  if (j.contains("trigger")) d.trigger = device_of(j["trigger"]);
-  return d;
-}
-
 }  // namespace
 
 std::string to_json(const SessionDescription& d) {
@@ -70,8 +36,7 @@ std::string to_json(const SessionDescription& d) {
                         {"ins", d.ins},
                         {"mount_source", d.mount_source},
                         {"settings", d.settings},
-                        {"cameras", d.cameras},
-                        {"devices", json_of(d.devices)}}
+                        {"cameras", d.cameras}}
       .dump(1, ' ', false, nlohmann::json::error_handler_t::replace);  // names need not be UTF-8
 }
 
@@ -96,7 +61,6 @@ SessionDescription parse_session_description(std::string_view json, const std::s
     j.at("mount_source").get_to(d.mount_source);
     j.at("settings").get_to(d.settings);
     j.at("cameras").get_to(d.cameras);
-    if (j.contains("devices")) d.devices = devices_of(j["devices"]);  // not in those of 0.1
     return d;
   } catch (const nlohmann::json::exception& e) {
     throw InputError(name + ": the description of the recorded session cannot be read (" +

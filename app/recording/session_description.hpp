@@ -1,19 +1,11 @@
 #pragma once
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "app/recording/device_records.hpp"
 #include "core/estimator/estimator.hpp"
 
 namespace vergence::app {
-
-/// The devices of a live drive. Empty cameras: it was none.
-struct RecordedDevices {
-  std::vector<RecordedDevice> cameras{};
-  std::optional<RecordedDevice> ins{}, trigger{};
-};
 
 /// What a replay has to know of a session before its first frame: at the beginning of every file
 /// of a recording, JSON in a std_msgs/String.
@@ -31,7 +23,6 @@ struct SessionDescription {
   std::string mount_source{};           // where the mount of the INS is from
   std::vector<std::string> settings{};  // KEY=VALUE where they are not the defaults
   std::vector<std::string> cameras{};   // topics of their images
-  RecordedDevices devices{};
 };
 
 [[nodiscard]] std::string to_json(const SessionDescription& description);

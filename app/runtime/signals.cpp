@@ -1,18 +1,12 @@
 #include "app/runtime/signals.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <atomic>
-#include <cerrno>
 
 namespace vergence::app {
 namespace {
 
 std::atomic<int> caught{0};  // the first signal's number; all a handler may touch
 std::atomic<bool> calibration_asked{false};
-std::atomic<bool> reopen_asked{false};
-std::atomic<bool> has_had_terminal{false};
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
 extern "C" void note_signal(int number) {
@@ -21,23 +15,6 @@ extern "C" void note_signal(int number) {
 }
 
 extern "C" void note_calibration_request(int /*number*/) { calibration_asked.store(true); }
-
-/// open() and close() may be called in a handler.
-bool has_terminal() noexcept {
-  const int fd = ::open("/dev/tty", O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (fd >= 0) (void)::close(fd);
-  return fd >= 0;
-}
-
-/// The kernel sends SIGHUP when the terminal is closed, people and log rotation when it is not.
-extern "C" void note_hangup(int number) {
-  const int error = errno;
-  if (has_had_terminal.load() && !has_terminal())
-    note_signal(number);
-  else
-    reopen_asked.store(true);
-  errno = error;
-}
 
 /// Restart: a signal must not turn a write of the session into an error. `once`: the second one
 /// acts as it would by default.
@@ -52,17 +29,12 @@ void install(int number, void (*handler)(int), bool once, struct sigaction* form
 
 }  // namespace
 
-SignalGuard::SignalGuard(OnHangup on_hangup) {
+SignalGuard::SignalGuard() {
   caught.store(0);
   calibration_asked.store(false);
-  reopen_asked.store(false);
-  has_had_terminal.store(has_terminal());
   install(SIGINT, note_signal, true, &former_interrupt_);
   install(SIGTERM, note_signal, true, &former_terminate_);
-  if (on_hangup == OnHangup::reopen)
-    install(SIGHUP, note_hangup, false, &former_hangup_);
-  else
-    install(SIGHUP, note_signal, true, &former_hangup_);
+  install(SIGHUP, note_signal, true, &former_hangup_);
   if (former_hangup_.sa_handler == SIG_IGN)  // nohup: the drive is to outlive its terminal
     install(SIGHUP, SIG_IGN, false, nullptr);
   install(SIGUSR1, note_calibration_request, false, &former_user_);
@@ -89,8 +61,6 @@ bool SignalGuard::stop_requested() const noexcept {
 bool SignalGuard::take_calibration_request() const noexcept {
   return calibration_asked.exchange(false);
 }
-
-bool SignalGuard::take_reopen_request() const noexcept { return reopen_asked.exchange(false); }
 
 std::optional<ExitCode> SignalGuard::stop_code() const noexcept {
   switch (caught.load(std::memory_order_relaxed)) {

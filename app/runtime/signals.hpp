@@ -1,5 +1,4 @@
 #pragma once
-#include <cstdint>
 #include <optional>
 
 #include <csignal>
@@ -9,8 +8,7 @@
 namespace vergence::app {
 
 /// SIGINT and SIGTERM become a flag that a command looks at between frames: it stops, closes its
-/// session and returns stop_code(). SIGHUP does the same, or with OnHangup::reopen asks for the
-/// session's files to be opened again; that stops, too, where the program's terminal has gone.
+/// session and returns stop_code(). SIGHUP does the same, unless it was ignored before (nohup).
 /// SIGUSR1 asks for a new calibration; a command that has none to make takes no notice. SIGPIPE,
 /// SIGXFSZ and SIGUSR2 are ignored: they would end a drive without its summary and report.
 ///
@@ -20,9 +18,7 @@ namespace vergence::app {
 ///            the way out of a hang.
 class SignalGuard {
  public:
-  enum class OnHangup : std::uint8_t { stop, reopen };
-
-  explicit SignalGuard(OnHangup on_hangup = OnHangup::stop);
+  SignalGuard();
   ~SignalGuard();
   SignalGuard(const SignalGuard&) = delete;
   SignalGuard& operator=(const SignalGuard&) = delete;
@@ -33,8 +29,6 @@ class SignalGuard {
   [[nodiscard]] std::optional<ExitCode> stop_code() const noexcept;
   /// Whether SIGUSR1 has come since the last call, however often.
   [[nodiscard]] bool take_calibration_request() const noexcept;
-  /// Whether SIGHUP has asked for the files to be opened again since the last call.
-  [[nodiscard]] bool take_reopen_request() const noexcept;
 
  private:
   struct sigaction former_interrupt_ {};

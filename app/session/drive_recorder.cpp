@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include <fmt/format.h>
+
 #include "app/session/recording_plan.hpp"
 
 namespace vergence::app {
@@ -24,6 +26,7 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
     : settings_(configuration.record),
       watch_(watch),
       frames_(recorded_names(facts.begin.file)),
+      folder_(folder.string()),
       recording_(folder, recording_options(configuration, facts)),
       rig_(facts.begin.file.rig),
       calibrated_(facts.begin.trust != CalibrationTrust::none) {
@@ -31,9 +34,14 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
   if (as_png(settings_)) encoder_.emplace(recording_, encoder_options(facts));
 }
 
-void DriveRecorder::close() noexcept {
+void DriveRecorder::close(std::vector<std::string>* faults) {
   if (encoder_) encoder_->close();
   recording_.close();
+  if (const std::uint64_t lost = recording_.counters().lost; lost > 0)
+    faults->push_back(fmt::format(
+        "{}: the recording is not complete ({} messages are lost); check that disk and make room "
+        "on it",
+        folder_, lost));
 }
 
 /// → CRC-32 of what `write` returns, the bytes of its pixels; 0: dropped.
@@ -203,58 +211,14 @@ void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcep
   if (settings_.poses != 0) post_rig(calibration.stamp);
 }
 
-// ---- what the devices gave
-
-/// `bytes`: that the message holds beside what every small one takes.
-template <class Write>
-void DriveRecorder::post_small(std::size_t topic, Stamp stamp, std::size_t queue, std::size_t bytes,
-                               const Write& write) noexcept {
+void DriveRecorder::on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept {
   post(
-      topic, stamp, kMessageRoom + bytes, false,
+      pulse_topic, arrival, kMessageRoom, false,
       [&](CdrWriter* out) {
-        write(out);
+        write_pulse(out, arrival, pulse, edge);
         return std::size_t{0};
       },
-      queue);
-}
-
-void DriveRecorder::on_device_frame(Stamp arrival, int camera, const Frame& frame) noexcept {
-  if (settings_.pulses == 0) return;
-  const auto k = static_cast<std::size_t>(camera);
-  post_small(image_topic(k) + 2, arrival, acquisition_queue, 0,
-             [&](CdrWriter* out) { write_device_frame(out, arrival, frame_names_[k], frame); });
-}
-
-void DriveRecorder::on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept {
-  if (settings_.pulses == 0) return;
-  post_small(pulse_topic, arrival, acquisition_queue, 0,
-             [&](CdrWriter* out) { write_pulse(out, arrival, pulse, edge); });
-}
-
-void DriveRecorder::on_device_gone(Stamp when, int camera) noexcept {
-  if (settings_.pulses == 0) return;
-  post_small(device_gone_topic, when, acquisition_queue, 0,
-             [&](CdrWriter* out) { write_device_gone(out, when, camera); });
-}
-
-void DriveRecorder::on_set(const SetArrivals& set) noexcept {
-  if (settings_.pulses == 0) return;
-  const Stamp newest = *std::max_element(set.at.begin(), set.at.end());
-  post_small(set_topic, newest, estimator_queue, 0,
-             [&](CdrWriter* out) { write_set(out, newest, set); });
-}
-
-void DriveRecorder::on_line_event(Stamp when, DeviceLine line, const LineEvent& event) noexcept {
-  if (settings_.raw == 0) return;
-  const bool ins = line == DeviceLine::ins, read = event.kind == LineEvent::Kind::read;
-  const std::size_t topic =
-      read ? (ins ? ins_raw_topic : board_raw_topic) : (ins ? ins_line_topic : board_line_topic);
-  post_small(topic, when, ins ? ins_queue : board_queue, event.bytes.size(), [&](CdrWriter* out) {
-    if (read)
-      write_bytes(out, event.bytes);
-    else
-      write_line_event(out, when, event);
-  });
+      acquisition_queue);
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> DriveRecorder::counters() {

@@ -13,20 +13,20 @@
 #include "app/recording/image_encoder.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/recording.hpp"
-#include "app/session/device_observer.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/solver_watch.hpp"
+#include "drivers/acquisition/acquired.hpp"
 
 namespace vergence::app {
 
 /// `record:` of the configuration: what goes through a session into drive.mcap (docs/recording.md).
 ///
 /// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
-///            DeviceObserver, a queue each. The rest: the owner's.
+///            PulseObserver, a queue each. The rest: the owner's.
 /// Memory     The recording's queues and the encoder's, at construction.
 /// Errors     The constructor throws InputError: no room, no file. Afterwards sentences.
-class DriveRecorder final : public SessionObserver, public DeviceObserver {
+class DriveRecorder final : public SessionObserver, public PulseObserver {
  public:
   /// `folder`: of the session, exists. Precondition: configuration.record.any().
   DriveRecorder(const std::filesystem::path& folder, const Configuration& configuration,
@@ -38,18 +38,12 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
 
-  void on_device_frame(Stamp arrival, int camera, const Frame& frame) noexcept override;
   void on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept override;
-  void on_device_gone(Stamp when, int camera) noexcept override;
-  void on_line_event(Stamp when, DeviceLine line, const LineEvent& event) noexcept override;
-  void on_set(const SetArrivals& set) noexcept override;
 
   /// Sentences about the disk, since the last call.
   [[nodiscard]] std::vector<std::string> take_errors() { return recording_.take_errors(); }
-  /// The file at hand ends, a new one begins. Any thread.
-  void roll() noexcept { recording_.roll(); }
-  /// Ends the files.
-  void close() noexcept;
+  /// Ends the files. What a disk failure cost becomes a sentence of *faults.
+  void close(std::vector<std::string>* faults);
   /// Nothing more is recorded. The estimator's thread.
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
@@ -61,9 +55,6 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   template <class Write>
   std::uint32_t post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
                      const Write& write, std::size_t queue = 0) noexcept;
-  template <class Write>
-  void post_small(std::size_t topic, Stamp stamp, std::size_t queue, std::size_t bytes,
-                  const Write& write) noexcept;
   [[nodiscard]] bool post_pixels(const RigFrame& frame, std::size_t camera) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
@@ -74,6 +65,7 @@ class DriveRecorder final : public SessionObserver, public DeviceObserver {
   const SolverWatch& watch_;
   std::vector<std::string> frames_;  // of reference, of the cameras
   std::array<std::string_view, kMaxCameras> frame_names_{};
+  const std::string folder_;
   Recording recording_;
   std::optional<ImageEncoder> encoder_;  // record.image_format: png
 

@@ -15,10 +15,10 @@
 #include "app/recording/session_description.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
-#include "app/session/device_observer.hpp"
 #include "app/session/ins_comparison.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
+#include "drivers/acquisition/acquired.hpp"
 
 namespace vergence::app {
 
@@ -67,7 +67,6 @@ struct SourceFacts {
   Stamp first{};                           // of the drive
   std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
   std::optional<SourceIns> ins{};
-  RecordedDevices devices{};  // of a live drive, for its recording
   Trajectory truth{};  // that came with a recording: what an estimate without INS is compared with
   std::vector<SourceRemark> remarks{};
   bool knows_truth = false;  // at the drive's end describe() holds its trajectory against it
@@ -89,8 +88,9 @@ class FrameSource {
 
   [[nodiscard]] virtual const SourceFacts& facts() const noexcept = 0;
 
-  /// Before start(): who sees what the devices give; outlives it. Nothing where there are none.
-  virtual void observe_devices(DeviceObserver* /*observer*/) {}
+  /// Before start(): `observer` receives the trigger board's pulses, if there is one, and outlives
+  /// the source.
+  virtual void observe_pulses(PulseObserver* /*observer*/) {}
   /// Begins the stream; the session's files are open. What is wrong with a file goes to *faults.
   /// InputError: a device does not start.
   virtual void start(std::vector<std::string>* faults) = 0;

@@ -8,8 +8,7 @@
 namespace vergence::app {
 
 ExitCode run_drive(const RunRequest& request) {
-  const SignalGuard signals(
-      SignalGuard::OnHangup::reopen);  // before a mock's world is built, which takes seconds
+  const SignalGuard signals;  // before a mock's world is built, which takes seconds
   try {
     const auto source = in_words([&] { return std::make_unique<LiveSource>(request); });
     if (const auto stopped = signals.stop_code()) return *stopped;  // devices are opened in seconds

@@ -68,8 +68,7 @@ void LiveSource::make_acquisition() {
         devices_.cameras(), c.width, c.height, masks.views()[0], exposure_options(configuration_),
         starting_exposure(configuration_, 0), request_.fast);
   }
-  tie_ = {o.tie_stamp, o.tie_host};
-  if (!request_.fast) facts_.tie = tie_;
+  if (!request_.fast) facts_.tie = ClockTie{o.tie_stamp, o.tie_host};
   acquisition_ = std::make_unique<Acquisition>(
       exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
   start_ = o.tie_stamp + (devices_.start() - o.tie_host);
@@ -103,11 +102,6 @@ void LiveSource::make_facts() {
   if (mode == SyncMode::software)
     facts_.remarks.push_back(
         {std::string(proof_sentence(mode)) + "; poses in motion suffer from it"});
-  for (const CameraDevice* camera : devices_.cameras())
-    facts_.devices.cameras.push_back({camera->info(), camera->timing()});
-  if (const InsDevice* ins = devices_.ins()) facts_.devices.ins = {ins->info(), ins->timing()};
-  if (const TriggerDevice* trigger = devices_.trigger())
-    facts_.devices.trigger = {trigger->info(), trigger->timing()};
   facts_.knows_truth = devices_.mock() != nullptr;
   facts_.image_bytes = devices_.image_bytes();
   facts_.ring_bytes = sizeof(Acquisition);
@@ -115,15 +109,9 @@ void LiveSource::make_facts() {
   facts_.on_request = true;
 }
 
-void LiveSource::observe_devices(DeviceObserver* observer) {
-  tap_ = std::make_unique<DeviceTap>(observer, tie_);
-  if (InsDevice* ins = devices_.ins()) (void)ins->observe_line(&tap_->ins_line());
-  if (TriggerDevice* board = devices_.trigger()) (void)board->observe_line(&tap_->board_line());
-}
-
 void LiveSource::start(std::vector<std::string>* faults) {
   const HostStamp assumed = devices_.start();
-  start_acquisition(acquisition_.get(), tap_.get());
+  start_acquisition(acquisition_.get(), pulse_observer_);
   begun_ = std::chrono::steady_clock::now();
   start_ = start_ + (devices_.start() - assumed);  // a mock in real time knows it only now
   if (devices_.mock() == nullptr || devices_.board_keeps_own_time()) return;
@@ -139,7 +127,6 @@ bool LiveSource::next(SourceItem* item) noexcept {
       if (next_event(item)) return true;
       waiting_ = false;
       const auto* frame = std::get_if<AcquiredFrame>(&in_hand_);
-      if (tap_ != nullptr) tap_->on_set(frame->set);
       *item = SourceFrame{frame->rig, 0};
       return true;
     }

@@ -7,7 +7,6 @@
 
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/exposure_control.hpp"
-#include "app/session/device_tap.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/live_session.hpp"
 #include "app/session/timing_monitor.hpp"
@@ -26,7 +25,7 @@ class LiveSource final : public FrameSource {
   explicit LiveSource(const RunRequest& request);
 
   [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
-  void observe_devices(DeviceObserver* observer) override;
+  void observe_pulses(PulseObserver* observer) override { pulse_observer_ = observer; }
   void start(std::vector<std::string>* faults) override;
   [[nodiscard]] bool next(SourceItem* item) noexcept override;
   void done(const PoseSample& sample) noexcept override;
@@ -61,10 +60,9 @@ class LiveSource final : public FrameSource {
   DriveDevices devices_;
   SourceFacts facts_;
   std::unique_ptr<ExposureControl> exposure_;  // null: exposures are fixed
-  std::unique_ptr<DeviceTap> tap_;             // null: nobody looks
+  PulseObserver* pulse_observer_ = nullptr;    // null: pulses are not recorded
   std::unique_ptr<Acquisition> acquisition_;
-  ClockTie tie_{};  // of stamps to the devices' time
-  Stamp start_{};   // of the drive
+  Stamp start_{};  // of the drive
   std::chrono::steady_clock::time_point begun_{};
   std::vector<StampedPose> truth_;
 

@@ -20,12 +20,10 @@ namespace {
 
 constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue without images
 constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
-constexpr std::size_t kDeviceQueue = std::size_t{1} << 20;  // bytes
+constexpr std::size_t kPulseQueue = std::size_t{1} << 20;  // bytes
 // Bytes that are recorded of each, and some to spare: of a frame beside its images (1310), of a
-// reading of the INS (740) and its line (130), of a pulse and the frames it triggered (500) and the
-// board's line (1800).
-constexpr double kFrameRecords = 2048, kReadingRecords = 1024, kReadingLine = 512,
-                 kPulseRecords = 3072;
+// reading of the INS (740), of a pulse (300).
+constexpr double kFrameRecords = 2048, kReadingRecords = 1024, kPulseRecords = 512;
 
 std::vector<RecordedTopic> topics(const CalibrationFile& file, bool png) {
   std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
@@ -37,19 +35,12 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file, bool png) {
                                  {"/vergence/ins_reading", RosType::ins_reading, false},
                                  {"/ins/fix", RosType::nav_sat_fix, false},
                                  {"/ins/imu", RosType::imu, false},
-                                 {"/vergence/pulse", RosType::pulse, false},
-                                 {"/ins/raw", RosType::bytes, false},
-                                 {"/trigger_board/raw", RosType::bytes, false},
-                                 {"/ins/line", RosType::line_event, false},
-                                 {"/trigger_board/line", RosType::line_event, false},
-                                 {"/vergence/device_gone", RosType::device_gone, false},
-                                 {"/vergence/set", RosType::rig_set, false}};
+                                 {"/vergence/pulse", RosType::pulse, false}};
   for (const std::string& name : recorded_names(file)) {
     const std::string images = "/" + name + "/image_raw";
     out.push_back(png ? RecordedTopic{images + "/compressed", RosType::compressed_image, false}
                       : RecordedTopic{images, RosType::image, false});
     out.push_back({"/" + name + "/camera_info", RosType::camera_info, false});
-    out.push_back({"/" + name + "/device_frame", RosType::device_frame, false});
   }
   return out;
 }
@@ -82,7 +73,6 @@ std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts&
   d.ins = facts.ins.has_value();
   if (facts.ins) d.mount_source = facts.ins->mount_source;
   d.settings = settings_of(c);
-  d.devices = facts.devices;
   for (std::size_t k = 0; k < static_cast<std::size_t>(facts.begin.file.rig.cameras); ++k)
     d.cameras.push_back(topics(facts.begin.file, as_png(c.record))[image_topic(k)].name);
   const std::string json = to_json(d);
@@ -158,11 +148,6 @@ ImageEncoder::Options encoder_options(const SourceFacts& facts) {
   ImageEncoder::Options o;
   o.queue = png_queue;
   o.waiting = static_cast<std::size_t>(kLeastHeld * frame_bytes(facts));
-  for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
-    const Intrinsics& lens = facts.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
-    o.width = std::max(o.width, lens.width);
-    o.height = std::max(o.height, lens.height);
-  }
   o.when_full = when_full(facts);
   return o;
 }
@@ -171,16 +156,12 @@ Recording::Options recording_options(const Configuration& c, const SourceFacts& 
   Recording::Options o;
   const bool png = as_png(c.record);
   o.files.topics = topics(facts.begin.file, png);
-  const auto device = [](double kept) { return kDeviceQueue + static_cast<std::size_t>(kept); };
-  const double pulses = kept_bytes(c, kPulseRecords, c.trigger.rate);
   o.queues = {png ? static_cast<std::size_t>(small_bytes(c)) : queue_bytes(c, facts),
-              device(pulses), device(kept_bytes(c, kReadingLine, c.ins.rate)), device(pulses)};
+              kPulseQueue + static_cast<std::size_t>(kept_bytes(c, kPulseRecords, c.trigger.rate))};
   if (png) o.queues.push_back(queue_bytes(c, facts));
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
-  o.files.wait_for_disk = facts.when_full == Recorder::WhenFull::drop;
   o.files.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
-  o.files.roll_time = Duration::seconds(c.record.roll_s);
   o.keep = Duration::seconds(c.record.keep_s);
   o.when_full = when_full(facts);
   return o;

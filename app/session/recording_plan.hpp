@@ -12,9 +12,9 @@
 namespace vergence::app {
 
 /// Queues of a recording, one for each thread that posts.
-enum Queue : std::size_t { estimator_queue, acquisition_queue, ins_queue, board_queue, png_queue };
+enum Queue : std::size_t { estimator_queue, acquisition_queue, png_queue };
 
-/// Topics of a recording. Of a camera there are three, from first_camera_topic on.
+/// Topics of a recording. Of a camera there are two, from first_camera_topic on.
 enum Topic : std::size_t {
   session_topic,
   frame_topic,
@@ -26,18 +26,12 @@ enum Topic : std::size_t {
   fix_topic,
   imu_topic,
   pulse_topic,
-  ins_raw_topic,
-  board_raw_topic,
-  ins_line_topic,
-  board_line_topic,
-  device_gone_topic,
-  set_topic,
   first_camera_topic
 };
 
-/// A camera's images; its CameraInfo is the next one, its device's frames the one after.
+/// A camera's images; its CameraInfo is the next one.
 constexpr std::size_t image_topic(std::size_t camera) noexcept {
-  return first_camera_topic + 3 * camera;
+  return first_camera_topic + 2 * camera;
 }
 
 /// Names of the cameras in topics and as frames of reference: those of the calibration, each once.

@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "app/session/device_replay_source.hpp"
 #include "app/session/drive_calibration.hpp"
 #include "app/session/recorded_source.hpp"
 #include "app/session/replayed_ins.hpp"
@@ -136,22 +135,19 @@ ExitCode replay_recording(const ReplayRequest& request) {
     throw InputError(fmt::format("--start {} is beyond the drive: {} has {} frames", request.start,
                                  request.data.string(), session.frames().size()));
   auto other = other_beginning(request, session);
-  const auto source = in_words([&]() -> std::unique_ptr<FrameSource> {
-    if (request.through_devices)
-      return std::make_unique<DeviceReplaySource>(request, std::move(session), std::move(other));
+  const auto source = in_words([&] {
     return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
   });
-  const SignalGuard signals(SignalGuard::OnHangup::reopen);
+  const SignalGuard signals;
   return run_session(*source, request.configuration, request.session, signals);
 }
 
 }  // namespace
 
-std::vector<std::string> recorded_settings(const std::filesystem::path& session, bool devices) {
+std::vector<std::string> recorded_settings(const std::filesystem::path& session) {
   // What poses depend on; the mock and what is recorded are the drive's own.
-  std::vector<const char*> kept{"odometry.",        "calibration.",       "monitor.", "comparison.",
-                                "ins.lever_arm_m.", "ins.boresight_deg.", "rig.name="};
-  if (devices) kept.insert(kept.end(), {"cameras.", "trigger.", "sync.", "ins.", "mock."});
+  constexpr std::array kept{"odometry.",        "calibration.",       "monitor.", "comparison.",
+                            "ins.lever_arm_m.", "ins.boresight_deg.", "rig.name="};
   std::vector<std::string> settings = RecordedSession::open(session).description().settings;
   std::erase_if(settings, [&](const std::string& s) {
     const bool mask = s.starts_with("cameras.") && s.find(".mask=") != std::string::npos;
@@ -174,7 +170,7 @@ ExitCode run_replay(const ReplayRequest& request) {
   Trajectory truth = read_reference(request, sequence);
   ReplayedIns ins = replayed_ins(request, sequence);
   // One for both: who stops the calibration does not want the drive.
-  const SignalGuard signals(SignalGuard::OnHangup::reopen);
+  const SignalGuard signals;
   if (request.calibrate_first) calibrate_unknown(request, signals, &sequence, &begin);
   if (const auto stopped = signals.stop_code()) return *stopped;
   const auto source = in_words([&] {

@@ -24,16 +24,14 @@ struct ReplayRequest {
   std::optional<double> baseline;          // m: instead of the calibration's length
   bool from_scratch = false;               // of the calibration only intrinsics and length are read
   bool calibrate_first = false;            // from the whole drive, then drive with what was found
-  bool through_devices = false;            // of a session: from the devices on
   std::size_t start = 0;                   // first frame
   std::optional<std::size_t> frames;       // at most so many; all when not set
   Configuration configuration;
 };
 
 /// KEY=VALUE of the configuration that a recorded session was driven with, as far as poses depend
-/// on them; `devices`: and the devices. InputError: as RecordedSession::open().
-[[nodiscard]] std::vector<std::string> recorded_settings(const std::filesystem::path& session,
-                                                         bool devices);
+/// on them. InputError: as RecordedSession::open().
+[[nodiscard]] std::vector<std::string> recorded_settings(const std::filesystem::path& session);
 
 /// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6
 /// and the figures against the data set's truth (run_session()).

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
-#include <cstring>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -40,7 +39,6 @@ class SessionRunner {
 
  private:
   void open(std::vector<std::string>* faults);
-  void make_folder();
   void open_files(std::vector<std::string>* faults);
   [[nodiscard]] bool trajectory_is_asked_for() const;
   [[nodiscard]] SessionStart session_start() const;
@@ -82,7 +80,6 @@ class SessionRunner {
   struct {
     std::uint64_t number = 0;  // SessionMark
     bool made = false;         // it was not there before
-    int fault = 0;             // errno: it is not there yet
   } folder_;
   bool halted_ = false;        // the caller's thread alone
   ResidentMemory resident_{};  // at the drive's end
@@ -127,10 +124,6 @@ void SessionRunner::watch(Progress* progress) {
                    std::chrono::steady_clock::now());
     if (facts_.on_request && signals_.take_calibration_request()) loop_.ask_calibration();
     lock.unlock();
-    if (signals_.take_reopen_request()) {
-      recorder_->reopen();
-      if (recording_) recording_->roll();
-    }
     if (loop_.drained())
       halt_source();
     else
@@ -182,7 +175,8 @@ std::thread SessionRunner::start_estimating() {
 /// Of a session that ends before it began: a service is started again and again until its devices
 /// are there.
 void SessionRunner::leave_no_folder() {
-  if (recording_) recording_->close();
+  std::vector<std::string> ignored;
+  if (recording_) recording_->close(&ignored);
   if (recorder_) (void)recorder_->close();
   discard_session_folder(request_.out, folder_.made);
 }
@@ -201,22 +195,14 @@ void SessionRunner::open(std::vector<std::string>* faults) {
   (void)check_session_folder(request_.out);
   if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
     removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
-  make_folder();
+  folder_.number = next_session_number(request_.out);
+  folder_.made = make_session_folder(request_.out);
   try {
     open_files(faults);
   } catch (const std::exception&) {
     leave_no_folder();
     throw;
   }
-}
-
-/// Poses that others drive by wait for no disk: they are published while their lines wait.
-void SessionRunner::make_folder() {
-  folder_.number = next_session_number(request_.out);
-  if (facts_.when_full == Recorder::WhenFull::drop)
-    folder_.fault = try_session_folder(request_.out, &folder_.made);
-  else
-    folder_.made = make_session_folder(request_.out);
 }
 
 void SessionRunner::open_files(std::vector<std::string>* faults) {
@@ -229,16 +215,13 @@ void SessionRunner::open_files(std::vector<std::string>* faults) {
   to_record.keep = calibration_keeper(request_.out, facts_.begin.file, facts_.begin.state);
   to_record.disk_full = facts_.disk_full;
   to_record.number = folder_.number;
-  to_record.folder_fault = folder_.fault;
-  if (facts_.when_full == Recorder::WhenFull::drop) to_record.disk_away = LineFile::Away::wait;
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
   observers_ = request_.observers;
   if (configuration_.record.any()) {
     recording_ =
         std::make_unique<DriveRecorder>(request_.out, configuration_, facts_, loop_.solver_watch());
     observers_.push_back(recording_.get());
-    if (configuration_.record.pulses + configuration_.record.raw > 0)
-      source_.observe_devices(recording_.get());
+    if (configuration_.record.pulses != 0) source_.observe_pulses(recording_.get());
   }
   const SessionStart start = session_start();
   for (SessionObserver* observer : observers_) observer->on_start(start);
@@ -269,11 +252,6 @@ SessionStart SessionRunner::session_start() const {
 }
 
 void SessionRunner::say_remarks(Progress* progress) {
-  if (folder_.fault != 0)
-    progress->say(fmt::format(
-        "vergence: {}: cannot be made ({}); the drive goes on, lines wait in memory and the folder "
-        "is tried again: make room on that disk, or check it",
-        request_.out.string(), std::strerror(folder_.fault)));
   for (const std::string& sentence : removed_) {
     progress->say("vergence: " + sentence);
     loop_.event_log().log(facts_.first, "session_removed", sentence, false);
@@ -390,7 +368,7 @@ ExitCode SessionRunner::run() {
   if (request_.print_memory) print_memory_table(resident_);
   source_.finish(&progress, &faults);
 
-  if (recording_) recording_->close();
+  if (recording_) recording_->close(&faults);
   say_recording_errors(&progress);
   const auto totals = recorder_->close();
   const SummaryInput input =

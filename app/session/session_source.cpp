@@ -30,6 +30,9 @@ StartingCalibration recorded_beginning(const SessionDescription& d, const std::s
   return begin;
 }
 
+namespace {
+
+/// Facts of a replay of frames `first` to before `end`. `other`: as SessionSource's.
 SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSession& session,
                                std::optional<StartingCalibration> other, std::size_t first,
                                std::size_t end) {
@@ -56,11 +59,13 @@ SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSessi
   return facts;
 }
 
+/// What time decided of a frame's pose in the drive, for the estimator to decide again.
 void decide_as_then(const FrameRecord& given, SourceFrame* frame) noexcept {
   frame->solver_idle = given.solver_done;
   frame->rig.effort = given.sample.effort;
 }
 
+/// A calibration was requested before that frame.
 SourceEvent recalibration_as_then(Stamp stamp) noexcept {
   SourceEvent event;
   event.record.stamp = stamp;
@@ -69,6 +74,8 @@ SourceEvent recalibration_as_then(Stamp stamp) noexcept {
   event.recalibrate = true;
   return event;
 }
+
+}  // namespace
 
 SessionSource::SessionSource(const ReplayRequest& request, RecordedSession session,
                              std::optional<StartingCalibration> other)
@@ -138,14 +145,18 @@ SourceFrame SessionSource::load(const RecordedFrame& recorded) noexcept {
       std::min(given.pairing, static_cast<std::uint8_t>(Pairing::contradicted)));
   frame.rig.cameras = facts_.begin.file.rig.cameras;
   if (!other_) decide_as_then(given, &frame);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(frame.rig.cameras); ++k) {
-    if ((given.images_present >> k & 1U) == 0) continue;
-    const RecordedImage& image = recorded.images[k];
-    if (session_.read(recorded, k, pixels_[k].data(), static_cast<std::size_t>(image.width)))
-      frame.rig.images[k] = {pixels_[k].data(), image.width, image.height, image.width};
-    else
-      ++images_missing_;
-  }
+  auto read = [&] {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(frame.rig.cameras); ++k) {
+      if ((given.images_present >> k & 1U) == 0) continue;
+      const RecordedImage& image = recorded.images[k];
+      if (session_.read(recorded, k, pixels_[k].data(), static_cast<std::size_t>(image.width)))
+        frame.rig.images[k] = {pixels_[k].data(), image.width, image.height, image.width};
+      else
+        ++images_missing_;
+    }
+  };
+  auto wait = [] {};
+  reader_.run(TaskRef(wait), TaskRef(read));
   frame.decode_ms =
       std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - begun).count();
   return frame;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/datasets/recorded_session.hpp"
+#include "app/runtime/thread_runner.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/replay_session.hpp"
 
@@ -53,17 +54,8 @@ class SessionSource final : public FrameSource {
   std::size_t next_frame_ = 0, next_reading_ = 0;
   bool recalibration_said_ = false;  // of the next frame
   std::uint64_t images_missing_ = 0;
+  ThreadRunner reader_{ThreadRunner::Worker::of_reader};  // decoding takes heap
 };
-
-/// Facts of a replay of frames `first` to before `end`. `other`: as SessionSource's.
-[[nodiscard]] SourceFacts facts_of_recording(const ReplayRequest& request,
-                                             const RecordedSession& session,
-                                             std::optional<StartingCalibration> other,
-                                             std::size_t first, std::size_t end);
-/// What time decided of a frame's pose in the drive, for the estimator to decide again.
-void decide_as_then(const FrameRecord& given, SourceFrame* frame) noexcept;
-/// Somebody asked for a calibration before that frame.
-[[nodiscard]] SourceEvent recalibration_as_then(Stamp stamp) noexcept;
 
 /// What a recorded session began with. InputError: the recording's description is damaged.
 [[nodiscard]] StartingCalibration recorded_beginning(const SessionDescription& description,

@@ -40,17 +40,15 @@ struct DeviceEvent {
   double seconds = 0;  // proven: since the first frame that was not
 };
 
-/// Sees what the devices hand out before it is paired: for a record.
+/// Receives the trigger board's pulses as they arrive, to record them.
 ///
-/// Threads  The acquisition's; the calls do not wait.
-class AcquisitionObserver {
+/// Threads  The acquisition's; the call must not wait.
+class PulseObserver {
  public:
-  virtual ~AcquisitionObserver() = default;
-  virtual void on_device_frame(int camera, const Frame& frame) noexcept = 0;
-  virtual void on_pulse(const Pulse& pulse) noexcept = 0;
-  /// A camera, or the trigger (kTrigger), is not there any more.
-  virtual void on_device_gone(int camera, HostStamp when) noexcept = 0;
-  static constexpr int kTrigger = -1;
+  virtual ~PulseObserver() = default;
+  /// `arrival`: when the report arrived. `edge`: pulse.host, where pulse.mapped says that the
+  /// driver mapped it.
+  virtual void on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept = 0;
 };
 
 using Acquired = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent>;

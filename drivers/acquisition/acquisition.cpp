@@ -42,8 +42,8 @@ Acquisition::~Acquisition() {
   join();
 }
 
-std::optional<StartFailure> Acquisition::start(AcquisitionObserver* observer) {
-  if (observer != nullptr) options_.observer = observer;
+std::optional<StartFailure> Acquisition::start(PulseObserver* observer) {
+  options_.pulse_observer = observer;
   std::optional<StartFailure> failure;
   const auto start_device = [&](auto* device) {
     if (device == nullptr || failure) return;
@@ -204,7 +204,6 @@ void Acquisition::take_frame(std::size_t k) {
     push_event(DeviceEvent::Kind::camera_back, head.value.arrival, camera);
   }
   const Frame& frame = head.value;
-  if (options_.observer != nullptr) options_.observer->on_device_frame(camera, frame);
   SyncFrame in;
   in.camera = camera;
   in.slot = frame.slot;
@@ -232,7 +231,6 @@ void Acquisition::take_frame(std::size_t k) {
 void Acquisition::note_gone(int camera, HostStamp when) {
   auto& head = heads_[static_cast<std::size_t>(camera)];
   head.gone = true;
-  if (options_.observer != nullptr) options_.observer->on_device_gone(camera, when);
   sync_.absent(camera);
   // One that started and gave nothing has not been back: it is not gone once more.
   if (!head.back) push_event(DeviceEvent::Kind::camera_gone, when, camera);

@@ -91,8 +91,7 @@ class Acquisition final : private Notifier {
     /// The board lives in a virtual time of its own, beside the other devices: its next report is
     /// there for the waiting.
     bool board_keeps_own_time = false;
-    AcquisitionObserver* observer =
-        nullptr;  // sees what the devices hand out; outlives it. Null: nobody
+    PulseObserver* pulse_observer = nullptr;  // set by start(); null: pulses are not recorded
   };
 
   /// `ins` may be null. The cameras in the order of the rig, camera 0 first.
@@ -103,8 +102,8 @@ class Acquisition final : private Notifier {
   /// Who waits for pulses first, who makes them last: the board, the INS with `ins_syncout`, camera
   /// 0 with `master_strobe`.
   /// → the device that could not be started; the stream has not begun then.
-  /// `observer`, if any, instead of that of the options.
-  [[nodiscard]] std::optional<StartFailure> start(AcquisitionObserver* observer = nullptr);
+  /// `observer`: receives the pulses, outlives the acquisition; may be null.
+  [[nodiscard]] std::optional<StartFailure> start(PulseObserver* observer = nullptr);
   /// False: the drive is over, or stop() was called.
   [[nodiscard]] bool next(Acquired* item) noexcept { return queue_.next(item); }
   /// Of every AcquiredFrame that next() gave, once.

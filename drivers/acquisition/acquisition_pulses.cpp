@@ -11,8 +11,6 @@ void Acquisition::take_board() {
   head.held = false;
   if (head.event) {
     head.gone = true;
-    if (options_.observer != nullptr)
-      options_.observer->on_device_gone(AcquisitionObserver::kTrigger, head.value.arrival);
     // As a camera: one that started and gave nothing is not gone once more.
     if (!head.back) push_event(DeviceEvent::Kind::board_gone, head.value.arrival);
     return;
@@ -26,7 +24,9 @@ void Acquisition::take_board() {
 }
 
 void Acquisition::take_pulse(const Pulse& reported) {
-  if (options_.observer != nullptr) options_.observer->on_pulse(reported);
+  if (options_.pulse_observer != nullptr)
+    options_.pulse_observer->on_pulse(stamp_of(reported.arrival), reported,
+                                      stamp_of(reported.host));
   const PulseMapper::Report report = pulse_mapper_.add(reported);
   const Pulse& pulse = report.pulse;
   if (report.rebooted && !sync_out_) {

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "drivers/serial/byte_line.hpp"
-#include "drivers/serial/observed_line.hpp"
 #include "drivers/stream.hpp"
 
 namespace vergence {
@@ -64,10 +63,6 @@ class SerialDevice {
   [[nodiscard]] DeviceStatus open_line(const LineSettings& settings) {
     DeviceStatus status = DeviceStatus::ok;
     auto line = place_->open(settings, &status);
-    if (line != nullptr) {
-      log_.opened(*place_, line->now());
-      line = std::make_unique<ObservedLine>(std::move(line), log_);
-    }
     const std::lock_guard lock(line_mutex_);
     line_ = std::move(line);
     return status;
@@ -85,7 +80,6 @@ class SerialDevice {
   /// perhaps back.
   [[nodiscard]] DeviceStatus start_thread(Notifier* ready) noexcept {
     if (thread_.joinable()) return out_.start(ready);
-    log_.streaming();
     out_.clear();  // of the start before: its readings are past
     const DeviceStatus status = out_.start(ready);
     if (status != DeviceStatus::ok) return status;
@@ -115,8 +109,6 @@ class SerialDevice {
     stopping_.store(false, std::memory_order_release);
   }
   [[nodiscard]] bool running() const noexcept { return thread_.joinable(); }
-  /// Of what is said on the line. Owner's thread, while the device's does not run.
-  [[nodiscard]] LineLog& log() noexcept { return log_; }
 
   // ---- any thread
 
@@ -188,10 +180,6 @@ class SerialDevice {
   /// False: stopped.
   [[nodiscard]] bool come_back() noexcept {
     while (!stop_requested()) {
-      if (place_->exhausted()) {
-        push({Item::What::end, HostStamp{}, {}}, true);
-        return false;
-      }
       try {
         if (reopen() == DeviceStatus::ok) return true;
       } catch (const std::exception&) {  // out of memory: perhaps not the next time
@@ -223,7 +211,6 @@ class SerialDevice {
   std::unique_ptr<LinePlace> place_;
   const char* const thread_name_;
   bool virtual_time_ = false;
-  LineLog log_;
   std::mutex line_mutex_;  // of the pointer: stop_thread() wakes a line that may be replaced
   std::unique_ptr<ByteLine> line_;
   Stream<Value, kRing> out_;

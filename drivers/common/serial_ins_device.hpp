@@ -28,10 +28,6 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
     if (status == DeviceStatus::ok) delivered_.fetch_add(1, std::memory_order_relaxed);
     return status;
   }
-  bool observe_line(LineObserver* observer) noexcept final {
-    this->log().observe(observer);
-    return true;
-  }
   [[nodiscard]] std::string last_error() const final { return last_error_; }
   [[nodiscard]] std::string remark() const final { return remark_; }
   [[nodiscard]] bool keeps_own_time() const noexcept final { return this->virtual_time(); }

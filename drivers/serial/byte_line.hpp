@@ -75,8 +75,6 @@ class LinePlace {
   /// For a simulation in virtual time: lets so much of it pass, with no line open. False: time is
   /// real, the caller waits by itself.
   [[nodiscard]] virtual bool pass(Duration /*time*/) { return false; }
-  /// For a recording: its end was read, no line of it will bring anything any more.
-  [[nodiscard]] virtual bool exhausted() const noexcept { return false; }
 };
 
 }  // namespace vergence

@@ -61,10 +61,6 @@ class Device final : public TriggerDevice,
   [[nodiscard]] DeviceStatus wait(Duration limit, Pulse* pulse) noexcept override;
   [[nodiscard]] DeviceStatus pause(std::uint32_t pulses) noexcept override;
   void stop() noexcept override;
-  bool observe_line(LineObserver* observer) noexcept override {
-    log().observe(observer);
-    return true;
-  }
   [[nodiscard]] std::string last_error() const override { return last_error_.get(); }
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] TriggerStatistics statistics() const noexcept override;

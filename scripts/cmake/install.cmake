@@ -1,5 +1,5 @@
-# cmake --install build --prefix DIR: the program, its manual pages and completion, the checkerboard tool where the program looks for
-# it, examples, udev rules, service (udev and systemd read theirs only under /usr/lib, so a package sets --prefix /usr), documents.
+# cmake --install build --prefix DIR: the program, its man pages (where help2man is installed), the checkerboard tool where the
+# program looks for it, examples, udev rules, service (udev and systemd read theirs only under /usr/lib, so a package sets --prefix /usr), documents.
 include(GNUInstallDirs)
 set(packaging ${PROJECT_SOURCE_DIR}/packaging)
 
@@ -17,12 +17,11 @@ install(FILES ${packaging}/vergence.service DESTINATION lib/systemd/system COMPO
 install(FILES ${packaging}/10-vergence.conf DESTINATION lib/sysctl.d COMPONENT program)
 install(PROGRAMS ${packaging}/vergence-session DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/vergence COMPONENT program)
 
-# When installing, so that they are those of the program that is installed.
+# When installing, so that they are those of the program that is installed. help2man needs the program to run here.
 set(manuals ${PROJECT_BINARY_DIR}/manuals)
-install(CODE "execute_process(COMMAND \"${CMAKE_COMMAND}\" \"-DPROGRAM=${CMAKE_CROSSCOMPILING_EMULATOR};$<TARGET_FILE:vergence>\"
+install(CODE "execute_process(COMMAND \"${CMAKE_COMMAND}\" \"-DPROGRAM=${CMAKE_CROSSCOMPILING_EMULATOR};$<TARGET_FILE:vergence>\" \"-DVERSION=${PROJECT_VERSION}\"
     \"-DOUT=${manuals}\" -P \"${PROJECT_SOURCE_DIR}/scripts/cmake/manuals.cmake\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT program)
-install(DIRECTORY ${manuals}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT program)
-install(DIRECTORY ${manuals}/completions DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion COMPONENT program)
+install(DIRECTORY ${manuals}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT program OPTIONAL)
 
 install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${packaging}/debian/copyright
   DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)

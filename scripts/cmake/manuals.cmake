@@ -1,27 +1,30 @@
-# Manual pages and the completion, from the program's own declarations: what --help prints.
-#   cmake -DPROGRAM="…;…" -DOUT=… -P manuals.cmake        PROGRAM: with the emulator before it where it is a foreign one
-# OUT/man1/vergence.1.gz, one page a command, and OUT/completions/vergence.
-function(ask out)
-  execute_process(COMMAND ${PROGRAM} ${ARGN} OUTPUT_VARIABLE text ERROR_VARIABLE error RESULT_VARIABLE result)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "${PROGRAM} ${ARGN}: ${result} ${error}")
-  endif()
-  set(${out} "${text}" PARENT_SCOPE)
+# Man pages from --help, by help2man:
+#   cmake -DPROGRAM="…;…" -DVERSION=… -DOUT=… -P manuals.cmake      PROGRAM: with the emulator before it where it is a foreign one
+# OUT/man1/vergence.1.gz and vergence-COMMAND.1.gz; none where help2man is not installed.
+file(REMOVE_RECURSE ${OUT}/man1)
+find_program(HELP2MAN help2man)
+if(NOT HELP2MAN)
+  message(STATUS "no man pages: help2man is not installed")
+  return()
+endif()
+file(MAKE_DIRECTORY ${OUT}/man1)
+list(JOIN PROGRAM " " program)
+
+# Of the program, or of one of its commands.
+function(page name description command)
+  execute_process(COMMAND ${HELP2MAN} --no-info --locale=C.UTF-8 --version-string=${VERSION} --source=vergence "--name=${description}"
+    "${command}" OUTPUT_VARIABLE text COMMAND_ERROR_IS_FATAL ANY)
+  string(REGEX REPLACE "(\n\\.SH NAME\n)[^\n]* (\\\\- )" "\\1${name} \\2" text "${text}")  # `vergence run` is no name for whatis
+  file(WRITE ${OUT}/man1/${name}.1 "${text}")
+  execute_process(COMMAND gzip -9 -n -f ${OUT}/man1/${name}.1 COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
 
-function(keep page text)
-  file(WRITE ${OUT}/man1/${page}.1 "${text}")
-  execute_process(COMMAND gzip -9 -n -f ${OUT}/man1/${page}.1 COMMAND_ERROR_IS_FATAL ANY)
-endfunction()
-
-file(REMOVE_RECURSE ${OUT}/man1 ${OUT}/completions)
-ask(page manual)
-keep(vergence "${page}")
-string(REGEX MATCHALL "vergence\\\\-[a-z]+\\(1\\)" commands "${page}")
-foreach(command IN LISTS commands)
-  string(REGEX REPLACE "vergence\\\\-([a-z]+)\\(1\\)" "\\1" word "${command}")
-  ask(page manual ${word})
-  keep(vergence-${word} "${page}")
+execute_process(COMMAND ${PROGRAM} --help OUTPUT_VARIABLE help COMMAND_ERROR_IS_FATAL ANY)
+page(vergence "stereo visual odometry that finds and keeps its own calibration" "${program}")
+string(REPLACE ";" "," help "${help}")  # a list of CMake is split there
+string(REGEX REPLACE ".*Subcommands:" "" commands "${help}")
+string(REGEX MATCHALL "\n  [a-z]+ +[^\n]+" commands "${commands}")
+foreach(line IN LISTS commands)
+  string(REGEX MATCH "^\n  ([a-z]+) +(.*)$" matched "${line}")
+  page(vergence-${CMAKE_MATCH_1} "${CMAKE_MATCH_2}" "${program} ${CMAKE_MATCH_1}")
 endforeach()
-ask(completion completion)
-file(WRITE ${OUT}/completions/vergence "${completion}")

@@ -33,7 +33,7 @@ list(JOIN libraries_of_both ", " libraries_of_both)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "adduser, ${libraries_of_both}, libbz2-1.0, liblz4-1, libzstd1 (>= 1.5.2)")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME vergence)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "vergence-checkerboard, systemd, udev, bash-completion")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "vergence-checkerboard, systemd, udev")
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "stereo visual odometry that finds and keeps its own calibration
 Reads two or more rigidly mounted cameras (GigE Vision, IIDC, V4L2), a
 trigger board and a geodetic INS; gives a pose for every pair, with a status

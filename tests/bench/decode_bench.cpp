@@ -39,8 +39,7 @@ struct Encoding {
 Encoding encode(const std::vector<std::vector<std::uint8_t>>& files, const Intrinsics& lens) {
   const auto stride = static_cast<std::size_t>(lens.width);
   std::vector<std::uint8_t> pixels(stride * static_cast<std::size_t>(lens.height));
-  app::PngEncoder encoder(lens.width, lens.height);
-  std::vector<std::uint8_t> out(app::PngEncoder::most_bytes(lens.width, lens.height));
+  std::vector<std::uint8_t> out;
   std::chrono::duration<double, std::milli> took{};
   std::size_t bytes = 0;
   for (const auto& file : files) {
@@ -48,7 +47,8 @@ Encoding encode(const std::vector<std::vector<std::uint8_t>>& files, const Intri
         app::ImageFileStatus::ok)
       return {};
     const auto begin = std::chrono::steady_clock::now();
-    bytes += encoder.encode({pixels.data(), lens.width, lens.height, lens.width}, out);
+    if (!app::encode_png({pixels.data(), lens.width, lens.height, lens.width}, &out)) return {};
+    bytes += out.size();
     took += std::chrono::steady_clock::now() - begin;
   }
   const auto count = static_cast<double>(files.size());

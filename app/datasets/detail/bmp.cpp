@@ -25,6 +25,11 @@ std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
   return (std::size_t{width} * bits + 31) / 32 * 4;
 }
 
+/// Of a pixel's blue, green and red, with the weights of PNG and JPEG images.
+std::uint8_t luminance(const std::uint8_t* bgr) noexcept {
+  return static_cast<std::uint8_t>((114U * bgr[0] + 587U * bgr[1] + 299U * bgr[2] + 500U) / 1000U);
+}
+
 bool palette_is_grey(Bytes b) noexcept {
   const std::size_t first = kFileHeader + u32(b, kHeaderSize), end = u32(b, kPixelsAt);
   std::size_t count = std::min<std::size_t>(256, u32(b, kColours) == 0 ? 256 : u32(b, kColours));
@@ -66,15 +71,19 @@ ImageFileStatus check_bmp(Bytes b) noexcept {
 
 ImageFileStatus decode_bmp(Bytes b, ImageSize size, std::uint8_t* out,
                            std::size_t stride) noexcept {
-  if (u16(b, kBits) != 8 || u32(b, kCompression) != 0 || !palette_is_grey(b))
+  const std::uint32_t bits = u16(b, kBits);
+  if (u32(b, kCompression) != 0 || (bits != 24 && (bits != 8 || !palette_is_grey(b))))
     return ImageFileStatus::undecodable;
   const std::size_t width = static_cast<std::size_t>(size.width),
                     height = static_cast<std::size_t>(size.height);
-  const std::size_t row = row_bytes(static_cast<std::uint32_t>(size.width), 8);
-  for (std::size_t y = 0; y < height; ++y)
-    std::copy_n(b.begin() + static_cast<std::ptrdiff_t>(u32(b, kPixelsAt) +
-                                                        (top_down(b) ? y : height - 1 - y) * row),
-                width, out + y * stride);
+  const std::size_t row = row_bytes(static_cast<std::uint32_t>(size.width), bits);
+  for (std::size_t y = 0; y < height; ++y, out += stride) {
+    const std::uint8_t* from = &b[u32(b, kPixelsAt) + (top_down(b) ? y : height - 1 - y) * row];
+    if (bits == 8)
+      std::copy_n(from, width, out);
+    else
+      for (std::size_t x = 0; x < width; ++x) out[x] = luminance(from + 3 * x);
+  }
   return ImageFileStatus::ok;
 }
 

@@ -5,8 +5,8 @@
 
 #include "app/datasets/image_file.hpp"
 
-/// BMP as industrial cameras' recorders write it: 8 bits a pixel, uncompressed, a palette of greys
-/// or none. Files are hostile: every offset is checked against the bytes there are.
+/// Uncompressed BMP of 8 bits (a palette of greys, or none) or 24 bits. Files are untrusted: every
+/// offset is checked against the bytes there are.
 namespace vergence::app::detail {
 
 inline constexpr std::size_t kBmpHead = 26;  // bytes up to the end of the size
@@ -20,8 +20,8 @@ inline constexpr std::size_t kBmpHead = 26;  // bytes up to the end of the size
 /// Whether every row is there. Precondition: is_bmp(). → ok, torn, not_an_image
 [[nodiscard]] ImageFileStatus check_bmp(std::span<const std::uint8_t> bytes) noexcept;
 
-/// Rows of `stride` bytes. Precondition: check_bmp() and the size are right. → ok, undecodable (not
-/// 8 bits, compressed, a palette of colours)
+/// Rows of `stride` bytes. Precondition: check_bmp() and the size are right. → ok, undecodable
+/// (other depths, compressed, a palette of colours)
 [[nodiscard]] ImageFileStatus decode_bmp(std::span<const std::uint8_t> bytes, ImageSize size,
                                          std::uint8_t* out, std::size_t stride) noexcept;
 

@@ -8,7 +8,6 @@
 #include <csetjmp>
 #include <cstring>
 
-#include "app/datasets/detail/grey_png.hpp"
 #include "app/datasets/detail/image_size.hpp"
 
 namespace vergence::app::detail {
@@ -21,6 +20,26 @@ constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n'
 std::uint32_t u32(Bytes b, std::size_t at) noexcept {
   return (std::uint32_t{b[at]} << 24U) | (std::uint32_t{b[at + 1]} << 16U) |
          (std::uint32_t{b[at + 2]} << 8U) | b[at + 3];
+}
+
+struct Chunk {
+  Bytes type_and_content;       // four letters, then the content
+  std::uint32_t check_sum = 0;  // as the file has it, CRC-32 of both
+
+  [[nodiscard]] bool is(const char (&type)[5]) const noexcept {
+    return std::memcmp(type_and_content.data(), type, 4) == 0;
+  }
+};
+
+/// The chunk that begins at *at, and *at behind it. → false: it does not fit into the file
+bool next_chunk(Bytes png, std::size_t* at, Chunk* chunk) noexcept {
+  constexpr std::size_t kFrame = 12;  // length, type, check sum
+  if (*at > png.size() || png.size() - *at < kFrame) return false;
+  const std::size_t length = u32(png, *at);
+  if (length > png.size() - *at - kFrame) return false;
+  *chunk = {png.subspan(*at + 4, length + 4), u32(png, *at + 8 + length)};
+  *at += length + kFrame;
+  return true;
 }
 
 struct Source {
@@ -122,20 +141,10 @@ ImageFileStatus png_size(Bytes b, ImageSize* size) noexcept {
   return accept_size(u32(b, 16), u32(b, 20), size);
 }
 
-bool next_chunk(Bytes png, std::size_t* at, PngChunk* chunk) noexcept {
-  constexpr std::size_t kFrame = 12;  // length, type, check sum
-  if (*at > png.size() || png.size() - *at < kFrame) return false;
-  const std::size_t length = u32(png, *at);
-  if (length > png.size() - *at - kFrame) return false;
-  *chunk = {png.subspan(*at + 4, length + 4), u32(png, *at + 8 + length)};
-  *at += length + kFrame;
-  return true;
-}
-
 ImageFileStatus check_png(Bytes b) noexcept {
-  PngChunk chunk;
+  Chunk chunk;
   bool pixels = false;
-  for (std::size_t at = kPngChunks; next_chunk(b, &at, &chunk);) {
+  for (std::size_t at = kSignature.size(); next_chunk(b, &at, &chunk);) {
     const Bytes summed = chunk.type_and_content;
     if (libdeflate_crc32(0, summed.data(), summed.size()) != chunk.check_sum)
       return ImageFileStatus::torn;
@@ -147,7 +156,6 @@ ImageFileStatus check_png(Bytes b) noexcept {
 
 ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
                            DeepSamples* deep) noexcept {
-  if (decode_grey_png(bytes, size, out, stride)) return ImageFileStatus::ok;
   const Reader reader;
   if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
   Source source{bytes};

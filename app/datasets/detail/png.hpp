@@ -2,13 +2,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 
 #include "app/datasets/image_file.hpp"
 
-/// PNG by libpng, plain grey ones by libdeflate (grey_png.hpp). Files are hostile: chunks are
-/// walked with their check sums and the size is accepted before libpng sees a byte.
+/// PNG by libpng. Files are untrusted: chunks are walked with their check sums and the size is
+/// accepted before libpng sees a byte.
 namespace vergence::app::detail {
 
 inline constexpr std::size_t kPngHead = 33;  // bytes of the signature and the whole IHDR chunk
@@ -24,21 +23,6 @@ inline constexpr std::size_t kPngHead = 33;  // bytes of the signature and the w
 /// Every chunk with its check sum, up to IEND; what follows it is nobody's business. Precondition:
 /// is_png(). → ok, torn
 [[nodiscard]] ImageFileStatus check_png(std::span<const std::uint8_t> bytes) noexcept;
-
-struct PngChunk {
-  std::span<const std::uint8_t> type_and_content;  // four letters, then the content
-  std::uint32_t check_sum = 0;                     // as the file has it, CRC-32 of both
-
-  [[nodiscard]] bool is(const char (&type)[5]) const noexcept {
-    return std::memcmp(type_and_content.data(), type, 4) == 0;
-  }
-};
-
-inline constexpr std::size_t kPngChunks = 8;  // bytes before the first chunk
-
-/// The chunk that begins at *at, and *at behind it. → false: it does not fit into the file
-[[nodiscard]] bool next_chunk(std::span<const std::uint8_t> png, std::size_t* at,
-                              PngChunk* chunk) noexcept;
 
 /// The upper 8 of the lower `bits` (8 … 16) of a grey sample; what is beyond them is white.
 [[nodiscard]] inline std::uint8_t narrowed(std::uint16_t sample, int bits) noexcept {

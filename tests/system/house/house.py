@@ -38,7 +38,7 @@ WORLDS_OF_THEIR_OWN = ("firmware_iface/trigger/board/", "tests/rigs/kernel/")
 LIBRARIES = {
     "opencv2": ("app/calibration/", "tests/"),  # the checkerboard tool; the program needs none of it
     "opencv": ("app/calibration/", "tests/"),
-    "png.h": ("app/datasets/", "tests/"),
+    "png.h": ("app/datasets/", "app/recording/", "tests/"),
     "jpeglib.h": ("app/datasets/", "tests/"),
     "Eigen": ("app/", "core/", "drivers/", "tests/"),
     "hwy": ("core/", "drivers/mock/", "tests/"),

@@ -20,9 +20,11 @@ program="$work/usr/bin/vergence"
 for file in lib/udev/rules.d/99-vergence.rules lib/systemd/system/vergence.service lib/sysctl.d/10-vergence.conf libexec/vergence/vergence-session; do
   [ -f "$work/usr/$file" ] || fail "$file is not installed"
 done
-# The manual pages and the completion are those of this program.
-zcat "$work/usr/share/man/man1/vergence-run.1.gz" | cmp - <("$program" manual run) || fail "the manual page is not the program's"
-cmp "$work/usr/share/bash-completion/completions/vergence" <("$program" completion) || fail "the completion is not the program's"
+if command -v help2man >/dev/null; then  # of the packages' build alone
+  for command in $("$program" --help | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p'); do
+    zcat "$work/usr/share/man/man1/vergence-$command.1.gz" | grep -q '^\.SH OPTIONS\|^\.SS "Options' || fail "$command has no man page"
+  done
+fi
 
 status=0
 "$program" calibrate --convert "$work/session/calibration.yaml" "$work/camchain.yaml" 2>"$work/err" || status=$?

@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <string>
 
-#include "tests/support/small_disk.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/live_drive.hpp"
 
@@ -85,29 +84,6 @@ TEST(Run, aTerminalStoppedByCtrlSHoldsUpNoSigterm) {
   drive.signal(SIGTERM);
   EXPECT_EQ(drive.wait(30s), 143);
   expect_whole(folder / "s");
-}
-
-TEST(Run, aDiskThatIsFullAtTheStartCostsNoPose) {
-  const test::TemporaryFolder folder;
-  const test::SmallDisk disk(folder.path(), "nr_inodes=1");
-  if (!disk.ready()) GTEST_SKIP() << "no file system may be mounted here";
-  const Pipe errors;
-  const fs::path session = folder / "sessions" / "s";
-  Drive drive(session, false, 600, {}, errors.input());
-  ASSERT_TRUE(errors.says(session.string() + ": cannot be made (No space left on device)", 60s));
-  std::this_thread::sleep_for(2s);
-  ASSERT_FALSE(fs::exists(session));
-  ASSERT_TRUE(disk.change("nr_inodes=1000"));
-  ASSERT_TRUE(within(60s, [&] { return lines_of(session / "poses.csv") > 5; }));
-  drive.signal(SIGTERM);
-  EXPECT_EQ(drive.wait(60s), 143);
-  expect_whole(session);
-  EXPECT_EQ(lines_of(session / "poses.csv"),
-            test::summary_of(session)["frames"]["read"].get<std::size_t>() + 1);
-  EXPECT_EQ(test::events(session, "disk_full").size(), 1U);
-  EXPECT_EQ(test::events(session, "disk_room"),
-            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
-  EXPECT_GT(fs::file_size(session / "drive.mcap"), 0U);
 }
 
 TEST(Run, aDriveInRealTimeEndsByTheClockWhereEveryCameraIsGone) {

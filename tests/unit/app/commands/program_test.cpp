@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "app/runtime/version.hpp"
+#include "app/runtime/withdrawn.hpp"
 #include "core/features/simd_target.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
@@ -61,52 +62,22 @@ TEST(Program, HelpAndVersionAreWordsToo) {
   EXPECT_TRUE(refused_in_one_sentence(run_vergence("help nothing")));
 }
 
-/// Every `--option` that a help text declares, one a line.
-std::vector<std::string> options_of(const std::string& help) {
-  std::vector<std::string> options;
-  std::istringstream lines(help);
-  for (std::string line; std::getline(lines, line);) {
-    const auto at = line.find("--");
-    if (!line.starts_with("  -") || at == std::string::npos) continue;
-    options.push_back(line.substr(at, line.find_first_of(" ,=[", at) - at));
-  }
-  return options;
-}
-
-TEST(Program, ManualAndCompletionHaveEveryCommandAndOption) {
-  const std::string completion = run_vergence("completion").out, whole = run_vergence("manual").out;
-  std::size_t count = 0;
-  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices",
-                           "doctor", "snap", "report"}) {
-    const std::string page = run_vergence(std::string("manual ") + word).out;
-    EXPECT_TRUE(contains(whole, std::string("\\fB") + word + "\\fR")) << word;
-    const auto at = completion.find(std::string("    ") + word + ") options=");
-    ASSERT_NE(at, std::string::npos) << word;
-    const std::string row = completion.substr(at, completion.find('\n', at) - at);
-    for (const std::string& option : options_of(run_vergence(std::string(word) + " --help").out)) {
-      std::string escaped;
-      for (const char c : option) escaped += c == '-' ? std::string("\\-") : std::string(1, c);
-      EXPECT_TRUE(contains(page, escaped)) << word << " " << option;
-      EXPECT_TRUE(contains(row, option)) << word << " " << option;
-      ++count;
-    }
-  }
-  EXPECT_GT(count, 60U);
-  EXPECT_TRUE(refused_in_one_sentence(run_vergence("manual nothing")));
-}
-
-TEST(Program, BashCompletesCommandsAndOptions) {
+TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {
+  using Kind = Withdrawn::Kind;
   const test::TemporaryFolder folder;
-  folder.write("completion", run_vergence("completion").out);
-  const std::string script =
-      "source '" + (folder / "completion").string() +
-      "'; COMP_WORDS=(vergence rep); COMP_CWORD=1; _vergence; echo \"${COMPREPLY[@]}\"; "
-      "COMP_WORDS=(vergence replay x --from); COMP_CWORD=3; _vergence; echo \"${COMPREPLY[@]}\"";
-  folder.write("script", script);
-  const std::string command =
-      "bash '" + (folder / "script").string() + "' > '" + (folder / "out").string() + "'";
-  ASSERT_EQ(std::system(command.c_str()), 0);
-  EXPECT_EQ(test::read_file(folder / "out"), "replay report\n--from-scratch\n");
+  folder.write("rig.yaml", "threads: 1\n");
+  const std::string out = " --out '" + (folder / "out").string() + "'",
+                    run = "run '" + (folder / "rig.yaml").string() + "'" + out + " --set ";
+  for (const Withdrawn& row : withdrawn()) {
+    const std::string name(row.name);
+    const std::string words = row.kind == Kind::key            ? run + name + "=1"
+                              : row.kind == Kind::record_topic ? run + "'record=[" + name + "]'"
+                              : row.kind == Kind::option       ? name + " x" + out
+                                                               : name;
+    const Outcome outcome = run_vergence(words);
+    EXPECT_TRUE(refused_in_one_sentence(outcome)) << name;
+    EXPECT_TRUE(contains(outcome.err, std::string(row.instead))) << name << ": " << outcome.err;
+  }
 }
 
 TEST(Program, AnUnknownCommandNamesTheNearest) {
@@ -156,9 +127,8 @@ TEST(Program, AStackThatIsTooSmallIsSaidBeforeItOverflows) {
 }
 
 TEST(Program, AStandardOutputThatTakesNothingIsAnError) {
-  const std::string command =
-      std::string("'") + VERGENCE_PROGRAM + "' --help >/dev/full 2>/dev/null";
-  EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 2);
+  constexpr const char* kCommand = "'" VERGENCE_PROGRAM "' --help >/dev/full 2>/dev/null";
+  EXPECT_EQ(WEXITSTATUS(std::system(kCommand)), 2);
 }
 
 }  // namespace

@@ -111,18 +111,27 @@ TEST_F(ImageFile, greyBmpIsReadToTheBitFromBothEnds) {
   EXPECT_EQ(size, kSize);
 }
 
-TEST_F(ImageFile, aBmpCutAnywhereIsTornAndOneOfColoursIsRefused) {
+TEST_F(ImageFile, aBmpCutAnywhereIsTornAndOtherDepthsAreRefused) {
   const auto bytes = tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)));
   for (std::size_t n = 2; n < bytes.size(); n += n < 60 ? 1 : 37)
     EXPECT_EQ(decode({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n)}),
               ImageFileStatus::torn)
         << n;
-  EXPECT_EQ(
-      decode(tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC3, cv::Scalar(90, 80, 70)))),
-      ImageFileStatus::undecodable);
+  EXPECT_EQ(decode(tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC4, cv::Scalar(90)))),
+            ImageFileStatus::undecodable);
   auto painted = bytes;
   painted[14 + 40 + 4 * 90] ^= 1U;  // blue of palette entry 90
   EXPECT_EQ(decode(painted), ImageFileStatus::undecodable);
+}
+
+TEST_F(ImageFile, aBmpOf24BitsBecomesItsLuminance) {
+  const auto bytes =
+      tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC3, cv::Scalar(90, 80, 70)));
+  std::vector<std::uint8_t> out(kStride * kTinyHeight);
+  ASSERT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
+  // 0.299 * 70 + 0.587 * 80 + 0.114 * 90 = 78.15
+  EXPECT_EQ(out.front(), 78);
+  EXPECT_EQ(out[kStride * (kTinyHeight - 1) + kTinyWidth - 1], 78);
 }
 
 TEST_F(ImageFile, aBmpWhoseNumbersLieReadsNothingBeyondItsBytes) {

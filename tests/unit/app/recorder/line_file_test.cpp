@@ -8,7 +8,6 @@
 
 #include "app/runtime/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/unit/app/recorder/broken_descriptor.hpp"
 
 namespace vergence::app {
 namespace {
@@ -104,122 +103,6 @@ TEST(LineFile, whatWaitsIsBoundedAndWhatIsLostIsWholeLinesThatAreCounted) {
     EXPECT_TRUE(file.close());
   }
   EXPECT_EQ(test::read_file(folder / "a.txt").size(), taken * line.size());
-}
-
-TEST(LineFile, afterAMoveReopenBeginsANewFileAndLosesNoLine) {
-  const test::TemporaryFolder folder;
-  LineFile file(folder / "a.txt");
-  bool fresh = true;
-  EXPECT_TRUE(file.append("one\n"));
-  EXPECT_TRUE(file.reopen(&fresh));
-  EXPECT_FALSE(fresh) << "the file is where it was, and has a line";
-  EXPECT_TRUE(file.append("two\n"));
-  std::filesystem::rename(folder / "a.txt", folder / "a.txt.1");
-  EXPECT_TRUE(file.reopen(&fresh));
-  EXPECT_TRUE(fresh);
-  EXPECT_TRUE(file.append("three\n"));
-  EXPECT_TRUE(file.close());
-  EXPECT_EQ(test::read_file(folder / "a.txt.1"), "one\ntwo\n");
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "three\n");
-}
-
-TEST(LineFile, aFileThatIsLeftAndThatTheDiskDidNotKeepIsKnown) {
-  const test::TemporaryFolder folder;
-  LineFile file(folder / "a.txt");
-  bool fresh = false;
-  EXPECT_TRUE(file.append("one\n"));
-  EXPECT_TRUE(file.reopen(&fresh));
-  EXPECT_EQ(file.take_left_fault(), 0);
-  ASSERT_EQ(test::break_descriptors_of(folder / "a.txt", O_PATH), 1);
-  EXPECT_TRUE(file.reopen(&fresh));
-  EXPECT_EQ(file.take_left_fault(), EBADF);
-  EXPECT_EQ(file.take_left_fault(), 0) << "once";
-  EXPECT_EQ(file.fault(), 0) << "the new one is good";
-}
-
-TEST(LineFile, onAFullDiskReopenWaitsUntilTheOldFileHasItsLinesWhole) {
-  const test::TemporaryFolder folder;
-  LineFile file(folder / "a.txt");
-  bool fresh = true;
-  EXPECT_TRUE(file.append("one\n"));
-  std::filesystem::rename(folder / "a.txt", folder / "a.txt.1");
-  {
-    SmallDisk disk(2);
-    EXPECT_FALSE(file.reopen(&fresh));
-    EXPECT_FALSE(fresh);
-    EXPECT_TRUE(file.reopen_due());
-  }
-  EXPECT_TRUE(file.flush());
-  EXPECT_TRUE(file.reopen(&fresh));
-  EXPECT_TRUE(fresh);
-  EXPECT_FALSE(file.reopen_due());
-  EXPECT_TRUE(file.append("two\n"));
-  EXPECT_TRUE(file.close());
-  EXPECT_EQ(test::read_file(folder / "a.txt.1"), "one\n");
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "two\n");
-}
-
-TEST(LineFile, whatCannotBeReopenedGoesOnInTheOldFile) {
-  const test::TemporaryFolder folder;
-  std::filesystem::create_directory(folder / "s");
-  LineFile file(folder / "s" / "a.txt");
-  std::filesystem::rename(folder / "s", folder / "t");
-  bool fresh = true;
-  EXPECT_FALSE(file.reopen(&fresh));
-  EXPECT_FALSE(fresh);
-  EXPECT_EQ(file.fault(), ENOENT);
-  EXPECT_TRUE(file.append("one\n"));
-  EXPECT_TRUE(file.close());
-  EXPECT_EQ(test::read_file(folder / "t" / "a.txt"), "one\n");
-}
-
-TEST(LineFile, aDescriptorThatIsLostIsGivenUpAndTheWholeLinesGoToTheFileOfThatName) {
-  const test::TemporaryFolder folder;
-  LineFile file(folder / "a.txt");
-  EXPECT_TRUE(file.append("one\n"));
-  EXPECT_TRUE(file.flush());
-  {
-    SmallDisk disk(6);
-    EXPECT_TRUE(file.append("two\n"));
-    EXPECT_FALSE(file.flush());
-    EXPECT_FALSE(file.out_of_reach()) << "room is all it lacks";
-  }
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "one\ntw");
-  EXPECT_TRUE(file.append("three\n"));
-  ASSERT_EQ(test::break_descriptors_of(folder / "a.txt"), 1);
-  EXPECT_FALSE(file.flush());
-  EXPECT_TRUE(file.out_of_reach());
-  bool fresh = true;
-  EXPECT_TRUE(file.reopen(&fresh));
-  EXPECT_FALSE(fresh);
-  EXPECT_EQ(file.lost_lines(), 1U) << "the one that was cut";
-  EXPECT_EQ(file.waiting_lines(), 1U);
-  EXPECT_TRUE(file.append("four\n"));
-  EXPECT_TRUE(file.close());
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "one\nthree\nfour\n");
-}
-
-TEST(LineFile, aLostFileThatIsEmptyUnderItsNameBeginsWithItsHeadOnce) {
-  const test::TemporaryFolder folder;
-  LineFile file(folder / "a.txt");
-  EXPECT_TRUE(file.append("head\n"));
-  ASSERT_EQ(test::break_descriptors_of(folder / "a.txt"), 1);
-  bool fresh = false;
-  EXPECT_TRUE(file.reopen(&fresh));
-  EXPECT_TRUE(fresh);
-  file.begin_with("head\n");
-  EXPECT_TRUE(file.append("one\n"));
-  EXPECT_TRUE(file.flush());
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "head\none\n") << "its head still waited";
-  std::filesystem::remove(folder / "a.txt");
-  folder.write("a.txt", "");
-  EXPECT_TRUE(file.append("two\n"));
-  ASSERT_EQ(test::break_descriptors_of((folder / "a.txt").string() + " (deleted)"), 1);
-  EXPECT_TRUE(file.reopen(&fresh));
-  EXPECT_TRUE(fresh);
-  file.begin_with("head\n");
-  EXPECT_TRUE(file.close());
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "head\ntwo\n");
 }
 
 TEST(LineFile, aPlaceThatCannotBeWrittenIsNamed) {

@@ -27,8 +27,6 @@ Recording::Options recording_options() {
 ImageEncoder::Options encoder_options() {
   ImageEncoder::Options o;
   o.waiting = 100'000;
-  o.width = kWidth;
-  o.height = kHeight;
   o.when_full = Recording::WhenFull::wait;
   return o;
 }
@@ -87,7 +85,7 @@ TEST(ImageEncoder, anImageWithoutRoomIsDroppedAndCounted) {
   EXPECT_EQ(encoder.dropped(), 1U);
 }
 
-TEST(ImageEncoder, postingAndEncodingTakeNoMemory) {
+TEST(ImageEncoder, postingTakesNoMemory) {
   if (!AllocationGuard::available()) GTEST_SKIP() << "no allocation hooks in this build";
   const TemporaryFolder folder;
   Recording recording(folder.path(), recording_options());

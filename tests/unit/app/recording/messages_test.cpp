@@ -168,9 +168,6 @@ TEST(Messages, everyMessageFitsItsRoom) {
   EXPECT_TRUE(fits([](CdrWriter* o) { write_pose_transform(o, {}); }));
   EXPECT_TRUE(fits([](CdrWriter* o) { write_frame(o, {}); }));
   EXPECT_TRUE(fits([](CdrWriter* o) { write_pulse(o, {}, {}, {}); }));
-  EXPECT_TRUE(fits([](CdrWriter* o) { write_device_gone(o, {}, 3); }));
-  EXPECT_TRUE(fits([](CdrWriter* o) { write_line_event(o, {}, {}); }));
-  EXPECT_TRUE(fits([](CdrWriter* o) { write_set(o, {}, {}); }));
   EXPECT_TRUE(fits([&](CdrWriter* o) { write_rig_transforms(o, {}, four, names); }));
   EXPECT_TRUE(fits([&](CdrWriter* o) { write_camera_info(o, {}, names[3], four, 3, true); }));
 }

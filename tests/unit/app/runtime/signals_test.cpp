@@ -80,17 +80,6 @@ TEST(SignalGuard, ADriveThatIsToOutliveItsTerminalDoesSoAlsoAfterAnotherGuard) {
   EXPECT_EQ(std::signal(SIGHUP, before), SIG_IGN);
 }
 
-TEST(SignalGuard, AHangupAsksForTheFilesToBeOpenedAgainWhereThatIsWanted) {
-  const SignalGuard guard(SignalGuard::OnHangup::reopen);
-  EXPECT_FALSE(guard.take_reopen_request());
-  for (int i = 0; i < 2; ++i) {
-    std::raise(SIGHUP);
-    EXPECT_TRUE(guard.take_reopen_request());
-    EXPECT_FALSE(guard.take_reopen_request());
-  }
-  EXPECT_FALSE(guard.stop_requested());
-}
-
 TEST(SignalGuard, WhatAReaderOrADiskDoesIsLeftToTheWriteThatFails) {
   const SignalGuard guard;
   for (const int number : {SIGPIPE, SIGXFSZ, SIGUSR2}) std::raise(number);

@@ -50,6 +50,11 @@ class RecordedPoses {
     recorder_.on_event(event);
   }
   [[nodiscard]] DriveRecorder& recorder() { return recorder_; }
+  void close() {
+    std::vector<std::string> faults;
+    recorder_.close(&faults);
+    EXPECT_TRUE(faults.empty());
+  }
   /// Messages of a topic in a file; none where it is not there.
   [[nodiscard]] std::ptrdiff_t messages(const std::string& topic, const std::string& file) const {
     if (!std::filesystem::exists(folder_ / file)) return 0;
@@ -88,14 +93,12 @@ class RecordedPoses {
 };
 
 TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
-  RecordedPoses drive({"record=[poses]"});
-  drive.drive(10);
-  drive.recorder().roll();
-  for (int i = 0; i < 1000 && drive.rigs("drive_1.mcap") == 0; ++i) {
-    drive.drive(1);
-    std::this_thread::sleep_for(5ms);
+  RecordedPoses drive({"record=[poses]", "record.roll_mb=1"});
+  for (int i = 0; i < 100 && drive.rigs("drive_1.mcap") == 0; ++i) {
+    drive.drive(100);
+    std::this_thread::sleep_for(100ms);
   }
-  drive.recorder().close();
+  drive.close();
   EXPECT_EQ(drive.rigs("drive_0.mcap"), 1);
   EXPECT_EQ(drive.rigs("drive_1.mcap"), 1);
 }
@@ -115,7 +118,7 @@ TEST(DriveRecorder, allOfTheTimeBeforeAnEventIsKept) {
   drive.drive(kKept + 100);
   drive.mark();
   drive.drive(1);
-  drive.recorder().close();
+  drive.close();
   EXPECT_GE(drive.messages("/vergence/odometry", "drive.mcap"), kKept);
 }
 
@@ -125,7 +128,7 @@ TEST(DriveRecorder, whatIsKeptAroundAnEventSaysWhereTheCamerasAre) {
   std::this_thread::sleep_for(300ms);  // the writer passes over the first of them
   drive.mark();
   drive.drive(2);
-  drive.recorder().close();
+  drive.close();
   EXPECT_GE(drive.rigs("drive.mcap"), 2);
 }
 

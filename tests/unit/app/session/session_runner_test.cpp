@@ -22,7 +22,6 @@
 
 #include "app/recorder/pose_line.hpp"
 #include "core/memory/fixed_vector.hpp"
-#include "tests/support/small_disk.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -270,34 +269,6 @@ TEST(SessionRunner, theQuotaMakesRoomBeforeTheFolderAndASessionThatIsRefusedCost
   BlackSource without_room(2);
   EXPECT_THROW((void)run_session(without_room, configuration, options, signals), InputError);
   EXPECT_FALSE(std::filesystem::exists(folder / "old"));
-}
-
-TEST(SessionRunner, aLiveDriveGoesOnWhereTheDiskIsFullFromTheBeginning) {
-  for (const bool read_only : {false, true}) {
-    const test::TemporaryFolder folder;
-    const test::SmallDisk disk(folder.path(), read_only ? "" : "nr_inodes=1");
-    if (!disk.ready() || (read_only && !disk.make_read_only()))
-      GTEST_SKIP() << "no file system may be mounted here";
-    BlackSource source(4);
-    Notebook notes;
-    SessionOptions options;
-    options.out = folder / "session";
-    options.quiet = true;
-    options.observers = {&notes};
-    const SignalGuard signals;
-    const Configuration configuration = load_configuration(std::nullopt, {"record=[poses]"});
-    EXPECT_THROW((void)run_session(source, configuration, options, signals), InputError)
-        << "a replay has time";
-    BlackSource live(4);
-    live.be_live();
-    testing::internal::CaptureStderr();
-    (void)run_session(live, configuration, options, signals);
-    const std::string said = testing::internal::GetCapturedStderr();
-    EXPECT_EQ(live.finished(), 1);
-    EXPECT_EQ(std::string_view(notes.order()).substr(notes.order().size() - 3), "fpc");
-    EXPECT_NE(said.find("session: cannot be made ("), std::string::npos) << said;
-    EXPECT_NE(said.find("poses.csv: is not complete ("), std::string::npos) << said;
-  }
 }
 
 TEST(SessionRunner, aSessionHasTheNumberAfterThoseBesideIt) {
