@@ -18,7 +18,7 @@ CORES = os.cpu_count() or 1
 
 
 def listed(build):
-    """[(name, tier, folder, seconds of one processor)] in CTest's order, which its -I counts from 1."""
+    """[(name, tier, folder, seconds of one processor)] in CTest's order."""
     shown = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], capture_output=True, text=True, check=True)
     found = []
     for test in json.loads(shown.stdout)["tests"]:
@@ -32,9 +32,8 @@ def listed(build):
 def share(build, tier, turn, seconds):
     budget = seconds * CORES
     shares, used, left_out = [[]], 0.0, []
-    for number, (name, its_tier, _, cost) in enumerate(listed(build), 1):
-        if its_tier != tier:
-            continue
+    # CTest's -I counts from 1 the tests that pass its other filters, which is the tier as a label.
+    for number, (name, _, _, cost) in enumerate([test for test in listed(build) if test[1] == tier], 1):
         if cost > budget:
             left_out.append("%s (%.0f s)" % (name, cost / CORES))
             continue
