@@ -1,8 +1,9 @@
 // Whether poses come out anywhere on the recorded drives, whatever is done to them that an odometry
 // should bear.
 //
-//   robustness_bench [cold|windows|times|scenes|planar|all] [DRIVE|all] [KEY=VALUE …]
+//   robustness_bench [drives|cold|windows|times|scenes|planar|all] [DRIVE|all] [KEY=VALUE …]
 //
+// drives   Whole drives, calibration given, with `calibration.online=off` and online.
 // cold     Starts at every tenth frame, ten frames, calibration
 //          given and not refined: starts that give a pose within three frames.
 // windows  Starts at every 25th frame, 150 frames or to the end, with the calibration given, the
@@ -80,6 +81,20 @@ std::string millimetres(const DriveOutcome& r) {
 void row(const std::string& text) {
   fmt::print("{}\n", text);
   std::fflush(stdout);
+}
+
+void whole(const Bench& b, const RecordedSequence& d) {
+  for (const bool online : {false, true}) {
+    const app::Configuration& c = online ? b.online : b.off;
+    const DriveOutcome r = drive(d, d.sequence, c, given(c, d.sequence));
+    const auto moving = std::count_if(r.samples.begin(), r.samples.end(), [](const PoseSample& s) {
+      return s.reason == Reason::moving_scene;
+    });
+    row(fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |", d.name,
+                    online ? "online" : "off", posed(r), r.ok, moving, millimetres(r),
+                    r.segments_percent > 0 ? fmt::format("{:.3f}", r.segments_percent) : "–",
+                    r.knocks, r.adopted));
+  }
 }
 
 void cold_starts(const Bench& b, const RecordedSequence& d) {
@@ -248,6 +263,10 @@ int main(int argc, char** argv) {
     fmt::print("\n");
     for (const RecordedSequence& d : drives) run(d);
   };
+  section("drives",
+          "drive | calibration | posed | ok | moving scene | ATE mm | segments % | knocks "
+          "| adopted",
+          9, [&](const RecordedSequence& d) { whole(b, d); });
   section("cold", "drive | starts with a pose within three frames | not, at frame (reason)", 3,
           [&](const RecordedSequence& d) { cold_starts(b, d); });
   section("windows",
