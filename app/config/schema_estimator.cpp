@@ -24,18 +24,9 @@ Group odometry() {
       .integer("pyramid_levels", &O::pyramid_levels, 2, 6, "levels",
                "Sizes of the image that are searched, each half of the one before: more levels "
                "follow faster motion.")
-      .number("min_corner_score", &O::min_corner_score, 0.01, 1e5, "grey² / px²",
-              "Contrast that a corner needs to be tracked (least eigenvalue of the structure "
-              "tensor): lower it for dim images.")
-      .number("nearest_baselines", &O::nearest_baselines, 1, 50, "baselines",
-              "Nearest depth at which a point is looked for in the other image, as a multiple of "
-              "the baseline; nearer ones are not found.")
       .number("band_px", &O::band_px, 0.5, 5, "px",
               "Half the width of the band along the epipolar line in which a match across is "
               "sought: wide for a poor calibration.")
-      .number("match_zncc", &O::match_zncc, 0.5, 0.99, "",
-              "Least normalised correlation of the two image patches of a match across (1: the "
-              "same picture).")
       .number("pixel_sigma", &O::pixel_sigma, 0.02, 5, "px",
               "Standard deviation of a tracked corner's position, each coordinate, at full "
               "resolution; the scale of all residuals.")
@@ -62,9 +53,6 @@ Group odometry() {
       .integer("ok_inliers", &O::ok_inliers, 6, 1000, "points",
                "A pose on fewer points than this is `degraded` with the reason `few_inliers`; not "
                "below `min_inliers`.")
-      .number(
-          "max_gap_s", &O::max_gap_s, 0.05, 5, "s",
-          "Longest time between two frames over which motion is predicted; longer is a `time_gap`.")
       .integer("mlesac_hypotheses", &O::mlesac_hypotheses, 10, 1000, "",
                "Most poses tried on random point triples, a frame.")
       .integer("seed", &O::seed, 0, kLargestSeed, "",

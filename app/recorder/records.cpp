@@ -36,6 +36,8 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
       return "calibration_rejected";
     case EstimatorEvent::Kind::calibration_waits:
       return "calibration_waits";
+    case EstimatorEvent::Kind::calibration_resumed:
+      return "calibration_resumed";
   }
   return "";
 }
@@ -49,6 +51,8 @@ const char* opening(EstimatorEvent::Kind kind) noexcept {
       return "a calibration was rejected";
     case EstimatorEvent::Kind::calibration_waits:
       return "the calibration waits";
+    case EstimatorEvent::Kind::calibration_resumed:
+      return "the last calibration is in use again";
     default:
       return "";
   }

@@ -17,7 +17,8 @@ bool is_for_user(EstimatorEvent::Kind kind) noexcept {
   return kind == Kind::rig_changed || kind == Kind::in_step ||
          kind == Kind::calibration_confirmed || kind == Kind::calibration_contradicted ||
          kind == Kind::focal_length_contradicted || kind == Kind::calibration_accepted ||
-         kind == Kind::calibration_rejected || kind == Kind::calibration_waits;
+         kind == Kind::calibration_rejected || kind == Kind::calibration_waits ||
+         kind == Kind::calibration_resumed;
 }
 
 std::string words(std::string_view name) {

@@ -67,6 +67,8 @@ struct EstimatorEvent {
     calibration_accepted,       // value: frames it was solved from
     calibration_rejected,       // why: the reason; value: frames
     calibration_waits,          // why: what is missing to calibrate
+    calibration_resumed,        // the one from before an alarm is in use again: the scene was lost
+                                // while another was sought, and its images fit this one
   } kind = Kind::state;
   State from = State::initialising;
   State to = State::initialising;

@@ -35,11 +35,8 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kUnmatchedAfter) {
     unmatched_frames = 0;
-    // Good images of which no scene can be made: before a wall, or it is the rig that does not fit.
-    if (!odometry.too_near()) {
-      give_up_calibration(frame, kUnmatchedAfter);
-      odometry.reset_extrinsics();
-    }
+    give_up_calibration(frame, kUnmatchedAfter);
+    odometry.reset_extrinsics();
   }
   if (out.uneven) {
     may_lag = kLagShownAfter;
@@ -57,6 +54,11 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     return;
   }
   without_pose = 0;
+  if (out.resumed && calibrator.seeking()) {
+    calibrator.keep();
+    note(EstimatorEvent::Kind::calibration_resumed, frame.stamp,
+         "the calibration from before fits the images again", 0);
+  }
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
                : !calibrator.calibrated()                  ? Trigger::pose_found_uncalibrated

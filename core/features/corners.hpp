@@ -18,7 +18,6 @@ struct Corner {
 struct CornerOptions {
   int cell = 32;               // px: at most one corner a cell
   int border = 16;             // px kept free at the image's edge
-  float min_score = 30.F;      // (grey levels / px)²
   float min_distance = 12;     // px to a corner already taken
   const Mask* mask = nullptr;  // of the image searched; null: all of it is looked at
 };
@@ -27,7 +26,8 @@ inline constexpr int kMaxCell = 128;        // px: sizes the working memory of a
 inline constexpr int kMaxGridCells = 4096;  // of an image
 
 /// The strongest corner of every grid cell that holds none of `taken`, strongest first, as many as
-/// `out` has room for.
+/// `out` has room for. A corner counts by its rank: what there is no contrast for in absolute
+/// numbers may be all that a scene offers. Left out is only what the rounding of grey levels makes.
 ///
 /// Threads  The runner takes the lower half of the grid to its other side; the result does not
 ///          depend on it.

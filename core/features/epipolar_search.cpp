@@ -55,15 +55,23 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   const int coarsest = std::min<int>(image.levels(), patch.levels) - 1;
   int level = std::min(options.level, coarsest);
   if (level < 0) return result;
-  Vec2 first, last;
+  Vec2 first;
   if (curve.at(options.rho_first, &first, nullptr) != ProjectStatus::ok) return result;
-  // The near end may lie beyond the lens: come back until it does not.
-  double rho_last = options.rho_last;
-  constexpr int kHalvings = 6;
-  int halvings = 0;
-  while (curve.at(rho_last, &last, nullptr) != ProjectStatus::ok && halvings++ < kHalvings)
-    rho_last = options.rho_first + 0.6 * (rho_last - options.rho_first);
-  if (halvings > kHalvings) return result;
+  Vec2 last = first;
+  // The near end may lie beyond the image, or the lens: the range ends where the curve leaves it.
+  double rho_last = options.rho_first;
+  double step = options.rho_last - options.rho_first;
+  constexpr int kBisections = 10;  // to a thousandth of the range
+  for (int i = 0; i <= kBisections; ++i, step *= 0.5) {
+    Vec2 p;
+    if (std::abs(rho_last + step - options.rho_first) >
+            std::abs(options.rho_last - options.rho_first) ||
+        curve.at(rho_last + step, &p, nullptr) != ProjectStatus::ok || !curve.camera->inside(p, 0))
+      continue;
+    rho_last += step;
+    last = p;
+  }
+  if (rho_last == options.rho_first) return result;
 
   const double length = (last - first).norm();
   while (level < coarsest && std::ldexp(length, -level) > kMaxSearchSteps - 1) ++level;

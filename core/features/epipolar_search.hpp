@@ -23,7 +23,7 @@ struct EpipolarSearchOptions {
   int level = 1;           // pyramid level searched; a coarser one where the curve is longer there
                            // than kMaxSearchSteps: steps of more than a pixel pass matches by
   double rho_first = 0.0;  // 1/m, start of the range; may be negative to ask for exchanged cameras
-  double rho_last = 1.0;   // 1/m, its end
+  double rho_last = 1.0;   // 1/m, its end, or before it where the curve leaves the image
   int band = 1;            // px of the level to each side of the curve, 2 at most
   float min_zncc = 0.7F;   // of the 8×8 px compared
   float unique = 0.85F;    // (1 − best) / (1 − second best): above it the match is ambiguous

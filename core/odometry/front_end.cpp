@@ -69,7 +69,8 @@ std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCal
     bytes += BlobMatcher::memory_needed(largest_width(rig), largest_height(rig));
   const auto n = static_cast<std::size_t>(options.features);
   return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint) + sizeof(FreeMatch)) +
-         kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor)) + 6 * kCacheLine;
+         kMaxPoints * (sizeof(features::Corner) + sizeof(features::Descriptor) + sizeof(float)) +
+         7 * kCacheLine;
 }
 
 FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Arena& arena,
@@ -91,6 +92,7 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
   taken_ =
       BoundedVector<features::Corner>(arena.make<features::Corner>(kMaxPoints, "taken corners"));
   fresh_ = arena.make<NewPoint>(n, "new points");
+  distances_ = BoundedVector<float>(arena.make<float>(kMaxPoints, "distances to epipolar lines"));
   described_ = arena.make<features::Descriptor>(kMaxPoints, "descriptors");
   free_matches_ = BoundedVector<FreeMatch>(arena.make<FreeMatch>(n, "free matches"));
   if (options.first_pair != 0) blobs_ = BlobMatcher(largest_width(rig), largest_height(rig), arena);
@@ -219,7 +221,7 @@ void FrontEnd::follow_sample(Map& map, const Transform& T_left_world, int sample
   features::AlignOptions how;
   how.coarsest = coarsest;
   how.finest = 0;
-  how.min_zncc = static_cast<float>(options_.match_zncc);
+  how.min_zncc = kMayMatch;
   how.max_shift = static_cast<float>(8 << coarsest);
   // At least every second: stride 1 would mean the candidates too.
   follow_into_all(map, T_left_world, how, std::max(2, active / std::max(sample, 1)));
@@ -229,7 +231,7 @@ void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
   features::AlignOptions how;
   how.coarsest = 1;
   how.finest = 0;
-  how.min_zncc = static_cast<float>(options_.match_zncc);
+  how.min_zncc = kMayMatch;
   how.max_shift = 8.F;
   follow_into_all(map, T_left_world, how, 1);
 }

@@ -7,6 +7,7 @@
 #include "core/features/descriptor.hpp"
 #include "core/features/mask.hpp"
 #include "core/features/pyramid.hpp"
+#include "core/geometry/epipolar_evidence.hpp"
 #include "core/odometry/blob_matcher.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/options.hpp"
@@ -30,8 +31,9 @@ struct ImageCheck {
 /// How the search across went for the corners of one frame.
 struct StereoCount {
   int corners = 0;
-  int matched = 0;  // in front of the rig
-  int near = 0;     // of these, with a disparity that measures depth
+  int matched = 0;              // in front of the rig
+  int near = 0;                 // of these, with a disparity that measures depth
+  EpipolarEvidence evidence{};  // what their distances from the epipolar lines say
 };
 
 /// A match between the left and another image found without knowing the rig: ideal pixels.
@@ -93,20 +95,20 @@ class FrontEnd {
   /// times that. Valid until the next call.
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
-  /// What the first two cameras share is nearer than points are looked for, by the calibration:
-  /// most free matches lie along its epipolar lines, and before that depth. As long as
-  /// match_free().
-  [[nodiscard]] bool too_near() noexcept;
+  /// New corners of `left` where the map has no points, matched across; null: as if there were no
+  /// map. As many as there is room for, by the effort, and `at_least` so many whatever that is.
+  [[nodiscard]] StereoCount match_new(const Map* map, const FrameEffort& effort = {},
+                                      int at_least = 0) noexcept;
+  /// What the distances of this frame's points from the epipolar lines between the first two
+  /// cameras say.
+  [[nodiscard]] EpipolarEvidence weigh_points(const Map& map) noexcept;
+  /// What the last match_new() has matched becomes points of the given stage, each with its
+  /// observation in `now`.
+  void add_points(const Transform& T_left_world, PointStage stage, Map* map) noexcept;
 
-  /// New corners of `left` where there are no points, matched across, as points of the given stage,
-  /// each with its observation in `now`. As many as there is room for, by the effort, and
-  /// `at_least` so many whatever that is.
-  StereoCount add_points(Map& map, const Transform& T_left_world, PointStage stage,
-                         const FrameEffort& effort = {}, int at_least = 0) noexcept;
-
-  /// How many corners of the last add_points() match where points of a rig with exchanged cameras
-  /// would lie: behind it.
-  [[nodiscard]] int count_exchanged() noexcept;
+  /// The corners of the last match_new() fit the rig with its cameras exchanged better than as it
+  /// is. Its matches are lost.
+  [[nodiscard]] bool exchanged() noexcept;
 
   [[nodiscard]] const UndistortedCamera& lens(int k) const noexcept {
     return lenses_[static_cast<std::size_t>(k)];
@@ -118,6 +120,9 @@ class FrontEnd {
   [[nodiscard]] float detect_ms() const noexcept { return detect_ms_; }
 
  private:
+  /// Least correlation of what may be one thing in two images. Whether it is, its distance from the
+  /// epipolar line, a clearly worse second best and the frames that follow say.
+  static constexpr float kMayMatch = 0.7F;
   static constexpr int kSmallestCell =
       12;  // px: a window's side; nearer corners share their pixels
 
@@ -128,10 +133,10 @@ class FrontEnd {
   };
   struct NewPoint {
     bool usable = false;
-    bool behind = false;  // matched where a point of exchanged cameras would lie
     int matched_camera = 0;
     double rho = 0;        // 1/m
     double disparity = 0;  // px between here and a point at infinity
+    float distance = 0;    // px from the epipolar line
     Vec3 ray{};
     Mat2 d_ray_d_pixel{};
     features::Patch patch{};
@@ -154,6 +159,8 @@ class FrontEnd {
   /// Aligns a rough match and keeps it if that succeeds and there is room.
   void keep_free_match(const features::Patch& patch, const RoughMatch& rough, int k) noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
+  /// What the distances of the matches with a larger disparity say.
+  [[nodiscard]] EpipolarEvidence weigh(double least_disparity) noexcept;
   /// Where camera k sits is known, if only roughly: before, its transform is the identity.
   [[nodiscard]] bool placed(int k) const noexcept {
     return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0;
@@ -177,6 +184,7 @@ class FrontEnd {
   std::array<std::span<Followed>, kMaxCameras> followed_{};
   BoundedVector<features::Corner> corners_, taken_;
   std::span<NewPoint> fresh_;
+  BoundedVector<float> distances_;  // from epipolar lines, of what is weighed
   std::span<features::Descriptor>
       described_;  // of the map's points in relocalise(), of dense corners in match_free()
   BoundedVector<FreeMatch> free_matches_;

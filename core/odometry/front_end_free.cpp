@@ -3,7 +3,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/features/epipolar_search.hpp"
 #include "core/features/patch.hpp"
 #include "core/odometry/front_end.hpp"
 
@@ -84,27 +83,11 @@ std::span<const FreeMatch> FrontEnd::match_free(int k) noexcept {
   return free_matches_.span();
 }
 
-bool FrontEnd::too_near() noexcept {
-  constexpr int kFewest = 30;  // matches, as a scene is begun from
-  const Transform& T_right_left = rig_.T_camera_left[1];
-  const double nearest = 1.0 / (options_.nearest_baselines * T_right_left.t.norm());
-  const std::span<const FreeMatch> matches = match_free(1);
-  int near = 0;
-  for (const FreeMatch& m : matches) {
-    features::EpipolarCurve curve{&lenses_[1].ideal(), T_right_left, Vec3::Zero()};
-    if (!lenses_[0].ideal().unproject(m.left, &curve.ray)) continue;
-    double rho = nearest, sigma_per_px = 0;
-    const double off = features::fit_inverse_depth(curve, m.other, &rho, &sigma_per_px);
-    if (off >= 0 && off < band_px_ && rho > nearest) ++near;
-  }
-  return near >= kFewest && 2 * near > static_cast<int>(matches.size());
-}
-
 void FrontEnd::keep_free_match(const features::Patch& patch, const RoughMatch& rough,
                                int k) noexcept {
   features::AlignOptions how;
   how.coarsest = 1;
-  how.min_zncc = static_cast<float>(options_.match_zncc);
+  how.min_zncc = kMayMatch;
   how.max_shift = 8.F;
   const features::AlignResult a = features::align(patch, pyramids_[static_cast<std::size_t>(k)],
                                                   rough.other, Mat2::Identity(), how);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 
 #include "core/features/epipolar_search.hpp"
 #include "core/features/patch.hpp"
@@ -10,9 +11,6 @@
 /// New points: corners of `left`, matched along their epipolar lines.
 namespace vergence::odometry {
 namespace {
-
-constexpr double kFarBaselines =
-    2000.0;  // depth given to a point whose disparity is within the noise of zero
 
 float milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
   return std::chrono::duration<float, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -29,7 +27,6 @@ features::CornerOptions FrontEnd::corner_options(int k) const noexcept {
   how.cell = std::clamp(
       static_cast<int>(std::sqrt(c.width * c.height / (kCellsAPoint * options_.features))),
       kSmallestCell, features::kMaxCell);
-  how.min_score = static_cast<float>(options_.min_corner_score);
   how.min_distance = 0.5F * static_cast<float>(how.cell);
   how.mask = mask(k);
   return how;
@@ -38,21 +35,26 @@ features::CornerOptions FrontEnd::corner_options(int k) const noexcept {
 void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
                             NewPoint* out) const noexcept {
   out->usable = false;
-  out->behind = false;
   const Vec2 at(corner.x, corner.y);
   if (!features::cut_patch(pyramids_[0], at, &out->patch)) return;
-  if (!lenses_[0].ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) return;
   if (!finish(0, at, 0.0, &out->left)) return;
   for (int k = 1; k < cameras_; ++k) {
     if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0 || !placed(k)) continue;
     const auto i = static_cast<std::size_t>(k);
-    const features::EpipolarCurve curve{&lenses_[i].raw(), rig_.T_camera_left[i], out->ray};
+    // Of exchanged cameras the first image is what camera k saw.
+    const UndistortedCamera& here = lenses_[exchanged ? i : 0];
+    if (!here.ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) continue;
+    const Transform& T_k_left = rig_.T_camera_left[i];
+    const features::EpipolarCurve curve{&lenses_[exchanged ? 0 : i].raw(),
+                                        exchanged ? T_k_left.inverse() : T_k_left, out->ray};
     const double baseline = rig_.T_camera_left[i].t.norm();
     features::EpipolarSearchOptions search;
     search.level = 1;
     search.band = std::max(1, static_cast<int>(std::lround(0.5 * band_px_)));
     search.mask = mask(k);
-    search.rho_last = (exchanged ? -1.0 : 1.0) / (options_.nearest_baselines * baseline);
+    // As far as the image is wide: what is nearer no two cameras see.
+    const Intrinsics& lens = rig_.intrinsics[i];
+    search.rho_last = std::max(lens.width, lens.height) / (lens.fx * baseline);
     const features::SearchResult s =
         features::search_along(out->patch, pyramids_[i], curve, search);
     if (s.status != features::SearchStatus::ok) continue;
@@ -62,7 +64,7 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
     if (curve.at(rho, &foot, &J) != ProjectStatus::ok) continue;
     features::AlignOptions how;
     how.coarsest = 1;
-    how.min_zncc = static_cast<float>(options_.match_zncc);
+    how.min_zncc = kMayMatch;
     how.max_shift = 6.F;
     // The curve's point is in units of depth 1, so the warp's depth is 1 too.
     const features::AlignResult a =
@@ -72,13 +74,10 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
     double sigma_per_px = 0;
     const double off = features::fit_inverse_depth(curve, a.pixel, &rho, &sigma_per_px);
     if (off < 0 || off > band_px_) continue;
+    out->distance = static_cast<float>(off);
     out->disparity = rho / sigma_per_px;
     const double noise = 3.0 * std::sqrt(2.0) *
                          options_.pixel_sigma;  // px, three sigmas of a difference of two positions
-    if (exchanged) {
-      out->behind = out->disparity < -kNearDisparity;
-      return;
-    }
     if (out->disparity < -noise) continue;
     out->rho = std::max(rho, 1.0 / (kFarBaselines * baseline));
     if (!finish(k, a.pixel, out->rho * baseline, &out->stereo)) continue;
@@ -90,18 +89,15 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
 
 void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchanged) noexcept {
   const std::size_t half = corners.size() / 2;
-  auto first = [&]() noexcept {
-    for (std::size_t i = 0; i < half; ++i) match_stereo(corners[i], exchanged, &fresh_[i]);
+  const auto some = [&](std::size_t begin, std::size_t end) noexcept {
+    for (std::size_t i = begin; i < end; ++i) match_stereo(corners[i], exchanged, &fresh_[i]);
   };
-  auto second = [&]() noexcept {
-    for (std::size_t i = half; i < corners.size(); ++i)
-      match_stereo(corners[i], exchanged, &fresh_[i]);
-  };
+  auto first = [&]() noexcept { some(0, half); };
+  auto second = [&]() noexcept { some(half, corners.size()); };
   runner_.run(TaskRef(first), TaskRef(second));
 }
 
-StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointStage stage,
-                                 const FrameEffort& effort, int at_least) noexcept {
+StereoCount FrontEnd::match_new(const Map* map, const FrameEffort& effort, int at_least) noexcept {
   StereoCount count;
   corners_.clear();
   // Without a left image the pyramid still looks at the last one, whose memory its camera may have
@@ -109,8 +105,9 @@ StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
   if ((structured_ & 1U) == 0) return count;
   const auto start = std::chrono::steady_clock::now();
   taken_.clear();
-  for (const MapPoint& p : map.points())
-    if (p.followed() && p.now.by(0)) (void)taken_.push({p.raw[0].x(), p.raw[0].y(), 0.F});
+  if (map != nullptr)
+    for (const MapPoint& p : map->points())
+      if (p.followed() && p.now.by(0)) (void)taken_.push({p.raw[0].x(), p.raw[0].y(), 0.F});
   features::find_corners(pyramids_[0].level(0), corner_options(0), taken_.span(), runner_,
                          &corners_);
   const auto room = static_cast<std::size_t>(std::max(
@@ -118,15 +115,55 @@ StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
   if (corners_.size() > room) corners_.truncate(room);
   detect_ms_ = milliseconds_since(start);
 
-  count.corners = static_cast<int>(corners_.size());
   match_all(corners_.span(), false);
+  count.corners = static_cast<int>(corners_.size());
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    if (!fresh_[i].usable) continue;
+    ++count.matched;
+    if (fresh_[i].disparity > kNearDisparity) ++count.near;
+  }
+  count.evidence = weigh(-HUGE_VAL);
+  return count;
+}
+
+EpipolarEvidence FrontEnd::weigh(double least_disparity) noexcept {
+  distances_.clear();
+  for (std::size_t i = 0; i < corners_.size(); ++i)
+    if (fresh_[i].usable && fresh_[i].disparity > least_disparity)
+      (void)distances_.push(fresh_[i].distance);
+  return weigh_epipolar_distances(distances_.span(), band_px_,
+                                  std::numbers::sqrt2 * options_.pixel_sigma);
+}
+
+EpipolarEvidence FrontEnd::weigh_points(const Map& map) noexcept {
+  distances_.clear();
+  for (const MapPoint& p : map.points()) {
+    if (!p.followed() || !p.now.by(0) || !p.now.by(1)) continue;
+    features::EpipolarCurve curve{&lenses_[1].ideal(), rig_.T_camera_left[1], {}};
+    double rho = 0, unused = 0;
+    if (!lenses_[0].ideal().unproject(p.now.pixel[0].cast<double>(), &curve.ray)) continue;
+    const double off =
+        features::fit_inverse_depth(curve, p.now.pixel[1].cast<double>(), &rho, &unused);
+    // Beyond the band as far as in it: none was found there by chance.
+    if (off >= 0) (void)distances_.push(static_cast<float>(std::min(off, band_px_)));
+  }
+  return weigh_epipolar_distances(distances_.span(), band_px_,
+                                  std::numbers::sqrt2 * options_.pixel_sigma);
+}
+
+bool FrontEnd::exchanged() noexcept {
+  const double as_given = weigh(kNearDisparity).log_likelihood_ratio;
+  match_all(corners_.span(), true);
+  const EpipolarEvidence other = weigh(kNearDisparity);
+  return other.fits() && other.log_likelihood_ratio > as_given;
+}
+
+void FrontEnd::add_points(const Transform& T_left_world, PointStage stage, Map* map) noexcept {
   const Transform T_world_left = T_left_world.inverse();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     const NewPoint& f = fresh_[i];
     if (!f.usable) continue;
-    ++count.matched;
-    if (f.disparity > kNearDisparity) ++count.near;
-    MapPoint* p = map.make_point();
+    MapPoint* p = map->make_point();
     if (p == nullptr) break;
     p->stage = stage;
     p->p_world = T_world_left * (f.ray / f.rho);
@@ -135,18 +172,11 @@ StereoCount FrontEnd::add_points(Map& map, const Transform& T_left_world, PointS
     p->d_ray_d_pixel = f.d_ray_d_pixel;
     p->patch = f.patch;
     p->found = 1;
+    p->across = true;
     store(f.left, 0, p);
     store(f.stereo, f.matched_camera, p);
     p->in_images = p->now.cameras;
   }
-  return count;
-}
-
-int FrontEnd::count_exchanged() noexcept {
-  match_all(corners_.span(), true);
-  int n = 0;
-  for (std::size_t i = 0; i < corners_.size(); ++i) n += fresh_[i].behind ? 1 : 0;
-  return n;
 }
 
 }  // namespace vergence::odometry

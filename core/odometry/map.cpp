@@ -20,6 +20,7 @@ MapPoint* Map::make_point() noexcept {
     p.found = 0;
     p.now.cameras = 0;
     p.in_images = 0;
+    p.across = false;
     p.logged = false;
     for (PointObservation& s : p.seen) s.cameras = 0;
     return &p;
@@ -62,6 +63,17 @@ void Map::scale_about(const Vec3& centre, double factor) noexcept {
     k.T_left_world = scaled_about(k.T_left_world, centre, factor);
     for (Transform& T : k.T_camera_left) T.t *= factor;
   }
+}
+
+void Map::move_world(const Transform& T_old_new) noexcept {
+  const Transform T_new_old = T_old_new.inverse();
+  for (MapPoint& p : points_) {
+    if (p.stage == PointStage::free) continue;
+    p.p_world = T_new_old * p.p_world;
+    p.T_origin_world = p.T_origin_world * T_old_new;
+  }
+  for (const std::uint8_t slot : order_)
+    keyframes_[slot].T_left_world = keyframes_[slot].T_left_world * T_old_new;
 }
 
 }  // namespace vergence::odometry

@@ -17,6 +17,9 @@ inline constexpr std::size_t kMaxPoints =
 inline constexpr double kNearDisparity =
     3.0;  // px between a point and infinity: ten times the noise of a match; what makes scale
 
+// Depth given to a point whose disparity is within the noise of zero.
+inline constexpr double kFarBaselines = 2000.0;
+
 /// What one rig frame saw of a point: pixels of an ideal pinhole camera with each camera's own K,
 /// distortion removed.
 struct PointObservation {
@@ -59,6 +62,7 @@ struct MapPoint {
   PointObservation now{};  // this frame's
   std::uint8_t in_images =
       0;  // bit k: found in camera k's image now, whether that agrees with the pose or not
+  bool across = false;          // another camera than `left` has seen it where it should be
   bool logged = false;          // `logged_at` says where
   Eigen::Vector2f logged_at{};  // raw pixel in `left` when the track log last took a frame
   std::array<Eigen::Vector2f, kMaxCameras> raw{};   // this frame's pixels as the image has them
@@ -105,6 +109,8 @@ class Map {
   /// Everything grows by `factor` about a place of the world: points, keyframes and the distances
   /// of their cameras.
   void scale_about(const Vec3& centre, double factor) noexcept;
+  /// Poses become T_left_world · T_old_new, and all points with them.
+  void move_world(const Transform& T_old_new) noexcept;
 
   [[nodiscard]] std::span<MapPoint> points() noexcept { return points_; }
   [[nodiscard]] std::span<const MapPoint> points() const noexcept { return points_; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "core/odometry/detail/frame_steps.hpp"
 #include "core/odometry/drift_covariance.hpp"
@@ -18,10 +19,7 @@ namespace {
 constexpr int kFramesUntilTrial =
     3;  // without new points, before some are made to be tried alone: no keyframe is made while
         // the rig stands, and it stands for whoever follows a truck alongside
-constexpr int kRelinkWaits = 60;  // frames, for something near to begin a scene with
 constexpr int kTrialPoints = 40;  // of them, however little time there is: enough to judge from
-constexpr double kConfirmedShare = 0.3;  // of points and new corners together: 0.44 to 0.65 on a
-                                         // rig that fits, 0.12 to 0.2 a frame out of step
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kUnlinkedBand =
     4.0;  // px: this frame's transform between the cameras is itself measured
@@ -46,18 +44,18 @@ Odometry::Odometry(const OdometryOptions& options, const RigCalibration& rig, bo
       map_(static_cast<std::size_t>(options.window_keyframes), arena),
       window_(options, rig_, arena),
       poses_(options, rig_, arena),
-      initialiser_(static_cast<std::size_t>(options.features), options.seed, arena),
-      motion_(options.max_gap_s) {
+      initialiser_(static_cast<std::size_t>(options.features), options.seed, arena) {
   if (known) return;
+  link_ = Link::unlinked;
   unlink();
   reset_extrinsics();
 }
 
-void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = {rig, 0}; }
+void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = rig; }
 
 void Odometry::unlink() noexcept {
+  if (link_ == Link::linked) last_rig_ = rig_;
   link_ = Link::unlinked;
-  stereo_fails_ = false;  // by the calibration that is not used any more
   gaps_.forget();
   next_rig_.reset();
   front_end_.set_band(std::max(options_.band_px, kUnlinkedBand));
@@ -90,7 +88,7 @@ double Odometry::renew_scale(std::size_t slot) noexcept {
   return factor;
 }
 
-void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept {
+void Odometry::make_keyframe(Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
   const std::size_t slot = map_.make_keyframe(motion_.T_left_world(), stamp);
   map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
@@ -111,7 +109,7 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   const auto keyframes = std::min<std::size_t>(map_.order().size(), out->effort.window_keyframes);
   budget_.window_took(static_cast<double>(clock.mark(Stage::window)), static_cast<int>(keyframes),
                       window.steps);
-  budget_.points_took(new_points(fit, 0, out), out->effort);
+  budget_.points_took(new_points(0, out), out->effort);
   keyframe_points_ = 0;
   for (MapPoint& p : map_.points()) {
     if (!p.followed()) continue;
@@ -121,12 +119,10 @@ void Odometry::make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out)
   out->keyframe = true;
 }
 
-double Odometry::new_points(const PoseFit& fit, int at_least, FrameOutcome* out) noexcept {
+double Odometry::new_points(int at_least, FrameOutcome* out) noexcept {
   StageClock clock(out);
-  const StereoCount stereo = front_end_.add_points(map_, motion_.T_left_world(),
-                                                   PointStage::candidate, out->effort, at_least);
-  // Of all that the left image offers, how much the other cameras confirm.
-  stereo_fails_ = stereo.matched + fit.stereo < kConfirmedShare * (stereo.corners + fit.inliers);
+  (void)front_end_.match_new(&map_, out->effort, at_least);
+  front_end_.add_points(motion_.T_left_world(), PointStage::candidate, &map_);
   const float ms = clock.mark(Stage::match);
   out->stage_ms[static_cast<std::size_t>(Stage::match)] -= front_end_.detect_ms();
   out->stage_ms[static_cast<std::size_t>(Stage::detect)] += front_end_.detect_ms();
@@ -179,15 +175,14 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
 
   if (map_.order().empty()) {
     if (next_rig_) {
-      take_up_link();
+      take_up(*std::exchange(next_rig_, std::nullopt));
       out.relinked = true;
     }
     begin_scene(frame, images, predicted, dt, &out);
     return out;
   }
 
-  out.gap_s =
-      gaps_.note(frames_lost_ == 0 ? dt : since_frame, options_.max_gap_s, link_ == Link::linked);
+  out.gap_s = gaps_.note(frames_lost_ == 0 ? dt : since_frame, link_ == Link::linked);
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
     out.reason = of_images != Reason::none ? of_images
@@ -214,28 +209,21 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   const FrameEffort effort =
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
-  // Far things alone carry a scene on and begin none: for a better calibration it is not given away
-  // at once. Not for ever: with a wrong one near things look far.
+  // Far things alone carry a scene on and begin none.
   const bool all_far = link_ == Link::linked && fit.confirmed_stereo() && fit.near < kNearEnough;
-  const bool waits = next_rig_ && all_far && next_rig_->waited++ < kRelinkWaits;
-  if (next_rig_ && out.images_good && !waits) {
+  if (next_rig_ && out.images_good) {
     out.relink_due = true;
   } else if (gaps_.renewal_due() && out.images_good && fit.confirmed_stereo() && !all_far) {
     out.renewal_due = true;
   } else if (fit.confirmed_stereo() && !images.repeated && wants_keyframe()) {
     out.effort = effort;
-    make_keyframe(fit, frame.stamp, &out);
+    make_keyframe(frame.stamp, &out);
     out.T_left_world = motion_.T_left_world();
   } else if (frames_untried_ >= kFramesUntilTrial && out.images_good && link_ == Link::linked) {
     cursor_before_trial_ = map_.cursor();
     frames_untried_ = 0;
     out.effort.points_percent = effort.points_percent;
-    (void)new_points(fit, kTrialPoints, &out);
-  }
-  // By this frame's new points, of which judge() could not know.
-  if (stereo_fails_ && out.status == PoseStatus::ok) {
-    out.status = PoseStatus::degraded;
-    out.reason = Reason::no_stereo_matches;
+    (void)new_points(kTrialPoints, &out);
   }
   if (restart_cooldown_ > 0) --restart_cooldown_;
   return out;

@@ -35,6 +35,7 @@ struct FrameOutcome {
   bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
                              // tracks are of no more use
   bool relinked = false;     // it was, in this frame
+  bool resumed = false;      // the calibration from before unlink() was: it fits this frame
   bool renewal_due = false;  // after a gap rebuild() makes the scene anew from this frame
   bool renewed = false;      // it did
   bool initialised = false;  // the rig's transform was found from this frame's images alone
@@ -91,15 +92,16 @@ class Odometry {
   [[nodiscard]] FrameOutcome process(const RigFrame& frame, Duration budget = {}) noexcept;
 
   /// From the next frame on the cameras are one rig with this calibration: that frame is still
-  /// posed as before, then rebuild() makes a new scene from it.
+  /// posed as before, then rebuild() goes over to it. Of linked cameras the scene stays, seen
+  /// through the new lenses; without a link a new one is made from that frame, if it can be.
   void link(const RigCalibration& rig) noexcept;
   /// After process() of every frame: what its outcome says is due. Of a link that was taken back
   /// since, nothing.
   void rebuild(FrameOutcome* out) noexcept;
-  /// From the next frame on the cameras are not linked; the scene stays.
+  /// From the next frame on the cameras are not linked; the scene stays. Should it be lost, the
+  /// calibration until now is the first that another is begun with (FrameOutcome::resumed), if its
+  /// images fit.
   void unlink() noexcept;
-  /// No scene can be made of the newest frame although its calibration fits: all is too near.
-  [[nodiscard]] bool too_near() noexcept { return front_end_.too_near(); }
   /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with
   /// finding it.
   void reset_extrinsics() noexcept;
@@ -125,19 +127,28 @@ class Odometry {
   /// Cameras whose own pose was not found are sought by what the points look like.
   void recover_cameras(const PoseFit& fit) noexcept;
   void settle_points(const PoseFit& fit) noexcept;
+  /// Whether the other cameras still see what they have seen.
+  void count_across(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
-  void make_keyframe(const PoseFit& fit, Stamp stamp, FrameOutcome* out) noexcept;
-  /// Points to be tried, and whether the cameras confirm what there is; what it took, ms.
-  double new_points(const PoseFit& fit, int at_least, FrameOutcome* out) noexcept;
+  void make_keyframe(Stamp stamp, FrameOutcome* out) noexcept;
+  /// Makes points to be tried. Returns what it took, ms.
+  double new_points(int at_least, FrameOutcome* out) noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
   [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp,
                                  FrameOutcome* out) noexcept;
   void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
                    double dt, FrameOutcome* out) noexcept;
-  /// The scene is made anew from the newest frame, where its pose says that the camera is.
-  void renew_scene(FrameOutcome* out) noexcept;
-  void take_up_link() noexcept;
+  /// The scene is made anew from the newest frame, where its pose says that the camera is. False:
+  /// it cannot be, and the old one goes on.
+  bool renew_scene(FrameOutcome* out) noexcept;
+  void take_up(const RigCalibration& rig) noexcept;
+  /// Takes up a calibration and keeps the scene: what the window saw is what the new lenses make of
+  /// the same pixels, points are triangulated again, and the newest pose stays. False: this
+  /// frame's matches do not fit it.
+  [[nodiscard]] bool reexpress_scene(const RigCalibration& rig) noexcept;
+  /// The calibration from before unlink() is used again if a scene can be made of this frame by it.
+  [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
   /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
   /// again.
   void lose_scene() noexcept;
@@ -146,12 +157,9 @@ class Odometry {
   const OdometryOptions& options_;
   RigCalibration rig_;
   Link link_;
-  bool rig_known_;  // rig_ has a transform to begin with
-  struct Next {
-    RigCalibration rig;
-    int waited;  // frames
-  };
-  std::optional<Next> next_rig_;  // taken up with a pose to come
+  bool rig_known_;                          // rig_ has a transform to begin with
+  std::optional<RigCalibration> next_rig_;  // taken up with a pose to come
+  std::optional<RigCalibration> last_rig_;  // in use before unlink()
   FrontEnd front_end_;
   Map map_;
   WindowAdjuster window_;
@@ -163,7 +171,8 @@ class Odometry {
   MovingScene moving_;
 
   int frames_lost_ = 0;        // in a row, with images that show something
-  bool stereo_fails_ = false;  // of the last new points the other cameras confirmed hardly any
+  bool stereo_fails_ = false;  // hardly any of the points that the other cameras saw before are
+                               // where they should be in this frame
   // There are candidates, made to be tried, that belong to no keyframe; where they begin.
   std::optional<std::size_t> cursor_before_trial_;
   int frames_untried_ = 0;    // since new points were tried

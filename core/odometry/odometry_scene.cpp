@@ -1,7 +1,9 @@
 #include "core/odometry/odometry.hpp"
 
 #include <algorithm>
+#include <utility>
 
+#include "core/features/epipolar_search.hpp"
 #include "core/odometry/detail/frame_steps.hpp"
 
 /// How scenes begin and end.
@@ -15,11 +17,7 @@ using detail::weakness;
 namespace {
 
 constexpr int kRestartedFrames = 10;  // frames marked after the scene was rebuilt
-constexpr double kCertainShare =
-    0.6;  // near matches of the corners above which nobody asks whether the cameras are exchanged
-constexpr double kStartShare =
-    0.4;  // of the corners that must match: chance across a wrong rig gives a tenth to a quarter
-constexpr int kStartMatches = 30;  // points across to start from
+constexpr int kStartMatches = 30;     // points across to find the rig's transform from
 
 constexpr double kWorstDirection = 0.1;  // rad, of t, to start from
 constexpr double kWorstRotation = 0.01;  // rad
@@ -49,20 +47,23 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
 
 bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
   StageClock clock(out);
-  map_.clear();
-  const StereoCount stereo = front_end_.add_points(map_, T_left_world, PointStage::active);
+  StereoCount stereo = front_end_.match_new(nullptr);
+  // Where half of the corners are matched and near, no more of them are so by chance.
+  const bool asked = 2 * stereo.near < stereo.corners;
+  const bool exchanged = asked && front_end_.exchanged();
+  if (asked) stereo = front_end_.match_new(nullptr);
   clock.mark(Stage::match);
-  if (stereo.corners < kStartMatches)
+  if (stereo.corners < options_.min_inliers)
     out->reason = Reason::few_features;
-  else if (stereo.near < kCertainShare * stereo.corners &&
-           front_end_.count_exchanged() > std::max(stereo.near, kNearEnough - 1))
+  else if (exchanged)
     out->reason = Reason::cameras_swapped;
-  else if (stereo.matched < kStartMatches || stereo.matched < kStartShare * stereo.corners)
+  else if (!stereo.evidence.fits() || stereo.matched < options_.min_inliers)
     out->reason = Reason::no_stereo_matches;
   else if (stereo.near < kNearEnough)  // the rig fits, and nothing seen holds the scale
     out->reason = Reason::weak_geometry;
   else {
-    stereo_fails_ = false;
+    map_.clear();
+    front_end_.add_points(T_left_world, PointStage::active, &map_);
     moving_.forget_points();
     gaps_.forget();
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
@@ -81,7 +82,6 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
     out->stereo_inliers = stereo.matched;
     return true;
   }
-  map_.clear();
   return false;
 }
 
@@ -89,9 +89,11 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
                            const Transform& predicted, double dt, FrameOutcome* out) noexcept {
   // Nothing to follow: this frame begins a scene, where the last one is thought to have ended.
   const Reason of_images = weakness(images, rig_.cameras);
-  const bool initialise = link_ == Link::unlinked && !rig_known_;
-  bool started = !initialise || initialise_rig(out);
-  if (started && !start_scene(predicted, frame.stamp, out)) started = false;
+  const bool unknown = link_ == Link::unlinked && !rig_known_;
+  bool started = unknown && resume(predicted, frame.stamp, out);
+  const bool initialise = unknown && !started;
+  if (!started)
+    started = (!initialise || initialise_rig(out)) && start_scene(predicted, frame.stamp, out);
   if (!started) {
     if (of_images != Reason::none) out->reason = of_images;
     return;
@@ -120,7 +122,7 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
     out->reason = Reason::scene_restarted;
   }
   out->T_left_world = predicted;
-  motion_.update(predicted, frame.stamp);
+  motion_.assume(predicted, frame.stamp);
   frames_lost_ = 0;
 }
 
@@ -134,10 +136,9 @@ void Odometry::reset_extrinsics() noexcept {
   for (Transform& T : rig_.T_camera_left) T = {};
 }
 
-void Odometry::take_up_link() noexcept {
+void Odometry::take_up(const RigCalibration& rig) noexcept {
   link_ = Link::linked;
-  rig_ = next_rig_->rig;
-  next_rig_.reset();
+  rig_ = rig;
   rig_known_ = true;
   front_end_.rebuild_lenses();
   front_end_.set_band(options_.band_px);
@@ -145,25 +146,145 @@ void Odometry::take_up_link() noexcept {
 }
 
 void Odometry::rebuild(FrameOutcome* out) noexcept {
-  if (next_rig_ && out->relink_due) {  // the scene was made with another rig
-    take_up_link();
+  if (next_rig_ && out->relink_due) {
+    const RigCalibration next = *std::exchange(next_rig_, std::nullopt);
     out->relinked = true;
-    renew_scene(out);
+    if (!reexpress_scene(next)) {
+      out->status = PoseStatus::degraded;
+      out->reason = Reason::no_stereo_matches;
+    }
   } else if (gaps_.renewal_due() && out->renewal_due) {
-    out->renewed = true;
-    renew_scene(out);
+    out->renewed = renew_scene(out);
+    gaps_.forget();  // what there was goes on where no new scene can be made
   }
 }
 
-void Odometry::renew_scene(FrameOutcome* out) noexcept {
+bool Odometry::renew_scene(FrameOutcome* out) noexcept {
   FrameOutcome built;
-  if (start_scene(motion_.T_left_world(), motion_.stamp(), &built)) {
-    out->keyframe = true;
-  } else {
-    out->status = PoseStatus::degraded;
-    out->reason = built.reason;
-  }
+  const bool renewed = start_scene(motion_.T_left_world(), motion_.stamp(), &built);
+  if (renewed) out->keyframe = true;
   for (std::size_t i = 0; i < out->stage_ms.size(); ++i) out->stage_ms[i] += built.stage_ms[i];
+  return renewed;
+}
+
+bool Odometry::reexpress_scene(const RigCalibration& rig) noexcept {
+  const RigCalibration before = rig_;
+  std::array<UndistortedCamera, kMaxCameras> old_lenses;
+  for (int k = 0; k < rig_.cameras; ++k)
+    old_lenses[static_cast<std::size_t>(k)] = front_end_.lens(k);
+  const bool was_linked = link_ == Link::linked;
+  take_up(rig);
+
+  // A direction seen by the old lens of camera k → pixels of the image → ideal ones of the new
+  // lens.
+  const auto seen_again = [&](int k, const Vec3& direction, Vec2* raw, Vec2* ideal) noexcept {
+    double unused = 0;
+    return old_lenses[static_cast<std::size_t>(k)].raw().project(direction, raw, nullptr) ==
+               ProjectStatus::ok &&
+           front_end_.lens(k).undistort(*raw, ideal, &unused);
+  };
+  const auto reexpress = [&](PointObservation* o) noexcept {
+    for (int k = 0; k < rig_.cameras; ++k) {
+      if (!o->by(k)) continue;
+      const auto c = static_cast<std::size_t>(k);
+      Vec3 ray;
+      Vec2 raw, ideal;
+      if (old_lenses[c].ideal().unproject(o->pixel[c].cast<double>(), &ray) &&
+          seen_again(k, ray, &raw, &ideal))
+        o->pixel[c] = ideal.cast<float>();
+      else
+        o->drop(k);
+    }
+  };
+  // What two images saw as X in the old left camera, triangulated with the new rig.
+  const auto triangulate = [&](const Vec3& X, const Transform& T_right_left_before,
+                               Vec3* again) noexcept {
+    const Vec3 X_right = T_right_left_before * X;
+    Vec2 raw, left, right;
+    features::EpipolarCurve curve{&front_end_.lens(1).ideal(), rig_.T_camera_left[1], {}};
+    double rho = 1 / X.z(), unused = 0;
+    if (!(X.z() > 0) || !(X_right.z() > 0) || !seen_again(0, X, &raw, &left) ||
+        !seen_again(1, X_right, &raw, &right) ||
+        !front_end_.lens(0).ideal().unproject(left, &curve.ray) ||
+        features::fit_inverse_depth(curve, right, &rho, &unused) < 0)
+      return false;
+    *again = curve.ray / std::max(rho, 1 / (kFarBaselines * rig_.baseline));
+    return true;
+  };
+  // The newest keyframe that saw it in `left`; where none did, the one where it was made.
+  const auto where = [&](const MapPoint& p, Transform* T_left_world,
+                         Transform* T_right_left) noexcept {
+    *T_left_world = p.T_origin_world;
+    *T_right_left = before.T_camera_left[1];
+    for (const std::uint8_t slot : map_.order()) {
+      if (!p.seen[slot].by(0)) continue;
+      *T_left_world = map_.keyframe(slot).T_left_world;
+      if (!was_linked) *T_right_left = map_.keyframe(slot).T_camera_left[1];
+    }
+  };
+
+  // Depths change by one factor for the most part: by it the way between the keyframes, too.
+  std::array<double, kMaxPoints> factors;
+  std::size_t n = 0;
+  Transform T_left_world, T_right_left;
+  for (const MapPoint& p : map_.points()) {
+    if (!p.holds_poses()) continue;
+    where(p, &T_left_world, &T_right_left);
+    const Vec3 X = T_left_world * p.p_world;
+    Vec3 again;
+    if (rig_.intrinsics[0].fx * before.baseline > kNearDisparity * X.z() &&
+        triangulate(X, T_right_left, &again))
+      factors[n++] = again.z() / X.z();
+  }
+  double factor = 1;
+  if (n > 0) {
+    const auto middle = factors.begin() + static_cast<std::ptrdiff_t>(n / 2);
+    std::nth_element(factors.begin(), middle, factors.begin() + static_cast<std::ptrdiff_t>(n));
+    factor = *middle;
+  }
+  const Vec3 here = motion_.T_left_world().centre();
+  for (MapPoint& p : map_.points()) {
+    if (p.stage == PointStage::free) continue;
+    where(p, &T_left_world, &T_right_left);
+    Vec3 X = T_left_world * p.p_world;
+    if (!triangulate(X, T_right_left, &X)) X *= factor;
+    p.p_world = scaled_about(T_left_world, here, factor).inverse() * X;
+    Vec2 raw, ideal;
+    // The patch was cut from pixels: its ray is what the new lens makes of them.
+    if (!seen_again(0, p.ray, &raw, &ideal) ||
+        !front_end_.lens(0).ray_jacobian(raw, &p.ray, &p.d_ray_d_pixel))
+      p.stage = PointStage::free;
+    p.T_origin_world = scaled_about(p.T_origin_world, here, factor);
+    reexpress(&p.now);
+    for (const std::uint8_t slot : map_.order()) reexpress(&p.seen[slot]);
+  }
+  for (const std::uint8_t slot : map_.order()) {
+    Keyframe& keyframe = map_.keyframe(slot);
+    keyframe.T_left_world = scaled_about(keyframe.T_left_world, here, factor);
+    keyframe.T_camera_left = rig_.T_camera_left;
+  }
+  motion_.scale(factor);
+
+  const EpipolarEvidence evidence = front_end_.weigh_points(map_);
+  // Where depths change by a tenth the steps of one keyframe are not enough.
+  constexpr int kAdjustments = 3;
+  for (int i = 0; i < kAdjustments && window_.adjust(map_).usable; ++i)
+    std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
+  const PoseFit newest = poses_.fit_linked(map_, motion_.T_left_world(), false);
+  if (newest.found) map_.move_world(newest.T_left_world.inverse() * motion_.T_left_world());
+  return evidence.fits();
+}
+
+bool Odometry::resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
+  if (!last_rig_) return false;
+  take_up(*last_rig_);
+  if (start_scene(T_left_world, stamp, out)) {
+    out->relinked = out->resumed = true;
+    return true;
+  }
+  unlink();
+  reset_extrinsics();
+  return false;
 }
 
 }  // namespace vergence::odometry

@@ -25,6 +25,10 @@ constexpr double kSampleResidual =
 constexpr int kRelocaliseInliers = 15;    // that agree on one pose: by chance of rough matches 8 do
 constexpr double kRecognisedShare = 0.5;  // of the points in view that must be found again where
                                           // the way to a place was not followed
+constexpr double kBorder = 12.0;          // px: nearer to the edge a patch does not fit
+// Of the points that other cameras have seen and that are in their view: under that they see
+// something else.
+constexpr double kSeenAcross = 0.3;
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough =
     2;                             // rig frames, so four images, before a point holds a pose
@@ -105,7 +109,6 @@ void Odometry::recover_cameras(const PoseFit& fit) noexcept {
 }
 
 int Odometry::points_in_view(const Transform& T_left_world) const noexcept {
-  constexpr double kBorder = 12.0;  // px: nearer to the edge a patch does not fit
   int n = 0;
   for (const MapPoint& p : map_.points()) {
     Vec2 pixel;
@@ -141,10 +144,32 @@ PoseFit Odometry::relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived
   return fit;
 }
 
+void Odometry::count_across(const PoseFit& fit) noexcept {
+  int expected = 0, seen = 0;
+  for (MapPoint& p : map_.points()) {
+    if (!p.holds_poses() || !p.now.by(0)) continue;
+    const bool now = std::popcount(p.now.cameras) > 1;
+    bool in_view = now;
+    for (int k = 1; k < rig_.cameras && !in_view; ++k) {
+      Vec2 pixel;
+      const Camera& camera = front_end_.lens(k).raw();
+      in_view = camera.project(rig_.T_camera_left[static_cast<std::size_t>(k)] *
+                                   (fit.T_left_world * p.p_world),
+                               &pixel, nullptr) == ProjectStatus::ok &&
+                camera.inside(pixel, kBorder) && !front_end_.hides(k, pixel);
+    }
+    expected += p.across && in_view ? 1 : 0;
+    seen += p.across && now ? 1 : 0;
+    p.across = p.across || now;
+  }
+  stereo_fails_ = link_ == Link::linked && seen < kSeenAcross * expected;
+}
+
 void Odometry::settle_points(const PoseFit& fit) noexcept {
   for (MapPoint& p : map_.points()) p.in_images = p.now.cameras;
   for (std::size_t i = 0; i < map_.points().size(); ++i)
     if (map_.points()[i].holds_poses()) map_.points()[i].now.cameras &= poses_.agrees()[i];
+  count_across(fit);
   int tried = 0, kept = 0;
   for (MapPoint& p : map_.points()) {
     if (!p.followed()) continue;

@@ -9,13 +9,8 @@ struct OdometryOptions {
   int features = 400;  // tracked points per image aimed at, 50 … 1000
   int first_pair = 0;  // what finds the transform of a rig that nobody has calibrated: 0 corners, 1
                        // SURF-64 (docs/front_ends.md)
-  int pyramid_levels = 4;  // 2 … 6; each halves the image
-  double min_corner_score =
-      15.0;  // least eigenvalue of the structure tensor's mean, grey levels² / px², > 0
-  double nearest_baselines =
-      4.0;  // nearest depth looked for across, in baselines: sets the largest disparity, 1 … 50
+  int pyramid_levels = 4;     // 2 … 6; each halves the image
   double band_px = 2.0;       // half width of the band about the epipolar line across, 0.5 … 5
-  double match_zncc = 0.8;    // least normalised correlation of a stereo match, 0.5 … 0.99
   double pixel_sigma = 0.15;  // px, of one coordinate of a tracked corner, level 0; also the floor
                               // of the residual scale (METHOD §2)
   double parallax_sigma = 0.8;    // px more, in quadrature, for a patch seen from one depth further
@@ -31,10 +26,8 @@ struct OdometryOptions {
                                   // new one is made, 0.1 … 1
   int min_inliers = 20;           // points under which a pose is not believed (`lost`), 6 … 200
   int ok_inliers = 40;            // points under which it is `degraded: few_inliers`
-  double max_gap_s =
-      0.5;  // longer between two frames and motion cannot be predicted (`time_gap`), 0.05 … 5
-  int mlesac_hypotheses = 100;  // at most, a frame, 10 … 1000
-  std::uint64_t seed = 1;       // of the sampling; same seed, same poses
+  int mlesac_hypotheses = 100;    // at most, a frame, 10 … 1000
+  std::uint64_t seed = 1;         // of the sampling; same seed, same poses
 };
 
 }  // namespace vergence

@@ -105,12 +105,11 @@ Matches follow_corners(const ImagePair& pair, const OdometryOptions& options, do
   where.cell =
       std::clamp(static_cast<int>(std::sqrt(c.width * c.height / (1.6 * options.features))), 12,
                  features::kMaxCell);
-  where.min_score = static_cast<float>(options.min_corner_score);
   where.min_distance = 0.5F * static_cast<float>(where.cell);
   features::find_corners(first.level(0), where, {}, one, &corners);
   features::AlignOptions how;
   how.coarsest = kCoarsest;
-  how.min_zncc = static_cast<float>(options.match_zncc);
+  how.min_zncc = 0.7F;
   how.max_shift = 8 << kCoarsest;
   Matches matches;
   features::Patch patch;

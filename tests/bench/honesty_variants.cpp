@@ -110,6 +110,39 @@ void lag_right(Pairs* pairs, std::size_t from) {
     (*pairs)[i].file[1] = (*pairs)[i - 1].file[1];
 }
 
+/// Stamps `step` apart, from the first one's on.
+void restamp(Pairs* pairs, Duration step) {
+  for (std::size_t i = 1; i < pairs->size(); ++i) (*pairs)[i].stamp = (*pairs)[i - 1].stamp + step;
+}
+
+/// Every tenth pair is left out: the interval there is twice as long, and so is the motion.
+void leave_out_every_tenth(Pairs* pairs) {
+  Pairs kept;
+  for (std::size_t i = 0; i < pairs->size(); ++i)
+    if (i % 10 != 9) kept.push_back((*pairs)[i]);
+  *pairs = std::move(kept);
+}
+
+void leave_out_two_seconds(Pairs* pairs) {
+  const Stamp from = (*pairs)[pairs->size() / 3].stamp;
+  std::erase_if(*pairs, [&](const app::StereoPair& p) {
+    return p.stamp > from && p.stamp < from + Duration::milliseconds(2000);
+  });
+}
+
+/// A textured plane so near that only this camera sees it, over the lower half; it slides by.
+void cover_lower_half(cv::Mat* image, std::size_t at) {
+  cv::RNG random(5);
+  cv::Mat texture(image->rows / 2 / 4, image->cols, CV_8U);
+  random.fill(texture, cv::RNG::UNIFORM, 40, 200);
+  cv::resize(texture, texture, {}, 4, 4, cv::INTER_CUBIC);
+  const int slid = static_cast<int>(6 * at) % (texture.cols - image->cols);
+  texture(cv::Rect(slid, 0, image->cols, texture.rows))
+      .copyTo((*image)(cv::Rect(0, image->rows - texture.rows, image->cols, texture.rows)));
+}
+
+void halve(cv::Mat* image) { cv::resize(*image, *image, {}, 0.5, 0.5, cv::INTER_AREA); }
+
 using M = cv::Mat;
 using N = std::size_t;
 
@@ -227,9 +260,56 @@ constexpr std::array kVariants = {
     HonestyVariant{"every third pair", nullptr, [](Pairs* p) { keep_every(p, 3); }},
 };
 
+constexpr std::array kTimes = {
+    HonestyVariant{"right one frame late", nullptr, [](Pairs* p) { lag_right(p, 0); }},
+    HonestyVariant{"right one frame late half-way", nullptr,
+                   [](Pairs* p) { lag_right(p, p->size() / 2); }},
+    HonestyVariant{"every tenth interval doubled", nullptr, leave_out_every_tenth},
+    HonestyVariant{"even 1 Hz", nullptr,
+                   [](Pairs* p) { restamp(p, Duration::milliseconds(1000)); }},
+    HonestyVariant{"one frame 2.5 rows off",
+                   [](M*, M* r, N i, N n) {
+                     if (i == n / 2) warp(r, 0, 2.5, 0, 1);
+                   },
+                   nullptr},
+    HonestyVariant{"a gap of two seconds", nullptr, leave_out_two_seconds},
+};
+
+constexpr std::array kScenes = {
+    HonestyVariant{"contrast a quarter",
+                   [](M* l, M* r, N, N) {
+                     for (M* image : {l, r}) {
+                       const double mean = cv::mean(*image)[0];
+                       image->convertTo(*image, CV_8U, 0.25, 0.75 * mean);
+                     }
+                   },
+                   nullptr},
+    HonestyVariant{"brightness a half",
+                   [](M* l, M* r, N, N) {
+                     for (M* image : {l, r}) image->convertTo(*image, CV_8U, 0.5);
+                   },
+                   nullptr},
+    HonestyVariant{"noise of 10 grey levels",
+                   [](M* l, M* r, N i, N) {
+                     noise(l, 10, 2 * i);
+                     noise(r, 10, 2 * i + 1);
+                   },
+                   nullptr},
+    HonestyVariant{"left half covered", [](M* l, M*, N i, N) { cover_lower_half(l, i); }, nullptr},
+    HonestyVariant{"right half covered", [](M*, M* r, N i, N) { cover_lower_half(r, i); }, nullptr},
+    HonestyVariant{"half resolution",
+                   [](M* l, M* r, N, N) {
+                     halve(l);
+                     halve(r);
+                   },
+                   nullptr},
+};
+
 }  // namespace
 
 std::span<const HonestyVariant> honesty_variants() { return kVariants; }
+std::span<const HonestyVariant> time_variants() { return kTimes; }
+std::span<const HonestyVariant> scene_variants() { return kScenes; }
 
 app::StereoSequence spoil(const test::RecordedSequence& drive, const HonestyVariant& variant,
                           const std::filesystem::path& folder) {
@@ -247,6 +327,15 @@ app::StereoSequence spoil(const test::RecordedSequence& drive, const HonestyVari
       if (!cv::imwrite(file.string(), images[k], {cv::IMWRITE_PNG_COMPRESSION, 1}))
         throw std::runtime_error("cannot write " + file.string());
       s.pairs[i].file[k] = file.string();
+      // Images of another size have another lens in pixels, whose centres are half a pixel in.
+      Intrinsics& lens = s.calibration.intrinsics[k];
+      const double scale = static_cast<double>(images[k].cols) / lens.width;
+      lens.fx *= scale;
+      lens.fy *= scale;
+      lens.cx = scale * (lens.cx + 0.5) - 0.5;
+      lens.cy = scale * (lens.cy + 0.5) - 0.5;
+      lens.width = images[k].cols;
+      lens.height = images[k].rows;
     }
   }
   return s;

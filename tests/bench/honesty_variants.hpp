@@ -19,6 +19,10 @@ struct HonestyVariant {
 };
 
 [[nodiscard]] std::span<const HonestyVariant> honesty_variants();
+/// Faults of time: images and pairs that come late, twice as late, or not at all.
+[[nodiscard]] std::span<const HonestyVariant> time_variants();
+/// Scenes that are harder than the one recorded, and none of which is a fault of the rig.
+[[nodiscard]] std::span<const HonestyVariant> scene_variants();
 
 /// The drive so spoilt, its changed images in `folder`.
 [[nodiscard]] app::StereoSequence spoil(const test::RecordedSequence& drive,

@@ -42,11 +42,7 @@ StereoSequence with_right_changed(const RecordedSequence& drive, std::size_t fro
 std::optional<RecordedSequence> open_recorded(const std::string& name) {
   const auto folder = shared_data("data/" + name);
   if (!folder) return std::nullopt;
-  const bool euroc = name.starts_with("euroc");
-  RecordedSequence d{
-      name,
-      app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder),
-      {}};
+  RecordedSequence d{name, app::open_sequence(app::find_format(*folder).value(), *folder), {}};
   const auto truth = app::find_truth(*folder);
   if (truth && truth->kind != app::TruthFiles::Kind::kitti) {
     d.truth = app::read_truth(*truth);
@@ -110,6 +106,7 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
     const auto at = static_cast<int>(s.frame);
     const bool knocked = s.frame >= knock_at;
     ++row.frames;
+    row.samples.push_back(s);
     if (s.status != PoseStatus::lost) poses.push_back({s.stamp, s.T_world_left});
     for (const EstimatorEvent& event : e.events()) {
       using Kind = EstimatorEvent::Kind;
@@ -124,6 +121,7 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
       }
     }
     for (const CalibrationDecision& decision : e.calibrations()) {
+      if (decision.accepted && row.adopted++ == 0) row.adopted_at = at;
       if (knocked && row.told_at >= 0 && decision.accepted && row.mended_at < 0) row.mended_at = at;
       if (decision.focal.measured_px > 0) row.focal = decision.focal;
       if (decision.held_out_after_px > 0) row.held_out_px = decision.held_out_after_px;

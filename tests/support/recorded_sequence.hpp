@@ -3,11 +3,13 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "app/config/configuration.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/session/starting_calibration.hpp"
+#include "core/types/pose_sample.hpp"
 
 namespace vergence::test {
 
@@ -20,6 +22,10 @@ struct RecordedSequence {
 
 inline constexpr std::array kRecordedSequences = {"kitti06_51", "kitti01_51", "kitti00_151",
                                                   "euroc_mh01"};
+/// All drives there are, also those of which no truth in six degrees of freedom is known.
+inline constexpr std::array kRecordedDrives = {"kitti06_51",     "kitti01_51",   "kitti00_151",
+                                               "euroc_mh01",     "euroc_pallet", "sand_rover",
+                                               "boofcv_backyard"};
 /// By the name of its folder below data/; empty: it is not there.
 [[nodiscard]] std::optional<RecordedSequence> open_recorded(const std::string& name);
 
@@ -52,6 +58,8 @@ struct DriveOutcome {
   double held_out_px = 0;                         // of the last decision that had frames held out
   FocalMeasurement focal;                         // the newest
   std::optional<RigCalibration> rig;              // in use at the end
+  std::vector<PoseSample> samples;                // one a frame
+  int adopted = 0, adopted_at = -1;               // calibrations, and the first of them
 };
 
 /// `knock_at`: the frame from which on the images are of a turned camera, if any.

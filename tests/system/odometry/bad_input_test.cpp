@@ -206,11 +206,11 @@ TEST(OdometryInBadConditions, aGapWhoseFirstFrameIsOfNoUseIsMarkedFromTheNextOn)
   }
 }
 
-TEST(OdometryInBadConditions, whereEveryIntervalIsAGapTheCalibrationIsKept) {
-  const Replay r = replay(still_drive(), [](std::size_t i, RigFrame*) { return i % 11 == 0; });
+TEST(OdometryInBadConditions, anEvenDriveIsAnOrdinaryOneHoweverSlowItIs) {
+  const Replay r = replay(
+      still_drive(), [](std::size_t i, RigFrame*) { return i % 11 == 0; }, 1, kCalibrationHeld);
   ASSERT_EQ(r.answers.size(), 6U);
-  for (const Answer& a : r.answers) EXPECT_EQ(a.sample.state, State::stereo_odometry);
-  EXPECT_EQ(count_ok(r.answers, 1, still_drive().size()), 0) << story(r.answers);
+  for (const Answer& a : r.answers) EXPECT_EQ(a.sample.status, PoseStatus::ok);
 }
 
 TEST(OdometryInBadConditions, oneLostFrameInThreeIsNothing) {
@@ -261,19 +261,10 @@ TEST(OdometryInBadConditions, aLongGapIsNowhereTakenForAPlaceThatLooksTheSame) {
   }
 }
 
-constexpr std::size_t kConfirmed = 55;  // the first `ok` frame of the drive
-
 TEST(OdometryInBadConditions, exchangedCamerasLeaveNoTraceWhenTheyArePutBack) {
   for (const std::size_t from : {std::size_t{40}, std::size_t{70}, std::size_t{110}}) {
     const Replay r = replay(drive(), swap_cameras(from, from + 40));
     EXPECT_EQ(count_ok(r.answers, from, from + 40), 0) << story(r.answers);
-    // Where the rig was confirmed the cameras contradict each other, and the rig is sought anew.
-    for (std::size_t i = from; from > kConfirmed && i < from + 40; ++i) {
-      const Reason reason = r.answers[i].sample.reason;
-      EXPECT_TRUE(reason == Reason::one_camera || reason == Reason::recalibrating)
-          << i << '\n'
-          << story(r.answers);
-    }
     EXPECT_EQ(wrong_ok(r.answers, {}), "") << "exchanged from frame " << from << '\n'
                                            << story(r.answers);
   }

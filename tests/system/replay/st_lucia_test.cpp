@@ -52,7 +52,7 @@ TEST(StLucia, aDriveReplayedFromTheDataSetsFilesIsTheDriveItself) {
   const Outcome replay = run_vergence(
       "replay '" + (work / "data").string() + "' --format st-lucia --calibration '" +
       (work / "calibration.yaml").string() +
-      "' --set odometry.features=300 --set odometry.min_corner_score=3 --set calibration.online=off"
+      "' --set odometry.features=300 --set calibration.online=off"
       " --set 'ins.lever_arm_m=[0.9, 0.375, 0.5]' --quiet --out '" +
       (work / "replay").string() + "'");
   ASSERT_EQ(replay.code, 0) << replay.err;

@@ -84,8 +84,7 @@ inline pid_t start(const SlowDrive& drive, const std::filesystem::path& session)
   ::execl(VERGENCE_PROGRAM, "vergence", "run", file.c_str(), "--fast", "--quiet", "--duration",
           duration.c_str(), "--out", out.c_str(), "--set", speed.c_str(), "--set",
           "mock.texture_detail=0", "--set", "cameras.0.size=[320,240]", "--set",
-          "cameras.1.size=[320,240]", "--set", "trigger.rate=1", "--set", "ins.rate=20", "--set",
-          "odometry.max_gap_s=5", nullptr);
+          "cameras.1.size=[320,240]", "--set", "trigger.rate=1", "--set", "ins.rate=20", nullptr);
   ::_exit(127);
 }
 

@@ -162,7 +162,7 @@ TEST(Corners, withLittleRoomTheWeakestAreDropped) {
   for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(few.corners[i].score, all.corners[i].score);
 }
 
-TEST(Corners, thereAreNoneOnFlatGroundAnEdgeOrBelowTheThreshold) {
+TEST(Corners, thereAreNoneOnFlatGroundOrAnEdge) {
   EXPECT_EQ(
       Found(draw(kWidth, kHeight, [](const Vec2&) { return 90.0; }).view(), {}).corners.size(), 0U);
   const Image edge = draw(kWidth, kHeight, [](const Vec2& p) {
@@ -170,9 +170,23 @@ TEST(Corners, thereAreNoneOnFlatGroundAnEdgeOrBelowTheThreshold) {
   });
   // Rounding to whole grey levels leaves a third of a level: far below the threshold.
   EXPECT_EQ(Found(edge.view(), {}).corners.size(), 0U);
-  CornerOptions strict;
-  strict.min_score = 1e6F;
-  EXPECT_EQ(Found(textured().view(), strict).corners.size(), 0U);
+}
+
+TEST(Corners, contrastDoesNotChangeWhichThereAre) {
+  const Texture texture(5);
+  const Found all(draw(kWidth, kHeight, texture).view(), {});
+  const Found dim(
+      draw(kWidth, kHeight, [&](const Vec2& p) { return 90 + 0.1 * texture(p); }).view(), {});
+  ASSERT_GT(all.corners.size(), 40U);
+  // Rounding moves a few.
+  EXPECT_GT(dim.corners.size(), 9 * all.corners.size() / 10);
+  std::size_t near = 0;
+  for (const Corner& c : dim.corners.span())
+    near += std::any_of(all.corners.begin(), all.corners.end(),
+                        [&](const Corner& o) { return std::hypot(c.x - o.x, c.y - o.y) < 3; })
+                ? 1U
+                : 0U;
+  EXPECT_GT(near, 8 * all.corners.size() / 10);
 }
 
 TEST(Corners, areTheSameAgainOnEveryTargetWhateverThePaddingAndTheRunner) {

@@ -1,0 +1,288 @@
+// Whether poses come out anywhere on the recorded drives, whatever is done to them that an odometry
+// should bear.
+//
+//   robustness_bench [drives|cold|windows|times|scenes|planar|all] [DRIVE|all] [KEY=VALUE …]
+//
+// drives   Whole drives, calibration given, with `calibration.online=off` and online.
+// cold     Starts at every tenth frame, ten frames, calibration
+//          given and not refined: starts that give a pose within three frames.
+// windows  Starts at every 25th frame, 150 frames or to the end, with the calibration given, the
+//          one found beforehand, and from scratch (counted from the adoption on), against the same
+//          window with the calibration given and `calibration.online=off`.
+// times    Faults of time, with the calibration given, online and off.
+// scenes   Harder scenes, the same.
+// planar   `sand_rover` against its planar truth: similarity and an offset of time are fitted.
+//
+// Tables are markdown, for docs/benchmarks.md. Settings apply to every run.
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstdlib>
+#include <fstream>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+
+#include "app/session/drive_calibration.hpp"
+#include "core/estimator/estimator.hpp"
+#include "tests/bench/honesty_variants.hpp"
+#include "tests/support/recorded_sequence.hpp"
+#include "tests/support/shared_data.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::bench {
+namespace {
+
+using app::StartingCalibration;
+using app::StereoSequence;
+using test::DriveOutcome;
+using test::RecordedSequence;
+
+struct Bench {
+  app::Configuration online, off;
+};
+
+StereoSequence part(const StereoSequence& s, std::size_t first, std::size_t count) {
+  StereoSequence out = s;
+  const auto begin = s.pairs.begin() + static_cast<std::ptrdiff_t>(first);
+  const auto end = begin + static_cast<std::ptrdiff_t>(std::min(count, s.pairs.size() - first));
+  out.pairs.assign(begin, end);
+  return out;
+}
+
+DriveOutcome drive(const RecordedSequence& d, const StereoSequence& s, const app::Configuration& c,
+                   const StartingCalibration& begin) {
+  return test::drive_recorded(d, s, c, begin);
+}
+
+StartingCalibration given(const app::Configuration& c, const StereoSequence& s) {
+  return app::replayed_calibration(c, s, false);
+}
+
+int posed(const DriveOutcome& r) { return r.ok + r.degraded; }
+
+/// Frames from `first` on that `r` has no pose of and `reference` has one.
+int lost_beside(const DriveOutcome& r, const DriveOutcome& reference, std::size_t first) {
+  int n = 0;
+  for (std::size_t i = first; i < std::min(r.samples.size(), reference.samples.size()); ++i)
+    n += r.samples[i].status == PoseStatus::lost && reference.samples[i].status != PoseStatus::lost
+             ? 1
+             : 0;
+  return n;
+}
+
+std::string millimetres(const DriveOutcome& r) {
+  return r.ate_m > 0 ? fmt::format("{:.1f}", 1e3 * r.ate_m) : "–";
+}
+
+void row(const std::string& text) {
+  fmt::print("{}\n", text);
+  std::fflush(stdout);
+}
+
+void whole(const Bench& b, const RecordedSequence& d) {
+  for (const bool online : {false, true}) {
+    const app::Configuration& c = online ? b.online : b.off;
+    const DriveOutcome r = drive(d, d.sequence, c, given(c, d.sequence));
+    const auto moving = std::count_if(r.samples.begin(), r.samples.end(), [](const PoseSample& s) {
+      return s.reason == Reason::moving_scene;
+    });
+    row(fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |", d.name,
+                    online ? "online" : "off", posed(r), r.ok, moving, millimetres(r),
+                    r.segments_percent > 0 ? fmt::format("{:.3f}", r.segments_percent) : "–",
+                    r.knocks, r.adopted));
+  }
+}
+
+void cold_starts(const Bench& b, const RecordedSequence& d) {
+  constexpr std::size_t kStep = 10, kFrames = 10;
+  int starts = 0, posed_within = 0;
+  std::string failed;
+  for (std::size_t first = 0; first + kFrames <= d.sequence.pairs.size(); first += kStep) {
+    const StereoSequence s = part(d.sequence, first, kFrames);
+    const DriveOutcome r = drive(d, s, b.off, given(b.off, s));
+    ++starts;
+    bool any = false;
+    for (std::size_t i = 0; i < std::min<std::size_t>(3, r.samples.size()); ++i)
+      any = any || r.samples[i].status != PoseStatus::lost;
+    posed_within += any ? 1 : 0;
+    if (!any) failed += fmt::format(" {} ({})", first, to_string(r.samples[2].reason));
+  }
+  row(fmt::format("| {} | {} of {} |{} |", d.name, posed_within, starts, failed));
+}
+
+void window_row(const std::string& name, std::size_t first, const char* what, const DriveOutcome& r,
+                const DriveOutcome& reference, bool scratch) {
+  if (scratch && r.adopted_at < 0)
+    return row(fmt::format("| {} | {} | {} | never adopted | | | | | |", name, first, what));
+  const std::size_t from = scratch ? static_cast<std::size_t>(r.adopted_at) : 0;
+  const auto after = [&](PoseStatus s) {
+    return std::count_if(r.samples.begin() + static_cast<std::ptrdiff_t>(from), r.samples.end(),
+                         [&](const PoseSample& p) { return p.status == s; });
+  };
+  row(fmt::format("| {} | {} | {} | {} of {} | {} | {} | {} | {} | {} |", name, first, what,
+                  after(PoseStatus::ok) + after(PoseStatus::degraded), r.samples.size() - from,
+                  after(PoseStatus::ok), millimetres(r), lost_beside(r, reference, from), r.knocks,
+                  r.adopted));
+}
+
+void windows(const Bench& b, const RecordedSequence& d) {
+  constexpr std::size_t kStep = 25, kFrames = 150, kLeast = 25;
+  const StartingCalibration claim = given(b.online, d.sequence);
+  StartingCalibration own = claim;
+  const app::DriveCalibration found =
+      app::calibrate_drive({d.sequence, b.online, 0, d.sequence.pairs.size(), {}, {}}, claim);
+  if (found.rig) own.file.rig = *found.rig;
+  for (std::size_t first = 0; first + kLeast <= d.sequence.pairs.size(); first += kStep) {
+    const StereoSequence s = part(d.sequence, first, kFrames);
+    const DriveOutcome off = drive(d, s, b.off, claim);
+    window_row(d.name, first, "off", off, off, false);
+    window_row(d.name, first, "given", drive(d, s, b.online, claim), off, false);
+    if (found.rig) window_row(d.name, first, "found", drive(d, s, b.online, own), off, false);
+    window_row(d.name, first, "from scratch", drive(d, s, b.online, test::blank(claim)), off, true);
+  }
+}
+
+void variants(const Bench& b, const RecordedSequence& d, std::span<const HonestyVariant> all) {
+  const DriveOutcome untouched = drive(d, d.sequence, b.off, given(b.off, d.sequence));
+  row(fmt::format("| {} | untouched | {} | {} | | | |", d.name, posed(untouched), untouched.ok));
+  for (const HonestyVariant& v : all) {
+    const test::TemporaryFolder folder;
+    const StereoSequence s = spoil(d, v, folder.path());
+    const DriveOutcome off = drive(d, s, b.off, given(b.off, s));
+    const DriveOutcome online = drive(d, s, b.online, given(b.online, s));
+    row(fmt::format("| {} | {} | {} | {} | {} | {} | {} |", d.name, v.name, posed(off), off.ok,
+                    posed(online), online.ok, online.knocks));
+  }
+}
+
+struct PlanarFit {
+  double rms_m = 0, scale = 0, offset_s = 0;
+  int poses = 0;
+};
+
+/// Of positions of frames in [first, last), on the plane that they spread along most; turned,
+/// moved, scaled and shifted in time onto the track.
+PlanarFit fit_planar(const DriveOutcome& r, std::size_t first, std::size_t last) {
+  const auto folder = test::shared_data("data/sand_rover").value();
+  std::vector<double> seconds, frame_s;
+  std::vector<std::complex<double>> track;
+  std::ifstream truth(folder / "truth_planar.txt"), times(folder / "times_1hz.txt");
+  for (double t = 0, x = 0, y = 0; truth >> t >> x >> y;) {
+    seconds.push_back(t);
+    track.emplace_back(x, y);
+  }
+  for (double t = 0; times >> t;) frame_s.push_back(t);
+
+  std::vector<std::size_t> frames;
+  Eigen::MatrixX3d positions(static_cast<Eigen::Index>(r.samples.size()), 3);
+  for (const PoseSample& s : r.samples) {
+    if (s.frame < first || s.frame >= last || s.status == PoseStatus::lost) continue;
+    positions.row(static_cast<Eigen::Index>(frames.size())) = s.T_world_left.t.transpose();
+    frames.push_back(s.frame);
+  }
+  PlanarFit best;
+  best.poses = static_cast<int>(frames.size());
+  best.rms_m = HUGE_VAL;
+  if (frames.size() < 3) return best;
+  const auto n = static_cast<Eigen::Index>(frames.size());
+  const Eigen::MatrixX3d centred =
+      positions.topRows(n).rowwise() - positions.topRows(n).colwise().mean();
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(centred.transpose() * centred);
+  // The plane may be seen from below: the track's and its mirror image are both tried.
+  for (const double side : {1.0, -1.0}) {
+    for (double offset = -5; offset <= 5; offset += 0.05) {
+      std::vector<std::complex<double>> a, b;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const double t = frame_s[frames[static_cast<std::size_t>(i)]] + offset;
+        const auto next = std::upper_bound(seconds.begin(), seconds.end(), t);
+        if (next == seconds.begin() || next == seconds.end()) continue;
+        const auto j = static_cast<std::size_t>(next - seconds.begin());
+        const double w = (t - seconds[j - 1]) / (seconds[j] - seconds[j - 1]);
+        const Vec3 p = centred.row(i).transpose();
+        a.emplace_back(p.dot(axes.eigenvectors().col(2)), side * p.dot(axes.eigenvectors().col(1)));
+        b.push_back((1 - w) * track[j - 1] + w * track[j]);
+      }
+      if (a.size() < 3) continue;
+      const auto count = static_cast<double>(a.size());
+      const auto mean_a = std::accumulate(a.begin(), a.end(), std::complex<double>{}) / count;
+      const auto mean_b = std::accumulate(b.begin(), b.end(), std::complex<double>{}) / count;
+      std::complex<double> cross{};
+      double square = 0, error = 0;
+      for (std::size_t i = 0; i < a.size(); ++i) {
+        cross += std::conj(a[i] - mean_a) * (b[i] - mean_b);
+        square += std::norm(a[i] - mean_a);
+      }
+      const std::complex<double> turn = cross / square;
+      for (std::size_t i = 0; i < a.size(); ++i)
+        error += std::norm(b[i] - mean_b - turn * (a[i] - mean_a));
+      const double rms = std::sqrt(error / count);
+      if (rms < best.rms_m) best = {rms, std::abs(turn), offset, best.poses};
+    }
+  }
+  return best;
+}
+
+void planar(const Bench& b, const RecordedSequence& d) {
+  for (const bool online : {false, true}) {
+    const app::Configuration& c = online ? b.online : b.off;
+    const DriveOutcome r = drive(d, d.sequence, c, given(c, d.sequence));
+    const PlanarFit sunny = fit_planar(r, 0, 329), dim = fit_planar(r, 329, 428);
+    row(fmt::format("| {} | {} | {} | {} | {} | {:.0f} | {:.3f} | {} | {:.0f} | {:.3f} | {} |",
+                    online ? "online" : "off", r.samples.size(), posed(r), r.ok, sunny.poses,
+                    1e3 * sunny.rms_m, sunny.scale, dim.poses, 1e3 * dim.rms_m, dim.scale,
+                    r.knocks));
+  }
+}
+
+}  // namespace
+}  // namespace vergence::bench
+
+int main(int argc, char** argv) {
+  using namespace vergence;
+  using namespace vergence::bench;
+  const std::string what = argc > 1 ? argv[1] : "all", only = argc > 2 ? argv[2] : "all";
+  const std::vector<std::string> set(argv + std::min(argc, 3), argv + argc);
+  Bench b{app::load_configuration(std::nullopt, set), app::load_configuration(std::nullopt, set)};
+  b.off.online = 0;
+  std::vector<RecordedSequence> drives;
+  for (const char* name : test::kRecordedDrives)
+    if (only == "all" || only == name)
+      if (auto d = test::open_recorded(name)) drives.push_back(std::move(*d));
+  if (drives.empty()) {
+    fmt::print("VERGENCE_SHARED has no such drive\n");
+    return 2;
+  }
+  const auto section = [&](const char* name, const char* heading, int columns, const auto& run) {
+    if (what != "all" && what != name) return;
+    fmt::print("\n| {} |\n|", heading);
+    for (int i = 0; i < columns; ++i) fmt::print("---|");
+    fmt::print("\n");
+    for (const RecordedSequence& d : drives) run(d);
+  };
+  section("drives",
+          "drive | calibration | posed | ok | moving scene | ATE mm | segments % | knocks "
+          "| adopted",
+          9, [&](const RecordedSequence& d) { whole(b, d); });
+  section("cold", "drive | starts with a pose within three frames | not, at frame (reason)", 3,
+          [&](const RecordedSequence& d) { cold_starts(b, d); });
+  section("windows",
+          "drive | start | calibration | posed | ok | ATE mm | lost, and posed with `off` | knocks "
+          "| adopted",
+          9, [&](const RecordedSequence& d) { windows(b, d); });
+  const char* spoilt = "drive | what | posed, off | ok, off | posed, online | ok, online | knocks";
+  section("times", spoilt, 7, [&](const RecordedSequence& d) { variants(b, d, time_variants()); });
+  section("scenes", spoilt, 7,
+          [&](const RecordedSequence& d) { variants(b, d, scene_variants()); });
+  section(
+      "planar",
+      "sand_rover | frames | posed | ok | posed 0–328 | rms mm | scale | posed 329–427 | rms mm "
+      "| scale | knocks",
+      11, [&](const RecordedSequence& d) {
+        if (d.name == "sand_rover") planar(b, d);
+      });
+  return EXIT_SUCCESS;
+}
