@@ -13,6 +13,13 @@ constexpr std::array kTable{
               "device bytes are no longer recorded; record.images and record.ins hold all that a "
               "replay reads"},
     Withdrawn{Kind::key, "record.roll_s", "files are split by size alone; set record.roll_mb"},
+    Withdrawn{Kind::key, "odometry.min_corner_score",
+              "corners are chosen by rank within the image"},
+    Withdrawn{Kind::key, "odometry.nearest_baselines",
+              "disparities are searched up to the image's width"},
+    Withdrawn{Kind::key, "odometry.match_zncc", "matches are accepted by consistency"},
+    Withdrawn{Kind::key, "odometry.max_gap_s",
+              "gaps are measured in the intervals of the sequence itself"},
     Withdrawn{Kind::record_topic, "raw",
               "device bytes are no longer recorded; images and ins hold all that a replay reads"},
     Withdrawn{Kind::option, "replay --through-devices",
