@@ -64,14 +64,14 @@ CONTEXTS = {
     "drivers/sync/clock_tie.hpp": (
         ("drivers/sync/durations.hpp", "drivers/sync/sync_types.hpp", "drivers/trigger.hpp"),
         "ClockTie& tie, const SyncFrame& frame, const Pulse& pulse, const Pulse& next, DeviceStamp stamp"),
-    "drivers/sync/missed_trigger_doubt.hpp": (
-        (), "MissedTriggerDoubt& doubt, std::uint64_t missed, const PulseTrain& train, std::uint64_t number, Duration gate"),
-    "drivers/sync/pulse_acquisition.hpp": ((), "PulseAcquisition& acquisition, const StampedFrame& frame, const PulseTrain& train"),
+    "drivers/sync/pulse_matcher.hpp": (
+        (), "MissedTriggerDoubt& doubt, std::uint64_t missed, const PulseTrain& train, std::uint64_t number, Duration gate, "
+        "PulseAcquisition& acquisition, const StampedFrame& frame"),
     "drivers/sync/rig_synchronizer.hpp": (("drivers/camera.hpp",), "const SyncFrame& frame, CameraDevice& camera"),
     "drivers/trigger.hpp": (
         ("drivers/camera.hpp", "drivers/sync/rig_synchronizer.hpp"),
         "TriggerDevice& board, CameraDevice& left, RigSynchronizer& synchronizer"),
-    "drivers/trigger_board/pause_request.hpp": (
+    "drivers/trigger_board/board_line.hpp": (
         (), "PauseRequest& request, HostStamp now, std::uint8_t (*send_pause)(std::uint32_t)"),
     "drivers/xsens/decoder.hpp": (
         (), "Decoder& decoder, const StreamSettings& settings, std::span<const std::uint8_t> bytes, HostStamp arrival"),
