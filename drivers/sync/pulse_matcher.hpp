@@ -100,9 +100,6 @@ class PulseAcquisition {
 ///          more than the limit given. Intervals that differ settle it soon, even ones not before a
 ///          pause.
 /// Threads  One caller. Memory: fixed. Time: at most kMost steps a call.
-///
-///     if (!doubt.add(missed)) return;  // more than can be followed
-///     if (doubt.any() && doubt.compare(train, number, gate * 2)) return;  // settled
 class MissedTriggerDoubt {
  public:
   static constexpr std::size_t kMost = 8;  // pulses missed since the doubt began

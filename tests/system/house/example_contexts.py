@@ -64,9 +64,7 @@ CONTEXTS = {
     "drivers/sync/clock_tie.hpp": (
         ("drivers/sync/durations.hpp", "drivers/sync/sync_types.hpp", "drivers/trigger.hpp"),
         "ClockTie& tie, const SyncFrame& frame, const Pulse& pulse, const Pulse& next, DeviceStamp stamp"),
-    "drivers/sync/pulse_matcher.hpp": (
-        (), "MissedTriggerDoubt& doubt, std::uint64_t missed, const PulseTrain& train, std::uint64_t number, Duration gate, "
-        "PulseAcquisition& acquisition, const StampedFrame& frame"),
+    "drivers/sync/pulse_matcher.hpp": ((), "PulseAcquisition& acquisition, const StampedFrame& frame, const PulseTrain& train"),
     "drivers/sync/rig_synchronizer.hpp": (("drivers/camera.hpp",), "const SyncFrame& frame, CameraDevice& camera"),
     "drivers/trigger.hpp": (
         ("drivers/camera.hpp", "drivers/sync/rig_synchronizer.hpp"),
