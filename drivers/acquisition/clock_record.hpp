@@ -3,9 +3,40 @@
 #include <cstdint>
 #include <cstdlib>
 
+#include "drivers/camera.hpp"
 #include "drivers/sync/clock_mapper.hpp"
+#include "drivers/trigger.hpp"
 
 namespace vergence {
+
+/// A camera's clock on the host's, from its frames.
+///
+/// From the end of an exposure to the arrival is always as long, from its start not: exposures that
+/// grow would look like a clock that drifts. So the clock is fitted to where the frame would have
+/// started with the first frame's exposure.
+///
+/// Threads  One. Memory: that of a ClockMapper. Errors: none.
+class CameraClock {
+ public:
+  explicit CameraClock(const ClockMapperOptions& clock) : clock_(clock) {}
+
+  /// The start of its exposure on the host's clock.
+  [[nodiscard]] MappedStamp start_of(const Frame& frame) noexcept {
+    if (exposure_ == Duration{}) exposure_ = frame.exposure;
+    const Duration longer = frame.exposure - exposure_;
+    MappedStamp start = clock_.map(frame.exposure_start + longer, frame.arrival);
+    start.host = start.host - longer;
+    return start;
+  }
+  /// It was started again: its clock is another.
+  void restart() noexcept { clock_.restart(); }
+  /// Times that the clock was found set.
+  [[nodiscard]] std::uint64_t resets() const noexcept { return clock_.resets(); }
+
+ private:
+  ClockMapper clock_;
+  Duration exposure_{};  // of the first frame: what the mapper's least delay holds for
+};
 
 /// How well a device's clock was known over a drive, from its stamps and where they were mapped to.
 ///
@@ -60,6 +91,40 @@ class ClockRecord {
   std::uint64_t stamps_ = 0, since_ = 0;
   double drift_ppm_ = 0;
   Duration error_{}, worst_{};
+};
+
+/// Reports of pulses on the host's clock: what the driver has not mapped is mapped here, with a new
+/// fit for every boot.
+///
+/// Threads  One. Memory: that of a ClockMapper. Errors: none; a reboot is told.
+class PulseMapper {
+ public:
+  struct Report {
+    Pulse pulse{};          // mapped
+    bool rebooted = false;  // of another boot than the one before it
+  };
+
+  explicit PulseMapper(const ClockMapperOptions& clock) : clock_(clock) {}
+
+  [[nodiscard]] Report add(const Pulse& reported) noexcept {
+    Report report{reported, any_ && reported.boot != boot_};
+    any_ = true;
+    boot_ = reported.boot;
+    if (reported.mapped) return report;
+    if (report.rebooted) clock_.restart();
+    const MappedStamp at = clock_.map(reported.edge, reported.arrival);
+    report.pulse.mapped = true;
+    report.pulse.host = at.host;
+    report.pulse.host_error = at.error;
+    return report;
+  }
+  /// Times that the board's clock was found set.
+  [[nodiscard]] std::uint64_t clock_resets() const noexcept { return clock_.resets(); }
+
+ private:
+  ClockMapper clock_;
+  bool any_ = false;
+  std::uint32_t boot_ = 0;  // of the newest pulse
 };
 
 }  // namespace vergence

@@ -11,9 +11,17 @@
 #include <vector>
 
 #include "core/types/time.hpp"
-#include "drivers/options/option_text.hpp"
 
 namespace vergence {
+
+// How the values of options are written.
+
+/// The whole text is one finite number.
+[[nodiscard]] std::optional<double> parse_number(std::string_view text);
+/// on, yes, true; off, no, false.
+[[nodiscard]] std::optional<bool> parse_switch(std::string_view text);
+/// The shortest text that reads back as the same number.
+[[nodiscard]] std::string shortest_text(double value);
 
 /// One option as people read it.
 struct OptionRow {

@@ -5,6 +5,7 @@
 #include <string_view>
 
 namespace vergence::trigger_board {
+
 namespace {
 
 constexpr std::size_t kTextAtLeast = 12;  // so many printable bytes in a row are no accident
@@ -125,6 +126,31 @@ std::string BoardLine::received_instead() const {
     return "it writes text (\"" + some + "\")";
   }
   return "its bytes are no frames of the trigger protocol";
+}
+
+void PauseRequest::restart() noexcept {
+  drop_new();
+  open_ = {};
+}
+
+std::uint32_t PauseRequest::due(HostStamp now) noexcept {
+  const std::uint32_t added = requested_.exchange(0, std::memory_order_acq_rel);
+  if (added > 0)
+    open_ = {open_.pulses + added, 0, 0, {}};
+  else if (open_.pulses == 0 || now < open_.again)
+    return 0;
+  if (open_.sent == kMostSent) open_ = {};
+  return open_.pulses;
+}
+
+void PauseRequest::sent(std::uint8_t sequence, HostStamp now) noexcept {
+  open_.sequence = sequence;
+  ++open_.sent;
+  open_.again = now + kAnswerLimit;
+}
+
+void PauseRequest::answered(std::uint8_t sequence) noexcept {
+  if (open_.sent > 0 && sequence == open_.sequence) open_ = {};
 }
 
 }  // namespace vergence::trigger_board

@@ -1,17 +1,124 @@
 #pragma once
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <utility>
 
+#include "drivers/sync/clock_mapper.hpp"
 #include "drivers/trigger.hpp"
-#include "drivers/trigger_board/board_clock.hpp"
 #include "drivers/trigger_board/board_line.hpp"
-#include "drivers/trigger_board/pause_request.hpp"
 #include "drivers/trigger_board/pulse_account.hpp"
 #include "drivers/trigger_board/setup.hpp"
 #include "firmware_iface/trigger/trigger.h"
 
 namespace vergence::trigger_board {
+
+/// What came of a PONG.
+enum class PongWord : std::uint8_t {
+  taken,
+  unasked,   // no such question is open
+  invalid,   // it cannot be: sent before received, or longer in the board than under way
+  backward,  // earlier than the one before
+};
+
+/// How well the board's time is known, and from what. Durations of the newest kRemembered pings.
+struct TimeQuality {
+  std::uint64_t asked = 0, answered = 0;
+  std::uint64_t unanswered = 0;  // for as long as kOpen questions took
+  std::uint64_t refused = 0;     // answers that made no sense
+  std::uint64_t resets = 0;      // times that the board's clock was found to have been set
+  Duration rtt_least{}, rtt_median{}, rtt_most{};  // without the wire's and the board's own time
+  Duration error{};                                // bound of a stamp now
+  double drift_ppm = 0;                            // of the host's clock against the board's
+  bool pps_locked = false;
+  Duration pps_age = Duration::nanoseconds(-1);  // negative: never seen
+};
+
+/// The board's clock on the host's, from pings.
+///
+/// Method   Every PING and its PONG give four stamps: t1 when it was handed to the line, t2 and t3
+///          the board's ticks, t4 when its answer left the board at the latest (BoardLine). The
+///          ClockMapper makes of them a line and a bound that no asymmetry can break: rtt / 2 at
+///          worst. What bytes take on the wire at the baud rate is known, and not the same both
+///          ways: it is taken out of t1 here, of t4 there. PPS moves the rate of the board's ticks,
+///          as no crystal does: then two mappers take turns, each used when it is kTurn to 2 kTurn
+///          old, and until the rate is there the bound has room for what it moves in that time
+///          (kMoving).
+/// Threads  One caller. Memory: fixed.
+/// Errors   PongWord. kBackward answers in a row from an earlier time than before are a clock that
+///          was set: the fit begins again.
+class BoardClock {
+ public:
+  static constexpr std::size_t kOpen =
+      64;  // questions that may be under way: more than half a second of them
+  static constexpr std::size_t kRemembered = 1024;
+  static constexpr int kBackward = 3;
+  static constexpr Duration kUnseen = Duration::milliseconds(1);  // a USB frame
+  static constexpr Duration kTurn = Duration::seconds(6);
+  static constexpr Duration kMoving = Duration::microseconds(
+      150);  // 8 ppm a second over 2 kTurn: an eighth of it times their square
+
+  BoardClock() noexcept
+      : mappers_{ClockMapper(ClockMapperOptions{}), ClockMapper(ClockMapperOptions{})} {}
+
+  /// Another start of the board. `spread`: by how much the report of a stamp is late at worst, for
+  /// stamps before the first answer.
+  /// `pps`: something disciplines its ticks.
+  void restart(Duration spread, bool pps) noexcept;
+  /// What the board says of PPS, about every second.
+  void report_lock(bool locked, HostStamp now) noexcept;
+  /// The line was opened again: what was under way is not answered any more. The fit stays. `wire`:
+  /// a byte's time on it, 0 where it has none.
+  void reopen(Duration wire) noexcept;
+
+  /// A PING is being sent now: its token.
+  [[nodiscard]] std::uint32_t ask(HostStamp t1) noexcept;
+  /// `t4`: BoardLine's departure.
+  [[nodiscard]] PongWord answer(const TriggerPong& pong, HostStamp t4) noexcept;
+
+  /// A ping has been answered since restart().
+  [[nodiscard]] bool known() const noexcept { return known_; }
+  /// Answers since restart() or reopen().
+  [[nodiscard]] std::uint64_t answers() const noexcept { return answers_; }
+  /// The host's time of an event, whose report was here at `arrival`. Before the first answer: from
+  /// arrivals alone, which cannot tell the least time that the way takes; kUnseen is allowed for
+  /// it.
+  [[nodiscard]] MappedStamp map(DeviceStamp stamp, HostStamp arrival) noexcept;
+
+  /// Times that answers showed a clock that was set back.
+  [[nodiscard]] std::uint64_t resets_by_set_back() const noexcept { return totals_.resets; }
+  /// All but the PPS. Takes a median: not for every event.
+  [[nodiscard]] TimeQuality quality() const noexcept;
+
+ private:
+  struct Question {
+    std::uint32_t token = 0;
+    HostStamp sent{};
+    bool open = false;
+  };
+  void forget() noexcept;
+  void take_turns(HostStamp now) noexcept;
+  [[nodiscard]] MappedStamp with_room(MappedStamp m) const noexcept;
+
+  std::array<ClockMapper, 2> mappers_;
+  std::size_t used_ = 0;
+  bool turns_ = false;   // they take turns
+  bool moving_ = false;  // the rate of the ticks may be on its way
+  HostStamp turn_began_{}, lock_began_{};
+  bool locked_ = false;
+  Duration wire_{};
+  std::array<Question, kOpen> questions_{};
+  std::uint32_t next_token_ = 1;
+  bool known_ = false;
+  std::uint64_t newest_tick_ = 0;
+  int backward_ = 0;
+  std::uint64_t answers_ = 0;
+  std::array<std::int64_t, kRemembered> rtt_ns_{};
+  std::size_t rtts_ = 0, rtt_at_ = 0;
+  std::uint64_t resets_before_ = 0;  // of mappers before this one
+  TimeQuality totals_{};             // the counters of it
+};
 
 /// What a board says by itself, counters since open.
 struct ReceiverCounters {

@@ -6,7 +6,7 @@
 #include <exception>
 #include <utility>
 
-#include "drivers/trigger_board/requested_configuration.hpp"
+#include "drivers/trigger_board/setup.hpp"
 
 namespace vergence::trigger_board {
 namespace {

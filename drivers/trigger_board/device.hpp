@@ -10,7 +10,6 @@
 #include "drivers/trigger_board/board_line.hpp"
 #include "drivers/trigger_board/board_receiver.hpp"
 #include "drivers/trigger_board/options.hpp"
-#include "drivers/trigger_board/pause_request.hpp"
 #include "drivers/trigger_board/setup.hpp"
 
 namespace vergence::trigger_board {

@@ -4,10 +4,24 @@
 #include <span>
 #include <string>
 
+#include "drivers/trigger.hpp"
 #include "drivers/trigger_board/board_line.hpp"
 #include "drivers/trigger_board/options.hpp"
+#include "firmware_iface/trigger/trigger.h"
 
 namespace vergence::trigger_board {
+
+// What is asked of a board, as it goes over the wire.
+
+/// → ok; bad_configuration, unsupported: *sentence says what is wrong and what to do, *config is as
+///   it was.
+[[nodiscard]] DeviceStatus wire_configuration(const TriggerConfiguration& requested,
+                                              const Options& options, const TriggerInfo& board,
+                                              TriggerConfig* config, std::string* sentence);
+[[nodiscard]] TriggerConfiguration configuration_of(const TriggerConfig& config) noexcept;
+/// What the board will do otherwise than asked. Empty: nothing.
+[[nodiscard]] std::string remark_about(const TriggerConfiguration& requested,
+                                       const TriggerConfig& config);
 
 /// Who gets the frames that answer nothing.
 class FrameSink {

@@ -6,9 +6,13 @@
 #include "drivers/v4l2/controls.hpp"
 #include "drivers/v4l2/formats.hpp"
 #include "drivers/v4l2/node.hpp"
-#include "drivers/v4l2/request_checks.hpp"
 
 namespace vergence::v4l2 {
+
+/// What is wrong with the numbers by themselves; empty: nothing.
+[[nodiscard]] std::string find_invalid(const CameraConfiguration& requested);
+/// A figure in a sentence, to six digits.
+[[nodiscard]] std::string number_text(double value);
 
 /// What a camera has been brought to.
 struct Settings {

@@ -2,9 +2,321 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <numbers>
 #include <utility>
 
+#include <Eigen/Geometry>
+
+#include "core/math/angle.hpp"
+
 namespace vergence::xsens {
+
+namespace {
+
+ClockMapperOptions mapper_options() noexcept {
+  ClockMapperOptions o;
+  o.delay_spread =
+      Duration::milliseconds(5);  // of a read behind its last byte: a USB frame and the scheduler
+  o.resolution = Duration::microseconds(100);  // SampleTimeFine's tick
+  o.jump = Duration::milliseconds(20);
+  o.stall = Duration::seconds(1);
+  return o;
+}
+
+}  // namespace
+
+ArrivalTiming::ArrivalTiming(std::uint32_t baud, Duration processing) noexcept
+    : mapper_(mapper_options()), processing_(processing), byte_ns_(1e10 / std::max(1U, baud)) {}
+
+void ArrivalTiming::restart() noexcept {
+  mapper_.restart();
+  count_ = 0;
+  known_ = false;
+  line_known_ = false;
+}
+
+Duration ArrivalTiming::wire_time(std::uint64_t bytes) const noexcept {
+  return Duration::nanoseconds(std::llround(static_cast<double>(bytes) * byte_ns_));
+}
+
+void ArrivalTiming::read(std::uint64_t end, HostStamp arrival) noexcept {
+  if (count_ == marks_.size()) {
+    std::move(marks_.begin() + 1, marks_.end(), marks_.begin());
+    --count_;
+  }
+  marks_[count_++] = {end, arrival};
+}
+
+void ArrivalTiming::drop_marks(std::uint64_t end) noexcept {
+  std::size_t n = 0;
+  while (n < count_ && marks_[n].end <= end) ++n;
+  std::move(marks_.begin() + static_cast<std::ptrdiff_t>(n),
+            marks_.begin() + static_cast<std::ptrdiff_t>(count_), marks_.begin());
+  count_ -= n;
+}
+
+void ArrivalTiming::other(std::uint64_t end) noexcept {
+  if (end <= end_) return;
+  line_free_ = line_free_ + wire_time(end - end_);
+  end_ = end;
+  drop_marks(end);
+}
+
+void ArrivalTiming::message(std::uint64_t begin, std::uint64_t end, DeviceStamp measured) noexcept {
+  other(begin);
+  DeviceStamp sent = measured + processing_;
+  if (line_known_) sent = std::max(sent, line_free_);
+  for (std::size_t i = 0; i < count_ && marks_[i].end <= end; ++i) {
+    witness_ = sent + wire_time(marks_[i].end - begin);
+    mapped_ = mapper_.map(witness_, marks_[i].arrival);
+    known_ = true;
+  }
+  line_free_ = sent + wire_time(end - begin);
+  line_known_ = true;
+  end_ = end;
+  drop_marks(end);
+}
+
+MappedStamp ArrivalTiming::at(DeviceStamp measured) const noexcept {
+  const Duration since = measured - witness_;
+  const double stretch = static_cast<double>(since.ns()) * mapper_.drift();
+  return {mapped_.host + since + Duration::nanoseconds(std::llround(stretch)), mapped_.error};
+}
+
+std::int64_t SampleTime::difference(std::uint32_t ticks) const noexcept {
+  const std::int64_t plain = static_cast<std::int64_t>(ticks) - static_cast<std::int64_t>(last_);
+  // The nearest of the three: no wrap, a day's, the full width's. A counter that has been past a
+  // day's end has the full width.
+  std::int64_t best = plain;
+  for (const std::int64_t modulus : {kDay, kFull}) {
+    if (modulus == kDay && (last_ >= kDay || ticks >= kDay)) continue;
+    for (const std::int64_t d : {plain + modulus, plain - modulus})
+      if (std::llabs(d) < std::llabs(best)) best = d;
+  }
+  return best;
+}
+
+ClockStep SampleTime::next(std::uint32_t ticks, Duration elapsed) noexcept {
+  if (!known_) {
+    known_ = true;
+    last_ = ticks;
+    ticks_ = ticks;
+    return ClockStep::first;
+  }
+  const std::int64_t d = difference(ticks);
+  if (d > kFarthest || d < -kFarthest) {
+    // Something that only grows goes on for those who look at differences.
+    ticks_ += std::max<std::int64_t>(1, elapsed.ns() / kTick);
+    last_ = ticks;
+    return ClockStep::restart;
+  }
+  if (d <= 0) return ClockStep::backward;
+  ticks_ += d;
+  last_ = ticks;
+  return ClockStep::forward;
+}
+
+std::optional<DeviceStamp> SampleTime::near(std::uint32_t ticks) const noexcept {
+  if (!known_) return std::nullopt;
+  const std::int64_t d = difference(ticks);
+  if (d > kFarthest || d < -kFarthest) return std::nullopt;
+  return DeviceStamp((ticks_ + d) * kTick);
+}
+
+ClockStep SampleCounter::next(std::uint16_t counter, std::int64_t expected_steps) noexcept {
+  if (!known_) {
+    known_ = true;
+    last_ = counter;
+    count_ = counter;
+    return ClockStep::first;
+  }
+  const auto d = static_cast<std::uint16_t>(counter - last_);
+  last_ = counter;
+  // The step that is nearest to what the time between says, of those that the sixteen bits allow.
+  constexpr std::int64_t kWrap = 65536, kTolerance = 2048;
+  const std::int64_t wraps = (expected_steps - d + kWrap / 2) / kWrap;
+  const std::int64_t steps = d + std::max<std::int64_t>(0, wraps) * kWrap;
+  if (steps == 0) return ClockStep::backward;
+  if (std::llabs(steps - expected_steps) > kTolerance) {
+    count_ += std::max<std::int64_t>(1, expected_steps);
+    return ClockStep::restart;
+  }
+  count_ += steps;
+  return ClockStep::forward;
+}
+
+namespace {
+
+using namespace xbus;
+
+Eigen::Quaterniond enu_from(LocalFrame frame) noexcept {
+  const double h = std::numbers::sqrt2 / 2;
+  switch (frame) {
+    case LocalFrame::nwu:
+      return {h, 0, 0, h};
+    case LocalFrame::ned:
+      return {0, h, h, 0};
+    case LocalFrame::enu:
+      break;
+  }
+  return Eigen::Quaterniond::Identity();
+}
+
+/// What both generations' status bits say alike.
+void fill_fix(bool filter_valid, bool fix, bool coasting, const Receiver& receiver, HostStamp now,
+              InsReading* r) noexcept {
+  const bool fresh = receiver.known && now - receiver.received < kReceiverStale;
+  InsSample& s = r->sample;
+  r->quality.filter_valid = filter_valid;
+  if (fresh) {
+    r->quality.satellites = receiver.satellites;
+    r->quality.position_dop = receiver.position_dop;
+  }
+  if (!filter_valid) {
+    s.fix = FixStatus::none;
+    s.attitude_valid = false;
+    return;
+  }
+  if (fix) {
+    constexpr std::uint8_t kTwoDimensional = 2;
+    s.fix = fresh && receiver.fix == kTwoDimensional ? FixStatus::fix_2d : FixStatus::fix_3d;
+    if (fresh) {
+      s.position_sigma = receiver.position_sigma;
+      s.height_sigma = receiver.height_sigma;
+      s.velocity_sigma = receiver.velocity_sigma;
+    }
+  } else {
+    s.fix = coasting ? FixStatus::dead_reckoning : FixStatus::none;
+  }
+}
+
+void place(const std::optional<std::array<double, 2>>& latitude_longitude,
+           const std::optional<double>& altitude, InsSample* s) noexcept {
+  Geodetic at;
+  if (latitude_longitude && altitude)
+    at = {(*latitude_longitude)[0], (*latitude_longitude)[1], *altitude};
+  if (latitude_longitude && altitude && at.plausible()) {
+    s->position = at;
+    return;
+  }
+  s->fix = FixStatus::none;
+  s->position_sigma = s->height_sigma = 0;
+}
+
+template <class Data>
+void fill_motion(const Data& d, LocalFrame orientation_frame, LocalFrame velocity_frame,
+                 InsSample* s) noexcept {
+  std::optional<std::array<double, 4>> q = d.quaternion;
+  if (!q && d.euler_deg) q = quaternion_of_euler(*d.euler_deg);
+  if (!q && d.rotation_matrix) q = quaternion_of_matrix(*d.rotation_matrix);
+  if (q) {
+    if (const auto enu = enu_attitude(*q, orientation_frame)) {
+      s->q_enu_ins = *enu;
+      s->attitude_valid = true;
+    }
+  }
+  if (d.velocity) {
+    s->velocity_enu = enu_vector(*d.velocity, velocity_frame);
+    s->velocity_valid = true;
+  }
+}
+
+void fill_utc(const std::optional<Utc>& utc, std::uint8_t enough, InsQuality* quality) noexcept {
+  if (!utc || !plausible(*utc)) return;
+  quality->utc_ns = unix_ns(*utc);
+  quality->utc_valid = (utc->flags & enough) != 0;
+}
+
+}  // namespace
+
+std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& wxyz,
+                                                  LocalFrame frame) noexcept {
+  const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+  const double n = q.norm();
+  constexpr double kLeast = 0.9, kMost = 1.1;  // what 12.20 rounds is far inside
+  if (!(n > kLeast && n < kMost)) return std::nullopt;
+  const Eigen::Quaterniond enu = enu_from(frame) * Eigen::Quaterniond(q.coeffs() / n);
+  return std::array{enu.x(), enu.y(), enu.z(), enu.w()};
+}
+
+std::array<double, 4> quaternion_of_euler(const Three& deg) noexcept {
+  const Eigen::Quaterniond q =
+      Eigen::AngleAxisd(deg[2] * kRadiansPerDegree, Eigen::Vector3d::UnitZ()) *
+      Eigen::AngleAxisd(deg[1] * kRadiansPerDegree, Eigen::Vector3d::UnitY()) *
+      Eigen::AngleAxisd(deg[0] * kRadiansPerDegree, Eigen::Vector3d::UnitX());
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+std::array<double, 4> quaternion_of_matrix(const std::array<double, 9>& rows) noexcept {
+  const Eigen::Quaterniond q(
+      Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data())));
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+std::array<double, 3> enu_vector(const Three& v, LocalFrame frame) noexcept {
+  switch (frame) {
+    case LocalFrame::nwu:
+      return {-v[1], v[0], v[2]};
+    case LocalFrame::ned:
+      return {v[1], v[0], -v[2]};
+    case LocalFrame::enu:
+      break;
+  }
+  return v;
+}
+
+Receiver receiver_of(const GnssPvt& p, HostStamp received) noexcept {
+  constexpr std::uint32_t kUnknown = 0xFFFFFFFF;
+  constexpr std::uint16_t kNoDop = 9999;
+  const auto metres = [](std::uint32_t mm) { return mm == kUnknown ? 0 : 1e-3 * mm; };
+  Receiver r;
+  r.known = true;
+  r.received = received;
+  r.fix = (p.flags & 1U) != 0 ? p.fix : std::uint8_t{0};
+  r.satellites = p.satellites;
+  if (p.dop_1e2[1] != kNoDop) r.position_dop = 0.01F * static_cast<float>(p.dop_1e2[1]);
+  // The receiver's horizontal accuracy is of the plane, both axes together.
+  r.position_sigma = metres(p.horizontal_accuracy_mm) / std::numbers::sqrt2;
+  r.height_sigma = metres(p.vertical_accuracy_mm);
+  r.velocity_sigma = metres(p.speed_accuracy_mm_s);
+  return r;
+}
+
+Receiver receiver_of(const LegacyFix& f, std::uint8_t status, HostStamp received) noexcept {
+  Receiver r;
+  r.known = true;
+  r.received = received;
+  r.fix = (status & kStatusGnssFix) != 0 ? 3 : 0;
+  r.position_sigma = 1e-3 * f.horizontal_accuracy_mm / std::numbers::sqrt2;
+  r.height_sigma = 1e-3 * f.vertical_accuracy_mm;
+  r.velocity_sigma = 1e-2 * f.speed_accuracy_cm_s;
+  return r;
+}
+
+void fill(const Mtdata2& d, const Receiver& receiver, HostStamp now, InsReading* r) noexcept {
+  const std::uint32_t status = d.status_word ? *d.status_word : d.status_byte ? *d.status_byte : 0U;
+  r->quality.status = status;
+  r->quality.sync_out = d.status_word && (status & kStatusSyncOutMarker) != 0;
+  fill_motion(d, d.orientation_frame, d.velocity_frame, &r->sample);
+  const bool coasting = d.status_word && filter_mode(status) == 1;
+  const bool fix = (status & kStatusGnssFix) != 0 && !coasting;
+  fill_fix((status & kStatusFilterValid) != 0, fix, coasting, receiver, now, r);
+  place(d.latitude_longitude_deg, d.altitude_ellipsoid_m, &r->sample);
+  fill_utc(d.utc, kUtcValid, &r->quality);
+}
+
+void fill(const Mtdata& d, const Receiver& receiver, HostStamp now, InsReading* r) noexcept {
+  const std::uint8_t status = d.status.value_or(0);
+  r->quality.status = status;
+  fill_motion(d, d.frame, d.frame, &r->sample);
+  const bool fix = (status & kStatusGnssFix) != 0;
+  // Without a fix a valid filter goes on by inertia.
+  fill_fix((status & kStatusFilterValid) != 0, fix, !fix, receiver, now, r);
+  place(d.latitude_longitude_deg, d.altitude_m, &r->sample);
+  fill_utc(d.utc, kUtcValid, &r->quality);
+}
+
 namespace {
 
 using namespace xbus;

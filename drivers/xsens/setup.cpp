@@ -3,11 +3,95 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "drivers/xsens/detail/format_text.hpp"
 
 namespace vergence::xsens {
+
+namespace {
+
+constexpr Duration kAskAgain = Duration::milliseconds(150);
+constexpr Duration kListen = Duration::milliseconds(50);
+constexpr Duration kWrite = Duration::milliseconds(100);
+
+}  // namespace
+
+void RequestReply::ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply,
+                       Duration limit) {
+  std::array<std::uint8_t, xbus::kMaxFrame> frame{};
+  const xbus::WrittenFrame w =
+      xbus::write_frame({xbus::kBusMaster, static_cast<std::uint8_t>(id), payload}, frame);
+  const HostStamp end = line_.now() + limit;
+  reply->answer = Answer::silent;
+  do {  // ends: each turn listens for kAskAgain of the limit
+    const DeviceStatus sent = line_.write(std::span(frame).first(w.size), kWrite);
+    if (sent == DeviceStatus::gone || sent == DeviceStatus::failed) {
+      reply->answer = Answer::gone;
+      return;
+    }
+    const HostStamp until = std::min(end, line_.now() + kAskAgain);
+    reply->answer = listen(static_cast<std::uint8_t>(static_cast<unsigned>(id) + 1U), until, reply);
+  } while (reply->answer == Answer::silent && line_.now() < end);
+}
+
+Answer RequestReply::listen(std::uint8_t requested, HostStamp until, Reply* reply) {
+  std::array<std::uint8_t, 512> bytes{};
+  for (;;) {  // ends at `until`: reading lets time pass
+    for (xbus::Message m; stream_.next(&m);) {
+      ++messages_;
+      if (m.id != requested && !m.is(xbus::MessageId::error)) continue;
+      reply->size = m.payload.size();
+      std::copy(m.payload.begin(), m.payload.end(), reply->payload.begin());
+      if (m.id == requested) return Answer::ok;
+      reply->error = m.payload.empty() ? std::uint8_t{0} : m.payload[0];
+      // A dip of the supply is told unasked: it answers nothing.
+      if (reply->error != xbus::kErrorPowerDip) return Answer::refused;
+    }
+    if (stop_.load(std::memory_order_acquire)) return Answer::stopped;
+    const HostStamp now = line_.now();
+    if (now >= until) return Answer::silent;
+    const LineRead r = line_.read(bytes, std::min(kListen, until - now));
+    if (r.status == DeviceStatus::gone || r.status == DeviceStatus::failed ||
+        r.status == DeviceStatus::ended)
+      return Answer::gone;
+    if (r.status != DeviceStatus::ok) continue;
+    const std::span<const std::uint8_t> got(bytes.data(), r.size);
+    remember(got);
+    (void)stream_.accept(got);  // 512 bytes fit beside any frame that waits
+  }
+}
+
+void RequestReply::remember(std::span<const std::uint8_t> bytes) noexcept {
+  const std::size_t n = std::min(bytes.size(), received_.size() - received_size_);
+  std::copy_n(bytes.begin(), n, received_.begin() + static_cast<std::ptrdiff_t>(received_size_));
+  received_size_ += n;
+}
+
+void RequestReply::forget() noexcept {
+  stream_.reset();
+  messages_ = 0;
+  received_size_ = 0;
+}
+
+std::string RequestReply::received_instead() const {
+  const std::string_view received(reinterpret_cast<const char*>(received_.data()), received_size_);
+  if (received.empty() || messages_ > 0) return {};
+  if (received.find("$G") != std::string_view::npos &&
+      received.find("\r\n") != std::string_view::npos)
+    return "it speaks NMEA 0183";
+  if (received.find("\xB5\x62") != std::string_view::npos) return "it speaks u-blox's protocol";
+  if (received.find("\xAA\x44\x12") != std::string_view::npos)
+    return "it speaks NovAtel's protocol";
+  if (received.find("snp") != std::string_view::npos)
+    return "it speaks the protocol of a Redshift or CH Robotics sensor";
+  if (received.find("VNYMR") != std::string_view::npos ||
+      received.find("$VN") != std::string_view::npos)
+    return "it speaks VectorNav's protocol";
+  return "its bytes are no Xbus";
+}
+
 namespace {
 
 using namespace xbus;
@@ -178,6 +262,253 @@ DeviceStatus Setup::measure() {
   const DeviceStatus status = failed("to measure");
   return reply_.answer == Answer::refused && reply_.error == kTooMuch ? DeviceStatus::no_bandwidth
                                                                       : status;
+}
+
+namespace {
+
+using namespace xbus;
+
+// What the program wants of an MTi-G: fixed point 16.32, so that a position keeps its digits; X
+// north, Y west, Z up as it comes.
+constexpr std::uint16_t kLegacyMode =
+    kModeOrientation | kModePosition | kModeVelocity | kModeStatus;
+constexpr std::uint32_t kLegacySettings =
+    settings_format(NumberFormat::fp16_32) | kSettingsQuaternion | kSettingsCounter | kSettingsUtc;
+
+}  // namespace
+
+DeviceStatus Setup::set_legacy(double rate_hz, StreamSettings* stream) {
+  const auto period = period_of_rate(rate_hz);
+  if (!period) {
+    last_error_ = format_text(
+        "an MTi-G has no %.6g Hz: its rates divide 115200 Hz, from 10 to 512, without those that "
+        "its receiver cannot correct; "
+        "set ins.rate to 100 or 120",
+        rate_hz);
+    return DeviceStatus::unsupported;
+  }
+  // With the receiver's own fix where the line has room for it.
+  MtdataLayout layout{static_cast<std::uint16_t>(kLegacyMode | kModeGnss), kLegacySettings};
+  if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.mode = kLegacyMode;
+  if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.settings &= ~kSettingsUtc;
+  const LineBudget budget = line_budget(layout, rate_hz, baud_to_be());
+  if (!budget.fits()) return refuse_load(budget, rate_hz, baud_to_be());
+
+  if (const DeviceStatus s =
+          write(MessageId::configuration_request, {}, "the question for its configuration");
+      s != DeviceStatus::ok)
+    return s;
+  DeviceConfiguration has;
+  if (!read_configuration(reply_.bytes(), &has)) {
+    last_error_ = "its configuration cannot be read: is more than one device on the bus?";
+    return DeviceStatus::unsupported;
+  }
+  std::array<std::uint8_t, 4> bytes{};
+  const auto u16 = [&bytes](std::uint16_t v) {
+    return write_u16(bytes, v), std::span<const std::uint8_t>(bytes).first(2);
+  };
+  DeviceStatus s = DeviceStatus::ok;
+  if (has.period != *period) s = write(MessageId::period, u16(*period), "the sample period");
+  if (s == DeviceStatus::ok && has.output_skip != 0)
+    s = write(MessageId::output_skip, u16(0), "the output skip factor");
+  if (s == DeviceStatus::ok && has.output_mode != layout.mode)
+    s = write(MessageId::output_mode, u16(layout.mode), "the output mode");
+  if (s == DeviceStatus::ok && has.output_settings != layout.settings) {
+    write_u32(bytes, layout.settings);
+    s = write(MessageId::output_settings, bytes, "the output settings");
+  }
+  if (s == DeviceStatus::ok)
+    s = write(MessageId::data_length_request, {}, "the question for its message's length");
+  if (s != DeviceStatus::ok) return s;
+  if (reply_.size != 2 || read_u16(reply_.bytes()) != layout.payload_size()) {
+    last_error_ = format_text(
+        "its messages have %u bytes where its settings mean %zu: this firmware is not known",
+        reply_.size == 2 ? unsigned{read_u16(reply_.bytes())} : 0U,
+        layout.payload_size().value_or(0));
+    return DeviceStatus::unsupported;
+  }
+  stream->layout = layout;
+  stream->period_numerator = *period;
+  stream->period_denominator = kPeriodClock;
+  return set_legacy_lines(rate_hz, stream);
+}
+
+DeviceStatus Setup::set_legacy_line(MessageId id, LegacySync parameter, std::uint32_t value) {
+  const std::uint8_t which = static_cast<std::uint8_t>(parameter);
+  if (const DeviceStatus s = write(id, {&which, 1}, "the question for a synchronisation line");
+      s != DeviceStatus::ok)
+    return s;
+  LegacySync stored{};
+  std::uint32_t has = 0;
+  if (read_legacy_sync(reply_.bytes(), &stored, &has) && stored == parameter && has == value)
+    return DeviceStatus::ok;
+  std::array<std::uint8_t, 5> bytes{};
+  return write(id, std::span(bytes).first(write_legacy_sync(parameter, value, bytes)),
+               "a setting of a synchronisation line");
+}
+
+DeviceStatus Setup::set_legacy_lines(double rate_hz, StreamSettings* stream) {
+  const auto out = [this](LegacySync p, std::uint32_t v) {
+    return set_legacy_line(MessageId::legacy_sync_out, p, v);
+  };
+  if (options_.sync_out_hz < 0) {
+    if (const DeviceStatus s = out(LegacySync::mode, kLegacySyncOutOff); s != DeviceStatus::ok)
+      return s;
+  } else if (options_.sync_out_hz > 0) {
+    double actual = 0;
+    const std::uint16_t skip = sync_out_skip(rate_hz, options_.sync_out_hz, &actual);
+    const auto width = static_cast<std::uint32_t>(std::lround(
+        std::clamp(options_.sync_out_width_ms, 0.01, 1000.0) * 1e-3 * kLegacySyncClock));
+    for (const auto& [parameter, value] :
+         {std::pair<LegacySync, std::uint32_t>{LegacySync::skip, skip},
+          {LegacySync::offset, 0},
+          {LegacySync::width, width},
+          {LegacySync::mode, kLegacySyncOutPulse | kLegacySyncOutPositive}})
+      if (const DeviceStatus s = out(parameter, value); s != DeviceStatus::ok) return s;
+    stream->sync_out_hz = actual;
+  }
+  if (options_.sync_in == SyncIn::leave) return DeviceStatus::ok;
+  constexpr std::uint16_t kSendLatest = 4, kRising = 1, kFalling = 2;
+  const std::uint16_t mode =
+      options_.sync_in == SyncIn::off
+          ? std::uint16_t{0}
+          : static_cast<std::uint16_t>(kSendLatest |
+                                       (options_.sync_in == SyncIn::rising ? kRising : kFalling));
+  return set_legacy_line(MessageId::legacy_sync_in, LegacySync::mode, mode);
+}
+
+namespace {
+
+using namespace xbus;
+
+/// What the program wants of an MTi-G-700/710. Without UTC it still has the receiver's.
+OutputConfiguration requested_outputs(std::uint16_t rate_hz, bool utc) noexcept {
+  OutputConfiguration o;
+  if (utc) (void)o.add({wire_id(PacketId::utc), kEveryMessage});
+  for (const OutputEntry e :
+       {OutputEntry{wire_id(PacketId::packet_counter), kEveryMessage},
+        {wire_id(PacketId::sample_time_fine), kEveryMessage},
+        {wire_id(PacketId::quaternion), rate_hz},
+        {wire_id(PacketId::latitude_longitude, NumberFormat::fp16_32), rate_hz},
+        {wire_id(PacketId::altitude_ellipsoid, NumberFormat::fp16_32), rate_hz},
+        {wire_id(PacketId::velocity), rate_hz},
+        {wire_id(PacketId::status_word), kEveryMessage},
+        {wire_id(PacketId::gnss_pvt), 4}})
+    (void)o.add(e);
+  return o;
+}
+
+/// The rate of an MTi-G-700/710 next to the one asked for.
+std::uint16_t nearest_rate(double rate_hz) noexcept {
+  constexpr std::array<std::uint16_t, 15> kRates{1,  2,  4,  5,  8,   10,  16, 20,
+                                                 25, 40, 50, 80, 100, 200, 400};
+  std::uint16_t best = kRates[0];
+  for (const std::uint16_t r : kRates)
+    if (std::abs(r - rate_hz) < std::abs(best - rate_hz)) best = r;
+  return best;
+}
+
+}  // namespace
+
+DeviceStatus Setup::set_mark4(double rate_hz, StreamSettings* stream) {
+  const std::uint16_t rate = nearest_rate(rate_hz);
+  OutputConfiguration requested = requested_outputs(rate, true);
+  if (!line_budget(requested, baud_to_be()).fits()) requested = requested_outputs(rate, false);
+  const LineBudget budget = line_budget(requested, baud_to_be());
+  if (!budget.fits()) return refuse_load(budget, rate, baud_to_be());
+
+  // Text output, while set, overrides everything else.
+  dialogue_.ask(MessageId::string_output, &reply_);
+  if (reply_.answer == Answer::ok && reply_.size == 2 && read_u16(reply_.bytes()) != 0) {
+    constexpr std::array<std::uint8_t, 2> kOff{0, 0};
+    if (const DeviceStatus s = write(MessageId::string_output, kOff, "to leave its text output");
+        s != DeviceStatus::ok)
+      return s;
+  }
+  if (const DeviceStatus s =
+          write(MessageId::output_configuration, {}, "the question for its outputs");
+      s != DeviceStatus::ok)
+    return s;
+  OutputConfiguration has;
+  if (!read_output_configuration(reply_.bytes(), &has) || !(has == requested)) {
+    std::array<std::uint8_t, 4 * kMostOutputs> bytes{};
+    const std::size_t n = write_output_configuration(requested, bytes);
+    if (const DeviceStatus s = write(MessageId::output_configuration, std::span(bytes).first(n),
+                                     "the outputs asked for");
+        s != DeviceStatus::ok)
+      return s;
+    if (!read_output_configuration(reply_.bytes(), &has)) has = {};
+  }
+  // It answers with what it took.
+  std::uint16_t taken = 0;
+  for (const OutputEntry& e : has.items())
+    if (e.id == wire_id(PacketId::quaternion)) taken = e.rate_hz;
+  const bool clocked = std::any_of(
+      has.items().begin(), has.items().end(),
+      [](const OutputEntry& e) { return packet_id(e.id) == PacketId::sample_time_fine; });
+  const bool placed = std::any_of(has.items().begin(), has.items().end(), [](const OutputEntry& e) {
+    return packet_id(e.id) == PacketId::latitude_longitude;
+  });
+  if (taken == 0 || taken == kEveryMessage || !clocked || !placed) {
+    last_error_ =
+        "it does not give position and attitude together with its clock: this is no MTi-G";
+    return DeviceStatus::unsupported;
+  }
+  stream->outputs = has;
+  stream->period_numerator = 1;
+  stream->period_denominator = taken;
+  return set_mark4_lines(stream);
+}
+
+DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
+  if (options_.sync_out_hz == 0 && options_.sync_in == SyncIn::leave) return DeviceStatus::ok;
+  if (const DeviceStatus s =
+          write(MessageId::sync_settings, {}, "the question for its synchronisation lines");
+      s != DeviceStatus::ok)
+    return s;
+  SyncSettings has;
+  if (!read_sync_settings(reply_.bytes(), &has)) {
+    last_error_ = "its synchronisation settings cannot be read: this firmware is not known";
+    return DeviceStatus::unsupported;
+  }
+  // The list replaces the old one: other entries, the receiver's clock among them, stay.
+  const auto ours = [this](const SyncEntry& e) {
+    return (options_.sync_out_hz != 0 && e.function == kSyncIntervalTransition &&
+            e.line == kSyncLineOut) ||
+           (options_.sync_in != SyncIn::leave && e.function == kSyncTriggerIndication &&
+            e.line == kSyncLineIn1);
+  };
+  SyncSettings requested;
+  for (const SyncEntry& e : has.items())
+    if (!ours(e)) requested.entries[requested.count++] = e;
+  const auto add = [&requested](const SyncEntry& e) {
+    if (requested.count == requested.entries.size()) return false;
+    requested.entries[requested.count++] = e;
+    return true;
+  };
+  bool room = true;
+  if (options_.sync_out_hz > 0) {
+    double actual = 0;
+    const std::uint16_t skip = sync_out_skip(kSyncOutBase, options_.sync_out_hz, &actual);
+    const auto width = static_cast<std::uint16_t>(
+        std::clamp(std::lround(options_.sync_out_width_ms * 10), 1L, 1000L));
+    room = add({kSyncIntervalTransition, kSyncLineOut, kSyncPositive, 0, 0, skip, width, 0});
+    stream->sync_out_hz = actual;
+  }
+  if (options_.sync_in == SyncIn::rising || options_.sync_in == SyncIn::falling)
+    room =
+        add({kSyncTriggerIndication, kSyncLineIn1,
+             options_.sync_in == SyncIn::rising ? kSyncPositive : kSyncNegative, 0, 0, 0, 0, 0}) &&
+        room;
+  if (!room) {
+    last_error_ = "its list of synchronisation settings is full; clear it with the maker's program";
+    return DeviceStatus::unsupported;
+  }
+  if (requested == has) return DeviceStatus::ok;
+  std::array<std::uint8_t, kSyncEntrySize * kMostSyncEntries> bytes{};
+  return write(MessageId::sync_settings,
+               std::span(bytes).first(write_sync_settings(requested, bytes)),
+               "its synchronisation settings");
 }
 
 }  // namespace vergence::xsens

@@ -1,11 +1,70 @@
 #pragma once
+#include <array>
+#include <atomic>
 #include <cstdint>
+#include <span>
 #include <string>
 
+#include "drivers/serial/byte_line.hpp"
 #include "drivers/xsens/options.hpp"
-#include "drivers/xsens/request_reply.hpp"
+#include "firmware_iface/xbus/xbus.hpp"
 
 namespace vergence::xsens {
+
+/// What came of a question.
+enum class Answer : std::uint8_t {
+  ok,
+  refused,  // the device answered with an error: Reply::error
+  silent,   // nothing came in time
+  gone,     // the line is
+  stopped,  // we were told to
+};
+
+struct Reply {
+  Answer answer = Answer::silent;
+  std::uint8_t error = 0;  // refused: the code
+  std::size_t size = 0;    // of the payload
+  std::array<std::uint8_t, xbus::kMaxPayload> payload{};
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept {
+    return {payload.data(), size};
+  }
+};
+
+/// Questions and answers over an Xbus line, also while data keep streaming: what is no answer is
+/// passed over.
+///
+/// Threads  One caller. Memory: in place. Time: no call outlasts its limit (of the line's clock) by
+///          more than a read of 50 ms.
+class RequestReply {
+ public:
+  /// `stop`: while true, every question is `stopped`.
+  RequestReply(ByteLine& line, const std::atomic<bool>& stop) noexcept : line_(line), stop_(stop) {}
+
+  static constexpr Duration kAnswerTime = Duration::milliseconds(500);
+
+  /// Asks, waits for the answer to this message, asks again every 150 ms until the limit.
+  void ask(xbus::MessageId id, std::span<const std::uint8_t> payload, Reply* reply,
+           Duration limit = kAnswerTime);
+  void ask(xbus::MessageId id, Reply* reply) { ask(id, {}, reply); }
+
+  /// What the bytes that were received look like, when they are no Xbus: for a sentence. Empty:
+  /// nothing was received.
+  [[nodiscard]] std::string received_instead() const;
+  [[nodiscard]] std::uint64_t messages_received() const noexcept { return messages_; }
+  /// Forgets what was received: after a change of the baud rate.
+  void forget() noexcept;
+
+ private:
+  [[nodiscard]] Answer listen(std::uint8_t requested, HostStamp until, Reply* reply);
+  void remember(std::span<const std::uint8_t> bytes) noexcept;
+
+  ByteLine& line_;
+  const std::atomic<bool>& stop_;
+  xbus::FrameStream stream_;
+  std::uint64_t messages_ = 0;
+  std::array<std::uint8_t, 512> received_{};  // the first bytes
+  std::size_t received_size_ = 0;
+};
 
 /// Finds a device on an open line, brings it into its configuration state and sets it, changing
 /// only what differs.

@@ -1,19 +1,49 @@
 #pragma once
+#include <atomic>
+#include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 
+#include "core/types/time.hpp"
 #include "drivers/camera.hpp"
 #include "drivers/common/frame_queue.hpp"
 #include "drivers/common/last_error.hpp"
 #include "drivers/common/published.hpp"
 #include "drivers/gige/detail/frame_receiver.hpp"
 #include "drivers/gige/detail/image_memory.hpp"
-#include "drivers/gige/detail/periodic_thread.hpp"
 #include "drivers/gige/detail/session.hpp"
 #include "drivers/gige/detail/slot_returns.hpp"
 
 namespace vergence::gige {
+
+/// A thread that does something every `interval`, the first time after one of them.
+///
+/// Threads  start(), stop(): the owner. stopping(): any. Memory: start()'s.
+/// Errors   start() throws where there is no thread. What `round` throws ends the program.
+///
+///     watch_.start("vergence-watch", Duration::milliseconds(100), [this] { look(); });
+class PeriodicThread {
+ public:
+  ~PeriodicThread() { stop(); }
+
+  /// Nothing happens where it runs already. `name`: at most 15 letters, and it stays.
+  void start(const char* name, Duration interval, std::function<void()> round);
+  /// Returns when the round in progress is over; at once where none runs.
+  void stop() noexcept;
+  /// For long rounds: somebody waits in stop().
+  [[nodiscard]] bool stopping() const noexcept { return stopping_; }
+
+ private:
+  void work(const char* name, Duration interval, const std::function<void()>& round);
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
 
 /// `640 x 480`.
 [[nodiscard]] std::string size_text(int width, int height);

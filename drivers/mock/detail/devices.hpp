@@ -1,27 +1,100 @@
 #pragma once
 #include <array>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <shared_mutex>
 #include <vector>
 
 #include "core/memory/arena.hpp"
+#include "core/types/time.hpp"
 #include "drivers/camera.hpp"
 #include "drivers/common/wake_event.hpp"
 #include "drivers/ins.hpp"
-#include "drivers/mock/detail/delivery_progress.hpp"
-#include "drivers/mock/detail/exposure_plan.hpp"
 #include "drivers/mock/detail/oscillator.hpp"
 #include "drivers/mock/ins_model.hpp"
 #include "drivers/mock/mock_rig.hpp"
-#include "drivers/mock/stream.hpp"
+#include "drivers/stream.hpp"
 #include "drivers/trigger.hpp"
 
 /// The mock's devices as their consumers meet them; what they deliver comes from the scheduler
 /// through their streams.
 namespace vergence::mock {
+
+/// What the pulses of a mock's camera are exposed with: a setting holds from its pulse on, until
+/// the next.
+///
+/// Threads  Any. Memory: grows with changes that no pulse has passed yet. Errors: change() may
+///          throw std::bad_alloc, and has changed nothing that any pulse settled.
+class ExposurePlan {
+ public:
+  /// From the first pulse on.
+  void reset(const ExposureSetting& setting) {
+    const std::lock_guard lock(mutex_);
+    changes_ = {{0, setting}};
+  }
+  /// From this pulse on, whatever was to hold later. What only pulses before `past` were exposed
+  /// with is forgotten. Precondition: reset().
+  void change(std::uint64_t from, const ExposureSetting& setting, std::uint64_t past) {
+    const std::lock_guard lock(mutex_);
+    while (changes_.size() > 1 && changes_.back().from >= from) changes_.pop_back();
+    while (changes_.size() > 1 && changes_[1].from < past) changes_.erase(changes_.begin());
+    changes_.push_back({from, setting});
+  }
+  /// Precondition: reset(); no change has forgotten this pulse.
+  [[nodiscard]] ExposureSetting at(std::uint64_t pulse) const {
+    const std::lock_guard lock(mutex_);
+    ExposureSetting setting = changes_.front().setting;
+    for (const Change& c : changes_)
+      if (c.from <= pulse) setting = c.setting;
+    return setting;
+  }
+
+ private:
+  struct Change {
+    std::uint64_t from = 0;  // pulse
+    ExposureSetting setting{};
+  };
+
+  mutable std::mutex mutex_;
+  std::vector<Change> changes_;  // by pulse, the first is in force
+};
+
+/// How far the deliveries of a rig in virtual time have come.
+///
+/// Threads  advance(), restart(): the one that delivers. wait_for(): any.
+class DeliveryProgress {
+ public:
+  void restart() noexcept { set(std::numeric_limits<std::int64_t>::min()); }
+  /// Everything that arrives before `instant` has been delivered.
+  void advance(HostStamp instant) noexcept { set(instant.ns()); }
+  /// Whether that is so of this instant, after at most `limit`.
+  [[nodiscard]] bool wait_for(HostStamp instant, Duration limit) noexcept {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
+                             [&] { return until_ns_ >= instant.ns(); });
+  }
+
+ private:
+  void set(std::int64_t until_ns) noexcept {
+    {
+      const std::lock_guard lock(mutex_);
+      until_ns_ = until_ns;
+    }
+    changed_.notify_all();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::int64_t until_ns_ = std::numeric_limits<std::int64_t>::min();
+};
+
+using vergence::Delivery;
+using vergence::Stream;
 
 /// What the devices of one rig share.
 struct RigContext {

@@ -1,20 +1,124 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <queue>
 #include <thread>
 #include <vector>
 
+#include "core/types/time.hpp"
 #include "drivers/mock/detail/delivery_queue.hpp"
 #include "drivers/mock/detail/devices.hpp"
-#include "drivers/mock/detail/exposure.hpp"
-#include "drivers/mock/detail/pause_window.hpp"
-#include "drivers/mock/detail/pulse_feed.hpp"
 #include "drivers/mock/detail/pulse_plan.hpp"
+#include "drivers/mock/rig_truth.hpp"
 
 namespace vergence::mock {
+
+/// Times of pulses that somebody else makes, on their way to the scheduler.
+///
+/// Threads  push(), end(): who feeds. next(): the scheduler's producer. wake(): any.
+/// Memory   Grows with what is not taken.
+class PulseFeed {
+ public:
+  /// `stop`: next() ends. It outlives the feed; wake() follows its setting.
+  explicit PulseFeed(const std::atomic<bool>& stop) : stop_(stop) {}
+
+  /// Since the drive's start. Nothing happens after end().
+  void push(Duration time) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!over_) times_.push(time);
+    }
+    changed_.notify_all();
+  }
+  void end() noexcept {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    changed_.notify_all();
+  }
+  void wake() noexcept {
+    { const std::lock_guard lock(mutex_); }
+    changed_.notify_all();
+  }
+  /// Waits for it; nothing: there is no more, or it was stopped.
+  [[nodiscard]] std::optional<Duration> next() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return !times_.empty() || over_ || stop_; });
+    if (times_.empty() || stop_) return std::nullopt;
+    const Duration time = times_.front();
+    times_.pop();
+    return time;
+  }
+
+ private:
+  const std::atomic<bool>& stop_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::queue<Duration> times_;
+  bool over_ = false;
+};
+
+/// The slots of a pulse plan that a pause leaves out.
+///
+/// Threads  request(): any. make(): the scheduler's producer, slot after slot. Memory: none.
+class PauseWindow {
+ public:
+  /// So many slots from that one on, in this boot (0: in any); slots that were made already stay.
+  void request(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept {
+    const std::lock_guard lock(mutex_);
+    from = std::max(from, made_);
+    pause_ = {from, from + pulses, boot};
+  }
+  /// Slot `slot` is made now, in this boot. True: it is left out.
+  [[nodiscard]] bool make(std::uint64_t slot, std::uint32_t boot) noexcept {
+    const std::lock_guard lock(mutex_);
+    made_ = slot + 1;
+    if (!pause_) return false;
+    const bool in_boot = pause_->boot == 0 || pause_->boot == boot;
+    if (!in_boot || slot >= pause_->end) pause_.reset();
+    return pause_ && slot >= pause_->from;
+  }
+
+ private:
+  struct Pause {
+    std::uint64_t from = 0, end = 0;  // slots
+    std::uint32_t boot = 0;           // of Pulse
+  };
+  std::mutex mutex_;
+  std::optional<Pause> pause_;
+  std::uint64_t made_ = 0;  // slots
+};
+
+/// One pulse as a camera's input meets it.
+struct PulseAt {
+  std::uint64_t number = 0;  // its slot in the plan
+  Duration time{};           // of the exposure's start, since the drive's start
+  const PulsePlan* plan = nullptr;
+};
+
+/// What becomes of one camera's image of one pulse, by the faults that are due.
+struct Exposure {
+  bool missed = false;  // never happens
+  bool lost = false;    // never arrives
+  bool twice = false;   // arrives again
+  Duration delay{};     // of the arrival, beyond the usual
+  double brightness = 1;
+  // Which image it is: usually this camera's, of this pulse.
+  int camera = 0;
+  std::uint64_t pulse = 0;  // numbers its noise
+  Duration time{};          // of the start of the exposure
+};
+
+/// Pure function of its arguments; the draws of faults with a share come from `seed`.
+[[nodiscard]] Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& pulse,
+                                   int camera) noexcept;
 
 /// Makes what the devices deliver, pulse after pulse; the DeliveryQueue hands it out.
 ///

@@ -254,7 +254,7 @@ TEST(PngDecoder, pixelsThatAreFewerOrMoreThanTheHeadSaysStayInTheirRows) {
   }
 }
 
-TEST(ImageFile, anAreaThatNoCameraHasIsRefusedBeforeAnythingIsTakenForIt) {
+TEST(ImageDecoder, anAreaThatNoCameraHasIsRefusedBeforeAnythingIsTakenForIt) {
   FileBytes png = test::png_head({}, 32768, 32768);
   append_chunk(&png, "IDAT", {});
   append_chunk(&png, "IEND", {});
@@ -270,7 +270,7 @@ FileBytes mutated(const FileBytes& file, Random* random) {
   return changed;
 }
 
-TEST(ImageFile, aHundredThousandMutationsKeepWithinTheirRows) {
+TEST(ImageDecoder, aHundredThousandMutationsKeepWithinTheirRows) {
   std::vector<FileBytes> seeds{jpeg_of(picture()),
                                jpeg_of(picture(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1})};
   for (const PngKind& kind : every_png_kind())

@@ -1,9 +1,8 @@
-#include "drivers/acquisition/pulse_mapper.hpp"
 
 #include <gtest/gtest.h>
 
-#include "drivers/acquisition/camera_clock.hpp"
-#include "drivers/acquisition/pairing_watch.hpp"
+#include "drivers/acquisition/acquired_queue.hpp"
+#include "drivers/acquisition/clock_record.hpp"
 #include "drivers/sync/durations.hpp"
 
 namespace vergence {

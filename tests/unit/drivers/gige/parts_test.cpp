@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/gige/detail/block_counter.hpp"
+#include "drivers/gige/detail/frame_receiver.hpp"
 #include "drivers/gige/detail/grey.hpp"
 #include "drivers/gige/detail/link.hpp"
 #include "drivers/gige/detail/slot_returns.hpp"

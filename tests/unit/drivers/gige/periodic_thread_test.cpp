@@ -1,4 +1,4 @@
-#include "drivers/gige/detail/periodic_thread.hpp"
+#include "drivers/gige/detail/gige_camera.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "drivers/iidc/grey.hpp"
+#include "drivers/iidc/camera_plan.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "drivers/mock/detail/exposure_plan.hpp"
+#include "drivers/mock/detail/devices.hpp"
 
 #include <gtest/gtest.h>
 

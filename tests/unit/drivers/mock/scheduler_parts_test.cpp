@@ -3,8 +3,7 @@
 #include <atomic>
 #include <thread>
 
-#include "drivers/mock/detail/pause_window.hpp"
-#include "drivers/mock/detail/pulse_feed.hpp"
+#include "drivers/mock/detail/scheduler.hpp"
 
 namespace vergence::mock {
 namespace {

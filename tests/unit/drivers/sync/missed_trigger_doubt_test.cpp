@@ -1,4 +1,4 @@
-#include "drivers/sync/missed_trigger_doubt.hpp"
+#include "drivers/sync/pulse_matcher.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "drivers/trigger_board/board_clock.hpp"
+#include "drivers/trigger_board/board_receiver.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "drivers/trigger_board/pause_request.hpp"
+#include "drivers/trigger_board/board_line.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "drivers/v4l2/slots.hpp"
+#include "drivers/v4l2/frame_exchange.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>

@@ -1,8 +1,6 @@
-#include "drivers/mock/simulators/usb_converter.hpp"
+#include "drivers/mock/simulators/simulated_line.hpp"
 
 #include <gtest/gtest.h>
-
-#include "drivers/mock/simulators/outage_schedule.hpp"
 
 namespace vergence::mock {
 namespace {

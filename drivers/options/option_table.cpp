@@ -1,4 +1,4 @@
-#include "drivers/options/option_text.hpp"
+#include "drivers/options/option_table.hpp"
 
 #include <array>
 #include <charconv>
