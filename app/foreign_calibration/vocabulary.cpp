@@ -20,6 +20,7 @@ constexpr std::array kWords{
     Words{Part::cx, " cx u0 "},
     Words{Part::cy, " cy v0 "},
     Words{Part::focal, " f focal focallength "},
+    Words{Part::centre, " principalpoint pp "},
     Words{Part::distortion,
           " d dist distcoeff distcoeffs distcoef distcoefs distortion distortioncoeffs "
           "distortioncoefficients distortionvector distortionparameters coefficients "},
