@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "app/calibration/written_formats.hpp"
 #include "app/foreign_calibration/foreign_calibration.hpp"
 
 /// `vergence calibrate --convert IN OUT`.

@@ -5,8 +5,7 @@
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 
-#include "app/foreign_calibration/foreign_formats.hpp"
-#include "app/foreign_calibration/yaml_matrix.hpp"
+#include "app/calibration/written_formats.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

@@ -1,5 +1,6 @@
 #include "app/checkerboard/calibrate_session.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -10,6 +11,8 @@
 #include "app/calibration/board_images.hpp"
 #include "app/calibration/board_report.hpp"
 #include "app/config/calibration_file.hpp"
+#include "core/math/angle.hpp"
+#include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
@@ -60,6 +63,79 @@ const char* how_to_count(BoardKind kind) {
   return "count them where four squares meet";
 }
 
+/// Views whose boards lie differently: by 2 degrees, or 3 % of their distance. One view many times
+/// over says no more than once.
+std::size_t distinct_views(const BoardCalibration& found) {
+  constexpr double kTurn = 2 * kRadiansPerDegree, kShift = 0.03;
+  std::vector<Transform> distinct;
+  for (std::size_t v = 0; v < found.views.size(); ++v) {
+    const Transform& T = found.T_left_board[v];
+    const bool seen = std::any_of(distinct.begin(), distinct.end(), [&](const Transform& other) {
+      return rotation_angle(T.R * other.R.transpose()) < kTurn &&
+             (T.t - other.t).norm() < kShift * T.t.norm();
+    });
+    if (found.views[v].used && !seen) distinct.push_back(T);
+  }
+  return distinct.size();
+}
+
+/// Why the views say too little of the lenses: half a sentence; empty: they do not.
+std::string undetermined(const BoardCalibration& found) {
+  constexpr std::size_t kFewest = 4;
+  constexpr double kMostSigma = 0.02;  // of the focal length
+  if (const std::size_t distinct = distinct_views(found); distinct < kFewest)
+    return fmt::format(
+        "only {} of {} views show the board differently; {} are the least, better 15: move and "
+        "tilt "
+        "it between the images",
+        distinct, found.views.size(), kFewest);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(found.rig.cameras); ++k) {
+    const Intrinsics& lens = found.rig.intrinsics[k];
+    if (lens.sigma[0] > kMostSigma * lens.fx)
+      return fmt::format(
+          "the views do not determine the lens of camera {}: the focal length {:.0f} px has a "
+          "sigma "
+          "of {:.0f} px ({:.1f} %, {:.0f} % are the most): tilt the board more, and show it nearer "
+          "and farther",
+          k, lens.fx, lens.sigma[0], 100 * lens.sigma[0] / lens.fx, 100 * kMostSigma);
+  }
+  return "";
+}
+
+/// Squares of real boards have between 2 mm and half a metre.
+void remark_square(double square, Progress* progress) {
+  constexpr double kSmallest = 0.002, kLargest = 0.5;  // m
+  if (square < kSmallest || square > kLargest)
+    progress->say(
+        fmt::format("vergence: --square is {:g} m, unusually {}: it takes metres, and the baseline "
+                    "comes out in "
+                    "the same unit",
+                    square, square < kSmallest ? "small" : "large"));
+}
+
+/// With k3 where that explains the corners better: every camera's k3 is far from 0, and the
+/// residuals shrink.
+BoardCalibration calibrate_with_k3(const std::vector<BoardView>& views,
+                                   BoardCalibrationOptions options, BoardCalibration without,
+                                   Progress* progress) {
+  constexpr double kSigmas = 5, kBetter = 0.97;  // of the residuals without
+  if (options.sixth_order || options.model != CameraModelKind::pinhole_radtan ||
+      !without.error.empty())
+    return without;
+  options.sixth_order = true;
+  BoardCalibration with = calibrate_boards(views, options);
+  if (!with.error.empty() || with.rig.reprojection_px > kBetter * without.rig.reprojection_px)
+    return without;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(with.rig.cameras); ++k) {
+    const Intrinsics& lens = with.rig.intrinsics[k];
+    if (!(std::abs(lens.distortion[4]) > kSigmas * lens.distortion_sigma[4])) return without;
+  }
+  progress->say(fmt::format(
+      "vergence: k3 is estimated, too: the residuals are {:.3f} px with it and {:.3f} px without",
+      with.rig.reprojection_px, without.rig.reprojection_px));
+  return with;
+}
+
 }  // namespace
 
 ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedRig& rig,
@@ -69,9 +145,12 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
   options.sizes = rig.sizes;
   options.model = request.model;
   options.sixth_order = request.sixth_order;
-  const BoardCalibration found = calibrate_boards(views, options);
-  if (!found.error.empty()) {
-    progress->say("vergence: no calibration: " + found.error);
+  remark_square(request.board.square, progress);
+  const BoardCalibration found =
+      calibrate_with_k3(views, options, calibrate_boards(views, options), progress);
+  const std::string why = found.error.empty() ? undetermined(found) : found.error;
+  if (!why.empty()) {
+    progress->say("vergence: no calibration: " + why);
     return ExitCode::not_usable;
   }
   CalibrationFile file;
@@ -89,6 +168,11 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
   const BoardReport report{found, file, request.board, coverage, request.measured_baseline};
   std::cout << (request.json ? json_report(report).dump(1) + "\n" : format_report(report));
   remark(file, progress);
+  if (file.rig.cameras > 1) {
+    progress->say("vergence: " + baseline_sentence(file.rig));
+    if (const std::string doubt = baseline_doubt(file.rig); !doubt.empty())
+      progress->say("vergence: " + doubt);
+  }
   progress->say(fmt::format("{}: written{}", request.out.string(),
                             file.rig.cameras == 1
                                 ? "; one camera makes no rig, its intrinsics go into a "

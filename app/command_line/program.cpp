@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/terminal_text.hpp"
 #include "app/runtime/version.hpp"
 #include "app/runtime/withdrawn.hpp"
 #include "core/features/simd_target.hpp"
@@ -23,10 +24,8 @@ namespace {
 
 /// One sentence on one line of stderr. Words of the user's may stand in it: nothing in them may
 /// steer a terminal.
-void print_error(std::string sentence) {
-  std::replace_if(
-      sentence.begin(), sentence.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
-  std::cerr << "vergence: " << sentence << '\n';
+void print_error(const std::string& sentence) {
+  std::cerr << "vergence: " << harmless(sentence) << '\n';
 }
 
 std::vector<std::string> command_words(CLI::App& root) {

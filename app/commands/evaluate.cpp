@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,6 +23,7 @@ struct EvaluateArguments {
   double max_gap = 0.2;           // s
   double max_difference = 0.005;  // s
   std::string axes = "camera";
+  std::string unit, quaternion;  // ESTIMATE[,REFERENCE]
 };
 
 std::vector<double> parse_lengths(const std::string& text) {
@@ -52,6 +55,28 @@ std::vector<SegmentOptions> usual_segments(const std::optional<int>& step) {
           {{0.1, 0.2, 0.3, 0.4, 0.5}, step.value_or(1), false}};
 }
 
+/// `ms`, `ms,s`, `,s`: of the estimate's file and of the reference's.
+template <class Value, class Parse>
+std::array<std::optional<Value>, 2> parse_pair(const char* option, const std::string& text,
+                                               const char* words, const Parse& parse) {
+  std::array<std::optional<Value>, 2> pair;
+  std::array<std::string_view, 2> fields;
+  const std::size_t count = split(text, ',', fields);
+  for (std::size_t i = 0; i < std::min(count, fields.size()); ++i)
+    if (!fields[i].empty()) pair[i] = parse(fields[i]);
+  const bool read = (fields[0].empty() || pair[0]) && (fields[1].empty() || pair[1]);
+  if (count > fields.size() || !read)
+    throw InputError(std::string(option) + " is \"" + text.substr(0, 40) + "\"; it takes " + words +
+                     " of ESTIMATE, and after a comma that of REFERENCE");
+  return pair;
+}
+
+std::optional<QuaternionOrder> parse_order(std::string_view word) {
+  if (word == "xyzw") return QuaternionOrder::xyzw;
+  if (word == "wxyz") return QuaternionOrder::wxyz;
+  return std::nullopt;
+}
+
 EvaluationOptions options_of(const EvaluateArguments& a) {
   EvaluationOptions options;
   options.association = a.associate == "nearest" ? Association::nearest : Association::interpolate;
@@ -74,6 +99,9 @@ EvaluationRequest evaluate_request(const EvaluateArguments& a) {
   r.usual_lengths = !a.lengths;
   r.json = a.json;
   r.estimate_mount = a.estimate_mount;
+  r.units = parse_pair<TimeUnit>("--time-unit", a.unit, "s, ms, us or ns", parse_time_unit);
+  r.quaternions =
+      parse_pair<QuaternionOrder>("--quaternion", a.quaternion, "xyzw or wxyz", parse_order);
   return r;
 }
 
@@ -82,11 +110,11 @@ EvaluationRequest evaluate_request(const EvaluateArguments& a) {
 void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<EvaluateArguments>();
   CLI::App* command = root.add_subcommand("evaluate", "Compare a trajectory with a reference");
-  command->add_option("ESTIMATE", a->estimate, "TUM file, session folder, or data set")->required();
+  command->add_option("ESTIMATE", a->estimate, "Text file of poses, session folder, or data set")->required();
   command->add_option(
       "REFERENCE", a->reference,
-      "TUM file, KITTI or EuRoC data-set folder, or its truth file; ins.csv of a session, which is "
-      "brought to the left camera by the session's mount");
+      "Text file of poses, KITTI or EuRoC data-set folder; ins.csv of a session, which is brought to "
+      "the left camera by the session's mount");
   command->add_flag("--json", a->json, "The figures as JSON");
   command->add_option(
       "--lengths", a->lengths,
@@ -109,6 +137,16 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
                    "Axes of the body: camera (z forward) or flu (x forward, y left, z up)")
       ->check(CLI::IsMember({"camera", "flu"}))
       ->capture_default_str();
+  command
+      ->add_option("--time-unit", a->unit,
+                   "Unit of the times of ESTIMATE[,REFERENCE]: s, ms, us, ns [by their magnitude, or "
+                   "s]")
+      ->type_name("UNIT");
+  command
+      ->add_option("--quaternion", a->quaternion,
+                   "Order of the quaternion in ESTIMATE[,REFERENCE]: xyzw, wxyz [by the headings, or "
+                   "xyzw]")
+      ->type_name("ORDER");
   command->add_flag("--estimate-mount", a->estimate_mount,
                     "Find how the two bodies sit to one another; compare at the estimate's. "
                     "Without REFERENCE: the session's own INS");

@@ -89,14 +89,14 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<ReplayArguments>();
   CLI::App* command = root.add_subcommand(
       "replay", "Run a recorded drive through the estimator and write a session folder");
-  command->add_option("DATA", a->data, "Folder of the data set, or a .mcap or .bag file")
+  command->add_option("DATA", a->data, "Folder of the data set, or a .mcap, .db3 or .bag file")
       ->required();
   command
-      ->add_option(
-          "--format", a->format,
-          "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap, rosbag, session; auto: "
-          "by what is "
-          "in it")
+      ->add_option("--format", a->format,
+                   "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap, rosbag, db3, "
+                   "session; auto: "
+                   "by what is "
+                   "in it")
       ->type_name("NAME")
       ->capture_default_str();
   command->add_option("--out", a->out, "Session folder; must not exist or be empty")

@@ -125,8 +125,7 @@ Finding check_transform(Transform* T, const std::string& field) {
   return std::nullopt;
 }
 
-/// Camera 1 by the length that was measured and by its side. X_right = R X_left + t: a camera on
-/// the right has t_x < 0.
+/// Camera 1 by the length that was measured and by its side. X_right = R X_left + t.
 Finding check_baseline(const RigCalibration& rig) {
   const Vec3& t = rig.T_camera_left[1].t;
   if (!std::isfinite(rig.baseline) || rig.baseline < 0)
@@ -137,14 +136,17 @@ Finding check_baseline(const RigCalibration& rig) {
     return finding("rig.baseline", fmt::format("is {:g} m, but cameras.1.T_camera_left has a "
                                                "translation of {:g} m; one of them is wrong",
                                                rig.baseline, t.norm()));
-  if (t.x() > 0.5 * t.norm())
+  // Where camera 1 is, in the axes of camera 0: t has those of camera 1, which may be mounted
+  // upside down.
+  const Vec3 centre = -(rig.T_camera_left[1].R.transpose() * t);
+  if (centre.x() < -0.5 * centre.norm())
     return finding(
         "cameras.1.T_camera_left",
         fmt::format(
-            "has t1 = {:g} m, which puts camera 1 to the left of camera 0: left and right are "
-            "swapped, or the transform is given as its inverse (X_camera = R X_left + t, so a "
-            "camera on the right has t1 < 0)",
-            t.x()));
+            "puts camera 1 {:g} m to the left of camera 0: left and right are swapped, or the "
+            "transform is given as its inverse (X_camera = R X_left + t, so a parallel camera on "
+            "the right has t1 < 0)",
+            -centre.x()));
   return std::nullopt;
 }
 
@@ -165,6 +167,20 @@ Finding check_found(const RigCalibration& rig) {
 }
 
 }  // namespace
+
+std::string baseline_sentence(const RigCalibration& rig) {
+  return fmt::format("the baseline is {:.4g} m", rig.T_camera_left[1].t.norm());
+}
+
+std::string baseline_doubt(const RigCalibration& rig) {
+  constexpr double kUsuallyShortest = 0.02, kUsuallyLongest = 2;  // m
+  const double length = rig.T_camera_left[1].t.norm();
+  if (length >= kUsuallyShortest && length <= kUsuallyLongest) return "";
+  return fmt::format(
+      "a baseline of {:.4g} m is unusually {}: is the calibration's unit metres, and not {}?",
+      length, length < kUsuallyShortest ? "short" : "long",
+      length < kUsuallyShortest ? "another" : "centimetres, millimetres or squares of a board");
+}
 
 std::optional<Implausible> find_implausible(RigCalibration* rig) {
   if (rig->cameras < 2 || rig->cameras > kMaxCameras)

@@ -43,6 +43,11 @@ struct Implausible {
 /// I) is replaced by the nearest one; beyond, it is reported.
 [[nodiscard]] std::optional<Implausible> find_implausible(RigCalibration* rig);
 
+/// "the baseline is 0.1101 m", for people who know their rig.
+[[nodiscard]] std::string baseline_sentence(const RigCalibration& rig);
+/// Asks for the unit of a length above 2 m or below 2 cm, which few rigs have; empty: it is usual.
+[[nodiscard]] std::string baseline_doubt(const RigCalibration& rig);
+
 /// Errors  InputError with file:line and the field's name: unreadable, unknown key, missing or
 ///         malformed field, implausible.
 [[nodiscard]] CalibrationFile read_calibration(const std::filesystem::path& path,

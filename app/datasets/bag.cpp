@@ -1,12 +1,16 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <optional>
+#include <span>
 
 #include <fmt/format.h>
 
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/bag_ins.hpp"
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/pairing.hpp"
+#include "app/datasets/detail/side_names.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
@@ -29,65 +33,157 @@ std::string list_of_image_topics(const BagIndex& bag) {
   std::string list;
   std::size_t unreadable = 0;
   for (const auto& [name, topic] : bag.images) {
-    const std::size_t other = topic.left_out.unreadable;
+    const LeftOut& out = topic.left_out;
     list += fmt::format("{}{} ({} images{})", list.empty() ? "" : ", ", name, topic.images.size(),
-                        other > 0 ? fmt::format(", {} that cannot be read", other) : "");
-    unreadable += other;
+                        out.unreadable > 0
+                            ? fmt::format(", {} that cannot be read, of the encoding \"{}\"",
+                                          out.unreadable, out.encoding)
+                            : "");
+    unreadable += out.unreadable;
   }
   if (unreadable > 0)
-    list += "; encodings that can be read: mono8, mono16, rgb8, bgr8, bayer_*8, and PNG and JPEG";
+    list +=
+        "; encodings that can be read: mono8, mono16, rgb8, bgr8, rgba8, bgra8, 8UC1, 8UC3, 16UC1, "
+        "yuv422, yuv422_yuy2, uyvy, yuyv, nv12, nv21, bayer_*8, bayer_*16, and PNG and JPEG";
+  if (list.empty() && !bag.unread.empty())
+    return "none; what is not read: " + bag.unread +
+           ", for messages are those of ROS, in CDR or as ROS 1 has them";
   return list.empty() ? "none" : list;
 }
 
-std::string choose(const fs::path& path, const BagIndex& bag, const std::string& requested,
+using Topics = std::array<std::string, 2>;
+
+void require_topic(const fs::path& path, const BagIndex& bag, const std::string& requested,
                    std::string_view side) {
-  const std::string ask =
-      fmt::format("choose with --{}-topic; topics of images: {}", side, list_of_image_topics(bag));
-  if (!requested.empty()) {
-    const auto found = bag.images.find(requested);
-    if (found == bag.images.end() || found->second.images.empty())
-      refuse(path, 0, fmt::format("has no image on {} that can be read; {}", requested, ask));
-    return requested;
-  }
-  std::vector<std::string> named;
-  for (const auto& [name, topic] : bag.images)
-    if (!topic.images.empty() && name.find(side) != std::string::npos) named.push_back(name);
-  if (named.size() != 1)
+  if (requested.empty()) return;
+  const auto found = bag.images.find(requested);
+  if (found == bag.images.end() || found->second.images.empty())
     refuse(path, 0,
-           fmt::format("has {} topics of images with \"{}\" in their names; {}", named.size(), side,
-                       ask));
-  return named.front();
+           fmt::format("has no image on {} that can be read; choose with --{}-topic; topics of "
+                       "images: {}",
+                       requested, side, list_of_image_topics(bag)));
 }
 
-Duration half_interval(const std::vector<BagImage>& images) {
-  std::vector<std::int64_t> ns;
-  for (std::size_t i = 1; i < images.size(); ++i)
-    ns.push_back((images[i].image.stamp - images[i - 1].image.stamp).ns());
-  if (ns.empty()) return Duration::nanoseconds(50'000'000);
-  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
-  std::nth_element(ns.begin(), middle, ns.end());
-  return Duration::nanoseconds(*middle / 2);
-}
-
-std::int64_t apart(const BagImage& a, const BagImage& b) {
-  const std::int64_t ns = (a.image.stamp - b.image.stamp).ns();
-  return ns < 0 ? -ns : ns;
-}
-
-/// Indices of images that are each other's nearest, within `most`; both lists ascend.
-std::vector<std::array<std::size_t, 2>> pair_nearest(const std::vector<BagImage>& left,
-                                                     const std::vector<BagImage>& right,
-                                                     Duration most) {
-  const auto nearest = [](const std::vector<BagImage>& in, const BagImage& to, std::size_t from) {
-    while (from + 1 < in.size() && apart(in[from + 1], to) < apart(in[from], to)) ++from;
-    return from;
-  };
-  std::vector<std::array<std::size_t, 2>> pairs;
-  for (std::size_t l = 0, r = 0, back = 0; l < left.size(); ++l) {
-    r = nearest(right, left[l], r);
-    back = nearest(left, right[r], back);
-    if (back == l && apart(left[l], right[r]) <= most.ns()) pairs.push_back({l, r});
+/// What speaks for a pair of topics: both have a CameraInfo, or a calibration is given; the images
+/// are as the lenses made them; they are not compressed.
+int merit(const BagIndex& bag, const Topics& topics, bool given) {
+  int sum = 0;
+  for (const std::string& topic : topics) {
+    if (given || bag.infos.contains(camera_of(topic) + "/camera_info")) sum += 4;
+    if (!is_rectified(topic)) sum += 2;
+    if (!topic.ends_with("/compressed")) sum += 1;
   }
+  return sum;
+}
+
+/// Topics that do not differ by their side alone, where one says left and one says right.
+std::optional<Topics> only_named(const std::vector<std::string>& names,
+                                 const BagTopics& requested) {
+  Topics found{requested.left, requested.right};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const char* side = k == 0 ? "left" : "right";
+    std::vector<std::string> with;
+    for (const std::string& name : names)
+      if (lower(name).find(side) != std::string::npos) with.push_back(name);
+    if (found[k].empty() && with.size() != 1) return std::nullopt;
+    if (found[k].empty()) found[k] = with.front();
+  }
+  return found;
+}
+
+/// The pair that the user names, or the best of those with the usual names.
+Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& requested, bool given) {
+  require_topic(path, bag, requested.left, "left");
+  require_topic(path, bag, requested.right, "right");
+  if (!requested.left.empty() && !requested.right.empty()) return {requested.left, requested.right};
+  std::vector<std::string> names;
+  for (const auto& [name, topic] : bag.images) {
+    const std::string small = lower(name);
+    const bool of_a_camera = small.find("depth") == std::string::npos &&
+                             small.find("disparity") == std::string::npos &&
+                             small.find("confidence") == std::string::npos;
+    if (!topic.images.empty() && of_a_camera) names.push_back(name);
+  }
+  std::vector<Topics> best;
+  for (const Topics& pair : stereo_names(names)) {
+    if ((!requested.left.empty() && pair[0] != requested.left) ||
+        (!requested.right.empty() && pair[1] != requested.right))
+      continue;
+    if (!best.empty() && merit(bag, pair, given) > merit(bag, best.front(), given)) best.clear();
+    if (best.empty() || merit(bag, pair, given) == merit(bag, best.front(), given))
+      best.push_back(pair);
+  }
+  if (best.size() == 1) return best.front();
+  if (best.empty())
+    if (const auto only = only_named(names, requested)) return *only;
+  refuse(path, 0,
+         fmt::format("has {} pairs of topics of images with the names of a left and a right camera "
+                     "(left/right, infra1/infra2, cam0/cam1, image_0/image_1 …); choose with "
+                     "--left-topic and --right-topic; topics of images: {}",
+                     best.size(), list_of_image_topics(bag)));
+}
+
+std::vector<Stamp> stamps_of(const std::vector<BagImage>& images) {
+  std::vector<Stamp> stamps;
+  for (const BagImage& image : images) stamps.push_back(image.image.stamp);
+  return stamps;
+}
+
+/// What the times of recording say of pairs that stamps made: by how much right images were
+/// recorded later than their stamps say.
+Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
+                        std::span<const std::array<std::size_t, 2>> pairs) {
+  std::array<std::vector<Stamp>, 2> log;
+  for (std::size_t k = 0; k < 2; ++k)
+    for (const BagImage& image : images[k]) {
+      constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
+      if (image.log_time <= 0 || image.log_time > kFarthest) return {};
+      log[k].emplace_back(image.log_time);
+    }
+  return pair_offset(log[0], log[1], pairs).median;
+}
+
+/// Pairs of the nearest stamps, and what is to be said of how far these are apart.
+std::vector<std::array<std::size_t, 2>> pair_images(
+    const fs::path& path, const Topics& topics, const std::array<std::vector<BagImage>, 2>& images,
+    StereoSequence* sequence) {
+  constexpr double kHalf = 0.5, kDoubtful = 0.1;  // of the interval
+  constexpr Duration kSuspicious = Duration::milliseconds(5);
+  const std::array stamps{stamps_of(images[0]), stamps_of(images[1])};
+  const double interval = usual_interval(stamps[0]).to_seconds();
+  const Duration most = Duration::seconds(kMostApart * interval);
+  const auto near = pair_nearest(stamps[0], stamps[1], Duration::seconds(kHalf * interval));
+  const PairOffset offset = pair_offset(stamps[0], stamps[1], near);
+  const Duration middle = std::max(offset.median, -offset.median);
+  if (!near.empty() && middle > most)
+    refuse(
+        path, 0,
+        fmt::format("{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: which "
+                    "images belong together cannot be told; correct the stamps of one topic",
+                    topics[1], 1e3 * middle.to_seconds(),
+                    offset.median > Duration{} ? "later" : "earlier", topics[0], 1e3 * interval));
+  auto pairs = pair_nearest(stamps[0], stamps[1], most);
+  if (pairs.empty())
+    refuse(path, 0,
+           fmt::format("has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no "
+                       "two are within {:.0f} % of the interval of each other",
+                       topics[0], stamps[0].front().ns(), topics[1], stamps[1].front().ns(),
+                       100 * kMostApart));
+  const PairOffset kept = pair_offset(stamps[0], stamps[1], pairs);
+  sequence->assumptions.push_back(
+      "images are paired by the nearest stamp, right ones are later by " + describe(kept));
+  const Duration apart = std::max(std::max(kept.median, -kept.median), kept.farthest);
+  if (apart > kSuspicious || apart.to_seconds() > kDoubtful * interval)
+    sequence->remarks.push_back(fmt::format(
+        "the stamps of {} and {} differ by {} at an interval of {:.3g} ms: if the cameras do not "
+        "expose together, poses suffer in turns; if they do, one of the stamps is wrong",
+        topics[0], topics[1], describe(kept), 1e3 * interval));
+  const Duration late = recorded_later(images, pairs) - kept.median;
+  if (std::max(late, -late) > most)
+    sequence->remarks.push_back(fmt::format(
+        "the images of a pair of {} and {} were recorded {:.3g} ms further apart than their stamps "
+        "say, near the interval: is one camera stamped a frame early or late?",
+        topics[0], topics[1], 1e3 * std::max(late, -late).to_seconds()));
   return pairs;
 }
 
@@ -101,7 +197,8 @@ void remark_left_out(const std::string& name, const LeftOut& out,
                   name, out.unreadable, out.other_size, out.backwards, out.first));
 }
 
-RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::string& topic) {
+RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::string& topic,
+                      StereoSequence* sequence) {
   const std::string name = camera_of(topic) + "/camera_info";
   const auto found = bag.infos.find(name);
   if (found == bag.infos.end())
@@ -110,11 +207,36 @@ RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::stri
                        "with --calibration",
                        name, topic));
   const RosCameraInfo& info = found->second;
-  RosCamera camera = is_rectified(topic) ? rectified(info.camera) : info.camera;
   const std::string& fault = is_rectified(topic) ? info.fault_rectified : info.fault;
   if (!fault.empty())
     refuse(path, 0, fmt::format("{}: {}; give a calibration with --calibration", name, fault));
-  return camera;
+  RosCamera camera = info.camera;
+  const ImageSize size = bag.images.at(topic).images.front().image.size;
+  if (const std::string taken = apply_crop(info.crop, size, &camera); !taken.empty())
+    sequence->assumptions.push_back(name + ": " + taken);
+  return is_rectified(topic) ? rectified(camera) : camera;
+}
+
+/// Two cameras' mosaics in JPEG: what the packing smears, no demosaicing brings back.
+void remark_mosaics(const BagIndex& bag, const std::string& topic, StereoSequence* sequence) {
+  const ImageTopic& of_topic = bag.images.at(topic);
+  const BagImage& image = of_topic.images.front();
+  if (image.image.layout == PixelLayout::encoded_bayer) {
+    std::array<std::uint8_t, 2> first{};
+    (void)bag.files[image.file].bytes->read(image.place.offset + image.image.offset, first);
+    const bool jpeg = image.place.chunk == BagPlace::kNoChunk ? first[0] == 0xFF : true;
+    sequence->assumptions.push_back(topic +
+                                    " holds mosaics, by its format, and grey is made of them");
+    if (jpeg)
+      sequence->remarks.push_back(
+          topic +
+          ": mosaics were compressed as they are, and JPEG mixes their colours: poses suffer; "
+          "record PNG, or debayer before compressing");
+  }
+  if (of_topic.unstamped > 0)
+    sequence->assumptions.push_back(
+        fmt::format("{}: {} images have no stamp (0), the time of recording is taken", topic,
+                    of_topic.unstamped));
 }
 
 }  // namespace
@@ -127,8 +249,7 @@ StereoSequence open_bag(BagFormat format, const std::filesystem::path& path, boo
 StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag, bool given,
                            const BagTopics& topics) {
   auto ins = std::make_shared<const RecordedIns>(bag_ins(path, bag, topics));
-  const std::array chosen{choose(path, bag, topics.left, "left"),
-                          choose(path, bag, topics.right, "right")};
+  const Topics chosen = choose(path, bag, topics, given);
   if (chosen[0] == chosen[1])
     refuse(path, 0, "is to give the left and the right images from one topic, " + chosen[0]);
   StereoSequence sequence;
@@ -141,32 +262,31 @@ StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag, bool
     remark_left_out(name, out, &sequence.remarks);
     sequence.left_out += out.unreadable + out.other_size + out.backwards;
   }
+  if (topics.left.empty() || topics.right.empty())
+    if (bag.images.size() > 2 || chosen[0].find("left") == std::string::npos)
+      sequence.assumptions.push_back(chosen[0] + " is left and " + chosen[1] + " is right");
+  for (const std::string& name : chosen) remark_mosaics(bag, name, &sequence);
   if (!given) {
-    const std::array cameras{camera_info(path, bag, chosen[0]), camera_info(path, bag, chosen[1])};
+    const std::array cameras{camera_info(path, bag, chosen[0], &sequence),
+                             camera_info(path, bag, chosen[1], &sequence)};
     if (const std::string fault = set_ros_rig(cameras[0], cameras[1], &sequence.calibration);
         !fault.empty())
       refuse(path, 0,
-             fmt::format("{}/camera_info: p {}; give a calibration with --calibration",
+             fmt::format("{}/camera_info: P {}; give a calibration with --calibration",
                          camera_of(chosen[1]), fault));
     sequence.calibration_source =
         "CameraInfo of " + camera_of(chosen[0]) + " and " + camera_of(chosen[1]);
   }
   std::array images{std::move(bag.images[chosen[0]].images),
                     std::move(bag.images[chosen[1]].images)};
-  const auto pairs = pair_nearest(images[0], images[1], half_interval(images[0]));
-  if (pairs.empty())
-    refuse(path, 0,
-           fmt::format("has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no "
-                       "two are within half a frame of each other",
-                       chosen[0], images[0].front().image.stamp.ns(), chosen[1],
-                       images[1].front().image.stamp.ns()));
+  const auto pairs = pair_images(path, chosen, images, &sequence);
   const std::size_t alone = images[0].size() + images[1].size() - 2 * pairs.size();
   if (alone > 0)
     sequence.remarks.push_back(
-        fmt::format("{} images have no partner within half a frame and were left out", alone));
+        fmt::format("{} images have no partner within {:.0f} % of the interval and were left out",
+                    alone, 100 * kMostApart));
   sequence.left_out += alone;
-  std::vector<Stamp> stamps;
-  for (const BagImage& image : images[0]) stamps.push_back(image.image.stamp);
+  const std::vector<Stamp> stamps = stamps_of(images[0]);
   const auto store = std::make_shared<const BagImages>(bag.format, std::move(bag.files), chosen,
                                                        std::move(images));
   for (const auto& [l, r] : pairs)

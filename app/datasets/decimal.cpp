@@ -59,14 +59,14 @@ std::optional<Digits> read_digits(std::string_view text) noexcept {
 
 }  // namespace
 
-std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept {
+std::optional<std::int64_t> parse_decimal(std::string_view text, int decimals) noexcept {
   if (text.empty() || text.size() >= kMaxText) return std::nullopt;
   const bool negative = text.front() == '-';
   if (negative || text.front() == '+') text.remove_prefix(1);
   const std::optional<Digits> d = read_digits(text);
   if (!d) return std::nullopt;
   std::uint64_t ns = 0;
-  const int requested = d->point + kDecimals;  // digits before the nanosecond's point
+  const int requested = d->point + decimals;  // digits before the point of the result
   for (int i = 0; i < requested; ++i) {
     if (i >= d->count && ns == 0) break;  // only zeros follow zeros
     if (!append(&ns, i < d->count ? d->digit[i] - '0' : 0)) return std::nullopt;
@@ -76,6 +76,10 @@ std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept {
     ++ns;
   const auto value = static_cast<std::int64_t>(ns);
   return negative ? -value : value;
+}
+
+std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept {
+  return parse_decimal(text, kDecimals);
 }
 
 std::optional<std::int64_t> parse_integer(std::string_view text) noexcept {

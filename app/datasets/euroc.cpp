@@ -1,66 +1,33 @@
 #include <algorithm>
 #include <array>
-#include <unordered_map>
 
-#include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/euroc_sensor.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/datasets/times_file.hpp"
 
 namespace vergence::app::detail {
 namespace {
 
-struct Entry {
-  Stamp stamp{};
-  std::string file;  // relative to the root
+/// The images of a camera, as its data.csv lists them.
+struct Index {
+  std::vector<Stamp> stamps{};
+  std::vector<std::string> files{};  // relative to the root
 };
 
-std::vector<Entry> read_index(const std::filesystem::path& root, const std::string& camera) {
+Index read_index(const std::filesystem::path& root, const std::string& camera,
+                 std::vector<std::string>* assumptions) {
   const std::filesystem::path file = root / camera / "data.csv";
-  const std::string text = read_text(file);
-  Lines lines(text);
-  std::vector<Entry> entries;
-  for (std::string_view line; lines.next(&line);) {
-    std::array<std::string_view, 2> fields;
-    if (split(line, ',', fields) < 2 || fields[1].empty())
-      refuse(file, lines.number(), "is not `stamp in nanoseconds,file name`");
-    const auto ns = parse_integer(fields[0]);
-    if (!ns)
-      refuse(file, lines.number(),
-             "`" + std::string(fields[0].substr(0, 40)) + "` is not a stamp in whole nanoseconds");
-    if (fields[1].find('/') != std::string_view::npos)
-      refuse(file, lines.number(), "names an image outside the folder data");
-    entries.push_back({Stamp(*ns), camera + "/data/" + std::string(fields[1])});
+  Index index;
+  const TimesFile times = read_times_file(file, TimeUnit::nanoseconds);
+  for (const TimesLine& line : times.lines) {
+    index.stamps.push_back(line.stamp);
+    index.files.push_back(
+        camera + "/data/" +
+        (line.name[0].empty() ? std::to_string(line.stamp.ns()) + ".png" : line.name[0]));
   }
-  if (entries.empty()) refuse(file, 0, "lists no images");
-  return entries;
-}
-
-/// The right image of the same stamp for each left one; right ones alone stand where their stamp
-/// belongs.
-std::vector<StereoPair> pair_by_stamp(const std::vector<Entry>& left,
-                                      const std::vector<Entry>& right) {
-  std::unordered_map<std::int64_t, std::size_t> of_left;
-  for (std::size_t i = 0; i < left.size(); ++i) of_left.emplace(left[i].stamp.ns(), i);
-  std::unordered_map<std::int64_t, const Entry*> of_right;
-  std::vector<const Entry*> alone;
-  for (const Entry& e : right) {
-    of_right.emplace(e.stamp.ns(), &e);
-    if (!of_left.contains(e.stamp.ns())) alone.push_back(&e);
-  }
-  std::stable_sort(alone.begin(), alone.end(),
-                   [](const Entry* a, const Entry* b) { return a->stamp < b->stamp; });
-  std::vector<StereoPair> pairs;
-  auto next_alone = alone.begin();
-  for (const Entry& e : left) {
-    for (; next_alone != alone.end() && (*next_alone)->stamp < e.stamp; ++next_alone)
-      pairs.push_back({(*next_alone)->stamp, {"", (*next_alone)->file}});
-    const auto match = of_right.find(e.stamp.ns());
-    pairs.push_back({e.stamp, {e.file, match == of_right.end() ? "" : match->second->file}});
-  }
-  for (; next_alone != alone.end(); ++next_alone)
-    pairs.push_back({(*next_alone)->stamp, {"", (*next_alone)->file}});
-  return pairs;
+  assumptions->insert(assumptions->end(), times.remarks.begin(), times.remarks.end());
+  return index;
 }
 
 /// Lens and size of a camera's sensor.yaml.
@@ -114,12 +81,15 @@ StereoSequence open_euroc(const std::filesystem::path& folder, bool given) {
   sequence.times = sequence.root / "cam0" / "data.csv";
   for (const char* camera : {"cam0", "cam1"})
     require_folder(sequence.root / camera, "data.csv, sensor.yaml and data/ of that camera");
-  sequence.pairs =
-      pair_by_stamp(read_index(sequence.root, "cam0"), read_index(sequence.root, "cam1"));
+  const std::array cameras{read_index(sequence.root, "cam0", &sequence.assumptions),
+                           read_index(sequence.root, "cam1", &sequence.assumptions)};
+  sequence.pairs = merged_pairs(
+      cameras[0].stamps, cameras[1].stamps,
+      [&](std::size_t k, std::size_t i) { return cameras[k].files[i]; }, &sequence.assumptions);
   if (std::none_of(sequence.pairs.begin(), sequence.pairs.end(),
                    [](const StereoPair& p) { return !p.file[0].empty() && !p.file[1].empty(); }))
     refuse(sequence.root / "cam1" / "data.csv", 0,
-           "has no stamp in common with that of cam0; the two do not belong together");
+           "has no stamp near one of cam0's; the two do not belong together");
   if (given) return sequence;
   const std::filesystem::path left = sequence.root / "cam0" / "sensor.yaml",
                               right = sequence.root / "cam1" / "sensor.yaml";

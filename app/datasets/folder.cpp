@@ -1,104 +1,107 @@
 #include <algorithm>
 #include <array>
-#include <span>
+#include <optional>
+
+#include <fmt/format.h>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/name_order.hpp"
+#include "app/datasets/detail/pairing.hpp"
+#include "app/datasets/detail/side_names.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/datasets/times_file.hpp"
 
 namespace vergence::app::detail {
 namespace {
 
-/// A line of times.txt: `stamp`, `stamp,file` (of that name on both sides) or `stamp,left
-/// file,right file`.
-struct Line {
-  Stamp stamp{};
-  std::array<std::string, 2> name{};  // empty: by order
+namespace fs = std::filesystem;
+
+/// The images of both cameras, in order of their names, and where they lie.
+struct Images {
+  std::array<std::string, 2> below{};               // the folders, relative to the drive's
+  std::array<std::vector<std::string>, 2> names{};  // with their folder
+  bool side_by_side = false;
 };
 
-std::array<std::string, 2> names_of(const std::filesystem::path& file, std::size_t line,
-                                    std::span<const std::string_view> fields) {
-  std::array<std::string, 2> names;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const std::string_view name = fields[std::min(k + 1, fields.size() - 1)];
-    if (name.empty() || name == "." || name == ".." || name.find('/') != std::string_view::npos)
-      refuse(
-          file, line,
-          "`" + std::string(name.substr(0, 40)) + "` is no name of an image in left/ and right/");
-    names[k] = name;
+std::string file_of(const std::string& name) { return fs::path(name).filename().string(); }
+std::string stem_of(const std::string& name) { return fs::path(name).stem().string(); }
+
+/// Both cameras in one folder, told by how their images' names begin.
+std::optional<Images> images_by_prefix(const fs::path& root) {
+  std::error_code ignored;
+  std::vector<std::string> files;
+  for (fs::directory_iterator it(root, ignored), end; !ignored && it != end; it.increment(ignored))
+    if (is_image_name(it->path().filename().string()))
+      files.push_back(it->path().filename().string());
+  const std::array<std::string, 2> prefix = side_prefixes(files);
+  if (prefix[0].empty()) return std::nullopt;
+  Images images;
+  for (const std::string& file : files)
+    for (std::size_t k = 0; k < 2; ++k)
+      if (file.starts_with(prefix[k])) images.names[k].push_back(file);
+  for (auto& names : images.names) std::sort(names.begin(), names.end(), in_name_order);
+  return images;
+}
+
+Images find_images(const fs::path& root) {
+  Images images;
+  if (const auto folders = camera_folders(root)) {
+    images.below = *folders;
+  } else {
+    std::error_code ignored;
+    images.side_by_side = fs::exists(root / "both", ignored);
+    if (images.side_by_side)
+      images.below = {"both", "both"};
+    else if (auto together = images_by_prefix(root))
+      return std::move(*together);
+    else
+      images.below = {"left", "right"};  // to be named as missing
   }
-  return names;
+  for (std::size_t k = 0; k < 2; ++k) images.names[k] = list_images(root, images.below[k]);
+  return images;
 }
 
-/// Whether the stamps of a times.txt are seconds. One with a point or an exponent says it of all:
-/// programs print 1403636584 where the next is 1403636584.1.
-bool in_seconds(const std::string& text) {
-  Lines lines(text);
-  for (std::string_view line; lines.next(&line);)
-    if (line.substr(0, line.find(',')).find_first_of(".eE") != std::string_view::npos) return true;
-  return false;
+std::string in_folder(const Images& images, std::size_t k, const std::string& file) {
+  return images.below[k].empty() ? file : images.below[k] + "/" + file;
 }
 
-std::vector<Line> read_times(const std::filesystem::path& file) {
-  const std::string text = read_text(file);
-  const bool seconds = in_seconds(text);
-  Lines lines(text);
-  std::vector<Line> times;
-  for (std::string_view line; lines.next(&line);) {
-    std::array<std::string_view, 3> fields;
-    const std::size_t count = split(line, ',', fields);
-    if (count > fields.size())
-      refuse(file, lines.number(),
-             "has " + std::to_string(count) + " columns; stamp[,file[,right file]] is expected");
-    const auto ns = seconds ? parse_seconds_ns(fields[0]) : parse_integer(fields[0]);
-    if (!ns)
-      refuse(file, lines.number(),
-             "`" + std::string(fields[0].substr(0, 40)) +
-                 "` is neither integer nanoseconds nor seconds with a point" +
-                 (lines.number() == 1 && count > 1 ? "; begin a line of headings with #" : ""));
-    Line entry{Stamp(*ns), {}};
-    if (count > 1) entry.name = names_of(file, lines.number(), std::span(fields).first(count));
-    if (!times.empty() && times.front().name[0].empty() != entry.name[0].empty())
-      refuse(file, lines.number(),
-             "names an image where other lines do not, or the other way round; every line is of "
-             "the same kind");
-    times.push_back(std::move(entry));
-  }
-  if (times.empty()) refuse(file, 0, "holds no times; one line a pair is expected");
-  return times;
+// ---- pairs by names
+
+/// The last number in a name, digits and points: `left_0012` → `0012`; empty: it has none.
+std::string_view last_number(std::string_view stem) {
+  constexpr std::string_view kDigits = "0123456789";
+  const std::size_t last = stem.find_last_of(kDigits);
+  if (last == std::string_view::npos) return {};
+  stem = stem.substr(0, last + 1);
+  const std::size_t before = stem.find_last_not_of("0123456789.");
+  stem.remove_prefix(before == std::string_view::npos ? 0 : before + 1);
+  return stem.substr(std::min(stem.find_first_of(kDigits), stem.size()));
 }
 
-/// Where nobody wrote down when: motion is predicted by frames, so a rate that is wrong spoils no
-/// pose, but every stamp.
-void assume_times(StereoSequence* sequence) {
-  constexpr std::int64_t kStep = 100'000'000;  // ns
-  for (std::size_t i = 0; i < sequence->pairs.size(); ++i)
-    sequence->pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kStep);
-  sequence->remarks.emplace_back(
-      "there is no times.txt: pairs are taken to be 0.1 s apart; write one line a pair, seconds "
-      "with a point or whole nanoseconds");
+/// The last number in a name without its leading zeros.
+std::string number_key(const std::string& name) {
+  const std::string stem = stem_of(name);
+  const std::string_view number = last_number(stem);
+  return std::string(number.substr(std::min(number.find_first_not_of('0'), number.size())));
 }
 
-std::string stem(const std::string& name) { return std::filesystem::path(name).stem().string(); }
-
-/// Both lists sorted; equal stems meet, the others stand alone. A side that has no image gets the
-/// name it should have had.
-std::vector<StereoPair> pair_by_name(const std::vector<std::string>& left,
-                                     const std::vector<std::string>& right) {
+/// Both sorted lists by their keys; equal ones meet, the others stand alone. A side that has no
+/// image gets the name it should have had.
+template <class Key>
+std::vector<StereoPair> pair_by_key(const Images& images, const Key& key) {
+  const auto& [left, right] = images.names;
   std::vector<StereoPair> pairs;
   std::size_t l = 0, r = 0;
   while (l < left.size() || r < right.size()) {
     const bool have_left =
-        l < left.size() && (r == right.size() || !in_name_order(stem(right[r]), stem(left[l])));
+        l < left.size() && (r == right.size() || !in_name_order(key(right[r]), key(left[l])));
     const bool have_right =
-        r < right.size() && (l == left.size() || !in_name_order(stem(left[l]), stem(right[r])));
+        r < right.size() && (l == left.size() || !in_name_order(key(left[l]), key(right[r])));
     StereoPair pair;
-    pair.file[0] =
-        have_left ? left[l] : "left/" + std::filesystem::path(right[r]).filename().string();
-    pair.file[1] =
-        have_right ? right[r] : "right/" + std::filesystem::path(left[l]).filename().string();
+    pair.file[0] = have_left ? left[l] : in_folder(images, 0, file_of(right[r]));
+    pair.file[1] = have_right ? right[r] : in_folder(images, 1, file_of(left[l]));
     l += have_left ? 1 : 0;
     r += have_right ? 1 : 0;
     pairs.push_back(std::move(pair));
@@ -106,94 +109,198 @@ std::vector<StereoPair> pair_by_name(const std::vector<std::string>& left,
   return pairs;
 }
 
-std::vector<StereoPair> pair_in_order(const std::vector<std::string>& left,
-                                      const std::vector<std::string>& right) {
-  std::vector<StereoPair> pairs(left.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i].file = {left[i], right[i]};
+std::size_t met(const Images& images, const std::vector<StereoPair>& pairs) {
+  return images.names[0].size() + images.names[1].size() - pairs.size();
+}
+
+/// By equal names, else by equal last numbers, whichever half of the images agree on; nothing:
+/// neither.
+std::optional<std::vector<StereoPair>> pair_by_names(Images* images) {
+  const std::size_t least = std::min(images->names[0].size(), images->names[1].size());
+  auto pairs = pair_by_key(*images, stem_of);
+  if (2 * met(*images, pairs) >= least) return pairs;
+  Images numbered = *images;
+  for (auto& names : numbered.names)
+    std::stable_sort(names.begin(), names.end(), [](const std::string& a, const std::string& b) {
+      return in_name_order(number_key(a), number_key(b));
+    });
+  const auto unique = [](const std::vector<std::string>& names) {
+    return std::adjacent_find(names.begin(), names.end(), [](const auto& a, const auto& b) {
+             return number_key(a) == number_key(b);
+           }) == names.end();
+  };
+  if (!unique(numbered.names[0]) || !unique(numbered.names[1])) return std::nullopt;
+  pairs = pair_by_key(numbered, number_key);
+  if (2 * met(numbered, pairs) < least) return std::nullopt;
+  *images = std::move(numbered);
   return pairs;
 }
 
-std::array<std::string, 2> in_folders(const std::array<std::string, 2>& names, bool side_by_side) {
-  if (side_by_side) return {"both/" + names[0], "both/" + names[0]};
-  return {"left/" + names[0], "right/" + names[1]};
+std::vector<StereoPair> pair_in_order(const Images& images) {
+  std::vector<StereoPair> pairs(images.names[0].size());
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    pairs[i].file = {images.names[0][i], images.names[1][i]};
+  return pairs;
 }
 
-/// Images as times.txt names them; some may be missing, but not all of a side.
-std::vector<StereoPair> pair_as_named(const std::filesystem::path& folder,
-                                      const std::vector<Line>& times,
-                                      const std::array<std::vector<std::string>, 2>& there,
-                                      bool side_by_side) {
+// ---- pairs by stamps in names
+
+/// The times that the names are; nothing: they are none.
+std::optional<std::vector<Stamp>> stamps_in(const std::vector<std::string>& names,
+                                            std::string* unit) {
+  std::vector<std::string> stems;
+  for (const std::string& name : names) stems.push_back(stem_of(name));
+  std::vector<std::string_view> numbers;
+  for (const std::string& stem : stems) numbers.push_back(last_number(stem));
+  const TimeForm form = find_time_form(numbers, std::nullopt, TimeUnit::nanoseconds);
+  if (!form.absolute || form.iso) return std::nullopt;
+  std::vector<Stamp> stamps;
+  for (const std::string_view number : numbers) {
+    const auto stamp = read_time(number, form);
+    if (!stamp) return std::nullopt;
+    stamps.push_back(*stamp);
+  }
+  *unit = to_string(form.unit);
+  return stamps;
+}
+
+/// By the nearest stamp; nothing: names are no stamps.
+std::optional<std::vector<StereoPair>> pair_by_stamps(const Images& images,
+                                                      std::vector<std::string>* assumptions) {
+  std::string unit;
+  const auto left = stamps_in(images.names[0], &unit), right = stamps_in(images.names[1], &unit);
+  if (!left || !right) return std::nullopt;
+  std::vector<StereoPair> pairs = merged_pairs(
+      *left, *right, [&](std::size_t k, std::size_t i) { return images.names[k][i]; }, assumptions);
+  if (pairs.size() == left->size() + right->size()) return std::nullopt;
+  assumptions->push_back("times are the " + unit + " in the images' names");
+  return pairs;
+}
+
+// ---- times
+
+/// Where nobody wrote down when: motion is predicted by frames, so a rate that is wrong spoils no
+/// pose, but every stamp.
+constexpr std::int64_t kAssumedStep = 100'000'000;  // ns
+
+std::optional<fs::path> times_of(const fs::path& folder) {
+  std::error_code ignored;
+  for (const char* name : {"times.txt", "timestamps.txt", "times.csv", "timestamps.csv"})
+    if (fs::exists(folder / name, ignored)) return folder / name;
+  return std::nullopt;
+}
+
+/// Images as the lines name them; some may be missing, but not all of a side.
+std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<TimesLine>& times,
+                                      const Images& images) {
   std::vector<StereoPair> pairs(times.size());
   for (std::size_t i = 0; i < times.size(); ++i)
-    pairs[i] = {times[i].stamp, in_folders(times[i].name, side_by_side)};
+    pairs[i] = {times[i].stamp,
+                {in_folder(images, 0, times[i].name[0]), in_folder(images, 1, times[i].name[1])}};
   for (std::size_t k = 0; k < 2; ++k)
-    if (std::none_of(times.begin(), times.end(), [&](const Line& line) {
-          return std::binary_search(there[k].begin(), there[k].end(),
-                                    in_folders(line.name, side_by_side)[k], in_name_order);
+    if (std::none_of(pairs.begin(), pairs.end(), [&](const StereoPair& pair) {
+          return std::binary_search(images.names[k].begin(), images.names[k].end(), pair.file[k],
+                                    in_name_order);
         }))
-      refuse(folder / "times.txt", 0,
-             "names no image that is there: the first is " +
-                 in_folders(times.front().name, side_by_side)[k] + ", the folder has " +
-                 there[k].front());
+      refuse(file, 0,
+             "names no image that is there: the first is " + pairs.front().file[k] +
+                 ", the folder has " + images.names[k].front());
   return pairs;
 }
 
-/// By equal names, where these give as many pairs as there are times: a name that only one side has
-/// is an image that the other lost. Else in order of name, where there is one of each a pair.
-std::vector<StereoPair> pair_with_times(const std::filesystem::path& folder,
-                                        const std::vector<Line>& times,
-                                        const std::vector<std::string>& left,
-                                        const std::vector<std::string>& right) {
-  std::vector<StereoPair> pairs = pair_by_name(left, right);
-  if (pairs.size() != times.size() && left.size() == right.size())
-    pairs = pair_in_order(left, right);
+/// Image N belongs to line N, counted from 0 or from 1; nothing: a name has no number of a line.
+std::optional<std::vector<StereoPair>> pair_by_number(const std::vector<StereoPair>& pairs,
+                                                      std::size_t lines) {
+  std::vector<std::size_t> numbers;
+  for (const StereoPair& pair : pairs) {
+    const std::string key = number_key(pair.file[0]);
+    const auto n = key.empty() ? std::optional<std::int64_t>(0) : parse_integer(key);
+    if (!n || *n < 0 || *n > static_cast<std::int64_t>(lines)) return std::nullopt;
+    numbers.push_back(static_cast<std::size_t>(*n));
+  }
+  const std::size_t first = *std::max_element(numbers.begin(), numbers.end()) == lines ? 1 : 0;
+  if (*std::min_element(numbers.begin(), numbers.end()) < first) return std::nullopt;
+  std::vector<StereoPair> all(lines);
+  for (std::size_t i = 0; i < pairs.size(); ++i) all[numbers[i] - first].file = pairs[i].file;
+  return all;
+}
+
+/// By names, where these give as many pairs as there are times: a name that only one side has is an
+/// image that the other lost. Where both lost one, by the numbers in the names: image N has line N.
+/// Else in order of name, where there is one of each a pair.
+std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vector<TimesLine>& times,
+                                        Images* images, std::vector<std::string>* assumptions) {
+  const auto& [left, right] = images->names;
+  std::vector<StereoPair> pairs = pair_by_names(images).value_or(std::vector<StereoPair>{});
+  if (pairs.size() != times.size() && left.size() == right.size() && left.size() == times.size())
+    pairs = pair_in_order(*images);
+  if (!pairs.empty() && pairs.size() < times.size())
+    if (auto numbered = pair_by_number(pairs, times.size())) {
+      pairs = std::move(*numbered);
+      assumptions->emplace_back(
+          "there are fewer pairs than times: an image belongs to the line of its number");
+    }
   if (pairs.size() != times.size())
-    refuse(folder, 0,
-           "has " + std::to_string(left.size()) + " images in left/, " +
-               std::to_string(right.size()) + " in right/ and " + std::to_string(times.size()) +
-               " lines in times.txt; one of each a pair is expected (a line may name its image: "
-               "stamp,file)");
+    refuse(
+        folder, 0,
+        fmt::format("has {} left images, {} right ones and {} lines in its list of times; one of "
+                    "each a pair is expected (a line may name its image: stamp,file)",
+                    left.size(), right.size(), times.size()));
   for (std::size_t i = 0; i < times.size(); ++i) pairs[i].stamp = times[i].stamp;
   return pairs;
 }
 
-/// By equal names; in order where no name is on both sides.
-std::vector<StereoPair> pair_without_times(const std::filesystem::path& folder,
-                                           const std::vector<std::string>& left,
-                                           const std::vector<std::string>& right) {
-  std::vector<StereoPair> pairs = pair_by_name(left, right);
-  if (pairs.size() < left.size() + right.size()) return pairs;
-  if (left.size() != right.size())
+std::vector<StereoPair> pair_without_times(const fs::path& folder, Images* images,
+                                           std::vector<std::string>* assumptions) {
+  if (auto stamped = pair_by_stamps(*images, assumptions)) return std::move(*stamped);
+  const auto& [left, right] = images->names;
+  auto named = pair_by_names(images);
+  if (!named && left.size() != right.size())
     refuse(folder, 0,
-           "has " + std::to_string(left.size()) + " images in left/ and " +
-               std::to_string(right.size()) +
-               " in right/, without a name that is in both; give the images of a pair one name, or "
-               "write a times.txt whose lines name them: stamp,left file,right file");
-  return pair_in_order(left, right);
+           fmt::format("has {} left images and {} right ones, whose names have no numbers in "
+                       "common; give the images of a pair one name, or write a times.txt whose "
+                       "lines name them: stamp,left file,right file",
+                       left.size(), right.size()));
+  std::vector<StereoPair> pairs = named ? std::move(*named) : pair_in_order(*images);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kAssumedStep);
+  assumptions->emplace_back(
+      "there is no times.txt, so pairs are 0.1 s apart (write one line a pair: the time)");
+  return pairs;
 }
 
 }  // namespace
 
-StereoSequence open_folder(const std::filesystem::path& folder, bool given,
-                           const CalibrationUse& use) {
+bool holds_stereo_images(const fs::path& root) {
+  return camera_folders(root).has_value() || images_by_prefix(root).has_value();
+}
+
+StereoSequence open_folder(const fs::path& folder, bool given, const CalibrationUse& use) {
   StereoSequence sequence;
   sequence.root = folder;
-  std::error_code ignored;
-  sequence.side_by_side = !std::filesystem::exists(folder / "left", ignored) &&
-                          std::filesystem::exists(folder / "both", ignored);
-  const auto left = list_images(folder, sequence.side_by_side ? "both" : "left");
-  const auto right = sequence.side_by_side ? left : list_images(folder, "right");
+  Images images = find_images(folder);
+  sequence.side_by_side = images.side_by_side;
+  if (images.side_by_side ? images.below[0] != "both" : images.below[0] != "left")
+    sequence.assumptions.push_back(fmt::format("{} is left and {} is right",
+                                               images.names[0].front(), images.names[1].front()));
   sequence.times = folder / "times.txt";
-  if (std::filesystem::exists(sequence.times)) {
-    const std::vector<Line> times = read_times(sequence.times);
-    sequence.pairs = times.front().name[0].empty()
-                         ? pair_with_times(folder, times, left, right)
-                         : pair_as_named(folder, times, {left, right}, sequence.side_by_side);
+  if (const auto file = times_of(folder)) {
+    sequence.times = *file;
+    const TimesFile times = read_times_file(*file);
+    sequence.assumptions.insert(sequence.assumptions.end(), times.remarks.begin(),
+                                times.remarks.end());
+    sequence.pairs = times.lines.front().name[0].empty()
+                         ? pair_with_times(folder, times.lines, &images, &sequence.assumptions)
+                         : pair_as_named(*file, times.lines, images);
   } else {
-    sequence.pairs = pair_without_times(folder, left, right);
-    assume_times(&sequence);
+    sequence.pairs = pair_without_times(folder, &images, &sequence.assumptions);
   }
   if (given) return sequence;
+  if (!fs::exists(folder / "calibration.yaml"))
+    refuse(
+        folder, 0,
+        "has no calibration.yaml; give a calibration with --calibration (of vergence, Kalibr, ROS, "
+        "OpenCV or another program), or --focal and --baseline");
   sequence.calibration = read_calibration(folder / "calibration.yaml", use).rig;
   sequence.calibration_source = "calibration.yaml";
   return sequence;

@@ -9,6 +9,7 @@
 
 #include "app/datasets/detail/bmp.hpp"
 #include "app/datasets/detail/jpeg.hpp"
+#include "app/datasets/detail/netpbm.hpp"
 #include "app/datasets/detail/png.hpp"
 
 namespace vergence::app {
@@ -23,6 +24,7 @@ ImageFileStatus size_of(Bytes b, ImageSize* size) noexcept {
   if (detail::is_png(b)) return detail::png_size(b, size);
   if (detail::is_jpeg(b)) return detail::jpeg_size(b, size);
   if (detail::is_bmp(b)) return detail::bmp_size(b, size);
+  if (detail::is_netpbm(b)) return detail::netpbm_size(b, size);
   // A file of nothing, or of the first bytes of a signature, is a torn write; another content is
   // another kind of file.
   return detail::may_become_png(b) ? ImageFileStatus::torn : ImageFileStatus::not_an_image;
@@ -83,7 +85,7 @@ const char* to_phrase(ImageFileStatus status) noexcept {
       return "cannot be opened: this program or the machine has as many files open as it may "
              "(ulimit -n)";
     case ImageFileStatus::not_an_image:
-      return "is no PNG, JPEG or BMP image";
+      return "is no PNG, JPEG, BMP or PGM image";
     case ImageFileStatus::torn:
       return "is torn: it ends before the image is complete, or its check sums fail";
     case ImageFileStatus::undecodable:
@@ -104,8 +106,9 @@ ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* si
   std::vector<std::uint8_t> head;
   if (const auto status = read_bytes(file, detail::kPngHead, &head); status != ImageFileStatus::ok)
     return status;
-  if (detail::is_jpeg(head))
-    if (const auto status = read_bytes(file, detail::kJpegHead, &head);
+  if (detail::is_jpeg(head) || detail::is_netpbm(head))
+    if (const auto status =
+            read_bytes(file, std::max(detail::kJpegHead, detail::kNetpbmHead), &head);
         status != ImageFileStatus::ok)
       return status;
   return size_of(head, size);
@@ -118,6 +121,7 @@ ImageFileStatus read_image_size(std::span<const std::uint8_t> head, ImageSize* s
 ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept {
   if (const auto status = size_of(bytes, size); status != ImageFileStatus::ok) return status;
   if (detail::is_bmp(bytes)) return detail::check_bmp(bytes);
+  if (detail::is_netpbm(bytes)) return detail::check_netpbm(bytes);
   return detail::is_png(bytes) ? detail::check_png(bytes) : detail::check_jpeg(bytes);
 }
 
@@ -125,6 +129,7 @@ std::optional<std::uint16_t> peak_of_deep_image(std::span<const std::uint8_t> by
   ImageSize size;
   constexpr std::size_t kDepthAt = 24;  // of the header: other depths are not worth decoding
   if (check_image(bytes, &size) != ImageFileStatus::ok) return std::uint16_t{0};
+  if (detail::is_netpbm(bytes)) return detail::netpbm_peak(bytes);
   if (!detail::is_png(bytes) || bytes.size() <= kDepthAt || bytes[kDepthAt] != 16)
     return std::nullopt;
   const auto width = static_cast<std::size_t>(size.width);
@@ -141,6 +146,10 @@ ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size,
   if (const auto status = check_image(bytes, &found); status != ImageFileStatus::ok) return status;
   if (found != size) return ImageFileStatus::wrong_size;
   if (detail::is_bmp(bytes)) return detail::decode_bmp(bytes, size, out, stride);
+  if (detail::is_netpbm(bytes)) {
+    detail::decode_netpbm(bytes, out, stride, deep_bits);
+    return ImageFileStatus::ok;
+  }
   detail::DeepSamples deep{deep_bits};
   return detail::is_png(bytes) ? detail::decode_png(bytes, size, out, stride, &deep)
                                : detail::decode_jpeg(bytes, size, out, stride);

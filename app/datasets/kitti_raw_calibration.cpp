@@ -1,91 +1,17 @@
-#include <map>
-
 #include <fmt/format.h>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/kitti_raw.hpp"
-#include "app/datasets/euroc_sensor.hpp"
+#include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
 namespace {
 
-constexpr std::size_t kLargest = std::size_t{1} << 20U;  // bytes
-constexpr int kWidest = 1 << 15;                         // px
-
-/// `KEY: numbers` lines of a calib_*.txt.
-class CalibrationText {
- public:
-  CalibrationText(const std::filesystem::path& file, const char* without) : file_(file) {
-    std::error_code ignored;
-    if (!std::filesystem::exists(file, ignored))
-      refuse(file, 0, fmt::format("is missing: unpack the date's calibration there{}", without));
-    text_ = read_text(file, kLargest);
-    Lines lines(text_);
-    for (std::string_view line; lines.next(&line);)
-      if (const std::size_t colon = line.find(':'); colon != std::string_view::npos)
-        found_.insert_or_assign(line.substr(0, colon),
-                                Line{line.substr(colon + 1), lines.number()});
-  }
-
-  /// All of `values`. InputError: no such key, another count, no numbers.
-  template <std::size_t N>
-  void read(const std::string& key, std::array<double, N>* values) const {
-    const auto found = found_.find(key);
-    if (found == found_.end())
-      refuse(file_, 0, fmt::format("has no line `{}:`, {} numbers are expected there", key, N));
-    std::array<std::string_view, N> fields;
-    const std::size_t count = split(found->second.rest, ' ', fields);
-    if (count != N)
-      refuse(file_, found->second.number,
-             fmt::format("{}: has {} numbers where {} are expected", key, count, N));
-    for (std::size_t i = 0; i < N; ++i)
-      if (!parse_number(fields[i], &(*values)[i]))
-        refuse(file_, found->second.number,
-               fmt::format("{}: `{}` is not a finite number", key, fields[i].substr(0, 40)));
-  }
-  [[nodiscard]] Mat3 rotation(const std::string& key) const {
-    const Mat3 written = matrix(key);
-    Mat3 R;
-    if (!accept_rotation(written, &R))
-      refuse(file_, line_of(key),
-             key + ": is no rotation, it is off orthonormal by more than 1e-4");
-    return R;
-  }
-  [[nodiscard]] Mat3 matrix(const std::string& key) const {
-    std::array<double, 9> v{};
-    read(key, &v);
-    return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v.data());
-  }
-  [[nodiscard]] Vec3 vector(const std::string& key) const {
-    std::array<double, 3> v{};
-    read(key, &v);
-    return {v[0], v[1], v[2]};
-  }
-  [[nodiscard]] ImageSize size(const std::string& key) const {
-    std::array<double, 2> v{};
-    read(key, &v);
-    if (!(v[0] >= 1 && v[0] <= kWidest && v[1] >= 1 && v[1] <= kWidest))
-      refuse(file_, line_of(key), key + ": is no size of an image");
-    return {static_cast<int>(v[0]), static_cast<int>(v[1])};
-  }
-  [[nodiscard]] std::size_t line_of(const std::string& key) const { return found_.at(key).number; }
-  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
-
- private:
-  struct Line {
-    std::string_view rest;
-    std::size_t number = 0;
-  };
-  std::filesystem::path file_;
-  std::string text_;
-  std::map<std::string_view, Line, std::less<>> found_;
-};
-
 std::string key(const char* name, int camera) { return fmt::format("{}_{:02d}", name, camera); }
 
-Intrinsics raw_lens(const CalibrationText& text, int camera) {
+Intrinsics raw_lens(const KittiCalibrationText& text, int camera) {
   const Mat3 K = text.matrix(key("K", camera));
   std::array<double, 5> distortion{};  // k1 k2 p1 p2 k3
   text.read(key("D", camera), &distortion);
@@ -104,7 +30,7 @@ struct Camera {
   Transform T_camera_camera0{};
 };
 
-Camera camera_of(const CalibrationText& text, int number, bool rectified) {
+Camera camera_of(const KittiCalibrationText& text, int number, bool rectified) {
   Camera c;
   if (!rectified) {
     c.lens = raw_lens(text, number);
@@ -121,7 +47,7 @@ Camera camera_of(const CalibrationText& text, int number, bool rectified) {
 }
 
 Transform rigid_of(const std::filesystem::path& file) {
-  const CalibrationText text(
+  const KittiCalibrationText text(
       file, ", or say by `--set ins.lever_arm_m=[…]` where the left camera sits in the INS's body");
   return {text.rotation("R"), text.vector("T")};
 }
@@ -130,7 +56,7 @@ Transform rigid_of(const std::filesystem::path& file) {
 
 KittiRawRig read_kitti_raw_rig(const std::filesystem::path& file, const std::array<int, 2>& cameras,
                                ImageSize images, const std::string& drive_name) {
-  const CalibrationText text(file, ", or give one with --calibration");
+  const KittiCalibrationText text(file, ", or give one with --calibration");
   KittiRawRig out;
   const ImageSize raw = text.size(key("S", cameras[0])),
                   rectified = text.size(key("S_rect", cameras[0]));

@@ -33,6 +33,7 @@ RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path
     case SequenceFormat::folder:
     case SequenceFormat::mcap:  // has it in StereoSequence::ins
     case SequenceFormat::rosbag:
+    case SequenceFormat::db3:
     case SequenceFormat::session:
       break;
   }

@@ -1,6 +1,7 @@
 #include "app/datasets/ros_camera.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -11,16 +12,114 @@ namespace {
 constexpr double kSameRectification =
     1e-6;  // relative: focal lengths of the two projection matrices
 
+struct Model {
+  std::string_view word;
+  CameraModelKind kind;
+};
+/// In small letters and digits.
+constexpr std::array kModels{Model{"radtan", CameraModelKind::pinhole_radtan},
+                             Model{"radialtangential", CameraModelKind::pinhole_radtan},
+                             Model{"pinholeradtan", CameraModelKind::pinhole_radtan},
+                             Model{"plumbbob", CameraModelKind::pinhole_radtan},
+                             Model{"brown", CameraModelKind::pinhole_radtan},
+                             Model{"brownconrady", CameraModelKind::pinhole_radtan},
+                             Model{"opencv", CameraModelKind::pinhole_radtan},
+                             Model{"rational", CameraModelKind::pinhole_radtan},
+                             Model{"rationalpolynomial", CameraModelKind::pinhole_radtan},
+                             Model{"standard", CameraModelKind::pinhole_radtan},
+                             Model{"pinhole", CameraModelKind::pinhole_radtan},
+                             Model{"perspective", CameraModelKind::pinhole_radtan},
+                             Model{"none", CameraModelKind::pinhole_radtan},
+                             Model{"rectified", CameraModelKind::pinhole_radtan},
+                             Model{"", CameraModelKind::pinhole_radtan},
+                             Model{"equidistant", CameraModelKind::pinhole_equidistant},
+                             Model{"equidist", CameraModelKind::pinhole_equidistant},
+                             Model{"equi", CameraModelKind::pinhole_equidistant},
+                             Model{"pinholeequidistant", CameraModelKind::pinhole_equidistant},
+                             Model{"pinholeequi", CameraModelKind::pinhole_equidistant},
+                             Model{"fisheye", CameraModelKind::pinhole_equidistant},
+                             Model{"opencvfisheye", CameraModelKind::pinhole_equidistant},
+                             Model{"kannalabrandt", CameraModelKind::pinhole_equidistant},
+                             Model{"kannalabrandt4", CameraModelKind::pinhole_equidistant},
+                             Model{"kannalabrandt8", CameraModelKind::pinhole_equidistant},
+                             Model{"kb4", CameraModelKind::pinhole_equidistant}};
+
+/// How far a principal point lies from the middle, as a part of the image.
+double off_middle(double x, double y, const ImageSize& size) {
+  return std::max(std::abs(x / size.width - 0.5), std::abs(y / size.height - 0.5));
+}
+
+/// Rows of pixels minus an offset, divided by a binning.
+struct ToImage {
+  double x = 0, y = 0, binning_x = 1, binning_y = 1;
+  void apply(RosCamera* c) const {
+    Intrinsics& k = c->lens;
+    k.fx /= binning_x, k.fy /= binning_y;
+    k.cx = (k.cx - x) / binning_x, k.cy = (k.cy - y) / binning_y;
+    c->P(0, 2) -= x * c->P(2, 2), c->P(1, 2) -= y * c->P(2, 2);
+    c->P.row(0) /= binning_x, c->P.row(1) /= binning_y;
+  }
+};
+
 }  // namespace
+
+std::optional<CameraModelKind> lens_model(std::string_view word) {
+  std::string plain;
+  for (const char c : word) {
+    const char small = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 0x20) : c;
+    if ((small >= 'a' && small <= 'z') || (small >= '0' && small <= '9')) plain.push_back(small);
+  }
+  for (const Model& model : kModels)
+    if (plain == model.word) return model.kind;
+  return std::nullopt;
+}
+
+bool is_rectified(const RosCamera& c) {
+  const Intrinsics& k = c.lens;
+  const auto zero = [](double d) { return d == 0; };
+  return std::all_of(k.distortion.begin(), k.distortion.end(), zero) && c.P(0, 0) == k.fx &&
+         c.P(1, 1) == k.fy && c.P(0, 2) == k.cx && c.P(1, 2) == k.cy;
+}
+
+std::string apply_crop(const RosCrop& crop, const std::optional<ImageSize>& image, RosCamera* c) {
+  const double bx = std::max(1U, crop.binning_x), by = std::max(1U, crop.binning_y);
+  Intrinsics& k = c->lens;
+  const bool part = crop.width > 0 && crop.height > 0;
+  if (!part && bx == 1 && by == 1) return "";
+  const double width = part ? crop.width : k.width, height = part ? crop.height : k.height;
+  const ImageSize binned{static_cast<int>(width / bx), static_cast<int>(height / by)};
+  const ImageSize own{k.width, k.height};
+  const ImageSize size = image && *image == own && *image != binned ? own : binned;
+  if (size.width < 1 || size.height < 1) return "";
+  const ToImage whole{part ? crop.x : 0.0, part ? crop.y : 0.0, bx, by};
+  // What REP 104 says goes before what would suit better by little.
+  constexpr double kNear = 0.15;
+  const ToImage* best = &whole;
+  const std::array others{ToImage{}, ToImage{0, 0, bx, by}, ToImage{whole.x, whole.y, 1, 1}};
+  const auto off = [&](const ToImage& to) {
+    return off_middle((k.cx - to.x) / to.binning_x, (k.cy - to.y) / to.binning_y, size);
+  };
+  if (off(whole) > kNear)
+    for (const ToImage& other : others)
+      if (off(other) < off(*best)) best = &other;
+  best->apply(c);
+  k.width = size.width, k.height = size.height;
+  return best == &whole ? ""
+                        : "CameraInfo has binning or a region, but its numbers are taken to be "
+                          "those of the image itself by its principal point";
+}
 
 std::string set_ros_distortion(std::string_view model, std::span<const double> d,
                                Intrinsics* lens) {
-  const bool equidistant = model == "equidistant";
-  if (!equidistant && model != "plumb_bob" && model != "rational_polynomial")
+  const auto kind = lens_model(model);
+  if (!kind)
     return fmt::format(
-        "is of the model \"{}\"; plumb_bob, equidistant and rational_polynomial are known",
+        "is of the model \"{}\"; plumb_bob (radtan), equidistant (fisheye) and "
+        "rational_polynomial are known",
         model.substr(0, 60));
-  if (equidistant ? d.size() != 4 : d.size() > 8) return fmt::format("has {} numbers", d.size());
+  const bool equidistant = *kind == CameraModelKind::pinhole_equidistant;
+  if (equidistant ? d.size() != 4 && !d.empty() : d.size() > 14)
+    return fmt::format("has {} numbers", d.size());
   const auto used = d.first(std::min<std::size_t>(5, d.size()));
   const auto zero = [](double v) { return v == 0; };
   if (const auto rest = d.subspan(used.size()); !std::all_of(rest.begin(), rest.end(), zero))
@@ -41,9 +140,19 @@ std::string set_ros_rig(const RosCamera& left, const RosCamera& right, RigCalibr
         "has the focal length {}, that of the left camera {}: they are not of one stereo "
         "calibration",
         P_r(0, 0), P_l(0, 0));
+  if (P_l(0, 3) == P_r(0, 3) && P_l(1, 3) == P_r(1, 3) && (P_l(0, 3) != 0 || P_l(1, 3) != 0))
+    return fmt::format(
+        "has the fourth number {} in its first row, and so has that of the left camera, where it "
+        "is 0 in a stereo calibration: both have the P of one camera",
+        P_r(0, 3));
   const Vec3 apart((P_r(0, 3) - P_l(0, 3)) / P_r(0, 0), (P_r(1, 3) - P_l(1, 3)) / P_r(1, 1), 0);
   if (!(apart.norm() > 0))
     return "has no baseline: the fourth number of its first row is −fx·B in a stereo calibration";
+  if (apart.x() > 0.5 * apart.norm())
+    return fmt::format(
+        "has the fourth number {} in its first row, where a right camera has −fx·B: left and right "
+        "are swapped, or its driver writes the other sign",
+        P_r(0, 3));
   rig->cameras = 2;
   rig->intrinsics[0] = left.lens;
   rig->intrinsics[1] = right.lens;

@@ -11,7 +11,8 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
   constexpr const char* kLayouts =
       "KITTI (image_0, image_1, calib.txt, times.txt), KITTI raw (image_00, image_01, calib_*.txt "
       "above), EuRoC (mav0), plain (left, "
-      "right, times.txt, calibration.yaml), UQ St Lucia, bags of ROS 2 (.mcap) and ROS 1 (.bag) "
+      "right or other usual names, times.txt, calibration.yaml), UQ St Lucia, bags of ROS 2 "
+      "(.mcap, .db3) and ROS 1 (.bag) "
       "and sessions with a recording (drive.mcap) are what can be read";
   if (word == "kitti") return SequenceFormat::kitti;
   if (word == "kitti-raw") return SequenceFormat::kitti_raw;
@@ -20,27 +21,36 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
   if (word == "st-lucia") return SequenceFormat::st_lucia;
   if (word == "mcap") return SequenceFormat::mcap;
   if (word == "rosbag") return SequenceFormat::rosbag;
+  if (word == "db3") return SequenceFormat::db3;
   if (word == "session") return SequenceFormat::session;
   if (word != "auto")
     throw InputError(
         "--format \"" + word + "\" is not known" +
         did_you_mean(word, {"auto", "kitti", "kitti-raw", "euroc", "folder", "st-lucia", "mcap",
-                            "rosbag", "session"}) +
-        "; kitti, kitti-raw, euroc, folder, st-lucia, mcap, rosbag and session are what "
+                            "rosbag", "db3", "session"}) +
+        "; kitti, kitti-raw, euroc, folder, st-lucia, mcap, rosbag, db3 and session are what "
         "can be read, and auto finds out which it is");
   std::error_code ignored;
   if (const auto bag = bag_format(folder); bag && !std::filesystem::is_directory(folder, ignored))
     return *bag;
   if (!std::filesystem::is_directory(folder, ignored))
+    if (const std::string advice = unpack_advice(folder); !advice.empty())
+      throw InputError(folder.string() + ": " + advice);
+  if (!std::filesystem::is_directory(folder, ignored))
     throw InputError(folder.string() + ": is no folder; a folder with a drive is expected");
   if (const auto found = find_format(folder)) return *found;
+  for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
+       it.increment(ignored))
+    if (const std::string advice = unpack_advice(it->path()); !advice.empty())
+      throw InputError(it->path().string() + ": " + advice);
   throw InputError(folder.string() + ": holds no drive that is known: " + kLayouts);
 }
 
 void check_topics(SequenceFormat format, const BagTopics& topics) {
   if (!is_bag(format) && !topics.empty())
     throw InputError(
-        "topics are chosen of bags (--format mcap or rosbag); leave --left-topic, --right-topic, "
+        "topics are chosen of bags (--format mcap, db3 or rosbag); leave --left-topic, "
+        "--right-topic, "
         "--ins-topic and --imu-topic away");
 }
 

@@ -1,6 +1,7 @@
 #include "app/datasets/stereo_sequence.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <system_error>
 
 #include "app/config/calibration_file.hpp"
@@ -9,8 +10,12 @@
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/kitti_raw.hpp"
 #include "app/datasets/detail/name_order.hpp"
+#include "app/datasets/detail/pairing.hpp"
+#include "app/datasets/detail/side_names.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/terminal_text.hpp"
 
 namespace vergence::app {
 namespace {
@@ -35,6 +40,8 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
       return detail::open_bag(detail::BagFormat::mcap, folder, given, topics);
     case SequenceFormat::rosbag:
       return detail::open_bag(detail::BagFormat::rosbag, folder, given, topics);
+    case SequenceFormat::db3:
+      return detail::open_bag(detail::BagFormat::sqlite, folder, given, topics);
     case SequenceFormat::session:
       return detail::open_recorded_session(folder, given);
   }
@@ -106,6 +113,9 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
                "; both have to be of one size");
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
   find_deep_bits(&sequence);
+  // Names and words of files stand in them.
+  for (auto* sentences : {&sequence.remarks, &sequence.assumptions})
+    for (std::string& sentence : *sentences) sentence = harmless(sentence);
   return sequence;
 }
 
@@ -114,9 +124,27 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
 std::optional<SequenceFormat> bag_format(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
   if (name.ends_with(".mcap")) return SequenceFormat::mcap;
+  if (name.ends_with(".db3")) return SequenceFormat::db3;
   // As rosbag calls one that it is recording, or that it was when the power went.
   if (name.ends_with(".bag") || name.ends_with(".bag.active")) return SequenceFormat::rosbag;
   return std::nullopt;
+}
+
+std::string unpack_advice(const std::filesystem::path& file) {
+  struct Packed {
+    std::string_view ending, command;
+  };
+  constexpr std::array kPacked{Packed{".zstd", "zstd -d"},   Packed{".zst", "zstd -d"},
+                               Packed{".lz4", "lz4 -d"},     Packed{".gz", "gunzip -k"},
+                               Packed{".bz2", "bunzip2 -k"}, Packed{".xz", "unxz -k"},
+                               Packed{".zip", "unzip"},      Packed{".7z", "7z x"},
+                               Packed{".tar", "tar -xf"},    Packed{".tgz", "tar -xf"}};
+  const std::string name = file.filename().string();
+  const auto packed = std::find_if(kPacked.begin(), kPacked.end(),
+                                   [&](const Packed& p) { return name.ends_with(p.ending); });
+  if (packed == kPacked.end()) return "";
+  return "is packed (" + std::string(packed->ending.substr(1)) + "); unpack it with `" +
+         std::string(packed->command) + " " + name + "` and give what comes out";
 }
 
 namespace {
@@ -127,7 +155,8 @@ std::optional<SequenceFormat> bag_format_within(const std::filesystem::path& fol
   std::error_code ignored;
   for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
        it.increment(ignored))
-    if (const auto format = bag_format(it->path()); format && found != SequenceFormat::mcap)
+    if (const auto format = bag_format(it->path());
+        format && found != SequenceFormat::mcap && (!found || *found != SequenceFormat::db3))
       found = format;
   return found;
 }
@@ -142,8 +171,9 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
     return std::filesystem::exists(folder / name, ignored);
   };
   if (holds_recorded_session(folder)) return SequenceFormat::session;
-  if (has("mav0") || (has("cam0") && has("cam1"))) return SequenceFormat::euroc;
-  if (has("image_0") && has("image_1")) return SequenceFormat::kitti;
+  if (has("mav0/cam0/data.csv") || has("cam0/data.csv")) return SequenceFormat::euroc;
+  if ((has("image_0") && has("image_1")) || (has("image_2") && has("image_3")))
+    return SequenceFormat::kitti;
   if ((has("left") && has("right")) || has("both")) return SequenceFormat::folder;
   for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
        it.increment(ignored))
@@ -151,6 +181,8 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
       return SequenceFormat::st_lucia;
   if (const auto bag = bag_format_within(folder)) return bag;
   if (detail::holds_kitti_raw(folder)) return SequenceFormat::kitti_raw;
+  if (detail::holds_stereo_images(folder)) return SequenceFormat::folder;
+  if (has("mav0")) return SequenceFormat::euroc;  // which says what is missing
   return std::nullopt;
 }
 
@@ -174,6 +206,8 @@ ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
   const std::size_t end =
       first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
+  std::size_t good = 0, bad = 0;
+  std::string sentence;
   for (std::size_t i = first; i < end; ++i)
     for (std::size_t k = 0; k < 2; ++k) {
       const std::string& name = sequence.pairs[i].file[k];
@@ -182,13 +216,16 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       if (image_size(sequence, name, &size) != ImageFileStatus::ok) continue;
       const Intrinsics& camera = sequence.calibration.intrinsics[k];
       const ImageSize requested{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
-      if (size != requested)
-        refuse(sequence.root / name, 0,
-               "is " + text(size) + " pixels, but the calibration of this camera (" +
-                   sequence.calibration_source + ") is for " + text(requested) +
-                   (sequence.side_by_side ? " (twice its width, side by side)" : "") +
-                   "; use the calibration that belongs to these images");
+      ++(size == requested ? good : bad);
+      if (size == requested || !sentence.empty()) continue;
+      sentence = (sequence.root / name).string() + ": is " + text(size) +
+                 " pixels, but the calibration of this camera (" + sequence.calibration_source +
+                 ") is for " + text(requested) +
+                 (sequence.side_by_side ? " (twice its width, side by side)" : "") +
+                 "; use the calibration that belongs to these images";
     }
+  // Single images of another size cost their frames.
+  if (bad > good) throw InputError(sentence);
 }
 
 namespace detail {
@@ -203,24 +240,93 @@ void require_folder(const std::filesystem::path& folder, const char* what_it_sho
           : std::string("does not exist; a folder with ") + what_it_should_hold + " is expected");
 }
 
+bool is_image_name(const std::string& file) {
+  constexpr std::array kEndings{".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pnm"};
+  const std::string ending = lower(std::filesystem::path(file).extension().string());
+  return !file.starts_with('.') &&
+         std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+}
+
+std::optional<std::array<std::string, 2>> camera_folders(const std::filesystem::path& root) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  const auto holds_images = [&](const std::string& below) {
+    for (fs::directory_iterator it(root / below, ignored), end; !ignored && it != end;
+         it.increment(ignored))
+      if (is_image_name(it->path().filename().string())) return true;
+    return false;
+  };
+  for (const std::string above : {"", "mav0/", "images/", "data/"}) {
+    std::vector<std::string> names;
+    for (fs::directory_iterator it(root / above, ignored), end; !ignored && it != end;
+         it.increment(ignored))
+      if (std::error_code other; it->is_directory(other))
+        names.push_back(it->path().filename().string());
+    for (const auto& [left, right] : stereo_names(names))
+      for (const char* below : {"", "/data", "/images"})
+        if (holds_images(above + left + below) && holds_images(above + right + below))
+          return std::array{above + left + below, above + right + below};
+  }
+  return std::nullopt;
+}
+
 std::vector<std::string> list_images(const std::filesystem::path& root, const std::string& below) {
   const std::filesystem::path folder = root / below;
-  require_folder(folder, "PNG or JPEG images");
+  require_folder(folder, "images");
   std::vector<std::string> names;
+  std::string other;  // the ending of a file that is none
   std::error_code error;
   for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
        it.increment(error)) {
-    std::string extension = it->path().extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) {
-      return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    });
-    if (extension == ".png" || extension == ".jpg" || extension == ".jpeg")
-      names.push_back(below + "/" + it->path().filename().string());
+    const std::string name = it->path().filename().string();
+    if (is_image_name(name))
+      names.push_back(below.empty() ? name : below + "/" + name);
+    else if (!name.starts_with('.') && it->path().has_extension())
+      other = it->path().extension().string();
   }
   if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
-  if (names.empty()) refuse(folder, 0, "holds no PNG or JPEG image");
+  if (names.empty())
+    refuse(folder, 0,
+           other.empty() ? "holds no PNG, JPEG, BMP or PGM image"
+                         : "holds no PNG, JPEG, BMP or PGM image; files of the kind " + other +
+                               " are not read: convert them, for example with `mogrify -format png "
+                               "*" +
+                               other + "`");
   std::sort(names.begin(), names.end(), in_name_order);
   return names;
+}
+
+std::vector<StereoPair> merged_pairs(
+    std::span<const Stamp> left, std::span<const Stamp> right,
+    const std::function<std::string(std::size_t camera, std::size_t index)>& name,
+    std::vector<std::string>* assumptions) {
+  const Duration interval = usual_interval(left);
+  const auto together =
+      pair_nearest(left, right, Duration::seconds(kMostApart * interval.to_seconds()));
+  if (const PairOffset offset = pair_offset(left, right, together); offset.farthest > Duration{})
+    assumptions->push_back("images are paired by the nearest stamp, right ones are later by " +
+                           describe(offset));
+  constexpr std::size_t kAlone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> partner(left.size(), kAlone);
+  std::vector<bool> paired(right.size(), false);
+  for (const auto& [l, r] : together) partner[l] = r, paired[r] = true;
+  std::vector<std::size_t> alone;
+  for (std::size_t r = 0; r < right.size(); ++r)
+    if (!paired[r]) alone.push_back(r);
+  std::stable_sort(alone.begin(), alone.end(),
+                   [&](std::size_t a, std::size_t b) { return right[a] < right[b]; });
+  std::vector<StereoPair> pairs;
+  auto next = alone.begin();
+  const auto take_alone = [&] {
+    pairs.push_back({right[*next], {"", name(1, *next)}});
+    ++next;
+  };
+  for (std::size_t l = 0; l < left.size(); ++l) {
+    while (next != alone.end() && right[*next] < left[l]) take_alone();
+    pairs.push_back({left[l], {name(0, l), partner[l] == kAlone ? "" : name(1, partner[l])}});
+  }
+  while (next != alone.end()) take_alone();
+  return pairs;
 }
 
 }  // namespace detail

@@ -28,6 +28,7 @@ enum class SequenceFormat : std::uint8_t {
   st_lucia,
   mcap,
   rosbag,
+  db3,
   session
 };
 
@@ -55,8 +56,8 @@ struct StereoSequence {
   std::string calibration_source;  // the file's name, for calibrations.csv
   std::filesystem::path times;     // the file that the stamps are from, for sentences about them
   std::size_t left_out = 0;  // frames that are none of `pairs`: no stamp, no partner, out of order
-  std::vector<std::string>
-      remarks{};              // what was left out, taken on trust or assumed: a sentence each
+  std::vector<std::string> remarks{};      // what was left out or is doubtful: a sentence each
+  std::vector<std::string> assumptions{};  // what nobody said and was taken to be: a phrase each
   bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
                               // file[1] are the same
   std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
@@ -85,11 +86,16 @@ struct BagTopics {
 };
 
 [[nodiscard]] inline bool is_bag(SequenceFormat format) noexcept {
-  return format == SequenceFormat::mcap || format == SequenceFormat::rosbag;
+  return format == SequenceFormat::mcap || format == SequenceFormat::rosbag ||
+         format == SequenceFormat::db3;
 }
 
 /// Of a bag's file by the ending of its name; nothing: it is none.
 [[nodiscard]] std::optional<SequenceFormat> bag_format(const std::filesystem::path& file);
+
+/// What to do with a bag that was packed as a whole (`drive.mcap.zstd`): a phrase; empty: it was
+/// not.
+[[nodiscard]] std::string unpack_advice(const std::filesystem::path& file);
 
 /// The format of a folder (or a bag's file) by what is in it; nothing: none that is known.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);

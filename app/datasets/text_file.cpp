@@ -17,6 +17,18 @@ namespace {
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::string_view kBlanks = " \t\r\v\f";
 
+/// What some editors and shells write: two bytes a character, least first or last. Others than
+/// those of ASCII become question marks; no number, key or name that is read here has them.
+std::string narrowed(const std::string& wide, bool least_first) {
+  std::string text;
+  text.reserve(wide.size() / 2);
+  for (std::size_t i = 2; i + 1 < wide.size(); i += 2) {
+    const char low = wide[i + (least_first ? 0 : 1)], high = wide[i + (least_first ? 1 : 0)];
+    text.push_back(high == 0 && low >= 0 ? low : '?');
+  }
+  return text;
+}
+
 }  // namespace
 
 void refuse(const std::filesystem::path& file, std::size_t line, std::string_view what) {
@@ -54,7 +66,8 @@ std::string read_text(const std::filesystem::path& file, std::size_t limit) {
           "is longer than " + std::to_string(limit) + " bytes: this is not the file that is meant");
   }
   if (in.bad()) refuse(file, 0, "reading it failed half way");
-  return text;
+  const bool least_first = text.starts_with("\xFF\xFE");
+  return least_first || text.starts_with("\xFE\xFF") ? narrowed(text, least_first) : text;
 }
 
 Lines::Lines(std::string_view text) noexcept : rest_(text) {

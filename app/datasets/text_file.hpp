@@ -12,8 +12,8 @@ namespace vergence::app {
 [[noreturn]] void refuse(const std::filesystem::path& file, std::size_t line,
                          std::string_view what);
 
-/// All bytes of a file (a pipe will do). InputError: not there, a folder, not readable, longer than
-/// `limit` bytes.
+/// All bytes of a file; one of UTF-16, by its byte order mark, as ASCII. InputError: not there, a
+/// folder, not readable, longer than `limit` bytes.
 [[nodiscard]] std::string read_text(const std::filesystem::path& file,
                                     std::size_t limit = std::size_t{1} << 30U);
 

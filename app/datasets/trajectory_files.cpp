@@ -1,14 +1,16 @@
 #include "app/datasets/trajectory_files.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <string>
-#include <string_view>
 #include <system_error>
+
+#include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/euroc_sensor.hpp"
-#include "app/datasets/text_file.hpp"
+#include "app/datasets/text_table.hpp"
+#include "app/datasets/times_file.hpp"
 
 namespace vergence::app {
 namespace {
@@ -18,200 +20,539 @@ namespace fs = std::filesystem;
 // Two decimals of a quaternion already keep its length within this; columns that are no quaternion
 // rarely do.
 constexpr double kQuaternionLength = 0.02;
+// Of R Rᵀ − I: three decimals of a matrix keep within it.
+constexpr double kNearRotation = 5e-3;
+constexpr std::int64_t kRowStep = 100'000'000;  // ns: from row to row where a file has no times
+constexpr double kRounded = 1e-4;  // beyond, the numbers have lost digits, and it is said
 
 bool present(const fs::path& p) {
   std::error_code ignored;
   return fs::exists(p, ignored);
 }
 
-bool is_folder(const fs::path& p) {
-  std::error_code ignored;
-  return fs::is_directory(p, ignored);
+/// What the numbers of a row are.
+enum class Layout : std::uint8_t { pose, matrix3x4, matrix4x4 };
+
+/// Which column is what.
+struct Columns {
+  Layout layout = Layout::pose;
+  std::optional<std::size_t> stamp{}, nanoseconds{};  // beside a stamp of whole seconds
+  std::array<std::size_t, 7> pose{};                  // x y z, then the quaternion as it is written
+  std::size_t first = 0;                              // of a matrix
+  std::optional<QuaternionOrder> order{};             // told by headings
+  [[nodiscard]] std::size_t needed() const {
+    std::size_t last = layout == Layout::pose        ? *std::max_element(pose.begin(), pose.end())
+                       : layout == Layout::matrix3x4 ? first + 11
+                                                     : first + 15;
+    if (stamp) last = std::max({last, *stamp, nanoseconds.value_or(0)});
+    return last + 1;
+  }
+};
+
+/// Letters and digits of a heading in lower case, without its unit: `p_RS_R_x [m]` → `prsrx`.
+std::string plain(std::string_view heading) {
+  std::string word;
+  for (const char c : heading.substr(0, heading.find_first_of("[("))) {
+    const char small = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 0x20) : c;
+    if ((small >= 'a' && small <= 'z') || (small >= '0' && small <= '9')) word.push_back(small);
+  }
+  return word;
 }
 
-void numbers(const fs::path& file, std::size_t line, std::span<const std::string_view> fields,
-             std::span<double> out) {
+bool contains(const std::string& word, std::initializer_list<const char*> parts) {
+  return std::any_of(parts.begin(), parts.end(),
+                     [&](const char* part) { return word.find(part) != std::string::npos; });
+}
+
+/// The column whose heading is the axis of a quaternion; its words are those of all programs that
+/// head their columns.
+bool is_quaternion(const std::string& word) {
+  return word.size() == 2 ? word[0] == 'q'
+                          : word.starts_with("q") || contains(word, {"quat", "orient", "rot"});
+}
+bool is_position(const std::string& word) {
+  if (word.size() == 1) return true;  // x, y, z
+  if (contains(word, {"vel", "acc", "gyr", "bias", "cov", "std", "sigma", "twist", "ang", "lin"}))
+    return false;
+  return word[0] == 'p' || word[0] == 't' || contains(word, {"pos", "trans"});
+}
+
+/// By the headings, if these name all of a pose.
+std::optional<Columns> columns_of_names(const std::vector<std::string_view>& names) {
+  Columns c;
+  std::array<std::optional<std::size_t>, 3> position;
+  std::array<std::optional<std::size_t>, 4> quaternion;  // x y z w
+  std::optional<std::size_t> exact, seconds;
+  const auto take = [](std::optional<std::size_t>* place, std::size_t i) {
+    if (!*place) *place = i;
+  };
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string word = plain(names[i]);
+    if (word.empty()) continue;
+    const std::size_t axis = std::string_view("xyzw").find(word.back());
+    if (word.ends_with("nsec") || word.ends_with("nsecs") || word.ends_with("nanosec"))
+      take(&c.nanoseconds, i);
+    else if (word.ends_with("secs") || word.ends_with("sec"))
+      take(&seconds, i);
+    else if (contains(word, {"headerstamp"}))
+      exact = i;
+    else if (contains(word, {"time", "stamp"}) || word == "t" || word == "ts")
+      take(&c.stamp, i);
+    else if (axis < 4 && is_quaternion(word))
+      take(&quaternion[axis], i);
+    else if (axis < 3 && is_position(word))
+      take(&position[axis], i);
+  }
+  if (exact) c.stamp = exact;
+  if (seconds && c.nanoseconds)
+    c.stamp = seconds;
+  else
+    c.nanoseconds.reset();
+  if (!c.stamp) c.stamp = seconds;
+  if (!c.stamp || !position[0] || !position[1] || !position[2] || !quaternion[0] ||
+      !quaternion[1] || !quaternion[2] || !quaternion[3])
+    return std::nullopt;
+  for (std::size_t k = 0; k < 3; ++k) c.pose[k] = *position[k];
+  for (std::size_t k = 0; k < 4; ++k) c.pose[3 + k] = *quaternion[k];
+  c.order = QuaternionOrder::xyzw;  // as they stand in `pose`
+  return c;
+}
+
+/// The numbers of a row from `first` on. False: they are not all there and finite.
+bool finite_numbers(const std::vector<std::string_view>& fields, std::size_t first,
+                    std::span<double> out) {
+  if (first + out.size() > fields.size()) return false;
   for (std::size_t i = 0; i < out.size(); ++i)
-    if (!parse_number(fields[i], &out[i]))
-      refuse(file, line, "`" + std::string(fields[i].substr(0, 40)) + "` is not a finite number");
+    if (!parse_number(fields[first + i], &out[i])) return false;
+  return true;
 }
 
-/// Unit quaternion from w x y z as written.
-Mat3 rotation(const fs::path& file, std::size_t line, double w, double x, double y, double z) {
-  const Eigen::Quaterniond q(w, x, y, z);
-  if (!(std::abs(q.norm() - 1.0) <= kQuaternionLength))
-    refuse(file, line,
-           "the quaternion has length " + std::to_string(q.norm()) +
-               " and not 1: check the order of the columns");
-  return q.normalized().toRotationMatrix();
+double off_rotation(const Mat3& R) {
+  return R.determinant() > 0 ? (R * R.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() : 1.0;
 }
 
-/// Appends, keeping stamps ascending.
-void append(const fs::path& file, std::size_t line, const StampedPose& pose,
-            Trajectory* trajectory) {
-  if (!trajectory->empty() && !(trajectory->back().stamp < pose.stamp))
-    refuse(file, line,
-           "the stamp " + format_seconds(pose.stamp.ns()) +
-               " s is not later than the one before: stamps must ascend");
-  trajectory->push_back(pose);
+template <std::size_t N>
+Mat3 rotation_of(const std::array<double, N>& v) {
+  Mat3 R;
+  R << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
+  return R;
 }
 
-Trajectory checked(const fs::path& file, Trajectory trajectory) {
-  if (trajectory.empty()) refuse(file, 0, "has no pose in it");
-  return trajectory;
+bool is_matrix(const std::vector<std::string_view>& fields, std::size_t first, Layout layout) {
+  std::array<double, 16> v{};
+  v[15] = 1;
+  constexpr double kRoughly = 0.1;  // the matrix is meant; rows that are off are refused one by one
+  return finite_numbers(fields, first,
+                        std::span(v).first(layout == Layout::matrix3x4 ? 12U : 16U)) &&
+         off_rotation(rotation_of(v)) < kRoughly && v[12] == 0 && v[13] == 0 && v[14] == 0 &&
+         v[15] == 1;
 }
 
-Trajectory parse_tum(const fs::path& file, std::string_view text) {
-  constexpr std::size_t kShortestLine = 15;  // bytes of eight numbers
-  const auto ends = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-  Trajectory trajectory;
-  trajectory.reserve(std::min(ends, text.size() / kShortestLine) + 1);
-  Lines lines(text);
-  std::string_view line;
-  while (lines.next(&line)) {
-    const std::size_t n = lines.number();
-    std::array<std::string_view, 8> fields;
-    const std::size_t count = split(line, ' ', fields);
-    if (count != fields.size())
-      refuse(file, n,
-             "has " + std::to_string(count) +
-                 " columns where a pose has 8: stamp tx ty tz qx qy qz qw");
-    const auto ns = parse_seconds_ns(fields[0]);
-    if (!ns)
-      refuse(file, n, "`" + std::string(fields[0].substr(0, 40)) + "` is not a stamp in seconds");
-    std::array<double, 7> v{};
-    numbers(file, n, std::span(fields).subspan(1), v);
-    append(file, n, {Stamp(*ns), {rotation(file, n, v[6], v[3], v[4], v[5]), {v[0], v[1], v[2]}}},
-           &trajectory);
+bool is_unit(const std::vector<std::string_view>& fields, std::size_t first) {
+  std::array<double, 4> q{};
+  return finite_numbers(fields, first, q) &&
+         std::abs(std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3])) - 1) <=
+             kQuaternionLength;
+}
+
+/// By the numbers of a row that has them all. Nothing: it has not.
+std::optional<Columns> columns_of_row(const std::vector<std::string_view>& fields, bool index) {
+  Columns c;
+  const std::size_t n = fields.size();
+  for (const auto& [layout, numbers] : {std::pair{Layout::matrix3x4, std::size_t{12}},
+                                        std::pair{Layout::matrix4x4, std::size_t{16}}})
+    if ((n == numbers || n == numbers + 1) && is_matrix(fields, n - numbers, layout)) {
+      c.layout = layout;
+      c.first = n - numbers;
+      if (c.first > 0) c.stamp = 0;
+      return c;
+    }
+  const auto pose_from = [&c](std::size_t first) {
+    for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = first + k;
+  };
+  for (const std::size_t stamp :
+       index ? std::array<std::size_t, 2>{1, 0} : std::array<std::size_t, 2>{0, 1})
+    if (n >= stamp + 8 && is_unit(fields, stamp + 4)) {
+      c.stamp = stamp;
+      pose_from(stamp + 1);
+      return c;
+    }
+  if (n != 7 || !is_unit(fields, 3)) return std::nullopt;
+  pose_from(0);
+  return c;
+}
+
+/// The first rows of a file, from which it is told how all are written.
+struct Sample {
+  std::vector<std::vector<std::string_view>> rows{};
+  bool index = false;  // the first column counts the rows
+  std::vector<std::string_view> names{};
+  char separator = ' ';
+};
+
+Sample sample_of(std::string_view text) {
+  constexpr std::size_t kRows = 1000;
+  Sample s;
+  TextTable table(text);
+  s.names = table.names();
+  s.separator = table.separator();
+  while (s.rows.size() < kRows && table.next()) s.rows.push_back(table.fields());
+  s.index = s.rows.size() > 2;
+  std::int64_t expected = 0;
+  for (std::size_t i = 0; s.index && i < s.rows.size(); ++i) {
+    const auto value = s.rows[i].empty() ? std::nullopt : parse_integer(s.rows[i].front());
+    if (i == 0 && value) expected = *value;
+    s.index = value && *value == expected++ && s.rows[i].size() > 8;
   }
-  return checked(file, std::move(trajectory));
+  return s;
 }
 
-std::vector<Stamp> read_times(const fs::path& file) {
-  const std::string text = read_text(file);
-  std::vector<Stamp> times;
-  Lines lines(text);
-  std::string_view line;
-  while (lines.next(&line)) {
-    const auto ns = parse_seconds_ns(line);
-    if (!ns)
-      refuse(file, lines.number(),
-             "`" + std::string(line.substr(0, 40)) + "` is not a time in seconds");
-    if (!times.empty() && !(times.back() < Stamp(*ns)))
-      refuse(file, lines.number(), "the time is not later than the one before: times must ascend");
-    times.push_back(Stamp(*ns));
+Columns columns_of(const fs::path& file, const Sample& sample, std::size_t first_line) {
+  if (auto named = columns_of_names(sample.names)) return *named;
+  for (const auto& row : sample.rows)
+    if (auto found = columns_of_row(row, sample.index)) return *found;
+  // None is as it should be: the rows say for themselves what is wrong.
+  const std::size_t n = sample.rows.front().size();
+  Columns c;
+  if (n == 12 || n == 13) {
+    c.layout = Layout::matrix3x4;
+    c.first = n - 12;
+    if (c.first > 0) c.stamp = 0;
+  } else if (n >= 8) {
+    c.stamp = 0;
+    for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = 1 + k;
+  } else {
+    refuse(
+        file, first_line,
+        fmt::format("has {} columns where a pose has 8, stamp tx ty tz qx qy qz qw, or the 12 of "
+                    "a 3x4 matrix row by row",
+                    n));
   }
-  return times;
+  return c;
 }
 
-/// Row k of the text at times[k]. Rows whose time is not later than all before are left out.
-Trajectory parse_kitti(const fs::path& file, std::string_view text, std::span<const Stamp> times,
-                       const std::string& times_name) {
-  Trajectory trajectory;
-  std::size_t rows = 0;
-  Lines lines(text);
-  std::string_view line;
-  while (lines.next(&line)) {
-    const std::size_t n = lines.number();
-    std::array<std::string_view, 12> fields;
-    const std::size_t count = split(line, ' ', fields);
-    if (count != fields.size())
+/// Whether the file is the truth of an EuRoC data set, by its headings or its name.
+bool is_euroc_truth(const fs::path& file, const Sample& sample) {
+  return file.filename() == "data.csv" ||
+         std::any_of(sample.names.begin(), sample.names.end(),
+                     [](std::string_view name) { return plain(name) == "prsrx"; });
+}
+
+/// One file, read twice: how it is written, and its rows. Memory: its text and its poses.
+class Reader {
+ public:
+  Reader(const fs::path& file, std::string_view text, const TrajectoryOptions& options)
+      : file_(file), text_(text), options_(options), sample_(sample_of(text)) {
+    TextTable table(text);
+    if (!table.next()) refuse(file, 0, "has no pose in it: there is no row of numbers");
+    columns_ = columns_of(file, sample_, table.line());
+    euroc_ = is_euroc_truth(file, sample_);
+    find_times();
+    find_order();
+  }
+
+  [[nodiscard]] bool euroc() const { return euroc_; }
+
+  TrajectoryFile read() {
+    out_.poses.reserve(rows_at_most());
+    TextTable table(text_);
+    while (table.next())
+      if (!take(table)) break;
+    if (out_.poses.empty())
+      refuse(file_, 0,
+             skipped_ > 0
+                 ? fmt::format("has no pose in it: {} rows have numbers that are none", skipped_)
+                 : "has no pose in it");
+    out_.timed = columns_.stamp.has_value();
+    out_.rows = rows_;
+    put_in_order();
+    say();
+    return std::move(out_);
+  }
+
+ private:
+  void find_times() {
+    if (!columns_.stamp || columns_.nanoseconds) return;
+    std::vector<std::string_view> times;
+    bool whole = true;
+    for (const auto& row : sample_.rows) {
+      if (*columns_.stamp >= row.size()) continue;
+      times.push_back(row[*columns_.stamp]);
+      whole = whole && parse_integer(times.back()).has_value();
+    }
+    form_ = find_time_form(times, options_.unit,
+                           euroc_ && whole ? TimeUnit::nanoseconds : TimeUnit::seconds);
+    if (!options_.unit && !describe(form_).empty() && !euroc_)
+      out_.remarks.push_back(describe(form_));
+  }
+
+  void find_order() {
+    out_.order_told = columns_.order || options_.quaternion || columns_.layout != Layout::pose;
+    out_.order = columns_.order.value_or(QuaternionOrder::xyzw);
+    if (!columns_.order && columns_.layout == Layout::pose) {
+      // EuRoC and those who write as it does (VINS): w first, commas, whole nanoseconds.
+      const bool csv = sample_.separator != ' ' && form_.unit == TimeUnit::nanoseconds;
+      if (csv) out_.order = QuaternionOrder::wxyz;
+      if (csv && !euroc_ && !options_.quaternion)
+        out_.remarks.emplace_back(
+            "quaternions are taken to have w first, as EuRoC and VINS write with nanoseconds and "
+            "commas");
+    }
+    if (!options_.quaternion) return;
+    // The user speaks of the columns as they stand in the file.
+    out_.order = *options_.quaternion;
+    std::sort(columns_.pose.begin() + 3, columns_.pose.end());
+  }
+
+  [[nodiscard]] std::size_t rows_at_most() const {
+    constexpr std::size_t kShortest = 15;  // bytes of eight numbers
+    const auto ends = static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n'));
+    return std::min(ends, text_.size() / kShortest) + 1;
+  }
+
+  /// False: the row is the last, and its writer stopped in it.
+  bool take(const TextTable& table) {
+    const auto& fields = table.fields();
+    if (fields.size() < columns_.needed()) {
+      if (table.unfinished() && !out_.poses.empty()) {
+        out_.remarks.emplace_back("the last row is unfinished and left out");
+        return false;
+      }
+      refuse(file_, table.line(),
+             fmt::format("has {} columns where the other rows have {}", fields.size(),
+                         columns_.needed()));
+    }
+    StampedPose pose;
+    if (!read_stamp(fields, table.line(), &pose.stamp) ||
+        !read_pose(fields, table.line(), &pose.T_world_body))
+      ++skipped_;
+    else
+      out_.poses.push_back(pose);
+    ++rows_;
+    return true;
+  }
+
+  /// False: the row has no number there. InputError: it has something else.
+  bool read_field(std::string_view field, std::size_t line, double* value) const {
+    if (parse_number(field, value)) return true;
+    if (is_no_value(field)) return false;
+    refuse(file_, line, fmt::format("`{}` is not a finite number", field.substr(0, 40)));
+  }
+
+  bool read_stamp(const std::vector<std::string_view>& fields, std::size_t line,
+                  Stamp* stamp) const {
+    if (!columns_.stamp) {
+      *stamp = Stamp(static_cast<std::int64_t>(rows_) * kRowStep);
+      return true;
+    }
+    const std::string_view field = fields[*columns_.stamp];
+    if (is_no_value(field)) return false;
+    auto read = read_time(field, form_);
+    if (read && columns_.nanoseconds) {
+      const auto ns = parse_integer(fields[*columns_.nanoseconds]);
+      constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
+      if (!ns || std::abs(read->ns()) > kFarthest || *ns < 0 || *ns > 999'999'999)
+        read.reset();
+      else
+        *read = Stamp(read->ns() + *ns);
+    }
+    if (!read)
+      refuse(file_, line,
+             fmt::format("`{}` is not a stamp in {}", field.substr(0, 40), to_string(form_.unit)));
+    *stamp = *read;
+    return true;
+  }
+
+  bool read_pose(const std::vector<std::string_view>& fields, std::size_t line, Transform* T) {
+    std::array<double, 16> v{};
+    const std::size_t count = columns_.layout == Layout::pose        ? 7
+                              : columns_.layout == Layout::matrix3x4 ? 12
+                                                                     : 16;
+    bool there = true;
+    for (std::size_t i = 0; i < count; ++i)
+      there = read_field(
+                  fields[columns_.layout == Layout::pose ? columns_.pose[i] : columns_.first + i],
+                  line, &v[i]) &&
+              there;
+    if (!there) return false;
+    if (columns_.layout == Layout::pose) {
+      const bool w_first = out_.order == QuaternionOrder::wxyz;
+      const Eigen::Quaterniond q = w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
+                                           : Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
+      if (!(std::abs(q.norm() - 1.0) <= kQuaternionLength))
+        refuse(file_, line,
+               fmt::format("the quaternion has length {:.6f} and not 1: check the order of the "
+                           "columns",
+                           q.norm()));
+      *T = {q.normalized().toRotationMatrix(), {v[0], v[1], v[2]}};
+      return true;
+    }
+    const Mat3 written = rotation_of(v);
+    const double off = off_rotation(written);
+    if (!(off <= kNearRotation))
       refuse(
-          file, n,
-          "has " + std::to_string(count) + " numbers where a pose has 12: a 3x4 matrix row by row");
-    if (rows == times.size())
-      refuse(file, n,
-             "is pose " + std::to_string(times.size() + 1) + ", but " + times_name + " has only " +
-                 std::to_string(times.size()) + " times");
-    std::array<double, 12> v{};
-    numbers(file, n, fields, v);
-    Mat3 written;
-    written << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
-    Transform T;
-    T.t = {v[3], v[7], v[11]};
-    if (!accept_rotation(written, &T.R))
-      refuse(file, n,
-             "the matrix is not a rotation: it is off orthonormal by more than 1e-4, or it is a "
-             "reflection");
-    const Stamp stamp = times[rows++];
-    if (trajectory.empty() || trajectory.back().stamp < stamp) trajectory.push_back({stamp, T});
+          file_, line,
+          fmt::format("the matrix is not a rotation: it is off orthonormal by more than {:g}, or "
+                      "it is a reflection",
+                      kNearRotation));
+    roughest_ = std::max(roughest_, off);
+    *T = {normalised(written), {v[3], v[7], v[11]}};
+    return true;
   }
-  if (rows != times.size())
-    refuse(file, 0,
-           "has " + std::to_string(rows) + " poses, but " + times_name + " has " +
-               std::to_string(times.size()) + " times");
-  return checked(file, std::move(trajectory));
-}
 
-Trajectory parse_kitti(const fs::path& file, std::string_view text, const fs::path& times_file) {
-  return parse_kitti(file, text, read_times(times_file), times_file.string());
-}
-
-Trajectory parse_euroc(const fs::path& file, std::string_view text, const fs::path& camera_yaml) {
-  const Transform T_body_left = read_sensor_mount(camera_yaml);
-  Trajectory trajectory;
-  Lines lines(text);
-  std::string_view line;
-  while (lines.next(&line)) {
-    const std::size_t n = lines.number();
-    std::array<std::string_view, 8> fields;
-    const std::size_t count = split(line, ',', fields);
-    if (count < fields.size())
-      refuse(file, n,
-             "has " + std::to_string(count) +
-                 " columns where a pose has 8 or more: stamp px py pz qw qx qy qz …");
-    const auto ns = parse_integer(fields[0]);
-    if (!ns)
-      refuse(file, n,
-             "`" + std::string(fields[0].substr(0, 40)) + "` is not a stamp in whole nanoseconds");
-    std::array<double, 7> v{};
-    numbers(file, n, std::span(fields).subspan(1), v);
-    const Transform T_world_body{rotation(file, n, v[3], v[4], v[5], v[6]), {v[0], v[1], v[2]}};
-    append(file, n, {Stamp(*ns), T_world_body * T_body_left}, &trajectory);
+  /// Restores the order of the stamps and drops rows that repeat one.
+  void put_in_order() {
+    Trajectory& poses = out_.poses;
+    const auto earlier = [](const StampedPose& a, const StampedPose& b) {
+      return a.stamp < b.stamp;
+    };
+    for (std::size_t i = 1; i < poses.size(); ++i)
+      moved_ += earlier(poses[i], poses[i - 1]) ? 1 : 0;
+    if (moved_ > 0) std::stable_sort(poses.begin(), poses.end(), earlier);
+    const std::size_t all = poses.size();
+    poses.erase(
+        std::unique(poses.begin(), poses.end(),
+                    [](const StampedPose& a, const StampedPose& b) { return a.stamp == b.stamp; }),
+        poses.end());
+    repeated_ = all - poses.size();
+    if (all > 2 && poses.size() == 1)
+      refuse(file_, 0,
+             fmt::format("has the same stamp in all of its {} rows: times were written with too "
+                         "few digits, or this column is no time",
+                         all));
+    if (2 * repeated_ > all)
+      refuse(file_, 0,
+             fmt::format("has only {} different stamps in {} rows: times were written with too few "
+                         "digits",
+                         poses.size(), all));
+    if (options_.unit || options_.unit_option.empty() || !columns_.stamp || poses.size() < 3)
+      return;
+    std::vector<std::int64_t> steps(poses.size() - 1);
+    for (std::size_t i = 0; i < steps.size(); ++i)
+      steps[i] = (poses[i + 1].stamp.ns() / 2 - poses[i].stamp.ns() / 2);  // halves do not overflow
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    constexpr double kLongest = 10;  // s
+    if (const double step = 2e-9 * static_cast<double>(*middle); step > kLongest)
+      refuse(
+          file_, 0,
+          fmt::format("has poses that follow one another after {:.6g} (median), read as seconds: "
+                      "say the unit of its times with {}",
+                      step, options_.unit_option));
   }
-  return checked(file, std::move(trajectory));
-}
+
+  void say() {
+    auto& remarks = out_.remarks;
+    if (skipped_ > 0)
+      remarks.push_back(fmt::format("{} rows without numbers (NaN) are skipped", skipped_));
+    if (repeated_ > 0)
+      remarks.push_back(fmt::format("{} rows that repeat a stamp are dropped", repeated_));
+    if (moved_ > 0)
+      remarks.push_back(
+          fmt::format("the order of the times is restored, {} rows went back", moved_));
+    if (roughest_ > kRounded)
+      remarks.push_back(fmt::format(
+          "rotations have few decimals, they are up to {:.1g} off orthonormal", roughest_));
+  }
+
+  /// NaN and infinity in all their spellings, and an empty field.
+  static bool is_no_value(std::string_view field) {
+    std::string word;
+    for (const char c : field.substr(0, 12)) word.push_back(static_cast<char>(c | 0x20));
+    if (word.starts_with('-') || word.starts_with('+')) word.erase(0, 1);
+    return word.empty() || word.starts_with("nan") || word == "inf" || word == "infinity" ||
+           word == "null" || word == "none" || word == "n/a";
+  }
+
+  const fs::path& file_;
+  std::string_view text_;
+  const TrajectoryOptions& options_;
+  Sample sample_;
+  Columns columns_;
+  TimeForm form_;
+  bool euroc_ = false;
+  std::size_t rows_ = 0, skipped_ = 0, repeated_ = 0, moved_ = 0;
+  double roughest_ = 0;
+  TrajectoryFile out_;
+};
 
 fs::path folder_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
-/// The times of a KITTI truth file: beside it, or, in the benchmark's tree, at sequences/NN for
-/// poses/NN.txt.
-fs::path times_beside(const fs::path& poses) {
-  const fs::path folder = folder_of(poses);
-  for (const fs::path& candidate :
-       {folder / "times.txt", folder / ".." / "sequences" / poses.stem() / "times.txt"})
-    if (present(candidate)) return candidate;
-  refuse(poses, 0,
-         "holds KITTI poses, which carry no stamps: put the sequence's times.txt beside it");
+/// The first of these files that is there.
+std::optional<fs::path> first_present(std::initializer_list<fs::path> candidates) {
+  for (const fs::path& candidate : candidates)
+    if (present(candidate)) return candidate.lexically_normal();
+  return std::nullopt;
 }
 
-/// The left camera's sensor.yaml of an EuRoC truth file.
-fs::path camera_beside(const fs::path& csv) {
-  const fs::path folder = folder_of(csv);
-  for (const fs::path& candidate :
-       {folder / ".." / "cam0" / "sensor.yaml", folder / "cam0" / "sensor.yaml"})
-    if (present(candidate)) return candidate.lexically_normal();
-  refuse(csv, 0,
-         "holds the truth of the body: put cam0/sensor.yaml of the data set beside it, it tells "
-         "where the left camera is");
+/// Row k at times[k].
+void set_times(const fs::path& file, std::span<const Stamp> times, const std::string& times_name,
+               TrajectoryFile* trajectory) {
+  Trajectory& poses = trajectory->poses;
+  if (trajectory->rows != times.size())
+    refuse(file, 0,
+           fmt::format("has {} poses, but {} has {} times", trajectory->rows, times_name,
+                       times.size()));
+  for (StampedPose& pose : poses)
+    pose.stamp = times[static_cast<std::size_t>(pose.stamp.ns() / kRowStep)];
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; });
+  poses.erase(
+      std::unique(poses.begin(), poses.end(),
+                  [](const StampedPose& a, const StampedPose& b) { return a.stamp == b.stamp; }),
+      poses.end());
+  trajectory->timed = true;
+}
+
+void set_times_beside(const fs::path& file, TrajectoryFile* trajectory) {
+  const fs::path folder = folder_of(file);
+  const auto times_path = first_present(
+      {folder / "times.txt", folder / ".." / "sequences" / file.stem() / "times.txt"});
+  if (!times_path) return;
+  std::vector<Stamp> times;
+  for (const TimesLine& line : read_times_file(*times_path, TimeUnit::seconds).lines)
+    times.push_back(line.stamp);
+  set_times(file, times, times_path->string(), trajectory);
+}
+
+void bring_to_camera(const fs::path& sensor, Trajectory* poses) {
+  const Transform T_body_left = read_sensor_mount(sensor);
+  for (StampedPose& pose : *poses) pose.T_world_body = pose.T_world_body * T_body_left;
+}
+
+TrajectoryFile read_file(const fs::path& path, const TrajectoryOptions& options) {
+  const std::string text = read_text(path);
+  Reader reader(path, text, options);
+  TrajectoryFile out = reader.read();
+  if (!out.timed) set_times_beside(path, &out);
+  if (!reader.euroc()) return out;
+  const fs::path folder = folder_of(path);
+  if (const auto sensor =
+          first_present({folder / ".." / "cam0" / "sensor.yaml", folder / "cam0" / "sensor.yaml"}))
+    bring_to_camera(*sensor, &out.poses);
+  else
+    out.remarks.emplace_back(
+        "this is the truth of the body and not of the left camera: put cam0/sensor.yaml of the "
+        "data set beside it, or use --estimate-mount");
+  return out;
 }
 
 }  // namespace
 
-Trajectory read_tum(const fs::path& file) { return parse_tum(file, read_text(file)); }
-
-Trajectory read_kitti(const fs::path& poses_file, const fs::path& times_file) {
-  return parse_kitti(poses_file, read_text(poses_file), times_file);
+Trajectory read_tum(const fs::path& file) {
+  const std::string text = read_text(file);
+  const TrajectoryOptions options;
+  return Reader(file, text, options).read().poses;
 }
 
 Trajectory read_kitti(const fs::path& poses_file, std::span<const Stamp> times) {
-  return parse_kitti(poses_file, read_text(poses_file), times, "the drive");
-}
-
-Trajectory read_euroc(const fs::path& csv_file, const fs::path& camera_yaml) {
-  return parse_euroc(csv_file, read_text(csv_file), camera_yaml);
+  const std::string text = read_text(poses_file);
+  const TrajectoryOptions options;
+  TrajectoryFile out = Reader(poses_file, text, options).read();
+  set_times(poses_file, times, "the drive", &out);
+  return std::move(out.poses);
 }
 
 std::optional<TruthFiles> find_truth(const fs::path& folder) {
@@ -219,8 +560,7 @@ std::optional<TruthFiles> find_truth(const fs::path& folder) {
   const fs::path sequence = (folder.has_filename() ? folder : folder.parent_path()).filename();
   for (const fs::path& poses :
        {folder / "poses.txt", folder / ".." / ".." / "poses" / (sequence.string() + ".txt")})
-    if (present(poses) && present(folder / "times.txt"))
-      return TruthFiles{TruthFiles::Kind::kitti, poses, folder / "times.txt"};
+    if (present(poses)) return TruthFiles{TruthFiles::Kind::kitti, poses, folder / "times.txt"};
   for (const fs::path& mav : {folder / "mav0", folder}) {
     const fs::path csv = mav / "state_groundtruth_estimate0" / "data.csv",
                    camera = mav / "cam0" / "sensor.yaml";
@@ -229,31 +569,37 @@ std::optional<TruthFiles> find_truth(const fs::path& folder) {
   return std::nullopt;
 }
 
-Trajectory read_truth(const TruthFiles& files) {
-  return files.kind == TruthFiles::Kind::kitti ? read_kitti(files.poses, files.second)
-                                               : read_euroc(files.poses, files.second);
+Trajectory read_truth(const TruthFiles& files) { return read_file(files.poses, {}).poses; }
+
+TrajectoryFile read_trajectory_file(const fs::path& path, const TrajectoryOptions& options) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return read_file(path, options);
+  if (present(path / "trajectory.tum")) return read_file(path / "trajectory.tum", options);
+  const auto truth = find_truth(path);
+  if (!truth)
+    refuse(path, 0,
+           "has no trajectory.tum, no poses.txt (KITTI) and no "
+           "mav0/state_groundtruth_estimate0/data.csv with cam0/sensor.yaml (EuRoC)");
+  return read_file(truth->poses, options);
 }
 
 Trajectory read_trajectory(const fs::path& path) {
-  if (is_folder(path)) {
-    if (present(path / "trajectory.tum")) return read_tum(path / "trajectory.tum");
-    const auto truth = find_truth(path);
-    if (!truth)
-      refuse(path, 0,
-             "has no trajectory.tum, no poses.txt with times.txt (KITTI) and no "
-             "mav0/state_groundtruth_estimate0/data.csv with "
-             "cam0/sensor.yaml (EuRoC)");
-    return read_truth(*truth);
+  TrajectoryFile file = read_trajectory_file(path);
+  if (!file.timed)
+    refuse(path, 0,
+           "holds KITTI poses, which carry no stamps: put the sequence's times.txt beside it");
+  return std::move(file.poses);
+}
+
+Trajectory in_other_order(Trajectory poses, QuaternionOrder read) {
+  for (StampedPose& pose : poses) {
+    const Eigen::Quaterniond q(pose.T_world_body.R);
+    const Eigen::Quaterniond other = read == QuaternionOrder::xyzw
+                                         ? Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w())
+                                         : Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
+    pose.T_world_body.R = other.normalized().toRotationMatrix();
   }
-  const std::string text = read_text(path);
-  Lines lines(text);
-  std::string_view line;
-  if (!lines.next(&line)) refuse(path, 0, "has no pose in it");
-  if (line.find(',') != std::string_view::npos) return parse_euroc(path, text, camera_beside(path));
-  std::array<std::string_view, 1> first;
-  constexpr std::size_t kKittiNumbers = 12;
-  if (split(line, ' ', first) == kKittiNumbers) return parse_kitti(path, text, times_beside(path));
-  return parse_tum(path, text);
+  return poses;
 }
 
 }  // namespace vergence::app

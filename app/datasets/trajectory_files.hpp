@@ -2,35 +2,64 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
+#include "app/datasets/stamp_text.hpp"
 #include "core/types/stamped_pose.hpp"
 
-/// Trajectories from files, as body-to-world poses with absolute integer stamps.
+/// Trajectories from text files of any program, as body-to-world poses with absolute integer
+/// stamps.
 ///
-/// All of them: stamps strictly ascending, at least one pose, rotations normalised. What a file
-/// from outside gets wrong is an InputError with file:line that says what is wrong.
+/// One reader for all. A row is a pose: stamp, x y z and a quaternion, or KITTI's matrix of 3x4 (or
+/// 4x4) numbers, with a stamp before it or without. Between the numbers stand blanks, tabs, commas
+/// or semicolons; an index may stand before the stamp; further columns are passed over. Headings
+/// tell which column is which, where there are some.
+///
+/// Of what is read: stamps strictly ascending, at least one pose, rotations normalised. Rows with
+/// a number that is none (NaN) are skipped, rows that repeat a stamp dropped, the order of the
+/// others is restored; all of that is counted in `remarks`. InputError with file:line: a field that
+/// is no number, a quaternion or a matrix that is no rotation, rows that are no poses, times of
+/// which most repeat one another.
 namespace vergence::app {
 
 using Trajectory = std::vector<StampedPose>;
 
-/// TUM: `stamp tx ty tz qx qy qz qw`, decimal seconds and metres; `#` begins a comment.
+enum class QuaternionOrder : std::uint8_t { xyzw, wxyz };
+
+struct TrajectoryOptions {
+  std::optional<TimeUnit> unit{};               // nothing: by the magnitude, or seconds
+  std::optional<QuaternionOrder> quaternion{};  // nothing: by the headings, or xyzw
+  std::string_view unit_option{};  // with which the user gives a unit; empty: any interval is taken
+};
+
+struct TrajectoryFile {
+  Trajectory poses{};
+  std::vector<std::string> remarks{};  // what was assumed, skipped or put right: a phrase each
+  std::size_t rows = 0;                // of the file, also those that are skipped
+  bool timed = true;        // false: the file holds no times; rows are 0.1 s apart, from 0
+  bool order_told = false;  // headings, a matrix or the user say how rotations are written
+  QuaternionOrder order = QuaternionOrder::xyzw;  // as read
+};
+
+/// What `evaluate` takes: a file, or a folder that stands for one. A session folder: its
+/// trajectory.tum; a data set of KITTI or EuRoC: its truth.
+///
+/// Of a KITTI file without times they are looked for beside it (times.txt, or the benchmark's tree
+/// sequences/NN). The truth of an EuRoC data set, told by its place or its headings, is that of the
+/// body: it is brought to the left camera by the cam0/sensor.yaml beside it, T_R_left = T_R_B ·
+/// T_BS.
+[[nodiscard]] TrajectoryFile read_trajectory_file(const std::filesystem::path& path,
+                                                  const TrajectoryOptions& options = {});
+/// Its poses.
+[[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& path);
+/// The same of one file, whatever lies beside it.
 [[nodiscard]] Trajectory read_tum(const std::filesystem::path& file);
 
-/// KITTI odometry: twelve numbers a line, T_world_left row by row; line k belongs to line k of the
-/// times file (seconds). Rotations off orthonormal by up to 1e-4 are normalised, others refused.
-[[nodiscard]] Trajectory read_kitti(const std::filesystem::path& poses_file,
-                                    const std::filesystem::path& times_file);
-/// The same with the times in hand. They may go backwards: poses whose time is not later than all
-/// before are left out, like their frames.
+/// KITTI's twelve numbers a line, T_world_left row by row; line k belongs to times[k].
 [[nodiscard]] Trajectory read_kitti(const std::filesystem::path& poses_file,
                                     std::span<const Stamp> times);
-
-/// EuRoC: `state_groundtruth_estimate0/data.csv` (stamp in ns, p, q with w first; further columns
-/// are passed over), brought from the body to the left camera: T_R_left = T_R_B · T_BS of the
-/// camera's sensor.yaml.
-[[nodiscard]] Trajectory read_euroc(const std::filesystem::path& csv_file,
-                                    const std::filesystem::path& camera_yaml);
 
 /// Where the truth of a data-set folder lies.
 struct TruthFiles {
@@ -40,15 +69,13 @@ struct TruthFiles {
 };
 
 /// KITTI: `poses.txt` and `times.txt` in the folder, or the benchmark's own tree (sequences/NN with
-/// poses/NN.txt above).
+/// poses/NN.txt above); times.txt may be missing where images are counted instead.
 /// EuRoC: the folder that holds mav0, or mav0. Nothing when the folder has no truth.
 [[nodiscard]] std::optional<TruthFiles> find_truth(const std::filesystem::path& folder);
 
 [[nodiscard]] Trajectory read_truth(const TruthFiles& files);
 
-/// What `evaluate` takes: a TUM file, KITTI's poses.txt, EuRoC's data.csv, or a data-set folder of
-/// either with its truth. A session folder stands for its trajectory.tum. The second file of KITTI
-/// and EuRoC is looked up beside the first.
-[[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& path);
+/// Rotations as if their quaternions had been written in the other order than they were read in.
+[[nodiscard]] Trajectory in_other_order(Trajectory poses, QuaternionOrder read);
 
 }  // namespace vergence::app

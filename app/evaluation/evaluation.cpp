@@ -1,10 +1,13 @@
 #include "app/evaluation/evaluation.hpp"
 
+#include <algorithm>
 #include <iostream>
+#include <limits>
 #include <optional>
 #include <system_error>
 #include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/trajectory_files.hpp"
@@ -12,9 +15,14 @@
 #include "app/evaluation/ins_mount.hpp"
 #include "app/evaluation/mount_report.hpp"
 #include "app/recorder/ins_file.hpp"
+#include "app/runtime/terminal_text.hpp"
+#include "core/math/angle.hpp"
+#include "core/math/so3.hpp"
 
 namespace vergence::app {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// Of the usual lengths those that the path is long enough for; KITTI's where it is for none.
 void keep_longest(TrajectoryEvaluation* e, EvaluationOptions* options) {
@@ -49,6 +57,76 @@ Reference reference_of(const EvaluationRequest& a) {
   return {path, false};
 }
 
+/// Both as they are read; an INS's readings are no trajectory yet.
+struct Files {
+  TrajectoryFile estimate{}, reference{};
+};
+
+void say(const std::string& sentence) { std::cerr << "vergence: " << harmless(sentence) << '\n'; }
+
+/// Rows of a file without times belong to the rows of the other one, with its times if it has some.
+void pair_rows(const EvaluationRequest& a, const Reference& from, Files* files) {
+  TrajectoryFile &e = files->estimate, &r = files->reference;
+  if (e.timed && (r.timed || from.is_ins)) return;
+  const std::string help = "put the sequence's times.txt beside it";
+  if (from.is_ins) throw InputError(a.estimate.string() + ": has no times; " + help);
+  if (e.rows != r.rows)
+    throw InputError(fmt::format(
+        "{}: has {} poses and {} has {}: {}, so that row belongs to row, which takes as many; {}",
+        a.estimate.string(), e.rows, from.path.string(), r.rows,
+        e.timed   ? "the reference has no times"
+        : r.timed ? "the estimate has no times"
+                  : "neither has times",
+        help));
+  say(std::string(e.timed == r.timed ? "neither file has times" : "one of the files has no times") +
+      ": row belongs to row");
+  if (e.timed == r.timed) return;
+  TrajectoryFile& without = e.timed ? r : e;
+  const TrajectoryFile& with = e.timed ? e : r;
+  if (without.poses.size() != with.poses.size())
+    throw InputError("rows without numbers are skipped in one of the files, which has no times; " +
+                     help);
+  for (std::size_t i = 0; i < with.poses.size(); ++i) without.poses[i].stamp = with.poses[i].stamp;
+}
+
+TrajectoryFile read(const fs::path& path, std::optional<TimeUnit> unit,
+                    std::optional<QuaternionOrder> quaternion, std::string_view unit_option) {
+  TrajectoryFile file = read_trajectory_file(path, {unit, quaternion, unit_option});
+  if (!file.remarks.empty())
+    say(fmt::format("{}: {}", path.string(), fmt::join(file.remarks, "; ")));
+  return file;
+}
+
+/// One unit given is the estimate's, and also the reference's where that has none to be told by.
+TrajectoryFile read_reference(const EvaluationRequest& a, const fs::path& path) {
+  constexpr std::string_view kOption =
+      "--time-unit ,s (or ,ms ,us ,ns: the reference's follows the comma)";
+  if (a.units[1] || !a.units[0]) return read(path, a.units[1], a.quaternions[1], kOption);
+  try {
+    return read(path, std::nullopt, a.quaternions[1], kOption);
+  } catch (const InputError&) {
+    return read(path, a.units[0], a.quaternions[1], kOption);
+  }
+}
+
+Files read_files(const EvaluationRequest& a, const Reference& from) {
+  Files files;
+  files.estimate = read(a.estimate, a.units[0], a.quaternions[0], "--time-unit s, ms, us or ns");
+  if (!from.is_ins) files.reference = read_reference(a, from.path);
+  pair_rows(a, from, &files);
+  return files;
+}
+
+Duration usual_interval(const Trajectory& poses) {
+  std::vector<std::int64_t> ns;
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    ns.push_back(poses[i].stamp.ns() / 2 - poses[i - 1].stamp.ns() / 2);
+  if (ns.empty()) return {};
+  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
+  std::nth_element(ns.begin(), middle, ns.end());
+  return Duration::nanoseconds(2 * std::min(*middle, std::numeric_limits<std::int64_t>::max() / 2));
+}
+
 /// A reference at the estimate's body, and how it came there.
 struct Brought {
   Trajectory poses{};
@@ -70,13 +148,13 @@ Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readi
   return out;
 }
 
-Brought bring_reference(const EvaluationRequest& a, const Reference& from,
-                        const Trajectory& estimate) {
+Brought bring_reference(const EvaluationRequest& a, const Reference& from, Files* files) {
+  const Trajectory& estimate = files->estimate.poses;
   Brought out;
   if (from.is_ins) {
     out = bring_ins(a, from.path, estimate);
   } else {
-    out.poses = read_trajectory(from.path);
+    out.poses = files->reference.poses;
     if (a.estimate_mount) out.found = find_mount(estimate, out.poses);
   }
   if (a.estimate_mount && out.found.status == MountStatus::ok)
@@ -95,6 +173,74 @@ ExitCode tell_no_mount(const EvaluationRequest& a, const Reference& from, const 
   std::cerr << "vergence: no mount between " << a.estimate.string() << " and " << from.path.string()
             << ": " << mount_problem(found.status) << '\n';
   return ExitCode::not_usable;
+}
+
+constexpr double kRotationsDiffer = 20 * kRadiansPerDegree;
+
+/// Whether positions agree and rotations do not.
+bool rotations_differ(const TrajectoryEvaluation& e) {
+  constexpr double kPositionsAgree = 0.05;  // of the path
+  return e.status == EvaluationStatus::ok && !e.se3.roll_unobservable &&
+         e.ate_se3.rmse < kPositionsAgree * e.path_reference &&
+         e.rotation_se3.median > kRotationsDiffer;
+}
+
+/// The turn from one body to the other where it is the same all the way; nothing: it is not.
+std::optional<double> constant_turn(const Trajectory& estimate, const Trajectory& reference,
+                                    const EvaluationOptions& options,
+                                    const TrajectoryEvaluation& e) {
+  const MatchedTrajectories matched = associate(estimate, reference, options);
+  const auto turn = [&](std::size_t i) -> Mat3 {
+    return matched.reference[i].T_world_body.R.transpose() * e.se3.R_reference_estimate *
+           matched.estimate[i].T_world_body.R;
+  };
+  if (matched.estimate.empty()) return std::nullopt;
+  const Mat3 first = turn(matched.estimate.size() / 2);
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < matched.estimate.size(); ++i)
+    near += rotation_angle(first.transpose() * turn(i)) < kRotationsDiffer / 2 ? 1 : 0;
+  if (10 * near < 9 * matched.estimate.size()) return std::nullopt;
+  return rotation_angle(first);
+}
+
+/// What is probably wrong with rotations that do not agree where positions do.
+std::string rotation_remark(const EvaluationRequest& a, const Files& files,
+                            const Trajectory& reference, const EvaluationOptions& options,
+                            const TrajectoryEvaluation& e) {
+  const std::string what = fmt::format("positions agree and rotations do not ({:.0f} deg, median)",
+                                       e.rotation_se3.median * kDegreesPerRadian);
+  const auto helps = [&](const Trajectory& of_estimate, const Trajectory& of_reference) {
+    const TrajectoryEvaluation other = evaluate(of_estimate, of_reference, options);
+    return other.status == EvaluationStatus::ok && other.rotation_se3.median < kRotationsDiffer;
+  };
+  const auto option = [](const TrajectoryFile& file) {
+    return file.order == QuaternionOrder::xyzw ? "wxyz" : "xyzw";
+  };
+  const auto order = [&](const fs::path& path, const char* comma, const TrajectoryFile& file) {
+    return fmt::format(
+        "{}: probably {} has the quaternion with w {}; --quaternion {}{} reads it so", what,
+        path.string(), file.order == QuaternionOrder::xyzw ? "first" : "last", comma, option(file));
+  };
+  const Trajectory& estimate = files.estimate.poses;
+  if (helps(in_other_order(estimate, files.estimate.order), reference))
+    return order(a.estimate, "", files.estimate);
+  if (!files.reference.poses.empty() && !a.estimate_mount &&
+      helps(estimate, in_other_order(files.reference.poses, files.reference.order)))
+    return order(a.reference, ",", files.reference);
+  if (const auto turn = constant_turn(estimate, reference, options, e))
+    return fmt::format(
+        "{}: the two bodies have different axes, turned by {:.0f} deg all the way (a camera and an "
+        "IMU or a vehicle?); --estimate-mount finds the turn",
+        what, *turn * kDegreesPerRadian);
+  Trajectory inverse = estimate;
+  for (StampedPose& pose : inverse) pose.T_world_body.R.transposeInPlace();
+  if (helps(inverse, reference))
+    return what +
+           ": the estimate's rotations are probably from world to body, the inverse of what "
+           "is expected";
+  return what +
+         ": check which axes and which order of the quaternion the two files have "
+         "(--quaternion wxyz)";
 }
 
 void print(const EvaluationRequest& a, const EvaluationOptions& options, const Brought& reference,
@@ -116,16 +262,24 @@ void print(const EvaluationRequest& a, const EvaluationOptions& options, const B
 ExitCode run_evaluation(const EvaluationRequest& a) {
   EvaluationOptions options = a.options;
   const Reference from = reference_of(a);
-  const Trajectory estimate = read_trajectory(a.estimate);
-  const Brought reference = bring_reference(a, from, estimate);
+  Files files = read_files(a, from);
+  const Trajectory& estimate = files.estimate.poses;
+  const Brought reference = bring_reference(a, from, &files);
   if (a.estimate_mount && reference.found.status != MountStatus::ok)
     return tell_no_mount(a, from, reference.found);
   TrajectoryEvaluation evaluation = evaluate(estimate, reference.poses, options);
   if (a.usual_lengths) keep_longest(&evaluation, &options);
   print(a, options, reference, evaluation);
-  if (evaluation.status == EvaluationStatus::ok) return ExitCode::done;
-  std::cerr << "vergence: " << a.estimate.string() << " against " << from.path.string() << ": "
-            << evaluation_problem(evaluation, options) << '\n';
+  const Duration interval = usual_interval(reference.poses);
+  if (evaluation.status == EvaluationStatus::ok) {
+    if (const std::string holes = gap_remark(evaluation, options, interval); !holes.empty())
+      say(holes);
+    if (rotations_differ(evaluation))
+      say(rotation_remark(a, files, reference.poses, options, evaluation));
+    return ExitCode::done;
+  }
+  say(a.estimate.string() + " against " + from.path.string() + ": " +
+      evaluation_problem(evaluation, options, interval));
   return ExitCode::not_usable;
 }
 

@@ -1,6 +1,9 @@
 #pragma once
+#include <array>
 #include <filesystem>
+#include <optional>
 
+#include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 
@@ -14,6 +17,9 @@ struct EvaluationRequest {
   bool usual_lengths = true;  // of options.segments the longest that the path is long enough for
   bool json = false;
   bool estimate_mount = false;
+  // What the user says of the estimate's file and of the reference's.
+  std::array<std::optional<TimeUnit>, 2> units{};
+  std::array<std::optional<QuaternionOrder>, 2> quaternions{};
 };
 
 /// Compares, and prints the figures on standard output.

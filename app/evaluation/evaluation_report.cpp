@@ -164,16 +164,31 @@ std::string evaluation_text(const TrajectoryEvaluation& e, const EvaluationOptio
   return out;
 }
 
-std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOptions& options) {
+std::string gap_remark(const TrajectoryEvaluation& e, const EvaluationOptions& options,
+                       Duration interval) {
+  if (e.gap <= e.matched || options.association == Association::nearest) return "";
+  constexpr double kRoom = 1.1;  // above the interval, whose length varies
+  constexpr double kSteps = 20;  // of the number that is proposed, in a second
+  const double seconds = interval.to_seconds();
+  return fmt::format(
+      "{} poses lie in holes of the reference, whose poses are {:.3g} s apart (median), wider than "
+      "--max-gap {:g}; --max-gap {:g} bridges them",
+      e.gap, seconds, options.max_gap.to_seconds(), std::ceil(kSteps * kRoom * seconds) / kSteps);
+}
+
+std::string evaluation_problem(const TrajectoryEvaluation& e, const EvaluationOptions& options,
+                               Duration interval) {
+  const std::string holes = gap_remark(e, options, interval);
   switch (e.status) {
     case EvaluationStatus::no_match:
+      if (!holes.empty()) return holes;
       return fmt::format(
           "no pose of the estimate has a reference at its time ({}): are both stamped by the same "
           "clock?",
           left_out(e, options));
     case EvaluationStatus::too_few:
-      return fmt::format("only {} poses matched, an alignment needs three ({})", e.matched,
-                         left_out(e, options));
+      return fmt::format("only {} poses matched, an alignment needs three ({}){}{}", e.matched,
+                         left_out(e, options), holes.empty() ? "" : "; ", holes);
     case EvaluationStatus::no_motion:
       return "one of the two trajectories stays in one place, there is nothing to align";
     case EvaluationStatus::ok:

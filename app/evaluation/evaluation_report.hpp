@@ -16,8 +16,12 @@ namespace vergence::app {
 [[nodiscard]] std::string evaluation_text(const TrajectoryEvaluation& evaluation,
                                           const EvaluationOptions& options);
 
-/// Why there are no figures, as a whole sentence. Precondition: the status is not ok.
+/// Why there are no figures, as a whole sentence. `interval`: the usual one between the reference's
+/// poses. Precondition: the status is not ok.
 [[nodiscard]] std::string evaluation_problem(const TrajectoryEvaluation& evaluation,
-                                             const EvaluationOptions& options);
+                                             const EvaluationOptions& options, Duration interval);
+/// That most poses lie in holes of the reference, and what bridges them; empty: they do not.
+[[nodiscard]] std::string gap_remark(const TrajectoryEvaluation& evaluation,
+                                     const EvaluationOptions& options, Duration interval);
 
 }  // namespace vergence::app

@@ -258,6 +258,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   json["frames"] = {{"read", totals.read}, {"posed", totals.ok + totals.degraded},
                     {"ok", totals.ok},     {"degraded", totals.degraded},
                     {"lost", totals.lost}, {"skipped", input.skipped}};
+  json["input"] = {{"assumptions", input.assumptions}};
   json["path_m"] = totals.path_m;
   json["timing_ms"] = timing_json(totals);
   json["metrics"] = metrics_json(input.evaluation);

@@ -61,7 +61,8 @@ struct SummaryInput {
       comparison{};                     // counters of the comparison with an INS
   std::optional<EarthFigures> earth{};  // with an INS
   std::optional<TruthFigures> truth{};
-  std::optional<TimeFigures> time{};  // none in a replay
+  std::vector<std::string> assumptions{};  // about the recording that was read
+  std::optional<TimeFigures> time{};       // none in a replay
 };
 
 /// What the metrics of summary.json are computed with: segments of 100–800 m (step 10), 10–50 m

@@ -7,32 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "app/runtime/terminal_text.hpp"
+
 namespace vergence::app::report {
 namespace {
-
-bool continues(std::string_view text, std::size_t at) {
-  return at < text.size() && (static_cast<unsigned char>(text[at]) & 0xc0U) == 0x80U;
-}
-
-/// Length of the well-formed UTF-8 character at the front; 0: none.
-std::size_t utf8_length(std::string_view text) {
-  const auto first = static_cast<unsigned char>(text[0]);
-  if (first < 0x80) return 1;
-  const std::size_t n = first >= 0xc2 && first < 0xe0   ? 2
-                        : first >= 0xe0 && first < 0xf0 ? 3
-                        : first >= 0xf0 && first < 0xf5 ? 4
-                                                        : 0;
-  for (std::size_t i = 1; i < n; ++i)
-    if (!continues(text, i)) return 0;
-  if (n < 3) return n;
-  const auto second = static_cast<unsigned char>(text[1]);
-  const bool overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
-  const bool surrogate = first == 0xed && second >= 0xa0;
-  const bool beyond = first == 0xf4 && second >= 0x90;
-  const bool nonce = first == 0xef && second == 0xbf &&
-                     static_cast<unsigned char>(text[2]) >= 0xbe;  // U+FFFE, U+FFFF are no XML
-  return overlong || surrogate || beyond || nonce ? 0 : n;
-}
 
 void append_escaped(std::string* out, std::string_view character) {
   switch (character[0]) {

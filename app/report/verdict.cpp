@@ -52,7 +52,7 @@ void judge_frames(const Session& s, const Analysis& a, const Usability& use, Fin
 }
 
 /// `broken`: outages broke the way.
-void judge_drift(const Analysis& a, bool broken, Findings* j) {
+void judge_drift(const Session& s, const Analysis& a, bool broken, Findings* j) {
   if (a.ins_unplaced) {
     j->find(Grade::care,
             "nothing says how far it drifted: the drive was not placed on the earth with its INS");
@@ -63,6 +63,12 @@ void judge_drift(const Analysis& a, bool broken, Findings* j) {
   }
   if (a.source == ErrorSource::none) {
     j->find(Grade::care, "nothing says how far it drifted: there was no reference");
+    // Two cameras alone cannot tell a wrong unit: everything is too long or too short alike.
+    if (s.calibration)
+      if (const std::string doubt = baseline_doubt(s.calibration->rig); !doubt.empty()) {
+        j->find(Grade::care, doubt);
+        j->advise("Compare the baseline with the rig: all lengths are wrong by as much as it is.");
+      }
     j->advise(
         "For a judgement of the drift record with an INS, or compare with a reference: vergence "
         "evaluate SESSION REFERENCE.");
@@ -164,14 +170,15 @@ Verdict judge(const Session& session, const Analysis& analysis) {
   judge_mistake(session, analysis, &j);
   judge_focal_length(session, &j);
   if (analysis.read > 0 || outages.empty()) judge_frames(session, analysis, use, &j);
-  if (analysis.source != ErrorSource::none) judge_drift(analysis, broken, &j);
+  if (analysis.source != ErrorSource::none) judge_drift(session, analysis, broken, &j);
   judge_calibration(session, use, &j);
   judge_lenses(session, analysis, &j);
   // Of a drive without a frame nothing else is to be asked.
   if (analysis.read > 0) judge_verification(session, analysis, use, &j);
   advise_on_events(session, &j);
   judge_session(session, analysis, &j);
-  if (analysis.source == ErrorSource::none && analysis.read > 0) judge_drift(analysis, broken, &j);
+  if (analysis.source == ErrorSource::none && analysis.read > 0)
+    judge_drift(session, analysis, broken, &j);
   advise_by_reasons(session, analysis, &j);
   Verdict v = j.verdict();
   for (const std::string& reason : v.reasons)

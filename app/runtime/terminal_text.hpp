@@ -26,8 +26,10 @@ struct Terminal {
   [[nodiscard]] std::string in(Ink ink, std::string_view text) const;
 };
 
-/// Whatever is not printable becomes a blank: texts of devices must not steer a terminal. UTF-8
-/// stays.
+/// Length of the well-formed UTF-8 character at the front of a text that is not empty; 0: none.
+[[nodiscard]] std::size_t utf8_length(std::string_view text);
+/// Whatever is not printable becomes a blank, and bytes that are no UTF-8 become question marks:
+/// texts of devices and files must not steer a terminal or spoil a JSON.
 [[nodiscard]] std::string harmless(std::string_view text);
 
 }  // namespace vergence::app

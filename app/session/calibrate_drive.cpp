@@ -30,6 +30,8 @@ ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
   const SignalGuard signals;
   Progress progress = Progress::on_stderr(r.quiet);
   for (const std::string& sentence : sequence.remarks) progress.say("vergence: " + sentence);
+  if (!sequence.assumptions.empty())
+    progress.say(fmt::format("vergence: assumed: {}", fmt::join(sequence.assumptions, "; ")));
   const DriveCalibration found = calibrate_with_progress(
       {sequence, c, 0, sequence.pairs.size(), {}, {}}, given, signals, &progress);
   if (!found.rig) {

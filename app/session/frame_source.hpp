@@ -69,6 +69,7 @@ struct SourceFacts {
   std::optional<SourceIns> ins{};
   Trajectory truth{};  // that came with a recording: what an estimate without INS is compared with
   std::vector<SourceRemark> remarks{};
+  std::vector<std::string> assumptions{};  // of a recording: what nobody said, a phrase each
   bool knows_truth = false;  // at the drive's end describe() holds its trajectory against it
   std::size_t image_bytes = 0, ring_bytes = 0;
   Duration frame_interval{};  // of a live drive, whose frames do not wait; zero: they do

@@ -14,8 +14,7 @@ namespace {
 /// Ours is one file: a pair or a folder of them is refused with the other formats.
 bool is_foreign(const std::string& in) {
   std::error_code ignored;
-  return !std::filesystem::is_regular_file(in, ignored) ||
-         calibration_format(in) != CalibrationFormat::vergence;
+  return !std::filesystem::is_regular_file(in, ignored) || !is_own_calibration(in);
 }
 
 }  // namespace
@@ -37,10 +36,7 @@ std::vector<double> parse_distortion(const std::string& text) {
 CalibrationFile read_given_calibration(const std::string& in, const CalibrationUse& use,
                                        const std::optional<ImageSize>& size,
                                        std::vector<std::string>* remarks) {
-  if (!is_foreign(in)) return read_calibration(in, use);
-  CalibrationFile file = read_any_calibration(in, size, remarks);
-  apply_use(use, &file.rig);
-  return file;
+  return read_any_calibration(in, size, remarks, use);
 }
 
 GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,

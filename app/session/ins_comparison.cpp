@@ -19,7 +19,8 @@ InsComparison::InsComparison(const ComparisonOptions& options, InsSource source,
 void InsComparison::add(const InsRecord& reading) noexcept {
   output_->post(reading);
   comparison_.add(reading.sample);
-  events_.note(reading.sample, comparison_.counters().jumps);
+  events_.note(reading.sample, comparison_.counters().jumps,
+               comparison_.counters().ins_contradicted > 0);
 }
 
 void InsComparison::add(const PoseSample& pose, float decode_ms) noexcept {
@@ -73,8 +74,11 @@ void InsComparison::measure_errors(const ComparedPose& pose) noexcept {
   e.horizontal_rms_m += across * across;
   e.horizontal_most_m = std::max(e.horizontal_most_m, across);
   e.horizontal_end_m = across;
-  e.up_rms_m += up * up;
-  e.up_end_m = up;
+  if (pose.height_known) {
+    ++heights_;
+    e.up_rms_m += up * up;
+    e.up_end_m = up;
+  }
   e.heading_rms_deg += turn * turn;
   e.heading_most_deg = std::max(e.heading_most_deg, std::abs(turn));
   e.heading_end_deg = turn;
@@ -88,9 +92,10 @@ EarthFigures InsComparison::earth(const std::string& mount_source) const {
   // The last step is still under way; alone it may be nothing but a standstill's noise.
   if (errors_.way_m > 0) figures.errors.way_m += beyond_;
   const double n = std::max(1.0, static_cast<double>(errors_.poses));
-  for (double* squares : {&figures.errors.horizontal_rms_m, &figures.errors.up_rms_m,
-                          &figures.errors.heading_rms_deg})
+  for (double* squares : {&figures.errors.horizontal_rms_m, &figures.errors.heading_rms_deg})
     *squares = std::sqrt(*squares / n);
+  figures.errors.up_rms_m =
+      std::sqrt(figures.errors.up_rms_m / std::max(1.0, static_cast<double>(heights_)));
   figures.T_ins_left = T_ins_left_;
   figures.mount_source = mount_source;
   return figures;
@@ -102,6 +107,7 @@ std::vector<std::pair<std::string, std::uint64_t>> InsComparison::counters() con
           {"ins_refused", k.ins_refused},
           {"ins_restarts", k.ins_restarts},
           {"ins_without_attitude", k.ins_without_attitude},
+          {"ins_contradicted", k.ins_contradicted},
           {"jumps", k.jumps},
           {"compared", k.compared},
           {"without_ins", k.without_ins},

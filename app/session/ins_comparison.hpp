@@ -61,6 +61,7 @@ class InsComparison {
   std::uint32_t placement_revision_ = 0;
   std::vector<PlacementRecord> placements_;  // its memory is taken at construction
   EarthErrors errors_{};                     // means and roots are squares' sums until earth()
+  std::uint64_t heights_ = 0;                // poses whose error upwards is in errors_
   bool on_way_ = false;                      // last_place_ means something
   Vec2 last_place_ = Vec2::Zero();           // where the newest whole step of the way ended
   double beyond_ = 0;                        // m from there to the newest place

@@ -9,8 +9,14 @@
 
 namespace vergence::app {
 
-void InsEvents::note(const InsSample& sample, std::uint64_t jumps) noexcept {
+void InsEvents::note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept {
   note_attitude(sample);
+  if (contradicted && !std::exchange(contradiction_noted_, true))
+    event_log_.log(
+        sample.stamp, "ins_attitude",
+        "the INS's attitude is more than 30 degrees off the way that is driven: it is not "
+        "used while it is; check its filter, and ins.boresight_deg",
+        true);
   if (jumps == jumps_) return;
   jumps_ = jumps;
   event_log_.log(

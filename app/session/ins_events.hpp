@@ -17,8 +17,9 @@ class InsEvents {
   InsEvents(InsSource source, double scale_stretch_m, EventLog& event_log) noexcept
       : source_(source), scale_stretch_m_(scale_stretch_m), event_log_(event_log) {}
 
-  /// A reading, after the comparison has counted `jumps` of the position.
-  void note(const InsSample& sample, std::uint64_t jumps) noexcept;
+  /// A reading, after the comparison has counted `jumps` of the position. `contradicted`: an
+  /// attitude did not go with the way driven.
+  void note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept;
   /// A pose that has met its readings, the `matches`-th that found any.
   void note(const ComparedPose& pose, std::uint64_t matches) noexcept;
   void note(const Placement& placement, Stamp stamp) noexcept;
@@ -31,7 +32,7 @@ class InsEvents {
   const InsSource source_;
   const double scale_stretch_m_;
   EventLog& event_log_;
-  bool attitude_noted_ = false, scale_disagrees_ = false;
+  bool attitude_noted_ = false, contradiction_noted_ = false, scale_disagrees_ = false;
   std::uint64_t jumps_ = 0;
   InsMatch last_match_ = InsMatch::ok;
   std::uint64_t match_run_ = 0;  // poses in a row with that

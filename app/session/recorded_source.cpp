@@ -68,6 +68,19 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
   for (const std::vector<std::string>* remarks : {&sequence_.remarks, &ins_.remarks})
     for (const std::string& sentence : *remarks)
       facts_.remarks.push_back({sentence, "data", !request.session.quiet});
+  facts_.assumptions = sequence_.assumptions;
+  if (!facts_.assumptions.empty())
+    facts_.remarks.push_back({fmt::format("assumed: {}", fmt::join(facts_.assumptions, "; ")),
+                              "data", !request.session.quiet});
+  if (request.from_scratch || request.known) {
+    // The length is the user's own, and where the right camera sits is to be found.
+  } else {
+    const RigCalibration& rig = facts_.begin.file.rig;
+    facts_.remarks.push_back({baseline_sentence(rig) + " (" + facts_.begin.source + ")", nullptr,
+                              !request.session.quiet});
+    if (std::string doubt = baseline_doubt(rig); !doubt.empty())
+      facts_.remarks.push_back({std::move(doubt), "calibration", !request.session.quiet});
+  }
   facts_.image_bytes = frames_arena_.capacity();
   facts_.ring_bytes = sizeof(FrameDecoder);
 }

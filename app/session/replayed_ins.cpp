@@ -1,12 +1,15 @@
 #include "app/session/replayed_ins.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "app/devices/comparison_settings.hpp"
+#include "core/comparison/attitude_check.hpp"
 
 namespace vergence::app {
 namespace {
@@ -49,6 +52,44 @@ bool keep_around(const StereoSequence& sequence, std::size_t first, std::size_t 
   return !readings->empty();
 }
 
+/// Of a recording the whole way is known before the first frame: an attitude that contradicts most
+/// of it is taken out from the beginning, and its heading is the course over ground. → how many
+/// readings
+std::size_t drop_contradicted(const ComparisonOptions& options,
+                              std::vector<RecordedReading>* readings) {
+  AttitudeCheck check;
+  std::optional<LocalTangentPlane> plane;
+  std::vector<std::optional<double>> courses;
+  bool contradicted = false;
+  for (const RecordedReading& r : *readings) {
+    const InsSample& s = r.sample;
+    const bool fixed = s.fix == FixStatus::fix_2d || s.fix == FixStatus::fix_3d;
+    if (fixed && s.attitude_valid && s.position.plausible()) {
+      if (!plane) plane.emplace(s.position);
+      const auto& [x, y, z, w] = s.q_enu_ins;
+      const Vec3 view = Eigen::Quaterniond(w, x, y, z).normalized() * options.T_ins_left.R.col(2);
+      check.add(plane->to_enu(s.position).head<2>(),
+                s.position_sigma > 0 ? s.position_sigma : options.position_sigma_m,
+                std::atan2(view.y(), view.x()));
+    }
+    contradicted = contradicted || check.contradicted();
+    courses.push_back(check.course());
+  }
+  if (!contradicted || !check.mostly_off()) return 0;
+  const auto first =
+      std::find_if(courses.begin(), courses.end(), [](const auto& c) { return c.has_value(); });
+  std::size_t dropped = 0;
+  for (std::size_t i = 0; i < readings->size(); ++i) {
+    InsSample& s = (*readings)[i].sample;
+    if (!s.attitude_valid) continue;
+    s.attitude_valid = false;
+    s.heading_source = HeadingSource::course;
+    s.yaw_enu = courses[i].value_or(first->value_or(0));
+    ++dropped;
+  }
+  return dropped;
+}
+
 std::string mount_sentence(const Transform& T_ins_left, const std::string& source) {
   const Vec3 turn = boresight_of(T_ins_left.R) * (180 / std::numbers::pi);
   const Vec3& arm = T_ins_left.t;
@@ -89,6 +130,12 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
     if (out.options.heading_sigma_rad == 0) out.options.heading_sigma_rad = kPublishedHeading;
     out.mount_source = recorded.mount_source;
   }
+  if (const std::size_t dropped = drop_contradicted(out.options, &out.readings); dropped > 0)
+    out.remarks.push_back(
+        fmt::format("the INS's attitude is not used, {} readings: it is more than 30 degrees off "
+                    "the course over "
+                    "ground for 50 m or more; heading is the course",
+                    dropped));
   out.remarks.push_back(mount_sentence(out.options.T_ins_left, out.mount_source));
   return out;
 }

@@ -292,6 +292,7 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
   for (const MemoryRow& row : memory()) input.memory.emplace_back(row.name, row.bytes);
   input.resident = named(resident_);
   input.configuration_hash = configuration_hash(configuration_);
+  input.assumptions = facts_.assumptions;
   source_.describe(totals, loop_.estimator(), &input);
   for (SessionObserver* observer : observers_)
     for (auto& counter : observer->counters()) input.devices.push_back(std::move(counter));

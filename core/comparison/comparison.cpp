@@ -4,6 +4,7 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 namespace vergence {
 namespace {
@@ -93,6 +94,8 @@ void Comparison::take(const ComparedPose& c, const InsHistory::Reference& refere
     builder_.add({c.pose.stamp, T_world_left.t, T_enu_left.t,
                   T_enu_left.R * T_world_left.R.transpose(), reference.sigmas.position,
                   reference.sigmas.height, reference.sigmas.tilt, options_.heading_sigma_rad});
+  // A height that begins or ends to be measured is no way.
+  if (std::exchange(flat_, reference.flat) != reference.flat) ratio_.interrupt();
   ratio_.add(T_world_left.t, T_enu_left.t, reference.sigmas.position, options_);
 }
 
@@ -114,6 +117,7 @@ bool Comparison::next(ComparedPose* out) noexcept {
     c.reference = on_earth(reference.T_enu_left);
     c.ins_stamp_error = reference.stamp_error;
     c.ins_position_sigma = reference.sigmas.position;
+    c.height_known = !reference.flat;
   } else {
     ++counters_.without_ins;
   }
@@ -144,6 +148,7 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.compared = c.placed && c.ins_valid;
   if (c.compared) {
     c.error_enu = c.ours.T_enu_left.t - c.reference.T_enu_left.t;
+    if (!c.height_known) c.error_enu.z() = 0;
     c.error_yaw = wrapped(c.ours.yaw - c.reference.yaw);
     ++counters_.compared;
   }

@@ -89,6 +89,7 @@ struct ComparedPose {
   EarthPose reference{};          // the INS brought to the left camera and to the frame's stamp
   Duration ins_stamp_error{};     // the larger of the two samples' around the frame
   double ins_position_sigma = 0;  // m, horizontal, each axis: likewise
+  bool height_known = false;      // the INS measured its height; else error_enu.z() is 0
   Vec3 error_enu = Vec3::Zero();  // m, ours − INS
   double error_yaw = 0;           // rad, in (−π, π], counter-clockwise from above positive
   /// Ours / INS over the newest scale_stretch_m that have both; 0: not yet that far. It and what
@@ -104,6 +105,7 @@ struct ComparisonCounters {
   std::uint64_t ins_restarts =
       0;  // the INS's stamps went back for good: its history was begun again
   std::uint64_t ins_without_attitude = 0;  // compared by position and heading, taken as level
+  std::uint64_t ins_contradicted = 0;  // likewise: their attitude did not go with the way driven
   std::uint64_t jumps = 0;
   std::uint64_t compared = 0;
   std::uint64_t without_ins = 0;  // poses that went out with an InsMatch other than ok
@@ -176,6 +178,7 @@ class Comparison {
   std::array<PoseSample, kPending> pending_{};
   std::uint64_t pending_begin_ = 0, pending_end_ = 0;
   bool finishing_ = false;
+  bool flat_ = false;       // the newest reference had no height
   bool restarted_ = false;  // the newest pose was of a restarted scene
 };
 

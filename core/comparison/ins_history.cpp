@@ -15,7 +15,9 @@ constexpr double kFastest = 60.0;  // m/s: no vehicle that carries this rig
 constexpr Duration kBackForGood = Duration::seconds(1);
 constexpr int kLeastBack = 3;  // samples: two stamps are a mistake as soon as a clock
 constexpr double kQuaternionLength = 0.1;
-constexpr double kLevelSigma = 0.05;  // rad: slopes and suspension, where nobody measures tilt
+constexpr double kHorizontal = 0.5;      // of a unit vector: less says little of a heading
+constexpr double kUnknownHeight = 1000;  // m: sigma of a height that is not measured
+constexpr double kLevelSigma = 0.05;     // rad: slopes and suspension, where nobody measures tilt
 
 bool positive(double v) noexcept { return std::isfinite(v) && v > 0; }
 
@@ -67,33 +69,61 @@ void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {
   const bool fixed = sample.fix == FixStatus::fix_2d || sample.fix == FixStatus::fix_3d;
   Mat3 R_local_ins;
   if (fixed && !sample.position.plausible()) ++counters_.ins_refused;
-  const bool attitude = attitude_of(sample, &R_local_ins);
+  bool attitude = attitude_of(sample, &R_local_ins);
+  if (fixed && attitude && sample.position.plausible()) attitude = agrees(sample, R_local_ins);
   if (!attitude) {
     ++counters_.ins_without_attitude;
     if (sample.heading_source != HeadingSource::none && std::isfinite(sample.yaw_enu))
       yaw_ = sample.yaw_enu;
+    if (sample.attitude_valid && attitude_check_.contradicted()) yaw_ = attitude_check_.course();
     R_local_ins = level_at(yaw_.value_or(0));  // at a standstill the last heading holds
   }
   if (!fixed || !sample.position.plausible() || !(attitude || yaw_)) return;
-  if (!has_origin_) {
-    plane_ = LocalTangentPlane(sample.position);
-    has_origin_ = true;
-  }
+  begin_plane(sample.position);
   r->valid = true;
-  r->p_enu_ins = plane_.to_enu(sample.position);
-  r->R_enu_ins = plane_.rotation_from(sample.position) * R_local_ins;
+  r->flat = sample.fix == FixStatus::fix_2d;
+  // What a receiver writes as the height of a fix in two dimensions may be 0 or years old.
+  Geodetic position = sample.position;
+  if (r->flat)
+    position.height_m = height_.value_or(plane_.origin().height_m);
+  else
+    height_ = position.height_m;
+  r->p_enu_ins = plane_.to_enu(position);
+  r->R_enu_ins = plane_.rotation_from(position) * R_local_ins;
   r->sigmas.position = or_default(sample.position_sigma, options_.position_sigma_m);
-  r->sigmas.height = or_default(sample.height_sigma, options_.height_sigma_m);
+  r->sigmas.height =
+      r->flat ? kUnknownHeight : or_default(sample.height_sigma, options_.height_sigma_m);
   r->sigmas.tilt = attitude ? or_default(sample.tilt_sigma, options_.tilt_sigma_rad) : kLevelSigma;
+}
+
+void InsHistory::begin_plane(const Geodetic& position) noexcept {
+  if (has_origin_) return;
+  plane_ = LocalTangentPlane(position);
+  has_origin_ = true;
+}
+
+/// Whether the attitude goes with the way that is driven.
+bool InsHistory::agrees(const InsSample& sample, const Mat3& R_local_ins) noexcept {
+  begin_plane(sample.position);
+  const Vec3 view = R_local_ins * options_.T_ins_left.R.col(2);
+  if (view.head<2>().norm() < kHorizontal) return true;  // a view up or down has no heading
+  attitude_check_.add(plane_.to_enu(sample.position).head<2>(),
+                      or_default(sample.position_sigma, options_.position_sigma_m),
+                      std::atan2(view.y(), view.x()));
+  if (!attitude_check_.contradicted()) return true;
+  ++counters_.ins_contradicted;
+  return false;
 }
 
 /// A receiver often has no fix for a reading or more where its position leaps: the last place it
 /// had counts, and a vehicle may have driven since.
 bool InsHistory::leapt(const Reading& r) noexcept {
-  const std::optional<Fix> before = std::exchange(last_fix_, Fix{r.stamp, r.p_enu_ins});
+  const std::optional<Fix> before = std::exchange(last_fix_, Fix{r.stamp, r.p_enu_ins, r.flat});
   if (!before) return false;
   const double farthest = options_.jump_m + kFastest * (r.stamp - before->stamp).to_seconds();
-  if (!((r.p_enu_ins - before->p_enu_ins).norm() > farthest)) return false;
+  Vec3 step = r.p_enu_ins - before->p_enu_ins;
+  if (r.flat || before->flat) step.z() = 0;
+  if (!(step.norm() > farthest)) return false;
   ++counters_.jumps;
   leaps_ = leaps_ ? Leaps{std::min(leaps_->first, r.stamp), std::max(leaps_->last, r.stamp)}
                   : Leaps{r.stamp, r.stamp};
@@ -146,6 +176,7 @@ InsMatch InsHistory::reference_at(Stamp stamp, Reference* out) const noexcept {
   const Transform T_enu_ins =
       interpolate({a.R_enu_ins, a.p_enu_ins}, {b.R_enu_ins, b.p_enu_ins}, s);
   out->T_enu_left = T_enu_ins * options_.T_ins_left;
+  out->flat = a.flat || b.flat;
   out->stamp_error = std::max(a.stamp_error, b.stamp_error);
   out->sigmas.position = std::max(a.sigmas.position, b.sigmas.position);
   out->sigmas.height = std::max(a.sigmas.height, b.sigmas.height);

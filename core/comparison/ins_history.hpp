@@ -2,6 +2,7 @@
 #include <optional>
 #include <span>
 
+#include "core/comparison/attitude_check.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/se3.hpp"
 #include "core/memory/arena.hpp"
@@ -27,6 +28,7 @@ class InsHistory {
     Transform T_enu_left{};
     Sigmas sigmas{};         // the larger of both
     Duration stamp_error{};  // the larger of both
+    bool flat = false;       // one of them has no height: its height is the last measured one
   };
 
   /// Counts refused samples and jumps in `counters`, which outlive this, as `options` do.
@@ -53,6 +55,7 @@ class InsHistory {
     Duration stamp_error{};
     bool valid = false;
     bool jumped = false;  // against the last fix before
+    bool flat = false;    // a fix in two dimensions
     Vec3 p_enu_ins = Vec3::Zero();
     Mat3 R_enu_ins = Mat3::Identity();
     Sigmas sigmas{};
@@ -60,6 +63,7 @@ class InsHistory {
   struct Fix {
     Stamp stamp{};
     Vec3 p_enu_ins = Vec3::Zero();
+    bool flat = false;
   };
   struct Refused {  // in a row for their stamps, which ascend among themselves
     int count = 0;
@@ -78,6 +82,8 @@ class InsHistory {
   [[nodiscard]] bool back_for_good(Stamp stamp) noexcept;
   /// Whether a valid reading is farther from the last one than a vehicle drives; counted.
   [[nodiscard]] bool leapt(const Reading& r) noexcept;
+  void begin_plane(const Geodetic& position) noexcept;
+  [[nodiscard]] bool agrees(const InsSample& sample, const Mat3& R_local_ins) noexcept;
   /// The sample's place in enu, if it has one.
   void locate(const InsSample& sample, Reading* r) noexcept;
 
@@ -88,9 +94,11 @@ class InsHistory {
   std::span<Reading> readings_;
   std::uint64_t begin_ = 0, end_ = 0;  // numbers of the readings held
   Refused refused_{};
-  std::optional<Fix> last_fix_;  // since the INS began or began anew
-  std::optional<double> yaw_;    // rad, the newest of a sample without attitude
-  std::optional<Leaps> leaps_;   // that nobody has taken
+  std::optional<Fix> last_fix_;   // since the INS began or began anew
+  std::optional<double> yaw_;     // rad, the newest of a sample without attitude
+  std::optional<double> height_;  // m, the newest that was measured
+  AttitudeCheck attitude_check_;
+  std::optional<Leaps> leaps_;  // that nobody has taken
 };
 
 }  // namespace vergence

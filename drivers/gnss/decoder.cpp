@@ -20,9 +20,11 @@ constexpr Duration kFresh = Duration::milliseconds(1100);  // VTG and HDT, at 1 
 unsigned bit(Type type) noexcept { return 1U << static_cast<unsigned>(type); }
 
 FixStatus fix_of(const Sentence& gga, bool has_height) noexcept {
-  constexpr std::uint8_t kFirstFix = 1, kLastFix = 5, kEstimated = 6;
+  // NovAtel's 9 is a fix with corrections of satellites.
+  constexpr std::uint8_t kFirstFix = 1, kLastFix = 5, kEstimated = 6, kOfNovatel = 9;
   if (gga.quality == kEstimated) return FixStatus::dead_reckoning;
-  if (gga.quality < kFirstFix || gga.quality > kLastFix) return FixStatus::none;
+  if (gga.quality < kFirstFix || (gga.quality > kLastFix && gga.quality != kOfNovatel))
+    return FixStatus::none;
   return has_height ? FixStatus::fix_3d : FixStatus::fix_2d;
 }
 

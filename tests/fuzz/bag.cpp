@@ -1,5 +1,5 @@
-/// Any bytes as a bag, of ROS 1 if they begin like one, else of ROS 2. Entry point of libFuzzer;
-/// the unit tests call it with seeded mutations.
+/// Any bytes as a bag, of ROS 1 or in SQLite if they begin like one, else MCAP. Entry point of
+/// libFuzzer; the unit tests call it with seeded mutations.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -43,9 +43,11 @@ void check(const StereoSequence& s) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::vector<char> bytes(
       data, data + size);  // exactly so many: a read behind the last one is found by ASan
-  const bool mcap = size == 0 || data[0] != '#';
+  const auto format = size > 0 && data[0] == '#'   ? detail::BagFormat::rosbag
+                      : size > 0 && data[0] == 'S' ? detail::BagFormat::sqlite
+                                                   : detail::BagFormat::mcap;
   for (const bool given : {true, false}) try {
-      check(test::bag_in_memory(mcap, bytes, given));
+      check(test::bag_in_memory(format, bytes, given));
     } catch (const InputError&) {
     }
   return 0;

@@ -1,14 +1,13 @@
-/// Any bytes as a calibration: the project's own, Kalibr's, one of ROS or of OpenCV. The byte 0x1e
+/// Any bytes as a calibration, the project's own or that of another program. The byte 0x1e
 /// ends the first of two files. Entry point of libFuzzer.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <string>
 #include <string_view>
 #include <vector>
 
-#include <yaml-cpp/yaml.h>  // a YamlFile is copied here
-
-#include "app/foreign_calibration/foreign_formats.hpp"
+#include "app/foreign_calibration/foreign_calibration.hpp"
 #include "app/runtime/errors.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
@@ -51,14 +50,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return file;
   });
   probe([&] { return parse_calibration(left, "a.yaml", {.length_only = true, .baseline = 0.5}); });
-  probe([&] { return read_kalibr(YamlFile::parse(left, "a.yaml"), &remarks); });
-  probe([&] {
-    return read_ros(YamlFile::parse(left, "a.yaml"), YamlFile::parse(right, "b.yaml"), &remarks);
-  });
-  probe([&] {
-    const std::vector<YamlFile> files{parse_opencv_yaml(left, "a.yaml"),
-                                      parse_opencv_yaml(right, "b.yaml")};
-    return read_opencv(files, ImageSize{640, 480}, &remarks);
-  });
+  const std::vector<CalibrationText> one{{"a.yaml", left}},
+      two{{"a.yaml", left}, {"b.yaml", right}};
+  for (const std::vector<CalibrationText>& files : {one, two}) {
+    probe([&] { return parse_any_calibration(files, ImageSize{640, 480}, &remarks); });
+    probe([&] {
+      return parse_any_calibration(files, std::nullopt, &remarks,
+                                   {.length_only = true, .baseline = 0.5});
+    });
+  }
   return 0;
 }

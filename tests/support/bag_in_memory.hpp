@@ -7,21 +7,34 @@
 #include <vector>
 
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/sqlite_bag.hpp"
 
 namespace vergence::test {
 
 /// The drive of a bag of one file that is not on a disk; `bytes` outlive it. `given`: without a
 /// calibration.
-[[nodiscard]] inline app::StereoSequence bag_in_memory(bool mcap, std::span<const char> bytes,
+[[nodiscard]] inline app::StereoSequence bag_in_memory(app::detail::BagFormat format,
+                                                       std::span<const char> bytes,
                                                        bool given = true,
                                                        const app::BagTopics& topics = {}) {
   using namespace app::detail;
-  const BagFormat format = mcap ? BagFormat::mcap : BagFormat::rosbag;
-  const std::string name = mcap ? "a.mcap" : "a.bag";
+  const std::string name = "a.bag";
+  const std::span view(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
   std::vector<BagFile> files;
-  files.push_back({name, std::make_unique<MemoryBytes>(std::span(
-                             reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()))});
+  if (format == BagFormat::sqlite)
+    files.push_back(
+        {name, std::make_unique<SqliteBag>(std::vector<std::uint8_t>(view.begin(), view.end()))});
+  else
+    files.push_back({name, std::make_unique<MemoryBytes>(view)});
   return sequence_of(name, index_bag(format, name, std::move(files)), given, topics);
+}
+
+/// The same; `mcap`: else a rosbag.
+[[nodiscard]] inline app::StereoSequence bag_in_memory(bool mcap, std::span<const char> bytes,
+                                                       bool given = true,
+                                                       const app::BagTopics& topics = {}) {
+  using app::detail::BagFormat;
+  return bag_in_memory(mcap ? BagFormat::mcap : BagFormat::rosbag, bytes, given, topics);
 }
 
 }  // namespace vergence::test

@@ -15,12 +15,43 @@ std::uint16_t sample_at(const std::uint8_t* row, int x, bool big_endian) noexcep
 }
 
 /// Luminance of ITU-R BT.601 in 8 bits, as JPEG has it. `red`, `blue`: place of the colours in a
-/// pixel.
-void colour_to_grey(const std::uint8_t* row, int width, std::size_t red, std::size_t blue,
-                    std::uint8_t* out) noexcept {
-  for (int x = 0; x < width; ++x, row += 3)
+/// pixel of `bytes`.
+void colour_to_grey(const std::uint8_t* row, int width, std::size_t bytes, std::size_t red,
+                    std::size_t blue, std::uint8_t* out) noexcept {
+  for (int x = 0; x < width; ++x, row += bytes)
     out[x] =
         static_cast<std::uint8_t>((77U * row[red] + 150U * row[1] + 29U * row[blue] + 128U) >> 8U);
+}
+
+/// One row of a layout that needs no others.
+void row_to_grey(const RosImage& image, const std::uint8_t* in, int deep_bits,
+                 std::uint8_t* out) noexcept {
+  const int width = image.size.width;
+  switch (image.layout) {
+    case PixelLayout::grey16:
+    case PixelLayout::bayer16:
+      for (int x = 0; x < width; ++x)
+        out[x] = narrowed(sample_at(in, x, image.big_endian), deep_bits);
+      return;
+    case PixelLayout::rgb:
+      return colour_to_grey(in, width, 3, 0, 2, out);
+    case PixelLayout::bgr:
+      return colour_to_grey(in, width, 3, 2, 0, out);
+    case PixelLayout::rgba:
+      return colour_to_grey(in, width, 4, 0, 2, out);
+    case PixelLayout::bgra:
+      return colour_to_grey(in, width, 4, 2, 0, out);
+    case PixelLayout::luma_first:
+    case PixelLayout::luma_second:
+      in += image.layout == PixelLayout::luma_second ? 1 : 0;
+      for (int x = 0; x < width; ++x) out[x] = in[std::size_t{2} * static_cast<std::size_t>(x)];
+      return;
+    case PixelLayout::grey:
+    case PixelLayout::bayer:
+    case PixelLayout::encoded:
+    case PixelLayout::encoded_bayer:
+      std::copy_n(in, width, out);
+  }
 }
 
 }  // namespace
@@ -89,10 +120,12 @@ std::optional<std::uint16_t> BagImages::peak(const std::string& name,
   const BagImage* entry = find(name, &camera);
   if (entry == nullptr) return std::uint16_t{0};
   const RosImage& image = entry->image;
-  if (image.layout != PixelLayout::encoded && image.layout != PixelLayout::grey16)
+  const bool encoded =
+      image.layout == PixelLayout::encoded || image.layout == PixelLayout::encoded_bayer;
+  if (!encoded && image.layout != PixelLayout::grey16 && image.layout != PixelLayout::bayer16)
     return std::nullopt;
   if (!load(*entry, work)) return std::uint16_t{0};
-  if (image.layout == PixelLayout::encoded) return peak_of_deep_image(*work);
+  if (encoded) return peak_of_deep_image(*work);
   std::uint16_t peak = 0;
   const std::uint8_t* row = work->data();
   for (int y = 0; y < image.size.height; ++y, row += image.step)
@@ -111,29 +144,29 @@ ImageFileStatus BagImages::decode(const std::string& name, ImageSize size, std::
   if (image.size != size) return ImageFileStatus::wrong_size;
   if (!load(*entry, work)) return ImageFileStatus::unreadable;
   const std::uint8_t* in = work->data();
-  switch (image.layout) {
-    case PixelLayout::encoded:
-      return decode_grey(*work, size, out, stride, deep_bits);
-    case PixelLayout::bayer:
-      bayer_to_grey(in, image.step, size.width, size.height, out,
-                    static_cast<std::ptrdiff_t>(stride));
-      return ImageFileStatus::ok;
-    case PixelLayout::grey:
-    case PixelLayout::grey16:
-    case PixelLayout::rgb:
-    case PixelLayout::bgr:
-      break;
+  const auto width = static_cast<std::size_t>(size.width);
+  const auto to_grey = [&](const std::uint8_t* mosaic, std::size_t step) {
+    bayer_to_grey(mosaic, static_cast<std::ptrdiff_t>(step), size.width, size.height, out,
+                  static_cast<std::ptrdiff_t>(stride));
+  };
+  if (image.layout == PixelLayout::encoded) return decode_grey(*work, size, out, stride, deep_bits);
+  if (image.layout == PixelLayout::bayer) {
+    to_grey(in, image.step);
+    return ImageFileStatus::ok;
   }
-  for (int y = 0; y < size.height; ++y, in += image.step, out += stride) {
-    if (image.layout == PixelLayout::grey)
-      std::copy_n(in, size.width, out);
-    else if (image.layout == PixelLayout::grey16)
-      for (int x = 0; x < size.width; ++x)
-        out[x] = narrowed(sample_at(in, x, image.big_endian), deep_bits);
-    else
-      colour_to_grey(in, size.width, image.layout == PixelLayout::rgb ? 0 : 2,
-                     image.layout == PixelLayout::rgb ? 2 : 0, out);
+  const bool mosaic =
+      image.layout == PixelLayout::encoded_bayer || image.layout == PixelLayout::bayer16;
+  std::vector<std::uint8_t> room(mosaic ? width * static_cast<std::size_t>(size.height) : 0);
+  if (image.layout == PixelLayout::encoded_bayer) {
+    if (const auto status = decode_grey(*work, size, room.data(), width, deep_bits);
+        status != ImageFileStatus::ok)
+      return status;
+  } else {
+    std::uint8_t* to = mosaic ? room.data() : out;
+    for (int y = 0; y < size.height; ++y, in += image.step, to += mosaic ? width : stride)
+      row_to_grey(image, in, deep_bits, to);
   }
+  if (mosaic) to_grey(room.data(), width);
   return ImageFileStatus::ok;
 }
 

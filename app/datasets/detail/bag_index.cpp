@@ -1,6 +1,9 @@
 #include "app/datasets/detail/bag_index.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <span>
 #include <system_error>
 #include <type_traits>
 
@@ -9,6 +12,7 @@
 #include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/jpeg.hpp"
 #include "app/datasets/detail/name_order.hpp"
+#include "app/datasets/detail/sqlite_bag.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/text_file.hpp"
@@ -24,10 +28,27 @@ constexpr std::size_t kMostImages =
 constexpr std::size_t kMostAttitudes = 8'000'000;  // of all topics: five hours at 400 Hz, 460 MB
 constexpr std::size_t kMostBytes = 65536;          // of a CameraInfo and of a reading
 
+struct Container {
+  BagFormat format;
+  SequenceFormat sequence;
+  const char* ending;
+  const char* beginning;
+};
+constexpr std::array kContainers{
+    Container{BagFormat::mcap, SequenceFormat::mcap, ".mcap",
+              "an MCAP file (offset 0: 89 4D 43 41 50 30 0D 0A)"},
+    Container{BagFormat::rosbag, SequenceFormat::rosbag, ".bag",
+              "a ROS 1 bag of version 2.0 (offset 0: #ROSBAG V2.0)"},
+    Container{BagFormat::sqlite, SequenceFormat::db3, ".db3",
+              "an SQLite file of rosbag2, with the tables topics and messages"}};
+
+const Container& container_of(BagFormat format) {
+  return kContainers[static_cast<std::size_t>(format)];
+}
+
 std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
-  const std::string ending = format == BagFormat::mcap ? ".mcap" : ".bag";
-  const SequenceFormat wanted =
-      format == BagFormat::mcap ? SequenceFormat::mcap : SequenceFormat::rosbag;
+  const Container& container = container_of(format);
+  const std::string ending = container.ending;
   std::error_code error;
   if (!fs::is_directory(bag, error)) {
     if (!fs::exists(bag, error))
@@ -36,7 +57,7 @@ std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
   }
   std::vector<fs::path> files;
   for (fs::directory_iterator it(bag, error), end; !error && it != end; it.increment(error))
-    if (bag_format(it->path()) == wanted) files.push_back(it->path());
+    if (bag_format(it->path()) == container.sequence) files.push_back(it->path());
   if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "): check its permissions");
   if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
   if (files.size() > kMostFiles)
@@ -89,16 +110,16 @@ class Indexer {
     const BagFile& file = bag_.files[file_];
     const auto scan = scan_bag(bag_.format, *file.bytes, [this](const BagMessage& m) { take(m); });
     if (!scan)
-      refuse(path_, 0,
-             fmt::format("{} does not begin as {} does", file.name,
-                         bag_.format == BagFormat::mcap
-                             ? "an MCAP file (offset 0: 89 4D 43 41 50 30 0D 0A)"
-                             : "a ROS 1 bag of version 2.0 (offset 0: #ROSBAG V2.0)"));
+      refuse(path_, 0, fmt::format("{} is not {}", file.name, container_of(bag_.format).beginning));
     remark(file.name, *scan);
   }
 
   void take(const BagMessage& message) {
+    if (message.channel->encoding == MessageEncoding::other && bag_.unread.empty())
+      bag_.unread = message.channel->topic + " of " + message.channel->type;
     if (message.channel->encoding == MessageEncoding::other) return;
+    if (bag_.unread.empty() && message.channel->type.find('/') == std::string::npos)
+      bag_.unread = message.channel->topic + " of " + message.channel->type;
     const std::string &type = message.channel->type, &topic = message.channel->topic;
     if (type == "sensor_msgs/Image") return take_image(message, false);
     if (type == "sensor_msgs/CompressedImage") return take_image(message, true);
@@ -115,18 +136,33 @@ class Indexer {
     ImageTopic& topic = bag_.images[message.channel->topic];
     const std::vector<std::uint8_t> head =
         first_bytes(message, compressed ? kJpegHead : kRosImageHead);
+    refuse_packed(head);
     const auto read = compressed ? read_ros_compressed_image : read_ros_image;
-    const auto image = read(head, message.place.size, message.channel->encoding);
+    std::string encoding;
+    const auto image = read(head, message.place.size, message.channel->encoding, &encoding);
     const bool other_size =
         image && !topic.images.empty() && image->size != topic.images.front().image.size;
     if (image && !other_size) {
       if (++images_ > kMostImages)
         refuse(path_, 0, fmt::format("brings more than {} images; cut the bag", kMostImages));
-      topic.images.push_back({*image, message.place, static_cast<std::uint32_t>(file_)});
+      topic.images.push_back(
+          {*image, message.log_time, message.place, static_cast<std::uint32_t>(file_)});
       return;
     }
     if (topic.left_out.first.empty()) topic.left_out.first = where(message.place, file_);
+    if (!image && topic.left_out.unreadable == 0) topic.left_out.encoding = encoding;
     ++(image ? topic.left_out.other_size : topic.left_out.unreadable);
+  }
+
+  /// Recorders may compress message by message, which leaves nothing of a message's own head.
+  void refuse_packed(std::span<const std::uint8_t> head) const {
+    constexpr std::array<std::uint8_t, 4> kZstd{0x28, 0xB5, 0x2F, 0xFD};
+    if (head.size() >= kZstd.size() && std::equal(kZstd.begin(), kZstd.end(), head.begin()))
+      refuse(
+          path_, 0,
+          "has messages that are compressed one by one (compression_mode: MESSAGE), which is not "
+          "read: unpack them with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml has "
+          "`output_bags: [{uri: BAG_PLAIN, storage_id: mcap, all_topics: true}]`");
   }
 
   void take_info(const BagMessage& message) {
@@ -153,8 +189,32 @@ class Indexer {
     topic->readings.push_back(*reading);
   }
 
+  /// Drivers that set no stamp leave 0: the time of recording less the topic's usual delay.
+  static void replace_zero_stamps(ImageTopic* topic) {
+    std::vector<std::int64_t> delays;
+    for (const BagImage& image : topic->images)
+      if (image.image.stamp.ns() != 0)
+        if (std::int64_t delay = 0;
+            !__builtin_sub_overflow(image.log_time, image.image.stamp.ns(), &delay))
+          delays.push_back(delay);
+    std::int64_t usual = 0;
+    constexpr std::int64_t kLongestDelay =
+        10'000'000'000;  // ns: else the clocks are different ones
+    if (!delays.empty()) {
+      const auto middle = delays.begin() + static_cast<std::ptrdiff_t>(delays.size() / 2);
+      std::nth_element(delays.begin(), middle, delays.end());
+      if (std::abs(*middle) < kLongestDelay) usual = *middle;
+    }
+    for (BagImage& image : topic->images) {
+      if (image.image.stamp.ns() != 0 || image.log_time <= kLongestDelay) continue;
+      image.image.stamp = Stamp(image.log_time - usual);
+      ++topic->unstamped;
+    }
+  }
+
   /// Leaves out the images whose stamps do not go forward.
   void put_in_order(ImageTopic* topic) {
+    replace_zero_stamps(topic);
     std::vector<Stamp> stamps;
     for (const BagImage& image : topic->images) stamps.push_back(image.image.stamp);
     const std::vector<std::size_t> kept = ascending(stamps);
@@ -198,7 +258,10 @@ class Indexer {
 std::vector<BagFile> open_bag_files(BagFormat format, const fs::path& path) {
   std::vector<BagFile> files;
   for (const fs::path& file : files_of(format, path))
-    files.push_back({file.filename().string(), std::make_unique<FileBytes>(file)});
+    files.push_back({file.filename().string(),
+                     format == BagFormat::sqlite
+                         ? std::unique_ptr<const ByteSource>(std::make_unique<SqliteBag>(file))
+                         : std::make_unique<FileBytes>(file)});
   return files;
 }
 

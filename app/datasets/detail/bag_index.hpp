@@ -18,6 +18,7 @@ namespace vergence::app::detail {
 /// Where an image of a bag is; its pixels stay in the file.
 struct BagImage {
   RosImage image{};
+  std::int64_t log_time = 0;  // ns, when it was recorded
   BagPlace place{};
   std::uint32_t file = 0;  // of the bag's files
 };
@@ -25,13 +26,15 @@ struct BagImage {
 /// What is left out of a topic, and where that begins.
 struct LeftOut {
   std::size_t unreadable = 0, other_size = 0, backwards = 0;
-  std::string first{};  // file and offset
+  std::string first{};     // file and offset
+  std::string encoding{};  // of the first that cannot be read, as it names itself
 };
 
 /// Images of one size, stamps strictly ascending.
 struct ImageTopic {
   std::vector<BagImage> images{};
   LeftOut left_out{};
+  std::size_t unstamped = 0;  // whose stamp was 0: the time of recording has its place
 };
 
 /// Readings whose stamps strictly ascend.
@@ -56,6 +59,8 @@ struct BagIndex {
   std::map<std::string, ReadingTopic<RosFix>> fixes{};
   std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};  // without orientation: unreadable
   std::map<std::string, ReadingTopic<RosOdometry>> odometry{};
+  std::string
+      unread{};  // the first topic whose messages are serialised in another way, and its type
   std::vector<std::string> remarks{};  // a sentence each
 };
 

@@ -2,6 +2,7 @@
 
 #include "app/datasets/detail/mcap.hpp"
 #include "app/datasets/detail/rosbag.hpp"
+#include "app/datasets/detail/sqlite_bag.hpp"
 
 namespace vergence::app::detail {
 
@@ -21,11 +22,13 @@ void BagScan::broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std:
 }
 
 std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file, const BagVisitor& each) {
+  if (format == BagFormat::sqlite) return dynamic_cast<const SqliteBag&>(file).scan(each);
   return format == BagFormat::mcap ? scan_mcap(file, each) : scan_rosbag(file, each);
 }
 
 bool unpack_chunk(BagFormat format, const ByteSource& file, std::uint64_t offset,
                   std::vector<std::uint8_t>* records) {
+  if (format == BagFormat::sqlite) return false;  // it has no chunks
   return format == BagFormat::mcap ? unpack_mcap_chunk(file, offset, records)
                                    : unpack_rosbag_chunk(file, offset, records);
 }

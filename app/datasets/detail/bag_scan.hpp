@@ -21,7 +21,7 @@ inline constexpr std::uint64_t kMostDescription =
 inline constexpr std::size_t kMostName = 1024;       // bytes of a topic's or a type's name
 inline constexpr std::size_t kMostChannels = 65536;  // of a file
 
-enum class BagFormat : std::uint8_t { mcap, rosbag };
+enum class BagFormat : std::uint8_t { mcap, rosbag, sqlite };
 
 /// How the messages of a channel are serialised: by CDR (ROS 2), as ROS 1 does it, or in a way that
 /// is not read.
@@ -49,7 +49,7 @@ struct BagMessage {
   const BagChannel* channel = nullptr;  // until the scan ends
   BagPlace place{};
   const ByteSource* bytes = nullptr;  // where place.offset counts; during the call
-  std::int64_t log_time = 0;          // ns, when it was recorded; of rosbags 0
+  std::int64_t log_time = 0;          // ns, when it was recorded
 };
 
 using BagVisitor = std::function<void(const BagMessage&)>;
@@ -71,11 +71,11 @@ struct BagScan {
   void broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std::string_view why);
 };
 
-/// Hands every message to `each`, in the file's order; content that is not all there is not handed
-/// over. Chunks without compression are read where they lie, the heads of messages only, whatever
-/// their length.
-/// Nothing: the file does not begin as the format does.
-/// Memory  Two times kMostChunk, and kMostChannels names, at most.
+/// Hands every message to `each`, in the file's order (of sqlite in that of log times); content
+/// that is not all there is not handed over. Chunks without compression are read where they lie,
+/// the heads of messages only, whatever their length. Nothing: the file does not begin as the
+/// format does. Precondition: of sqlite a SqliteBag. Memory  Two times kMostChunk, and
+/// kMostChannels names, at most.
 [[nodiscard]] std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file,
                                               const BagVisitor& each);
 

@@ -1,6 +1,9 @@
 #pragma once
 #include <array>
 #include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,14 +39,27 @@ namespace vergence::app::detail {
 [[nodiscard]] RecordedIns read_oxts(const std::filesystem::path& folder,
                                     const std::array<int, 2>& cameras, bool mount_wanted);
 
-/// The camera that a rectified projection P = K [I | t] (3×4 row by row, pixels and metres)
-/// describes, without its image's size, and where it sits: X_k = X_rectified + *t. InputError with
-/// file:line: it is no such projection.
-[[nodiscard]] Intrinsics rectified_camera(const std::array<double, 12>& P, Vec3* t,
-                                          const std::filesystem::path& file, std::size_t line);
+/// Pairs of the nearest stamps, within kMostApart of the interval, in the order of the left ones;
+/// images without a partner stand where their stamp belongs. `name`: of an image by camera and
+/// index. That stamps differ is one of *assumptions.
+[[nodiscard]] std::vector<StereoPair> merged_pairs(
+    std::span<const Stamp> left, std::span<const Stamp> right,
+    const std::function<std::string(std::size_t camera, std::size_t index)>& name,
+    std::vector<std::string>* assumptions);
 
-/// Names of the PNG and JPEG files in root/below, sorted, as root-relative paths. InputError: no
-/// such folder, no image in it.
+/// The two folders of a drive that have the usual names of a left and a right camera and images in
+/// them, or in `data` or `images` below; as root-relative paths. Nothing: there are none.
+[[nodiscard]] std::optional<std::array<std::string, 2>> camera_folders(
+    const std::filesystem::path& root);
+
+/// Whether open_folder() would find images of two cameras.
+[[nodiscard]] bool holds_stereo_images(const std::filesystem::path& root);
+
+/// By the ending; hidden files, which systems put beside images, are none.
+[[nodiscard]] bool is_image_name(const std::string& file);
+
+/// Names of the images in root/below, sorted, as root-relative paths. InputError: no
+/// such folder, no image in it that can be read.
 [[nodiscard]] std::vector<std::string> list_images(const std::filesystem::path& root,
                                                    const std::string& below);
 

@@ -29,9 +29,6 @@ struct KittiRawFolders {
 /// `folder`: the drive, its date, or what the date lies in. InputError: no drive in it, or several.
 [[nodiscard]] KittiRawFolders find_kitti_raw(const std::filesystem::path& folder);
 
-/// A line of a timestamps.txt, `2011-09-26 14:05:35.500923136`, taken as UTC. Nothing: it is none.
-[[nodiscard]] std::optional<Stamp> parse_kitti_stamp(std::string_view text) noexcept;
-
 /// A timestamps.txt: line k is of file k.
 struct KittiStamps {
   std::vector<std::optional<Stamp>> lines{};  // nothing: the line is empty or no stamp

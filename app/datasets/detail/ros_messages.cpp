@@ -17,12 +17,43 @@ struct Encoding {
   PixelLayout layout;
   std::uint32_t bytes;  // a pixel
 };
-constexpr std::array kEncodings{
-    Encoding{"mono8", PixelLayout::grey, 1},        Encoding{"8UC1", PixelLayout::grey, 1},
-    Encoding{"bayer_rggb8", PixelLayout::bayer, 1}, Encoding{"bayer_bggr8", PixelLayout::bayer, 1},
-    Encoding{"bayer_gbrg8", PixelLayout::bayer, 1}, Encoding{"bayer_grbg8", PixelLayout::bayer, 1},
-    Encoding{"rgb8", PixelLayout::rgb, 3},          Encoding{"bgr8", PixelLayout::bgr, 3},
-    Encoding{"mono16", PixelLayout::grey16, 2},     Encoding{"16UC1", PixelLayout::grey16, 2}};
+constexpr std::array kEncodings{Encoding{"mono8", PixelLayout::grey, 1},
+                                Encoding{"8UC1", PixelLayout::grey, 1},
+                                Encoding{"nv12", PixelLayout::grey, 1},
+                                Encoding{"nv21", PixelLayout::grey, 1},
+                                Encoding{"nv24", PixelLayout::grey, 1},
+                                Encoding{"mono16", PixelLayout::grey16, 2},
+                                Encoding{"16UC1", PixelLayout::grey16, 2},
+                                Encoding{"bayer_rggb8", PixelLayout::bayer, 1},
+                                Encoding{"bayer_bggr8", PixelLayout::bayer, 1},
+                                Encoding{"bayer_gbrg8", PixelLayout::bayer, 1},
+                                Encoding{"bayer_grbg8", PixelLayout::bayer, 1},
+                                Encoding{"bayer_rggb16", PixelLayout::bayer16, 2},
+                                Encoding{"bayer_bggr16", PixelLayout::bayer16, 2},
+                                Encoding{"bayer_gbrg16", PixelLayout::bayer16, 2},
+                                Encoding{"bayer_grbg16", PixelLayout::bayer16, 2},
+                                Encoding{"rgb8", PixelLayout::rgb, 3},
+                                Encoding{"bgr8", PixelLayout::bgr, 3},
+                                Encoding{"8UC3", PixelLayout::bgr, 3},
+                                Encoding{"rgba8", PixelLayout::rgba, 4},
+                                Encoding{"bgra8", PixelLayout::bgra, 4},
+                                Encoding{"8UC4", PixelLayout::bgra, 4},
+                                Encoding{"yuyv", PixelLayout::luma_first, 2},
+                                Encoding{"yuv422_yuy2", PixelLayout::luma_first, 2},
+                                Encoding{"uyvy", PixelLayout::luma_second, 2},
+                                Encoding{"yuv422", PixelLayout::luma_second, 2}};
+
+/// Whether the format of a CompressedImage says that a mosaic was compressed as it was: the
+/// encoding stands first, and behind `compressed` what it was turned into, if it was.
+bool is_mosaic(const std::string& format) {
+  const std::size_t bayer = format.find("bayer_"), compressed = format.find("compressed");
+  if (bayer == std::string::npos) return false;
+  if (compressed == std::string::npos) return true;
+  const std::string_view target = std::string_view(format).substr(compressed);
+  return target.find("bgr") == std::string_view::npos &&
+         target.find("rgb") == std::string_view::npos &&
+         target.find("mono") == std::string_view::npos;
+}
 
 bool is_rotation(const Mat3& R) {
   return (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() <= 1e-3;
@@ -31,12 +62,13 @@ bool is_rotation(const Mat3& R) {
 }  // namespace
 
 std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::size_t size,
-                                       MessageEncoding encoding) {
+                                       MessageEncoding encoding, std::string* name) {
   RosReader in(head, encoding);
   RosImage image;
   image.stamp = in.header();
   const auto height = in.get<std::uint32_t>(), width = in.get<std::uint32_t>();
   const std::string pixels = in.text();
+  if (name != nullptr) *name = pixels.substr(0, 40);
   image.big_endian = in.get<std::uint8_t>() != 0;
   image.step = in.get<std::uint32_t>();
   image.bytes = in.get<std::uint32_t>();
@@ -56,12 +88,14 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
 }
 
 std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> head,
-                                                  std::size_t size, MessageEncoding encoding) {
+                                                  std::size_t size, MessageEncoding encoding,
+                                                  std::string* name) {
   RosReader in(head, encoding);
   RosImage image;
-  image.layout = PixelLayout::encoded;
   image.stamp = in.header();
-  (void)in.text();  // the format's name: the bytes tell it better
+  const std::string format = in.text();  // PNG or JPEG: the bytes tell it better
+  if (name != nullptr) *name = format.substr(0, 40);
+  image.layout = is_mosaic(format) ? PixelLayout::encoded_bayer : PixelLayout::encoded;
   image.bytes = in.get<std::uint32_t>();
   if (!in.ok()) return std::nullopt;
   image.offset = static_cast<std::uint32_t>(in.position());
@@ -88,17 +122,24 @@ std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> 
   for (int i = 0; i < 9; ++i) camera.R(i / 3, i % 3) = in.get<double>();
   for (int i = 0; i < 12; ++i) camera.P(i / 4, i % 4) = in.get<double>();
   if (!in.ok()) return std::nullopt;
+  RosCrop crop;
+  for (std::uint32_t* value :
+       {&crop.binning_x, &crop.binning_y, &crop.x, &crop.y, &crop.height, &crop.width})
+    *value = in.get<std::uint32_t>();
+  if (in.ok()) info.crop = crop;
   Intrinsics& lens = camera.lens;
   ImageSize size;
   if (accept_size(width, height, &size) != ImageFileStatus::ok) return std::nullopt;
   lens.width = size.width, lens.height = size.height;
   lens.fx = k[0], lens.fy = k[4], lens.cx = k[2], lens.cy = k[5];
   if (!(camera.P(0, 0) > 0 && camera.P(1, 1) > 0))
-    info.fault_rectified = "p has no positive focal lengths";
+    info.fault_rectified = "P has no positive focal lengths, so the driver has no calibration";
   info.fault = info.fault_rectified;
+  if (!(lens.fx > 0 && lens.fy > 0)) info.fault = "K has no positive focal lengths";
   if (const std::string fault = set_ros_distortion(model, d, &lens); !fault.empty())
-    info.fault = "d " + fault;
-  if (!is_rotation(camera.R)) info.fault = "r is not a rotation";
+    info.fault = "D " + fault;
+  if (camera.R.isZero(0) && is_rectified(camera)) camera.R.setIdentity();
+  if (!is_rotation(camera.R)) info.fault = "R is not a rotation";
   return info;
 }
 

@@ -15,7 +15,20 @@
 /// the bytes are no such message.
 namespace vergence::app::detail {
 
-enum class PixelLayout : std::uint8_t { grey, grey16, bayer, rgb, bgr, encoded };
+enum class PixelLayout : std::uint8_t {
+  grey,  // also of a planar YUV: its first plane
+  grey16,
+  bayer,
+  bayer16,
+  rgb,
+  bgr,
+  rgba,
+  bgra,
+  luma_first,  // YUV 4:2:2: of two bytes the first, or the second, is grey
+  luma_second,
+  encoded,
+  encoded_bayer,  // a mosaic in a PNG or JPEG
+};
 
 struct RosImage {
   Stamp stamp{};
@@ -31,16 +44,19 @@ inline constexpr std::size_t kRosImageHead =
     4096;  // bytes in which an image's own fields have to end
 
 /// `head`: the first bytes of a message of `size` bytes. Also nothing: other encodings than
-/// those of docs/bags.md.
+/// those of docs/bags.md. `pixels`: the encoding as the message names it, where that is not null.
 [[nodiscard]] std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head,
-                                                     std::size_t size, MessageEncoding encoding);
+                                                     std::size_t size, MessageEncoding encoding,
+                                                     std::string* pixels = nullptr);
 /// The head of the PNG or JPEG has to lie in `head`, too.
 [[nodiscard]] std::optional<RosImage> read_ros_compressed_image(std::span<const std::uint8_t> head,
                                                                 std::size_t size,
-                                                                MessageEncoding encoding);
+                                                                MessageEncoding encoding,
+                                                                std::string* pixels = nullptr);
 
 struct RosCameraInfo {
-  RosCamera camera;               // of raw images
+  RosCamera camera;               // of raw images, as if these were of the whole sensor
+  RosCrop crop{};                 // which they are not
   std::string fault{};            // why it is no calibration of these: a phrase; empty: it is one
   std::string fault_rectified{};  // nor of rectified images
 };

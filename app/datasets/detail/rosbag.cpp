@@ -24,6 +24,7 @@ struct Header {
   std::optional<std::uint32_t> connection{};
   std::optional<std::uint32_t> size{};  // unpacked, of a chunk
   std::uint64_t index = 0;              // where the index begins; 0: there is none
+  std::int64_t time = 0;                // ns, when a message was recorded
   std::string compression{}, topic{}, type{};
 };
 
@@ -39,6 +40,10 @@ void set_field(std::string_view name, std::string_view value, Header* header) {
   if (name == "op" && value.size() == 1) header->op = static_cast<std::uint8_t>(value[0]);
   if (name == "conn") header->connection = narrow(number(value, 4));
   if (name == "size") header->size = narrow(number(value, 4));
+  if (name == "time")
+    if (const auto parts = number(value, 8))  // seconds, then nanoseconds
+      header->time = static_cast<std::int64_t>(*parts & 0xFFFFFFFFU) * 1'000'000'000 +
+                     static_cast<std::int64_t>(*parts >> 32U);
   if (name == "index_pos") header->index = number(value, 8).value_or(0);
   if (value.size() > kMostName) return;
   if (name == "compression") header->compression = value;
@@ -202,7 +207,7 @@ class Scanner {
       return;
     }
     ++scan_.messages;
-    each_({&channel->second, {chunk, record.data, record.size}, &bytes});
+    each_({&channel->second, {chunk, record.data, record.size}, &bytes, record.header.time});
   }
 
   const ByteSource& file_;

@@ -40,7 +40,8 @@ std::vector<Reference> reference_of_camchain(const std::string& text) {
 
 TEST(Kalibr, aCamchainIsReadAsItsOwnDefinitionProjects) {
   Remarks remarks;
-  const CalibrationFile c = read_kalibr(YamlFile::parse(kCamchain, "camchain.yaml"), &remarks);
+  const CalibrationFile c =
+      parse_any_calibration({{"camchain.yaml", kCamchain}}, std::nullopt, &remarks);
   expect_same(c, reference_of_camchain(kCamchain));
   EXPECT_EQ(c.names[0], "left");
   EXPECT_EQ(c.names[1], "cam1");
@@ -54,7 +55,8 @@ TEST(Kalibr, aNameIsWhatStandsBeforeTheImageInATopic) {
     const std::string chain =
         replaced(replaced(kCamchain, "/left/image_raw", left), "/cam1/image_raw", right);
     Remarks remarks;
-    const auto all = read_kalibr(YamlFile::parse(chain, "camchain.yaml"), &remarks).names;
+    const auto all =
+        parse_any_calibration({{"camchain.yaml", chain}}, std::nullopt, &remarks).names;
     return all[0] + " " + all[1];
   };
   EXPECT_EQ(names("/stereo/left/image_raw", "/stereo/right/image_raw"), "left right");
@@ -69,7 +71,8 @@ TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
     Remarks remarks;
     const std::string text = format_kalibr(c, &remarks);
     expect_same(c, reference_of_camchain(text));
-    const CalibrationFile back = read_kalibr(YamlFile::parse(text, "camchain.yaml"), &remarks);
+    const CalibrationFile back =
+        parse_any_calibration({{"camchain.yaml", text}}, std::nullopt, &remarks);
     expect_same(c, back);
     EXPECT_EQ(back.names[2], "bow");
     ASSERT_EQ(remarks.size(), 1U);

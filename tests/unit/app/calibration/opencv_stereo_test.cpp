@@ -28,7 +28,7 @@ TEST(OpenCvStereo, whatIsWrittenIsReadByOpenCvAndProjectsAsOurs) {
     file["M1"] >> left.K, file["D1"] >> left.D, file["M2"] >> right.K, file["D2"] >> right.D,
         file["R"] >> right.R, file["T"] >> right.t;
     expect_same(c, {left, right});
-    expect_same(c, read_opencv({parse_opencv_yaml(text, "stereo.yml")}, std::nullopt, &remarks));
+    expect_same(c, parse_any_calibration({{"stereo.yml", text}}, std::nullopt, &remarks));
   }
 }
 
@@ -58,12 +58,13 @@ TEST(OpenCvStereo, whatOpenCvWritesIsReadAsItProjectsUnderEachOfItsNames) {
     lenses << n.M1 << references[0].K << n.D1 << references[0].D << n.M2 << references[1].K << n.D2
            << references[1].D;
     places << n.R << references[1].R << n.T << references[1].t;
-    const std::vector<YamlFile> files{
-        parse_opencv_yaml(lenses.releaseAndGetString(), "intrinsics.yml"),
-        parse_opencv_yaml(places.releaseAndGetString(), "extrinsics.yml")};
+    const std::vector<CalibrationText> files{{"intrinsics.yml", lenses.releaseAndGetString()},
+                                             {"extrinsics.yml", places.releaseAndGetString()}};
     Remarks remarks;
-    EXPECT_THROW((void)read_opencv(files, std::nullopt, &remarks), InputError) << "no size";
-    expect_same(read_opencv(files, ImageSize{640, 480}, &remarks), {references[0], references[1]});
+    EXPECT_THROW((void)parse_any_calibration(files, std::nullopt, &remarks), InputError)
+        << "no size";
+    expect_same(parse_any_calibration(files, ImageSize{640, 480}, &remarks),
+                {references[0], references[1]});
   }
 }
 
@@ -82,7 +83,7 @@ TEST(OpenCvStereo, fourCoefficientsThatMayBeOfAFisheyeLensAreSaid) {
   const std::string four = "{rows: 4, cols: 1, data: [-0.02, 0.008, -0.004, 0.0008]}\n",
                     five = "{rows: 1, cols: 5, data: [-0.02, 0.008, -0.004, 0.0008, 0]}\n";
   const auto read = [](const std::string& yaml, Remarks* remarks) {
-    return read_opencv({parse_opencv_yaml(yaml, "stereo.yml")}, std::nullopt, remarks)
+    return parse_any_calibration({{"stereo.yml", yaml}}, std::nullopt, remarks)
         .rig.intrinsics[1]
         .kind;
   };

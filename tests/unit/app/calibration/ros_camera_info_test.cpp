@@ -66,8 +66,8 @@ TEST(RosCameraInfo, whatIsWrittenProjectsAsOursAndReadsBack) {
     const auto [left, right] = format_ros(c, &remarks);
     expect_camera_info(c, info_of(left), info_of(right));
     EXPECT_LT(info_of(right).P.at<double>(0, 3), 0) << "−fx B of a camera on the right";
-    const CalibrationFile back = read_ros(YamlFile::parse(left, "left.yaml"),
-                                          YamlFile::parse(right, "right.yaml"), &remarks);
+    const CalibrationFile back =
+        parse_any_calibration({{"left.yaml", left}, {"right.yaml", right}}, std::nullopt, &remarks);
     expect_same(c, back);
     EXPECT_EQ(back.names[0], "port");
   }
@@ -106,7 +106,7 @@ TEST(RosCameraInfo, aPairFromOpenCvsOwnRectificationIsReadAsItProjects) {
   }
   Remarks remarks;
   const CalibrationFile c =
-      read_ros(YamlFile::parse(text[0], "l.yaml"), YamlFile::parse(text[1], "r.yaml"), &remarks);
+      parse_any_calibration({{"l.yaml", text[0]}, {"r.yaml", text[1]}}, std::nullopt, &remarks);
   expect_same(truth, c);
 }
 

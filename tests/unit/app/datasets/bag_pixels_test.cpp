@@ -83,20 +83,27 @@ class BagPixels : public ::testing::TestWithParam<BagKind> {
 };
 
 TEST_P(BagPixels, GreyIsAsItIs) {
-  for (const char* encoding : {"mono8", "8UC1"}) {
-    const Grey out = grey_of(image_of(encoding, 1));
+  struct Case {
+    const char* encoding;
+    int bytes, grey;  // of a pixel, and its place there
+  };
+  for (const Case& c :
+       {Case{"mono8", 1, 0}, Case{"8UC1", 1, 0}, Case{"nv12", 1, 0}, Case{"nv21", 1, 0},
+        Case{"yuyv", 2, 0}, Case{"yuv422_yuy2", 2, 0}, Case{"uyvy", 2, 1}, Case{"yuv422", 2, 1}}) {
+    const Grey out = grey_of(image_of(c.encoding, c.bytes));
     ASSERT_FALSE(out.empty()) << refusal_;
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x)
-        ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, 0)) << encoding;
+        ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, c.grey)) << c.encoding;
   }
 }
 
 // ITU-R BT.601: 0.299, 0.587, 0.114, to half a step.
 TEST_P(BagPixels, ColoursAreWeighedAsBt601Does) {
-  for (const char* encoding : {"rgb8", "bgr8"}) {
+  for (const char* encoding : {"rgb8", "bgr8", "8UC3", "rgba8", "bgra8"}) {
     const int red = encoding[0] == 'r' ? 0 : 2;
-    const Grey out = grey_of(image_of(encoding, 3));
+    const bool alpha = std::string_view(encoding).find('a') != std::string_view::npos;
+    const Grey out = grey_of(image_of(encoding, alpha ? 4 : 3));
     ASSERT_FALSE(out.empty()) << refusal_;
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; ++x)
@@ -123,7 +130,8 @@ TEST_P(BagPixels, MosaicsGoTheWayOfTheCameras) {
 
 TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
   EXPECT_TRUE(grey_of(image_of("32FC1", 4)).empty());
-  EXPECT_NE(refusal_.find("/left/image (0 images, 1 that cannot be read)"), std::string::npos)
+  EXPECT_NE(refusal_.find("/left/image (0 images, 1 that cannot be read, of the encoding"),
+            std::string::npos)
       << refusal_;
   ImageMessage image = image_of("mono8", 1);
   image.data.pop_back();

@@ -1,12 +1,16 @@
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include <array>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <span>
 
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
+#include "core/math/random.hpp"
 #include "tests/support/ros_messages.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -34,6 +38,14 @@ std::string camera_info(Wire wire, double fx_times_b, const std::string& model =
       wire, kStart,
       {kWidth, kHeight, model, {-0.1, 0.01, 0.001, 0.002, 0.0}, 60, 61, 35, 24, fx_times_b});
 }
+
+/// Of other images than those of camera_info().
+constexpr const char* kCalibration =
+    "version: 1\nrig: {name: tiny, baseline: 0.5}\ncameras:\n"
+    "  - {name: left, size: [70, 48], model: pinhole-radtan, intrinsics: [60, 60, 35, 24], "
+    "distortion: [0, 0, 0, 0]}\n"
+    "  - {name: right, size: [70, 48], model: pinhole-radtan, intrinsics: [60, 60, 35, 24], "
+    "distortion: [0, 0, 0, 0], T_camera_left: [1, 0, 0, -0.5, 0, 1, 0, 0, 0, 0, 1, 0]}\n";
 
 class Bag : public ::testing::TestWithParam<BagKind> {
  protected:
@@ -151,19 +163,80 @@ TEST_P(Bag, SeveralTopicsAreListedAndOneIsChosen) {
   writer_->channel(5, "/left/image_small", "sensor_msgs/Image");
   writer_->message(5, 0, image(wire(), kStart));
   for (std::int64_t i = 0; i < 4; ++i) frame(i);
+  writer_->channel(6, "/right/image_small", "sensor_msgs/Image");
+  writer_->message(6, 0, image(wire(), kStart));
   const std::string said = refusal();
   EXPECT_NE(said.find("--left-topic"), std::string::npos) << said;
   EXPECT_NE(said.find("/left/image_raw (4 images), /left/image_small (1 images)"),
             std::string::npos)
       << said;
-  EXPECT_EQ(open({"/left/image_raw", ""}).pairs.size(), 4U);
+  EXPECT_EQ(open({"/left/image_raw", ""}).pairs.size(), 4U) << "the right one follows";
+}
+
+// Names of other rigs, and of what lies beside the images.
+TEST_P(Bag, TheUsualNamesMakeAPair) {
+  struct Case {
+    const char *left, *right;
+  };
+  for (const Case& c :
+       {Case{"/camera/infra1/image_raw", "/camera/infra2/image_raw"},
+        Case{"/cam0/image_raw", "/cam1/image_raw"}, Case{"/rig/image_0", "/rig/image_1"},
+        Case{"/device_0/Infrared_1/data", "/device_0/Infrared_2/data"}}) {
+    writer_ = GetParam().writer();
+    writer_->channel(1, c.left, "sensor_msgs/Image");
+    writer_->channel(2, c.right, "sensor_msgs/Image");
+    writer_->channel(3, "/camera/depth/image_raw", "sensor_msgs/Image");
+    for (std::int64_t i = 0; i < 3; ++i) frame(i);
+    writer_->message(3, kStart, image(wire(), kStart));
+    writer_->finish();
+    folder_.write("drive/drive_0" + GetParam().ending(), writer_->bytes());
+    const auto calibration = folder_.write("c.yaml", kCalibration);
+    const StereoSequence s = open_sequence(format(), folder_ / "drive", calibration);
+    EXPECT_EQ(s.pairs.size(), 3U);
+    EXPECT_EQ(s.assumptions.front(), std::string(c.left) + " is left and " + c.right + " is right");
+  }
+}
+
+// Drivers that set no stamp; the time of recording less the usual delay is what is left.
+TEST_P(Bag, StampsOfZeroAreReplacedByTheTimeOfRecording) {
+  for (std::int64_t i = 0; i < 5; ++i) {
+    const std::int64_t stamp = kStart + i * kStep;
+    writer_->message(1, stamp + 7'000'000, image(wire(), i == 2 ? 0 : stamp));
+    writer_->message(2, stamp + 7'000'000, image(wire(), stamp));
+  }
+  const StereoSequence s = open();
+  ASSERT_EQ(s.pairs.size(), 5U);
+  EXPECT_EQ(s.pairs[2].stamp.ns(), kStart + 2 * kStep);
+  EXPECT_NE(s.assumptions.front().find("1 images have no stamp"), std::string::npos);
+}
+
+TEST_P(Bag, OffsetsWithinPairsAreSaidAndRefusedWhereTheyCouldBeOfTheNeighbour) {
+  struct Case {
+    std::int64_t late;
+    std::size_t remarks;
+    bool refused;
+  };
+  for (const Case& c : {Case{1'000'000, 0, false}, Case{15'000'000, 1, false},
+                        Case{24'000'000, 0, true}, Case{27'000'000, 0, true}}) {
+    begin();
+    writer_->channel(4, "/right/camera_info", "sensor_msgs/CameraInfo");
+    writer_->message(3, kStart, camera_info(wire(), 0));
+    writer_->message(4, kStart, camera_info(wire(), -7.2));
+    for (std::int64_t i = 0; i < 6; ++i) frame(i, c.late);
+    const std::string said = refusal();
+    EXPECT_EQ(!said.empty(), c.refused) << c.late << said;
+    if (!c.refused) {
+      EXPECT_EQ(open().remarks.size(), c.remarks) << c.late;
+      EXPECT_NE(open().assumptions.back().find("right ones are later by"), std::string::npos);
+    }
+  }
 }
 
 TEST_P(Bag, CameraInfoOfAnotherModelIsRefused) {
   begin();
   writer_->message(3, kStart, camera_info(wire(), 0, "fov"));
   frame(0);
-  EXPECT_NE(refusal().find("/left/camera_info: d is of the model \"fov\""), std::string::npos);
+  EXPECT_NE(refusal().find("/left/camera_info: D is of the model \"fov\""), std::string::npos);
 }
 
 TEST_P(Bag, CameraInfoOfAnotherSizeIsRefused) {
@@ -183,7 +256,7 @@ TEST_P(Bag, OtherFilesAreRefusedByWhatTheyBeginWith) {
     (void)open_sequence(format(), folder_ / "drive");
     FAIL() << "taken";
   } catch (const InputError& e) {
-    EXPECT_NE(std::string(e.what()).find("does not begin as a"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("is not a"), std::string::npos) << e.what();
   }
 }
 
@@ -234,6 +307,95 @@ TEST_P(Bag, CutAnywhereIsReadOrRefused) {
     }
   }
   EXPECT_GT(opened, 0U);
+}
+
+/// As rosbag2 writes a .db3.
+void write_db3(const std::filesystem::path& file, int pairs) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+  const auto run = [&](const std::string& sql) {
+    ASSERT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+  };
+  run("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format "
+      "TEXT, "
+      "offered_qos_profiles TEXT)");
+  run("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data "
+      "BLOB)");
+  const std::array<std::string, 4> topics{"left/image_raw", "right/image_raw", "left/camera_info",
+                                          "right/camera_info"};
+  for (std::size_t id = 1; id <= topics.size(); ++id)
+    run("INSERT INTO topics VALUES(" + std::to_string(id) + ", '/" + topics[id - 1] +
+        "', 'sensor_msgs/msg/" + (id < 3 ? "Image" : "CameraInfo") + "', 'cdr', '')");
+  const auto message = [&](int topic, std::int64_t time, const std::string& content) {
+    sqlite3_stmt* insert = nullptr;
+    ASSERT_EQ(sqlite3_prepare_v2(database,
+                                 "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)",
+                                 -1, &insert, nullptr),
+              SQLITE_OK);
+    sqlite3_bind_int(insert, 1, topic);
+    sqlite3_bind_int64(insert, 2, time);
+    sqlite3_bind_blob(insert, 3, content.data(), static_cast<int>(content.size()),
+                      SQLITE_TRANSIENT);
+    EXPECT_EQ(sqlite3_step(insert), SQLITE_DONE);
+    sqlite3_finalize(insert);
+  };
+  message(3, kStart, camera_info(Wire::cdr, 0));
+  message(4, kStart, camera_info(Wire::cdr, -7.2));
+  for (int i = pairs; i-- > 0;)  // rows need not be in the order of time
+    for (int k = 1; k <= 2; ++k)
+      message(k, kStart + i * kStep, image(Wire::cdr, kStart + i * kStep));
+  sqlite3_close(database);
+}
+
+TEST(Db3, ABagInSqliteIsReadAlsoSplitAndInItsFolder) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "drive?#%");
+  const auto file = folder / "drive?#%" / "drive_0.db3";
+  write_db3(file, 4);
+  folder.write("drive?#%/metadata.yaml", "rosbag2_bagfile_information: {version: 5}\n");
+  EXPECT_EQ(find_format(folder / "drive?#%"), SequenceFormat::db3);
+  EXPECT_EQ(find_format(file), SequenceFormat::db3);
+  const StereoSequence s = open_sequence(SequenceFormat::db3, folder / "drive?#%");
+  ASSERT_EQ(s.pairs.size(), 4U);
+  EXPECT_EQ(s.pairs[3].stamp.ns(), kStart + 3 * kStep);
+  EXPECT_NEAR((s.calibration.T_camera_left[1].t - Vec3(-0.12, 0, 0)).norm(), 0, 1e-15);
+  std::vector<std::uint8_t> out(std::size_t{kWidth} * kHeight), work;
+  ASSERT_EQ(s.store->decode(s.pairs[1].file[1], {kWidth, kHeight}, out.data(), kWidth, 16, &work),
+            ImageFileStatus::ok);
+  EXPECT_EQ(out[5 * kWidth + 7], static_cast<std::uint8_t>(pixel(7, 5)));
+}
+
+TEST(Db3, ADamagedOneIsReadOrRefused) {
+  const test::TemporaryFolder folder;
+  write_db3(folder / "a.db3", 3);
+  std::ifstream in(folder / "a.db3", std::ios::binary);
+  const std::string whole((std::istreambuf_iterator<char>(in)), {});
+  Random random(5);
+  int opened = 0;
+  for (int run = 0; run < 60; ++run) {
+    std::string bytes = whole;
+    if (run % 3 == 0) bytes.resize(random.below(static_cast<std::uint32_t>(bytes.size())));
+    for (int i = 0; i < run && !bytes.empty(); ++i)
+      bytes[random.below(static_cast<std::uint32_t>(bytes.size()))] =
+          static_cast<char>(random.below(256));
+    try {
+      opened +=
+          open_sequence(SequenceFormat::db3, folder.write("b.db3", bytes)).pairs.empty() ? 0 : 1;
+    } catch (const InputError& e) {
+      EXPECT_NE(std::string(e.what()).find("b.db3"), std::string::npos) << e.what();
+    }
+  }
+  EXPECT_GT(opened, 0);
+  EXPECT_LT(opened, 60);
+}
+
+TEST(Bags, thosePackedAsAWholeAreNamedWithWhatUnpacksThem) {
+  for (const auto& [name, command] :
+       {std::pair{"d.mcap.zstd", "zstd -d d.mcap.zstd"},
+        std::pair{"d_0.db3.zst", "zstd -d d_0.db3.zst"},
+        std::pair{"d.bag.gz", "gunzip -k d.bag.gz"}, std::pair{"d.zip", "unzip d.zip"}})
+    EXPECT_NE(unpack_advice(name).find(command), std::string::npos) << name;
+  EXPECT_EQ(unpack_advice("d.mcap"), "");
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Bag,

@@ -12,6 +12,7 @@
 #include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/kitti_raw.hpp"
 #include "app/datasets/recorded_ins.hpp"
+#include "app/datasets/stamp_text.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/comparison/comparison.hpp"
@@ -261,6 +262,7 @@ TEST_F(KittiRaw, carriageReturnsAndStrayFilesDoNoHarm) {
   for (const char c : text_of(times_name(0))) text += c == '\n' ? "\r\n" : std::string(1, c);
   folder_.write(times_name(0), text);
   folder_.write(kDrive + "/image_00/data/._0000000000.png", "x");
+  folder_.write(kDrive + "/image_00/data/thumbnail.png", "x");
   const StereoSequence s = open();
   EXPECT_EQ(s.pairs.size(), static_cast<std::size_t>(kFrames));
   EXPECT_TRUE(says(s.remarks, "1 images that are not named by their number"));
@@ -306,15 +308,13 @@ TEST_F(KittiRaw, whatIsNoDriveIsRefusedWithFileAndLine) {
 }
 
 TEST_F(KittiRaw, stampsAreUtcToTheNanosecond) {
-  using detail::parse_kitti_stamp;
-  EXPECT_EQ(parse_kitti_stamp("2011-09-26 14:05:35.500923136")->ns(), kStart);
-  EXPECT_EQ(parse_kitti_stamp("2012-02-29 00:00:00")->ns(), 1'330'473'600'000'000'000);
-  EXPECT_EQ(parse_kitti_stamp("1970-01-01 00:00:00.1")->ns(), 100'000'000);
-  for (const char* wrong :
-       {"", "2011-09-26", "2011-09-26T14:05:35", "2011-02-30 00:00:00", "2011-09-26 24:00:00",
-        "2011-09-26 14:05:35.", "2011-09-26 14:05:35.5e3", "2011-09-26 14:05:3",
-        "2011-09-26 14:05:35 x", "-011-09-26 14:05:35"})
-    EXPECT_FALSE(parse_kitti_stamp(wrong)) << wrong;
+  EXPECT_EQ(parse_iso_time("2011-09-26 14:05:35.500923136")->ns(), kStart);
+  EXPECT_EQ(parse_iso_time("2012-02-29 00:00:00")->ns(), 1'330'473'600'000'000'000);
+  EXPECT_EQ(parse_iso_time("1970-01-01 00:00:00.1")->ns(), 100'000'000);
+  for (const char* wrong : {"", "2011-09-26", "2011-02-30 00:00:00", "2011-09-26 24:00:00",
+                            "2011-09-26 14:05:35.", "2011-09-26 14:05:35.5e3", "2011-09-26 14:05:3",
+                            "2011-09-26 14:05:35 x", "-011-09-26 14:05:35"})
+    EXPECT_FALSE(parse_iso_time(wrong)) << wrong;
 }
 
 TEST(KittiStamps, theLongestAscendingPartStays) {

@@ -1,19 +1,15 @@
 #include "app/datasets/trajectory_files.hpp"
 
+#include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <array>
+#include <functional>
+#include <string>
 #include <string_view>
 
 #include "app/datasets/text_file.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <functional>
-#include <string>
-
-#include "app/datasets/euroc_sensor.hpp"
+#include "app/datasets/times_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -36,17 +32,8 @@ testing::AssertionResult has(const std::string& text, const std::string& part) {
   return testing::AssertionFailure() << "`" << text << "` does not have `" << part << "`";
 }
 
-/// Reads `text` as a TUM file and gives the complaint without the folder.
-std::string tum_complaint(const std::string& text) {
-  const test::TemporaryFolder folder;
-  const auto file = folder.write("t.tum", text);
-  std::string said = last_error([&] { (void)read_tum(file); });
-  const std::string prefix = folder.path().string() + "/";
-  if (said.starts_with(prefix)) said.erase(0, prefix.size());
-  return said;
-}
-
 constexpr const char* kGoodLine = "1.5 1 2 3 0 0 0 1\n";
+constexpr std::int64_t kFirst = 1403636584763555584;  // ns
 
 constexpr const char* kSensor =
     "%YAML:1.0\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.1,\n  "
@@ -63,125 +50,183 @@ TEST(Split, everyByteEndsAFieldOrBelongsToOne) {
   }
 }
 
-TEST(Tum, readsStampsAsIntegersAndQuaternionsWithWLast) {
-  const test::TemporaryFolder folder;
-  const auto file =
-      folder.write("t.tum",
-                   "# a comment\n\n1403636584.763555584 1 -2 3.5e0 0 0 0.70710678 0.70710678\r\n"
-                   "1403636584.763555585\t0 0 0   0 0 0 -1");
-  const Trajectory t = read_tum(file);
-  ASSERT_EQ(t.size(), 2U);
-  EXPECT_EQ(t[0].stamp.ns(), 1403636584763555584);
-  EXPECT_EQ(t[1].stamp.ns(), 1403636584763555585);
-  EXPECT_EQ(t[0].T_world_body.t, Vec3(1, -2, 3.5));
-  EXPECT_LT((t[0].T_world_body * Vec3(1, 0, 0) - Vec3(1, -1, 3.5)).norm(),
-            1e-15);  // a quarter turn about z
-  EXPECT_LT((t[0].T_world_body.R * t[0].T_world_body.R.transpose() - Mat3::Identity()).norm(),
-            1e-15);
-  EXPECT_EQ(t[1].T_world_body.R, Mat3(Mat3::Identity()));
+/// As PowerShell writes a text.
+std::string wide(const std::string& text) {
+  std::string bytes = "\xFF\xFE";
+  for (const char c : text) bytes += std::string{c, '\0'};
+  return bytes;
 }
 
-TEST(Tum, saysFileAndLineOfWhatIsWrong) {
+/// A quarter turn about z at (1, 2, 3), some other poses after it.
+struct Row {
+  const char* name;
+  std::string text;
+  std::size_t poses;
+  std::int64_t first;  // ns
+  const char* remark;  // part of what is said; empty: nothing is
+};
+
+TEST(Trajectory, isReadHoweverProgramsWriteIt) {
+  const std::string q = " 0 0 0.70710678 0.70710678", w = ",0.70710678,0,0,0.70710678";
+  const std::string moved = " 1 2 3" + q;
+  const auto stamps = [&](const char* a, const char* b, const char* c) {
+    return std::string(a) + moved + "\n" + b + moved + "\n" + c + moved + "\n";
+  };
+  const std::array rows{
+      Row{"seconds",
+          "# a comment\n\n1403636584.763555584" + moved + "\r\n1403636584.863555585\t1 2  3" + q, 2,
+          kFirst, ""},
+      Row{"byte order mark",
+          "\xEF\xBB\xBF"
+          "5" +
+              moved,
+          1, 5'000'000'000, ""},
+      Row{"nanoseconds",
+          stamps("1403636584763555584.000000", "1403636584863555584", "1403636584963555584"), 3,
+          kFirst, "nanoseconds"},
+      Row{"microseconds", stamps("1403636584763555", "1403636584863555", "1403636584963555"), 3,
+          kFirst - 584, "microseconds"},
+      Row{"milliseconds", stamps("1403636584763.555", "1403636584863.555", "1403636584963.555"), 3,
+          kFirst - 584, "milliseconds"},
+      Row{"VINS", "1403636584763555584,1,2,3" + w + ",\n1403636584863555584,1,2,3" + w + ",\n", 2,
+          kFirst, "w first"},
+      Row{"commas and headings", "time,tx,ty,tz,qw,qx,qy,qz\n1.5,1,2,3" + w + "\n", 1,
+          1'500'000'000, ""},
+      Row{"semicolons", "1.5; 1; 2; 3; 0; 0; 0.70710678; 0.70710678\n", 1, 1'500'000'000, ""},
+      Row{"columns in another order",
+          "# qx qy qz qw x y z timestamp\n0 0 0.70710678 0.70710678 1 2 3 1.5\n", 1, 1'500'000'000,
+          ""},
+      Row{"rostopic echo -p",
+          "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.pose.position.x,"
+          "field.pose.position.y,field.pose.position.z,field.pose.orientation.x,field.pose."
+          "orientation.y,field.pose.orientation.z,field.pose.orientation.w\n"
+          "1403636584999000000,1,1403636584763555584,map,1,2,3,0,0,0.70710678,0.70710678\n",
+          1, kFirst, "nanoseconds"},
+      Row{"seconds and nanoseconds",
+          "secs,nsecs,x,y,z,qx,qy,qz,qw\n1403636584,763555584,1,2,3,0,0,0.70710678,0.70710678\n", 1,
+          kFirst, ""},
+      Row{"an index and more columns",
+          "0 1.5" + moved + " 7 7\n1 1.6" + moved + " 7 7\n2 1.7" + moved + " 7 7\n", 3,
+          1'500'000'000, ""},
+      Row{"rows of NaN",
+          "1 nan nan nan nan nan nan nan\n1.5" + moved + "\n1.6 NaN NaN NaN 0 0 0 1\n", 1,
+          1'500'000'000, "2 rows without numbers"},
+      Row{"repeated and out of order",
+          "1.6" + moved + "\n1.6" + moved + "\n1.5" + moved + "\n1.7" + moved + "\n", 3,
+          1'500'000'000, "1 rows that repeat a stamp are dropped"},
+      Row{"unfinished", "1.5" + moved + "\n1.6 1 2", 1, 1'500'000'000, "unfinished"},
+      Row{"a matrix with its time", "1.5 0 -1 0 1 1 0 0 2 0 0 1 3\n", 1, 1'500'000'000, ""},
+      Row{"a matrix of 4 x 4", "1.5 0 -1 0 1 1 0 0 2 0 0 1 3 0 0 0 1\n", 1, 1'500'000'000, ""},
+      Row{"a matrix of three decimals", "1.5 0.001 -1 0 1 1 0.001 0 2 0 0 1.001 3\n", 1,
+          1'500'000'000, "few decimals"},
+      Row{"UTF-16", wide("1.5" + moved + "\n"), 1, 1'500'000'000, ""},
+  };
+  const test::TemporaryFolder folder;
+  for (const Row& row : rows) {
+    const TrajectoryFile t = read_trajectory_file(folder.write("t.txt", row.text));
+    ASSERT_EQ(t.poses.size(), row.poses) << row.name;
+    EXPECT_EQ(t.poses.front().stamp.ns(), row.first) << row.name;
+    const Transform& T = t.poses.front().T_world_body;
+    EXPECT_LT((T * Vec3(1, 0, 0) - Vec3(1, 3, 3)).norm(), 2e-3) << row.name;
+    EXPECT_LT((T.R * T.R.transpose() - Mat3::Identity()).norm(), 1e-14) << row.name;
+    std::string said;
+    for (const std::string& remark : t.remarks) said += remark + "; ";
+    EXPECT_TRUE(has(said, row.remark)) << row.name;
+    EXPECT_EQ(said.empty(), std::string_view(row.remark).empty()) << row.name << ": " << said;
+  }
+}
+
+TEST(Trajectory, saysFileAndLineOfWhatIsWrong) {
   const std::string good = kGoodLine;
-  EXPECT_TRUE(has(tum_complaint(good + "2.5 1 2 3 0 0 0\n"), "t.tum:2: has 7 columns"));
-  EXPECT_TRUE(has(tum_complaint(good + "2.5 1 2 3 0 0 0 1 9\n"), "t.tum:2: has 9 columns"));
-  EXPECT_TRUE(has(tum_complaint("# c\n" + good + "2.5 1 two 3 0 0 0 1\n"),
-                  "t.tum:3: `two` is not a finite number"));
-  EXPECT_TRUE(has(tum_complaint(good + "2.5 nan 2 3 0 0 0 1\n"), "t.tum:2: `nan` is not"));
-  EXPECT_TRUE(has(tum_complaint(good + "2.5 1e999 2 3 0 0 0 1\n"), "t.tum:2: `1e999` is not"));
-  EXPECT_TRUE(has(tum_complaint(good + "2.5 -inf 2 3 0 0 0 1\n"), "t.tum:2: `-inf` is not"));
-  EXPECT_TRUE(has(tum_complaint(good + "nan 1 2 3 0 0 0 1\n"), "t.tum:2: `nan` is not a stamp"));
-  EXPECT_TRUE(has(tum_complaint(good + "1e30 1 2 3 0 0 0 1\n"), "t.tum:2: `1e30` is not a stamp"));
-  EXPECT_TRUE(
-      has(tum_complaint(good + "2.5 1 2 3 0 0 0 0\n"), "t.tum:2: the quaternion has length 0"));
-  EXPECT_TRUE(
-      has(tum_complaint(good + "2.5 1 2 3 1 1 0 1\n"), "t.tum:2: the quaternion has length 1.73"));
-  EXPECT_TRUE(has(tum_complaint(good + good), "t.tum:2: the stamp 1.500000000 s is not later"));
-  EXPECT_TRUE(has(tum_complaint(good + "1.4 1 2 3 0 0 0 1\n"),
-                  "t.tum:2: the stamp 1.400000000 s is not later"));
-  EXPECT_TRUE(has(tum_complaint(""), "t.tum: has no pose"));
-  EXPECT_TRUE(has(tum_complaint("# only words\n\n"), "t.tum: has no pose"));
-  EXPECT_TRUE(has(tum_complaint(std::string(100, '\0') + "\n"), "t.tum:1: has 1 columns"));
-  EXPECT_TRUE(has(tum_complaint(std::string(1U << 20U, 'x')), "t.tum:1: has 1 columns"));
-}
-
-TEST(Tum, saysWhichFileCannotBeRead) {
+  struct Case {
+    std::string text, said;
+  };
+  const std::array cases{
+      Case{good + "2.5 1 2 3 0 0 0\n", "t.tum:2: has 7 columns"},
+      Case{"# c\n" + good + "2.5 1 two 3 0 0 0 1\n", "t.tum:3: `two` is not a finite number"},
+      Case{good + "1e30 1 2 3 0 0 0 1\n", "t.tum:2: `1e30` is not a stamp"},
+      Case{good + "2.5 1 2 3 0 0 0 0\n", "t.tum:2: the quaternion has length 0"},
+      Case{good + "2.5 1 2 3 1 1 0 1\n", "t.tum:2: the quaternion has length 1.73"},
+      Case{good + good + good, "t.tum: has the same stamp in all of its 3 rows"},
+      Case{good + good + good + good + "1.6 1 2 3 0 0 0 1\n", "only 2 different stamps in 5 rows"},
+      Case{"1 1 2\n", "t.tum:1: has 3 columns"},
+      Case{"1 0 0 0 0 1 0 0 0 0 1 0\n1.02 0 0 7 0 1 0 8 0 0 1 9\n",
+           "t.tum:2: the matrix is not a rotation"},
+      Case{"1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 7 0 1 0 8 0 0 -1 9\n", "a reflection"},
+      Case{"", "t.tum: has no pose"},
+      Case{"# only words\n\n", "t.tum: has no pose"},
+      Case{std::string(100, '\0') + "\n", "t.tum: has no pose"},
+      Case{std::string(1U << 20U, 'x'), "t.tum: has no pose"},
+  };
   const test::TemporaryFolder folder;
+  for (const Case& c : cases) {
+    const auto file = folder.write("t.tum", c.text);
+    EXPECT_TRUE(has(last_error([&] { (void)read_tum(file); }), c.said)) << c.text.substr(0, 80);
+  }
   EXPECT_TRUE(has(last_error([&] { (void)read_tum(folder / "none.tum"); }),
                   "none.tum: cannot be opened (No such file"));
   EXPECT_TRUE(has(last_error([&] { (void)read_tum(folder.path()); }), "is a folder"));
   const std::filesystem::path pipe = folder / "pipe.tum";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_TRUE(has(last_error([&] { (void)read_tum(pipe); }), "is a pipe or a device"));
-  EXPECT_TRUE(has(last_error([] { (void)read_tum("/dev/zero"); }), "is a pipe or a device"));
 }
 
-TEST(Kitti, readsPosesWithTheirTimes) {
+TEST(Trajectory, unitAndOrderAreWhatTheUserSays) {
   const test::TemporaryFolder folder;
-  const auto poses =
-      folder.write("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 4 1 0 0 5 0 0 1 6\n");
-  folder.write("times.txt", "0.000000e+00\n1.044989e-01\n");
-  for (const auto& path : {poses, folder.path()}) {
+  const std::string turn = " 1 2 3 0.70710678 0 0 0.70710678\n";
+  const auto file = folder.write("t.txt", "0" + turn + "100" + turn + "200" + turn);
+  TrajectoryOptions options;
+  options.unit_option = "--time-unit";
+  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory_file(file, options); }), "--time-unit"));
+  options.unit = TimeUnit::milliseconds;
+  EXPECT_EQ(read_trajectory_file(file, options).poses[1].stamp.ns(), 100'000'000);
+  EXPECT_FALSE(read_trajectory_file(file, options).order_told);
+  options.quaternion = QuaternionOrder::wxyz;
+  const Trajectory w_first = read_trajectory_file(file, options).poses;
+  EXPECT_LT((w_first[0].T_world_body.R * Vec3(1, 0, 0) - Vec3(0, 1, 0)).norm(), 1e-8) << "about z";
+  options.quaternion = QuaternionOrder::xyzw;
+  const Trajectory other =
+      in_other_order(read_trajectory_file(file, options).poses, QuaternionOrder::xyzw);
+  EXPECT_LT(rotation_angle(other[0].T_world_body.R.transpose() * w_first[0].T_world_body.R), 1e-7);
+}
+
+TEST(Kitti, posesHaveTheTimesBesideThemOrNone) {
+  const test::TemporaryFolder folder;
+  const std::string first = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  const auto poses = folder.write("poses/06.txt", first + "0 -1 0 4 1 0 0 5 0 0 1 6\n");
+  EXPECT_FALSE(read_trajectory_file(poses).timed);
+  EXPECT_EQ(read_trajectory_file(poses).rows, 2U);
+  EXPECT_TRUE(
+      has(last_error([&] { (void)read_trajectory(poses); }), "put the sequence's times.txt"));
+  folder.write("sequences/06/times.txt", "12.5\n1.26e+01\n");
+  for (const auto& path : {poses, folder / "sequences/06", folder / "sequences/06/"}) {
     const Trajectory t = read_trajectory(path);
-    ASSERT_EQ(t.size(), 2U);
-    EXPECT_EQ(t[1].stamp.ns(), 104498900);
+    ASSERT_EQ(t.size(), 2U) << path;
+    EXPECT_EQ(t[1].stamp.ns(), 12600000000) << path;
     EXPECT_LT((t[1].T_world_body * Vec3(1, 0, 0) - Vec3(4, 6, 6)).norm(), 1e-15);
   }
-}
-
-TEST(Kitti, findsTheBenchmarksOwnTree) {
-  const test::TemporaryFolder folder;
-  const auto poses = folder.write("poses/06.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
-  folder.write("sequences/06/times.txt", "12.5\n");
-  for (const auto& path : {poses, folder / "sequences/06", folder / "sequences/06/"})
-    EXPECT_EQ(read_trajectory(path).front().stamp.ns(), 12500000000) << path;
-}
-
-TEST(Kitti, normalisesRoundedRotationsAndRefusesOthersByFileAndLine) {
-  const test::TemporaryFolder folder;
-  folder.write("times.txt", "0\n1\n");
-  const std::string first = "1 0 0 0 0 1 0 0 0 0 1 0\n";
-  const auto poses = folder.write("poses.txt", first + "1.000001 1e-6 0 7 0 1 0 8 0 0 1 9\n");
-  const Mat3 R = read_trajectory(poses)[1].T_world_body.R;
-  EXPECT_LT((R * R.transpose() - Mat3::Identity()).norm(), 1e-14);
-
-  folder.write("poses.txt", first + "1.0005 0 0 7 0 1 0 8 0 0 1 9\n");  // R Rᵀ − I: 1.0e-3
-  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(poses); }),
-                  "poses.txt:2: the matrix is not a rotation"));
-  folder.write("poses.txt", first + "1 0.001 0 7 0 1 0 8 0 0 1 9\n");
-  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(poses); }),
-                  "poses.txt:2: the matrix is not a rotation"));
-  folder.write("poses.txt", first + "1 0 0 7 0 1 0 8 0 0 -1 9\n");
-  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(poses); }), "a reflection"));
-}
-
-TEST(Kitti, saysWhenPosesAndTimesDoNotBelongTogether) {
-  const test::TemporaryFolder folder;
-  const std::string line = "1 0 0 0 0 1 0 0 0 0 1 0\n";
-  const auto poses = folder.write("poses.txt", line + line);
-  const auto said = [&] { return last_error([&] { (void)read_trajectory(poses); }); };
-  EXPECT_TRUE(has(said(), "put the sequence's times.txt beside it"));
-  folder.write("times.txt", "0\n");
-  EXPECT_TRUE(has(said(), "poses.txt:2: is pose 2, but "));
-  folder.write("times.txt", "0\n1\n2\n");
-  EXPECT_TRUE(has(said(), "has 2 poses, but "));
-  folder.write("times.txt", "0\n0\n");
-  EXPECT_TRUE(has(said(), "times.txt:2: the time is not later"));
-  folder.write("times.txt", "0\nsoon\n");
-  EXPECT_TRUE(has(said(), "times.txt:2: `soon` is not a time"));
-  folder.write("poses.txt", line + "1 0 0 0 0 1 0 0 0 0 1\n");
-  folder.write("times.txt", "0\n1\n");
-  EXPECT_TRUE(has(said(), "poses.txt:2: has 11 numbers"));
+  folder.write("sequences/06/times.txt", "0\n1\n2\n");
+  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(poses); }), "has 2 poses, but "));
+  folder.write("sequences/06/times.txt", "0\nsoon\n");
+  EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(poses); }), "times.txt:2: `soon`"));
+  const std::vector<Stamp> times = {Stamp(30), Stamp(20)};
+  EXPECT_EQ(read_kitti(poses, times).front().stamp, Stamp(20)) << "in the order of time";
+  EXPECT_THROW((void)read_kitti(poses, std::span(times).first(1)), InputError);
 }
 
 TEST(Euroc, bringsTheBodyToTheLeftCamera) {
   const test::TemporaryFolder folder;
-  folder.write("mav0/cam0/sensor.yaml", kSensor);
   // w first; a half turn about x; 17 columns; CR LF.
-  const auto csv = folder.write("mav0/state_groundtruth_estimate0/data.csv",
-                                "#timestamp, p_RS_R_x [m], …\r\n"
-                                "1403636584763555584,1,2,3,0,1,0,0,0.1,0.2,0.3,0,0,0,0,0,0\r\n"
-                                "1403636584768555584,1,2,3,0,1,0,0,0.1,0.2,0.3,0,0,0,0,0,0\r\n");
+  const std::string text =
+      "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+      "q_RS_z [], v_RS_R_x [m s^-1]\r\n"
+      "1403636584763555584,1,2,3,0,1,0,0,0.1,0.2,0.3,0,0,0,0,0,0\r\n"
+      "1403636584768555584,1,2,3,0,1,0,0,0.1,0.2,0.3,0,0,0,0,0,0\r\n";
+  const auto alone = folder.write("alone/gt.csv", text);
+  EXPECT_EQ(read_trajectory(alone)[0].T_world_body.t, Vec3(1, 2, 3)) << "of the body";
+  EXPECT_TRUE(has(read_trajectory_file(alone).remarks.at(0), "cam0/sensor.yaml"));
+  folder.write("mav0/cam0/sensor.yaml", kSensor);
+  const auto csv = folder.write("mav0/state_groundtruth_estimate0/data.csv", text);
   for (const auto& path : {csv, folder.path(), folder / "mav0", folder / "mav0/"}) {
     const Trajectory t = read_trajectory(path);
     ASSERT_EQ(t.size(), 2U) << path;
@@ -191,55 +236,63 @@ TEST(Euroc, bringsTheBodyToTheLeftCamera) {
     // The camera's x axis is the body's y axis, which points along −y of the world.
     EXPECT_LT((t[0].T_world_body.R.col(0) - Vec3(0, -1, 0)).norm(), 1e-15);
   }
-}
-
-TEST(Euroc, readsEightColumnsToo) {
-  const test::TemporaryFolder folder;
-  folder.write("cam0/sensor.yaml", kSensor);
-  const auto csv = folder.write("data.csv", "5,1,2,3,1,0,0,0\n");
-  EXPECT_LT((read_trajectory(csv)[0].T_world_body.t - Vec3(1.1, 2.2, 3.3)).norm(), 1e-15);
-}
-
-TEST(Euroc, saysFileAndLineOfWhatIsWrong) {
-  const test::TemporaryFolder folder;
-  const auto csv = folder.write("data.csv", "5,1,2,3,1,0,0,0\n6,1,2,3,1,0,0\n");
   const auto said = [&] { return last_error([&] { (void)read_trajectory(csv); }); };
-  EXPECT_TRUE(has(said(), "put cam0/sensor.yaml"));
-  folder.write("cam0/sensor.yaml", kSensor);
-  EXPECT_TRUE(has(said(), "data.csv:2: has 7 columns"));
-  folder.write("data.csv", "5.5,1,2,3,1,0,0,0\n");
-  EXPECT_TRUE(has(said(), "data.csv:1: `5.5` is not a stamp in whole nanoseconds"));
-  folder.write("data.csv", "5,1,2,3,1,0,0,0\n5,1,2,3,1,0,0,0\n");
-  EXPECT_TRUE(has(said(), "data.csv:2: the stamp"));
-  folder.write("data.csv", "5,1,,3,1,0,0,0\n");
-  EXPECT_TRUE(has(said(), "data.csv:1: `` is not a finite number"));
-
-  folder.write("data.csv", "5,1,2,3,1,0,0,0\n");
-  folder.write("cam0/sensor.yaml", "rate_hz: 20\n");
-  EXPECT_TRUE(has(said(), "sensor.yaml: has no T_BS"));
-  folder.write("cam0/sensor.yaml", "a: 1\nT_BS:\n  data: [1, 0, 0]\n");
-  EXPECT_TRUE(has(said(), "sensor.yaml:3: T_BS data"));
-  folder.write("cam0/sensor.yaml", "T_BS:\n  data: [1,0,0,0, 0,1,0,0, 0,0,1.01,0, 0,0,0,1]\n");
-  EXPECT_TRUE(has(said(), "sensor.yaml:2: T_BS is not a rigid transform"));
-  folder.write("cam0/sensor.yaml", "T_BS:\n  data: [1,0,0,x, 0,1,0,0, 0,0,1,0, 0,0,0,1]\n");
-  EXPECT_TRUE(has(said(), "sensor.yaml:2: T_BS data"));
-  folder.write("cam0/sensor.yaml", "a: [1\nb: 2\n");
-  EXPECT_TRUE(has(said(), "is not YAML"));
-  folder.write("cam0/sensor.yaml", "just words\n");
-  EXPECT_TRUE(has(said(), "is not a sensor.yaml"));
-  folder.write("cam0/sensor.yaml", std::string(100000, '['));
-  EXPECT_TRUE(has(said(), "is not YAML"));
+  struct Case {
+    const char *sensor, *said;
+  };
+  for (const Case& c :
+       {Case{"rate_hz: 20\n", "sensor.yaml: has no T_BS"},
+        Case{"a: 1\nT_BS:\n  data: [1, 0, 0]\n", "sensor.yaml:3: T_BS data"},
+        Case{"T_BS:\n  data: [1,0,0,0, 0,1,0,0, 0,0,1.01,0, 0,0,0,1]\n",
+             "is not a rigid transform"},
+        Case{"a: [1\nb: 2\n", "is not YAML"}, Case{"just words\n", "is not a sensor.yaml"}}) {
+    folder.write("mav0/cam0/sensor.yaml", c.sensor);
+    EXPECT_TRUE(has(said(), c.said));
+  }
 }
 
-TEST(Trajectory, folderWithoutOneSaysWhatWasLookedFor) {
+TEST(TimesFile, isReadHoweverProgramsWriteIt) {
+  struct Case {
+    const char* text;
+    std::int64_t second;  // ns
+    const char* name;     // of the second line's left image
+  };
+  const test::TemporaryFolder folder;
+  for (const Case& c : {
+           Case{"1403636584763555584\n1403636584863555584\n", kFirst + 100'000'000, ""},
+           Case{"1403636584763\n1403636584863\n", kFirst + 100'000'000 - 555'584, ""},
+           Case{"1403636584763555\n1403636584863555\n", kFirst + 100'000'000 - 584, ""},
+           Case{"timestamp,name\n1403636584763555584 , a.png\n1403636584863555584 , b.png\n",
+                kFirst + 100'000'000, "b.png"},
+           Case{"0 1.5 a.png\n1 1.6 b.png\n", 1'600'000'000, "b.png"},
+           Case{"1403636584 763555584\n1403636584 863555584\n", kFirst + 100'000'000, ""},
+           Case{"1403636584.763555584\n1403636585.0\n", 1403636585000000000, ""},
+           Case{"5.963555584\n6.63555584\n6.163555584\n", 6'063'555'584, ""},
+           Case{"2014-06-24T18:29:44.5\n2014-06-24T18:29:45Z\n", 1403634585000000000, ""},
+           Case{"2014-06-24 18:29:44.5 a.png\n2014-06-24 18:29:45 b.png\n", 1403634585000000000,
+                "b.png"},
+           Case{"0\n50000000\n100000000\n", 50'000'000, ""},
+           Case{"864000000000000\n864000050000000\n", 864000050000000, ""},  // ns since the start
+       }) {
+    const TimesFile t = read_times_file(folder.write("times.txt", c.text));
+    EXPECT_EQ(t.lines.at(1).stamp.ns(), c.second) << c.text;
+    EXPECT_EQ(t.lines.at(1).name[0], c.name) << c.text;
+  }
+  for (const auto& [text, said] :
+       {std::pair{"1\nnoon\n", "times.txt:2: `noon`"}, std::pair{"", "holds no times"},
+        std::pair{"0.1,a.png\n0.2\n", "times.txt:2: names an image"},
+        std::pair{"0.1,../a.png\n", "times.txt:1: `../a.png`"},
+        std::pair{"0.1,a,b,c\n", "4 columns"}}) {
+    const auto file = folder.write("times.txt", text);
+    EXPECT_TRUE(has(last_error([&] { (void)read_times_file(file); }), said)) << text;
+  }
+}
+
+TEST(Trajectory, aFolderStandsForItsTrajectoryOrIsRefused) {
   const test::TemporaryFolder folder;
   EXPECT_TRUE(has(last_error([&] { (void)read_trajectory(folder.path()); }),
                   "has no trajectory.tum, no poses.txt"));
   EXPECT_FALSE(find_truth(folder.path()).has_value());
-}
-
-TEST(Trajectory, sessionFolderStandsForItsTrajectory) {
-  const test::TemporaryFolder folder;
   folder.write("trajectory.tum", kGoodLine);
   EXPECT_EQ(read_trajectory(folder.path()).front().stamp.ns(), 1500000000);
 }
@@ -260,19 +313,6 @@ TEST(Trajectory, kittiExcerptIsTheReferenceOfPairC) {
     EXPECT_LT(rotation_angle(kitti[i].T_world_body.R.transpose() * reference[i].T_world_body.R),
               5e-7);
   }
-}
-
-TEST(Trajectory, kittiPosesWithTimesInHandLeaveOutThoseThatGoBackwards) {
-  const test::TemporaryFolder folder;
-  std::string rows;
-  for (int i = 0; i < 4; ++i) rows += "1 0 0 " + std::to_string(i) + " 0 1 0 0 0 0 1 0\n";
-  const auto file = folder.write("poses.txt", rows);
-  const std::vector<Stamp> times = {Stamp(10), Stamp(30), Stamp(20), Stamp(31)};
-  const Trajectory trajectory = read_kitti(file, times);
-  ASSERT_EQ(trajectory.size(), 3U);
-  EXPECT_EQ(trajectory[2].stamp, Stamp(31));
-  EXPECT_EQ(trajectory[2].T_world_body.t.x(), 3.0);
-  EXPECT_THROW((void)read_kitti(file, std::span(times).first(3)), InputError);
 }
 
 TEST(Trajectory, eurocExcerptGivesTheKnownLeftCamera) {

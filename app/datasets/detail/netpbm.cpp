@@ -1,0 +1,107 @@
+#include "app/datasets/detail/netpbm.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "app/datasets/detail/image_size.hpp"
+#include "app/datasets/detail/png.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+struct Header {
+  ImageSize size{};
+  std::uint32_t largest = 0;  // sample
+  std::size_t samples = 1;    // of a pixel
+  std::size_t begin = 0;      // of the pixels
+  [[nodiscard]] std::size_t bytes_a_sample() const { return largest > 255 ? 2 : 1; }
+  [[nodiscard]] std::size_t row() const {
+    return static_cast<std::size_t>(size.width) * samples * bytes_a_sample();
+  }
+};
+
+bool is_blank(std::uint8_t c) noexcept { return c == ' ' || (c >= '\t' && c <= '\r'); }
+
+/// Three whole numbers after the two letters, between them blanks and comments, then one blank.
+ImageFileStatus read_header(Bytes bytes, Header* header) noexcept {
+  std::array<std::uint32_t, 3> numbers{};
+  std::size_t at = 2;
+  for (std::uint32_t& number : numbers) {
+    while (at < bytes.size() && (is_blank(bytes[at]) || bytes[at] == '#')) {
+      if (bytes[at] == '#')
+        while (at < bytes.size() && bytes[at] != '\n') ++at;
+      else
+        ++at;
+    }
+    const std::size_t first = at;
+    for (; at < bytes.size() && bytes[at] >= '0' && bytes[at] <= '9' && at - first < 6; ++at)
+      number = 10 * number + (bytes[at] - std::uint32_t{'0'});
+    if (at == bytes.size()) return ImageFileStatus::torn;
+    if (at == first || !is_blank(bytes[at])) return ImageFileStatus::not_an_image;
+  }
+  if (numbers[2] == 0 || numbers[2] > 65535) return ImageFileStatus::not_an_image;
+  header->largest = numbers[2];
+  header->samples = bytes[1] == '6' ? 3 : 1;
+  header->begin = at + 1;
+  return accept_size(numbers[0], numbers[1], &header->size);
+}
+
+std::uint16_t deep_sample(const std::uint8_t* at) noexcept {
+  return static_cast<std::uint16_t>(at[0] << 8U | at[1]);
+}
+
+}  // namespace
+
+bool is_netpbm(Bytes b) noexcept {
+  return b.size() > 2 && b[0] == 'P' && (b[1] == '5' || b[1] == '6') &&
+         (is_blank(b[2]) || b[2] == '#');
+}
+
+ImageFileStatus netpbm_size(Bytes head, ImageSize* size) noexcept {
+  Header header;
+  const ImageFileStatus status = read_header(head, &header);
+  *size = header.size;
+  return status;
+}
+
+ImageFileStatus check_netpbm(Bytes bytes) noexcept {
+  Header header;
+  if (const auto status = read_header(bytes, &header); status != ImageFileStatus::ok) return status;
+  const std::size_t needed = header.row() * static_cast<std::size_t>(header.size.height);
+  return bytes.size() - std::min(header.begin, bytes.size()) >= needed ? ImageFileStatus::ok
+                                                                       : ImageFileStatus::torn;
+}
+
+std::optional<std::uint16_t> netpbm_peak(Bytes bytes) noexcept {
+  Header header;
+  (void)read_header(bytes, &header);
+  if (header.samples != 1 || header.bytes_a_sample() != 2) return std::nullopt;
+  std::uint16_t peak = 0;
+  const std::size_t end =
+      header.begin + header.row() * static_cast<std::size_t>(header.size.height);
+  for (std::size_t at = header.begin; at < end; at += 2)
+    peak = std::max(peak, deep_sample(bytes.data() + at));
+  return peak;
+}
+
+void decode_netpbm(Bytes bytes, std::uint8_t* out, std::size_t stride, int deep_bits) noexcept {
+  Header header;
+  (void)read_header(bytes, &header);
+  const std::uint8_t* in = bytes.data() + header.begin;
+  const std::size_t width = static_cast<std::size_t>(header.size.width),
+                    step = header.bytes_a_sample();
+  for (int y = 0; y < header.size.height; ++y, in += header.row(), out += stride)
+    for (std::size_t x = 0; x < width; ++x) {
+      // Of colours the upper 8 bits, as luminance of ITU-R BT.601.
+      const std::uint8_t* pixel = in + x * header.samples * step;
+      out[x] = header.samples == 3
+                   ? static_cast<std::uint8_t>(
+                         (77U * pixel[0] + 150U * pixel[step] + 29U * pixel[2 * step] + 128U) >> 8U)
+               : step == 2 ? narrowed(deep_sample(pixel), deep_bits)
+                           : pixel[0];
+    }
+}
+
+}  // namespace vergence::app::detail

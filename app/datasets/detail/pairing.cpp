@@ -1,0 +1,102 @@
+#include "app/datasets/detail/pairing.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <numeric>
+
+#include <fmt/format.h>
+
+namespace vergence::app::detail {
+namespace {
+
+/// At most what 64 bits hold: the stamps are whatever a file says.
+std::int64_t apart(Stamp a, Stamp b) {
+  const auto later = static_cast<std::uint64_t>(std::max(a, b).ns()),
+             earlier = static_cast<std::uint64_t>(std::min(a, b).ns());
+  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  return static_cast<std::int64_t>(std::min(later - earlier, kMost));
+}
+
+/// Stamps by time, whatever their order.
+class Sorted {
+ public:
+  explicit Sorted(std::span<const Stamp> stamps) : stamps_(stamps), order_(stamps.size()) {
+    std::iota(order_.begin(), order_.end(), std::size_t{0});
+    std::stable_sort(order_.begin(), order_.end(),
+                     [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
+  }
+  /// Index of the nearest; the earlier of two. Precondition: there is one.
+  [[nodiscard]] std::size_t nearest(Stamp to) const {
+    const auto after = std::lower_bound(order_.begin(), order_.end(), to,
+                                        [&](std::size_t i, Stamp s) { return stamps_[i] < s; });
+    if (after == order_.begin()) return *after;
+    const std::size_t before = *(after - 1);
+    return after == order_.end() || apart(stamps_[before], to) <= apart(stamps_[*after], to)
+               ? first_of(before)
+               : *after;
+  }
+
+ private:
+  /// Of equal stamps the first.
+  [[nodiscard]] std::size_t first_of(std::size_t i) const {
+    return *std::lower_bound(order_.begin(), order_.end(), stamps_[i],
+                             [&](std::size_t k, Stamp s) { return stamps_[k] < s; });
+  }
+  std::span<const Stamp> stamps_;
+  std::vector<std::size_t> order_;
+};
+
+template <typename T>
+T at_share(std::vector<T> values, double share) {
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(
+                                          share * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+}  // namespace
+
+Duration usual_interval(std::span<const Stamp> stamps) {
+  std::vector<std::int64_t> ns;
+  for (std::size_t i = 1; i < stamps.size(); ++i)
+    if (stamps[i] > stamps[i - 1]) ns.push_back(apart(stamps[i], stamps[i - 1]));
+  if (ns.empty()) return Duration::milliseconds(100);
+  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
+  std::nth_element(ns.begin(), middle, ns.end());
+  return Duration::nanoseconds(*middle);
+}
+
+std::vector<std::array<std::size_t, 2>> pair_nearest(std::span<const Stamp> left,
+                                                     std::span<const Stamp> right, Duration most) {
+  std::vector<std::array<std::size_t, 2>> pairs;
+  if (left.empty() || right.empty()) return pairs;
+  const Sorted of_left(left), of_right(right);
+  for (std::size_t l = 0; l < left.size(); ++l) {
+    const std::size_t r = of_right.nearest(left[l]);
+    if (apart(left[l], right[r]) <= most.ns() && of_left.nearest(right[r]) == l)
+      pairs.push_back({l, r});
+  }
+  return pairs;
+}
+
+PairOffset pair_offset(std::span<const Stamp> left, std::span<const Stamp> right,
+                       std::span<const std::array<std::size_t, 2>> pairs) {
+  constexpr double kMiddle = 0.5, kMost = 0.95;
+  std::vector<std::int64_t> ns, far;
+  for (const auto& [l, r] : pairs) {
+    ns.push_back((right[r] - left[l]).ns());
+    far.push_back(std::abs(ns.back()));
+  }
+  if (ns.empty()) return {};
+  return {Duration::nanoseconds(at_share(std::move(ns), kMiddle)),
+          Duration::nanoseconds(at_share(std::move(far), kMost))};
+}
+
+std::string describe(const PairOffset& offset) {
+  return fmt::format("{:.4g} ms (median; 95 % within {:.4g} ms)", 1e3 * offset.median.to_seconds(),
+                     1e3 * offset.farthest.to_seconds());
+}
+
+}  // namespace vergence::app::detail

@@ -1,0 +1,37 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/types/time.hpp"
+
+/// Which image of one camera belongs to which of the other.
+namespace vergence::app::detail {
+
+/// Stamps of a pair may be apart by so much of the interval, 40 % with room for its own rounding:
+/// half of it is the same to both neighbours.
+inline constexpr double kMostApart = 0.404;
+
+/// The median step forward; 0.1 s where there is none.
+[[nodiscard]] Duration usual_interval(std::span<const Stamp> stamps);
+
+/// Indices of stamps that are each other's nearest and not farther apart than `most`, in the order
+/// of the left ones.
+[[nodiscard]] std::vector<std::array<std::size_t, 2>> pair_nearest(std::span<const Stamp> left,
+                                                                   std::span<const Stamp> right,
+                                                                   Duration most);
+
+/// By how much the right stamps of pairs are later.
+struct PairOffset {
+  Duration median{};    // signed
+  Duration farthest{};  // the 95th percentile of the magnitude
+};
+[[nodiscard]] PairOffset pair_offset(std::span<const Stamp> left, std::span<const Stamp> right,
+                                     std::span<const std::array<std::size_t, 2>> pairs);
+
+/// "0.312 ms (median; 95 % within 0.4 ms)".
+[[nodiscard]] std::string describe(const PairOffset& offset);
+
+}  // namespace vergence::app::detail

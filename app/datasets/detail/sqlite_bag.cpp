@@ -1,0 +1,171 @@
+#include "app/datasets/detail/sqlite_bag.hpp"
+
+#include <sqlite3.h>
+
+#include <map>
+#include <string>
+#include <system_error>
+
+#include "app/datasets/text_file.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+constexpr unsigned kRowBits = 32;  // below them the offset in a row's bytes
+
+/// A file's name as SQLite's URI has it.
+std::string uri_of(const std::filesystem::path& file) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-";
+  constexpr std::string_view kHex = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(file).string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (kPlain.find(c) != std::string_view::npos)
+      uri += c;
+    else
+      uri.append({'%', kHex[byte >> 4U], kHex[byte & 15U]});
+  }
+  // Without a log of writes nothing beside the file is needed, and nothing is written there.
+  std::error_code ignored;
+  const auto log = std::filesystem::file_size(file.string() + "-wal", ignored);
+  return uri + (ignored || log == 0 ? "?mode=ro&immutable=1" : "?mode=ro");
+}
+
+class Statement {
+ public:
+  Statement(sqlite3* database, const char* sql) noexcept {
+    if (sqlite3_prepare_v2(database, sql, -1, &statement_, nullptr) != SQLITE_OK)
+      statement_ = nullptr;
+  }
+  ~Statement() { sqlite3_finalize(statement_); }
+  Statement(const Statement&) = delete;
+  Statement& operator=(const Statement&) = delete;
+
+  [[nodiscard]] bool ok() const noexcept { return statement_ != nullptr; }
+  /// SQLITE_ROW, SQLITE_DONE, or what is wrong.
+  [[nodiscard]] int step() noexcept { return sqlite3_step(statement_); }
+  [[nodiscard]] std::int64_t integer(int column) noexcept {
+    return sqlite3_column_int64(statement_, column);
+  }
+  [[nodiscard]] std::string text(int column) {
+    const auto* bytes = sqlite3_column_text(statement_, column);
+    const int size = sqlite3_column_bytes(statement_, column);
+    return bytes == nullptr
+               ? std::string()
+               : std::string(reinterpret_cast<const char*>(bytes), static_cast<std::size_t>(size));
+  }
+
+ private:
+  sqlite3_stmt* statement_ = nullptr;
+};
+
+}  // namespace
+
+void SqliteBag::Close::operator()(sqlite3* database) const noexcept { sqlite3_close(database); }
+void SqliteBag::Close::operator()(sqlite3_blob* blob) const noexcept { sqlite3_blob_close(blob); }
+
+SqliteBag::SqliteBag(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored))
+    refuse(file, 0, "is no regular file; a bag is expected");
+  sqlite3* database = nullptr;
+  const int status = sqlite3_open_v2(uri_of(file).c_str(), &database,
+                                     SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
+  database_.reset(database);
+  if (status != SQLITE_OK)
+    refuse(file, 0, std::string("cannot be opened by SQLite: ") + sqlite3_errstr(status));
+  harden();
+}
+
+SqliteBag::SqliteBag(std::vector<std::uint8_t> bytes) : bytes_(std::move(bytes)) {
+  sqlite3* database = nullptr;
+  (void)sqlite3_open_v2(":memory:", &database, SQLITE_OPEN_READWRITE, nullptr);
+  database_.reset(database);
+  harden();
+  const auto size = static_cast<sqlite3_int64>(bytes_.size());
+  (void)sqlite3_deserialize(database, "main", bytes_.data(), size, size,
+                            SQLITE_DESERIALIZE_READONLY);
+}
+
+SqliteBag::~SqliteBag() = default;
+
+/// The file is untrusted: its schema may not call functions, and no row is longer than a message.
+void SqliteBag::harden() const noexcept {
+  sqlite3* database = database_.get();
+  (void)sqlite3_db_config(database, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  (void)sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  (void)sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  (void)sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  (void)sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(2 * kMostChunk));
+}
+
+std::uint64_t SqliteBag::size() const noexcept { return std::uint64_t{1} << 63U; }
+
+bool SqliteBag::read(std::uint64_t offset, std::span<std::uint8_t> out) const noexcept {
+  const std::uint64_t row = offset >> kRowBits;
+  const auto at = static_cast<std::uint32_t>(offset);
+  const std::lock_guard lock(mutex_);
+  if (!blob_ || row != row_) {
+    blob_.reset();
+    sqlite3_blob* blob = nullptr;
+    const int status = sqlite3_blob_open(database_.get(), "main", "messages", "data",
+                                         static_cast<sqlite3_int64>(row), 0, &blob);
+    blob_.reset(blob);
+    row_ = row;
+    if (status != SQLITE_OK) {
+      blob_.reset();
+      return false;
+    }
+  }
+  const auto size = static_cast<std::uint32_t>(sqlite3_blob_bytes(blob_.get()));
+  if (at > size || out.size() > size - at) return false;
+  return sqlite3_blob_read(blob_.get(), out.data(), static_cast<int>(out.size()),
+                           static_cast<int>(at)) == SQLITE_OK;
+}
+
+std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
+  constexpr std::int64_t kMostRow = std::int64_t{1} << (62 - kRowBits);
+  BagScan scan;
+  std::map<std::int64_t, BagChannel> channels;
+  {
+    Statement topics(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
+    if (!topics.ok()) return std::nullopt;
+    while (topics.step() == SQLITE_ROW && channels.size() < kMostChannels)
+      if (std::string name = topics.text(1); name.size() <= kMostName)
+        channels.try_emplace(
+            topics.integer(0),
+            BagChannel{std::move(name), plain_type(topics.text(2)),
+                       topics.text(3) == "cdr" ? MessageEncoding::cdr : MessageEncoding::other});
+  }
+  Statement messages(database_.get(),
+                     "SELECT id, topic_id, timestamp, length(data), typeof(data) FROM messages "
+                     "ORDER BY timestamp, id");
+  if (!messages.ok()) return std::nullopt;
+  int status = SQLITE_ROW;
+  while ((status = messages.step()) == SQLITE_ROW) {
+    const std::int64_t row = messages.integer(0), size = messages.integer(3);
+    const auto channel = channels.find(messages.integer(1));
+    if (channel == channels.end()) {
+      ++scan.orphans;
+    } else if (row <= 0 || row >= kMostRow || size > static_cast<std::int64_t>(kMostChunk) ||
+               messages.text(4) != "blob") {
+      scan.broken(&BagScan::broken_records, 0,
+                  "a row that is no message, or one longer than 64 MiB");
+    } else {
+      ++scan.messages;
+      each({&channel->second,
+            {BagPlace::kNoChunk, static_cast<std::uint64_t>(row) << kRowBits,
+             static_cast<std::uint32_t>(size)},
+            this,
+            messages.integer(2)});
+    }
+  }
+  scan.finished = true;
+  if (status != SQLITE_DONE)
+    scan.broken(&BagScan::broken_records, 0,
+                std::string("where SQLite says: ") + sqlite3_errstr(status));
+  return scan;
+}
+
+}  // namespace vergence::app::detail

@@ -1,0 +1,107 @@
+#include "app/datasets/text_table.hpp"
+
+#include <algorithm>
+
+#include "app/datasets/decimal.hpp"
+#include "app/datasets/stamp_text.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
+/// What begins a comment, taken off; nothing: the line is none.
+std::size_t comment_mark(std::string_view line) noexcept {
+  if (line.starts_with('#') || line.starts_with('%')) return 1;
+  return line.starts_with("//") ? 2 : 0;
+}
+
+/// A number, or what programs print where they have none.
+bool begins_row(std::string_view field) noexcept {
+  double ignored = 0;
+  constexpr std::string_view kNan = "nan";
+  const std::string_view magnitude = field.substr(field.starts_with('-') ? 1 : 0);
+  bool nan = magnitude.size() == kNan.size();
+  for (std::size_t i = 0; nan && i < kNan.size(); ++i) nan = (magnitude[i] | 0x20) == kNan[i];
+  return nan || parse_number(field, &ignored) || parse_decimal(field, 0) || parse_iso_time(field) ||
+         (field.size() == 10 && field[4] == '-' && field[7] == '-');  // a date, its time follows
+}
+
+}  // namespace
+
+TextTable::TextTable(std::string_view text) : rest_(text) {
+  constexpr std::size_t kMostHeadings = 50;  // lines
+  if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
+  std::string_view headings;
+  for (std::size_t others = 0;;) {
+    const std::string_view before = rest_;
+    const std::size_t number = number_;
+    std::string_view line;
+    if (!next_line(&line)) break;
+    if (const std::size_t mark = comment_mark(line); mark > 0) {
+      headings = trimmed(line.substr(mark));
+      continue;
+    }
+    separator_ = line.find(';') != std::string_view::npos   ? ';'
+                 : line.find(',') != std::string_view::npos ? ','
+                                                            : ' ';
+    split_into(line, &fields_);
+    if (!fields_.empty() && begins_row(fields_.front())) {
+      rest_ = before;
+      number_ = number;
+      break;
+    }
+    headings = line;
+    if (++others > kMostHeadings) rest_ = {};  // this is no table
+  }
+  const char of_rows = separator_;
+  if (headings.find(',') != std::string_view::npos) separator_ = ',';
+  if (headings.find(';') != std::string_view::npos) separator_ = ';';
+  split_into(headings, &names_);
+  separator_ = of_rows;
+  fields_.clear();
+}
+
+bool TextTable::next_line(std::string_view* line) {
+  while (!rest_.empty()) {
+    const std::size_t end = rest_.find('\n');
+    *line = trimmed(rest_.substr(0, end));
+    unfinished_ = end == std::string_view::npos;
+    rest_.remove_prefix(unfinished_ ? rest_.size() : end + 1);
+    ++number_;
+    if (!line->empty()) return true;
+  }
+  return false;
+}
+
+bool TextTable::next() {
+  for (std::string_view line; next_line(&line);) {
+    if (comment_mark(line) > 0) continue;
+    split_into(line, &fields_);
+    return true;
+  }
+  return false;
+}
+
+void TextTable::split_into(std::string_view line, std::vector<std::string_view>* fields) const {
+  constexpr std::string_view kBlanks = " \t\r\v\f";
+  fields->clear();
+  while (!line.empty()) {
+    std::size_t end = 0;
+    if (separator_ == ' ') {
+      line.remove_prefix(std::min(line.find_first_not_of(kBlanks), line.size()));
+      if (line.empty()) return;
+      end = line.find_first_of(kBlanks);
+    } else {
+      end = line.find(separator_);
+    }
+    std::string_view field = trimmed(line.substr(0, end));
+    if (field.size() > 1 && field.front() == '"' && field.back() == '"')
+      field = field.substr(1, field.size() - 2);
+    fields->push_back(field);
+    line.remove_prefix(end == std::string_view::npos ? line.size() : end + 1);
+  }
+  if (separator_ != ' ' && !fields->empty() && fields->back().empty()) fields->pop_back();
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,159 @@
+#include "app/foreign_calibration/settings_tree.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include <yaml-cpp/yaml.h>
+
+#include "app/datasets/decimal.hpp"
+#include "app/datasets/text_file.hpp"
+
+namespace vergence::app {
+namespace {
+
+bool begins_number(std::string_view word) {
+  double ignored = 0;
+  return parse_number(word.substr(0, word.find_first_of(" \t")), &ignored);
+}
+
+/// The numbers of a text between blanks, commas and semicolons, as a YAML list.
+std::string as_list(std::string_view text) {
+  std::string list = "[";
+  std::string_view rest = text;
+  constexpr std::string_view kBetween = " \t\r\n,;";
+  while (!rest.empty()) {
+    rest.remove_prefix(std::min(rest.find_first_not_of(kBetween), rest.size()));
+    const std::string_view word = rest.substr(0, rest.find_first_of(kBetween));
+    if (!word.empty()) list.append(list.size() > 1 ? ", " : "").append(word);
+    rest.remove_prefix(word.size());
+  }
+  return list + "]";
+}
+
+/// A value as it stands in another syntax: a number, a list of some, or words.
+std::string as_yaml(std::string_view value) {
+  value = trimmed(value);
+  if (value.starts_with('[') || value.starts_with('{')) return std::string(value);
+  const bool several = value.find_first_of(" \t,\n") != std::string_view::npos;
+  if (begins_number(value) && several) return as_list(value);
+  return begins_number(value) ? std::string(value) : double_quoted(value);
+}
+
+/// OpenCV's XML: elements become keys, an element with text only its value. `depth`: of nesting, at
+/// most as deep as such files are.
+std::string from_xml(std::string_view* rest, std::string_view end, int depth) {
+  constexpr int kDeepest = 20;
+  std::string map;
+  std::string_view text;
+  while (!rest->empty()) {
+    const std::size_t open = rest->find('<');
+    text = map.empty() ? rest->substr(0, open) : text;
+    if (open == std::string_view::npos) break;
+    const std::size_t close = rest->find('>', open);
+    if (close == std::string_view::npos) break;
+    const std::string_view tag = rest->substr(open + 1, close - open - 1);
+    rest->remove_prefix(close + 1);
+    if (tag.starts_with('?') || tag.starts_with('!') || tag.ends_with('/')) continue;
+    if (tag.starts_with('/')) {
+      if (tag.substr(1) == end) break;
+      continue;
+    }
+    const std::string_view name = tag.substr(0, tag.find_first_of(" \t\r\n"));
+    if (depth == kDeepest) break;
+    const std::string inner = from_xml(rest, name, depth + 1);
+    map += (map.empty() ? "" : ", ") + double_quoted(name) + ": " + inner;
+  }
+  return map.empty() ? as_yaml(text) : "{" + map + "}";
+}
+
+/// Sections become groups; `key = value` or `key: value`, or a key alone and its numbers below.
+std::string from_ini(std::string_view text) {
+  std::string yaml = "{", section, key, numbers;
+  bool first = true, open = false;
+  const auto add = [&](std::string_view name, const std::string& value) {
+    yaml.append(first ? "" : ", ").append(double_quoted(name)).append(": ").append(value);
+    first = false;
+  };
+  const auto finish = [&] {
+    if (!key.empty() && !numbers.empty()) add(key, as_yaml(numbers));
+    key.clear(), numbers.clear();
+  };
+  Lines lines(text);
+  for (std::string_view line; lines.next(&line);) {
+    if (line.starts_with(';')) continue;
+    if (line.starts_with('[') && line.ends_with(']') && !begins_number(line.substr(1))) {
+      finish();
+      if (open) yaml += "}";
+      add(line.substr(1, line.size() - 2), "{");
+      first = open = true;
+    } else if (const std::size_t equals = line.find('='); equals != std::string_view::npos) {
+      finish();
+      add(trimmed(line.substr(0, equals)), as_yaml(line.substr(equals + 1)));
+    } else if (begins_number(line)) {
+      numbers.append(line).append(" ");
+    } else {
+      finish();
+      key = line;
+    }
+  }
+  finish();
+  return yaml + (open ? "}}" : "}");
+}
+
+bool is_ini(std::string_view text) {
+  Lines lines(text);
+  std::string_view line;
+  return lines.next(&line) && line.starts_with('[') && line.ends_with(']') && line.size() > 2 &&
+         !begins_number(line.substr(1)) && line.find_first_of(",{\"") == std::string_view::npos;
+}
+
+/// OpenCV's head is no YAML 1.2 and tabs are none: blanks have their places, so that lines keep
+/// their numbers.
+void put_right(std::string* text) {
+  if (text->starts_with("\xEF\xBB\xBF")) text->erase(0, 3);
+  if (text->starts_with("%YAML"))
+    std::fill(text->begin(),
+              text->begin() + static_cast<std::ptrdiff_t>(std::min(text->find('\n'), text->size())),
+              ' ');
+  std::replace(text->begin(), text->end(), '\t', ' ');
+}
+
+}  // namespace
+
+std::vector<YamlFile> settings_trees(std::string text, const std::string& name) {
+  put_right(&text);
+  std::string_view rest = text;
+  rest.remove_prefix(std::min(rest.find_first_not_of(" \r\n"), rest.size()));
+  if (rest.starts_with('<'))
+    text = from_xml(&rest, "", 0);
+  else if (is_ini(rest))
+    text = from_ini(rest);
+  std::vector<YamlFile> trees;
+  // Lines stay where they are: what is of other documents is blanked.
+  constexpr int kMostDocuments = 16;
+  int documents = 0;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    if (++documents > kMostDocuments)
+      refuse(name, 0, "has more documents (---) than a calibration has");
+    std::size_t end = text.size(), next = text.size() + 1;
+    for (std::size_t line = begin; line < text.size();) {
+      const std::size_t stop = std::min(text.find('\n', line), text.size());
+      if (std::string_view(text).substr(line, stop - line).starts_with("---")) {
+        end = line;
+        next = stop + 1;
+        break;
+      }
+      line = stop + 1;
+    }
+    std::string document(begin, ' ');
+    for (std::size_t i = 0; i < begin; ++i)
+      if (text[i] == '\n') document[i] = '\n';
+    document += text.substr(begin, end - begin);
+    YamlFile tree = YamlFile::parse(document, name);
+    if (!tree.root().IsNull()) trees.push_back(std::move(tree));
+    begin = next;
+  }
+  return trees;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,29 @@
+#include "core/comparison/attitude_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace vergence {
+
+void AttitudeCheck::add(const Vec2& place, double sigma, double yaw) noexcept {
+  // A step four sigmas long has a course good to some 15 degrees; longer steps cut bends.
+  constexpr double kSigmas = 4, kShortest = 2, kLongest = 10;  // m
+  constexpr double kMostOff = 30 * std::numbers::pi / 180;
+  if (!anchor_) anchor_ = place;
+  const Vec2 step = place - *anchor_;
+  // Of a leap of the position, or a hole, no more than of a long step.
+  constexpr double kMostOfStep = 20;  // m
+  const double length = std::min(step.norm(), kMostOfStep);
+  if (length < std::clamp(kSigmas * sigma, kShortest, kLongest)) return;
+  anchor_ = place;
+  course_ = std::atan2(step.y(), step.x());
+  const bool off = std::abs(std::remainder(*course_ - yaw, 2 * std::numbers::pi)) > kMostOff;
+  against_ = off ? against_ + length : 0;
+  with_ = off ? 0 : with_ + length;
+  (off ? all_against_ : all_with_) += length;
+  if (against_ >= kDistance) contradicted_ = true;
+  if (with_ >= kDistance) contradicted_ = false;
+}
+
+}  // namespace vergence
