@@ -206,6 +206,12 @@ StereoSequence open_folder(const std::filesystem::path& folder, bool given,
     sequence.pairs = pair_without_times(folder, left, right);
     assume_times(&sequence);
   }
+  if (left.size() != right.size())
+    sequence.remarks.push_back(
+        "left/ has " + std::to_string(left.size()) + " images and right/ has " +
+        std::to_string(right.size()) +
+        ": where one camera lost an image without leaving a gap in the names or in times.txt, all "
+        "pairs after it are a frame off; check that the names of a pair belong together");
   if (std::string turned = orientation_remark(folder / left.front()); !turned.empty())
     sequence.remarks.push_back(std::move(turned));
   if (given) return sequence;

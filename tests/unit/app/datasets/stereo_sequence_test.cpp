@@ -271,6 +271,9 @@ TEST_F(Sequence, folderWithALostImagePairsTheRestByName) {
   ASSERT_EQ(s.pairs.size(), 4U);
   EXPECT_EQ(s.pairs[1].file[1], "right/001.png");
   EXPECT_EQ(s.pairs[2].file[1], "right/002.png");
+  ASSERT_EQ(s.remarks.size(), 1U);
+  EXPECT_NE(s.remarks[0].find("left/"), std::string::npos) << s.remarks[0];
+  EXPECT_NE(s.remarks[0].find("right/"), std::string::npos) << s.remarks[0];
 }
 
 // With and without times: equal numbers of images on both sides are no proof of an order.
