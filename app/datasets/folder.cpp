@@ -295,6 +295,12 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   } else {
     sequence.pairs = pair_without_times(folder, &images, &sequence.assumptions);
   }
+  if (const auto& [left, right] = images.names; left.size() != right.size())
+    sequence.remarks.push_back(fmt::format(
+        "there are {} left images and {} right ones: where one camera lost an image without "
+        "leaving a gap in the names or in times.txt, all pairs after it are a frame off; check "
+        "that the names of a pair belong together",
+        left.size(), right.size()));
   if (given) return sequence;
   if (!fs::exists(folder / "calibration.yaml"))
     refuse(

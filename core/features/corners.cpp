@@ -11,9 +11,9 @@ namespace {
 
 // Vector loads run past the block by up to 16 + 8 pixels: cells nearer to the right edge are cut.
 constexpr int kRightMargin = 28;
-// (grey levels / px)². Rounding to whole grey levels is noise of variance 1/12, so 1/24 in the mean
-// of the structure tensor; the largest of a cell's many stays below six times that.
-constexpr float kRoundingScore = 0.25F;
+// (grey levels / px)². Below it align() finds a window flat (kMinHessian), so that nothing could be
+// matched: rounding to whole grey levels alone makes 1/24, the largest of a cell's many 1/4.
+constexpr float kFlat = 1.0F;
 
 struct Grid {
   int cell, columns, rows;
@@ -73,7 +73,7 @@ void scan_rows(const ImageView& image, const CornerOptions& options, const Grid&
       if (x1 - x0 < 4 || y1 - y0 < 4) continue;
       detail::corner_scores(image, x0, y0, x1 - x0, y1 - y0, score.data());
       Corner best = best_of(score.data(), x0, y0, x1 - x0, y1 - y0, options.mask);
-      if (!(best.score > kRoundingScore)) continue;
+      if (!(best.score > kFlat)) continue;
       best.x += static_cast<float>(x0);
       best.y += static_cast<float>(y0);
       found[cell] = best;

@@ -27,7 +27,7 @@ inline constexpr int kMaxGridCells = 4096;  // of an image
 
 /// The strongest corner of every grid cell that holds none of `taken`, strongest first, as many as
 /// `out` has room for. A corner counts by its rank: what there is no contrast for in absolute
-/// numbers may be all that a scene offers. Left out is only what the rounding of grey levels makes.
+/// numbers may be all that a scene offers. Left out is only what no patch could be aligned on.
 ///
 /// Threads  The runner takes the lower half of the grid to its other side; the result does not
 ///          depend on it.

@@ -326,6 +326,18 @@ TEST_F(Sequence, timesThatRunBackwardsAreRefused) {
       << "one frame is skipped when it comes";
 }
 
+TEST_F(Sequence, folderWithALostImagePairsTheRestByName) {
+  test::write_tiny_folder(folder_, 4);
+  std::filesystem::remove(folder_ / "right/001.png");
+  const auto s = open_sequence(SequenceFormat::folder, folder_.path());
+  ASSERT_EQ(s.pairs.size(), 4U);
+  EXPECT_EQ(s.pairs[1].file[1], "right/001.png");
+  EXPECT_EQ(s.pairs[2].file[1], "right/002.png");
+  ASSERT_EQ(s.remarks.size(), 1U);
+  EXPECT_NE(s.remarks[0].find("4 left"), std::string::npos) << s.remarks[0];
+  EXPECT_NE(s.remarks[0].find("3 right"), std::string::npos) << s.remarks[0];
+}
+
 // With and without times: equal numbers of images on both sides are no proof of an order.
 TEST_F(Sequence, folderThatLostAnImageOnEachSidePairsTheRestByName) {
   for (const bool times : {true, false}) {

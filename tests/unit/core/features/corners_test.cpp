@@ -176,7 +176,7 @@ TEST(Corners, contrastDoesNotChangeWhichThereAre) {
   const Texture texture(5);
   const Found all(draw(kWidth, kHeight, texture).view(), {});
   const Found dim(
-      draw(kWidth, kHeight, [&](const Vec2& p) { return 90 + 0.1 * texture(p); }).view(), {});
+      draw(kWidth, kHeight, [&](const Vec2& p) { return 90 + 0.25 * texture(p); }).view(), {});
   ASSERT_GT(all.corners.size(), 40U);
   // Rounding moves a few.
   EXPECT_GT(dim.corners.size(), 9 * all.corners.size() / 10);
