@@ -48,7 +48,6 @@ struct BoardSimulatorOptions {
   std::vector<HostStamp>
       reboots{};     // it begins again, by itself, in mid-frame if need be; ascending
   bool pps = false;  // a GNSS receiver is wired: an edge every whole second of the host's clock
-  std::vector<std::pair<HostStamp, HostStamp>> pps_gaps{};
   Duration ins_interval{};  // of the INS' SyncOut; 0: not wired
   std::uint64_t seed = 1;
 };

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "core/memory/allocation_guard.hpp"
-#include "drivers/mock/mock_rig.hpp"
 #include "tests/support/acquired.hpp"
+#include "tests/support/small_mock.hpp"
 #include "tests/support/watched_camera.hpp"
 
 namespace vergence {
@@ -32,63 +32,33 @@ using test::worst_acquisition;
 constexpr Stamp kStart{1'577'836'800'000'000'000};
 
 struct BenchOptions {
-  bool real_time = false;
   Duration grid = Duration::nanoseconds(1);
   SyncMode mode = SyncMode::counter;
   Duration vary{};
-  std::uint8_t feedback = 0;
   double seconds = 4;
 };
 
 /// A mock rig with tiny pictures in an almost empty town, and the source on top of it.
 struct Bench {
   explicit Bench(const std::vector<std::string>& faults, const BenchOptions& b = {}) {
-    const bool real_time = b.real_time;
-    const Duration grid = b.grid;
-    mock::WorldOptions town;
-    town.texture_detail = 0;
-    town.built_fraction = town.tree_fraction = town.car_fraction = 0;
-    RigCalibration calibration;
-    calibration.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) {
-      Intrinsics& lens = calibration.intrinsics[k];
-      lens.width = 64;
-      lens.height = 48;
-      lens.fx = lens.fy = 50;
-      lens.cx = 31.5;
-      lens.cy = 23.5;
-    }
-    calibration.T_camera_left[1].t = {-0.75, 0, 0};
-    std::vector<mock::Fault> parsed;
-    for (const std::string& f : faults) parsed.push_back(mock::parse_fault(f));
-    mock::DriveOptions drive;
-    drive.kind = mock::DriveKind::brief;
     mock::MockRigOptions o;
     o.duration = Duration::seconds(b.seconds);
-    o.real_time = real_time;
     o.reports_taken = true;
-    rig = std::make_unique<mock::MockRig>(
-        std::make_shared<const mock::RigTruth>(std::make_shared<const mock::World>(town), drive,
-                                               calibration, mock::default_T_body_left(),
-                                               Transform{}, parsed),
-        o);
+    rig = std::make_unique<mock::MockRig>(test::small_truth(faults), o);
     for (int k = 0; k < 2; ++k)
-      EXPECT_EQ(rig->camera(k).configure(
-                    {64, 48, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
-                DeviceStatus::ok);
+      EXPECT_EQ(rig->camera(k).configure(test::small_camera(), nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
     TriggerConfiguration pulses;
     pulses.rate_hz = 20;
     pulses.vary = b.vary;
-    pulses.feedback = b.feedback;
     EXPECT_EQ(rig->trigger().configure(pulses, nullptr), DeviceStatus::ok);
     Acquisition::Options options;
     options.sync.interval = Duration::milliseconds(50);
     options.sync.mode = b.mode;
-    options.wait_when_full = !real_time;
+    options.wait_when_full = true;
     options.tie_stamp = kStart;
     options.tie_host = rig->start();
-    options.stamp_grid = grid;
+    options.stamp_grid = b.grid;
     for (int k = 0; k < 2; ++k) watched.push_back(std::make_unique<WatchedCamera>(&rig->camera(k)));
     source = std::make_unique<Acquisition>(
         std::vector<CameraDevice*>{watched[0].get(), watched[1].get()}, &rig->ins(),
@@ -179,23 +149,6 @@ TEST(Acquisition, stampsLieOnTheirGridAndNoFartherFromWhereTheyWereThanHalfOfIt)
     off += stamp_of(fine[i]).ns() % 1000 != 0 ? 1 : 0;
   }
   EXPECT_GT(off, 100);
-}
-
-TEST(Acquisition, aCameraThatWasGoneJoinsTheRightPulsesAgain) {
-  Bench b({"camera_gone@2 camera=1 duration_s=1"});
-  const auto items = b.drive();
-  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_gone), 1);
-  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_back), 1);
-  for (const Acquired& item : items) {
-    const AcquiredFrame* frame = frame_of(item);
-    if (frame == nullptr) continue;
-    const SyncedSet& set = frame->set;
-    EXPECT_TRUE(set.present[0]);
-    EXPECT_EQ(set.present[1], set.number < 40 || set.number >= 60) << set.number;
-    // Both expose at the same instant: a camera paired a pulse off would be 50 ms away.
-    EXPECT_LT(set.spread, Duration::milliseconds(5)) << set.number;
-  }
-  EXPECT_TRUE(b.source->missing().empty());
 }
 
 /// Starts, gives nothing and is gone, again and again; who tells it is only told of the first.
@@ -397,27 +350,6 @@ INSTANTIATE_TEST_SUITE_P(
         LossCase{"pairs", {"break_pairs@3 share=0.5 duration_s=0"}, 2, Kind::acquiring, 2},
         LossCase{"doubles", {"duplicate_frames@3 share=0.3 duration_s=0"}, 2, Kind::acquiring, 2}),
     [](const auto& i) { return std::string(i.param.name); });
-
-TEST(Acquisition, everyLossHasItsOwnCounter) {
-  Bench b({"missed_trigger@4 camera=1 pulses=2", "lose_frames@5 camera=0 share=0.2 duration_s=2"},
-          kByPulses);
-  (void)b.drive();
-  const SyncCounters& c = b.source->counters().sync;
-  EXPECT_EQ(c.missed_trigger[1], 2U);
-  EXPECT_EQ(c.missed_trigger[0], 0U);
-  EXPECT_EQ(c.lost[0], b.rig->camera(0).statistics().lost);
-  EXPECT_GT(c.lost[0], 2U);
-  EXPECT_EQ(c.lost[1], 0U);
-}
-
-TEST(Acquisition, feedbackIsTakenForTheMiddleOfTheExposure) {
-  BenchOptions o = kByPulses;
-  o.feedback = 0b11;
-  Bench b({}, o);
-  const auto items = b.drive();
-  expect_right_pairs(b, items);
-  EXPECT_LE(worst_acquisition(items), 1);
-}
 
 TEST(Acquisition, theClocksOfADriveAreRecorded) {
   Bench b({}, kByPulses);

@@ -107,19 +107,6 @@ TEST_F(CameraConformance, nonsenseIsRefusedAndChangesNothing) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, aStartAfterAStopBeginsAnew) {
-  if (make(12) == nullptr) GTEST_SKIP() << why_;
-  ShadowCamera camera(rig_.get());
-  camera.configure(rig_->possible().front());
-  for (int i = 0; i < 4 && !HasFatalFailure(); ++i) {
-    camera.start();
-    camera.expect_frames(3);
-    camera.stop();
-    camera.release_all();
-    camera.check_statistics();
-  }
-}
-
 TEST_F(CameraConformance, aWaitEndsWhenTheCameraIsStopped) {
   if (make(13) == nullptr) GTEST_SKIP() << why_;
   auto configuration = rig_->possible().front();

@@ -129,21 +129,6 @@ TEST(GigeCamera, itsTemperatureIsReadWhileItStreams) {
   EXPECT_DOUBLE_EQ(*b.camera->temperature_c(), 41.5);
 }
 
-TEST(GigeCamera, softwareTriggersAreFrames) {
-  GigeBench b;
-  CameraConfiguration c = b.wish();
-  c.trigger = CameraTrigger::software;
-  b.configure(c);
-  EXPECT_EQ(b.camera->trigger_once(), DeviceStatus::stopped);
-  b.start();
-  for (std::uint64_t n = 0; n < 10; ++n) {
-    ASSERT_EQ(b.camera->trigger_once(), DeviceStatus::ok) << b.camera->last_error();
-    const auto frames = b.take(1);
-    ASSERT_EQ(frames.size(), 1U);
-    EXPECT_EQ(frames[0].counter, n);
-  }
-}
-
 TEST(GigeCamera, stampsAreTheCamerasClockInNanoseconds) {
   GigeCameraOptions o;
   o.tick_frequency = 62'500'000;

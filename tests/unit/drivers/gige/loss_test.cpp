@@ -27,18 +27,6 @@ CameraConfiguration many_packets(const GigeBench& b, const char* resend) {
   return c;
 }
 
-TEST(GigeLoss, lostFramesAreCountedByTheirGap) {
-  GigeBench b;
-  b.configure(b.wish());
-  b.start();
-  std::size_t taken = b.take(5).size();
-  b.simulator->lose_frames(3);
-  taken += b.take(10).size();
-  taken += b.drain().size();
-  EXPECT_EQ(b.camera->statistics().lost, 3U);
-  expect_equal_accounts(b, taken);
-}
-
 TEST(GigeLoss, brokenFramesAreTornAndTheNextOnesWhole) {
   for (const char* resend : {"off", "on"}) {
     GigeBench b;
@@ -119,22 +107,6 @@ TEST(GigeLoss, lateHalvesComeInTimeOrAreTorn) {
   EXPECT_EQ(b.numbers.size() + 3, b.simulator->report().exposed);
   EXPECT_TRUE(std::is_sorted(frames.begin(), frames.end(),
                              [](const Frame& x, const Frame& y) { return x.counter < y.counter; }));
-}
-
-TEST(GigeLoss, idsWrapAndWideIdsCountOn) {
-  for (const bool wide : {false, true}) {
-    GigeCameraOptions o;
-    o.extended_ids = wide;
-    o.first_block = 65'528;
-    GigeBench b(o);
-    b.configure(b.wish());
-    b.start();
-    const auto frames = b.take(40);
-    ASSERT_EQ(frames.size(), 40U);
-    for (std::size_t i = 0; i < frames.size(); ++i)
-      EXPECT_EQ(frames[i].counter, i) << (wide ? "64-bit" : "16-bit");
-    EXPECT_EQ(b.camera->statistics().lost, 0U);
-  }
 }
 
 }  // namespace

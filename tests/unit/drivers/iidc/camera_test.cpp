@@ -61,42 +61,6 @@ TEST(IidcCamera, StampsGoOnThroughTheWrapOfTheBusClock) {
   }
 }
 
-TEST(IidcCamera, LostExposuresAreCountedWhenALaterOneComes) {
-  CameraUnderTest c;
-  c.start();
-  c.bus->expose(10, Duration::milliseconds(100), {0, 3, 4, 5, 9});
-  std::vector<std::uint64_t> counters;
-  for (int i = 0; i < 5; ++i) counters.push_back(c.take_and_release().counter);
-  EXPECT_EQ(counters, (std::vector<std::uint64_t>{0, 1, 5, 6, 7}));
-  EXPECT_EQ(c.camera->statistics().lost,
-            3U);  // what came before the first or after the last is not known
-}
-
-TEST(IidcCamera, SlotsComeBackInAnyOrderAndTheNewestIsDroppedWithoutOne) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
-  test::give<iidc::Options>(&requested, "buffers", "4");
-  c.configure(requested);
-  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
-  c.bus->expose(7);
-  std::vector<Frame> held;
-  for (Frame f; c.camera->wait(Duration{}, &f) == DeviceStatus::ok;) held.push_back(f);
-  ASSERT_EQ(held.size(), 3U);  // the fourth is on the wire
-  EXPECT_EQ(c.camera->statistics().underruns, 4U);
-  for (std::size_t i = 0; i < held.size(); ++i) {
-    EXPECT_EQ(held[i].counter, i);
-    EXPECT_EQ(c.camera->view(held[i].slot).at(0, 1), 1 + i);
-  }
-  c.camera->release(held[1].slot);
-  c.bus->expose(1);
-  const Frame next = c.take_and_release();
-  EXPECT_EQ(next.counter, 7U);
-  EXPECT_EQ(next.slot, held[1].slot);
-  c.camera->release(held[2].slot);
-  c.camera->release(held[0].slot);
-  EXPECT_EQ(c.camera->statistics().lost, 0U) << "dropped here is not lost on the way";
-}
-
 TEST(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
   CameraUnderTest c;
   c.start();
@@ -120,10 +84,7 @@ TEST(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
 TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
   for (const std::size_t lost : {1U, 3U, 100U}) {
     CameraUnderTest c(true);
-    CameraConfiguration requested = CameraUnderTest::usual();
-    test::give<iidc::Options>(&requested, "packet_bytes", "1024");
-    c.configure(requested);
-    ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+    c.start(CameraUnderTest::usual_with("packet_bytes", "1024"));
     c.bus->expose(1);
     // The receiver fills up with the beginning of the next frame and waits for the start of the one
     // after that.
@@ -158,10 +119,7 @@ TEST(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
   std::vector<std::int64_t> starts;
   for (const char* at : {"start", "middle", "end"}) {
     CameraUnderTest c;
-    CameraConfiguration requested = CameraUnderTest::usual();
-    test::give<iidc::Options>(&requested, "stamp_at", at);
-    c.configure(requested);
-    ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+    c.start(CameraUnderTest::usual_with("stamp_at", at));
     c.bus->expose(1);
     starts.push_back(c.take_and_release().exposure_start.ns());
   }
@@ -174,8 +132,7 @@ TEST(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
   CameraConfiguration requested = CameraUnderTest::usual();
   requested.pixel_format = "Mono16";
   test::give<iidc::Options>(&requested, "buffers", "5");
-  c.configure(requested);
-  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  c.start(requested);
   c.bus->expose(7);
   EXPECT_EQ(c.camera->statistics().underruns, 2U);
   for (std::uint64_t n = 0; n < 5; ++n) {
@@ -185,28 +142,6 @@ TEST(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
     EXPECT_EQ(view.at(639, 479), (479 + n) & 0xFFU);
     EXPECT_EQ(view.stride % 64, 0);
   }
-}
-
-TEST(IidcCamera, ARestartCountsFromZeroAndForgetsWhatWasUnderWay) {
-  CameraUnderTest c;
-  c.start();
-  c.bus->expose(3);
-  const Frame held = c.take();
-  c.camera->stop();
-  EXPECT_FALSE(c.bus->model().transmitting);
-  Frame f;
-  EXPECT_EQ(c.camera->wait(Duration::milliseconds(1), &f), DeviceStatus::stopped);
-  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::busy)
-      << "an image is held";
-  EXPECT_EQ(c.camera->view(held.slot).at(0, 1), 1) << "still there";
-  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
-  EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::busy)
-      << "streaming";
-  c.bus->expose(1);
-  EXPECT_EQ(c.take_and_release().counter, 0U);
-  c.camera->release(held.slot);
-  EXPECT_EQ(c.camera->statistics().starts, 2U);
-  EXPECT_EQ(c.camera->statistics().lost, 0U);
 }
 
 TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
@@ -227,10 +162,7 @@ TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
 
 TEST(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
   CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
-  test::give<iidc::Options>(&requested, "embedded", "no");
-  c.configure(requested);
-  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  c.start(CameraUnderTest::usual_with("embedded", "no"));
   c.bus->expose(3, Duration::milliseconds(100), {1});
   EXPECT_EQ(c.take_and_release().counter, 0U);
   const Frame f = c.take_and_release();

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "drivers/iidc/iidc_camera.hpp"
+#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/iidc/fake_bus.hpp"
 
 namespace vergence::test {
@@ -28,8 +29,13 @@ struct CameraUnderTest {
   void configure(const CameraConfiguration& c = usual()) {
     ASSERT_EQ(camera->configure(c, &actual), DeviceStatus::ok) << camera->last_error();
   }
-  void start() {
-    configure();
+  [[nodiscard]] static CameraConfiguration usual_with(const char* option, const char* value) {
+    CameraConfiguration c = usual();
+    test::give<iidc::Options>(&c, option, value);
+    return c;
+  }
+  void start(const CameraConfiguration& c = usual()) {
+    configure(c);
     ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   }
   /// The next frame, which must be there.

@@ -76,8 +76,7 @@ TEST(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
     EXPECT_LE(static_cast<double>(usb.bus->shape().packet_bytes) * kCyclesPerSecond * cameras,
               33e6);
   }
-  CameraConfiguration requested = CameraUnderTest::usual();
-  test::give<iidc::Options>(&requested, "packet_bytes", "1024");
+  CameraConfiguration requested = CameraUnderTest::usual_with("packet_bytes", "1024");
   bus.configure(requested);
   EXPECT_EQ(bus.bus->model().f7_packet, 1024U);
 }
@@ -131,9 +130,7 @@ TEST(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
   EXPECT_EQ(c.bus->model().frame_info, 0x41U);
   EXPECT_EQ(c.camera->plan().info.size(), 8U);
   EXPECT_TRUE(c.camera->remark().empty());
-  CameraConfiguration requested = CameraUnderTest::usual();
-  test::give<iidc::Options>(&requested, "embedded", "no");
-  c.configure(requested);
+  c.configure(CameraUnderTest::usual_with("embedded", "no"));
   EXPECT_EQ(c.bus->model().frame_info, 0U);
   expect_says(c.camera->remark(), {"embeds no counter"});
 }
@@ -174,8 +171,7 @@ TEST(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
   EXPECT_EQ(legacy.bus->model().iso_speed, 2U);
   beta.configure();
   EXPECT_EQ(beta.bus->model().iso_speed, 3U);
-  CameraConfiguration requested = CameraUnderTest::usual();
-  test::give<iidc::Options>(&requested, "speed", "800");
+  CameraConfiguration requested = CameraUnderTest::usual_with("speed", "800");
   std::string said;
   EXPECT_EQ(legacy.refuse(requested, &said), DeviceStatus::unsupported);
   expect_says(said, {"speed", "S400"});
@@ -203,66 +199,51 @@ TEST(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIsNo
 }
 
 TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
-  CameraUnderTest c(true);
-  std::string said;
-  auto with = [](auto change) {
-    CameraConfiguration requested = CameraUnderTest::usual();
-    change(requested);
-    return requested;
+  using C = CameraConfiguration;
+  struct Refusal {
+    void (*change)(C*);
+    std::initializer_list<const char*> says;
+    DeviceStatus status = DeviceStatus::unsupported;
   };
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.width = 641; }), &said), DeviceStatus::unsupported);
-  expect_says(said, {"641 x 480", "640 x 480 Mono8 at", "1280 x 960 in steps of 8 x 2"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.width = 1280, w.height = 960, w.rate_hz = 30; }), &said),
-            DeviceStatus::unsupported);
-  expect_says(said, {"packets of 4096 bytes", "26.58 Hz"});  // S400
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::microseconds(3); }), &said),
-            DeviceStatus::unsupported);
-  expect_says(said, {"3 us", "10 to 100000 us"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.gain_db = 30; }), &said), DeviceStatus::unsupported);
-  expect_says(said, {"30 dB", "0 to 24 dB"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.pixel_format = "RGB8"; }), &said),
-            DeviceStatus::unsupported);
-  expect_says(said, {"RGB8", "Mono8 Mono16 Raw8"});
-  EXPECT_EQ(c.refuse(with([](auto& w) {
-                       w.trigger = CameraTrigger::hardware,
-                       w.options = Options{.trigger_source = 3};
-                     }),
-                     &said),
-            DeviceStatus::unsupported);
-  expect_says(said, {"input 3", "inputs 0 1", "software", "modes 0 14 15"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.options = v4l2::Options{}; }), &said),
-            DeviceStatus::unsupported);
-  expect_says(said, {"another kind of camera", "IIDC"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.options = Options{.packet_bytes = 1022}; }), &said),
-            DeviceStatus::unsupported);
-  expect_says(said, {"packet_bytes", "steps of 4"});
-  EXPECT_EQ(
-      c.refuse(with([](auto& w) { w.options = Options{.packet_bytes = 256}, w.rate_hz = 25; }),
-               &said),
-      DeviceStatus::unsupported);
-  expect_says(said, {"packets of 256 bytes"});
-  EXPECT_EQ(c.refuse(with([](auto& w) { w.exposure = Duration::milliseconds(150); }), &said),
-            DeviceStatus::bad_configuration);
-  expect_says(said, {"150000 us", "10 Hz"});
-}
-
-TEST(IidcConfigure, ARefusedRequestWritesNothing) {
-  CameraUnderTest c;
+  CameraUnderTest c(true);
   c.configure();
   c.bus->written.clear();
-  CameraConfiguration requested = CameraUnderTest::usual();
-  requested.gain_db = 99;
-  std::string said;
-  EXPECT_EQ(c.refuse(requested, &said), DeviceStatus::unsupported);
-  EXPECT_TRUE(c.bus->written.empty());
+  for (const Refusal& r : {
+           Refusal{[](C* w) { w->width = 641; },
+                   {"641 x 480", "640 x 480 Mono8 at", "1280 x 960 in steps of 8 x 2"}},
+           Refusal{[](C* w) { w->width = 1280, w->height = 960, w->rate_hz = 30; },
+                   {"packets of 4096 bytes", "26.58 Hz"}},  // S400
+           Refusal{[](C* w) { w->exposure = Duration::microseconds(3); },
+                   {"3 us", "10 to 100000 us"}},
+           Refusal{[](C* w) { w->gain_db = 30; }, {"30 dB", "0 to 24 dB"}},
+           Refusal{[](C* w) { w->pixel_format = "RGB8"; }, {"RGB8", "Mono8 Mono16 Raw8"}},
+           Refusal{[](C* w) {
+                     w->trigger = CameraTrigger::hardware;
+                     w->options = Options{.trigger_source = 3};
+                   },
+                   {"input 3", "inputs 0 1", "software", "modes 0 14 15"}},
+           Refusal{[](C* w) { w->options = v4l2::Options{}; }, {"another kind of camera", "IIDC"}},
+           Refusal{[](C* w) { w->options = Options{.packet_bytes = 1022}; },
+                   {"packet_bytes", "steps of 4"}},
+           Refusal{[](C* w) { w->options = Options{.packet_bytes = 256}, w->rate_hz = 25; },
+                   {"packets of 256 bytes"}},
+           Refusal{[](C* w) { w->exposure = Duration::milliseconds(150); },
+                   {"150000 us", "10 Hz"},
+                   DeviceStatus::bad_configuration},
+       }) {
+    CameraConfiguration requested = CameraUnderTest::usual();
+    r.change(&requested);
+    std::string said;
+    EXPECT_EQ(c.refuse(requested, &said), r.status) << said;
+    expect_says(said, r.says);
+  }
+  EXPECT_TRUE(c.bus->written.empty()) << "a refusal writes nothing";
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
 }
 
 TEST(IidcConfigure, WithoutFormat7ARateBetweenTheFixedOnesBecomesTheNext) {
   CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
-  test::give<iidc::Options>(&requested, "format7", "no");
-  c.configure(requested);
+  c.configure(CameraUnderTest::usual_with("format7", "no"));
   EXPECT_EQ(c.actual.rate_hz, 15);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U);
 }

@@ -7,6 +7,7 @@
 
 #include "drivers/mock/mock_rig.hpp"
 #include "firmware_iface/trigger/trigger.h"
+#include "tests/support/small_mock.hpp"
 
 namespace vergence::mock {
 namespace {
@@ -26,35 +27,13 @@ struct Bench {
   explicit Bench(const std::vector<std::string>& faults, const TriggerConfiguration& c,
                  double seconds = 4, bool reports_taken = true,
                  std::array<Duration, kMaxCameras> delays = {}) {
-    WorldOptions town;
-    town.texture_detail = 0;
-    town.built_fraction = town.tree_fraction = town.car_fraction = 0;
-    RigCalibration calibration;
-    calibration.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) {
-      Intrinsics& lens = calibration.intrinsics[k];
-      lens.width = 64;
-      lens.height = 48;
-      lens.fx = lens.fy = 50;
-      lens.cx = 31.5;
-      lens.cy = 23.5;
-    }
-    std::vector<Fault> parsed;
-    for (const std::string& f : faults) parsed.push_back(parse_fault(f));
-    DriveOptions drive;
-    drive.kind = DriveKind::brief;
     MockRigOptions o;
     o.duration = Duration::seconds(seconds);
     o.reports_taken = reports_taken;
     o.trigger_delay = delays;
-    rig = std::make_unique<MockRig>(
-        std::make_shared<const RigTruth>(std::make_shared<const World>(town), drive, calibration,
-                                         default_T_body_left(), Transform{}, std::move(parsed)),
-        o);
+    rig = std::make_unique<MockRig>(test::small_truth(faults), o);
     for (int k = 0; k < 2; ++k)
-      EXPECT_EQ(
-          rig->camera(k).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr),
-          DeviceStatus::ok);
+      EXPECT_EQ(rig->camera(k).configure(test::small_camera(), nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig->trigger().configure(c, nullptr), DeviceStatus::ok);
   }
 
@@ -265,13 +244,9 @@ TEST(MockBoard, whatCannotBePulsedIsRefusedAndNothingIsConfiguredAmidPulses) {
   EXPECT_EQ(b.rig->trigger().configure(at_20_hz(), nullptr), DeviceStatus::busy);
   EXPECT_EQ(b.rig->ins().configure(100, nullptr), DeviceStatus::busy);
   b.rig->camera(0).stop();
-  EXPECT_EQ(
-      b.rig->camera(0).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr),
-      DeviceStatus::busy);
+  EXPECT_EQ(b.rig->camera(0).configure(test::small_camera(), nullptr), DeviceStatus::busy);
   b.rig->trigger().stop();
-  EXPECT_EQ(
-      b.rig->camera(0).configure({64, 48, 20, kExposure, 0, CameraTrigger::hardware}, nullptr),
-      DeviceStatus::ok);
+  EXPECT_EQ(b.rig->camera(0).configure(test::small_camera(), nullptr), DeviceStatus::ok);
 }
 
 }  // namespace

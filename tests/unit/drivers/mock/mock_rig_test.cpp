@@ -78,17 +78,23 @@ double mean_of(const ImageView& v) {
   return sum / (v.width * v.height);
 }
 
-Harvest drive(MockRig* rig) {
-  Harvest h;
-  CameraConfiguration c{96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
+const CameraConfiguration kCamera{
+    96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
+
+void start_cameras(MockRig* rig) {
   for (int k = 0; k < 2; ++k) {
-    EXPECT_EQ(rig->camera(k).configure(c, nullptr), DeviceStatus::ok);
+    EXPECT_EQ(rig->camera(k).configure(kCamera, nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig->camera(k).start(nullptr), DeviceStatus::ok);
   }
-  EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
-  EXPECT_EQ(rig->ins().start(nullptr), DeviceStatus::ok);
   EXPECT_EQ(rig->trigger().configure({kRate}, nullptr), DeviceStatus::ok);
   EXPECT_EQ(rig->trigger().start(nullptr), DeviceStatus::ok);
+}
+
+Harvest drive(MockRig* rig) {
+  Harvest h;
+  EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
+  EXPECT_EQ(rig->ins().start(nullptr), DeviceStatus::ok);
+  start_cameras(rig);
   h.start = rig->start();
   std::array<bool, 3> ended{};
   while (!(ended[0] && ended[1] && ended[2])) {
@@ -241,12 +247,7 @@ TEST(MockRig, aColourSensorsGreyIsMadeOfTheMosaicThatItWouldHandOutRaw) {
   o.pattern = Pattern::gbrg;
   const auto first_picture = [&o] {
     MockRig rig(truth_with({}), o);
-    const CameraConfiguration c{
-        96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
-    EXPECT_EQ(rig.camera(0).configure(c, nullptr), DeviceStatus::ok);
-    EXPECT_EQ(rig.camera(0).start(nullptr), DeviceStatus::ok);
-    EXPECT_EQ(rig.trigger().configure({kRate}, nullptr), DeviceStatus::ok);
-    EXPECT_EQ(rig.trigger().start(nullptr), DeviceStatus::ok);
+    start_cameras(&rig);
     Frame f;
     EXPECT_EQ(rig.camera(0).wait(Duration::seconds(20), &f), DeviceStatus::ok);
     const ImageView v = rig.camera(0).view(f.slot);
@@ -379,53 +380,43 @@ TEST(MockRig, aDriftGrowsEvenlyAndStays) {
   EXPECT_NEAR(yaw(9), 1, 1e-9);
 }
 
+/// What the INS says of its position, less where it truly is.
+Vec3 position_error(const RigTruth& truth, const InsSample& s, Duration t) {
+  static const GeographicLib::LocalCartesian plane(
+      kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg, kWorldOrigin.height_m);
+  Vec3 p;
+  plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(),
+                p.y(), p.z());
+  return p - truth.ins_in_enu(t).t;
+}
+
 TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
   const auto truth = truth_with({});
   InsModel model({true, 1, 120}, *truth);
-  const GeographicLib::LocalCartesian plane(kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg,
-                                            kWorldOrigin.height_m);
   for (std::uint64_t i = 0; i < 1200; ++i) {
     const Duration t = Duration::seconds(static_cast<double>(i) / 120);
     const InsSample s = model.sample(i, t);
-    const Transform T = truth->ins_in_enu(t);
-    Vec3 p;
-    plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(),
-                  p.y(), p.z());
-    ASSERT_LT((p - T.t).norm(), 1e-6);
+    ASSERT_LT(position_error(*truth, s, t).norm(), 1e-6);
     // Axes at the place and at the origin differ by less than distance / earth's radius: 300 m /
     // 6.4e6 m.
     const Eigen::Quaterniond q(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2]);
-    ASSERT_LT(log_so3(q.toRotationMatrix().transpose() * T.R).norm(), 1e-4);
+    ASSERT_LT(log_so3(q.toRotationMatrix().transpose() * truth->ins_in_enu(t).R).norm(), 1e-4);
   }
 }
 
 TEST(MockRig, aNoisyInsErrsByItsSigmasAndSlowly) {
   const auto truth = truth_with({});
-  const GeographicLib::LocalCartesian plane(kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg,
-                                            kWorldOrigin.height_m);
   double squares = 0, step = 0;
-  int n = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     InsModel model({false, seed, 120}, *truth);
-    Vec3 last = Vec3::Zero();
-    for (std::uint64_t i = 0; i < 2; ++i) {
-      const Duration t = Duration::seconds(static_cast<double>(i) / 120);
-      const InsSample s = model.sample(i, t);
-      Vec3 p;
-      plane.Forward(s.position.latitude_deg, s.position.longitude_deg, s.position.height_m, p.x(),
-                    p.y(), p.z());
-      const Vec3 error = p - truth->ins_in_enu(t).t;
-      if (i == 0) {
-        squares += error.head<2>().squaredNorm();
-        n += 2;
-      } else {
-        step = std::max(step, (error - last).norm());
-      }
-      last = error;
-    }
+    const Duration later = Duration::seconds(1.0 / 120);
+    const Vec3 first = position_error(*truth, model.sample(0, {}), {}),
+               second = position_error(*truth, model.sample(1, later), later);
+    squares += first.head<2>().squaredNorm();
+    step = std::max(step, (second - first).norm());
   }
   // 400 draws: the sigma is known to 1/√800 = 3.5 %; five of those.
-  EXPECT_NEAR(std::sqrt(squares / n), 2.12, 0.18 * 2.12);
+  EXPECT_NEAR(std::sqrt(squares / 400), 2.12, 0.18 * 2.12);
   // A step is σ √(2 Δt/τ) = 3.5 cm across and 6.7 cm up; five sigma of the largest.
   EXPECT_LT(step, 0.4);
 }
@@ -465,12 +456,12 @@ TEST(MockRig, aClockThatIsSetShowsInItsDevicesStampsOnly) {
 TEST(MockRig, nonsenseIsRefusedByName) {
   EXPECT_THROW(MockRig(truth_with({"cover@1 camera=2"}), options(1)), std::invalid_argument);
   MockRig rig(truth_with({}), options(1));
-  EXPECT_EQ(rig.camera(0).configure(
-                {96, 64, 0, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
-            DeviceStatus::bad_configuration);
-  EXPECT_EQ(rig.camera(0).configure(
-                {97, 64, 20, Duration::milliseconds(8), 0, CameraTrigger::hardware}, nullptr),
-            DeviceStatus::unsupported);
+  CameraConfiguration other = kCamera;
+  other.rate_hz = 0;
+  EXPECT_EQ(rig.camera(0).configure(other, nullptr), DeviceStatus::bad_configuration);
+  other = kCamera;
+  other.width = 97;
+  EXPECT_EQ(rig.camera(0).configure(other, nullptr), DeviceStatus::unsupported);
   EXPECT_EQ(rig.camera(0).start(nullptr), DeviceStatus::bad_configuration);
   EXPECT_EQ(rig.ins().configure(0, nullptr), DeviceStatus::bad_configuration);
   EXPECT_EQ(rig.trigger().configure({-1}, nullptr), DeviceStatus::bad_configuration);
@@ -480,13 +471,7 @@ TEST(MockRig, nonsenseIsRefusedByName) {
 
 TEST(MockRig, stoppingAmidTheDriveEndsAtOnce) {
   MockRig rig(truth_with({}), options(10));
-  CameraConfiguration c{96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
-  for (int k = 0; k < 2; ++k) {
-    ASSERT_EQ(rig.camera(k).configure(c, nullptr), DeviceStatus::ok);
-    ASSERT_EQ(rig.camera(k).start(nullptr), DeviceStatus::ok);
-  }
-  ASSERT_EQ(rig.trigger().configure({kRate}, nullptr), DeviceStatus::ok);
-  ASSERT_EQ(rig.trigger().start(nullptr), DeviceStatus::ok);
+  start_cameras(&rig);
   Frame f;
   ASSERT_EQ(rig.camera(0).wait(Duration::seconds(10), &f), DeviceStatus::ok);
   rig.camera(0).stop();  // the producer may be waiting for a slot

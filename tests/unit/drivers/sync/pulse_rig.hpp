@@ -33,12 +33,6 @@ struct PulseRigOptions {
   std::array<Duration, kMaxCameras> delay{
       Duration::microseconds(40), Duration::microseconds(70), {}, {}};
   Duration host_noise = Duration::microseconds(20);  // of the pulses' mapped edges
-  /// How the host comes by the pulses' edges: it knows them but for `host_noise`; asks the board a
-  /// hundred times a second; or from the arrival of the reports alone. The line is late by
-  /// report_delay, and by report_jitter_ms on average, each way.
-  enum class Clock : std::uint8_t { given, pings, arrivals } clock = Clock::given;
-  bool feedback = false;  // the board measures the exposures
-  double settle = 0;      // s, from which on stamps are compared with the truth
   // Events, seconds since the start.
   struct Gone {
     int camera = 0;
@@ -60,9 +54,8 @@ struct PulseRigTruth {
   std::uint64_t pulses = 0;
   std::array<std::uint64_t, kMaxCameras> exposed{}, lost{}, missed{}, duplicated{};
   std::uint64_t sets = 0, complete = 0, wrong = 0, unproven = 0, unreported = 0;
-  std::uint64_t broken = 0;   // promises to the user: a slot twice or never, an order, a flag
-  std::uint64_t outside = 0;  // stamps farther from the truth than their bound
-  std::vector<double> stamp_errors_us{};
+  std::uint64_t broken = 0;        // promises to the user: a slot twice or never, an order, a flag
+  std::uint64_t outside = 0;       // stamps farther from the truth than their bound
   double worst_acquisition_s = 0;  // from the first pulse after a start, reconnect or reboot to the
                                    // first image of a set that is proven
 };
@@ -70,11 +63,7 @@ struct PulseRigTruth {
 class PulseRig {
  public:
   PulseRig(const PulseRigOptions& options, SyncOptions sync)
-      : o_(options),
-        sync_(with(options, sync)),
-        random_(options.seed, 77),
-        truths_(1U << 16U),
-        board_clock_(board_clock(options)) {
+      : o_(options), sync_(with(options, sync)), random_(options.seed, 77), truths_(1U << 16U) {
     board_offset_ = static_cast<std::int64_t>(random_.below(1'000'000)) * 1'000;
     board_drift_ = random_.uniform(-50e-6, 50e-6);
     for (int k = 0; k < o_.cameras; ++k) start_camera(k);
@@ -91,12 +80,9 @@ class PulseRig {
         resumed_ = true;
         board_offset_ = -ns(t) + static_cast<std::int64_t>(random_.below(1'000'000)) * 1'000;
         t += 0.7;
-        board_clock_.restart();
-        next_ping_ = ns(t);
         waiting_since_.fill(t);
       }
       device_events(t);
-      ask(ns(t));
       make_pulse(t);
       deliver(ns(t));
       if (const std::uint32_t leave_out = sync_.wants_pause(); leave_out > 0 && pauses_) {
@@ -114,7 +100,6 @@ class PulseRig {
   }
 
   void pauses(bool possible) { pauses_ = possible; }
-  void keep_errors() { keep_errors_ = true; }
   [[nodiscard]] const PulseRigTruth& truth() const { return truth_; }
   [[nodiscard]] SyncCounters counters() const { return sync_.counters(); }
   [[nodiscard]] int asked() const { return asked_; }
@@ -128,17 +113,11 @@ class PulseRig {
     bool here = true, first = true;
     std::int64_t last_arrival = 0;
   };
-  struct Ping {
-    HostStamp t1{};
-    DeviceStamp t2{}, t3{};
-    HostStamp t4{};
-  };
   struct Event {
     std::int64_t arrival = 0;
     std::uint64_t order = 0;
-    bool is_pulse = false, is_ping = false;
+    bool is_pulse = false;
     Pulse pulse{};
-    Ping ping{};
     SyncFrame frame{};
     [[nodiscard]] bool operator<(const Event& o) const {
       return arrival != o.arrival ? arrival > o.arrival : order > o.order;
@@ -156,28 +135,10 @@ class PulseRig {
     for (std::size_t k = 0; k < kMaxCameras; ++k) s.camera[k].delay = o.delay[k];
     return s;
   }
-  static ClockMapperOptions board_clock(const PulseRigOptions& o) {
-    ClockMapperOptions c;
-    if (o.clock == PulseRigOptions::Clock::arrivals) c.least_delay = o.report_delay;
-    return c;
-  }
   [[nodiscard]] DeviceStamp board_time(std::int64_t host) const {
     return DeviceStamp((host + board_offset_ +
                         std::llround(board_drift_ * static_cast<double>(host - ns(kStart)))) /
                        1'000 * 1'000);
-  }
-  void ask(std::int64_t until) {
-    if (o_.clock != PulseRigOptions::Clock::pings) return;
-    for (; next_ping_ < until; next_ping_ += 10'000'000) {
-      const auto late = [&] {
-        return o_.report_delay.ns() + ns(exponential(o_.report_jitter_ms * 1e-3));
-      };
-      const std::int64_t t2 = next_ping_ + late(), t3 = t2 + 20'000, t4 = t3 + late();
-      Event e;
-      e.is_ping = true;
-      e.ping = {HostStamp(next_ping_), board_time(t2), board_time(t3), HostStamp(t4)};
-      put(e, t4);
-    }
   }
   double interval(double period) {
     const double sign = trigger_interval_is_longer(static_cast<std::uint32_t>(number_)) ? 1 : -1;
@@ -254,10 +215,6 @@ class PulseRig {
       p.host = HostStamp(
           at + std::llround(random_.uniform(-1, 1) * static_cast<double>(o_.host_noise.ns())));
       p.host_error = o_.host_noise + Duration::microseconds(1);
-      for (std::size_t k = 0; o_.feedback && k < static_cast<std::size_t>(o_.cameras); ++k) {
-        const Duration start = Duration::microseconds(o_.delay[k].ns() / 1'000);
-        p.exposure[k] = {true, start, start + o_.exposure};
-      }
       if (random_.uniform() < o_.bursts) stalled_until_ = at + 60'000'000;
       const std::int64_t delayed =
           at + o_.report_delay.ns() + ns(exponential(o_.report_jitter_ms * 1e-3));
@@ -326,10 +283,8 @@ class PulseRig {
     while (!events_.empty() && events_.top().arrival <= until) {
       const Event e = events_.top();
       events_.pop();
-      if (e.is_ping) {
-        board_clock_.ping(e.ping.t1, e.ping.t2, e.ping.t3, e.ping.t4);
-      } else if (e.is_pulse) {
-        sync_.pulse(mapped(e.pulse));
+      if (e.is_pulse) {
+        sync_.pulse(e.pulse);
       } else {
         if (!cameras_[static_cast<std::size_t>(e.frame.camera)].here) continue;
         offer(e.frame);
@@ -355,16 +310,6 @@ class PulseRig {
     truth_.broken += truth_.sets > 0 && set.number <= last_number_ ? 1 : 0;
     last_number_ = set.number;
   }
-  Pulse mapped(Pulse p) {
-    if (o_.clock == PulseRigOptions::Clock::given) return p;
-    const bool asks = o_.clock == PulseRigOptions::Clock::pings;
-    if (asks && !board_clock_.known()) return p;
-    const MappedStamp m = asks ? board_clock_.at(p.edge) : board_clock_.map(p.edge, p.arrival);
-    p.host = m.host;
-    p.host_error = m.error;
-    return p;
-  }
-
   void drain() {
     for (SyncedSet set; sync_.next(&set);) {
       check_contract(set);
@@ -389,9 +334,6 @@ class PulseRig {
         waiting_since_[k] = -1;
       }
       const std::int64_t off = std::abs(set.stamp.ns() - first.middle);
-      if (static_cast<double>(first.middle) * 1e-9 - kStart >= o_.settle && keep_errors_) {
-        truth_.stamp_errors_us.push_back(static_cast<double>(set.stamp.ns() - first.middle) * 1e-3);
-      }
       truth_.outside += off <= set.error.ns() ? 0 : 1;
       // Of another pulse than the frames': a stamp that is nearer to its neighbour.
       truth_.wrong += right && static_cast<double>(off) * 1e-9 * o_.rate_hz < 0.4 ? 0 : 1;
@@ -404,7 +346,6 @@ class PulseRig {
   std::vector<Made> truths_;
   std::vector<std::uint8_t> held_ = std::vector<std::uint8_t>(1U << 16U, 0);
   std::uint64_t last_number_ = 0;
-  ClockMapper board_clock_;
   std::uint64_t made_ = 0;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<double, kMaxCameras> waiting_since_{};  // 0: since the next pulse, -1: for nothing
@@ -413,8 +354,7 @@ class PulseRig {
   double board_drift_ = 0, last_s_ = -1;
   std::uint64_t number_ = 0, order_ = 0;
   std::uint32_t boot_ = 7;
-  bool resumed_ = true, pauses_ = true, keep_errors_ = false;
-  std::int64_t next_ping_ = ns(kStart);
+  bool resumed_ = true, pauses_ = true;
   int asked_ = 0;
   PulseRigTruth truth_{};
 };

@@ -19,6 +19,11 @@ struct RigSets {
   void drain(RigSynchronizer* sync) {
     for (SyncedSet set; sync->next(&set);) sets.push_back(set);
   }
+  SyncVerdict offer(RigSynchronizer* sync, const SyncFrame& f) {
+    const SyncVerdict verdict = sync->offer(f);
+    drain(sync);
+    return verdict;
+  }
   [[nodiscard]] std::size_t complete() const {
     return static_cast<std::size_t>(
         std::count_if(sets.begin(), sets.end(), [](const SyncedSet& s) { return s.complete; }));
@@ -53,6 +58,19 @@ inline SyncOptions rig_options(SyncMode mode) {
   o.mode = mode;
   o.interval = kRigInterval;
   return o;
+}
+
+/// What comes of so many pulses that both cameras expose at, stamped by their own clocks; to the
+/// end.
+template <class Stamp>
+RigSets sets_of(RigSynchronizer* sync, int pulses, const Stamp& stamp_ns) {
+  RigSets out;
+  for (int n = 0; n < pulses; ++n)
+    for (int k = 0; k < 2; ++k)
+      (void)out.offer(sync, rig_frame(k, n, 0, rig_time(n), DeviceStamp(stamp_ns(n, k))));
+  sync->finish();
+  out.drain(sync);
+  return out;
 }
 
 }  // namespace vergence::testing

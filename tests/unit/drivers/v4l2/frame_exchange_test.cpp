@@ -67,15 +67,6 @@ TEST_F(Exchange, theKernelKeepsItsReserve) {
   EXPECT_TRUE(exchange.hold_buffer(0, 0, kBufferReserve));
 }
 
-TEST_F(Exchange, whatWasOfferedBeforeALossIsStillHandedOut) {
-  ASSERT_TRUE(offer(1, 5));
-  exchange.lose(HostStamp(42));
-  EXPECT_EQ(exchange.standing(), DeviceStatus::gone);
-  EXPECT_EQ(exchange.wait({}, &frame), DeviceStatus::ok);
-  EXPECT_EQ(exchange.wait({}, &frame), DeviceStatus::gone);
-  EXPECT_EQ(frame.arrival, HostStamp(42));
-}
-
 TEST_F(Exchange, aStopFreesWhatNobodyTookButNotWhatSomebodyHolds) {
   ASSERT_TRUE(offer(1, 5));
   ASSERT_TRUE(offer(3, 6));

@@ -83,15 +83,5 @@ TEST(Features, IsoChannelsInBothLayouts) {
   EXPECT_EQ(IsoChannel::of(0x5200'0000).channel, 5U);
 }
 
-TEST(Features, EveryFeatureHasAName) {
-  std::set<std::string> names;
-  for (unsigned f = 0; f < 64; ++f) {
-    const auto name = to_string(static_cast<Feature>(f));
-    if (name == "unknown feature") continue;
-    EXPECT_TRUE(names.emplace(name).second) << name;
-  }
-  EXPECT_EQ(names.size(), 19U);
-}
-
 }  // namespace
 }  // namespace vergence::iidc

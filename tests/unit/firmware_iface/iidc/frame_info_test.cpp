@@ -46,5 +46,18 @@ TEST(CounterUnwrapper, WidensThroughTheWrapFromZero) {
   EXPECT_EQ(c.take(1), 6U);
 }
 
+TEST(FrameInfo, EveryFrameInfoRegisterGivesALayoutThatFits) {
+  const std::vector<std::uint8_t> image(40, 0xFF);
+  for (std::uint32_t q = 0; q < 4096; ++q)
+    for (const std::uint32_t present : {0U, kFrameInfoPresent}) {
+      const FrameInfoLayout layout = FrameInfoLayout::of(q | present);
+      ASSERT_LE(layout.size(), image.size());
+      for (unsigned i = 0; i < kFrameInfoItems; ++i) {
+        const auto item = static_cast<FrameInfoItem>(i);
+        ASSERT_TRUE(!layout.has(item) || layout.read(item, image) == 0xFFFF'FFFFU);
+      }
+    }
+}
+
 }  // namespace
 }  // namespace vergence::iidc

@@ -88,15 +88,6 @@ TEST(SimulatedLine, aDenseStreamComesInBurstsOfEightPacketsUnderALongTimer) {
   EXPECT_NEAR((all.back().arrival - all.front().arrival).to_seconds() / 49, 0.062, 0.0005);
 }
 
-TEST(SimulatedLine, aShortTimerSendsWhatIsThereEveryFrameOrTwo) {
-  SimulatedLineOptions o = quiet_host();
-  o.latency_timer = Duration::milliseconds(1);
-  SimulatedPlace place(std::make_shared<Counter>(80, Duration::milliseconds(10)), o);
-  const auto line = opened(place);
-  const auto all = reads(*line, 200);
-  for (const Read& r : all) EXPECT_LE(r.size, 24U) << "two frames carry 23 bytes at 115200 baud";
-}
-
 TEST(SimulatedLine, nothingArrivesBeforeItWasOnTheWire) {
   for (const bool converter : {true, false}) {
     SimulatedLineOptions o = quiet_host();
@@ -140,23 +131,6 @@ TEST(SimulatedLine, writesReachTheDeviceAfterTheirTimeOnTheWire) {
   (void)line->read(some, Duration::seconds(1));
   EXPECT_EQ(device->told, message);
   EXPECT_NEAR((device->told_at - before).to_seconds(), 115 * 10 / 115200.0 + 125e-6, 1e-6);
-}
-
-TEST(SimulatedLine, theWrongBaudRateIsGarbageBothWays) {
-  auto device = std::make_shared<Counter>(200, Duration::milliseconds(100));
-  SimulatedPlace place(device, quiet_host());
-  const auto line = opened(place);
-  ASSERT_EQ(line->set_baud(57600), DeviceStatus::ok);
-  EXPECT_EQ(line->baud(), 57600U);
-  ASSERT_EQ(line->write(Bytes(50, 1), {}), DeviceStatus::ok);
-  Bytes bytes;
-  (void)reads(*line, 10, &bytes);
-  std::size_t right = 0;
-  for (std::size_t i = 0; i < bytes.size(); ++i)
-    right += bytes[i] == static_cast<std::uint8_t>(i) ? 1U : 0U;
-  EXPECT_LT(right, bytes.size() / 10);
-  ASSERT_EQ(device->told.size(), 50U);
-  EXPECT_NE(device->told, Bytes(50, 1));
 }
 
 TEST(SimulatedLine, anOutageKillsTheLineAndANewOneOpensAfterIt) {

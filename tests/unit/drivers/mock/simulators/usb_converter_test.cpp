@@ -46,15 +46,6 @@ TEST_F(Converter, aFewBytesGoWithTheFrameAfterTheTimerHasRunOut) {
   EXPECT_TRUE(converter.empty());
 }
 
-TEST_F(Converter, aDenseStreamComesInTransfersOfEightPackets) {
-  for (int ms = 0; ms < 20; ++ms) {  // 200 bytes a frame: the timer never runs out
-    receive(200);
-    run(kStart + Duration::milliseconds(ms + 1));
-  }
-  ASSERT_EQ(transfers.size(), 8U);  // of 4000 bytes; the rest is under way
-  for (const auto& transfer : transfers) EXPECT_EQ(transfer.size(), 496U);
-}
-
 TEST_F(Converter, aShortPacketCompletesATransferOfFullOnes) {
   receive(62 * 2 + 5);
   run(kStart + kTimer * 2);
@@ -74,25 +65,6 @@ TEST_F(Converter, whatIsDiscardedNeverComes) {
 TEST(UsbConverterClock, aFastConverterClockIsALongerTimer) {
   const UsbConverter converter(kTimer, 1000, kStart, kFrame);
   EXPECT_EQ(converter.timer_at(), kStart + Duration::microseconds(16'016));
-}
-
-TEST(OutageSchedule, outagesBeginAndEndOneAfterTheOther) {
-  OutageSchedule schedule(
-      {{HostStamp(10), HostStamp(20), true}, {HostStamp(30), HostStamp(40), false}});
-  EXPECT_FALSE(schedule.unplugged(HostStamp(9)));
-  EXPECT_TRUE(schedule.unplugged(HostStamp(10)));
-  EXPECT_EQ(schedule.next(), HostStamp(10));
-  EXPECT_TRUE(schedule.change().device_powered);
-  EXPECT_TRUE(schedule.in_outage());
-  EXPECT_EQ(schedule.begun(), 1U);
-  EXPECT_EQ(schedule.next(), HostStamp(20));
-  EXPECT_TRUE(schedule.change().device_powered) << "the one that ends";
-  EXPECT_FALSE(schedule.in_outage());
-  EXPECT_FALSE(schedule.unplugged(HostStamp(25)));
-  (void)schedule.change();
-  EXPECT_FALSE(schedule.change().device_powered);
-  EXPECT_EQ(schedule.begun(), 2U);
-  EXPECT_FALSE(schedule.next());
 }
 
 }  // namespace

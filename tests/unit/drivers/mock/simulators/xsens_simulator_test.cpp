@@ -105,16 +105,6 @@ TEST(XsensSimulator, refusesToMeasureMoreThanItsLineCarries) {
             (std::pair<std::uint8_t, Bytes>{0x42, {0x29}}));
 }
 
-TEST(XsensSimulator, aBaudRateHoldsFromTheNextResetOn) {
-  Bench bench(Generation::mark4);
-  (void)bench.ask(MessageId::go_to_config);
-  ASSERT_EQ(bench.ask(MessageId::baudrate, {0x00}).back().first, 0x19);
-  EXPECT_EQ(bench.sensor().baud(), 115200U);
-  (void)bench.ask(MessageId::reset);
-  (void)bench.run(Duration::milliseconds(50));
-  EXPECT_EQ(bench.sensor().baud(), 460800U);
-}
-
 TEST(XsensSimulator, receiversMessagesAreOlderAndHaveTheirStampsBehindTheData) {
   XsensSimulatorOptions o;
   for (const OutputEntry e : {OutputEntry{0x1020, kEveryMessage},

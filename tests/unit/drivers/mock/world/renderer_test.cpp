@@ -90,6 +90,20 @@ double edge_position(const Picture& p, int y, int x0, int x1, double left, doubl
   return x0 - 0.5 + sum;
 }
 
+/// Where a line that goes upwards in the world is seen in a row, by bisection on the model's
+/// projection.
+template <class Line>
+Vec2 seen_in_row(const Camera& camera, const Transform& T_camera_enu, int row, double lo, double hi,
+                 const Line& at_height) {
+  Vec2 pixel(0, 0);
+  for (int i = 0; i < 60; ++i) {
+    const double mid = 0.5 * (lo + hi);
+    EXPECT_EQ(camera.project(T_camera_enu * at_height(mid), &pixel, nullptr), ProjectStatus::ok);
+    (pixel.y() > row ? lo : hi) = mid;
+  }
+  return pixel;
+}
+
 TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
   for (const bool distorted : {false, true}) {
     Plates scene;
@@ -104,16 +118,8 @@ TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
       ASSERT_GT(bright - dark, 150);
       for (const double plate_x : {-1.2, 1.7}) {
         for (int y = 90; y < 160; y += 7) {
-          // The height on the plate's vertical border that this row sees, by bisection on the
-          // model's projection.
-          double lo = -1.1, hi = 1.4;
-          Vec2 pixel(0, 0);
-          for (int i = 0; i < 60; ++i) {
-            const double mid = 0.5 * (lo + hi);
-            ASSERT_EQ(camera.project(T_camera_enu * Vec3(plate_x, 6.0, mid), &pixel, nullptr),
-                      ProjectStatus::ok);
-            (pixel.y() > y ? lo : hi) = mid;
-          }
+          const Vec2 pixel = seen_in_row(camera, T_camera_enu, y, -1.1, 1.4,
+                                         [&](double z) { return Vec3(plate_x, 6.0, z); });
           const int x = static_cast<int>(pixel.x());
           const double measured = plate_x < 0 ? edge_position(p, y, x - 5, x + 6, dark, bright)
                                               : edge_position(p, y, x - 5, x + 6, bright, dark);
@@ -123,6 +129,33 @@ TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
               << "row " << y << (distorted ? " distorted" : "");
         }
       }
+    }
+  }
+}
+
+TEST(Renderer, aTextureLiesWhereItsPlaceOnASlantedPlateIsSeen) {
+  Plates scene;
+  Canvas half(6, 6, 1, 1, 0.1F);
+  half.rectangle(0.5, 0, 1, 1, 0.8F);
+  scene.scene->materials.push_back({scene.scene->atlas.add(half), {}, 64, 64, {}});
+  scene.builder.begin();
+  scene.builder.picture(
+      std::array<Vec3, 4>{Vec3(-2, 5, -2), Vec3(2, 7, -2), Vec3(2, 7, 2), Vec3(-2, 5, 2)}, 2, 1.0F,
+      std::sqrt(20.0), 4);
+  scene.builder.end();
+  const Camera camera(lens(true));
+  Renderer renderer(scene.world(), camera);
+  for (const double shift : {0.0, 0.007, 0.013}) {
+    const Transform T_camera_enu = looking_north({shift, 0, 0});
+    const Picture p = take(&renderer, T_camera_enu, clean());
+    for (int y = 70; y < 170; y += 7) {
+      const Vec2 pixel =
+          seen_in_row(camera, T_camera_enu, y, -1.9, 1.9, [](double z) { return Vec3(0, 6, z); });
+      const int x = static_cast<int>(pixel.x());
+      // A texel is three pixels wide, and perspective makes one end of the ramp between two of them
+      // a tenth longer than the other.
+      EXPECT_NEAR(edge_position(p, y, x - 7, x + 8, p.at(x - 7, y), p.at(x + 7, y)), pixel.x(), 0.2)
+          << y;
     }
   }
 }
@@ -168,14 +201,9 @@ TEST(Renderer, surfacesThatCutThroughEachOtherMeetInASmoothLine) {
   const Transform T_camera_enu = looking_north({0, 0, 0});
   const Picture p = take(&renderer, T_camera_enu, clean());
   for (int y = 60; y < 180; ++y) {
-    double lo = -3, hi = 3;  // both walls meet on the line x = 0.2 + 0.05 z at y = 6
-    Vec2 pixel(0, 0);
-    for (int i = 0; i < 60; ++i) {
-      const double mid = 0.5 * (lo + hi);
-      ASSERT_EQ(camera.project(T_camera_enu * Vec3(0.2 + 0.05 * mid, 6.0, mid), &pixel, nullptr),
-                ProjectStatus::ok);
-      (pixel.y() > y ? lo : hi) = mid;
-    }
+    // Both walls meet on the line x = 0.2 + 0.05 z at y = 6.
+    const Vec2 pixel = seen_in_row(camera, T_camera_enu, y, -3, 3,
+                                   [](double z) { return Vec3(0.2 + 0.05 * z, 6.0, z); });
     const int x = static_cast<int>(pixel.x());
     EXPECT_NEAR(edge_position(p, y, x - 5, x + 6, p.at(x - 5, y), p.at(x + 5, y)), pixel.x(),
                 kRounding + 3e-3)

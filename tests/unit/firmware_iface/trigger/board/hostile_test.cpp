@@ -67,22 +67,9 @@ TEST(BoardHostile, framesWithAGoodCrcAndRandomContentKeepEveryPromise) {
   EXPECT_GT(b.made.size(), 100U);
 }
 
-TEST(BoardHostile, afterATruncatedFrameTheNextIsHeard) {
-  VirtualBoard b;
-  const Bytes whole = VirtualBoard::framed(trigger_ping, 1, {1, 2, 3, 4});
-  for (std::size_t cut = 1; cut < whole.size(); ++cut) {
-    Bytes bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(cut));
-    bytes.insert(bytes.end(), whole.begin(), whole.end());  // spoilt together with the cut one
-    bytes.insert(bytes.end(), whole.begin(), whole.end());
-    b.bytes(bytes);
-    EXPECT_GE(b.take(trigger_pong).size(), 1U) << cut;
-  }
-}
-
 TEST(BoardHostile, aHostThatDoesNotListenCostsMessagesWhichAreCountedAndThenItIsAnswered) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   b.run_for_us(20'000);
   b.frames.clear();
   b.deaf = true;
@@ -112,8 +99,7 @@ TEST(BoardHostile, aFloodOfPingsDropsAnswersAndNothingElse) {
 
 TEST(BoardHostile, aRebootInMidFrameIsAnotherBootAndNumbersFromZero) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   b.run_for_us(55'000);
   std::uint8_t out[trigger_max_frame];
   b.frames.clear();

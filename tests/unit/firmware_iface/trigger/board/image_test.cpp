@@ -1,9 +1,6 @@
 // The image that is flashed, in an emulated machine, spoken to over its line.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <memory>
-
 #include "tests/unit/firmware_iface/trigger/board/qemu_board.hpp"
 
 namespace vergence {
@@ -68,22 +65,9 @@ TEST_F(TriggerBoardImage, saysWhatItIsAndRefusesWhatItIsNot) {
   EXPECT_EQ(info.feedback_inputs, 2);
   EXPECT_EQ(status(board.wait(trigger_status)).boot_id, info.boot_id);
 
-  const auto refusal = [&board](std::uint8_t type, const Bytes& payload) {
-    const TriggerFrame f = board.ask(type, payload);
-    EXPECT_EQ(f.type, trigger_error);
-    EXPECT_EQ(f.payload[0], type);
-    return int{f.payload[1]};
-  };
-  EXPECT_EQ(refusal(trigger_hello, {trigger_protocol_version + 1}), trigger_error_version);
-  EXPECT_EQ(refusal(trigger_hello, {}), trigger_error_wrong_size);
-  EXPECT_EQ(refusal(0x44, {}), trigger_error_unknown_type);
-  EXPECT_EQ(refusal(trigger_start, {}), trigger_error_not_configured);
-  EXPECT_EQ(refusal(trigger_pause, {1, 0, 0, 0}), trigger_error_not_running);
-  EXPECT_EQ(refusal(trigger_config, config(0)), trigger_error_rate);
-  EXPECT_EQ(refusal(trigger_config, config(600'000)), trigger_error_pulse);
-  Bytes five_lines = config(1000);
-  five_lines[12] = 0x1F;
-  EXPECT_EQ(refusal(trigger_config, five_lines), trigger_error_line);
+  const TriggerFrame refused = board.ask(trigger_config, config(0));
+  EXPECT_EQ(refused.type, trigger_error);
+  EXPECT_EQ(refused.payload[1], trigger_error_rate);
   const Bytes good = config(1000);
   EXPECT_EQ(status(board.ask(trigger_config, good)).configuration,
             trigger_crc32(good.data(), good.size()));
@@ -159,30 +143,6 @@ TEST_F(TriggerBoardImage, pingBracketsTheBoardsTicksBetweenTheHosts) {
   EXPECT_LE(low, high) << "the board's clock runs at another rate than its machine's";
 }
 
-TEST_F(TriggerBoardImage, garbageIsCountedAndTheNextMessageHeard) {
-  QemuBoard board;
-  const std::uint32_t before = status(board.wait(trigger_status)).frames_refused;
-  Bytes garbage;
-  std::uint32_t random = 7;
-  for (int i = 0; i < 3000; ++i) {
-    random = random * 1664525U + 1013904223U;
-    garbage.push_back(static_cast<std::uint8_t>(random >> 24U));
-  }
-  garbage.push_back(0);
-  board.bytes(garbage);
-  EXPECT_EQ(board.ask(trigger_ping, {9, 9, 9, 9}).type, trigger_pong);
-  Bytes cut(trigger_max_frame);
-  cut.resize(trigger_write_frame(trigger_start, 1, nullptr, 0, cut.data()) - 3);
-  board.bytes(cut);
-  board.bytes({0});
-  EXPECT_EQ(board.ask(trigger_ping, {9, 9, 9, 9}).type, trigger_pong);
-  (void)board.drain();
-  (void)board.wait(trigger_status);
-  const TriggerStatus s = status(board.wait(trigger_status));
-  EXPECT_GE(s.frames_refused - before, 5U);
-  EXPECT_EQ(s.state, trigger_stopped);
-}
-
 TEST_F(TriggerBoardImage, edgesOfPpsAndInsAreStampedBetweenTwoLooksAtTheCounter) {
   QemuBoard board(3);
   (void)board.ask(trigger_config, config(1000));
@@ -212,61 +172,6 @@ TEST_F(TriggerBoardImage, edgesOfPpsAndInsAreStampedBetweenTwoLooksAtTheCounter)
       EXPECT_LE(ticks, most + 1);
     }
   }
-}
-
-/// PPS at exact counts of the time base, which is set there.
-struct TriggerBoardImagePps : TriggerBoardImage {
-  std::unique_ptr<QemuBoard> board;
-  double second = 0;  // counts
-  double next = 0;
-  void begin(double counts_a_second) {
-    board = std::make_unique<QemuBoard>(0);
-    (void)board->ask(trigger_config, config(1000));
-    second = counts_a_second;
-    next = board->counter() + second;
-  }
-  /// The next edge's tick.
-  std::uint64_t tick() {
-    board->halted([this] {
-      board->set_counter(static_cast<std::uint32_t>(std::fmod(std::round(next), 4294967296.0)));
-      board->set_exti(6, true);
-      board->set_exti(6, false);
-    });
-    next += second;
-    return edge(board->wait(trigger_pps)).tick;
-  }
-};
-
-TEST_F(TriggerBoardImagePps, ticksAreItsMicrosecondsOnceFourEdgesAgree) {
-  begin(16e6 * 1.004);  // the internal oscillator may be off as much
-  std::vector<std::uint64_t> ticks;
-  ticks.reserve(40);
-  for (int k = 0; k < 40; ++k) ticks.push_back(tick());
-  constexpr double kStamp =
-      10;  // us: an edge is stamped by the interrupt here, some hundred instructions at 1/16 us
-  for (std::size_t k = 1; k < 4; ++k)
-    EXPECT_NEAR(static_cast<double>(ticks[k] - ticks[k - 1]), 1'004'000, kStamp) << k;
-  for (std::size_t k = 5; k < 40; ++k)
-    EXPECT_NEAR(static_cast<double>(ticks[k] - ticks[k - 1]), 1'000'000, kStamp) << k;
-  EXPECT_NEAR(static_cast<double>(ticks[39] - ticks[4]), 35e6, kStamp)
-      << "the phase is held, not the rate alone";
-  (void)board->drain();
-  EXPECT_EQ(status(board->wait(trigger_status)).pps_locked, 1);
-}
-
-TEST_F(TriggerBoardImagePps, afterHelloTheRateMovesSlowly) {
-  begin(16e6 * 1.00002);
-  (void)board->ask(trigger_hello, {trigger_protocol_version});
-  std::vector<std::uint64_t> ticks;
-  ticks.reserve(60);
-  for (int k = 0; k < 60; ++k) ticks.push_back(tick());
-  constexpr double kStamp = 10;
-  EXPECT_NEAR(static_cast<double>(ticks[3] - ticks[0]), 3'000'060, kStamp);
-  EXPECT_NEAR(static_cast<double>(ticks[10] - ticks[4]), 6'000'000 + 6 * 20 - 21, 2 * kStamp)
-      << "1 ppm less each second, from 20";
-  EXPECT_NEAR(static_cast<double>(ticks[59] - ticks[30]), 29e6, kStamp);
-  (void)board->drain();
-  EXPECT_EQ(status(board->wait(trigger_status)).pps_locked, 1);
 }
 
 TEST_F(TriggerBoardImage, aResetInMidFrameIsAnotherBootThatKnowsNothing) {

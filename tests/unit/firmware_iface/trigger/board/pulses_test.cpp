@@ -77,8 +77,7 @@ TEST(BoardPulses, goOutOnTheirGridWithTheirWidthAndLines) {
 
 TEST(BoardPulses, oneThatTheHardwareRefusedComesLateAndSaysSo) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   ASSERT_TRUE(b.armed);
   const std::uint64_t due = b.pulse.count;
   b.armed = false;
@@ -97,8 +96,7 @@ TEST(BoardPulses, oneThatTheHardwareRefusedComesLateAndSaysSo) {
 
 TEST(BoardPulses, aBoardThatWasHeldUpLeavesNumbersOutInsteadOfCatchingUp) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   b.run_for_us(15'000);
   const std::uint64_t armed_count = b.pulse.count;
   b.now += 1'000'000 * kUs;  // a second in which only the armed pulse went out

@@ -200,21 +200,11 @@ std::uint32_t QemuBoard::counter() {
   return static_cast<std::uint32_t>(std::stoull(qtest("readl 0x40000024"), nullptr, 16));
 }
 
-void QemuBoard::set_counter(std::uint32_t count) {
-  (void)qtest("writel 0x40000024 " + std::to_string(count));
-}
-
 void QemuBoard::monitor(const std::string& command) {
   const std::string line = "{\"execute\":\"" + command + "\"}\n";
   write_all(monitor_, line.data(), line.size());
   while (read_text_line(monitor_).find("\"return\"") == std::string::npos) {
   }
-}
-
-void QemuBoard::halted(const std::function<void()>& deed) {
-  monitor("stop");
-  deed();
-  monitor("cont");
 }
 
 void QemuBoard::reset() { monitor("system_reset"); }

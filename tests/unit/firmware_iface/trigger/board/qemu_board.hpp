@@ -67,10 +67,6 @@ class QemuBoard {
   void set_exti(unsigned line, bool level);
   /// The time base as it is now, low 32 bits.
   std::uint32_t counter();
-  /// The machine stands still while `deed` is done to it.
-  void halted(const std::function<void()>& deed);
-  /// Sets the time base, as if so much time had passed in which the processor did nothing.
-  void set_counter(std::uint32_t count);
   /// The machine's reset line.
   void reset();
 

@@ -140,8 +140,7 @@ TEST(BoardConfig, withoutPpsOrInsTheirEdgesAreRefused) {
 TEST(BoardTalk, whatNobodyAskedForHasNumbersOfItsOwn) {
   VirtualBoard b;
   b.deaf = true;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   b.run_for_us(500'000);  // more events than there is room for
   b.deaf = false;
   b.run_for_us(3'000'000);
@@ -173,8 +172,7 @@ TEST(BoardStates, statusComesEverySecondAndWhenTheStateChanges) {
 
 TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(10'000));
-  b.send(trigger_start);
+  b.start(10'000);
   b.run_for_us(50'000);
   b.pause(4);  // the slots of 201, 301, 401 and 501 ms
   EXPECT_EQ(b.status().state, trigger_paused);
@@ -190,8 +188,7 @@ TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
 
 TEST(BoardStates, numbersGoOnAcrossStopAndStart) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   b.run_for_us(96'000);
   b.send(trigger_stop);
   const TriggerStatus stopped = b.status();
@@ -200,8 +197,7 @@ TEST(BoardStates, numbersGoOnAcrossStopAndStart) {
   b.run_for_us(500'000);
   EXPECT_EQ(b.made.size(), 10U) << "no pulse after STOP was answered";
   b.frames.clear();
-  b.configure(VirtualBoard::config(50'000));
-  b.send(trigger_start);
+  b.start(50'000);
   b.run_for_us(50'000);
   const auto events = b.events();
   ASSERT_EQ(events.size(), 3U);
@@ -213,8 +209,7 @@ TEST(BoardStates, numbersGoOnAcrossStopAndStart) {
 
 TEST(BoardStates, stopIsAnsweredAfterAPulseThatCouldNotBeTakenBack) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   ASSERT_TRUE(b.armed);
   b.frames.clear();
   const Bytes stop = VirtualBoard::framed(trigger_stop, 99, {});
@@ -237,8 +232,7 @@ TEST(BoardStates, stopIsAnsweredAfterAPulseThatCouldNotBeTakenBack) {
 
 TEST(BoardStates, aPauseLeavesOutSoManyNumbersAndKeepsTheGrid) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   b.run_for_us(46'500);  // numbers 0..4 are out, 5 is armed
   b.pause(7);
   b.run_for_us(200'000);
@@ -254,8 +248,7 @@ TEST(BoardStates, aPauseLeavesOutSoManyNumbersAndKeepsTheGrid) {
 
 TEST(BoardStates, aPauseCanBeEndedAndIsEndedByStop) {
   VirtualBoard b;
-  b.configure(VirtualBoard::config(100'000));
-  b.send(trigger_start);
+  b.start(100'000);
   b.run_for_us(20'000);
   b.pause(0xFFFFFFFF);
   b.run_for_us(5'000'000);
@@ -272,16 +265,6 @@ TEST(BoardStates, aPauseCanBeEndedAndIsEndedByStop) {
   EXPECT_EQ(b.status().state, trigger_stopped);
   b.send(trigger_start);
   EXPECT_EQ(b.status().state, trigger_running);
-}
-
-TEST(BoardStates, twoBoardsKnowNothingOfEachOther) {
-  VirtualBoard a, b;
-  a.configure(VirtualBoard::config(100'000));
-  a.send(trigger_start);
-  a.run_for_us(100'000);
-  b.run_for_us(100'000);
-  EXPECT_GT(a.made.size(), 8U);
-  EXPECT_TRUE(b.made.empty());
 }
 
 }  // namespace

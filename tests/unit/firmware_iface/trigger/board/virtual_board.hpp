@@ -53,6 +53,10 @@ class VirtualBoard {
     trigger_put_config(&c, payload.data());
     send(trigger_config, payload);
   }
+  void start(std::uint32_t millihertz) {
+    configure(config(millihertz));
+    send(trigger_start);
+  }
   void pause(std::uint32_t pulses) {
     Bytes payload(trigger_pause_payload_size);
     (void)trigger_put_bytes(payload.data(), pulses, 4);

@@ -1,0 +1,43 @@
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/mock/mock_rig.hpp"
+
+namespace vergence::test {
+
+/// Tiny pictures of an almost empty town: for tests of what devices do, not of what is seen.
+[[nodiscard]] inline std::shared_ptr<const mock::RigTruth> small_truth(
+    const std::vector<std::string>& faults = {}, int cameras = 2,
+    mock::DriveKind kind = mock::DriveKind::brief) {
+  static const auto town = [] {
+    mock::WorldOptions o;
+    o.texture_detail = 0;
+    o.built_fraction = o.tree_fraction = o.car_fraction = 0;
+    return std::make_shared<const mock::World>(o);
+  }();
+  RigCalibration calibration;
+  calibration.cameras = cameras;
+  for (Intrinsics& lens : calibration.intrinsics) {
+    lens.width = 64;
+    lens.height = 48;
+    lens.fx = lens.fy = 50;
+    lens.cx = 31.5;
+    lens.cy = 23.5;
+  }
+  calibration.T_camera_left[1].t = {-0.75, 0, 0};
+  std::vector<mock::Fault> parsed;
+  for (const std::string& f : faults) parsed.push_back(mock::parse_fault(f));
+  mock::DriveOptions drive;
+  drive.kind = kind;
+  return std::make_shared<const mock::RigTruth>(
+      town, drive, calibration, mock::default_T_body_left(), Transform{}, std::move(parsed));
+}
+
+/// What its cameras are set to: triggered, 8 ms.
+[[nodiscard]] inline CameraConfiguration small_camera(double rate_hz = 20) {
+  return {64, 48, rate_hz, Duration::milliseconds(8), 0, CameraTrigger::hardware};
+}
+
+}  // namespace vergence::test
