@@ -47,13 +47,13 @@ Row row_of(const std::vector<Line>& lines) {
                      });
   if (index && lines.size() > 1) row.time = 1;
   constexpr std::int64_t kYear1973 = 100'000'000, kYear5138 = 100'000'000'000,
-                         kSecond = 1'000'000'000;
+                         kNsPerSecond = 1'000'000'000;
   bool large = false;
   row.parts = all([&](const auto& fields, std::ptrdiff_t) {
     if (fields.size() < row.time + 2) return false;
     const auto s = parse_integer(fields[row.time]), ns = parse_integer(fields[row.time + 1]);
     large = large || (ns && *ns > 1'000'000);
-    return s && ns && *s >= kYear1973 && *s < kYear5138 && *ns >= 0 && *ns < kSecond;
+    return s && ns && *s >= kYear1973 && *s < kYear5138 && *ns >= 0 && *ns < kNsPerSecond;
   });
   row.parts = row.parts && large;
   return row;
