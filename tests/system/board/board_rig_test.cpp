@@ -125,31 +125,5 @@ TEST_F(BoardRig, aPortThatVanishesWhileItIsListedIsLeftOut) {
   }
 }
 
-TEST_F(BoardRig, comesBackAfterItsConverterWasUnpluggedWithTheBoardsOwnNumbers) {
-  auto device = open();
-  ASSERT_NE(device, nullptr);
-  ASSERT_EQ(device->configure(thirty_hertz(), nullptr), DeviceStatus::ok) << device->last_error();
-  ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
-  const auto before = take(*device, 30);
-  ASSERT_EQ(before.size(), 30U);
-  board_.converter().command("unplug");
-  DeviceStatus status = DeviceStatus::ok;
-  Pulse p;
-  ASSERT_TRUE(within(10, [&] {
-    do status = device->wait(Duration{}, &p);
-    while (status == DeviceStatus::ok);
-    return status == DeviceStatus::gone;
-  }));
-  board_.converter().command("replug");
-  ASSERT_TRUE(within(30, [&] { return device->start(nullptr) == DeviceStatus::ok; }));
-  const auto after = take(*device, 30);
-  ASSERT_EQ(after.size(), 30U);
-  EXPECT_EQ(after.front().boot, before.front().boot) << "the board did not begin anew";
-  EXPECT_GT(after.front().number, before.back().number)
-      << "it went on pulsing while nobody listened";
-  expect_true_edges(after);
-  device->stop();
-}
-
 }  // namespace
 }  // namespace vergence

@@ -28,14 +28,5 @@ TEST(GigePairs, withoutResendEveryPairThatCameWholePairsUp) {
   }
 }
 
-TEST(GigePairs, withResendEveryPairPairsUp) {
-  if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
-  constexpr int kPulses = 120;
-  const Pairs p("on", 0.005, 40, kPulses);
-  EXPECT_EQ(p.complete.size(), static_cast<std::size_t>(kPulses));
-  EXPECT_EQ(p.source->counters().sync.unproven, 0U);
-  EXPECT_EQ(p.source->counters().torn, 0U);
-}
-
 }  // namespace
 }  // namespace vergence

@@ -211,44 +211,39 @@ TEST(GigeRun, aRecordedDriveReplaysBitForBit) {
 TEST(GigeRun, whatCannotBeDrivenIsRefusedInASentence) {
   const Wires wires(nullptr);
   const TemporaryFolder folder;
-  const auto ends = [&](int code, const std::string& more, const std::string& word) {
-    const Outcome o = run_vergence("run '" + kExample + "' --duration 2 --out '" +
-                                   (folder / "s").string() + "'" + wires.settings() + more);
-    EXPECT_EQ(o.code, code) << more << ": " << o.err;
-    EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
-    EXPECT_FALSE(std::filesystem::exists(folder / "s")) << more;
+  struct Refusal {
+    int code;  // 3: what is asked for is in order, and not there
+    const char *settings, *word;
   };
-  const auto refused = [&](const std::string& more, const std::string& word) {
-    ends(2, more, word);
-  };
-  // What is asked for is in order, and not there.
-  const auto missing = [&](const std::string& more, const std::string& word) {
-    ends(3, more, word);
-  };
-  missing(" --set cameras.1.serial=NOT-HERE",
-          "cameras.1: the gige camera \"NOT-HERE\" was not found");
-  missing(" --set ins.driver=xsens --set ins.port=/dev/ttyNotThere --set ins.rate=100",
-          "ins: the xsens INS on /dev/ttyNotThere cannot be used");
-  missing(
-      " --set trigger.driver=board --set sync.mode=board --set trigger.port=/dev/ttyNotThere "
-      "--set cameras.0.trigger=hardware --set cameras.1.trigger=hardware",
-      "trigger: the board on /dev/ttyNotThere cannot be used");
-  refused(" --set cameras.0.size=[1600,1200] --set cameras.1.size=[1600,1200]",
-          "Width 1600 px is not possible: the camera offers 16 to 640 px");
-  refused(" --set cameras.0.options.trigger_line=Line9",
-          "TriggerSource has no Line9; the camera offers Software, Line1, Line2");
-  refused(" --set cameras.0.options.paket_size=9000", "there is no option \"paket_size\"");
-  refused(" --set cameras.0.trigger=free --set cameras.1.trigger=free", "sync.mode to software");
-  refused(" --set cameras.0.trigger=soft", "cameras.0.trigger is \"soft\"");
-  refused(" --set cameras.1.driver=mock", "a mock's cameras share one world");
-  refused(" --set cameras.0.driver=gigevision", "this version knows");
-  refused(" --fast", "--fast is virtual time");
-  refused(
-      " --set trigger.rate=900 --set cameras.0.exposure_us=100 --set cameras.1.exposure_us=100 "
-      "--set cameras.0.options.link_mbps=1000",
-      "trigger.rate");
-  wires.cameras[1]->take_control(true);
-  missing("", "is in use by another program");
+  for (const Refusal& r : {
+           Refusal{3, "--set cameras.1.serial=NOT-HERE", "cameras.1"},
+           {3, "--set ins.driver=xsens --set ins.port=/dev/ttyNotThere --set ins.rate=100", "ins:"},
+           {3,
+            "--set trigger.driver=board --set sync.mode=board --set trigger.port=/dev/ttyNotThere "
+            "--set cameras.0.trigger=hardware --set cameras.1.trigger=hardware",
+            "trigger:"},
+           {2, "--set cameras.0.size=[1600,1200] --set cameras.1.size=[1600,1200]", "16 to 640 px"},
+           {2, "--set cameras.0.options.trigger_line=Line9", "Software, Line1, Line2"},
+           {2, "--set cameras.0.options.paket_size=9000", "paket_size"},
+           {2, "--set cameras.0.trigger=free --set cameras.1.trigger=free", "sync.mode"},
+           {2, "--set cameras.0.trigger=soft", "cameras.0.trigger"},
+           {2, "--set cameras.1.driver=mock", "one world"},
+           {2, "--set cameras.0.driver=gigevision", "gigevision"},
+           {2, "--fast", "--fast"},
+           {2,
+            "--set trigger.rate=900 --set cameras.0.exposure_us=100 --set "
+            "cameras.1.exposure_us=100 --set cameras.0.options.link_mbps=1000",
+            "trigger.rate"},
+           {3, "", "another program"},
+       }) {
+    wires.cameras[1]->take_control(*r.settings == '\0');
+    const Outcome o =
+        run_vergence("run '" + kExample + "' --duration 2 --out '" + (folder / "s").string() + "'" +
+                     wires.settings() + " " + r.settings);
+    EXPECT_EQ(o.code, r.code) << r.settings << ": " << o.err;
+    EXPECT_NE(o.err.find(r.word), std::string::npos) << o.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "s")) << r.settings;
+  }
 }
 
 }  // namespace

@@ -49,17 +49,6 @@ class IidcRig : public ::testing::Test {
       taker_->drain(Duration{});
     }
   }
-  /// Every exposure from the first to the last that was taken was given out or is a gap, and every
-  /// gap is in the driver's counters; what these have beyond was exposed after the last.
-  void check_account(unsigned k, const std::string& report) {
-    const Account& a = taker_->account(k);
-    const CameraStatistics s = cameras_[k]->statistics();
-    const auto exposed =
-        static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "exposed"));
-    EXPECT_EQ(a.span(), a.complete + a.torn + a.gaps) << "camera " << k << '\n' << report;
-    EXPECT_GE(s.lost + s.underruns, a.gaps) << report;
-    EXPECT_LE(s.lost + s.underruns - a.gaps, exposed - a.span()) << report;
-  }
   /// Ends everything; what the emulator says it did.
   std::string end() {
     for (const auto& c : cameras_) c->stop();
@@ -89,34 +78,6 @@ TEST_F(IidcRig, TwoCamerasAreListedWithIdsThatOpenThem) {
   EXPECT_EQ(driver_->open("15021234", &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::not_found);
   (void)end();
-}
-
-TEST_F(IidcRig, TwoCamerasStreamEveryExposureInStep) {
-  ASSERT_NO_FATAL_FAILURE(begin(usual()));
-  ASSERT_NO_FATAL_FAILURE(start());
-  ASSERT_TRUE(taker_->take(90));
-  const std::string report = end();
-  for (unsigned k = 0; k < 2; ++k) {
-    const Account& a = taker_->account(k);
-    const CameraStatistics s = cameras_[k]->statistics();
-    EXPECT_EQ(a.complete, 90U);
-    EXPECT_EQ(a.wrong, 0U);
-    EXPECT_EQ(a.torn, 0U);
-    check_account(k, report);
-    // A machine that keeps up loses nothing but what the emulator could not send.
-    if (s.underruns == 0) {
-      EXPECT_LE(s.lost,
-                static_cast<std::uint64_t>(count_of(report, static_cast<int>(k), "overtaken")))
-          << report;
-    }
-  }
-  // Free-running cameras of one rate expose together.
-  for (const std::int64_t m : taker_->account(0).middles) {
-    std::int64_t nearest = INT64_MAX;
-    for (const std::int64_t other : taker_->account(1).middles)
-      nearest = std::min(nearest, std::abs(other - m));
-    EXPECT_LT(nearest, 1'000'000'000) << "another time altogether";
-  }
 }
 
 TEST_F(IidcRig, EveryPulseIsOneFrameAndTheEmulatorsAccountsAgree) {
@@ -168,59 +129,6 @@ TEST_F(IidcRig, ATornFrameIsMarkedAndNoOther) {
   EXPECT_EQ(s.lost, BusUnderTest::kLostWithTorn * 2) << report;
   EXPECT_EQ(a.complete + a.torn + s.lost, 16U) << report;
   EXPECT_EQ(taker_->account(1).complete, 16U);
-}
-
-TEST_F(IidcRig, TheSoftwareTriggerMakesOneFrameACall) {
-  ASSERT_NO_FATAL_FAILURE(begin(usual(CameraTrigger::software)));
-  ASSERT_NO_FATAL_FAILURE(start());
-  for (int i = 0; i < 5; ++i) {
-    for (const auto& c : cameras_)
-      EXPECT_EQ(c->trigger_once(), DeviceStatus::ok) << c->last_error();
-    EXPECT_TRUE(taker_->take(1, Duration::seconds(3)));
-  }
-  const std::string report = end();
-  for (int k = 0; k < 2; ++k) EXPECT_EQ(count_of(report, k, "exposed"), 5) << report;
-}
-
-TEST_F(IidcRig, ACameraThatFallsSilentIsATimeoutAndGoesOn) {
-  ASSERT_NO_FATAL_FAILURE(begin(usual()));
-  ASSERT_NO_FATAL_FAILURE(start());
-  ASSERT_TRUE(taker_->take(10));
-  emulator_->command("mute 0 1");
-  Frame frame;
-  DeviceStatus status = DeviceStatus::ok;
-  while ((status = cameras_[0]->wait(Duration::milliseconds(500), &frame)) == DeviceStatus::ok)
-    cameras_[0]->release(frame.slot);
-  EXPECT_EQ(status, DeviceStatus::timeout);
-  emulator_->command("mute 0 0");
-  ASSERT_TRUE(taker_->take(10));
-  const std::string report = end();
-  EXPECT_GT(cameras_[0]->statistics().lost, 5U);
-  EXPECT_EQ(
-      cameras_[0]->statistics().lost,
-      static_cast<std::uint64_t>(count_of(report, 0, "dropped") + count_of(report, 0, "overtaken")))
-      << report;
-}
-
-TEST_F(IidcRig, StopsUnderLoadAndStartsAgain) {
-  ASSERT_NO_FATAL_FAILURE(begin(usual()));
-  for (int i = 0; i < 6; ++i) {
-    ASSERT_NO_FATAL_FAILURE(start());
-    EXPECT_TRUE(taker_->take(3)) << i;
-    // With frames under way, some delivered and not taken.
-    std::this_thread::sleep_for(std::chrono::milliseconds(60));
-    for (std::size_t k = 0; k < 2; ++k) {
-      const auto begun = std::chrono::steady_clock::now();
-      cameras_[k]->stop();
-      EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(3));
-      taker_->restarted(k);
-    }
-  }
-  for (unsigned k = 0; k < 2; ++k) {
-    EXPECT_EQ(taker_->account(k).wrong + taker_->account(k).torn, 0U);
-    EXPECT_EQ(cameras_[k]->statistics().starts, 6U);
-  }
-  (void)end();
 }
 
 TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
@@ -302,24 +210,6 @@ TEST_F(IidcRig, GivenUpForItsSilenceWhileAnImageIsHeldItIsOpenedAnewBesideIt) {
   ASSERT_TRUE(taker_->take(3));
   EXPECT_EQ(taker_->account(0).wrong + taker_->account(1).wrong, 0U);
   (void)end();
-}
-
-TEST_F(IidcRig, WhatIsDroppedForWantOfASlotIsCountedExactly) {
-  CameraConfiguration few = usual();
-  test::give<iidc::Options>(&few, "buffers", "6");
-  ASSERT_NO_FATAL_FAILURE(begin(few));
-  ASSERT_NO_FATAL_FAILURE(start());
-  ASSERT_TRUE(taker_->take(5));
-  std::this_thread::sleep_for(std::chrono::milliseconds(1500));  // nobody takes
-  ASSERT_TRUE(taker_->take(20));
-  const std::string report = end();
-  for (unsigned k = 0; k < 2; ++k) {
-    const Account& a = taker_->account(k);
-    const CameraStatistics s = cameras_[k]->statistics();
-    EXPECT_GT(s.underruns, 20U);
-    EXPECT_EQ(a.wrong, 0U);
-    check_account(k, report);
-  }
 }
 
 }  // namespace vergence::test

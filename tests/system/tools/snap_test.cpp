@@ -115,9 +115,9 @@ TEST(SnapMock, nothingIsOverwrittenAndNonsenseIsRefused) {
 /// The two cameras of app/config/gige.yaml, simulated; the second sees the same scene from further
 /// right, as it should.
 struct Wires {
-  explicit Wires(bool same_picture = false) {
+  Wires() {
     for (int k = 0; k < 2; ++k) {
-      pictures.push_back(scene(same_picture ? 0 : 12 * k));
+      pictures.push_back(scene(12 * k));
       test::GigeCameraOptions o;
       o.address = GigeCamera::address(70 + k);
       o.serial = "SNAP-" + std::to_string(k);
@@ -189,16 +189,6 @@ TEST(SnapGige, withoutPulsesItAsksByCommandAndSaysSo) {
   const json all = report(folder);
   EXPECT_EQ(all["trigger"], "software");
   EXPECT_FALSE(all["notes"].empty());
-}
-
-TEST(SnapGige, oneCameraTwiceIsNoticed) {
-  const Wires wires(true);
-  const TemporaryFolder folder;
-  const Outcome o =
-      snap(folder, "gige.yaml",
-           wires.settings() + " --set cameras.0.trigger=software --set cameras.1.trigger=software");
-  EXPECT_EQ(o.code, 1) << o.err;
-  EXPECT_TRUE(contains(o.err, "left and right are the same picture")) << o.err;
 }
 
 TEST(SnapGige, aCameraThatSendsNothingEndsWithThreeAndItsName) {

@@ -182,33 +182,5 @@ TEST_F(ToolsRig, whatTheDoctorPrintsMends) {
   EXPECT_EQ(finding(large, "usb_memory")["state"], "ok");
 }
 
-TEST_F(ToolsRig, aPictureOfEachCameraOfEveryKind) {
-  // An emulated camera is plugged in when its emulator starts; it is there when the bus has found
-  // it.
-  const auto until_there = [](const char* driver, std::size_t count) {
-    return within(20, [&] { return cameras_of(devices(), driver) == count; });
-  };
-  const auto snapped = [](const std::string& configuration, const std::string& more) {
-    const TemporaryFolder folder;
-    const Outcome o = run_vergence("snap '" + kConfigurations + configuration +
-                                   "' --wait 10 --out '" + (folder / "s").string() + "' " + more);
-    // What emulators and test patterns show may be the same twice, or exchanged: that is told by 1.
-    EXPECT_TRUE(o.code == 0 || o.code == 1) << configuration << ": " << o.code << o.err;
-    for (const char* name : {"s/left.png", "s/right.png", "s/snap.json"})
-      EXPECT_TRUE(fs::exists(folder / name)) << configuration << o.err;
-  };
-  {
-    Emulator usb("sim_usb_iidc", {"--cameras", "2", "--trigger-hz", "10"});
-    ASSERT_TRUE(until_there("iidc-usb", 2));
-    snapped("iidc_usb.yaml", "");
-  }
-  {
-    Emulator firewire("sim_1394", {"--cameras", "2"});
-    ASSERT_TRUE(until_there("iidc-1394", 2));
-    std::this_thread::sleep_for(std::chrono::seconds(3));  // bus resets
-    snapped("iidc_1394.yaml", "");
-  }
-}
-
 }  // namespace
 }  // namespace vergence::test

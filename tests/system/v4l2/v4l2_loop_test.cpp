@@ -149,26 +149,5 @@ TEST_F(V4l2Loop, thinnedCamerasSeeTheSameImagesAndEveryOne) {
   }
 }
 
-TEST_F(V4l2Loop, aHeldImageKeepsItsPixelsWhileTheStreamGoesOn) {
-  VividPlayer player({node(1), node(3)}, kInterval_ns, draw_number);
-  auto camera = streaming(0, configuration(59.94));
-  Frame held;
-  std::int64_t number = -1;
-  for (int i = 0; i < 200 && number < 0; ++i) {
-    ASSERT_EQ(camera->wait(Duration::seconds(3), &held), DeviceStatus::ok);
-    number = number_in(camera->view(held.slot), 0);
-    if (number < 0) camera->release(held.slot);
-  }
-  ASSERT_GE(number, 0);
-  for (int i = 0; i < 60; ++i) {
-    Frame frame;
-    ASSERT_EQ(camera->wait(Duration::seconds(3), &frame), DeviceStatus::ok);
-    EXPECT_NE(frame.slot, held.slot);
-    camera->release(frame.slot);
-  }
-  EXPECT_EQ(number_in(camera->view(held.slot), 0), number);
-  camera->release(held.slot);
-}
-
 }  // namespace
 }  // namespace vergence::v4l2

@@ -8,10 +8,8 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <numbers>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -23,8 +21,6 @@
 #include "tests/rigs/film.hpp"
 #include "tests/rigs/vivid.hpp"
 #include "tests/support/child_program.hpp"
-#include "tests/support/gnss_bytes.hpp"
-#include "tests/support/receiver_terminal.hpp"
 #include "tests/support/thread_allocations.hpp"
 
 namespace vergence {
@@ -159,74 +155,6 @@ TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
     EXPECT_EQ(s["devices"][name], 1) << name;
 }
 
-/// Latitude or longitude as NMEA writes it: degrees and minutes in one number, of which `width`
-/// digits stand before the point.
-std::string in_minutes(double degrees, int width) {
-  const double whole = std::floor(degrees);
-  std::array<char, 24> text{};
-  (void)std::snprintf(text.data(), text.size(), "%0*.7f", width + 8,
-                      whole * 100 + (degrees - whole) * 60);
-  return text.data();
-}
-
-/// An epoch of a receiver that stands where the film's left camera does; the film begins northward.
-std::string epoch_at(const Eigen::Vector3d& t_first_left, const Eigen::Vector3d& before,
-                     int tenths) {
-  constexpr double kLatitude = 27.5, kLongitude = 153;  // degrees
-  constexpr double kDegree = 110'800, kEast = 98'700;   // metres a degree there
-  const std::string at = in_minutes(kLatitude + t_first_left.z() / kDegree, 4) + ",N," +
-                         in_minutes(kLongitude + t_first_left.x() / kEast, 5) + ",E";
-  const Eigen::Vector3d v = (t_first_left - before) / 0.1;
-  const double course = std::atan2(v.x(), v.z()) * 180 / std::numbers::pi;
-  std::array<char, 64> time{}, motion{};
-  (void)std::snprintf(time.data(), time.size(), "01%02d%02d.%d0", tenths / 600 % 60,
-                      tenths / 10 % 60, tenths % 10);
-  (void)std::snprintf(motion.data(), motion.size(), "%.3f,%.2f", v.norm() / 0.514444,
-                      course < 0 ? course + 360 : course);
-  return test::nmea_sentence("GPRMC," + std::string(time.data()) + ",A," + at + "," +
-                             motion.data() + ",290224,,,A") +
-         test::nmea_sentence("GPGGA," + std::string(time.data()) + "," + at +
-                             ",4,12,0.8,50.0,M,0.0,M,,");
-}
-
-TEST_F(V4l2Run, theDriveIsComparedWithASatelliteReceiver) {
-  for (int k = 0; k < 2; ++k) test::loop(node(2 * k), node(2 * k + 1));
-  const char* folder = std::getenv("VERGENCE_FILM");
-  ASSERT_NE(folder, nullptr);
-  const test::Film film(folder);
-  Roll roll;
-  std::atomic<std::uint64_t> shown{0};
-  test::VividPlayer player(
-      {node(1), node(3)}, kInterval_ns,
-      [&](std::size_t output, std::uint64_t number, std::span<std::uint8_t> image) {
-        shown = roll.image(number);
-        const auto of_film = film.image(output, shown);
-        std::copy(of_film.begin(), of_film.end(), image.begin());
-      });
-  const test::Receiver receiver([&](int tenths) {
-    const std::size_t n = std::min<std::size_t>(shown, film.pairs() - 1);
-    const bool moves = n > 0 && n + 1 < film.pairs();
-    return epoch_at(film.T_first_left(n).t, film.T_first_left(moves ? n - 1 : n).t, tenths);
-  });
-  std::vector<std::string> all = words();
-  for (const std::string& setting :
-       {std::string("ins.driver=nmea"), std::string("ins.rate=10"), "ins.port=" + receiver.port(),
-        std::string("comparison.placement_m=15")}) {
-    all.emplace_back("--set");
-    all.push_back(setting);
-  }
-  test::ChildProgram program(all);
-  ASSERT_NO_FATAL_FAILURE(drive(&program, &roll, film));
-  const nlohmann::json s = summary();
-  expect_the_drive(film, s);
-  const auto& comparison = s["comparison"];
-  EXPECT_GT(comparison["ins_samples"], film.pairs() / 2) << s.dump(1);
-  EXPECT_EQ(comparison["ins_without_attitude"], comparison["ins_samples"]);
-  EXPECT_GE(comparison["placements"], 1) << "placed on the earth";
-  EXPECT_GT(comparison["compared"].get<std::uint64_t>(), film.pairs() / 2);
-  EXPECT_EQ(comparison["jumps"], 0);
-}
-
 /// The film's two images beside one another in the middle of a larger picture's rows.
 TEST_F(V4l2Run, theSameDriveComesOutOfOneCameraWithBothImagesInItsPicture) {
   constexpr test::LoopSize kSize = test::LoopSize::hd;
@@ -265,13 +193,6 @@ TEST_F(V4l2Run, aCameraThatIsNotThereIsOneSentence) {
   test::ChildProgram program(w);
   EXPECT_EQ(program.wait(30s), 3);
   EXPECT_FALSE(std::filesystem::exists(session_ + "/poses.csv"));
-}
-
-TEST_F(V4l2Run, whatTheCameraCannotDoIsRefused) {
-  auto w = words();
-  w.insert(w.end(), {"--set", "cameras.0.trigger=hardware", "--set", "cameras.1.trigger=hardware"});
-  test::ChildProgram program(w);
-  EXPECT_EQ(program.wait(30s), 2);
 }
 
 }  // namespace

@@ -11,13 +11,12 @@
 #include <thread>
 
 #include "drivers/gnss/gnss.hpp"
+#include "tests/support/device_terminal.hpp"
 #include "tests/support/gnss_bytes.hpp"
-#include "tests/support/receiver_terminal.hpp"
+#include "tests/unit/drivers/conformance/serial_conformance.hpp"
 
 namespace vergence::gnss {
 namespace {
-
-using test::Receiver;
 
 std::string ubx_epoch(int i) {
   test::PvtBytes pvt;
@@ -32,6 +31,39 @@ std::string nmea_epoch(int i) {
                              ",A,2729.85,S,15300.822,E,10.0,45.0,290224,,,A") +
          test::nmea_sentence(std::string("GPGGA,") + time +
                              ",2729.85,S,15300.822,E,1,9,0.9,20.5,M,39.5,M,,");
+}
+
+/// A receiver that sends an epoch every 100 ms.
+class Model final : public mock::DeviceModel {
+ public:
+  using Epoch = std::string (*)(int number);
+  Model(Epoch epoch, HostStamp start, Duration duration)
+      : of_(epoch), start_(start), end_(start + duration) {}
+  void receive(std::span<const std::uint8_t>, HostStamp) override {}
+  std::optional<HostStamp> next() const override {
+    return ended() ? std::nullopt : std::optional(start_ + kInterval * epoch_);
+  }
+  void produce(HostStamp, std::vector<std::uint8_t>* out) override {
+    const std::string bytes = of_(epoch_++);
+    out->insert(out->end(), bytes.begin(), bytes.end());
+  }
+  std::uint32_t baud() const override { return now_baud; }
+  void power_cycle(HostStamp) override {}
+  bool ended() const override { return start_ + kInterval * epoch_ > end_; }
+
+  std::atomic<std::uint32_t> now_baud{38400};
+
+ private:
+  static constexpr Duration kInterval = Duration::milliseconds(100);
+  Epoch of_;
+  HostStamp start_, end_;
+  int epoch_ = 1;
+};
+
+/// The same in real time behind a terminal.
+test::DeviceOnTerminal on_terminal(Model::Epoch epoch) {
+  return test::DeviceOnTerminal(
+      std::make_unique<Model>(epoch, monotonic_now(), Duration::seconds(600)));
 }
 
 void expect_readings(InsDevice* device) {
@@ -67,24 +99,18 @@ std::unique_ptr<InsDevice> opened(Driver* driver, const std::string& port) {
   return device;
 }
 
-TEST(GnssDevice, ubxIsFoundAndRead) {
-  Receiver receiver(ubx_epoch);
-  Driver driver({Protocol::ubx, 0, {}});
-  const auto device = opened(&driver, receiver.port());
-  ASSERT_NE(device, nullptr);
-  expect_readings(device.get());
-}
-
-TEST(GnssDevice, nmeaIsFoundAndRead) {
-  Receiver receiver(nmea_epoch);
-  Driver driver({Protocol::nmea, 38400, {}});
-  const auto device = opened(&driver, receiver.port());
-  ASSERT_NE(device, nullptr);
-  expect_readings(device.get());
+TEST(GnssDevice, eitherProtocolIsFoundAndRead) {
+  for (const Protocol protocol : {Protocol::ubx, Protocol::nmea}) {
+    const auto receiver = on_terminal(protocol == Protocol::ubx ? ubx_epoch : nmea_epoch);
+    Driver driver({protocol, protocol == Protocol::ubx ? 0U : 38400U, {}});
+    const auto device = opened(&driver, receiver.port());
+    ASSERT_NE(device, nullptr);
+    expect_readings(device.get());
+  }
 }
 
 TEST(GnssDevice, theOtherProtocolIsNamed) {
-  Receiver receiver(nmea_epoch);
+  const auto receiver = on_terminal(nmea_epoch);
   Driver driver({Protocol::ubx, 38400, {}});
   DeviceStatus status = DeviceStatus::ok;
   EXPECT_EQ(driver.open(receiver.port(), &status), nullptr);
@@ -94,7 +120,7 @@ TEST(GnssDevice, theOtherProtocolIsNamed) {
 }
 
 TEST(GnssDevice, anotherRateIsRefusedWithTheReceiversOwn) {
-  Receiver receiver(ubx_epoch);
+  const auto receiver = on_terminal(ubx_epoch);
   Driver driver({Protocol::ubx, 9600, {}});
   const auto device = opened(&driver, receiver.port());
   ASSERT_NE(device, nullptr);
@@ -104,110 +130,47 @@ TEST(GnssDevice, anotherRateIsRefusedWithTheReceiversOwn) {
   EXPECT_EQ(device->start(nullptr), DeviceStatus::bad_configuration);
 }
 
-TEST(GnssDevice, silenceIsGoneAndFixesBringItBack) {
-  Receiver receiver(ubx_epoch);
-  Driver driver({Protocol::ubx, 9600, {}});
-  const auto device = opened(&driver, receiver.port());
-  ASSERT_NE(device, nullptr);
-  ASSERT_EQ(device->configure(10, nullptr), DeviceStatus::ok);
-  ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
-  receiver.turn(false);
-  InsReading r;
-  DeviceStatus status = DeviceStatus::ok;
-  for (int i = 0; i < 10 && status == DeviceStatus::ok; ++i)
-    status = device->wait(Duration::seconds(10), &r);
-  ASSERT_EQ(status, DeviceStatus::gone);
-  receiver.turn(true);
-  for (int i = 0; i < 200 && device->start(nullptr) == DeviceStatus::gone; ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_EQ(device->wait(Duration::seconds(5), &r), DeviceStatus::ok);
-}
-
-/// A receiver at a baud rate of its own, an epoch every 100 ms of virtual time.
-struct Wire {
-  std::atomic<std::uint32_t> baud{38400};
-  std::atomic<std::int64_t> now{1'000'000'000};  // ns
+struct JoinedReceiver {
+  using Item = InsReading;
+  static constexpr double kRate = 10;
+  JoinedReceiver(const mock::SimulatedLineOptions& line, Duration duration,
+                 test::Tampered::Tamper tamper, std::uint32_t baud = 0)
+      : model(std::make_shared<Model>(ubx_epoch, HostStamp{}, duration)),
+        receiver(std::make_unique<mock::SimulatedPlace>(
+                     std::make_shared<test::Tampered>(model, std::move(tamper)), line),
+                 {Protocol::ubx, baud, {}}) {}
+  DeviceStatus configure() {
+    const DeviceStatus status = receiver.connect();
+    return status == DeviceStatus::ok ? receiver.configure(kRate, nullptr) : status;
+  }
+  Device& device() { return receiver; }
+  static std::pair<std::uint64_t, DeviceStamp> order(const InsReading& r) {
+    return {r.sample.number, r.measured};
+  }
+  std::shared_ptr<Model> model;
+  Device receiver;
 };
 
-class WireLine final : public ByteLine {
- public:
-  WireLine(Wire* wire, std::uint32_t baud) : wire_(*wire), baud_(baud) {}
-  [[nodiscard]] LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
-    constexpr std::int64_t kEpoch = 100'000'000;
-    if (woken_.exchange(false)) return {DeviceStatus::stopped, 0, {}};
-    const std::int64_t number = wire_.now / kEpoch + 1, next = number * kEpoch;
-    if (wire_.baud != baud_ || next > wire_.now + limit.ns()) {
-      wire_.now += limit.ns();
-      return {};
-    }
-    wire_.now = next;
-    const std::string bytes = ubx_epoch(static_cast<int>(number));
-    std::copy(bytes.begin(), bytes.end(), out.begin());
-    return {DeviceStatus::ok, bytes.size(), now()};
+TEST(GnssDevice, oneThatComesBackAtAnotherBaudRateIsFoundUnlessOneIsAskedFor) {
+  for (const std::uint32_t asked : {0U, 38400U}) {
+    JoinedReceiver joined({}, Duration::seconds(600), {}, asked);
+    ASSERT_EQ(joined.configure(), DeviceStatus::ok) << joined.receiver.last_error();
+    ASSERT_EQ(joined.receiver.start(nullptr), DeviceStatus::ok);
+    InsReading r;
+    ASSERT_EQ(joined.receiver.wait(Duration::seconds(5), &r), DeviceStatus::ok);
+    joined.model->now_baud = 115200;
+    ASSERT_EQ(test::end_of(joined.receiver, &r), DeviceStatus::gone);
+    for (int i = 0; i < 200 && joined.receiver.start(nullptr) == DeviceStatus::gone; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_EQ(joined.receiver.wait(Duration::seconds(1), &r),
+              asked == 0 ? DeviceStatus::ok : DeviceStatus::gone);
+    EXPECT_EQ(joined.receiver.last_error(), "") << "the owner's alone";
   }
-  [[nodiscard]] DeviceStatus write(std::span<const std::uint8_t>, Duration) noexcept override {
-    return DeviceStatus::failed;
-  }
-  [[nodiscard]] DeviceStatus set_baud(std::uint32_t baud) noexcept override {
-    baud_ = baud;
-    return DeviceStatus::ok;
-  }
-  [[nodiscard]] std::uint32_t baud() const noexcept override { return baud_; }
-  void discard_input() noexcept override {}
-  void wake() noexcept override { woken_ = true; }
-  [[nodiscard]] HostStamp now() const noexcept override { return HostStamp(wire_.now); }
-
- private:
-  Wire& wire_;
-  std::uint32_t baud_;
-  std::atomic<bool> woken_{false};
-};
-
-class WirePlace final : public LinePlace {
- public:
-  explicit WirePlace(Wire* wire) : wire_(*wire) {}
-  [[nodiscard]] std::unique_ptr<ByteLine> open(const LineSettings& settings,
-                                               DeviceStatus* status) override {
-    *status = DeviceStatus::ok;
-    return std::make_unique<WireLine>(&wire_, settings.baud);
-  }
-  [[nodiscard]] std::string name() const override { return "wire"; }
-  [[nodiscard]] bool pass(Duration time) override {
-    wire_.now += time.ns();
-    return true;
-  }
-
- private:
-  Wire& wire_;
-};
-
-/// What wait() says once the receiver went over from 38400 to 115200 baud and was waited for.
-DeviceStatus after_another_baud(std::uint32_t asked) {
-  Wire wire;
-  Device device(std::make_unique<WirePlace>(&wire), {Protocol::ubx, asked, {}});
-  EXPECT_EQ(device.connect(), DeviceStatus::ok) << device.last_error();
-  EXPECT_EQ(device.configure(10, nullptr), DeviceStatus::ok) << device.last_error();
-  EXPECT_EQ(device.start(nullptr), DeviceStatus::ok);
-  InsReading r;
-  EXPECT_EQ(device.wait(Duration::seconds(5), &r), DeviceStatus::ok);
-  wire.baud = 115200;
-  DeviceStatus status = DeviceStatus::ok;
-  while (status == DeviceStatus::ok) status = device.wait(Duration::seconds(5), &r);
-  EXPECT_EQ(status, DeviceStatus::gone);
-  for (int i = 0; i < 200 && device.start(nullptr) == DeviceStatus::gone; ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  status = device.wait(Duration::seconds(1), &r);
-  EXPECT_EQ(device.last_error(), "") << "the owner's alone";
-  return status;
-}
-
-TEST(GnssDevice, aReceiverThatComesBackAtAnotherBaudRateIsFoundAgain) {
-  EXPECT_EQ(after_another_baud(0), DeviceStatus::ok);
-}
-
-TEST(GnssDevice, theBaudRateThatWasAskedForStays) {
-  EXPECT_EQ(after_another_baud(38400), DeviceStatus::gone);
 }
 
 }  // namespace
 }  // namespace vergence::gnss
+
+namespace vergence::test {
+INSTANTIATE_TYPED_TEST_SUITE_P(Gnss, SerialConformance, gnss::JoinedReceiver);
+}  // namespace vergence::test

@@ -14,14 +14,6 @@ struct Machine {
   };
   std::vector<Port> ports;
 
-  class Silent final : public mock::DeviceModel {
-   public:
-    void receive(std::span<const std::uint8_t>, HostStamp) override {}
-    std::optional<HostStamp> next() const override { return std::nullopt; }
-    void produce(HostStamp, std::vector<std::uint8_t>*) override {}
-    std::uint32_t baud() const override { return 115200; }
-    void power_cycle(HostStamp) override {}
-  };
   class Refusing final : public LinePlace {
    public:
     explicit Refusing(DeviceStatus status) : status_(status) {}
@@ -45,7 +37,8 @@ struct Machine {
   }
   void add(const char* port, std::uint16_t vendor, std::uint16_t product,
            DeviceStatus trouble = DeviceStatus::ok) {
-    ports.push_back({{port, "", vendor, product, "", {}}, std::make_shared<Silent>(), trouble});
+    ports.push_back(
+        {{port, "", vendor, product, "", {}}, std::make_shared<test::Talker>("", 115200), trouble});
   }
   std::vector<std::string> asked;
   Driver driver() {

@@ -5,43 +5,11 @@
 
 #include "core/memory/allocation_guard.hpp"
 #include "drivers/serial/serial.hpp"
+#include "tests/support/device_terminal.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
 namespace vergence::trigger_board {
 namespace {
-
-/// A simulated board in real time at the far end of a pipe within the process.
-class BoardOnPipe {
- public:
-  BoardOnPipe(std::unique_ptr<mock::BoardSimulator> board, std::unique_ptr<ByteLine> end)
-      : board_(std::move(board)), end_(std::move(end)) {
-    thread_ = std::thread([this] { work(); });
-  }
-  BoardOnPipe(const BoardOnPipe&) = delete;
-  BoardOnPipe& operator=(const BoardOnPipe&) = delete;
-  ~BoardOnPipe() {
-    stop_ = true;
-    thread_.join();
-  }
-
- private:
-  void work() {
-    std::array<std::uint8_t, 512> in{};
-    while (!stop_) {
-      std::vector<std::uint8_t> out;
-      for (auto next = board_->next(); next && *next <= end_->now(); next = board_->next())
-        board_->produce(end_->now(), &out);
-      if (!out.empty()) (void)end_->write(out, Duration{});
-      const LineRead r = end_->read(in, Duration::milliseconds(1));
-      if (r.status == DeviceStatus::ok) board_->receive(std::span(in).first(r.size), end_->now());
-      if (r.status == DeviceStatus::gone) return;
-    }
-  }
-  std::unique_ptr<mock::BoardSimulator> board_;
-  std::unique_ptr<ByteLine> end_;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
-};
 
 /// A line that seals whoever reads it, as long as it is told to.
 class SealingLine final : public ByteLine {
@@ -67,60 +35,55 @@ class SealingLine final : public ByteLine {
   const std::atomic<bool>& seal_;
 };
 
-/// A place with one line in it.
-class OneLine final : public LinePlace {
+/// A port whose lines do so.
+class SealingPlace final : public LinePlace {
  public:
-  explicit OneLine(std::unique_ptr<ByteLine> line) : line_(std::move(line)) {}
-  std::unique_ptr<ByteLine> open(const LineSettings&, DeviceStatus* status) override {
-    *status = line_ ? DeviceStatus::ok : DeviceStatus::not_found;
-    return std::move(line_);
+  SealingPlace(const std::string& port, const std::atomic<bool>& seal)
+      : place_(port), seal_(seal) {}
+  std::unique_ptr<ByteLine> open(const LineSettings& settings, DeviceStatus* status) override {
+    auto line = place_.open(settings, status);
+    return line == nullptr ? nullptr : std::make_unique<SealingLine>(std::move(line), seal_);
   }
-  std::string name() const override { return "pipe"; }
+  std::string name() const override { return place_.name(); }
 
  private:
-  std::unique_ptr<ByteLine> line_;
+  SerialPort place_;
+  const std::atomic<bool>& seal_;
 };
 
-struct PipeRig {
-  explicit PipeRig(const std::atomic<bool>& seal = never()) {
-    auto ends = make_byte_pipe();
+/// A device in real time and its board, with a terminal between them, at 100 Hz.
+struct TerminalRig {
+  TerminalRig() {
+    TriggerConfiguration requested;
+    requested.rate_hz = 100;
+    EXPECT_EQ(device.configure(requested, nullptr), DeviceStatus::ok) << device.last_error();
+  }
+  static std::unique_ptr<mock::BoardSimulator> simulator() {
     mock::BoardSimulatorOptions o;
-    o.power_on = ends.first->now();
-    board = std::make_unique<BoardOnPipe>(
-        std::make_unique<mock::BoardSimulator>(mock::PulseSource{}, o), std::move(ends.second));
-    Options options;
-    options.native_usb = true;
-    device = std::make_unique<Device>(
-        std::make_unique<OneLine>(std::make_unique<SealingLine>(std::move(ends.first), seal)),
-        options);
+    o.power_on = monotonic_now();
+    return std::make_unique<mock::BoardSimulator>(mock::PulseSource{}, o);
   }
-  static const std::atomic<bool>& never() {
-    static const std::atomic<bool> no{false};
-    return no;
+  static Options options() {
+    Options o;
+    o.native_usb = true;
+    return o;
   }
-  std::unique_ptr<BoardOnPipe> board;
-  std::unique_ptr<Device> device;
+  std::atomic<bool> seal{false};
+  test::DeviceOnTerminal board{simulator()};
+  Device device{std::make_unique<SealingPlace>(board.port(), seal), options()};
 };
-
-TriggerConfiguration hundred_hertz() {
-  TriggerConfiguration c;
-  c.rate_hz = 100;
-  return c;
-}
 
 TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
-  PipeRig rig;
-  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->last_error();
+  TerminalRig rig;
   for (int round = 0; round < 2; ++round) {
-    ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+    ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
     std::atomic<bool> done{false};
     std::thread onlooker([&] {
       while (!done) {
-        (void)rig.device->statistics();
-        (void)rig.device->board_statistics();
-        (void)rig.device->timing();
-        (void)rig.device->pause(1);
+        (void)rig.device.statistics();
+        (void)rig.device.board_statistics();
+        (void)rig.device.timing();
+        (void)rig.device.pause(1);
         std::this_thread::sleep_for(std::chrono::milliseconds(30));
       }
     });
@@ -129,7 +92,7 @@ TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
     std::thread consumer([&] {
       Pulse p;
       for (;;) {
-        const DeviceStatus s = rig.device->wait(Duration::seconds(5), &p);
+        const DeviceStatus s = rig.device.wait(Duration::seconds(5), &p);
         if (s != DeviceStatus::ok) break;
         if (taken++ > 0 && p.number <= last) ADD_FAILURE() << p.number << " after " << last;
         last = p.number;
@@ -138,7 +101,7 @@ TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
       }
     });
     std::this_thread::sleep_for(std::chrono::milliseconds(400));
-    rig.device->stop();
+    rig.device.stop();
     done = true;
     consumer.join();
     onlooker.join();
@@ -146,44 +109,25 @@ TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
   }
 }
 
-TEST(RealTime, aLineThatIsCutIsGoneAndStopsAtOnce) {
-  PipeRig rig;
-  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->last_error();
-  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
-  Pulse p;
-  ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
-  rig.board.reset();
-  DeviceStatus s = DeviceStatus::ok;
-  while (s == DeviceStatus::ok) s = rig.device->wait(Duration::seconds(5), &p);
-  EXPECT_EQ(s, DeviceStatus::gone);
-  EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::gone) << "and does not wait";
-  rig.device->stop();
-  EXPECT_EQ(rig.device->wait(Duration{}, &p), DeviceStatus::stopped);
-}
-
 TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
-  std::atomic<bool> seal{false};
-  PipeRig rig(seal);
-  ASSERT_EQ(rig.device->configure(hundred_hertz(), nullptr), DeviceStatus::ok)
-      << rig.device->last_error();
-  ASSERT_EQ(rig.device->start(nullptr), DeviceStatus::ok);
+  TerminalRig rig;
+  ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
   Pulse p;
-  ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
+  ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
   const std::uint64_t before = AllocationGuard::allocations_after_seal();
   {
     const SealedScope sealed;
-    seal = true;
-    (void)rig.device->pause(2);
+    rig.seal = true;
+    (void)rig.device.pause(2);
     for (int i = 0; i < 50; ++i)
-      ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
-    (void)rig.device->statistics();
+      ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
+    (void)rig.device.statistics();
   }
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
-  seal = false;
-  ASSERT_EQ(rig.device->wait(Duration::seconds(5), &p), DeviceStatus::ok);
+  rig.seal = false;
+  ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
 }
 
 }  // namespace

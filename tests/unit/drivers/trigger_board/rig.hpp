@@ -3,13 +3,13 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "drivers/mock/simulators/simulators.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
 #include "tests/support/tampered.hpp"
+#include "tests/unit/drivers/conformance/serial_conformance.hpp"
 
 namespace vergence::test {
 
@@ -71,23 +71,27 @@ struct BoardRig {
   std::unique_ptr<trigger_board::Device> device;
   int times_gone = 0;
 
-  /// Pulses until the device has no more, or this many; `gone` is passed over, the device is asked
-  /// to come back.
+  /// Configured and started.
+  void start(const TriggerConfiguration& requested = thirty_hertz()) {
+    ASSERT_EQ(device->configure(requested, nullptr), DeviceStatus::ok) << device->last_error();
+    ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
+  }
+  /// Pulses until the device has no more, or this many, each stamped within its bound; `gone` is
+  /// passed over.
   std::vector<Pulse> pulses(std::size_t most = SIZE_MAX) {
-    std::vector<Pulse> all;
-    while (all.size() < most) {
-      Pulse p;
-      const DeviceStatus s = device->wait(Duration::seconds(20), &p);
-      if (s == DeviceStatus::ok) {
-        all.push_back(p);
-      } else if (s == DeviceStatus::gone) {
-        ++times_gone;
-        while (device->start(nullptr) == DeviceStatus::gone) std::this_thread::yield();
-      } else {
-        break;
-      }
+    const auto all = all_of<Pulse>(*device, most, &times_gone);
+    EXPECT_FALSE(all.empty());
+    for (const Pulse& p : all) {
+      EXPECT_TRUE(p.mapped);
+      EXPECT_LE(std::abs((p.host - truth(p)).ns()), p.host_error.ns()) << p.number;
+      if (::testing::Test::HasFailure()) break;
     }
     return all;
+  }
+  /// All pulses of the board's time.
+  std::vector<Pulse> drive(const TriggerConfiguration& requested = thirty_hertz()) {
+    start(requested);
+    return pulses();
   }
   [[nodiscard]] HostStamp truth(const Pulse& p) const { return edges.at({p.boot, p.number}); }
 };

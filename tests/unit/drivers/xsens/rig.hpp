@@ -8,6 +8,7 @@
 #include "drivers/mock/simulators/simulators.hpp"
 #include "drivers/xsens/device.hpp"
 #include "tests/support/tampered.hpp"
+#include "tests/unit/drivers/conformance/serial_conformance.hpp"
 
 namespace vergence::test {
 
@@ -29,8 +30,10 @@ namespace vergence::test {
 }
 
 /// The simulator of a generation with what goes with it.
-[[nodiscard]] inline mock::XsensSimulatorOptions simulated(xbus::Generation generation) {
+[[nodiscard]] inline mock::XsensSimulatorOptions simulated(xbus::Generation generation,
+                                                           double seconds = 0) {
   mock::XsensSimulatorOptions o;
+  if (seconds > 0) o.duration = Duration::seconds(seconds);
   o.generation = generation;
   o.device_id = generation == xbus::Generation::legacy ? 0x00500123 : 0x07701234;
   return o;
@@ -40,9 +43,9 @@ namespace vergence::test {
 struct XsensRig {
   explicit XsensRig(const mock::XsensSimulatorOptions& sensor = {},
                     const mock::SimulatedLineOptions& line = {}, const xsens::Options& options = {},
-                    mock::InsSource source = easy_drive)
+                    mock::InsSource source = easy_drive, Tampered::Tamper tamper = {})
       : simulator(std::make_shared<mock::XsensSimulator>(std::move(source), sensor)),
-        between(std::make_shared<Tampered>(simulator)),
+        between(std::make_shared<Tampered>(simulator, std::move(tamper))),
         device(std::make_unique<xsens::Device>(
             std::make_unique<mock::SimulatedPlace>(between, line), options)) {}
 
@@ -50,23 +53,18 @@ struct XsensRig {
   std::shared_ptr<Tampered> between;
   std::unique_ptr<xsens::Device> device;
 
-  /// All readings until the device has no more, or this many; `gone` is passed over, the device is
-  /// asked to come back.
+  void start(double rate_hz = 100) {
+    ASSERT_EQ(device->configure(rate_hz, nullptr), DeviceStatus::ok) << device->last_error();
+    ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
+  }
+  /// All readings until the device has no more, or this many; `gone` is passed over.
   std::vector<InsReading> readings(std::size_t most = SIZE_MAX) {
-    std::vector<InsReading> all;
-    while (all.size() < most) {
-      InsReading r;
-      const DeviceStatus s = device->wait(Duration::seconds(20), &r);
-      if (s == DeviceStatus::ok) {
-        all.push_back(r);
-      } else if (s == DeviceStatus::gone) {
-        ++times_gone;
-        while (device->start(nullptr) == DeviceStatus::gone) std::this_thread::yield();
-      } else {
-        break;
-      }
-    }
-    return all;
+    return all_of<InsReading>(*device, most, &times_gone);
+  }
+  /// All readings of the sensor's time.
+  std::vector<InsReading> drive(double rate_hz = 100) {
+    start(rate_hz);
+    return readings();
   }
   int times_gone = 0;
 };
