@@ -110,11 +110,12 @@ EvaluationRequest evaluate_request(const EvaluateArguments& a) {
 void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<EvaluateArguments>();
   CLI::App* command = root.add_subcommand("evaluate", "Compare a trajectory with a reference");
-  command->add_option("ESTIMATE", a->estimate, "Text file of poses, session folder, or data set")->required();
-  command->add_option(
-      "REFERENCE", a->reference,
-      "Text file of poses, KITTI or EuRoC data-set folder; ins.csv of a session, which is brought to "
-      "the left camera by the session's mount");
+  command->add_option("ESTIMATE", a->estimate, "Text file of poses, session folder, or data set")
+      ->required();
+  command->add_option("REFERENCE", a->reference,
+                      "Text file of poses, KITTI or EuRoC data-set folder; ins.csv of a session, "
+                      "which is brought to "
+                      "the left camera by the session's mount");
   command->add_flag("--json", a->json, "The figures as JSON");
   command->add_option(
       "--lengths", a->lengths,
@@ -138,14 +139,16 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
       ->check(CLI::IsMember({"camera", "flu"}))
       ->capture_default_str();
   command
-      ->add_option("--time-unit", a->unit,
-                   "Unit of the times of ESTIMATE[,REFERENCE]: s, ms, us, ns [by their magnitude, or "
-                   "s]")
+      ->add_option(
+          "--time-unit", a->unit,
+          "Unit of the times of ESTIMATE[,REFERENCE]: s, ms, us, ns [by their magnitude, or "
+          "s]")
       ->type_name("UNIT");
   command
-      ->add_option("--quaternion", a->quaternion,
-                   "Order of the quaternion in ESTIMATE[,REFERENCE]: xyzw, wxyz [by the headings, or "
-                   "xyzw]")
+      ->add_option(
+          "--quaternion", a->quaternion,
+          "Order of the quaternion in ESTIMATE[,REFERENCE]: xyzw, wxyz [by the headings, or "
+          "xyzw]")
       ->type_name("ORDER");
   command->add_flag("--estimate-mount", a->estimate_mount,
                     "Find how the two bodies sit to one another; compare at the estimate's. "

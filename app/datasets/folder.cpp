@@ -279,6 +279,12 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   StereoSequence sequence;
   sequence.root = folder;
   Images images = find_images(folder);
+  // Images in DRIVE/left and DRIVE/right below the folder: the calibration and the times are
+  // theirs.
+  if (const fs::path parent = fs::path(images.below[0]).parent_path();
+      !parent.empty() && parent == fs::path(images.below[1]).parent_path() &&
+      !fs::exists(folder / "calibration.yaml"))
+    return open_folder(folder / parent, given, use);
   sequence.side_by_side = images.side_by_side;
   if (images.side_by_side ? images.below[0] != "both" : images.below[0] != "left")
     sequence.assumptions.push_back(fmt::format("{} is left and {} is right",

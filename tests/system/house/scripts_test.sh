@@ -13,7 +13,7 @@ expect_refusal() {  # words that the sentence holds, then the command
   local words="$1" status=0
   shift
   "$@" </dev/null >out 2>err || status=$?
-  if [ "$status" -ne 2 ] || ! grep -qF "$words" err || [ "$(wc -l <err)" -ne 1 ]; then
+  if [ "$status" -ne 2 ] || ! grep -qF -- "$words" err || [ "$(wc -l <err)" -ne 1 ]; then
     echo "expected exit 2 and one line with '$words' from: $*; exit $status, stderr:"
     cat err
     failures=$((failures + 1))

@@ -49,12 +49,12 @@ TEST(StLucia, aDriveReplayedFromTheDataSetsFilesIsTheDriveItself) {
       run_vergence("run '" + kRig + "' --fast --duration " + std::to_string(kSeconds) +
                    set_arguments() + quiet + (work / "run").string() + "'");
   ASSERT_EQ(run.code, 0) << run.err;
-  const Outcome replay = run_vergence(
-      "replay '" + (work / "data").string() + "' --format st-lucia --calibration '" +
-      (work / "calibration.yaml").string() +
-      "' --set odometry.features=300 --set calibration.online=off"
-      " --set 'ins.lever_arm_m=[0.9, 0.375, 0.5]' --quiet --out '" +
-      (work / "replay").string() + "'");
+  const Outcome replay =
+      run_vergence("replay '" + (work / "data").string() + "' --format st-lucia --calibration '" +
+                   (work / "calibration.yaml").string() +
+                   "' --set odometry.features=300 --set calibration.online=off"
+                   " --set 'ins.lever_arm_m=[0.9, 0.375, 0.5]' --quiet --out '" +
+                   (work / "replay").string() + "'");
   ASSERT_EQ(replay.code, 0) << replay.err;
 
   EXPECT_EQ(read_file(work / "run" / "trajectory.tum"),

@@ -65,7 +65,8 @@ TEST_F(Sequence, kittiSaysWhatIsWrong) {
   folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt", "P1"}));
   folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 -30 0 60 24 0 0 0 1\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt:2", "12 are expected"}));
+  EXPECT_TRUE(
+      says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt:2", "12 are expected"}));
   folder_.write("calib.txt", "P0: 60 0 35 0 0 60 24 0 0 0 1 0\nP1: 60 0 35 30 0 60 24 0 0 0 1 0\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"calib.txt", "swapped"}));
   folder_.write("calib.txt",

@@ -51,12 +51,12 @@ TEST(RigSettings, aCamerasOwnNumbersGoBeforeThoseOfTheRig) {
   const RigCalibration rig = mounted_rig(
       configured({"rig.nominal.k1=-0.1", "cameras.1.intrinsics=[500, 501, 322, 241]",
                   "cameras.1.distortion=[-0.2, 0.05, 0.001]",
-                  "cameras.1.T_camera_left=[0, -1, 0, -0.4, 1, 0, 0, 0.3, 0, 0, 1, 0]"}));
+                  "cameras.1.T_camera_left=[0, -1, 0, -0.4, 1, 0, 0, -0.3, 0, 0, 1, 0]"}));
   EXPECT_EQ(rig.intrinsics[0].distortion[0], -0.1);
   EXPECT_EQ(rig.intrinsics[1].fy, 501);
   EXPECT_EQ(rig.intrinsics[1].cx, 322);
   EXPECT_EQ(rig.intrinsics[1].distortion, (std::array<double, 5>{-0.2, 0.05, 0.001, 0, 0}));
-  EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.4, 0.3, 0));
+  EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.4, -0.3, 0));
   EXPECT_EQ(rig.T_camera_left[1].R(1, 0), 1);
   EXPECT_DOUBLE_EQ(rig.baseline, 0.5);
 }
