@@ -72,9 +72,8 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
   if (!facts_.assumptions.empty())
     facts_.remarks.push_back({fmt::format("assumed: {}", fmt::join(facts_.assumptions, "; ")),
                               "data", !request.session.quiet});
-  if (request.from_scratch || request.known) {
-    // The length is the user's own, and where the right camera sits is to be found.
-  } else {
+  // Otherwise the length is the user's own, and where the right camera sits is to be found.
+  if (!request.from_scratch && !request.known) {
     const RigCalibration& rig = facts_.begin.file.rig;
     facts_.remarks.push_back({baseline_sentence(rig) + " (" + facts_.begin.source + ")", nullptr,
                               !request.session.quiet});
