@@ -1,13 +1,11 @@
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <vector>
 
 #include "tests/unit/drivers/sync/pulse_rig.hpp"
 
-/// What the time layer reaches, in virtual time: stamps, pairs, acquisition. sync_bench [SEEDS]
+/// What the time layer reaches, in virtual time: pairs and acquisition. sync_bench [SEEDS]
 namespace {
 
 using vergence::Duration;
@@ -16,45 +14,11 @@ using vergence::SyncMode;
 using vergence::SyncOptions;
 using vergence::testing::PulseRig;
 using vergence::testing::PulseRigOptions;
-using Clock = PulseRigOptions::Clock;
 
 SyncOptions board() {
   SyncOptions o;
   o.mode = SyncMode::board;
   return o;
-}
-
-void stamps(const char* name, Clock clock, double settle, bool feedback, int seeds) {
-  std::vector<double> errors;
-  std::uint64_t outside = 0;
-  for (int seed = 1; seed <= seeds; ++seed) {
-    PulseRigOptions o;
-    o.seed = static_cast<std::uint64_t>(seed);
-    o.clock = clock;
-    o.report_jitter_ms = 2;
-    o.report_delay = Duration::microseconds(300);
-    o.feedback = feedback;
-    o.settle = settle;
-    PulseRig rig(o, board());
-    rig.keep_errors();
-    rig.run(settle + 10);
-    outside += rig.truth().outside;
-    errors.insert(errors.end(), rig.truth().stamp_errors_us.begin(),
-                  rig.truth().stamp_errors_us.end());
-  }
-  double sum = 0, mean = 0;
-  for (double& e : errors) {
-    sum += e * e;
-    mean += e;
-    e = std::abs(e);
-  }
-  std::sort(errors.begin(), errors.end());
-  const auto n = static_cast<double>(errors.size());
-  std::printf(
-      "stamp, %-28s %7zu frames  rms %5.1f us  mean %5.1f us  p99 %5.1f us  max %5.1f us  outside "
-      "their bound %llu\n",
-      name, errors.size(), std::sqrt(sum / n), mean / n, errors[errors.size() * 99 / 100],
-      errors.back(), static_cast<unsigned long long>(outside));
 }
 
 void acquisition(double rate, double vary_ms, const char* name, int seeds) {
@@ -108,11 +72,6 @@ void ten_hours(std::uint64_t seed) {
 
 int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::max(1, std::atoi(argv[1])) : 20;
-  stamps("10 s of pings, feedback", Clock::pings, 10, true, seeds);
-  stamps("30 s of reports, feedback", Clock::arrivals, 30, true, seeds);
-  stamps("60 s of pings, feedback", Clock::pings, 60, true, seeds);
-  stamps("60 s of reports, feedback", Clock::arrivals, 60, true, seeds);
-  stamps("10 s of pings, no feedback", Clock::pings, 10, false, seeds);
   for (const double rate : {20.0, 30.0}) {
     acquisition(rate, 1, "intervals varied by 1 ms", seeds);
     acquisition(rate, 0, "even intervals, a pause", seeds);
