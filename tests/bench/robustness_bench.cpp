@@ -97,7 +97,8 @@ void whole(const Bench& b, const RecordedSequence& d) {
   }
 }
 
-void cold_starts(const Bench& b, const RecordedSequence& d) {
+/// Returns whether every start had a pose.
+bool cold_starts(const Bench& b, const RecordedSequence& d) {
   constexpr std::size_t kStep = 10, kFrames = 10;
   int starts = 0, posed_within = 0;
   std::string failed;
@@ -112,6 +113,7 @@ void cold_starts(const Bench& b, const RecordedSequence& d) {
     if (!any) failed += fmt::format(" {} ({})", first, to_string(r.samples[2].reason));
   }
   row(fmt::format("| {} | {} of {} |{} |", d.name, posed_within, starts, failed));
+  return posed_within == starts;
 }
 
 void window_row(const std::string& name, std::size_t first, const char* what, const DriveOutcome& r,
@@ -256,6 +258,7 @@ int main(int argc, char** argv) {
     fmt::print("VERGENCE_SHARED has no such drive\n");
     return 2;
   }
+  bool started = true;
   const auto section = [&](const char* name, const char* heading, int columns, const auto& run) {
     if (what != "all" && what != name) return;
     fmt::print("\n| {} |\n|", heading);
@@ -268,7 +271,7 @@ int main(int argc, char** argv) {
           "| adopted",
           9, [&](const RecordedSequence& d) { whole(b, d); });
   section("cold", "drive | starts with a pose within three frames | not, at frame (reason)", 3,
-          [&](const RecordedSequence& d) { cold_starts(b, d); });
+          [&](const RecordedSequence& d) { started = cold_starts(b, d) && started; });
   section("windows",
           "drive | start | calibration | posed | ok | ATE mm | lost, and posed with `off` | knocks "
           "| adopted",
@@ -284,5 +287,5 @@ int main(int argc, char** argv) {
       11, [&](const RecordedSequence& d) {
         if (d.name == "sand_rover") planar(b, d);
       });
-  return EXIT_SUCCESS;
+  return started ? EXIT_SUCCESS : EXIT_FAILURE;
 }
