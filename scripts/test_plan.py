@@ -14,6 +14,7 @@ import subprocess
 import sys
 
 SHOWN = 40
+TIERS = ("default", "rig", "statistics", "hardening", "deploy")
 CORES = os.cpu_count() or 1
 
 
@@ -23,9 +24,11 @@ def listed(build):
     found = []
     for test in json.loads(shown.stdout)["tests"]:
         properties = {p["name"]: p["value"] for p in test.get("properties", [])}
-        labels = properties.get("LABELS", []) + ["", ""]
+        labels = properties.get("LABELS", [])
+        tier = next((label for label in labels if label in TIERS), "")
+        folder = next((label for label in labels if label not in TIERS), "")
         alone = properties.get("RUN_SERIAL", False) or properties.get("PROCESSORS", 1) > 1
-        found.append((test["name"], labels[0], labels[1], float(properties.get("COST", 1)) * (CORES if alone else 1)))
+        found.append((test["name"], tier, folder, float(properties.get("COST", 1)) * (CORES if alone else 1)))
     return found
 
 

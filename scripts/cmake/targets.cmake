@@ -104,7 +104,7 @@ endfunction()
 # optimised at all, as that takes as long again as compiling them.
 set(VERGENCE_TEST_OPTIMISATION $<IF:$<BOOL:${VERGENCE_SANITIZE}>,-O0,-O1>)
 
-# The tiers of tests (CONTRIBUTING.md); every test is in exactly one of them, which is its first label. Building tests_TIER builds what the
+# The tiers of tests (CONTRIBUTING.md); every test is in exactly one of them, which is one of its labels. Building tests_TIER builds what the
 # tests of a tier run; `all` builds none of them.
 set(VERGENCE_TIERS default rig statistics hardening deploy)
 if(VERGENCE_TESTS)
@@ -188,8 +188,9 @@ function(vergence_test name)
     endforeach()
     return()
   endif()
-  # Parameters that print as bytes would make a name of addresses.
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES PROPERTIES ${properties} LABELS "${labels}")
+  # gtest_discover_tests() takes one label at a time. Parameters that print as bytes would make a name of addresses.
+  list(TRANSFORM labels PREPEND "LABELS;")
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST NO_PRETTY_VALUES PROPERTIES ${properties} ${labels})
 endfunction()
 
 # vergence_command_test(NAME name TIER tier COMMAND … [PROPERTIES …]): a ctest that runs a command.
