@@ -80,7 +80,7 @@ std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::stri
       const auto other = replaced(small, sides.left, sides.right);
       const auto found = other ? there.find(*other) : there.end();
       const bool taken = std::any_of(pairs.begin(), pairs.end(),
-                                     [&](const auto& pair) { return pair[0] == name; });
+                                     [&name = name](const auto& pair) { return pair[0] == name; });
       if (found != there.end() && !taken) pairs.push_back({name, found->second});
     }
   return pairs;
