@@ -64,8 +64,8 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
                        requested, side, list_of_image_topics(bag)));
 }
 
-/// What speaks for a pair of topics: both have a CameraInfo, or a calibration is given; the images
-/// are as the lenses made them; they are not compressed.
+/// Ranks a pair of topics: a CameraInfo for both (or a supplied calibration) counts most, then
+/// unrectified images, then uncompressed ones.
 int merit(const BagIndex& bag, const Topics& topics, bool given) {
   int sum = 0;
   for (const std::string& topic : topics) {
@@ -129,8 +129,8 @@ std::vector<Stamp> stamps_of(const std::vector<BagImage>& images) {
   return stamps;
 }
 
-/// What the times of recording say of pairs that stamps made: by how much right images were
-/// recorded later than their stamps say.
+/// Median delay by which right images were recorded later than their stamps and the left images
+/// imply.
 Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
                         std::span<const std::array<std::size_t, 2>> pairs) {
   std::array<std::vector<Stamp>, 2> log;
@@ -158,8 +158,8 @@ std::vector<std::array<std::size_t, 2>> pair_images(
   if (!near.empty() && middle > most)
     refuse(
         path, 0,
-        fmt::format("{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: which "
-                    "images belong together cannot be told; correct the stamps of one topic",
+        fmt::format("{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: the "
+                    "association of images is ambiguous; correct the stamps of one topic",
                     topics[1], 1e3 * middle.to_seconds(),
                     offset.median > Duration{} ? "later" : "earlier", topics[0], 1e3 * interval));
   auto pairs = pair_nearest(stamps[0], stamps[1], most);

@@ -10,7 +10,7 @@ namespace vergence::app {
 /// from zero. Nothing: not a number (blanks included), or beyond what 64 bits hold.
 [[nodiscard]] std::optional<std::int64_t> parse_decimal(std::string_view text,
                                                         int decimals) noexcept;
-/// The same of seconds as nanoseconds (`12`, `-0.5`, `1.044989e-01`).
+/// Parses seconds and returns nanoseconds (`12`, `-0.5`, `1.044989e-01`).
 [[nodiscard]] std::optional<std::int64_t> parse_seconds_ns(std::string_view text) noexcept;
 
 /// The whole text as a decimal integer. Nothing: anything else.

@@ -28,7 +28,7 @@ struct Images {
 std::string file_of(const std::string& name) { return fs::path(name).filename().string(); }
 std::string stem_of(const std::string& name) { return fs::path(name).stem().string(); }
 
-/// Both cameras in one folder, told by how their images' names begin.
+/// Images of both cameras in one folder, distinguished by the prefixes of their names.
 std::optional<Images> images_by_prefix(const fs::path& root) {
   std::error_code ignored;
   std::vector<std::string> files;
@@ -179,8 +179,8 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const Images& images,
 
 // ---- times
 
-/// Where nobody wrote down when: motion is predicted by frames, so a rate that is wrong spoils no
-/// pose, but every stamp.
+/// Interval assumed without a times.txt. Motion is predicted by frames, so a wrong rate affects
+/// stamps and not poses.
 constexpr std::int64_t kAssumedStep = 100'000'000;  // ns
 
 std::optional<fs::path> times_of(const fs::path& folder) {

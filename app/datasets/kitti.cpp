@@ -35,7 +35,7 @@ std::optional<std::size_t> index_of(const fs::path& image, std::size_t first, st
   return number >= first && number - first < count ? std::optional(number - first) : std::nullopt;
 }
 
-/// The times, one a frame; where nobody wrote them down those of the benchmark's cameras.
+/// One time per frame: those of times.txt, or the benchmark's frame rate without such a file.
 std::vector<Stamp> times_of(StereoSequence* sequence, std::size_t frames) {
   std::vector<Stamp> times;
   if (!fs::exists(sequence->times)) {

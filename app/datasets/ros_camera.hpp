@@ -33,7 +33,7 @@ struct RosCrop {
                                              Intrinsics* lens);
 
 /// Numbers of the whole sensor become those of the image, as REP 104 says; `image`: its size, where
-/// that is known. Drivers that already gave the image's own numbers are told by the principal
+/// that is known. Drivers that already gave the image's own numbers are recognised by the principal
 /// point, which lies near the middle: then the returned phrase says what was taken instead.
 [[nodiscard]] std::string apply_crop(const RosCrop& crop, const std::optional<ImageSize>& image,
                                      RosCamera* camera);

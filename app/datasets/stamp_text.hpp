@@ -35,9 +35,9 @@ struct TimeForm {
   bool nanoseconds_after_point = false;
 };
 
-/// Told from some of a file's times, in their order: seconds since 1970 have ten digits today,
-/// milliseconds 13, microseconds 16, nanoseconds 19. What is no time since 1970 is in the unit
-/// `relative`. `given`: the unit that the user names; it counts whatever the magnitude.
+/// Infers the form from some of a file's times, in their order: seconds since 1970 have ten digits
+/// today, milliseconds 13, microseconds 16, nanoseconds 19. What is no time since 1970 is in the
+/// unit `relative`. `given`: the unit that the user names; it counts whatever the magnitude.
 [[nodiscard]] TimeForm find_time_form(std::span<const std::string_view> times,
                                       std::optional<TimeUnit> given,
                                       TimeUnit relative = TimeUnit::seconds);

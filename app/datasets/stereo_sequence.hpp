@@ -56,8 +56,9 @@ struct StereoSequence {
   std::string calibration_source;  // the file's name, for calibrations.csv
   std::filesystem::path times;     // the file that the stamps are from, for sentences about them
   std::size_t left_out = 0;  // frames that are none of `pairs`: no stamp, no partner, out of order
-  std::vector<std::string> remarks{};      // what was left out or is doubtful: a sentence each
-  std::vector<std::string> assumptions{};  // what nobody said and was taken to be: a phrase each
+  std::vector<std::string> remarks{};  // what was left out or is doubtful: a sentence each
+  std::vector<std::string>
+      assumptions{};          // facts the files leave out, and the values assumed: one phrase each
   bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
                               // file[1] are the same
   std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root

@@ -28,7 +28,7 @@ struct Line {
   std::size_t number = 0;
 };
 
-/// Told from all rows: a column that counts rows and one of nanoseconds look like others in one.
+/// Infers the columns from all rows, because an index and nanoseconds cannot be recognised in one.
 Row row_of(const std::vector<Line>& lines) {
   const std::vector<std::string_view>& first = lines.front().fields;
   Row row;

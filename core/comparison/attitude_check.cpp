@@ -9,10 +9,11 @@ namespace vergence {
 void AttitudeCheck::add(const Vec2& place, double sigma, double yaw) noexcept {
   // A step four sigmas long has a course good to some 15 degrees; longer steps cut bends.
   constexpr double kSigmas = 4, kShortest = 2, kLongest = 10;  // m
+  // Twice the course error of the shortest step.
   constexpr double kMostOff = 30 * std::numbers::pi / 180;
   if (!anchor_) anchor_ = place;
   const Vec2 step = place - *anchor_;
-  // Of a leap of the position, or a hole, no more than of a long step.
+  // A position jump or an outage counts as one long step.
   constexpr double kMostOfStep = 20;  // m
   const double length = std::min(step.norm(), kMostOfStep);
   if (length < std::clamp(kSigmas * sigma, kShortest, kLongest)) return;

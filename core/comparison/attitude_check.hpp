@@ -5,26 +5,27 @@
 
 namespace vergence {
 
-/// Whether the heading that an attitude says goes with the way that is driven. An INS without a
-/// filter, or mounted another way than is said, tells one thing all the drive long while the
-/// vehicle goes another way: such an attitude is worse than none.
+/// Compares the heading of an INS attitude with the course over ground. An INS without a filter, or
+/// one mounted differently than configured, reports a heading that contradicts the motion; such an
+/// attitude is not used.
 ///
-/// Threads one. Memory: none.
+/// Not thread-safe. Does not allocate.
 class AttitudeCheck {
  public:
-  /// A fix in its order: place in enu, m, its sigma, and the yaw of the camera's view, rad, by the
-  /// attitude.
+  /// Call once per fix, in order. `place`: position in enu, m; `sigma`: of the position, m; `yaw`:
+  /// of the camera's optical axis according to the attitude, rad counter-clockwise from east.
   void add(const Vec2& place, double sigma, double yaw) noexcept;
-  /// For the last kDistance m driven heading and course differed by more than 30 degrees. It holds
-  /// until they agree for as long.
+  /// True once heading and course have differed by more than 30 degrees over kDistance, until they
+  /// have agreed over the same distance.
   [[nodiscard]] bool contradicted() const noexcept { return contradicted_; }
-  /// Most of the way heading and course differed.
+  /// True if heading and course differed over most of the distance travelled.
   [[nodiscard]] bool mostly_off() const noexcept { return all_against_ > all_with_; }
-  /// Of the newest step, rad counter-clockwise from east; nothing: none was driven yet.
+  /// Course of the newest step, rad counter-clockwise from east; empty before the first step.
   [[nodiscard]] std::optional<double> course() const noexcept { return course_; }
 
  private:
-  static constexpr double kDistance = 50;  // m
+  // Longer than a manoeuvre in reverse; m.
+  static constexpr double kDistance = 50;
 
   std::optional<Vec2> anchor_;
   std::optional<double> course_;

@@ -25,7 +25,7 @@ std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
   return (std::size_t{width} * bits + 31) / 32 * 4;
 }
 
-/// Of a pixel's blue, green and red, with the weights of PNG and JPEG images.
+/// Luminance of one pixel (blue, green, red), with the weights that PNG and JPEG images get.
 std::uint8_t luminance(const std::uint8_t* bgr) noexcept {
   return static_cast<std::uint8_t>((114U * bgr[0] + 587U * bgr[1] + 299U * bgr[2] + 500U) / 1000U);
 }

@@ -52,7 +52,7 @@ namespace vergence::app::detail {
 [[nodiscard]] std::optional<std::array<std::string, 2>> camera_folders(
     const std::filesystem::path& root);
 
-/// Whether open_folder() would find images of two cameras.
+/// Returns true if open_folder() finds images of two cameras below `root`.
 [[nodiscard]] bool holds_stereo_images(const std::filesystem::path& root);
 
 /// By the ending; hidden files, which systems put beside images, are none.

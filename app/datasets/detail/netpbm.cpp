@@ -94,7 +94,7 @@ void decode_netpbm(Bytes bytes, std::uint8_t* out, std::size_t stride, int deep_
                     step = header.bytes_a_sample();
   for (int y = 0; y < header.size.height; ++y, in += header.row(), out += stride)
     for (std::size_t x = 0; x < width; ++x) {
-      // Of colours the upper 8 bits, as luminance of ITU-R BT.601.
+      // Colour becomes luminance (ITU-R BT.601) of the upper 8 bits.
       const std::uint8_t* pixel = in + x * header.samples * step;
       out[x] = header.samples == 3
                    ? static_cast<std::uint8_t>(

@@ -39,7 +39,7 @@ class Sorted {
   }
 
  private:
-  /// Of equal stamps the first.
+  /// Returns the first of the images that share the stamp of image i.
   [[nodiscard]] std::size_t first_of(std::size_t i) const {
     return *std::lower_bound(order_.begin(), order_.end(), stamps_[i],
                              [&](std::size_t k, Stamp s) { return stamps_[k] < s; });

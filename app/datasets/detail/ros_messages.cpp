@@ -43,8 +43,8 @@ constexpr std::array kEncodings{Encoding{"mono8", PixelLayout::grey, 1},
                                 Encoding{"uyvy", PixelLayout::luma_second, 2},
                                 Encoding{"yuv422", PixelLayout::luma_second, 2}};
 
-/// Whether the format of a CompressedImage says that a mosaic was compressed as it was: the
-/// encoding stands first, and behind `compressed` what it was turned into, if it was.
+/// Returns true if a CompressedImage's format names a Bayer mosaic that was compressed without
+/// demosaicing: its encoding comes first, and `compressed` is followed by the converted encoding.
 bool is_mosaic(const std::string& format) {
   const std::size_t bayer = format.find("bayer_"), compressed = format.find("compressed");
   if (bayer == std::string::npos) return false;
