@@ -20,7 +20,15 @@ constexpr double kWorstFit = 1.5;           // px: matches of frames not in the 
 // And how many times that of the frames that were; under so many pixels they may differ: on
 // recorded drives both are 0.08 to 0.25 px.
 constexpr double kTimesUsed = 3.0, kLeastMisfit = 0.4;
-constexpr double kCertain = 3.0;         // sigmas of depth by which a calibration is contradicted
+// rad, of the turn between two cameras that no epipolar line shows: what a calibration that does
+// not state its sigmas is off by when it is the rig's, and when it is not.
+constexpr double kMakersTurn = 1e-3, kOtherTurn = 15e-3;
+// That a calibration which is given is not the rig's, before the drive has begun; and the rate of
+// wrong decisions about it, either way.
+constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
+// Sigma of a measurement over the claim's, under which it may take the claim's place: it has nine
+// times the information, so what is adopted rests on the drive.
+constexpr double kOfClaim = 1.0 / 3;
 constexpr double kNeedsBaselines = 3.0;  // travelled, besides needs_motion_m
 
 /// Median distance to the epipolar lines of one frame's matches of the left camera and camera k,
@@ -92,15 +100,25 @@ HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibrat
   return fit_of(std::span(medians).first(n));
 }
 
-/// Whether frames that were not used contradict camera k of a solution.
-bool contradicted(const TrackLog& log, const RigSolution& s, int k) noexcept {
-  const HeldOut fit = fit_of_held_out(log, s.newest, s.rig, k);
+/// Whether frames that were not used contradict camera k of `rig`, by what a solution makes of the
+/// frames that it rests on.
+bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
+                  std::uint64_t newest, int k) noexcept {
+  const HeldOut fit = fit_of_held_out(log, newest, rig, k);
   if (fit.frames < kFewestHeldOut) return false;
-  const HeldOut used = fit_of_used(log, s.newest, s.rig, k);
+  const HeldOut used = fit_of_used(log, newest, solved, k);
   const double worst = used.frames < kFewestHeldOut
                            ? kWorstFit
                            : std::clamp(kTimesUsed * used.median_px, kLeastMisfit, kWorstFit);
   return fit.median_px > worst;
+}
+
+/// The same of any camera.
+bool misfits(const TrackLog& log, std::uint64_t newest, const RigCalibration& solved,
+             const RigCalibration& rig) noexcept {
+  for (int k = 1; k < solved.cameras; ++k)
+    if (contradicted(log, rig, solved, newest, k)) return true;
+  return false;
 }
 
 double angle_between(const Vec3& a, const Vec3& b) noexcept {
@@ -149,30 +167,62 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
   return mean > chance * std::sqrt(variance / (n - 1));
 }
 
+namespace {
+
+/// Log odds of a rig that is the one of the claim; x in percent of the depth.
+double log_odds_of(double difference, double measured, double claimed, double other) noexcept {
+  const double same = claimed * claimed + measured * measured,
+               wrong = other * other + measured * measured;
+  return 0.5 * (std::log(wrong / same) - difference * difference * (1 / same - 1 / wrong));
+}
+
+/// Sigma of the relative depth of a calibration that is believed to be the rig's, percent.
+double claimed_percent(const RigCalibration& claimed, int k, double depth,
+                       const CalibrationOptions& o) noexcept {
+  const double own = depth_error_percent(claimed, k, depth);
+  const double by_turn = 100 * depth / claimed.T_camera_left[static_cast<std::size_t>(k)].t.norm();
+  // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
+  return own > 0 ? std::hypot(own, 1e-3 * o.drift_mrad * by_turn) : kMakersTurn * by_turn;
+}
+
+}  // namespace
+
 Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
                   const TrackLog& log, std::uint64_t after, const CalibrationOptions& o,
                   double pixel_sigma) noexcept {
+  const double before = std::log(kOtherBefore / (1 - kOtherBefore)),
+               certain = std::log((1 - kErrorRate) / kErrorRate);
   Assessment a;
-  double worst = -1, told = -1;
+  a.confirmed = true;
+  double worst = 0;
+  bool nearer = false;
   for (int k = 1; k < measured.cameras; ++k) {
     const double depth = judged_depth_m(measured, k, o, pixel_sigma);
-    const double sigma = depth_error_percent(measured, k, depth),
+    const double s = depth_error_percent(measured, k, depth),
                  difference = depth_difference_percent(measured, claimed, k, depth);
-    const double all = std::hypot(sigma, difference);
-    worst = std::max(worst, all);
-    // What is known against one camera is told before what is not known of another.
-    const bool contradicted =
-        difference > o.tolerated_depth_percent && difference > kCertain * sigma;
-    if (contradicted == a.contradicted ? all <= told : a.contradicted) continue;
-    told = all;
+    const double by_turn =
+        100 * depth / measured.T_camera_left[static_cast<std::size_t>(k)].t.norm();
+    const double m = claimed_percent(claimed, k, depth, o);
+    const double odds = log_odds_of(difference, s, m, kOtherTurn * by_turn);
+    // Where the rig is that of the claim, its depth is off by the mean of both, weighted.
+    const double weight = m * m / (m * m + s * s);
+    const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
+    a.confirmed =
+        a.confirmed && s > 0 && odds - before > certain && off <= o.tolerated_depth_percent;
+    const bool contradicted = difference > o.tolerated_depth_percent && odds - before < -certain;
+    nearer = nearer || (s < kOfClaim * m && difference > kChance * s);
+    // What is known against one camera counts before what is not known of another.
+    if (k > 1 && (contradicted == a.contradicted ? off <= worst : a.contradicted)) continue;
+    worst = off;
     a.contradicted = contradicted;
+    a.log_odds = odds;
     a.depth_m = depth;
-    a.sigma_percent = sigma;
+    a.sigma_percent = s;
     a.difference_percent = difference;
   }
-  a.better = fits_better(log, after, measured, claimed, kRareChance);
+  a.better = (nearer || misfits(log, after, measured, claimed)) &&
+             fits_better(log, after, measured, claimed, kRareChance);
   a.worse = fits_better(log, after, claimed, measured);
-  a.confirmed = worst <= o.tolerated_depth_percent;
   return a;
 }
 
@@ -263,8 +313,7 @@ Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noe
     return Gate::sigmas_too_large;
   }
   if (q.log == nullptr) return Gate::open;
-  for (int k = 1; k < s.rig.cameras; ++k)
-    if (contradicted(*q.log, s, k)) return Gate::does_not_fit;
+  if (misfits(*q.log, s.newest, s.rig, s.rig)) return Gate::does_not_fit;
   if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))
     return Gate::no_better;
   return Gate::open;

@@ -27,23 +27,31 @@ inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 /// frame can say. Of more than one further camera the sum of what each gains: a camera that was
 /// knocked tells, and another that a shorter drive holds a little less well does not outweigh it.
 /// Threads pure.
-inline constexpr double kChance = 2.0,
-                        kRareChance =
-                            3.0;  // of a question asked once; of one that is asked all the time
+inline constexpr double kChance = 2.0;
+inline constexpr double kRareChance = 3.0;  // of a question that every solve asks
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;
 
-/// What a drive's own measurement of the rig says of the calibration in use (METHOD §6.4).
+/// What a drive's own measurement of the rig says of the calibration in use (METHOD §7).
+///
+/// The difference d of their depths, at the depth that calibrations are judged at, is evidence
+/// between two hypotheses: the rig is the one of the claim, which is off by no more than a
+/// calibration of its kind is (sigma m), or it is another one (sigma M, kOtherTurn). With s, the
+/// sigma of the measurement,
+///
+///     log_odds = log N(d; 0, m² + s²) − log N(d; 0, M² + s²).
 struct Assessment {
   double depth_m = 0;             // where it is judged: judged_depth_m()
   double sigma_percent = 0;       // of the measured calibration's depth there, 1 sigma
   double difference_percent = 0;  // of the claimed one from the measured, root mean over the image
-  bool better =
-      false;  // the measured one fits frames that were not used better, by more than chance
-  bool worse = false;         // or worse
-  bool confirmed = false;     // the claim holds to the tolerated depth error
-  bool contradicted = false;  // it certainly does not
+  double log_odds = 0;            // that the rig is the one of the claim
+  bool better = false;        // the measured one explains frames that were not used better, and is
+                              // surely nearer to the rig in depth: it should be used instead
+  bool worse = false;         // it explains them worse
+  bool confirmed = false;     // the rig is the one of the claim, whose depths hold to the tolerated
+                              // error
+  bool contradicted = false;  // the rig certainly is another one
 };
 
 /// The worst of the rig's further cameras. `log` with frames after `after` that `measured` does not

@@ -7,7 +7,7 @@ namespace vergence {
 namespace {
 
 // Frames after a snapshot, for the gates to have frames that were not in it.
-constexpr int kLeastHeldOut = 12;
+constexpr int kLeastHeldOut = 6;
 
 }  // namespace
 

@@ -44,7 +44,7 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
       solve_(options, rig, most_tracks(options), arena, solver),
       monitor_(options.monitor, rig.cameras, most_tracks(options), arena) {
   if (!calibrated_) return;
-  monitor_.watch(rig_, verified_);
+  monitor_.watch(rig_, false);
   monitor_.set_jump_reference(rig_);
   frames_.begin_segment();
 }
@@ -73,7 +73,7 @@ void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
 }
 
 void OnlineCalibrator::scene_rebuilt(const odometry::Odometry& odometry) noexcept {
-  monitor_.scene_rebuilt(odometry.map(), rig_, verified_);
+  monitor_.scene_rebuilt(odometry.map(), rig_, verified_ && found());
 }
 
 void OnlineCalibrator::forget_frames() noexcept {
@@ -237,7 +237,7 @@ void OnlineCalibrator::set_verified(bool verified) noexcept {
   if (verified == verified_) return;
   verified_ = verified;
   ever_verified_ = ever_verified_ || verified;
-  monitor_.watch(rig_, verified_);
+  if (found()) monitor_.watch(rig_, verified_);
 }
 
 CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review, Stamp stamp,

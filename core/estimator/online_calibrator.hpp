@@ -97,6 +97,9 @@ class OnlineCalibrator {
   };
 
   void set_verified(bool verified) noexcept;
+  /// The calibration in use was solved from images, this drive's or an earlier one's, and its
+  /// lenses with it: its epipolar lines hold better than those of a claim.
+  [[nodiscard]] bool found() const noexcept { return !rig_.covariance.empty(); }
   [[nodiscard]] SolutionReview review(bool last) const noexcept;
   /// `last`: no more frames come that could make it better.
   [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number,

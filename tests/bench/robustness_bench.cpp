@@ -83,17 +83,34 @@ void row(const std::string& text) {
   std::fflush(stdout);
 }
 
+/// What a drive that is watched and calibrated keeps of the frames that are `ok` without it, from
+/// the first frame on at which a calibration given is usually confirmed.
+double share_kept_ok(const DriveOutcome& online, const DriveOutcome& off) {
+  constexpr std::size_t kFrom = 36;
+  int before = 0, kept = 0;
+  for (std::size_t i = kFrom; i < std::min(online.samples.size(), off.samples.size()); ++i) {
+    if (off.samples[i].status != PoseStatus::ok) continue;
+    ++before;
+    kept += online.samples[i].status == PoseStatus::ok ? 1 : 0;
+  }
+  return before == 0 ? 1.0 : static_cast<double>(kept) / before;
+}
+
 void whole(const Bench& b, const RecordedSequence& d) {
-  for (const bool online : {false, true}) {
-    const app::Configuration& c = online ? b.online : b.off;
-    const DriveOutcome r = drive(d, d.sequence, c, given(c, d.sequence));
-    const auto moving = std::count_if(r.samples.begin(), r.samples.end(), [](const PoseSample& s) {
-      return s.reason == Reason::moving_scene;
-    });
-    row(fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |", d.name,
-                    online ? "online" : "off", posed(r), r.ok, moving, millimetres(r),
-                    r.segments_percent > 0 ? fmt::format("{:.3f}", r.segments_percent) : "–",
-                    r.knocks, r.adopted));
+  const DriveOutcome off = drive(d, d.sequence, b.off, given(b.off, d.sequence));
+  const DriveOutcome online = drive(d, d.sequence, b.online, given(b.online, d.sequence));
+  for (const DriveOutcome* r : {&off, &online}) {
+    const auto moving =
+        std::count_if(r->samples.begin(), r->samples.end(),
+                      [](const PoseSample& s) { return s.reason == Reason::moving_scene; });
+    const auto first = std::find_if(r->samples.begin(), r->samples.end(),
+                                    [](const PoseSample& s) { return s.status == PoseStatus::ok; });
+    row(fmt::format("| {} | {} | {} | {} | {} | {:.1f} | {} | {} | {} | {} | {} |", d.name,
+                    r == &online ? "online" : "off", posed(*r), r->ok,
+                    first == r->samples.end() ? -1 : first - r->samples.begin(),
+                    100 * share_kept_ok(*r, off), moving, millimetres(*r),
+                    r->segments_percent > 0 ? fmt::format("{:.3f}", r->segments_percent) : "–",
+                    r->knocks, r->adopted));
   }
 }
 
@@ -266,10 +283,11 @@ int main(int argc, char** argv) {
     fmt::print("\n");
     for (const RecordedSequence& d : drives) run(d);
   };
-  section("drives",
-          "drive | calibration | posed | ok | moving scene | ATE mm | segments % | knocks "
-          "| adopted",
-          9, [&](const RecordedSequence& d) { whole(b, d); });
+  section(
+      "drives",
+      "drive | calibration | posed | ok | first ok | ok of those with `off` from frame 36 on, % "
+      "| moving scene | ATE mm | segments % | knocks | adopted",
+      11, [&](const RecordedSequence& d) { whole(b, d); });
   section("cold", "drive | starts with a pose within three frames | not, at frame (reason)", 3,
           [&](const RecordedSequence& d) { started = cold_starts(b, d) && started; });
   section("windows",

@@ -59,6 +59,7 @@ void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance
     detector_[window_count_++] = n;
   }
   history_.clear();
+  pending_.reset();
   lambda_stereo_ = lambda_motion_ = now_fast_ = now_slow_ = life_slow_ = 0;
   residuals_ = 0;
   over_ = 0;
@@ -115,7 +116,30 @@ void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
   ++residuals_;
 }
 
+bool ChangeDetector::stands_out(const FrameEvidence& e) const noexcept {
+  if (history_.frames() == 0) return false;
+  Vec5 mean;
+  Mat5 covariance;
+  learn(TwoEvidences{}, &mean, &covariance);
+  Evidence alone;
+  alone.add(e.evidence.stereo, 1.0 / (lambda_stereo_ + bias2_ * e.evidence.stereo.n));
+  return statistic(alone, mean, covariance) > options_.threshold;
+}
+
 void ChangeDetector::push(const FrameEvidence& e) noexcept {
+  const bool out = stands_out(e);
+  if (pending_ && out) {
+    take(*pending_);
+    pending_.reset();
+  } else if (out && over_ == 0) {
+    pending_ = e;
+    return;
+  }
+  pending_.reset();
+  take(e);
+}
+
+void ChangeDetector::take(const FrameEvidence& e) noexcept {
   follow_spread(e);
   if (!history_.push({e.frame, e.before, e.evidence})) return;
   measure_scatter();
@@ -228,6 +252,7 @@ Decision ChangeDetector::decide() noexcept {
   const double limit = over_ > 0 ? kRelease * options_.threshold : options_.threshold;
   over_ = d.statistic > limit ? over_ + 1 : 0;
   if (over_ > 0 || lagging) attribute(window, &d);
+  d.undecided = d.undecided || pending_.has_value();
   return d;
 }
 

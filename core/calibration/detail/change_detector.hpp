@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "core/calibration/detail/evidence_history.hpp"
 #include "core/calibration/detail/monitor_evidence.hpp"
@@ -43,6 +44,8 @@ class ChangeDetector {
   /// How much stretches of the drive are expected to disagree until that is measured; outlives
   /// reset(), as what was measured does.
   void expect_scatter(double bias_px) noexcept;
+  /// A frame that stands out by itself counts once the next one does, too: a knock stays, and
+  /// images that are spoilt once (skewed exposure, a shaken rolling shutter) do not.
   void push(const FrameEvidence& e) noexcept;
   [[nodiscard]] Decision decide() noexcept;
   /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
@@ -74,6 +77,8 @@ class ChangeDetector {
   };
 
   void follow_spread(const FrameEvidence& e) noexcept;
+  void take(const FrameEvidence& e) noexcept;
+  [[nodiscard]] bool stands_out(const FrameEvidence& e) const noexcept;
   void measure_scatter() noexcept;
   void renew_floor() noexcept;
   [[nodiscard]] Evidence effective(const TwoEvidences& sum) const noexcept;
@@ -95,6 +100,7 @@ class ChangeDetector {
   std::array<std::size_t, 6> detector_{};
   std::size_t window_count_ = 0;
   EvidenceHistory history_;
+  std::optional<FrameEvidence> pending_;  // stands out, and waits for the next one
   double lambda_stereo_ = 0, lambda_motion_ = 0;
   double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;  // running means of the spreads
   std::uint64_t residuals_ = 0;
