@@ -187,7 +187,7 @@ double claimed_percent(const RigCalibration& claimed, int k, double depth,
 
 }  // namespace
 
-Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
+Assessment assess(const RigCalibration& measured, const RigCalibration& claimed, ClaimSource source,
                   const TrackLog& log, std::uint64_t after, const CalibrationOptions& o,
                   double pixel_sigma) noexcept {
   const double before = std::log(kOtherBefore / (1 - kOtherBefore)),
@@ -195,7 +195,6 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
   Assessment a;
   a.confirmed = true;
   double worst = 0;
-  bool nearer = false;
   for (int k = 1; k < measured.cameras; ++k) {
     const double depth = judged_depth_m(measured, k, o, pixel_sigma);
     const double s = depth_error_percent(measured, k, depth),
@@ -205,12 +204,13 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     const double m = claimed_percent(claimed, k, depth, o);
     const double odds = log_odds_of(difference, s, m, kOtherTurn * by_turn);
     // Where the rig is that of the claim, its depth is off by the mean of both, weighted.
-    const double weight = m * m / (m * m + s * s);
+    const double weight = source == ClaimSource::this_drive ? 1.0 : m * m / (m * m + s * s);
     const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
     a.confirmed =
         a.confirmed && s > 0 && odds - before > certain && off <= o.tolerated_depth_percent;
     const bool contradicted = difference > o.tolerated_depth_percent && odds - before < -certain;
-    nearer = nearer || (s < kOfClaim * m && difference > kChance * s);
+    const double least = source == ClaimSource::this_drive ? m : kOfClaim * m;
+    a.nearer = a.nearer || (s < least && difference > kChance * s);
     // What is known against one camera counts before what is not known of another.
     if (k > 1 && (contradicted == a.contradicted ? off <= worst : a.contradicted)) continue;
     worst = off;
@@ -220,9 +220,9 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     a.sigma_percent = s;
     a.difference_percent = difference;
   }
-  a.better = (nearer || misfits(log, after, measured, claimed)) &&
-             fits_better(log, after, measured, claimed, kRareChance);
   a.worse = fits_better(log, after, claimed, measured);
+  a.better = (a.nearer && !a.worse) || (misfits(log, after, measured, claimed) &&
+                                        fits_better(log, after, measured, claimed, kRareChance));
   return a;
 }
 

@@ -46,18 +46,23 @@ struct Assessment {
   double sigma_percent = 0;       // of the measured calibration's depth there, 1 sigma
   double difference_percent = 0;  // of the claimed one from the measured, root mean over the image
   double log_odds = 0;            // that the rig is the one of the claim
-  bool better = false;        // the measured one explains frames that were not used better, and is
-                              // surely nearer to the rig in depth: it should be used instead
-  bool worse = false;         // it explains them worse
-  bool confirmed = false;     // the rig is the one of the claim, whose depths hold to the tolerated
-                              // error
+  bool nearer = false;            // the measured one is surely nearer to the rig in depth
+  bool better = false;     // it should be used instead: it is nearer and explains frames that were
+                           // not used no worse, or it does better where the claim misses them
+  bool worse = false;      // it explains them worse
+  bool confirmed = false;  // the rig is the one of the claim, whose depths hold to the tolerated
+                           // error
   bool contradicted = false;  // the rig certainly is another one
 };
+
+/// Where a claim is from: the sigma of one that was solved from this drive's frames, which the
+/// measurement rests on, too, is no evidence beside it.
+enum class ClaimSource : std::uint8_t { elsewhere, this_drive };
 
 /// The worst of the rig's further cameras. `log` with frames after `after` that `measured` does not
 /// rest on. Threads pure.
 [[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
-                                const TrackLog& log, std::uint64_t after,
+                                ClaimSource source, const TrackLog& log, std::uint64_t after,
                                 const CalibrationOptions& options, double pixel_sigma) noexcept;
 
 enum class Gate : std::uint8_t {

@@ -6,7 +6,7 @@ namespace vergence::calibration {
 /// Every number a user may change in `calibration:` (METHOD §3); the configuration's schema has a
 /// row for each field.
 struct CalibrationOptions {
-  int min_frames = 20;   // moving rig frames before a solve is tried, 5 … 150
+  int min_frames = 25;   // moving rig frames before a solve is tried, 5 … 150
   int max_frames = 150;  // of which the newest so many are kept and solved, 10 … 150
   int max_observations =
       100'000;  // of one solve: beyond it frames are taken at wider steps, 10'000 … 1'000'000
@@ -20,7 +20,7 @@ struct CalibrationOptions {
       0;  // 1: focal lengths and principal points of all cameras, with their priors
   int estimate_lenses =
       1;  // 1: lenses are part of the calibration where the drive shows that they are off; 0: held
-  double focal_sigma_percent = 0.5;  // prior sigma of a focal length, 0.001 … 10
+  double focal_sigma_percent = 0.25;  // prior sigma of a focal length, 0.001 … 10
   double principal_point_sigma_px =
       0.5;  // what a principal point that is held may be off by, a coordinate, 0.01 … 50
   double lens_centre_sigma_px =

@@ -88,7 +88,7 @@ void CalibrationFrames::clear() noexcept {
 
 bool CalibrationFrames::enough() const noexcept { return logged_ >= wanted_ && enough_for_any(); }
 
-bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= least(); }
+bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= fewest(); }
 
 bool CalibrationFrames::new_since_solve() const noexcept {
   return log_.size() >= solved_frames_ + kNewFrames;
@@ -104,6 +104,11 @@ void CalibrationFrames::want_more() noexcept {
 
 std::size_t CalibrationFrames::most() const noexcept {
   return static_cast<std::size_t>(options_.max_frames);
+}
+
+std::size_t CalibrationFrames::fewest() const noexcept {
+  constexpr std::size_t kFewest = 20;
+  return std::min(kFewest, least());
 }
 
 std::size_t CalibrationFrames::least() const noexcept {

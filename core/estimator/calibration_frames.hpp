@@ -53,7 +53,10 @@ class CalibrationFrames {
   void want_more() noexcept;
   void want_full() noexcept { wanted_ = most(); }
   [[nodiscard]] std::size_t most() const noexcept;
+  /// Of the first solve of a calibration that is sought.
   [[nodiscard]] std::size_t least() const noexcept;
+  /// Of any solve: what a calibration that is given is confirmed with.
+  [[nodiscard]] std::size_t fewest() const noexcept;
 
   [[nodiscard]] const calibration::TrackLog& log() const noexcept { return log_; }
 

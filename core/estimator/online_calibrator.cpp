@@ -47,11 +47,13 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
   monitor_.watch(rig_, false);
   monitor_.set_jump_reference(rig_);
   frames_.begin_segment();
+  frames_.want(frames_.fewest());
 }
 
 void OnlineCalibrator::use(const RigCalibration& rig, bool lenses) noexcept {
   rig_ = rig;
   calibrated_ = true;
+  source_ = calibration::ClaimSource::this_drive;
   found_with_lenses_ = lenses;
   keep();
 }
@@ -68,6 +70,7 @@ void OnlineCalibrator::keep() noexcept {
 
 void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
   rig_ = rig;
+  source_ = calibration::ClaimSource::this_drive;
   found_with_lenses_ = options_.calibration.estimate_lenses != 0;
   monitor_.expect_rebuilt_scene();
 }
@@ -136,6 +139,7 @@ SolutionReview OnlineCalibrator::review(bool last) const noexcept {
           {.options = options_,
            .nominal = nominal_,
            .in_use = calibrated_ ? &rig_ : nullptr,
+           .source = source_,
            .log = frames_.log(),
            .focal = solve_.focal_check(),
            .may_have_changed = !(seeking_ && search_.change_believed),
@@ -199,7 +203,7 @@ CalibrationDecision OnlineCalibrator::judge_sought(const SolutionReview& review,
   d.onset_frame = search_.onset;
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
-  review.assess_next(found.rig, found.newest, &d);
+  review.assess_next(found.rig, &d);
   if (d.accepted) {
     forget_rig(&learnt_);
     verified_ = d.verified;
@@ -250,7 +254,7 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
   d.onset_frame = search_.onset;
   d.learnt = true;
   if (found.status == calibration::RigSolveStatus::ok) {
-    const calibration::Assessment a = review.assess(found, rig_, found.newest);
+    const calibration::Assessment a = review.assess(found, rig_, source_);
     d.judged_depth_m = a.depth_m;
     d.depth_sigma_percent = a.sigma_percent;
     d.depth_difference_percent = a.difference_percent;

@@ -118,6 +118,7 @@ class OnlineCalibrator {
   bool verified_ = false, ever_verified_ = false;
   bool watched_ = true;  // frames have been watched without an outage since what is in use was
                          // confirmed
+  calibration::ClaimSource source_ = calibration::ClaimSource::elsewhere;
   bool found_with_lenses_ = false;
   std::optional<RigCalibration> learnt_;  // what closed segments show, with the lenses free
   bool learnt_since_outage_ = false;      // its transforms are of segments after the last outage

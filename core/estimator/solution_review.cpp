@@ -21,8 +21,8 @@ Gate SolutionReview::gate(const RigSolution& found, bool must_be_better) const n
   if (gate != Gate::no_better) return gate;
   // A yaw hardly shows beside the epipolar lines that the gate asks about, and in the depth it
   // does.
-  const calibration::Assessment a = assess(found, *context_.in_use, found.newest);
-  return a.contradicted && !a.worse ? Gate::open : gate;
+  const calibration::Assessment a = assess(found, *context_.in_use, context_.source);
+  return (a.nearer || a.log_odds < 0) && !a.worse ? Gate::open : gate;
 }
 
 bool SolutionReview::held_out_enough() const noexcept {
@@ -49,22 +49,23 @@ bool SolutionReview::lenses_are_off() const noexcept {
 
 calibration::Assessment SolutionReview::assess(const RigSolution& measured,
                                                const RigCalibration& claimed,
-                                               std::uint64_t newest) const noexcept {
-  return calibration::assess(measured.rig, claimed, context_.log, newest,
+                                               calibration::ClaimSource source) const noexcept {
+  return calibration::assess(measured.rig, claimed, source, context_.log, measured.newest,
                              context_.options.calibration, context_.options.odometry.pixel_sigma);
 }
 
-void SolutionReview::assess_next(const RigCalibration& next, std::uint64_t newest,
+void SolutionReview::assess_next(const RigCalibration& next,
                                  CalibrationDecision* decision) const noexcept {
   const RigSolution& found = measured();
   if (found.status != RigSolveStatus::ok) return;
-  const calibration::Assessment then = assess(found, next, newest);
+  const calibration::Assessment then = assess(found, next, calibration::ClaimSource::this_drive);
   decision->judged_depth_m = then.depth_m;
   decision->depth_sigma_percent = then.sigma_percent;
   // All distances are off by what the focal length is off by.
   decision->verified = then.confirmed && !decision->focal.contradicted;
   if (context_.in_use != nullptr)
-    decision->depth_difference_percent = assess(found, *context_.in_use, newest).difference_percent;
+    decision->depth_difference_percent =
+        assess(found, *context_.in_use, context_.source).difference_percent;
 }
 
 CalibrationDecision SolutionReview::decision(const RigSolution& found, Stamp stamp) const noexcept {

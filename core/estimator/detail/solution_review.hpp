@@ -12,7 +12,8 @@ class SolutionReview {
   struct Context {
     const EstimatorOptions& options;
     const RigCalibration& nominal;
-    const RigCalibration* in_use;  // null: there is none
+    const RigCalibration* in_use;     // null: there is none
+    calibration::ClaimSource source;  // of that
     const calibration::TrackLog& log;
     const calibration::FocalCheck& focal;
     bool may_have_changed = true;  // AcceptanceInput::may_have_changed
@@ -34,10 +35,9 @@ class SolutionReview {
   [[nodiscard]] const calibration::RigSolution& measured() const noexcept;
   [[nodiscard]] calibration::Assessment assess(const calibration::RigSolution& measured,
                                                const RigCalibration& claimed,
-                                               std::uint64_t newest) const noexcept;
+                                               calibration::ClaimSource source) const noexcept;
   /// The measurement against `next`, which is in use after this decision.
-  void assess_next(const RigCalibration& next, std::uint64_t newest,
-                   CalibrationDecision* decision) const noexcept;
+  void assess_next(const RigCalibration& next, CalibrationDecision* decision) const noexcept;
   /// What a decision about `found` says of it, whatever the outcome.
   [[nodiscard]] CalibrationDecision decision(const calibration::RigSolution& found,
                                              Stamp stamp) const noexcept;

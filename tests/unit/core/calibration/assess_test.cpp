@@ -18,6 +18,7 @@ struct Measured {
   Arena arena{TrackLog::memory_needed(20, 300)};
   TrackLog log{20, 300, arena};
   CalibrationOptions options;
+  ClaimSource source = ClaimSource::elsewhere;
   RigCalibration measured = test::rig_of(drive), claimed = measured;
 
   /// `sigma`: of its yaw, rad.
@@ -30,7 +31,7 @@ struct Measured {
   [[nodiscard]] Assessment of(const Vec3& turned) {
     claimed = measured;
     claimed.T_camera_left[1].R = exp_so3(turned) * measured.T_camera_left[1].R;
-    return assess(measured, claimed, log, 5, options, kPixelSigma);
+    return assess(measured, claimed, source, log, 5, options, kPixelSigma);
   }
 };
 
@@ -47,47 +48,49 @@ TEST(Assessment, theSameRigIsConfirmedByASmallSigma) {
   EXPECT_FALSE(a.worse);
 }
 
+// A calibration that does not state its sigmas is off by 1 mrad where it is the rig's.
 TEST(Assessment, aYawThatIsOffIsContradicted) {
-  for (const double yaw : {1.5e-3, -1.5e-3, 5e-3}) {
+  for (const double yaw : {8e-3, -8e-3, 20e-3}) {
     Measured m(1e-4);
     const Assessment a = m.of({0, yaw, 0});
     EXPECT_NEAR(a.difference_percent, 100 * 20 * std::abs(yaw) / 0.75,
                 0.1 * 100 * 20 * std::abs(yaw) / 0.75);
+    EXPECT_LT(a.log_odds, 0) << yaw;
     EXPECT_TRUE(a.contradicted) << yaw;
+    EXPECT_TRUE(a.nearer) << yaw;
     EXPECT_FALSE(a.confirmed) << yaw;
     EXPECT_FALSE(a.worse) << yaw;
   }
 }
 
-TEST(Assessment, aYawWithinWhatIsToleratedIsConfirmed) {
-  Measured m(1e-4);
-  const Assessment a = m.of({0, 0.5e-3, 0});  // 1.3 %
-  EXPECT_TRUE(a.confirmed);
-  EXPECT_FALSE(a.contradicted);
-  // Neither where difference and sigma are more than that only together.
-  Measured half(0.6e-3);  // 1.6 %
-  const Assessment b = half.of({0, 0.6e-3, 0});
-  EXPECT_FALSE(b.confirmed);
-  EXPECT_FALSE(b.contradicted);
+TEST(Assessment, aClaimFromElsewhereCountsBesideAMeasurementAndOneOfTheSameFramesDoesNot) {
+  Measured sharp(1e-4);
+  EXPECT_TRUE(sharp.of({0, 0.5e-3, 0}).confirmed);   // 1.3 %
+  EXPECT_FALSE(sharp.of({0, 1.5e-3, 0}).confirmed);  // 4 %
+  Measured blunt(0.6e-3);  // 1.6 %, and 1.6 % of difference: together more than 2 %
+  EXPECT_TRUE(blunt.of({0, 0.6e-3, 0}).confirmed);
+  blunt.source = ClaimSource::this_drive;
+  EXPECT_FALSE(blunt.of({0, 0.6e-3, 0}).confirmed);
 }
 
 TEST(Assessment, aLargeSigmaSaysNeither) {
   for (const double yaw : {0.0, 1.5e-3, 5e-3}) {
-    Measured m(2e-3);  // 5.3 %
+    Measured m(10e-3);  // 27 %: no evidence about a rig that may be 15 mrad off
     const Assessment a = m.of({0, yaw, 0});
     EXPECT_FALSE(a.confirmed) << yaw;
     EXPECT_FALSE(a.contradicted) << yaw;
+    EXPECT_FALSE(a.nearer) << yaw;
   }
 }
 
 TEST(Assessment, aPitchIsSeenOnFramesThatWereNotUsed) {
   Measured m(1e-4);
-  const Assessment a = m.of({1e-3, 0, 0});  // 1.2 px of row, hardly anything of depth
+  const Assessment a = m.of({2e-3, 0, 0});  // 2.4 px of row, hardly anything of depth
   EXPECT_TRUE(a.better);
   EXPECT_FALSE(a.worse);
   EXPECT_FALSE(a.contradicted);
   // And the other way round.
-  const Assessment b = assess(m.claimed, m.measured, m.log, 5, m.options, kPixelSigma);
+  const Assessment b = assess(m.claimed, m.measured, m.source, m.log, 5, m.options, kPixelSigma);
   EXPECT_FALSE(b.better);
   EXPECT_TRUE(b.worse);
 }
