@@ -88,7 +88,7 @@ Group calibration_options() {
               "The same of the translation across the baseline, for a baseline of 0.75 m and in "
               "proportion to it.")
       .integer("adopt_after", &C::adopt_after, 0, 1000, "frames",
-               "A result is adopted when the frames after its snapshot confirm it, 12 of them or "
+               "A result is adopted when the frames after its snapshot confirm it, 6 of them or "
                "more; so many frames after the snapshot it is decided about, one way or the other. "
                "In a replay and with `--fast` the solver is waited for: alike on every machine.")
       .integer(
@@ -162,10 +162,10 @@ Group monitor() {
               "Slow error that imperfect intrinsics leave in the matches across and that is no "
               "knock, at least.")
       .number("found_bias_px", &M::found_bias_px, 0, 2, "px",
-              "The same for lenses that the drive has confirmed, expected until the monitor has "
-              "measured it.")
+              "The same with a calibration that was found from images and is confirmed, expected "
+              "until the monitor has measured it.")
       .number("claimed_bias_px", &M::claimed_bias_px, 0, 5, "px",
-              "The same for a calibration that the drive has not confirmed yet.")
+              "The same with a calibration that is given.")
       .integer("min_matches", &M::min_matches, 12, 1000, "matches",
                "A frame with fewer matches across measures nothing.")
       .integer("short_window", &M::short_window, 1, 10, "frames",

@@ -15,9 +15,10 @@ struct MonitorOptions {
                             // alarms, 20 … 500
   double bias_px = 0.02;  // px rms over the image: slow error of vertical differences that is
                           // overlooked at least, 0 … 1
-  double found_bias_px =
-      0.12;  // expected of lenses that the drive has confirmed, until it is measured, 0 … 2
-  double claimed_bias_px = 0.3;  // and of a calibration that it has not, 0 … 5
+  // The same with a calibration that was found from images and is confirmed, expected until it is
+  // measured, 0 … 2.
+  double found_bias_px = 0.12;
+  double claimed_bias_px = 0.3;  // and with one that is given, 0 … 5
   int min_matches =
       30;  // stereo matches under which a frame measures nothing (`needs_texture`), 12 … 1000
   int short_window = 3;     // moving frames of the shortest window: large knocks, 1 … 10
