@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/estimator/detail/rig_verdict.hpp"
 #include "core/geometry/epipolar.hpp"
@@ -246,8 +247,8 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
 }
 
 MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
-                                  const odometry::FrameOutcome& outcome,
-                                  const RigFrame& frame) noexcept {
+                                  const odometry::FrameOutcome& outcome, const RigFrame& frame,
+                                  bool may_lag) noexcept {
   RigVerdict verdict;
   const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < cameras_; ++k) {
@@ -257,6 +258,7 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
       jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
     else
       camera(k).jumps.skip(step);
+    if (may_lag) jump.suspected = jump.suspected || std::exchange(jump.confirmed, false);
     if (scene_pending_)
       verdict.add(jump);
     else
