@@ -6,16 +6,14 @@
 
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
-#include "app/doctor/devices_report.hpp"
-#include "app/doctor/needs.hpp"
-#include "app/doctor/rig_devices.hpp"
+#include "app/doctor/report.hpp"
 #include "app/doctor/udev_rules.hpp"
 
 namespace vergence::app {
 namespace {
 
 struct DevicesArguments {
-  bool json = false, probe = false;
+  bool json = false;
   std::string rig;    // configuration; empty: whatever is plugged in
   std::string rules;  // `-`: standard output
 };
@@ -44,14 +42,11 @@ void list(const DevicesArguments& a, bool rules_asked) {
   if (!a.rig.empty()) needs = needs_of(load_configuration(a.rig, {}));
   if (needs.given && !rules_asked)
     throw InputError("--rig says whose rules are written; add --write-udev");
-  InventoryOptions options;
-  options.probe = a.probe;
   const Machine machine = Machine::here();
-  const Inventory inventory = take_inventory(machine, options);
+  const Inventory inventory = take_inventory(machine, {});
   std::string rules;
   if (rules_asked)
-    rules = needs.given ? udev_rules(rig_devices(inventory, with_nodes(needs, machine)))
-                        : udev_rules(inventory);
+    rules = udev_rules(needs.given ? ports_of_rig(inventory, needs, machine) : inventory);
   const bool to_stdout = a.rules == "-";
   if (rules_asked && !to_stdout) write_rules(a.rules, rules);
   if (a.json)
@@ -70,9 +65,6 @@ void add_devices(CLI::App& root, ExitCode* exit_code) {
                                           "List the cameras, sensors and boards that are "
                                           "connected, with what to paste into a configuration");
   command->add_flag("--json", a->json, "For programs (docs/devices.md has the keys)");
-  command->add_flag(
-      "--probe", a->probe,
-      "Open the serial ports on USB and ask who is there; some boards restart from that");
   CLI::Option* rules = command
                            ->add_option("--write-udev", a->rules,
                                         "Write udev rules for what is plugged in, to FILE or to "
@@ -84,8 +76,8 @@ void add_devices(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option(
           "--rig", a->rig,
-          "With --write-udev: rules for the devices of this configuration alone, each named "
-          "by what it is there")
+          "With --write-udev: rules for the serial ports of this configuration alone, each "
+          "named by what it is there")
       ->type_name("CONFIG");
   command->callback([a, rules, exit_code] {
     if (rules->count() > 0 && a->rules.empty()) a->rules = "-";

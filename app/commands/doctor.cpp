@@ -6,7 +6,7 @@
 
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
-#include "app/doctor/doctor_report.hpp"
+#include "app/doctor/report.hpp"
 
 namespace vergence::app {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
+#include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,8 +8,7 @@
 #include "app/doctor/machine.hpp"
 #include "app/doctor/needs.hpp"
 
-/// What `vergence doctor` looks at. Every check is a function of what it is given and of the
-/// machine's files.
+/// The checks of `vergence doctor`. Each is a function of the context and of the machine's files.
 namespace vergence::app {
 
 enum class FindingState : std::uint8_t {
@@ -20,46 +19,35 @@ enum class FindingState : std::uint8_t {
 [[nodiscard]] const char* to_string(FindingState) noexcept;
 
 struct Finding {
-  std::string check;  // which, as in docs/doctor.md
+  std::string check;  // name, as in docs/doctor.md
   FindingState state = FindingState::ok;
-  std::string sentence;
-  std::vector<std::string>
-      mend;  // commands as they are typed, the lasting one last; empty: none, or nothing to mend
+  std::string message;
+  std::vector<std::string> mend;  // commands as they are typed, the lasting one last
 };
 
-/// What the checks look at.
 struct CheckContext {
   const Machine& machine;
   const Inventory& inventory;
   const Needs& needs;
   std::filesystem::path out = ".";           // where sessions go
-  std::filesystem::path configuration = {};  // the file that `needs` are of; empty: none
+  std::filesystem::path configuration = {};  // of `needs`; empty: none
 
-  /// The configuration is the service's, which is installed: not this user is to drive with it.
+  /// Returns true for the configuration of an installed service, which drives with permissions and
+  /// limits of its own.
   [[nodiscard]] bool is_of_service() const;
-  /// A key of the service, `LimitRTPRIO`, as unit and drop-ins have it; nothing: no word of it.
-  [[nodiscard]] std::optional<std::string> service_setting(const std::string& key) const;
 };
 
-/// All checks; those about devices that neither are there nor are asked for say nothing. Problems
-/// first, then advice, then what is well.
+/// All checks; those about devices that are neither there nor asked for have no finding. Problems
+/// first, then advice.
 [[nodiscard]] std::vector<Finding> run_checks(const CheckContext& context);
 
-// The checks by what they are about; each appends its findings in any order.
-void check_cameras(
-    const CheckContext& context,
-    std::vector<Finding>* findings);  // asked for and there, permissions, media controllers
+// The checks by topic; each appends its findings in any order.
+void check_devices(const CheckContext& context, std::vector<Finding>* findings);
 void check_network(const CheckContext& context, std::vector<Finding>* findings);  // GigE Vision
-void check_usb(const CheckContext& context,
-               std::vector<Finding>* findings);  // memory, budget, sleep
-void check_firewire(const CheckContext& context, std::vector<Finding>* findings);  // stack, budget
-void check_serial(const CheckContext& context,
-                  std::vector<Finding>* findings);  // permissions, latency timer, ModemManager
-void check_system(const CheckContext& context,
-                  std::vector<Finding>* findings);  // limits, governor, clocks, disk
+void check_system(const CheckContext& context, std::vector<Finding>* findings);
 
 /// The found camera that a configuration means: by serial or place; an empty serial is the next
 /// that no other entry names. Null: none. One entry for each of needs.cameras.
-[[nodiscard]] std::vector<const FoundCamera*> match_cameras(const CheckContext& context);
+[[nodiscard]] std::vector<const DeviceInfo*> match_cameras(const CheckContext& context);
 
 }  // namespace vergence::app

@@ -1,6 +1,7 @@
 #include "app/doctor/inventory.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -14,14 +15,27 @@
 #include <nlohmann/json.hpp>
 
 #include "app/devices/camera_drivers.hpp"
-#include "app/doctor/probe.hpp"
-#include "drivers/v4l2/v4l2.hpp"
 
 namespace vergence::app {
 namespace fs = std::filesystem;
 namespace {
 
-/// What a driver's own thread leaves behind; it may outlive the one that waits.
+constexpr std::uint16_t kFtdi = 0x0403, kXsens = 0x2639;
+
+/// Vendors of boards that bring USB with them, or a converter that hardly anything else has.
+constexpr std::array<std::uint16_t, 9> kBoardVendors{
+    0x2341,  // Arduino
+    0x2A03,  // Arduino (dog hunter)
+    0x16C0,  // Teensy, and others of that shared id
+    0x2E8A,  // Raspberry Pi: Pico
+    0x0483,  // STMicroelectronics: virtual COM port, ST-Link
+    0x239A,  // Adafruit
+    0x303A,  // Espressif
+    0x1B4F,  // SparkFun
+    0x1A86,  // QinHeng: the CH340 of cheap boards
+};
+
+/// Result of a driver's own thread, which may outlive the one that waits.
 struct Search {
   std::mutex mutex;
   std::condition_variable changed;
@@ -51,39 +65,14 @@ std::shared_ptr<Search> begin_search(const CameraDriverRow& row) {
   return search;
 }
 
-/// What a node of /dev/videoN belongs to: the same text for nodes of one device. Devices of one
-/// driver may have one parent, and cheap cameras one serial number; both are the same for nodes of
-/// one device only.
-std::string owner_of(const Machine& machine, const std::vector<UsbDevice>& usb,
-                     const DeviceInfo& info) {
-  const std::string node = fs::path(info.place).filename(),
-                    serial = info.serial.substr(0, info.serial.rfind('#'));
-  for (const UsbDevice& d : usb)
-    if (std::find(d.video.begin(), d.video.end(), node) != d.video.end())
-      return d.port + " " + serial;
-  std::error_code error;
-  const fs::path device =
-      fs::canonical(machine.root / ("sys/class/video4linux/" + node + "/device"), error);
-  return (error ? info.place : device.string()) + " " + serial;
-}
-
-std::string link_to(const Machine& machine, const std::string& port) {
-  constexpr const char* kLinks = "/dev/serial/by-id/";
-  for (const std::string& name : machine.names(kLinks)) {
-    std::error_code error;
-    const fs::path target =
-        fs::read_symlink(machine.root / (std::string(kLinks + 1) + name), error);
-    if (!error && target.filename() == fs::path(port).filename()) return kLinks + name;
-  }
-  return {};
-}
-
 std::vector<FoundPort> list_ports(const Machine& machine) {
+  constexpr const char* kLinks = "/dev/serial/by-id/";
   std::vector<FoundPort> ports;
   for (SerialPortInfo& info : list_serial_ports()) {
     FoundPort p;
     p.kind = serial_kind(info.usb_vendor, info.usb_product);
-    p.by_id = link_to(machine, info.port);
+    for (const std::string& name : machine.names(kLinks))
+      if (machine.target(kLinks + name) == info.port) p.by_id = kLinks + name;
     p.info = std::move(info);
     if (p.kind == SerialKind::ins) p.configuration = "ins: {driver: xsens, port: " + p.name() + "}";
     ports.push_back(std::move(p));
@@ -93,29 +82,69 @@ std::vector<FoundPort> list_ports(const Machine& machine) {
 
 }  // namespace
 
-std::size_t Inventory::cameras() const noexcept {
-  std::size_t n = 0;
-  for (const DriverFindings& d : drivers) n += d.cameras.size();
-  return n;
-}
+std::string UsbDevice::node() const { return fmt::format("/dev/bus/usb/{:03}/{:03}", bus, number); }
 
-std::vector<FoundCamera> one_entry_a_device(const Machine& machine,
-                                            const std::vector<UsbDevice>& usb,
-                                            const std::vector<DeviceInfo>& found) {
-  std::vector<FoundCamera> all;
-  std::vector<std::string> owners;
-  for (const DeviceInfo& info : found) {
-    const bool node = info.place.starts_with("/dev/video");
-    const std::string owner = node ? owner_of(machine, usb, info) : std::string();
-    const auto same = owner.empty() ? owners.end() : std::find(owners.begin(), owners.end(), owner);
-    if (same != owners.end()) {
-      all[static_cast<std::size_t>(same - owners.begin())].also.push_back(info.serial);
+std::vector<UsbDevice> list_usb_devices(const Machine& m) {
+  const std::string devices = "/sys/bus/usb/devices/";
+  const auto small_number = [&m](const std::string& path) {
+    const std::int64_t n = m.number(path).value_or(0);
+    return n > 0 && n < 1000 ? static_cast<int>(n) : 0;
+  };
+  std::vector<UsbDevice> all;
+  for (const std::string& name : m.names(devices)) {
+    // usb1 is a root hub, 1-2:1.0 an interface of 1-2.
+    if (name.find(':') != std::string::npos || name.find('-') == std::string::npos) continue;
+    const std::string folder = devices + name;
+    const auto vendor = m.number(folder + "/idVendor", 16),
+               product = m.number(folder + "/idProduct", 16);
+    if (!vendor || !product || *vendor < 0 || *vendor > 0xFFFF || *product < 0 || *product > 0xFFFF)
       continue;
-    }
-    owners.push_back(owner);
-    all.push_back({info, {}, {}});
+    UsbDevice d;
+    d.port = name;
+    d.vendor = static_cast<std::uint16_t>(*vendor);
+    d.product = static_cast<std::uint16_t>(*product);
+    d.serial = m.line(folder + "/serial").value_or("");
+    const std::string maker = m.line(folder + "/manufacturer").value_or(""),
+                      title = m.line(folder + "/product").value_or("");
+    d.title = title.starts_with(maker) ? title : title.empty() ? maker : maker + " " + title;
+    d.bus = small_number(folder + "/busnum");
+    d.number = small_number(folder + "/devnum");
+    for (const std::string& entry : m.names(folder))
+      if (entry.starts_with(name + ":"))
+        for (std::string& node : m.names(fmt::format("{}/{}/video4linux", folder, entry)))
+          d.video.push_back(std::move(node));
+    all.push_back(std::move(d));
   }
   return all;
+}
+
+const char* to_string(SerialKind kind) noexcept {
+  constexpr std::array kKeys{"ins", "ftdi", "converter", "board", "built_in", "unknown"};
+  return kKeys.at(static_cast<std::size_t>(kind));
+}
+
+SerialKind serial_kind(std::uint16_t vendor, std::uint16_t product) noexcept {
+  if (vendor == 0) return SerialKind::built_in;
+  // XSens' products under FTDI's vendor id, as in udev/99-vergence.rules.
+  const bool xsens = vendor == kFtdi && product >= 0xD388 && product <= 0xD38F;
+  if (vendor == kXsens || xsens) return SerialKind::ins;
+  if (vendor == kFtdi) return SerialKind::ftdi;
+  if (vendor == 0x10C4 || vendor == 0x067B) return SerialKind::converter;  // Silicon Labs, Prolific
+  if (std::find(kBoardVendors.begin(), kBoardVendors.end(), vendor) != kBoardVendors.end())
+    return SerialKind::board;
+  return SerialKind::unknown;
+}
+
+bool is_ftdi(std::uint16_t vendor, std::uint16_t product) noexcept {
+  return vendor == kFtdi ||
+         (vendor == kXsens && (product == 0x0300 || product == 0x0301 || product == 0xD00D));
+}
+
+bool names_port(const Machine& machine, const std::string& key, const FoundPort& port) {
+  if (key.empty()) return port.info.usb_vendor != 0;
+  const std::string& serial = port.info.usb_serial;
+  return key == port.by_id || machine.target(key) == port.info.port ||
+         "/dev/" + key == port.info.port || (!serial.empty() && key == serial);
 }
 
 Inventory take_inventory(const Machine& machine, const InventoryOptions& options) {
@@ -128,22 +157,16 @@ Inventory take_inventory(const Machine& machine, const InventoryOptions& options
   inventory.usb = list_usb_devices(machine);
   inventory.firewire = iidc::list_firewire_cameras(machine.root / "sys");
   inventory.ports = list_ports(machine);
-  if (options.probe)
-    for (FoundPort& port : inventory.ports) probe(&port, all_askers());
 
   const auto until =
       std::chrono::steady_clock::now() + std::chrono::nanoseconds(options.limit.ns());
   for (const auto& [row, search] : searches) {
-    DriverFindings d;
-    d.name = row->name;
-    d.meaning = row->meaning;
+    DriverFindings d{row->name, row->meaning, true, {}, {}};
     std::unique_lock lock(search->mutex);
     d.answered = search->changed.wait_until(lock, until, [&s = *search] { return s.done; });
     if (d.answered) {
-      d.cameras = one_entry_a_device(machine, inventory.usb, search->found);
+      d.cameras = search->found;
       d.note = search->note;
-      for (FoundCamera& c : d.cameras)
-        if (c.info.driver == "v4l2") c.media = v4l2::media_advice(c.info.place);
     } else {
       d.note = fmt::format(
           "no answer within {:.0f} s: a device or its kernel driver hangs; unplug it, and look at "
@@ -155,13 +178,12 @@ Inventory take_inventory(const Machine& machine, const InventoryOptions& options
   return inventory;
 }
 
-std::string quoted(const std::string& text) {
-  return nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
-}
-
 std::string camera_line(const DeviceInfo& info) {
   const std::string& name = info.serial.empty() && info.driver == "gige" ? info.place : info.serial;
-  return fmt::format("{{driver: {}, serial: {}}}", info.driver, quoted(name));
+  // A JSON string is a YAML one, whatever the device says of itself.
+  return fmt::format(
+      "{{driver: {}, serial: {}}}", info.driver,
+      nlohmann::json(name).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace));
 }
 
 }  // namespace vergence::app

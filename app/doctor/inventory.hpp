@@ -1,10 +1,9 @@
 #pragma once
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "app/doctor/machine.hpp"
-#include "app/doctor/serial_kind.hpp"
-#include "app/doctor/usb_tree.hpp"
 #include "core/types/time.hpp"
 #include "drivers/device.hpp"
 #include "drivers/iidc/firewire_nodes.hpp"
@@ -13,34 +12,61 @@
 /// What is plugged in.
 namespace vergence::app {
 
-struct FoundCamera {
-  DeviceInfo info;
-  std::vector<std::string> also;  // further nodes of the same device that capture, by their serials
-                                  // (a colour camera's infrared image)
-  std::string media;  // of V4L2: what media_advice() says; empty: nothing stands before the node
+constexpr std::uint16_t kPointGreyVendor = 0x1E10;  // USB vendor id of the IIDC cameras
+
+/// A device on USB as the kernel lists it; nothing is opened.
+struct UsbDevice {
+  std::string port;  // `1-2.3`: bus and the ports on the way; stays as long as the cable does
+  std::uint16_t vendor = 0, product = 0;
+  std::string serial, title;       // title: manufacturer and product; either may be empty
+  int bus = 0, number = 0;         // 0: unknown
+  std::vector<std::string> video;  // video0, …: nodes of its interfaces
+
+  [[nodiscard]] std::string node() const;  // /dev/bus/usb/001/004
 };
 
-/// What one driver found.
-struct DriverFindings {
-  std::string name, meaning;
-  bool answered = true;  // false: it took longer than the limit
-  std::vector<FoundCamera> cameras;
-  std::string
-      note;  // one sentence: why there is none, or what stands in the way; empty: nothing to say
+/// Every device but root hubs, in the order of their ports.
+[[nodiscard]] std::vector<UsbDevice> list_usb_devices(const Machine& machine);
+
+/// What is likely to be at a serial port, by the USB ids of what carries it. The port is not
+/// opened, because that resets many boards. The values are keys of `devices --json`.
+enum class SerialKind : std::uint8_t {
+  ins,        // XSens' own converter, or an MTi with USB
+  ftdi,       // an FTDI converter: whatever is wired to it, an MTi often
+  converter,  // another maker's converter
+  board,      // a microcontroller board, which may be the trigger board
+  built_in,   // not on USB
+  unknown,
 };
+[[nodiscard]] const char* to_string(SerialKind) noexcept;
+/// Vendor 0: not on USB.
+[[nodiscard]] SerialKind serial_kind(std::uint16_t vendor, std::uint16_t product) noexcept;
+/// Returns true for an FTDI chip under whatever vendor id: it has a latency timer.
+[[nodiscard]] bool is_ftdi(std::uint16_t vendor, std::uint16_t product) noexcept;
 
 struct FoundPort {
   SerialPortInfo info;
   std::string by_id;  // a link that stays when ports are renumbered; empty: none
   SerialKind kind = SerialKind::unknown;
-  std::string device;  // who answered, where it was asked: `xsens 07701234, MTI-G-710`; empty:
-                       // nobody, or not asked
-  std::string configuration;  // line for the configuration; empty: nobody knows
+  std::string configuration;  // line for the configuration; empty: unknown
 
-  /// What a configuration should name.
+  /// The name for a configuration.
   [[nodiscard]] const std::string& name() const noexcept {
     return by_id.empty() ? info.port : by_id;
   }
+};
+
+/// Returns true if a configuration's `port` means this port: by its name, any link to it, or its
+/// adapter's serial number. An empty key means every port on USB.
+[[nodiscard]] bool names_port(const Machine& machine, const std::string& key,
+                              const FoundPort& port);
+
+/// What one driver found.
+struct DriverFindings {
+  std::string name, meaning;
+  bool answered = true;  // false: it took longer than the limit
+  std::vector<DeviceInfo> cameras;
+  std::string note;  // why there is none, or what stands in the way; may be empty
 };
 
 struct Inventory {
@@ -48,33 +74,19 @@ struct Inventory {
   std::vector<FoundPort> ports;
   std::vector<UsbDevice> usb;
   std::vector<iidc::FirewireNode> firewire;  // cameras
-
-  [[nodiscard]] std::size_t cameras() const noexcept;
 };
 
 struct InventoryOptions {
   std::vector<std::string> drivers;  // of cameras, by name; empty: all
-  bool probe = false;  // opens serial ports and asks who is there: some boards restart from that
-  Duration limit = Duration::seconds(
-      8);  // for each driver of cameras; they look at the same time. Longest seen: GigE, 1 s
+  /// For each driver of cameras; they search at the same time. The longest search is GigE's, 1 s.
+  Duration limit = Duration::seconds(8);
 };
 
-/// Looks for everything.
-///
-/// Threads  One a driver while it runs; one that does not come back within the limit is left to
-///          itself. Memory: ordinary.
-/// Time     The limit; with `probe` some seconds a port more.
+/// Looks for everything. One thread a driver; one that does not come back within the limit is
+/// abandoned.
 [[nodiscard]] Inventory take_inventory(const Machine& machine, const InventoryOptions& options);
-
-/// Cameras on the list whose nodes belong to one device become one. A pure function of what was
-/// found.
-[[nodiscard]] std::vector<FoundCamera> one_entry_a_device(const Machine& machine,
-                                                          const std::vector<UsbDevice>& usb,
-                                                          const std::vector<DeviceInfo>& found);
 
 /// `{driver: gige, serial: "15021234"}`, as an item of `cameras:`.
 [[nodiscard]] std::string camera_line(const DeviceInfo& info);
-/// A text in double quotes, as YAML and JSON read it.
-[[nodiscard]] std::string quoted(const std::string& text);
 
 }  // namespace vergence::app

@@ -41,36 +41,18 @@ std::optional<Integer> whole_number(const std::optional<std::string>& text, int 
   return value;
 }
 
-constexpr std::size_t kMostEntry = 16384;  // bytes of a group's or a user's entry
-
-/// Empty: there is none.
+/// Empty: there is none. Not thread-safe, as getgrgid().
 std::string group_name(gid_t id) {
-  std::vector<char> text(kMostEntry);
-  ::group entry{};
-  ::group* found = nullptr;
-  (void)::getgrgid_r(id, &entry, text.data(), text.size(), &found);
-  return found == nullptr || found->gr_name == nullptr ? std::string() : found->gr_name;
-}
-
-/// Empty: there is none.
-std::string own_name() {
-  std::vector<char> text(kMostEntry);
-  passwd entry{};
-  passwd* found = nullptr;
-  (void)::getpwuid_r(::getuid(), &entry, text.data(), text.size(), &found);
-  return found == nullptr || found->pw_name == nullptr ? std::string() : found->pw_name;
+  const ::group* found = ::getgrgid(id);
+  return found == nullptr ? std::string() : found->gr_name;
 }
 
 std::vector<std::string> own_groups() {
   std::vector<gid_t> ids(static_cast<std::size_t>(std::max(0, ::getgroups(0, nullptr))));
-  const int n = ::getgroups(static_cast<int>(ids.size()), ids.data());
-  ids.resize(static_cast<std::size_t>(std::max(0, n)));
+  (void)::getgroups(static_cast<int>(ids.size()), ids.data());
   ids.push_back(::getegid());
   std::vector<std::string> names;
-  for (const gid_t id : ids)
-    if (std::string name = group_name(id); !name.empty()) names.push_back(std::move(name));
-  std::sort(names.begin(), names.end());
-  names.erase(std::unique(names.begin(), names.end()), names.end());
+  for (const gid_t id : ids) names.push_back(group_name(id));
   return names;
 }
 
@@ -96,12 +78,6 @@ std::string group_of_node(const std::string& node) {
   return group_name(s.st_gid);
 }
 
-std::optional<unsigned> mode_of_node(const std::string& node) {
-  struct stat s {};
-  if (::stat(node.c_str(), &s) != 0) return std::nullopt;
-  return s.st_mode & 07777U;
-}
-
 std::optional<DiskRoom> room_of(const fs::path& folder) {
   // The folder may still have to be made, or be closed to this user: what counts is the disk that
   // it will be on, by the first folder above it that tells.
@@ -117,7 +93,6 @@ std::optional<DiskRoom> room_of(const fs::path& folder) {
   }
   DiskRoom room;
   room.bytes = static_cast<std::uint64_t>(s.f_bavail) * s.f_frsize;
-  if (s.f_files != 0) room.files = s.f_favail;  // FAT and Btrfs count none
   room.read_only = (s.f_flag & ST_RDONLY) != 0;
   room.may_write = !closed && ::access(at.c_str(), W_OK | X_OK) == 0;
   return room;
@@ -134,12 +109,11 @@ std::optional<bool> kernel_clock_synchronised() {
 
 Machine Machine::here() {
   Machine m;
-  m.user = own_name();
+  if (const passwd* self = ::getpwuid(::getuid())) m.user = self->pw_name;
   m.groups = own_groups();
   m.addresses = own_addresses();
   m.may_use = [](const std::string& node) { return ::access(node.c_str(), R_OK | W_OK) == 0; };
   m.group_of = group_of_node;
-  m.mode_of = mode_of_node;
   m.room_at = room_of;
   m.clock_synchronised = kernel_clock_synchronised();
   return m;
@@ -153,7 +127,7 @@ std::optional<std::string> Machine::text(const std::string& path) const {
   std::error_code error;
   if (!fs::is_regular_file(at(path), error)) return std::nullopt;  // a pipe would make us wait
   std::ifstream in(at(path), std::ios::binary);
-  std::string all(kMostText, '\0');
+  std::string all(kMaxText, '\0');
   if (!in.read(all.data(), static_cast<std::streamsize>(all.size())) && !in.eof())
     return std::nullopt;
   all.resize(static_cast<std::size_t>(in.gcount()));
@@ -169,19 +143,15 @@ std::optional<std::string> Machine::line(const std::string& path) const {
   return first;
 }
 
-std::optional<std::int64_t> Machine::number(const std::string& path) const {
-  return whole_number<std::int64_t>(line(path), 10);
-}
-
-std::optional<std::uint16_t> Machine::hex16(const std::string& path) const {
-  return whole_number<std::uint16_t>(line(path), 16);
+std::optional<std::int64_t> Machine::number(const std::string& path, int base) const {
+  return whole_number<std::int64_t>(line(path), base);
 }
 
 std::vector<std::string> Machine::names(const std::string& path) const {
   std::vector<std::string> all;
   std::error_code error;
   for (fs::directory_iterator it(at(path), error), end;
-       !error && it != end && all.size() < kMostNames; it.increment(error))
+       !error && it != end && all.size() < kMaxNames; it.increment(error))
     all.push_back(it->path().filename().string());
   std::sort(all.begin(), all.end());
   return all;
@@ -199,16 +169,6 @@ std::string Machine::target(const std::string& path) const {
   const fs::path end = fs::canonical(at(path), error).lexically_relative(inside);
   if (error || end.empty() || *end.begin() == "..") return path;
   return (fs::path("/") / end).string();
-}
-
-bool Machine::runs(const std::string& name) const {
-  constexpr std::size_t kKept = 15;  // letters of a name that the kernel keeps
-  const std::string shown = name.substr(0, kKept);
-  for (const std::string& entry : names("/proc"))
-    if (entry.find_first_not_of("0123456789") == std::string::npos &&
-        line("/proc/" + entry + "/comm") == shown)
-      return true;
-  return false;
 }
 
 bool Machine::has_capability(unsigned bit) const {
@@ -239,19 +199,6 @@ std::optional<std::int64_t> Machine::limit(const std::string& name) const {
 
 bool Machine::in_group(const std::string& group) const {
   return std::find(groups.begin(), groups.end(), group) != groups.end();
-}
-
-bool Machine::listed_in_group(const std::string& group) const {
-  const std::optional<std::string> file = text("/etc/group");
-  if (!file) return false;
-  std::istringstream lines(*file);
-  for (std::string row; std::getline(lines, row);) {
-    if (!row.starts_with(group + ":")) continue;
-    std::istringstream members(row.substr(row.rfind(':') + 1));
-    for (std::string member; std::getline(members, member, ',');)
-      if (trimmed(member) == user) return true;
-  }
-  return false;
 }
 
 }  // namespace vergence::app

@@ -44,13 +44,10 @@ Needs needs_of(const Configuration& c) {
     n.name = s.name;
     n.driver = s.driver;
     n.serial = s.serial;
-    n.width = s.width;
-    n.height = s.height;
     n.bytes = bytes_per_pixel(s) * s.width * s.height;
     n.options = s.options;
     const auto* v4l2 = std::get_if<v4l2::Options>(&s.options);
     n.rate_hz = c.trigger.rate * (v4l2 != nullptr ? v4l2->thin : 1);
-    n.free = s.trigger == CameraTrigger::free;
     needs.cameras.push_back(std::move(n));
   }
   needs.ins_driver = c.ins.driver;
@@ -58,6 +55,10 @@ Needs needs_of(const Configuration& c) {
   needs.trigger_driver = c.trigger.driver;
   needs.trigger_port = c.trigger.port;
   return needs;
+}
+
+bool is_real_driver(const std::string& driver) {
+  return !driver.empty() && driver != "none" && driver != "mock";
 }
 
 }  // namespace vergence::app

@@ -16,14 +16,11 @@ namespace {
 
 // As the driver asks for its sockets: eight images, 4 MiB at least; with less than two, images are
 // lost.
-constexpr double kBufferedImages = 8, kLeastImages = 2;
-constexpr std::int64_t kLeastBuffer = std::int64_t{4} << 20;
+constexpr double kBufferedImages = 8, kMinImages = 2;
+constexpr std::int64_t kMinBuffer = std::int64_t{4} << 20;
 constexpr std::int64_t kRecommendedBuffer = 10'485'760;
 constexpr int kJumbo = 9000, kStandard = 1500;  // bytes
-constexpr double kGigabit = 1e9;                // bit/s, where the system does not say
-constexpr double kMega = 1e6;
-constexpr std::size_t kMostOnLink = 16;
-constexpr double kMostMegabits = 1e6;
+constexpr double kMega = 1e6, kGigabit = 1e9;   // bit/s
 
 std::optional<std::uint32_t> ipv4(const std::string& text) {
   in_addr a{};
@@ -35,16 +32,6 @@ std::string dotted(std::uint32_t a) {
   return fmt::format("{}.{}.{}.{}", a >> 24U, a >> 16U & 255U, a >> 8U & 255U, a & 255U);
 }
 
-int prefix(std::uint32_t mask) {
-  int n = 0;
-  for (; mask != 0; mask <<= 1U) n += (mask >> 31U) != 0 ? 1 : 0;
-  return n;
-}
-
-std::string shown(const InterfaceAddress& a) {
-  return fmt::format("{} {}/{}", a.name, dotted(a.address), prefix(a.mask));
-}
-
 /// The interface through which an address is reached: the longest mask that fits.
 const InterfaceAddress* way_to(const Machine& m, std::uint32_t address) {
   const InterfaceAddress* best = nullptr;
@@ -54,38 +41,33 @@ const InterfaceAddress* way_to(const Machine& m, std::uint32_t address) {
   return best;
 }
 
-bool overlap(const InterfaceAddress& a, const InterfaceAddress& b) {
-  return a.name != b.name && ((a.address ^ b.address) & a.mask & b.mask) == 0;
-}
-
 /// A camera and the way to it.
 struct Reached {
-  const FoundCamera* camera = nullptr;
-  const CameraNeed* need = nullptr;  // null: no configuration asks for it
-  const InterfaceAddress* through = nullptr;
+  std::string place;                          // its address
+  bool found = false;                         // it answered the broadcast
+  const CameraNeed* need = nullptr;           // null: no configuration asks for it
+  const InterfaceAddress* through = nullptr;  // null: in no network of this host
 };
 
 std::vector<Reached> gige_cameras(const CheckContext& p) {
   std::vector<Reached> all;
   const auto matched = match_cameras(p);
-  for (const DriverFindings& d : p.inventory.drivers) {
-    if (d.name != "gige") continue;
-    for (const FoundCamera& c : d.cameras) {
-      Reached r{&c, nullptr, nullptr};
+  for (const DriverFindings& d : p.inventory.drivers)
+    for (const DeviceInfo& c : d.cameras) {
+      if (d.name != "gige") continue;
       const auto at = std::find(matched.begin(), matched.end(), &c);
-      if (at != matched.end())
-        r.need = &p.needs.cameras[static_cast<std::size_t>(at - matched.begin())];
-      if (const auto a = ipv4(c.info.place)) r.through = way_to(p.machine, *a);
-      all.push_back(r);
+      all.push_back({c.place, true,
+                     at == matched.end()
+                         ? nullptr
+                         : &p.needs.cameras[static_cast<std::size_t>(at - matched.begin())],
+                     nullptr});
     }
-  }
-  // Those at an address that no broadcast found are reached all the same.
-  for (std::size_t k = 0; k < matched.size(); ++k) {
-    const CameraNeed& n = p.needs.cameras[k];
-    if (matched[k] != nullptr || n.driver != "gige") continue;
-    const auto a = ipv4(n.serial);
-    all.push_back({nullptr, &n, a ? way_to(p.machine, *a) : nullptr});
-  }
+  // A camera that is configured by its address need not answer a broadcast.
+  for (std::size_t k = 0; k < matched.size(); ++k)
+    if (matched[k] == nullptr && p.needs.cameras[k].driver == "gige")
+      all.push_back({p.needs.cameras[k].serial, false, &p.needs.cameras[k], nullptr});
+  for (Reached& r : all)
+    if (const auto address = ipv4(r.place)) r.through = way_to(p.machine, *address);
   return all;
 }
 
@@ -94,235 +76,100 @@ void check_receive_buffer(const CheckContext& p, std::vector<Finding>* findings)
   if (!limit) return;
   double image = 0;
   for (const CameraNeed& n : p.needs.of("gige")) image = std::max(image, n.bytes);
-  const auto requested = std::max(kLeastBuffer, static_cast<std::int64_t>(kBufferedImages * image));
+  const auto requested = std::max(kMinBuffer, static_cast<std::int64_t>(kBufferedImages * image));
   const std::int64_t advised = std::max(kRecommendedBuffer, requested);
-  const std::string holds = image > 0 ? fmt::format(", {:.1f} images of this configuration",
-                                                    static_cast<double>(*limit) / image)
-                                      : "";
   Finding f{
       "receive_buffer",
       FindingState::ok,
       fmt::format(
-          "net.core.rmem_max is {} KiB{}; the receive buffer of a GigE camera should have {} KiB",
-          *limit / 1024, holds, requested / 1024),
+          "net.core.rmem_max is {} KiB; the receive buffer of a GigE camera should have {} KiB",
+          *limit / 1024, requested / 1024),
       {}};
-  if (*limit < requested) {
-    const bool lost = image > 0 && static_cast<double>(*limit) < kLeastImages * image;
+  if (*limit < requested && !p.machine.has_capability(CAP_NET_ADMIN)) {
+    const bool lost = static_cast<double>(*limit) < kMinImages * image;
     f.state = lost ? FindingState::problem : FindingState::advice;
-    if (lost) f.sentence += ": images will be lost";
-    if (p.machine.has_capability(CAP_NET_ADMIN)) {
-      f.state = FindingState::ok;
-      f.sentence += "; this user may go beyond it";
-    } else {
-      // Sorted behind the package's own file: the last one counts.
-      f.mend = {
-          fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
-          fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/90-vergence-rmem.conf",
-                      advised)};
-    }
+    if (lost) f.message += ": images will be lost";
+    // The last file by name counts, and the package's own is 10-vergence.conf.
+    f.mend = {
+        fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
+        fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/90-vergence-rmem.conf",
+                    advised)};
   }
   findings->push_back(std::move(f));
 }
 
-std::vector<std::string> commands_for_network(const Machine& m, std::uint32_t camera) {
-  // Wired interfaces with a cable in: one of them it is.
-  std::vector<std::string> wired;
-  for (const std::string& name : m.names("/sys/class/net"))
-    if (m.exists("/sys/class/net/" + name + "/device") &&
-        !m.exists("/sys/class/net/" + name + "/wireless") &&
-        m.number("/sys/class/net/" + name + "/carrier").value_or(0) == 1)
-      wired.push_back(name);
-  const bool link_local = camera >> 16U == 0xA9FEU;
-  const std::uint32_t own = (camera & ~255U) | ((camera & 255U) == 1 ? 2U : 1U);
-  return {fmt::format("sudo ip addr add {}/{} dev {}", dotted(own), link_local ? 16 : 24,
-                      wired.size() == 1 ? wired.front() : "INTERFACE")};
-}
-
-void check_reach(const CheckContext& p, const std::vector<Reached>& cameras,
-                 std::vector<Finding>* findings) {
-  std::string fine;
+void check_reach(const std::vector<Reached>& cameras, std::vector<Finding>* findings) {
+  std::vector<std::string> reached;
   for (const Reached& r : cameras) {
-    const std::string place = r.camera != nullptr ? r.camera->info.place : r.need->serial;
-    const auto address = ipv4(place);
+    const auto address = ipv4(r.place);
     if (!address) continue;
     if (r.through != nullptr) {
-      fine += fmt::format("{}{} through {}", fine.empty() ? "" : ", ", place, shown(*r.through));
+      reached.push_back(r.place + " through " + r.through->name);
       continue;
     }
-    std::vector<std::string> own;
-    for (const InterfaceAddress& a : p.machine.addresses)
-      if (a.address >> 24U != 127) own.push_back(shown(a));
+    const bool link_local = *address >> 16U == 0xA9FEU;
+    const std::uint32_t own = (*address & ~255U) | ((*address & 255U) == 1 ? 2U : 1U);
     findings->push_back(
-        {"camera_network", r.camera != nullptr ? FindingState::problem : FindingState::advice,
-         fmt::format("the camera at {} is in no network of this host ({}): it {}", place,
-                     own.empty() ? "no address" : fmt::format("{}", fmt::join(own, ", ")),
-                     r.camera != nullptr ? "answers broadcasts and nothing else"
-                                         : "is reached through a router, or not"),
-         commands_for_network(p.machine, *address)});
+        {"camera_network",
+         r.found ? FindingState::problem : FindingState::advice,
+         fmt::format("the camera at {} is in no network of this host: it {}", r.place,
+                     r.found ? "answers broadcasts and nothing else"
+                             : "is reached through a router, or not"),
+         {fmt::format("sudo ip addr add {}/{} dev INTERFACE", dotted(own), link_local ? 16 : 24)}});
   }
-  if (!fine.empty()) findings->push_back({"camera_network", FindingState::ok, fine, {}});
-  if (!cameras.empty() && std::all_of(cameras.begin(), cameras.end(),
-                                      [](const Reached& r) { return r.camera == nullptr; }))
-    for (const std::string& name : p.machine.names("/sys/class/net")) {
-      const std::string folder = "/sys/class/net/" + name;
-      const bool wired =
-          p.machine.exists(folder + "/device") && !p.machine.exists(folder + "/wireless");
-      const bool named = std::any_of(p.machine.addresses.begin(), p.machine.addresses.end(),
-                                     [&](const auto& a) { return a.name == name; });
-      if (wired && !named && p.machine.number(folder + "/carrier").value_or(0) == 1)
-        findings->push_back({"camera_network",
-                             FindingState::advice,
-                             fmt::format("{} has a cable and no address; cameras without a fixed "
-                                         "one take one of 169.254.0.0/16, which "
-                                         "this host must have, too",
-                                         name),
-                             {fmt::format("sudo ip addr add 169.254.1.1/16 dev {}", name),
-                              fmt::format("sudo nmcli con mod {} ipv4.method link-local", name)}});
-    }
+  if (!reached.empty())
+    findings->push_back(
+        {"camera_network", FindingState::ok, fmt::format("{}", fmt::join(reached, ", ")), {}});
 }
 
-/// The cameras on one interface; its facts.
-struct Link {
-  std::string name;
-  int mtu = kStandard;
-  double speed = 0;  // bit/s; 0: the system does not say
-  std::vector<const CameraNeed*> needs;
-  std::size_t cameras = 0;
-};
-
-std::vector<Link> links_of(const Machine& m, const std::vector<Reached>& cameras) {
-  std::map<std::string, Link> links;
-  for (const Reached& r : cameras) {
-    Link& link = links[r.through == nullptr ? "" : r.through->name];
-    ++link.cameras;
-    if (r.need != nullptr) link.needs.push_back(r.need);
-    if (r.through == nullptr) continue;
-    link.name = r.through->name;
-    link.mtu = static_cast<int>(std::clamp<std::int64_t>(
-        m.number("/sys/class/net/" + link.name + "/mtu").value_or(kStandard), 68, 65536));
-    const std::int64_t megabits = m.number("/sys/class/net/" + link.name + "/speed").value_or(0);
-    link.speed = megabits > 0 ? static_cast<double>(megabits) * kMega : 0;
+void check_mtu(const std::string& name, int mtu, std::vector<Finding>* findings) {
+  Finding f{"mtu", FindingState::ok, fmt::format("{} has an MTU of {}", name, mtu), {}};
+  if (mtu < kJumbo) {
+    f.state = FindingState::advice;
+    f.message += fmt::format(
+        ": with {} (interface, and every switch on the way) a camera takes a quarter of the "
+        "processor's time",
+        kJumbo);
+    f.mend = {fmt::format("sudo ip link set dev {} mtu {}", name, kJumbo),
+              fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", name, kJumbo)};
   }
-  std::vector<Link> all;
-  all.reserve(links.size());
-  for (auto& [name, link] : links) all.push_back(std::move(link));
-  return all;
+  findings->push_back(std::move(f));
 }
 
-void check_mtu(const Link& link, std::vector<Finding>* findings) {
-  if (link.name.empty()) return;
-  if (link.mtu >= kJumbo) {
-    findings->push_back(
-        {"mtu",
-         FindingState::ok,
-         fmt::format("{} carries packets of {} bytes", link.name, std::min(link.mtu, kJumbo)),
-         {}});
-    return;
-  }
-  findings->push_back(
-      {"mtu",
-       FindingState::advice,
-       fmt::format("{} has an MTU of {}: with {} (interface, and every switch on the way) a camera "
-                   "takes a quarter of the "
-                   "processor's time",
-                   link.name, link.mtu, kJumbo),
-       {fmt::format("sudo ip link set dev {} mtu {}", link.name, kJumbo),
-        fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", link.name, kJumbo)}});
-}
-
-void check_load(const Link& link, std::vector<Finding>* findings) {
-  const double slowest = link.speed > 0 ? link.speed : kGigabit;
-  if (link.speed > 0 && link.speed < kGigabit)
-    findings->push_back(
-        {"link",
-         FindingState::advice,
-         fmt::format(
-             "{} runs at {:.0f} Mbit/s; GigE cameras need a gigabit: check cable and switch",
-             link.name, link.speed / kMega),
-         {}});
-  if (link.needs.empty()) return;
-  double used = 0, megabytes = 0, highest = 0, megabits = 0;
-  for (const CameraNeed* n : link.needs) {
+/// The driver's own plan for the cameras on one interface. `speed`: bit/s.
+void check_load(const std::string& name, const std::vector<const CameraNeed*>& needs, int mtu,
+                double speed, std::vector<Finding>* findings) {
+  double used = 0, highest = 0, megabytes = 0;
+  for (const CameraNeed* n : needs) {
+    const auto* given = std::get_if<gige::Options>(&n->options);
+    const gige::Options options = given != nullptr ? *given : gige::Options{};
     gige::LinkDemand d;
     d.image_bytes = static_cast<std::int64_t>(n->bytes);
     d.rate_hz = n->rate_hz;
-    const auto* given = std::get_if<gige::Options>(&n->options);
-    const gige::Options options = given != nullptr ? *given : gige::Options{};
-    d.cameras = options.link_cameras > 0
-                    ? options.link_cameras
-                    : static_cast<int>(std::clamp<std::size_t>(link.needs.size(), 1, kMostOnLink));
-    d.mtu = link.mtu;
+    d.cameras = options.link_cameras > 0 ? options.link_cameras : static_cast<int>(needs.size());
+    d.mtu = mtu;
     d.packet_size = options.packet_size;
-    megabits =
-        options.link_mbps > 0 ? options.link_mbps : std::clamp(slowest / kMega, 1.0, kMostMegabits);
-    d.speed = static_cast<std::int64_t>(megabits * kMega);
+    d.speed = static_cast<std::int64_t>(options.link_mbps > 0 ? options.link_mbps * kMega : speed);
     const gige::LinkBudget budget = gige::link_budget(d);
     if (budget.used >= used) used = budget.used, highest = budget.highest_hz;
-    megabytes += n->bytes_per_second() / kMega;
+    megabytes += n->bytes * n->rate_hz / kMega;
   }
-  const std::string where = link.name.empty() ? "on a link that is not known" : link.name;
   Finding f{
       "link",
       FindingState::ok,
-      fmt::format("{}: {} camera{}, {:.0f} MB/s of images, {:.0f} % of what {:.0f} Mbit/s carry",
-                  where, link.needs.size(), link.needs.size() == 1 ? "" : "s", megabytes,
-                  100 * used, megabits),
+      fmt::format("{}: cameras {}, {:.0f} MB/s of images, {:.0f} % of what {:.0f} Mbit/s carry",
+                  name, needs.size(), megabytes, 100 * used, speed / kMega),
       {}};
   if (used > 1) {
     f.state = FindingState::problem;
-    f.sentence += fmt::format(
+    f.message += fmt::format(
         "; they fit up to {:.1f} Hz (trigger.rate), with smaller images, or on links of their own",
         highest);
+  } else if (speed < kGigabit) {
+    f.state = FindingState::advice;
+    f.message += "; GigE cameras need a gigabit: check cable and switch";
   }
   findings->push_back(std::move(f));
-}
-
-void check_rp_filter(const CheckContext& p, const std::vector<Reached>& cameras,
-                     std::vector<Finding>* findings) {
-  std::vector<std::string> reported;
-  const auto filter = [&](const std::string& name) {
-    return p.machine.number("/proc/sys/net/ipv4/conf/" + name + "/rp_filter").value_or(0);
-  };
-  for (const Reached& r : cameras) {
-    if (r.through == nullptr ||
-        std::find(reported.begin(), reported.end(), r.through->name) != reported.end())
-      continue;
-    const auto other = std::find_if(p.machine.addresses.begin(), p.machine.addresses.end(),
-                                    [&](const auto& a) { return overlap(*r.through, a); });
-    if (other == p.machine.addresses.end()) continue;
-    reported.push_back(r.through->name);
-    const bool strict = std::max(filter("all"), filter(r.through->name)) == 1;
-    findings->push_back(
-        {"rp_filter", strict ? FindingState::problem : FindingState::advice,
-         fmt::format("{} and {} are in one network: the kernel sends through one of them{}; give "
-                     "each a network of its own{}",
-                     shown(*r.through), shown(*other),
-                     strict ? " and drops what comes in by the other (rp_filter 1)" : "",
-                     strict ? ", or loosen the filter" : ""),
-         strict ? std::vector{fmt::format("sudo sysctl -w net.ipv4.conf.{}.rp_filter=2",
-                                          r.through->name),
-                              fmt::format("echo net.ipv4.conf.{}.rp_filter=2 | sudo tee "
-                                          "/etc/sysctl.d/90-vergence-rp-filter.conf",
-                                          r.through->name)}
-                : std::vector<std::string>{}});
-  }
-}
-
-void check_packet_socket(const CheckContext& p, std::vector<Finding>* findings) {
-  for (const CameraNeed& n : p.needs.of("gige")) {
-    const auto* options = std::get_if<gige::Options>(&n.options);
-    if (options == nullptr || !options->packet_socket) continue;
-    const bool may = p.machine.has_capability(CAP_NET_RAW);
-    findings->push_back(
-        {"packet_socket", may ? FindingState::ok : FindingState::problem,
-         may ? "packet_socket is on, and this user may have one (CAP_NET_RAW)"
-             : n.key + ".options.packet_socket is on, which needs CAP_NET_RAW: give it to the "
-                       "program, or leave the option out",
-         may ? std::vector<std::string>{}
-             : std::vector<std::string>{
-                   "sudo setcap cap_net_raw+ep \"$(readlink -f \"$(command -v vergence)\")\""}});
-    return;
-  }
 }
 
 }  // namespace
@@ -331,13 +178,24 @@ void check_network(const CheckContext& p, std::vector<Finding>* findings) {
   const std::vector<Reached> cameras = gige_cameras(p);
   if (cameras.empty()) return;
   check_receive_buffer(p, findings);
-  check_reach(p, cameras, findings);
-  for (const Link& link : links_of(p.machine, cameras)) {
-    check_mtu(link, findings);
-    check_load(link, findings);
+  check_reach(cameras, findings);
+  std::map<std::string, std::vector<const CameraNeed*>> links;
+  for (const Reached& r : cameras) {
+    if (r.through == nullptr) continue;
+    auto& needs = links[r.through->name];
+    if (r.need != nullptr) needs.push_back(r.need);
   }
-  check_rp_filter(p, cameras, findings);
-  check_packet_socket(p, findings);
+  for (const auto& [name, needs] : links) {
+    const std::string folder = "/sys/class/net/" + name;
+    const int mtu = static_cast<int>(
+        std::clamp<std::int64_t>(p.machine.number(folder + "/mtu").value_or(kStandard), 68, 65536));
+    const auto megabits = std::clamp<std::int64_t>(p.machine.number(folder + "/speed").value_or(0),
+                                                   0, 1'000'000);  // 0 or -1: unknown
+    check_mtu(name, mtu, findings);
+    if (!needs.empty())
+      check_load(name, needs, mtu, megabits > 0 ? static_cast<double>(megabits) * kMega : kGigabit,
+                 findings);
+  }
 }
 
 }  // namespace vergence::app

@@ -8,27 +8,23 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::uint16_t kPointGrey = 0x1E10;
-
 bool plain(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-';
 }
 
-/// For the right side of `==`, which is a pattern.
-std::string pattern(const std::string& text) {
+/// At most 64 letters; those that mean something in a rule or a path become `other`.
+std::string plain_text(const std::string& text, char other) {
   std::string out = text.substr(0, 64);
   std::replace_if(
-      out.begin(), out.end(), [](char c) { return !plain(c); }, '?');
+      out.begin(), out.end(), [](char c) { return !plain(c); }, other);
   return out;
 }
 
-/// For a name under /dev/vergence.
-std::string part_of_name(const std::string& text) {
-  std::string out = text.substr(0, 64);
-  std::replace_if(
-      out.begin(), out.end(), [](char c) { return !plain(c); }, '_');
-  return out;
-}
+/// The right side of `==`, which is a pattern.
+std::string pattern(const std::string& text) { return plain_text(text, '?'); }
+
+/// A name under /dev/vergence.
+std::string part_of_name(const std::string& text) { return plain_text(text, '_'); }
 
 /// For a comment: one line.
 std::string comment(const std::string& text) {
@@ -38,8 +34,8 @@ std::string comment(const std::string& text) {
   return out;
 }
 
-/// Which one: by vendor, product and, where it has one, serial number. `attribute`: ATTR of the
-/// device itself, ATTRS of one below it.
+/// Matches a device by vendor, product and, where it has one, serial number. `attribute`: ATTR of
+/// the device itself, ATTRS of one below it.
 std::string which(const char* attribute, std::uint16_t vendor, std::uint16_t product,
                   const std::string& serial) {
   std::string s = fmt::format("{0}{{idVendor}}==\"{1:04x}\", {0}{{idProduct}}==\"{2:04x}\"",
@@ -56,8 +52,7 @@ const char* name_of(SerialKind kind) {
 std::string port_rules(const FoundPort& port) {
   const SerialPortInfo& i = port.info;
   const std::string who = which("ATTRS", i.usb_vendor, i.usb_product, i.usb_serial);
-  std::string out = fmt::format("\n# {}: {}{}{}\n", i.port, comment(i.description),
-                                port.device.empty() ? "" : ", ", comment(port.device));
+  std::string out = fmt::format("\n# {}: {}\n", i.port, comment(i.description));
   out += fmt::format(
       "ENV{{DEVTYPE}}==\"usb_device\", {}, ENV{{ID_MM_DEVICE_IGNORE}}=\"1\", "
       "ATTR{{power/control}}=\"on\"\n",
@@ -76,7 +71,7 @@ std::string port_rules(const FoundPort& port) {
 }
 
 std::string usb_camera_rules(const UsbDevice& d) {
-  const bool iidc = d.vendor == kPointGrey;
+  const bool iidc = d.vendor == kPointGreyVendor;
   std::string out = fmt::format("\n# camera on USB {}: {}\n", d.port, comment(d.title));
   out += fmt::format(
       "ENV{{DEVTYPE}}==\"usb_device\", {}, GROUP=\"video\", MODE=\"0660\", "
@@ -110,7 +105,7 @@ std::string udev_rules(const Inventory& inventory) {
   for (const FoundPort& port : inventory.ports)
     if (port.info.usb_vendor != 0) rules += port_rules(port);
   for (const UsbDevice& d : inventory.usb)
-    if (d.vendor == kPointGrey || !d.video.empty()) rules += usb_camera_rules(d);
+    if (d.vendor == kPointGreyVendor || !d.video.empty()) rules += usb_camera_rules(d);
   for (const iidc::FirewireNode& node : inventory.firewire) rules += firewire_rules(node);
 
   const std::string head =
@@ -124,11 +119,21 @@ std::string udev_rules(const Inventory& inventory) {
          "\nLABEL=\"vergence_rig_end\"\n";
 }
 
-std::string udev_rules(const RigDevices& rig) {
-  std::string rules = udev_rules(rig.inventory);
-  for (const std::string& sentence : rig.missing)
-    rules += fmt::format("# Left out, {}\n", comment(sentence));
-  return rules;
+Inventory ports_of_rig(Inventory inventory, const Needs& needs, const Machine& machine) {
+  std::vector<FoundPort> ports;
+  const auto add = [&](const std::string& driver, const std::string& key, SerialKind kind) {
+    if (!is_real_driver(driver)) return;
+    for (FoundPort port : inventory.ports) {
+      const bool likely = port.kind == kind || port.kind == SerialKind::ftdi;
+      if (!names_port(machine, key, port) || (key.empty() && !likely)) continue;
+      port.kind = kind;
+      ports.push_back(std::move(port));
+    }
+  };
+  add(needs.ins_driver, needs.ins_port, SerialKind::ins);
+  add(needs.trigger_driver, needs.trigger_port, SerialKind::board);
+  inventory.ports = std::move(ports);
+  return inventory;
 }
 
 }  // namespace vergence::app

@@ -2,7 +2,7 @@
 #include <string>
 
 #include "app/doctor/inventory.hpp"
-#include "app/doctor/rig_devices.hpp"
+#include "app/doctor/needs.hpp"
 
 namespace vergence::app {
 
@@ -10,12 +10,13 @@ namespace vergence::app {
 /// dialout and video), names under /dev/vergence that stay, ModemManager kept away, the latency
 /// timer that docs/ins.md recommends, no autosuspend of cameras.
 ///
-/// What a device says of itself is hostile: of its serial number only letters, digits and `._-` are
-/// written, everything else matches any one character and is no part of a name. A pure function.
+/// Texts of devices are untrusted: of a serial number only letters, digits and `._-` are written,
+/// everything else matches any one character and is no part of a name. A pure function.
 [[nodiscard]] std::string udev_rules(const Inventory& inventory);
 
-/// The same about a rig's devices alone, a serial port being named by what the configuration has
-/// on it; what is missing is said in comments.
-[[nodiscard]] std::string udev_rules(const RigDevices& rig);
+/// The ports that the configuration means, as its INS and its trigger board; cameras unchanged.
+/// Where it names no port, the ones on USB that carry such a device by their ids are meant.
+[[nodiscard]] Inventory ports_of_rig(Inventory inventory, const Needs& needs,
+                                     const Machine& machine);
 
 }  // namespace vergence::app

@@ -37,7 +37,7 @@ TEST(Devices, aCameraOnTheNetworkIsListedWithWhatToPaste) {
   ASSERT_NE(found, all["cameras"].end()) << for_programs.out;
   EXPECT_EQ((*found)["place"], o.address);
   EXPECT_EQ((*found)["driver"], "gige");
-  for (const char* key : {"driver", "serial", "model", "place", "also", "configuration"})
+  for (const char* key : {"driver", "serial", "model", "place", "configuration"})
     EXPECT_TRUE(found->contains(key)) << key;
   ASSERT_EQ(all["drivers"].size(), 4U);
   for (const json& d : all["drivers"]) EXPECT_EQ(d["answered"], true) << d;

@@ -32,7 +32,7 @@ TEST(Doctor, aDriveOfTheMockNeedsNoDevice) {
   const Outcome o = run_vergence("doctor '" + kConfigurations + "mock.yaml' --json");
   const json all = json::parse(o.out);
   EXPECT_EQ(o.code, all["problems"] == 0 ? 0 : 1);
-  for (const char* check : {"cameras", "receive_buffer", "usb_memory", "firewire", "ins"})
+  for (const char* check : {"cameras", "receive_buffer", "usb_memory", "ins"})
     EXPECT_TRUE(of(all, check).empty()) << check;
   EXPECT_EQ(all["problems"].get<int>() + all["advice"].get<int>() + all["ok"].get<int>(),
             static_cast<int>(all["findings"].size()));
@@ -60,9 +60,8 @@ TEST(Doctor, aCameraThatIsThereIsMatchedAndItsLinkJudged) {
   const json all = json::parse(o.out);
   EXPECT_EQ(of(all, "cameras").size(), 2U) << all.dump(1);
   EXPECT_TRUE(contains(of(all, "cameras").dump(), "cameras.0 (left) is gige TOOL-61"));
-  EXPECT_TRUE(contains(of(all, "mtu").dump(), "lo carries packets of 9000 bytes"));
-  EXPECT_TRUE(
-      contains(of(all, "camera_network").dump(), options.address + " through lo 127.0.0.1/8"));
+  EXPECT_TRUE(contains(of(all, "mtu").dump(), "lo has an MTU of"));
+  EXPECT_TRUE(contains(of(all, "camera_network").dump(), options.address + " through lo"));
 }
 
 TEST(Doctor, whatCannotBeReadIsRefusedInASentence) {

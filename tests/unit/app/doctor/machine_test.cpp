@@ -8,8 +8,6 @@
 #include <filesystem>
 #include <string>
 
-#include "app/doctor/serial_kind.hpp"
-#include "app/doctor/usb_tree.hpp"
 #include "tests/unit/app/doctor/fake_machine.hpp"
 
 namespace vergence::app {
@@ -17,53 +15,34 @@ namespace {
 
 using test::FakeMachine;
 
-TEST(Machine, aNumberIsANumberAndNothingElse) {
+TEST(Machine, ReadsNumbersAndNothingElse) {
   const FakeMachine f;
   f.file("/sys/good", "  42\n");
   f.file("/sys/negative", "-1\n");
+  f.file("/sys/hex", "1e10\n");
   f.file("/sys/words", "42 apples\n");
   f.file("/sys/empty", "");
   f.file("/sys/huge", "99999999999999999999999\n");
   f.file("/sys/binary", std::string("\0\x01\xff\n42", 6));
   EXPECT_EQ(f.machine.number("/sys/good"), 42);
   EXPECT_EQ(f.machine.number("/sys/negative"), -1);
+  EXPECT_EQ(f.machine.number("/sys/hex", 16), 0x1E10);
   for (const char* name :
        {"/sys/words", "/sys/empty", "/sys/huge", "/sys/binary", "/sys/missing", "/sys"})
     EXPECT_FALSE(f.machine.number(name)) << name;
 }
 
-TEST(Machine, whatCannotBePrintedIsNotHandedOn) {
+TEST(Machine, ReadsPrintableTextOfRegularFilesUpToAPage) {
   const FakeMachine f;
   f.file("/sys/serial", "A\033[2J\tB\xc3\xbc\n");
-  const auto line = f.machine.line("/sys/serial");
-  ASSERT_TRUE(line);
-  EXPECT_EQ(*line, "A?[2J?B??");
-}
-
-TEST(Machine, readsNoMoreThanAPage) {
-  const FakeMachine f;
+  EXPECT_EQ(f.machine.line("/sys/serial"), "A?[2J?B??");
   f.file("/sys/long", std::string(1'000'000, 'x'));
-  EXPECT_EQ(f.machine.text("/sys/long")->size(), Machine::kMostText);
-}
-
-TEST(Machine, aPipeDoesNotMakeItWait) {
-  const FakeMachine f;
-  f.file("/sys/other", "1");
+  EXPECT_EQ(f.machine.text("/sys/long")->size(), Machine::kMaxText);
   ASSERT_EQ(::mkfifo((f.folder / "sys/pipe").c_str(), 0600), 0);
-  EXPECT_FALSE(f.machine.text("/sys/pipe"));
+  EXPECT_FALSE(f.machine.text("/sys/pipe")) << "reading would wait";
 }
 
-TEST(Machine, knowsWhatRunsByTheFifteenLettersThatTheKernelKeeps) {
-  const FakeMachine f;
-  f.file("/proc/17/comm", "systemd-timesyn\n");
-  f.file("/proc/18/comm", "ModemManager\n");
-  f.file("/proc/self/comm", "chronyd\n");
-  EXPECT_TRUE(f.machine.runs("systemd-timesyncd"));
-  EXPECT_TRUE(f.machine.runs("ModemManager"));
-  EXPECT_FALSE(f.machine.runs("chronyd")) << "self is nobody's number";
-}
-
-TEST(Machine, readsLimitsAndCapabilitiesOfTheProcess) {
+TEST(Machine, ReadsLimitsAndCapabilities) {
   const FakeMachine f;
   f.file("/proc/self/status", "Name:\tx\nCapPrm:\t0000000000000000\nCapEff:\t0000000000003000\n");
   f.file("/proc/self/limits",
@@ -71,7 +50,6 @@ TEST(Machine, readsLimitsAndCapabilitiesOfTheProcess) {
          "Max locked memory         65536                unlimited            bytes\n"
          "Max realtime priority     unlimited            0\n"
          "Max nonsense              many                 0\n");
-  EXPECT_TRUE(f.machine.has_capability(12));
   EXPECT_TRUE(f.machine.has_capability(13));
   EXPECT_FALSE(f.machine.has_capability(14));
   EXPECT_FALSE(f.machine.has_capability(64));
@@ -81,42 +59,12 @@ TEST(Machine, readsLimitsAndCapabilitiesOfTheProcess) {
   EXPECT_FALSE(f.machine.limit("Max absent"));
 }
 
-TEST(Machine, tellsMembershipFromAMerePlaceOnTheList) {
-  FakeMachine f;
-  f.machine.groups = {"video"};
-  f.file("/etc/group",
-         "video:x:44:\ndialout:x:20:somebody, driver\ndialouts:x:21:driver\nplug:x:22:driverx\n");
-  EXPECT_TRUE(f.machine.in_group("video"));
-  EXPECT_FALSE(f.machine.in_group("dialout"));
-  EXPECT_TRUE(f.machine.listed_in_group("dialout"));
-  EXPECT_FALSE(f.machine.listed_in_group("plug"));
-  EXPECT_FALSE(f.machine.listed_in_group("video"));
-}
-
-TEST(Machine, theOneThisRunsOnAnswers) {
+TEST(Machine, ThisOneAnswers) {
   const Machine m = Machine::here();
   EXPECT_FALSE(m.user.empty());
   EXPECT_TRUE(m.limit("Max open files"));
-  EXPECT_TRUE(m.room_at("/there/is/no/such/folder")) << "the disk that it would be on";
   EXPECT_TRUE(m.may_use("/dev/null"));
   EXPECT_FALSE(m.may_use("/dev/there-is-no-such-node"));
-}
-
-TEST(Machine, aLinkIsWhatItLeadsTo) {
-  const FakeMachine f;
-  f.file("/dev/ttyUSB0", "");
-  std::filesystem::create_symlink("ttyUSB0", f.folder / "dev/ins");
-  std::filesystem::create_symlink("nothing", f.folder / "dev/dangling");
-  std::filesystem::create_symlink("/", f.folder / "dev/outside");
-  EXPECT_EQ(f.machine.target("/dev/ins"), "/dev/ttyUSB0");
-  EXPECT_EQ(f.machine.target("/dev/ttyUSB0"), "/dev/ttyUSB0");
-  for (const char* path : {"/dev/dangling", "/dev/outside", "/dev/missing"})
-    EXPECT_EQ(f.machine.target(path), path);
-  EXPECT_EQ(Machine::here().target("/dev/null"), "/dev/null");
-}
-
-TEST(Machine, roomIsThatOfTheFirstFolderThatTells) {
-  const Machine m = Machine::here();
   const test::TemporaryFolder folder;
   const auto room = m.room_at(folder / "not/there/yet");
   ASSERT_TRUE(room);
@@ -124,12 +72,23 @@ TEST(Machine, roomIsThatOfTheFirstFolderThatTells) {
   EXPECT_TRUE(room->may_write);
 }
 
-TEST(Machine, roomBehindAClosedFolderIsToldAndNotThisUsersToWrite) {
+TEST(Machine, FollowsLinksInsideItsRoot) {
+  const FakeMachine f;
+  f.file("/dev/ttyUSB0", "");
+  std::filesystem::create_symlink("ttyUSB0", f.folder / "dev/ins");
+  std::filesystem::create_symlink("nothing", f.folder / "dev/dangling");
+  std::filesystem::create_symlink("/", f.folder / "dev/outside");
+  EXPECT_EQ(f.machine.target("/dev/ins"), "/dev/ttyUSB0");
+  for (const char* path : {"/dev/ttyUSB0", "/dev/dangling", "/dev/outside", "/dev/missing"})
+    EXPECT_EQ(f.machine.target(path), path);
+}
+
+TEST(Machine, RoomBehindAClosedFolderMayNotBeWritten) {
   const test::TemporaryFolder folder;
   (void)folder.write("closed/a/b/file", "");
   ASSERT_EQ(::chmod(folder.path().c_str(), 0755), 0);
   ASSERT_EQ(::chmod((folder / "closed").c_str(), 0), 0);
-  const pid_t child = ::fork();  // root may go anywhere, so somebody else looks
+  const pid_t child = ::fork();  // root may go anywhere, so another user looks
   if (child == 0) {
     constexpr uid_t kNobody = 65534;
     if (::geteuid() == 0 && (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) ::_exit(3);
@@ -140,44 +99,41 @@ TEST(Machine, roomBehindAClosedFolderIsToldAndNotThisUsersToWrite) {
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   (void)::chmod((folder / "closed").c_str(), 0700);
   ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0) << "1: it may write; 2: not told; 3: no other user here";
+  EXPECT_EQ(WEXITSTATUS(status), 0) << "1: it may write; 2: unknown; 3: no other user here";
 }
 
-TEST(UsbTree, listsDevicesAndPassesOverWhatMakesNoSense) {
+TEST(UsbDevices, ListsDevicesAndSkipsNonsense) {
   const FakeMachine f;
-  f.usb("1-2", "1e10:2005", "12345");
-  f.file("/sys/bus/usb/devices/1-2/manufacturer", "Point Grey\n");
-  f.file("/sys/bus/usb/devices/1-2/product", "Chameleon\n");
-  f.file("/sys/bus/usb/devices/1-2/power/control", "auto\n");
-  f.usb("1-3", "046d:0825", "");
+  const auto usb = [&f](const std::string& port, const std::string& vendor) {
+    const std::string at = "/sys/bus/usb/devices/" + port + "/";
+    f.file(at + "idVendor", vendor + "\n");
+    f.file(at + "idProduct", "2005\n");
+    return at;
+  };
+  const std::string camera = usb("1-2", "1e10");
+  f.file(camera + "serial", "12345\n");
+  f.file(camera + "busnum", "1\n");
+  f.file(camera + "devnum", "2\n");
+  f.file(camera + "manufacturer", "Point Grey\n");
+  f.file(camera + "product", "Chameleon\n");
+  f.file(camera + "1-2:1.0/video4linux/video0/index", "0\n");
+  f.file(camera + "1-2:1.2/video4linux/video2/index", "0\n");
+  f.file(usb("1-3", "046d") + "devnum", "-7\n");
   f.file("/sys/bus/usb/devices/1-3:1.0/video4linux", "not a folder");
-  f.usb("usb1", "1d6b:0002", "");
-  f.usb("1-4", "zzzz:0001", "");
+  (void)usb("usb1", "1d6b");
+  (void)usb("1-4", "zzzz");
+  (void)usb("1-6", "11e10");
   f.file("/sys/bus/usb/devices/1-5/idVendor", "1e10\n");
-  f.file("/sys/bus/usb/devices/1-3/speed", "fast\n");
-  f.file("/sys/bus/usb/devices/1-3/devnum", "-7\n");
   const auto all = list_usb_devices(f.machine);
   ASSERT_EQ(all.size(), 2U);
   EXPECT_EQ(all[0].title, "Point Grey Chameleon");
   EXPECT_EQ(all[0].serial, "12345");
   EXPECT_EQ(all[0].node(), "/dev/bus/usb/001/002");
-  EXPECT_EQ(all[0].control, "auto");
-  EXPECT_EQ(all[0].mbit, 480);
-  EXPECT_EQ(all[1].mbit, 0);
+  EXPECT_EQ(all[0].video, (std::vector<std::string>{"video0", "video2"}));
   EXPECT_EQ(all[1].number, 0);
 }
 
-TEST(UsbTree, findsTheVideoNodesOfADevicesInterfaces) {
-  const FakeMachine f;
-  f.usb("1-2", "046d:0825", "");
-  f.file("/sys/bus/usb/devices/1-2/1-2:1.0/video4linux/video0/index", "0\n");
-  f.file("/sys/bus/usb/devices/1-2/1-2:1.2/video4linux/video2/index", "0\n");
-  const auto all = list_usb_devices(f.machine);
-  ASSERT_EQ(all.size(), 1U);
-  EXPECT_EQ(all[0].video, (std::vector<std::string>{"video0", "video2"}));
-}
-
-TEST(SerialKind, goesByWhatCarriesIt) {
+TEST(SerialPorts, KindFollowsUsbIds) {
   EXPECT_EQ(serial_kind(0, 0), SerialKind::built_in);
   EXPECT_EQ(serial_kind(0x2639, 0x0017), SerialKind::ins);
   EXPECT_EQ(serial_kind(0x0403, 0xD38B), SerialKind::ins);
@@ -185,6 +141,19 @@ TEST(SerialKind, goesByWhatCarriesIt) {
   EXPECT_EQ(serial_kind(0x10C4, 0xEA60), SerialKind::converter);
   EXPECT_EQ(serial_kind(0x2341, 0x0043), SerialKind::board);
   EXPECT_EQ(serial_kind(0x1234, 0x5678), SerialKind::unknown);
+}
+
+TEST(SerialPorts, AreNamedByNodeLinkOrSerial) {
+  const FakeMachine f;
+  f.file("/dev/ttyUSB0", "");
+  std::filesystem::create_symlink("ttyUSB0", f.folder / "dev/imu");
+  FoundPort p = test::port(0x0403, 0x6001, "A1");
+  p.by_id = "/dev/serial/by-id/usb-FTDI_A1-if00-port0";
+  for (const char* key : {"", "/dev/ttyUSB0", "ttyUSB0", "A1", "/dev/imu", p.by_id.c_str()})
+    EXPECT_TRUE(names_port(f.machine, key, p)) << key;
+  for (const char* key : {"/dev/ttyUSB1", "A", "/dev/vergence/ins-A2"})
+    EXPECT_FALSE(names_port(f.machine, key, p)) << key;
+  EXPECT_FALSE(names_port(f.machine, "", test::port(0, 0, "")));
 }
 
 }  // namespace

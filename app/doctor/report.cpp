@@ -1,4 +1,4 @@
-#include "app/doctor/devices_report.hpp"
+#include "app/doctor/report.hpp"
 
 #include <algorithm>
 #include <array>
@@ -36,27 +36,19 @@ std::string usb_ids(const SerialPortInfo& info) {
 }
 
 std::string cameras_text(const Inventory& inventory, const Terminal& t) {
-  if (inventory.cameras() == 0) return {};
   std::vector<Row> rows;
   for (const DriverFindings& d : inventory.drivers)
-    for (const FoundCamera& c : d.cameras) {
-      const std::string model =
-          harmless(c.info.model) +
-          (c.also.empty()
-               ? ""
-               : fmt::format(" (also {})", harmless(fmt::format("{}", fmt::join(c.also, ", ")))));
-      rows.push_back({d.name, c.info.serial.empty() ? "?" : harmless(c.info.serial), model,
-                      harmless(c.info.place)});
-    }
-  return t.in(Terminal::Ink::bold, "Cameras") + "\n" + table(rows) + "\n";
+    for (const DeviceInfo& c : d.cameras)
+      rows.push_back({d.name, c.serial.empty() ? "?" : harmless(c.serial), harmless(c.model),
+                      harmless(c.place)});
+  return rows.empty() ? "" : t.in(Terminal::Ink::bold, "Cameras") + "\n" + table(rows) + "\n";
 }
 
 std::string ports_text(const Inventory& inventory, const Terminal& t) {
   if (inventory.ports.empty()) return {};
   std::vector<Row> rows;
   for (const FoundPort& p : inventory.ports)
-    rows.push_back({p.info.port, usb_ids(p.info), harmless(p.info.usb_serial),
-                    p.device.empty() ? to_phrase(p.kind) : harmless(p.device),
+    rows.push_back({p.info.port, usb_ids(p.info), harmless(p.info.usb_serial), to_string(p.kind),
                     p.info.latency_timer_ms
                         ? fmt::format("latency timer {} ms", *p.info.latency_timer_ms)
                         : ""});
@@ -66,8 +58,8 @@ std::string ports_text(const Inventory& inventory, const Terminal& t) {
 std::string paste_text(const Inventory& inventory, const Terminal& t) {
   std::string text;
   for (const DriverFindings& d : inventory.drivers)
-    for (const FoundCamera& c : d.cameras)
-      if (!c.info.serial.empty() || d.name == "gige") text += "    - " + camera_line(c.info) + "\n";
+    for (const DeviceInfo& c : d.cameras)
+      if (!c.serial.empty() || d.name == "gige") text += "    - " + camera_line(c) + "\n";
   if (!text.empty()) text = "  cameras:\n" + text;
   for (const FoundPort& p : inventory.ports)
     if (!p.configuration.empty()) text += "  " + p.configuration + "\n";
@@ -94,7 +86,17 @@ std::string notes_text(const Inventory& inventory, const Terminal& t) {
   return text.empty() ? "" : t.in(Terminal::Ink::bold, "Not found") + "\n" + text;
 }
 
-Json number_or_null(const std::optional<int>& n) { return n ? Json(*n) : Json(nullptr); }
+constexpr std::size_t kState = 9, kCheck = 19;  // columns
+
+std::string state_text(FindingState state, const Terminal& t) {
+  constexpr std::array kInks{Terminal::Ink::green, Terminal::Ink::yellow, Terminal::Ink::red};
+  return t.in(kInks.at(static_cast<std::size_t>(state)), padded(to_string(state), kState));
+}
+
+std::size_t count(const std::vector<Finding>& findings, FindingState state) {
+  return static_cast<std::size_t>(std::count_if(
+      findings.begin(), findings.end(), [state](const Finding& f) { return f.state == state; }));
+}
 
 }  // namespace
 
@@ -113,26 +115,62 @@ std::string devices_json(const Inventory& inventory, const std::string& rules) {
                        {"found", d.cameras.size()},
                        {"answered", d.answered},
                        {"note", d.note}});
-    for (const FoundCamera& c : d.cameras)
+    for (const DeviceInfo& c : d.cameras)
       cameras.push_back({{"driver", d.name},
-                         {"serial", c.info.serial},
-                         {"model", c.info.model},
-                         {"place", c.info.place},
-                         {"also", c.also},
-                         {"configuration", camera_line(c.info)}});
+                         {"serial", c.serial},
+                         {"model", c.model},
+                         {"place", c.place},
+                         {"configuration", camera_line(c)}});
   }
   for (const FoundPort& p : inventory.ports)
-    ports.push_back({{"port", p.info.port},
-                     {"by_id", p.by_id},
-                     {"kind", to_key(p.kind)},
-                     {"usb_ids", usb_ids(p.info)},
-                     {"usb_serial", p.info.usb_serial},
-                     {"description", p.info.description},
-                     {"latency_timer_ms", number_or_null(p.info.latency_timer_ms)},
-                     {"device", p.device},
-                     {"configuration", p.configuration}});
+    ports.push_back(
+        {{"port", p.info.port},
+         {"by_id", p.by_id},
+         {"kind", to_string(p.kind)},
+         {"usb_ids", usb_ids(p.info)},
+         {"usb_serial", p.info.usb_serial},
+         {"description", p.info.description},
+         {"latency_timer_ms", p.info.latency_timer_ms ? Json(*p.info.latency_timer_ms) : Json()},
+         {"configuration", p.configuration}});
   Json all{{"cameras", cameras}, {"serial_ports", ports}, {"drivers", drivers}};
   if (!rules.empty()) all["udev_rules"] = rules;
+  return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string doctor_text(const std::vector<Finding>& findings, bool given, const Terminal& t) {
+  std::string text;
+  const std::string margin(kState + kCheck, ' ');
+  for (const Finding& f : findings) {
+    std::string head = state_text(f.state, t) + padded(f.check, kCheck);
+    for (const std::string& line : wrapped(harmless(f.message), t.width - margin.size())) {
+      text += head + line + "\n";
+      head = margin;
+    }
+    for (const std::string& command : f.mend)
+      text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) +
+              "\n";  // never broken: it is copied
+    if (!f.mend.empty()) text += "\n";
+  }
+  if (!text.ends_with("\n\n")) text += "\n";
+  text +=
+      fmt::format("problems: {}, advice: {}, well: {}\n", count(findings, FindingState::problem),
+                  count(findings, FindingState::advice), count(findings, FindingState::ok));
+  if (!given)
+    text += "Name a configuration to have checked what its drive needs: vergence doctor CONFIG\n";
+  return text;
+}
+
+std::string doctor_json(const std::vector<Finding>& findings) {
+  Json rows = Json::array();
+  for (const Finding& f : findings)
+    rows.push_back({{"check", f.check},
+                    {"state", to_string(f.state)},
+                    {"sentence", f.message},
+                    {"mend", f.mend}});
+  const Json all{{"problems", count(findings, FindingState::problem)},
+                 {"advice", count(findings, FindingState::advice)},
+                 {"ok", count(findings, FindingState::ok)},
+                 {"findings", rows}};
   return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -1,0 +1,76 @@
+#include "app/doctor/report.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/unit/app/doctor/fake_machine.hpp"
+
+namespace vergence::app {
+namespace {
+
+using test::contains;
+
+TEST(TerminalText, BreaksAtBlanksAndCountsLetters) {
+  EXPECT_EQ(wrapped("one two  three", 7), (std::vector<std::string>{"one two", "three"}));
+  EXPECT_EQ(wrapped("a-word-longer-than-the-line b", 5),
+            (std::vector<std::string>{"a-word-longer-than-the-line", "b"}));
+  EXPECT_EQ(wrapped("  ", 5), std::vector<std::string>{""});
+  EXPECT_EQ(padded("µ", 3), "µ  ");
+  EXPECT_EQ(padded("long", 2), "long");
+  EXPECT_EQ(harmless("a\033[2J\nb\x7f"), "a [2J b ");
+}
+
+TEST(DoctorReport, CommandsStayWholeAndDevicesCannotSteerTheTerminal) {
+  const std::string command = "sudo sysctl -w net.core.rmem_max=10485760 # longer than the line";
+  const std::vector<Finding> findings{
+      {"receive_buffer", FindingState::problem, "too little \033[2J", {command}},
+      {"disk", FindingState::ok, "room", {}}};
+  const std::string plain = doctor_text(findings, true, {60, false});
+  EXPECT_TRUE(contains(plain, command + "\n")) << plain;
+  EXPECT_FALSE(contains(plain, "\033"));
+  const std::string coloured = doctor_text(findings, true, {100, true});
+  EXPECT_TRUE(contains(coloured, "\033[31;1mproblem"));
+  EXPECT_FALSE(contains(coloured, "\033[2J"));
+  const auto json = nlohmann::json::parse(doctor_json(findings));
+  EXPECT_EQ(json["problems"], 1);
+  EXPECT_EQ(json["ok"], 1);
+  EXPECT_EQ(json["findings"][0]["check"], "receive_buffer");
+  EXPECT_EQ(json["findings"][0]["state"], "problem");
+  EXPECT_EQ(json["findings"][0]["mend"].at(0), command);
+}
+
+TEST(DevicesReport, TextAndJsonHaveWhatToPaste) {
+  Inventory i;
+  i.drivers = {{"gige", "", true, {{"gige", "1502", "A camera", "10.0.0.2"}}, ""},
+               {"v4l2", "", true, {}, "/dev/video0: no permission"}};
+  i.ports = {test::port(0x0403, 0xD38B, "X\0337")};
+  i.ports[0].configuration = "ins: {driver: xsens, port: /dev/ttyUSB0}";
+  const std::string text = devices_text(i, {80, false});
+  for (const char* part :
+       {"  gige  1502  A camera  10.0.0.2\n", "    - {driver: gige, serial: \"1502\"}\n  ins: {",
+        "v4l2        /dev/video0: no permission\n"})
+    EXPECT_TRUE(contains(text, part)) << text;
+  EXPECT_FALSE(contains(text, "\033"));
+  const auto json = nlohmann::json::parse(devices_json(i, "# rules\n"));
+  EXPECT_EQ(json["cameras"][0]["configuration"], "{driver: gige, serial: \"1502\"}");
+  const auto& port = json["serial_ports"][0];
+  for (const char* key : {"port", "by_id", "usb_serial", "description", "configuration"})
+    EXPECT_TRUE(port.contains(key)) << key;
+  EXPECT_EQ(port["kind"], "ins");
+  EXPECT_EQ(port["usb_ids"], "0403:d38b");
+  EXPECT_EQ(port["latency_timer_ms"], 16);
+  EXPECT_EQ(json["udev_rules"], "# rules\n");
+}
+
+TEST(DevicesReport, CameraLineIsYamlWhateverTheSerial) {
+  EXPECT_EQ(camera_line({"gige", "", "", "10.0.0.2"}), "{driver: gige, serial: \"10.0.0.2\"}");
+  EXPECT_EQ(camera_line({"v4l2", "a\"b\\\n\xff", "", ""}),
+            "{driver: v4l2, serial: \"a\\\"b\\\\\\n\\ufffd\"}");
+}
+
+}  // namespace
+}  // namespace vergence::app
