@@ -13,8 +13,6 @@
 namespace vergence::app {
 namespace {
 
-constexpr double kSharedErrors = 1.5;  // between over wide: from here on noise is not all there is
-
 int digits_for(double sigma) {
   return sigma > 0 ? std::clamp(static_cast<int>(std::ceil(1 - std::log10(sigma))), 1, 7) : 5;
 }
@@ -26,8 +24,12 @@ std::vector<std::string> lens_numbers(const BoardReport& r) {
     names.insert(names.end(), {"k1", "k2", "p1", "p2"});
   else
     names.insert(names.end(), {"k1", "k2", "k3", "k4"});
-  if (radtan && r.found.cameras[0].noise[8] > 0) names.emplace_back("k3");
+  if (radtan && r.file.rig.intrinsics[0].distortion_sigma[4] > 0) names.emplace_back("k3");
   return names;
+}
+
+double lens_sigma(const Intrinsics& lens, std::size_t i) {
+  return i < 4 ? lens.sigma[i] : lens.distortion_sigma[i - 4];
 }
 
 double lens_value(const Intrinsics& lens, std::size_t i) {
@@ -45,11 +47,10 @@ std::string lens_table(const BoardReport& r) {
     text += fmt::format("{:<14}", names[i]);
     for (std::size_t k = 0; k < cameras; ++k) {
       const Intrinsics& lens = r.file.rig.intrinsics[k];
-      const double sigma = r.found.cameras[k].noise[i];
+      const double sigma = lens_sigma(lens, i);
       const int digits = digits_for(sigma);
       text += fmt::format(
-          "{:>36}", fmt::format("{:.{}f} ± {:.{}f} ({:.{}f})", lens_value(lens, i), digits, sigma,
-                                digits, r.found.cameras[k].between[i], digits));
+          "{:>36}", fmt::format("{:.{}f} ± {:.{}f}", lens_value(lens, i), digits, sigma, digits));
     }
     text += "\n";
   }
@@ -58,10 +59,8 @@ std::string lens_table(const BoardReport& r) {
     for (std::size_t k = 0; k < cameras; ++k) text += fmt::format("{:>36}", value(k));
     text += "\n";
   };
-  row("rms, px", [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].rms_px); });
-  if (cameras > 1)
-    row("rms alone, px",
-        [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].alone_rms_px); });
+  row("rms alone, px",
+      [&](std::size_t k) { return fmt::format("{:.4f}", r.found.cameras[k].alone_rms_px); });
   row("images", [&](std::size_t k) { return std::to_string(r.found.cameras[k].images); });
   return text;
 }
@@ -74,40 +73,29 @@ std::string place_table(const BoardReport& r, std::size_t k) {
                               "t_x, mm",       "t_y, mm",       "t_z, mm"};
   std::string text = fmt::format("{} from {}: X_{} = R X_{} + t\n", r.file.names[k],
                                  r.file.names[0], r.file.names[k], r.file.names[0]);
-  text += fmt::format("{:<16}{:>12}{:>12}{:>14}{:>16}\n", "", "", "1 σ", "lenses held",
-                      "between views");
+  text += fmt::format("{:<16}{:>12}{:>12}{:>14}\n", "", "", "1 σ", "lenses held");
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
     const double sigma = unit * rig.sigma_wide[k][i];
     const int digits = std::max(digits_for(sigma), i < 3 ? 4 : 3);
     const auto at = static_cast<Eigen::Index>(i % 3);
     // ° is one column and two bytes: fmt counts columns.
-    text += fmt::format("{:<16}{:>12.{}f}{:>12.{}f}{:>14.{}f}{:>16.{}f}\n", kNames[i],
-                        i < 3 ? turn(at) : t(at), digits, sigma, digits,
-                        unit * rig.sigma_noise[k][i], digits, unit * r.found.between[k][i], digits);
+    text +=
+        fmt::format("{:<16}{:>12.{}f}{:>12.{}f}{:>14.{}f}\n", kNames[i], i < 3 ? turn(at) : t(at),
+                    digits, sigma, digits, unit * rig.sigma_noise[k][i], digits);
   }
   return text;
 }
 
-bool views_share_errors(const BoardReport& r) {
-  int more = 0, all = 0;
-  for (std::size_t k = 1; k < static_cast<std::size_t>(r.file.rig.cameras); ++k)
-    for (std::size_t i = 0; i < 6; ++i, ++all)
-      more += r.found.between[k][i] > kSharedErrors * r.file.rig.sigma_wide[k][i] ? 1 : 0;
-  return all > 0 && 2 * more >= all;
-}
-
 std::string baseline_sentence(const BoardReport& r) {
   const RigCalibration& rig = r.file.rig;
-  std::string text = fmt::format("baseline {:.3f} ± {:.3f} mm (between views {:.3f} mm)",
-                                 1e3 * rig.T_camera_left[1].t.norm(), 1e3 * rig.baseline_sigma,
-                                 1e3 * r.found.length_between);
+  std::string text = fmt::format("baseline {:.3f} ± {:.3f} mm", 1e3 * rig.T_camera_left[1].t.norm(),
+                                 1e3 * rig.baseline_sigma);
   if (r.measured_baseline) {
     const double off = rig.T_camera_left[1].t.norm() - *r.measured_baseline;
     text += fmt::format("; measured {:.3f} mm, {:+.3f} mm ({:+.2f} %) off",
                         1e3 * *r.measured_baseline, 1e3 * off, 100 * off / *r.measured_baseline);
-    const double sigma = std::max(rig.baseline_sigma, r.found.length_between);
-    if (std::abs(off) > 3 * sigma)
+    if (std::abs(off) > 3 * rig.baseline_sigma)
       text += fmt::format(
           ", more than 3 sigma: squares of {:.4g} mm would agree; measure the board over all its "
           "squares",
@@ -132,15 +120,6 @@ std::string worst_views(const BoardReport& r) {
   return shown == 0 ? "" : text + "\n";
 }
 
-/// fx fy cx cy.
-std::span<const double> of_pinhole(const std::array<double, 9>& of_lens) {
-  return std::span(of_lens).first(4);
-}
-/// d0 … d4.
-std::span<const double> of_distortion(const std::array<double, 9>& of_lens) {
-  return std::span(of_lens).subspan(4);
-}
-
 }  // namespace
 
 std::string format_report(const BoardReport& r) {
@@ -153,17 +132,11 @@ std::string format_report(const BoardReport& r) {
   for (const BoardViewResult& v : r.found.views)
     if (!v.used) text += fmt::format("  refused: {}, {:.3g} px rms\n", v.name, v.rms_px);
   text += worst_views(r);
-  text += fmt::format("reprojection {:.4f} px rms, {:.3f} px a coordinate\n\n", rig.reprojection_px,
-                      r.found.corner_sigma_px);
-  text += lens_table(r) + "± 1 σ by noise, in brackets between views\n\n";
+  text += fmt::format("reprojection {:.4f} px rms\n\n", rig.reprojection_px);
+  text += lens_table(r) + "± 1 σ\n\n";
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
     text += place_table(r, k) + "\n";
   if (rig.cameras > 1) text += baseline_sentence(r) + "\n";
-  if (views_share_errors(r))
-    text +=
-        "The views differ by more than noise: the board is not flat, the exposures were not "
-        "simultaneous, or the model does not fit the "
-        "lens.\n\n";
   text += r.coverage.grid() + "corners a cell: · none, - up to 9, + up to 39, # more\n";
   const auto needs = r.coverage.needs();
   text += needs.empty() ? "Nothing is missing: every part of the images, tilts and distances.\n"
@@ -184,9 +157,7 @@ nlohmann::ordered_json json_report(const BoardReport& r) {
     board["marker"] = r.board.marker;
     board["dictionary"] = std::string(kMarkerDictionaries[r.board.dictionary]);
   }
-  Json json{{"board", std::move(board)},
-            {"reprojection_px", rig.reprojection_px},
-            {"corner_sigma_px", r.found.corner_sigma_px}};
+  Json json{{"board", std::move(board)}, {"reprojection_px", rig.reprojection_px}};
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
     const Intrinsics& lens = rig.intrinsics[k];
     const BoardCameraResult& c = r.found.cameras[k];
@@ -195,37 +166,28 @@ nlohmann::ordered_json json_report(const BoardReport& r) {
                 {"model", lens.kind == CameraModelKind::pinhole_radtan ? "pinhole-radtan"
                                                                        : "pinhole-equidistant"},
                 {"images", c.images},
-                {"rms_px", c.rms_px},
                 {"alone_rms_px", c.alone_rms_px},
                 {"intrinsics", {lens.fx, lens.fy, lens.cx, lens.cy}},
                 {"intrinsics_sigma", lens.sigma},
-                {"intrinsics_noise", of_pinhole(c.noise)},
-                {"intrinsics_between", of_pinhole(c.between)},
                 {"distortion", lens.distortion},
-                {"distortion_sigma", lens.distortion_sigma},
-                {"distortion_noise", of_distortion(c.noise)},
-                {"distortion_between", of_distortion(c.between)}};
+                {"distortion_sigma", lens.distortion_sigma}};
     if (k > 0) {
       const Transform& T = rig.T_camera_left[k];
       const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;
-      std::array<double, 6> sigma{}, held{}, between{};
+      std::array<double, 6> sigma{}, held{};
       for (std::size_t i = 0; i < 6; ++i) {
         const double unit = i < 3 ? kDegreesPerRadian : 1e3;
-        sigma[i] = unit * rig.sigma_wide[k][i], held[i] = unit * rig.sigma_noise[k][i],
-        between[i] = unit * r.found.between[k][i];
+        sigma[i] = unit * rig.sigma_wide[k][i], held[i] = unit * rig.sigma_noise[k][i];
       }
       camera["place"] = {{"rotation_deg", {turn.x(), turn.y(), turn.z()}},
                          {"t_mm", {1e3 * T.t.x(), 1e3 * T.t.y(), 1e3 * T.t.z()}},
                          {"sigma_deg_mm", sigma},
-                         {"sigma_lenses_held_deg_mm", held},
-                         {"between_views_deg_mm", between}};
+                         {"sigma_lenses_held_deg_mm", held}};
     }
     json["cameras"].push_back(camera);
   }
   if (rig.cameras > 1) {
-    json["baseline"] = {{"m", rig.T_camera_left[1].t.norm()},
-                        {"sigma_m", rig.baseline_sigma},
-                        {"between_views_m", r.found.length_between}};
+    json["baseline"] = {{"m", rig.T_camera_left[1].t.norm()}, {"sigma_m", rig.baseline_sigma}};
     if (r.measured_baseline) json["baseline"]["measured_m"] = *r.measured_baseline;
   }
   for (const BoardViewResult& v : r.found.views) {

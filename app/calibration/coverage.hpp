@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "app/calibration/board_bundle.hpp"
+#include "app/calibration/board_calibration.hpp"
 #include "app/datasets/image_file.hpp"
 
 namespace vergence::app {

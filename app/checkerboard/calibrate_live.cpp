@@ -209,11 +209,11 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   for (const int camera : source.missing())
     progress.say(
         fmt::format("vergence: camera {} did not come back; check its cable and power", camera));
-  if (collection.views().size() < kFewestViews) {
+  if (collection.views().size() < kMinViews) {
     progress.say(fmt::format(
         "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}, "
         "whole and lit in every image?",
-        collection.views().size(), kFewestViews, request.board.words()));
+        collection.views().size(), kMinViews, request.board.words()));
     return stopped.value_or(source.missing().empty() ? ExitCode::not_usable
                                                      : ExitCode::device_failed);
   }

@@ -151,53 +151,6 @@ TEST(AprilGrid, anotherBoardOrNoneIsNothing) {
       << "tags that lie as on a board of other columns";
 }
 
-/// What of the board lies within the images.
-BoardView partly_seen(const RigCalibration& rig, const BoardPattern& board, const Transform& T,
-                      Random* noise) {
-  constexpr double kNoise = 0.1;  // px a coordinate
-  BoardView view;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Camera camera(rig.intrinsics[k]);
-    for (std::size_t i = 0; i < board.corners(); ++i) {
-      Vec2 x;
-      if (camera.project(rig.T_camera_left[k] * (T * board.corner(i)), &x, nullptr) ==
-              ProjectStatus::ok &&
-          camera.inside(x, 8))
-        view.corners[k].push_back({i, x + kNoise * Vec2(noise->normal(), noise->normal())});
-    }
-  }
-  return view;
-}
-
-TEST(AprilGrid, aRigIsRecoveredFromPartsOfTheBoard) {
-  const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
-  const BoardPattern board = parse_aprilgrid("6x6", 0.088, 0.3);
-  Random noise(5, 1);
-  std::vector<BoardView> views;
-  std::size_t whole = 0;
-  for (int i = 0; i < 16; ++i) {
-    const double angle = 0.4 * i;
-    const Transform T =
-        shown(board, 0.4 * Vec3(std::cos(angle), std::sin(angle), 0.3 * std::sin(3 * angle)),
-              Vec3(0.35 * std::sin(2 * angle), 0.25 * std::cos(angle), 0.7 + 0.04 * (i % 5)));
-    views.push_back(partly_seen(rig, board, T, &noise));
-    views.back().name = std::to_string(i);
-    whole += views.back().corners[0].size() == board.corners() ? 1 : 0;
-  }
-  ASSERT_LT(whole, 4U) << "most views are to be parts";
-  const BoardCalibration c = calibrate_boards(views, test::board_options(rig, board));
-  ASSERT_EQ(c.error, "");
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Intrinsics &found = c.rig.intrinsics[k], &real = rig.intrinsics[k];
-    EXPECT_LT(std::abs(found.fx - real.fx), 4 * found.sigma[0]);
-    EXPECT_LT(std::abs(found.cx - real.cx), 4 * found.sigma[2]);
-    EXPECT_LT(found.sigma[0], 1.0) << "px: found well, too";
-  }
-  const Vec6 e = test::place_error(c.rig.T_camera_left[1], rig.T_camera_left[1]);
-  for (int i = 0; i < 6; ++i)
-    EXPECT_LT(std::abs(e(i)), 4 * c.rig.sigma_wide[1][static_cast<std::size_t>(i)]) << i;
-}
-
 TEST(AprilGrid, onlyGridsThatCanBePrintedArePermitted) {
   EXPECT_EQ(parse_aprilgrid("6x6", 0.088, 0.3).corners(), 144U);
   for (const char* bad : {"", "6", "6x", "0x6", "25x2", "24x24x", "-6x6"})

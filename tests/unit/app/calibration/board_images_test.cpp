@@ -3,17 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
 #include "app/calibration/board_detector.hpp"
-#include "app/calibration/charuco.hpp"
-#include "app/datasets/image_writer.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/unit/app/calibration/board_scene.hpp"
-#include "tests/unit/app/calibration/charuco_painter.hpp"
 
 namespace vergence::app {
 namespace {
@@ -78,81 +73,19 @@ TEST(BoardImages, imagesThatCannotBeReadAreRemarks) {
   EXPECT_NE(images.remarks[1].find("gone.png is missing"), std::string::npos) << images.remarks[1];
 }
 
-/// A ChArUco board in front of one camera without distortion, so that its lines are straight.
-class CharucoImages : public ::testing::Test {
- protected:
-  static Intrinsics straight_lens() {
-    Intrinsics lens = test::known_rig(1, CameraModelKind::pinhole_radtan).intrinsics[0];
-    lens.distortion.fill(0);
-    return lens;
-  }
-  [[nodiscard]] std::vector<std::uint8_t> paint(const Vec3& turn, const Vec3& centre) const {
-    return painter.paint(lens, test::shown_charuco(board, turn, centre));
-  }
-  [[nodiscard]] ImageView view(const std::vector<std::uint8_t>& pixels) const {
-    return {pixels.data(), lens.width, lens.height, lens.width};
-  }
-  [[nodiscard]] std::filesystem::path write(const std::string& name,
-                                            const std::vector<std::uint8_t>& pixels) const {
-    write_png(folder / name, view(pixels));
-    return folder / name;
-  }
-  /// Tilted to all sides, in the parts of the image in turn.
-  [[nodiscard]] std::vector<Paths> good_views() const {
-    std::vector<Paths> views;
-    for (int i = 0; i < 12; ++i) {
-      const Vec3 turn = 0.5 * Vec3(std::cos(2.1 * i), std::sin(2.1 * i), 0.1);
-      const Vec3 centre(0.12 * (i % 3 - 1), 0.09 * (i / 3 % 3 - 1), 0.7 + 0.05 * (i % 4));
-      views.push_back({write(fmt::format("good{}.png", i), paint(turn, centre))});
-    }
-    return views;
-  }
-  /// The middle of the board where only one line of its corners is in the image and away from its
-  /// edge: the second line of squares, which has the fourth marker, ends `kCut` px within the edge.
-  [[nodiscard]] Vec3 strip_at(bool right_edge) const {
-    constexpr double kDepth = 0.75, kCut = 4;
-    const double lines = 0.5 * (board.columns + 1) - 2;  // from the middle to that line
-    const double aside = lines * board.square;
-    const double u = right_edge ? lens.width - kCut : kCut;
-    return {(u - lens.cx) / lens.fx * kDepth + (right_edge ? aside : -aside), 0, kDepth};
-  }
-
-  const test::TemporaryFolder folder{};
-  const Intrinsics lens = straight_lens();
+/// OpenCV throws at a view whose corners determine no homography, and at all views together.
+TEST(BoardImages, CornersOnALineDetermineNoHomography) {
   const BoardPattern board = parse_charuco("8x7", 0.06, 0.044, "5X5_100");
-  const test::CharucoPainter painter{board, true};
-};
-
-TEST_F(CharucoImages, viewsWithTooLittleOfTheBoardAreSaidAndSkippedAndSpoilNothing) {
-  const std::vector<Paths> good = good_views();
-  std::vector<Paths> all = good;
-  for (const bool right : {true, false}) {
-    const auto strip = paint(Vec3::Zero(), strip_at(right));
-    const BoardCorners line = find_charuco(view(strip), board);
-    ASSERT_GE(line.size(), 4U) << "nothing is there: nothing is tested";
-    for (const BoardCorner& c : line)
-      ASSERT_EQ(board.corner(c.index).x(), board.corner(line[0].index).x()) << "more than a line";
-    EXPECT_TRUE(find_board(view(strip), board, BoardSearch::quick, {}).empty());
-    all.push_back({write(right ? "strip1.png" : "strip2.png", strip)});
-  }
-  const BoardImages images = read_board_images(all, board, {});
-  EXPECT_EQ(images.views.size(), good.size());
-  ASSERT_EQ(images.remarks.size(), 2U);
-  EXPECT_NE(images.remarks[0].find("too little of it, in " + (folder / "strip1.png").string() +
-                                   "; skipped"),
-            std::string::npos)
-      << images.remarks[0];
-  EXPECT_NE(images.remarks[1].find("strip2.png; skipped"), std::string::npos) << images.remarks[1];
-
-  BoardCalibrationOptions options;
-  options.board = board;
-  options.sizes = images.sizes;
-  const BoardCalibration c = calibrate_boards(images.views, options);
-  EXPECT_EQ(c.error, "");
-  EXPECT_EQ(c.rig.frames, 12);
-  const BoardCalibration without =
-      calibrate_boards(read_board_images(good, board, {}).views, options);
-  EXPECT_EQ(c.rig.intrinsics[0].fx, without.rig.intrinsics[0].fx);
+  const auto determined = [&board](const std::vector<std::size_t>& corners) {
+    BoardCorners seen;
+    for (const std::size_t index : corners) seen.push_back({index, Vec2::Zero()});
+    return determine_a_homography(seen, board);
+  };
+  EXPECT_TRUE(determined({0, 1, 2, 7, 8, 9}));
+  EXPECT_FALSE(determined({0, 1, 2, 7, 8}));
+  EXPECT_FALSE(determined({0, 7, 14, 21, 28, 35})) << "a column";
+  EXPECT_FALSE(determined({0, 7, 14, 21, 28, 35, 36})) << "all but one";
+  EXPECT_FALSE(determined({0, 8, 16, 24, 32, 40})) << "a diagonal";
 }
 
 }  // namespace

@@ -57,23 +57,6 @@ TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
   expect_same(ours(kModels[0]), read_any_calibration(pair, std::nullopt, &remarks));
 }
 
-TEST(Conversion, namesAndSerialsSurviveWhereTheyHaveAPlace) {
-  const test::TemporaryFolder folder;
-  const CalibrationFile c = ours(kModels[0]);
-  Remarks remarks;
-  write_any_calibration((folder / "c.yaml").string(), CalibrationFormat::vergence, c, &remarks);
-  EXPECT_TRUE(remarks.empty());
-  const CalibrationFile same =
-      read_any_calibration((folder / "c.yaml").string(), std::nullopt, &remarks);
-  EXPECT_EQ(same.serials[0], "4711");
-  write_any_calibration((folder / "camchain.yaml").string(), CalibrationFormat::kalibr, c,
-                        &remarks);
-  EXPECT_EQ(
-      read_any_calibration((folder / "camchain.yaml").string(), std::nullopt, &remarks).names[1],
-      "starboard");
-  ASSERT_FALSE(remarks.empty());
-}
-
 /// One sentence that names the file and the key.
 std::string last_error(const std::function<void()>& f) {
   try {
