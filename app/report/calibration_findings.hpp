@@ -1,8 +1,8 @@
 #pragma once
 #include "app/report/analysis.hpp"
-#include "app/report/findings.hpp"
 #include "app/report/session.hpp"
 #include "app/report/usability.hpp"
+#include "app/report/verdict.hpp"
 
 /// What a session says about its calibration: reasons and advice for the verdict.
 ///

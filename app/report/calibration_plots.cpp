@@ -10,7 +10,6 @@ namespace vergence::app::report {
 namespace {
 
 constexpr double kMillimetres = 1e3;
-constexpr int kPlaceNumbers = 6;  // before those of the lens
 
 struct Held {  // a value that held for a while
   double from = 0, to = 0, value = 0, two_sigma = kNone;
@@ -27,15 +26,11 @@ struct CalibrationCurve {
 };
 
 struct Component {
-  double value = kNone, sigma = kNone;
+  double value = 0, sigma = kNone;
 };
 
 /// A number of a row in the unit it is shown in.
 Component component_of(const CalibrationRow& c, int component) {
-  if (component >= kPlaceNumbers) {
-    const auto i = static_cast<std::size_t>(component - kPlaceNumbers);
-    return {c.lens[i], c.lens_sigma[i]};
-  }
   const double unit = component < 3 ? kDegreesPerRadian : kMillimetres;
   const auto k = static_cast<std::size_t>(component);
   return {c.value[k] * unit, c.has_sigma ? c.sigma[k] * unit : kNone};
@@ -44,8 +39,8 @@ Component component_of(const CalibrationRow& c, int component) {
 CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int camera, int component) {
   CalibrationCurve curve;
   for (const CalibrationRow& c : s.calibrations) {
+    if (c.camera != camera) continue;
     const Component number = component_of(c, component);
-    if (c.camera != camera || !std::isfinite(number.value)) continue;
     const double since = s.frames.empty() ? 0
                                           : (static_cast<double>(c.stamp.ns()) -
                                              static_cast<double>(s.frames.front().stamp.ns())) *

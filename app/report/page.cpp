@@ -9,13 +9,10 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "app/report/happenings.hpp"
 #include "app/report/plots.hpp"
-#include "app/report/residual_section.hpp"
 #include "app/report/style.hpp"
 #include "app/report/svg.hpp"
 #include "app/report/tables.hpp"
-#include "app/report/time_section.hpp"
 
 namespace vergence::app::report {
 namespace {
@@ -189,38 +186,6 @@ bool changed(const Session& s, int camera) {
                      [camera](const CalibrationRow& c) { return c.camera == camera && c.decided; });
 }
 
-/// A number of the lens that was held throughout is no curve either.
-bool lens_changed(const Session& s, int camera, std::size_t number) {
-  double first = kNone;
-  for (const CalibrationRow& c : s.calibrations) {
-    const double value = c.lens[number];
-    if (c.camera != camera || !std::isfinite(value)) continue;
-    if (std::isfinite(first) ? value != first : c.decided && c.lens_sigma[number] > 0) return true;
-    first = value;
-  }
-  return false;
-}
-
-void lens_plots(const Session& s, const Analysis& a, int camera, const std::string& whose,
-                std::string* out) {
-  const bool radtan =
-      !s.calibration || s.calibration->rig.intrinsics[static_cast<std::size_t>(camera)].kind ==
-                            CameraModelKind::pinhole_radtan;
-  const std::array<const char*, 8> names{"focal length x, px",
-                                         "focal length y, px",
-                                         "principal point x, px",
-                                         "principal point y, px",
-                                         "distortion k1",
-                                         "distortion k2",
-                                         radtan ? "distortion p1" : "distortion k3",
-                                         radtan ? "distortion p2" : "distortion k4"};
-  constexpr int kFirst = 6;  // of calibration_plot()
-  for (std::size_t i = 0; i < names.size(); ++i)
-    if (lens_changed(s, camera, i))
-      *out += figure(fmt::format("{}: {}", whose, names[i]),
-                     calibration_plot(s, a, camera, kFirst + static_cast<int>(i)));
-}
-
 void calibration_sections(const Session& s, const Analysis& a, std::string* out) {
   constexpr std::array<const char*, 6> kNames{"rotation x, degrees", "rotation y, degrees",
                                               "rotation z, degrees", "translation x, mm",
@@ -232,7 +197,6 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
     for (const int component : {0, 3, 1, 4, 2, 5})  // rotation and translation side by side
       plots += figure(fmt::format("{}: {}", whose, kNames[static_cast<std::size_t>(component)]),
                       calibration_plot(s, a, camera, component));
-    lens_plots(s, a, camera, whose, &plots);
   }
   std::string body = health_table(s);
   if (s.calibrations.empty())
@@ -246,7 +210,7 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
         "intrinsics). Hollow red marks were rejected; hollow grey ones are what the drive measured "
         "while it kept what was in use.</p>" +
         calibrations_table(s);
-  *out += section("wide long", "Calibration", body) + plots + residual_section(s);
+  *out += section("wide long", "Calibration", body) + plots;
 }
 
 std::string footer(const Session& s) {
@@ -272,9 +236,6 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
       title + "</title><style>" + style_sheet() + "</style></head><body><main>\n";
   out += "<h1>" + title + "</h1>\n" + verdict_section(session, analysis, verdict) +
          "<div class=\"grid\">\n";
-  if (verdict.grade != Grade::good)
-    if (const std::string happened = happenings_table(session, analysis); !happened.empty())
-      out += section("wide", "What happened", happened);
   if (!verdict.advice.empty()) out += section("wide", "What to do next", list(verdict.advice));
   if (const std::vector<std::string> missing = session.not_had(); !missing.empty())
     out += section("wide", "What is missing in this session", list(missing));
@@ -284,9 +245,6 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
   out += running + errors_head(analysis);
   if (analysis.source != ErrorSource::none) error_plots(session, analysis, &out);
   calibration_sections(session, analysis, &out);
-  const TimeSection time = time_section(session);
-  if (!time.body.empty()) out += section("", "Time", time.body);
-  if (!time.latency.empty()) out += figure(time.caption, time.latency);
   out += section("wide long", "Events",
                  session.events.empty() ? "<p>None was recorded.</p>" : events_table(session));
   out += section("wide long", "Figures",

@@ -45,8 +45,7 @@ struct TimingPicture {
 /// One number of a camera's calibration as it held over the drive, with a band of ± 2 sigma; hollow
 /// red marks are rejected ones, hollow grey ones what the drive measured beside one that was kept.
 /// A dashed line: the drive confirmed it there first. `component`: 0–2 rotation vector, shown in
-/// degrees; 3–5 translation, in millimetres; 6–9 fx, fy, cx, cy, in pixels; 10–13 coefficients of
-/// distortion. Empty when no row has it.
+/// degrees; 3–5 translation, in millimetres. Empty when no row has it.
 [[nodiscard]] std::string calibration_plot(const Session& session, const Analysis& analysis,
                                            int camera, int component);
 

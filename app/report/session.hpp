@@ -55,10 +55,6 @@ struct CalibrationRow {
   std::array<double, 6> value{};  // rotation vector, rad; translation, m
   std::array<double, 6> sigma{};  // the wide one, else the noise's; meaningless without has_sigma
   bool has_sigma = false;
-  std::array<double, 8> lens{kNone, kNone, kNone, kNone,
-                             kNone, kNone, kNone, kNone};  // fx fy cx cy, px; four of distortion
-  std::array<double, 8> lens_sigma{kNone, kNone, kNone, kNone,
-                                   kNone, kNone, kNone, kNone};  // of these
   // What the drive had measured of the depth by then: at which distance, its sigma, and how far off
   // what was in use is by it.
   double judged_depth_m = kNone, depth_sigma_percent = kNone, depth_difference_percent = kNone;

@@ -77,21 +77,6 @@ void error_group(const Analysis& a, Figures* f) {
   f->row("scale (reference over ours)", a.scale, "{:.4f}");
 }
 
-void timing_group(const Session& s, const TimingPicture& timing, Figures* f) {
-  f->group("Time a frame, ms");
-  constexpr std::array<std::array<const char*, 2>, 5> kRows{{{"mean", "mean"},
-                                                             {"median", "p50"},
-                                                             {"99 of 100 within", "p99"},
-                                                             {"999 of 1000 within", "p99_9"},
-                                                             {"longest", "max"}}};
-  for (const auto& [name, key] : kRows)
-    f->row(name, number_at(s.summary, std::string("timing_ms.") + key), "{:.1f}");
-  for (const char* stage : {"decode", "pyramid", "detect", "track", "match", "pose", "window"})
-    f->row(std::string(stage) + ", mean",
-           number_at(s.summary, std::string("timing_ms.stages.") + stage), "{:.2f}");
-  if (timing.frames > 0) f->row("frames over the frame interval", grouped(timing.over_budget));
-}
-
 /// What the drive itself has measured of the calibration in use.
 void verification_rows(const Session& s, const Analysis& a, Figures* f) {
   if (const auto verified = flag_at(s.summary, "calibration.verified"))
@@ -128,9 +113,6 @@ void calibration_group(const Session& s, const Analysis& a, Figures* f) {
   if (const std::string by = text_at(s.summary, "calibration.limited_by"); !by.empty())
     f->row("limited by", by);
   verification_rows(s, a, f);
-  for (const char* z : {"1", "5", "10", "20", "50"})
-    f->row(std::string("depth error at ") + z + " m",
-           number_at(s.summary, std::string("calibration.depth_error_percent.") + z), "{:.1f} %");
 }
 
 /// Counters in full, other numbers with `digits`.
@@ -181,24 +163,6 @@ void block_group(const Session& s, const char* key, const char* head, Figures* f
   flatten(s.summary[key], "", 0, &rows, f);
   if (rows > kMostRows)
     f->row(fmt::format("… {} more in summary.json", grouped(rows - kMostRows)), "");
-}
-
-void memory_group(const Session& s, Figures* f) {
-  f->group("Memory and drops");
-  constexpr double kMegabyte = 1e6;
-  if (const auto bytes = number_at(s.summary, "memory.sum_bytes"))
-    f->row("memory held", fmt::format("{:.1f} MB", *bytes / kMegabyte));
-  for (const auto& [key, name] : {std::pair{"estimator_bytes", "of these the estimator"},
-                                  {"images_bytes", "images"},
-                                  {"rings_bytes", "rings"}})
-    if (const auto bytes = number_at(s.summary, std::string("memory.") + key))
-      f->row(name, fmt::format("{:.1f} MB", *bytes / kMegabyte));
-  f->row("allocations after the seal", number_at(s.summary, "allocations_after_seal"), "{:.0f}");
-  for (const auto& [key, name] : {std::pair{"frames", "frames dropped"},
-                                  {"estimator", "points over capacity"},
-                                  {"records", "records dropped"},
-                                  {"lines", "lines the disk did not take"}})
-    f->row(name, number_at(s.summary, std::string("drops.") + key), "{:.0f}");
 }
 
 std::string event_time(const Session& s, Stamp stamp) {
@@ -255,12 +219,17 @@ std::string figures_table(const Session& session, const Analysis& analysis,
   f.row("way", fmt::format("{:.1f} m", analysis.path_m));
   frames_group(session, analysis, &f);
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
-  timing_group(session, timing, &f);
+  block_group(session, "timing_ms", "Time a frame, ms", &f);
+  if (timing.frames > 0) f.row("frames over the frame interval", grouped(timing.over_budget));
   calibration_group(session, analysis, &f);
   block_group(session, "truth", "Against the truth of the mock drive (metres, radians)", &f);
   block_group(session, "devices", "Devices", &f);
   block_group(session, "comparison", "Comparison with the INS", &f);
-  memory_group(session, &f);
+  block_group(session, "time", "Clocks and pairing", &f);
+  block_group(session, "memory", "Memory", &f);
+  f.row("allocations after the seal", number_at(session.summary, "allocations_after_seal"),
+        "{:.0f}");
+  block_group(session, "drops", "Drops", &f);
   return std::move(f).finish();
 }
 

@@ -9,7 +9,6 @@
 
 #include "app/report/advice.hpp"
 #include "app/report/calibration_findings.hpp"
-#include "app/report/findings.hpp"
 #include "app/report/outages.hpp"
 #include "app/report/usability.hpp"
 
@@ -148,6 +147,26 @@ void advise_by_reasons(const Session& s, const Analysis& a, Findings* j) {
 }
 
 }  // namespace
+
+void Findings::find(Grade grade, std::string reason) {
+  found_.push_back({grade, std::move(reason)});
+  verdict_.grade = std::max(verdict_.grade, grade);
+}
+
+void Findings::give_up(const std::string& reason, const std::string& advice) {
+  verdict_.usable = false;
+  if (verdict_.main_reason.empty())
+    verdict_.main_reason = reason + (advice.empty() ? "" : ". " + advice);
+}
+
+Verdict Findings::verdict() const {
+  std::vector<Found> sorted = found_;
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Found& a, const Found& b) { return a.grade > b.grade; });
+  Verdict verdict = verdict_;
+  for (Found& f : sorted) verdict.reasons.push_back(std::move(f.reason));
+  return verdict;
+}
 
 const char* to_words(Grade grade) noexcept {
   switch (grade) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/report/analysis.hpp"
@@ -23,5 +24,24 @@ struct Verdict {
 };
 
 [[nodiscard]] Verdict judge(const Session& session, const Analysis& analysis);
+
+/// Collects what speaks against a drive, and what to do; the grade is that of the worst.
+class Findings {
+ public:
+  void find(Grade grade, std::string reason);
+  void advise(std::string sentence) { verdict_.advice.push_back(std::move(sentence)); }
+  /// No pose can be relied on; the first reason stands.
+  void give_up(const std::string& reason, const std::string& advice);
+  /// The worst reasons first, equal ones as they were found. The sentence is still to be made.
+  [[nodiscard]] Verdict verdict() const;
+
+ private:
+  struct Found {
+    Grade grade;
+    std::string reason;
+  };
+  std::vector<Found> found_;
+  Verdict verdict_;
+};
 
 }  // namespace vergence::app::report

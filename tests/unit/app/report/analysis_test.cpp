@@ -90,19 +90,6 @@ TEST(Analysis, framesThatOnlyWaitedForTheCalibrationAreCountedApart) {
   EXPECT_NEAR(*a.confirmed_s, 10, 1e-9);
 }
 
-TEST(Analysis, framesBeforeADriveFromScratchFoundItsCalibrationWaitedToo) {
-  Session s = unverified_drive(100);
-  s.reasons[1] = "uncalibrated";
-  s.events = {{s.frames[100].stamp, "calibration_confirmed", ""}};
-  EXPECT_EQ(analyse(s).waited, 99U);
-}
-
-TEST(Analysis, aDriveThatNeverConfirmedItsCalibrationWaitedToItsEnd) {
-  const Analysis a = analyse(unverified_drive(100));
-  EXPECT_EQ(a.waited, 100U);
-  EXPECT_FALSE(a.confirmed_s);
-}
-
 TEST(Analysis, aStraightWayIsLaidByAttitudesAndKeepsItsVerticalError) {
   Session s;
   for (int i = 0; i < 120; ++i) {
@@ -150,12 +137,6 @@ TEST(Analysis, lostFramesHaveNoPlaceAndMissingOnesABreak) {
   EXPECT_EQ(std::count(a.breaks.begin(), a.breaks.end(), 1), 1);
   EXPECT_EQ(a.lost, 5U);
   EXPECT_NEAR(a.ok_share.value(), 85.0 / 90.0, 1e-12);
-}
-
-TEST(Analysis, skippedFramesCountAgainstTheShare) {
-  Session s = bent_drive(90);
-  s.summary = {{"frames", {{"skipped", 10}}}};
-  EXPECT_NEAR(analyse(s).ok_share.value(), 0.9, 1e-12);
 }
 
 TEST(Analysis, turnedRightIsAPositiveHeadingErrorWhicheverWayUpTheReferenceHasIt) {
@@ -262,12 +243,6 @@ TEST(Analysis, extremeStampsDoNotOverflow) {
   s.frames[0].stamp = Stamp(std::numeric_limits<std::int64_t>::min());
   s.frames[1].stamp = Stamp(std::numeric_limits<std::int64_t>::max());
   EXPECT_NEAR(analyse(s).duration_s, 1.8446744e10, 1e4);
-}
-
-TEST(Analysis, nothingAtAllIsAnAnswer) {
-  const Analysis a = analyse(Session{});
-  EXPECT_EQ(a.read, 0U);
-  EXPECT_FALSE(a.ok_share.has_value());
 }
 
 }  // namespace

@@ -56,16 +56,6 @@ TEST(Decimate, everyColumnKeepsItsExtremesItsFirstAndItsLastValue) {
                              [](const Point& a, const Point& b) { return a.x < b.x; }));
 }
 
-TEST(Decimate, oneFrameThatIsDifferentAmongManySurvives) {
-  Curve c = noise(100'000);
-  std::fill(c.y.begin(), c.y.end(), 1.0);
-  c.y[77'777] = 42.0;
-  const auto lines = decimate(c.x, c.y, {}, 0, 100'000, 50);
-  EXPECT_TRUE(std::any_of(lines[0].begin(), lines[0].end(),
-                          [](const Point& p) { return p.y == 42.0 && p.x == 77'777.0; }));
-  EXPECT_LE(points(lines), 4U * 50U);
-}
-
 TEST(Decimate, whereThereIsNoValueTheLineEnds) {
   Curve c = noise(10);
   c.y[0] = kNan, c.y[4] = kNan, c.y[5] = std::numeric_limits<double>::infinity(), c.y[7] = kNan;
@@ -86,12 +76,6 @@ TEST(Decimate, aBreakCutsEvenWithinAColumn) {
   ASSERT_EQ(lines.size(), 2U);
   EXPECT_EQ(lines[0].back().x, 4);
   EXPECT_EQ(lines[1].front().x, 5);
-}
-
-TEST(Decimate, nothingGivesNothing) {
-  EXPECT_TRUE(decimate({}, {}, {}, 0, 1, 10).empty());
-  const std::vector<double> x{1, 2}, y{kNan, kNan};
-  EXPECT_TRUE(decimate(x, y, {}, 0, 1, 10).empty());
 }
 
 TEST(Thin, noPointLeftOutIsFartherThanTheStepFromAPointKept) {

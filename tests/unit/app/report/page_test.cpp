@@ -53,40 +53,22 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
   for (const char* part : {"Usable with care",
                            "0.74 %",
                            "Error to the INS",
-                           "Map",
                            "north",
                            "Status and state",
                            "Inliers",
                            "Time a frame",
                            "Horizontal error",
                            "Vertical error",
-                           "Heading error, degrees (clockwise is positive)",
+                           "Heading error",
                            "over the distance travelled",
                            "rotation x, degrees",
                            "translation z, mm",
-                           "focal length x, px",
-                           "principal point x, px",
-                           "distortion k1",
                            ">verified</text>",
                            "class=\"seen\"",
                            ">kept</td>",
                            "± 0.10 % at 20 m,",
-                           "was off 0.24 %",
-                           "first verified after",
-                           "can be improved",
-                           "9.1 %",
-                           "0.06 %",
-                           "Predicted error of a depth",
-                           "from scratch",
-                           "75 frames",
                            "0.90 → 0.21 px",
-                           "from 60 frames; too little motion",
-                           "found again against the window",
-                           "How the calibration fits the images",
-                           "Right camera, calibration of the start · rms 0.90 px",
-                           "Right camera, calibration of the end · rms 0.02 px",
-                           "+1.40 px",
-                           ">−0.60<",
+                           "can be improved",
                            "(20 times)",
                            "allocations after the seal",
                            "What to do next",
@@ -116,15 +98,6 @@ TEST(Page, withoutAReferenceSaysSoAndHasNoErrorPlots) {
   EXPECT_TRUE(contains(html, "not known"));
   for (const char* part : {"Horizontal error", "Vertical error", "Heading error", "north"})
     EXPECT_FALSE(contains(html, part)) << part;
-  EXPECT_TRUE(self_contained(html));
-}
-
-TEST(Page, withoutResidualsHasNoSectionAndMissesNothing) {
-  const test::TemporaryFolder folder;
-  writer_of(200).write(folder.path());
-  std::filesystem::remove(folder / "residuals.csv");
-  const std::string html = page_of(folder.path());
-  EXPECT_FALSE(contains(html, "How the calibration fits") || contains(html, "What is missing"));
   EXPECT_TRUE(self_contained(html));
 }
 
@@ -243,11 +216,6 @@ TEST(Page, countersStandInFullAndRowsThatAreLeftOutAreCounted) {
   EXPECT_TRUE(contains(html, "… 13 more in summary.json"));
 }
 
-TEST(Page, aDriveOfAnHourIsNoMinutes) {
-  const std::string html = page_of(session_with({}));
-  EXPECT_TRUE(contains(html, " in 1:00:00 h"));
-}
-
 TEST(Page, whatALiveDriveLacksNeverCameAndWasNotUnreadable) {
   nlohmann::json summary = {{"frames", {{"skipped", 5}}}};
   EXPECT_TRUE(contains(page_of(session_with(summary)), "skipped (not readable)"));
@@ -290,14 +258,6 @@ TEST(WriteReport, replacesAnOlderPageAndLeavesNothingElse) {
   const std::string html = page_of(folder.path());
   EXPECT_TRUE(html.starts_with("<!DOCTYPE html>"));
   EXPECT_EQ(html, page_of(folder.path())) << "the same session gives the same bytes";
-  EXPECT_FALSE(std::filesystem::exists(folder / "report.html.new"));
-}
-
-TEST(WriteReport, aPageThatCannotBeWrittenIsASentence) {
-  const test::TemporaryFolder folder;
-  writer_of(100).write(folder.path());
-  folder.write("report.html/in_the_way", "");
-  EXPECT_THROW((void)write_report(folder.path()), InputError);
   EXPECT_FALSE(std::filesystem::exists(folder / "report.html.new"));
 }
 

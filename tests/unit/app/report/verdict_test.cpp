@@ -3,9 +3,27 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "app/report/fit_pattern.hpp"
+#include "app/report/outages.hpp"
+#include "app/report/report.hpp"
+#include "app/report/usability.hpp"
 
 namespace vergence::app::report {
 namespace {
+
+using enum Grade;
+
+bool any_has(const std::vector<std::string>& sentences, const std::string& part) {
+  return std::any_of(sentences.begin(), sentences.end(),
+                     [&](const std::string& s) { return s.find(part) != std::string::npos; });
+}
+
+Stamp at(double s) { return Stamp(static_cast<std::int64_t>(std::llround(s * 1e9))); }
 
 /// A drive with which nothing is wrong: 1000 frames, a reference, 0.8 % drift.
 struct Case {
@@ -15,6 +33,7 @@ struct Case {
   Case() {
     for (int i = 0; i < 1000; ++i) {
       Frame f;
+      f.stamp = at(0.05 * i);
       f.posed = true;
       f.status = PoseStatus::ok;
       f.estimate_ms = 10;
@@ -31,263 +50,390 @@ struct Case {
     analysis.scale = 1.001;
     analysis.interval_s = 0.05;
   }
-  [[nodiscard]] Verdict verdict() const { return judge(session, analysis); }
+  nlohmann::json& calibration() { return session.summary["calibration"]; }
+  CalibrationRow& attempt(bool accepted, const char* cause, double before_px, double after_px) {
+    CalibrationRow row;
+    row.accepted = accepted;
+    row.decided = true;
+    row.cause = cause;
+    row.reason = accepted ? "" : "it is worse";
+    row.held_out_before_px = before_px;
+    row.held_out_after_px = after_px;
+    session.calibrations.push_back(row);
+    return session.calibrations.back();
+  }
+  void event(double s, const char* kind, const std::string& sentence = "") {
+    session.events.push_back({at(s), kind, sentence});
+  }
+  void frames_of(std::size_t degraded, std::size_t lost) {
+    analysis.degraded = degraded, analysis.lost = lost, analysis.ok = 1000 - degraded - lost;
+    analysis.ok_share = 1e-3 * static_cast<double>(analysis.ok);
+  }
 };
 
-bool any_has(const std::vector<std::string>& sentences, const std::string& part) {
-  return std::any_of(sentences.begin(), sentences.end(),
-                     [&](const std::string& s) { return s.find(part) != std::string::npos; });
-}
+struct Row {
+  const char* name;
+  std::function<void(Case&)> change;
+  Grade grade;
+  std::string reason = {};  // a part of one; empty: any
+  std::string advice = {};  // likewise
+};
 
-TEST(Verdict, aDriveWithNothingWrongIsGood) {
-  const Verdict v = Case().verdict();
-  EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_TRUE(v.reasons.empty() && v.advice.empty());
-  EXPECT_FALSE(v.sentence.empty());
-}
-
-TEST(Verdict, withoutAReferenceItIsNeverGood) {
-  Case c;
-  c.analysis.source = ErrorSource::none;
-  c.analysis.drift.reset();
-  const Verdict v = c.verdict();
-  EXPECT_EQ(v.grade, Grade::care);
-  EXPECT_TRUE(any_has(v.reasons, "no reference"));
-}
-
-TEST(Verdict, aDoubtThatPassedIsNoKnock) {
-  Case c;
-  c.session.reasons = {"recalibrating"};
-  c.analysis.by_reason = {3};
-  EXPECT_FALSE(any_has(c.verdict().advice, "knocked"));
-  Event changed;
-  changed.kind = "rig_changed";
-  c.session.events.push_back(changed);
-  EXPECT_TRUE(any_has(c.verdict().advice, "recalibrating (3 frames)"));
-}
-
-TEST(Verdict, driftAndScaleMoveTheGradeAtTheirLimits) {
-  const std::vector<std::pair<double, Grade>> drifts{
-      {0.02, Grade::good}, {0.021, Grade::care}, {0.05, Grade::care}, {0.051, Grade::bad}};
-  for (const auto& [drift, grade] : drifts) {
+TEST(Verdict, GradeReasonAndAdviceByFinding) {
+  const std::vector<Row> rows{
+      {"nothing is wrong", [](Case&) {}, good},
+      {"no reference",
+       [](Case& c) { c.analysis.source = ErrorSource::none, c.analysis.drift.reset(); }, care,
+       "no reference"},
+      {"an INS without a placement",
+       [](Case& c) { c.analysis.source = ErrorSource::none, c.analysis.ins_unplaced = true; }, care,
+       "not placed on the earth", "comparison.placement_m"},
+      {"drift of 2 %", [](Case& c) { c.analysis.drift = 0.02; }, good},
+      {"drift above 2 %", [](Case& c) { c.analysis.drift = 0.021; }, care},
+      {"drift of 5 %", [](Case& c) { c.analysis.drift = 0.05; }, care},
+      {"drift above 5 %", [](Case& c) { c.analysis.drift = 0.051; }, bad},
+      {"lengths", [](Case& c) { c.analysis.scale = 0.96; }, care, "too long"},
+      {"5 % lost", [](Case& c) { c.frames_of(0, 50); }, care},
+      {"20 % lost", [](Case& c) { c.frames_of(0, 200); }, bad},
+      {"no pose",
+       [](Case& c) {
+         for (Frame& f : c.session.frames) f.posed = false;
+       },
+       bad, "never was a pose"},
+      {"weak by lenses",
+       [](Case& c) {
+         c.calibration() = {{"word", "recalibrate"}, {"limited_by", "intrinsics"}};
+       },
+       bad, "calibration", "driving on does not help"},
+      {"weak by noise",
+       [](Case& c) {
+         c.calibration() = {{"word", "recalibrate"}, {"limited_by", "noise"}};
+       },
+       bad, "calibration", "near and far structure"},
+      {"short baseline, known well near",
+       [](Case& c) {
+         c.calibration()["word"] = "recalibrate";
+         CalibrationRow& row = c.attempt(true, "refinement", 1, 0.2);
+         row.judged_depth_m = 2.4, row.depth_sigma_percent = 1.0;
+       },
+       care, "1.0 % at 2.4 m"},
+      {"short baseline, not known near",
+       [](Case& c) {
+         c.calibration()["word"] = "recalibrate";
+         CalibrationRow& row = c.attempt(true, "refinement", 1, 0.2);
+         row.judged_depth_m = 2.4, row.depth_sigma_percent = 3.0;
+       },
+       bad},
+      {"a knock that was mended", [](Case& c) { c.attempt(true, "knock", 1.4, 0.2); }, good, "",
+       "knocked"},
+      {"rejected",
+       [](Case& c) {
+         c.attempt(true, "from_scratch", 0, 0.2);
+         c.attempt(false, "drift", 1.4, 0.2);
+       },
+       care, "", "it is worse"},
+      {"rejected, and the one in use fits as well",
+       [](Case& c) {
+         c.attempt(true, "from_scratch", 0, 0.2);
+         c.attempt(false, "requested", 0.2, 0.2);
+       },
+       good},
+      {"measured and kept",
+       [](Case& c) {
+         c.attempt(true, "given", 0, 0);
+         c.attempt(false, "refinement", 1.4, 0.2).kept = true;
+       },
+       good},
+      {"never a calibration", [](Case& c) { c.attempt(false, "from_scratch", 0, 0.9); }, care,
+       "no calibration was found", "near and far"},
+      {"never an attempt", [](Case& c) { c.calibration()["accepted"] = 0; }, care,
+       "no calibration was found"},
+      {"waited for the first confirmation",
+       [](Case& c) {
+         c.session.reasons.emplace_back("unverified_calibration");
+         c.frames_of(400, 0);
+         c.analysis.waited = 400, c.analysis.confirmed_s = 20;
+         c.analysis.by_reason = c.analysis.waited_by_reason = {0, 400};
+         c.attempt(true, "given", 0, 0);
+         c.calibration()["verified"] = true;
+       },
+       good},
+      {"not verified",
+       [](Case& c) { c.attempt(true, "given", 0, 0), c.calibration()["verified"] = false; }, care,
+       "has not confirmed its calibration", "near things at the roadside"},
+      {"not verified at the end",
+       [](Case& c) {
+         c.attempt(true, "given", 0, 0), c.calibration()["verified"] = false;
+         c.analysis.confirmed_s = 20;
+       },
+       care, "at the end is not verified"},
+      {"nothing watched",
+       [](Case& c) {
+         c.attempt(true, "given", 0, 0), c.calibration()["verified"] = false;
+         c.calibration()["online"] = false;
+       },
+       care, "nothing watched it"},
+      {"torn, waited in vain",
+       [](Case& c) {
+         c.session.summary = nullptr, c.attempt(true, "given", 0, 0);
+         c.frames_of(1000, 0), c.analysis.waited = 1000;
+       },
+       bad, "has not confirmed its calibration"},
+      {"contradicted",
+       [](Case& c) {
+         c.attempt(true, "given", 0, 0);
+         c.event(1, "calibration_contradicted", "its depths are off by 6.1 %");
+       },
+       care, "", "off by 6.1 %"},
+      {"another focal length",
+       [](Case& c) {
+         c.calibration()["focal_length"] = {{"given_px", 898.6},
+                                            {"measured_px", 711.2},
+                                            {"sigma_px", 12.0},
+                                            {"contradicted", true}};
+       },
+       bad, "711 ± 12", "--focal"},
+      {"inverted transform", [](Case& c) { c.calibration()["mistake"] = "rotation_transposed"; },
+       care, "T_camera_left is inverted", "R transposed"},
+      {"scale of the INS, calibration not kept",
+       [](Case& c) {
+         c.event(1, "scale_disagrees", "90.0 % longer"),
+             c.event(2, "calibration_not_kept", "no room");
+       },
+       care, "lengths disagree", "no room"},
+      {"torn",
+       [](Case& c) {
+         c.session.summary = nullptr, c.session.missing = {"summary.json is missing"};
+       },
+       care, "not whole", "not closed"},
+      {"slow",
+       [](Case& c) {
+         for (std::size_t i = 0; i < 20; ++i) c.session.frames[i].estimate_ms = 80;
+       },
+       good, "", "frame interval"},
+      {"allocations", [](Case& c) { c.session.summary["allocations_after_seal"] = 3; }, good, "",
+       "Memory was taken 3 times"},
+      {"lines dropped",
+       [](Case& c) {
+         c.session.summary["drops"] = {{"lines", 4}};
+       },
+       care, "4 lines"},
+      // Outages
+      {"a camera that never came back",
+       [](Case& c) { c.event(49.96, "camera_gone", "camera 1 is gone; check it"); }, bad,
+       "no frame after 50.0 s: camera 1 was gone", "Camera 1 was gone from 50.0 s on, to the end"},
+      {"a board that never came back", [](Case& c) { c.event(49.96, "board_gone", "x"); }, bad,
+       "the trigger board was gone"},
+      {"a camera that the others drove on without",
+       [](Case& c) { c.event(30, "camera_gone", "camera 1 is gone"); }, care,
+       "camera 1 was gone from 30.0 s to the end"},
+      {"a loose cable",
+       [](Case& c) {
+         for (int i = 0; i < 50; ++i)
+           c.event(10 + 0.6 * i, "camera_gone", "camera 0 is gone"),
+               c.event(10.3 + 0.6 * i, "camera_back", "camera 0 is back");
+       },
+       good, "", "Camera 0 was gone 50 times for 15.0 s"},
+      {"a hole breaks the way, so that lengths say nothing",
+       [](Case& c) {
+         c.analysis.scale = 1.045;
+         for (std::size_t i = 400; i < 800; ++i) c.session.frames[i].posed = false;
+         c.event(20, "camera_gone", "camera 0 is gone"),
+             c.event(40, "camera_back", "camera 0 is back");
+       },
+       care, "camera 0 was gone for 20.0 s"},
+      {"a short outage leaves lengths to be judged",
+       [](Case& c) {
+         c.analysis.scale = 1.045;
+         c.event(20, "camera_gone", "camera 0 is gone"),
+             c.event(23, "camera_back", "camera 0 is back");
+       },
+       care, "lengths come out", "Lengths disagree"},
+      {"an outage after the frames that are read",
+       [](Case& c) {
+         c.session.left_out = {"poses.csv has more lines"};
+         c.event(70, "camera_gone", "camera 0 is gone");
+       },
+       care, "longer than the report reads"},
+  };
+  for (const Row& row : rows) {
+    SCOPED_TRACE(row.name);
     Case c;
-    c.analysis.drift = drift;
-    EXPECT_EQ(c.verdict().grade, grade) << drift;
+    row.change(c);
+    const Verdict v = judge(c.session, c.analysis);
+    EXPECT_EQ(v.grade, row.grade) << v.sentence;
+    EXPECT_TRUE(row.reason.empty() || any_has(v.reasons, row.reason)) << v.sentence;
+    EXPECT_TRUE(row.advice.empty() || any_has(v.advice, row.advice))
+        << (v.advice.empty() ? "" : v.advice.front());
+    if (row.grade == good && row.advice.empty()) {
+      EXPECT_TRUE(v.reasons.empty() && v.advice.empty());
+    }
   }
-  Case c;
-  c.analysis.scale = 0.96;  // reference = 0.96 of ours
-  EXPECT_EQ(c.verdict().grade, Grade::care);
-  EXPECT_TRUE(any_has(c.verdict().reasons, "too long"));
 }
 
-TEST(Verdict, lostFramesAndNoPosesAtAll) {
-  Case c;
-  c.analysis.ok = 950, c.analysis.lost = 50;
-  EXPECT_EQ(c.verdict().grade, Grade::care);
-  c.analysis.ok = 800, c.analysis.lost = 200;
-  EXPECT_EQ(c.verdict().grade, Grade::bad);
-  for (Frame& f : c.session.frames) f.posed = false;
-  EXPECT_TRUE(any_has(c.verdict().reasons, "never was a pose"));
-  EXPECT_EQ(judge(Session{}, analyse(Session{})).grade, Grade::bad);
+TEST(Verdict, WorstReasonComesFirstAndTheFirstToGiveUpStands) {
+  Findings f;
+  f.find(care, "first");
+  f.find(bad, "worst");
+  f.find(care, "second");
+  f.give_up("the lens is another", "Calibrate it.");
+  f.give_up("no pose is ok", "");
+  const Verdict v = f.verdict();
+  EXPECT_EQ(v.grade, bad);
+  EXPECT_EQ(v.reasons, (std::vector<std::string>{"worst", "first", "second"}));
+  EXPECT_EQ(v.main_reason, "the lens is another. Calibrate it.");
+  EXPECT_FALSE(v.usable);
+  EXPECT_EQ(judge(Session{}, analyse(Session{})).grade, bad);
 }
 
-TEST(Verdict, theWorstReasonComesFirst) {
-  Case c;
-  c.analysis.ok = 950, c.analysis.lost = 50;
-  c.session.summary["calibration"]["word"] = "recalibrate";
-  const Verdict v = c.verdict();
-  EXPECT_EQ(v.grade, Grade::bad);
-  ASSERT_EQ(v.reasons.size(), 2U);
-  EXPECT_NE(v.reasons[0].find("calibration"), std::string::npos);
-}
-
-TEST(Verdict, everyReasonOfAPoseHasItsAdvice) {
-  Event changed;
-  changed.kind = "rig_changed";
+TEST(Verdict, EveryReasonOfAPoseHasAdvice) {
   for (int i = 1; i <= static_cast<int>(Reason::unproven_pairing); ++i) {
     Case c;
     c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
     c.analysis.by_reason = {0, 3};
-    c.session.events.push_back(changed);
-    EXPECT_TRUE(any_has(c.verdict().advice, "3 frames")) << c.session.reasons.back();
+    c.event(1, "rig_changed");
+    EXPECT_TRUE(any_has(judge(c.session, c.analysis).advice, "3 frames"))
+        << c.session.reasons.back();
+    c.session.events.clear();
+    if (static_cast<Reason>(i) == Reason::recalibrating) {
+      EXPECT_FALSE(any_has(judge(c.session, c.analysis).advice, "knocked")) << "a passing doubt";
+    }
   }
 }
 
-CalibrationRow attempt(bool accepted, const char* cause, double before_px, double after_px) {
-  CalibrationRow row;
-  row.accepted = accepted;
-  row.decided = true;
-  row.cause = cause;
-  row.reason = accepted ? "" : "it is worse";
-  row.held_out_before_px = before_px;
-  row.held_out_after_px = after_px;
-  return row;
+TEST(Outages, BeginAndEndByDevice) {
+  const std::vector<Event> events{{at(1), "camera_back", "camera 3 is back"},
+                                  {at(2), "camera_gone", "camera 0 is gone"},
+                                  {at(3), "camera_gone", "camera 1 is gone"},
+                                  {at(4), "camera_back", "camera 0 is back"},
+                                  {at(5), "state", ""},
+                                  {at(6), "camera_gone", ""}};
+  const auto outages = outages_of(events);
+  ASSERT_EQ(outages.size(), 3U);
+  EXPECT_EQ(outages[0].device, "camera 0");
+  EXPECT_EQ(outages[0].to, at(4));
+  EXPECT_EQ(outages[1].device, "camera 1");
+  EXPECT_FALSE(outages[1].to);
+  EXPECT_EQ(outages[2].device, "a camera");
 }
 
-TEST(Verdict, aWeakCalibrationSaysWhatWouldHelp) {
-  Case c;
-  c.session.summary["calibration"] = {{"word", "recalibrate"}, {"limited_by", "intrinsics"}};
-  EXPECT_TRUE(any_has(c.verdict().advice, "driving on does not help"));
-  c.session.summary["calibration"]["limited_by"] = "noise";
-  EXPECT_TRUE(any_has(c.verdict().advice, "near and far structure"));
+/// Frames that are all degraded for one reason, the last `lost` of them without a pose.
+Session degraded_drive(std::size_t frames, const char* reason, std::size_t lost = 0) {
+  Session s;
+  s.reasons = {"", reason};
+  for (std::size_t i = 0; i < frames; ++i) {
+    Frame f;
+    f.stamp = at(0.1 * static_cast<double>(i));
+    f.posed = i + lost < frames;
+    f.status = f.posed ? PoseStatus::degraded : PoseStatus::lost;
+    f.reason = 1;
+    s.frames.push_back(f);
+  }
+  s.summary = nlohmann::json::object();
+  return s;
 }
 
-TEST(Verdict, aShortBaselineIsJudgedWhereItCanSee) {
-  Case c;
-  c.session.summary["calibration"]["word"] = "recalibrate";
-  c.session.calibrations = {attempt(true, "refinement", 1, 0.2)};
-  EXPECT_EQ(c.verdict().grade, Grade::bad);
-  c.session.calibrations.back().judged_depth_m = 2.4;
-  c.session.calibrations.back().depth_sigma_percent = 1.0;
-  EXPECT_EQ(c.verdict().grade, Grade::care);
-  EXPECT_TRUE(any_has(c.verdict().reasons, "1.0 % at 2.4 m"));
-  c.session.calibrations.back().depth_sigma_percent = 3.0;
-  EXPECT_EQ(c.verdict().grade, Grade::bad);
+TEST(Usability, OfDrivesWithoutAnOkFrame) {
+  struct Drive {
+    Session session;
+    bool usable;
+    std::string main_reason;
+  };
+  std::vector<Drive> drives{
+      {degraded_drive(100, "few_inliers"), false, "few_inliers (100 of 100 frames)"},
+      {degraded_drive(30, "few_inliers"), false, "few_inliers"},
+      {degraded_drive(40, "cameras_swapped", 40), false, "there never was a pose: cameras_swapped"},
+      {degraded_drive(30, "unverified_calibration", 10), false, ""},
+  };
+  for (const char* waits : {"unverified_calibration", "uncalibrated", "unconfirmed"}) {
+    drives.push_back({degraded_drive(kFramesToConfirm - 1, waits), true, ""});
+    drives.push_back({degraded_drive(kFramesToConfirm, waits), false, waits});
+  }
+  // Why no calibration was found is the main reason.
+  drives.push_back({degraded_drive(100, "uncalibrated"), false, "the right camera is on the left"});
+  CalibrationRow rejected;
+  rejected.reason = "the right camera is on the left";
+  drives.back().session.calibrations = {rejected};
+  // Frames that stand still confirm nothing: fifty moved.
+  drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
+  drives.back().session.summary = {{"calibration", {{"baseline_m", 0.5}}}};
+  for (std::size_t i = 50; i < 100; ++i)
+    drives.back().session.frames[i].T_world_left.t.z() = 0.2 * static_cast<double>(i - 50);
+  // Frames that were not read are the reason where they are most.
+  drives.push_back({degraded_drive(1, "unverified_calibration"), false, "image_torn (99 of 100"});
+  drives.back().session.summary = {{"frames", {{"skipped", 99}}}};
+  for (int i = 0; i < 99; ++i) drives.back().session.events.push_back({Stamp(i), "image_torn", ""});
+  // One ok frame, or statuses that are not known.
+  drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
+  drives.back().session.frames.back().status = PoseStatus::ok;
+  drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
+  for (Frame& f : drives.back().session.frames) f.status.reset();
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const Verdict v = judge(drives[i].session, analyse(drives[i].session));
+    EXPECT_EQ(v.usable, drives[i].usable) << i;
+    EXPECT_NE(v.main_reason.find(drives[i].main_reason), std::string::npos)
+        << i << ": " << v.main_reason;
+  }
 }
 
-TEST(Verdict, aKnockThatWasMendedIsAdviceAndNoGrade) {
-  Case c;
-  c.session.calibrations = {attempt(true, "knock", 1.4, 0.2)};
-  const Verdict v = c.verdict();
-  EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_TRUE(any_has(v.advice, "knocked"));
+/// 8 × 6 cells of 100 matches whose distances are `middle` px at the centre and grow with the
+/// square of the radius to `corner`.
+void add_field(bool at_the_end, double middle, double corner, double scatter, Session* s) {
+  for (int i = 0; i < 48; ++i) {
+    ResidualRow r;
+    r.at_the_end = at_the_end;
+    r.width = 80, r.height = 80, r.left = i % 8 * 80.0, r.top = i / 8 * 80.0;
+    const double radius = std::hypot(r.left + 40 - 320, r.top + 40 - 240) / std::hypot(320, 240);
+    r.mean_px = (i % 2 == 0 ? 1 : -1) * (middle + (corner - middle) * radius * radius);
+    r.matches = 100, r.scatter_px = scatter;
+    s->residuals.push_back(r);
+  }
 }
 
-TEST(Verdict, aRejectedCalibrationIsADoubtUnlessTheOneInUseFitsAsWell) {
-  Case c;
-  c.session.calibrations = {attempt(true, "from_scratch", 0, 0.2),
-                            attempt(false, "drift", 1.4, 0.2)};
-  EXPECT_EQ(c.verdict().grade, Grade::care);
-  EXPECT_TRUE(any_has(c.verdict().advice, "it is worse"));
-  c.session.calibrations.back() = attempt(false, "requested", 0.2, 0.2);
-  EXPECT_EQ(c.verdict().grade, Grade::good);
+TEST(FitPattern, GrowsTowardsTheEdges) {
+  const auto pattern = [](double middle, double corner, double scatter) {
+    Session s;
+    add_field(true, middle, corner, scatter, &s);
+    EXPECT_EQ(fit_of(s, false).pattern, FitPattern::unknown);
+    return fit_of(s, true).pattern;
+  };
+  EXPECT_EQ(pattern(0.1, 0.4, 0.3), FitPattern::fine);
+  EXPECT_EQ(pattern(0.5, 3, 0.3), FitPattern::turned) << "near and far points alike";
+  EXPECT_EQ(pattern(0.5, 3, 0.7), FitPattern::lens);
+  EXPECT_EQ(pattern(3, 3, 0.7), FitPattern::fine) << "the same everywhere is no lens";
+  Session few;
+  add_field(true, 0.5, 3, 0.7, &few);
+  for (ResidualRow& r : few.residuals) r.matches = 3;
+  EXPECT_EQ(fit_of(few, true).pattern, FitPattern::unknown);
 }
 
-TEST(Verdict, aDriveThatWasNotPlacedWithItsInsSaysSoAndNotThatThereWasNone) {
-  Case c;
-  c.analysis.source = ErrorSource::none;
-  c.analysis.ins_unplaced = true;
-  const Verdict v = c.verdict();
-  EXPECT_TRUE(any_has(v.reasons, "was not placed on the earth"));
-  EXPECT_FALSE(any_has(v.reasons, "no reference"));
-  EXPECT_TRUE(any_has(v.advice, "comparison.placement_m"));
+TEST(FitPattern, WrongLensIsNotUsableUntilTheDriveHasFoundIt) {
+  for (const bool at_the_end : {true, false}) {
+    Case c;
+    c.calibration()["verified"] = !at_the_end;
+    add_field(at_the_end, 0.5, 3, 0.7, &c.session);
+    if (!at_the_end) add_field(true, 0.03, 0.05, 0.25, &c.session);
+    const Verdict v = judge(c.session, c.analysis);
+    EXPECT_EQ(v.grade, at_the_end ? bad : care);
+    EXPECT_EQ(v.usable, !at_the_end);
+    EXPECT_TRUE(any_has(v.reasons, at_the_end ? ": the lens" : "the lens numbers given are wrong"));
+  }
 }
 
-TEST(Verdict, aMeasurementThatWasNotTakenIsNoRejection) {
-  Case c;
-  c.session.calibrations = {attempt(true, "given", 0, 0), attempt(false, "refinement", 1.4, 0.2)};
-  c.session.calibrations.back().kept = true;
-  EXPECT_EQ(c.verdict().grade, Grade::good);
-}
-
-TEST(Verdict, theWaitForTheFirstConfirmationIsNotHeldAgainstTheDrive) {
-  Case c;
-  c.session.reasons.emplace_back("unverified_calibration");
-  c.analysis.ok = 600, c.analysis.degraded = 400;
-  c.analysis.by_reason = {0, 400}, c.analysis.waited_by_reason = {0, 400};
-  c.analysis.waited = 400;
-  c.analysis.confirmed_s = 20;
-  c.session.calibrations = {attempt(true, "given", 0, 0)};
-  c.session.summary["calibration"]["verified"] = true;
-  const Verdict v = c.verdict();
-  EXPECT_EQ(v.grade, Grade::good);
-  EXPECT_TRUE(v.advice.empty());
-  EXPECT_NE(v.sentence.find("400 before the drive had confirmed"), std::string::npos);
-}
-
-TEST(Verdict, aDriveThatEndsWithoutVerificationSaysWhatWouldHelp) {
-  Case c;
-  c.session.calibrations = {attempt(true, "given", 0, 0)};
-  c.session.summary["calibration"]["verified"] = false;
-  EXPECT_EQ(c.verdict().grade, Grade::care);
-  EXPECT_TRUE(any_has(c.verdict().reasons, "has not confirmed its calibration"));
-  for (const char* help : {"turns", "near things at the roadside", "corners of the image"})
-    EXPECT_TRUE(any_has(c.verdict().advice, help));
-  c.analysis.confirmed_s = 20;
-  EXPECT_TRUE(any_has(c.verdict().reasons, "at the end is not verified"));
-  c.session.summary["calibration"]["online"] = false;
-  EXPECT_TRUE(any_has(c.verdict().reasons, "is not verified, nothing watched it"));
-}
-
-TEST(Verdict, aTornSessionThatWaitedInVainSaysSo) {
-  Case c;
-  c.session.summary = nullptr;
-  c.session.calibrations = {attempt(true, "given", 0, 0)};
-  EXPECT_FALSE(any_has(c.verdict().reasons, "confirmed"));
-  c.analysis.degraded = c.analysis.waited = 1000, c.analysis.ok = 0;
-  EXPECT_TRUE(any_has(c.verdict().reasons, "has not confirmed its calibration"));
-}
-
-TEST(Verdict, aContradictedCalibrationIsTold) {
-  Case c;
-  c.session.calibrations = {attempt(true, "given", 0, 0)};
-  c.session.events = {
-      {Stamp(), "calibration_contradicted",
-       "the calibration in use is not that of the rig: its depths are off by 6.1 %"}};
-  EXPECT_TRUE(any_has(c.verdict().advice, "off by 6.1 %"));
-}
-
-TEST(Verdict, aFocalLengthThatTheDriveContradictsMakesItUseless) {
-  Case c;
-  auto& focal = c.session.summary["calibration"]["focal_length"];
-  focal = {{"given_px", 898.6}, {"measured_px", 711.2}, {"sigma_px", 12.0}};
-  focal["contradicted"] = false;
-  EXPECT_EQ(c.verdict().grade, Grade::good);
-  focal["contradicted"] = true;
-  Verdict v = c.verdict();
-  EXPECT_EQ(v.grade, Grade::bad);
-  EXPECT_FALSE(v.usable);
-  EXPECT_TRUE(
-      any_has(v.reasons, "899 px, is not that of these images: the drive measures 711 ± 12"));
-  EXPECT_TRUE(any_has(v.advice, "--focal"));
-  focal["sigma_px"] = 0.0;
-  v = c.verdict();
-  EXPECT_TRUE(any_has(v.reasons, "the drive measures 711 px or still farther from it"));
-}
-
-TEST(Verdict, neverACalibrationSaysHowToGetOne) {
-  Case c;
-  c.session.calibrations = {attempt(false, "from_scratch", 0, 0.9)};
-  const Verdict v = c.verdict();
-  EXPECT_EQ(v.grade, Grade::care);
-  EXPECT_TRUE(any_has(v.reasons, "no calibration was found"));
-  EXPECT_TRUE(any_has(v.advice, "near and far"));
-  c.session.calibrations.clear();
-  EXPECT_EQ(c.verdict().grade, Grade::good) << "nothing is known of it";
-  c.session.summary["calibration"]["accepted"] = 0;
-  EXPECT_TRUE(any_has(c.verdict().reasons, "no calibration was found"));
-}
-
-TEST(Verdict, aScaleThatDisagreesAndACalibrationThatWasNotKeptAreTold) {
-  Case c;
-  c.session.events = {
-      {Stamp(), "scale_disagrees", "the distance travelled comes out 90.0 % longer"},
-      {Stamp(), "calibration_not_kept", "no room"}};
-  c.session.calibrations = {attempt(true, "from_scratch", 0, 0.2)};
-  const Verdict v = c.verdict();
-  EXPECT_EQ(v.grade, Grade::care);
-  EXPECT_TRUE(any_has(v.advice, "90.0 % longer"));
-  EXPECT_TRUE(any_has(v.advice, "no room"));
-}
-
-TEST(Verdict, aTornSessionSaysHowToCloseOne) {
-  Case c;
-  c.session.summary = nullptr;
-  c.session.missing = {"summary.json is missing"};
-  const Verdict v = c.verdict();
-  EXPECT_EQ(v.grade, Grade::care);
-  EXPECT_TRUE(any_has(v.advice, "not closed"));
-}
-
-TEST(Verdict, slowFramesAndAllocationsGiveAdvice) {
-  Case c;
-  for (std::size_t i = 0; i < 20; ++i) c.session.frames[i].estimate_ms = 80;
-  c.session.summary["allocations_after_seal"] = 3;
-  c.session.summary["drops"] = {{"lines", 4}};
-  const Verdict v = c.verdict();
-  EXPECT_TRUE(any_has(v.advice, "frame interval"));
-  EXPECT_TRUE(any_has(v.advice, "Memory was taken 3 times"));
-  EXPECT_TRUE(any_has(v.reasons, "4 lines"));
+TEST(ClosingLines, HaveTheWorstReasonTheAdviceAndTheFile) {
+  ReportOutcome o;
+  o.page = "monday/report.html";
+  o.grade = "Usable with care";
+  o.reasons = {"it drifts by 3.0 %", "it can be improved"};
+  o.advice = {"Drive turns."};
+  auto lines = closing_lines(o, "");
+  EXPECT_EQ(lines[0], "verdict: Usable with care: it drifts by 3.0 % (and 1 more in the report)");
+  EXPECT_EQ(lines[1], "to do: Drive turns.");
+  EXPECT_EQ(lines[2], "report: monday/report.html");
+  o.usable = false;
+  o.main_reason = "swapped (24 of 24 frames)";
+  EXPECT_EQ(closing_lines(o, "")[0], "verdict: do not use these poses: swapped (24 of 24 frames)");
+  EXPECT_EQ(closing_lines({}, "monday: the disk is full")[2], "report: monday: the disk is full");
 }
 
 }  // namespace
