@@ -5,7 +5,7 @@
 #include "app/command_line/checkerboard_tool.hpp"
 #include "app/commands/commands.hpp"
 #include "app/datasets/sequence_format.hpp"
-#include "app/session/calibrate_drive.hpp"
+#include "app/session/drive_calibration.hpp"
 
 namespace vergence::app {
 namespace {

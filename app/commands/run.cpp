@@ -6,7 +6,7 @@
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/publish/publish.hpp"
-#include "app/session/live_session.hpp"
+#include "app/session/live_source.hpp"
 
 namespace vergence::app {
 namespace {

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "app/config/detail/schema_groups.hpp"
-#include "app/runtime/cpu_list.hpp"
+#include "app/runtime/realtime.hpp"
 
 namespace vergence::app {
 

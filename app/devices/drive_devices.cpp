@@ -7,7 +7,7 @@
 
 #include "app/devices/device_sentences.hpp"
 #include "app/devices/drive_sync.hpp"
-#include "app/devices/exposure_settings.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "app/devices/simulated_board.hpp"
 #include "app/devices/simulated_ins.hpp"
 #include "app/devices/software_trigger.hpp"

@@ -6,9 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "app/devices/comparison_settings.hpp"
 #include "app/devices/drive_sync.hpp"
-#include "app/devices/exposure_settings.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 

@@ -1,6 +1,7 @@
 #include "app/devices/rig_settings.hpp"
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <string>
 
@@ -107,6 +108,61 @@ RigCalibration nominal_rig(const Configuration& c) {
   if (const auto bad = find_implausible(&rig))
     throw InputError("mock.calibration_error and intrinsics_error: " + bad->sentence);
   return rig;
+}
+
+namespace {
+
+Vec3 vec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace
+
+ComparisonOptions comparison_options(const Configuration& c) {
+  ComparisonOptions o;
+  o.T_ins_left =
+      mount_of(vec3(c.ins.lever_arm_m), vec3(c.ins.boresight_deg) * (std::numbers::pi / 180));
+  o.placement_m = c.comparison.placement_m;
+  o.correlation_s = c.comparison.correlation_s;
+  o.heading_sigma_rad = c.comparison.heading_sigma_deg * (std::numbers::pi / 180);
+  o.max_gap = Duration::seconds(c.comparison.max_gap_ms * 1e-3);
+  o.max_wait = Duration::seconds(c.comparison.max_wait_ms * 1e-3);
+  if (c.ins.driver == "nmea" || c.ins.driver == "ubx") {  // readings 0.1 to 1 s apart
+    o.max_gap = std::max(o.max_gap, Duration::seconds(1.5 / c.ins.rate));
+    o.max_wait = std::max(o.max_wait, Duration::seconds(0.5 + 1.5 / c.ins.rate));
+  }
+  o.jump_m = c.comparison.jump_m;
+  o.scale_tolerance = c.comparison.scale_tolerance;
+  if (const char* sentence = o.validate()) throw InputError(std::string("comparison: ") + sentence);
+  return o;
+}
+
+namespace {
+
+Duration microseconds(double us) { return Duration::seconds(us * 1e-6); }
+
+}  // namespace
+
+bool exposes_by_itself(const Configuration& c) { return c.exposure.mode != 0; }
+
+exposure::ExposureOptions exposure_options(const Configuration& c) {
+  exposure::ExposureOptions o;
+  o.target = c.exposure.target;
+  o.may_saturate = 0.01 * c.exposure.saturated_percent;
+  o.least = microseconds(c.exposure.min_us);
+  o.most = microseconds(c.exposure.max_us);
+  o.most_gain_db = c.exposure.max_gain_db;
+  o.settle_frames = c.exposure.settle_frames;
+  if (const char* sentence = o.validate()) throw InputError(std::string("exposure: ") + sentence);
+  if (c.exposure.max_us * 1e-6 * c.trigger.rate > 1)
+    throw InputError(fmt::format(
+        "exposure.max_us is {}, longer than the {:.0f} µs between two pulses (trigger.rate {})",
+        c.exposure.max_us, 1e6 / c.trigger.rate, c.trigger.rate));
+  return o;
+}
+
+ExposureSetting starting_exposure(const Configuration& c, std::size_t k) {
+  const CameraSettings& camera = c.cameras[exposes_by_itself(c) ? 0 : k];
+  const ExposureSetting own{microseconds(camera.exposure_us), camera.gain_db};
+  return exposes_by_itself(c) ? exposure::within(exposure_options(c), own) : own;
 }
 
 }  // namespace vergence::app

@@ -1,6 +1,11 @@
 #pragma once
+#include <cstddef>
+
 #include "app/config/configuration.hpp"
+#include "core/comparison/comparison.hpp"
 #include "core/types/calibration.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/exposure/exposure_controller.hpp"
 
 /// The rig that a configuration describes. InputError names the key.
 namespace vergence::app {
@@ -17,5 +22,19 @@ namespace vergence::app {
 /// `mock.intrinsics_error` and `mock.calibration_error`. `baseline` is the length that somebody
 /// measured.
 [[nodiscard]] RigCalibration nominal_rig(const Configuration& configuration);
+
+/// `comparison:`, and the INS's mount of `ins:`, as the comparison takes them. InputError: what
+/// does not go together.
+[[nodiscard]] ComparisonOptions comparison_options(const Configuration& configuration);
+
+/// `exposure.mode: auto`.
+[[nodiscard]] bool exposes_by_itself(const Configuration& configuration);
+
+/// `exposure:` as the controller takes it. InputError names the keys that do not go together.
+[[nodiscard]] exposure::ExposureOptions exposure_options(const Configuration& configuration);
+
+/// What camera k begins with: its own; where exposures are controlled camera 0's, inside the
+/// bounds, for all alike.
+[[nodiscard]] ExposureSetting starting_exposure(const Configuration& configuration, std::size_t k);
 
 }  // namespace vergence::app

@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <string>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/publish/page_html.hpp"
+#include "app/publish/page_parts.hpp"  // made by CMake from app/publish/page/
+#include "app/report/style.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -175,6 +177,16 @@ void LivePage::act(HttpRoute route) noexcept {
   if (route == HttpRoute::recalibrate) requests_->recalibrate.store(true, kOrder);
   if (route == HttpRoute::mark) requests_->mark.store(true, kOrder);
   if (route == HttpRoute::stop_recording) requests_->stop_recording.store(true, kOrder);
+}
+
+std::string_view page_html() {
+  static const std::string page =
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+      "<link rel=\"icon\" href=\"data:,\"><title>vergence</title><style>" +
+      report::palette() + kPageCss + "</style></head>" + kPageBody + "<script>" + kPageScript +
+      "</script></html>\n";
+  return page;
 }
 
 }  // namespace vergence::app

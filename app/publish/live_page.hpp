@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "app/publish/http_server.hpp"
-#include "app/publish/live_frame_builder.hpp"
 #include "app/publish/live_images.hpp"
 #include "app/publish/live_state.hpp"
 #include "app/session/session_observer.hpp"
@@ -95,5 +94,9 @@ class LivePage final : public SessionObserver {
   Clock::time_point shown_{};
   std::thread thread_;
 };
+
+/// The live page: HTML, style sheet and script in one, from app/publish/page/. Lives as long as
+/// the program.
+[[nodiscard]] std::string_view page_html();
 
 }  // namespace vergence::app

@@ -15,10 +15,8 @@
 #include <fmt/format.h>
 
 #include "app/datasets/trajectory_files.hpp"
-#include "app/recorder/calibration_line.hpp"
-#include "app/recorder/event_line.hpp"
 #include "app/recorder/line_file.hpp"
-#include "app/recorder/pose_line.hpp"
+#include "app/recorder/record_lines.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/memory/allocation_guard.hpp"
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/recording/byte_writer.hpp"
+#include "app/recording/cdr_writer.hpp"
 #include "app/recording/disk.hpp"
 
 namespace vergence::app {

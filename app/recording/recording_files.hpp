@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "app/recording/mcap_file.hpp"
-#include "app/recording/ros_types.hpp"
+#include "app/recording/messages.hpp"
 #include "core/memory/ring.hpp"
 #include "core/types/time.hpp"
 

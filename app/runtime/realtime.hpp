@@ -8,9 +8,25 @@
 #include <string_view>
 #include <vector>
 
-#include "app/runtime/process_threads.hpp"
-
 namespace vergence::app {
+
+/// Processors as taskset(1) has them, `0-1,3`. Nothing: another text, an empty one, or a number
+/// beyond CPU_SETSIZE.
+[[nodiscard]] std::optional<cpu_set_t> parse_cpu_list(std::string_view text) noexcept;
+
+/// A thread of this program, as the kernel lists it.
+struct ProcessThread {
+  pid_t id = 0;
+  std::string name{};  // at most 15 bytes: what pthread_setname_np gave it, else the creator's
+
+  /// One of ours that has its name; what a library starts is called otherwise.
+  [[nodiscard]] bool ours() const noexcept { return name.starts_with("vergence"); }
+};
+
+/// All threads of this program into `threads`, by /proc/self/task; none where there is none such. A
+/// thread that has just begun may still have its creator's name. Memory: of the vector alone, where
+/// it grows.
+void process_threads(std::vector<ProcessThread>* threads);
 
 /// How urgent a thread is, by its name (docs/realtime.md has the table).
 enum class ThreadRole : std::uint8_t {

@@ -1,4 +1,5 @@
 #pragma once
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -6,6 +7,7 @@
 
 #include "app/config/configuration.hpp"
 #include "app/datasets/stereo_sequence.hpp"
+#include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/session/starting_calibration.hpp"
@@ -60,5 +62,28 @@ struct DrivePass {
 /// What was found as lines for the terminal: each parameter with its sigma, the depth error, how
 /// far the stretches agree.
 [[nodiscard]] std::string describe(const DriveCalibration& found);
+
+/// `vergence calibrate --drive`: an ordinary recorded drive instead of a board.
+struct DriveCalibrationRequest {
+  std::filesystem::path data;
+  SequenceFormat format = SequenceFormat::kitti;
+  BagTopics topics{};                      // of a bag
+  std::filesystem::path out;               // calibration.yaml to write
+  std::optional<std::string> calibration;  // lenses and length to begin with, of any program
+  std::optional<double> baseline;          // m: instead of the file's
+  Configuration configuration;
+  bool quiet = false;
+};
+
+/// Calibrates, writes the file and prints what was found on standard output.
+/// → done, not_usable (nothing was found, or the depth is not known well enough)
+/// Errors  InputError: data, calibration, a file that cannot be written.
+///
+///     DriveCalibrationRequest request;
+///     request.data = "MH_01_easy";
+///     request.format = SequenceFormat::euroc;
+///     request.out = "calibration.yaml";
+///     const ExitCode code = calibrate_from_drive(request);
+[[nodiscard]] ExitCode calibrate_from_drive(const DriveCalibrationRequest& request);
 
 }  // namespace vergence::app

@@ -5,8 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "app/runtime/cpu_list.hpp"
-#include "app/runtime/process_threads.hpp"
+#include "app/runtime/realtime.hpp"
 #include "core/memory/thread_allocations.hpp"
 
 namespace vergence::app {

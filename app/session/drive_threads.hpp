@@ -5,7 +5,6 @@
 
 #include "app/config/configuration.hpp"
 #include "app/recorder/summary.hpp"
-#include "app/runtime/process_threads.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/realtime.hpp"
 

@@ -11,7 +11,7 @@
 #include "app/session/frame_source.hpp"
 #include "app/session/ins_comparison.hpp"
 #include "app/session/memory_figures.hpp"
-#include "app/session/session_output.hpp"
+#include "app/session/session_observer.hpp"
 #include "app/session/session_runner.hpp"
 #include "app/session/solver_watch.hpp"
 #include "core/estimator/estimator.hpp"

@@ -5,7 +5,7 @@
 
 #include "app/recorder/match_sample.hpp"
 #include "app/runtime/progress.hpp"
-#include "app/session/session_output.hpp"
+#include "app/session/session_observer.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/memory/ring.hpp"
 

@@ -9,7 +9,7 @@
 #include "app/recorder/earth_figures.hpp"
 #include "app/session/event_log.hpp"
 #include "app/session/ins_events.hpp"
-#include "app/session/session_output.hpp"
+#include "app/session/session_observer.hpp"
 #include "core/comparison/comparison.hpp"
 
 namespace vergence::app {

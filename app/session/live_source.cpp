@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <memory>
 #include <string_view>
 #include <utility>
 
@@ -10,10 +11,10 @@
 
 #include "app/datasets/decimal.hpp"
 #include "app/devices/camera_masks.hpp"
-#include "app/devices/comparison_settings.hpp"
 #include "app/devices/drive_sync.hpp"
-#include "app/devices/exposure_settings.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "app/recorder/line_file.hpp"
+#include "app/runtime/errors.hpp"
 #include "app/session/session_files.hpp"
 #include "drivers/clock.hpp"
 
@@ -324,6 +325,19 @@ std::optional<ExitCode> LiveSource::verdict(Progress* progress) const {
   progress->say(fmt::format("vergence: camera {} was gone at the end; check its cable and power",
                             fmt::join(acquisition_->missing(), ", ")));
   return ExitCode::device_failed;
+}
+
+ExitCode run_drive(const RunRequest& request) {
+  const SignalGuard signals;  // before a mock's world is built, which takes seconds
+  try {
+    const auto source = in_words([&] { return std::make_unique<LiveSource>(request); });
+    if (const auto stopped = signals.stop_code()) return *stopped;  // devices are opened in seconds
+    return run_session(*source, request.configuration, request.session, signals);
+  } catch (const DeviceError&) {
+    // Who has stopped it does not miss the device.
+    if (const auto stopped = signals.stop_code()) return *stopped;
+    throw;
+  }
 }
 
 }  // namespace vergence::app

@@ -5,14 +5,27 @@
 #include <string>
 #include <vector>
 
+#include "app/config/configuration.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/exposure_control.hpp"
+#include "app/runtime/errors.hpp"
 #include "app/session/frame_source.hpp"
-#include "app/session/live_session.hpp"
+#include "app/session/session_runner.hpp"
+#include "app/session/starting_calibration.hpp"
 #include "app/session/timing_monitor.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 
 namespace vergence::app {
+
+/// What a drive is to do.
+struct RunRequest {
+  SessionOptions session{};
+  Configuration configuration;
+  CalibrationSource calibration{};   // --from-scratch, --calibration
+  std::vector<std::string> faults;   // of the command line, beside the configuration's
+  std::optional<double> duration_s;  // all of the drive when not set
+  bool fast = false;                 // virtual time: nothing is dropped for time
+};
 
 /// The devices of a configuration as the source of a session: cameras, INS and board, real or a
 /// mock's.
@@ -72,5 +85,13 @@ class LiveSource final : public FrameSource {
   Acquired in_hand_{};    // given, or held back behind its events
   bool waiting_ = false;  // in_hand_ is a frame that was not given yet
 };
+
+/// Drives: the cameras, INS and board of the configuration into a session folder (run_session()).
+///
+/// Errors   InputError, DeviceError before the session folder is made, for all that can be known by
+/// then.
+///          Afterwards sentences on stderr.
+/// → as run_session(); device_failed: a camera was gone at the end
+[[nodiscard]] ExitCode run_drive(const RunRequest& request);
 
 }  // namespace vergence::app

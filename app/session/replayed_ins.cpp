@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "app/devices/comparison_settings.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "core/comparison/attitude_check.hpp"
 
 namespace vergence::app {

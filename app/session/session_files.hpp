@@ -12,7 +12,7 @@
 #include "app/recorder/summary.hpp"
 #include "app/report/report.hpp"
 #include "app/runtime/progress.hpp"
-#include "app/session/session_output.hpp"
+#include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
 #include "core/types/parallel.hpp"
 

@@ -14,7 +14,7 @@
 
 #include <fmt/format.h>
 
-#include "app/recorder/pose_line.hpp"
+#include "app/recorder/record_lines.hpp"
 #include "app/recorder/session_folder.hpp"
 
 namespace vergence::app {

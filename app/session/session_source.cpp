@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "app/devices/comparison_settings.hpp"
+#include "app/devices/rig_settings.hpp"
 
 namespace vergence::app {
 namespace {

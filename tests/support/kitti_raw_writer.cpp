@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/devices/comparison_settings.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/random.hpp"

@@ -162,15 +162,6 @@ TEST_F(Calibrate, anotherBoardIsSaidOnceAndNotForEveryView) {
   EXPECT_NE(o.err.find("no view has the board of 8x5 inner corners"), std::string::npos) << o.err;
 }
 
-TEST_F(Calibrate, exchangedCamerasAreNotUsableAndNothingIsWritten) {
-  const Outcome o = run_vergence(fmt::format(
-      "calibrate --quiet --left '{0}/right/*.png' --right '{0}/left/*.png'{1} --out '{0}/x.yaml'",
-      folder_->path().string(), kArguments));
-  EXPECT_EQ(o.code, 1);
-  EXPECT_NE(o.err.find("left and right are swapped"), std::string::npos) << o.err;
-  EXPECT_FALSE(fs::exists(file("x.yaml")));
-}
-
 TEST_F(Calibrate, badArgumentsAreOneSentence) {
   const std::string good = images() + kArguments, out = " --out '" + file("n.yaml").string() + "'";
   for (const std::string& bad :
@@ -242,17 +233,6 @@ TEST_F(Calibrate, aFileThatIsThereIsNotOverwrittenUnasked) {
   EXPECT_EQ(read_file(file("precious.yaml")), "mine");
   EXPECT_EQ(run_vergence(command + " --force").code, 0);
   EXPECT_NO_THROW((void)app::read_calibration(file("precious.yaml")));
-}
-
-TEST_F(Calibrate, viewsNeverGoIntoAFolderThatHasSomething) {
-  const Outcome o = run_vergence(
-      fmt::format("calibrate '{}/app/config/mock.yaml' --quiet --board 9x6 --square 0.04 --out "
-                  "'{}' --set mock.texture_detail=0 --set mock.drive=brief "
-                  "--set cameras.0.size=[160,120] --set cameras.1.size=[160,120] --keep-views '{}' "
-                  "--set mock.stop_s=1",
-                  VERGENCE_SOURCE_DIR, file("m.yaml").string(), file("left").string()));
-  EXPECT_EQ(o.code, 2) << o.err;
-  EXPECT_NE(o.err.find("is not empty"), std::string::npos) << o.err;
 }
 
 TEST_F(Calibrate, withoutTheToolTheSentenceNamesItsPackageAndADriveNeedsNone) {

@@ -173,41 +173,6 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
   EXPECT_NE(refused.err.find("cameras.0.size is 640 x 480"), std::string::npos) << refused.err;
 }
 
-TEST_F(CalibrationCli, aGivenCalibrationThatTheDriveConfirmsIsWhereTheNextBegins) {
-  ASSERT_EQ(drive("first", std::string("--from-scratch ") + kLongEnough).code, 0);
-  // The mock's own calibration, with lenses and transform that belong together.
-  ASSERT_EQ(drive("own", "--duration 1 --set rig.state_dir=none").code, 0);
-  app::CalibrationFile mine = app::read_calibration(session("own") / "calibration.yaml");
-  mine.rig.T_camera_left[1].t.y() = 0.0001;
-  mine.rig.found = Stamp();
-  app::write_calibration(folder_ / "mine.yaml", mine);
-  const std::string given = fmt::format("--calibration '{}' ", (folder_ / "mine.yaml").string());
-  ASSERT_EQ(drive("short", given + "--duration 1").code, 0);
-  EXPECT_NE(app::read_calibration(state()).rig.found, Stamp()) << "not confirmed, not kept";
-  ASSERT_EQ(drive("second", given + kLongEnough).code, 0);
-  ASSERT_EQ(events("second", "calibration_confirmed").size(), 1U);
-  const app::CalibrationFile used = app::read_calibration(session("second") / "calibration.yaml");
-  EXPECT_EQ(app::read_calibration(state()).rig.T_camera_left[1].t, used.rig.T_camera_left[1].t);
-  ASSERT_EQ(drive("third", "--duration 1").code, 0);
-  EXPECT_NE(lines("third", "calibrations.csv").at(1).find(",accepted,state_file,"),
-            std::string::npos);
-}
-
-TEST_F(CalibrationCli, aRecordedSessionIsReplayedWithAFileOfItsOwnNumberOfCameras) {
-  ASSERT_EQ(drive("first", "--duration 1 --set record.images=on").code, 0);
-  app::CalibrationFile file = app::read_calibration(session("first") / "calibration.yaml");
-  file.rig.cameras = 3;
-  file.rig.intrinsics[2] = file.rig.intrinsics[1];
-  file.rig.T_camera_left[2].t = 2 * file.rig.T_camera_left[1].t;
-  app::write_calibration(folder_ / "three.yaml", file);
-  const Outcome o = run_vergence(fmt::format(
-      "replay '{}' --format session --quiet --out '{}' --calibration '{}'",
-      session("first").string(), session("s").string(), (folder_ / "three.yaml").string()));
-  EXPECT_EQ(o.code, 2);
-  EXPECT_NE(o.err.find("three.yaml: is of 3 cameras"), std::string::npos) << o.err;
-  EXPECT_FALSE(fs::exists(session("s")));
-}
-
 TEST_F(CalibrationCli, aScheduledWishRecalibrates) {
   const Outcome o = drive("s", "--duration 9 --fault recalibrate@4");
   // 1 if no frame was ok: the wish comes before the calibration in use is verified.

@@ -43,20 +43,6 @@ TEST_F(IidcRig, CamerasThatDoNotFitTogetherAreToldInNumbersBeforeTheyStart) {
   (void)end();
 }
 
-TEST_F(IidcRig, AtS800TheyFit) {
-  CameraConfiguration wide = usual();
-  wide.width = 1280;
-  wide.height = 960;
-  wide.rate_hz = 15;
-  wide.sharing = 2;
-  ASSERT_NO_FATAL_FAILURE(begin(wide, {"--s800"}));
-  EXPECT_EQ(cameras_[0]->remark(), "");
-  ASSERT_NO_FATAL_FAILURE(start());
-  ASSERT_TRUE(taker_->take(10));
-  EXPECT_EQ(taker_->account(0).wrong + taker_->account(1).wrong, 0U);
-  (void)end();
-}
-
 TEST_F(IidcRig, TheBusClockIsOneForBothCamerasThroughItsWrap) {
   ASSERT_NO_FATAL_FAILURE(begin(usual()));
   ASSERT_NO_FATAL_FAILURE(start());

@@ -201,31 +201,6 @@ TEST_F(RecordedDrive, isExportedForOtherPrograms) {
   EXPECT_FALSE(std::filesystem::exists(out("kitti")));
 }
 
-TEST_F(RecordedDrive, isNotExportedWithACalibrationOfImagesOfAnotherSize) {
-  std::string calibration = text_of(session() / "calibration.yaml");
-  const std::string size = "size: [320, 240]";
-  const auto at = calibration.rfind(size);  // the right camera's
-  ASSERT_NE(at, std::string::npos);
-  calibration.replace(at, size.size(), "size: [326, 240]");
-  const TemporaryFolder other;
-  const auto file = other.write("calibration.yaml", calibration);
-  for (const std::string format : {"folder", "euroc"}) {
-    const Outcome o = export_to(other / format, session(),
-                                "--format " + format + " --calibration '" + file.string() + "'");
-    EXPECT_EQ(o.code, 2);
-    EXPECT_NE(o.err.find("320x240 pixels, but the calibration is for 326x240"), std::string::npos)
-        << o.err;
-    EXPECT_FALSE(std::filesystem::exists(other / format));
-  }
-  // The one that the drive ended with is of these images: what comes of it is replayed.
-  const auto last = session() / "calibration.yaml";
-  EXPECT_EQ(
-      export_to(other / "last", session(), "--format euroc --calibration '" + last.string() + "'")
-          .code,
-      0);
-  EXPECT_LE(replay(other / "last", other / "again", "--frames 20").code, 1);
-}
-
 TEST(Recorded, aPlainDriveComesBackFromItsExportBitForBit) {
   const TemporaryFolder folder;
   ASSERT_LE(drive(folder / "s", "--fast --duration 5").code, 1);
@@ -259,21 +234,6 @@ TEST(Recorded, aLiveDriveReplaysBitForBit) {
   ASSERT_LE(o.code, 1) << o.err;
   ASSERT_LE(replay(folder / "live", folder / "again").code, 1);
   expect_same_poses(folder / "live", folder / "again");
-}
-
-// A drive that has a microsecond a frame has time for its poses alone: as many as there are frames,
-// and the replay, which has all the time there is, leaves out what the drive left out.
-TEST(Recorded, aLiveDriveWithoutTimeForItsWorkReplaysBitForBit) {
-  const TemporaryFolder folder;
-  ASSERT_LE(drive(folder / "drive", "--duration 8 --set realtime.frame_budget_ms=0.001").code, 1);
-  ASSERT_LE(replay(folder / "drive", folder / "again").code, 1);
-  const auto live = summary_of(folder / "drive"), again = summary_of(folder / "again");
-  EXPECT_GT(live["work_dropped"]["windows"], 10);
-  EXPECT_EQ(live["frames"]["lost"], 0);
-  for (const char* what : {"frames", "points", "windows"})
-    EXPECT_EQ(live["work_dropped"][what], again["work_dropped"][what]) << what;
-  EXPECT_NE(text_of(folder / "drive" / "events.jsonl").find("work_dropped"), std::string::npos);
-  expect_same_poses(folder / "drive", folder / "again");
 }
 
 /// A rectified drive with a truth that is a straight drive at constant speed and ends `short_ns`
@@ -310,26 +270,6 @@ TEST(RecordedTruth, reachesAFrameThatIsStampedMicrosecondsAfterItsEnd) {
   }
 }
 
-TEST(RecordedTruth, isNotCarriedOnForMilliseconds) {
-  const TemporaryFolder folder;
-  drive_with_truth(folder / "s", 2'000'000);
-  const Outcome kitti = export_to(folder / "kitti", folder / "s", "--format kitti");
-  EXPECT_EQ(kitti.code, 0) << kitti.err;
-  EXPECT_NE(kitti.err.find("is not written: 1 of "), std::string::npos) << kitti.err;
-  EXPECT_FALSE(std::filesystem::exists(folder / "kitti" / "poses.txt"));
-  const Outcome euroc = export_to(folder / "euroc", folder / "s", "--format euroc");
-  EXPECT_EQ(euroc.code, 0) << euroc.err;
-  EXPECT_NE(euroc.err.find("frames have no truth"), std::string::npos) << euroc.err;
-}
-
-TEST(Recorded, aReplayOfAReplayedRecordingIsTheSame) {
-  const TemporaryFolder folder;
-  ASSERT_LE(drive(folder / "s", "--fast --duration 4").code, 1);
-  ASSERT_LE(replay(folder / "s", folder / "second", "--set record.images=on").code, 1);
-  ASSERT_LE(replay(folder / "second", folder / "third").code, 1);
-  expect_same_poses(folder / "s", folder / "third");
-}
-
 TEST(Recorded, aDriveRecordedAsPngReplaysBitForBitAndIsExported) {
   const TemporaryFolder folder;
   const std::string session = (folder / "s").string();
@@ -352,17 +292,6 @@ TEST(Recorded, aDriveRecordedAsPngReplaysBitForBitAndIsExported) {
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_LE(replay(folder / "data", folder / "third").code, 1);
   expect_same_poses(session, folder / "third");
-}
-
-TEST(Recorded, aSessionWithoutImagesIsRefused) {
-  const TemporaryFolder folder;
-  const Outcome o =
-      run_vergence("run '" + kMock + "' --fast --duration 2 --out '" + (folder / "s").string() +
-                   "'" + kSmall + " --set record=[poses,ins]");
-  ASSERT_LE(o.code, 1) << o.err;
-  const Outcome r = replay(folder / "s", folder / "again");
-  EXPECT_EQ(r.code, 2);
-  EXPECT_NE(r.err.find("without images"), std::string::npos) << r.err;
 }
 
 TEST(Recorded, thePulsesOfATriggerBoardAreRecordedAndTheDriveIsTheSame) {

@@ -42,25 +42,6 @@ TEST_P(SealedThreads, allocateNothingWhileFramesCome) {
       << "what is not 0 is printed at the end: " << o.err;
 }
 
-/// What is resident is told by parts, and they make the process's sum.
-TEST(Memory, isPrintedAsTakenAndAsResident) {
-  const TemporaryFolder folder;
-  const auto session = folder / "s";
-  const auto o = run_vergence("run '" + std::string(VERGENCE_SOURCE_DIR) +
-                              "/app/config/mock.yaml' --fast --duration 2 --memory --out '" +
-                              session.string() + "'" + kSmall);
-  ASSERT_EQ(o.code, 0) << o.err;
-  for (const char* name : {"estimator_bytes", "map points", "sum_bytes", "resident estimator_bytes",
-                           "resident sum_bytes"})
-    EXPECT_NE(o.out.find(name), std::string::npos) << name << " of\n" << o.out;
-  const auto memory = summary_of(session)["memory"];
-  std::uint64_t parts = 0;
-  for (const auto& [name, bytes] : memory["resident"].items())
-    if (name != "sum_bytes") parts += bytes.get<std::uint64_t>();
-  EXPECT_EQ(memory["resident"]["sum_bytes"], parts);
-  EXPECT_LE(memory["resident"]["estimator_bytes"], memory["estimator_bytes"]);
-}
-
 INSTANTIATE_TEST_SUITE_P(OfMockDrives, SealedThreads,
                          testing::Values("mock.yaml", "mock_board.yaml"));
 

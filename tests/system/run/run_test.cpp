@@ -146,32 +146,6 @@ TEST(Run, withAnIdealInsTheReferenceIsTheTruthToAMillimetre) {
       << "twice a thousandth of a degree: the chosen start errs, too";
 }
 
-TEST(Run, aMaskIsHeldAgainstTheCamerasSizeAndItsSkyIsMissedByNobody) {
-  const TemporaryFolder folder;
-  const auto mask_of = [](int width, int height) {  // the upper third is sky, and hidden
-    std::string all = "P5\n" + std::to_string(width) + " " + std::to_string(height) + "\n255\n" +
-                      std::string(static_cast<std::size_t>(width * height), '\xff');
-    std::fill(all.end() - width * height, all.end() - width * (height - height / 3), '\0');
-    return all;
-  };
-  const auto large = folder.write("large.pgm", mask_of(640, 480)),
-             small = folder.write("small.pgm", mask_of(320, 240));
-  const Outcome refused = drive(
-      folder / "a", "--duration 2 --quiet" + kSmall + " --set cameras.1.mask=" + large.string());
-  EXPECT_EQ(refused.code, 2);
-  EXPECT_NE(refused.err.find("cameras.1.mask: " + large.string() +
-                             " is 640 × 480 px, the camera's images are 320 × 240"),
-            std::string::npos)
-      << refused.err;
-  EXPECT_FALSE(std::filesystem::exists(folder / "a")) << "nothing was begun";
-  const std::string masks =
-      " --set cameras.0.mask=" + small.string() + " --set cameras.1.mask=" + small.string();
-  const Outcome o = drive(folder / "b", "--duration 6 --quiet" + kSmall + masks);
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_EQ(summary_of(folder / "b")["frames"]["posed"], 121);
-  EXPECT_NEAR(summary_of(folder / "b")["truth"]["path_ratio"].get<double>(), 1, 0.02);
-}
-
 TEST(Run, atNightControlledExposuresKeepThePosesAndAreTheSameOnEveryRun) {
   const TemporaryFolder folder;
   const std::string night =
@@ -201,19 +175,6 @@ TEST(Run, atNightControlledExposuresKeepThePosesAndAreTheSameOnEveryRun) {
                        "(trigger.rate 20)"),
             std::string::npos)
       << o.err;
-}
-
-TEST(Run, aDiskThatIsFullForAWhileIsAnEventAndTheDriveIsWhole) {
-  const TemporaryFolder folder;
-  const Outcome o =
-      drive(folder / "s", "--duration 6 --quiet --fault 'disk_full@2 duration_s=2'" + kSmall);
-  EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("No space left on device"), std::string::npos) << o.err;
-  EXPECT_EQ(events(folder / "s", "disk_full").size(), 1U);
-  EXPECT_EQ(events(folder / "s", "disk_room"),
-            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
-  EXPECT_EQ(app::read_tum(folder / "s" / "trajectory.tum").size(), 121U);
-  EXPECT_EQ(summary_of(folder / "s")["drops"]["lines"], 0);
 }
 
 TEST(Run, onADiskThatStaysFullFilesAreWholeOrNotThereAndTheExitCodeSaysSo) {

@@ -1,7 +1,6 @@
 // Drives whose terminal or disk takes nothing, and whose cameras give nothing.
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <poll.h>
 #include <unistd.h>
 
 #include <array>
@@ -39,19 +38,6 @@ class Pipe {
     }
     (void)::fcntl(ends_[1], F_SETFL, 0);
   }
-  /// Reads until it has come across those words.
-  [[nodiscard]] bool says(const std::string& words, std::chrono::seconds limit) const {
-    std::string text;
-    return within(limit, [&] {
-      std::array<char, 4096> piece{};
-      pollfd asked{ends_[0], POLLIN, 0};
-      if (::poll(&asked, 1, 0) > 0)
-        if (const ssize_t n = ::read(ends_[0], piece.data(), piece.size()); n > 0)
-          text.append(piece.data(), static_cast<std::size_t>(n));
-      return text.find(words) != std::string::npos;
-    });
-  }
-
  private:
   std::array<int, 2> ends_{-1, -1};
 };
@@ -73,17 +59,6 @@ TEST(Run, aTerminalThatTakesNothingHoldsUpNeitherSigtermNorTheEnd) {
   Drive ended(folder / "e", false, 4, {}, errors.input());
   EXPECT_GE(ended.wait(60s), 0) << "it hangs";
   expect_whole(folder / "e");
-}
-
-TEST(Run, aTerminalStoppedByCtrlSHoldsUpNoSigterm) {
-  const test::TemporaryFolder folder;
-  Drive drive(folder / "s", true, 600, {});
-  ASSERT_TRUE(within(60s, [&] { return lines_of(folder / "s" / "poses.csv") > 5; }));
-  ASSERT_EQ(::write(drive.terminal(), "\x13", 1), 1);
-  std::this_thread::sleep_for(500ms);
-  drive.signal(SIGTERM);
-  EXPECT_EQ(drive.wait(30s), 143);
-  expect_whole(folder / "s");
 }
 
 TEST(Run, aDriveInRealTimeEndsByTheClockWhereEveryCameraIsGone) {

@@ -66,24 +66,6 @@ TEST(SnapMock, aPictureOfEachCameraAndTheirFigures) {
   }
 }
 
-TEST(SnapMock, severalSetsAreNumbered) {
-  const TemporaryFolder folder;
-  const Outcome o = snap(folder, "mock.yaml",
-                         "--count 3 --set cameras.0.name=port --set cameras.1.name=starboard");
-  ASSERT_EQ(o.code, 0) << o.err;
-  for (const char* name : {"port_0000.png", "port_0002.png", "starboard_0001.png"})
-    (void)size_of(folder / (std::string("s/") + name));
-  const json all = report(folder);
-  ASSERT_EQ(all["sets"].size(), 3U);
-  // A period apart, as well as each stamp says that it is known.
-  const double apart_ms = static_cast<double>(all["sets"][1]["stamp_ns"].get<std::int64_t>() -
-                                              all["sets"][0]["stamp_ns"].get<std::int64_t>()) *
-                          1e-6;
-  EXPECT_NEAR(apart_ms, 50,
-              all["sets"][0]["stamp_error_ms"].get<double>() +
-                  all["sets"][1]["stamp_error_ms"].get<double>());
-}
-
 TEST(SnapMock, exchangedCablesAreNoticed) {
   const TemporaryFolder folder;
   const Outcome o = snap(folder, "mock.yaml", "--set 'faults.0=swap_cables@0'");
@@ -205,15 +187,6 @@ TEST(SnapGige, aCameraThatSendsNothingEndsWithThreeAndItsName) {
   EXPECT_FALSE(std::filesystem::exists(folder / "s/left.png"));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20))
       << "the wait is bounded";
-}
-
-TEST(SnapGige, aCameraThatIsNotThereEndsWithThreeAndItsKey) {
-  const Wires wires;
-  const TemporaryFolder folder;
-  const Outcome o =
-      snap(folder, "gige.yaml", wires.settings() + " --set cameras.1.serial=127.77.77.77");
-  EXPECT_EQ(o.code, 3);
-  EXPECT_TRUE(contains(o.err, "cameras.1")) << o.err;
 }
 
 }  // namespace

@@ -187,13 +187,5 @@ TEST_F(V4l2Run, theSameDriveComesOutOfOneCameraWithBothImagesInItsPicture) {
   EXPECT_EQ(s["devices"]["sets_incomplete"], 0) << "one picture has both";
 }
 
-TEST_F(V4l2Run, aCameraThatIsNotThereIsOneSentence) {
-  auto w = words();
-  w.insert(w.end(), {"--set", "cameras.1.serial=/dev/video9"});
-  test::ChildProgram program(w);
-  EXPECT_EQ(program.wait(30s), 3);
-  EXPECT_FALSE(std::filesystem::exists(session_ + "/poses.csv"));
-}
-
 }  // namespace
 }  // namespace vergence

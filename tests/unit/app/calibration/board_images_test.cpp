@@ -42,28 +42,6 @@ TEST(BoardImages, viewsArePairedByNumberWhereSomeAreMissingElseByOrder) {
   EXPECT_THROW((void)group_views({{"a.png", "b.png"}, {"c.png"}}, &remarks), InputError);
 }
 
-TEST(BoardImages, numbersAreEqualWhateverZerosAreInFront) {
-  Paths left, right, farther;
-  for (int i = 1; i <= 14; ++i) {
-    left.emplace_back(fmt::format("left{}.png", i));
-    right.emplace_back(fmt::format("right{:02}.png", i));
-    farther.emplace_back(fmt::format("right{}.png", 100 + i));
-  }
-  std::vector<Paths> by_number, by_order;
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    by_number.push_back({left[i], right[i]});
-    by_order.push_back({left[i], farther[i]});
-  }
-  std::sort(left.begin(), left.end());  // as matching_files() has them: left1, left10, left11 …
-  std::vector<std::string> remarks;
-  EXPECT_EQ(group_views({left, right}, &remarks), by_number);
-  EXPECT_EQ(group_views({left, farther}, &remarks), by_order);
-  EXPECT_TRUE(remarks.empty());
-  EXPECT_EQ(group_views({{"a0.png", "a00.png"}, {"b0.png", "b1.png"}}, &remarks)[0],
-            (Paths{"a0.png", "b0.png"}))
-      << "two of one number";
-}
-
 TEST(BoardImages, imagesThatCannotBeReadAreRemarks) {
   const test::TemporaryFolder folder;
   const Paths view{folder.write("left.png", "no image"), folder / "gone.png"};

@@ -17,19 +17,6 @@ namespace {
 
 using namespace test;
 
-TEST(Conversion, WhatIsKnownOfSigmasIsSaidToBeLeftOut) {
-  CalibrationFile c = ours(CameraModelKind::pinhole_radtan);
-  c.rig.intrinsics[1].distortion_sigma[0] = 1e-3;
-  c.rig.covariance.set(intrinsic_row(1) + 4, intrinsic_row(1) + 4, 1e-6);
-  Remarks kalibr, ros;
-  (void)format_kalibr(c, &kalibr);
-  (void)format_ros(c, &ros);
-  for (const Remarks& remarks : {kalibr, ros}) {
-    ASSERT_FALSE(remarks.empty());
-    EXPECT_NE(remarks[0].find("sigmas, the covariance"), std::string::npos) << remarks[0];
-  }
-}
-
 TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
   const test::TemporaryFolder folder;
   for (const auto kind : kModels) {

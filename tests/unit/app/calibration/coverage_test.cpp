@@ -75,23 +75,6 @@ TEST(Coverage, saysWhichPartsTiltsAndSizesAreMissing) {
       << all(last);
 }
 
-TEST(Coverage, theGridCountsCornersWhereTheyAre) {
-  const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
-  Coverage c = nothing_yet(rig);
-  const auto marks = [&c] {
-    const std::string grid = c.grid();
-    return std::count_if(grid.begin(), grid.end(),
-                         [](char ch) { return ch == '-' || ch == '+' || ch == '#'; });
-  };
-  EXPECT_EQ(marks(), 0);
-  BoardView corner_only;
-  corner_only.corners[0].assign(54, {0, Vec2(1, 1)});
-  c.add(corner_only);
-  EXPECT_EQ(marks(), 1);
-  const std::string grid = c.grid();
-  EXPECT_EQ(grid.substr(grid.find('\n') + 1, 1), "#");
-}
-
 TEST(Coverage, cornersThatDoNotTellHowTheBoardStandsHaveNoTilt) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   const BoardView whole = seen_board(rig, kBoard, flat(rig, 0.06, 0, 0.3, Vec3(0, 0.4, 0)));

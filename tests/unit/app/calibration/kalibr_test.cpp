@@ -50,21 +50,6 @@ TEST(Kalibr, aCamchainIsReadAsItsOwnDefinitionProjects) {
   EXPECT_NE(remarks[0].find("T_cam_imu"), std::string::npos);
 }
 
-TEST(Kalibr, aNameIsWhatStandsBeforeTheImageInATopic) {
-  const auto names = [](const std::string& left, const std::string& right) {
-    const std::string chain =
-        replaced(replaced(kCamchain, "/left/image_raw", left), "/cam1/image_raw", right);
-    Remarks remarks;
-    const auto all =
-        parse_any_calibration({{"camchain.yaml", chain}}, std::nullopt, &remarks).names;
-    return all[0] + " " + all[1];
-  };
-  EXPECT_EQ(names("/stereo/left/image_raw", "/stereo/right/image_raw"), "left right");
-  EXPECT_EQ(names("/rig/port/image_rect_raw/compressed", "starboard/image"), "port starboard");
-  EXPECT_EQ(names("/cam_a", "/rig/cam_b"), "cam_a cam_b");
-  EXPECT_EQ(names("/image_raw", "//"), "left right") << "names of their own, as without a topic";
-}
-
 TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
   for (const auto kind : kModels) {
     const CalibrationFile c = ours(kind, 3);

@@ -73,42 +73,5 @@ TEST(RosCameraInfo, whatIsWrittenProjectsAsOursAndReadsBack) {
   }
 }
 
-TEST(RosCameraInfo, aPairFromOpenCvsOwnRectificationIsReadAsItProjects) {
-  const CalibrationFile truth = ours(CameraModelKind::pinhole_radtan);
-  std::array<std::string, 2> text;
-  std::array<cv::Mat, 2> K, D;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Intrinsics& lens = truth.rig.intrinsics[k];
-    K[k] = diagonal(lens.fx, lens.fy, lens.cx, lens.cy);
-    D[k] = (cv::Mat_<double>(1, 5) << lens.distortion[0], lens.distortion[1], lens.distortion[2],
-            lens.distortion[3], 0);
-  }
-  const Transform& T = truth.rig.T_camera_left[1];
-  cv::Mat R(3, 3, CV_64F), t = (cv::Mat_<double>(3, 1) << T.t.x(), T.t.y(), T.t.z()), R1, R2, P1,
-                           P2, Q;
-  for (int i = 0; i < 9; ++i) R.at<double>(i / 3, i % 3) = T.R(i / 3, i % 3);
-  cv::stereoRectify(K[0], D[0], K[1], D[1], {640, 480}, R, t, R1, R2, P1, P2, Q, 0, 1, {640, 480});
-  const auto list = [](const cv::Mat& m) {
-    return fmt::format("[{}]", fmt::join(m.begin<double>(), m.end<double>(), ", "));
-  };
-  for (std::size_t k = 0; k < 2; ++k) {
-    const std::string d =
-        k == 0 ? "plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: " + list(D[k]) + "}"
-               : "rational_polynomial\ndistortion_coefficients: {rows: 1, cols: 8, data: [" +
-                     fmt::format("{}, 0, 0, 0]}}",
-                                 fmt::join(D[k].begin<double>(), D[k].end<double>(), ", "));
-    text[k] =
-        "image_width: 640\nimage_height: 480\ncamera_name: narrow_stereo\ncamera_matrix: {rows: 3, "
-        "cols: 3, data: " +
-        list(K[k]) + "}\ndistortion_model: " + d +
-        "\nrectification_matrix: {rows: 3, cols: 3, data: " + list(k == 0 ? R1 : R2) +
-        "}\nprojection_matrix: {rows: 3, cols: 4, data: " + list(k == 0 ? P1 : P2) + "}\n";
-  }
-  Remarks remarks;
-  const CalibrationFile c =
-      parse_any_calibration({{"l.yaml", text[0]}, {"r.yaml", text[1]}}, std::nullopt, &remarks);
-  expect_same(truth, c);
-}
-
 }  // namespace
 }  // namespace vergence::app

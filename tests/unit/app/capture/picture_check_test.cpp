@@ -71,16 +71,6 @@ TEST(PictureFigures, areThoseOfThePixelsAndNotOfThePadding) {
   EXPECT_DOUBLE_EQ(f.sharpness, 77.0 * 77.0) << "half of 154 in each of the four inner pixels";
 }
 
-TEST(PictureFigures, aSingleColumnHasNoSharpness) {
-  const Picture p(1, 5, 7);
-  EXPECT_DOUBLE_EQ(figures_of(p.view()).sharpness, 0);
-}
-
-TEST(Judgement, soundPicturesAreNotRemarkedUpon) {
-  const auto still = [](int) { return 0; };
-  EXPECT_TRUE(judged({squares(320, 240, 1, still), squares(320, 240, 2, still)}).empty());
-}
-
 TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
   const auto remarks =
       judged({Picture(320, 240, 2), Picture(320, 240, 255), Picture(320, 240, 90)});

@@ -133,27 +133,6 @@ TEST(EvaluateCommand, dataSetFoldersAreReferencesOfTheirOwn) {
   EXPECT_LT(got["ate_unaligned_m"]["max"].get<double>(), 2e-9);
 }
 
-TEST(EvaluateCommand, tableForAPersonHasTheFigures) {
-  const test::TemporaryFolder folder;
-  std::string reference, estimate;
-  for (int i = 0; i < 200; ++i) {
-    const double a = 0.05 * i;
-    const std::string stamp = std::to_string(i / 10) + "." + std::to_string(i % 10);
-    reference += stamp + " " + std::to_string(20 * std::cos(a)) + " " +
-                 std::to_string(20 * std::sin(a)) + " 0 0 0 0 1\n";
-    estimate += stamp + " " + std::to_string(20.4 * std::cos(a)) + " " +
-                std::to_string(20.4 * std::sin(a)) + " 0 0 0 0 1\n";
-  }
-  const auto r = folder.write("r.tum", reference), e = folder.write("e.tum", estimate);
-  const Outcome o =
-      evaluate_command({e.string(), r.string(), "--lengths", "10,300", "--step", "1"});
-  EXPECT_EQ(o.code, ExitCode::done) << o.err;
-  EXPECT_NE(o.out.find("200 poses matched"), std::string::npos) << o.out;
-  EXPECT_NE(o.out.find("scale: 0.980392"), std::string::npos) << o.out;
-  EXPECT_NE(o.out.find("SE(3)-aligned"), std::string::npos);
-  EXPECT_NE(o.out.find("the path is too short"), std::string::npos);
-}
-
 TEST(EvaluateCommand, trajectoriesWithoutCommonTimeAreNotUsable) {
   const test::TemporaryFolder folder;
   const auto a = folder.write("a.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n"),
@@ -245,33 +224,6 @@ std::string session_with_ins(const test::TemporaryFolder& folder, const std::str
   return folder.write(name + "/ins.csv", readings).parent_path().string();
 }
 
-TEST(EvaluateCommand, aSessionsOwnInsGivesTheMountOfTheCamera) {
-  const test::TemporaryFolder folder;
-  const std::string session = session_with_ins(folder, "s");
-  const Outcome alone = evaluate_command({session, "--estimate-mount", "--json"});
-  ASSERT_EQ(alone.code, ExitCode::done) << alone.err;
-  const auto mount = nlohmann::json::parse(alone.out).at("mount");
-  EXPECT_NEAR(mount["rotation_deg"]["z"]["value"].get<double>(), 2, 0.02);
-  EXPECT_NEAR(mount["boresight_deg"][2].get<double>(), 2, 0.02);
-  EXPECT_NEAR(mount["boresight_deg"][0].get<double>(), 0, 0.05);
-  EXPECT_NEAR(mount["lever_arm_m"]["x"]["value"].get<double>(), 0.9, 0.02);
-  EXPECT_NEAR(mount["lever_arm_m"]["y"]["value"].get<double>(), 0.4, 0.02);
-  EXPECT_NEAR(mount["clock_offset_s"]["value"].get<double>(), 0.012, 1e-3);
-  // However the INS is named.
-  for (const std::string& reference : {session, session + "/ins.csv"})
-    EXPECT_EQ(evaluate_command({session, reference, "--estimate-mount", "--json"}).out, alone.out)
-        << reference;
-  const Outcome table = evaluate_command({session, "--estimate-mount"});
-  EXPECT_NE(table.out.find("mount of the left camera in the INS's body"), std::string::npos)
-      << table.out;
-  EXPECT_NE(table.out.find("ins.boresight_deg: ["), std::string::npos) << table.out;
-  // Without a mount a session folder stands for its poses, its ins.csv for the INS's.
-  EXPECT_LT(
-      nlohmann::json::parse(evaluate_command({session, session, "--json"}).out)["ate_se3_m"]["max"]
-          .get<double>(),
-      1e-9);
-}
-
 /// The poses are the truth and so is the INS, but for its 12 ms: at 0.375 rad/s of yaw and 0.08 of
 /// roll and pitch at most that is 0.264 deg, and a segment that begins turned by it ends off by
 /// 0.46 % of its length.
@@ -310,38 +262,6 @@ TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
   }
   EXPECT_NE(evaluate_command({session, ins}).out.find("nobody says how the camera sits"),
             std::string::npos);
-}
-
-TEST(EvaluateCommand, saysWhatAMountLacks) {
-  const test::TemporaryFolder folder;
-  const auto refused = [](const std::vector<std::string>& words, const std::string& part) {
-    const Outcome o = evaluate_command(words);
-    EXPECT_EQ(o.code, ExitCode::bad_input);
-    EXPECT_NE(o.err.find(part), std::string::npos) << o.err;
-  };
-  const std::string tum =
-      folder.write("s/trajectory.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").string();
-  refused({tum}, "REFERENCE is missing");
-  const Outcome brief = evaluate_command({tum, tum, "--estimate-mount"});
-  EXPECT_EQ(brief.code, ExitCode::not_usable);
-  EXPECT_NE(brief.err.find("no mount between"), std::string::npos) << brief.err;
-  EXPECT_NE(brief.err.find("fewer than 20 moments in common"), std::string::npos) << brief.err;
-  EXPECT_EQ(brief.out, "") << "no figures between bodies that nobody has brought together";
-  const auto json =
-      nlohmann::json::parse(evaluate_command({tum, tum, "--estimate-mount", "--json"}).out);
-  EXPECT_EQ(json.size(), 1U);
-  EXPECT_NE(json["mount"]["status"], "ok");
-  refused({(folder / "s").string()}, "REFERENCE is missing");
-  refused({(folder / "s").string(), "--estimate-mount"},
-          "is no session folder with an ins.csv; name a REFERENCE");
-  InsRecord bare;
-  std::string line;
-  format_ins_record(bare, &line);
-  folder.write("s/ins.csv", std::string(kInsHeader) + "\n" + line);
-  refused({(folder / "s").string(), "--estimate-mount"},
-          "has no reading with an attitude and a satellites' fix");
-  folder.write("s/ins.csv", std::string(kInsHeader) + "\nnonsense\n");
-  refused({(folder / "s").string(), "--estimate-mount"}, "ins.csv:2: has 1 columns");
 }
 
 TEST(EvaluateCommand, refusesArgumentsThatMakeNoSense) {

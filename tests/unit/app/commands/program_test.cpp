@@ -54,14 +54,6 @@ TEST(Program, EveryCommandHasItsHelp) {
   }
 }
 
-TEST(Program, HelpAndVersionAreWordsToo) {
-  EXPECT_EQ(run_vergence("help").out, run_vergence("--help").out);
-  EXPECT_EQ(run_vergence("help replay").out, run_vergence("replay --help").out);
-  EXPECT_EQ(run_vergence("version").out, run_vergence("--version").out);
-  EXPECT_TRUE(contains(run_vergence("hlep").err, "did you mean \"help\"?"));
-  EXPECT_TRUE(refused_in_one_sentence(run_vergence("help nothing")));
-}
-
 TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {
   using Kind = Withdrawn::Kind;
   const test::TemporaryFolder folder;
@@ -88,12 +80,6 @@ TEST(Program, AnUnknownCommandNamesTheNearest) {
   EXPECT_TRUE(refused_in_one_sentence(run_vergence("''")));
 }
 
-TEST(Program, ACommandLineThatSaysNothingIsRefused) {
-  EXPECT_TRUE(refused_in_one_sentence(run_vergence("")));
-  EXPECT_TRUE(refused_in_one_sentence(run_vergence("--loud")));
-  EXPECT_TRUE(refused_in_one_sentence(run_vergence("--")));
-}
-
 TEST(Program, AnUnknownOptionNamesTheNearest) {
   const Outcome outcome = run_vergence("--verison");
   EXPECT_TRUE(refused_in_one_sentence(outcome));
@@ -104,12 +90,6 @@ TEST(Program, AnUnknownOptionNamesTheNearest) {
   EXPECT_TRUE(
       contains(of_command.err, "evaluate: unknown option \"--jsno\"; did you mean \"--json\"?"))
       << of_command.err;
-}
-
-TEST(Program, WrongValuesOfOptionsAreOneSentence) {
-  EXPECT_TRUE(refused_in_one_sentence(
-      run_vergence("replay somewhere --format kitti --out out --frames many")));
-  EXPECT_TRUE(refused_in_one_sentence(run_vergence("replay")));
 }
 
 TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {

@@ -109,11 +109,6 @@ TEST(CalibrationCovariance, CamerasThatNamesDoNotTellApartGoByIndex) {
       << "an index is understood beside names";
 }
 
-TEST(CalibrationCovariance, NothingKnownIsNoBlock) {
-  EXPECT_EQ(format_covariance(parse_calibration(kRig, "c.yaml")), "");
-  EXPECT_TRUE(parse_calibration(kRig, "c.yaml").rig.covariance.empty());
-}
-
 TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
   EXPECT_TRUE(refused(with_block("[right.rx, rihgt.ry]", "[1, 0, 1]"),
                       "c.yaml:7: covariance.parameters has \"rihgt.ry\"",
@@ -164,30 +159,6 @@ TEST(CalibrationCovariance, FlawsInMemoryAreFoundToo) {
   EXPECT_FALSE(find_flaw(example().rig.covariance));
 }
 
-TEST(CalibrationCovariance, NineDigitsAreEnough) {
-  RigCovariance rounded = example().rig.covariance;
-  for (int i = 0; i < kRigSize; ++i)
-    for (int j = 0; j <= i; ++j) {
-      const double value = rounded(i, j),
-                   unit =
-                       value == 0 ? 1 : std::pow(10.0, std::floor(std::log10(std::abs(value))) - 8);
-      rounded.set(i, j, std::round(value / unit) * unit);
-    }
-  EXPECT_FALSE(find_flaw(rounded));
-}
-
-TEST(CalibrationCovariance, AGivenBaselineScalesIt) {
-  const RigCalibration before = example().rig;
-  RigCalibration rig = before;
-  apply_use({.baseline = 1.5}, &rig);
-  const int rx = extrinsic_row(1), tx = rx + 3, k1 = intrinsic_row(0) + 4;
-  EXPECT_EQ(rig.covariance(rx, rx), before.covariance(rx, rx));
-  EXPECT_EQ(rig.covariance(tx, rx), 2 * before.covariance(tx, rx));
-  EXPECT_EQ(rig.covariance(tx, tx), 4 * before.covariance(tx, tx));
-  EXPECT_EQ(rig.covariance(tx, k1), 2 * before.covariance(tx, k1));
-  EXPECT_FALSE(find_flaw(rig.covariance));
-}
-
 TEST(CalibrationCovariance, FromScratchTheLensesStayAndThePlacesGo) {
   const RigCalibration before = example().rig;
   RigCalibration rig = before;
@@ -199,22 +170,6 @@ TEST(CalibrationCovariance, FromScratchTheLensesStayAndThePlacesGo) {
   EXPECT_EQ(rig.covariance(k1, fx), before.covariance(k1, fx));
   EXPECT_EQ(rig.inflation, 0);
   EXPECT_FALSE(find_flaw(rig.covariance));
-}
-
-/// No cut and no changed byte may do anything but be read or be refused.
-TEST(CalibrationCovariance, TornAndGarbledBlocksNeverEscapeAsAnythingElse) {
-  const std::string good = format_calibration(example());
-  const std::size_t begin = good.find("covariance:");
-  Random random(13);
-  for (std::size_t length = begin; length < good.size(); length += 7)
-    static_cast<void>(refusal(good.substr(0, length)));
-  for (int i = 0; i < 500; ++i) {
-    std::string text = good;
-    const auto at = begin + static_cast<std::size_t>(random.uniform() *
-                                                     static_cast<double>(text.size() - begin));
-    text[at] = static_cast<char>(random.uniform() * 256.0);
-    static_cast<void>(refusal(text));
-  }
 }
 
 }  // namespace

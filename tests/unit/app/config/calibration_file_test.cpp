@@ -73,20 +73,6 @@ TEST(CalibrationFile, ReadsTheDocumentedForm) {
   EXPECT_EQ(rig.frames, 60);
 }
 
-TEST(CalibrationFile, WhatMayBeLeftOutHasItsDefault) {
-  const CalibrationFile c = parse_calibration(R"(version: 1
-cameras:
-  - {size: [640, 480], model: pinhole-equidistant, intrinsics: [300, 300, 320, 240]}
-  - {size: [640, 480], model: pinhole-radtan, intrinsics: [300, 300, 320, 240], distortion: [], T_camera_left: [1, 0, 0, -0.3, 0, 1, 0, 0.4, 0, 0, 1, 0]}
-)",
-                                              "c.yaml");
-  EXPECT_EQ(c.names[0], "left");
-  EXPECT_EQ(c.rig.intrinsics[0].kind, CameraModelKind::pinhole_equidistant);
-  EXPECT_FALSE(c.rig.intrinsics[1].has_distortion());
-  EXPECT_DOUBLE_EQ(c.rig.baseline, 0.5);
-  EXPECT_EQ(c.rig.found, Stamp(0));
-}
-
 /// A rig of four with every field set to numbers that need all their digits.
 CalibrationFile awkward() {
   Random random(7);
@@ -165,11 +151,6 @@ TEST(CalibrationFile, WhatIsWrittenReadsBackToTheSameDoubles) {
   EXPECT_EQ(after.rig.scale_sigma, before.rig.scale_sigma);
   EXPECT_EQ(after.rig.inflation, before.rig.inflation);
   EXPECT_EQ(format_calibration(after), format_calibration(before));
-}
-
-TEST(CalibrationFile, AFileThatCannotBeWrittenIsNamed) {
-  EXPECT_THROW(write_calibration("/nowhere/at/all/c.yaml", awkward()), InputError);
-  EXPECT_THROW(write_calibration("/dev/full", awkward()), InputError);
 }
 
 TEST(CalibrationPlausibility, Sizes) {
@@ -267,12 +248,6 @@ std::string with_rotation(const Mat3& R) {
   return format_calibration(c);
 }
 
-TEST(CalibrationPlausibility, ARotationOffByAMillionthPassesAsItIs) {
-  Mat3 R = exp_so3(Vec3(0.01, -0.02, 0.03));
-  R(0, 0) += 4e-7;  // RᵀR − I is twice that
-  EXPECT_EQ(parse_calibration(with_rotation(R), "c.yaml").rig.T_camera_left[1].R, R);
-}
-
 TEST(CalibrationPlausibility, ARotationWithFewDigitsIsReplacedByTheNearest) {
   const Mat3 exact = exp_so3(Vec3(0.01, -0.02, 0.03));
   const Mat3 rounded = (exact * 1e4).array().round().matrix() / 1e4;
@@ -320,50 +295,6 @@ TEST(CalibrationPlausibility, NumbersThatAreNotFinite) {
   EXPECT_TRUE(
       refused(with("-0.75, 0, 1", ".inf, 0, 1"), "c.yaml:10: cameras.1.T_camera_left", "finite"));
   EXPECT_TRUE(refused(with("982, 983", "1e999, 983"), "c.yaml:8: cameras.1.intrinsics", ""));
-}
-
-TEST(CalibrationPlausibility, EveryNumberOfARigInMemoryIsCheckedToo) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto field = [](const RigCalibration& rig) {
-    RigCalibration copy = rig;
-    const auto bad = find_implausible(&copy);
-    return bad ? bad->field : std::string();
-  };
-  const RigCalibration good = awkward().rig;
-  EXPECT_EQ(field(good), "");
-  RigCalibration r = good;
-  r.intrinsics[2].fy = nan;
-  EXPECT_EQ(field(r), "cameras.2.intrinsics");
-  r = good;
-  r.intrinsics[1].distortion[2] = nan;
-  EXPECT_EQ(field(r), "cameras.1.distortion");
-  r = good;
-  r.intrinsics[0].sigma[0] = -1;
-  EXPECT_EQ(field(r), "cameras.0.intrinsics_sigma");
-  r = good;
-  r.T_camera_left[3].R(1, 1) = nan;
-  EXPECT_EQ(field(r), "cameras.3.T_camera_left");
-  r = good;
-  r.sigma_wide[1][4] = nan;
-  EXPECT_EQ(field(r), "cameras.1.sigma_wide");
-  r = good;
-  r.covariance_wide[1](2, 2) = -1;
-  EXPECT_EQ(field(r), "cameras.1.covariance_wide");
-  r = good;
-  r.intrinsics[3].distortion_sigma[1] = nan;
-  EXPECT_EQ(field(r), "cameras.3.distortion_sigma");
-  r = good;
-  r.covariance.set(0, 0, nan);
-  EXPECT_EQ(field(r), "covariance");
-  r = good;
-  r.inflation = -1;
-  EXPECT_EQ(field(r), "found.inflation");
-  r = good;
-  r.baseline = nan;
-  EXPECT_EQ(field(r), "rig.baseline");
-  r = good;
-  r.cameras = 1;
-  EXPECT_EQ(field(r), "cameras");
 }
 
 TEST(CalibrationFile, UnknownMissingAndRepeatedFieldsAreNamed) {

@@ -178,35 +178,6 @@ TEST(StateFile, WhatAGivenCalibrationHadOtherwiseThanTheConfigurationIsNoChangeO
       << state.sentence;
 }
 
-TEST(StateFile, OfAnOlderReleaseACameraMayBearWhatItIsAskedForWith) {
-  const test::TemporaryFolder folder;
-  const auto path = folder / "calibration_state.yaml";
-  CalibrationFile old = two_cameras();
-  old.serials = {"192.168.7.2", "102", "", ""};
-  write_state(path, old);
-  EXPECT_TRUE(read_state(path, configured()).calibration)
-      << read_state(path, configured()).sentence;
-  old.configured = configured().configured;
-  write_state(path, old);
-  EXPECT_FALSE(read_state(path, configured()).calibration) << "this release writes serials";
-}
-
-TEST(StateFile, IsACalibrationThatCanBeGiven) {
-  const test::TemporaryFolder folder;
-  write_state(folder / "calibration_state.yaml", configured());
-  const CalibrationFile given = read_calibration(folder / "calibration_state.yaml");
-  EXPECT_EQ(given.rig.baseline, 0.75);
-  EXPECT_EQ(format_calibration(given), format_calibration(two_cameras()));
-  for (const char* part : {"baseline", "model", "offset", "T_camera_left"}) {
-    std::string text = test::read_file(folder / "calibration_state.yaml");
-    text.replace(text.find(part, text.find("\nconfigured:")), 3, "xyz");
-    EXPECT_THROW((void)parse_calibration(text, "c.yaml"), InputError) << part;
-  }
-  std::string text = test::read_file(folder / "calibration_state.yaml");
-  text.replace(text.find("pinhole-radtan", text.find("\nconfigured:")), 14, "pinhole-foo");
-  EXPECT_THROW((void)parse_calibration(text, "c.yaml"), InputError) << "a model nobody knows";
-}
-
 TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
   const test::TemporaryFolder folder;
   folder.write("calibration_state.yaml", "version: 1\ncameras: [{name: left");
@@ -214,13 +185,6 @@ TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
   EXPECT_FALSE(state.calibration);
   EXPECT_NE(state.sentence.find("the drive begins without it"), std::string::npos)
       << state.sentence;
-}
-
-TEST(StateFile, AFolderThatCannotBeMadeIsNamed) {
-  const test::TemporaryFolder folder;
-  folder.write("file", "");
-  EXPECT_THROW(write_state(folder / "file/below/calibration_state.yaml", two_cameras()),
-               InputError);
 }
 
 }  // namespace

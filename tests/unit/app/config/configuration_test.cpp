@@ -28,14 +28,6 @@ bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST(Configuration, NothingGivenMeansTheDefaults) {
-  EXPECT_EQ(canonical_text(load_configuration(std::nullopt, {})), canonical_text(Configuration{}));
-  EXPECT_EQ(canonical_text(parse_configuration("", "drive.yaml", {})),
-            canonical_text(Configuration{}));
-  EXPECT_EQ(canonical_text(parse_configuration("odometry:\n", "drive.yaml", {})),
-            canonical_text(Configuration{}));
-}
-
 TEST(Configuration, ReadsNestedAndDottedKeys) {
   const auto c = parse_configuration(
       "rig: {name: van}\nodometry:\n  features: 400\n  band_px: 3.5\nthreads: 1\n", "drive.yaml",
@@ -55,23 +47,12 @@ TEST(Configuration, TheLastSetWinsOverEarlierOnesAndTheFile) {
   EXPECT_EQ(c.rig.name, "a: b") << "a value is taken as it stands";
 }
 
-TEST(Configuration, SetTakesGroupsAsYaml) {
-  EXPECT_EQ(parse_configuration("", "drive.yaml", {"odometry={features: 70, band_px: 4}"})
-                .odometry.features,
-            70);
-}
-
 TEST(Configuration, AnUnknownKeyNamesTheNearestFileAndLine) {
   EXPECT_EQ(
       refusal("threads: 1\nodometry:\n  featurs: 3\n"),
       "drive.yaml:3: there is no key \"odometry.featurs\"; did you mean \"odometry.features\"?");
   EXPECT_EQ(refusal("", {"thread=1"}),
             "--set thread=1: there is no key \"thread\"; did you mean \"threads\"?");
-}
-
-TEST(Configuration, AKeyWithoutItsGroupIsFoundByItsLastPart) {
-  EXPECT_TRUE(contains(refusal("features: 300"), "did you mean \"odometry.features\"?"))
-      << refusal("features: 300");
 }
 
 TEST(Configuration, ListItemsAreNamedByNumber) {
@@ -153,11 +134,6 @@ TEST(Configuration, AliasesThatUnfoldWithoutEndAreStopped) {
   EXPECT_NE(refusal(bomb), "");
 }
 
-TEST(Configuration, ASetWithoutKeyOrValueIsRefused) {
-  EXPECT_TRUE(contains(refusal("", {"features"}), "KEY=VALUE is expected"));
-  EXPECT_TRUE(contains(refusal("", {"=3"}), "KEY=VALUE is expected"));
-}
-
 TEST(Configuration, FilesThatCannotBeReadAreNamed) {
   const test::TemporaryFolder folder;
   const auto sentence = [](const std::filesystem::path& path) -> std::string {
@@ -186,12 +162,6 @@ TEST(ConfigurationHash, IsOfTheValuesNotOfTheWriting) {
   EXPECT_EQ(configuration_hash(a), configuration_hash(b));
   EXPECT_EQ(configuration_hash(a).size(), 16U);
   EXPECT_NE(configuration_hash(a), configuration_hash(Configuration{}));
-}
-
-TEST(ConfigurationHash, SeesTheLastBitOfANumber) {
-  Configuration a, b;
-  b.odometry.band_px = std::nextafter(a.odometry.band_px, 100.0);
-  EXPECT_NE(configuration_hash(a), configuration_hash(b));
 }
 
 TEST(Configuration, AListOfWhatIsRecordedSwitchesItsWordsOn) {
@@ -256,17 +226,6 @@ cameras:
       << canonical_text(c);
 }
 
-TEST(CameraOptionKeys, TheLastOneWinsWhicheverFormItHas) {
-  const std::string yaml = "cameras: [{driver: v4l2, options: {thin: 3, buffers: 8}}]\n";
-  const auto options = [&yaml](const std::vector<std::string>& set) {
-    return std::get<v4l2::Options>(parse_configuration(yaml, "rig.yaml", set).cameras[0].options);
-  };
-  EXPECT_EQ(options({"cameras.0.options.thin=5"}).thin, 5);
-  EXPECT_EQ(options({"cameras.0.options.thin=5"}).buffers, 8);
-  EXPECT_EQ(options({"cameras.0.options=thin=6"}).thin, 6);
-  EXPECT_EQ(options({"cameras.0.options=thin=6"}).buffers, v4l2::Options{}.buffers) << "all anew";
-}
-
 TEST(CameraOptionKeys, WhatCannotBeIsRefusedWithItsPlaceAndWhatThereIs) {
   const auto said = [](const std::string& options) {
     return refusal("cameras:\n  - {driver: gige, options: " + options + "}\n");
@@ -280,26 +239,6 @@ TEST(CameraOptionKeys, WhatCannotBeIsRefusedWithItsPlaceAndWhatThereIs) {
   for (const char* bad :
        {"{buffers: }", "{trigger_line: a b}", "{buffers: [4]}", "buffers", "buffers=", "=4"})
     EXPECT_NE(said(bad).find("cameras.0.options"), std::string::npos) << said(bad);
-}
-
-TEST(CameraOptionKeys, AMockHasNone) {
-  const Configuration c =
-      parse_configuration("cameras: [{driver: mock, options: {thin: 3}}]\n", "rig.yaml", {});
-  EXPECT_TRUE(std::holds_alternative<std::monostate>(c.cameras[0].options));
-}
-
-TEST(ChosenWords, AreTypedAndRefusedWhereTheyStand) {
-  const Configuration c = parse_configuration(
-      "sync: {mode: master_strobe}\ntrigger: {pps: rising}\nins: {sync_in: off}\n"
-      "cameras: [{trigger: free}]\n",
-      "rig.yaml", {});
-  EXPECT_EQ(c.sync.mode, SyncMode::master_strobe);
-  EXPECT_EQ(c.trigger.pps, trigger_board::Edge::rising);
-  EXPECT_EQ(c.ins.sync_in, xsens::SyncIn::off);
-  EXPECT_EQ(c.cameras[0].trigger, CameraTrigger::free);
-  for (const char* yaml : {"sync: {mode: bored}", "trigger: {ins: up}", "ins: {sync_in: on}",
-                           "cameras: [{trigger: hard}]", "mock: {drive: lop}"})
-    EXPECT_THROW((void)parse_configuration(yaml, "rig.yaml", {}), InputError) << yaml;
 }
 
 }  // namespace

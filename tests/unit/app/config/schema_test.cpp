@@ -162,37 +162,6 @@ void expect_rows_for(const std::map<std::string, std::string>& declared,
   }
 }
 
-/// What a number below its least is refused with.
-std::string refusal_of(const Key& key) {
-  const std::string below = key.type == KeyType::number
-                                ? fmt::format("{}", key.least - 1)
-                                : fmt::format("{}", static_cast<std::int64_t>(key.least) - 1);
-  try {
-    (void)parse_configuration("", "test.yaml", {key.name + "=" + below});
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
-}
-
-TEST(Schema, ANumberOutsideItsRangeIsRefusedInASentenceThatIsOne) {
-  int checked = 0, open = 0;
-  for (const Group& group : schema())
-    for (const Key& key : group.keys) {
-      if (key.type == KeyType::text || key.least <= -0x1p63) continue;
-      const std::string sentence = refusal_of(key);
-      const std::string range = range_text(key);
-      const bool from = range.starts_with("from ");
-      EXPECT_NE(sentence.find("must be " + (from ? range + " on" : "in " + range)),
-                std::string::npos)
-          << key.name << ": " << sentence;
-      ++checked;
-      open += from ? 1 : 0;
-    }
-  EXPECT_GT(checked, 50);
-  EXPECT_GE(open, 1) << "a key without an upper bound is among them";
-}
-
 TEST(Schema, EveryOptionOfTheCoreCanBeSetInTheRangeItsHeaderStates) {
   expect_rows_for(declared_fields("core/odometry/options.hpp", "OdometryOptions"), "odometry");
   expect_rows_for(declared_fields("core/calibration/options.hpp", "CalibrationOptions"),

@@ -44,20 +44,6 @@ test::GigeCameraOptions small(int k) {
   return o;
 }
 
-TEST(CameraDrivers, anUnknownDriverIsRefusedWithTheNearestOne) {
-  const std::string sentence = refusal({request("gigE", "1")});
-  EXPECT_NE(sentence.find("cameras.0.driver is \"gigE\"; did you mean \"gige\"?"),
-            std::string::npos)
-      << sentence;
-}
-
-TEST(CameraDrivers, everyNameStandsOnce) {
-  auto names = camera_driver_names();
-  std::sort(names.begin(), names.end());
-  EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
-  EXPECT_NE(std::find(names.begin(), names.end(), "gige"), names.end());
-}
-
 TEST(CameraDrivers, oneSerialTwiceIsRefused) {
   EXPECT_NE(refusal({request("gige", "A"), request("gige", "A")}).find("two entries"),
             std::string::npos);

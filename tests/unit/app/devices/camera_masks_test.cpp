@@ -63,11 +63,6 @@ TEST(CameraMasks, areReadFromPngAndPgmBesideTheConfiguration) {
   EXPECT_TRUE(views[2].empty());
 }
 
-TEST(CameraMasks, withoutKeysAreEmpty) {
-  const CameraMasks masks(Configuration{}, small_rig());
-  for (const ImageView& view : masks.views()) EXPECT_TRUE(view.empty());
-}
-
 TEST(CameraMasks, thatCannotBeUsedAreRefusedInASentence) {
   const TemporaryFolder folder;
   (void)folder.write("small.pgm", "P5 40 30 255\n" + std::string(40 * 30, '\1'));
@@ -92,12 +87,6 @@ TEST(CameraMasks, thatCannotBeUsedAreRefusedInASentence) {
         refusal(folder.path(), name),
         at + name + " is no mask; a PNG or a binary PGM is, 0 where nothing is to be looked for");
   EXPECT_EQ(refusal(folder.path(), "nowhere.png"), "cameras.1.mask: nowhere.png is missing");
-}
-
-TEST(CameraMasks, ofCamerasThatTheRigDoesNotHaveAreRefused) {
-  Configuration c;
-  c.cameras[2].mask = "any.png";
-  EXPECT_THROW(CameraMasks(c, small_rig()), InputError);
 }
 
 }  // namespace

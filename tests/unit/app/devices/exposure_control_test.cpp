@@ -141,16 +141,6 @@ TEST_P(ExposureOnTheMock,
 
 INSTANTIATE_TEST_SUITE_P(ByLatency, ExposureOnTheMock, ::testing::Values(1, 4));
 
-TEST(ExposureControl, isTheSameOnEveryRunInVirtualTime) {
-  const std::vector<std::string> faults{
-      "night@2 duration_s=3 factor=0.2", "lose_frames@1 camera=0 share=0.3 duration_s=5",
-      "late_frames@2 camera=0 share=0.2 delay_s=0.12 duration_s=3"};
-  const Driven a = drive(faults, 2, 8), b = drive(faults, 2, 8);
-  EXPECT_GT(a.counters.changes, 3U);
-  EXPECT_LT(a.cameras[0].size(), a.cameras[1].size());
-  EXPECT_EQ(a.cameras, b.cameras);
-}
-
 /// Answers as told, after a while.
 class SlowCamera final : public CameraDevice {
  public:

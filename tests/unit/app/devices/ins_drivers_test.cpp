@@ -31,13 +31,6 @@ InsRequest xsens_on(const std::string& port, double rate) {
   return r;
 }
 
-TEST(InsDrivers, noneIsNoDevice) {
-  std::vector<std::string> remarks;
-  InsRequest none;
-  none.driver = "none";
-  EXPECT_EQ(open_ins(none, &remarks), nullptr);
-}
-
 TEST(InsDrivers, whatCannotBeOpenedIsToldInOneSentence) {
   InsRequest unknown;
   unknown.driver = "xsense";

@@ -93,19 +93,6 @@ TEST(MissingDevices, aPortThatIsNotThereIsADeviceErrorOfEveryIns) {
   }
 }
 
-TEST(MissingDevices, aPortThatIsAFileIsTheConfigurationsFault) {
-  const test::TemporaryFolder folder;
-  std::ofstream(folder / "port") << "no terminal";
-  InsRequest request;
-  request.driver = "xsens";
-  request.port = (folder / "port").string();
-  request.rate_hz = 100;
-  std::string sentence;
-  std::vector<std::string> remarks;
-  EXPECT_EQ(refusal_of([&] { (void)open_ins(request, &remarks); }, &sentence), Refusal::input)
-      << sentence;
-}
-
 TEST(MissingDevices, aTriggerBoardThatIsNotThereIsADeviceError) {
   TriggerSettings settings;
   settings.port = "/dev/ttyNotThere";

@@ -215,9 +215,5 @@ TEST(SimulatedBoardLine, aBoardThatNeverComesBackEndsNothingButItsPulses) {
   EXPECT_LT(sets, 85U);
 }
 
-TEST(SimulatedBoardLine, isForVirtualTimeOnly) {
-  EXPECT_THROW((void)DriveDevices(chain({"mock.ins_line=none"}), {}, false, kSeconds), InputError);
-}
-
 }  // namespace
 }  // namespace vergence::app

@@ -34,21 +34,6 @@ TEST(Address, whatIsNoneIsRefusedWithItsKey) {
   }
 }
 
-TEST(Address, whereItIsEveryOneIsShownAsThoseThatOthersCanOpen) {
-  for (const char* every : {"0.0.0.0:8080", "[::]:8080"}) {
-    const auto addresses = addresses_of(parse_host_port(every, "k"));
-    ASSERT_FALSE(addresses.empty()) << every;
-    for (const HostPort& a : addresses) {
-      EXPECT_EQ(parse_host_port(a.text(), "k").port, 8080) << a.text();
-      EXPECT_TRUE(a.host != "0.0.0.0" && a.host != "::") << a.text();
-      EXPECT_TRUE(!a.loopback() || addresses.size() == 1) << a.text();
-    }
-  }
-  const auto named = addresses_of(parse_host_port("rig.local:80", "k"));
-  ASSERT_EQ(named.size(), 1U);
-  EXPECT_EQ(named[0].text(), "rig.local:80");
-}
-
 TEST(Address, ofLinesIsASocketFileOrADatagramsGoal) {
   EXPECT_EQ(parse_line_address("unix:///run/a.sock", "k").path, "/run/a.sock");
   const LineAddress udp = parse_line_address("udp://10.0.0.7:9870", "k");

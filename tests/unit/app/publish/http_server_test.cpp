@@ -156,12 +156,5 @@ TEST_F(Http, garbageAndAThousandConnectionsLeaveThePageToOthers) {
   EXPECT_NE(received(watching).find("still"), std::string::npos);
 }
 
-TEST_F(Http, wakeEndsAWait) {
-  server_->wake();
-  const auto begin = std::chrono::steady_clock::now();
-  server_->step(milliseconds(20'000));
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
-}
-
 }  // namespace
 }  // namespace vergence::app

@@ -130,19 +130,6 @@ TEST_F(UnixLines, aFileLeftBehindIsReplacedAnotherProgramsIsNot) {
   EXPECT_THROW((void)open_line_socket(nowhere, "k"), InputError);
 }
 
-TEST_F(UnixLines, aSocketOfAnotherKindThatLivesIsLeftAlone) {
-  const FileDescriptor datagrams(::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0));
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  path_.copy(address.sun_path, sizeof address.sun_path - 1);
-  const auto* general = reinterpret_cast<const sockaddr*>(&address);
-  ASSERT_EQ(::bind(datagrams.get(), general, sizeof address), 0);
-  EXPECT_THROW((void)open_line_socket(address_, "k"), InputError);
-  const FileDescriptor sender(::socket(AF_UNIX, SOCK_DGRAM, 0));
-  EXPECT_EQ(::sendto(sender.get(), "x", 1, 0, general, sizeof address), 1);
-  EXPECT_EQ(all_of(datagrams), "x");
-}
-
 TEST(UdpLines, goToTheirAddressOneALine) {
   const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK, 0));
   sockaddr_in address{};

@@ -81,24 +81,6 @@ TEST(LiveState, tellsWhatIsNewOnceAndALateViewerEverything) {
   EXPECT_FALSE(hello["ended"].get<bool>());
 }
 
-TEST(LiveState, aLateViewerReadsWhereACalibrationIsFromWhenItsSourceIsGone) {
-  LiveState state;
-  auto source = std::make_unique<std::string>("a calibration file of some other day");
-  state.add(CalibrationRecord::begin({}, Stamp(), "given", *source));
-  source.reset();
-  const json hello = json::parse(state.hello(kNow));
-  EXPECT_EQ(hello["calibration"]["history"][0]["reason"], "a calibration file of some other day");
-}
-
-TEST(LiveState, anOriginThatIsTooLongIsCutAtAWholeCharacter) {
-  std::string path(254, '/');
-  path += "\xc3\xa4";  // the second byte would be the array's last
-  LiveState state;
-  state.add(CalibrationRecord::begin({}, Stamp(), "state_file", path));
-  const json hello = json::parse(state.hello(kNow));
-  EXPECT_EQ(hello["calibration"]["history"][0]["reason"], std::string(254, '/'));
-}
-
 TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
   LiveState state;
   std::size_t told = 0;
@@ -154,30 +136,6 @@ TEST(LiveState, aRigThatStandsKeepsItsMapWhateverItsStatusDoes) {
   map = map_of(state);
   EXPECT_LE(map.longest_m, 1.0);
   EXPECT_EQ(map.degraded, 1U);
-}
-
-TEST(LiveState, aPlaceThatBecomesWorseIsToldAnew) {
-  LiveState state;
-  state.add(at(0));
-  state.add(at(1));
-  (void)state.update(kNow, -1);
-  state.add(at(1.1, PoseStatus::degraded));
-  const json worse = json::parse(state.update(kNow, -1));
-  EXPECT_EQ(worse["trail_from"], 1);
-  EXPECT_EQ(worse["trail"], json::parse("[[0.0,0.0,1.0,1]]"));
-  state.add(at(1.2));
-  EXPECT_TRUE(json::parse(state.update(kNow, -1))["trail"].empty()) << "better is no news";
-}
-
-TEST(LiveState, weeksInAYardLeaveItsNewestWay) {
-  LiveState state;
-  for (int i = 0; i < 200'000; ++i) {
-    PoseRecord pose = at(25 * std::sin(i * 0.02));
-    pose.world_left.t[0] = 25 * std::cos(i * 0.02);
-    state.add(pose);
-  }
-  const json trail = json::parse(state.hello(kNow))["trail"];
-  EXPECT_GE(trail.size(), LiveTrail::kMost / 2);
 }
 
 LiveFrame come(double seconds) {
@@ -243,18 +201,6 @@ TEST(LiveState, aCalibrationStandsWithTwoSigmaAndWhatTheDriveMeasuredBesideIt) {
   EXPECT_EQ(c["measured"][1]["figures"][3][1], 2.0);
   EXPECT_FALSE(json::parse(state.update(kNow, -1)).contains("calibration")) << "told once";
   ASSERT_NE(state.rig(), nullptr);
-}
-
-TEST(LiveState, camerasThatAreInStepAgainLeaveTheCalibrationAsItWas) {
-  for (const bool before : {false, true}) {
-    LiveState state;
-    state.add(calibration(false, -0.75));
-    if (before) state.add(event("calibration_confirmed", ""));
-    state.add(event("rig_changed", "the cameras' images are not of the same instant"));
-    EXPECT_FALSE(json::parse(state.update(kNow, -1))["calibration"]["confirmed"].get<bool>());
-    state.add(event("in_step", "the cameras are in step again"));
-    EXPECT_EQ(json::parse(state.update(kNow, -1))["calibration"]["confirmed"].get<bool>(), before);
-  }
 }
 
 }  // namespace

@@ -95,20 +95,5 @@ TEST(PoseLine, staysJsonWithNumbersThatAreNone) {
   EXPECT_TRUE(j["reprojection_px"].is_null());
 }
 
-TEST(Earth, isThatOfTheComparison) {
-  // World looks north: x right is east, y down, z forward is north.
-  Mat3 R_enu_world;
-  R_enu_world << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  PublishedPlacement placement;
-  placement.T_enu_world = PoseNumbers::of({R_enu_world, {10, 20, 30}});
-  placement.origin = {-27.4975, 153.0137, 60};
-  const EarthNumbers e = Earth(placement).of(PoseNumbers::of({exp_so3({0, 0.1, 0}), {1, 2, 3}}));
-  EXPECT_NEAR(e.enu[0], 11, 1e-12);
-  EXPECT_NEAR(e.enu[1], 23, 1e-12);
-  EXPECT_NEAR(e.enu[2], 28, 1e-12);
-  EXPECT_NEAR(e.heading_deg, 0.1 * 180 / std::numbers::pi, 1e-9) << "turned to the right";
-  EXPECT_NEAR(e.position.height_m, 88, 1e-3);
-}
-
 }  // namespace
 }  // namespace vergence::app

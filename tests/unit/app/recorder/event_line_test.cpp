@@ -1,4 +1,4 @@
-#include "app/recorder/event_line.hpp"
+#include "app/recorder/record_lines.hpp"
 
 #include <gtest/gtest.h>
 
@@ -47,13 +47,6 @@ TEST(EventLine, numbersThatJsonDoesNotHaveAreNull) {
   const nlohmann::json json = parsed(event);
   EXPECT_TRUE(json["fields"]["nan"].is_null());
   EXPECT_TRUE(json["fields"]["infinite"].is_null());
-}
-
-TEST(EventLine, withoutFieldsHasAnEmptyObject) {
-  EventRecord event;
-  event.kind = "k";
-  EXPECT_TRUE(parsed(event)["fields"].is_object());
-  EXPECT_TRUE(parsed(event)["fields"].empty());
 }
 
 /// Valid as they are: two, three and four bytes. Replaced: a lone continuation, a cut sequence, a

@@ -178,23 +178,5 @@ TEST(InsFile, theRecorderWritesEveryReadingAndThePostingThreadTakesNoMemory) {
   EXPECT_EQ(totals->dropped_readings, 0U);
 }
 
-TEST(InsFile, readingsThatFindNoRoomAreCounted) {
-  const test::TemporaryFolder folder;
-  constexpr std::uint64_t kReadings = 50'000;
-  Recorder recorder(folder.path(), {.when_full = Recorder::WhenFull::drop, .ins = true});
-  for (std::uint64_t i = 0; i < kReadings; ++i) recorder.post(reading(i));
-  const auto totals = recorder.close();
-  const std::string text = test::read_file(folder / "ins.csv");
-  const auto lines = static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n')) - 1;
-  EXPECT_EQ(lines + totals->dropped_readings + totals->lost_lines, kReadings);
-  EXPECT_EQ(totals->dropped_records, 0U);
-}
-
-TEST(InsFile, aDriveWithoutAnInsHasNone) {
-  const test::TemporaryFolder folder;
-  (void)Recorder(folder.path(), {}).close();
-  EXPECT_FALSE(std::filesystem::exists(folder / "ins.csv"));
-}
-
 }  // namespace
 }  // namespace vergence::app

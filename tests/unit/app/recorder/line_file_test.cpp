@@ -34,19 +34,6 @@ class SmallDisk {
   void (*former_handler_)(int);
 };
 
-TEST(LineFile, linesAreInTheFileAfterFlushAndNotBefore) {
-  const test::TemporaryFolder folder;
-  LineFile file(folder / "a.txt");
-  EXPECT_TRUE(file.append("one\n"));
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "");
-  EXPECT_TRUE(file.flush());
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "one\n");
-  EXPECT_TRUE(file.append("two\n"));
-  EXPECT_TRUE(file.close());
-  EXPECT_TRUE(file.close());
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "one\ntwo\n");
-}
-
 TEST(LineFile, moreThanMayWaitIsHandedOverWhileTheDiskTakesIt) {
   const test::TemporaryFolder folder;
   LineFile file(folder / "a.txt", 16);
@@ -59,14 +46,6 @@ TEST(LineFile, moreThanMayWaitIsHandedOverWhileTheDiskTakesIt) {
   EXPECT_TRUE(file.close());
   EXPECT_EQ(file.lost_lines(), 0U);
   EXPECT_EQ(test::read_file(folder / "a.txt"), all);
-}
-
-TEST(LineFile, aFullDeviceIsAFaultWithItsReason) {
-  LineFile file("/dev/full");
-  EXPECT_TRUE(file.append("lost\n"));
-  EXPECT_FALSE(file.flush());
-  EXPECT_EQ(file.fault(), ENOSPC);
-  EXPECT_FALSE(file.close());
 }
 
 TEST(LineFile, goesOnWhereItStoppedWhenRoomComesBack) {
@@ -103,16 +82,6 @@ TEST(LineFile, whatWaitsIsBoundedAndWhatIsLostIsWholeLinesThatAreCounted) {
     EXPECT_TRUE(file.close());
   }
   EXPECT_EQ(test::read_file(folder / "a.txt").size(), taken * line.size());
-}
-
-TEST(LineFile, aPlaceThatCannotBeWrittenIsNamed) {
-  const test::TemporaryFolder folder;
-  try {
-    const LineFile file(folder / "none" / "a.txt");
-    FAIL() << "opened a file in a folder that does not exist";
-  } catch (const InputError& e) {
-    EXPECT_NE(std::string(e.what()).find("none/a.txt"), std::string::npos);
-  }
 }
 
 }  // namespace

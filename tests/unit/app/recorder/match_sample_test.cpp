@@ -86,14 +86,5 @@ TEST(MatchSample, aLongDriveIsSampledThinnerAndEvenly) {
     ASSERT_EQ(values[i], 8.0 * static_cast<double>(i));
 }
 
-TEST(MatchSample, remembersBetweenWhichFramesTheRigWasWhich) {
-  const auto sample = std::make_unique<MatchSample>();
-  EXPECT_EQ(sample->last_change(), 0U);
-  EXPECT_GT(sample->first_change(), 1'000'000'000U);
-  for (const std::uint64_t frame : {700U, 300U, 500U}) sample->rig_changed(frame);
-  EXPECT_EQ(sample->first_change(), 300U);
-  EXPECT_EQ(sample->last_change(), 700U);
-}
-
 }  // namespace
 }  // namespace vergence::app

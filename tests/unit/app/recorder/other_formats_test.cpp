@@ -81,16 +81,6 @@ TEST(OtherFormats, theStepToASecondPlacementIsNoWayDriven) {
   EXPECT_TRUE(w.said.empty());
 }
 
-TEST(OtherFormats, aChangeOfStatusIsJoined) {
-  SessionTotals totals = straight_drive(100);
-  totals.statuses[50] = PoseStatus::degraded;
-  EarthFigures earth = placed_twice(60);
-  earth.placements.pop_back();
-  const auto geojson = nlohmann::json::parse(write("geojson", "drive.geojson", totals, earth).text);
-  ASSERT_EQ(geojson["features"].size(), 3U);
-  EXPECT_EQ(geojson["features"][1]["geometry"]["coordinates"].size(), 2U);
-}
-
 TEST(OtherFormats, aTrajectoryThatCouldNotBeReadBackIsAFaultAndNoDriveWithoutAPose) {
   SessionTotals totals;
   totals.read = totals.ok = 100;
@@ -105,21 +95,6 @@ TEST(OtherFormats, aTrajectoryThatCouldNotBeReadBackIsAFaultAndNoDriveWithoutAPo
   EXPECT_TRUE(w.faults.empty());
   ASSERT_EQ(w.said.size(), 1U);
   EXPECT_NE(w.said[0].find("there never was a pose"), std::string::npos);
-}
-
-TEST(OtherFormats, aMapThatEndsBeforeTheDriveSaysSo) {
-  TotalsBuilder builder(80);
-  const SessionTotals drive = straight_drive(100);
-  for (std::size_t i = 0; i < 100; ++i) builder.add(pose(i, PoseStatus::ok, 0), true);
-  SessionTotals totals = builder.totals();
-  EXPECT_EQ(totals.statuses_left_out, 20U);
-  totals.trajectory = drive.trajectory;
-  const Written w = write("kitti,geojson", "trajectory.kitti", totals, placed_twice(60));
-  ASSERT_EQ(w.said.size(), 1U) << "the other has all";
-  EXPECT_NE(
-      w.said[0].find("drive.geojson ends before the drive: the statuses of its last 20 frames"),
-      std::string::npos)
-      << w.said[0];
 }
 
 }  // namespace

@@ -51,44 +51,6 @@ TEST(Recorder, calibrationsCarryTheirNumbersAndEmptyFieldsWhereNothingIsGiven) {
   EXPECT_EQ(totals->attempts[1].reason, "held-out frames do not fit better");
 }
 
-TEST(Recorder, whatTheDriveMeasuredWhileItWentOnIsKeptAndNoAttempt) {
-  const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {});
-  CalibrationDecision measured = decision(false);
-  measured.cause = CalibrationCause::refinement;
-  measured.learnt = true;
-  measured.judged_depth_m = 20;
-  measured.depth_sigma_percent = 0.25;
-  measured.depth_difference_percent = 1.5;
-  measured.verified = measured.lenses = true;
-  recorder.post(CalibrationRecord::of(measured));
-  const auto totals = recorder.close();
-  const auto lines = lines_of(folder / "calibrations.csv");
-  ASSERT_EQ(lines.size(), 2U);
-  EXPECT_EQ(lines[1].substr(0, 40), "1403636584763555584,kept,refinement,held");
-  EXPECT_TRUE(lines[1].ends_with(",20.00,0.2500,1.5000,1,1")) << lines[1];
-  EXPECT_EQ(totals->rejected, 0U);
-  EXPECT_TRUE(totals->attempts.empty());
-}
-
-TEST(TotalsBuilder, theFirstCalibrationFoundIsKnownAlsoAfterThousandsOfAttempts) {
-  TotalsBuilder builder(0);
-  const auto attempt = [&builder](CalibrationCause cause, bool accepted) {
-    CalibrationDecision d = decision(accepted);
-    d.cause = cause;
-    return builder.add(CalibrationRecord::of(d));
-  };
-  for (std::size_t i = 0; i < kMostAttempts + 5; ++i)
-    EXPECT_FALSE(attempt(CalibrationCause::from_scratch, false));
-  EXPECT_TRUE(attempt(CalibrationCause::from_scratch, true));
-  for (std::size_t i = 0; i < kMostAttempts + 5; ++i)
-    EXPECT_FALSE(attempt(CalibrationCause::knock, false));
-  const SessionTotals& totals = builder.totals();
-  ASSERT_TRUE(totals.from_scratch.found);
-  EXPECT_EQ(totals.from_scratch.rejected, kMostAttempts + 5);
-  EXPECT_EQ(totals.attempts.size(), kMostAttempts);
-}
-
 EventRecord event_at(std::int64_t ns, EstimatorEvent::Kind kind, double value) {
   EstimatorEvent event;
   event.stamp = Stamp(ns);
@@ -120,16 +82,6 @@ TEST(Recorder, theFirstConfirmationAndTheFirstContradictionAreInTheTotals) {
     EXPECT_EQ(totals->contradicted->stamp, Stamp(700));
     EXPECT_EQ(totals->contradicted->depth_percent, 6.5);
   }
-}
-
-TEST(TotalsBuilder, camerasThatAreInStepAgainConfirmNoCalibration) {
-  TotalsBuilder builder(0);
-  const EventRecord in_step = event_at(700, EstimatorEvent::Kind::in_step, 0);
-  EXPECT_STREQ(in_step.kind, "in_step");
-  builder.add(in_step);
-  EXPECT_FALSE(builder.totals().confirmed);
-  builder.add(event_at(900, EstimatorEvent::Kind::calibration_confirmed, 0.3));
-  EXPECT_EQ(builder.totals().confirmed, Stamp(900));
 }
 
 TEST(RigNumbers, thereAndBackAreTheSameDoubles) {
@@ -201,27 +153,6 @@ TEST(Recorder, aCalibrationThatIsFoundWhileTheDiskStandsStillIsKept) {
   EXPECT_EQ(totals->accepted, 1U);
   EXPECT_GT(totals->dropped_records, 0U) << "poses, of which the next ones say the same";
   EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
-}
-
-TEST(Recorder, calibrationsComeInTheirTurnAmongTheEvents) {
-  using Kind = EstimatorEvent::Kind;
-  const test::TemporaryFolder folder;
-  test::StandingFile poses(folder / "poses.csv");
-  std::vector<bool> kept;
-  Recorder::Options options;
-  options.keep = [&kept](const RigCalibration& /*rig*/, bool found) {
-    kept.push_back(found);
-    return Kept{false, "kept"};
-  };
-  Recorder recorder(folder.path(), options);
-  // All of this waits, and is taken at once.
-  recorder.post(event_at(600, Kind::calibration_confirmed, 0.3));
-  recorder.post(CalibrationRecord::begin(two_cameras(), Stamp(kStamp), "given", "mine.yaml"));
-  recorder.post(event_at(700, Kind::calibration_confirmed, 0.3));
-  recorder.post(CalibrationRecord::of(decision(true)));
-  poses.take_all();
-  (void)recorder.close();
-  EXPECT_EQ(kept, (std::vector<bool>{false, true}));
 }
 
 TEST(Recorder, whatTheDriveBeganWithIsKeptOnceItIsConfirmedUnlessAnotherWasFoundBefore) {

@@ -1,23 +1,15 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
-#include <fstream>
 #include <functional>
-#include <memory>
-#include <thread>
 
 #include <nlohmann/json.hpp>
 
-#include "app/recorder/pose_line.hpp"
+#include "app/recorder/record_lines.hpp"
 #include "app/recorder/recorder.hpp"
-#include "app/recorder/session_folder.hpp"
-#include "app/runtime/errors.hpp"
-#include "tests/support/small_disk.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/recorder/recorder_inputs.hpp"
 
@@ -56,51 +48,6 @@ std::function<bool(Stamp)> full_from_to(std::uint64_t first, std::uint64_t last)
            s < Stamp(kStamp + static_cast<std::int64_t>(last) * 50'000'000);
   };
 }
-
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which take what they want
-
-/// The process has so many bytes more than it has now, while it lives.
-class LittleMemory {
- public:
-  explicit LittleMemory(std::size_t more) {
-    std::size_t pages = 0;
-    std::ifstream("/proc/self/statm") >> pages;
-    (void)::getrlimit(RLIMIT_AS, &before_);
-    const rlimit little{pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + more,
-                        before_.rlim_max};
-    (void)::setrlimit(RLIMIT_AS, &little);
-  }
-  ~LittleMemory() { (void)::setrlimit(RLIMIT_AS, &before_); }
-  LittleMemory(const LittleMemory&) = delete;
-  LittleMemory& operator=(const LittleMemory&) = delete;
-
- private:
-  rlimit before_{};
-};
-
-TEST(Recorder, aTrajectoryThatIsTooLongForTheMemoryIsASentenceAndTheTotalsAreThere) {
-  constexpr std::size_t kLong = std::size_t{256} << 20, kMemory = std::size_t{32} << 20;  // bytes
-  const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {});
-  for (std::uint64_t i = 0; i < 5; ++i) recorder.post(pose(i, PoseStatus::ok, 0.1));
-  while (lines_of(folder / "trajectory.tum").size() < 5)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  std::filesystem::resize_file(folder / "trajectory.tum", kLong);
-  std::unique_ptr<SessionTotals> totals;
-  {
-    const LittleMemory memory(kMemory);
-    totals = recorder.close();
-  }
-  EXPECT_EQ(totals->ok, 5U);
-  EXPECT_TRUE(totals->trajectory.empty());
-  const auto errors = recorder.take_errors();
-  ASSERT_EQ(errors.size(), 1U);
-  EXPECT_NE(errors[0].find("trajectory.tum: is too long for this machine's memory"),
-            std::string::npos)
-      << errors[0];
-}
-
-#endif
 
 TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
   const test::TemporaryFolder folder;
@@ -141,26 +88,6 @@ TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
   EXPECT_EQ(told(folder.path(), "disk_room"),
             std::vector<std::string>{"the disk takes lines again; " +
                                      std::to_string(totals->lost_lines) + " were lost"});
-}
-
-TEST(Recorder, aDiskThatIsFullToTheEndLeavesFilesThatAreNotWholeAndNamesThem) {
-  const test::TemporaryFolder folder;
-  Recorder::Options options;
-  options.disk_full = full_from_to(10, 1'000'000);
-  Recorder recorder(folder.path(), options);
-  for (std::uint64_t i = 0; i < 100; ++i)
-    recorder.post(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
-  const auto totals = recorder.close();
-  EXPECT_GE(totals->faults.size(), 2U);
-  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 10U);
-}
-
-TEST(Recorder, aFolderOnADiskThatTakesNoNewFileIsRefused) {
-  const test::TemporaryFolder folder;
-  const test::SmallDisk disk(folder.path(), "nr_inodes=1");
-  if (!disk.ready()) GTEST_SKIP() << "no file system may be mounted here";
-  EXPECT_THROW((void)make_session_folder(folder / "monday"), InputError);
-  EXPECT_THROW(Recorder(folder.path(), {}), InputError);
 }
 
 TEST(Recorder, aSessionIsLockedUntilItsRecorderGoes) {

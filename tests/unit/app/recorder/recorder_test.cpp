@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/recorder/pose_line.hpp"
+#include "app/recorder/record_lines.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -77,17 +77,6 @@ TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
   EXPECT_TRUE(totals->faults.empty());
 }
 
-TEST(Recorder, itsOwnEventsBeforeTheFirstPoseAreOfTheDrivesBegin) {
-  const test::TemporaryFolder folder;
-  std::filesystem::create_symlink("/dev/full", folder / "poses.csv");
-  Recorder recorder(folder.path(), {.first = Stamp(kStamp)});
-  while (recorder.take_errors().empty()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  (void)recorder.close();
-  const auto lines = lines_of(folder / "events.jsonl");
-  ASSERT_EQ(lines.size(), 1U);
-  EXPECT_NE(lines[0].find(std::to_string(kStamp)), std::string::npos) << lines[0];
-}
-
 TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
@@ -117,74 +106,6 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   EXPECT_EQ(state["kind"], "state");
   EXPECT_EQ(state["sentence"], "initialising to stereo_odometry: trusted calibration");
   EXPECT_EQ(state["fields"]["to"], "stereo_odometry");
-}
-
-TEST(EventRecord, aLongSentenceIsCutBetweenCharacters) {
-  EventRecord event;
-  event.set_sentence(std::string(254, 'a').append("é and more"));  // the é would straddle the end
-  const std::string kept = event.sentence.data();
-  EXPECT_EQ(kept, std::string(254, 'a'));
-}
-
-TEST(EventRecord, whatHappensToACalibrationIsAWholeSentence) {
-  EstimatorEvent event;
-  event.kind = EstimatorEvent::Kind::calibration_rejected;
-  event.why = "too little motion";
-  EXPECT_STREQ(EventRecord::of(event).sentence.data(),
-               "a calibration was rejected: too little motion");
-  event.kind = EstimatorEvent::Kind::calibration_confirmed;
-  event.why = "the drive confirms it";
-  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the drive confirms it");
-  event.kind = EstimatorEvent::Kind::calibration_contradicted;
-  event.why = "it is not that of the rig";
-  event.value = 6.54;
-  EXPECT_STREQ(EventRecord::of(event).sentence.data(),
-               "it is not that of the rig: its depths are off by 6.5 %");
-  event.kind = EstimatorEvent::Kind::rig_changed;
-  event.why = "the rig no longer fits";
-  EXPECT_STREQ(EventRecord::of(event).sentence.data(), "the rig no longer fits");
-}
-
-TEST(Recorder, framesOfOtherStatesThanOdometryAreTimedByThemselves) {
-  const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {});
-  const std::array states{State::initialising,    State::parallel_monocular, State::calibrating,
-                          State::stereo_odometry, State::recalibrating,      State::lost};
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    PoseRecord p = pose(i, PoseStatus::ok, 0);
-    p.state = states[i];
-    p.estimate_ms = static_cast<float>(i + 1);
-    recorder.post(p);
-  }
-  const auto totals = recorder.close();
-  EXPECT_EQ(totals->calibrating.count(), 4U);
-  EXPECT_DOUBLE_EQ(totals->calibrating.mean(), (1 + 2 + 3 + 5) / 4.0);
-}
-
-TEST(Recorder, theSameRecordsGiveTheSameBytes) {
-  std::array<std::string, 2> bytes;
-  for (std::string& b : bytes) {
-    const test::TemporaryFolder folder;
-    Recorder recorder(folder.path(), {});
-    for (std::uint64_t i = 0; i < 500; ++i)
-      recorder.post(pose(i, i % 7 == 3 ? PoseStatus::lost : PoseStatus::ok,
-                         std::sin(static_cast<double>(i))));
-    (void)recorder.close();
-    b = test::read_file(folder / "trajectory.tum") + test::read_file(folder / "poses.csv") +
-        test::read_file(folder / "events.jsonl");
-  }
-  EXPECT_EQ(bytes[0], bytes[1]);
-}
-
-TEST(Recorder, nothingIsLostWhenTheProducerOutrunsTheDisk) {
-  const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {});
-  constexpr std::uint64_t kFrames = 20000;
-  for (std::uint64_t i = 0; i < kFrames; ++i) recorder.post(pose(i, PoseStatus::ok, 0));
-  const auto totals = recorder.close();
-  EXPECT_EQ(totals->read, kFrames);
-  EXPECT_EQ(totals->dropped_records, 0U);
-  EXPECT_EQ(lines_of(folder / "poses.csv").size(), kFrames + 1);
 }
 
 TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
@@ -219,11 +140,6 @@ TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
     if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   EXPECT_TRUE(found);
-}
-
-TEST(Recorder, aFolderThatCannotBeWrittenIsNamed) {
-  const test::TemporaryFolder folder;
-  EXPECT_THROW(Recorder(folder / "none", {}), InputError);
 }
 
 TEST(Recorder, postingAllocatesNothing) {

@@ -95,14 +95,5 @@ TEST(ResidualField, onlyFramesOfTheSameRigCount) {
   EXPECT_TRUE(residual_field(matches, rig, 0, 0).empty());
 }
 
-TEST(ResidualField, aTableOfBothEnds) {
-  const std::vector<ResidualCell> begin{{1, 0, 80, 80, 80, 12, -0.5, 0.25}},
-      end{{2, 0, 0, 80.5, 60.25, 9, 0.125, 0.3}};
-  EXPECT_EQ(format_residuals(begin, end),
-            "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n"
-            "begin,1,0.00,80.00,80.00,80.00,12,-0.5000,0.2500\n"
-            "end,2,0.00,0.00,80.50,60.25,9,0.1250,0.3000\n");
-}
-
 }  // namespace
 }  // namespace vergence::app

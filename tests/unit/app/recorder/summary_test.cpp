@@ -137,25 +137,6 @@ TEST(Summary, aYawSigmaTellsTheDepthErrorAndTheWord) {
   }
 }
 
-TEST(Summary, saysWhetherAndWhenTheDriveConfirmedItsCalibration) {
-  auto totals = std::make_unique<SessionTotals>();
-  SummaryInput in = input();
-  auto json = summary_json(*totals, in)["calibration"];
-  EXPECT_EQ(json["verified"], false);
-  EXPECT_EQ(json["online"], true);
-  for (const char* key : {"verified_frame", "verified_stamp_ns", "contradicted"})
-    EXPECT_TRUE(json.contains(key) && json[key].is_null()) << key;
-  in.verified = true, in.online = false;
-  totals->confirmed = Stamp(1234), totals->confirmed_frame = 56;
-  totals->contradicted = {Stamp(1000), 6.5};
-  json = summary_json(*totals, in)["calibration"];
-  EXPECT_EQ(json["verified"], true);
-  EXPECT_EQ(json["online"], false);
-  EXPECT_EQ(json["verified_frame"], 56);
-  EXPECT_EQ(json["verified_stamp_ns"], 1234);
-  EXPECT_EQ(json["contradicted"]["depth_percent"], 6.5);
-}
-
 TEST(Summary, whatLimitsADepthIsNoiseOrIntrinsics) {
   auto totals = std::make_unique<SessionTotals>();
   SummaryInput in = input();

@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "app/datasets/detail/ros_messages.hpp"
-#include "app/recording/ros_types.hpp"
 
 namespace vergence::app {
 namespace {
@@ -135,21 +134,6 @@ TEST(Messages, cameraInfosHoldTheRig) {
   EXPECT_LT((read.T_camera_left[1].t - original.T_camera_left[1].t).norm(), 1e-12);
   EXPECT_EQ(read.intrinsics[1].distortion, original.intrinsics[1].distortion);
   EXPECT_EQ(read.intrinsics[0].fx, 450);
-}
-
-TEST(Messages, aRigWithoutCalibrationHasPlainCameraInfos) {
-  RigCalibration original = rig();
-  original.T_camera_left[1] = {};
-  for (const bool calibrated : {false, true}) {  // true: no direction to rectify along
-    Room room;
-    write_camera_info(&room.out, Stamp(1), "right", original, 1, calibrated);
-    const auto info =
-        detail::read_ros_camera_info(room.out.written(), detail::MessageEncoding::cdr);
-    ASSERT_TRUE(info);
-    EXPECT_EQ(info->camera.R, Mat3::Identity());
-    EXPECT_EQ(info->camera.P(0, 0), 450);
-    EXPECT_EQ(info->camera.P(0, 3), 0);
-  }
 }
 
 TEST(Messages, everyMessageFitsItsRoom) {

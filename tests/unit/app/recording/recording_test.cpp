@@ -80,16 +80,6 @@ TEST(Recording, readsBackAsPosted) {
   EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 1000));
 }
 
-TEST(Recording, queueLargerThanItselfGoesThroughItManyTimes) {
-  const TemporaryFolder folder;
-  Recording::Options o = options();
-  o.queues = {64U << 10U};
-  Recording recording(folder.path(), o);
-  for (int i = 0; i < 3000; ++i) ASSERT_TRUE(post(&recording, i, 777));
-  recording.close();
-  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 3000));
-}
-
 TEST(Recording, messagesAreInTheFileSoonWithoutItsEnd) {
   const TemporaryFolder folder;
   Recording recording(folder.path(), options());
@@ -154,18 +144,6 @@ TEST(Recording, aMessageLargerThanItsQueueIsDroppedAlsoWhenOneWaits) {
   Recording recording(folder.path(), options());
   EXPECT_TRUE(recording.begin(0, kImage, Stamp(1), 5U << 20U, true).empty());
   EXPECT_EQ(recording.counters().dropped_images, 1U);
-}
-
-TEST(Recording, figuresOfItsQueuesAreOfAllOfThem) {
-  const TemporaryFolder folder;
-  Recording::Options o = options();
-  o.queues = {64U << 10U, 128U << 10U};
-  Recording recording(folder.path(), o);
-  EXPECT_EQ(recording.counters().queue_bytes, std::size_t{192} << 10U);
-  ASSERT_FALSE(recording.begin(1, kText, Stamp(1), 1000).empty());
-  recording.commit(1, 1000);
-  recording.close();
-  EXPECT_GE(recording.counters().queue_high_water, 1000U);
 }
 
 TEST(Recording, shortWritesLoseNothing) {
@@ -253,14 +231,6 @@ TEST(Recording, whatTheDiskTookAndDidNotKeepIsCountedAndSaid) {
             std::string::npos)
       << errors[0];
   EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
-}
-
-TEST(SystemDisk, saysWhatBecameOfAWritebackAndNothingWhereThereCanBeNone) {
-  EXPECT_EQ(system_disk().finish_writeback(-1, 0, 0), -EBADF);
-  std::array<int, 2> pipe{};
-  ASSERT_EQ(::pipe(pipe.data()), 0);
-  EXPECT_EQ(system_disk().finish_writeback(pipe[1], 0, 0), 0);
-  for (const int fd : pipe) system_disk().close(fd);
 }
 
 TEST(Recording, aDiskThatFailsForAWhileIsTriedAgainInTheSameFile) {
@@ -357,12 +327,6 @@ TEST(Recording, keepsWhatIsAroundAnEvent) {
   const auto kept = numbers(folder / "drive.mcap");
   EXPECT_EQ(kept, sequence(899, 1100));
   EXPECT_EQ(recording.counters().passed_over, 2000U - kept.size());
-}
-
-TEST(Recording, aFolderThatTakesNoFileIsRefused) {
-  const TemporaryFolder folder;
-  (void)folder.write("drive.mcap", "somebody's");
-  EXPECT_THROW(Recording(folder.path() / "nowhere", options()), InputError);
 }
 
 TEST(Recording, postingAndWritingTakeNoMemory) {

@@ -48,20 +48,6 @@ TEST(BackgroundThread, whatATaskWroteIsThereWhenItIsNoLongerBusy) {
   }
 }
 
-TEST(BackgroundThread, waitingWithoutATaskReturnsAtOnceAndTheEndWaitsForOne) {
-  std::atomic<bool> done{false};
-  auto task = [&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    done = true;
-  };
-  {
-    BackgroundThread runner;
-    runner.wait();
-    runner.start(TaskRef(task));
-  }
-  EXPECT_TRUE(done);
-}
-
 TEST(BackgroundThread, allocatesNothingPerTaskAndSealsItsThread) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";

@@ -90,20 +90,6 @@ TEST_F(ProgressTest, TheLineSaysEverythingThatIsKnown) {
       "stereo · frame 1001/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 05:20 left");
 }
 
-TEST_F(ProgressTest, WhatIsNotKnownIsLeftOut) {
-  auto p = progress(Progress::Mode::terminal);
-  p.update(ProgressState{.state = "lost", .frame = 7});
-  EXPECT_EQ(show(out.str()).row, "lost · frame 7 · 0.00 km");
-}
-
-TEST_F(ProgressTest, HoursAreShownWhenTheyAreLeft) {
-  auto p = progress(Progress::Mode::terminal);
-  p.update(at(0, 100000));
-  now = now + Duration::seconds(2);
-  p.update(at(20, 100000));  // 10 a second: 9998 s
-  EXPECT_NE(show(out.str()).row.find("2:46:38 left"), std::string::npos) << out.str();
-}
-
 TEST_F(ProgressTest, TheTerminalIsRedrawnAtMostTenTimesASecond) {
   auto p = progress(Progress::Mode::terminal);
   constexpr int kMilliseconds = 2000;
@@ -126,14 +112,6 @@ TEST_F(ProgressTest, TheLineIsCutToTheWidthInCharactersNotBytes) {
   for (const auto& c : shown) EXPECT_TRUE(c.size() == 1 || c == "·");
 }
 
-TEST_F(ProgressTest, AShorterLineLeavesNothingOfALongerOne) {
-  auto p = progress(Progress::Mode::terminal);
-  p.update(at(1204, 33000));
-  now = now + Duration::seconds(1);
-  p.update(ProgressState{.state = "lost", .frame = 1205});
-  EXPECT_EQ(show(out.str()).row, "lost · frame 1205 · 0.00 km");
-}
-
 TEST_F(ProgressTest, FinishShowsTheLastStateAndEndsTheLine) {
   auto p = progress(Progress::Mode::terminal);
   p.update(at(1, 10));
@@ -144,16 +122,6 @@ TEST_F(ProgressTest, FinishShowsTheLastStateAndEndsTheLine) {
   ASSERT_EQ(screen.rows.size(), 1U);
   EXPECT_EQ(screen.rows[0], "stereo · frame 10/10 · 0.62 km · 318 inliers · 7.9 ms");
   EXPECT_EQ(screen.row, "");
-}
-
-TEST_F(ProgressTest, ASentenceStandsOnItsOwnLineAndTheProgressComesBack) {
-  auto p = progress(Progress::Mode::terminal);
-  p.update(at(5, 10));
-  p.say("frame 5 is skipped");
-  const Screen screen = show(out.str());
-  ASSERT_EQ(screen.rows.size(), 1U);
-  EXPECT_EQ(screen.rows[0], "frame 5 is skipped");
-  EXPECT_EQ(screen.row.substr(0, 6), "stereo");
 }
 
 TEST_F(ProgressTest, WithoutATerminalALineComesEveryTenSecondsAndOneAtTheEnd) {
@@ -169,16 +137,6 @@ TEST_F(ProgressTest, WithoutATerminalALineComesEveryTenSecondsAndOneAtTheEnd) {
   EXPECT_NE(screen.rows[1].find("frame 20/100"), std::string::npos);
   EXPECT_NE(screen.rows[2].find("frame 25/100"), std::string::npos);
   EXPECT_EQ(redraws(), 0U) << "no carriage return in a file";
-}
-
-TEST_F(ProgressTest, QuietWritesNothingButSentences) {
-  auto p = progress(Progress::Mode::quiet);
-  p.update(at(1, 10));
-  now = now + Duration::seconds(60);
-  p.update(at(5, 10));
-  p.say("frame 5 is skipped");
-  p.finish();
-  EXPECT_EQ(out.str(), "frame 5 is skipped\n");
 }
 
 TEST_F(ProgressTest, LinesThatWereNotTakenAreCountedWhereOneIs) {
@@ -202,16 +160,6 @@ TEST_F(ProgressTest, LinesThatWereNotTakenAreCountedWhereOneIs) {
   EXPECT_EQ(screen.rows[0], "vergence: lines that were not taken before this one: 2");
   EXPECT_EQ(screen.rows[1], "both are back");
   EXPECT_EQ(screen.rows[2].substr(0, 6), "stereo") << "what was not drawn before is at the end";
-}
-
-TEST_F(ProgressTest, AnUnknownWidthIsTakenAsEightyColumns) {
-  width = 0;
-  auto p = progress(Progress::Mode::terminal);
-  ProgressState s = at(1204, 33000);
-  s.state =
-      "a state whose name is so long that it fills the line of any terminal that there is, twice";
-  p.update(s);
-  EXPECT_EQ(code_points(show(out.str()).row).size(), 79U);
 }
 
 }  // namespace

@@ -11,8 +11,6 @@
 #include <thread>
 #include <vector>
 
-#include "app/runtime/cpu_list.hpp"
-
 namespace vergence::app {
 namespace {
 
@@ -57,12 +55,6 @@ TEST(Realtime, theMoreUrgentRoleHasTheHigherPriority) {
   EXPECT_EQ(system.priorities, expected) << "solver, mock, caller and libraries stay as they are";
 }
 
-TEST(Realtime, theLowestPriorityIsStillOne) {
-  EXPECT_EQ(role_priority(ThreadRole::background, 1), 1);
-  EXPECT_EQ(role_priority(ThreadRole::capture, 1), 1);
-  EXPECT_EQ(role_priority(ThreadRole::capture, 0), 0);
-}
-
 TEST(Realtime, aThreadIsSetOnceAndALaterOneWhenItComes) {
   FakeSystem system;
   RealtimeRequest request;
@@ -77,18 +69,6 @@ TEST(Realtime, aThreadIsSetOnceAndALaterOneWhenItComes) {
   (void)threads.apply(later);
   EXPECT_EQ(system.calls, 5);
   EXPECT_EQ(system.priorities[9], 40);
-}
-
-TEST(Realtime, aThreadThatIsGivenTheNumberOfOneThatEndedIsSet) {
-  FakeSystem system;
-  RealtimeRequest request;
-  request.priority = 40;
-  RealtimeThreads threads(request, system);
-  const std::vector<ProcessThread> capture = {{9, "vergence-v4l2"}};
-  (void)threads.apply(capture);
-  (void)threads.apply({});
-  (void)threads.apply(capture);
-  EXPECT_EQ(system.calls, 2);
 }
 
 TEST(Realtime, theSolverHasProcessorsOfItsOwn) {
@@ -122,23 +102,6 @@ TEST(Realtime, aRefusalIsOneSentenceWithWhatAllowsIt) {
   EXPECT_TRUE(mentions(sentences[1], "setcap") && mentions(sentences[1], "LimitRTPRIO=40"))
       << sentences[1];
   EXPECT_TRUE(threads.apply({{20, "vergence-v4l2"}}).empty());
-}
-
-TEST(Realtime, nothingIsTouchedWhereNothingIsAskedFor) {
-  FakeSystem system;
-  RealtimeThreads threads({}, system);
-  EXPECT_TRUE(threads.apply(kDrive).empty());
-  EXPECT_TRUE(threads.lock_memory().empty());
-  EXPECT_EQ(system.calls + system.locks, 0);
-}
-
-TEST(Realtime, memoryLockedOnlyInPartIsSaid) {
-  FakeSystem system;
-  system.covers = RealtimeSystem::Locked::present;
-  RealtimeRequest request;
-  request.lock_memory = true;
-  RealtimeThreads threads(request, system);
-  EXPECT_EQ(threads.lock_memory().size(), 1U);
 }
 
 /// The kernel itself: a thread of this test is found by its name and gets what was asked for.

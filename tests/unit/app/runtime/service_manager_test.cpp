@@ -89,16 +89,6 @@ TEST_F(ServiceManagerTest, ASlowLoopIsAliveAndAHungOneIsNot) {
   EXPECT_EQ(manager.heard(), "");
 }
 
-TEST_F(ServiceManagerTest, WithoutAWatchdogTheStatusGoesOutOnceASecond) {
-  ServiceManager service(path.string(), 0s);
-  for (int i = 0; i < 20; ++i)
-    service.alive(static_cast<std::uint64_t>(i + 5), static_cast<std::uint64_t>(i + 1),
-                  begin + i * 100ms);
-  EXPECT_EQ(manager.heard(), "STATUS=1 frames, readings and events handled");
-  EXPECT_EQ(manager.heard(), "STATUS=11 frames, readings and events handled");
-  EXPECT_EQ(manager.heard(), "");
-}
-
 TEST_F(ServiceManagerTest, NobodyAsksOrTheNameIsNoSocketsName) {
   for (const std::string& name : {std::string(), std::string("notify"), std::string(300, '/')}) {
     ServiceManager service(name, 1s);

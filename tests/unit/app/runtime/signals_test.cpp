@@ -7,12 +7,6 @@
 namespace vergence::app {
 namespace {
 
-TEST(SignalGuard, NothingIsRequestedBeforeASignal) {
-  const SignalGuard guard;
-  EXPECT_FALSE(guard.stop_requested());
-  EXPECT_EQ(guard.stop_code(), std::nullopt);
-}
-
 TEST(SignalGuard, InterruptAndTerminateHaveTheirExitCodes) {
   {
     const SignalGuard guard;
@@ -23,13 +17,6 @@ TEST(SignalGuard, InterruptAndTerminateHaveTheirExitCodes) {
   const SignalGuard guard;
   EXPECT_FALSE(guard.stop_requested()) << "a new guard starts afresh";
   std::raise(SIGTERM);
-  EXPECT_EQ(guard.stop_code(), ExitCode::terminated);
-}
-
-TEST(SignalGuard, TheFirstSignalDecides) {
-  const SignalGuard guard;
-  std::raise(SIGTERM);
-  std::raise(SIGINT);
   EXPECT_EQ(guard.stop_code(), ExitCode::terminated);
 }
 
@@ -67,17 +54,6 @@ TEST(SignalGuard, AClosedTerminalEndsTheSessionUnlessItIsToOutliveIt) {
     EXPECT_FALSE(guard.stop_requested());
   }
   std::signal(SIGHUP, before);
-}
-
-TEST(SignalGuard, ADriveThatIsToOutliveItsTerminalDoesSoAlsoAfterAnotherGuard) {
-  auto* const before = std::signal(SIGHUP, SIG_IGN);
-  { const SignalGuard guard; }
-  {
-    const SignalGuard guard;
-    std::raise(SIGHUP);
-    EXPECT_FALSE(guard.stop_requested());
-  }
-  EXPECT_EQ(std::signal(SIGHUP, before), SIG_IGN);
 }
 
 TEST(SignalGuard, WhatAReaderOrADiskDoesIsLeftToTheWriteThatFails) {

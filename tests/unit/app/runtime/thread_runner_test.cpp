@@ -77,18 +77,5 @@ TEST(ThreadRunner, allocatesNothingPerRunAndSealsItsWorker) {
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
 }
 
-TEST(ThreadRunner, theWorkerOfAReaderMayAllocate) {
-  if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
-  ThreadRunner runner(ThreadRunner::Worker::of_reader);
-  const auto before = AllocationGuard::allocations_after_seal();
-  std::vector<int> grown;
-  auto here = [] {};
-  auto there = [&] { grown.resize(100); };
-  runner.run(TaskRef(here), TaskRef(there));
-  EXPECT_EQ(grown.size(), 100U);
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
-}
-
 }  // namespace
 }  // namespace vergence::app

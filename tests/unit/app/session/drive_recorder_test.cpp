@@ -103,14 +103,6 @@ TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
   EXPECT_EQ(drive.rigs("drive_1.mcap"), 1);
 }
 
-TEST(DriveRecorder, itsMemoryIsThatOfAllQueuesAndOfTheEncoder) {
-  const std::vector<std::string> plain{"record=[images]", "record.memory_mb=64"};
-  std::vector<std::string> png = plain;
-  png.emplace_back("record.image_format=png");
-  EXPECT_GT(RecordedPoses(png).recorder().memory(), RecordedPoses(plain).recorder().memory())
-      << "the same images, and pixels that wait for the encoder";
-}
-
 // The queues are as large as the time asked for needs.
 TEST(DriveRecorder, allOfTheTimeBeforeAnEventIsKept) {
   constexpr int kKept = 20 * 300;

@@ -49,22 +49,5 @@ TEST(GivenCalibration, theBaselineOfTheCommandLineCountsForEveryFormat) {
   }
 }
 
-TEST(GivenCalibration, theFormatIsToldByContentWhateverTheKeysAreCalled) {
-  const test::TemporaryFolder folder;
-  EXPECT_EQ(read(folder.write("stereo.yaml", kOpenCv)).rig.intrinsics[1].fx, 461);
-  EXPECT_EQ(read(folder.write("ours.yaml", kOurs)).rig.intrinsics[1].fx, 461);
-  EXPECT_EQ(read(folder.write("notes.yaml", "# from cam0: and K1:\n" + kOurs)).rig.intrinsics[1].fx,
-            461);
-}
-
-TEST(GivenCalibration, aCommaInANameIsNoSecondFile) {
-  const test::TemporaryFolder folder;
-  EXPECT_EQ(read(folder.write("a,b/ours.yaml", kOurs)).rig.intrinsics[1].fx, 461);
-  EXPECT_EQ(read(folder.write("a,b/chain.yaml", kKalibr)).rig.intrinsics[1].fx, 461);
-  const auto ours = folder.write("ours.yaml", kOurs);
-  EXPECT_THROW((void)read(ours.string() + "," + ours.string()), InputError)
-      << "two files with a comma are a pair, and ours is one";
-}
-
 }  // namespace
 }  // namespace vergence::app

@@ -35,12 +35,5 @@ TEST(Heartbeat, anEstimatorThatHangsIsNotAliveWhateverTheDevicesDo) {
   EXPECT_FALSE(beats(&heart, 7, false, 30)) << "it works on what it was given";
 }
 
-TEST(Heartbeat, whereNobodyKnowsOfRoundsItemsAloneCount) {
-  Heartbeat heart;
-  const std::uint64_t last = heart.beats(7, true, 0);
-  EXPECT_EQ(heart.beats(7, true, 0), last);
-  EXPECT_NE(heart.beats(8, true, 0), last);
-}
-
 }  // namespace
 }  // namespace vergence::app

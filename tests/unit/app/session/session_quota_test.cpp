@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-#include "app/recorder/pose_line.hpp"
+#include "app/recorder/record_lines.hpp"
 #include "app/recorder/session_folder.hpp"
 #include "tests/support/small_disk.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -62,16 +62,6 @@ TEST(SessionQuota, whatIsNoSessionARunningDriveALinkAndTheSessionItselfStay) {
   EXPECT_TRUE(fs::exists(folder / "elsewhere" / "linked" / "poses.csv"));
 }
 
-// A board without a clock of its own begins at the same date with every boot.
-TEST(SessionQuota, aSessionCutOffAMomentAgoByAPowerCutGoes) {
-  const test::TemporaryFolder folder;
-  make_session(folder / "a_moment_ago", 0, false);
-  make_session(folder / "ahead", -48, false);
-  EXPECT_EQ(keep_session_quota(folder / "now", 0).size(), 2U);
-  EXPECT_FALSE(fs::exists(folder / "a_moment_ago"));
-  EXPECT_FALSE(fs::exists(folder / "ahead"));
-}
-
 TEST(SessionQuota, aSessionThatIsLockedStaysHoweverOld) {
   const test::TemporaryFolder folder;
   for (const bool ended : {false, true}) {
@@ -104,48 +94,6 @@ TEST(SessionQuota, theOrderIsThatOfDrivingWhateverTheClockSaid) {
   EXPECT_EQ(keep_session_quota(folder / "now", kSize + 5000).size(), 1U);
   EXPECT_FALSE(fs::exists(folder / "second"));
   EXPECT_TRUE(fs::exists(folder / "third"));
-}
-
-TEST(SessionQuota, theFirstSessionHasNumberOneAndANumberThatCannotBeCountsAsNone) {
-  const test::TemporaryFolder folder;
-  EXPECT_EQ(next_session_number(folder / "now"), 1U);
-  folder.write("odd/session_number", "18446744073709551615\n");
-  folder.write("words/session_number", "many\n");
-  EXPECT_EQ(next_session_number(folder / "now/"), 1U);
-}
-
-// Nor is it looked into: a server that does not answer would hold up every drive beside it.
-TEST(SessionQuota, whatIsMountedBesideItIsNoSession) {
-  const test::TemporaryFolder folder;
-  fs::create_directory(folder / "mounted");
-  const test::SmallDisk disk(folder / "mounted", "");
-  if (!disk.ready()) GTEST_SKIP() << "no file system may be mounted here";
-  make_session(folder / "mounted", 3);
-  folder.write("mounted/session_number", "5\n");
-  EXPECT_EQ(next_session_number(folder / "now"), 1U);
-  EXPECT_TRUE(keep_session_quota(folder / "now", 0).empty());
-  EXPECT_TRUE(fs::exists(folder / "mounted" / "poses.csv"));
-}
-
-TEST(SessionQuota, aPathThatEndsWithASlashIsTheSameSession) {
-  const test::TemporaryFolder folder;
-  for (const char* end : {"/", "//", "/."}) {
-    make_session(folder / "now", 2);
-    make_session(folder / "now" / "inside", 2);
-    make_session(folder / "beside", 3);
-    EXPECT_EQ(keep_session_quota((folder / "now").string() + end, 0).size(), 1U) << end;
-    EXPECT_FALSE(fs::exists(folder / "beside")) << end;
-    EXPECT_TRUE(fs::exists(folder / "now" / "inside" / "poses.csv")) << end;
-  }
-}
-
-TEST(SessionQuota, theSessionsOwnFolderNeedNotBeThereYet) {
-  const test::TemporaryFolder folder;
-  for (const char* own : {"now", "now/"}) {
-    make_session(folder / "old", 3);
-    EXPECT_EQ(keep_session_quota(folder / own, 0).size(), 1U) << own;
-    EXPECT_TRUE(fs::is_empty(folder.path())) << own;
-  }
 }
 
 /// Somebody who may remove nothing from a folder without write permission, which root may.

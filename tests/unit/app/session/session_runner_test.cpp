@@ -1,16 +1,10 @@
 #include "app/session/session_runner.hpp"
 
 #include <gtest/gtest.h>
-#include <pthread.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <optional>
 #include <string>
@@ -20,9 +14,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/recorder/pose_line.hpp"
+#include "app/recorder/record_lines.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/session/waiting_source.hpp"
 
 namespace vergence::app {
 namespace {
@@ -33,32 +28,16 @@ constexpr Stamp kStart{1'577'836'800'000'000'000};
 Stamp at(int n) { return kStart + Duration::milliseconds(50) * n; }
 
 /// Black images, an event and a frame that cannot be read among them: no pose ever.
-class BlackSource final : public FrameSource {
+class BlackSource final : public test::WaitingSource {
  public:
-  explicit BlackSource(int frames) : frames_(frames), pixels_(kWidth * kHeight) {
-    RigCalibration& rig = facts_.begin.file.rig;
-    rig.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) {
-      Intrinsics& lens = rig.intrinsics[k];
-      lens.width = kWidth, lens.height = kHeight;
-      lens.fx = lens.fy = 100;
-      lens.cx = (kWidth - 1) / 2.0, lens.cy = (kHeight - 1) / 2.0;
-    }
-    rig.T_camera_left[1].t = {-0.5, 0, 0};
-    rig.baseline = 0.5;
-    facts_.begin.nominal = rig;
+  explicit BlackSource(int frames) : WaitingSource(Milliseconds(0)), count_(frames) {
     facts_.frames = facts_.expected_frames = static_cast<std::uint64_t>(frames);
     facts_.first = at(0);
     facts_.remarks.push_back({"a remark", "data", false});
   }
 
-  [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
-  void start(std::vector<std::string>* /*faults*/) override {
-    if (started_) started_();
-  }
-  void halt() noexcept override { ++halted_; }
   [[nodiscard]] bool next(SourceItem* item) noexcept override {
-    if (next_ == frames_) return false;
+    if (next_ == count_) return false;
     if (next_ == 2 && !noted_) {
       SourceEvent event;
       event.record.stamp = at(2);
@@ -68,47 +47,21 @@ class BlackSource final : public FrameSource {
       *item = event;
       return true;
     }
-    SourceFrame frame;
-    frame.rig.number = static_cast<std::uint64_t>(next_);
-    frame.rig.stamp = at(next_++);
-    frame.rig.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k)
-      frame.rig.images[k] = {pixels_.data(), kWidth, kHeight, kWidth};
-    *item = frame;
+    *item = black_frame(static_cast<std::uint64_t>(next_), at(next_));
+    ++next_;
     ++held_;
     return true;
   }
   void done(const PoseSample& /*sample*/) noexcept override { --held_; }
-  void stop() noexcept override { ++stopped_; }
   void finish(Progress* /*progress*/, std::vector<std::string>* /*faults*/) override {
     ++finished_;
   }
-  void describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,
-                SummaryInput* input) const override {
-    input->skipped = noted_ ? 1 : 0;
-  }
-  void print_figures(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
-                     Progress* /*progress*/) const override {}
-  [[nodiscard]] std::optional<ExitCode> verdict(Progress* progress) const override {
-    progress->say("camera 0 was gone");
-    return ExitCode::device_failed;
-  }
-
-  void begin_from(const std::string& source) { facts_.begin.source = source; }
-  void be_live() { facts_.when_full = Recorder::WhenFull::drop; }
-  /// Called when it has started.
-  void when_started(std::function<void()> started) { started_ = std::move(started); }
   [[nodiscard]] int held() const { return held_; }
   [[nodiscard]] int finished() const { return finished_; }
-  [[nodiscard]] int stopped() const { return stopped_; }
-  [[nodiscard]] int halted() const { return halted_; }
 
  private:
-  SourceFacts facts_;
-  int frames_, next_ = 0, held_ = 0, finished_ = 0, stopped_ = 0, halted_ = 0;
-  std::function<void()> started_;
+  int count_, next_ = 0, held_ = 0, finished_ = 0;
   bool noted_ = false;
-  std::vector<std::uint8_t> pixels_;
 };
 
 /// Writes down what it is told, in memory that it has from the start.
@@ -142,7 +95,6 @@ class Notebook final : public SessionObserver {
     for (const Line& line : lines_) text += line.what;
     return text;
   }
-  [[nodiscard]] const auto& lines() const { return lines_; }
   [[nodiscard]] int images() const { return images_; }
 
  private:
@@ -150,47 +102,26 @@ class Notebook final : public SessionObserver {
   int images_ = 0;
 };
 
-struct Ran {
-  ExitCode code = ExitCode::done;
-  std::string order, other, said;
-  int images = 0, held = 0, finished = 0;
-};
-
-Ran run_black(int frames) {
+TEST(SessionRunner, ObserversSeeFramePoseAndLineInTurnAndFramesGoBack) {
   const test::TemporaryFolder folder;
-  BlackSource source(frames);
+  BlackSource source(4);
   Notebook first, second;
   SessionOptions options;
   options.out = folder.path() / "session";
   options.quiet = true;
   options.observers = {&first, &second};
   const SignalGuard signals;
-  Ran ran;
   testing::internal::CaptureStderr();
-  ran.code = run_session(source, load_configuration(std::nullopt, {}), options, signals);
-  ran.said = testing::internal::GetCapturedStderr();
+  (void)run_session(source, load_configuration(std::nullopt, {}), options, signals);
+  (void)testing::internal::GetCapturedStderr();
   for (const char* file : {"poses.csv", "events.jsonl", "summary.json", "report.html"})
     EXPECT_TRUE(std::filesystem::exists(options.out / file)) << file;
-  ran.order = first.order();
-  ran.other = second.order();
-  ran.images = first.images();
-  ran.held = source.held();
-  ran.finished = source.finished();
-  return ran;
-}
-
-TEST(SessionRunner, anObserverSeesFramePoseAndLineOfEachInTurnAndTheEventsBetween) {
-  const Ran ran = run_black(4);
   // The calibration it begins with and the remark, two frames, the one that is missing, two more.
-  EXPECT_EQ(ran.order, "krfpcfpcefpcfpc");
-  EXPECT_EQ(ran.other, ran.order) << "every observer the same";
-  EXPECT_EQ(ran.images, 4) << "views of pixels, while it is called";
-}
-
-TEST(SessionRunner, everyFrameGoesBackToItsSourceWhichIsEndedOnce) {
-  const Ran ran = run_black(4);
-  EXPECT_EQ(ran.held, 0);
-  EXPECT_EQ(ran.finished, 1);
+  EXPECT_EQ(first.order(), "krfpcfpcefpcfpc");
+  EXPECT_EQ(second.order(), first.order());
+  EXPECT_EQ(first.images(), 4) << "views of pixels, while it is called";
+  EXPECT_EQ(source.held(), 0);
+  EXPECT_EQ(source.finished(), 1);
 }
 
 /// Asks for everything with the first frame, as a viewer of a live page would.
@@ -271,69 +202,6 @@ TEST(SessionRunner, theQuotaMakesRoomBeforeTheFolderAndASessionThatIsRefusedCost
   EXPECT_FALSE(std::filesystem::exists(folder / "old"));
 }
 
-TEST(SessionRunner, aSessionHasTheNumberAfterThoseBesideIt) {
-  const test::TemporaryFolder folder;
-  folder.write("before/session_number", "41\n");
-  BlackSource source(2);
-  SessionOptions options;
-  options.out = folder / "session";
-  options.quiet = true;
-  const SignalGuard signals;
-  testing::internal::CaptureStderr();
-  (void)run_session(source, load_configuration(std::nullopt, {}), options, signals);
-  (void)testing::internal::GetCapturedStderr();
-  EXPECT_EQ(test::read_file(options.out / "session_number"), "42\n");
-}
-
-/// Keeps calibration.yaml from being written until the first pose.
-class InTheWay final : public SessionObserver {
- public:
-  explicit InTheWay(const std::filesystem::path& session)
-      : folder_((session / "calibration.yaml.new").string()) {}
-  void on_start(const SessionStart& /*start*/) noexcept override {
-    made_ = ::mkdir(folder_.c_str(), 0755) == 0;
-  }
-  void on_pose(const PoseSample& /*sample*/) noexcept override { (void)::rmdir(folder_.c_str()); }
-  [[nodiscard]] bool made() const { return made_; }
-
- private:
-  std::string folder_;
-  bool made_ = false;
-};
-
-TEST(SessionRunner, aCalibrationThatCouldNotBeWrittenAtTheStartIsWrittenAtTheEnd) {
-  const test::TemporaryFolder folder;
-  BlackSource source(4);
-  SessionOptions options;
-  options.out = folder / "session";
-  options.quiet = true;
-  InTheWay in_the_way(options.out);
-  options.observers = {&in_the_way};
-  const SignalGuard signals;
-  testing::internal::CaptureStderr();
-  (void)run_session(source, load_configuration(std::nullopt, {}), options, signals);
-  const std::string said = testing::internal::GetCapturedStderr();
-  EXPECT_TRUE(in_the_way.made());
-  EXPECT_TRUE(std::filesystem::exists(options.out / "calibration.yaml"));
-  EXPECT_EQ(said.find("calibration.yaml:"), std::string::npos) << said;
-}
-
-TEST(SessionRunner, namesNeedNotBeUtf8) {
-  const test::TemporaryFolder folder;
-  BlackSource source(4);
-  source.begin_from("k\xe4lib.yaml");
-  SessionOptions options;
-  options.out = folder / "session";
-  options.quiet = true;
-  const SignalGuard signals;
-  testing::internal::CaptureStderr();
-  const Configuration configuration = load_configuration(std::nullopt, {"record=[poses]"});
-  EXPECT_EQ(run_session(source, configuration, options, signals), ExitCode::not_usable);
-  (void)testing::internal::GetCapturedStderr();
-  for (const char* file : {"summary.json", "drive.mcap"})
-    EXPECT_TRUE(std::filesystem::exists(options.out / file)) << file;
-}
-
 /// Files of this process may have so many bytes while it lives.
 class LargestFile {
  public:
@@ -361,69 +229,6 @@ TEST(SessionRunner, aSessionThatCannotBeRecordedLeavesNoFolder) {
   const LargestFile limit(2000);
   EXPECT_THROW((void)run_session(source, configuration, options, signals), InputError);
   EXPECT_FALSE(std::filesystem::exists(options.out));
-}
-
-TEST(SessionRunner, theWholeTrajectoryIsKeptOnlyWhereSomethingIsMadeOfIt) {
-  const auto bytes = [](const std::vector<OtherFormat>& also) {
-    const test::TemporaryFolder folder;
-    BlackSource source(64);
-    SessionOptions options;
-    options.out = folder / "session";
-    options.quiet = true;
-    options.also = also;
-    const SignalGuard signals;
-    testing::internal::CaptureStderr();
-    (void)run_session(source, load_configuration(std::nullopt, {}), options, signals);
-    (void)testing::internal::GetCapturedStderr();
-    const auto summary = nlohmann::json::parse(test::read_file(options.out / "summary.json"));
-    return summary["memory"]["recorder_bytes"].get<std::size_t>();
-  };
-  EXPECT_EQ(bytes({OtherFormat::kitti}) - bytes({}), 64U) << "a status for each frame";
-}
-
-/// No thread begins while it lives: none has room for such a stack.
-class NoThreads {
- public:
-  NoThreads() {
-    pthread_attr_t huge;
-    (void)::pthread_getattr_default_np(&before_);
-    (void)::pthread_getattr_default_np(&huge);
-    (void)::pthread_attr_setstacksize(&huge, std::size_t{1} << 50U);
-    (void)::pthread_setattr_default_np(&huge);
-    (void)::pthread_attr_destroy(&huge);
-  }
-  ~NoThreads() {
-    (void)::pthread_setattr_default_np(&before_);
-    (void)::pthread_attr_destroy(&before_);
-  }
-  NoThreads(const NoThreads&) = delete;
-  NoThreads& operator=(const NoThreads&) = delete;
-
- private:
-  pthread_attr_t before_{};
-};
-
-TEST(SessionRunner, withoutAThreadForTheEstimatorTheDevicesAreStoppedAndNothingIsLeft) {
-  const test::TemporaryFolder folder;
-  BlackSource source(4);
-  std::optional<NoThreads> no_threads;
-  source.when_started([&no_threads] { no_threads.emplace(); });
-  SessionOptions options;
-  options.out = folder / "session";
-  options.quiet = true;
-  const SignalGuard signals;
-  EXPECT_THROW((void)run_session(source, load_configuration(std::nullopt, {}), options, signals),
-               InputError);
-  EXPECT_EQ(source.stopped(), 1);
-  EXPECT_EQ(source.halted(), 1);
-  EXPECT_FALSE(std::filesystem::exists(options.out));
-}
-
-TEST(SessionRunner, withoutAPoseThatIsTheVerdictButTheSourceIsHeardToo) {
-  const Ran ran = run_black(3);
-  EXPECT_EQ(ran.code, ExitCode::not_usable);
-  EXPECT_NE(ran.said.find("camera 0 was gone"), std::string::npos) << ran.said;
-  EXPECT_NE(ran.said.find("there never was a pose"), std::string::npos) << ran.said;
 }
 
 }  // namespace

@@ -39,19 +39,6 @@ CalibrationFile found(const Configuration& c, double t_y) {
   return file;
 }
 
-TEST(StartingCalibration, isTheConfigurationsWhereNothingElseIsSaid) {
-  const test::TemporaryFolder folder;
-  const StartingCalibration start = starting_calibration(configuration(folder), {}, kSerials);
-  EXPECT_EQ(start.trust, CalibrationTrust::given);
-  EXPECT_EQ(start.file.rig.T_camera_left[1].t, Vec3(-0.75, 0.001, 0.002));
-  EXPECT_EQ(start.file.names[0], "links");
-  EXPECT_EQ(start.file.names[1], "right");
-  EXPECT_EQ(start.file.serials[0], "A1") << "a mock is the camera that is asked for";
-  EXPECT_EQ(start.file.serials[1], "m-1") << "the device's";
-  EXPECT_EQ(start.state, folder / "calibration_state.yaml");
-  EXPECT_TRUE(start.remarks.empty());
-}
-
 TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfiguration) {
   const test::TemporaryFolder folder;
   const Configuration c = configuration(folder);
@@ -78,17 +65,6 @@ TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfigurat
     EXPECT_NEAR(scratch.file.rig.baseline, 0.75, 1e-4);
     EXPECT_TRUE(scratch.state) << "what is found is kept";
   }
-}
-
-TEST(StartingCalibration, aStateOfOtherCamerasIsARemarkAndNotUsed) {
-  const test::TemporaryFolder folder;
-  const Configuration c = configuration(folder);
-  write_state(folder / "calibration_state.yaml", found(c, 0.011));
-  const StartingCalibration start = starting_calibration(c, {}, {"m-0", "another"});
-  EXPECT_EQ(start.trust, CalibrationTrust::given);
-  EXPECT_EQ(start.file.rig.T_camera_left[1].t.y(), 0.001);
-  ASSERT_EQ(start.remarks.size(), 1U);
-  EXPECT_NE(start.remarks[0].find("another"), std::string::npos) << start.remarks[0];
 }
 
 TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
@@ -119,33 +95,6 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
 }
 
-TEST(StartingCalibration, aStateFoundUnderAnotherConfigurationIsARemarkAndNotUsed) {
-  const test::TemporaryFolder folder;
-  const Configuration then = configuration(folder);
-  write_state(folder / "calibration_state.yaml", found(then, 0.011));
-  const auto refused = [](const Configuration& now, const char* why) {
-    const StartingCalibration start = starting_calibration(now, {}, kSerials);
-    EXPECT_EQ(start.trust, CalibrationTrust::given) << why;
-    ASSERT_EQ(start.remarks.size(), 1U) << why;
-    EXPECT_NE(start.remarks[0].find(why), std::string::npos) << start.remarks[0];
-  };
-  Configuration now = then;
-  now.cameras[1].intrinsics = {500, 500, 320, 240};
-  refused(now, "intrinsics");
-  now = then;
-  now.cameras[0].offset_x = 200;
-  refused(now, "offset");
-  now = then;
-  const Mat3 R = exp_so3({0, 0.087, 0});
-  for (std::size_t i = 0; i < 9; ++i)
-    now.cameras[1].T_camera_left[i / 3 * 4 + i % 3] =
-        R(static_cast<int>(i / 3), static_cast<int>(i % 3));
-  refused(now, "another place for camera 1");
-  now = then;
-  for (auto& camera : now.cameras) camera.model = CameraModelKind::pinhole_equidistant;
-  refused(now, "model");
-}
-
 TEST(StartingCalibration, ofAFileWithAnotherBaselineTheUserHears) {
   const test::TemporaryFolder folder;
   const Configuration c = configuration(folder);
@@ -161,17 +110,6 @@ TEST(StartingCalibration, ofAFileWithAnotherBaselineTheUserHears) {
                                      "0.750003 m: all lengths go by the file"),
             std::string::npos)
       << remarks_for(0.3)[0];
-}
-
-TEST(StartingCalibration, aFileOfAnotherRigIsRefused) {
-  const test::TemporaryFolder folder;
-  const Configuration c = configuration(folder);
-  CalibrationFile other = found(c, 0);
-  for (Intrinsics& lens : other.rig.intrinsics) lens.width = 800;
-  write_calibration(folder / "other.yaml", other);
-  EXPECT_THROW((void)starting_calibration(c, {.file = folder / "other.yaml"}, kSerials),
-               InputError);
-  EXPECT_THROW((void)starting_calibration(c, {.file = folder / "none.yaml"}, kSerials), InputError);
 }
 
 TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {

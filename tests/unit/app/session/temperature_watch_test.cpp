@@ -71,14 +71,6 @@ TEST(SessionTemperatures, aCameraThatTakesSecondsToAnswerHoldsUpNeitherTheWatchN
   EXPECT_LT(source.halted_, source.answered_) << "cameras are stopped while one is still asked";
 }
 
-TEST(SessionTemperatures, nobodyIsAskedWhereNobodyWantsToKnow) {
-  SlowCamera source(200ms);
-  Thermometer observer(false);
-  drive(&source, &observer);
-  EXPECT_EQ(source.asked_, 0);
-  EXPECT_EQ(observer.told_, 0);
-}
-
 TEST(TemperatureWatch, givesEachAnswerOnceAndAsksNoCameraAfterItsEnd) {
   SlowCamera source(0ms);
   TemperatureWatch watch(source);

@@ -37,11 +37,7 @@ class WaitingSource : public app::FrameSource {
       return false;
     }
     --frames_;
-    app::SourceFrame frame;
-    frame.rig.stamp = facts_.first;
-    frame.rig.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) frame.rig.images[k] = {pixels_.data(), 160, 120, 160};
-    *item = frame;
+    *item = black_frame(0, facts_.first);
     return true;
   }
   void done(const PoseSample& /*sample*/) noexcept override {}
@@ -53,11 +49,20 @@ class WaitingSource : public app::FrameSource {
                      app::Progress* /*progress*/) const override {}
 
  protected:
-  Milliseconds drive_;
+  [[nodiscard]] app::SourceFrame black_frame(std::uint64_t number, Stamp stamp) const {
+    app::SourceFrame frame;
+    frame.rig.number = number;
+    frame.rig.stamp = stamp;
+    frame.rig.cameras = 2;
+    for (std::size_t k = 0; k < 2; ++k) frame.rig.images[k] = {pixels_.data(), 160, 120, 160};
+    return frame;
+  }
+
+  app::SourceFacts facts_;
   int frames_ = 0;  // that come before the waiting
 
  private:
-  app::SourceFacts facts_;
+  Milliseconds drive_;
   std::vector<std::uint8_t> pixels_;
 };
 

@@ -16,4 +16,16 @@ void format_pose(const PoseRecord& pose, std::string* line);
 /// The same of a TUM file: the stamp in seconds, position, quaternion.
 void format_tum(Stamp stamp, const PoseNumbers& pose, std::string* line);
 
+/// The line of calibrations.csv (kCalibrationsHeader) of camera k, 1 ≤ k < cameras, end of line
+/// included.
+///
+/// Memory  None where the capacity of *line is enough.
+void format_calibration(const CalibrationRecord& calibration, int k, std::string* line);
+
+/// A line of events.jsonl, end of line included: `stamp_ns`, `kind`, `sentence`, `fields`. Bytes
+/// that are no UTF-8, which file names may hold, become U+FFFD: the line stays JSON.
+///
+/// Memory  None where the capacity of *line is enough.
+void format_event(const EventRecord& event, std::string* line);
+
 }  // namespace vergence::app
