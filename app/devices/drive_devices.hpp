@@ -7,8 +7,8 @@
 
 #include "app/config/configuration.hpp"
 #include "app/devices/camera_drivers.hpp"
-#include "app/devices/ins_drivers.hpp"
 #include "app/devices/mock_drive.hpp"
+#include "app/devices/serial_devices.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 #include "drivers/sync/rig_synchronizer.hpp"
 #include "drivers/trigger_board/device.hpp"

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "app/devices/ins_drivers.hpp"
+#include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/datasets/image_file.hpp"
-#include "app/recording/image_encoder.hpp"
+#include "app/recording/png_encoder.hpp"
 #include "tests/support/recorded_sequence.hpp"
 
 namespace {

@@ -13,7 +13,7 @@
 #include "app/config/calibration_file.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/system/gige/pairs.hpp"
+#include "tests/system/gige/socket_buffer.hpp"
 #include "tests/unit/app/calibration/board_picture.hpp"
 #include "tests/unit/app/calibration/board_scene.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"

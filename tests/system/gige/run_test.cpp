@@ -16,7 +16,7 @@
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/thread_allocations.hpp"
 #include "tests/support/xsens_terminal.hpp"
-#include "tests/system/gige/pairs.hpp"
+#include "tests/system/gige/socket_buffer.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {

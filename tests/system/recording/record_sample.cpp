@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "app/recording/image_encoder.hpp"
 #include "app/recording/messages.hpp"
+#include "app/recording/png_encoder.hpp"
 #include "app/recording/recording.hpp"
 
 namespace vergence::app {

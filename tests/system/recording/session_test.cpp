@@ -201,15 +201,6 @@ TEST_F(RecordedDrive, isExportedForOtherPrograms) {
   EXPECT_FALSE(std::filesystem::exists(out("kitti")));
 }
 
-TEST(Recorded, aPlainDriveComesBackFromItsExportBitForBit) {
-  const TemporaryFolder folder;
-  ASSERT_LE(drive(folder / "s", "--fast --duration 5").code, 1);
-  const Outcome o = export_to(folder / "data", folder / "s", "--format folder");
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_LE(replay(folder / "data", folder / "again").code, 1);
-  expect_same_poses(folder / "s", folder / "again");
-}
-
 TEST(Recorded, ofThreeCamerasTwoAreExportedAndReplayed) {
   const TemporaryFolder folder;
   const Outcome run =

@@ -226,19 +226,6 @@ TEST(Run, aCameraThatNeverComesBackIsADeviceThatFailed) {
   EXPECT_EQ(summary_of(folder / "s")["frames"]["read"], 81) << "the drive went on with the other";
 }
 
-TEST(Run, aKnockIsInTheTruthAndWithoutOnlineCalibrationNowhereElse) {
-  const TemporaryFolder folder;
-  const Outcome o =
-      drive(folder / "s",
-            "--duration 4 --set calibration.online=off --fault 'knock@2 camera=1 pitch_deg=0.2'" +
-                kSmall);
-  ASSERT_EQ(o.code, 0) << o.err;
-  const auto summary = summary_of(folder / "s");
-  EXPECT_NEAR(summary["truth"]["calibration_error"][0].get<double>(), -0.2 * 3.14159265 / 180,
-              1e-6);
-  EXPECT_EQ(summary["calibration"]["T_right_left"][0], 1.0);
-}
-
 struct InsCase {
   const char* fault;
   const char* event;

@@ -6,19 +6,18 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/gige_camera.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {
 namespace {
 
+using test::contains;
+
 using nlohmann::json;
 using test::Outcome;
 using test::run_vergence;
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 TEST(Devices, aCameraOnTheNetworkIsListedWithWhatToPaste) {
   test::GigeCameraOptions o;

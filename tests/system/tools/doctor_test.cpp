@@ -5,20 +5,19 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/gige_camera.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {
 namespace {
+
+using test::contains;
 
 using nlohmann::json;
 using test::Outcome;
 using test::run_vergence;
 
 const std::string kConfigurations = std::string(VERGENCE_SOURCE_DIR) + "/app/config/";
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 /// The findings of one check.
 json of(const json& all, const std::string& check) {

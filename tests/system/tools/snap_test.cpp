@@ -13,11 +13,14 @@
 #include "app/datasets/image_file.hpp"
 #include "core/math/random.hpp"
 #include "tests/support/gige_camera.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence {
 namespace {
+
+using test::contains;
 
 using nlohmann::json;
 using test::GigeCamera;
@@ -27,10 +30,6 @@ using test::TemporaryFolder;
 
 const std::string kConfigurations = std::string(VERGENCE_SOURCE_DIR) + "/app/config/";
 constexpr int kWidth = 320, kHeight = 240;
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 Outcome snap(const TemporaryFolder& folder, const std::string& configuration,
              const std::string& more) {
@@ -64,13 +63,6 @@ TEST(SnapMock, aPictureOfEachCameraAndTheirFigures) {
     EXPECT_EQ(image["exposure_us"], 8000);
     EXPECT_TRUE(contains(o.out, image["file"]));
   }
-}
-
-TEST(SnapMock, exchangedCablesAreNoticed) {
-  const TemporaryFolder folder;
-  const Outcome o = snap(folder, "mock.yaml", "--set 'faults.0=swap_cables@0'");
-  EXPECT_EQ(o.code, 1) << o.err;
-  EXPECT_TRUE(contains(o.err, "left and right are probably exchanged")) << o.err;
 }
 
 TEST(SnapMock, aCapOnALensIsNoticed) {

@@ -1,14 +1,13 @@
 #include "app/calibration/conversion.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-
-#include <fmt/format.h>
 
 #include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/calibration/conversion_references.hpp"
 
@@ -42,16 +41,6 @@ TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
   const std::string pair = (folder / "a.yaml").string() + "," + (folder / "b.yaml").string();
   write_any_calibration(pair, CalibrationFormat::ros, ours(kModels[0]), &remarks);
   expect_same(ours(kModels[0]), read_any_calibration(pair, std::nullopt, &remarks));
-}
-
-/// One sentence that names the file and the key.
-std::string last_error(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
@@ -104,7 +93,7 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
     std::string in = folder.write("in.yaml", cases[i].text).string();
     if (!cases[i].second.empty()) in += "," + folder.write("second.yaml", cases[i].second).string();
     const std::string said =
-        last_error([&] { (void)read_any_calibration(in, std::nullopt, &none); });
+        refusal_of([&] { (void)read_any_calibration(in, std::nullopt, &none); });
     EXPECT_NE(said.find(cases[i].key), std::string::npos) << "case " << i << " said: " << said;
     EXPECT_EQ(said.find('\n'), std::string::npos) << said;
     EXPECT_NE(said.find(folder.path().string()), std::string::npos) << "which file: " << said;
@@ -119,7 +108,7 @@ TEST(Conversion, rationalLensesAreRefusedUnlessTheyAreNone) {
   const std::string more =
       replaced(replaced(parts[0], "cols: 5", "cols: 8"), "-0.0005, 0]", "-0.0005, 0, 0, 0, 0.02]") +
       parts[1];
-  const std::string said = last_error([&] {
+  const std::string said = refusal_of([&] {
     (void)parse_any_calibration({{"m.yml", more}}, std::nullopt, &none);
   });
   EXPECT_NE(said.find("D1 has k4 to k6 of a rational polynomial"), std::string::npos) << said;
@@ -143,7 +132,7 @@ TEST(Conversion, aFileWithSomeBytesChangedIsReadOrRefusedAndNothingElse) {
     if (run % 5 == 0) text.resize(random.below(static_cast<std::uint32_t>(text.size())));
     std::string in = folder.write("in.yaml", text).string();
     if (run % 3 == 1) in += "," + second;
-    if (!last_error([&] { (void)read_any_calibration(in, std::nullopt, &none); }).empty())
+    if (!refusal_of([&] { (void)read_any_calibration(in, std::nullopt, &none); }).empty())
       ++refused;
   }
   EXPECT_GT(refused, 100);
@@ -151,7 +140,7 @@ TEST(Conversion, aFileWithSomeBytesChangedIsReadOrRefusedAndNothingElse) {
 
 TEST(Conversion, wordsOfTheCommandLineAreChecked) {
   EXPECT_EQ(parse_format("ros"), CalibrationFormat::ros);
-  EXPECT_NE(last_error([] { (void)parse_format("kalbr"); }).find("did you mean \"kalibr\""),
+  EXPECT_NE(refusal_of([] { (void)parse_format("kalbr"); }).find("did you mean \"kalibr\""),
             std::string::npos);
   EXPECT_EQ(parse_size("640x480"), (ImageSize{640, 480}));
   for (const char* bad : {"", "640", "640x", "x480", "640x-1", "640x480x3", "640*480"})
@@ -159,6 +148,218 @@ TEST(Conversion, wordsOfTheCommandLineAreChecked) {
   EXPECT_THROW((void)format_of_name("calibration.txt"), InputError);
   EXPECT_EQ(format_of_name("intrinsics.yml,extrinsics.yml"), CalibrationFormat::opencv);
   EXPECT_EQ(format_of_name("l.yaml,r.yaml"), CalibrationFormat::ros);
+}
+
+/// By Kalibr's own words: X_cn = T_cn_cnm1 X_cn-1, one after the other.
+std::vector<Reference> reference_of_camchain(const std::string& text) {
+  const YAML::Node root = YAML::Load(text);
+  std::vector<Reference> references;
+  cv::Mat before = cv::Mat::eye(4, 4, CV_64F);
+  for (int k = 0; root[fmt::format("cam{}", k)]; ++k) {
+    const YAML::Node cam = root[fmt::format("cam{}", k)];
+    if (k > 0) {
+      cv::Mat step(4, 4, CV_64F);
+      for (int i = 0; i < 16; ++i)
+        step.at<double>(i / 4, i % 4) =
+            cam["T_cn_cnm1"][static_cast<std::size_t>(i / 4)][static_cast<std::size_t>(i % 4)]
+                .as<double>();
+      before = step * before;
+    }
+    const auto f = cam["intrinsics"].as<std::vector<double>>();
+    Reference r{diagonal(f[0], f[1], f[2], f[3]), cv::Mat::zeros(4, 1, CV_64F),
+                before(cv::Rect(0, 0, 3, 3)).clone(), before(cv::Rect(3, 0, 1, 3)).clone(),
+                cam["distortion_model"].as<std::string>() == "equidistant"};
+    if (cam["distortion_model"].as<std::string>() != "none")
+      r.D = matrix(cam["distortion_coeffs"], 4, 1);
+    references.push_back(r);
+  }
+  return references;
+}
+
+TEST(Kalibr, aCamchainIsReadAsItsOwnDefinitionProjects) {
+  Remarks remarks;
+  const CalibrationFile c =
+      parse_any_calibration({{"camchain.yaml", kCamchain}}, std::nullopt, &remarks);
+  expect_same(c, reference_of_camchain(kCamchain));
+  EXPECT_EQ(c.names[0], "left");
+  EXPECT_EQ(c.names[1], "cam1");
+  EXPECT_EQ(c.rig.intrinsics[1].width, 752);
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_NE(remarks[0].find("T_cam_imu"), std::string::npos);
+}
+
+TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
+  for (const auto kind : kModels) {
+    const CalibrationFile c = ours(kind, 3);
+    Remarks remarks;
+    const std::string text = format_kalibr(c, &remarks);
+    expect_same(c, reference_of_camchain(text));
+    const CalibrationFile back =
+        parse_any_calibration({{"camchain.yaml", text}}, std::nullopt, &remarks);
+    expect_same(c, back);
+    EXPECT_EQ(back.names[2], "bow");
+    ASSERT_EQ(remarks.size(), 1U);
+    EXPECT_NE(remarks[0].find("serials"), std::string::npos) << remarks[0];
+  }
+}
+
+TEST(Kalibr, aThirdCoefficientOfRadiusHasNoPlaceAndIsNotDropped) {
+  CalibrationFile c = ours(CameraModelKind::pinhole_radtan);
+  c.rig.intrinsics[0].distortion[4] = 0.01;
+  Remarks remarks;
+  EXPECT_THROW((void)format_kalibr(c, &remarks), InputError);
+}
+
+struct Info {
+  cv::Mat K, D, R, P;
+  bool fisheye = false;
+};
+
+Info info_of(const std::string& text) {
+  const YAML::Node root = YAML::Load(text);
+  const int d = root["distortion_coefficients"]["cols"].as<int>();
+  return {matrix(root["camera_matrix"]["data"], 3, 3),
+          matrix(root["distortion_coefficients"]["data"], 1, d),
+          matrix(root["rectification_matrix"]["data"], 3, 3),
+          matrix(root["projection_matrix"]["data"], 3, 4),
+          root["distortion_model"].as<std::string>() == "equidistant"};
+}
+
+/// By the definition of sensor_msgs/CameraInfo: a point X of the rectified left camera has the
+/// pixel P (X, 1) in each rectified image, and lies at R⁻¹ K'⁻¹ (pixel, 1) · depth in the camera
+/// itself, where K and D make the raw image of it.
+void expect_camera_info(const CalibrationFile& c, const Info& l, const Info& r) {
+  for (const Vec3& X_left : points()) {
+    const cv::Mat X = (cv::Mat_<double>(3, 1) << X_left.x(), X_left.y(), X_left.z());
+    cv::Mat rectified(4, 1, CV_64F, 1.0);
+    rectified.rowRange(0, 3) = l.R * X;
+    const cv::Mat pixel = r.P * rectified;
+    const cv::Mat X_right =
+        r.R.t() * r.P.colRange(0, 3).inv() * pixel;  // homogeneous pixel keeps its depth
+    const Reference in_left{l.K, l.D, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F),
+                            l.fisheye};
+    const Reference in_right{r.K, r.D, cv::Mat::eye(3, 3, CV_64F), cv::Mat::zeros(3, 1, CV_64F),
+                             r.fisheye};
+    Vec2 x_left, x_right;
+    ASSERT_EQ(Camera(c.rig.intrinsics[0]).project(X_left, &x_left, nullptr), ProjectStatus::ok);
+    ASSERT_EQ(
+        Camera(c.rig.intrinsics[1]).project(c.rig.T_camera_left[1] * X_left, &x_right, nullptr),
+        ProjectStatus::ok);
+    ASSERT_LT((x_left - project(in_left, X_left)).norm(), kSamePixel);
+    ASSERT_LT((x_right - project(in_right, {X_right.at<double>(0), X_right.at<double>(1),
+                                            X_right.at<double>(2)}))
+                  .norm(),
+              kSamePixel);
+    // Rectified rows are the same in both images: what camera_info is for.
+    const cv::Mat left_pixel = l.P * rectified;
+    ASSERT_NEAR(left_pixel.at<double>(1) / left_pixel.at<double>(2),
+                pixel.at<double>(1) / pixel.at<double>(2), 1e-8);
+  }
+}
+
+TEST(RosCameraInfo, whatIsWrittenProjectsAsOursAndReadsBack) {
+  for (const auto kind : kModels) {
+    CalibrationFile c = ours(kind);
+    if (kind == CameraModelKind::pinhole_radtan)
+      c.rig.intrinsics[0].distortion[4] = -0.004;  // k3 has its place here
+    Remarks remarks;
+    const auto [left, right] = format_ros(c, &remarks);
+    expect_camera_info(c, info_of(left), info_of(right));
+    EXPECT_LT(info_of(right).P.at<double>(0, 3), 0) << "−fx B of a camera on the right";
+    const CalibrationFile back =
+        parse_any_calibration({{"left.yaml", left}, {"right.yaml", right}}, std::nullopt, &remarks);
+    expect_same(c, back);
+    EXPECT_EQ(back.names[0], "port");
+  }
+}
+
+TEST(OpenCvStereo, whatIsWrittenIsReadByOpenCvAndProjectsAsOurs) {
+  for (const auto kind : kModels) {
+    const CalibrationFile c = ours(kind);
+    Remarks remarks;
+    const auto parts = format_opencv(c, &remarks);
+    const std::string text = "%YAML:1.0\n---\n" + parts[0] + parts[1];
+    cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+    Reference left{{},
+                   {},
+                   cv::Mat::eye(3, 3, CV_64F),
+                   cv::Mat::zeros(3, 1, CV_64F),
+                   kind == CameraModelKind::pinhole_equidistant};
+    Reference right;
+    right.fisheye = left.fisheye;
+    file["M1"] >> left.K, file["D1"] >> left.D, file["M2"] >> right.K, file["D2"] >> right.D,
+        file["R"] >> right.R, file["T"] >> right.t;
+    expect_same(c, {left, right});
+    expect_same(c, parse_any_calibration({{"stereo.yml", text}}, std::nullopt, &remarks));
+  }
+}
+
+TEST(OpenCvStereo, whatOpenCvWritesIsReadAsItProjectsUnderEachOfItsNames) {
+  const CalibrationFile truth = ours(CameraModelKind::pinhole_radtan);
+  struct Names {
+    const char *M1, *D1, *M2, *D2, *R, *T;
+  };
+  for (const Names& n :
+       {Names{"M1", "D1", "M2", "D2", "R", "T"}, Names{"K1", "D1", "K2", "D2", "R", "T"},
+        Names{"cameraMatrix1", "distCoeffs1", "cameraMatrix2", "distCoeffs2", "R", "T"}}) {
+    std::array<Reference, 2> references;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Intrinsics& lens = truth.rig.intrinsics[k];
+      references[k].K = diagonal(lens.fx, lens.fy, lens.cx, lens.cy);
+      references[k].D = cv::Mat::zeros(1, 14, CV_64F);
+      for (int i = 0; i < 5; ++i)
+        references[k].D.at<double>(i) = lens.distortion[static_cast<std::size_t>(i)];
+      const Transform& T = truth.rig.T_camera_left[k];
+      references[k].t = (cv::Mat_<double>(3, 1) << T.t.x(), T.t.y(), T.t.z());
+      references[k].R = cv::Mat(3, 3, CV_64F);
+      for (int i = 0; i < 9; ++i) references[k].R.at<double>(i / 3, i % 3) = T.R(i / 3, i % 3);
+    }
+    // As the sample does: lenses in one file, places in another.
+    cv::FileStorage lenses("a.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY),
+        places("b.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
+    lenses << n.M1 << references[0].K << n.D1 << references[0].D << n.M2 << references[1].K << n.D2
+           << references[1].D;
+    places << n.R << references[1].R << n.T << references[1].t;
+    const std::vector<CalibrationText> files{{"intrinsics.yml", lenses.releaseAndGetString()},
+                                             {"extrinsics.yml", places.releaseAndGetString()}};
+    Remarks remarks;
+    EXPECT_THROW((void)parse_any_calibration(files, std::nullopt, &remarks), InputError)
+        << "no size";
+    expect_same(parse_any_calibration(files, ImageSize{640, 480}, &remarks),
+                {references[0], references[1]});
+  }
+}
+
+/// As cv::fisheye::stereoCalibrate's answer is written: nothing but the count tells its D from that
+/// of a lens with k1 k2 p1 p2, which is legal, too.
+TEST(OpenCvStereo, fourCoefficientsThatMayBeOfAFisheyeLensAreSaid) {
+  const std::string lens =
+      "!!opencv-matrix {rows: 3, cols: 3, dt: d, data: [290, 0, 320, 0, 291, "
+      "240, 0, 0, 1]}\n";
+  const auto text = [&](const std::string& d, const std::string& more) {
+    return "%YAML:1.0\n---\nM1: " + lens + "D1: " + d + "M2: " + lens + "D2: " + d +
+           "R: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n"
+           "T: {rows: 3, cols: 1, data: [-0.12, 0, 0]}\nimageSize: [640, 480]\n" +
+           more;
+  };
+  const std::string four = "{rows: 4, cols: 1, data: [-0.02, 0.008, -0.004, 0.0008]}\n",
+                    five = "{rows: 1, cols: 5, data: [-0.02, 0.008, -0.004, 0.0008, 0]}\n";
+  const auto read = [](const std::string& yaml, Remarks* remarks) {
+    return parse_any_calibration({{"stereo.yml", yaml}}, std::nullopt, remarks)
+        .rig.intrinsics[1]
+        .kind;
+  };
+  Remarks remarks;
+  EXPECT_EQ(read(text(four, ""), &remarks), CameraModelKind::pinhole_radtan);
+  ASSERT_EQ(remarks.size(), 1U);
+  EXPECT_NE(remarks[0].find("stereo.yml: four distortion coefficients"), std::string::npos);
+  EXPECT_NE(remarks[0].find("fisheye_model: 1"), std::string::npos) << remarks[0];
+
+  remarks.clear();
+  EXPECT_EQ(read(text(four, "fisheye_model: 1\n"), &remarks), CameraModelKind::pinhole_equidistant);
+  EXPECT_EQ(read(text(four, "fisheye_model: 0\n"), &remarks), CameraModelKind::pinhole_radtan);
+  EXPECT_EQ(read(text(five, ""), &remarks), CameraModelKind::pinhole_radtan);
+  EXPECT_TRUE(remarks.empty()) << remarks[0];
 }
 
 }  // namespace

@@ -6,11 +6,14 @@
 #include <map>
 
 #include "app/calibration/view_collector.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/unit/app/calibration/board_picture.hpp"
 #include "tests/unit/app/calibration/board_scene.hpp"
 
 namespace vergence::app {
 namespace {
+
+using test::contains;
 
 using test::known_rig;
 using test::seen_board;
@@ -26,10 +29,6 @@ std::string all(const std::vector<std::string>& needs) {
   std::string text;
   for (const std::string& need : needs) text += need + "\n";
   return text;
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 /// Face to face at a place in the left image, in shares of it.

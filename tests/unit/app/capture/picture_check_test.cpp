@@ -8,9 +8,12 @@
 
 #include "app/capture/picture_files.hpp"
 #include "core/math/random.hpp"
+#include "tests/support/refusal.hpp"
 
 namespace vergence::app {
 namespace {
+
+using test::contains;
 
 /// A picture with padded rows, so that whoever takes the stride for the width is found out.
 struct Picture {
@@ -48,10 +51,6 @@ std::vector<PictureRemark> judged(const std::vector<Picture>& pictures) {
   std::vector<PictureFigures> figures;
   for (const Picture& p : pictures) figures.push_back(figures_of(p.view()));
   return judge_pictures(std::span(kNames).first(pictures.size()), figures);
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 TEST(PictureFigures, areThoseOfThePixelsAndNotOfThePadding) {

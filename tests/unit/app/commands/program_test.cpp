@@ -8,11 +8,14 @@
 #include "app/runtime/version.hpp"
 #include "app/runtime/withdrawn.hpp"
 #include "core/features/simd_target.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::app {
 namespace {
+
+using test::contains;
 
 using test::Outcome;
 using test::run_vergence;
@@ -24,10 +27,6 @@ testing::AssertionResult refused_in_one_sentence(const Outcome& outcome) {
     return testing::AssertionSuccess();
   return testing::AssertionFailure() << "exit code " << outcome.code << ", stdout \"" << outcome.out
                                      << "\", stderr \"" << outcome.err << '"';
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 TEST(Program, VersionAndHelpGoToStandardOutput) {

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
+#include "tests/support/refusal.hpp"
 
 namespace vergence::app {
 namespace {
@@ -25,20 +25,7 @@ std::string with_block(const std::string& parameters, const std::string& upper) 
 }
 
 std::string refusal(const std::string& yaml) {
-  try {
-    static_cast<void>(parse_calibration(yaml, "c.yaml"));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-testing::AssertionResult refused(const std::string& yaml, const std::string& beginning,
-                                 const std::string& part) {
-  const std::string sentence = refusal(yaml);
-  if (sentence.rfind(beginning, 0) == 0 && sentence.find(part) != std::string::npos)
-    return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "the sentence is: " << sentence;
+  return test::refusal_of([&] { (void)parse_calibration(yaml, "c.yaml"); });
 }
 
 /// Rows of both cameras that a drive estimates, one combination of them exactly known, as with a
@@ -110,40 +97,41 @@ TEST(CalibrationCovariance, CamerasThatNamesDoNotTellApartGoByIndex) {
 }
 
 TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
-  EXPECT_TRUE(refused(with_block("[right.rx, rihgt.ry]", "[1, 0, 1]"),
-                      "c.yaml:7: covariance.parameters has \"rihgt.ry\"",
-                      "did you mean \"right.ry\"?"));
-  EXPECT_TRUE(refused(with_block("[left.rx]", "[1]"),
-                      "c.yaml:7: covariance.parameters has \"left.rx\"", "no parameter"))
-      << "left sits still";
-  EXPECT_TRUE(
-      refused(with_block("[right.p1]", "[1]"), "c.yaml:7: covariance.parameters", "no parameter"))
-      << "an equidistant lens has none";
-  EXPECT_TRUE(refused(with_block("[right.rx, 1.rx]", "[1, 0, 1]"),
-                      "c.yaml:7: covariance.parameters has 1.rx twice", ""));
-  EXPECT_TRUE(refused(with_block("[]", "[]"),
-                      "c.yaml:7: covariance.parameters is not a list of parameters", ""));
-  EXPECT_TRUE(refused(with_block("right.rx", "[1]"),
-                      "c.yaml:7: covariance.parameters is not a list of parameters", ""));
-  EXPECT_TRUE(refused(with_block("[[right.rx]]", "[1]"),
-                      "c.yaml:7: covariance.parameters is not a text", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0]"),
-                      "c.yaml:8: covariance.upper has 2 numbers; it needs 3", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, .nan, 1]"),
-                      "c.yaml:8: covariance.upper", "finite"));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0, -1]"),
-                      "c.yaml:8: covariance.upper has -1 as the variance of right.ry", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 0, 0]"),
-                      "c.yaml:8: covariance.upper has 0 as the variance of right.ry", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry]", "[1, 1.1, 1]"),
-                      "c.yaml:7: covariance has a correlation beyond 1", ""));
-  EXPECT_TRUE(refused(with_block("[right.rx, right.ry, right.rz]", "[1, 0.9, -0.9, 1, 0.9, 1]"),
-                      "c.yaml:7: covariance is not positive", ""));
-  EXPECT_TRUE(refused(kRig + "covariance: {parameters: [right.rx]}\n",
-                      "c.yaml:6: covariance.upper is missing", ""));
-  EXPECT_TRUE(refused(kRig + "covariance: 3\n", "c.yaml:6: covariance is not a group", ""));
-  EXPECT_TRUE(refused(kRig + "covariance: {parameter: [right.rx], upper: [1]}\n",
-                      "c.yaml:6: covariance has the unknown key", ""));
+  const std::string two = "[right.rx, right.ry]";
+  struct Row {
+    std::string yaml, beginning, says = "";
+  };
+  for (const Row& r : std::vector<Row>{
+           {with_block("[right.rx, rihgt.ry]", "[1, 0, 1]"),
+            "c.yaml:7: covariance.parameters has \"rihgt.ry\"", "did you mean \"right.ry\"?"},
+           {with_block("[left.rx]", "[1]"), "c.yaml:7: covariance.parameters has \"left.rx\"",
+            "no parameter"},  // left sits still
+           {with_block("[right.p1]", "[1]"), "c.yaml:7: covariance.parameters",
+            "no parameter"},  // an equidistant lens has none
+           {with_block("[right.rx, 1.rx]", "[1, 0, 1]"),
+            "c.yaml:7: covariance.parameters has 1.rx twice"},
+           {with_block("[]", "[]"), "c.yaml:7: covariance.parameters is not a list of parameters"},
+           {with_block("right.rx", "[1]"),
+            "c.yaml:7: covariance.parameters is not a list of parameters"},
+           {with_block("[[right.rx]]", "[1]"), "c.yaml:7: covariance.parameters is not a text"},
+           {with_block(two, "[1, 0]"), "c.yaml:8: covariance.upper has 2 numbers; it needs 3"},
+           {with_block(two, "[1, .nan, 1]"), "c.yaml:8: covariance.upper", "finite"},
+           {with_block(two, "[1, 0, -1]"),
+            "c.yaml:8: covariance.upper has -1 as the variance of right.ry"},
+           {with_block(two, "[1, 0, 0]"),
+            "c.yaml:8: covariance.upper has 0 as the variance of right.ry"},
+           {with_block(two, "[1, 1.1, 1]"), "c.yaml:7: covariance has a correlation beyond 1"},
+           {with_block("[right.rx, right.ry, right.rz]", "[1, 0.9, -0.9, 1, 0.9, 1]"),
+            "c.yaml:7: covariance is not positive"},
+           {kRig + "covariance: {parameters: [right.rx]}\n",
+            "c.yaml:6: covariance.upper is missing"},
+           {kRig + "covariance: 3\n", "c.yaml:6: covariance is not a group"},
+           {kRig + "covariance: {parameter: [right.rx], upper: [1]}\n",
+            "c.yaml:6: covariance has the unknown key"},
+       }) {
+    const std::string sentence = refusal(r.yaml);
+    EXPECT_TRUE(sentence.starts_with(r.beginning) && test::contains(sentence, r.says)) << sentence;
+  }
 }
 
 TEST(CalibrationCovariance, FlawsInMemoryAreFoundToo) {

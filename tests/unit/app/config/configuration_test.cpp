@@ -9,23 +9,17 @@
 #include <gtest/gtest.h>
 
 #include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {
 
+using test::contains;
+
 /// The sentence with which a configuration is refused; empty when it is taken.
 std::string refusal(const std::string& yaml, const std::vector<std::string>& set = {}) {
-  try {
-    static_cast<void>(parse_configuration(yaml, "drive.yaml", set));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
+  return test::refusal_of([&] { (void)parse_configuration(yaml, "drive.yaml", set); });
 }
 
 TEST(Configuration, ReadsNestedAndDottedKeys) {
@@ -136,13 +130,8 @@ TEST(Configuration, AliasesThatUnfoldWithoutEndAreStopped) {
 
 TEST(Configuration, FilesThatCannotBeReadAreNamed) {
   const test::TemporaryFolder folder;
-  const auto sentence = [](const std::filesystem::path& path) -> std::string {
-    try {
-      static_cast<void>(load_configuration(path, {}));
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+  const auto sentence = [](const std::filesystem::path& path) {
+    return test::refusal_of([&] { (void)load_configuration(path, {}); });
   };
   EXPECT_EQ(sentence(folder / "none.yaml"),
             (folder / "none.yaml").string() + ": there is no such file");

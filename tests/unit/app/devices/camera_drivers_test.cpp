@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "app/devices/software_trigger.hpp"
-#include "app/runtime/errors.hpp"
 #include "tests/support/gige_camera.hpp"
+#include "tests/support/refusal.hpp"
 
 namespace vergence::app {
 namespace {
@@ -24,14 +24,7 @@ CameraRequest request(const std::string& driver, const std::string& serial) {
 
 std::string refusal(const std::vector<CameraRequest>& requests) {
   std::vector<std::string> remarks;
-  try {
-    (void)open_cameras(requests, &remarks);
-  } catch (const InputError& e) {
-    return e.what();
-  } catch (const DeviceError& e) {
-    return e.what();
-  }
-  return "nothing was refused";
+  return test::refusal_of([&] { (void)open_cameras(requests, &remarks); });
 }
 
 test::GigeCameraOptions small(int k) {

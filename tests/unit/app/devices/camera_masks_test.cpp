@@ -4,7 +4,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -33,12 +33,7 @@ std::string refusal(const std::filesystem::path& folder, const std::string& name
   Configuration c;
   c.folder = folder;
   c.cameras[1].mask = name;
-  try {
-    const CameraMasks masks(c, small_rig());
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "taken";
+  return test::refusal_of([&] { const CameraMasks masks(c, small_rig()); });
 }
 
 TEST(CameraMasks, areReadFromPngAndPgmBesideTheConfiguration) {

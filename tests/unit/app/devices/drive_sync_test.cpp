@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "app/devices/rig_settings.hpp"
-#include "app/devices/trigger_boards.hpp"
+#include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 
 namespace vergence::app {
 namespace {
@@ -46,17 +47,13 @@ constexpr const char* kTwoGige =
     "cameras: [{driver: gige, exposure_us: 4000}, {driver: gige, exposure_us: 4000}]\n";
 
 std::string refusal(const std::string& yaml) {
-  try {
-    const Configuration c = parse_configuration(kTwoGige, "t", {});
+  return test::refusal_of([&] {
     const Configuration mine = parse_configuration(
         yaml.find("cameras:") == std::string::npos ? kTwoGige + yaml : yaml, "t", {});
     (void)sync_options(mine, 2);
     (void)trigger_configuration(mine, 2);
     (void)trigger_board_options(mine.trigger);
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
+  });
 }
 
 struct BadCase {

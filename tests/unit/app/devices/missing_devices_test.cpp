@@ -7,8 +7,7 @@
 
 #include "app/devices/camera_drivers.hpp"
 #include "app/devices/device_sentences.hpp"
-#include "app/devices/ins_drivers.hpp"
-#include "app/devices/trigger_boards.hpp"
+#include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 

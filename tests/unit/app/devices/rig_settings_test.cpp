@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/devices/mock_drive.hpp"
-#include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 
 namespace vergence::app {
 namespace {
@@ -20,12 +20,7 @@ Configuration configured(const std::vector<std::string>& set) {
 }
 
 std::string refusal(const std::vector<std::string>& set) {
-  try {
-    (void)nominal_rig(configured(set));
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
+  return test::refusal_of([&] { (void)nominal_rig(configured(set)); });
 }
 
 void expect_equal(const RigCalibration& a, const RigCalibration& b) {

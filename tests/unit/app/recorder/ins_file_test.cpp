@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "app/recorder/recorder.hpp"
-#include "app/runtime/errors.hpp"
 #include "core/memory/allocation_guard.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -43,12 +43,7 @@ const std::string kHead = std::string(kInsHeader) + "\n";
 /// The sentence that refuses the file; empty: it was taken.
 std::string refusal(const std::string& text) {
   const test::TemporaryFolder folder;
-  try {
-    (void)read_ins_file(folder.write("ins.csv", text));
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return {};
+  return test::refusal_of([&] { (void)read_ins_file(folder.write("ins.csv", text)); });
 }
 
 TEST(InsFile, aReadingComesBackAsItWas) {
@@ -115,30 +110,29 @@ TEST(InsFile, hostileLinesAreRefusedWithTheirPlace) {
     for (const std::string& f : fields) line += (line.empty() ? "" : ",") + f;
     return refusal(kHead + line_of(reading(0)) + line + "\n");
   };
-  const auto has = [](const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-  };
-  EXPECT_TRUE(has(with(0, "1.5"), "ins.csv:3: `1.5` is not a stamp in whole nanoseconds"))
+  EXPECT_TRUE(
+      test::contains(with(0, "1.5"), "ins.csv:3: `1.5` is not a stamp in whole nanoseconds"))
       << with(0, "1.5");
-  EXPECT_TRUE(has(with(0, "99999999999999999999"), "is not a stamp"));
-  EXPECT_TRUE(has(with(1, "-1"), "is not a bound"));
-  EXPECT_TRUE(has(with(3, "great"), "`great` is not none, dead_reckoning"));
-  EXPECT_TRUE(has(with(4, "153"), "no place on the earth"));
-  EXPECT_TRUE(has(with(5, ""), "`` is not a coordinate"));
-  EXPECT_TRUE(has(with(7, "nan"), "`nan` is not a velocity"));
-  EXPECT_TRUE(has(with(10, "7"), "the quaternion has length"));
-  EXPECT_TRUE(has(with(10, "1e308"), "the quaternion has length"));
-  EXPECT_TRUE(has(with(14, "-2"), "`-2` is not a sigma"));
-  EXPECT_TRUE(has(with(19, "4294967296"), "is not a status word"));
-  EXPECT_TRUE(has(with(20, "256"), "is not a number of satellites"));
-  EXPECT_TRUE(has(with(21, "yes"), "`yes` is not 0 or 1"));
-  EXPECT_TRUE(has(with(22, "later"), "is not a time"));
-  EXPECT_TRUE(has(with(22, "1,2"), "has 24 columns where a reading has 23"));
-  EXPECT_TRUE(has(refusal(kHead + "1,2\n"), "ins.csv:2: has 2 columns"));
-  EXPECT_TRUE(has(refusal("a,b\n" + good), "ins.csv:1: is not the head"));
-  EXPECT_TRUE(has(refusal(""), "is not the head"));
-  EXPECT_TRUE(has(refusal(kHead), "has no reading in it"));
-  EXPECT_TRUE(has(refusal(kHead + good.substr(0, good.size() - 1)), "has no reading in it"))
+  EXPECT_TRUE(test::contains(with(0, "99999999999999999999"), "is not a stamp"));
+  EXPECT_TRUE(test::contains(with(1, "-1"), "is not a bound"));
+  EXPECT_TRUE(test::contains(with(3, "great"), "`great` is not none, dead_reckoning"));
+  EXPECT_TRUE(test::contains(with(4, "153"), "no place on the earth"));
+  EXPECT_TRUE(test::contains(with(5, ""), "`` is not a coordinate"));
+  EXPECT_TRUE(test::contains(with(7, "nan"), "`nan` is not a velocity"));
+  EXPECT_TRUE(test::contains(with(10, "7"), "the quaternion has length"));
+  EXPECT_TRUE(test::contains(with(10, "1e308"), "the quaternion has length"));
+  EXPECT_TRUE(test::contains(with(14, "-2"), "`-2` is not a sigma"));
+  EXPECT_TRUE(test::contains(with(19, "4294967296"), "is not a status word"));
+  EXPECT_TRUE(test::contains(with(20, "256"), "is not a number of satellites"));
+  EXPECT_TRUE(test::contains(with(21, "yes"), "`yes` is not 0 or 1"));
+  EXPECT_TRUE(test::contains(with(22, "later"), "is not a time"));
+  EXPECT_TRUE(test::contains(with(22, "1,2"), "has 24 columns where a reading has 23"));
+  EXPECT_TRUE(test::contains(refusal(kHead + "1,2\n"), "ins.csv:2: has 2 columns"));
+  EXPECT_TRUE(test::contains(refusal("a,b\n" + good), "ins.csv:1: is not the head"));
+  EXPECT_TRUE(test::contains(refusal(""), "is not the head"));
+  EXPECT_TRUE(test::contains(refusal(kHead), "has no reading in it"));
+  EXPECT_TRUE(
+      test::contains(refusal(kHead + good.substr(0, good.size() - 1)), "has no reading in it"))
       << "torn";
 }
 

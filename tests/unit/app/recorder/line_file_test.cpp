@@ -1,38 +1,19 @@
 #include "app/recorder/line_file.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <cerrno>
-#include <csignal>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
 
-#include "app/runtime/errors.hpp"
+#include <nlohmann/json.hpp>
+
+#include "app/recorder/record_lines.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {
-
-/// Files of this process can grow to `bytes` and no further: a disk that is full, without needing
-/// one.
-class SmallDisk {
- public:
-  explicit SmallDisk(rlim_t bytes) : former_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &former_);
-    const rlimit small{bytes, former_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallDisk() {
-    make_room();
-    std::signal(SIGXFSZ, former_handler_);
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-  void make_room() { setrlimit(RLIMIT_FSIZE, &former_); }
-
- private:
-  rlimit former_{};
-  void (*former_handler_)(int);
-};
 
 TEST(LineFile, moreThanMayWaitIsHandedOverWhileTheDiskTakesIt) {
   const test::TemporaryFolder folder;
@@ -48,40 +29,40 @@ TEST(LineFile, moreThanMayWaitIsHandedOverWhileTheDiskTakesIt) {
   EXPECT_EQ(test::read_file(folder / "a.txt"), all);
 }
 
-TEST(LineFile, goesOnWhereItStoppedWhenRoomComesBack) {
-  const test::TemporaryFolder folder;
-  SmallDisk disk(10);
-  LineFile file(folder / "a.txt");
-  EXPECT_TRUE(file.append("0123456\n"));
-  EXPECT_TRUE(file.flush());
-  EXPECT_TRUE(file.append("89abcdef\n"));
-  EXPECT_FALSE(file.flush());
-  EXPECT_EQ(file.fault(), EFBIG);
-  disk.make_room();
-  EXPECT_TRUE(file.flush());
-  EXPECT_EQ(file.fault(), 0);
-  EXPECT_TRUE(file.close());
-  EXPECT_EQ(test::read_file(folder / "a.txt"), "0123456\n89abcdef\n");
+nlohmann::json parsed(const EventRecord& event) {
+  std::string line;
+  format_event(event, &line);
+  EXPECT_EQ(line.back(), '\n');
+  EXPECT_EQ(line.find('\n'), line.size() - 1) << "one line";
+  return nlohmann::json::parse(line);
 }
 
-TEST(LineFile, whatWaitsIsBoundedAndWhatIsLostIsWholeLinesThatAreCounted) {
-  const test::TemporaryFolder folder;
-  const std::string line = std::string(999, 'x') + "\n";
-  std::uint64_t refused = 0;
-  std::uint64_t taken = 0;
-  {
-    SmallDisk disk(0);
-    LineFile file(folder / "a.txt");
-    for (int i = 0; i < 2000; ++i) {
-      ++(file.append(line) ? taken : refused);
-      EXPECT_FALSE(file.flush());
-    }
-    EXPECT_EQ(taken, LineFile::kPending / line.size());
-    EXPECT_EQ(file.lost_lines(), refused);
-    disk.make_room();
-    EXPECT_TRUE(file.close());
+TEST(EventLine, numbersThatJsonDoesNotHaveAreNull) {
+  EventRecord event;
+  event.kind = "k";
+  event.fields[0] = {"nan", std::numeric_limits<double>::quiet_NaN()};
+  event.fields[1] = {"infinite", -std::numeric_limits<double>::infinity()};
+  const nlohmann::json json = parsed(event);
+  EXPECT_TRUE(json["fields"]["nan"].is_null());
+  EXPECT_TRUE(json["fields"]["infinite"].is_null());
+}
+
+/// Valid as they are: two, three and four bytes. Replaced: a lone continuation, a cut sequence, a
+/// form that is too long, a surrogate, beyond the last code point.
+TEST(EventLine, bytesThatAreNoUtf8AreReplaced) {
+  const std::string good = "\xc3\xa9 \xe2\x82\xac \xf0\x9f\x9a\x97";
+  EventRecord event;
+  event.kind = "k";
+  event.set_sentence(good);
+  EXPECT_EQ(parsed(event)["sentence"], good);
+  for (const char* bad :
+       {"\x80", "a\xe2\x82z", "\xc0\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xff"}) {
+    std::size_t i = 0;
+    for (; bad[i] != 0; ++i) event.sentence[i] = bad[i];
+    event.sentence[i] = 0;
+    const std::string sentence = parsed(event)["sentence"];
+    EXPECT_NE(sentence.find("\xef\xbf\xbd"), std::string::npos) << sentence;
   }
-  EXPECT_EQ(test::read_file(folder / "a.txt").size(), taken * line.size());
 }
 
 }  // namespace

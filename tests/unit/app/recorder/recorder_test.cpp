@@ -87,6 +87,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   event.fields[0] = {"frame", std::int64_t{7}};
   event.fields[1] = {"seconds", 0.5};
   event.fields[2] = {"word", "late"};
+  event.fields[3] = {"whole", 2.0};
   recorder.post(event);
   EstimatorEvent change;
   change.stamp = Stamp(kStamp);
@@ -103,6 +104,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   EXPECT_EQ(torn["fields"]["frame"], 7);
   EXPECT_EQ(torn["fields"]["seconds"], 0.5);
   EXPECT_EQ(torn["fields"]["word"], "late");
+  EXPECT_TRUE(torn["fields"]["whole"].is_number_float()) << lines[0];
   EXPECT_EQ(state["kind"], "state");
   EXPECT_EQ(state["sentence"], "initialising to stereo_odometry: trusted calibration");
   EXPECT_EQ(state["fields"]["to"], "stereo_odometry");

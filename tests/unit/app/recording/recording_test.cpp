@@ -123,7 +123,7 @@ TEST(Recording, imagesNeverPushOutSmallMessages) {
   o.when_full = Recording::WhenFull::drop;
   o.files.disk = &disk;
   Recording recording(folder.path(), o);
-  disk.stall_ms = 400;  // the first chunk
+  disk.stall_ms = 1000;  // the first chunk
   ASSERT_TRUE(post(&recording, 0));
   std::this_thread::sleep_for(150ms);
   int images = 0;
@@ -132,7 +132,9 @@ TEST(Recording, imagesNeverPushOutSmallMessages) {
     ++images;
   }
   EXPECT_GE(images, 8);
+  const auto begun = std::chrono::steady_clock::now();
   for (int i = 1; i < 1000; ++i) ASSERT_TRUE(post(&recording, i));
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, 400ms) << "nobody waits for the disk";
   recording.close();
   EXPECT_EQ(recording.counters().dropped, 1U);
   EXPECT_EQ(recording.counters().dropped_images, 1U);
@@ -288,27 +290,6 @@ TEST(Recording, aDiskThatTakesNoFileAtTheBeginningIsRefused) {
     o.files.disk = &disk;
     EXPECT_THROW(Recording(folder.path(), o), InputError) << error;
   }
-}
-
-TEST(Recording, aStalledDiskKeepsNobodyWaitingAndLosesNothingThatHasRoom) {
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  Recording::Options o = options();
-  o.when_full = Recording::WhenFull::drop;
-  o.files.disk = &disk;
-  Recording recording(folder.path(), o);
-  disk.stall_ms = 1500;
-  auto longest = 0ns;
-  for (int i = 0; i < 300; ++i) {
-    const auto begun = std::chrono::steady_clock::now();
-    ASSERT_TRUE(post(&recording, i));
-    longest = std::max(longest, std::chrono::steady_clock::now() - begun);
-    std::this_thread::sleep_for(1ms);
-  }
-  EXPECT_LT(longest, 1s);  // the disk's 1.5 s are not the producer's
-  recording.close();
-  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 300));
-  EXPECT_EQ(recording.counters().dropped, 0U);
 }
 
 TEST(Recording, keepsWhatIsAroundAnEvent) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "core/math/so3.hpp"
 
@@ -108,21 +109,22 @@ TEST(Analysis, aStraightWayIsLaidByAttitudesAndKeepsItsVerticalError) {
 }
 
 TEST(Analysis, withoutAReferenceThereAreNoErrorsAndItIsSaid) {
-  const Analysis a = analyse(bent_drive(50));
-  EXPECT_EQ(a.source, ErrorSource::none);
-  for (const auto* curve : {&a.horizontal_m, &a.vertical_m, &a.heading_deg, &a.theirs_x})
-    for (const double v : *curve) EXPECT_TRUE(std::isnan(v));
-  EXPECT_NE(a.source_sentence.find("no reference"), std::string::npos);
-  EXPECT_FALSE(a.drift.has_value());
-}
-
-TEST(Analysis, aReferenceOfAnotherTimeIsNone) {
-  Session s = with_reference(bent_drive(50), Transform{});
-  for (StampedPose& p : s.reference) p.stamp = Stamp(p.stamp.ns() + 3'600'000'000'000);
-  const Analysis a = analyse(s);
-  EXPECT_EQ(a.source, ErrorSource::none);
-  EXPECT_NE(a.source_sentence.find("reference.tum has no pose at the times of ours"),
-            std::string::npos);
+  Session other_time = with_reference(bent_drive(50), Transform{});
+  for (StampedPose& p : other_time.reference) p.stamp = Stamp(p.stamp.ns() + 3'600'000'000'000);
+  Session unplaced = with_reference(bent_drive(50), Transform{});
+  for (Frame& f : unplaced.frames) f.has_ins = true, f.ins = {1, 2, 3};
+  for (const auto& [session, why] :
+       {std::pair(bent_drive(50), "no reference"),
+        std::pair(other_time, "reference.tum has no pose at the times of ours"),
+        std::pair(unplaced, "could not be placed")}) {
+    const Analysis a = analyse(session);
+    EXPECT_EQ(a.source, ErrorSource::none);
+    for (const auto* curve : {&a.horizontal_m, &a.vertical_m, &a.heading_deg})
+      for (const double v : *curve) EXPECT_TRUE(std::isnan(v));
+    EXPECT_NE(a.source_sentence.find(why), std::string::npos) << a.source_sentence;
+  }
+  EXPECT_FALSE(analyse(bent_drive(50)).drift.has_value());
+  EXPECT_TRUE(analyse(unplaced).ins_unplaced);
 }
 
 TEST(Analysis, lostFramesHaveNoPlaceAndMissingOnesABreak) {
@@ -217,15 +219,6 @@ TEST(Analysis, driftAgainstTheInsIsByPositionsWhateverItsAttitudeAndThePlacement
   // 300 m of ours are an arc of 300/102 rad on a circle of 102 m; the ways differ by 2 m of radius
   // over its chord.
   EXPECT_NEAR(a.drift.value(), 2 * 2 * std::sin(150.0 / 102) / 300, 2e-4);
-}
-
-TEST(Analysis, anInsThatNeverGaveAPlacementGivesNoErrors) {
-  Session s = bent_drive(10);
-  for (Frame& f : s.frames) f.has_ins = true, f.ins = {1, 2, 3};
-  const Analysis a = analyse(with_reference(s, Transform{}));
-  EXPECT_EQ(a.source, ErrorSource::none);
-  EXPECT_NE(a.source_sentence.find("could not be placed"), std::string::npos);
-  EXPECT_TRUE(a.ins_unplaced);
 }
 
 TEST(Analysis, withoutASummaryTheFiguresAreReckonedAgain) {

@@ -13,6 +13,7 @@
 #include "app/report/tables.hpp"
 #include "app/report/verdict.hpp"
 #include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/session_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/report/xml_check.hpp"
@@ -20,9 +21,7 @@
 namespace vergence::app {
 namespace {
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+using test::contains;
 
 /// Nothing that a browser would load or run.
 testing::AssertionResult self_contained(const std::string& html) {

@@ -6,19 +6,14 @@
 #include <iterator>
 #include <string>
 
-#include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {
 
 std::string refusal(const std::filesystem::path& file) {
-  try {
-    replace_durably(file, "new");
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
+  return test::refusal_of([&] { replace_durably(file, "new"); });
 }
 
 std::ptrdiff_t files_in(const std::filesystem::path& folder) {

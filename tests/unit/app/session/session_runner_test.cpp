@@ -1,7 +1,6 @@
 #include "app/session/session_runner.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <cstdint>
 #include <fstream>
@@ -200,35 +199,6 @@ TEST(SessionRunner, theQuotaMakesRoomBeforeTheFolderAndASessionThatIsRefusedCost
   BlackSource without_room(2);
   EXPECT_THROW((void)run_session(without_room, configuration, options, signals), InputError);
   EXPECT_FALSE(std::filesystem::exists(folder / "old"));
-}
-
-/// Files of this process may have so many bytes while it lives.
-class LargestFile {
- public:
-  explicit LargestFile(rlim_t bytes) {
-    (void)::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    (void)::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~LargestFile() { (void)::setrlimit(RLIMIT_FSIZE, &before_); }
-  LargestFile(const LargestFile&) = delete;
-  LargestFile& operator=(const LargestFile&) = delete;
-
- private:
-  rlimit before_{};
-};
-
-TEST(SessionRunner, aSessionThatCannotBeRecordedLeavesNoFolder) {
-  const test::TemporaryFolder folder;
-  BlackSource source(4);
-  SessionOptions options;
-  options.out = folder / "session";
-  options.quiet = true;
-  const SignalGuard signals;  // SIGXFSZ ends nothing
-  const Configuration configuration = load_configuration(std::nullopt, {"record=[poses]"});
-  const LargestFile limit(2000);
-  EXPECT_THROW((void)run_session(source, configuration, options, signals), InputError);
-  EXPECT_FALSE(std::filesystem::exists(options.out));
 }
 
 }  // namespace

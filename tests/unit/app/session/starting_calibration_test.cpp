@@ -2,10 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <csignal>
+#include <filesystem>
+#include <optional>
 #include <string>
 
 #include "app/config/calibration_state.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/session/drive_calibration.hpp"
+#include "app/session/given_calibration.hpp"
+#include "app/session/session_files.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -136,6 +142,115 @@ TEST(NominalGeometry, isParallelButForCamerasMountedFartherThanTheGates) {
   EXPECT_EQ(nominal.T_camera_left[1].t, Vec3(-given.baseline, 0, 0));
   EXPECT_EQ(nominal.T_camera_left[2].R, mounted.T_camera_left[2].R);
   EXPECT_TRUE(nominal.T_camera_left[2].t.isApprox(2 * mounted.T_camera_left[2].t, 1e-12));
+}
+
+const std::string kKalibr = R"(cam0:
+  {camera_model: pinhole, distortion_model: none, distortion_coeffs: [], intrinsics: [460, 460, 320, 240], resolution: [640, 480]}
+cam1:
+  {camera_model: pinhole, distortion_model: none, distortion_coeffs: [], intrinsics: [461, 461, 321, 241], resolution: [640, 480],
+   T_cn_cnm1: [[1, 0, 0, -0.3], [0, 1, 0, 0.003], [0, 0, 1, 0], [0, 0, 0, 1]]}
+)";
+
+const std::string kOpenCv = R"(cameraMatrix1: [[460, 0, 320], [0, 460, 240], [0, 0, 1]]
+cameraMatrix2: [[461, 0, 321], [0, 461, 241], [0, 0, 1]]
+distCoeffs1: [0, 0, 0, 0]
+distCoeffs2: [0, 0, 0, 0]
+R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+T: [-0.3, 0, 0]
+)";
+
+const std::string kOurs = R"({version: 1, cameras: [
+{size: [640, 480], model: pinhole-radtan, intrinsics: [460, 460, 320, 240]},
+{size: [640, 480], model: pinhole-radtan, intrinsics: [461, 461, 321, 241], T_camera_left: [1, 0, 0, -0.3, 0, 1, 0, 0, 0, 0, 1, 0]}]}
+)";
+
+CalibrationFile read(const std::filesystem::path& file, const CalibrationUse& use = {}) {
+  std::vector<std::string> remarks;
+  return read_given_calibration(file.string(), use, ImageSize{640, 480}, &remarks);
+}
+
+TEST(GivenCalibration, theBaselineOfTheCommandLineCountsForEveryFormat) {
+  const test::TemporaryFolder folder;
+  for (const auto& [name, text] :
+       {std::pair{"chain.yaml", kKalibr}, {"stereo.yml", kOpenCv}, {"ours.yaml", kOurs}}) {
+    const auto file = folder.write(name, text);
+    const RigCalibration rig = read(file, {.baseline = 0.6}).rig;
+    EXPECT_EQ(rig.baseline, 0.6) << name;
+    EXPECT_NEAR(rig.T_camera_left[1].t.norm(), 0.6, 1e-12) << name;
+    EXPECT_EQ(read(file, {.length_only = true}).rig.T_camera_left[1].t.y(), 0)
+        << name << ": from scratch no place is read";
+  }
+}
+
+/// Frames that nobody can read: each pass is over at once.
+StereoSequence unreadable() {
+  StereoSequence sequence;
+  sequence.root = "/none";
+  for (int i = 0; i < 3; ++i) sequence.pairs.push_back({Stamp(i), {"left.png", "right.png"}, true});
+  RigCalibration& rig = sequence.calibration;
+  rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k)
+    rig.intrinsics[k] = {.width = 160, .height = 120, .fx = 100, .fy = 100, .cx = 80, .cy = 60};
+  rig.T_camera_left[1].t = {-0.5, 0, 0};
+  rig.baseline = 0.5;
+  return sequence;
+}
+
+TEST(DriveCalibration, whatStopsItIsStillThereForWhoAskedForIt) {
+  const StereoSequence sequence = unreadable();
+  const Configuration configuration = load_configuration(std::nullopt, {});
+  const StartingCalibration given = replayed_calibration(configuration, sequence, true);
+  Progress progress = Progress::on_stderr(true);
+  const SignalGuard signals;
+  const DrivePass pass{sequence, configuration, 0, sequence.pairs.size(), {}, {}};
+  DriveCalibration found = calibrate_with_progress(pass, given, signals, &progress);
+  EXPECT_NE(found.why.find("no calibration was found"), std::string::npos) << found.why;
+  std::raise(SIGTERM);
+  found = calibrate_with_progress(pass, given, signals, &progress);
+  EXPECT_FALSE(found.rig);
+  EXPECT_EQ(found.why, "it was interrupted");
+  EXPECT_EQ(signals.stop_code(), ExitCode::terminated);
+}
+
+CalibrationFile two_cameras() {
+  CalibrationFile file;
+  RigCalibration& rig = file.rig;
+  rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k)
+    rig.intrinsics[k] = {.width = 160, .height = 120, .fx = 100, .fy = 100, .cx = 80, .cy = 60};
+  rig.T_camera_left[1].t = {-0.5, 0, 0};
+  rig.baseline = 0.5;
+  return file;
+}
+
+/// What is said of a calibration that was found, where files cannot be written.
+Kept kept(bool session_fails, bool has_state, bool state_fails) {
+  const test::TemporaryFolder folder;
+  const auto in_the_way = [&](const char* file) {
+    std::filesystem::create_directories(folder / (std::string(file) + ".new"));
+  };
+  std::filesystem::create_directory(folder / "session");
+  if (session_fails) in_the_way("session/calibration.yaml");
+  if (state_fails) in_the_way("state.yaml");
+  const CalibrationFile file = two_cameras();
+  const auto state = has_state ? std::optional(folder / "state.yaml") : std::nullopt;
+  const Kept kept = calibration_keeper(folder / "session", file, state)(file.rig, true);
+  EXPECT_EQ(std::filesystem::exists(folder / "state.yaml"), has_state && !state_fails);
+  return kept;
+}
+
+TEST(CalibrationKeeper, whetherItIsKeptIsWhetherTheNextDriveHasIt) {
+  EXPECT_TRUE(kept(false, false, false).sentence.empty());
+  EXPECT_FALSE(kept(false, true, false).failed);
+  EXPECT_TRUE(kept(false, true, true).failed);
+  EXPECT_TRUE(kept(true, true, true).failed);
+  EXPECT_TRUE(kept(true, false, false).failed) << "the session's is all there is to keep";
+
+  const Kept here = kept(true, true, false);
+  EXPECT_FALSE(here.failed);
+  EXPECT_TRUE(here.sentence.starts_with("the calibration is kept for the next drive: "))
+      << here.sentence;
+  EXPECT_NE(here.sentence.find("session/calibration.yaml"), std::string::npos) << here.sentence;
 }
 
 }  // namespace

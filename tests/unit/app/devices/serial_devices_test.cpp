@@ -1,11 +1,11 @@
-#include "app/devices/ins_drivers.hpp"
+#include "app/devices/serial_devices.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
-#include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/xsens_terminal.hpp"
 
 namespace vergence::app {
@@ -13,14 +13,7 @@ namespace {
 
 std::string refusal(const InsRequest& request) {
   std::vector<std::string> remarks;
-  try {
-    (void)open_ins(request, &remarks);
-  } catch (const InputError& e) {
-    return e.what();
-  } catch (const DeviceError& e) {
-    return e.what();
-  }
-  return "nothing was refused";
+  return test::refusal_of([&] { (void)open_ins(request, &remarks); });
 }
 
 InsRequest xsens_on(const std::string& port, double rate) {

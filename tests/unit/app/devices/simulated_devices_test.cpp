@@ -2,6 +2,7 @@
 // paired, stamped items.
 #include <gtest/gtest.h>
 
+#include <GeographicLib/LocalCartesian.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,7 +14,9 @@
 #include "app/devices/drive_devices.hpp"
 #include "app/runtime/errors.hpp"
 #include "drivers/acquisition/acquisition.hpp"
+#include "drivers/mock/ins_model.hpp"
 #include "tests/support/acquired.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/watched_camera.hpp"
 
 namespace vergence::app {
@@ -47,11 +50,14 @@ struct Driven {
   std::vector<Duration> pulses;
   AcquisitionCounters counters;
   HostStamp start{};
-  std::optional<trigger_board::BoardStatistics> board;
+  std::unique_ptr<DriveDevices> owner;
 };
 
-Driven drive(const Configuration& c, const std::vector<std::string>& faults = {}) {
-  DriveDevices devices(c, faults, true, kSeconds);
+Driven drive(const Configuration& c, const std::vector<std::string>& faults = {},
+             double seconds = kSeconds) {
+  Driven d;
+  d.owner = std::make_unique<DriveDevices>(c, faults, true, seconds);
+  DriveDevices& devices = *d.owner;
   Acquisition::Options o = devices.acquisition_options();
   o.wait_when_full = true;
   o.tie_stamp = kEpoch;
@@ -59,7 +65,6 @@ Driven drive(const Configuration& c, const std::vector<std::string>& faults = {}
   WatchedCamera left(devices.cameras()[0]), right(devices.cameras()[1]);
   Acquisition source({&left, &right}, devices.ins(), devices.trigger(), o);
   start_acquisition(&source);
-  Driven d;
   d.start = devices.start();
   for (Acquired item; source.next(&item);) {
     const AcquiredFrame* frame = test::frame_of(item);
@@ -76,7 +81,6 @@ Driven drive(const Configuration& c, const std::vector<std::string>& faults = {}
   source.join();
   d.counters = source.counters();
   d.pulses = devices.mock()->pulse_times();
-  if (devices.board() != nullptr) d.board = devices.board()->board_statistics();
   return d;
 }
 
@@ -121,8 +125,8 @@ TEST_P(SimulatedBoard, pairsAreProvenWithinASecondRightAndStampedWithinTheirBoun
   // What mapping the edge leaves, with pings 100 times a second over lines that are late now and
   // then.
   EXPECT_LT(p99(errors), 1000) << "µs";
-  ASSERT_TRUE(d.board);
-  EXPECT_GT(d.board->time.answered, 500U);
+  ASSERT_NE(d.owner->board(), nullptr);
+  EXPECT_GT(d.owner->board()->board_statistics().time.answered, 500U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Lines, SimulatedBoard, ::testing::Values("usb", "ftdi"));
@@ -213,6 +217,66 @@ TEST(SimulatedBoardLine, aBoardThatNeverComesBackEndsNothingButItsPulses) {
   const std::size_t sets = stamp_errors(d).size();
   EXPECT_GT(sets, 50U);
   EXPECT_LT(sets, 85U);
+}
+
+Configuration brief_drive(const std::string& line, const std::vector<std::string>& more = {}) {
+  std::vector<std::string> set{"mock.ins_line=" + line, "mock.ins=ideal"};
+  set.insert(set.end(), more.begin(), more.end());
+  return parse_configuration(R"(
+cameras: [{name: left, driver: mock, size: [64, 48]}, {name: right, driver: mock, size: [64, 48]}]
+trigger: {driver: mock, rate: 10}
+ins: {driver: mock, rate: 100}
+mock: {drive: brief, texture_detail: 0}
+)",
+                             "test", set);
+}
+
+class SimulatedIns : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(SimulatedIns, readingsStandWhereTheVehicleWasAtTheirStamps) {
+  const Driven driven = drive(brief_drive(GetParam()), {}, 24);
+  const GeographicLib::LocalCartesian plane(mock::kWorldOrigin.latitude_deg,
+                                            mock::kWorldOrigin.longitude_deg,
+                                            mock::kWorldOrigin.height_m);
+  std::size_t readings = 0;
+  for (const Acquired& item : driven.others) {
+    const AcquiredReading* reading = test::reading_of(item);
+    if (reading == nullptr) continue;
+    ++readings;
+    const Duration time = stamp_of(item) - kEpoch;
+    // 15 s after the line was opened; the fast part of this drive comes after that.
+    if (time < Duration::seconds(10) || time > Duration::seconds(24)) continue;
+    const auto truth = driven.owner->mock()->truth().ins_in_enu(time);
+    const auto body = driven.owner->mock()->truth().drive().at(time);
+    Vec3 at;
+    plane.Forward(reading->sample.position.latitude_deg, reading->sample.position.longitude_deg,
+                  reading->sample.position.height_m, at.x(), at.y(), at.z());
+    // The ideal INS's place is off by what the vehicle drove in the stamp's error: 0.5 ms, and
+    // 16.32's steps.
+    constexpr double kStamp = 0.5e-3, kStep = 1e-4;
+    EXPECT_LT((at - truth.t).norm(), kStamp * (body.velocity.norm() + 1) + kStep)
+        << time.to_seconds();
+    EXPECT_LT(std::abs(reading->sample.stamp_error.to_seconds()), 10e-3);
+  }
+  EXPECT_GT(readings, 2200U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lines, SimulatedIns, ::testing::Values("mti-g", "mti-g-710"),
+                         [](const auto& one) {
+                           return std::string(one.param) == "mti-g" ? "legacy" : "mark4";
+                         });
+
+TEST(SimulatedInsConfiguration, isRefusedWhereItCannotBe) {
+  const auto refusal = [](const Configuration& c, bool fast) {
+    return test::refusal_of([&] { const DriveDevices devices(c, {}, fast, 1.0); });
+  };
+  EXPECT_NE(refusal(brief_drive("mti-g"), false).find("--fast"), std::string::npos);
+  EXPECT_THROW((void)brief_drive("mti-h"), InputError) << "it is not read at all";
+  EXPECT_NE(refusal(brief_drive("mti-g", {"ins.rate=110"}), true).find("ins.rate"),
+            std::string::npos);
+  EXPECT_NE(refusal(brief_drive("mti-g-710", {"ins.rate=400"}), true).find("ins.baud"),
+            std::string::npos);
+  EXPECT_EQ(refusal(brief_drive("mti-g-710", {"ins.rate=400", "ins.baud=460800"}), true), "");
 }
 
 }  // namespace

@@ -1,12 +1,16 @@
 #include "app/runtime/nearest.hpp"
 
+#include <gtest/gtest.h>
+
 #include <string>
 #include <vector>
 
-#include <gtest/gtest.h>
+#include "app/runtime/distinct_names.hpp"
 
 namespace vergence::app {
 namespace {
+
+using Names = std::vector<std::string>;
 
 TEST(EditDistance, KnownAnswers) {
   EXPECT_EQ(edit_distance("", ""), 0U);
@@ -25,6 +29,13 @@ TEST(Nearest, GivesNothingWhenNothingIsNear) {
   EXPECT_EQ(nearest("xyzzy", {"replay", "evaluate"}), std::nullopt);
   EXPECT_EQ(nearest("replay", {}), std::nullopt);
   EXPECT_EQ(did_you_mean("xyzzy", {"replay"}), "");
+}
+
+TEST(DistinctNames, onlyThoseThatAreThereAlreadyAreChanged) {
+  EXPECT_EQ(distinct_names({"left", "right", "camera2"}), (Names{"left", "right", "camera2"}));
+  EXPECT_EQ(distinct_names({"left", "left", "left"}), (Names{"left", "left_1", "left_2"}));
+  EXPECT_EQ(distinct_names({"left", "left_1", "left"}), (Names{"left", "left_1", "left_2"}));
+  EXPECT_EQ(distinct_names({"left", "left", "left_1"}), (Names{"left", "left_1", "left_1_1"}));
 }
 
 }  // namespace

@@ -1,21 +1,24 @@
-#include "app/devices/simulated_board.hpp"
+#include "app/devices/simulated_devices.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include "app/devices/drive_sync.hpp"
-#include "app/devices/trigger_boards.hpp"
+#include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
+#include "drivers/mock/ins_model.hpp"
 #include "drivers/mock/simulators/board_simulator.hpp"
 #include "drivers/mock/simulators/simulated_line.hpp"
+#include "drivers/mock/simulators/simulators.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
+#include "drivers/xsens/xsens.hpp"
 
 namespace vergence::app {
 namespace {
 
-constexpr Duration kBefore =
+constexpr Duration kBoardBefore =
     Duration::seconds(3);  // from power to the drive's start: finding and setting the board fit
-constexpr Duration kAfter = Duration::seconds(
+constexpr Duration kBoardAfter = Duration::seconds(
     8);  // a board that was away to the end is found and set once more, which ends the drive
 
 /// The driver on its line, with the rig's cameras on the board's.
@@ -66,11 +69,26 @@ Duration length_of(const Configuration& c, const mock::MockRig& rig) {
   return Duration::seconds(static_cast<double>(rig.pulses(c.trigger.rate)) / c.trigger.rate);
 }
 
+/// When a line is unplugged; one that never comes back is away for `after` beyond the drive's end.
+std::vector<mock::Outage> outages_of(mock::FaultKind kind, const Configuration& c,
+                                     const mock::MockRig& rig, Duration after) {
+  std::vector<mock::Outage> outages;
+  for (const mock::Fault& f : rig.truth().faults()) {
+    if (f.kind != kind) continue;
+    const HostStamp from = rig.start() + f.at, never = rig.start() + length_of(c, rig) + after;
+    const bool powered = kind == mock::FaultKind::ins_gone || f.powered;
+    outages.push_back({from, f.duration == Duration{} ? never : from + f.duration, powered});
+  }
+  std::sort(outages.begin(), outages.end(),
+            [](const mock::Outage& a, const mock::Outage& b) { return a.from < b.from; });
+  return outages;
+}
+
 mock::BoardSimulatorOptions board_of(const Configuration& c, const mock::MockRig& rig) {
   mock::BoardSimulatorOptions o;
   o.clock_ppm = c.mock.clock_drift_ppm;
-  o.power_on = rig.start() - kBefore;
-  o.duration = kBefore + length_of(c, rig) + kAfter;
+  o.power_on = rig.start() - kBoardBefore;
+  o.duration = kBoardBefore + length_of(c, rig) + kBoardAfter;
   o.pps = c.trigger.pps != trigger_board::Edge::none;
   o.seed = static_cast<std::uint64_t>(c.mock.seed);
   for (const mock::Fault& f : rig.truth().faults())
@@ -79,10 +97,10 @@ mock::BoardSimulatorOptions board_of(const Configuration& c, const mock::MockRig
   return o;
 }
 
-mock::SimulatedLineOptions line_of(const Configuration& c, const mock::MockRig& rig) {
+mock::SimulatedLineOptions board_line_of(const Configuration& c, const mock::MockRig& rig) {
   constexpr std::size_t kUsbPacket = 64;
   mock::SimulatedLineOptions o;
-  o.start = rig.start() - kBefore;
+  o.start = rig.start() - kBoardBefore;
   o.converter = c.mock.board_line == MockSettings::BoardLine::ftdi;
   if (o.converter)
     o.latency_timer = Duration::milliseconds(std::max(1, c.mock.board_latency_timer_ms));
@@ -91,14 +109,7 @@ mock::SimulatedLineOptions line_of(const Configuration& c, const mock::MockRig& 
   o.late_fraction = o.sent_late_fraction = c.mock.board_late_percent / 100;
   o.late_mean = o.sent_late_mean = Duration::seconds(c.mock.board_late_ms * 1e-3);
   o.seed = static_cast<std::uint64_t>(c.mock.seed) + 1;
-  for (const mock::Fault& f : rig.truth().faults()) {
-    if (f.kind != mock::FaultKind::board_gone) continue;
-    const HostStamp from = rig.start() + f.at,
-                    never = rig.start() + length_of(c, rig) + Duration::seconds(1);
-    o.outages.push_back({from, f.duration == Duration{} ? never : from + f.duration, f.powered});
-  }
-  std::sort(o.outages.begin(), o.outages.end(),
-            [](const mock::Outage& a, const mock::Outage& b) { return a.from < b.from; });
+  o.outages = outages_of(mock::FaultKind::board_gone, c, rig, Duration::seconds(1));
   return o;
 }
 
@@ -124,6 +135,36 @@ mock::PulseSource cameras_of(mock::MockRig* rig, HostStamp end) {
   };
 }
 
+constexpr Duration kInsBefore =
+    Duration::seconds(5);  // from power to the drive's start: a baud scan and a reset fit
+constexpr Duration kInsAfter =
+    Duration::seconds(1);  // the last image's reading is on its way that long at most
+
+mock::InsSource source_of(const Configuration& c, const mock::MockRig& rig) {
+  mock::InsModelOptions o;
+  o.ideal = c.mock.ins == MockSettings::Ins::ideal;
+  o.seed = static_cast<std::uint64_t>(c.mock.seed);
+  o.rate_hz = c.ins.rate;
+  auto model = std::make_shared<mock::InsModel>(o, rig.truth());
+  const Duration end = rig.truth().drive().duration();
+  return [model = std::move(model), end](std::uint64_t number, Duration time) {
+    return model->sample(number, std::clamp(time - kInsBefore, Duration{},
+                                            end));  // before the start and after the end it stands
+  };
+}
+
+mock::SimulatedLineOptions ins_line_of(const Configuration& c, const mock::MockRig& rig) {
+  mock::SimulatedLineOptions o;
+  o.start = rig.start() - kInsBefore;
+  o.converter = c.mock.ins_latency_timer_ms > 0;
+  o.latency_timer = Duration::milliseconds(c.mock.ins_latency_timer_ms);
+  o.late_fraction = c.mock.ins_late_percent / 100;
+  o.late_mean = Duration::seconds(c.mock.ins_late_ms * 1e-3);
+  o.seed = static_cast<std::uint64_t>(c.mock.seed);
+  o.outages = outages_of(mock::FaultKind::ins_gone, c, rig, Duration::seconds(3600));
+  return o;
+}
+
 }  // namespace
 
 std::unique_ptr<TriggerDevice> make_simulated_board(const Configuration& c, mock::MockRig* rig,
@@ -135,7 +176,7 @@ std::unique_ptr<TriggerDevice> make_simulated_board(const Configuration& c, mock
   DeviceStatus status = DeviceStatus::ok;
   std::string error;
   auto board = trigger_board::open_on(
-      std::make_unique<mock::SimulatedPlace>(std::move(simulator), line_of(c, *rig)), options,
+      std::make_unique<mock::SimulatedPlace>(std::move(simulator), board_line_of(c, *rig)), options,
       &status, &error);
   if (board == nullptr) throw InputError("trigger: " + error);
   if (board->configure(trigger_configuration(c, rig->cameras()), nullptr) != DeviceStatus::ok)
@@ -144,6 +185,34 @@ std::unique_ptr<TriggerDevice> make_simulated_board(const Configuration& c, mock
     remarks->push_back(board_title(board->info()) + ": " + remark);
   *driver = board.get();
   return std::make_unique<SimulatedBoard>(rig, std::move(board));
+}
+
+std::unique_ptr<InsDevice> make_simulated_ins(const Configuration& c, const mock::MockRig& rig,
+                                              std::vector<std::string>* remarks) {
+  mock::XsensSimulatorOptions sensor;
+  sensor.generation = c.mock.ins_line == MockSettings::InsLine::mti_g ? xbus::Generation::legacy
+                                                                      : xbus::Generation::mark4;
+  sensor.device_id = sensor.generation == xbus::Generation::legacy ? 0x00500123 : 0x07701234;
+  sensor.clock_ppm = c.mock.clock_drift_ppm;
+  sensor.power_on = rig.start() - kInsBefore;
+  sensor.duration = kInsBefore + length_of(c, rig) + kInsAfter;
+  sensor.processing = Duration::seconds(c.ins.processing_ms * 1e-3);
+  sensor.seed = static_cast<std::uint64_t>(c.mock.seed);
+  auto simulator = std::make_shared<mock::XsensSimulator>(source_of(c, rig), sensor);
+  xsens::Options options;
+  options.baud = static_cast<std::uint32_t>(c.ins.baud);
+  options.processing = sensor.processing;
+  DeviceStatus status = DeviceStatus::ok;
+  std::string error;
+  auto device = xsens::open_on(
+      std::make_unique<mock::SimulatedPlace>(std::move(simulator), ins_line_of(c, rig)), options,
+      &status, &error);
+  if (device == nullptr) throw InputError("ins: " + error);
+  if (device->configure(c.ins.rate, nullptr) != DeviceStatus::ok)
+    throw InputError(ins_title(device->info()) + ": " + device->last_error());
+  if (const std::string remark = device->remark(); !remark.empty())
+    remarks->push_back(ins_title(device->info()) + ": " + remark);
+  return device;
 }
 
 }  // namespace vergence::app
