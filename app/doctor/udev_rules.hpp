@@ -1,8 +1,8 @@
 #pragma once
 #include <string>
 
+#include "app/doctor/checks.hpp"
 #include "app/doctor/inventory.hpp"
-#include "app/doctor/needs.hpp"
 
 namespace vergence::app {
 

@@ -38,6 +38,7 @@ class Pipe {
     }
     (void)::fcntl(ends_[1], F_SETFL, 0);
   }
+
  private:
   std::array<int, 2> ends_{-1, -1};
 };
