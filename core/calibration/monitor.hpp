@@ -128,7 +128,7 @@ struct MonitorVerdict {
 ///
 /// Memory   All of it from the arena in the constructor. look() allocates nothing.
 /// Threads  One caller.
-/// Time     Under 0.3 ms for 300 stereo matches and 200 motion tracks (build/bench/monitor_bench).
+/// Time     Under 0.3 ms for 300 stereo matches and 200 motion tracks.
 /// Errors   The constructor throws (std::invalid_argument with a sentence, std::length_error). What
 ///          is not a number is left out.
 class Monitor {

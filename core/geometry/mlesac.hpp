@@ -57,7 +57,7 @@ struct MlesacPose {
 ///
 /// Ownership  Workspace in the arena it was made in. flags() stay valid until the next solve().
 /// Threads    One caller per object; several objects may run side by side.
-/// Memory     All at construction. Time: tests/bench/geometry_bench.
+/// Memory     All at construction.
 /// Precision  Scores in float about the points' mean (0.01 px for points within 100 times their
 ///            distance), flags in double.
 /// Errors     By status; not `ok`: the pose is the identity and means nothing.
