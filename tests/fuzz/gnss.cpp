@@ -1,10 +1,10 @@
-#include "tests/fuzz/gnss/probe.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <span>
 
 #include "firmware_iface/nmea/nmea.hpp"
 #include "firmware_iface/ubx/ubx.hpp"
@@ -73,11 +73,18 @@ void probe_ubx(std::span<const std::uint8_t> bytes) {
   (void)ubx::decode_pvt(bytes, &pvt);
 }
 
-}  // namespace
-
+/// Gives hostile bytes to the decoders of NMEA and UBX. A breach of what must hold for any bytes
+/// aborts with a sentence on stderr.
 void probe_gnss(std::span<const std::uint8_t> bytes) {
   probe_nmea(bytes);
   probe_ubx(bytes);
 }
 
+}  // namespace
 }  // namespace vergence::test
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
+                                      std::size_t size) {  // NOLINT(readability-identifier-naming)
+  vergence::test::probe_gnss({data, size});
+  return 0;
+}

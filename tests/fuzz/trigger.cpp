@@ -1,6 +1,5 @@
-#include "tests/fuzz/trigger/probe.hpp"
-
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -206,11 +205,19 @@ class Bench {
   BoardPulse pulse_{};
 };
 
-}  // namespace
-
+/// Takes bytes as a stream from the line, then as a script of what may happen to a trigger board:
+/// bytes, time, edges, pulses made, refused and taken back. Aborts with a sentence when the
+/// protocol's decoder or the board breaks a promise.
 void probe_trigger(const std::uint8_t* data, std::size_t size) {
   probe_decoder(data, size);
   Bench(Script(data, size)).run();
 }
 
+}  // namespace
 }  // namespace vergence
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
+                                      std::size_t size) {  // NOLINT(readability-identifier-naming)
+  vergence::probe_trigger(data, size);
+  return 0;
+}

@@ -1,11 +1,10 @@
-#include "tests/fuzz/xbus/probe.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <vector>
+#include <span>
 
 #include "firmware_iface/xbus/xbus.hpp"
 
@@ -87,8 +86,9 @@ void probe_payload(std::span<const std::uint8_t> payload) {
   }
 }
 
-}  // namespace
-
+/// Gives hostile bytes to everything that reads Xbus: frames, both data messages, every
+/// configuration payload. Each property that must hold whatever the bytes are is checked; a breach
+/// aborts with a sentence on stderr.
 void probe(std::span<const std::uint8_t> bytes) {
   probe_payload(bytes);
   // The stream against a reader without memory: the same frames, however the bytes are cut into
@@ -127,4 +127,11 @@ void probe(std::span<const std::uint8_t> bytes) {
           "a refusal costs a byte");
 }
 
+}  // namespace
 }  // namespace vergence::xbus
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data,
+                                      std::size_t size) {  // NOLINT(readability-identifier-naming)
+  vergence::xbus::probe({data, size});
+  return 0;
+}
