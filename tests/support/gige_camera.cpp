@@ -33,7 +33,7 @@ int datagram_socket(const char* address) {
 
 GigeCamera::Impl::Impl(const GigeCameraOptions& o)
     : options(o),
-      sender(o.address, o.extended_ids, o.loss, o.seed),
+      sender(o.address, o.extended_ids, o.seed),
       memory_(gvcp::kMemory, 0),
       born_(monotonic_now()) {
   control_ = datagram_socket(o.address.c_str());
@@ -95,11 +95,6 @@ void GigeCamera::tear_frames(int exposures) {
   const std::lock_guard lock(impl_->mutex_);
   impl_->tear_ += exposures;
 }
-void GigeCamera::delay_frames(int exposures, Duration by) {
-  impl_->sender.hold_back(by);
-  const std::lock_guard lock(impl_->mutex_);
-  impl_->delay_ += exposures;
-}
 void GigeCamera::set_loss(double share) { impl_->sender.set_loss(share); }
 void GigeCamera::garble_chunks(int exposures) {
   const std::lock_guard lock(impl_->mutex_);
@@ -121,14 +116,12 @@ GigeCameraReport GigeCamera::report() const {
   GigeCameraReport r;
   impl_->sender.add_to(&r);
   const std::lock_guard lock(impl_->mutex_);
-  r.ignored_triggers = impl_->ignored_;
   r.starts = impl_->starts_;
   return r;
 }
 std::vector<std::uint64_t> GigeCamera::whole() const { return impl_->sender.whole(); }
 std::uint32_t GigeCamera::read(std::uint32_t address) const { return impl_->get(address); }
 void GigeCamera::write(std::uint32_t address, std::uint32_t value) { impl_->set(address, value); }
-HostStamp GigeCamera::sent(std::uint64_t number) const { return impl_->sender.sent(number); }
 std::uint64_t GigeCamera::ticks(HostStamp host) const { return impl_->ticks(host); }
 bool GigeCamera::acquiring() const { return impl_->acquiring(); }
 const GigeCameraOptions& GigeCamera::options() const { return impl_->options; }

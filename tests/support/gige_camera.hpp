@@ -19,18 +19,13 @@ struct GigeCameraOptions {
   double clock_drift_ppm = 20;
   std::uint64_t first_block = 65'500;  // 16-bit ids wrap 35 frames later; 0 is never used
   bool extended_ids = false;           // 64-bit block ids
-  bool resend = true;                  // answers resend requests
   bool old_names =
       false;  // ExposureTimeAbs, GainRaw, AcquisitionFrameRateAbs as cameras before SFNC 2.0
   bool discoverable = true;  // answers broadcasts
-  double loss = 0;           // share of the stream's packets that are not sent, the resent ones too
-  std::uint64_t seed = 1;    // of the loss
-  std::uint32_t heartbeat_ms = 3000;
-  std::uint32_t smallest_packet = 576, largest_packet = 16'000;  // bytes, of GevSCPSPacketSize
-  bool chunks = false;  // has chunk data: the exposure, the time stamp
+  std::uint64_t seed = 1;    // of the packets that are lost
+  bool chunks = false;       // has chunk data: the exposure, the time stamp
   std::uint32_t chunk_payload =
       0x4001;  // payload type then: image with chunks; 5: extended chunk data; 4: chunk data
-  bool chunk_formula = false;  // the description has the chunk's exposure behind a formula
   /// How long image `number` was really exposed, µs, of what the registers say; empty: as they say.
   std::function<double(std::uint64_t number, double us)> exposures{};
   bool number_images = true;  // the first 8 bytes of an image are its number, little endian
@@ -41,17 +36,15 @@ struct GigeCameraOptions {
 
 /// What it did with its exposures, exactly. A frame is one exposure since the acquisition's start.
 struct GigeCameraReport {
-  std::uint64_t exposed = 0;           // frames
-  std::uint64_t whole = 0;             // every packet was sent, at first or when asked again
-  std::uint64_t torn = 0;              // the leader was sent, something else was not
-  std::uint64_t headless = 0;          // the leader was not sent, something else was
-  std::uint64_t nothing = 0;           // not one packet was sent
-  std::uint64_t packets = 0;           // that belong to these frames
-  std::uint64_t dropped = 0;           // of these at first
-  std::uint64_t asked = 0;             // packets asked for again
-  std::uint64_t resent = 0;            // of these sent
-  std::uint64_t starts = 0;            // acquisitions
-  std::uint64_t ignored_triggers = 0;  // pulses that came while it was not waiting for one
+  std::uint64_t exposed = 0;   // frames
+  std::uint64_t whole = 0;     // every packet was sent, at first or when asked again
+  std::uint64_t torn = 0;      // the leader was sent, something else was not
+  std::uint64_t headless = 0;  // the leader was not sent, something else was
+  std::uint64_t nothing = 0;   // not one packet was sent
+  std::uint64_t dropped = 0;   // packets, at first
+  std::uint64_t asked = 0;     // packets asked for again
+  std::uint64_t resent = 0;    // of these sent
+  std::uint64_t starts = 0;    // acquisitions
 };
 
 /// A small GigE Vision camera on the loopback: GVCP control, GenICam description, GVSP stream, in
@@ -78,10 +71,7 @@ class GigeCamera {
   void lose_frames(int exposures);  // the next ones are not sent at all
   void tear_frames(
       int exposures);  // of the next ones one packet of data is not sent and not sent again
-  void delay_frames(
-      int exposures,
-      Duration by);  // the last half of each is sent so much later, after what comes between
-  void set_loss(double share);
+  void set_loss(double share);        // of the packets, those sent again too
   void garble_chunks(int exposures);  // the next ones have nonsense behind their pixels
   void lie_about_size(int width,
                       int height);  // sends this size, whatever the registers say; 0: honest again
@@ -97,8 +87,6 @@ class GigeCamera {
   /// A bootstrap register or one of the features.
   [[nodiscard]] std::uint32_t read(std::uint32_t address) const;
   void write(std::uint32_t address, std::uint32_t value);
-  /// When the last packet of image `number` was handed to the system; 0: not one of the newest.
-  [[nodiscard]] HostStamp sent(std::uint64_t number) const;
   /// How long image `number` was exposed, µs, as its chunk data say where it has them; 0: there is
   /// no such image.
   [[nodiscard]] double exposed(std::uint64_t number) const;

@@ -62,8 +62,8 @@ void GigeCamera::Impl::reset() {
   put(0x600, 1);
   put(0x900, 0);
   put(0x904, 1);
-  put(0x934, (options.resend ? 4U : 0U) | 2U | 1U);
-  put(kHeartbeat, options.heartbeat_ms);
+  put(0x934, 4U | 2U | 1U);
+  put(kHeartbeat, 3000);  // ms
   put(kTicksHigh, static_cast<std::uint32_t>(options.tick_frequency >> 32U));
   put(kTicksLow, static_cast<std::uint32_t>(options.tick_frequency));
   put(kPacketSize, 1500);
@@ -162,9 +162,8 @@ void GigeCamera::Impl::handle(int fd, const std::uint8_t* bytes, std::size_t len
         if (extended && size >= 20)
           block =
               static_cast<std::uint64_t>(from_wire(payload + 12)) << 32U | from_wire(payload + 16);
-        if (options.resend)
-          sender.resend(block, from_wire(payload + 4) & (extended ? ~0U : 0xFFFFFFU),
-                        from_wire(payload + 8) & (extended ? ~0U : 0xFFFFFFU));
+        sender.resend(block, from_wire(payload + 4) & (extended ? ~0U : 0xFFFFFFU),
+                      from_wire(payload + 8) & (extended ? ~0U : 0xFFFFFFU));
       }
       return;
     case 0x80:  // read registers
@@ -237,7 +236,7 @@ bool GigeCamera::Impl::value_fits(std::uint32_t address, std::uint32_t value) co
       return value % 2 == 0 && value + word(height) <= h;
     case kPacketSize: {
       const std::uint32_t size = value & 0xFFFFU;
-      return size >= options.smallest_packet && size <= options.largest_packet && size % 4 == 0;
+      return size >= kSmallestPacket && size <= kLargestPacket && size % 4 == 0;
     }
     case frame_rate: {
       const float rate = std::bit_cast<float>(value);

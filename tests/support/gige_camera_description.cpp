@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "tests/support/detail/gige_camera_impl.hpp"
 #include "tests/support/gige_camera.hpp"
 
 namespace vergence::test {
@@ -85,16 +86,11 @@ class Description {
         name, address, length);
   }
   /// A number in the chunk `id` (hexadecimal).
-  void chunk(const char* name, const char* id, int length, const char* endianness, bool formula) {
+  void chunk(const char* name, const char* id, int length, const char* endianness) {
     feature(name);
     const std::string reg = fmt::format("{}Reg", name);
-    text_ += formula
-                 ? fmt::format(
-                       "<SwissKnife Name=\"{}\"><pVariable "
-                       "Name=\"RAW\">{}</pVariable><Formula>RAW*1.5</Formula></SwissKnife>\n",
-                       name, reg)
-                 : fmt::format("<Float Name=\"{}\"><pValue>{}</pValue><Unit>us</Unit></Float>\n",
-                               name, reg);
+    text_ +=
+        fmt::format("<Float Name=\"{}\"><pValue>{}</pValue><Unit>us</Unit></Float>\n", name, reg);
     text_ += fmt::format(
         "<FloatReg "
         "Name=\"{0}\"><Address>0</Address><Length>{1}</Length><AccessMode>RO</"
@@ -197,12 +193,12 @@ std::string gige_description(const GigeCameraOptions& o) {
              {{"Image", 0}, {"ExposureTime", 1}, {"Timestamp", 2}});
     d.boolean("ChunkEnable", chunk_enable);
     d.chunk(o.old_names ? "ChunkExposureTimeAbs" : "ChunkExposureTime", "A5A50002",
-            o.old_names ? 4 : 8, o.old_names ? "LittleEndian" : "BigEndian", o.chunk_formula);
+            o.old_names ? 4 : 8, o.old_names ? "LittleEndian" : "BigEndian");
   }
   // Of the bootstrap registers; bit 0 is the most significant one.
-  d.bits(
-      "GevSCPSPacketSize", 0xD04, 31, 16,
-      fmt::format("<Min>{}</Min><Max>{}</Max><Inc>4</Inc>", o.smallest_packet, o.largest_packet));
+  d.bits("GevSCPSPacketSize", 0xD04, 31, 16,
+         fmt::format("<Min>{}</Min><Max>{}</Max><Inc>4</Inc>", gvcp::kSmallestPacket,
+                     gvcp::kLargestPacket));
   d.bit_command("GevSCPSFireTestPacket", 0xD04, 0);
   d.bits("GevSCPSDoNotFragment", 0xD04, 1, 1, "<Min>0</Min><Max>1</Max>");
   d.integer("GevSCPD", 0xD08, "<Min>0</Min><Max>1000000</Max>");

@@ -23,10 +23,8 @@ constexpr std::uint32_t kImageChunk = 0xA5A50001, kExposureChunk = 0xA5A50002,
 void GigeCamera::Impl::pulse(std::uint64_t number, std::uint32_t source, HostStamp when) {
   const std::lock_guard lock(mutex_);
   if (!acquiring_ || !powered_ || word(trigger_mode) == 0 || word(trigger_source) != source ||
-      pulses_.size() >= kLatchedPulses) {
-    ++ignored_;
+      pulses_.size() >= kLatchedPulses)
     return;
-  }
   pulses_.emplace_back(number, when.ns() != 0 ? when : monotonic_now());
   changed_.notify_all();
 }
@@ -99,9 +97,6 @@ void GigeCamera::Impl::expose() {
   std::unique_lock lock(mutex_);
   HostStamp last{};
   for (;;) {
-    lock.unlock();
-    sender.send_held(monotonic_now());
-    lock.lock();
     if (quit_) return;
     const bool triggered = word(trigger_mode) != 0;
     if (!acquiring_ || !powered_ || silent_ || (triggered && pulses_.empty())) {
@@ -136,9 +131,6 @@ void GigeCamera::Impl::expose() {
     } else if (tear_ > 0) {
       --tear_;
       fate = GvspSender::Fate::torn;
-    } else if (delay_ > 0) {
-      --delay_;
-      fate = GvspSender::Fate::delayed;
     }
     lock.unlock();
     sender.send(std::move(frame), fate);

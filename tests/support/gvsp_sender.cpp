@@ -24,9 +24,8 @@ void sleep_until(HostStamp when) noexcept {
   (void)::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
 }
 
-GvspSender::GvspSender(const std::string& address, bool extended_ids, double loss,
-                       std::uint64_t seed)
-    : extended_(extended_ids), loss_(loss), random_(seed, 77) {
+GvspSender::GvspSender(const std::string& address, bool extended_ids, std::uint64_t seed)
+    : extended_(extended_ids), random_(seed, 77) {
   socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in own{};
   own.sin_family = AF_INET;
@@ -52,11 +51,6 @@ void GvspSender::aim(const sockaddr_in& target, std::uint32_t packet_size, Durat
 void GvspSender::set_loss(double share) {
   const std::lock_guard lock(mutex_);
   loss_ = share;
-}
-
-void GvspSender::hold_back(Duration by) {
-  const std::lock_guard lock(mutex_);
-  held_by_ = by;
 }
 
 Wire GvspSender::header(std::uint64_t block, std::uint32_t format, std::uint32_t id,
@@ -120,8 +114,7 @@ void GvspSender::packet(const Record& record, std::uint32_t id, bool again) {
 void GvspSender::send(GvspFrame frame, Fate fate) {
   std::unique_lock lock(mutex_);
   const std::uint64_t number = frame.number;
-  const std::size_t slot = frames_++ % kHistory;
-  Record& record = history_[slot];
+  Record& record = history_[frames_++ % kHistory];
   record.frame = std::move(frame);
   record.data_bytes = packet_size_ - (extended_ ? 48U : 36U);
   record.packets = static_cast<std::uint32_t>((record.frame.pixels.size() + record.data_bytes - 1) /
@@ -130,37 +123,20 @@ void GvspSender::send(GvspFrame frame, Fate fate) {
   record.account = accounts_.size();
   accounts_.push_back({number, std::vector<bool>(record.packets, false), fate == Fate::torn,
                        1 + (record.packets - 2) / 2});
-  packets_ += record.packets;
   if (fate == Fate::unsent) {
     record.packets = 0;
     dropped_ += accounts_.back().went.size();
     return;
   }
-  const std::uint32_t packets = record.packets, half = packets / 2;
+  const std::uint32_t packets = record.packets;
   HostStamp due = monotonic_now();
   for (std::uint32_t id = 0; id < packets; ++id) {
-    if (fate == Fate::delayed && id == half) {
-      held_.push_back({slot, record.frame.block, half, monotonic_now() + held_by_});
-      return;
-    }
     packet(record, id, false);
     due = due + packet_delay_;
     const Duration ahead = due - monotonic_now();
     lock.unlock();  // requests to send again are answered between packets, as a camera does
     if (ahead > Duration::microseconds(60)) sleep_until(due);
     lock.lock();
-  }
-  sent_[number % sent_.size()] = {number, monotonic_now()};
-}
-
-void GvspSender::send_held(HostStamp until) {
-  const std::lock_guard lock(mutex_);
-  while (!held_.empty() && held_.front().due <= until) {
-    const Held h = held_.front();
-    held_.pop_front();
-    const Record& record = history_[h.record];
-    if (record.frame.block != h.block) continue;
-    for (std::uint32_t id = h.from; id < record.packets; ++id) packet(record, id, false);
   }
 }
 
@@ -195,7 +171,6 @@ void GvspSender::add_to(GigeCameraReport* r) const {
                              : r->headless);
   }
   r->exposed += accounts_.size();
-  r->packets += packets_;
   r->dropped += dropped_;
   r->asked += asked_;
   r->resent += resent_;
@@ -207,12 +182,6 @@ std::vector<std::uint64_t> GvspSender::whole() const {
   for (const Account& a : accounts_)
     if (std::find(a.went.begin(), a.went.end(), false) == a.went.end()) numbers.push_back(a.number);
   return numbers;
-}
-
-HostStamp GvspSender::sent(std::uint64_t number) const {
-  const std::lock_guard lock(mutex_);
-  const auto& [of, when] = sent_[number % sent_.size()];
-  return of == number ? when : HostStamp{};
 }
 
 }  // namespace vergence::test

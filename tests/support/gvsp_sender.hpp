@@ -48,18 +48,15 @@ struct GvspFrame {
 /// Threads  send(): one. Everything else: any.
 class GvspSender {
  public:
-  GvspSender(const std::string& address, bool extended_ids, double loss, std::uint64_t seed);
+  GvspSender(const std::string& address, bool extended_ids, std::uint64_t seed);
   ~GvspSender();
   GvspSender(const GvspSender&) = delete;
   GvspSender& operator=(const GvspSender&) = delete;
 
   void aim(const sockaddr_in& target, std::uint32_t packet_size, Duration packet_delay);
   /// What becomes of a frame on purpose.
-  enum class Fate : std::uint8_t { normal, unsent, torn, delayed };
+  enum class Fate : std::uint8_t { normal, unsent, torn };
   void send(GvspFrame frame, Fate fate);
-  /// The held back halves that are due; all of them when asked.
-  void send_held(HostStamp until);
-  void hold_back(Duration by);
   /// Answers a request; unknown blocks are answered as unavailable.
   void resend(std::uint64_t block, std::uint32_t first, std::uint32_t last);
   void fire_test_packet(std::uint32_t size);
@@ -67,7 +64,6 @@ class GvspSender {
 
   void add_to(GigeCameraReport* report) const;
   [[nodiscard]] std::vector<std::uint64_t> whole() const;
-  [[nodiscard]] HostStamp sent(std::uint64_t number) const;
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
 
  private:
@@ -84,12 +80,6 @@ class GvspSender {
     bool never = false;        // torn on purpose: packet `hole` is not sent again either
     std::uint32_t hole = 0;
   };
-  struct Held {
-    std::size_t record = 0;
-    std::uint64_t block = 0;
-    std::uint32_t from = 0;
-    HostStamp due{};
-  };
   void packet(const Record& record, std::uint32_t id, bool again);
   void transmit(const std::vector<std::uint8_t>& head, std::span<const std::uint8_t> data);
   [[nodiscard]] Wire header(std::uint64_t block, std::uint32_t format, std::uint32_t id,
@@ -99,17 +89,15 @@ class GvspSender {
   std::uint16_t port_ = 0;
   bool extended_;
   mutable std::mutex mutex_;  // held for one packet at a time while a frame goes out
-  double loss_;
+  double loss_ = 0;
   Random random_;
   sockaddr_in target_{};
   std::uint32_t packet_size_ = 1500;
-  Duration packet_delay_{}, held_by_{};
+  Duration packet_delay_{};
   std::array<Record, kHistory> history_{};
   std::uint64_t frames_ = 0;
   std::vector<Account> accounts_;
-  std::deque<Held> held_;
-  std::array<std::pair<std::uint64_t, HostStamp>, 64> sent_{};
-  std::uint64_t dropped_ = 0, asked_ = 0, resent_ = 0, packets_ = 0;
+  std::uint64_t dropped_ = 0, asked_ = 0, resent_ = 0;
 };
 
 void sleep_until(HostStamp when) noexcept;

@@ -28,6 +28,7 @@ inline constexpr std::uint32_t kHeartbeat = 0x938, kTicksHigh = 0x93C, kTicksLow
                                kLatch = 0x944, kLatchedHigh = 0x948, kControl = 0xA00,
                                kStreamPort = 0xD00, kPacketSize = 0xD04, kPacketDelay = 0xD08,
                                kStreamTarget = 0xD18;
+inline constexpr std::uint32_t kSmallestPacket = 576, kLargestPacket = 16'000;  // bytes
 // Places in ChunkSelector.
 inline constexpr std::uint32_t kSelectExposure = 1, kSelectTimestamp = 2;
 
@@ -74,10 +75,10 @@ class GigeCamera::Impl {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   bool silent_ = false;
-  int lose_ = 0, tear_ = 0, delay_ = 0, garble_ = 0;
+  int lose_ = 0, tear_ = 0, garble_ = 0;
   std::map<std::uint64_t, double> exposed_;  // µs, by image
   int lie_width_ = 0, lie_height_ = 0;
-  std::uint64_t ignored_ = 0, starts_ = 0;
+  std::uint64_t starts_ = 0;
 
  private:
   void answer();
