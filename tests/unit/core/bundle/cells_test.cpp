@@ -115,10 +115,6 @@ TEST(BundleCells, aFieldOverTheImageIsSeenByThemAndNotByTracks) {
   EXPECT_GT(mean, 2.0);
 }
 
-TEST(BundleCells, allTracksInOneClusterAreClustersOfTheirOwn) {
-  EXPECT_EQ(ratio(8, 8, 400, no_field, 1), 1.0);
-}
-
 TEST(BundleCells, numbersOfCellsThatCannotBeAreRefused) {
   for (const int cells : {-1, 9}) {
     BundleOptions o = calibration_options();

@@ -224,15 +224,5 @@ TEST(Camera, theEquidistantModelWithoutCoefficientsIsTheAngle) {
   EXPECT_EQ(pixel.y(), 256);
 }
 
-TEST(Camera, insideKeepsItsMargin) {
-  const Camera camera(models()[1].k);
-  EXPECT_TRUE(camera.inside({0, 0}, 0));
-  EXPECT_TRUE(camera.inside({751, 479}, 0));
-  EXPECT_FALSE(camera.inside({751.1, 479}, 0));
-  EXPECT_FALSE(camera.inside({4.9, 100}, 5));
-  EXPECT_TRUE(camera.inside({746, 474}, 5));
-  EXPECT_FALSE(camera.inside({std::numeric_limits<double>::quiet_NaN(), 1}, 0));
-}
-
 }  // namespace
 }  // namespace vergence

@@ -155,13 +155,6 @@ TEST(Corners, cellsThatHoldATakenOneAreLeftAloneAndOthersKeepTheirDistance) {
   EXPECT_EQ(still_there, all.corners.size() / 2);
 }
 
-TEST(Corners, withLittleRoomTheWeakestAreDropped) {
-  const Image image = textured();
-  const Found all(image.view(), {}), few(image.view(), {}, {}, 7);
-  ASSERT_EQ(few.corners.size(), 7U);
-  for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(few.corners[i].score, all.corners[i].score);
-}
-
 TEST(Corners, thereAreNoneOnFlatGroundOrAnEdge) {
   EXPECT_EQ(
       Found(draw(kWidth, kHeight, [](const Vec2&) { return 90.0; }).view(), {}).corners.size(), 0U);
@@ -170,23 +163,6 @@ TEST(Corners, thereAreNoneOnFlatGroundOrAnEdge) {
   });
   // Rounding to whole grey levels leaves a third of a level: far below the threshold.
   EXPECT_EQ(Found(edge.view(), {}).corners.size(), 0U);
-}
-
-TEST(Corners, contrastDoesNotChangeWhichThereAre) {
-  const Texture texture(5);
-  const Found all(draw(kWidth, kHeight, texture).view(), {});
-  const Found dim(
-      draw(kWidth, kHeight, [&](const Vec2& p) { return 90 + 0.25 * texture(p); }).view(), {});
-  ASSERT_GT(all.corners.size(), 40U);
-  // Rounding moves a few.
-  EXPECT_GT(dim.corners.size(), 9 * all.corners.size() / 10);
-  std::size_t near = 0;
-  for (const Corner& c : dim.corners.span())
-    near += std::any_of(all.corners.begin(), all.corners.end(),
-                        [&](const Corner& o) { return std::hypot(c.x - o.x, c.y - o.y) < 3; })
-                ? 1U
-                : 0U;
-  EXPECT_GT(near, 8 * all.corners.size() / 10);
 }
 
 TEST(Corners, areTheSameAgainOnEveryTargetWhateverThePaddingAndTheRunner) {
@@ -218,11 +194,6 @@ TEST(Corners, readNoByteOutsideTheImage) {
       test::on_every_target(
           [&](const char*) { EXPECT_GT(Found(image.view(), options).corners.size(), 0U); });
     }
-}
-
-TEST(Corners, anImageTooSmallOrEmptyHasNone) {
-  EXPECT_EQ(Found(white_noise(20, 20, 1).view(), {}).corners.size(), 0U);
-  EXPECT_EQ(Found(ImageView{}, {}).corners.size(), 0U);
 }
 
 TEST(Corners, allocateNothing) {

@@ -121,24 +121,6 @@ TEST(Patch, turnedAndScaledPatchesAreFoundWithTheirShape) {
   EXPECT_LT(std::sqrt(square / cases), 1.5 * kSubPixel);
 }
 
-TEST(Patch, brightnessAndContrastDoNotMoveIt) {
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const Scene s(seed);
-    const Vec2 shift(1.37, -0.81);
-    for (const auto& [gain, offset] :
-         {std::pair(0.5, 30.0), std::pair(0.9, -10.0), std::pair(1.3, -15.0)}) {
-      const Image moved = draw(kWidth, kHeight, [&](const Vec2& p) {
-        return 128 + gain * (s.texture(p - shift) - 128) + offset;
-      });
-      const AlignResult r = align_in(moved, s.patch, s.at);
-      ASSERT_EQ(r.status, AlignStatus::ok);
-      // Half the contrast doubles what rounding does.
-      EXPECT_LT((r.pixel - s.at - shift).norm(), 4 * kSubPixel / std::min(gain, 1.0))
-          << "gain " << gain << ", seed " << seed;
-    }
-  }
-}
-
 TEST(Patch, itsSigmaIsWhatNoiseDoes) {
   // One grey level of noise in the image (with the rounding 1.04), a clean patch: along the worst
   // direction the error's sigma is the one told, along the other it is less, so the whole lies
@@ -183,19 +165,6 @@ TEST(Patch, withoutStructureInBothDirectionsItIsFlat) {
   }
 }
 
-TEST(Patch, furtherThanAllowedItDiverges) {
-  const Scene s(2);
-  const Image moved =
-      draw(kWidth, kHeight, [&](const Vec2& p) { return s.texture(p - Vec2(5, 0)); });
-  AlignOptions options;
-  options.max_shift = 2;
-  EXPECT_EQ(align_in(moved, s.patch, s.at, Mat2::Identity(), options).status,
-            AlignStatus::diverged);
-  EXPECT_EQ(align(s.patch, s.built.pyramid, s.at, Mat2::Zero(), {}).status, AlignStatus::diverged);
-  EXPECT_EQ(align(s.patch, s.built.pyramid, s.at, 100 * Mat2::Identity(), {}).status,
-            AlignStatus::diverged);
-}
-
 TEST(Patch, somethingElseIsNeverTakenForIt) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     // Waves of 4 to 9 px fill a window with some thirty independent values: a correlation of 0.8 by
@@ -214,18 +183,6 @@ TEST(Patch, somethingElseIsNeverTakenForIt) {
                      s.patch, s.at)
                 .status,
             AlignStatus::ok);
-}
-
-TEST(Patch, isCutOnTheLevelsThatHoldItAndOnNoneOutside) {
-  const Scene s(1);
-  Patch patch{};
-  EXPECT_TRUE(cut_patch(s.built.pyramid, {90, 80}, &patch));
-  EXPECT_EQ(patch.levels, 3);
-  EXPECT_TRUE(cut_patch(s.built.pyramid, {16, 80}, &patch));
-  EXPECT_EQ(patch.levels, 1);
-  EXPECT_FALSE(cut_patch(s.built.pyramid, {10, 80}, &patch));
-  EXPECT_FALSE(cut_patch(s.built.pyramid, {90, kHeight - 10}, &patch));
-  EXPECT_EQ(patch.levels, 0);
 }
 
 TEST(Patch, atTheBorderNoByteOutsideTheImageIsRead) {

@@ -86,13 +86,6 @@ TEST(Pyramid, isOpenCvsPyrDown) {
   }
 }
 
-TEST(Pyramid, paddingOfTheRowsCountsForNothing) {
-  const Image tight = white_noise(203, 117, 9), padded = white_noise(203, 117, 9, 53, 255);
-  const Built a(tight.view(), 3), b(padded.view(), 3);
-  for (int l = 1; l < a.pyramid.levels(); ++l)
-    EXPECT_EQ(different_pixels(a.pyramid.level(l), b.pyramid.level(l)), 0);
-}
-
 TEST(Pyramid, readsNoByteOutsideTheImage) {
   for (const Size s : {Size{101, 75}, Size{64, 64}, Size{97, 66}})
     for (const auto guard :
@@ -124,14 +117,6 @@ TEST(Pyramid, aPixelOfALevelLiesAtItsIndexTimesThePowerOfTwo) {
     EXPECT_NEAR(std::ldexp(x_sum / sum, l), 160.0, 1e-9);
     EXPECT_NEAR(std::ldexp(y_sum / sum, l), 120.0, 1e-9);
   }
-}
-
-TEST(Pyramid, levelZeroIsTheCallersImageAndSmallImagesHaveFewerLevels) {
-  const Image image = white_noise(70, 200, 1);
-  const Built b(image.view(), 6);
-  EXPECT_EQ(b.pyramid.level(0).data, image.bytes.data());
-  ASSERT_EQ(b.pyramid.levels(), 2);  // 70 → 35 → 18, and no side falls below 32
-  EXPECT_EQ(b.pyramid.level(1).width, 35);
 }
 
 TEST(Pyramid, takesFromTheArenaWhatItSaidAndNothingFromTheHeap) {

@@ -34,15 +34,6 @@ TEST(Epipolar, trueMatchesHaveNoResidual) {
   }
 }
 
-TEST(Epipolar, parallelCamerasMeasureTheVerticalDisparity) {
-  const EpipolarGeometry geometry(Transform{Mat3::Identity(), {-0.5, 0, 0}});
-  double line = 0, sampson = 0;
-  ASSERT_EQ(geometry.to_line({0.1, 0.2}, {0.05, 0.23}, &line, nullptr), EpipolarStatus::ok);
-  ASSERT_EQ(geometry.sampson({0.1, 0.2}, {0.05, 0.23}, &sampson, nullptr), EpipolarStatus::ok);
-  EXPECT_NEAR(std::abs(line), 0.03, 1e-15);
-  EXPECT_NEAR(std::abs(sampson), 0.03 / std::sqrt(2.0), 1e-15);  // shared between both images
-}
-
 TEST(Epipolar, derivativesMatchCentralDifferences) {
   Random random(42);
   std::vector<Transform> transforms = {Transform{Mat3::Identity(), {-0.75, 0, 0}},

@@ -76,34 +76,6 @@ TEST(FivePoint, everySolutionIsEssentialAndFitsTheFiveMatches) {
   }
 }
 
-TEST(FivePoint, findsWhatOpenCvFindsInTheSameFive) {
-  Random random(53);
-  int compared = 0, missing = 0;
-  for (int k = 0; k < 200; ++k) {
-    const Matches m = random_matches(random);
-    std::vector<cv::Point2d> left, right;
-    for (std::size_t i = 0; i < 5; ++i)
-      left.emplace_back(m.left[i].x(), m.left[i].y()),
-          right.emplace_back(m.right[i].x(), m.right[i].y());
-    const cv::Mat all =
-        cv::findEssentialMat(left, right, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.999, 1e-3);
-    const FivePointSolutions s = solve_five_point(m.left, m.right);
-    for (int at = 0; at + 3 <= all.rows;
-         at += 3) {  // with five matches it returns every solution, one below the other
-      Mat3 E;
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) E(r, c) = all.at<double>(at + r, c);
-      E *= std::sqrt(2.0) / E.norm();
-      if ((2 * E * E.transpose() * E - (E * E.transpose()).trace() * E).norm() > 1e-8)
-        continue;  // its own rounding
-      ++compared;
-      missing += nearest(s, E) < 1e-5 ? 0 : 1;
-    }
-  }
-  EXPECT_GT(compared, 400);
-  EXPECT_LE(missing, compared / 500);
-}
-
 TEST(FivePoint, decompositionFindsTheTransform) {
   Random random(54);
   for (int k = 0; k < 1000; ++k) {

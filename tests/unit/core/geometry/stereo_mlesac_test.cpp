@@ -117,33 +117,6 @@ TEST_F(StereoMlesacTest, informationPredictsTheErrorOfMostRuns) {
       kRuns * 9 / 10);  // the truncated cost has side valleys: a sampled search may end in one
 }
 
-TEST_F(StereoMlesacTest, isNoWorseThanOpenCvOnTheSameMatches) {
-  double ours = 0, theirs = 0;
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    Random random(100 + seed);
-    const MatchSet m = make_matches(random, 300, 0.3, 0.3);
-    std::vector<cv::Point2d> left, right;
-    for (std::size_t i = 0; i < m.good.size(); ++i)
-      left.emplace_back(m.left_x[i], m.left_y[i]), right.emplace_back(m.right_x[i], m.right_y[i]);
-    cv::setRNGSeed(1);
-    cv::Mat mask, R, t;
-    const cv::Mat E = cv::findEssentialMat(left, right, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC,
-                                           0.999, kPixel, mask);
-    ASSERT_EQ(E.rows, 3);
-    cv::recoverPose(E, left, right, cv::Mat::eye(3, 3, CV_64F), R, t, mask);
-    Transform T;
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) T.R(r, c) = R.at<double>(r, c);
-      T.t[r] = t.at<double>(r);
-    }
-    const StereoEstimate found = mlesac_.estimate_stereo_transform(m.view(), kBaseline, {}, random);
-    ASSERT_EQ(found.status, StereoMlesacStatus::ok);
-    ours += step_between(found.T_right_left, m.T_right_left).squaredNorm();
-    theirs += step_between(T, m.T_right_left).squaredNorm();
-  }
-  EXPECT_LE(ours, theirs);
-}
-
 TEST_F(StereoMlesacTest, sameSeedSameResultToTheBit) {
   const auto once = [&] {
     Random random(9);

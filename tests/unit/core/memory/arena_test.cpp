@@ -52,20 +52,6 @@ TEST(Arena, sizesThatOverflowAreRefused) {
   EXPECT_EQ(arena.used(), 0U);
 }
 
-/// By default not all zero bytes.
-struct Slot {
-  int id = -1;
-  float score = 0.5F;
-};
-
-TEST(Arena, objectsTakeTheirDefaults) {
-  Arena arena(4096);
-  for (const Slot& slot : arena.make<Slot>(7, "slots")) {
-    EXPECT_EQ(slot.id, -1);
-    EXPECT_EQ(slot.score, 0.5F);
-  }
-}
-
 TEST(Arena, objectsOfZerosAreZerosWhetherTheyAreConstructedOrNot) {
   struct Zeros {
     std::uint64_t number = 0;
@@ -86,16 +72,6 @@ TEST(Arena, objectsOfZerosAreZerosWhetherTheyAreConstructedOrNot) {
     EXPECT_EQ(o.bytes[199], 0);
     EXPECT_EQ(o.last, 1);
   }
-}
-
-TEST(Arena, unsetObjectsAreZeroBytesWhateverTheirDefaults) {
-  Arena arena(4096);
-  for (const Slot& slot : arena.make_unset<Slot>(7, "slots")) {
-    EXPECT_EQ(slot.id, 0);
-    EXPECT_EQ(slot.score, 0.0F);
-  }
-  EXPECT_EQ(arena.used(), kCacheLine);
-  EXPECT_THROW((void)arena.make_unset<Slot>(4096, "too many"), std::length_error);
 }
 
 TEST(Arena, tellsWhoHoldsWhat) {

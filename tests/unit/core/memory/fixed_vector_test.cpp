@@ -79,14 +79,5 @@ TEST(FixedVector, whenFullRefusesAndChangesNothing) {
   EXPECT_EQ(vector[1], 2);
 }
 
-TEST(BoundedVector, withoutStorageHoldsNothing) {
-  BoundedVector<int> vector;
-  EXPECT_TRUE(vector.empty());
-  EXPECT_TRUE(vector.full());
-  EXPECT_EQ(vector.capacity(), 0U);
-  EXPECT_FALSE(vector.push(1));
-  EXPECT_EQ(vector.begin(), vector.end());
-}
-
 }  // namespace
 }  // namespace vergence

@@ -59,10 +59,5 @@ TEST(FramePool, aSlotIsReleasedOnce) {
   EXPECT_FALSE(pool.acquire());
 }
 
-TEST(FramePool, anArenaThatIsTooSmallIsNamed) {
-  Arena arena(FramePool::memory_needed(64, 8, 2) - 1);
-  EXPECT_THROW(FramePool(64, 8, 2, arena), std::length_error);
-}
-
 }  // namespace
 }  // namespace vergence

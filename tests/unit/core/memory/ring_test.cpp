@@ -42,17 +42,6 @@ TEST(Ring, behavesLikeALimitedQueue) {
   EXPECT_GT(empties, 10);
 }
 
-TEST(Ring, ofOneHoldsOne) {
-  Ring<int, 1> ring;
-  int value = 0;
-  for (int i = 1; i < 5; ++i) {
-    EXPECT_TRUE(ring.push(i));
-    EXPECT_FALSE(ring.push(9));
-    EXPECT_TRUE(ring.pop(&value));
-    EXPECT_EQ(value, i);
-  }
-}
-
 TEST(Ring, betweenTwoThreadsNothingIsLostDoubledTornOrReordered) {
   struct Message {
     std::uint64_t number;
@@ -82,34 +71,6 @@ TEST(Ring, betweenTwoThreadsNothingIsLostDoubledTornOrReordered) {
   producer.join();
   EXPECT_EQ(wrong, 0U);
   EXPECT_TRUE(ring.empty());
-}
-
-TEST(Ring, itsSizeIsNeverMoreThanItHoldsWhoeverAsks) {
-  constexpr int kMessages = 100'000;
-  Ring<int, 4> ring;
-  std::atomic<bool> done{false};
-  std::size_t most = 0;
-  std::thread asking([&] {
-    while (!done) most = std::max(most, ring.size());
-  });
-  std::thread producer([&] {
-    for (int i = 0; i < kMessages;) {
-      if (ring.push(i))
-        ++i;
-      else
-        std::this_thread::yield();
-    }
-  });
-  for (int i = 0, value = 0; i < kMessages;) {
-    if (ring.pop(&value))
-      ++i;
-    else
-      std::this_thread::yield();
-  }
-  done = true;
-  producer.join();
-  asking.join();
-  EXPECT_LE(most, ring.capacity());
 }
 
 }  // namespace

@@ -57,24 +57,6 @@ TEST_F(ThreadAllocationsTest, eachNameHasItsOwnCount) {
   EXPECT_EQ(count_of("gmain"), 2U);
 }
 
-TEST_F(ThreadAllocationsTest, threadsOfOneNameShareARow) {
-  ThreadAllocations::begin();
-  run_named("vergence-one", 3);
-  run_named("vergence-one", 4);
-  EXPECT_EQ(count_of("vergence-one"), 7U);
-}
-
-TEST_F(ThreadAllocationsTest, nothingCountsBeforeTheBeginningNorAfterTheEnd) {
-  ThreadAllocations::begin();
-  run_named("vergence-one", 1);
-  ThreadAllocations::end();
-  run_named("vergence-one", 10);
-  EXPECT_EQ(count_of("vergence-one"), 1U);
-  ThreadAllocations::begin();
-  EXPECT_EQ(ThreadAllocations::counts().others, 0U);
-  EXPECT_EQ(count_of("vergence-one"), std::nullopt);
-}
-
 TEST_F(ThreadAllocationsTest, aThreadThatOutlivesACountIsFoundAgainInTheNext) {
   int step = 0;
   std::thread worker;

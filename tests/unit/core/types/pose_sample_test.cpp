@@ -2,33 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <set>
-#include <string_view>
-
 #include "core/types/calibration.hpp"
 #include "core/types/image.hpp"
-#include "core/types/parallel.hpp"
 
 namespace vergence {
 namespace {
-
-template <class Enum>
-void expect_words_of_their_own(Enum last) {
-  std::set<std::string_view> words;
-  for (int i = 0; i <= static_cast<int>(last); ++i) {
-    const std::string_view word = to_string(static_cast<Enum>(i));
-    EXPECT_TRUE(words.insert(word).second) << word;
-    for (const char c : word)
-      EXPECT_TRUE((c >= 'a' && c <= 'z') || c == '_') << word << " stands in poses.csv";
-  }
-}
-
-TEST(Words, everyValueHasOneOfItsOwn) {
-  expect_words_of_their_own(State::lost);
-  expect_words_of_their_own(PoseStatus::lost);
-  expect_words_of_their_own(Reason::recalibrating);
-  expect_words_of_their_own(Stage::window);
-}
 
 TEST(Words, areThoseOfTheFiles) {
   EXPECT_EQ(to_string(State::initialising), "initialising");
@@ -63,15 +41,6 @@ TEST(Intrinsics, equidistantIsDistortedEvenWithoutCoefficients) {
   k = {};
   k.kind = CameraModelKind::pinhole_equidistant;
   EXPECT_TRUE(k.has_distortion());
-}
-
-TEST(SequentialRunner, runsBothTasksInOrder) {
-  int n = 0, here = 0, there = 0;
-  auto first = [&] { here = ++n; };
-  auto second = [&] { there = ++n; };
-  SequentialRunner().run(TaskRef(first), TaskRef(second));
-  EXPECT_EQ(here, 1);
-  EXPECT_EQ(there, 2);
 }
 
 }  // namespace
