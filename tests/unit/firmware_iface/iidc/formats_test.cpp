@@ -84,20 +84,5 @@ TEST(Formats, NonsenseIsZeroNotUndefined) {
   EXPECT_EQ(bits_per_pixel(static_cast<ColorCoding>(77)), 0U);
 }
 
-TEST(Formats, CodingsHaveNamesBothWays) {
-  for (unsigned i = 0; i < kColorCodings; ++i) {
-    const auto c = static_cast<ColorCoding>(i);
-    EXPECT_EQ(color_coding(to_string(c)), c);
-  }
-  EXPECT_FALSE(color_coding("Mono9"));
-}
-
-TEST(Formats, BayerTilesAreReadFromTheirLetters) {
-  EXPECT_EQ(bayer_tile(0x52474742), BayerTile::rggb);
-  EXPECT_EQ(bayer_tile(0x47425247), BayerTile::gbrg);
-  EXPECT_EQ(bayer_tile(0x59595959), BayerTile::none);
-  EXPECT_EQ(bayer_tile(0), BayerTile::none);
-}
-
 }  // namespace
 }  // namespace vergence::iidc

@@ -6,8 +6,6 @@
 #include <cstring>
 #include <vector>
 
-#include "tests/unit/firmware_iface/trigger/c_side.h"
-
 namespace vergence {
 namespace {
 
@@ -41,20 +39,6 @@ Bytes noise(std::size_t n, std::uint32_t seed) {
     b = static_cast<std::uint8_t>(seed >> 24U);
   }
   return bytes;
-}
-
-TriggerEvent some_event() {
-  TriggerEvent event{};
-  event.boot_id = 0xDEADBEEF;
-  event.pulse = 1234567;
-  event.tick = 0x0102030405060708;
-  event.lines = 0x3;
-  event.flags = 1;
-  event.exposure[0] = {12, 8012};
-  event.exposure[1] = {-3, 4000};
-  event.exposure[2] = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
-  event.exposure[3] = {TRIGGER_NOT_SEEN, TRIGGER_NOT_SEEN};
-  return event;
 }
 
 TEST(TriggerCrc, isThatOfIeee8023) {
@@ -114,37 +98,6 @@ TEST(TriggerFrames, afterGarbageAndACutFrameTheNextIsFoundAndEachLossIsNamed) {
   EXPECT_GE(all.decoder.bad_length, 2U);
 }
 
-TEST(TriggerFrames, idleZerosAreNothing) {
-  const Decoded all = decode_all(Bytes(100, 0));
-  EXPECT_TRUE(all.frames.empty());
-  EXPECT_EQ(all.decoder.bad_coding + all.decoder.bad_length + all.decoder.bad_crc, 0U);
-}
-
-TEST(TriggerFrames, aRefusedFrameLeavesTheOutputAlone) {
-  TriggerDecoder decoder{};
-  TriggerFrame frame{};
-  frame.type = 0x77;
-  Bytes bad = framed(trigger_ping, 3, {1, 2, 3, 4});
-  bad[4] ^= 0x10U;
-  for (const std::uint8_t b : bad)
-    EXPECT_NE(trigger_decode(&decoder, b, &frame), trigger_frame_ready);
-  EXPECT_EQ(frame.type, 0x77);
-}
-
-TEST(TriggerPayloads, anEventStandsByteForByteWhereTheHeaderSays) {
-  std::uint8_t p[trigger_event_payload_size];
-  const TriggerEvent event = some_event();
-  trigger_put_event(&event, p);
-  EXPECT_EQ(Bytes(p, p + 22), (Bytes{0xEF, 0xBE, 0xAD, 0xDE, 0x87, 0xD6, 0x12, 0x00, 8, 7, 6,
-                                     5,    4,    3,    2,    1,    3,    1,    12,   0, 0, 0}));
-  EXPECT_EQ(Bytes(p + 26, p + 30), (Bytes{0xFD, 0xFF, 0xFF, 0xFF}));
-  TriggerEvent back{};
-  ASSERT_TRUE(trigger_get_event(p, sizeof p, &back));
-  EXPECT_EQ(back.tick, event.tick);
-  EXPECT_EQ(back.exposure[1].start_us, -3);
-  EXPECT_EQ(back.exposure[3].end_us, TRIGGER_NOT_SEEN);
-}
-
 template <std::size_t kSize, class Message>
 Bytes laid(void (*put)(const Message*, std::uint8_t*), const Message& message) {
   Bytes bytes(kSize);
@@ -195,17 +148,6 @@ TEST(TriggerPayloads, everyLayoutStandsByteForByteWhereItsTableSays) {
             (Bytes{2, 6}));
 }
 
-/// Whole frames as they stand on the wire; the CRCs are zlib's.
-TEST(TriggerFrames, wholeFramesAreTheseBytes) {
-  EXPECT_EQ(framed(trigger_hello, 5, {1}),
-            (Bytes{0x08, 0x01, 0x05, 0x01, 0xF6, 0x77, 0xF3, 0xF4, 0x00}));
-  EXPECT_EQ(framed(trigger_start, 0, {}), (Bytes{0x02, 0x03, 0x05, 0x3C, 0x41, 0xF4, 0x6A, 0x00}));
-  EXPECT_EQ(framed(trigger_ping, 0x7F, {0, 1, 0, 2}),
-            (Bytes{0x03, 0x06, 0x7F, 0x02, 0x01, 0x06, 0x02, 0xBB, 0x3E, 0xD5, 0xF3, 0x00}));
-  EXPECT_EQ(framed(trigger_error, 9, {trigger_config, trigger_error_rate}),
-            (Bytes{0x09, 0x94, 0x09, 0x02, 0x06, 0xD7, 0x55, 0xE2, 0xC7, 0x00}));
-}
-
 /// Any bytes → struct → the same bytes: every byte of the layout is read and written, and none
 /// twice.
 template <class Message, std::size_t kSize, class Get, class Put>
@@ -234,22 +176,6 @@ TEST(TriggerPayloads, everyLayoutReadsAndWritesEachOfItsBytesOnce) {
   expect_bijective<TriggerStatus, trigger_status_payload_size>(trigger_get_status,
                                                                trigger_put_status);
   expect_bijective<TriggerError, trigger_error_payload_size>(trigger_get_error, trigger_put_error);
-}
-
-TEST(TriggerBothSides, theFirmwaresCompilerMakesTheHostsBytes) {
-  const TriggerEvent event = some_event();
-  Bytes payload(trigger_event_payload_size);
-  trigger_put_event(&event, payload.data());
-  Bytes from_c(trigger_max_frame);
-  from_c.resize(c_side_write_event(&event, 5, from_c.data()));
-  EXPECT_EQ(from_c, framed(trigger_event, 5, payload));
-  TriggerDecoder decoder{};
-  TriggerFrame frame{};
-  int ready = 0;
-  for (const std::uint8_t b : from_c)
-    ready += c_side_decode(&decoder, b, &frame) == trigger_frame_ready ? 1 : 0;
-  EXPECT_EQ(ready, 1);
-  EXPECT_EQ(payload_of(frame), payload);
 }
 
 TEST(TriggerVariedIntervals, noRunOf24FitsItselfShifted) {

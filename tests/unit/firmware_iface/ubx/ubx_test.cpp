@@ -64,14 +64,6 @@ TEST(Ubx, whatIsNotValidIsAbsentOrRefused) {
   EXPECT_FALSE(decode_pvt(b.bytes, &p));
 }
 
-// The poll of MON-VER, as the interface description's rule for the checksum has it.
-TEST(Ubx, framesAreWrittenWithTheirChecksum) {
-  std::array<std::uint8_t, 8> out{};
-  ASSERT_EQ(write_frame(0x0A, 0x04, {}, out), 8U);
-  EXPECT_EQ(out, (std::array<std::uint8_t, 8>{0xB5, 0x62, 0x0A, 0x04, 0, 0, 0x0E, 0x34}));
-  EXPECT_EQ(write_frame(0x0A, 0x04, {}, std::span(out).first(7)), 0U);
-}
-
 TEST(Ubx, aFrameWithinARefusedOneIsFound) {
   const std::string good = PvtBytes().frame();
   std::string bad = good;

@@ -163,16 +163,6 @@ TEST(Configuration, periodsAreWholeTicksAndNotTheExcludedOnes) {
   EXPECT_FALSE(period_of_rate(std::nan("")));
 }
 
-TEST(Configuration, syncOutOfANewerDeviceCannotMakeThirtyHertz) {
-  double actual = 0;
-  EXPECT_EQ(sync_out_skip(120, 30, &actual), 3);
-  EXPECT_EQ(actual, 30);
-  EXPECT_EQ(sync_out_skip(kSyncOutBase, 25, &actual), 15);
-  EXPECT_EQ(actual, 25);
-  EXPECT_EQ(sync_out_skip(kSyncOutBase, 30, &actual), 12);
-  EXPECT_NEAR(actual, 30.77, 0.01);
-}
-
 TEST(LineBudget, isThatOfTheTable) {
   struct Row {
     std::uint16_t mode;
@@ -219,13 +209,6 @@ TEST(LineBudget, ofPacketsCountsEachAtItsRateAndTheReceiversApart) {
   EXPECT_FALSE(line_budget(fast, 115200).fits());
   EXPECT_EQ(line_budget(fast, 115200).baud_needed, 460800U) << "230400 would carry it at 91 %";
   EXPECT_NEAR(line_budget(fast, 115200).greatest_rate, (0.9 * 11520 - 114 * 4) / 51, 1e-9);
-}
-
-TEST(Errors, haveWords) {
-  EXPECT_NE(error_text(0x29).find("line"), std::string_view::npos);
-  EXPECT_NE(error_text(kErrorPowerDip).find("dip"), std::string_view::npos);
-  for (int code = 0; code < 256; ++code)
-    EXPECT_FALSE(error_text(static_cast<std::uint8_t>(code)).empty());
 }
 
 }  // namespace

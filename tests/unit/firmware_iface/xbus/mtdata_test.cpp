@@ -80,15 +80,6 @@ void expect_fp1632_tail(const Mtdata& m) {
   expect_same(*m.utc, {250'000'000, 2012, 5, 14, 3, 4, 5, 7});
 }
 
-TEST(Mtdata, decodesSixteenDotThirtyTwoExactly) {
-  expect_fp1632_tail(
-      decoded(from_hex("FA FF 32 4B B5 04 F3 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 B5 04 F3 "
-                       "00 00 00 86 01 47 28 FF E4 07 5D 24 9E 00 99 40 "
-                       "00 00 00 00 34 80 00 00 00 00 0A E0 00 00 00 FF FF 10 00 00 00 00 00 07 12 "
-                       "34 0E E6 B2 80 07 DC 05 0E 03 04 05 07 2C"),
-              {0x0834, 0x203}));
-}
-
 TEST(Mtdata, decodesTheReceiversFixWhichIsInIntegersWhateverTheFormat) {
   const Mtdata m =
       decoded(from_hex("FA FF 32 77 C5 E7 02 12 06 42 FA EF 9F 69 8A 5B 36 56 22 00 00 CC 1A 00 00 "
@@ -108,29 +99,6 @@ TEST(Mtdata, decodesTheReceiversFixWhichIsInIntegersWhateverTheFormat) {
                  f.horizontal_accuracy_mm, f.vertical_accuracy_mm, f.speed_accuracy_cm_s, f.age),
       std::tuple(1050, -12, 6, 2500, 3800, 45, 3));
   expect_fp1632_tail(m);
-}
-
-TEST(Mtdata, decodesTwelveDotTwenty) {
-  const Mtdata m =
-      decoded(from_hex("FA FF 32 37 00 02 00 00 FF FC 00 00 00 9D 00 00 00 00 08 00 FF FF E0 00 00 "
-                       "00 80 00 00 08 00 00 FF FC 00 00 "
-                       "FF F4 00 00 00 0B 50 4F 00 00 00 00 00 00 00 00 00 0B 50 4F 07 12 34 01"),
-              {0x0806, 0x101});
-  EXPECT_EQ(m.acceleration, (Three{0.125, -0.25, 9.8125}));
-  EXPECT_EQ(m.rate_of_turn, (Three{0x1p-9, -0x1p-7, 0x1p-5}));
-  expect_attitude(m, 0x1p-21);
-  EXPECT_EQ(m.sample_counter, 0x1234);
-}
-
-TEST(Mtdata, decodesDoubles) {
-  const Mtdata m = decoded(
-      from_hex(
-          "FA FF 32 3B 3F E6 A0 9E 60 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 3F "
-          "E6 A0 9E 60 00 00 00 "
-          "C0 3B 79 FE B8 D8 23 42 40 63 20 EB A4 93 C8 9F 40 4A 20 00 00 00 00 00 07 12 34 64"),
-      {0x0814, 0x301});
-  expect_attitude(m, 1e-7);
-  expect_place(m, 1e-13);
 }
 
 TEST(Mtdata, aLengthThatIsNotTheLayoutsIsRefused) {
@@ -222,12 +190,6 @@ TEST(Mtdata, everyLayoutReadsBackWhatWasWritten) {
       }
   }
   EXPECT_GT(layouts, 3000);
-}
-
-TEST(Mtdata, encodingWithoutRoomWritesNothing) {
-  Bytes bytes(74, 0xEE);
-  EXPECT_EQ(encode_mtdata({}, {0x0834, 0x203}, bytes), 0U);
-  EXPECT_EQ(bytes, Bytes(74, 0xEE));
 }
 
 TEST(Numbers, writingRoundsAndStaysInsideTheFormat) {

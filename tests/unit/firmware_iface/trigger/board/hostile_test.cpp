@@ -16,25 +16,6 @@ struct Random {
   }
 };
 
-TEST(BoardHostile, aMillionRandomBytesChangeNothingButCounters) {
-  VirtualBoard b;
-  Random random{4};
-  for (int i = 0; i < 1'000'000; ++i) {
-    board_receive(&b.board, b.now, b.now, static_cast<std::uint8_t>(random()));
-    b.now += 900;
-    if (i % 64 == 0) board_poll(&b.board, b.now), b.listen();
-  }
-  b.bytes({0});
-  b.frames.clear();
-  b.run_for_us(1'100'000);
-  const TriggerStatus s = b.status();
-  EXPECT_GT(s.frames_refused, 3'000U) << "one of 256 bytes ends a frame";
-  EXPECT_EQ(s.configuration, 0U);
-  EXPECT_EQ(s.state, trigger_stopped);
-  b.send(trigger_hello, {trigger_protocol_version});
-  EXPECT_EQ(b.take(trigger_info).size(), 1U);
-}
-
 TEST(BoardHostile, framesWithAGoodCrcAndRandomContentKeepEveryPromise) {
   VirtualBoard b;
   Random random{9};
@@ -84,17 +65,6 @@ TEST(BoardHostile, aHostThatDoesNotListenCostsMessagesWhichAreCountedAndThenItIs
   EXPECT_GT(s.events_dropped, 70U);
   EXPECT_EQ(s.events_dropped, b.board.outbox.dropped);
   EXPECT_GT(s.pulses, 190U) << "pulses go on";
-}
-
-TEST(BoardHostile, aFloodOfPingsDropsAnswersAndNothingElse) {
-  VirtualBoard b;
-  b.deaf = true;
-  for (int i = 0; i < 1000; ++i) b.send(trigger_ping, {1, 0, 0, 0});
-  b.deaf = false;
-  b.listen();
-  EXPECT_EQ(b.take(trigger_pong).size() + 1, std::size_t{outbox_capacity})
-      << "and the STATUS of the start";
-  EXPECT_EQ(b.board.outbox.dropped, 1000U - (outbox_capacity - 1));
 }
 
 TEST(BoardHostile, aRebootInMidFrameIsAnotherBootAndNumbersFromZero) {

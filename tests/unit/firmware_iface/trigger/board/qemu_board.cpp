@@ -1,6 +1,5 @@
 #include "tests/unit/firmware_iface/trigger/board/qemu_board.hpp"
 
-#include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -39,20 +38,6 @@ void write_all(int fd, const void* data, std::size_t size) {
   }
 }
 
-char read_one(int fd) {
-  pollfd ready{fd, POLLIN, 0};
-  char c = 0;
-  if (poll(&ready, 1, 10'000) != 1 || ::read(fd, &c, 1) != 1)
-    throw std::runtime_error("the machine does not answer");
-  return c;
-}
-
-std::string read_text_line(int fd) {
-  std::string text;
-  for (char c = read_one(fd); c != '\n'; c = read_one(fd)) text += c;
-  return text;
-}
-
 }  // namespace
 
 std::string QemuBoard::missing() {
@@ -64,8 +49,8 @@ std::string QemuBoard::missing() {
 }
 
 QemuBoard::QemuBoard(int icount_shift) {
-  constexpr int kFirst = 100;  // numbers of the child's ends
-  const std::array<Ends, 3> ends = {make_ends(), make_ends(), make_ends()};
+  constexpr int kLine = 100;  // number of the child's end
+  const Ends ends = make_ends();
   std::vector<std::string> arguments = {VERGENCE_QEMU_ARM,
                                         "-M",
                                         "netduinoplus2",
@@ -76,17 +61,8 @@ QemuBoard::QemuBoard(int icount_shift) {
                                         VERGENCE_BOARD_IMAGE,
                                         "-serial",
                                         "chardev:line",
-                                        "-qtest",
-                                        "chardev:qtest",
-                                        "-qtest-log",
-                                        "none",
-                                        "-mon",
-                                        "chardev=monitor,mode=control"};
-  const char* names[] = {"line", "qtest", "monitor"};
-  for (int i = 0; i < 3; ++i) {
-    arguments.emplace_back("-chardev");
-    arguments.push_back("socket,id=" + std::string(names[i]) + ",fd=" + std::to_string(kFirst + i));
-  }
+                                        "-chardev",
+                                        "socket,id=line,fd=" + std::to_string(kLine)};
   if (icount_shift >= 0)
     arguments.insert(arguments.end(),
                      {"-icount", "shift=" + std::to_string(icount_shift) + ",sleep=off"});
@@ -101,17 +77,13 @@ QemuBoard::QemuBoard(int icount_shift) {
   if (pid_ == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) _exit(1);
-    for (int i = 0; i < 3; ++i) dup2(ends[static_cast<std::size_t>(i)].theirs, kFirst + i);
+    dup2(ends.theirs, kLine);
     execv(argv[0], argv.data());
     _exit(127);
   }
-  for (const Ends& e : ends) ::close(e.theirs);
-  line_ = ends[0].ours;
-  qtest_ = ends[1].ours;
-  monitor_ = ends[2].ours;
+  ::close(ends.theirs);
+  line_ = ends.ours;
   reader_ = std::thread([this] { read_line(); });
-  (void)read_text_line(monitor_);  // its greeting
-  monitor("qmp_capabilities");
   (void)wait(trigger_status);  // it listens now
 }
 
@@ -122,7 +94,7 @@ QemuBoard::~QemuBoard() {
   }
   ::shutdown(line_, SHUT_RDWR);
   if (reader_.joinable()) reader_.join();
-  for (const int fd : {line_, qtest_, monitor_}) ::close(fd);
+  ::close(line_);
 }
 
 void QemuBoard::read_line() {
@@ -133,7 +105,7 @@ void QemuBoard::read_line() {
       TriggerFrame frame{};
       if (trigger_decode(&decoder, buffer[i], &frame) != trigger_frame_ready) continue;
       const std::lock_guard lock(mutex_);
-      heard_.push_back({frame, std::chrono::steady_clock::now()});
+      heard_.push_back(frame);
       heard_something_.notify_one();
     }
 }
@@ -153,9 +125,8 @@ TriggerFrame QemuBoard::wait(const Predicate& requested) {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   for (;;) {
     while (looked_at_ < heard_.size()) {
-      const Heard& h = heard_[looked_at_++];
-      arrival_ = h.at;
-      if (requested(h.frame)) return h.frame;
+      const TriggerFrame& f = heard_[looked_at_++];
+      if (requested(f)) return f;
     }
     if (heard_something_.wait_until(lock, deadline) == std::cv_status::timeout)
       throw std::runtime_error("the board said nothing of the kind");
@@ -170,43 +141,8 @@ TriggerFrame QemuBoard::ask(std::uint8_t type, const Bytes& payload) {
 std::vector<TriggerFrame> QemuBoard::drain() {
   const std::lock_guard lock(mutex_);
   std::vector<TriggerFrame> frames;
-  while (looked_at_ < heard_.size()) frames.push_back(heard_[looked_at_++].frame);
+  while (looked_at_ < heard_.size()) frames.push_back(heard_[looked_at_++]);
   return frames;
 }
-
-std::string QemuBoard::qtest(const std::string& command) {
-  const std::string line = command + "\n";
-  write_all(qtest_, line.data(), line.size());
-  std::string answer = read_text_line(qtest_);
-  while (answer.rfind("IRQ", 0) == 0) answer = read_text_line(qtest_);
-  if (answer.rfind("OK", 0) != 0) throw std::runtime_error(command + ": " + answer);
-  return answer.size() > 3 ? answer.substr(3) : "";
-}
-
-void QemuBoard::set_exti(unsigned line, bool level) {
-  const std::string command =
-      "exti unnamed-gpio-in " + std::to_string(line) + (level ? " 1" : " 0");
-  if (processor_.empty()) try {
-      (void)qtest("set_irq_in /machine/soc/" + command);
-      processor_ = "/machine/soc/";
-    } catch (const std::runtime_error&) {
-      processor_ =
-          "/machine/unattached/device[0]/";  // older releases of the emulator have no name for it
-    }
-  (void)qtest("set_irq_in " + processor_ + command);
-}
-
-std::uint32_t QemuBoard::counter() {
-  return static_cast<std::uint32_t>(std::stoull(qtest("readl 0x40000024"), nullptr, 16));
-}
-
-void QemuBoard::monitor(const std::string& command) {
-  const std::string line = "{\"execute\":\"" + command + "\"}\n";
-  write_all(monitor_, line.data(), line.size());
-  while (read_text_line(monitor_).find("\"return\"") == std::string::npos) {
-  }
-}
-
-void QemuBoard::reset() { monitor("system_reset"); }
 
 }  // namespace vergence

@@ -19,19 +19,14 @@ namespace vergence {
 ///
 /// What the machine is: RCC reads 0, so that the image runs on the clock it falls back to, 16 MHz;
 /// the timers count 1 GHz of virtual time, so that a second of the board's is 16 ms; compare and
-/// capture units do nothing, so that pulses are forced by the main loop (late); its GPIO has no
-/// levels, edges come in through EXTI. Virtual time is the host's (steady_clock), or it goes on by
-/// so many nanoseconds with every instruction: then nothing depends on how busy the host is.
+/// capture units do nothing, so that pulses are forced by the main loop (late). Virtual time is the
+/// host's, or it goes on with every instruction: then nothing depends on how busy the host is.
 ///
 /// Ownership  The process is killed by the destructor, and by the kernel when the test dies.
 /// Threads    One of its own reads the line: a machine whose line is full stands still.
 /// Errors     Throws std::runtime_error when the machine does not answer.
 class QemuBoard {
  public:
-  struct Heard {
-    TriggerFrame frame{};
-    std::chrono::steady_clock::time_point at;
-  };
   using Bytes = std::vector<std::uint8_t>;
   using Predicate = std::function<bool(const TriggerFrame&)>;
 
@@ -56,34 +51,20 @@ class QemuBoard {
   }
   /// Sends and waits for the answer with its sequence number.
   TriggerFrame ask(std::uint8_t type, const Bytes& payload = {});
-  /// When the frame that wait() gave last was here.
-  [[nodiscard]] std::chrono::steady_clock::time_point arrival() const { return arrival_; }
   /// Frames not yet looked at; now they are.
   std::vector<TriggerFrame> drain();
 
-  /// A command of QEMU's qtest protocol. → what follows "OK"
-  std::string qtest(const std::string& command);
-  /// Level at a line of EXTI: the port's PPS is 6, INS 7.
-  void set_exti(unsigned line, bool level);
-  /// The time base as it is now, low 32 bits.
-  std::uint32_t counter();
-  /// The machine's reset line.
-  void reset();
-
  private:
   void read_line();
-  void monitor(const std::string& command);
 
   pid_t pid_ = -1;
-  int line_ = -1, qtest_ = -1, monitor_ = -1;
-  std::string processor_;  // the machine's name for it
+  int line_ = -1;
   std::uint8_t sequence_ = 0;
   std::thread reader_;
   std::mutex mutex_;
   std::condition_variable heard_something_;
-  std::vector<Heard> heard_;
+  std::vector<TriggerFrame> heard_;
   std::size_t looked_at_ = 0;
-  std::chrono::steady_clock::time_point arrival_;
 };
 
 }  // namespace vergence

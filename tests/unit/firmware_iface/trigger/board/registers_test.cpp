@@ -178,36 +178,6 @@ TEST_F(BoardPort, theCompareUnitMakesBothEdgesOfAllLinesAtOneCount) {
   EXPECT_TRUE(hal_arm(20'000, 500, 0x5));
 }
 
-TEST_F(BoardPort, anInterruptThatCameAfterTheWholePulseEndsIt) {
-  configure();
-  ASSERT_TRUE(hal_arm(11'000, 500, 0x4));
-  EXPECT_EQ(at(kTim2, dier), 8U);
-  at(kTim2, sr) = 8;
-  at(kTim2, cnt) = 12'000;
-  tim2_handler();
-  EXPECT_EQ(stamped().count, 11'000U);
-  EXPECT_EQ(at(kTim2, ccmr2), 0x4040U);
-  EXPECT_EQ(at(kTim2, dier), 0U);
-}
-
-TEST_F(BoardPort, nothingIsArmedOrTakenBackAtTheLastMoment) {
-  configure();
-  at(kTim2, cnt) = 0xFFFFFF00;
-  EXPECT_FALSE(hal_arm(0x00000080, 500, 0x1)) << "384 counts away, across the counter's wrap";
-  EXPECT_EQ(at(kTim2, dier), 0U);
-  EXPECT_FALSE(hal_arm(0xFFFFFE00, 500, 0x1)) << "past";
-  ASSERT_TRUE(hal_arm(0x00000400, 500, 0x1));
-  at(kTim2, cnt) = 0x00000300;
-  EXPECT_FALSE(hal_disarm());
-  at(kTim2, cnt) = 0x00000100;
-  at(kTim2, sr) = 0;
-  EXPECT_TRUE(hal_disarm());
-  EXPECT_EQ(at(kTim2, ccmr1), 0x4040U);
-  EXPECT_EQ(at(kTim2, dier), 0U);
-  EXPECT_FALSE(hal_disarm()) << "nothing is armed";
-  EXPECT_TRUE(nothing_stamped());
-}
-
 TEST_F(BoardPort, edgesThatTheCompareUnitDidNotMakeAreForcedAndSaidToBeLate) {
   configure();
   ASSERT_TRUE(hal_arm(11'000, 500, 0x1));

@@ -123,20 +123,6 @@ TEST(BoardConfig, isRefusedByCodeAndThenTheOldOneHolds) {
   EXPECT_EQ(b.error(), trigger_error_not_stopped);
 }
 
-TEST(BoardConfig, withoutPpsOrInsTheirEdgesAreRefused) {
-  BoardDescription bare = VirtualBoard::usual();
-  bare.has_pps = bare.has_ins = false;
-  VirtualBoard b(bare);
-  TriggerConfig c = VirtualBoard::config(30'000);
-  c.pps_edge = trigger_edge_rising;
-  b.configure(c);
-  EXPECT_EQ(b.error(), trigger_error_line);
-  c.pps_edge = trigger_edge_none;
-  c.ins_edge = trigger_edge_falling;
-  b.configure(c);
-  EXPECT_EQ(b.error(), trigger_error_line);
-}
-
 TEST(BoardTalk, whatNobodyAskedForHasNumbersOfItsOwn) {
   VirtualBoard b;
   b.deaf = true;
@@ -153,21 +139,6 @@ TEST(BoardTalk, whatNobodyAskedForHasNumbersOfItsOwn) {
   }
   EXPECT_EQ(missing, b.board.outbox.dropped) << "every gap is a message that was dropped";
   EXPECT_GT(missing, 20U);
-}
-
-TEST(BoardConfig, statusNamesItByItsCrc) {
-  VirtualBoard b;
-  const TriggerConfig c = VirtualBoard::config(12'345);
-  Bytes payload(trigger_config_payload_size);
-  trigger_put_config(&c, payload.data());
-  b.configure(c);
-  EXPECT_EQ(b.status().configuration, trigger_crc32(payload.data(), payload.size()));
-}
-
-TEST(BoardStates, statusComesEverySecondAndWhenTheStateChanges) {
-  VirtualBoard b;
-  b.run_for_us(10'500'000);
-  EXPECT_EQ(b.take(trigger_status).size(), 11U) << "at boot, then every second";
 }
 
 TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
@@ -244,27 +215,6 @@ TEST(BoardStates, aPauseLeavesOutSoManyNumbersAndKeepsTheGrid) {
     EXPECT_EQ(events[i].tick - events[0].tick, number * 10'000U);
     EXPECT_EQ(events[i].flags, i == 0 || i == 6 ? 1 : 0);
   }
-}
-
-TEST(BoardStates, aPauseCanBeEndedAndIsEndedByStop) {
-  VirtualBoard b;
-  b.start(100'000);
-  b.run_for_us(20'000);
-  b.pause(0xFFFFFFFF);
-  b.run_for_us(5'000'000);
-  const std::size_t before = b.made.size();
-  EXPECT_LE(before, 4U);
-  b.pause(0);
-  EXPECT_EQ(b.status().state, trigger_running);
-  b.run_for_us(55'000);
-  EXPECT_GE(b.made.size(), before + 5);
-  EXPECT_EQ(b.events().front().flags, 1);
-  b.pause(1000);
-  b.run_for_us(55'000);
-  b.send(trigger_stop);
-  EXPECT_EQ(b.status().state, trigger_stopped);
-  b.send(trigger_start);
-  EXPECT_EQ(b.status().state, trigger_running);
 }
 
 }  // namespace
