@@ -22,7 +22,6 @@ namespace vergence {
 namespace {
 
 using test::count;
-using test::event_of;
 using test::frame_of;
 using test::reading_of;
 using test::same;
@@ -136,19 +135,6 @@ TEST(Acquisition, twoRunsOfADriveInVirtualTimeAreTheSameItemByItem) {
   const auto a = Bench(faults).drive(), b = Bench(faults).drive();
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) ASSERT_TRUE(same(a[i], b[i])) << i;
-}
-
-TEST(Acquisition, stampsLieOnTheirGridAndNoFartherFromWhereTheyWereThanHalfOfIt) {
-  const auto fine = Bench({}).drive(),
-             coarse = Bench({}, {.grid = Duration::microseconds(1)}).drive();
-  ASSERT_EQ(fine.size(), coarse.size());
-  int off = 0;
-  for (std::size_t i = 0; i < fine.size(); ++i) {
-    EXPECT_EQ(stamp_of(coarse[i]).ns() % 1000, 0);
-    EXPECT_LE(std::abs((stamp_of(coarse[i]) - stamp_of(fine[i])).ns()), 500);
-    off += stamp_of(fine[i]).ns() % 1000 != 0 ? 1 : 0;
-  }
-  EXPECT_GT(off, 100);
 }
 
 /// Starts, gives nothing and is gone, again and again; who tells it is only told of the first.
@@ -292,21 +278,6 @@ TEST(Acquisition, byPulsesEveryPairIsProvenWithinASecondAndRight) {
             b.times.size());
   EXPECT_EQ(c.sync.incomplete, 0U);
   EXPECT_EQ(c.pauses, 0U) << "varied intervals prove it";
-}
-
-TEST(Acquisition, evenPulsesArePausedAtTheSamePulseOnEveryRunAndWhatComesOutIsRight) {
-  std::vector<std::vector<Acquired>> runs;
-  for (int run = 0; run < 2; ++run) {
-    Bench b({}, {.mode = SyncMode::board, .seconds = 8});
-    runs.push_back(b.drive());
-    expect_right_pairs(b, runs.back());
-    EXPECT_GE(b.source->counters().pauses, 1U);
-    EXPECT_EQ(b.source->counters().pauses_refused, 0U);
-    EXPECT_LT(b.source->counters().pulses, b.times.size()) << "some were left out";
-  }
-  ASSERT_EQ(runs[0].size(), runs[1].size());
-  for (std::size_t i = 0; i < runs[0].size(); ++i)
-    ASSERT_EQ(stamp_of(runs[0][i]), stamp_of(runs[1][i])) << i;
 }
 
 struct LossCase {

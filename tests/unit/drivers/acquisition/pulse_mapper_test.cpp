@@ -88,19 +88,5 @@ TEST(PairingWatch, tellsNothingOfCamerasThatGaveNoFrame) {
   EXPECT_FALSE(change->proven);
 }
 
-TEST(PairingWatch, tellsEachChangeOnceAndHowLongAProofTook) {
-  PairingWatch watch;
-  watch.frame(0);
-  EXPECT_FALSE(watch.look(0, true, kHost)) << "proven from the start: nothing to tell";
-  ASSERT_TRUE(watch.look(0, false, kHost));
-  EXPECT_FALSE(watch.look(0, false, kHost + Duration::seconds(1)));
-  const auto change = watch.look(0, true, kHost + Duration::seconds(3));
-  ASSERT_TRUE(change);
-  EXPECT_TRUE(change->proven);
-  EXPECT_DOUBLE_EQ(change->seconds, 3);
-  watch.restarted(0);
-  EXPECT_FALSE(watch.look(0, false, kHost)) << "no frame since then";
-}
-
 }  // namespace
 }  // namespace vergence

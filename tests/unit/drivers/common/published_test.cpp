@@ -35,15 +35,5 @@ TEST(Published, aReaderNeverSeesHalfAValue) {
   EXPECT_EQ(published.get()[63], 20'000U) << "the last one is set, whoever was reading";
 }
 
-TEST(LastError, keepsTheReasonOfAStatusUntilItIsCleared) {
-  enum class Status { busy };
-  LastError error;
-  EXPECT_EQ(error.get(), "");
-  EXPECT_EQ(error.refuse(Status::busy, "the camera streams"), Status::busy);
-  EXPECT_EQ(error.get(), "the camera streams");
-  error.clear();
-  EXPECT_EQ(error.get(), "");
-}
-
 }  // namespace
 }  // namespace vergence

@@ -79,12 +79,6 @@ class ScriptedCamera final : public CameraDevice {
   std::uint64_t next_ = 0;
 };
 
-class Counting final : public Notifier {
- public:
-  void notify() noexcept override { ++count; }
-  int count = 0;
-};
-
 class SideBySide : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -101,33 +95,6 @@ class SideBySide : public ::testing::Test {
   std::unique_ptr<CameraDevice> left_, right_;
   CameraConfiguration asked_{kWidth, kHeight, 30};
 };
-
-TEST_F(SideBySide, askForTwiceTheWidthAndTellTheirOwn) {
-  CameraConfiguration actual;
-  ASSERT_EQ(left_->configure(asked_, &actual), DeviceStatus::ok);
-  EXPECT_EQ(script_.configured.width, 2 * kWidth);
-  EXPECT_EQ(script_.configured.height, kHeight);
-  EXPECT_EQ(actual.width, kWidth);
-  EXPECT_EQ(actual.exposure, Duration::microseconds(4990));
-  EXPECT_NE(left_->info().model, right_->info().model);
-  EXPECT_EQ(left_->info().serial, "7");
-}
-
-TEST_F(SideBySide, areOfOneSize) {
-  ASSERT_EQ(left_->configure(asked_, nullptr), DeviceStatus::ok);
-  CameraConfiguration other = asked_;
-  other.width = kWidth / 2;
-  EXPECT_EQ(right_->configure(other, nullptr), DeviceStatus::bad_configuration);
-  EXPECT_NE(right_->last_error().find("8 x 2"), std::string::npos) << right_->last_error();
-}
-
-TEST_F(SideBySide, sayWhatTheCameraOffersAndThatItIsTwiceTheWidth) {
-  asked_.width = 3 * kWidth;
-  EXPECT_EQ(left_->configure(asked_, nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(left_->last_error().find("it offers 16 x 2 (twice the width"), std::string::npos)
-      << left_->last_error();
-  EXPECT_EQ(left_->start(nullptr), DeviceStatus::bad_configuration) << "not configured";
-}
 
 TEST_F(SideBySide, seeTheTwoSidesOfOneExposure) {
   stream();
@@ -212,28 +179,6 @@ TEST_F(SideBySide, oneThatGoesAgainBeforeBothAreBackComesBackToo) {
   ASSERT_EQ(left_->start(nullptr), DeviceStatus::ok);
   script_.answers = {DeviceStatus::ok};
   EXPECT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
-}
-
-TEST_F(SideBySide, notifyEachOnce) {
-  Counting both, other;
-  ASSERT_EQ(left_->configure(asked_, nullptr), DeviceStatus::ok);
-  ASSERT_EQ(right_->configure(asked_, nullptr), DeviceStatus::ok);
-  ASSERT_EQ(left_->start(&both), DeviceStatus::ok);
-  ASSERT_EQ(right_->start(&both), DeviceStatus::ok);
-  script_.ready->notify();
-  EXPECT_EQ(both.count, 1);
-  ASSERT_EQ(right_->start(&other), DeviceStatus::ok);
-  script_.ready->notify();
-  EXPECT_EQ(both.count, 2);
-  EXPECT_EQ(other.count, 1);
-}
-
-TEST_F(SideBySide, areTriggeredOnceAndRemarkOnce) {
-  stream();
-  EXPECT_EQ(left_->trigger_once(), DeviceStatus::ok);
-  EXPECT_EQ(right_->trigger_once(), DeviceStatus::ok);
-  EXPECT_EQ(script_.triggers, 1);
-  EXPECT_EQ(left_->remark() + right_->remark(), "a remark");
 }
 
 TEST_F(SideBySide, countTheirOwnFramesAndTheCamerasLosses) {

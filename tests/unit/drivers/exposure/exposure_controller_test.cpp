@@ -161,14 +161,6 @@ TEST(ExposureController, anImageSaturatedHereAndThereIsNotMadeBrighter) {
   EXPECT_LT(next->exposure, Duration::microseconds(2000));
 }
 
-TEST(ExposureController, refusesBoundsThatAreNone) {
-  ExposureOptions o;
-  o.most = Duration::microseconds(10);
-  EXPECT_NE(o.validate(), nullptr);
-  EXPECT_EQ(within(ExposureOptions{}, {Duration::seconds(1), -3}),
-            (ExposureSetting{ExposureOptions{}.most, 0}));
-}
-
 TEST(BrightnessMeter, measuresWhatTheMaskShows) {
   constexpr int kWidth = 640, kHeight = 480;
   std::vector<std::uint8_t> image(kWidth * kHeight, 40), mask(kWidth * kHeight, 255);

@@ -200,51 +200,5 @@ TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
       << b.camera->remark();
 }
 
-TEST(GigeCamera, widerAndColouredFormatsBecomeGrey) {
-  std::vector<std::uint8_t> words(320 * 240 * 2), mosaic(320 * 240, 80);
-  for (std::size_t i = 0; i < 320 * 240; ++i) {
-    const unsigned value = static_cast<unsigned>(i % 4096);
-    words[2 * i] = static_cast<std::uint8_t>(value);
-    words[2 * i + 1] = static_cast<std::uint8_t>(value >> 8U);
-  }
-  for (const std::string format : {"Mono12", "BayerGB8"}) {
-    GigeCameraOptions o;
-    o.number_images = false;
-    o.images = [&, format](std::uint64_t) {
-      return format == "Mono12" ? words.data() : mosaic.data();
-    };
-    GigeBench b(o);
-    CameraConfiguration c = b.wish();
-    c.pixel_format = format;
-    b.configure(c);
-    b.start();
-    Frame frame;
-    for (int i = 0; i < 30; ++i) {
-      ASSERT_EQ(b.camera->wait(Duration::seconds(1), &frame), DeviceStatus::ok);
-      const ImageView image = b.camera->view(frame.slot);
-      EXPECT_EQ(image.at(7, 5), format == "Mono12" ? (5 * 320 + 7) >> 4U : 80);
-      EXPECT_EQ(image.at(319, 239), format == "Mono12" ? ((320 * 240 - 1) % 4096) >> 4U : 80);
-      b.camera->release(frame.slot);
-    }
-  }
-}
-
-TEST(GigeCamera, theReceiveBufferIsThereBeforeTheFirstPacket) {
-  GigeBench b;
-  for (const int kib : {64, 150}) {  // below what any system allows
-    CameraConfiguration c = b.wish();
-    test::give<gige::Options>(&c, "socket_buffer_kb", std::to_string(kib));
-    b.configure(c);
-    b.start();
-    const int socket = gige::find_udp_socket(static_cast<std::uint16_t>(b.reg(0xD00)));
-    ASSERT_GE(socket, 0);
-    int bytes = 0;
-    socklen_t length = sizeof bytes;
-    ASSERT_EQ(::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &bytes, &length), 0);
-    EXPECT_EQ(bytes, 2 * kib * 1024) << "the kernel doubles it";
-    b.camera->stop();
-  }
-}
-
 }  // namespace
 }  // namespace vergence::test

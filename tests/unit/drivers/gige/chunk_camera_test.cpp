@@ -18,18 +18,6 @@ GigeCameraOptions with_chunks() {
   return o;
 }
 
-/// Every complete frame has the exposure that the simulator says it had.
-void expect_told(const GigeBench& b, const std::vector<Frame>& frames, std::size_t first_number) {
-  std::size_t n = first_number;
-  for (const Frame& f : frames) {
-    if (f.status != FrameStatus::complete) continue;
-    ASSERT_LT(n, b.numbers.size());
-    const std::uint64_t number = b.numbers[n++];
-    ASSERT_GT(b.simulator->exposed(number), 0) << number;
-    EXPECT_EQ(f.exposure, Duration::seconds(b.simulator->exposed(number) * 1e-6)) << number;
-  }
-}
-
 TEST(GigeChunkCamera, everyFrameHadTheExposureThatItsChunkDataSay) {
   struct Case {
     std::uint32_t payload;
@@ -69,22 +57,6 @@ TEST(GigeChunkCamera, everyFrameHadTheExposureThatItsChunkDataSay) {
       b.camera->release(frame.slot);
     }
     EXPECT_EQ(b.camera->remark().find("chunk"), std::string::npos) << b.camera->remark();
-  }
-}
-
-TEST(GigeChunkCamera, aChangeWhileItStreamsIsSeenInTheFramesThatHaveIt) {
-  GigeBench b(with_chunks());
-  b.configure(b.wish());
-  b.start();
-  for (const int ms : {3, 5, 2, 7, 4, 6}) {
-    const std::size_t before = b.numbers.size();
-    ASSERT_EQ(b.camera->set_exposure({Duration::milliseconds(ms), 0}, nullptr), DeviceStatus::ok)
-        << b.camera->last_error();
-    const auto frames = b.take(8);
-    ASSERT_EQ(frames.size(), 8U);
-    expect_told(b, frames, before);
-    EXPECT_GT(frames.back().exposure, Duration::milliseconds(ms));
-    EXPECT_LT(frames.back().exposure, Duration::milliseconds(ms) + Duration::microseconds(120));
   }
 }
 
@@ -148,58 +120,6 @@ TEST(GigeChunkCamera, nonsenseInThemIsCountedAndTheFrameIsComplete) {
   EXPECT_EQ(reckoned, 5);
   EXPECT_NE(b.camera->remark().find("5 images came without their exposure"), std::string::npos)
       << b.camera->remark();
-}
-
-TEST(GigeChunkCamera, aTornFrameTellsNothingAndIsNoFaultOfItsChunks) {
-  GigeCameraOptions o = with_chunks();
-  o.resend = false;
-  GigeBench b(o);
-  b.configure(b.wish());
-  b.start();
-  b.simulator->tear_frames(3);
-  const std::size_t before = b.numbers.size();
-  const auto frames = b.take(10);
-  expect_told(b, frames, before);
-  int torn = 0;
-  for (const Frame& f : frames)
-    if (f.status == FrameStatus::torn) {
-      ++torn;
-      EXPECT_EQ(f.exposure, Duration::milliseconds(2));
-    }
-  EXPECT_EQ(torn, 3);
-  EXPECT_EQ(b.camera->remark().find("chunk"), std::string::npos) << b.camera->remark();
-}
-
-TEST(GigeChunkCamera, imagesOfAnotherSizeAreNeverComplete) {
-  for (const std::uint32_t payload : {0x4001U, 5U, 4U}) {
-    for (const auto& [width, height] : {std::pair{160, 120}, {320, 238}, {640, 480}}) {
-      GigeCameraOptions o = with_chunks();
-      o.chunk_payload = payload;
-      GigeBench b(o);
-      b.configure(b.wish());
-      b.start();
-      ASSERT_EQ(b.take(3).size(), 3U);
-      const std::uint64_t before = b.numbers.back();
-      b.simulator->lie_about_size(width, height);
-      (void)b.take(20);
-      const std::size_t whole = b.numbers.size();
-      EXPECT_LE(whole, 5U) << payload << ": " << width << " x " << height << " after image "
-                           << before;
-    }
-  }
-}
-
-TEST(GigeChunkCamera, anExposureBehindAFormulaIsReckonedAndSaid) {
-  GigeCameraOptions o = with_chunks();
-  o.chunk_formula = true;
-  GigeBench b(o);
-  b.configure(b.wish());
-  EXPECT_EQ(b.reg(reg::chunk_mode), 0U);
-  EXPECT_NE(b.camera->remark().find("chunk data"), std::string::npos) << b.camera->remark();
-  b.start();
-  const auto frames = b.take(3);
-  ASSERT_EQ(frames.size(), 3U);
-  for (const Frame& f : frames) EXPECT_EQ(f.exposure, Duration::milliseconds(2));
 }
 
 }  // namespace

@@ -80,34 +80,5 @@ TEST(GigeLoss, withResendNoFrameIsLostAtHalfAPercent) {
   expect_equal_accounts(b, taken);
 }
 
-TEST(GigeLoss, aCameraThatCannotSendAgainIsNotAsked) {
-  GigeCameraOptions o;
-  o.resend = false;
-  GigeBench b(o);
-  b.configure(many_packets(b, "auto"));
-  b.start();
-  (void)b.take(3);
-  b.simulator->set_loss(0.01);
-  (void)b.take(10);
-  EXPECT_EQ(b.simulator->report().asked, 0U);
-}
-
-TEST(GigeLoss, lateHalvesComeInTimeOrAreTorn) {
-  GigeBench b;
-  CameraConfiguration c = many_packets(b, "off");
-  b.configure(c);
-  b.start();
-  (void)b.take(5);
-  b.simulator->delay_frames(
-      3, Duration::milliseconds(60));  // three periods: after frames that came whole
-  const auto frames = b.take(20);
-  (void)b.drain();
-  const CameraStatistics s = b.camera->statistics();
-  EXPECT_EQ(s.torn + s.lost, 3U);
-  EXPECT_EQ(b.numbers.size() + 3, b.simulator->report().exposed);
-  EXPECT_TRUE(std::is_sorted(frames.begin(), frames.end(),
-                             [](const Frame& x, const Frame& y) { return x.counter < y.counter; }));
-}
-
 }  // namespace
 }  // namespace vergence::test

@@ -99,14 +99,6 @@ TEST(GigeLink, theLoopbackIsFoundByItsAddress) {
   EXPECT_TRUE(interface_of("nonsense").name.empty());
 }
 
-TEST(GigeLink, aReceiveBufferIsReadBack) {
-  const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  ASSERT_GE(fd, 0);
-  EXPECT_EQ(set_receive_buffer(fd, 100'000), 100'000);
-  ::close(fd);
-  EXPECT_EQ(find_udp_socket(1), -1);
-}
-
 TEST(GigeGrey, theCheapestFormatIsTaken) {
   EXPECT_STREQ(choose_format({"Mono16", "BayerRG8", "Mono8"}, "")->name, "Mono8");
   EXPECT_STREQ(choose_format({"RGB8", "Mono16", "BayerRG8"}, "")->name, "BayerRG8");
@@ -125,18 +117,6 @@ TEST(GigeGrey, wordsKeepTheirHighestEightBits) {
   EXPECT_EQ(out[64], 128);
   EXPECT_EQ(out[65], 174);
   EXPECT_EQ(out[2], 7) << "padding is not touched";
-}
-
-TEST(GigeGrey, aMosaicOfOneColourHasNoGrid) {
-  // Red 200, green 100, blue 40 everywhere: (200 + 2 · 100 + 40) / 4 at every pixel, the border
-  // too.
-  constexpr int kW = 10, kH = 8;
-  std::vector<std::uint8_t> mosaic(kW * kH), out(kW * kH);
-  for (int y = 0; y < kH; ++y)
-    for (int x = 0; x < kW; ++x)
-      mosaic[static_cast<std::size_t>(y * kW + x)] = (x + y) % 2 == 1 ? 100 : y % 2 == 0 ? 200 : 40;
-  to_grey(*choose_format({"BayerRG8"}, ""), mosaic.data(), kW, kH, out.data(), kW);
-  for (const std::uint8_t v : out) EXPECT_EQ(v, 110);
 }
 
 TEST(GigeSlotReturns, slotsOutAreLimitedAndComeBack) {

@@ -30,27 +30,5 @@ TEST(GigePeriodicThread, goesOnUntilItIsStoppedAndCanBeStartedAgain) {
   }
 }
 
-TEST(GigePeriodicThread, aSecondStartChangesNothing) {
-  std::atomic<int> first{0}, second{0};
-  PeriodicThread thread;
-  thread.start("vergence-test", kOften, [&] { ++first; });
-  thread.start("vergence-test", kOften, [&] { ++second; });
-  wait_until(first, 2);
-  thread.stop();
-  EXPECT_EQ(second, 0);
-}
-
-TEST(GigePeriodicThread, aLongRoundSeesThatSomebodyWaitsForIt) {
-  std::atomic<int> rounds{0};
-  PeriodicThread thread;
-  thread.start("vergence-test", kOften, [&] {
-    ++rounds;
-    while (!thread.stopping()) std::this_thread::yield();
-  });
-  wait_until(rounds, 1);
-  thread.stop();
-  EXPECT_EQ(rounds, 1);
-}
-
 }  // namespace
 }  // namespace vergence::gige

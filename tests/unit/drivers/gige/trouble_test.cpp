@@ -25,18 +25,6 @@ bool goes(GigeBench* b, double limit_s) {
   return false;
 }
 
-TEST(GigeTrouble, whoIsNotThereIsNotFoundInTime) {
-  const auto driver = gige::make_driver();
-  DeviceStatus status = DeviceStatus::ok;
-  const auto begin = Clock::now();
-  EXPECT_EQ(driver->open("NO-SUCH-SERIAL", &status), nullptr);
-  EXPECT_EQ(status, DeviceStatus::not_found);
-  EXPECT_EQ(driver->open(GigeCamera::address(240), &status), nullptr);
-  EXPECT_EQ(status, DeviceStatus::not_found);
-  EXPECT_FALSE(driver->last_error().empty());
-  EXPECT_LT(seconds_since(begin), 8) << "one look of a second, one address that does not answer";
-}
-
 TEST(GigeTrouble, camerasAreFoundByBroadcastAndOpenedBySerial) {
   GigeCameraOptions o;
   o.address = GigeCamera::address(200);
@@ -129,25 +117,6 @@ GigeCameraOptions at_address_of(const GigeBench& b, const std::string& serial) {
   GigeCameraOptions o = b.simulator->options();
   o.serial = serial;
   return o;
-}
-
-TEST(GigeTrouble, anotherCameraAtItsAddressIsNotTakenForIt) {
-  GigeBench b;
-  b.configure(b.wish());
-  b.start();
-  EXPECT_EQ(b.take(3).size(), 3U);
-  b.camera->stop();
-  const GigeCameraOptions other = at_address_of(b, "OTHER"), same = b.simulator->options();
-  b.simulator.reset();
-  b.simulator = std::make_unique<GigeCamera>(other);
-  EXPECT_EQ(b.camera->start(nullptr), DeviceStatus::gone);
-  EXPECT_NE(b.camera->last_error().find("another camera, OTHER,"), std::string::npos)
-      << b.camera->last_error();
-  EXPECT_EQ(b.simulator->report().starts, 0U);
-  b.simulator.reset();
-  b.simulator = std::make_unique<GigeCamera>(same);
-  ASSERT_EQ(b.camera->start(nullptr), DeviceStatus::ok) << b.camera->last_error();
-  EXPECT_EQ(b.take(3).size(), 3U);
 }
 
 TEST(GigeTrouble, isFoundElsewhereThoughAnotherCameraHasItsAddress) {

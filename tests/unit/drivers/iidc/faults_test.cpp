@@ -103,28 +103,6 @@ TEST(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConfig
   c.camera->release(held.slot);
 }
 
-TEST(IidcFaults, ACameraUnpluggedWhileStoppedIsGoneAtTheNextStart) {
-  CameraUnderTest c;
-  c.start();
-  c.camera->stop();
-  c.bus->unplug();
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
-  Frame f;
-  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::stopped);
-  c.bus->replug();
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
-}
-
-TEST(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
-  CameraUnderTest c;
-  c.configure();
-  c.bus->all_accesses = DeviceStatus::timeout;
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
-  EXPECT_NE(c.camera->last_error().find("did not become ready"), std::string::npos);
-  c.bus->all_accesses = DeviceStatus::ok;
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
-}
-
 TEST(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
   CameraUnderTest c;
   c.start();

@@ -40,17 +40,6 @@ TEST(Grey, AColouredWallBehindAnyMosaicIsOneGrey) {
   }
 }
 
-TEST(Grey, MosaicsOfAnySizeStayInside) {
-  Random random(3);
-  for (int width = 2; width <= 5; ++width)
-    for (int height = 2; height <= 5; ++height) {
-      std::vector<std::uint8_t> raw(static_cast<std::size_t>(width * height));
-      for (auto& p : raw) p = static_cast<std::uint8_t>(random.below(256));
-      (void)convert({ColorCoding::raw8, true, 16}, raw, width, height,
-                    static_cast<std::size_t>(width));
-    }
-}
-
 TEST(Grey, SixteenBitsGiveTheHighestOfTheEffectiveOnes) {
   const std::vector<std::uint8_t> be{0x12, 0x34, 0x0F, 0xFF, 0xFF, 0xFF, 0x00, 0x7F};
   EXPECT_EQ(convert({ColorCoding::mono16, false, 16}, be, 4, 1, 4),

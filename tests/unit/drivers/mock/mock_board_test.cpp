@@ -134,23 +134,6 @@ TEST(MockBoard, aPauseLeavesPulsesOutAtTheSamePlaceOnEveryRun) {
   }
 }
 
-TEST(MockBoard, whereNobodyTakesItsReportsItPulsesOn) {
-  Bench b({}, at_20_hz(), 4, false);
-  for (int k = 0; k < 2; ++k) ASSERT_EQ(b.rig->camera(k).start(nullptr), DeviceStatus::ok);
-  ASSERT_EQ(b.rig->trigger().start(nullptr), DeviceStatus::ok);
-  int frames = 0;
-  for (DeviceStatus status = DeviceStatus::ok; status != DeviceStatus::ended;) {
-    for (int k = 0; k < 2; ++k) {
-      Frame f;
-      status = b.rig->camera(k).wait(Duration::milliseconds(1), &f);
-      if (status != DeviceStatus::ok) continue;
-      ++frames;
-      b.rig->camera(k).release(f.slot);
-    }
-  }
-  EXPECT_EQ(frames, 162);
-}
-
 TEST(MockBoard, feedbackTellsEveryExposureAndThatOneNeverCame) {
   TriggerConfiguration c = at_20_hz();
   c.feedback = 0b11;
@@ -211,42 +194,6 @@ TEST(MockBoard, anUnpluggedBoardStopsWithItsLineUnlessItHasASupplyOfItsOwn) {
   EXPECT_EQ(powered.pulses[40].number, 50U);
   EXPECT_EQ(powered.pulses[40].boot, powered.pulses[39].boot);
   EXPECT_EQ(powered.rig->trigger().statistics().lost, 10U);
-}
-
-TEST(MockBoard, aBoardThatNeverComesBackEndsWithTheDrive) {
-  Bench b({"board_gone@2 duration_s=0"}, at_20_hz());
-  b.drive();
-  EXPECT_EQ(b.pulses.size(), 40U);
-  EXPECT_EQ(b.frames[1].size(), 40U);
-}
-
-TEST(MockBoard, onlyTheLinesThatAreAskedForArePulsed) {
-  TriggerConfiguration c = at_20_hz();
-  c.lines = 0b01;
-  Bench b({}, c, 1);
-  b.drive();
-  EXPECT_EQ(b.frames[0].size(), 21U);
-  EXPECT_EQ(b.frames[1].size(), 0U);
-}
-
-TEST(MockBoard, whatCannotBePulsedIsRefusedAndNothingIsConfiguredAmidPulses) {
-  Bench b({}, at_20_hz());
-  TriggerConfiguration c = at_20_hz();
-  c.vary = Duration::milliseconds(26);
-  EXPECT_EQ(b.rig->trigger().configure(c, nullptr), DeviceStatus::unsupported)
-      << "longer than half the interval";
-  c = at_20_hz();
-  c.width = Duration::milliseconds(50);
-  EXPECT_EQ(b.rig->trigger().configure(c, nullptr), DeviceStatus::unsupported);
-  EXPECT_EQ(b.rig->trigger().pause(3), DeviceStatus::stopped);
-  ASSERT_EQ(b.rig->camera(0).start(nullptr), DeviceStatus::ok);
-  ASSERT_EQ(b.rig->trigger().start(nullptr), DeviceStatus::ok);
-  EXPECT_EQ(b.rig->trigger().configure(at_20_hz(), nullptr), DeviceStatus::busy);
-  EXPECT_EQ(b.rig->ins().configure(100, nullptr), DeviceStatus::busy);
-  b.rig->camera(0).stop();
-  EXPECT_EQ(b.rig->camera(0).configure(test::small_camera(), nullptr), DeviceStatus::busy);
-  b.rig->trigger().stop();
-  EXPECT_EQ(b.rig->camera(0).configure(test::small_camera(), nullptr), DeviceStatus::ok);
 }
 
 }  // namespace

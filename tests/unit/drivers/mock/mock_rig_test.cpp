@@ -7,47 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "core/types/bayer.hpp"
 #include "drivers/sync/clock_mapper.hpp"
+#include "tests/support/small_mock.hpp"
 
 namespace vergence::mock {
 namespace {
 
 constexpr double kRate = 20;
-
-RigCalibration small_rig() {
-  RigCalibration rig;
-  rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k) {
-    rig.intrinsics[k].width = 96;
-    rig.intrinsics[k].height = 64;
-    rig.intrinsics[k].fx = rig.intrinsics[k].fy = 70;
-    rig.intrinsics[k].cx = 47.5;
-    rig.intrinsics[k].cy = 31.5;
-  }
-  rig.T_camera_left[1].t = {-0.75, 0, 0};
-  return rig;
-}
-
-/// A light world, shared by all tests: building it takes longer than driving through it.
-std::shared_ptr<const World> world() {
-  static const auto shared = [] {
-    WorldOptions o;
-    o.texture_detail = 0;
-    return std::make_shared<const World>(o);
-  }();
-  return shared;
-}
-
-std::shared_ptr<const RigTruth> truth_with(const std::vector<std::string>& faults) {
-  std::vector<Fault> parsed;
-  for (const std::string& f : faults) parsed.push_back(parse_fault(f));
-  DriveOptions drive;
-  drive.kind = DriveKind::brief;
-  return std::make_shared<const RigTruth>(world(), drive, small_rig(), default_T_body_left(),
-                                          Transform{Mat3::Identity(), {0.5, 0, 1.2}},
-                                          std::move(parsed));
-}
 
 MockRigOptions options(double seconds) {
   MockRigOptions o;
@@ -78,12 +44,9 @@ double mean_of(const ImageView& v) {
   return sum / (v.width * v.height);
 }
 
-const CameraConfiguration kCamera{
-    96, 64, kRate, Duration::milliseconds(8), 0, CameraTrigger::hardware};
-
 void start_cameras(MockRig* rig) {
   for (int k = 0; k < 2; ++k) {
-    EXPECT_EQ(rig->camera(k).configure(kCamera, nullptr), DeviceStatus::ok);
+    EXPECT_EQ(rig->camera(k).configure(test::small_camera(kRate), nullptr), DeviceStatus::ok);
     EXPECT_EQ(rig->camera(k).start(nullptr), DeviceStatus::ok);
   }
   EXPECT_EQ(rig->trigger().configure({kRate}, nullptr), DeviceStatus::ok);
@@ -127,7 +90,7 @@ Harvest drive(MockRig* rig) {
 Harvest drive_with(const std::vector<std::string>& faults, double seconds = 3, bool ideal = false) {
   MockRigOptions o = options(seconds);
   o.ideal_ins = ideal;
-  MockRig rig(truth_with(faults), o);
+  MockRig rig(test::small_truth(faults), o);
   return drive(&rig);
 }
 
@@ -146,7 +109,7 @@ TEST(MockRig, everyPulseOfAGoodDriveHasAFrameOfEveryCamera) {
 }
 
 TEST(MockRig, arrivalsKeepTheStatedDelaysAndDeviceStampsTheirClock) {
-  MockRig rig(truth_with({}), options(3));
+  MockRig rig(test::small_truth({}), options(3));
   const Harvest h = drive(&rig);
   const DeviceTiming timing = rig.camera(1).timing();
   ClockMapper mapper({timing.least_delay, timing.delay_spread, timing.resolution});
@@ -218,13 +181,6 @@ TEST(MockRig, framesThatAreOnTheWayAsACameraGoesAreLostWithIt) {
   EXPECT_EQ(starts, 2U);
 }
 
-TEST(MockRig, aCameraThatNeverComesBackEndsWithTheDrive) {
-  const Harvest h = drive_with({"camera_gone@1 camera=1 duration_s=0"});
-  EXPECT_EQ(h.gone[1], 0);
-  EXPECT_EQ(h.frames[1].size(), 20U);
-  EXPECT_EQ(h.frames[0].size(), 61U);
-}
-
 TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
   const Harvest lost = drive_with({"lose_frames@0 camera=0 share=0.3 duration_s=0"});
   EXPECT_GT(lost.statistics[0].lost, 5U);
@@ -239,29 +195,6 @@ TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
   std::vector<std::uint64_t> order;
   for (const Seen& s : late.frames[0]) order.push_back(s.frame.counter);
   EXPECT_FALSE(std::is_sorted(order.begin(), order.end()));
-}
-
-TEST(MockRig, aColourSensorsGreyIsMadeOfTheMosaicThatItWouldHandOutRaw) {
-  MockRigOptions o = options(0.2);
-  o.noise = true;
-  o.pattern = Pattern::gbrg;
-  const auto first_picture = [&o] {
-    MockRig rig(truth_with({}), o);
-    start_cameras(&rig);
-    Frame f;
-    EXPECT_EQ(rig.camera(0).wait(Duration::seconds(20), &f), DeviceStatus::ok);
-    const ImageView v = rig.camera(0).view(f.slot);
-    std::vector<std::uint8_t> pixels;
-    for (int y = 0; y < v.height; ++y) pixels.insert(pixels.end(), v.row(y), v.row(y) + v.width);
-    return pixels;
-  };
-  const auto grey = first_picture();
-  o.raw = true;
-  const auto raw = first_picture();
-  std::vector<std::uint8_t> made(grey.size());
-  bayer_to_grey(raw.data(), 96, 96, 64, made.data(), 96);
-  EXPECT_EQ(made, grey);
-  EXPECT_NE(raw, grey);
 }
 
 TEST(MockRig, ofABrokenPairOneImageAtRandomNeverArrives) {
@@ -319,16 +252,9 @@ TEST(MockRig, aBusIsInTheWayForItsTimeOnly) {
     EXPECT_EQ(h.frames[0][i].mean != good.frames[0][i].mean, i >= 20 && i < 40) << i;
 }
 
-TEST(MockRig, aRequestOrAFullDiskDoesNothingToTheDevices) {
-  const Harvest good = drive_with({}, 1), h = drive_with({"recalibrate@0.5", "disk_full@0.2"}, 1);
-  ASSERT_EQ(h.frames[0].size(), good.frames[0].size());
-  for (std::size_t i = 0; i < h.frames[0].size(); ++i)
-    EXPECT_EQ(h.frames[0][i].mean, good.frames[0][i].mean);
-}
-
 TEST(RigTruth, aBusStandsLevelOnTheGroundWhereItsFaultSays) {
-  const auto truth = truth_with({"occluder@2 ahead_m=1.5 left_m=3 duration_s=2",
-                                 "occluder@5 ahead_m=4 turn_deg=90 speed_mps=-6"});
+  const auto truth = test::small_truth({"occluder@2 ahead_m=1.5 left_m=3 duration_s=2",
+                                        "occluder@5 ahead_m=4 turn_deg=90 speed_mps=-6"});
   EXPECT_FALSE(truth->bus_in_enu(Duration::seconds(1.9)));
   EXPECT_FALSE(truth->bus_in_enu(Duration::seconds(4.1)));
   // What the bus's own axes are in the vehicle's, without the vehicle's pitch and roll.
@@ -356,7 +282,7 @@ TEST(RigTruth, aBusStandsLevelOnTheGroundWhereItsFaultSays) {
 }
 
 TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
-  const auto truth = truth_with({"knock@1 camera=1 pitch_deg=0.2 x_m=0.003"});
+  const auto truth = test::small_truth({"knock@1 camera=1 pitch_deg=0.2 x_m=0.003"});
   const RigCalibration before = truth->calibration(Duration::seconds(0.9)),
                        after = truth->calibration(Duration::seconds(1.1));
   EXPECT_TRUE(before.T_camera_left[1].R.isApprox(Mat3::Identity(), 1e-14));
@@ -370,7 +296,7 @@ TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
 }
 
 TEST(MockRig, aDriftGrowsEvenlyAndStays) {
-  const auto truth = truth_with({"drift@1 camera=1 yaw_deg=1 duration_s=4"});
+  const auto truth = test::small_truth({"drift@1 camera=1 yaw_deg=1 duration_s=4"});
   const auto yaw = [&](double s) {
     return log_so3(truth->calibration(Duration::seconds(s)).T_camera_left[1].R).y() * 180 /
            std::numbers::pi;
@@ -391,7 +317,7 @@ Vec3 position_error(const RigTruth& truth, const InsSample& s, Duration t) {
 }
 
 TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
-  const auto truth = truth_with({});
+  const auto truth = test::small_truth({});
   InsModel model({true, 1, 120}, *truth);
   for (std::uint64_t i = 0; i < 1200; ++i) {
     const Duration t = Duration::seconds(static_cast<double>(i) / 120);
@@ -405,7 +331,7 @@ TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
 }
 
 TEST(MockRig, aNoisyInsErrsByItsSigmasAndSlowly) {
-  const auto truth = truth_with({});
+  const auto truth = test::small_truth({});
   double squares = 0, step = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     InsModel model({false, seed, 120}, *truth);
@@ -451,33 +377,6 @@ TEST(MockRig, aClockThatIsSetShowsInItsDevicesStampsOnly) {
               .to_seconds();
       EXPECT_NEAR(step, k == 0 && i == 20 ? 2.05 : 0.05, 1e-4) << k << " " << i;
     }
-}
-
-TEST(MockRig, nonsenseIsRefusedByName) {
-  EXPECT_THROW(MockRig(truth_with({"cover@1 camera=2"}), options(1)), std::invalid_argument);
-  MockRig rig(truth_with({}), options(1));
-  CameraConfiguration other = kCamera;
-  other.rate_hz = 0;
-  EXPECT_EQ(rig.camera(0).configure(other, nullptr), DeviceStatus::bad_configuration);
-  other = kCamera;
-  other.width = 97;
-  EXPECT_EQ(rig.camera(0).configure(other, nullptr), DeviceStatus::unsupported);
-  EXPECT_EQ(rig.camera(0).start(nullptr), DeviceStatus::bad_configuration);
-  EXPECT_EQ(rig.ins().configure(0, nullptr), DeviceStatus::bad_configuration);
-  EXPECT_EQ(rig.trigger().configure({-1}, nullptr), DeviceStatus::bad_configuration);
-  Frame f;
-  EXPECT_EQ(rig.camera(0).wait(Duration{}, &f), DeviceStatus::stopped);
-}
-
-TEST(MockRig, stoppingAmidTheDriveEndsAtOnce) {
-  MockRig rig(truth_with({}), options(10));
-  start_cameras(&rig);
-  Frame f;
-  ASSERT_EQ(rig.camera(0).wait(Duration::seconds(10), &f), DeviceStatus::ok);
-  rig.camera(0).stop();  // the producer may be waiting for a slot
-  EXPECT_EQ(rig.camera(0).wait(Duration{}, &f), DeviceStatus::stopped);
-  rig.trigger().stop();
-  rig.trigger().stop();
 }
 
 }  // namespace

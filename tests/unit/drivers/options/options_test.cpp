@@ -82,33 +82,6 @@ TEST(CameraOptions, everyRowIsReadAndWrittenAgain) {
   }
 }
 
-TEST(CameraOptions, areOfTheirOwnTypes) {
-  CameraOptions gige = begin_of("gige"), iidc = begin_of("iidc-1394"), v4l2 = begin_of("v4l2");
-  for (const auto& [name, value] : other_values().at("gige"))
-    ASSERT_TRUE(set_option(name, value, &gige));
-  for (const auto& [name, value] : other_values().at("iidc-usb"))
-    ASSERT_TRUE(set_option(name, value, &iidc));
-  for (const auto& [name, value] : other_values().at("v4l2"))
-    ASSERT_TRUE(set_option(name, value, &v4l2));
-  const auto& g = std::get<gige::Options>(gige);
-  EXPECT_EQ(g.packet_size, 1500);
-  EXPECT_EQ(g.packet_delay, Duration::nanoseconds(12'500));
-  EXPECT_EQ(g.frame_retention, Duration::milliseconds(20));
-  EXPECT_EQ(g.resend, gige::Resend::off);
-  EXPECT_TRUE(g.packet_socket && g.ptp && g.stamp_at_end && !g.chunks);
-  ASSERT_EQ(g.features.size(), 1U);
-  EXPECT_EQ(g.features[0].first, "BlackLevel");
-  const auto& i = std::get<iidc::Options>(iidc);
-  EXPECT_EQ(i.format7, std::optional(false));
-  EXPECT_EQ(i.packet_bytes, std::optional<std::size_t>(1024));
-  EXPECT_EQ(i.speed, std::optional(iidc::BusSpeed::s800));
-  EXPECT_EQ(i.strobe_delay, Duration::milliseconds(1));
-  const auto& v = std::get<v4l2::Options>(v4l2);
-  EXPECT_EQ(v.readout, Duration::nanoseconds(12'500'500));
-  EXPECT_EQ(v.gain_step_db, 0.3);
-  EXPECT_EQ(v.controls[0].first, "test_pattern");
-}
-
 TEST(CameraOptions, aValueThatCannotBeChangesNothing) {
   const std::map<std::string, std::vector<std::pair<std::string, std::string>>> wrong{
       {"gige",

@@ -194,14 +194,6 @@ TEST_P(EveryLine, discardedInputDoesNotComeAgain) {
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
 }
 
-TEST_P(EveryLine, baudChangesAndIsTold) {
-  EXPECT_EQ(line().baud(), 115200U);
-  for (const std::uint32_t baud : {921600U, 460800U, 123456U}) {  // the last is in no table
-    EXPECT_EQ(line().set_baud(baud), DeviceStatus::ok);
-    EXPECT_EQ(line().baud(), baud);
-  }
-}
-
 TEST_P(EveryLine, aWriteThatNobodyTakesEndsAtItsLimit) {
   const Bytes much(200'000, 0x55);
   const HostStamp before = line().now();
@@ -214,44 +206,11 @@ INSTANTIATE_TEST_SUITE_P(Serial, EveryLine, ::testing::Values(Kind::terminal, Ki
                            return one.param == Kind::terminal ? "terminal" : "pipe";
                          });
 
-TEST(SerialPort, aWaitingReadUsesNoTime) {
-  TerminalPair pair;
-  std::array<std::uint8_t, 8> some{};
-  rusage before{}, after{};
-  ASSERT_EQ(::getrusage(RUSAGE_THREAD, &before), 0);
-  for (int i = 0; i < 10; ++i)
-    ASSERT_EQ(pair.line().read(some, kSoon).status, DeviceStatus::timeout);
-  ASSERT_EQ(::getrusage(RUSAGE_THREAD, &after), 0);
-  const auto us = [](const rusage& r) {
-    return r.ru_utime.tv_usec + r.ru_stime.tv_usec +
-           1'000'000 * (r.ru_utime.tv_sec + r.ru_stime.tv_sec);
-  };
-  EXPECT_LT(us(after) - us(before), 50'000)
-      << "200 ms were waited; a spinning read burns most of them";
-}
-
 TEST(SerialPort, isHeldByOne) {
   TerminalPair pair;
   DeviceStatus status = DeviceStatus::ok;
   EXPECT_EQ(pair.place().open({}, &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::busy);
-}
-
-TEST(SerialPort, opensThroughALink) {
-  const int master = ::posix_openpt(O_RDWR | O_NOCTTY);
-  ASSERT_GE(master, 0);
-  ASSERT_EQ(::grantpt(master), 0);
-  ASSERT_EQ(::unlockpt(master), 0);
-  const std::filesystem::path link =
-      std::filesystem::temp_directory_path() / ("vergence-line-" + std::to_string(::getpid()));
-  std::filesystem::create_symlink(::ptsname(master), link);
-  DeviceStatus status = DeviceStatus::failed;
-  SerialPort place(link.string());
-  EXPECT_NE(place.open({}, &status), nullptr);
-  EXPECT_EQ(status, DeviceStatus::ok);
-  EXPECT_EQ(place.name(), link.string());
-  std::filesystem::remove(link);
-  ::close(master);
 }
 
 SerialPortInfo usb_port(const std::string& port, const std::string& serial) {

@@ -62,25 +62,6 @@ TEST_P(CommonClock, thatDriftsApartByAnIntervalProvesNothing) {
   EXPECT_EQ(sync.counters().unproven, doubted);
 }
 
-/// Both cameras' clock is set by so much between two of 400 pulses.
-void expect_followed_after_three_frames(SyncMode mode, std::int64_t step) {
-  RigSynchronizer sync(rig_options(mode));
-  const RigSets out =
-      sets_of(&sync, 400, [&](int n, int) { return clock_ns(n) + (n < 200 ? 0 : step); });
-  out.expect_pairs();
-  EXPECT_GE(out.complete(), 397U);
-  EXPECT_EQ(sync.counters().contradictions[0] + sync.counters().contradictions[1], 1U);
-  EXPECT_EQ(sync.counters().missed, 0U) << "a clock that was set tells of no pulses";
-  for (std::size_t i = 1; i < out.sets.size(); ++i)
-    EXPECT_EQ(out.sets[i].number, out.sets[i - 1].number + 1);
-}
-
-TEST_P(CommonClock, thatIsSetBackIsFollowedAfterThreeFrames) {
-  expect_followed_after_three_frames(GetParam(), -20'000'000'000);
-  if (GetParam() == SyncMode::ptp)  // to its epoch, which leaps over no numbers
-    expect_followed_after_three_frames(SyncMode::ptp, 1'700'000'000'000'000'000);
-}
-
 TEST(OneClock, whileOneCameraAloneHasAnotherClockNothingIsProven) {
   for (const std::int64_t step : {-50'000'000'000, 1'700'000'000'000'000'000}) {
     RigSynchronizer sync(rig_options(SyncMode::ptp));
@@ -109,49 +90,6 @@ TEST(OneClock, whileOneCameraAloneHasAnotherClockNothingIsProven) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, CommonClock, ::testing::Values(SyncMode::bus, SyncMode::ptp));
-
-// ---- before any set has gone out ----
-
-struct FirstSets : ::testing::TestWithParam<SyncMode> {
-  /// An image whose exposure begins then, by every clock; it comes after the one before it.
-  SyncVerdict offer(int camera, std::int64_t ms) {
-    const Duration at = Duration::milliseconds(ms);
-    SyncFrame f = rig_frame(camera, 0, 0, HostStamp(0) + at, DeviceStamp(0) + at);
-    arrival = arrival + Duration::microseconds(100);
-    f.arrival = arrival;
-    return sync.offer(f);
-  }
-
-  RigSynchronizer sync{rig_options(GetParam())};
-  HostStamp arrival{9'000'000'000};
-};
-
-TEST_P(FirstSets, whatWasExposedBeforeThemJoinsNone) {
-  EXPECT_EQ(offer(0, 8000), SyncVerdict::taken);
-  EXPECT_EQ(offer(1, 7980), SyncVerdict::late);
-  EXPECT_EQ(offer(1, 3000), SyncVerdict::late);
-  EXPECT_EQ(sync.counters().late[1], 2U);
-  EXPECT_EQ(offer(1, 8001), SyncVerdict::taken);
-  RigSets out;
-  out.drain(&sync);
-  ASSERT_EQ(out.complete(), 1U);
-  EXPECT_LE(out.sets[0].spread, rig_options(GetParam()).tolerance);
-}
-
-TEST_P(FirstSets, whatWasExposedBetweenThemOrTooFarFromThemJoinsNone) {
-  EXPECT_EQ(offer(0, 8000), SyncVerdict::taken);
-  EXPECT_EQ(offer(0, 8040), SyncVerdict::taken);
-  EXPECT_EQ(offer(1, 8016), SyncVerdict::late);
-  EXPECT_EQ(offer(1, 8060), SyncVerdict::taken);
-  sync.finish();
-  RigSets out;
-  out.drain(&sync);
-  EXPECT_EQ(out.sets.size(), 3U);
-  EXPECT_EQ(out.complete(), 0U);
-}
-
-INSTANTIATE_TEST_SUITE_P(Modes, FirstSets,
-                         ::testing::Values(SyncMode::ptp, SyncMode::bus, SyncMode::software));
 
 }  // namespace
 }  // namespace vergence

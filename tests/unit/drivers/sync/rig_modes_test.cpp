@@ -272,31 +272,5 @@ TEST(RigModes, nothingIsTakenFromTheHeap) {
   EXPECT_GT(sets, 400U);
 }
 
-TEST(RigModes, modesHaveNamesAndNonsenseIsNamed) {
-  for (const SyncMode m :
-       {SyncMode::counter, SyncMode::software, SyncMode::board, SyncMode::ins_syncout,
-        SyncMode::master_strobe, SyncMode::bus, SyncMode::ptp}) {
-    EXPECT_STRNE(to_string(m), "");
-    EXPECT_EQ(rig_options(m).validate(), nullptr);
-  }
-  using O = SyncOptions;
-  for (const auto& [mode, change] :
-       {std::pair<SyncMode, void (*)(O*)>{SyncMode::counter, [](O* o) { o->cameras = 5; }},
-        {SyncMode::counter, [](O* o) { o->interval = {}; }},
-        // An eighth of the interval and more.
-        {SyncMode::board, [](O* o) { o->camera[1].jitter = Duration::milliseconds(6); }},
-        {SyncMode::board, [](O* o) { o->camera[0].delay = Duration::milliseconds(40); }},
-        {SyncMode::software, [](O* o) { o->tolerance = Duration::milliseconds(21); }},
-        {SyncMode::bus, [](O* o) { o->tolerance = Duration::milliseconds(21); }},
-        {SyncMode::master_strobe, [](O* o) { o->cameras = 1; }}}) {
-    SyncOptions o = rig_options(mode);
-    change(&o);
-    EXPECT_NE(o.validate(), nullptr) << to_string(mode);
-  }
-  SyncOptions o = rig_options(SyncMode::board);
-  o.camera[1].jitter = Duration::milliseconds(4);
-  EXPECT_EQ(o.validate(), nullptr);
-}
-
 }  // namespace
 }  // namespace vergence

@@ -49,22 +49,6 @@ TEST(Board, isMetSetAndRead) {
   EXPECT_EQ(s.malformed + s.overruns + s.reboots, 0U);
 }
 
-TEST(Board, tellsEveryPulseOfTenMinutes) {
-  BoardRig rig(board_for(Duration::seconds(600)), direct_line());
-  const auto all = rig.drive();
-  expect_gapless(all);
-  // The last report may be on the wire when the board's time is over.
-  ASSERT_GE(all.size() + 1, rig.simulator->pulses_made());
-  ASSERT_GT(all.size(), 17'900U);
-  EXPECT_EQ(rig.device->statistics().lost, 0U);
-  EXPECT_EQ(rig.times_gone, 0);
-  const TimeQuality t = rig.device->board_statistics().time;
-  EXPECT_GT(t.answered, 55'000U) << "a hundred a second";
-  EXPECT_LT(t.unanswered, 3U);
-  EXPECT_EQ(t.resets, 0U);
-  EXPECT_NEAR(t.drift_ppm, -20, 1) << "the board's clock is 20 ppm fast";
-}
-
 TEST(Board, isFoundAtWhicheverBaudRateItHas) {
   for (const auto& [baud, asked] :
        {std::pair{115200U, 0U}, {460800U, 0U}, {921600U, 0U}, {57600U, 57600U}}) {
@@ -104,19 +88,6 @@ TEST(Board, exposureFeedbackComesWithItsPulse) {
                 (near_us(p.exposure[1].start, 41) &&
                  near_us(p.exposure[1].end, 6041 + static_cast<std::int64_t>(p.number))));
     ASSERT_FALSE(p.exposure[2].seen);
-  }
-}
-
-TEST(Board, variedIntervalsAreThoseThatBothSidesKnow) {
-  BoardRig rig(board_for(Duration::seconds(10)), direct_line());
-  TriggerConfiguration requested = thirty_hertz();
-  requested.vary = Duration::milliseconds(2);
-  const auto all = rig.drive(requested);
-  ASSERT_GT(all.size(), 250U);
-  for (std::size_t i = 1; i < all.size(); ++i) {
-    const bool longer = trigger_interval_is_longer(static_cast<std::uint32_t>(all[i - 1].number));
-    ASSERT_NEAR((all[i].edge - all[i - 1].edge).to_seconds(), 1.0 / 30 + (longer ? 2e-3 : -2e-3),
-                2.5e-6);
   }
 }
 
@@ -283,31 +254,6 @@ TEST(Board, anotherOneInItsPlaceIsNotTaken) {
   EXPECT_GT(rig.truth(all.back()), at_s(59));
 }
 
-TEST(Board, oneThatRefusesItsConfigurationIsOpenedTwiceASecond) {
-  // It has begun anew, and does not take its configuration for five seconds.
-  mock::BoardSimulatorOptions board = board_for(Duration::seconds(20));
-  board.reboots = {at_s(5)};
-  std::uint8_t configuring = 0;
-  int refused = 0;
-  BoardRig rig(board, direct_line(), {}, [&](HostStamp at, std::vector<std::uint8_t>* bytes) {
-    TriggerFrame f = opened(*bytes);
-    if (f.type != trigger_status || f.sequence != configuring || at < at_s(5) || at > at_s(10))
-      return;
-    ++refused;
-    *bytes = closed({trigger_error, f.sequence, 2, {trigger_config, trigger_error_line}});
-  });
-  rig.between->lose([&](HostStamp, std::span<const std::uint8_t> bytes) {
-    const TriggerFrame f = opened({bytes.begin(), bytes.end()});
-    if (f.type == trigger_config) configuring = f.sequence;
-    return false;
-  });
-  const auto all = rig.drive();
-  EXPECT_EQ(rig.times_gone, 1);
-  EXPECT_GE(refused, 8);
-  EXPECT_LE(refused, 11);
-  EXPECT_GT(rig.truth(all.back()), at_s(19));
-}
-
 // ---- what is asked
 
 TEST(Configuration, whatCannotBeIsRefusedWithTheKeyToChange) {
@@ -351,15 +297,6 @@ TEST(Configuration, whatCannotBeIsRefusedWithTheKeyToChange) {
         << "and it can still be set otherwise";
     EXPECT_TRUE(rig.device->last_error().empty());
   }
-}
-
-TEST(Configuration, aRateBetweenThousandthsIsRemarkedOn) {
-  BoardRig rig(board_for(Duration::seconds(100)));
-  TriggerConfiguration requested = thirty_hertz(), actual;
-  requested.rate_hz = 1000.0 / 33;
-  ASSERT_EQ(rig.device->configure(requested, &actual), DeviceStatus::ok);
-  EXPECT_EQ(actual.rate_hz, 30.303);
-  EXPECT_NE(rig.device->remark().find("30.303"), std::string::npos) << rig.device->remark();
 }
 
 struct JoinedBoard {

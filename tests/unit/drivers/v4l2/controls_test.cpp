@@ -24,13 +24,6 @@ Control integer(std::int64_t least, std::int64_t most, std::int64_t step) {
   return c;
 }
 
-TEST(V4l2Controls, namesBecomeKeys) {
-  EXPECT_EQ(key_of("Exposure Time, Absolute"), "exposure_time_absolute");
-  EXPECT_EQ(key_of("  Trigger (Mode) "), "trigger_mode");
-  EXPECT_EQ(key_of("S-Video 000-0"), "s_video_000_0");
-  EXPECT_EQ(key_of("µ"), "");
-}
-
 TEST(V4l2Controls, aValueIsANumberInRangeOrAMenuItem) {
   std::int64_t value = -1;
   const Control c = menu({{0, "manual_mode"}, {3, "aperture_priority_mode"}});
@@ -62,18 +55,6 @@ TEST(V4l2Controls, anExternalTriggerIsFoundByItsMenusWords) {
   EXPECT_EQ(trigger_on(menu({{0, "free_running"}, {1, "hardware"}})), 1);
   EXPECT_EQ(trigger_on(menu({{0, "off"}, {1, "on"}})), 1);
   EXPECT_EQ(trigger_on(integer(0, 1, 1)), 1);
-}
-
-TEST(V4l2Controls, aSentenceNamesTheRange) {
-  EXPECT_EQ(range_of(integer(0, 255, 5)), "0 to 255 in steps of 5");
-  EXPECT_EQ(range_of(menu({{0, "off"}, {2, "external"}})), "off, external");
-}
-
-TEST(V4l2Controls, anEmptyListHasNothing) {
-  const Controls none;
-  EXPECT_EQ(none.find("gain"), nullptr);
-  EXPECT_EQ(none.trigger(), nullptr);
-  EXPECT_EQ(none.keys(), "none");
 }
 
 }  // namespace

@@ -38,12 +38,6 @@ TEST(V4l2Formats, aWishIsTakenByItsFourCharacters) {
   EXPECT_EQ(choose_format({}, ""), nullptr);
 }
 
-TEST(V4l2Formats, namesAreReadable) {
-  EXPECT_EQ(name_of(V4L2_PIX_FMT_GREY), "GREY");
-  EXPECT_EQ(name_of(V4L2_PIX_FMT_Y10), "Y10");
-  EXPECT_EQ(name_of(0x01020304), "????");
-}
-
 TEST(V4l2Formats, aFrameNeedsNoPaddingAfterItsLastRow) {
   const PixelFormat& grey = format(V4L2_PIX_FMT_GREY);
   EXPECT_EQ(least_frame_bytes(grey, 640, 480, 640), 640U * 480);
@@ -129,25 +123,6 @@ INSTANTIATE_TEST_SUITE_P(, V4l2Luma,
                                            V4L2_PIX_FMT_Y16, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_YVYU,
                                            V4L2_PIX_FMT_UYVY, V4L2_PIX_FMT_VYUY),
                          [](const auto& p) { return name_of(p.param); });
-
-TEST(V4l2Formats, mosaicsOfEveryPatternBecomeTheMeanOfTheirColours) {
-  // Red 40, green 80, blue 120 everywhere: (40 + 2 · 80 + 120) / 4 at every pixel, whichever comes
-  // first.
-  const std::pair<std::uint32_t, std::array<std::uint8_t, 4>> patterns[] = {
-      {V4L2_PIX_FMT_SRGGB8, {40, 80, 80, 120}},
-      {V4L2_PIX_FMT_SGRBG8, {80, 40, 120, 80}},
-      {V4L2_PIX_FMT_SGBRG8, {80, 120, 40, 80}},
-      {V4L2_PIX_FMT_SBGGR8, {120, 80, 80, 40}}};
-  for (const auto& [fourcc, tile] : patterns) {
-    std::array<std::uint8_t, 8 * 6> raw{}, grey{};
-    for (std::size_t y = 0; y < 6; ++y)
-      for (std::size_t x = 0; x < 8; ++x) raw[y * 8 + x] = tile[y % 2 * 2 + x % 2];
-    to_grey(format(fourcc), raw.data(), 8, 7, 6, grey.data(), 8);
-    for (std::size_t y = 0; y < 6; ++y)
-      for (std::size_t x = 0; x < 7; ++x)
-        EXPECT_EQ(grey[y * 8 + x], 80) << name_of(fourcc) << " at " << x << ", " << y;
-  }
-}
 
 TEST(V4l2Formats, wordsDeeperThanToldSaturate) {
   const PixelFormat shifted{V4L2_PIX_FMT_Y16, Layout::words,

@@ -215,24 +215,6 @@ TEST_P(BothGenerations, aLineTooSlowIsRefusedWithWhatWouldDo) {
       << "and it can still be set otherwise";
 }
 
-TEST_P(BothGenerations, goesOnByItselfAfterTheSupplyDipped) {
-  mock::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
-  sensor.dips = {HostStamp(9'000'000'000)};
-  XsensRig rig(sensor);
-  const auto all = rig.drive();
-  EXPECT_EQ(rig.times_gone, 1) << "once: that it woke while it was set is past";
-  EXPECT_GT(all.back().arrival, HostStamp(19'500'000'000));
-  Duration longest{};
-  for (std::size_t i = 1; i < all.size(); ++i) {
-    ASSERT_GT(all[i].host, all[i - 1].host);
-    longest = std::max(longest, all[i].arrival - all[i - 1].arrival);
-  }
-  EXPECT_LT(longest, Duration::seconds(1.5)) << "it is not waited for";
-  // The stamps after the dip are right again, though its clock begins at another value.
-  const InsReading& last = all.back();
-  EXPECT_LT(std::abs(((last.arrival - last.host) - Duration::milliseconds(30)).to_seconds()), 0.05);
-}
-
 TEST_P(BothGenerations, oneThatLostItsSettingsIsSetAgain) {
   mock::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
   XsensRig rig(sensor);
@@ -334,39 +316,6 @@ INSTANTIATE_TEST_SUITE_P(
 
 // ---- what is special to one of them, and what is none
 
-TEST(Mark4, theDayOfItsClockWraps) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 25);
-  sensor.first_sample_time = 863'900'000;  // ten seconds before the end of its day
-  XsensRig rig(sensor);
-  const auto all = rig.drive();
-  ASSERT_GT(all.size(), 2000U);
-  for (std::size_t i = 1; i < all.size(); ++i)
-    ASSERT_EQ(all[i].measured - all[i - 1].measured, Duration::milliseconds(10));
-  EXPECT_EQ(rig.device->statistics().restarts, 0U);
-}
-
-TEST(Mark4, atOneHertzALostSampleIsNoSilence) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 40);
-  XsensRig rig(sensor);
-  rig.between->tamper([n = 0](HostStamp at, std::vector<std::uint8_t>* bytes) mutable {
-    if (at > HostStamp(9'000'000'000) && at < HostStamp(20'000'000'000) && ++n % 3 != 0)
-      bytes->clear();
-  });
-  rig.start(1);
-  EXPECT_GT(rig.readings().back().arrival, HostStamp(35'000'000'000));
-  EXPECT_EQ(rig.times_gone, 0);
-}
-
-TEST(Mark4, positionsThatAreMissingNowAndThenMakeNoHoleInTheFix) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
-  sensor.missing_position = 0.2;
-  XsensRig rig(sensor);
-  const auto all = rig.drive();
-  ASSERT_GT(all.size(), 1200U);
-  for (const InsReading& r : all) ASSERT_EQ(r.sample.fix, FixStatus::fix_3d);
-  EXPECT_LT(all.size(), 1700U);
-}
-
 TEST(Mark4, aDriveWithoutAFixIsToldAndGoesOn) {
   mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
   XsensRig rig(sensor, {}, {}, [](std::uint64_t n, Duration t) {
@@ -410,20 +359,6 @@ TEST(AnotherMake, isNamed) {
     EXPECT_EQ(device.connect(), DeviceStatus::not_found);
     EXPECT_NE(device.last_error().find(word), std::string::npos) << device.last_error();
   }
-}
-
-TEST(Configuration, ratesThatTheDeviceHasNotAreNamed) {
-  XsensRig rig(simulated(Generation::legacy));
-  EXPECT_EQ(rig.device->configure(110, nullptr), DeviceStatus::unsupported);
-  EXPECT_NE(rig.device->last_error().find("ins.rate"), std::string::npos)
-      << rig.device->last_error();
-  EXPECT_EQ(rig.device->configure(-1, nullptr), DeviceStatus::bad_configuration);
-  EXPECT_EQ(rig.device->start(nullptr), DeviceStatus::bad_configuration) << "not configured";
-  XsensRig newer(simulated(Generation::mark4));
-  double actual = 0;
-  EXPECT_EQ(newer.device->configure(110, &actual), DeviceStatus::ok);
-  EXPECT_EQ(actual, 100);
-  EXPECT_FALSE(newer.device->remark().empty());
 }
 
 template <Generation kGeneration>

@@ -104,21 +104,6 @@ TEST(SimulatedLine, nothingArrivesBeforeItWasOnTheWire) {
   }
 }
 
-TEST(SimulatedLine, aTimeoutLetsExactlyItsTimePass) {
-  SimulatedPlace place(std::make_shared<Counter>(1, Duration::seconds(1000), 0), quiet_host());
-  DeviceStatus status = DeviceStatus::ok;
-  const auto line = place.open({}, &status);
-  std::array<std::uint8_t, 8> some{};
-  EXPECT_EQ(line->read(some, Duration::seconds(1)).status, DeviceStatus::ended)
-      << "a device that will never speak again";
-  SimulatedPlace other(std::make_shared<Counter>(1, Duration::seconds(1000), 2), quiet_host());
-  const auto waiting = opened(other);
-  ASSERT_EQ(waiting->read(some, Duration::seconds(1)).status, DeviceStatus::ok);
-  const HostStamp before = waiting->now();
-  EXPECT_EQ(waiting->read(some, Duration::seconds(100)).status, DeviceStatus::timeout);
-  EXPECT_EQ(waiting->now() - before, Duration::seconds(100));
-}
-
 TEST(SimulatedLine, writesReachTheDeviceAfterTheirTimeOnTheWire) {
   auto device = std::make_shared<Counter>(1, Duration::seconds(1000));
   SimulatedPlace place(device, quiet_host());
@@ -153,43 +138,6 @@ TEST(SimulatedLine, anOutageKillsTheLineAndANewOneOpensAfterIt) {
   EXPECT_EQ(device->power_cycles, 1);
   const auto line = opened(place);
   EXPECT_EQ(reads(*line, 5).size(), 5U);
-}
-
-TEST(SimulatedLine, theSameSeedGivesTheSameArrivals) {
-  const auto run = [](std::uint64_t seed) {
-    SimulatedLineOptions o;
-    o.late_fraction = 0.3;
-    o.corrupt = 0.01;
-    o.seed = seed;
-    SimulatedPlace place(std::make_shared<Counter>(80, Duration::milliseconds(10)), o);
-    const auto line = opened(place);
-    Bytes bytes;
-    std::int64_t sum = 0;
-    for (const Read& r : reads(*line, 100, &bytes)) sum += r.arrival.ns();
-    return std::pair(sum, bytes);
-  };
-  EXPECT_EQ(run(4), run(4));
-  EXPECT_NE(run(4), run(5));
-}
-
-TEST(SimulatedLine, inRealTimeReadsWaitAndAreWoken) {
-  SimulatedLineOptions o = quiet_host();
-  o.real_time = true;
-  SimulatedPlace place(std::make_shared<Counter>(600, Duration::milliseconds(60)), o);
-  const auto line = opened(place);
-  EXPECT_FALSE(place.pass(Duration::seconds(1000)));
-  const auto all = reads(*line, 3);
-  ASSERT_EQ(all.size(), 3U);
-  EXPECT_GT(all[2].arrival - all[0].arrival, Duration::milliseconds(50));
-  std::thread waker([&line] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    line->wake();
-  });
-  std::array<std::uint8_t, 4096> some{};
-  DeviceStatus status = DeviceStatus::ok;
-  while (status == DeviceStatus::ok) status = line->read(some, Duration::seconds(20)).status;
-  EXPECT_EQ(status, DeviceStatus::stopped);
-  waker.join();
 }
 
 }  // namespace

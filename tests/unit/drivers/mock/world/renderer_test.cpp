@@ -133,33 +133,6 @@ TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
   }
 }
 
-TEST(Renderer, aTextureLiesWhereItsPlaceOnASlantedPlateIsSeen) {
-  Plates scene;
-  Canvas half(6, 6, 1, 1, 0.1F);
-  half.rectangle(0.5, 0, 1, 1, 0.8F);
-  scene.scene->materials.push_back({scene.scene->atlas.add(half), {}, 64, 64, {}});
-  scene.builder.begin();
-  scene.builder.picture(
-      std::array<Vec3, 4>{Vec3(-2, 5, -2), Vec3(2, 7, -2), Vec3(2, 7, 2), Vec3(-2, 5, 2)}, 2, 1.0F,
-      std::sqrt(20.0), 4);
-  scene.builder.end();
-  const Camera camera(lens(true));
-  Renderer renderer(scene.world(), camera);
-  for (const double shift : {0.0, 0.007, 0.013}) {
-    const Transform T_camera_enu = looking_north({shift, 0, 0});
-    const Picture p = take(&renderer, T_camera_enu, clean());
-    for (int y = 70; y < 170; y += 7) {
-      const Vec2 pixel =
-          seen_in_row(camera, T_camera_enu, y, -1.9, 1.9, [](double z) { return Vec3(0, 6, z); });
-      const int x = static_cast<int>(pixel.x());
-      // A texel is three pixels wide, and perspective makes one end of the ramp between two of them
-      // a tenth longer than the other.
-      EXPECT_NEAR(edge_position(p, y, x - 7, x + 8, p.at(x - 7, y), p.at(x + 7, y)), pixel.x(), 0.2)
-          << y;
-    }
-  }
-}
-
 TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   Plates scene;
   const double width = 0.3 * 8.0 / 290;  // 0.3 px at 8 m
@@ -174,16 +147,6 @@ TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
     for (int x = 150; x < 180; ++x) sum += p.at(x, 120) - p.at(2, 120);
     EXPECT_NEAR(sum, 0.3 * step, 2.0) << shift;  // three pixels and the step are rounded
   }
-}
-
-TEST(Renderer, surfacesThatShareAnEdgeLeaveNoSeam) {
-  Plates scene;
-  scene.plate(-2, 0.1234, -2, 2, 6.0, 1);
-  scene.plate(0.1234, 2, -2, 2, 6.0, 1);
-  Renderer renderer(scene.world(), Camera(lens(true)));
-  const Picture p = take(&renderer, looking_north({0, 0, 0}), clean());
-  for (int y = 80; y < 160; ++y)
-    for (int x = 120; x < 200; ++x) EXPECT_NEAR(p.at(x, y), p.at(120, 80), 1) << x << ' ' << y;
 }
 
 TEST(Renderer, surfacesThatCutThroughEachOtherMeetInASmoothLine) {
@@ -208,36 +171,6 @@ TEST(Renderer, surfacesThatCutThroughEachOtherMeetInASmoothLine) {
     EXPECT_NEAR(edge_position(p, y, x - 5, x + 6, p.at(x - 5, y), p.at(x + 5, y)), pixel.x(),
                 kRounding + 3e-3)
         << y;
-  }
-}
-
-TEST(Renderer, exposureScalesAndCoveredLensIsBlack) {
-  Plates scene;
-  Renderer renderer(scene.world(), Camera(lens(false)));
-  Shot shot = clean();
-  const int nominal = take(&renderer, looking_north({0, 0, 0}), shot).at(100, 100);
-  shot.exposure = 3;
-  EXPECT_NEAR(take(&renderer, looking_north({0, 0, 0}), shot).at(100, 100), 3 * nominal, 2);
-  shot.exposure = 100;
-  EXPECT_EQ(take(&renderer, looking_north({0, 0, 0}), shot).at(100, 100), 255);
-  shot.exposure = 0;
-  EXPECT_EQ(take(&renderer, looking_north({0, 0, 0}), shot).at(100, 100), 0);
-}
-
-TEST(Renderer, vignettingFollowsItsLaw) {
-  Plates scene;
-  scene.plate(-100, 100, -100, 100, 6.0, 1);
-  const Camera camera(lens(false));
-  Renderer renderer(scene.world(), camera);
-  Shot shot;
-  shot.vignetting = 1.0;
-  const Picture p = take(&renderer, looking_north({0, 0, 0}), shot);
-  for (const auto& [x, y] :
-       {std::pair{158, 122}, std::pair{0, 0}, std::pair{319, 239}, std::pair{300, 20}}) {
-    Vec3 ray;
-    ASSERT_TRUE(camera.unproject({x, y}, &ray));
-    EXPECT_NEAR(p.at(x, y), p.at(158, 122) * std::pow(1 / ray.norm(), 4),
-                1.01);  // cos⁴ of the angle to the axis
   }
 }
 
@@ -268,21 +201,6 @@ TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
   EXPECT_NEAR(0.5 * difference2, variance, 4 * std::sqrt(2 / n) * variance + 0.01 * variance);
   EXPECT_NEAR(product, 0, 4 * std::sqrt(1 / n) * variance);
   EXPECT_NEAR(mean, 0.8 * 255, 0.1);
-}
-
-TEST(Renderer, severalPosesAreTheirMean) {
-  Plates scene;
-  scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
-  Renderer renderer(scene.world(), Camera(lens(true)));
-  const std::array<Transform, 3> way{looking_north({0, 0, 0}), looking_north({0.05, 0, 0}),
-                                     looking_north({0.1, 0, 0})};
-  Picture blurred{320, 240, std::vector<std::uint8_t>(320 * 240)};
-  renderer.render(way, clean(), blurred.pixels.data(), 320);
-  std::vector<Picture> sharp;
-  for (const Transform& T : way) sharp.push_back(take(&renderer, T, clean()));
-  for (std::size_t i = 0; i < blurred.pixels.size(); ++i)
-    EXPECT_NEAR(blurred.pixels[i],
-                (sharp[0].pixels[i] + sharp[1].pixels[i] + sharp[2].pixels[i]) / 3.0, 1.01);
 }
 
 TEST(Renderer, everyTargetDrawsTheSamePicture) {
@@ -334,24 +252,6 @@ TEST(Renderer, oddSizesAndStridesStayInsideTheirRows) {
       else
         EXPECT_EQ(memory[static_cast<std::size_t>(y * kStride + x)], 7);
     }
-}
-
-TEST(Renderer, bayerPatternFollowsTheTint) {
-  Plates scene;
-  scene.scene->materials[0].tint = {1.0F, 0.5F, 1.0F, 1.5F};
-  Renderer renderer(scene.world(), Camera(lens(false)), Pattern::gbrg);
-  const Picture p = take(&renderer, looking_north({0, 0, 0}), Shot{.exposure = 4, .vignetting = 0});
-  const int green = p.at(100, 100);
-  EXPECT_EQ(p.at(101, 101), green);
-  EXPECT_NEAR(p.at(101, 100) / static_cast<double>(green), 1.5, 0.3);  // haze has no colour
-  EXPECT_NEAR(p.at(100, 101) / static_cast<double>(green), 0.5, 0.3);
-  EXPECT_GT(p.at(101, 100), green);
-  EXPECT_LT(p.at(100, 101), green);
-}
-
-TEST(Renderer, refusesACameraWithoutSize) {
-  Plates scene;
-  EXPECT_THROW(Renderer(scene.world(), Camera(Intrinsics{})), std::invalid_argument);
 }
 
 }  // namespace

@@ -25,13 +25,5 @@ TEST(Clock, ofAMomentTheTrialCountsThatWasNotHeldUp) {
   EXPECT_GT(trial, 2);
 }
 
-TEST(Clock, aMomentIsNow) {
-  const HostStamp before = monotonic_now();
-  const HostMoment moment = moment_now();
-  EXPECT_GE(moment.host, before);
-  EXPECT_LE(moment.host, monotonic_now());
-  EXPECT_LT(std::abs(moment.day.ns() - clock_ns(CLOCK_REALTIME)), 1'000'000'000);
-}
-
 }  // namespace
 }  // namespace vergence
