@@ -63,7 +63,7 @@ void read_text(std::span<const std::uint32_t> rom, const std::optional<Entry>& l
   constexpr std::size_t kBefore = 2;  // quadlets: character set and language
   if (!leaf || target(*leaf) >= rom.size()) return;
   const std::size_t header = target(*leaf), quadlets = rom[header] >> 16U;
-  if (quadlets <= kBefore || quadlets > rom.size() - header - 1) return;
+  if (quadlets > rom.size() - header - 1) return;
   std::size_t n = 0;
   for (std::size_t i = kBefore; i < quadlets; ++i) {
     for (unsigned shift = 32; shift != 0;) {

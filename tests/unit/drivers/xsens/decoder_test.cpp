@@ -116,7 +116,9 @@ TEST(SampleCounter, wrapsAndBridgesGapsByTheTimeBetween) {
   EXPECT_EQ(c.next(20, 65'546), ClockStep::forward)
       << "nine minutes of silence at 120 Hz: a whole turn";
   EXPECT_EQ(c.count(), 65'546 + 65'546);
-  EXPECT_EQ(c.next(20, 1), ClockStep::backward);
+  EXPECT_EQ(c.next(30, 65'540), ClockStep::forward) << "a turn and six more than the time says";
+  EXPECT_EQ(c.count(), 65'546 + 2 * 65'546);
+  EXPECT_EQ(c.next(30, 1), ClockStep::backward);
   EXPECT_EQ(c.next(30'000, 5), ClockStep::restart) << "restarted";
 }
 
