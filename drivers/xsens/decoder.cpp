@@ -275,7 +275,7 @@ Receiver receiver_of(const GnssPvt& p, HostStamp received) noexcept {
   r.received = received;
   r.fix = (p.flags & 1U) != 0 ? p.fix : std::uint8_t{0};
   r.satellites = p.satellites;
-  if (p.dop_1e2[1] != kNoDop) r.position_dop = 0.01F * static_cast<float>(p.dop_1e2[1]);
+  if (p.position_dop_1e2 != kNoDop) r.position_dop = 0.01F * static_cast<float>(p.position_dop_1e2);
   // The receiver's horizontal accuracy is of the plane, both axes together.
   r.position_sigma = metres(p.horizontal_accuracy_mm) / std::numbers::sqrt2;
   r.height_sigma = metres(p.vertical_accuracy_mm);

@@ -58,8 +58,6 @@ inline constexpr std::uint32_t kStatusSelfTest = 1U << 0U;
 inline constexpr std::uint32_t kStatusFilterValid = 1U << 1U;
 inline constexpr std::uint32_t kStatusGnssFix = 1U << 2U;
 inline constexpr std::uint32_t kStatusClockSynced = 1U << 6U;
-inline constexpr std::uint32_t kStatusClipping = 1U << 19U;
-inline constexpr std::uint32_t kStatusSyncInMarker = 1U << 21U;
 inline constexpr std::uint32_t kStatusSyncOutMarker = 1U << 22U;
 /// Filter mode of a status word: 0 without GNSS, 1 coasting (less than a minute without), 3 with
 /// GNSS.
@@ -90,54 +88,23 @@ class PacketReader {
   std::span<const std::uint8_t> rest_;
 };
 
-/// GNSS position, velocity and time (7010), raw integers as the receiver gives them.
+/// Of GNSS position, velocity and time (7010) what tells how good the fix is.
 struct GnssPvt {
-  std::uint32_t itow_ms = 0;  // GPS time of week, not UTC
-  std::uint16_t year = 0;
-  std::uint8_t month = 0, day = 0, hour = 0, minute = 0, second = 0;  // UTC
-  std::uint8_t valid = 0;  // 1 date, 2 time, 4 fully resolved; others are set too: mask
-  std::uint32_t time_accuracy_ns = 0;
-  std::int32_t nanosecond = 0;  // signed, added to the second
   std::uint8_t fix =
       0;  // 0 none, 1 dead reckoning, 2 2D, 3 3D, 4 GNSS and dead reckoning, 5 time only
   std::uint8_t flags = 0;  // 1 fix ok, 2 differential, 20h heading of vehicle valid
   std::uint8_t satellites = 0;
-  std::int32_t longitude_1e7_deg = 0, latitude_1e7_deg = 0;
-  std::int32_t height_ellipsoid_mm = 0, height_msl_mm = 0;
   std::uint32_t horizontal_accuracy_mm = 0, vertical_accuracy_mm = 0;  // FFFFFFFF without fix
-  std::int32_t velocity_north_mm_s = 0, velocity_east_mm_s = 0, velocity_down_mm_s = 0,
-               ground_speed_mm_s = 0;
-  std::int32_t heading_of_motion_1e5_deg = 0;
-  std::uint32_t speed_accuracy_mm_s = 0, heading_accuracy_1e5_deg = 0;
-  std::int32_t heading_of_vehicle_1e5_deg = 0;
-  std::array<std::uint16_t, 7> dop_1e2{};  // geometric, position, time, vertical, horizontal,
-                                           // northing, easting; 9999 without fix
+  std::uint32_t speed_accuracy_mm_s = 0;
+  std::uint16_t position_dop_1e2 = 0;  // 9999 without fix
 };
 
-/// One satellite of the satellite list (7020).
-struct Satellite {
-  std::uint8_t gnss = 0, id = 0, signal_dbhz = 0, flags = 0;
-};
-
-/// The satellite list; items point into the payload.
-struct SatelliteInfo {
-  std::uint32_t itow_ms = 0;
-  std::uint8_t count = 0;
-  std::span<const std::uint8_t> items{};  // 4 bytes each
-
-  /// Precondition: i < count.
-  [[nodiscard]] Satellite satellite(std::size_t i) const noexcept {
-    return {items[4 * i], items[4 * i + 1], items[4 * i + 2], items[4 * i + 3]};
-  }
-};
-
-/// A message's fields; absent: the message had no such packet. Units as in the names; vectors are
-/// in sensor axes unless said.
+/// Of a message's fields those that an INS sample is made of; absent: the message had no such
+/// packet, or one of a size or with a number that the field cannot have. Units as in the names.
 struct Mtdata2 {
   std::optional<std::uint16_t> packet_counter;  // steps by one with every message, of any content
   std::optional<std::uint32_t>
       sample_time_fine;  // 0.1 ms; wraps at 864 000 000 (one day) or 2³², by generation
-  std::optional<std::uint32_t> sample_time_coarse_s;
   std::optional<Utc> utc;
   std::optional<std::uint8_t> status_byte;
   std::optional<std::uint32_t> status_word;
@@ -145,29 +112,12 @@ struct Mtdata2 {
   std::optional<std::array<double, 9>> rotation_matrix;  // row by row, sensor → local frame
   std::optional<Three> euler_deg;                        // roll, pitch, yaw
   LocalFrame orientation_frame = LocalFrame::enu;
-  std::optional<Three> acceleration;       // m/s²
-  std::optional<Three> free_acceleration;  // m/s², local frame, gravity removed
-  std::optional<Three> delta_v;            // m/s over the sample
-  std::optional<Three> rate_of_turn;       // rad/s
-  std::optional<std::array<double, 4>> delta_q;
-  std::optional<Three> magnetic_field;  // 1: the field of the sensor's calibration
   std::optional<std::array<double, 2>> latitude_longitude_deg;
-  NumberFormat position_format =
-      NumberFormat::float64;  // of latitude and longitude: float32 steps by 0.4 m and more
   std::optional<double> altitude_ellipsoid_m;
-  std::optional<double> altitude_msl_m;
-  std::optional<Three> position_ecef_m;
   std::optional<Three> velocity;  // m/s, in velocity_frame
   LocalFrame velocity_frame = LocalFrame::enu;
-  std::optional<double> temperature_c;
-  std::optional<std::uint32_t> pressure_pa;
   std::optional<GnssPvt> gnss_pvt;
-  std::optional<SatelliteInfo> satellites;
-
-  std::uint32_t packets = 0;
-  std::uint32_t unknown_packets = 0;  // skipped by their size
-  std::uint32_t refused_packets =
-      0;  // known, but of a size the field cannot have, or a number that is not finite
+  bool satellites = false;  // there was a list of satellites (7020)
 };
 
 /// Puts packets one behind the other into a payload.

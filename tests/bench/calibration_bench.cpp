@@ -1,8 +1,6 @@
 // Calibration from nothing but the baseline's length: error of the transform found and its sigmas.
 //
 //   mock [--starts N] [--first K] [--from SECONDS] [--frames N]   a rendered rig, many places
-//   knock                               that rig knocked at frame 60
-//   euroc, kitti                        recorded excerpts, as they are
 //   drives [--only NAME]                every recorded drive: calibration given, wrong, found
 //   focal [--only NAME]                 focal lengths that are off: told or not
 //   stretches [--only NAME]             how far disjoint stretches of a drive agree
@@ -11,32 +9,25 @@
 //   learning --only mock [--frames N]   the same on the mock's streets, against the truth
 //
 // All take --set KEY=VALUE. One line a calibration, then the largest errors and their root means.
-// `--verbose`: every event and the poses' status.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
-#include <opencv2/core.hpp>
 
 #include "app/config/configuration.hpp"
-#include "app/datasets/image_file.hpp"
-#include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/thread_runner.hpp"
-#include "core/calibration/health.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "tests/bench/calibration_drives.hpp"
 #include "tests/bench/calibration_learning.hpp"
 #include "tests/support/rendered_drive.hpp"
-#include "tests/support/shared_data.hpp"
 
 namespace {
 
@@ -46,7 +37,6 @@ struct Arguments {
   std::string what, only;
   int starts = 20, first = 0, frames = 400;
   double from = -1;
-  bool verbose = false;
   bool wrong_intrinsics = false;
   std::vector<std::string> set;
 };
@@ -56,7 +46,6 @@ struct Found {
   RigCalibration rig;
   int at_frame = 0;
   double solve_ms = 0;
-  double slowest_ms = 0;  // frame while calibrating
 };
 
 using FrameSource = std::function<const RigFrame*(int)>;
@@ -85,7 +74,7 @@ Found calibrate(const Arguments& a, const RigCalibration& rig, const FrameSource
   Found f;
   const auto note = [&](int i) {
     for (const CalibrationDecision& d : estimator.calibrations()) {
-      if (a.verbose || !d.accepted)
+      if (!d.accepted)
         fmt::print(
             "       decision {} {} frames {} rms {:.3f} px held out {:.2f} -> {:.2f} px solve "
             "{:.0f} ms\n",
@@ -100,16 +89,7 @@ Found calibrate(const Arguments& a, const RigCalibration& rig, const FrameSource
   for (int i = 0; i < a.frames; ++i) {
     const RigFrame* frame = source(i);
     if (frame == nullptr) break;
-    const PoseSample s = estimator.process(*frame);
-    if (a.verbose) {
-      const Vec3& t = s.T_world_left.t;
-      fmt::print("  {:4d} {} {} {} {} inl {} st {} {:.2f} px {:.1f} ms  {:.3f} {:.3f} {:.3f}\n", i,
-                 to_string(s.state), to_string(s.status), to_string(s.reason),
-                 s.keyframe ? "K" : " ", s.inliers, s.stereo_inliers, s.reprojection_px,
-                 s.estimate_ms, t.x(), t.y(), t.z());
-      for (const EstimatorEvent& e : estimator.events())
-        fmt::print("       {} {:.3g}\n", e.why, e.value);
-    }
+    (void)estimator.process(*frame);
     note(i);
     if (f.accepted) break;
   }
@@ -199,125 +179,6 @@ int run_mock(const Arguments& a) {
   return 0;
 }
 
-struct Knock {
-  const char* name;
-  Vec3 turn_deg, shift_mm;
-  double lag = 0;  // frames that the right camera is late
-};
-
-/// A rig that knows its calibration is knocked at frame kKnockAt.
-int run_knocks(const Arguments& a) {
-  constexpr std::uint64_t kKnockAt = 60;
-  const std::array knocks = {Knock{"none", {0, 0, 0}, {0, 0, 0}},
-                             Knock{"pitch 0.2 deg", {0.2, 0, 0}, {0, 0, 0}},
-                             Knock{"pitch 0.05 deg", {0.05, 0, 0}, {0, 0, 0}},
-                             Knock{"roll 0.1 deg", {0, 0, 0.1}, {0, 0, 0}},
-                             Knock{"yaw 0.3 deg", {0, 0.3, 0}, {0, 0, 0}},
-                             Knock{"t_y 4 mm", {0, 0, 0}, {0, 4, 0}},
-                             Knock{"t_z 10 mm", {0, 0, 0}, {0, 0, 10}},
-                             Knock{"pitch 2 deg", {2, 0, 0}, {0, 0, 0}}};
-  for (std::size_t index = static_cast<std::size_t>(a.first);
-       index < knocks.size() && static_cast<int>(index) < a.first + a.starts; ++index) {
-    const Knock& knock = knocks[index];
-    test::RenderedDriveOptions o;
-    o.from_s = a.from >= 0 ? a.from : 20;
-    const Transform before = o.rig.T_camera_left[1];
-    Transform after{exp_so3(knock.turn_deg * std::numbers::pi / 180) * before.R,
-                    before.t + 1e-3 * knock.shift_mm};
-    after.t *= before.t.norm() / after.t.norm();
-    o.placed = [&](int, std::uint64_t i) { return i < kKnockAt ? before : after; };
-    test::RenderedDrive rendered(o);
-
-    const app::Configuration configuration = app::load_configuration(std::nullopt, a.set);
-    EstimatorOptions options;
-    options.odometry = configuration.odometry;
-    options.calibration = configuration.calibration;
-    options.monitor = configuration.monitor;
-    Arena arena(Estimator::memory_needed(options, o.rig));
-    app::ThreadRunner two;
-    ImmediateRunner solver;
-    Estimator estimator(options, o.rig, nominal_of(o.rig), arena, two, solver);
-    int noticed = -1, mended = -1, lost = 0, wrong_ok = 0;
-    Transform T_enu_world{};
-    double drift = 0;
-    fmt::print("{}\n", knock.name);
-    for (int i = 0; i < a.frames; ++i) {
-      const auto n = static_cast<std::uint64_t>(i);
-      const PoseSample s = estimator.process(rendered.frame(n));
-      if (i == 0) T_enu_world = rendered.T_enu_left(0);
-      const Transform truth = T_enu_world.inverse() * rendered.T_enu_left(n);
-      drift = (s.T_world_left.t - truth.t).norm();
-      if (s.status == PoseStatus::lost) ++lost;
-      if (a.verbose)
-        fmt::print("  {:4d} {} {} {} inl {} st {} {:.2f} px {:.1f} ms  off {:.3f} m {:.2f} mrad\n",
-                   i, to_string(s.state), to_string(s.status), to_string(s.reason), s.inliers,
-                   s.stereo_inliers, s.reprojection_px, s.estimate_ms, drift,
-                   1e3 * log_so3(s.T_world_left.R * truth.R.transpose()).norm());
-      if (n >= kKnockAt && mended < 0 && s.status == PoseStatus::ok) ++wrong_ok;
-      for (const EstimatorEvent& e : estimator.events()) {
-        fmt::print("    frame {}: {} {:.3g}\n", i, e.why, e.value);
-        if (e.kind == EstimatorEvent::Kind::rig_changed && noticed < 0) noticed = i;
-      }
-      for (const CalibrationDecision& d : estimator.calibrations()) {
-        fmt::print("    decision {} frames {} held out {:.2f} -> {:.2f} px\n", d.reason,
-                   d.calibration.frames, d.held_out_before_px, d.held_out_after_px);
-        if (d.accepted) {
-          if (mended < 0 && n >= kKnockAt) mended = i;
-          Found f{true, d.calibration, i, d.solve_ms, 0};
-          print("    found", f, errors_of(d.calibration, after));
-        }
-      }
-    }
-    fmt::print(
-        "  noticed after {} frames, mended {} frames later, {} lost, {} ok between, {:.3f} m off "
-        "at the end\n",
-        noticed < 0 ? -1 : noticed - static_cast<int>(kKnockAt), mended < 0 ? -1 : mended - noticed,
-        lost, wrong_ok, drift);
-    std::fflush(stdout);
-  }
-  return 0;
-}
-
-int run_recorded(const Arguments& a) {
-  const bool euroc = a.what == "euroc";
-  const auto folder = test::shared_data(euroc ? "data/euroc_mh01" : "data/kitti06_51");
-  if (!folder) {
-    fmt::print(stderr,
-               "calibration_bench: no recorded excerpts; set VERGENCE_SHARED to the folder that "
-               "holds data/\n");
-    return 2;
-  }
-  const app::StereoSequence sequence =
-      app::open_sequence(euroc ? app::SequenceFormat::euroc : app::SequenceFormat::kitti, *folder);
-  RigFrame frame;
-  std::array<cv::Mat, 2> images;
-  const Found f = calibrate(a, sequence.calibration, [&](int i) -> const RigFrame* {
-    if (i >= static_cast<int>(sequence.pairs.size())) return nullptr;
-    const app::StereoPair& pair = sequence.pairs[static_cast<std::size_t>(i)];
-    frame.number = static_cast<std::uint64_t>(i);
-    frame.stamp = pair.stamp;
-    frame.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const Intrinsics& c = sequence.calibration.intrinsics[k];
-      images[k].create(c.height, (c.width + 63) / 64 * 64, CV_8U);
-      std::vector<std::uint8_t> bytes;
-      if (app::read_image_file(sequence.root / pair.file[k], &bytes) != app::ImageFileStatus::ok ||
-          app::decode_grey(bytes, {c.width, c.height}, images[k].data, images[k].step) !=
-              app::ImageFileStatus::ok)
-        return nullptr;
-      frame.images[k] = {images[k].data, c.width, c.height,
-                         static_cast<std::ptrdiff_t>(images[k].step)};
-    }
-    return &frame;
-  });
-  print(a.what, f, errors_of(f.rig, sequence.calibration.T_camera_left[1]));
-  const Vec3 turn = log_so3(f.rig.T_camera_left[1].R) * 180 / std::numbers::pi;
-  fmt::print("rotation vector {:.4f} {:.4f} {:.4f} deg, t {:.5f} {:.5f} {:.5f} m\n", turn.x(),
-             turn.y(), turn.z(), f.rig.T_camera_left[1].t.x(), f.rig.T_camera_left[1].t.y(),
-             f.rig.T_camera_left[1].t.z());
-  return 0;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -337,8 +198,6 @@ int main(int argc, char** argv) {
       a.set.push_back(next());
     else if (word == "--only")
       a.only = next();
-    else if (word == "--verbose")
-      a.verbose = true;
     else if (word == "--wrong-intrinsics")
       a.wrong_intrinsics = true;
     else
@@ -346,21 +205,17 @@ int main(int argc, char** argv) {
   }
   try {
     if (a.what == "mock") return run_mock(a);
-    if (a.what == "knock") return run_knocks(a);
     if (a.what == "drives") return bench::run_drives(a.set, a.only);
     if (a.what == "learning" && a.only == "mock") return bench::run_mock_learning(a.set, a.frames);
     if (a.what == "learning") return bench::run_learning(a.set, a.starts);
     if (a.what == "focal") return bench::run_focal_lengths(a.set, a.only);
     if (a.what == "jumps") return bench::run_jumps(a.set, a.only);
     if (a.what == "stretches") return bench::run_stretches(a.set, a.only);
-    if (a.what == "euroc" || a.what == "kitti") return run_recorded(a);
   } catch (const std::exception& e) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
     return 2;
   }
   fmt::print(stderr,
-             "calibration_bench: drives, focal, stretches, jumps, learning, mock, knock, euroc or "
-             "kitti is "
-             "wanted\n");
+             "calibration_bench: drives, focal, stretches, jumps, learning or mock is wanted\n");
   return 2;
 }

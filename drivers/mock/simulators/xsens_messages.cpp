@@ -250,29 +250,16 @@ bool XsensMessages::fix_requested() const noexcept {
 XsensMessages::Message XsensMessages::fix() {
   const Sample& then = history_.front();
   const InsSample& s = then.sample;
-  const Utc utc = utc_of_unix_ns(options_.unix_ns_at_power_on + then.device_ns, 7);
   GnssPvt p;
-  p.itow_ms = static_cast<std::uint32_t>(then.device_ns / 1'000'000);
-  p.year = utc.year, p.month = utc.month, p.day = utc.day, p.hour = utc.hour, p.minute = utc.minute,
-  p.second = utc.second;
-  p.nanosecond = static_cast<std::int32_t>(utc.nanosecond);
-  p.valid = 0x37;  // bits beyond the documented ones are set, too
   p.fix = s.fix == FixStatus::fix_3d ? 3 : s.fix == FixStatus::fix_2d ? 2 : 0;
   p.flags = p.fix > 1 ? 1 : 0;
   p.satellites = p.fix > 1 ? 11 : 0;
-  p.longitude_1e7_deg = rounded(s.position.longitude_deg * 1e7);
-  p.latitude_1e7_deg = rounded(s.position.latitude_deg * 1e7);
-  p.height_ellipsoid_mm = rounded(s.position.height_m * 1e3);
-  p.height_msl_mm = p.height_ellipsoid_mm - 38'000;
   const auto accuracy = [&p](double sigma) {
     return p.fix > 1 ? static_cast<std::uint32_t>(rounded(sigma * 1e3)) : 0xFFFFFFFFU;
   };
   p.horizontal_accuracy_mm = accuracy(s.position_sigma * std::sqrt(2.0));
   p.vertical_accuracy_mm = accuracy(s.height_sigma);
   p.speed_accuracy_mm_s = accuracy(s.velocity_sigma);
-  p.velocity_east_mm_s = rounded(s.velocity_enu[0] * 1e3);
-  p.velocity_north_mm_s = rounded(s.velocity_enu[1] * 1e3);
-  p.velocity_down_mm_s = rounded(-s.velocity_enu[2] * 1e3);
   std::array<std::uint8_t, kMaxPayload> buffer{};
   PacketWriter packets(buffer);
   packets.put_pvt(p);  // in these messages the data stands before the stamps
