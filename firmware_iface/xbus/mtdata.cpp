@@ -1,12 +1,13 @@
 #include "firmware_iface/xbus/mtdata.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace vergence::xbus {
 namespace {
 
 constexpr std::size_t kRawSize = 20;
-constexpr std::size_t kFixSize = 44;
+constexpr std::size_t kBeforeAccuracies = 31;  // air pressure, time, position and velocity of a fix
 constexpr std::uint16_t kModesKnown = kModeTemperature | kModeCalibrated | kModeOrientation |
                                       kModeAuxiliary | kModePosition | kModeVelocity | kModeStatus |
                                       kModeGnss | kModeRaw;
@@ -15,29 +16,28 @@ constexpr std::uint32_t kPlaceBits = 0x7U << 14U;  // 0: latitude, longitude, al
 constexpr std::uint32_t kSpeedBits = 0x3U << 17U;  // 0: m/s along x, y, z
 
 /// Walks a payload in the layout's order; reading and writing differ only in what happens to a
-/// field. `Fields` has raw(), fix(), numbers(span of doubles by optional), u8(), u16(), utc(): each
-/// takes the optional it belongs to.
+/// field. `Fields` has fix(), numbers(span of doubles by optional), u8(), u16(), utc(): each takes
+/// the optional it belongs to; skip() takes the bytes of what no INS sample is made of.
 template <class Data, class Fields>
 void walk(const MtdataLayout& layout, Data& d, Fields& fields) noexcept {
   const std::uint16_t m = layout.mode;
   const std::uint32_t s = layout.settings;
-  if ((m & kModeRaw) != 0) fields.raw(d.raw);
+  if ((m & kModeRaw) != 0) fields.skip(kRawSize);
   if ((m & kModeGnss) != 0) fields.fix(d.fix);
-  if ((m & kModeTemperature) != 0) fields.number(d.temperature_c);
-  if ((m & kModeCalibrated) != 0) {
-    if ((s & kSettingsNoAcceleration) == 0) fields.numbers(d.acceleration);
-    if ((s & kSettingsNoRateOfTurn) == 0) fields.numbers(d.rate_of_turn);
-    if ((s & kSettingsNoMagneticField) == 0) fields.numbers(d.magnetic_field);
-  }
+  const std::size_t number_size = size_of(layout.format());
+  if ((m & kModeTemperature) != 0) fields.skip(number_size);
+  if ((m & kModeCalibrated) != 0)
+    for (const std::uint32_t left_out :
+         {kSettingsNoAcceleration, kSettingsNoRateOfTurn, kSettingsNoMagneticField})
+      if ((s & left_out) == 0) fields.skip(3 * number_size);
   if ((m & kModeOrientation) != 0) {
     if ((s & kOrientationBits) == kSettingsQuaternion) fields.numbers(d.quaternion);
     if ((s & kOrientationBits) == kSettingsEuler) fields.numbers(d.euler_deg);
     if ((s & kOrientationBits) == kSettingsMatrix) fields.numbers(d.rotation_matrix);
   }
-  if ((m & kModeAuxiliary) != 0) {
-    if ((s & kSettingsNoAnalogue1) == 0) fields.u16(d.analogue_1);
-    if ((s & kSettingsNoAnalogue2) == 0) fields.u16(d.analogue_2);
-  }
+  if ((m & kModeAuxiliary) != 0)
+    for (const std::uint32_t left_out : {kSettingsNoAnalogue1, kSettingsNoAnalogue2})
+      if ((s & left_out) == 0) fields.skip(2);
   if ((m & kModePosition) != 0) {
     fields.numbers(d.latitude_longitude_deg);
     fields.number(d.altitude_m);
@@ -52,8 +52,8 @@ void walk(const MtdataLayout& layout, Data& d, Fields& fields) noexcept {
 struct Sizes {
   std::size_t number_size;
   std::size_t total = 0;
-  void raw(const std::optional<RawInertial>& /*field*/) noexcept { total += kRawSize; }
-  void fix(const std::optional<LegacyFix>& /*field*/) noexcept { total += kFixSize; }
+  void skip(std::size_t bytes) noexcept { total += bytes; }
+  void fix(const std::optional<LegacyFix>& /*field*/) noexcept { total += kBeforeAccuracies + 13; }
   void number(const std::optional<double>& /*field*/) noexcept { total += number_size; }
   template <std::size_t N>
   void numbers(const std::optional<std::array<double, N>>& /*field*/) noexcept {
@@ -77,30 +77,15 @@ struct Reader {
   }
   std::uint16_t next_u16() noexcept { return read_u16(take(2)); }
   std::uint32_t next_u32() noexcept { return read_u32(take(4)); }
-  std::int32_t next_i32() noexcept { return read_i32(take(4)); }
   double next_number() noexcept {
     const double value = read_number(take(size_of(format)), format);
     finite = finite && std::isfinite(value);
     return value;
   }
-  void raw(std::optional<RawInertial>& field) noexcept {
-    RawInertial r;
-    for (auto* axes : {&r.acceleration, &r.rate_of_turn, &r.magnetic_field})
-      for (std::uint16_t& count : *axes) count = next_u16();
-    r.temperature = next_u16();
-    field = r;
-  }
+  void skip(std::size_t bytes) noexcept { (void)take(bytes); }
   void fix(std::optional<LegacyFix>& field) noexcept {
+    skip(kBeforeAccuracies);
     LegacyFix f;
-    f.pressure_2pa = next_u16();
-    f.pressure_age = take(1)[0];
-    f.itow_ms = next_u32();
-    f.latitude_1e7_deg = next_i32();
-    f.longitude_1e7_deg = next_i32();
-    f.height_mm = next_i32();
-    f.velocity_north_cm_s = next_i32();
-    f.velocity_east_cm_s = next_i32();
-    f.velocity_down_cm_s = next_i32();
     f.horizontal_accuracy_mm = next_u32();
     f.vertical_accuracy_mm = next_u32();
     f.speed_accuracy_cm_s = next_u32();
@@ -129,21 +114,13 @@ struct Writer {
     rest = rest.subspan(n);
     return bytes;
   }
-  void put_i32(std::int32_t v) noexcept { write_u32(room(4), static_cast<std::uint32_t>(v)); }
-  void raw(const std::optional<RawInertial>& field) noexcept {
-    const RawInertial r = field.value_or(RawInertial{});
-    for (const auto* axes : {&r.acceleration, &r.rate_of_turn, &r.magnetic_field})
-      for (const std::uint16_t count : *axes) write_u16(room(2), count);
-    write_u16(room(2), r.temperature);
+  void skip(std::size_t bytes) noexcept {
+    const auto zeros = room(bytes);
+    std::fill(zeros.begin(), zeros.end(), std::uint8_t{0});
   }
   void fix(const std::optional<LegacyFix>& field) noexcept {
     const LegacyFix f = field.value_or(LegacyFix{});
-    write_u16(room(2), f.pressure_2pa);
-    room(1)[0] = f.pressure_age;
-    write_u32(room(4), f.itow_ms);
-    for (const std::int32_t v : {f.latitude_1e7_deg, f.longitude_1e7_deg, f.height_mm,
-                                 f.velocity_north_cm_s, f.velocity_east_cm_s, f.velocity_down_cm_s})
-      put_i32(v);
+    skip(kBeforeAccuracies);
     for (const std::uint32_t v :
          {f.horizontal_accuracy_mm, f.vertical_accuracy_mm, f.speed_accuracy_cm_s})
       write_u32(room(4), v);

@@ -56,37 +56,20 @@ struct MtdataLayout {
   [[nodiscard]] std::optional<std::size_t> payload_size() const noexcept;
 };
 
-/// The receiver's fix as the MTi-G repeats it in every sample: a new one has come when `age` is
-/// less than in the sample before.
+/// Of the receiver's fix, as the MTi-G repeats it in every sample, how good it is: a new one has
+/// come when `age` is less than in the sample before.
 struct LegacyFix {
-  std::uint16_t pressure_2pa = 0;  // counts of 2 Pa
-  std::uint8_t pressure_age = 0;   // samples
-  std::uint32_t itow_ms = 0;       // GPS time of week, not UTC
-  std::int32_t latitude_1e7_deg = 0, longitude_1e7_deg = 0;
-  std::int32_t height_mm = 0;  // sources disagree: above the ellipsoid, or above the sea
-  std::int32_t velocity_north_cm_s = 0, velocity_east_cm_s = 0, velocity_down_cm_s = 0;
   std::uint32_t horizontal_accuracy_mm = 0, vertical_accuracy_mm = 0, speed_accuracy_cm_s = 0;
   std::uint8_t age = 0;  // of the fix, samples
 };
 
-/// Raw counts of the sensors.
-struct RawInertial {
-  std::array<std::uint16_t, 3> acceleration{}, rate_of_turn{}, magnetic_field{};
-  std::uint16_t temperature = 0;
-};
-
-/// A message's fields; absent: not in the layout. Units as in Mtdata2.
+/// Of a message's fields those that an INS sample is made of; absent: not in the layout. Units as
+/// in Mtdata2.
 struct Mtdata {
-  std::optional<RawInertial> raw;
   std::optional<LegacyFix> fix;
-  std::optional<double> temperature_c;
-  std::optional<Three> acceleration;                     // m/s²
-  std::optional<Three> rate_of_turn;                     // rad/s
-  std::optional<Three> magnetic_field;                   // 1: the field of the sensor's calibration
   std::optional<std::array<double, 4>> quaternion;       // w x y z, sensor → frame
   std::optional<Three> euler_deg;                        // roll, pitch, yaw
   std::optional<std::array<double, 9>> rotation_matrix;  // row by row
-  std::optional<std::uint16_t> analogue_1, analogue_2;
   std::optional<std::array<double, 2>>
       latitude_longitude_deg;          // as float32 it steps by 0.2 m and more
   std::optional<double> altitude_m;    // above the ellipsoid
@@ -109,8 +92,8 @@ enum class MtdataStatus : std::uint8_t {
 [[nodiscard]] MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload,
                                          const MtdataLayout& layout, Mtdata* out) noexcept;
 
-/// Writes the layout's fields, absent ones as zeros. Returns the bytes written; 0: the layout is
-/// unknown, or there is no room.
+/// Writes the layout's fields, absent ones and those that Mtdata has not as zeros. Returns the
+/// bytes written; 0: the layout is unknown, or there is no room.
 [[nodiscard]] std::size_t encode_mtdata(const Mtdata& data, const MtdataLayout& layout,
                                         std::span<std::uint8_t> out) noexcept;
 

@@ -128,9 +128,6 @@ XsensMessages::Message XsensMessages::legacy(const Sample& now) {
   const LocalFrame frame = settings_.layout().frame();
   const InsSample& s = now.sample;
   const Matrix R = attitude_in(frame, s);
-  d.raw = RawInertial{};
-  d.temperature_c = 31.5;
-  d.acceleration = gravity_in_body(s);
   d.quaternion = quaternion_of(R);
   d.euler_deg = euler_deg_of(R);
   d.rotation_matrix = flat(R);
@@ -144,16 +141,7 @@ XsensMessages::Message XsensMessages::legacy(const Sample& now) {
                                            : static_cast<std::uint8_t>(std::min(255, fix_age_ + 1));
   if (now.device_ns >= next_fix_ns_) next_fix_ns_ += options_.fix_interval.ns();
   LegacyFix f;
-  constexpr double kSeaLevel = 101325;
-  f.pressure_2pa = static_cast<std::uint16_t>(kSeaLevel / 2);
-  f.itow_ms = static_cast<std::uint32_t>(now.device_ns / 1'000'000);
   const InsSample& then = history_.empty() ? s : history_.front().sample;
-  f.latitude_1e7_deg = rounded(then.position.latitude_deg * 1e7);
-  f.longitude_1e7_deg = rounded(then.position.longitude_deg * 1e7);
-  f.height_mm = rounded(then.position.height_m * 1e3);
-  f.velocity_north_cm_s = rounded(then.velocity_enu[1] * 1e2);
-  f.velocity_east_cm_s = rounded(then.velocity_enu[0] * 1e2);
-  f.velocity_down_cm_s = rounded(-then.velocity_enu[2] * 1e2);
   f.horizontal_accuracy_mm =
       static_cast<std::uint32_t>(rounded(then.position_sigma * std::sqrt(2.0) * 1e3));
   f.vertical_accuracy_mm = static_cast<std::uint32_t>(rounded(then.height_sigma * 1e3));
