@@ -24,8 +24,8 @@ struct LineRead {
                          // gone: when that was noticed
 };
 
-/// An open line to a device that sends and takes bytes: a serial port, a plain tty, a pipe in the
-/// process, a simulator.
+/// An open line to a device that sends and takes bytes: a serial port, a plain tty or a
+/// simulator.
 ///
 /// Ownership  One owner, who closes it by destruction; closing does not wait for bytes that a dead
 ///            device will never take.
@@ -67,7 +67,7 @@ class LinePlace {
   /// Null: *status says why. → ok, not_found, no_permission, busy, unsupported, failed
   [[nodiscard]] virtual std::unique_ptr<ByteLine> open(const LineSettings& settings,
                                                        DeviceStatus* status) = 0;
-  /// For sentences: `/dev/ttyUSB0`, `pipe`, …
+  /// For sentences: `/dev/ttyUSB0`, …
   [[nodiscard]] virtual std::string name() const = 0;
   /// How long a chip between device and host may hold bytes back (latency timer of a USB
   /// converter); 0: it does not, or is not known.

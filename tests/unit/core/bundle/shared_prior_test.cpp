@@ -255,14 +255,5 @@ TEST(BundleSharedPrior, numbersThatAreNoneDoNoHarm) {
   }
 }
 
-TEST(BundleSharedPrior, aWeightThatIsNotAboveZeroIsRefused) {
-  for (const double weight : {0.0, -1.0, kNan, std::numeric_limits<double>::infinity()}) {
-    BundleOptions o = calibration_options();
-    o.shared_prior.weight = weight;
-    EXPECT_NE(std::string(o.validate()).find("shared_prior"), std::string::npos) << weight;
-  }
-  EXPECT_STREQ(calibration_options().validate(), "");
-}
-
 }  // namespace
 }  // namespace vergence

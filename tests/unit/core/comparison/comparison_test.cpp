@@ -190,24 +190,6 @@ TEST(Comparison, gapsAreFlaggedAndNotBridged) {
   EXPECT_EQ(gaps, 10);
 }
 
-TEST(Comparison, noFixPausesIt) {
-  Bench b;
-  b.drive(0, 30, [](double t, InsSample* s) {
-    if (t > 20 && t < 25) s->fix = FixStatus::none;
-    return true;
-  });
-  for (const ComparedPose& c : b.out) {
-    const double t = (c.pose.stamp - at(0)).to_seconds();
-    if (t > 20.01 && t < 24.99) {
-      EXPECT_EQ(c.ins, InsMatch::no_fix) << t;
-    }
-    if (t > 25.01 && t < 29.9) {
-      EXPECT_TRUE(c.compared) << t;
-      EXPECT_LT(c.error_enu.norm(), 1e-3);
-    }
-  }
-}
-
 TEST(Comparison, anInsThatStartsLateOrStopsLeavesThePosesGoing) {
   Bench b;
   b.drive(0, 60, [](double t, InsSample*) { return t > 20 && t < 40; });

@@ -22,15 +22,6 @@ constexpr int kWidth = 333, kHeight = 247;
 
 SequentialRunner in_order;
 
-/// The other half first: what a second thread may do.
-class BackwardRunner final : public PairRunner {
- public:
-  void run(TaskRef here, TaskRef there) noexcept override {
-    there();
-    here();
-  }
-};
-
 struct Found {
   std::vector<Corner> storage;
   BoundedVector<Corner> corners;
@@ -165,26 +156,6 @@ TEST(Corners, thereAreNoneOnFlatGroundOrAnEdge) {
   EXPECT_EQ(Found(edge.view(), {}).corners.size(), 0U);
 }
 
-TEST(Corners, areTheSameAgainOnEveryTargetWhateverThePaddingAndTheRunner) {
-  const Image image = white_noise(kWidth, kHeight, 4),
-              padded = white_noise(kWidth, kHeight, 4, 41, 200);
-  BackwardRunner backward;
-  const Found first(image.view(), {});
-  ASSERT_GT(first.corners.size(), 20U);
-  test::on_every_target([&](const char* target) {
-    for (const auto& [from, runner] : {std::pair<const Image*, PairRunner*>(&image, &in_order),
-                                       {&padded, &in_order},
-                                       {&image, &backward}}) {
-      const Found again(from->view(), {}, {}, 1000, *runner);
-      ASSERT_EQ(again.corners.size(), first.corners.size()) << target;
-      for (std::size_t i = 0; i < first.corners.size(); ++i) {
-        EXPECT_EQ(again.corners[i].x, first.corners[i].x) << target;
-        EXPECT_EQ(again.corners[i].y, first.corners[i].y) << target;
-      }
-    }
-  });
-}
-
 TEST(Corners, readNoByteOutsideTheImage) {
   for (const auto guard : {test::GuardedImage::Guard::before, test::GuardedImage::Guard::behind})
     for (const int border : {0, 5, 16}) {
@@ -194,19 +165,6 @@ TEST(Corners, readNoByteOutsideTheImage) {
       test::on_every_target(
           [&](const char*) { EXPECT_GT(Found(image.view(), options).corners.size(), 0U); });
     }
-}
-
-TEST(Corners, allocateNothing) {
-  const Image image = textured();
-  std::vector<Corner> storage(500);
-  BoundedVector<Corner> out(storage);
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
-  {
-    const SealedScope sealed;
-    find_corners(image.view(), {}, {}, in_order, &out);
-  }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
-  EXPECT_GT(out.size(), 0U);
 }
 
 }  // namespace

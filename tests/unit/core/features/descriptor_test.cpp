@@ -57,25 +57,5 @@ TEST(Descriptor, thePlaceSeenAgainIsNearerThanAnyOther) {
   }
 }
 
-TEST(Descriptor, aPatchOfOneLevelHasOneAndNothingIsAllocated) {
-  const test::Image image = draw(kWidth, kHeight, Texture(4));
-  Arena arena(Pyramid::memory_needed(kWidth, kHeight, 1));
-  Pyramid pyramid(kWidth, kHeight, 1, arena);
-  pyramid.build(image.view());
-  Patch patch{};
-  ASSERT_TRUE(cut_patch(pyramid, {60, 60}, &patch));
-  ASSERT_EQ(patch.levels, 1);
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
-  Descriptor a, b;
-  {
-    const SealedScope sealed;
-    a = describe(patch);
-    b = describe(patch);
-  }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
-  EXPECT_EQ(distance(a, b), 0);
-  EXPECT_NE(distance(a, {}), 0);
-}
-
 }  // namespace
 }  // namespace vergence::features

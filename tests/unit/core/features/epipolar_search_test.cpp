@@ -118,18 +118,6 @@ TEST(EpipolarSearch, findsTheDepthToAPixelOfItsLevel) {
       }
 }
 
-TEST(EpipolarSearch, isTheSameOnEveryTarget) {
-  const Wall wall(Texture(9), 7.0, true, turned());
-  const SearchResult first = wall.search({250, 150}, to_two_metres());
-  ASSERT_EQ(first.status, SearchStatus::ok);
-  test::on_every_target([&](const char* target) {
-    const SearchResult r = wall.search({250, 150}, to_two_metres());
-    EXPECT_EQ(r.status, first.status) << target;
-    EXPECT_EQ(r.rho, first.rho) << target;
-    EXPECT_EQ(r.zncc, first.zncc) << target;
-  });
-}
-
 TEST(EpipolarSearch, aPatternThatRepeatsIsAmbiguous) {
   const auto fence = [](const Vec2& p) {
     return 128 + 60 * std::cos(p.x() * 2 * std::numbers::pi / 24) *
@@ -210,21 +198,6 @@ TEST(InverseDepth, isFittedToItsPixelAndTheDistanceLeftIsTheOneAcross) {
         }
       }
     }
-}
-
-TEST(EpipolarSearch, allocatesNothing) {
-  const Wall wall(Texture(3), 8.0, true, turned());
-  Patch patch{};
-  ASSERT_TRUE(cut_patch(wall.left_built.pyramid, {250, 160}, &patch));
-  const EpipolarCurve c = wall.curve({250, 160});
-  double sigma = 0;
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
-  {
-    const SealedScope sealed;
-    SearchResult r = search_along(patch, wall.right_built.pyramid, c, to_two_metres());
-    (void)fit_inverse_depth(c, r.pixel, &r.rho, &sigma);
-  }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
 }
 
 }  // namespace

@@ -215,19 +215,5 @@ TEST(Patch, atTheBorderNoByteOutsideTheImageIsRead) {
   }
 }
 
-TEST(Patch, cuttingAndAligningAllocateNothing) {
-  const Scene s(1);
-  Patch patch{};
-  AlignResult r;
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
-  {
-    const SealedScope sealed;
-    (void)cut_patch(s.built.pyramid, s.at, &patch);
-    r = align(patch, s.built.pyramid, s.at + Vec2(1, 1), Mat2::Identity(), {});
-  }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
-  EXPECT_EQ(r.status, AlignStatus::ok);
-}
-
 }  // namespace
 }  // namespace vergence::features

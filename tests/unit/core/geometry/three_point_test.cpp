@@ -149,17 +149,5 @@ TEST(ThreePoint, nothingIsNotANumberWhateverTheInput) {
   }
 }
 
-TEST(ThreePoint, allocatesNothing) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer owns malloc";
-  Random random(16);
-  const Problem p = random_problem(random);
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
-  {
-    const SealedScope sealed;
-    EXPECT_GT(solve_three_point(p.rays, p.points).count, 0);
-  }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
-}
-
 }  // namespace
 }  // namespace vergence

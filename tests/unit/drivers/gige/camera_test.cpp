@@ -150,17 +150,6 @@ TEST(GigeCamera, stampsAreTheCamerasClockInNanoseconds) {
   EXPECT_GE(b.camera->timing().least_delay, Duration::milliseconds(2));
 }
 
-TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {
-  GigeCameraOptions o;
-  o.tick_frequency = 0;
-  GigeBench b(o);
-  b.configure(b.wish());
-  EXPECT_NE(b.camera->remark().find("no clock"), std::string::npos) << b.camera->remark();
-  b.start();
-  for (const Frame& f : b.take(5))
-    EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().least_delay);
-}
-
 TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
   GigeBench b;
   CameraConfiguration c = b.wish();

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <array>
@@ -20,19 +19,10 @@ using Bytes = std::vector<std::uint8_t>;
 constexpr Duration kSoon = Duration::milliseconds(20);
 constexpr Duration kLong = Duration::seconds(5);
 
-/// A line under test and the other side of it.
-class Pair {
- public:
-  virtual ~Pair() = default;
-  virtual ByteLine& line() = 0;
-  virtual void send(const Bytes& bytes) = 0;
-  virtual Bytes received(std::size_t n) = 0;
-  virtual void hang_up() = 0;
-};
-
-class TerminalPair final : public Pair {
- public:
-  TerminalPair() : master_(::posix_openpt(O_RDWR | O_NOCTTY)) {
+/// A line under test on a pseudo-terminal, and the other side of it.
+class SerialLine : public ::testing::Test {
+ protected:
+  SerialLine() : master_(::posix_openpt(O_RDWR | O_NOCTTY)) {
     if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0)
       throw std::runtime_error("no pseudo-terminal");
     place_ = std::make_unique<SerialPort>(::ptsname(master_));
@@ -40,12 +30,12 @@ class TerminalPair final : public Pair {
     line_ = place_->open({}, &status);
     if (!line_) throw std::runtime_error("the terminal does not open");
   }
-  ~TerminalPair() override { hang_up(); }
-  ByteLine& line() override { return *line_; }
-  void send(const Bytes& bytes) override {
+  ~SerialLine() override { hang_up(); }
+  ByteLine& line() { return *line_; }
+  void send(const Bytes& bytes) {
     ASSERT_EQ(::write(master_, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
   }
-  Bytes received(std::size_t n) override {
+  Bytes received(std::size_t n) {
     Bytes all;
     std::array<std::uint8_t, 4096> some{};
     while (all.size() < n) {
@@ -55,65 +45,21 @@ class TerminalPair final : public Pair {
     }
     return all;
   }
-  void hang_up() override {
+  void hang_up() {
     if (master_ >= 0) ::close(master_);
     master_ = -1;
   }
-  SerialPort& place() { return *place_; }
 
- private:
   int master_;
   std::unique_ptr<SerialPort> place_;
   std::unique_ptr<ByteLine> line_;
 };
 
-class PipePair final : public Pair {
- public:
-  PipePair() {
-    auto ends = make_byte_pipe();
-    line_ = std::move(ends.first);
-    other_ = std::move(ends.second);
-  }
-  ByteLine& line() override { return *line_; }
-  void send(const Bytes& bytes) override {
-    ASSERT_EQ(other_->write(bytes, kLong), DeviceStatus::ok);
-  }
-  Bytes received(std::size_t n) override {
-    Bytes all(n);
-    std::size_t have = 0;
-    while (have < n) {
-      const LineRead r = other_->read(std::span(all).subspan(have), kLong);
-      if (r.status != DeviceStatus::ok) break;
-      have += r.size;
-    }
-    all.resize(have);
-    return all;
-  }
-  void hang_up() override { other_.reset(); }
-
- private:
-  std::unique_ptr<ByteLine> line_, other_;
-};
-
-enum class Kind : std::uint8_t { terminal, pipe };
-
-class EveryLine : public ::testing::TestWithParam<Kind> {
- protected:
-  EveryLine() {
-    if (GetParam() == Kind::terminal)
-      pair_ = std::make_unique<TerminalPair>();
-    else
-      pair_ = std::make_unique<PipePair>();
-  }
-  ByteLine& line() { return pair_->line(); }
-  std::unique_ptr<Pair> pair_;
-};
-
-TEST_P(EveryLine, carriesEveryByteBothWays) {
+TEST_F(SerialLine, carriesEveryByteBothWays) {
   Bytes all(256);
   for (std::size_t i = 0; i < all.size(); ++i)
     all[i] = static_cast<std::uint8_t>(i);  // XON, XOFF, CR, NUL and FF among them
-  pair_->send(all);
+  send(all);
   Bytes got;
   while (got.size() < all.size()) {
     std::array<std::uint8_t, 100> some{};
@@ -124,11 +70,11 @@ TEST_P(EveryLine, carriesEveryByteBothWays) {
   }
   EXPECT_EQ(got, all);
   ASSERT_EQ(line().write(all, kLong), DeviceStatus::ok);
-  EXPECT_EQ(pair_->received(all.size()), all);
+  EXPECT_EQ(received(all.size()), all);
 }
 
-TEST_P(EveryLine, aReadTakesWhatIsThereAndDoesNotWaitForMore) {
-  pair_->send({1, 2, 3});
+TEST_F(SerialLine, aReadTakesWhatIsThereAndDoesNotWaitForMore) {
+  send({1, 2, 3});
   std::array<std::uint8_t, 64> some{};
   const HostStamp before = line().now();
   const LineRead r = line().read(some, kLong);
@@ -136,12 +82,12 @@ TEST_P(EveryLine, aReadTakesWhatIsThereAndDoesNotWaitForMore) {
   EXPECT_LT(line().now() - before, Duration::seconds(2)) << "three bytes are enough";
 }
 
-TEST_P(EveryLine, arrivalIsNeverBeforeTheBytesWereSent) {
+TEST_F(SerialLine, arrivalIsNeverBeforeTheBytesWereSent) {
   std::array<std::uint8_t, 64> some{};
   HostStamp before = line().now();
   for (int i = 0; i < 50; ++i) {
     const HostStamp sent = line().now();
-    pair_->send({9});
+    send({9});
     const LineRead r = line().read(some, kLong);
     ASSERT_EQ(r.status, DeviceStatus::ok);
     EXPECT_GE(r.arrival, sent);
@@ -151,7 +97,7 @@ TEST_P(EveryLine, arrivalIsNeverBeforeTheBytesWereSent) {
   }
 }
 
-TEST_P(EveryLine, aQuietLineIsATimeoutAfterItsLimit) {
+TEST_F(SerialLine, aQuietLineIsATimeoutAfterItsLimit) {
   std::array<std::uint8_t, 8> some{};
   const HostStamp before = line().now();
   EXPECT_EQ(line().read(some, kSoon).status, DeviceStatus::timeout);
@@ -159,7 +105,7 @@ TEST_P(EveryLine, aQuietLineIsATimeoutAfterItsLimit) {
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
 }
 
-TEST_P(EveryLine, wakeEndsOneReadAndOnlyOne) {
+TEST_F(SerialLine, wakeEndsOneReadAndOnlyOne) {
   std::array<std::uint8_t, 8> some{};
   std::thread waker([this] {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -171,12 +117,12 @@ TEST_P(EveryLine, wakeEndsOneReadAndOnlyOne) {
   line().wake();
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::stopped)
       << "the next one, when none waits";
-  pair_->send({5});
+  send({5});
   EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::ok);
 }
 
-TEST_P(EveryLine, aHungUpLineIsGoneAtOnceAndDoesNotBurnTime) {
-  pair_->hang_up();
+TEST_F(SerialLine, aHungUpLineIsGoneAtOnceAndDoesNotBurnTime) {
+  hang_up();
   std::array<std::uint8_t, 8> some{};
   const HostStamp before = line().now();
   EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::gone);
@@ -185,8 +131,8 @@ TEST_P(EveryLine, aHungUpLineIsGoneAtOnceAndDoesNotBurnTime) {
   EXPECT_LT(line().now() - before, kLong);
 }
 
-TEST_P(EveryLine, discardedInputDoesNotComeAgain) {
-  pair_->send({1, 2, 3});
+TEST_F(SerialLine, discardedInputDoesNotComeAgain) {
+  send({1, 2, 3});
   std::array<std::uint8_t, 8> some{};
   ASSERT_EQ(line().read(std::span(some).first(1), kLong).status,
             DeviceStatus::ok);  // the others are there, too
@@ -194,22 +140,9 @@ TEST_P(EveryLine, discardedInputDoesNotComeAgain) {
   EXPECT_EQ(line().read(some, Duration{}).status, DeviceStatus::timeout);
 }
 
-TEST_P(EveryLine, aWriteThatNobodyTakesEndsAtItsLimit) {
-  const Bytes much(200'000, 0x55);
-  const HostStamp before = line().now();
-  EXPECT_EQ(line().write(much, kSoon), DeviceStatus::timeout);
-  EXPECT_LT(line().now() - before, Duration::seconds(2));
-}
-
-INSTANTIATE_TEST_SUITE_P(Serial, EveryLine, ::testing::Values(Kind::terminal, Kind::pipe),
-                         [](const auto& one) {
-                           return one.param == Kind::terminal ? "terminal" : "pipe";
-                         });
-
-TEST(SerialPort, isHeldByOne) {
-  TerminalPair pair;
+TEST_F(SerialLine, isHeldByOne) {
   DeviceStatus status = DeviceStatus::ok;
-  EXPECT_EQ(pair.place().open({}, &status), nullptr);
+  EXPECT_EQ(place_->open({}, &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::busy);
 }
 
@@ -229,29 +162,6 @@ TEST(SerialPort, aDeviceThatCameBackElsewhereIsFoundByItsSerialNumber) {
   EXPECT_EQ(port_with_serial(ports, "", "/dev/ttyV7"), "/dev/ttyV7") << "never by no number";
   EXPECT_EQ(port_with_serial(ports, "C", "/dev/ttyV0"), "") << "B has its place, C is away";
   EXPECT_EQ(port_with_serial(ports, "C", "/dev/ttyS0"), "/dev/ttyS0") << "whose nobody knows";
-}
-
-TEST(SerialPort, ofPortsThatShareASerialNumberTheOneAskedForIsTaken) {
-  // An FT4232H has one number for its four ports, a CP2102 often has "0001".
-  const std::vector<SerialPortInfo> ports{usb_port("/dev/ttyV0", "A"), usb_port("/dev/ttyV1", "A"),
-                                          usb_port("/dev/ttyV2", "A")};
-  EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV1"), "/dev/ttyV1");
-  EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV7"), "/dev/ttyV7") << "which one nobody knows";
-}
-
-TEST(ConverterNumber, thatTwoWereSeenWithTellsNobodyForGood) {
-  const auto one = usb_port("/dev/ttyV0", "0001"), other = usb_port("/dev/ttyV1", "0001");
-  ConverterNumber shared;
-  shared.opened({one, other}, "0001");
-  shared.opened({one}, "0001");  // after the hub began anew it was there first
-  EXPECT_EQ(shared.find({other}, "/dev/ttyV0"), "/dev/ttyV0");
-
-  ConverterNumber alone;
-  alone.opened({one}, "0001");
-  EXPECT_EQ(alone.find({usb_port("/dev/ttyV5", "0001")}, "/dev/ttyV0"), "/dev/ttyV5");
-  EXPECT_EQ(alone.find({one, other}, "/dev/ttyV0"), "/dev/ttyV0");
-  EXPECT_EQ(alone.find({other}, "/dev/ttyV0"), "/dev/ttyV0");
-  EXPECT_EQ(alone.find({usb_port("/dev/ttyV0", "B")}, "/dev/ttyV0"), "") << "that is B's now";
 }
 
 TEST(SerialPort, aLinkIsKeptWhereItLeadsToThePortWithTheSerialNumber) {

@@ -139,24 +139,6 @@ TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
       << "another boot's clock is another clock, not one that was set";
 }
 
-TEST(Board, pulsesGoOnWhileTheLineIsAwayAndWhatWasMissedIsCounted) {
-  mock::SimulatedLineOptions line = direct_line();
-  line.outages = {{at_s(10), at_s(12.5)}};
-  BoardRig rig(board_for(Duration::seconds(20)), line);
-  const auto all = rig.drive();
-  EXPECT_EQ(rig.times_gone, 1);
-  std::uint64_t missed = 0;
-  for (std::size_t i = 1; i < all.size(); ++i) {
-    ASSERT_GT(all[i].number, all[i - 1].number);
-    ASSERT_EQ(all[i].boot, all[0].boot);
-    missed += all[i].number - all[i - 1].number - 1;
-  }
-  EXPECT_GE(missed, 74U);
-  EXPECT_LE(missed, 110U) << "attempts to open are half a second apart";
-  EXPECT_EQ(rig.device->statistics().lost, missed);
-  EXPECT_EQ(rig.device->statistics().reboots, 0U);
-}
-
 TEST(Board, overStopsAndStartsNumbersGoOnAndNoReportIsLost) {
   for (const std::uint8_t feedback : std::array<std::uint8_t, 2>{0, 1}) {
     BoardRig rig(board_for(Duration::seconds(200)), direct_line());

@@ -124,17 +124,6 @@ TEST(XsensDevice, aPauseLosesNoReadingOnEitherSideAndTheFirstAfterItIsMarked) {
   EXPECT_EQ(rig.times_gone, 0);
 }
 
-TEST(XsensDevice, aStopEndsThePulsesWhereSyncOutIsInUse) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
-  Options options;
-  options.sync_out_hz = 25;
-  XsensRig rig(sensor, {}, options);
-  rig.start();
-  (void)rig.readings(20);
-  rig.device->stop();
-  EXPECT_FALSE(rig.simulator->measuring());
-}
-
 TEST_P(BothGenerations, whatIsSetAlreadyIsNotWrittenAgain) {
   mock::XsensSimulatorOptions sensor = simulated(GetParam());
   XsensRig rig(sensor);
@@ -245,14 +234,6 @@ TEST_P(BothGenerations, oneThatLostItsSettingsIsSetAgain) {
                                    r.arrival < HostStamp(11'000'000'000);
                           }),
             0);
-}
-
-TEST_P(BothGenerations, oneThatFellSilentIsToldToMeasureAgain) {
-  mock::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
-  sensor.silences = {HostStamp(9'000'000'000)};
-  XsensRig rig(sensor);
-  EXPECT_GT(rig.drive().back().arrival, HostStamp(19'500'000'000));
-  EXPECT_EQ(rig.times_gone, 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Xsens, BothGenerations,

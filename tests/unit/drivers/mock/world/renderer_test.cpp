@@ -149,31 +149,6 @@ TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   }
 }
 
-TEST(Renderer, surfacesThatCutThroughEachOtherMeetInASmoothLine) {
-  Plates scene;
-  // A bright wall across the view, a dark one that turns from before it to behind it, 0.6 m deep
-  // over 4 m of width.
-  scene.plate(-4, 4, -4, 4, 6.0, 1);
-  scene.builder.begin();
-  scene.builder.picture(std::array<Vec3, 4>{Vec3(-2, 5.7, -4), Vec3(2, 6.3, -4), Vec3(2.4, 6.3, 4),
-                                            Vec3(-1.6, 5.7, 4)},
-                        0, 1.0F, 1, 1);
-  scene.builder.end();
-  const Camera camera(lens(false));
-  Renderer renderer(scene.world(), camera);
-  const Transform T_camera_enu = looking_north({0, 0, 0});
-  const Picture p = take(&renderer, T_camera_enu, clean());
-  for (int y = 60; y < 180; ++y) {
-    // Both walls meet on the line x = 0.2 + 0.05 z at y = 6.
-    const Vec2 pixel = seen_in_row(camera, T_camera_enu, y, -3, 3,
-                                   [](double z) { return Vec3(0.2 + 0.05 * z, 6.0, z); });
-    const int x = static_cast<int>(pixel.x());
-    EXPECT_NEAR(edge_position(p, y, x - 5, x + 6, p.at(x - 5, y), p.at(x + 5, y)), pixel.x(),
-                kRounding + 3e-3)
-        << y;
-  }
-}
-
 TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
   Plates scene;
   scene.plate(-100, 100, -100, 100, 6.0, 1);

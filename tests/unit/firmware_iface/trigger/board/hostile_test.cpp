@@ -16,38 +16,6 @@ struct Random {
   }
 };
 
-TEST(BoardHostile, framesWithAGoodCrcAndRandomContentKeepEveryPromise) {
-  VirtualBoard b;
-  Random random{9};
-  std::uint32_t last_pulse = 0;
-  bool any = false;
-  for (int i = 0; i < 20'000; ++i) {
-    Bytes payload(random() % 3 == 0 ? random() % 65 : std::uint32_t{trigger_config_payload_size});
-    for (auto& byte : payload) byte = random() % 2 == 0 ? 0 : static_cast<std::uint8_t>(random());
-    const auto type = static_cast<std::uint8_t>(random() % 8);
-    if (type == trigger_config && random() % 2 == 0) {
-      TriggerConfig good = VirtualBoard::config(100'000 + random() % 800'000);
-      good.vary_us = random() % 200;
-      good.feedback_inputs = static_cast<std::uint8_t>(random() % 4);
-      payload.assign(trigger_config_payload_size, 0);
-      trigger_put_config(&good, payload.data());
-    }
-    if (type == trigger_start || type == trigger_stop) payload.clear();
-    if (type == trigger_pause || type == trigger_ping) payload.resize(4);
-    if (type == trigger_hello) payload.resize(1);
-    b.send(type, payload);
-    b.run_for_us(random() % 2000);
-    for (const TriggerEvent& e : b.events()) {
-      ASSERT_TRUE(!any || e.pulse > last_pulse) << "numbers only grow";
-      last_pulse = e.pulse;
-      any = true;
-    }
-    ASSERT_LE(b.board.outbox.used, outbox_capacity);
-  }
-  for (std::size_t i = 1; i < b.made.size(); ++i) ASSERT_GT(b.made[i].count, b.made[i - 1].count);
-  EXPECT_GT(b.made.size(), 100U);
-}
-
 TEST(BoardHostile, aHostThatDoesNotListenCostsMessagesWhichAreCountedAndThenItIsAnswered) {
   VirtualBoard b;
   b.start(100'000);

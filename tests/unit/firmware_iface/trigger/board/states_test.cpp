@@ -123,40 +123,6 @@ TEST(BoardConfig, isRefusedByCodeAndThenTheOldOneHolds) {
   EXPECT_EQ(b.error(), trigger_error_not_stopped);
 }
 
-TEST(BoardTalk, whatNobodyAskedForHasNumbersOfItsOwn) {
-  VirtualBoard b;
-  b.deaf = true;
-  b.start(100'000);
-  b.run_for_us(500'000);  // more events than there is room for
-  b.deaf = false;
-  b.run_for_us(3'000'000);
-  std::uint8_t next = trigger_unasked;
-  unsigned missing = 0;
-  for (const TriggerFrame& f : b.frames) {
-    if (f.sequence < trigger_unasked) continue;
-    missing += static_cast<std::uint8_t>(f.sequence - next) % trigger_unasked;
-    next = static_cast<std::uint8_t>((f.sequence + 1) | trigger_unasked);
-  }
-  EXPECT_EQ(missing, b.board.outbox.dropped) << "every gap is a message that was dropped";
-  EXPECT_GT(missing, 20U);
-}
-
-TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
-  VirtualBoard b;
-  b.start(10'000);
-  b.run_for_us(50'000);
-  b.pause(4);  // the slots of 201, 301, 401 and 501 ms
-  EXPECT_EQ(b.status().state, trigger_paused);
-  b.run_for_us(450'000);
-  EXPECT_EQ(b.take(trigger_status).size(), 0U) << "nothing new";
-  b.run_for_us(2'000);
-  const auto told = b.take(trigger_status);
-  ASSERT_EQ(told.size(), 1U) << "the pause has ended by itself";
-  TriggerStatus s{};
-  ASSERT_TRUE(trigger_get_status(told[0].payload, told[0].size, &s));
-  EXPECT_EQ(s.state, trigger_running);
-}
-
 TEST(BoardStates, numbersGoOnAcrossStopAndStart) {
   VirtualBoard b;
   b.start(100'000);
