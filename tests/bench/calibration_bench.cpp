@@ -1,20 +1,19 @@
-// Calibration from nothing but the baseline's length: error of the transform found and its sigmas.
+// Calibration on recorded drives: what comes of a nominal calibration, of a wrong one, of none;
+// whether anything is told that was not there; and knocks made on real images by turning the right
+// ones.
 //
-//   mock [--starts N] [--first K] [--from SECONDS] [--frames N]   a rendered rig, many places
-//   drives [--only NAME]                every recorded drive: calibration given, wrong, found
-//   focal [--only NAME]                 focal lengths that are off: told or not
-//   stretches [--only NAME]             how far disjoint stretches of a drive agree
-//   jumps [--only NAME]                 how far disparities jump on rigs that nobody touched
-//   learning [--starts N]               a recorded drive N times to and fro: what each solve knows
-//   learning --only mock [--frames N]   the same on the mock's streets, against the truth
+//   drives [--only NAME]       every recorded drive: calibration given, wrong, found
+//   focal [--only NAME]        focal lengths that are off: told or not
+//   stretches [--only NAME]    how far disjoint stretches of a drive agree
+//   jumps [--only NAME]        how far disparities jump on rigs that nobody touched
 //
-// All take --set KEY=VALUE. One line a calibration, then the largest errors and their root means.
+// All take --set KEY=VALUE.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,200 +21,291 @@
 
 #include "app/config/configuration.hpp"
 #include "app/runtime/thread_runner.hpp"
+#include "app/session/drive_calibration.hpp"
+#include "core/calibration/disparity_jump.hpp"
+#include "core/calibration/stretches.hpp"
+#include "core/camera/camera.hpp"
 #include "core/estimator/estimator.hpp"
-#include "core/math/random.hpp"
 #include "core/math/so3.hpp"
-#include "tests/bench/calibration_drives.hpp"
-#include "tests/bench/calibration_learning.hpp"
+#include "tests/support/recorded_sequence.hpp"
 #include "tests/support/rendered_drive.hpp"
+#include "tests/support/temporary_folder.hpp"
 
+namespace vergence::bench {
 namespace {
 
-using namespace vergence;
+using app::StartingCalibration;
+using app::StereoSequence;
+using test::drive_recorded;
+using test::DriveOutcome;
+using test::RecordedSequence;
+using test::with_right_turned;
 
-struct Arguments {
-  std::string what, only;
-  int starts = 20, first = 0, frames = 400;
-  double from = -1;
-  bool wrong_intrinsics = false;
-  std::vector<std::string> set;
-};
-
-struct Found {
-  bool accepted = false;
-  RigCalibration rig;
-  int at_frame = 0;
-  double solve_ms = 0;
-};
-
-using FrameSource = std::function<const RigFrame*(int)>;
-
-RigCalibration nominal_of(const RigCalibration& rig) {
-  RigCalibration n = rig;
-  for (int k = 1; k < rig.cameras; ++k) {
-    const auto c = static_cast<std::size_t>(k);
-    n.T_camera_left[c] = {Mat3::Identity(), Vec3(-rig.T_camera_left[c].t.norm(), 0, 0)};
-  }
-  return n;
+void print(const std::string& drive_name, const std::string& what, const DriveOutcome& r) {
+  fmt::print(
+      "{:12s} {:34s} seg {:6.3f} %  ATE {:7.4f} m, {:7.4f} m after a scale of {:.4f}  ok {:3d} of "
+      "{:3d}",
+      drive_name, what, r.segments_percent, r.ate_m, r.ate_scaled_m, r.scale, r.ok, r.frames);
+  fmt::print("  knocks told {}  verified at {:3d} ({:3.0f} % ok since)", r.knocks, r.verified_at,
+             r.since_verified > 0 ? 100.0 * r.ok_since_verified / r.since_verified : 0.0);
+  if (r.contradicted_at >= 0)
+    fmt::print("  contradicted at {} by {:.1f} %", r.contradicted_at, r.contradicted_percent);
+  if (r.told_at >= 0 || r.mended_at >= 0)
+    fmt::print("  told at {} mended at {}", r.told_at, r.mended_at);
+  fmt::print("\n");
+  std::fflush(stdout);
 }
 
-Found calibrate(const Arguments& a, const RigCalibration& rig, const FrameSource& source) {
-  const app::Configuration configuration = app::load_configuration(std::nullopt, a.set);
+/// Whether a focal length that is off is told, and what the drive measures.
+void print_focal_lengths(const RecordedSequence& d, const app::Configuration& c) {
+  const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
+  for (const double factor : {1.0, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25}) {
+    const StartingCalibration begin = test::with_focal_length(given, factor);
+    for (const bool scratch : {false, true}) {
+      const DriveOutcome r = drive_recorded(d, d.sequence, c, scratch ? test::blank(begin) : begin);
+      fmt::print(
+          "{:12s} focal length x {:<4g} {:12s} ok {:3d} of {:3d}, {}: true one measured to "
+          "{:+.1f} % (sigma {:.1f} %)\n",
+          d.name, factor, scratch ? "from scratch" : "given", r.ok, r.frames,
+          r.focal.contradicted ? "contradicted" : "believed",
+          100 * (factor * r.focal.measured_px / r.focal.given_px - 1),
+          100 * r.focal.sigma_px / r.focal.measured_px);
+      std::fflush(stdout);
+    }
+  }
+}
+
+void run_drive(const RecordedSequence& d, const app::Configuration& c) {
+  const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
+  print(d.name, "from scratch, one pass", drive_recorded(d, d.sequence, c, test::blank(given)));
+  app::Configuration held = c;
+  held.online = 0;
+  print(d.name, "own calibration, held", drive_recorded(d, d.sequence, held, given));
+  print(d.name, "own calibration, one pass", drive_recorded(d, d.sequence, c, given));
+  const app::DriveCalibration found =
+      app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
+  if (!found.rig) {
+    fmt::print("{:12s} calibrate first: {}\n", d.name, found.why);
+    return;
+  }
+  StartingCalibration first = given;
+  first.file.rig = *found.rig;
+  print(d.name, "calibrated first", drive_recorded(d, d.sequence, c, first));
+  fmt::print("{:12s}   found from {} frames: depth at {:.1f} m known to {:.2f} %, rms {:.3f} px\n",
+             d.name, found.rig->frames, found.depth_m, found.depth_sigma_percent,
+             found.rig->reprojection_px);
+
+  // Turned images are not the raw ones: a homography knows no distortion.
+  if (d.sequence.calibration.intrinsics[1].has_distortion()) return;
+  const test::TemporaryFolder folder;
+  int index = 0;
+  for (const Vec3& turn : {Vec3(0, 0.3, 0), Vec3(0.3, 0.2, 0.25)}) {
+    const StereoSequence s =
+        with_right_turned(d, turn, 0, folder / fmt::format("start{}", index++));
+    const std::string words =
+        fmt::format("turned ({:g}, {:g}, {:g}) deg", turn.x(), turn.y(), turn.z());
+    const StartingCalibration wrong = app::replayed_calibration(c, s, false);
+    print(d.name, words + ", one pass", drive_recorded(d, s, c, wrong));
+    const app::DriveCalibration mended =
+        app::calibrate_drive({s, c, 0, s.pairs.size(), {}, {}}, wrong);
+    StartingCalibration then = wrong;
+    if (mended.rig) then.file.rig = *mended.rig;
+    print(d.name, words + ", first", drive_recorded(d, s, c, then));
+  }
+  const std::size_t at = d.sequence.pairs.size() / 2;
+  if (d.sequence.pairs.size() < 100) return;
+  for (const Vec3& turn : {Vec3(0.1, 0, 0), Vec3(0, 0, 0.2), Vec3(0, 0.3, 0), Vec3(2, 0, 0)}) {
+    const StereoSequence s =
+        with_right_turned(d, turn, at, folder / fmt::format("knock{}", index++));
+    const DriveOutcome r = drive_recorded(d, s, c, first, at);
+    fmt::print(
+        "{:12s} knock at {} by ({:g}, {:g}, {:g}) deg: told after {}, mended after {}, {} ok "
+        "before that, {} false before it; seg {:.3f} % ATE {:.4f} m\n",
+        d.name, at, turn.x(), turn.y(), turn.z(),
+        r.told_at < 0 ? -1 : r.told_at - static_cast<int>(at),
+        r.mended_at < 0 ? -1 : r.mended_at - static_cast<int>(at), r.ok_before_mended, r.knocks,
+        r.segments_percent, r.ate_m);
+    std::fflush(stdout);
+  }
+}
+
+void print_stretches(const std::string& name,
+                     const std::vector<calibration::RigSolution>& stretches) {
+  fmt::print("{}: {} stretches of some {} frames\n", name, stretches.size(),
+             stretches.empty() ? 0 : stretches.front().frames);
+  calibration::Agreement mean;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < stretches.size(); ++i) {
+    const calibration::RigSolution& s = stretches[i];
+    const Vec3 phi = 1e3 * log_so3(s.rig.T_camera_left[1].R), t = 1e3 * s.rig.T_camera_left[1].t;
+    const auto& sigma = s.rig.sigma_noise[1];
+    fmt::print(
+        "  rotation {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) {:8.3f} ({:.3f}) mrad  t_y {:7.3f} ({:.3f}) "
+        "t_z {:7.3f} ({:.3f}) mm",
+        phi.x(), 1e3 * sigma[0], phi.y(), 1e3 * sigma[1], phi.z(), 1e3 * sigma[2], t.y(),
+        1e3 * sigma[4], t.z(), 1e3 * sigma[5]);
+    fmt::print("  cx {:.2f} ({:.2f}) cy {:.2f} ({:.2f}) px  {:.0f} ms, inflation {:.1f}\n",
+               s.rig.intrinsics[1].cx, s.rig.intrinsics[1].sigma[2], s.rig.intrinsics[1].cy,
+               s.rig.intrinsics[1].sigma[3], s.solve_ms, s.rig.inflation);
+    if (i == 0) continue;
+    const calibration::Agreement a = calibration::agreement(stretches[i - 1].rig, s.rig, 1);
+    ++n;
+    mean.transform += a.transform;
+    mean.intrinsics += a.intrinsics;
+    for (std::size_t k = 0; k < a.depth.size(); ++k)
+      mean.depth[k] += a.depth[k], mean.depth_percent[k] += a.depth_percent[k];
+  }
+  if (n == 0) return;
+  const auto by = static_cast<double>(n);
+  fmt::print("  NEES a dimension: transform {:.2f}, intrinsics {:.2f}, depth", mean.transform / by,
+             mean.intrinsics / by);
+  for (std::size_t k = 0; k < mean.depth.size(); ++k)
+    fmt::print(" {:g} m {:.2f} ({:.2f} %)", calibration::Agreement::kDepthM[k], mean.depth[k] / by,
+               mean.depth_percent[k] / by);
+  fmt::print("\n");
+  std::fflush(stdout);
+}
+
+/// A logged observation as a pinhole camera without distortion has it.
+Vec2 undistorted(const Camera& camera, const Intrinsics& k, const Eigen::Vector2f& raw) {
+  Vec3 ray = Vec3::UnitZ();
+  (void)camera.unproject(raw.cast<double>(), &ray);
+  return {k.fx * ray.x() / ray.z() + k.cx, k.fy * ray.y() / ray.z() + k.cy};
+}
+
+void print_jumps(const RecordedSequence& d, const app::Configuration& c) {
+  const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
+  const auto features = static_cast<std::size_t>(c.odometry.features);
+  Arena arena(calibration::DisparityJumpDetector::memory_needed(features));
+  calibration::DisparityJumpDetector detector(features, arena);
+  const RigCalibration& rig = given.file.rig;
+  const std::array cameras{Camera(rig.intrinsics[0]), Camera(rig.intrinsics[1])};
+  const auto pinhole = [&](std::size_t k) {
+    return Pinhole{rig.intrinsics[k].fx, rig.intrinsics[k].fy, rig.intrinsics[k].cx,
+                   rig.intrinsics[k].cy};
+  };
+  detector.set_reference(rig.T_camera_left[1], pinhole(0), pinhole(1));
+  std::vector<double> shifts;
+  std::vector<calibration::StereoObservation> stereo;
+  int confirmed = 0;
+  Transform before;
+  std::uint64_t newest = 0;
+  (void)app::drive_once(
+      {d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given,
+      [&](const Estimator& e, const PoseSample&) {
+        if (e.tracks().empty()) return;
+        const calibration::LoggedFrame& f = e.tracks().frame(e.tracks().size() - 1);
+        if (f.number <= newest && newest > 0) return;
+        stereo.clear();
+        for (const calibration::LoggedObservation& o : f.observations)
+          if (o.by(0) && o.by(1))
+            stereo.push_back({undistorted(cameras[0], rig.intrinsics[0], o.raw[0]),
+                              undistorted(cameras[1], rig.intrinsics[1], o.raw[1]),
+                              static_cast<double>(o.sigma), o.track});
+        const calibration::DisparityJump jump =
+            detector.next(f.number, stereo, f.T_left_world * before.inverse());
+        if (jump.measured) shifts.push_back(std::abs(jump.px));
+        confirmed += jump.confirmed ? 1 : 0;
+        before = f.T_left_world;
+        newest = f.number;
+      });
+  if (shifts.empty()) return;
+  std::sort(shifts.begin(), shifts.end());
+  fmt::print(
+      "{:12s} {} frames: shift {:.3f} px median, {:.3f} 95 %, {:.3f} largest; {} confirmed\n",
+      d.name, shifts.size(), shifts[shifts.size() / 2],
+      shifts[std::min(shifts.size() - 1, shifts.size() * 95 / 100)], shifts.back(), confirmed);
+  std::fflush(stdout);
+}
+
+/// The paper's rig on the mock's streets, its true calibration in use.
+void rendered_stretches(const app::Configuration& c) {
+  constexpr std::uint64_t kFrames = 240;
+  constexpr std::size_t kStretch = 40;
+  test::RenderedDriveOptions o;
+  o.from_s = 20;
+  test::RenderedDrive rendered(o);
   EstimatorOptions options;
-  options.odometry = configuration.odometry;
-  options.calibration = configuration.calibration;
-  options.trust = CalibrationTrust::none;
-  RigCalibration blank = rig;
-  for (Transform& T : blank.T_camera_left) T = {};
-  Arena arena(Estimator::memory_needed(options, blank));
+  options.odometry = c.odometry;
+  options.calibration = c.calibration;
+  options.monitor = c.monitor;
+  const auto features = static_cast<std::size_t>(c.odometry.features);
+  Arena arena(Estimator::memory_needed(options, o.rig) +
+              calibration::Stretches::memory_needed(c.calibration, c.monitor, 2, features));
   app::ThreadRunner two;
   ImmediateRunner solver;
-  Estimator estimator(options, blank, nominal_of(rig), arena, two, solver);
-  Found f;
-  const auto note = [&](int i) {
-    for (const CalibrationDecision& d : estimator.calibrations()) {
-      if (!d.accepted)
-        fmt::print(
-            "       decision {} {} frames {} rms {:.3f} px held out {:.2f} -> {:.2f} px solve "
-            "{:.0f} ms\n",
-            d.accepted ? "yes" : "no", d.reason, d.calibration.frames,
-            d.calibration.reprojection_px, d.held_out_before_px, d.held_out_after_px, d.solve_ms);
-      f.solve_ms = d.solve_ms;
-      f.rig = d.calibration;
-      f.at_frame = i;
-      f.accepted = d.accepted;
-    }
-  };
-  for (int i = 0; i < a.frames; ++i) {
-    const RigFrame* frame = source(i);
-    if (frame == nullptr) break;
-    (void)estimator.process(*frame);
-    note(i);
-    if (f.accepted) break;
+  Estimator estimator(options, o.rig, o.rig, arena, two, solver);
+  calibration::Stretches alone(calibration::Stretches::Kind::alone, o.rig, o.rig, kStretch,
+                               c.calibration, c.monitor, features, arena);
+  std::vector<calibration::RigSolution> stretches;
+  for (std::uint64_t i = 0; i < kFrames; ++i) {
+    (void)estimator.process(rendered.frame(i));
+    const auto solved = alone.take(estimator.tracks());
+    if (solved && solved->status == calibration::RigSolveStatus::ok) stretches.push_back(*solved);
   }
-  if (!f.accepted) {
-    estimator.finish();
-    note(a.frames);
-  }
-  return f;
-}
-/// Errors of camera 1 about the axes (mrad) and of t (mm); sigma_noise and sigma_wide beside them.
-struct Errors {
-  std::array<double, 6> value{}, noise{}, wide{};
-};
-
-Errors errors_of(const RigCalibration& found, const Transform& truth) {
-  Errors e;
-  const Vec3 turn = 1e3 * log_so3(found.T_camera_left[1].R * truth.R.transpose());
-  const Vec3 shift = 1e3 * (found.T_camera_left[1].t - truth.t);
-  for (int i = 0; i < 3; ++i) {
-    e.value[static_cast<std::size_t>(i)] = turn[i];
-    e.value[static_cast<std::size_t>(i + 3)] = shift[i];
-  }
-  for (std::size_t i = 0; i < 6; ++i) {
-    e.noise[i] = 1e3 * found.sigma_noise[1][i];
-    e.wide[i] = 1e3 * found.sigma_wide[1][i];
-  }
-  return e;
+  print_stretches("mock", stretches);
 }
 
-void print(const std::string& name, const Found& f, const Errors& e) {
-  fmt::print("{:10s} {} frame {:3d}  {:3d} frames {:.3f} px ", name, f.accepted ? "ok" : "NO",
-             f.at_frame, f.rig.frames, f.rig.reprojection_px);
-  for (std::size_t i = 0; i < 6; ++i) fmt::print(" {:+8.4f}({:.3f})", e.value[i], e.noise[i]);
-  fmt::print("  f {:.2f} {:.2f} px  scale {:.2f} %  {:.0f} ms\n", f.rig.intrinsics[1].fx,
-             f.rig.intrinsics[1].fy, 100 * f.rig.scale_sigma, f.solve_ms);
+int for_drives(
+    const std::vector<std::string>& set, const std::string& only,
+    const std::function<void(const RecordedSequence&, const app::Configuration&)>& each) {
+  const app::Configuration c = app::load_configuration(std::nullopt, set);
+  int n = 0;
+  for (const char* name : test::kRecordedSequences) {
+    if (!only.empty() && only != name) continue;
+    if (const auto d = test::open_recorded(name)) {
+      each(*d, c);
+      ++n;
+    }
+  }
+  if (n > 0) return 0;
+  fmt::print(stderr,
+             "calibration_bench: no recorded drives; set VERGENCE_SHARED to the folder that holds "
+             "data/\n");
+  return 2;
 }
 
-int run_mock(const Arguments& a) {
-  mock::DriveOptions drive;
-  std::vector<double> starts = a.from >= 0 ? std::vector<double>{a.from}
-                                           : test::RenderedDrive::starts(drive, a.starts, 3.0, 5.0);
-  std::array<double, 6> largest{}, squares{}, nees{};
-  int n = 0, within = 0;
-  for (std::size_t i = static_cast<std::size_t>(a.first); i < starts.size(); ++i) {
-    test::RenderedDriveOptions o;
-    o.drive = drive;
-    o.from_s = starts[i];
-    test::RenderedDrive rendered(o);
-    RigCalibration given = o.rig;
-    if (a.wrong_intrinsics) {
-      Random random(1000 + i);
-      for (std::size_t k = 0; k < 2; ++k) {
-        const double focal = 1 + 0.001 * random.normal();
-        given.intrinsics[k].fx *= focal;
-        given.intrinsics[k].fy *= focal;
-        given.intrinsics[k].cx += 0.5 * random.normal();
-        given.intrinsics[k].cy += 0.5 * random.normal();
-      }
-    }
-    const Found f =
-        calibrate(a, given, [&](int k) { return &rendered.frame(static_cast<std::uint64_t>(k)); });
-    const Errors e = errors_of(f.rig, o.rig.T_camera_left[1]);
-    print(fmt::format("{:.2f} s", starts[i]), f, e);
-    std::fflush(stdout);
-    if (!f.accepted) continue;
-    ++n;
-    for (std::size_t k = 0; k < 6; ++k) {
-      largest[k] = std::max(largest[k], std::abs(e.value[k]));
-      squares[k] += e.value[k] * e.value[k];
-      const double sigma = a.wrong_intrinsics ? e.wide[k] : e.noise[k];
-      nees[k] += e.value[k] * e.value[k] / (sigma * sigma);
-      within += k != 3 && std::abs(e.value[k]) <= 2 * sigma ? 1 : 0;
-    }
+int run_stretches(const std::vector<std::string>& set, const std::string& only) {
+  const int recorded =
+      for_drives(set, only, [](const RecordedSequence& d, const app::Configuration& c) {
+        const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
+        const app::DriveCalibration found =
+            app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
+        print_stretches(d.name, found.stretches);
+      });
+  if (only.empty() || only == "mock") {
+    rendered_stretches(app::load_configuration(std::nullopt, set));
+    return 0;
   }
-  fmt::print(
-      "{} calibrated of {}; mrad and mm; {} of {} single errors within two {} sigmas (t_x follows "
-      "from the length)\n",
-      n, starts.size() - static_cast<std::size_t>(a.first), within, 5 * n,
-      a.wrong_intrinsics ? "wide" : "noise");
-  for (const auto& [name, row] :
-       {std::pair("largest", &largest), std::pair("rms", &squares), std::pair("z rms", &nees)}) {
-    fmt::print("{:10s}", name);
-    for (const double v : *row)
-      fmt::print(" {:8.4f}", name == std::string("largest") ? v : std::sqrt(v / std::max(1, n)));
-    fmt::print("\n");
-  }
-  return 0;
+  return recorded;
 }
 
 }  // namespace
+}  // namespace vergence::bench
 
 int main(int argc, char** argv) {
-  Arguments a;
+  using namespace vergence::bench;
+  std::string what, only;
+  std::vector<std::string> set;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     const auto next = [&]() -> std::string { return i + 1 < argc ? argv[++i] : ""; };
-    if (word == "--starts")
-      a.starts = std::stoi(next());
-    else if (word == "--first")
-      a.first = std::stoi(next());
-    else if (word == "--from")
-      a.from = std::stod(next());
-    else if (word == "--frames")
-      a.frames = std::stoi(next());
-    else if (word == "--set")
-      a.set.push_back(next());
+    if (word == "--set")
+      set.push_back(next());
     else if (word == "--only")
-      a.only = next();
-    else if (word == "--wrong-intrinsics")
-      a.wrong_intrinsics = true;
+      only = next();
     else
-      a.what = word;
+      what = word;
   }
   try {
-    if (a.what == "mock") return run_mock(a);
-    if (a.what == "drives") return bench::run_drives(a.set, a.only);
-    if (a.what == "learning" && a.only == "mock") return bench::run_mock_learning(a.set, a.frames);
-    if (a.what == "learning") return bench::run_learning(a.set, a.starts);
-    if (a.what == "focal") return bench::run_focal_lengths(a.set, a.only);
-    if (a.what == "jumps") return bench::run_jumps(a.set, a.only);
-    if (a.what == "stretches") return bench::run_stretches(a.set, a.only);
+    if (what == "drives") return for_drives(set, only, run_drive);
+    if (what == "focal") return for_drives(set, only, print_focal_lengths);
+    if (what == "jumps") return for_drives(set, only, print_jumps);
+    if (what == "stretches") return run_stretches(set, only);
   } catch (const std::exception& e) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
     return 2;
   }
-  fmt::print(stderr,
-             "calibration_bench: drives, focal, stretches, jumps, learning or mock is wanted\n");
+  fmt::print(stderr, "calibration_bench: drives, focal, stretches or jumps is wanted\n");
   return 2;
 }

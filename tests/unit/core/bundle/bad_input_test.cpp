@@ -54,6 +54,19 @@ TEST_F(BadBundle, pointSeenOnceIsNamed) {
   EXPECT_EQ(index, 5U);
 }
 
+TEST_F(BadBundle, pointSeenNeverIsLeftAlone) {
+  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.point == 5; });
+  const Vec3 before = rig.points[5];
+  EXPECT_TRUE(own.adjuster.solve(rig.problem(), calibration_options()).converged());
+  EXPECT_EQ(rig.points[5], before);
+}
+
+TEST_F(BadBundle, poseWithoutObservationsIsNamed) {
+  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.pose == 3; });
+  expect(BundleTermination::rank_deficient, BundleDefect::pose_without_observations, rig.problem());
+  EXPECT_EQ(index, 3U);
+}
+
 TEST_F(BadBundle, numbersThatAreNoneAreNamed) {
   rig.observations[11].x = kNaN;
   expect(BundleTermination::invalid_input, BundleDefect::not_finite, rig.problem());

@@ -196,6 +196,23 @@ TEST(Bundle, constantPosesAndPointsStayToTheBit) {
   EXPECT_NE(rig.T_left_world[5].t, before.T_left_world[5].t);
 }
 
+TEST(Bundle, withEveryPoseConstantThePointsAloneAreFound) {
+  SimulationOptions s;
+  s.noise = 0;
+  Random random(24);
+  SimulatedRig rig = simulate_rig(s, random);
+  rig.T_camera_left = rig.true_cameras;
+  rig.T_left_world = rig.true_poses;
+  const std::vector<std::uint8_t> constant(rig.T_left_world.size(), 1);
+  BundleProblem p = rig.problem();
+  p.pose_constant = constant;
+  OwnAdjuster own(capacities_for(s));
+  const BundleResult r = own.adjuster.solve(p, {});
+  ASSERT_TRUE(r.converged()) << to_string(r.termination);
+  for (std::size_t i = 0; i < rig.points.size(); ++i)
+    EXPECT_LT((rig.points[i] - rig.true_points[i]).norm(), kExactMetre);
+}
+
 TEST(Bundle, aPosePriorHoldsAPoseThatNothingElseHolds) {
   SimulationOptions s;
   s.noise = 0;

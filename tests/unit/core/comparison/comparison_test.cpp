@@ -190,6 +190,24 @@ TEST(Comparison, gapsAreFlaggedAndNotBridged) {
   EXPECT_EQ(gaps, 10);
 }
 
+TEST(Comparison, noFixPausesIt) {
+  Bench b;
+  b.drive(0, 30, [](double t, InsSample* s) {
+    if (t > 20 && t < 25) s->fix = FixStatus::none;
+    return true;
+  });
+  for (const ComparedPose& c : b.out) {
+    const double t = (c.pose.stamp - at(0)).to_seconds();
+    if (t > 20.01 && t < 24.99) {
+      EXPECT_EQ(c.ins, InsMatch::no_fix) << t;
+    }
+    if (t > 25.01 && t < 29.9) {
+      EXPECT_TRUE(c.compared) << t;
+      EXPECT_LT(c.error_enu.norm(), 1e-3);
+    }
+  }
+}
+
 TEST(Comparison, anInsThatStartsLateOrStopsLeavesThePosesGoing) {
   Bench b;
   b.drive(0, 60, [](double t, InsSample*) { return t > 20 && t < 40; });
@@ -482,6 +500,22 @@ TEST(Comparison, aRealDriveWithKnownAnswersToTheMillimetre) {
   EXPECT_GT(b.comparison.counters().compared, 3000U);
   EXPECT_LT(b.comparison.placement().residual, 1e-3);
   EXPECT_LT(rotation_angle(b.comparison.placement().T_enu_world.R * T_world_enu.R), 1e-4);
+}
+
+TEST(Comparison, optionsAreChecked) {
+  EXPECT_EQ(ComparisonOptions{}.validate(), nullptr);
+  const auto bad = [](auto edit) {
+    ComparisonOptions o;
+    edit(&o);
+    return o.validate() != nullptr;
+  };
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->placement_m = 0; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->placement_m = std::nan(""); }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->correlation_s = -1; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->tilt_sigma_rad = 0; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->max_gap = Duration{}; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->ins_capacity = 1000; }));
+  EXPECT_TRUE(bad([](ComparisonOptions* o) { o->T_ins_left.t.x() = std::nan(""); }));
 }
 
 TEST(Comparison, anHourAt120HzTakesNoMemory) {

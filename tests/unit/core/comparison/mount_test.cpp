@@ -254,6 +254,26 @@ TEST(Mount, trajectoriesThatDoNotBelongTogetherHaveNoFit) {
     }
 }
 
+/// The residuals of 15 degrees that a fit may have at most: half their square is the two degrees
+/// that count as seen.
+TEST(Mount, attitudesThatSwayTooFarHaveNoFit) {
+  How how;
+  how.ideal = true;
+  how.velocity = false;
+  const auto swaying = [&](double degrees) {
+    Drove d = drove(how);
+    for (MountReference& r : d.reference) {
+      const double t = (r.stamp - kStart).to_seconds();
+      const double sway = std::sqrt(2.0) * degrees * M_PI / 180 * std::sin(2 * M_PI * t / 5);
+      r.T_enu_ref.R = exp_so3(Vec3(0, 0, sway)) * r.T_enu_ref.R;
+    }
+    Mount m;
+    return estimate_mount(d.estimate, d.reference, nominal(), {}, &m);
+  };
+  EXPECT_EQ(swaying(13), MountStatus::ok);
+  EXPECT_EQ(swaying(18), MountStatus::not_converged);
+}
+
 TEST(Mount, whatCannotBeDoneIsToldAndLeavesTheResultAlone) {
   How still;
   still.kind = mock::DriveKind::still;

@@ -193,6 +193,20 @@ TEST(Evaluate, headingErrorsWrapToTheShorterWay) {
   EXPECT_NEAR(evaluate(estimate, reference, options).heading_start_aligned.last, 0.1, kRounding);
 }
 
+TEST(Evaluate, endErrorsOfADriftThatIsKnown) {
+  const std::vector<StampedPose> reference = line(101, 1.0);
+  std::vector<StampedPose> estimate = reference;
+  for (StampedPose& p : estimate) p.T_world_body.t *= 1.01;
+  estimate.back().T_world_body.R = exp_so3({0, 0.02, 0});
+  const Transform elsewhere{exp_so3({0, 0, 1}), {50, 50, 50}};  // start alignment takes it out
+  const TrajectoryEvaluation e = evaluate(moved(elsewhere, 1.0, estimate), reference, {});
+  EXPECT_NEAR(e.end_error_start_aligned, 1.0, 1e-9);
+  EXPECT_NEAR(e.end_error_ratio, 0.01, 1e-11);
+  EXPECT_NEAR(e.end_rotation_start_aligned, 0.02, 1e-9);
+  EXPECT_NEAR(e.end_error_se3, 0.5, 1e-9);  // centred: half the excess at either end
+  EXPECT_TRUE(e.se3.roll_unobservable);
+}
+
 TEST(SegmentErrors, endAtTheFirstPoseStrictlyFartherAndDivideByTheNominalLength) {
   const std::vector<StampedPose> reference = line(12, 1.0);
   const std::vector<StampedPose> estimate = line(12, 1.01);
@@ -214,6 +228,24 @@ TEST(SegmentErrors, endAtTheFirstPoseStrictlyFartherAndDivideByTheNominalLength)
   options.step = 4;
   EXPECT_EQ(segment_errors(estimate, reference, options).per_length[2].count,
             2U);  // from poses 0 and 4
+}
+
+TEST(SegmentErrors, rotationPerMetre) {
+  const std::vector<StampedPose> reference = line(30, 1.0);
+  std::vector<StampedPose> estimate = reference;
+  for (std::size_t i = 0; i < estimate.size(); ++i)
+    estimate[i].T_world_body.R = exp_so3({0.001 * static_cast<double>(i), 0, 0});
+  const SegmentErrors s = segment_errors(estimate, reference, {{10}, 1, false});
+  EXPECT_NEAR(s.rotation, 0.011 / 10, 1e-12);
+}
+
+TEST(Evaluate, pathShorterThanEveryLengthGivesNoneNotZero) {
+  const std::vector<StampedPose> reference = helix(50);
+  const TrajectoryEvaluation e = evaluate(reference, reference, {});
+  ASSERT_EQ(e.segments.size(), 1U);
+  EXPECT_EQ(e.segments[0].count, 0U);
+  EXPECT_TRUE(std::isnan(e.segments[0].translation));
+  EXPECT_TRUE(std::isnan(e.segments[0].rotation));
 }
 
 TEST(Evaluate, scaledSegmentsTakeTheSim3ScaleOut) {

@@ -146,6 +146,13 @@ TEST(Corners, cellsThatHoldATakenOneAreLeftAloneAndOthersKeepTheirDistance) {
   EXPECT_EQ(still_there, all.corners.size() / 2);
 }
 
+TEST(Corners, withLittleRoomTheWeakestAreDropped) {
+  const Image image = textured();
+  const Found all(image.view(), {}), few(image.view(), {}, {}, 7);
+  ASSERT_EQ(few.corners.size(), 7U);
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(few.corners[i].score, all.corners[i].score);
+}
+
 TEST(Corners, thereAreNoneOnFlatGroundOrAnEdge) {
   EXPECT_EQ(
       Found(draw(kWidth, kHeight, [](const Vec2&) { return 90.0; }).view(), {}).corners.size(), 0U);
@@ -165,6 +172,11 @@ TEST(Corners, readNoByteOutsideTheImage) {
       test::on_every_target(
           [&](const char*) { EXPECT_GT(Found(image.view(), options).corners.size(), 0U); });
     }
+}
+
+TEST(Corners, anImageTooSmallOrEmptyHasNone) {
+  EXPECT_EQ(Found(white_noise(20, 20, 1).view(), {}).corners.size(), 0U);
+  EXPECT_EQ(Found(ImageView{}, {}).corners.size(), 0U);
 }
 
 }  // namespace

@@ -118,6 +118,26 @@ TEST(EpipolarSearch, findsTheDepthToAPixelOfItsLevel) {
       }
 }
 
+TEST(EpipolarSearch, aLongCurveIsSearchedWithoutPassingMatchesBy) {
+  // From infinity to 1/6 m the curve is 1200 px long, 600 of level 1.
+  const Wall wall(Texture(7, 8, 20), 20.0, false, beside());
+  EpipolarSearchOptions usual, near;
+  near.rho_last = 6;
+  near.unique = usual.unique = 1.F;
+  int found = 0, found_usual = 0;
+  for (double y = 40; y < kHeight - 40; y += 20)
+    for (double x = 60; x < kWidth - 40; x += 20) {
+      constexpr double kDisparity = 400 * 0.5 / 20;
+      const auto right = [&](const SearchResult& r) {
+        return r.status == SearchStatus::ok && std::abs(r.pixel.x() - (x - kDisparity)) < 4;
+      };
+      found_usual += right(wall.search({x, y}, usual)) ? 1 : 0;
+      found += right(wall.search({x, y}, near)) ? 1 : 0;
+    }
+  EXPECT_GT(found_usual, 100);
+  EXPECT_GT(found, 9 * found_usual / 10);
+}
+
 TEST(EpipolarSearch, aPatternThatRepeatsIsAmbiguous) {
   const auto fence = [](const Vec2& p) {
     return 128 + 60 * std::cos(p.x() * 2 * std::numbers::pi / 24) *
@@ -198,6 +218,16 @@ TEST(InverseDepth, isFittedToItsPixelAndTheDistanceLeftIsTheOneAcross) {
         }
       }
     }
+}
+
+TEST(InverseDepth, withoutABaselineOrInFrontOfTheLensThereIsNone) {
+  const Camera camera(lens(false));
+  double rho = 0.1, sigma = 0;
+  const EpipolarCurve no_baseline{&camera, Transform{}, Vec3(0, 0, 1)};
+  EXPECT_LT(fit_inverse_depth(no_baseline, {200, 160}, &rho, &sigma), 0);
+  const EpipolarCurve behind{&camera, {exp_so3(Vec3(0, 3.1, 0)), Vec3(-0.5, 0, 0)}, Vec3(0, 0, 1)};
+  EXPECT_LT(fit_inverse_depth(behind, {200, 160}, &rho, &sigma), 0);
+  EXPECT_EQ(rho, 0.1);
 }
 
 }  // namespace

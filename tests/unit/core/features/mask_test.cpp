@@ -56,6 +56,19 @@ TEST(Mask, hidesWhatIsZeroAndItsMarginAndNothingElse) {
   }
 }
 
+TEST(Mask, withoutAnImageAndOutsideOfItHidesNothing) {
+  Arena arena(Mask::memory_needed(kWidth, kHeight));
+  EXPECT_FALSE(Mask().hides(3, 3));
+  EXPECT_TRUE(Mask(ImageView{}, 7, arena).empty());
+  const Image black(kWidth, kHeight);
+  const Mask mask(black.view(), 7, arena);
+  EXPECT_TRUE(mask.hides(Vec2(0, 0)));
+  EXPECT_FALSE(mask.hides(Vec2(-1, 3)));
+  EXPECT_FALSE(mask.hides(Vec2(kWidth, 3)));
+  EXPECT_FALSE(mask.hides(Vec2(std::nan(""), 3)));
+  EXPECT_FALSE(mask.hides(Vec2(1e300, 3)));
+}
+
 TEST(Mask, keepsCornersAwayAndLeavesTheOthersAsTheyAre) {
   const Image image = draw(kWidth, kHeight, Texture(5));
   const Image shown = half_hidden(kWidth / 2);
@@ -88,6 +101,34 @@ TEST(Mask, keepsCornersAwayAndLeavesTheOthersAsTheyAre) {
         << c.x << ", " << c.y;
   }
   EXPECT_GT(compared, 10U);
+}
+
+TEST(Mask, keepsBlobsAwayAndDoesNotLetThemTakeRoom) {
+  const Image image = draw(kWidth, kHeight, Texture(5));
+  const Image shown = half_hidden(kWidth / 2);
+  Arena arena(Mask::memory_needed(kWidth, kHeight) + Surf::memory_needed(kWidth, kHeight) +
+              2 * kCacheLine);
+  const Mask mask(shown.view(), 0, arena);
+  Surf surf(kWidth, kHeight, arena);
+  ASSERT_EQ(surf.set_image(image.view()), SurfStatus::ok);
+  SurfOptions options;
+  const auto find = [&](std::size_t room) {
+    std::vector<SurfPoint> storage(room);
+    BoundedVector<SurfPoint> points(storage);
+    (void)surf.detect(options, &points);
+    return std::vector<SurfPoint>(points.begin(), points.end());
+  };
+  std::vector<SurfPoint> expected = find(5000);
+  std::erase_if(expected, [&](const SurfPoint& p) { return mask.hides(Vec2(p.x, p.y)); });
+  constexpr std::size_t kRoom = 40;
+  ASSERT_GT(expected.size(), kRoom);
+  options.mask = &mask;
+  const std::vector<SurfPoint> found = find(kRoom);
+  ASSERT_EQ(found.size(), kRoom);
+  for (std::size_t i = 0; i < kRoom; ++i) {
+    EXPECT_EQ(found[i].x, expected[i].x);
+    EXPECT_EQ(found[i].y, expected[i].y);
+  }
 }
 
 }  // namespace

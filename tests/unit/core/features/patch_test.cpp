@@ -165,6 +165,19 @@ TEST(Patch, withoutStructureInBothDirectionsItIsFlat) {
   }
 }
 
+TEST(Patch, furtherThanAllowedItDiverges) {
+  const Scene s(2);
+  const Image moved =
+      draw(kWidth, kHeight, [&](const Vec2& p) { return s.texture(p - Vec2(5, 0)); });
+  AlignOptions options;
+  options.max_shift = 2;
+  EXPECT_EQ(align_in(moved, s.patch, s.at, Mat2::Identity(), options).status,
+            AlignStatus::diverged);
+  EXPECT_EQ(align(s.patch, s.built.pyramid, s.at, Mat2::Zero(), {}).status, AlignStatus::diverged);
+  EXPECT_EQ(align(s.patch, s.built.pyramid, s.at, 100 * Mat2::Identity(), {}).status,
+            AlignStatus::diverged);
+}
+
 TEST(Patch, somethingElseIsNeverTakenForIt) {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     // Waves of 4 to 9 px fill a window with some thirty independent values: a correlation of 0.8 by
@@ -183,6 +196,18 @@ TEST(Patch, somethingElseIsNeverTakenForIt) {
                      s.patch, s.at)
                 .status,
             AlignStatus::ok);
+}
+
+TEST(Patch, isCutOnTheLevelsThatHoldItAndOnNoneOutside) {
+  const Scene s(1);
+  Patch patch{};
+  EXPECT_TRUE(cut_patch(s.built.pyramid, {90, 80}, &patch));
+  EXPECT_EQ(patch.levels, 3);
+  EXPECT_TRUE(cut_patch(s.built.pyramid, {16, 80}, &patch));
+  EXPECT_EQ(patch.levels, 1);
+  EXPECT_FALSE(cut_patch(s.built.pyramid, {10, 80}, &patch));
+  EXPECT_FALSE(cut_patch(s.built.pyramid, {90, kHeight - 10}, &patch));
+  EXPECT_EQ(patch.levels, 0);
 }
 
 TEST(Patch, atTheBorderNoByteOutsideTheImageIsRead) {

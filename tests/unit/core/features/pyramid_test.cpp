@@ -119,6 +119,14 @@ TEST(Pyramid, aPixelOfALevelLiesAtItsIndexTimesThePowerOfTwo) {
   }
 }
 
+TEST(Pyramid, levelZeroIsTheCallersImageAndSmallImagesHaveFewerLevels) {
+  const Image image = white_noise(70, 200, 1);
+  const Built b(image.view(), 6);
+  EXPECT_EQ(b.pyramid.level(0).data, image.bytes.data());
+  ASSERT_EQ(b.pyramid.levels(), 2);  // 70 → 35 → 18, and no side falls below 32
+  EXPECT_EQ(b.pyramid.level(1).width, 35);
+}
+
 TEST(Pyramid, takesFromTheArenaWhatItSaidAndNothingFromTheHeap) {
   const Image image = white_noise(640, 480, 1);
   Arena arena(Pyramid::memory_needed(640, 480, 4));

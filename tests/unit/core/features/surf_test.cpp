@@ -324,5 +324,36 @@ TEST(Surf, nothingBesideThePictureIsReadAndPaddingIsNoPicture) {
   }
 }
 
+TEST(Surf, takesTheMemoryItSaysAndNoneAfterwards) {
+  const Image image = draw(240, 180, Texture(2));
+  constexpr std::size_t kRoom = 200;
+  Arena arena(Surf::memory_needed(240, 180) + SurfMatcher::memory_needed(kRoom) +
+              kRoom * (sizeof(SurfPoint) + sizeof(SurfDescriptor) + sizeof(SurfMatch)) +
+              3 * kCacheLine);
+  Surf surf(240, 180, arena);
+  SurfMatcher matcher(kRoom, arena);
+  BoundedVector<SurfPoint> points(arena.make<SurfPoint>(kRoom, "points"));
+  const std::span<SurfDescriptor> descriptors = arena.make<SurfDescriptor>(kRoom, "descriptors");
+  BoundedVector<SurfMatch> matches(arena.make<SurfMatch>(kRoom, "matches"));
+  Arena small(Surf::memory_needed(240, 180) / 2);
+  EXPECT_THROW(Surf(240, 180, small), std::length_error);
+
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    ASSERT_EQ(surf.set_image(image.view()), SurfStatus::ok);
+    (void)surf.detect({}, &points);
+    surf.orient(points.span());
+    surf.describe(points.span(), descriptors.first(points.size()));
+    const SurfView view{points.span(), descriptors.first(points.size())};
+    ASSERT_EQ(matcher.match(view, view, {}, nullptr, &matches), SurfMatchStatus::ok);
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  ASSERT_GT(points.size(), 30U);
+  // Everything finds itself.
+  EXPECT_EQ(matches.size(), points.size());
+  for (const SurfMatch& m : matches) EXPECT_EQ(m.left, m.right);
+}
+
 }  // namespace
 }  // namespace vergence::features

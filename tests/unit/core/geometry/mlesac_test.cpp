@@ -53,6 +53,18 @@ TEST_F(RigMlesacTest, findsThePoseAmongHalfOutliersAndFlagsThem) {
   EXPECT_GE(poses, 48);
 }
 
+TEST_F(RigMlesacTest, drawsFromACameraThatAloneSeesThePoints) {
+  Random random(8);
+  const RigScene scene = make_scene(random, 2, 60, 0.0, 0.0, 0.0, 0.3, &table_);
+  RigObservations o = table_.view();
+  std::vector<std::uint8_t> right_only(o.size(), 2);
+  o.seen = right_only;
+  const MlesacPose found = mlesac_.solve(o, {}, nullptr, random);
+  ASSERT_EQ(found.status, MlesacStatus::ok);
+  EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9);
+  EXPECT_EQ(found.inliers, 60);
+}
+
 TEST_F(RigMlesacTest, aGoodPriorEndsTheSearchEarlyAndABadOneDoesNoHarm) {
   Random random(10);
   const RigScene scene = make_scene(random, 2, 300, 0.1, 0.3, 0.3, 0.6, &table_);
@@ -138,6 +150,14 @@ TEST_F(RigMlesacTest, numbersThatAreNoneAreLeftOut) {
   EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9);
   EXPECT_EQ(found.inliers, 100);
   EXPECT_EQ(found.observations, 200);
+}
+
+TEST(SamplesNeeded, followsTheFormula) {
+  EXPECT_EQ(samples_needed(1.0, 3, 0.99, 1000), 1);
+  EXPECT_EQ(samples_needed(0.0, 3, 0.99, 1000), 1000);
+  EXPECT_EQ(samples_needed(0.5, 3, 0.99, 1000), 35);   // ln 0.01 / ln 0.875 = 34.5
+  EXPECT_EQ(samples_needed(0.5, 5, 0.99, 1000), 146);  // ln 0.01 / ln(1 − 1/32) = 145.05
+  EXPECT_EQ(samples_needed(0.1, 3, 0.99, 200), 200);
 }
 
 }  // namespace

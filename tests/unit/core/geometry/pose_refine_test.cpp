@@ -177,6 +177,17 @@ TEST_F(PoseRefinerTest, saysThatFarPointsDoNotHoldThePosition) {
   EXPECT_LT(loose.rotation_sigma, 0.01);
 }
 
+TEST_F(PoseRefinerTest, usesOnlyWhatItIsTold) {
+  Random random(25);
+  const RigScene scene = make_scene(random, 2, 100, 0.4, 0.0, 0.0, 0.3, &table_);
+  std::vector<std::uint8_t> use(100, 0);
+  for (std::size_t i = 0; i < 100; ++i) use[i] = scene.good[i] ? 3 : 0;
+  const RefinedPose found =
+      refiner_.refine(table_.view(), disturbed(scene.T_left_world, random, 0.02, 0.2), use, {});
+  EXPECT_LT(test::difference(found.T_left_world, scene.T_left_world), 1e-9);
+  for (std::size_t i = 0; i < 100; ++i) EXPECT_EQ(refiner_.flags()[i] == 3, scene.good[i]) << i;
+}
+
 TEST_F(PoseRefinerTest, namesWhatIsWrong) {
   Random random(26);
   const RigScene scene = make_scene(random, 1, 2, 0.0, 0.0, 0.0, 0.3, &table_);

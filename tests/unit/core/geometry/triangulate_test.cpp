@@ -72,6 +72,19 @@ TEST(Triangulate, covarianceAndChiSquareHoldUp) {
   EXPECT_NEAR(chi2, 5.0, 0.25);  // 2·4 − 3; √(2·5/3000) = 0.058
 }
 
+TEST(Triangulate, farPointsKeepTheirDirection) {
+  const std::array<RayView, 2> views = {
+      RayView{Transform{}, Vec2(0.1, -0.05), kSigma},
+      RayView{{Mat3::Identity(), {-0.5, 0, 0}}, Vec2(0.1, -0.05), kSigma}};
+  const TriangulatedPoint found = triangulate(views, {});
+  EXPECT_EQ(found.status, TriangulateStatus::no_parallax);
+  EXPECT_NEAR(found.inverse_depth, 0.0, 1e-12);
+  EXPECT_NEAR(found.inverse_depth_sigma, std::sqrt(2.0) * kSigma / 0.5,
+              1e-6);  // disparity's sigma over the baseline
+  EXPECT_LT((found.p_world / found.p_world.z() - Vec3(0.1, -0.05, 1)).norm(), 1e-9);
+  EXPECT_GT(found.p_world.z(), 100.0);
+}
+
 TEST(Triangulate, namesWhatIsWrong) {
   const Transform right{Mat3::Identity(), {-0.5, 0, 0}};
   std::array<RayView, 2> views = {RayView{Transform{}, Vec2(0.0, 0.0), kSigma},

@@ -33,6 +33,16 @@ TEST(Transform, isAGroup) {
   EXPECT_LT(((a * b) * p - a * (b * p)).norm(), kRounding);
 }
 
+TEST(Transform, finiteRefusesNanAndInfinity) {
+  EXPECT_TRUE(some(1).finite());
+  Transform T;
+  T.t.y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(T.finite());
+  T = {};
+  T.R(2, 0) = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(T.finite());
+}
+
 TEST(Transform, isPerturbedOnTheLeftOfTheRotationAndPlainlyInTranslation) {
   const Transform T = some(0.6);
   const Vec3 phi(1e-3, -2e-3, 5e-4), tau(0.1, 0.2, -0.3);

@@ -63,6 +63,11 @@ TEST(So3, logUndoesExpUpToPi) {
       EXPECT_LT((log_so3(exp_so3(angle * axis)) - angle * axis).norm(), kRounding) << angle;
 }
 
+TEST(So3, logKeepsTheDigitsOfTinyAngles) {
+  for (const Vec3& axis : axes())
+    EXPECT_LT((log_so3(exp_so3(1e-9 * axis)) - 1e-9 * axis).norm(), 1e-9 * kRounding);
+}
+
 TEST(So3, atPiEitherSignOfTheAxisIsRight) {
   for (const Vec3& axis : axes()) {
     const Mat3 R = exp_so3(kPi * axis);

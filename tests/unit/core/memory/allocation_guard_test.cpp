@@ -77,6 +77,29 @@ TEST_F(AllocationGuardTest, anUnsealedThreadMayAllocateWhileAnotherIsSealed) {
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
 }
 
+TEST_F(AllocationGuardTest, everySealedThreadCounts) {
+  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 3; ++i)
+    threads.emplace_back([] {
+      const SealedScope sealed;
+      void* volatile p = malloc(32);
+      free(p);
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(AllocationGuard::allocations_after_seal() - before, 3U);
+}
+
+TEST_F(AllocationGuardTest, scopesNest) {
+  EXPECT_FALSE(AllocationGuard::thread_sealed());
+  {
+    const SealedScope outer;
+    { const SealedScope inner; }
+    EXPECT_TRUE(AllocationGuard::thread_sealed());
+  }
+  EXPECT_FALSE(AllocationGuard::thread_sealed());
+}
+
 TEST_F(AllocationGuardTest, abortsWhenToldTo) {
   testing::FLAGS_gtest_death_test_style = "threadsafe";
   EXPECT_DEATH(

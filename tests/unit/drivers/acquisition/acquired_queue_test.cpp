@@ -64,6 +64,19 @@ TEST(AcquiredQueue, givesEverythingInOrderAndThenEnds) {
   EXPECT_EQ(queue.high_water(), 3U);
 }
 
+TEST(AcquiredQueue, slotsOfARefusedFrameGoBackUnseen) {
+  Bench b;
+  AcquiredQueue queue(b.cameras, true);
+  AcquiredQueue::Refused refused;
+  refused.set = frame(7).set;
+  queue.push(refused);
+  EXPECT_TRUE(b.camera.released.empty()) << "not on the producer's thread";
+  queue.finish();
+  Acquired item;
+  EXPECT_FALSE(queue.next(&item));
+  EXPECT_EQ(b.camera.released, std::vector<int>{7});
+}
+
 TEST(AcquiredQueue, aLateConsumerSkipsToTheNewestImagesOnlyLive) {
   for (const bool wait : {false, true}) {
     Bench b;

@@ -166,6 +166,21 @@ TEST_F(SideBySide, areBothGoneBeforeEitherComesBack) {
   EXPECT_EQ(right_->wait({}, &frame), DeviceStatus::ok);
 }
 
+TEST_F(SideBySide, oneThatGoesAgainBeforeBothAreBackComesBackToo) {
+  stream();
+  script_.answers = {DeviceStatus::gone};
+  Frame frame;
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::gone);
+  ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::gone);
+  ASSERT_EQ(left_->start(nullptr), DeviceStatus::ok);
+  script_.answers = {DeviceStatus::gone};
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::gone);
+  ASSERT_EQ(right_->start(nullptr), DeviceStatus::ok);
+  ASSERT_EQ(left_->start(nullptr), DeviceStatus::ok);
+  script_.answers = {DeviceStatus::ok};
+  EXPECT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
+}
+
 TEST_F(SideBySide, countTheirOwnFramesAndTheCamerasLosses) {
   stream();
   script_.answers = {DeviceStatus::ok};

@@ -150,6 +150,17 @@ TEST(GigeCamera, stampsAreTheCamerasClockInNanoseconds) {
   EXPECT_GE(b.camera->timing().least_delay, Duration::milliseconds(2));
 }
 
+TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {
+  GigeCameraOptions o;
+  o.tick_frequency = 0;
+  GigeBench b(o);
+  b.configure(b.wish());
+  EXPECT_NE(b.camera->remark().find("no clock"), std::string::npos) << b.camera->remark();
+  b.start();
+  for (const Frame& f : b.take(5))
+    EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().least_delay);
+}
+
 TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {
   GigeBench b;
   CameraConfiguration c = b.wish();
@@ -187,6 +198,23 @@ TEST(GigeCamera, packetSizeAndDelayAreComputedForTheLink) {
   b.configure(c);
   EXPECT_NE(b.camera->remark().find("packets of 16000 bytes instead of 20000"), std::string::npos)
       << b.camera->remark();
+}
+
+TEST(GigeCamera, theReceiveBufferIsThereBeforeTheFirstPacket) {
+  GigeBench b;
+  for (const int kib : {64, 150}) {  // below what any system allows
+    CameraConfiguration c = b.wish();
+    test::give<gige::Options>(&c, "socket_buffer_kb", std::to_string(kib));
+    b.configure(c);
+    b.start();
+    const int socket = gige::find_udp_socket(static_cast<std::uint16_t>(b.reg(0xD00)));
+    ASSERT_GE(socket, 0);
+    int bytes = 0;
+    socklen_t length = sizeof bytes;
+    ASSERT_EQ(::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &bytes, &length), 0);
+    EXPECT_EQ(bytes, 2 * kib * 1024) << "the kernel doubles it";
+    b.camera->stop();
+  }
 }
 
 }  // namespace

@@ -122,5 +122,24 @@ TEST(GigeChunkCamera, nonsenseInThemIsCountedAndTheFrameIsComplete) {
       << b.camera->remark();
 }
 
+TEST(GigeChunkCamera, imagesOfAnotherSizeAreNeverComplete) {
+  for (const std::uint32_t payload : {0x4001U, 5U, 4U}) {
+    for (const auto& [width, height] : {std::pair{160, 120}, {320, 238}, {640, 480}}) {
+      GigeCameraOptions o = with_chunks();
+      o.chunk_payload = payload;
+      GigeBench b(o);
+      b.configure(b.wish());
+      b.start();
+      ASSERT_EQ(b.take(3).size(), 3U);
+      const std::uint64_t before = b.numbers.back();
+      b.simulator->lie_about_size(width, height);
+      (void)b.take(20);
+      const std::size_t whole = b.numbers.size();
+      EXPECT_LE(whole, 5U) << payload << ": " << width << " x " << height << " after image "
+                           << before;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vergence::test

@@ -150,6 +150,44 @@ TEST(GnssDecoder, missingEpochsAreCounted) {
   EXPECT_EQ(d.period(), Duration::seconds(1));
 }
 
+/// Fixes of seconds 10 + … of a minute, each where it was measured.
+void read_fixes(Decoder* decoder, const std::vector<int>& milliseconds) {
+  for (const int ms : milliseconds) {
+    test::PvtBytes pvt;
+    pvt.put(10, 1, 10 + ms / 1000), pvt.put(16, 4, ms % 1000 * 1'000'000);
+    (void)read(decoder, pvt.frame(), HostStamp(7'000'000'000 + ms * 1'000'000LL));
+  }
+}
+
+TEST(GnssDecoder, aReceiverThatIsBackAtALowerRateLosesNothing) {
+  Decoder d({Protocol::ubx, 0, {}});
+  read_fixes(&d, {0, 100, 200, 300, 400, 500});
+  EXPECT_EQ(d.period(), Duration::milliseconds(100));
+  d.begin(0);
+  EXPECT_EQ(d.period(), Duration{});
+  read_fixes(&d, {5000, 6000, 7000, 8000});
+  EXPECT_EQ(d.counters().lost, 0U);
+  EXPECT_EQ(d.period(), Duration::seconds(1));
+}
+
+TEST(GnssDecoder, aSingleShortStepIsNoInterval) {
+  Decoder d({Protocol::ubx, 0, {}});
+  // A fix is acquired again 40 ms before the grid of the others goes on.
+  read_fixes(&d, {0, 100, 200, 300, 960, 1000, 1100, 1200, 1300, 1400});
+  EXPECT_EQ(d.period(), Duration::milliseconds(100));
+  EXPECT_EQ(d.counters().lost, 6U) << "between 300 and 960 ms";
+}
+
+TEST(GnssDecoder, theFirstStepIsTheIntervalUntilOneIsBelieved) {
+  for (const int first : {40, 700}) {
+    Decoder d({Protocol::ubx, 0, {}});
+    read_fixes(&d, {0, first});
+    EXPECT_EQ(d.period(), Duration::milliseconds(first));
+    read_fixes(&d, {first + 100, first + 200, first + 300});
+    EXPECT_EQ(d.period(), Duration::milliseconds(100));
+  }
+}
+
 TEST(GnssDecoder, oldAndUntimedFixesAreNotHandedOut) {
   Decoder d({Protocol::ubx, 0, {}});
   test::PvtBytes pvt;

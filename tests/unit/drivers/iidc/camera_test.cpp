@@ -115,6 +115,18 @@ TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
   }
 }
 
+TEST(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
+  std::vector<std::int64_t> starts;
+  for (const char* at : {"start", "middle", "end"}) {
+    CameraUnderTest c;
+    c.start(CameraUnderTest::usual_with("stamp_at", at));
+    c.bus->expose(1);
+    starts.push_back(c.take_and_release().exposure_start.ns());
+  }
+  EXPECT_NEAR(static_cast<double>(starts[0] - starts[1]), 2.5e6, 2);
+  EXPECT_NEAR(static_cast<double>(starts[0] - starts[2]), 5e6, 2);
+}
+
 TEST(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
   CameraUnderTest c;
   CameraConfiguration requested = CameraUnderTest::usual();
@@ -175,6 +187,17 @@ TEST(IidcCamera, ItsTemperatureIsReadInEitherUnitThatMakersUse) {
   EXPECT_DOUBLE_EQ(reads(4000), -1) << "neither";
   c.bus->all_accesses = DeviceStatus::gone;
   EXPECT_FALSE(c.camera->temperature_c());
+}
+
+TEST(IidcCamera, TimingIsExposureAndTheWay) {
+  CameraUnderTest usb, bus(true);
+  usb.configure();
+  bus.configure();
+  EXPECT_GT(usb.camera->timing().least_delay, usb.actual.exposure);
+  // 75 packets of 4096 bytes, one in each cycle of 125 us.
+  EXPECT_EQ(bus.camera->timing().least_delay,
+            bus.actual.exposure + Duration::microseconds(75 * 125));
+  EXPECT_LT(usb.camera->timing().resolution, Duration::microseconds(1));
 }
 
 }  // namespace

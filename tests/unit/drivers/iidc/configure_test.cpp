@@ -81,6 +81,14 @@ TEST(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
   EXPECT_EQ(bus.bus->model().f7_packet, 1024U);
 }
 
+TEST(IidcConfigure, WherePacketsSetTheRateTheyAreTheSmallestThatReachIt) {
+  CameraUnderTest c(true);
+  c.bus->masked[kRegisterSpace + 0xF00000 + reg::feature_inquiry(Feature::frame_rate)] = 0;
+  c.configure();
+  EXPECT_EQ(c.bus->model().f7_packet, packet_for_rate(640 * 480, 10 * 0.99, 4, 4096));
+  EXPECT_NEAR(c.actual.rate_hz, 10, 0.1);
+}
+
 TEST(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
   CameraUnderTest c;
   CameraConfiguration requested = CameraUnderTest::usual();
@@ -157,6 +165,21 @@ TEST(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
   EXPECT_EQ(t.mode, 0U);
 }
 
+TEST(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
+  CameraUnderTest legacy(true, false), beta(true, true);
+  legacy.configure();
+  EXPECT_EQ(legacy.bus->model().iso_speed, 2U);
+  beta.configure();
+  EXPECT_EQ(beta.bus->model().iso_speed, 3U);
+  CameraConfiguration requested = CameraUnderTest::usual_with("speed", "800");
+  std::string said;
+  EXPECT_EQ(legacy.refuse(requested, &said), DeviceStatus::unsupported);
+  expect_says(said, {"speed", "S400"});
+  test::give<iidc::Options>(&requested, "speed", "400");
+  beta.configure(requested);
+  EXPECT_EQ(beta.bus->model().iso_speed, 2U);
+}
+
 TEST(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIsNoSmallerOne) {
   CameraConfiguration requested = CameraUnderTest::usual();
   requested.width = 1280;
@@ -216,6 +239,13 @@ TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
   }
   EXPECT_TRUE(c.bus->written.empty()) << "a refusal writes nothing";
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+}
+
+TEST(IidcConfigure, WithoutFormat7ARateBetweenTheFixedOnesBecomesTheNext) {
+  CameraUnderTest c;
+  c.configure(CameraUnderTest::usual_with("format7", "no"));
+  EXPECT_EQ(c.actual.rate_hz, 15);
+  EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U);
 }
 
 }  // namespace

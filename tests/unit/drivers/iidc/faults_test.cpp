@@ -103,6 +103,49 @@ TEST(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConfig
   c.camera->release(held.slot);
 }
 
+TEST(IidcFaults, ACameraUnpluggedWhileStoppedIsGoneAtTheNextStart) {
+  CameraUnderTest c;
+  c.start();
+  c.camera->stop();
+  c.bus->unplug();
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
+  Frame f;
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::stopped);
+  c.bus->replug();
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+}
+
+TEST(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
+  CameraUnderTest c;
+  c.configure();
+  c.bus->all_accesses = DeviceStatus::timeout;
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
+  EXPECT_NE(c.camera->last_error().find("did not become ready"), std::string::npos);
+  c.bus->all_accesses = DeviceStatus::ok;
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+}
+
+TEST(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
+  CameraUnderTest c;
+  c.start();
+  c.bus->unplug();
+  Frame f;
+  while (c.camera->wait(Duration::milliseconds(20), &f) == DeviceStatus::ok)
+    c.camera->release(f.slot);
+  c.bus->replug();
+  c.bus->start_status = DeviceStatus::no_bandwidth;
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::no_bandwidth);
+    EXPECT_FALSE(c.bus->model().transmitting);
+    EXPECT_FALSE(c.camera->last_error().empty());
+    EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
+  }
+  c.bus->start_status = DeviceStatus::ok;
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->last_error();
+  c.bus->expose(1);
+  EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
+}
+
 TEST(IidcFaults, ACameraThatFallsSilentWhileAnImageIsHeldGoesOnBesideIt) {
   CameraUnderTest c;
   c.start();

@@ -101,5 +101,21 @@ TEST(FrameReader, BusStampsTellGapsWhereNothingIsEmbedded) {
   EXPECT_EQ(last, 8U);
 }
 
+TEST(BusLedger, CamerasOfOneBusShareItsRoomAndItsClock) {
+  BusLedger ledger;
+  const int a = 0, b = 0;
+  const BusShare large{6680, BusSpeed::s800, 1280 * 960};
+  ledger.put(&a, "card0", large);
+  EXPECT_EQ(ledger.last_error("card0"), "");
+  ledger.put(&b, "card0", large);
+  EXPECT_NE(ledger.last_error("card0").find("6692 of the bus's 4915"), std::string::npos);
+  EXPECT_EQ(ledger.last_error("card1"), "");
+  ledger.put(&b, "card1", large);
+  EXPECT_EQ(ledger.last_error("card0"), "");
+  ledger.remove(&a);
+  EXPECT_EQ(ledger.clock("card0"), ledger.clock("card0"));
+  EXPECT_NE(ledger.clock("card0"), ledger.clock("card1"));
+}
+
 }  // namespace
 }  // namespace vergence::iidc

@@ -196,5 +196,14 @@ TEST(MockBoard, anUnpluggedBoardStopsWithItsLineUnlessItHasASupplyOfItsOwn) {
   EXPECT_EQ(powered.rig->trigger().statistics().lost, 10U);
 }
 
+TEST(MockBoard, onlyTheLinesThatAreAskedForArePulsed) {
+  TriggerConfiguration c = at_20_hz();
+  c.lines = 0b01;
+  Bench b({}, c, 1);
+  b.drive();
+  EXPECT_EQ(b.frames[0].size(), 21U);
+  EXPECT_EQ(b.frames[1].size(), 0U);
+}
+
 }  // namespace
 }  // namespace vergence::mock

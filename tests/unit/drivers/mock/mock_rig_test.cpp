@@ -156,6 +156,22 @@ TEST(MockRig, aCameraThatWasGoneComesBackAndCountsAnew) {
   EXPECT_EQ(h.frames[0].size(), 61U);
 }
 
+// Frames of 0.8 s on would arrive after the camera is gone: none of them does, and no event of its
+// return is taken for a frame.
+TEST(MockRig, framesThatAreOnTheWayAsACameraGoesAreLostWithIt) {
+  const Harvest h = drive_with(
+      {"late_frames@0.5 camera=1 duration_s=0.5 share=1", "camera_gone@1 camera=1 duration_s=0.5"});
+  EXPECT_EQ(h.gone[1], 1);
+  EXPECT_GE(h.statistics[1].lost, 3U);
+  EXPECT_EQ(h.frames[1].size() + h.statistics[1].lost, 51U);
+  std::size_t starts = 0;
+  for (const Seen& seen : h.frames[1]) {
+    EXPECT_EQ(seen.frame.exposure, Duration::milliseconds(8));
+    starts += seen.frame.counter == 0 ? 1 : 0;
+  }
+  EXPECT_EQ(starts, 2U);
+}
+
 TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
   const Harvest lost = drive_with({"lose_frames@0 camera=0 share=0.3 duration_s=0"});
   EXPECT_GT(lost.statistics[0].lost, 5U);

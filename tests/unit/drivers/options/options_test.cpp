@@ -121,6 +121,19 @@ TEST(CameraOptions, aValueThatCannotBeChangesNothing) {
   EXPECT_FALSE(default_options("mock").has_value());
 }
 
+TEST(CameraOptions, switchesTakeWhatPeopleWrite) {
+  for (const auto& [text, on] : {std::pair{"on", true},
+                                 {"yes", true},
+                                 {"true", true},
+                                 {"off", false},
+                                 {"no", false},
+                                 {"false", false}}) {
+    CameraOptions o = iidc::Options{};
+    ASSERT_TRUE(set_option("format7", text, &o));
+    EXPECT_EQ(std::get<iidc::Options>(o).format7, std::optional(on)) << text;
+  }
+}
+
 TEST(CameraOptions, aDriverTakesItsOwnKindAndWhatIsPossible) {
   gige::Options taken;
   taken.buffers = 7;

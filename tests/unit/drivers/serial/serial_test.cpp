@@ -164,6 +164,29 @@ TEST(SerialPort, aDeviceThatCameBackElsewhereIsFoundByItsSerialNumber) {
   EXPECT_EQ(port_with_serial(ports, "C", "/dev/ttyS0"), "/dev/ttyS0") << "whose nobody knows";
 }
 
+TEST(SerialPort, ofPortsThatShareASerialNumberTheOneAskedForIsTaken) {
+  // An FT4232H has one number for its four ports, a CP2102 often has "0001".
+  const std::vector<SerialPortInfo> ports{usb_port("/dev/ttyV0", "A"), usb_port("/dev/ttyV1", "A"),
+                                          usb_port("/dev/ttyV2", "A")};
+  EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV1"), "/dev/ttyV1");
+  EXPECT_EQ(port_with_serial(ports, "A", "/dev/ttyV7"), "/dev/ttyV7") << "which one nobody knows";
+}
+
+TEST(ConverterNumber, thatTwoWereSeenWithTellsNobodyForGood) {
+  const auto one = usb_port("/dev/ttyV0", "0001"), other = usb_port("/dev/ttyV1", "0001");
+  ConverterNumber shared;
+  shared.opened({one, other}, "0001");
+  shared.opened({one}, "0001");  // after the hub began anew it was there first
+  EXPECT_EQ(shared.find({other}, "/dev/ttyV0"), "/dev/ttyV0");
+
+  ConverterNumber alone;
+  alone.opened({one}, "0001");
+  EXPECT_EQ(alone.find({usb_port("/dev/ttyV5", "0001")}, "/dev/ttyV0"), "/dev/ttyV5");
+  EXPECT_EQ(alone.find({one, other}, "/dev/ttyV0"), "/dev/ttyV0");
+  EXPECT_EQ(alone.find({other}, "/dev/ttyV0"), "/dev/ttyV0");
+  EXPECT_EQ(alone.find({usb_port("/dev/ttyV0", "B")}, "/dev/ttyV0"), "") << "that is B's now";
+}
+
 TEST(SerialPort, aLinkIsKeptWhereItLeadsToThePortWithTheSerialNumber) {
   const std::filesystem::path link =
       std::filesystem::temp_directory_path() / ("vergence-by-id-" + std::to_string(::getpid()));

@@ -99,12 +99,44 @@ TEST_F(Receiving, aBoardThatStoppedOrHasAnotherConfigurationIsHalted) {
   EXPECT_EQ(receiver.finding(), Finding::halted);
 }
 
+TEST_F(Receiving, numbersThatCannotBeEndInInvalidAfterAFewInARow) {
+  event(5, 6 * kPeriod);
+  for (int i = 1; i < BoardReceiver::kMostRefused; ++i) event(5, 6 * kPeriod);
+  EXPECT_EQ(receiver.finding(), Finding::none) << "one fewer than it takes";
+  event(5, 6 * kPeriod);
+  EXPECT_EQ(receiver.finding(), Finding::invalid);
+  EXPECT_EQ(pulses.size(), 1U);
+}
+
+TEST_F(Receiving, afterOneWrongTickItGoesOnOnceTheBoardIsSetUpAnew) {
+  for (std::uint32_t n = 0; n < 10; ++n) event(n, (n + 1) * kPeriod);
+  event(10, 11 * kPeriod + (std::uint64_t{1} << 32U));
+  for (std::uint32_t n = 11; receiver.finding() == Finding::none && n < 100; ++n)
+    event(n, (n + 1) * kPeriod);
+  ASSERT_EQ(receiver.finding(), Finding::invalid);
+  const std::size_t before = pulses.size();
+  receiver.clear_finding();
+  TriggerConfig config{};
+  config.rate_millihertz = 30'000;
+  receiver.begin_boot(kBoot, 100, config, {});
+  for (std::uint32_t n = 100; n < 120; ++n) event(n, (n + 1) * kPeriod);
+  EXPECT_EQ(pulses.size(), before + 20);
+  EXPECT_EQ(receiver.finding(), Finding::none);
+}
+
 TEST_F(Receiving, aStatusWithTheSequenceOfAPauseAnswersIt) {
   pause.add(3);
   ASSERT_EQ(pause.due(arrival), 3U);
   pause.sent(11, arrival);
   status(trigger_running, kMark, 11);
   EXPECT_EQ(pause.due(arrival + PauseRequest::kAnswerLimit * 2), 0U);
+}
+
+TEST_F(Receiving, framesOfNoKnownTypeOrSizeAreCounted) {
+  accept(frame_of(0x7E, 3));
+  accept(frame_of(trigger_event, trigger_event_payload_size - 1));
+  EXPECT_EQ(receiver.counters().frames_unknown, 2U);
+  EXPECT_TRUE(pulses.empty());
 }
 
 }  // namespace

@@ -100,5 +100,22 @@ TEST(Driver, opensByPortBySerialNumberOrTheOnlyOne) {
   EXPECT_NE(driver.last_error().find("30002b000b513336343931cc"), std::string::npos);
 }
 
+TEST(Driver, saysWhyThereIsNone) {
+  Machine m;
+  Driver driver = m.driver();
+  DeviceStatus s = DeviceStatus::ok;
+  EXPECT_EQ(driver.open("", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::not_found);
+  EXPECT_NE(driver.last_error().find("plug it in"), std::string::npos);
+  m.add("/dev/ttyUSB9", 0x0403, 0x6001, DeviceStatus::no_permission);
+  EXPECT_EQ(driver.open("", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::no_permission);
+  EXPECT_EQ(driver.open("/dev/ttyUSB9", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::no_permission);
+  EXPECT_EQ(driver.open("/dev/nothing", &s), nullptr);
+  EXPECT_EQ(s, DeviceStatus::not_found);
+  EXPECT_FALSE(driver.last_error().empty());
+}
+
 }  // namespace
 }  // namespace vergence::trigger_board

@@ -285,5 +285,22 @@ INSTANTIATE_TEST_SUITE_P(
                  }}),
     [](const auto& one) { return one.param.name; });
 
+TEST(AStubbornBoard, thatAnswersAndDoesNothingIsNamed) {
+  // STATUS for everything, always stopped and never configured.
+  const auto there = std::make_shared<Talker>(
+      "", 921600, answering([](const TriggerFrame& f) {
+        TriggerFrame a{trigger_status, f.sequence, trigger_status_payload_size, {}};
+        if (f.type != trigger_hello) return a;
+        TriggerInfo info{};
+        info.version = 1, info.lines = 2;
+        a = {trigger_info, f.sequence, trigger_info_payload_size, {}};
+        trigger_put_info(&info, a.payload);
+        return a;
+      }));
+  Device device(std::make_unique<mock::SimulatedPlace>(there, direct_line()), {});
+  EXPECT_EQ(device.configure(test::thirty_hertz(), nullptr), DeviceStatus::failed);
+  EXPECT_NE(device.last_error().find("does not do it"), std::string::npos) << device.last_error();
+}
+
 }  // namespace
 }  // namespace vergence::trigger_board

@@ -42,5 +42,26 @@ TEST(PauseRequest, oneThatComesWhileAnotherWaitsIsAddedToIt) {
   EXPECT_EQ(request.due(kStart), 5U) << "at once, not after the answer's limit";
 }
 
+TEST(PauseRequest, whatWasSentOutlivesADroppedRequestButNotAnotherStartOfTheBoard) {
+  PauseRequest request;
+  request.add(2);
+  ASSERT_EQ(request.due(kStart), 2U);
+  request.sent(1, kStart);
+  request.add(3);
+  request.drop_new();
+  EXPECT_EQ(request.due(after_limits(1)), 2U);
+  request.restart();
+  EXPECT_EQ(request.due(after_limits(2)), 0U);
+}
+
+TEST(PauseRequest, aRefusedOneIsNotSentAgain) {
+  PauseRequest request;
+  request.add(2);
+  ASSERT_EQ(request.due(kStart), 2U);
+  request.sent(1, kStart);
+  request.refused();
+  EXPECT_EQ(request.due(after_limits(1)), 0U);
+}
+
 }  // namespace
 }  // namespace vergence::trigger_board

@@ -73,6 +73,42 @@ struct TerminalRig {
   Device device{std::make_unique<SealingPlace>(board.port(), seal), options()};
 };
 
+TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
+  TerminalRig rig;
+  for (int round = 0; round < 2; ++round) {
+    ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
+    std::atomic<bool> done{false};
+    std::thread onlooker([&] {
+      while (!done) {
+        (void)rig.device.statistics();
+        (void)rig.device.board_statistics();
+        (void)rig.device.timing();
+        (void)rig.device.pause(1);
+        std::this_thread::sleep_for(std::chrono::milliseconds(30));
+      }
+    });
+    std::uint64_t last = 0;
+    int taken = 0;
+    std::thread consumer([&] {
+      Pulse p;
+      for (;;) {
+        const DeviceStatus s = rig.device.wait(Duration::seconds(5), &p);
+        if (s != DeviceStatus::ok) break;
+        if (taken++ > 0 && p.number <= last) ADD_FAILURE() << p.number << " after " << last;
+        last = p.number;
+        if (!p.mapped || p.host > p.arrival + p.host_error)
+          ADD_FAILURE() << "an edge after its report";
+      }
+    });
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    rig.device.stop();
+    done = true;
+    consumer.join();
+    onlooker.join();
+    EXPECT_GT(taken, 5);
+  }
+}
+
 TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";

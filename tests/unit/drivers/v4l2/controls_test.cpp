@@ -24,6 +24,13 @@ Control integer(std::int64_t least, std::int64_t most, std::int64_t step) {
   return c;
 }
 
+TEST(V4l2Controls, namesBecomeKeys) {
+  EXPECT_EQ(key_of("Exposure Time, Absolute"), "exposure_time_absolute");
+  EXPECT_EQ(key_of("  Trigger (Mode) "), "trigger_mode");
+  EXPECT_EQ(key_of("S-Video 000-0"), "s_video_000_0");
+  EXPECT_EQ(key_of("µ"), "");
+}
+
 TEST(V4l2Controls, aValueIsANumberInRangeOrAMenuItem) {
   std::int64_t value = -1;
   const Control c = menu({{0, "manual_mode"}, {3, "aperture_priority_mode"}});

@@ -47,6 +47,20 @@ TEST(V4l2Media, padsThatDisagreeAreNamed) {
   EXPECT_NE(text.find("wants 0x2001/640x400"), std::string::npos) << text;
 }
 
+TEST(V4l2Media, anEnabledLinkGoesBeforeOneThatIsOff) {
+  MediaGraph g = board();
+  g.entities.push_back({4, "other sensor", "", {{false, ""}}});
+  g.links.insert(g.links.begin(), MediaLink{4, 2, 0, 0, false});
+  EXPECT_EQ(advice(g, "/dev/video0").find("other sensor"), std::string::npos);
+}
+
+TEST(V4l2Media, anotherNodeOrNothingBeforeItNeedsNoAdvice) {
+  EXPECT_EQ(advice(board(), "/dev/video7"), "");
+  MediaGraph alone = board();
+  alone.links.clear();
+  EXPECT_EQ(advice(alone, "/dev/video0"), "");
+}
+
 TEST(V4l2Media, aRingOfLinksEnds) {
   MediaGraph g = board();
   g.links.push_back({2, 1, 1, 0, true});

@@ -51,6 +51,15 @@ TEST(V4l2Sequence, goesOnAcrossTheWrapOf32Bits) {
   EXPECT_EQ(step.missing, 1U) << "number 0";
 }
 
+TEST(V4l2Sequence, aNumberThatGoesBackCountsOne) {
+  SequenceCounter counter(Duration{});
+  (void)counter.next(100, {});
+  const auto step = counter.next(3, {});
+  EXPECT_EQ(step.counter, 1U);
+  EXPECT_EQ(step.missing, 0U);
+  EXPECT_EQ(counter.next(4, {}).counter, 2U);
+}
+
 TEST(V4l2Sequence, unnumberedBuffersAreCountedByTime) {
   const Duration period = Duration::milliseconds(40);
   SequenceCounter counter(period);
@@ -88,6 +97,17 @@ TEST(V4l2Raster, keepsTheFirstFrameOfEveryIntervalOfTheClock) {
     EXPECT_LT((kept[0][i] - kept[1][i]).ns(), frame.ns());
     EXPECT_LT((kept[1][i] - kept[0][i]).ns(), frame.ns());
   }
+}
+
+TEST(V4l2Raster, anIntervalWithoutAFrameIsMissing) {
+  Raster raster(Duration::milliseconds(100));
+  SequenceCounter::Step step;
+  EXPECT_TRUE(raster.keep(DeviceStamp(1'050'000'000), &step));
+  EXPECT_FALSE(raster.keep(DeviceStamp(1'099'000'000), &step));
+  EXPECT_TRUE(raster.keep(DeviceStamp(1'450'000'000), &step));
+  EXPECT_EQ(step.counter, 4U);
+  EXPECT_EQ(step.missing, 3U);
+  EXPECT_FALSE(raster.keep(DeviceStamp(1'150'000'000), &step)) << "late";
 }
 
 }  // namespace

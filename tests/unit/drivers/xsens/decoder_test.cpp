@@ -159,6 +159,50 @@ TEST(ArrivalTiming, aReadThatEndsInsideAMessageWaitsForIt) {
               100'000);
 }
 
+/// Captured streams through the whole decoder: what is true of a real device's time holds.
+TEST(Decoder, capturesGiveReadingsInStepWithTheirClock) {
+  constexpr const char* kFolder = "data/xsens_mtdata2";
+  const auto folder = test::shared_data(kFolder);
+  if (!folder) GTEST_SKIP() << test::shared_data_missing(kFolder);
+  for (const char* set : {"1", "2", "3", "4"}) {
+    const std::string bytes = test::read_file(*folder / set / "output.bin");
+    Decoder decoder;
+    StreamSettings settings;
+    decoder.begin(settings, 115200, {});
+    std::vector<InsReading> all;
+    HostStamp now(1'000'000'000);
+    for (std::size_t at = 0; at < bytes.size(); at += 62) {
+      const std::span<const std::uint8_t> piece(
+          reinterpret_cast<const std::uint8_t*>(bytes.data()) + at,
+          std::min<std::size_t>(62, bytes.size() - at));
+      now = now + Duration::nanoseconds(xbus::wire_time_ns(62, 115200));
+      decoder.accept(piece, now);
+      for (InsReading r; decoder.next(&r);) all.push_back(r);
+    }
+    EXPECT_EQ(decoder.line_counters().messages, 100U);
+    EXPECT_EQ(decoder.counters().fixes, 4U) << set;
+    EXPECT_EQ(decoder.counters().lost + decoder.counters().malformed + decoder.counters().backward +
+                  decoder.counters().restarts,
+              0U)
+        << set;
+    EXPECT_EQ(all.size() + decoder.counters().incomplete + decoder.counters().unsettled, 96U)
+        << set << ": all but the receiver's";
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      const Duration step = all[i].measured - all[i - 1].measured;
+      EXPECT_EQ(step.ns() % 10'000'000, 0) << "in steps of the sample period, the receiver's older "
+                                              "stamps between them notwithstanding";
+      EXPECT_GT(step, Duration{});
+      EXPECT_EQ(all[i].sample.number - all[i - 1].sample.number,
+                static_cast<std::uint64_t>(step.ns() / 10'000'000));
+      EXPECT_EQ(all[i].quality.utc_ns - all[i - 1].quality.utc_ns, step.ns())
+          << "its UTC is the same clock";
+    }
+    EXPECT_NEAR(all.back().sample.position.latitude_deg, 57.6794, 1e-3);
+    EXPECT_NEAR(all.back().sample.position.longitude_deg, 11.8825, 1e-3);
+    EXPECT_NEAR(all.back().quality.satellites, 11.5, 0.5) << set;
+  }
+}
+
 TEST(Decoder, anMtdataOfAnotherLengthIsRefusedAndTold) {
   Decoder decoder;
   StreamSettings settings;

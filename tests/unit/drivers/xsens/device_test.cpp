@@ -124,6 +124,17 @@ TEST(XsensDevice, aPauseLosesNoReadingOnEitherSideAndTheFirstAfterItIsMarked) {
   EXPECT_EQ(rig.times_gone, 0);
 }
 
+TEST(XsensDevice, aStopEndsThePulsesWhereSyncOutIsInUse) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
+  Options options;
+  options.sync_out_hz = 25;
+  XsensRig rig(sensor, {}, options);
+  rig.start();
+  (void)rig.readings(20);
+  rig.device->stop();
+  EXPECT_FALSE(rig.simulator->measuring());
+}
+
 TEST_P(BothGenerations, whatIsSetAlreadyIsNotWrittenAgain) {
   mock::XsensSimulatorOptions sensor = simulated(GetParam());
   XsensRig rig(sensor);
@@ -254,6 +265,14 @@ struct Timing {
 
 class Stamps : public ::testing::TestWithParam<Timing> {};
 
+TEST_P(BothGenerations, oneThatFellSilentIsToldToMeasureAgain) {
+  mock::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
+  sensor.silences = {HostStamp(9'000'000'000)};
+  XsensRig rig(sensor);
+  EXPECT_GT(rig.drive().back().arrival, HostStamp(19'500'000'000));
+  EXPECT_EQ(rig.times_gone, 1);
+}
+
 TEST_P(Stamps, areRightWithinThreeTenthsOfAMillisecondAfterTwentySeconds) {
   const Timing& t = GetParam();
   std::vector<double> errors;
@@ -296,6 +315,28 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& one) { return one.param.name; });
 
 // ---- what is special to one of them, and what is none
+
+TEST(Mark4, atOneHertzALostSampleIsNoSilence) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 40);
+  XsensRig rig(sensor);
+  rig.between->tamper([n = 0](HostStamp at, std::vector<std::uint8_t>* bytes) mutable {
+    if (at > HostStamp(9'000'000'000) && at < HostStamp(20'000'000'000) && ++n % 3 != 0)
+      bytes->clear();
+  });
+  rig.start(1);
+  EXPECT_GT(rig.readings().back().arrival, HostStamp(35'000'000'000));
+  EXPECT_EQ(rig.times_gone, 0);
+}
+
+TEST(Mark4, positionsThatAreMissingNowAndThenMakeNoHoleInTheFix) {
+  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
+  sensor.missing_position = 0.2;
+  XsensRig rig(sensor);
+  const auto all = rig.drive();
+  ASSERT_GT(all.size(), 1200U);
+  for (const InsReading& r : all) ASSERT_EQ(r.sample.fix, FixStatus::fix_3d);
+  EXPECT_LT(all.size(), 1700U);
+}
 
 TEST(Mark4, aDriveWithoutAFixIsToldAndGoesOn) {
   mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);

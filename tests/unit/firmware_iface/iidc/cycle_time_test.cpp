@@ -50,5 +50,24 @@ TEST(CycleUnwrapper, APauseOfHoursIsMeasuredByTheHost) {
   EXPECT_EQ(u.unwrap((100 * kSecond + bus) % kCycleTimeWrapNs, pause) - t0, bus);
 }
 
+TEST(CycleUnwrapper, CamerasThatShareItAgreeWhicheverCameFirst) {
+  // The clocks are 64 s apart: alone, each camera's wrap would be a matter of luck.
+  CycleUnwrapper u;
+  const std::int64_t host = 1'000 * kSecond, bus = 127 * kSecond + 990'000'000;
+  const std::int64_t a = u.unwrap(bus, host);
+  const std::int64_t b = u.unwrap((bus + 20'000'000) % kCycleTimeWrapNs,
+                                  host + 5'000'000);  // exposed 20 ms later, arrived sooner
+  EXPECT_EQ(b - a, 20'000'000);
+  EXPECT_EQ(u.unwrap(bus, host + 60'000'000), a);  // an older stamp that arrives late
+}
+
+TEST(CycleUnwrapper, ARestartForgets) {
+  CycleUnwrapper u;
+  (void)u.unwrap(127 * kSecond, 0);
+  EXPECT_EQ(u.unwrap(kSecond, 2 * kSecond), 129 * kSecond);
+  u.restart();
+  EXPECT_EQ(u.unwrap(kSecond, 3 * kSecond), kSecond);
+}
+
 }  // namespace
 }  // namespace vergence::iidc

@@ -64,6 +64,15 @@ TEST(Features, TriggerModesZeroAndFourteenAndTheirSources) {
   EXPECT_EQ(m.quadlet(), 0x82E0'0000U);
 }
 
+TEST(Features, StrobeTimesKeepToTheirBits) {
+  StrobeControl s;
+  s.on = true;
+  s.delay = 0x1ABC;
+  s.duration = 0x1DEF;
+  EXPECT_EQ(s.quadlet(), 0x83AB'CDEFU);
+  EXPECT_EQ(StrobeControl::of(s.quadlet()).delay, 0xABCU);
+}
+
 TEST(Features, IsoChannelsInBothLayouts) {
   EXPECT_EQ((IsoChannel{5, 2, false}.quadlet()), 0x5200'0000U);
   EXPECT_EQ((IsoChannel{33, 3, true}.quadlet()), 0x0000'A103U);

@@ -105,6 +105,12 @@ Bytes laid(void (*put)(const Message*, std::uint8_t*), const Message& message) {
   return bytes;
 }
 
+TEST(TriggerFrames, idleZerosAreNothing) {
+  const Decoded all = decode_all(Bytes(100, 0));
+  EXPECT_TRUE(all.frames.empty());
+  EXPECT_EQ(all.decoder.bad_coding + all.decoder.bad_length + all.decoder.bad_crc, 0U);
+}
+
 /// The bytes of docs/trigger_board.md, worked out by hand from its tables.
 TEST(TriggerPayloads, everyLayoutStandsByteForByteWhereItsTableSays) {
   EXPECT_EQ((laid<trigger_info_payload_size, TriggerInfo>(

@@ -163,6 +163,16 @@ TEST(Configuration, periodsAreWholeTicksAndNotTheExcludedOnes) {
   EXPECT_FALSE(period_of_rate(std::nan("")));
 }
 
+TEST(Configuration, syncOutOfANewerDeviceCannotMakeThirtyHertz) {
+  double actual = 0;
+  EXPECT_EQ(sync_out_skip(120, 30, &actual), 3);
+  EXPECT_EQ(actual, 30);
+  EXPECT_EQ(sync_out_skip(kSyncOutBase, 25, &actual), 15);
+  EXPECT_EQ(actual, 25);
+  EXPECT_EQ(sync_out_skip(kSyncOutBase, 30, &actual), 12);
+  EXPECT_NEAR(actual, 30.77, 0.01);
+}
+
 TEST(LineBudget, isThatOfTheTable) {
   struct Row {
     std::uint16_t mode;

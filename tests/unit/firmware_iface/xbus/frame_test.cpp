@@ -127,6 +127,17 @@ TEST(FrameStream, resynchronisesOneByteOnSoThatNoMessageHidesInAFalseFrame) {
   EXPECT_EQ(stream.counters().checksum_wrong, 1U);
 }
 
+TEST(FrameStream, aPreambleInsideAPayloadIsPayload) {
+  const Bytes bytes = from_hex("FA FF 36 07 10 60 04 FA FF 36 00 21");  // SampleTimeFine = FAFF3600
+  FrameStream stream;
+  const std::vector<Found> found = find_all(stream, bytes, 1);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].payload.size(), 7U);
+  // Cut before its own preamble, the inner one begins nothing either.
+  FrameStream cut;
+  EXPECT_TRUE(find_all(cut, std::span(bytes).subspan(1), 1).empty());
+}
+
 TEST(FrameStream, everyByteIsInAMessageOrCountedOrWaits) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     Bytes bytes = noise(5000, seed);
@@ -155,6 +166,15 @@ TEST(FrameStream, abandonGivesUpALongClaimAndLooksAtWhatStandsBehind) {
   EXPECT_EQ(stream.counters().abandoned, 1U);
   stream.abandon();
   EXPECT_EQ(stream.counters().abandoned, 1U) << "nothing was waited for";
+}
+
+TEST(FrameStream, resetForgetsWhatWaits) {
+  FrameStream stream;
+  EXPECT_TRUE(find_all(stream, from_hex("FA FF 36 20 01 02"), 2).empty());
+  stream.reset();
+  EXPECT_EQ(stream.waiting(), 0U);
+  EXPECT_EQ(find_all(stream, frame(0x31, {}), 2).size(), 1U);
+  EXPECT_EQ(stream.counters().garbage_bytes, 6U);
 }
 
 TEST(FrameStream, whenFullTakesWhatFitsAndLosesNothing) {

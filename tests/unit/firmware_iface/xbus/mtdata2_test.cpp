@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -142,6 +143,25 @@ TEST(Mtdata2, knownPacketsOfImpossibleSizeOrValueAreRefused) {
                  out.altitude_ellipsoid_m || out.gnss_pvt || out.satellites || out.status_byte)
         << what;
   }
+}
+
+TEST(Mtdata2, everyFormOfAnAttitudeHasItsOwnPacket) {
+  Mtdata2 out;
+  std::array<std::uint8_t, 128> buffer{};
+  PacketWriter packets(buffer);
+  packets.put_numbers(wire_id(PacketId::euler, NumberFormat::fp16_32, LocalFrame::nwu),
+                      Three{1.5, -2.25, -170.125});
+  packets.put_numbers(wire_id(PacketId::rotation_matrix, NumberFormat::float32, LocalFrame::nwu),
+                      std::array<double, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1});
+  packets.put(wire_id(PacketId::status_byte), from_hex("07"));
+  ASSERT_EQ(decode_mtdata2(packets.payload(), &out), PacketStatus::ok);
+  EXPECT_EQ(out.euler_deg, (Three{1.5, -2.25, -170.125}));
+  EXPECT_EQ(out.rotation_matrix, (std::array<double, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1}));
+  EXPECT_EQ(out.orientation_frame, LocalFrame::nwu);
+  EXPECT_EQ(out.status_byte, 0x07);
+  EXPECT_EQ(wire_id(PacketId::euler), 0x2030);
+  EXPECT_EQ(wire_id(PacketId::rotation_matrix), 0x2020);
+  EXPECT_EQ(wire_id(PacketId::status_byte), 0xE010);
 }
 
 TEST(Mtdata2, aListOfSatellitesIsAReceiversMessage) {

@@ -35,6 +35,17 @@ TEST(BoardHostile, aHostThatDoesNotListenCostsMessagesWhichAreCountedAndThenItIs
   EXPECT_GT(s.pulses, 190U) << "pulses go on";
 }
 
+TEST(BoardHostile, aFloodOfPingsDropsAnswersAndNothingElse) {
+  VirtualBoard b;
+  b.deaf = true;
+  for (int i = 0; i < 1000; ++i) b.send(trigger_ping, {1, 0, 0, 0});
+  b.deaf = false;
+  b.listen();
+  EXPECT_EQ(b.take(trigger_pong).size() + 1, std::size_t{outbox_capacity})
+      << "and the STATUS of the start";
+  EXPECT_EQ(b.board.outbox.dropped, 1000U - (outbox_capacity - 1));
+}
+
 TEST(BoardHostile, aRebootInMidFrameIsAnotherBootAndNumbersFromZero) {
   VirtualBoard b;
   b.start(100'000);

@@ -40,6 +40,12 @@ TEST(BoardSchedule, variedIntervalsFollowTheSharedBits) {
   }
 }
 
+TEST(BoardSchedule, whatIsVariedByIsRoundedToACount) {
+  PulseSchedule s{};
+  schedule_set(&s, 1'500'000, 1000, 1);
+  EXPECT_EQ(s.vary, 2U);
+}
+
 TEST(BoardPulses, goOutOnTheirGridWithTheirWidthAndLines) {
   VirtualBoard b;
   TriggerConfig c = VirtualBoard::config(29'970);
@@ -201,6 +207,17 @@ TEST_F(WithFeedback, anExposureThatOutlastsTheIntervalHasNoEndAndSpoilsNoOther) 
   }
 }
 
+TEST_F(WithFeedback, theLastEventComesWithoutAnotherPulse) {
+  begin();
+  b.run_for_us(2'000);
+  b.send(trigger_stop);
+  b.frames.clear();
+  b.run_for_us(20'000);
+  const auto events = b.events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].exposure[0].start_us, TRIGGER_NOT_SEEN);
+}
+
 TEST_F(WithFeedback, ofABouncingLineTheFirstStartAndTheFirstEndCount) {
   b.on_pulse = [this](const BoardPulse& p) {
     b.edge_at(p.count + 3 * kUs, input(0), false);
@@ -216,6 +233,22 @@ TEST_F(WithFeedback, ofABouncingLineTheFirstStartAndTheFirstEndCount) {
     EXPECT_EQ(e.exposure[0].start_us, 10);
     EXPECT_EQ(e.exposure[0].end_us, 5000);
   }
+}
+
+TEST_F(WithFeedback, anEdgeOlderThanItsPulseIsNoneOfIt) {
+  b.on_pulse = nullptr;
+  begin();
+  b.run_for_us(2'000);
+  ASSERT_EQ(b.made.size(), 1U);
+  const std::uint64_t pulse = b.made[0].count;
+  board_edge(&b.board, b.now, input(0), true,
+             pulse - 1);  // came to the main loop after the pulse's own record
+  exposure(0, pulse, 3000, 4000);
+  exposure(1, pulse, 3000, 4000);
+  b.run_for_us(5'000);
+  const auto events = b.events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].exposure[0].start_us, 3000);
 }
 
 TEST_F(WithFeedback, edgesWhileNobodyAskedAreNothing) {

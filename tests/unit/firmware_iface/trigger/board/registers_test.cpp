@@ -178,6 +178,36 @@ TEST_F(BoardPort, theCompareUnitMakesBothEdgesOfAllLinesAtOneCount) {
   EXPECT_TRUE(hal_arm(20'000, 500, 0x5));
 }
 
+TEST_F(BoardPort, anInterruptThatCameAfterTheWholePulseEndsIt) {
+  configure();
+  ASSERT_TRUE(hal_arm(11'000, 500, 0x4));
+  EXPECT_EQ(at(kTim2, dier), 8U);
+  at(kTim2, sr) = 8;
+  at(kTim2, cnt) = 12'000;
+  tim2_handler();
+  EXPECT_EQ(stamped().count, 11'000U);
+  EXPECT_EQ(at(kTim2, ccmr2), 0x4040U);
+  EXPECT_EQ(at(kTim2, dier), 0U);
+}
+
+TEST_F(BoardPort, nothingIsArmedOrTakenBackAtTheLastMoment) {
+  configure();
+  at(kTim2, cnt) = 0xFFFFFF00;
+  EXPECT_FALSE(hal_arm(0x00000080, 500, 0x1)) << "384 counts away, across the counter's wrap";
+  EXPECT_EQ(at(kTim2, dier), 0U);
+  EXPECT_FALSE(hal_arm(0xFFFFFE00, 500, 0x1)) << "past";
+  ASSERT_TRUE(hal_arm(0x00000400, 500, 0x1));
+  at(kTim2, cnt) = 0x00000300;
+  EXPECT_FALSE(hal_disarm());
+  at(kTim2, cnt) = 0x00000100;
+  at(kTim2, sr) = 0;
+  EXPECT_TRUE(hal_disarm());
+  EXPECT_EQ(at(kTim2, ccmr1), 0x4040U);
+  EXPECT_EQ(at(kTim2, dier), 0U);
+  EXPECT_FALSE(hal_disarm()) << "nothing is armed";
+  EXPECT_TRUE(nothing_stamped());
+}
+
 TEST_F(BoardPort, edgesThatTheCompareUnitDidNotMakeAreForcedAndSaidToBeLate) {
   configure();
   ASSERT_TRUE(hal_arm(11'000, 500, 0x1));
@@ -268,6 +298,32 @@ TEST_F(BoardPort, ppsAndInsHaveTheCapturesTimeOrElseTheInterrupts) {
   at(kTim4, sr) = 0;
   exti9_5_handler();
   EXPECT_EQ(stamped().count, 0x12340010U) << "no capture came";
+}
+
+TEST_F(BoardPort, theLineRunsAt921600AndStampsItsBytes) {
+  line_start(84'000'000);
+  EXPECT_EQ(at(kUsart1, 0x08), 91U) << "84 MHz / 91 = 923 077, 0.16 % fast";
+  EXPECT_EQ(at(kUsart1, 0x0C), 0x202CU) << "UE, RXNEIE, TE, RE";
+  EXPECT_EQ(at(kGpioa, moder) >> 18U & 0xFU, 0xAU) << "PA9, PA10";
+  EXPECT_EQ(at(kGpioa, afrh) >> 4U & 0xFFU, 0x77U);
+  EXPECT_EQ(at(kGpioa, 0x0C) >> 20U & 3U, 1U) << "pull-up at RX";
+  ByteRecord byte{};
+  at(kUsart1, 0x00) = 0x20;
+  at(kUsart1, 0x04) = 0x155;
+  at(kTim2, cnt) = 777;
+  usart1_handler();
+  ASSERT_TRUE(hal_received(&byte));
+  EXPECT_EQ(byte.byte, 0x55);
+  EXPECT_EQ(byte.count, 777U);
+  at(kUsart1, 0x00) = 0x08;
+  usart1_handler();
+  EXPECT_FALSE(hal_received(&byte)) << "an overrun alone has no byte";
+  EXPECT_FALSE(hal_send(1));
+  EXPECT_FALSE(hal_line_idle());
+  at(kUsart1, 0x00) = 0xC0;
+  EXPECT_TRUE(hal_line_idle());
+  EXPECT_TRUE(hal_send(0xA5));
+  EXPECT_EQ(at(kUsart1, 0x04), 0xA5U);
 }
 
 }  // namespace

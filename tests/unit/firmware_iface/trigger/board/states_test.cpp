@@ -123,6 +123,51 @@ TEST(BoardConfig, isRefusedByCodeAndThenTheOldOneHolds) {
   EXPECT_EQ(b.error(), trigger_error_not_stopped);
 }
 
+TEST(BoardConfig, withoutPpsOrInsTheirEdgesAreRefused) {
+  BoardDescription bare = VirtualBoard::usual();
+  bare.has_pps = bare.has_ins = false;
+  VirtualBoard b(bare);
+  TriggerConfig c = VirtualBoard::config(30'000);
+  c.pps_edge = trigger_edge_rising;
+  b.configure(c);
+  EXPECT_EQ(b.error(), trigger_error_line);
+  c.pps_edge = trigger_edge_none;
+  c.ins_edge = trigger_edge_falling;
+  b.configure(c);
+  EXPECT_EQ(b.error(), trigger_error_line);
+}
+
+TEST(BoardConfig, statusNamesItByItsCrc) {
+  VirtualBoard b;
+  const TriggerConfig c = VirtualBoard::config(12'345);
+  Bytes payload(trigger_config_payload_size);
+  trigger_put_config(&c, payload.data());
+  b.configure(c);
+  EXPECT_EQ(b.status().configuration, trigger_crc32(payload.data(), payload.size()));
+}
+
+TEST(BoardStates, statusComesEverySecondAndWhenTheStateChanges) {
+  VirtualBoard b;
+  b.run_for_us(10'500'000);
+  EXPECT_EQ(b.take(trigger_status).size(), 11U) << "at boot, then every second";
+}
+
+TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
+  VirtualBoard b;
+  b.start(10'000);
+  b.run_for_us(50'000);
+  b.pause(4);  // the slots of 201, 301, 401 and 501 ms
+  EXPECT_EQ(b.status().state, trigger_paused);
+  b.run_for_us(450'000);
+  EXPECT_EQ(b.take(trigger_status).size(), 0U) << "nothing new";
+  b.run_for_us(2'000);
+  const auto told = b.take(trigger_status);
+  ASSERT_EQ(told.size(), 1U) << "the pause has ended by itself";
+  TriggerStatus s{};
+  ASSERT_TRUE(trigger_get_status(told[0].payload, told[0].size, &s));
+  EXPECT_EQ(s.state, trigger_running);
+}
+
 TEST(BoardStates, numbersGoOnAcrossStopAndStart) {
   VirtualBoard b;
   b.start(100'000);
@@ -181,6 +226,27 @@ TEST(BoardStates, aPauseLeavesOutSoManyNumbersAndKeepsTheGrid) {
     EXPECT_EQ(events[i].tick - events[0].tick, number * 10'000U);
     EXPECT_EQ(events[i].flags, i == 0 || i == 6 ? 1 : 0);
   }
+}
+
+TEST(BoardStates, aPauseCanBeEndedAndIsEndedByStop) {
+  VirtualBoard b;
+  b.start(100'000);
+  b.run_for_us(20'000);
+  b.pause(0xFFFFFFFF);
+  b.run_for_us(5'000'000);
+  const std::size_t before = b.made.size();
+  EXPECT_LE(before, 4U);
+  b.pause(0);
+  EXPECT_EQ(b.status().state, trigger_running);
+  b.run_for_us(55'000);
+  EXPECT_GE(b.made.size(), before + 5);
+  EXPECT_EQ(b.events().front().flags, 1);
+  b.pause(1000);
+  b.run_for_us(55'000);
+  b.send(trigger_stop);
+  EXPECT_EQ(b.status().state, trigger_stopped);
+  b.send(trigger_start);
+  EXPECT_EQ(b.status().state, trigger_running);
 }
 
 }  // namespace

@@ -120,6 +120,20 @@ TEST_F(Disciplined, ticksNeverGoBackAndNeverStep) {
   }
 }
 
+TEST_F(Disciplined, jitterOfTheReceiverIsAveraged) {
+  pps.ppm = 20;
+  pps.jitter_us = 0.5;
+  begin(false);
+  feed(1, 60);
+  const double at = error_us(59.2);
+  double worst = 0;
+  for (std::uint64_t k = 60; k < 600; ++k) {
+    feed(k, k + 1);
+    worst = std::max(worst, std::abs(error_us(static_cast<double>(k) + 0.4) - at));
+  }
+  EXPECT_LT(worst, 3);
+}
+
 TEST_F(Disciplined, whenPpsIsGoneTheRateStays) {
   pps.ppm = 50;
   begin(false);
@@ -149,6 +163,21 @@ TEST_F(Disciplined, edgesThatFitNothingAreReportedButNotFollowed) {
   EXPECT_EQ(told, 40U);
   EXPECT_EQ(b.status().pps_locked, 1);
   EXPECT_LT(std::abs(error_us(59.4) - before), 2);
+}
+
+TEST_F(Disciplined, anEdgeThatIsAlmostRightIsNotFollowedEither) {
+  pps.ppm = 10;
+  begin(false);
+  feed(1, 30);
+  const double before = error_us(29.4);
+  for (std::uint64_t k = 30; k < 90; ++k) {
+    if (k % 7 == 0)
+      b.edge_at(pps.count(static_cast<double>(k) + 400e-6), board_input_pps, true);
+    else
+      feed(k, k + 1);
+  }
+  EXPECT_EQ(b.status().pps_locked, 1);
+  EXPECT_LT(std::abs(error_us(89.4) - before), 2);
 }
 
 TEST_F(Disciplined, thePhaseIsBroughtBackAndWhatSteeredItEndsWithPps) {
@@ -215,6 +244,37 @@ TEST_F(Disciplined, aSignalThatIsNoPpsIsNeverLockedTo) {
     b.run_for_us(20'000'000);
   }
   EXPECT_EQ(board_tick(&b.board, b.now), (b.now - 1'000'000 + 42) / 84) << "the crystal's ticks";
+}
+
+TEST_F(Disciplined, aSecondPhaseIsTakenOverAfterAFewSeconds) {
+  pps.ppm = 5;
+  begin(false);
+  feed(1, 30);
+  for (int k = 31; k < 90; ++k)
+    b.edge_at(pps.count(k + 0.37), board_input_pps, true);  // another receiver
+  b.run_until(pps.count(33.9));
+  EXPECT_EQ(b.status().pps_locked, 0) << "three in a row did not fit";
+  b.run_until(pps.count(36.9));
+  EXPECT_EQ(b.status().pps_locked, 1);
+  b.run_until(pps.count(90));
+  EXPECT_EQ(b.status().pps_locked, 1);
+}
+
+TEST(BoardTicks, otherTimersToo) {
+  for (const std::uint32_t hz : {1'000'000U, 16'000'000U, 72'000'000U, 1'000'000'000U}) {
+    TickDiscipline d{};
+    tick_init(&d, hz, 100, 7);
+    std::uint64_t at = 7;
+    for (int k = 0; k < 100; ++k) {
+      at += hz + hz / 20'000;  // 50 ppm
+      EXPECT_TRUE(tick_pps(&d, at, at + 10));
+      tick_advance(&d, at + hz / 2);
+    }
+    EXPECT_TRUE(d.locked);
+    const auto second = static_cast<double>(tick_of(&d, at + hz + hz / 20'000) - tick_of(&d, at));
+    EXPECT_NEAR(second, 1e6, 1.01) << hz;
+    EXPECT_EQ(tick_length(&d, hz + hz / 20'000), 1'000'000U);
+  }
 }
 
 }  // namespace
