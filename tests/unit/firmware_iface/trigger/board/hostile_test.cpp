@@ -8,14 +8,6 @@ namespace {
 
 using Bytes = VirtualBoard::Bytes;
 
-struct Random {
-  std::uint32_t state;
-  std::uint32_t operator()() {
-    state = state * 1664525U + 1013904223U;
-    return state >> 8U;
-  }
-};
-
 TEST(BoardHostile, aHostThatDoesNotListenCostsMessagesWhichAreCountedAndThenItIsAnswered) {
   VirtualBoard b;
   b.start(100'000);
