@@ -3,13 +3,24 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <string>
 #include <vector>
 
 #include "core/types/bayer.hpp"
-#include "drivers/iidc/text.hpp"
 
 namespace vergence::iidc {
+namespace {
+
+/// printf into a string of at most 255 characters: sentences with numbers, off the real-time path.
+template <class... A>
+std::string text(const char* format, A... values) {
+  std::array<char, 256> out{};
+  (void)std::snprintf(out.data(), out.size(), format, values...);
+  return out.data();
+}
+
+}  // namespace
 
 bool GreyConversion::possible() const noexcept {
   switch (coding) {

@@ -15,6 +15,8 @@
 #include "drivers/iidc/budget_words.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 #include "drivers/iidc/identity.hpp"
+#include "drivers/iidc/iidc.hpp"
+#include "drivers/iidc/iidc_camera.hpp"
 
 namespace vergence::iidc {
 namespace {
@@ -204,5 +206,36 @@ std::string FirewireBus::remark(const StreamShape& shape, double, int sharing) c
   const std::string text = budget_error(shares);
   return text.empty() ? text : "if all are on one bus, " + text;
 }
+
+namespace {
+
+class FirewireDriver final : public CameraDriver {
+ public:
+  std::vector<DeviceInfo> enumerate() override {
+    last_error_ = has_firewire() ? "" : "this kernel has no FireWire stack: modprobe firewire-ohci";
+    std::vector<DeviceInfo> out;
+    for (const FirewireNode& n : list_firewire_cameras())
+      out.push_back({"iidc-1394", guid_text(n.rom.guid),
+                     n.rom.model[0] != 0 ? n.rom.model.data() : "IIDC camera", n.device});
+    return out;
+  }
+  std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {
+    last_error_.clear();
+    auto bus = FirewireBus::open(serial, ledger_, status, &last_error_);
+    if (bus == nullptr) return nullptr;
+    const ConfigRom rom = bus->rom();
+    auto clock = bus->clock();
+    return std::make_unique<IidcCamera>(std::move(bus), rom, std::move(clock));
+  }
+  std::string last_error() const override { return last_error_; }
+
+ private:
+  std::shared_ptr<BusLedger> ledger_ = std::make_shared<BusLedger>();
+  std::string last_error_;
+};
+
+}  // namespace
+
+std::unique_ptr<CameraDriver> make_1394_driver() { return std::make_unique<FirewireDriver>(); }
 
 }  // namespace vergence::iidc

@@ -1,8 +1,190 @@
 #include "drivers/options/options.hpp"
 
+#include <array>
+#include <charconv>
+#include <cmath>
 #include <type_traits>
 
+namespace vergence::gige {
+namespace {
+
+OptionTable<Options> make_table() {
+  using O = Options;
+  OptionTable<O> t;
+  t.number("packet_size", &O::packet_size, {576, 65000}, "bytes", "computed",
+           "Size of the stream's packets with their headers: the interface's MTU, at most 9000.");
+  t.number("packet_delay_us", &O::packet_delay, {0, 10000}, "µs", "computed",
+           "Pause after each packet, so that the cameras of one link interleave.");
+  t.number("link_mbps", &O::link_mbps, {1, 400000}, "Mbit/s", "the interface's",
+           "Speed of the slowest link that the cameras share, where a switch is in between.");
+  t.number("link_cameras", &O::link_cameras, {1, 16}, "", "all GigE cameras",
+           "Cameras that share that link.");
+  t.on_off("packet_socket", &O::packet_socket, nullptr,
+           "Receives through a packet socket (needs CAP_NET_RAW): less work, frames some ms "
+           "later.");
+  t.choice<Resend, Resend>(
+      "resend", &O::resend, {{"auto", Resend::automatic}, {"on", Resend::on}, {"off", Resend::off}},
+      nullptr, "Asks again for lost packets; auto: where the camera says that it can.");
+  t.number("frame_retention_ms", &O::frame_retention, {1, 1000}, "ms", "3 periods, 60 to 100 ms",
+           "How long an incomplete frame waits for packets that were asked for again.");
+  t.number("socket_buffer_kb", &O::socket_buffer_kb, {64, 500000}, "KiB", "eight frames",
+           "Receive buffer of the socket; needs net.core.rmem_max of that size.");
+  t.number("buffers", &O::buffers, {4, 48}, "", nullptr, "Frames that may be in use at once.");
+  t.text("trigger_line", &O::line, "a name of the camera", nullptr,
+         "Input of the hardware trigger.");
+  t.choice<TriggerEdge, TriggerEdge>(
+      "trigger_edge", &O::edge,
+      {{"rising", TriggerEdge::rising}, {"falling", TriggerEdge::falling}}, nullptr,
+      "Edge of the pulse that begins the exposure.");
+  t.choice<TriggerOverlap, TriggerOverlap>(
+      "trigger_overlap", &O::overlap,
+      {{"off", TriggerOverlap::off},
+       {"readout", TriggerOverlap::readout},
+       {"previous_frame", TriggerOverlap::previous_frame}},
+      "the camera's", "Whether a pulse is taken while the frame before is read out.");
+  t.number("trigger_delay_us", &O::trigger_delay_us, {0, 1000000}, "µs", nullptr,
+           "From the pulse to the exposure.");
+  t.choice<ExposureMode, ExposureMode>(
+      "exposure_mode", &O::exposure_mode,
+      {{"timed", ExposureMode::timed}, {"trigger_width", ExposureMode::trigger_width}}, nullptr,
+      "trigger_width: the pulse's length is the exposure.");
+  t.text("exposure_line", &O::exposure_line, "a name of the camera", "none",
+         "Output that is high during the exposure.");
+  t.choice<bool, bool>("stamp_at", &O::stamp_at_end, {{"start", false}, {"end", true}}, nullptr,
+                       "What the camera's time stamp is of: the exposure's start or its end.");
+  t.on_off("ptp", &O::ptp, nullptr, "The camera's clock follows the network's (IEEE 1588).");
+  t.choice<bool, bool>("chunks", &O::chunks, {{"auto", true}, {"off", false}}, nullptr,
+                       "Each frame reports its own exposure, where the camera can (chunk data).");
+  t.number("heartbeat_ms", &O::heartbeat_ms, {500, 60000}, "ms", "the camera's",
+           "After so long without a word from us the camera gives up its controller.");
+  t.others("feature.", &O::features, "a value",
+           "Any feature of the camera by its own name, set after everything else.");
+  return t;
+}
+
+}  // namespace
+
+const OptionTable<Options>& option_table() {
+  static const OptionTable<Options> table = make_table();
+  return table;
+}
+
+}  // namespace vergence::gige
+
+namespace vergence::iidc {
+namespace {
+
+OptionTable<Options> make_table() {
+  using O = Options;
+  constexpr double kMostStrobeUs = 3998;  // 12 bits of 1/1024 ms
+  OptionTable<O> t;
+  t.number("trigger_source", &O::trigger_source, {0, 3}, "", nullptr,
+           "Input of the hardware trigger.");
+  t.choice<bool, bool>("trigger_edge", &O::trigger_rising, {{"rising", true}, {"falling", false}},
+                       nullptr, "Edge of the pulse that begins the exposure.");
+  t.choice<std::optional<unsigned>, unsigned>(
+      "trigger_mode", &O::trigger_mode, {{"0", 0U}, {"14", 14U}}, "14 where the camera has it",
+      "Trigger mode; 14: a pulse is taken while the frame before is read out.");
+  t.number("strobe_pin", &O::strobe_pin, {0, 3}, "", "none", "Output that shows the exposure.");
+  t.choice<bool, bool>("strobe_level", &O::strobe_high, {{"high", true}, {"low", false}}, nullptr,
+                       "Level of that output during the exposure.");
+  t.number("strobe_delay_us", &O::strobe_delay, {0, kMostStrobeUs}, "µs", nullptr,
+           "From the exposure's start to the strobe's.");
+  t.number("strobe_duration_us", &O::strobe_duration, {0, kMostStrobeUs}, "µs", nullptr,
+           "Length of the strobe; 0: as long as the exposure.");
+  t.on_off("format7", &O::format7, "where needed",
+           "on: only regions (Format 7), off: only fixed modes.");
+  t.number("packet_bytes", &O::packet_bytes, {4, 16384, 4}, "bytes", "its share of the bus",
+           "Packets of Format 7; smaller ones leave room for others, and take longer.");
+  t.choice<std::optional<BusSpeed>, BusSpeed>("speed", &O::speed,
+                                              {{"100", BusSpeed::s100},
+                                               {"200", BusSpeed::s200},
+                                               {"400", BusSpeed::s400},
+                                               {"800", BusSpeed::s800}},
+                                              "800 where the camera has it, else 400",
+                                              "Highest speed on IEEE 1394, in Mbit/s.");
+  t.number("buffers", &O::buffers, {4, kMaxBuffers}, "", nullptr,
+           "Images; all but four of them can be in use at once.");
+  t.on_off("embedded", &O::embedded, nullptr, "Stamp and counter in row 0.");
+  t.choice<StampedInstant, StampedInstant>("stamp_at", &O::stamped,
+                                           {{"start", StampedInstant::start},
+                                            {"middle", StampedInstant::middle},
+                                            {"end", StampedInstant::end}},
+                                           nullptr,
+                                           "What the camera's stamp is of, in the exposure.");
+  return t;
+}
+
+}  // namespace
+
+const OptionTable<Options>& option_table() {
+  static const OptionTable<Options> table = make_table();
+  return table;
+}
+
+}  // namespace vergence::iidc
+
+namespace vergence::v4l2 {
+namespace {
+
+OptionTable<Options> make_table() {
+  using O = Options;
+  OptionTable<O> t;
+  t.number("readout_us", &O::readout, {0, 1000000}, "µs", "the sensor's own figures, else 0",
+           "From the end of the exposure to the last pixel.");
+  t.number("thin", &O::thin, {1, 60}, "", nullptr,
+           "The camera runs at so many times the rate, one image in each interval is kept.");
+  t.number("buffers", &O::buffers, {4, 32}, "", nullptr,  // 32: the kernel's own limit
+           "Images; all but two of them can be in use at once.");
+  t.number("shift", &O::shift, {0, 8}, "bits", "by the format",
+           "Bits below the eight that are kept, of `Y10` to `Y16`.");
+  t.text("subdevice", &O::subdevice, "/dev/v4l-subdevN", "none",
+         "A sensor behind a media controller, whose controls are then used as well.");
+  t.text("trigger_control", &O::trigger_control, "key of a control, external",
+         "the first with \"trigger\"",
+         "Switches the hardware trigger on; external: something outside does.");
+  t.text("trigger_value", &O::trigger_value, "a number, a menu item's key",
+         "external, hardware, on or 1", "What that control is set to.");
+  t.number("gain_step_db", &O::gain_step_db, {0.001, 20}, "dB", "not known",
+           "One step of the gain control.");
+  t.others("control_", &O::controls, "a number, a menu item's key", "Any control by its key.");
+  return t;
+}
+
+}  // namespace
+
+const OptionTable<Options>& option_table() {
+  static const OptionTable<Options> table = make_table();
+  return table;
+}
+
+}  // namespace vergence::v4l2
+
 namespace vergence {
+
+std::optional<double> parse_number(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
+  return value;
+}
+
+std::optional<bool> parse_switch(std::string_view text) {
+  if (text == "on" || text == "yes" || text == "true") return true;
+  if (text == "off" || text == "no" || text == "false") return false;
+  return std::nullopt;
+}
+
+std::string shortest_text(double value) {
+  std::array<char, 32> text{};
+  // As digits where the number is whole: 1000000, not 1e+06.
+  const bool whole = value == std::floor(value) && std::abs(value) < 1e15;
+  const auto end = whole ? std::to_chars(text.begin(), text.end(), value, std::chars_format::fixed)
+                         : std::to_chars(text.begin(), text.end(), value);
+  return {text.begin(), end.ptr};
+}
+
 namespace {
 
 const OptionTable<gige::Options>& table_of(const gige::Options&) { return gige::option_table(); }

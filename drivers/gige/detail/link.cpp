@@ -15,6 +15,8 @@
 #include <cstring>
 #include <fstream>
 
+#include "drivers/gige/link_budget.hpp"
+
 namespace vergence::gige {
 namespace {
 
@@ -119,6 +121,17 @@ std::int64_t set_receive_buffer(int socket, std::int64_t bytes) {
   socklen_t length = sizeof got;
   if (::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &got, &length) != 0) return 0;
   return got / 2;  // the kernel doubles what it is asked for, for its own book-keeping
+}
+
+LinkBudget link_budget(const LinkDemand& d) noexcept {
+  constexpr int kLeastPacket = 576, kMostPacket = 65'000, kStep = 4;  // bytes: what cameras have
+  const LinkLoad load{d.image_bytes, d.rate_hz, d.cameras, false};
+  LinkBudget budget;
+  budget.packet_size = choose_packet_size(d.packet_size, d.mtu, kLeastPacket, kMostPacket, kStep);
+  budget.used =
+      plan_link(load, budget.packet_size, d.speed, Duration::nanoseconds(-1)).share / kMostOfPeriod;
+  budget.highest_hz = highest_rate(load, budget.packet_size, d.speed);
+  return budget;
 }
 
 }  // namespace vergence::gige
