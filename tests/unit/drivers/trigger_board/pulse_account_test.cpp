@@ -95,11 +95,12 @@ TEST_F(Accounted, repeatedOldAndBackwardEventsAreRefusedByName) {
   EXPECT_FALSE(take(0));
   EXPECT_EQ(account.counters().repeated, 2U);
   EXPECT_FALSE(account.take(event(2, kPeriod), &pulse));
+  EXPECT_FALSE(account.take(event(2, 2 * kPeriod), &pulse)) << "at the tick of the one before";
   EXPECT_FALSE(account.take(event(2, kMostTicks + 1), &pulse));
-  EXPECT_EQ(account.counters().backward, 2U);
+  EXPECT_EQ(account.counters().backward, 3U);
   EXPECT_FALSE(account.take(event(100'000, 3 * kPeriod), &pulse));
   EXPECT_EQ(account.counters().too_many, 1U);
-  EXPECT_EQ(account.refused_in_row(), 5);
+  EXPECT_EQ(account.refused_in_row(), 6);
   EXPECT_EQ(pulse.number, 1U) << "untouched";
   EXPECT_TRUE(take(2));
   EXPECT_EQ(account.refused_in_row(), 0);
