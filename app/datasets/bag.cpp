@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
@@ -9,8 +10,8 @@
 #include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/bag_ins.hpp"
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
-#include "app/datasets/detail/side_names.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app::detail {
@@ -26,7 +27,9 @@ std::string camera_of(std::string_view topic) {
 }
 
 bool is_rectified(std::string_view topic) {
-  return topic.find("image_rect") != std::string_view::npos;
+  // RealSense's image_rect_raw has its own K and D, as raw images have.
+  return topic.find("image_rect") != std::string_view::npos &&
+         topic.find("image_rect_raw") == std::string_view::npos;
 }
 
 std::string list_of_image_topics(const BagIndex& bag) {
@@ -143,26 +146,40 @@ Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
   return pair_offset(log[0], log[1], pairs).median;
 }
 
-/// Pairs of the nearest stamps, and what is to be said of how far these are apart.
+/// Of the nearest times of recording: nothing where these are none, or do not tell either.
+std::vector<std::array<std::size_t, 2>> pair_by_recording(
+    const std::array<std::vector<BagImage>, 2>& images, Duration interval) {
+  constexpr double kNear = 0.25;  // of the interval: far from both neighbours
+  std::array<std::vector<Stamp>, 2> log;
+  for (std::size_t k = 0; k < 2; ++k)
+    for (const BagImage& image : images[k]) log[k].emplace_back(image.log_time);
+  auto pairs = pair_nearest(log[0], log[1], Duration::seconds(kNear * interval.to_seconds()));
+  if (2 * pairs.size() < std::min(images[0].size(), images[1].size())) pairs.clear();
+  return pairs;
+}
+
+/// Pairs of the nearest stamps, and what is to be said of how far these are apart. Where stamps do
+/// not tell which images belong together, the times at which they were recorded do.
 std::vector<std::array<std::size_t, 2>> pair_images(
     const fs::path& path, const Topics& topics, const std::array<std::vector<BagImage>, 2>& images,
     StereoSequence* sequence) {
-  constexpr double kHalf = 0.5, kDoubtful = 0.1;  // of the interval
-  constexpr Duration kSuspicious = Duration::milliseconds(5);
+  constexpr double kHalf = 0.5;  // of the interval
   const std::array stamps{stamps_of(images[0]), stamps_of(images[1])};
-  const double interval = usual_interval(stamps[0]).to_seconds();
-  const Duration most = Duration::seconds(kMostApart * interval);
-  const auto near = pair_nearest(stamps[0], stamps[1], Duration::seconds(kHalf * interval));
+  const Duration interval = usual_interval(stamps[0]);
+  const Duration most = Duration::seconds(kMostApart * interval.to_seconds());
+  const auto near =
+      pair_nearest(stamps[0], stamps[1], Duration::seconds(kHalf * interval.to_seconds()));
   const PairOffset offset = pair_offset(stamps[0], stamps[1], near);
-  const Duration middle = std::max(offset.median, -offset.median);
-  if (!near.empty() && middle > most)
-    refuse(
-        path, 0,
-        fmt::format("{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: the "
-                    "association of images is ambiguous; correct the stamps of one topic",
-                    topics[1], 1e3 * middle.to_seconds(),
-                    offset.median > Duration{} ? "later" : "earlier", topics[0], 1e3 * interval));
-  auto pairs = pair_nearest(stamps[0], stamps[1], most);
+  const bool ambiguous = near.empty() || std::max(offset.median, -offset.median) > most;
+  auto pairs =
+      ambiguous ? pair_by_recording(images, interval) : pair_nearest(stamps[0], stamps[1], most);
+  if (pairs.empty() && !near.empty())
+    refuse(path, 0,
+           fmt::format("{} is stamped {:.3g} ms {} than {} at an interval of {:.3g} ms: the "
+                       "association of images is ambiguous; correct the stamps of one topic",
+                       topics[1], 1e3 * std::abs(offset.median.to_seconds()),
+                       offset.median > Duration{} ? "later" : "earlier", topics[0],
+                       1e3 * interval.to_seconds()));
   if (pairs.empty())
     refuse(path, 0,
            fmt::format("has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no "
@@ -170,16 +187,13 @@ std::vector<std::array<std::size_t, 2>> pair_images(
                        topics[0], stamps[0].front().ns(), topics[1], stamps[1].front().ns(),
                        100 * kMostApart));
   const PairOffset kept = pair_offset(stamps[0], stamps[1], pairs);
-  sequence->assumptions.push_back(
-      "images are paired by the nearest stamp, right ones are later by " + describe(kept));
-  const Duration apart = std::max(std::max(kept.median, -kept.median), kept.farthest);
-  if (apart > kSuspicious || apart.to_seconds() > kDoubtful * interval)
-    sequence->remarks.push_back(fmt::format(
-        "the stamps of {} and {} differ by {} at an interval of {:.3g} ms: if the cameras do not "
-        "expose together, poses suffer in turns; if they do, one of the stamps is wrong",
-        topics[0], topics[1], describe(kept), 1e3 * interval));
+  sequence->assumptions.push_back(fmt::format(
+      "images are paired by the nearest {}, right ones are later by {}",
+      ambiguous ? "time of recording, as their stamps do not tell" : "stamp", describe(kept)));
+  if (is_doubtful(kept, interval))
+    sequence->remarks.push_back(doubt(topics[0], topics[1], kept, interval));
   const Duration late = recorded_later(images, pairs) - kept.median;
-  if (std::max(late, -late) > most)
+  if (std::max(late, -late) > most && !ambiguous)
     sequence->remarks.push_back(fmt::format(
         "the images of a pair of {} and {} were recorded {:.3g} ms further apart than their stamps "
         "say, near the interval: is one camera stamped a frame early or late?",

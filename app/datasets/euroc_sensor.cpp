@@ -1,9 +1,13 @@
 #include "app/datasets/euroc_sensor.hpp"
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
+#include <yaml-cpp/yaml.h>
+
 #include "app/config/yaml_file.hpp"
+#include "app/datasets/ros_camera.hpp"
 #include "app/datasets/text_file.hpp"
 
 namespace vergence::app {
@@ -21,22 +25,10 @@ YamlFile read_yaml(const std::filesystem::path& file) {
   return yaml;
 }
 
-}  // namespace
-
-bool accept_rotation(const Mat3& written, Mat3* R) noexcept {
-  const double error = (written * written.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
-  if (!(error <= kOrthonormality) || !(written.determinant() > 0)) return false;
-  *R = normalised(written);
-  return true;
-}
-
-YAML::Node read_sensor_yaml(const std::filesystem::path& file) { return read_yaml(file).root(); }
-
-Transform read_sensor_mount(const std::filesystem::path& file) {
-  const YamlFile yaml = read_yaml(file);
+Transform mount_of(const YamlFile& yaml) {
   const YAML::Node mount = yaml.root()["T_BS"];
   if (!mount || !mount.IsMap() || !mount["data"])
-    refuse(file, 0, "has no T_BS with `data`: give the sensor.yaml of the camera");
+    refuse(yaml.name(), 0, "has no T_BS with `data`: give the sensor.yaml of the camera");
   const YAML::Node data = mount["data"];
   const std::vector<double> v = yaml.numbers(data, "T_BS data, a 4x4 matrix row by row,", 16, 16);
   Transform T;
@@ -49,6 +41,61 @@ Transform read_sensor_mount(const std::filesystem::path& file) {
               "or its last row is not 0 0 0 1");
   T.t = {v[3], v[7], v[11]};
   return T;
+}
+
+/// Lens and size of a camera's sensor.yaml.
+Intrinsics lens_of(const YamlFile& yaml) {
+  const auto value = [&](const char* key) {
+    const YAML::Node node = yaml.root()[key];
+    if (!node) refuse(yaml.name(), 0, std::string("has no ") + key);
+    return node;
+  };
+  const auto numbers = [&](const char* key, std::size_t least, std::size_t most) {
+    return yaml.numbers(value(key), key, least, most);
+  };
+  const auto word = [&](const char* key) { return yaml.text(value(key), key); };
+  const auto model = word("distortion_model");
+  const auto kind = lens_model(model);
+  if (const auto camera = word("camera_model"); camera != "pinhole" || !kind)
+    refuse(yaml.name(), 0,
+           "camera_model is " + camera + " and distortion_model " + model +
+               "; pinhole with radial-tangential or equidistant is what can be read");
+  Intrinsics k;
+  k.kind = *kind;
+  const auto size = numbers("resolution", 2, 2), f = numbers("intrinsics", 4, 4);
+  const auto d =
+      numbers("distortion_coefficients", 4, k.kind == CameraModelKind::pinhole_radtan ? 5 : 4);
+  constexpr double kLargestSide = 1 << 15;  // px
+  for (const double side : size)
+    if (!(side >= 1 && side <= kLargestSide))
+      refuse(yaml.name(), 0, "resolution is no size of an image");
+  k.width = static_cast<int>(size[0]), k.height = static_cast<int>(size[1]);
+  k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
+  std::copy(d.begin(), d.end(), k.distortion.begin());
+  return k;
+}
+
+}  // namespace
+
+bool accept_rotation(const Mat3& written, Mat3* R) noexcept {
+  const double error = (written * written.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
+  if (!(error <= kOrthonormality) || !(written.determinant() > 0)) return false;
+  *R = normalised(written);
+  return true;
+}
+
+Transform read_sensor_mount(const std::filesystem::path& file) { return mount_of(read_yaml(file)); }
+
+RigCalibration read_sensor_rig(const std::filesystem::path& left,
+                               const std::filesystem::path& right) {
+  const YamlFile of_left = read_yaml(left), of_right = read_yaml(right);
+  RigCalibration rig;
+  rig.cameras = 2;
+  rig.intrinsics = {lens_of(of_left), lens_of(of_right)};
+  rig.T_camera_left[1] = mount_of(of_right).inverse() * mount_of(of_left);
+  rig.T_camera_left[1].R = normalised(rig.T_camera_left[1].R);
+  rig.baseline = rig.T_camera_left[1].t.norm();
+  return rig;
 }
 
 }  // namespace vergence::app

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 
 #include "app/datasets/detail/bmp.hpp"
@@ -72,6 +73,18 @@ ImageFileStatus read_bytes(const std::filesystem::path& file, std::size_t limit,
 }
 
 }  // namespace
+
+bool is_image_name(std::string_view file) noexcept {
+  constexpr std::array<std::string_view, 7> kEndings{".png", ".jpg", ".jpeg", ".bmp",
+                                                     ".pgm", ".ppm", ".pnm"};
+  const auto ends_so = [file](std::string_view ending) {
+    return file.size() > ending.size() &&
+           std::equal(ending.begin(), ending.end(),
+                      file.end() - static_cast<std::ptrdiff_t>(ending.size()),
+                      [](char a, char b) { return a == (b >= 'A' && b <= 'Z' ? b | 0x20 : b); });
+  };
+  return !file.starts_with('.') && std::any_of(kEndings.begin(), kEndings.end(), ends_so);
+}
 
 const char* to_phrase(ImageFileStatus status) noexcept {
   switch (status) {

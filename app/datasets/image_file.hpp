@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace vergence::app {
@@ -29,6 +30,9 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
 };
 
+/// By the ending; hidden files, which systems put beside images, are none.
+[[nodiscard]] bool is_image_name(std::string_view file) noexcept;
+
 /// Whole file into *bytes (its capacity is reused). → ok, missing, unreadable
 [[nodiscard]] ImageFileStatus read_image_file(const std::filesystem::path& file,
                                               std::vector<std::uint8_t>* bytes);
@@ -52,11 +56,11 @@ struct ImageSize {
 /// decoded has 0, as a black one. Takes memory for the image.
 [[nodiscard]] std::optional<std::uint16_t> peak_of_deep_image(std::span<const std::uint8_t> bytes);
 
-/// PNG of any depth and colour, JPEG of grey or three colours, or BMP of 8-bit grey or 24 bits →
-/// 8-bit grey, into size.height rows of `stride` bytes at `out`; no other copy is made. Any number
-/// of threads at once. `deep_bits`: how many of the 16 bits of deep samples are used (8 … 16). Not
-/// `ok`: content of `out` undefined. Throws nothing. → ok, not_an_image, torn, undecodable,
-/// wrong_size
+/// PNG of any depth and colour, JPEG of grey or three colours, or BMP of 8, 24 or 32 bits, PGM or
+/// PPM → 8-bit grey, into size.height rows of `stride` bytes at `out`; no other copy is made. Any
+/// number of threads at once. `deep_bits`: how many of the 16 bits of deep samples are used (8 …
+/// 16). Not `ok`: content of `out` undefined. Throws nothing. → ok, not_an_image, torn,
+/// undecodable, wrong_size
 [[nodiscard]] ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size,
                                           std::uint8_t* out, std::size_t stride,
                                           int deep_bits = 16) noexcept;

@@ -1,111 +1,191 @@
 #include "app/datasets/kitti_calibration.hpp"
 
 #include <algorithm>
+#include <map>
+#include <string>
+#include <string_view>
 #include <system_error>
 
+#include <fmt/format.h>
+
+#include "app/config/calibration_file.hpp"
 #include "app/datasets/euroc_sensor.hpp"
+#include "app/datasets/text_file.hpp"
+#include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kLargest = std::size_t{1} << 20U;  // bytes
-constexpr int kWidest = 1 << 15;                         // px
+/// The lines of such a file by their keys.
+class Text {
+ public:
+  /// `without`: what a sentence about a missing file goes on with.
+  Text(const std::filesystem::path& file, const char* without) : file_(file) {
+    std::error_code ignored;
+    if (!std::filesystem::exists(file, ignored))
+      refuse(file, 0, fmt::format("is missing: unpack the date's calibration there{}", without));
+    constexpr std::size_t kLargest = std::size_t{1} << 20U;  // bytes
+    text_ = read_text(file, kLargest);
+    Lines lines(text_);
+    for (std::string_view line; lines.next(&line);) {
+      const std::size_t end = line.find_first_of(": \t");
+      if (end == std::string_view::npos) continue;
+      std::string_view rest = line.substr(end);
+      rest.remove_prefix(std::min(rest.find_first_not_of(" \t"), rest.size()));
+      if (rest.starts_with(':')) rest.remove_prefix(1);
+      found_.insert_or_assign(line.substr(0, end), Line{rest, lines.number()});
+    }
+  }
+
+  [[nodiscard]] bool has(const std::string& key) const { return found_.contains(key); }
+
+  [[noreturn]] void fail(const std::string& key, const std::string& what) const {
+    refuse(file_, found_.at(key).number, key + ": " + what);
+  }
+
+  template <std::size_t N>
+  [[nodiscard]] std::array<double, N> numbers(const std::string& key) const {
+    const auto found = found_.find(key);
+    if (found == found_.end())
+      refuse(file_, 0, fmt::format("has no line `{}:`, {} numbers are expected there", key, N));
+    std::array<std::string_view, N> fields;
+    const std::size_t count = split(found->second.rest, ' ', fields);
+    if (count != N) fail(key, fmt::format("has {} numbers where {} are expected", count, N));
+    std::array<double, N> values{};
+    for (std::size_t i = 0; i < N; ++i)
+      if (!parse_number(fields[i], &values[i]))
+        fail(key, fmt::format("`{}` is not a finite number", fields[i].substr(0, 40)));
+    return values;
+  }
+
+  [[nodiscard]] Transform rigid(const std::string& R, const std::string& T) const {
+    const auto r = numbers<9>(R);
+    const auto t = numbers<3>(T);
+    Transform out;
+    if (!accept_rotation(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data()),
+                         &out.R))
+      fail(R, "is no rotation, it is off orthonormal by more than 1e-4");
+    out.t = {t[0], t[1], t[2]};
+    return out;
+  }
+
+  [[nodiscard]] ImageSize size(const std::string& key) const {
+    const auto v = numbers<2>(key);
+    constexpr int kWidest = 1 << 15;  // px
+    if (!(v[0] >= 1 && v[0] <= kWidest && v[1] >= 1 && v[1] <= kWidest))
+      fail(key, "is no size of an image");
+    return {static_cast<int>(v[0]), static_cast<int>(v[1])};
+  }
+
+  /// The camera that a rectified projection P = K [I | t] describes, without its image's size, and
+  /// where it sits: X_k = X_rectified + *t.
+  [[nodiscard]] Intrinsics projection(const std::string& key, Vec3* t) const {
+    const auto P = numbers<12>(key);
+    if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1 || !(P[0] > 0 && P[5] > 0))
+      fail(key,
+           "is not the projection of a rectified camera: [fx 0 cx .; 0 fy cy .; 0 0 1 .] with "
+           "positive focal lengths is expected");
+    Intrinsics k;
+    k.fx = P[0], k.fy = P[5], k.cx = P[2], k.cy = P[6];
+    *t = {(P[3] - k.cx * P[11]) / k.fx, (P[7] - k.cy * P[11]) / k.fy, P[11]};
+    return k;
+  }
+
+ private:
+  struct Line {
+    std::string_view rest;
+    std::size_t number = 0;
+  };
+  std::filesystem::path file_;
+  std::string text_;
+  std::map<std::string_view, Line, std::less<>> found_;
+};
+
+std::string key(const char* name, int camera) { return fmt::format("{}_{:02d}", name, camera); }
+
+/// Where a camera sits, from camera 00 before rectification, and how it sees.
+Intrinsics camera_of(const Text& text, int number, bool rectified, Transform* T_camera_camera0) {
+  Intrinsics lens;
+  if (rectified) {
+    // All were turned into the axes of camera 00 as it became.
+    const auto r = text.numbers<9>(key("R_rect", 0));
+    if (!accept_rotation(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data()),
+                         &T_camera_camera0->R))
+      text.fail(key("R_rect", 0), "is no rotation");
+    lens = text.projection(key("P_rect", number), &T_camera_camera0->t);
+  } else {
+    const auto K = text.numbers<9>(key("K", number));
+    lens.distortion = text.numbers<5>(key("D", number));  // k1 k2 p1 p2 k3
+    lens.fx = K[0], lens.fy = K[4], lens.cx = K[2], lens.cy = K[5];
+    if (!(lens.fx > 0 && lens.fy > 0) || K[1] != 0 || K[3] != 0 || K[8] != 1)
+      text.fail(key("K", number), "is not [fx 0 cx; 0 fy cy; 0 0 1] with positive focal lengths");
+    *T_camera_camera0 = text.rigid(key("R", number), key("T", number));
+  }
+  const ImageSize size = text.size(key(rectified ? "S_rect" : "S", number));
+  lens.width = size.width, lens.height = size.height;
+  return lens;
+}
 
 }  // namespace
 
-KittiCalibrationText::KittiCalibrationText(const std::filesystem::path& file, const char* without)
-    : file_(file) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored))
-    refuse(file, 0, fmt::format("is missing: unpack the date's calibration there{}", without));
-  text_ = read_text(file, kLargest);
-  Lines lines(text_);
-  for (std::string_view line; lines.next(&line);) {
-    const std::size_t end = line.find_first_of(": \t");
-    if (end == std::string_view::npos) continue;
-    std::string_view rest = line.substr(end);
-    rest.remove_prefix(std::min(rest.find_first_not_of(" \t"), rest.size()));
-    if (rest.starts_with(':')) rest.remove_prefix(1);
-    found_.insert_or_assign(line.substr(0, end), Line{rest, lines.number()});
-  }
-}
-
-void KittiCalibrationText::read_numbers(const std::string& key, std::span<double> values) const {
-  const auto found = found_.find(key);
-  if (found == found_.end())
-    refuse(file_, 0,
-           fmt::format("has no line `{}:`, {} numbers are expected there", key, values.size()));
-  std::array<std::string_view, 12> fields;
-  const std::size_t count = split(found->second.rest, ' ', fields);
-  if (count != values.size())
-    refuse(file_, found->second.number,
-           fmt::format("{}: has {} numbers where {} are expected", key, count, values.size()));
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (!parse_number(fields[i], &values[i]))
-      refuse(file_, found->second.number,
-             fmt::format("{}: `{}` is not a finite number", key, fields[i].substr(0, 40)));
-}
-
-Mat3 KittiCalibrationText::rotation(const std::string& key) const {
-  const Mat3 written = matrix(key);
-  Mat3 R;
-  if (!accept_rotation(written, &R))
-    refuse(file_, line_of(key), key + ": is no rotation, it is off orthonormal by more than 1e-4");
-  return R;
-}
-
-Mat3 KittiCalibrationText::matrix(const std::string& key) const {
-  std::array<double, 9> v{};
-  read(key, &v);
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v.data());
-}
-
-Vec3 KittiCalibrationText::vector(const std::string& key) const {
-  std::array<double, 3> v{};
-  read(key, &v);
-  return {v[0], v[1], v[2]};
-}
-
-ImageSize KittiCalibrationText::size(const std::string& key) const {
-  std::array<double, 2> v{};
-  read(key, &v);
-  if (!(v[0] >= 1 && v[0] <= kWidest && v[1] >= 1 && v[1] <= kWidest))
-    refuse(file_, line_of(key), key + ": is no size of an image");
-  return {static_cast<int>(v[0]), static_cast<int>(v[1])};
-}
-
-Intrinsics rectified_camera(const std::array<double, 12>& P, Vec3* t,
-                            const std::filesystem::path& file, std::size_t line) {
-  Intrinsics k;
-  k.fx = P[0], k.fy = P[5], k.cx = P[2], k.cy = P[6];
-  if (!(k.fx > 0 && k.fy > 0)) refuse(file, line, "has a focal length that is not positive");
-  if (P[1] != 0 || P[4] != 0 || P[8] != 0 || P[9] != 0 || P[10] != 1)
-    refuse(
-        file, line,
-        "is not the projection of a rectified camera: [fx 0 cx .; 0 fy cy .; 0 0 1 .] is expected");
-  const double z = P[11];
-  *t = {(P[3] - k.cx * z) / k.fx, (P[7] - k.cy * z) / k.fy, z};
-  return k;
-}
-
 RigCalibration read_kitti_projections(const std::filesystem::path& file,
-                                      const std::array<int, 2>& cameras) {
-  const KittiCalibrationText text(file, ", or give a calibration with --calibration");
+                                      const std::array<int, 2>& cameras,
+                                      const std::optional<ImageSize>& size) {
+  const Text text(file, ", or give a calibration with --calibration");
   RigCalibration rig;
   rig.cameras = 2;
   std::array<Vec3, 2> t;
   for (std::size_t k = 0; k < 2; ++k) {
-    std::string name = fmt::format("P{}", cameras[k]);
-    if (const std::string raw = fmt::format("P_rect_{:02d}", cameras[k]);
-        !text.has(name) && text.has(raw))
-      name = raw;
-    std::array<double, 12> P{};
-    text.read(name, &P);
-    rig.intrinsics[k] = rectified_camera(P, &t[k], file, text.line_of(name));
+    const std::string raw = key("P_rect", cameras[k]), own = key("S_rect", cameras[k]);
+    const std::string name = fmt::format("P{}", cameras[k]);
+    rig.intrinsics[k] = text.projection(!text.has(name) && text.has(raw) ? raw : name, &t[k]);
+    if (!size && !text.has(own))
+      throw InputError(file.string() + ": holds no image size; add --size WIDTHxHEIGHT");
+    const ImageSize images = size ? *size : text.size(own);
+    rig.intrinsics[k].width = images.width, rig.intrinsics[k].height = images.height;
   }
   rig.T_camera_left[1].t = t[1] - t[0];
   rig.baseline = rig.T_camera_left[1].t.norm();
   return rig;
+}
+
+KittiRawRig read_kitti_raw_rig(const KittiRawFolders& folders, const std::array<int, 2>& cameras,
+                               ImageSize images) {
+  const std::filesystem::path file = folders.calibration / kKittiRawCalibration;
+  const Text text(file, ", or give one with --calibration");
+  const ImageSize raw = text.size(key("S", cameras[0])),
+                  rectified = text.size(key("S_rect", cameras[0]));
+  if (images != raw && images != rectified)
+    text.fail(key("S", cameras[0]),
+              fmt::format("is for images of {}x{} pixels, or {}x{} rectified, but those of the "
+                          "drive have {}x{}; use the calibration of its date",
+                          raw.width, raw.height, rectified.width, rectified.height, images.width,
+                          images.height));
+  const bool are_rectified =
+      images == rectified &&
+      (images != raw || folders.drive.filename().string().ends_with("_sync"));
+  KittiRawRig out;
+  std::array<Transform, 2> T_camera_camera0;
+  out.rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k)
+    out.rig.intrinsics[k] = camera_of(text, cameras[k], are_rectified, &T_camera_camera0[k]);
+  out.T_left_camera0 = T_camera_camera0[0];
+  out.rig.T_camera_left[1] = T_camera_camera0[1] * T_camera_camera0[0].inverse();
+  if (are_rectified)
+    out.rig.T_camera_left[1].R = Mat3::Identity();  // without the rounding of a product
+  out.rig.baseline = out.rig.T_camera_left[1].t.norm();
+  if (const auto bad = find_implausible(&out.rig)) refuse(file, 0, bad->sentence);
+  return out;
+}
+
+Transform read_kitti_raw_mount(const KittiRawFolders& folders) {
+  const auto rigid = [&](const char* name) {
+    return Text(folders.calibration / name,
+                ", or say by `--set ins.lever_arm_m=[…]` where the left camera sits in the INS's "
+                "body")
+        .rigid("R", "T");
+  };
+  return rigid("calib_velo_to_cam.txt") * rigid("calib_imu_to_velo.txt");
 }
 
 }  // namespace vergence::app

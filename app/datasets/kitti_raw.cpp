@@ -1,225 +1,192 @@
 #include <algorithm>
-#include <array>
-#include <system_error>
+#include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
-#include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/formats.hpp"
-#include "app/datasets/detail/kitti_raw.hpp"
+#include "app/datasets/detail/pairing.hpp"
+#include "app/datasets/kitti_calibration.hpp"
+#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/text_file.hpp"
+#include "app/datasets/times_file.hpp"
+#include "app/runtime/errors.hpp"
+#include "core/math/angle.hpp"
+#include "core/math/so3.hpp"
 
 namespace vergence::app::detail {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kCalibration = "calib_cam_to_cam.txt";
-constexpr std::size_t kMostDrives = 8;      // that are named in a refusal
-constexpr std::size_t kMostFolders = 1000;  // that are looked into for a drive
-// Cameras expose together; their stamps are of the arrival and up to some milliseconds apart. A
-// quarter of the interval is far from both neighbours.
-constexpr double kTogether = 0.25;
-constexpr std::size_t kLook = 48;  // frames that one camera may lack in a row where the other goes
-                                   // on, and pairing by stamps still finds on
+constexpr std::size_t kFields = 30;
+constexpr std::size_t kLongestPacket = std::size_t{1} << 16U;  // bytes
 
+/// The columns of a packet that are read; order and units are those of the development kit (its
+/// dataformat.txt).
+enum Column : std::size_t {
+  latitude,                // deg
+  longitude,               // deg
+  altitude,                // m
+  roll,                    // rad, positive with the left side up
+  pitch,                   // rad, positive with the front down
+  yaw,                     // rad, 0 is east, counter-clockwise
+  to_north,                // m/s
+  to_east,                 // m/s
+  upward = 10,             // m/s, perpendicular to the earth's surface
+  position_accuracy = 23,  // m, north and east
+  velocity_accuracy = 24,  // m/s, north and east
+  navigation_status = 25,
+  satellites = 26,
+  position_mode = 27,
+};
+
+// What the unit, an RT3003 with two antennas, is specified to: its packets have accuracies of place
+// and velocity alone.
+constexpr double kTiltSigma = 0.03 * kRadiansPerDegree, kHeadingSigma = 0.1 * kRadiansPerDegree;
+constexpr double kHeightOverPlace =
+    2;  // a receiver's height is about so much less accurate than its place
+
+constexpr int kLocked =
+    4;  // navigation status of a unit whose figures are valid; below it is starting
+
+/// Position modes of the unit's protocol (NCOM): 3 single point, 4 differential, 5 and 6 real-time
+/// kinematic, 7 to 9 and 13 to 18 further corrections. 0 none, 1 searching, 2 and 12 Doppler alone,
+/// 10 no data, 11 blanked: carried on by inertia.
+bool has_position(int mode) noexcept { return (mode >= 3 && mode <= 9) || mode >= 13; }
+
+FixStatus fix_of(int status, int satellites_used, int mode) noexcept {
+  if (status != kLocked) return FixStatus::none;
+  return has_position(mode) && satellites_used != 0 ? FixStatus::fix_3d : FixStatus::dead_reckoning;
+}
+
+int whole(double v) noexcept { return std::abs(v) < 1e6 ? static_cast<int>(std::lround(v)) : -1; }
+
+/// Nothing: fewer numbers than there are columns, or a place that is none.
+std::optional<RecordedReading> parse_packet(std::string_view text) noexcept {
+  std::array<std::string_view, kFields> fields;
+  Lines lines(text);
+  std::string_view line;
+  if (!lines.next(&line) || split(line, ' ', fields) != kFields) return std::nullopt;
+  std::array<double, kFields> v{};
+  for (std::size_t i = 0; i < kFields; ++i)
+    if (!parse_number(fields[i], &v[i])) return std::nullopt;
+  RecordedReading r;
+  InsSample& s = r.sample;
+  s.position = {v[latitude], v[longitude], v[altitude]};
+  const double largest = std::max({std::abs(v[roll]), std::abs(v[pitch]), std::abs(v[yaw])});
+  if (!s.position.plausible() || largest > 3 * std::numbers::pi)
+    return std::nullopt;  // degrees, or other columns
+  const int used = whole(v[satellites]), status = whole(v[navigation_status]),
+            mode = whole(v[position_mode]);
+  s.fix = fix_of(status, used, mode);
+  s.attitude_valid = s.velocity_valid = status == kLocked;
+  s.velocity_enu = {v[to_east], v[to_north], v[upward]};
+  const Mat3 R =
+      exp_so3(Vec3(0, 0, v[yaw])) * exp_so3(Vec3(0, v[pitch], 0)) * exp_so3(Vec3(v[roll], 0, 0));
+  const Eigen::Quaterniond q = quaternion(R);
+  s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
+  s.position_sigma = std::max(0.0, v[position_accuracy]);
+  s.height_sigma = kHeightOverPlace * s.position_sigma;
+  s.velocity_sigma = std::max(0.0, v[velocity_accuracy]);
+  s.tilt_sigma = kTiltSigma;
+  s.heading_sigma = kHeadingSigma;
+  r.quality.status = static_cast<std::uint32_t>(std::clamp(status, 0, 255)) << 8U |
+                     static_cast<std::uint32_t>(std::clamp(mode, 0, 255));
+  r.quality.satellites = static_cast<std::uint8_t>(std::clamp(used, 0, 255));
+  r.quality.filter_valid = status == kLocked;
+  return r;
+}
+
+/// The packets that lines of timestamps.txt are of, and how many of them, and of those that are
+/// left out.
+struct Packets {
+  std::vector<RecordedReading> readings{};
+  std::vector<Stamp> stamps{};
+  std::size_t missing = 0, broken = 0, without_stamp = 0;
+  std::string first_missing{}, first_broken{};
+};
+
+Packets read_packets(const fs::path& data, const std::vector<TimesLine>& lines) {
+  Packets out;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string name = fmt::format("{:010d}.txt", i);
+    std::error_code ignored;
+    if (!fs::is_regular_file(data / name, ignored)) {
+      if (out.missing++ == 0) out.first_missing = name;
+      continue;
+    }
+    std::optional<RecordedReading> reading;
+    try {
+      reading = parse_packet(read_text(data / name, kLongestPacket));
+    } catch (const InputError&) {  // not readable, or longer than a packet: one more that is broken
+    }
+    if (!reading) {
+      if (out.broken++ == 0) out.first_broken = name;
+      continue;
+    }
+    reading->sample.stamp = lines[i].stamp;
+    reading->sample.number = i;
+    out.readings.push_back(*reading);
+    out.stamps.push_back(lines[i].stamp);
+  }
+  std::error_code error;
+  for (fs::directory_iterator it(data, error), end; !error && it != end; it.increment(error)) {
+    const auto index = parse_integer(it->path().stem().string());
+    if (it->path().extension() == ".txt" && index && *index >= 0 &&
+        static_cast<std::size_t>(*index) >= lines.size())
+      ++out.without_stamp;
+  }
+  return out;
+}
+
+void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* ins) {
+  const auto say = [ins](std::size_t n, const std::string& what) {
+    if (n > 0) ins->remarks.push_back(fmt::format("oxts: {} {}", n, what));
+  };
+  say(packets.missing, "packets are missing, the first is " + packets.first_missing);
+  say(packets.broken, fmt::format("packets are not the {} numbers of one and are left out, the "
+                                  "first is {}",
+                                  kFields, packets.first_broken));
+  say(packets.without_stamp, "packets have no line in timestamps.txt and are left out");
+  say(disordered, "stamps go back or repeat one; their packets are left out");
+  const auto fixed = [](const RecordedReading& r) { return r.sample.fix == FixStatus::fix_3d; };
+  say(ins->readings.size() - static_cast<std::size_t>(
+                                 std::count_if(ins->readings.begin(), ins->readings.end(), fixed)),
+      fmt::format("of {} packets have no satellites' fix: nothing is compared there",
+                  ins->readings.size()));
+}
+
+/// A folder with a camera's images and their list, or with the INS's packets.
 bool is_drive(const fs::path& folder) {
   std::error_code ignored;
   for (int camera = 0; camera < 4; ++camera)
-    if (fs::is_directory(folder / kitti_raw_camera(camera), ignored)) return true;
-  return false;
-}
-
-void find_drives(const fs::path& folder, int depth, std::vector<fs::path>* found,
-                 std::size_t* looked) {
-  std::error_code error;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    std::error_code ignored;
-    if (!it->is_directory(ignored) || ++*looked > kMostFolders) continue;
-    if (is_drive(it->path()))
-      found->push_back(it->path());
-    else if (depth > 1)
-      for (fs::directory_iterator below(it->path(), ignored), none; !ignored && below != none;
-           below.increment(ignored))
-        if (++*looked <= kMostFolders && is_drive(below->path())) found->push_back(below->path());
-  }
-  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
+    if (fs::exists(folder / fmt::format("image_{:02d}/timestamps.txt", camera), ignored))
+      return true;
+  return fs::is_directory(folder / "oxts", ignored);
 }
 
 /// The folder itself, or what lies one or two folders below.
 std::vector<fs::path> drives_in(const fs::path& folder) {
   if (is_drive(folder)) return {folder};
+  constexpr std::size_t kMostFolders = 1000;  // that are looked into
   std::vector<fs::path> found;
   std::size_t looked = 0;
-  find_drives(folder, 2, &found, &looked);
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    std::error_code ignored;
+    if (!it->is_directory(ignored) || ++looked > kMostFolders) continue;
+    const bool drive = is_drive(it->path());
+    if (drive) found.push_back(it->path());
+    if (drive || it.depth() > 0) it.disable_recursion_pending();
+  }
+  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
   return found;
 }
 
-/// The images of one camera that have a stamp, in the order of their names.
-struct CameraFiles {
-  std::vector<Stamp> stamps{};
-  std::vector<std::size_t> index{};  // of the file, NNNNNNNNNN.png
-  std::string extension{};           // of the images, with its dot
-  std::size_t without_stamp = 0;     // images
-};
-
-CameraFiles list_camera(const fs::path& drive, int camera, std::vector<std::string>* remarks) {
-  const std::string name = kitti_raw_camera(camera);
-  require_folder(drive / name, "data/ and timestamps.txt of a camera");
-  const KittiStamps stamps = read_kitti_stamps(drive / name / "timestamps.txt");
-  CameraFiles out;
-  std::size_t end = 0, odd = 0;  // one past the last image
-  std::vector<bool> there(stamps.lines.size(), false);
-  for (const std::string& image : list_images(drive, name + "/data")) {
-    const fs::path file(image);
-    const auto index = parse_integer(file.stem().string());
-    if (!index || *index < 0) {
-      ++odd;
-      continue;
-    }
-    if (out.extension.empty()) out.extension = file.extension().string();
-    const auto i = static_cast<std::size_t>(*index);
-    if (i < there.size()) there[i] = true;
-    if (i >= there.size() || !stamps.lines[i]) ++out.without_stamp;
-    if (i < there.size()) end = std::max(end, i + 1);
-  }
-  for (std::size_t i = 0; i < end; ++i) {
-    if (!stamps.lines[i]) continue;
-    out.stamps.push_back(
-        *stamps.lines[i]);  // an image that is missing is missed when its frame comes
-    out.index.push_back(i);
-  }
-  if (out.stamps.empty())
-    refuse(drive / name, 0, "has no image that a line of its timestamps.txt is of");
-  if (odd > 0)
-    remarks->push_back(
-        fmt::format("{}: {} images that are not named by their number are left out", name, odd));
-  if (out.without_stamp > 0)
-    remarks->push_back(fmt::format(
-        "{}: {} images have no stamp and are left out: timestamps.txt has {} lines, {} of them "
-        "broken{}",
-        name, out.without_stamp, stamps.lines.size(), stamps.broken,
-        stamps.broken > 0 ? fmt::format(", the first is line {}", stamps.first_broken) : ""));
-  if (end < stamps.lines.size())
-    remarks->push_back(fmt::format("{}: timestamps.txt goes on for {} lines after the last image",
-                                   name, stamps.lines.size() - end));
-  return out;
-}
-
-Duration usual_interval(const std::vector<Stamp>& stamps) {
-  std::vector<std::int64_t> ns;
-  for (std::size_t i = 1; i < stamps.size(); ++i)
-    if (stamps[i] > stamps[i - 1]) ns.push_back((stamps[i] - stamps[i - 1]).ns());
-  if (ns.empty()) return Duration::milliseconds(100);
-  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
-  std::nth_element(ns.begin(), middle, ns.end());
-  return Duration::nanoseconds(*middle);
-}
-
-struct Pairing {
-  std::vector<std::array<std::size_t, 2>> pairs{};  // places in CameraFiles
-  std::array<std::size_t, 2> alone{};               // images without a partner
-  Duration farthest{};                              // stamps of a pair apart
-};
-
-Duration apart(Stamp a, Stamp b) { return a < b ? b - a : a - b; }
-
-/// How many of both to pass over until two belong together again, the fewest first. False: not
-/// within kLook.
-bool find_on(const std::array<const CameraFiles*, 2>& c, std::array<std::size_t, 2> at,
-             Duration together, std::array<std::size_t, 2>* skip) {
-  for (std::size_t most = 1; most <= kLook; ++most)
-    for (std::size_t least = 0; least <= most; ++least)
-      for (const std::array<std::size_t, 2>& s :
-           {std::array{most, least}, std::array{least, most}}) {
-        const std::size_t l = at[0] + s[0], r = at[1] + s[1];
-        if (l >= c[0]->stamps.size() || r >= c[1]->stamps.size() ||
-            apart(c[0]->stamps[l], c[1]->stamps[r]) > together)
-          continue;
-        *skip = s;
-        return true;
-      }
-  return false;
-}
-
-/// By stamps, in the order of the files. A stamp that is wrong by itself costs its own frame.
-Pairing pair_by_stamps(const CameraFiles& left, const CameraFiles& right) {
-  const std::array<const CameraFiles*, 2> cameras{&left, &right};
-  const Duration together = Duration::seconds(kTogether * usual_interval(left.stamps).to_seconds());
-  Pairing out;
-  std::array<std::size_t, 2> at{}, skip{};
-  std::size_t blind =
-      0;  // steps until the next look ahead: what was in vain a moment ago would be again
-  while (at[0] < left.stamps.size() && at[1] < right.stamps.size()) {
-    const Stamp l = left.stamps[at[0]], r = right.stamps[at[1]];
-    if (const Duration d = apart(l, r); d <= together) {
-      out.pairs.push_back(at);
-      out.farthest = std::max(out.farthest, d);
-      ++at[0], ++at[1];
-      continue;
-    }
-    const bool looked = blind == 0;
-    if (!looked || !find_on(cameras, at, together, &skip)) {
-      skip = l < r ? std::array<std::size_t, 2>{1, 0} : std::array<std::size_t, 2>{0, 1};
-      blind = looked ? kLook : blind - 1;
-    }
-    for (std::size_t k = 0; k < 2; ++k) at[k] += skip[k], out.alone[k] += skip[k];
-  }
-  out.alone[0] += left.stamps.size() - at[0];
-  out.alone[1] += right.stamps.size() - at[1];
-  return out;
-}
-
-std::string file_name(int camera, std::size_t index, const std::string& extension) {
-  return fmt::format("{}/data/{:010d}{}", kitti_raw_camera(camera), index, extension);
-}
-
-void list_pairs(const fs::path& drive, const std::array<int, 2>& cameras,
-                StereoSequence* sequence) {
-  const CameraFiles left = list_camera(drive, cameras[0], &sequence->remarks),
-                    right = list_camera(drive, cameras[1], &sequence->remarks);
-  const Pairing pairing = pair_by_stamps(left, right);
-  if (pairing.pairs.empty())
-    refuse(
-        drive, 0,
-        fmt::format(
-            "the stamps of {} and {} never agree: images that belong together have nearly the same",
-            kitti_raw_camera(cameras[0]), kitti_raw_camera(cameras[1])));
-  std::vector<Stamp> stamps;
-  stamps.reserve(pairing.pairs.size());
-  for (const auto& p : pairing.pairs) stamps.push_back(left.stamps[p[0]]);
-  const std::vector<std::size_t> kept = ascending(stamps);
-  sequence->pairs.reserve(kept.size());
-  for (const std::size_t i : kept)
-    sequence->pairs.push_back(
-        {stamps[i],
-         {file_name(cameras[0], left.index[pairing.pairs[i][0]], left.extension),
-          file_name(cameras[1], right.index[pairing.pairs[i][1]], right.extension)}});
-
-  const std::size_t disordered = stamps.size() - kept.size();
-  sequence->left_out =
-      std::max(pairing.alone[0] + left.without_stamp, pairing.alone[1] + right.without_stamp) +
-      disordered;
-  auto& remarks = sequence->remarks;
-  for (std::size_t k = 0; k < 2; ++k)
-    if (pairing.alone[k] > 0)
-      remarks.push_back(fmt::format(
-          "{}: {} images have no partner of {} by their stamps and are left out",
-          kitti_raw_camera(cameras[k]), pairing.alone[k], kitti_raw_camera(cameras[1 - k])));
-  if (disordered > 0)
-    remarks.push_back(fmt::format("{}: {} stamps go back or repeat one; their frames are left out",
-                                  kitti_raw_camera(cameras[0]), disordered));
-  constexpr Duration kTold = Duration::milliseconds(5);
-  if (pairing.farthest > kTold)
-    remarks.push_back(
-        fmt::format("the stamps of a pair are up to {:.1f} ms apart; that of {} counts",
-                    1e3 * pairing.farthest.to_seconds(), kitti_raw_camera(cameras[0])));
-}
-
 }  // namespace
-
-std::string kitti_raw_camera(int camera) { return fmt::format("image_{:02d}", camera); }
 
 bool holds_kitti_raw(const fs::path& folder) { return !drives_in(folder).empty(); }
 
@@ -229,48 +196,54 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
     refuse(folder, 0,
            "holds no KITTI raw drive: a folder with image_00, image_01 and oxts is expected");
   if (found.size() > 1) {
+    constexpr std::size_t kMostNamed = 8;
     std::sort(found.begin(), found.end());
     std::string names;
-    for (std::size_t i = 0; i < std::min(kMostDrives, found.size()); ++i)
+    for (std::size_t i = 0; i < std::min(kMostNamed, found.size()); ++i)
       names += (i > 0 ? ", " : "") + found[i].filename().string();
     refuse(folder, 0,
            fmt::format("holds {} drives ({}{}): name one of them", found.size(), names,
-                       found.size() > kMostDrives ? ", …" : ""));
+                       found.size() > kMostNamed ? ", …" : ""));
   }
-  KittiRawFolders out;
-  out.drive = found[0];
   std::error_code ignored;
-  fs::path lexical =
-      fs::absolute(out.drive, ignored)
-          .lexically_normal();  // `.` and a name that ends in a slash have a folder above, too
+  // `.` and a name that ends in a slash have a folder above, too.
+  fs::path lexical = fs::absolute(found[0], ignored).lexically_normal();
   if (!lexical.has_filename()) lexical = lexical.parent_path();
+  KittiRawFolders out{found[0], lexical.parent_path()};
   // A drive may be a link to where it is kept, its calibration beside the one or the other.
-  out.calibration = lexical.parent_path();
   for (const fs::path& other : {out.drive, fs::weakly_canonical(out.drive, ignored).parent_path()})
-    if (!fs::exists(out.calibration / kCalibration, ignored) &&
-        fs::exists(other / kCalibration, ignored))
+    if (!fs::exists(out.calibration / kKittiRawCalibration, ignored) &&
+        fs::exists(other / kKittiRawCalibration, ignored))
       out.calibration = other;
   return out;
 }
 
-StereoSequence open_kitti_raw(const fs::path& folder, bool given,
-                              const std::array<int, 2>& cameras) {
-  if (cameras[0] == cameras[1])
-    refuse(
-        folder, 0,
-        fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig",
-                    cameras[0]));
+RecordedIns read_oxts(const fs::path& folder, const std::array<int, 2>& cameras,
+                      bool mount_wanted) {
   const KittiRawFolders folders = find_kitti_raw(folder);
-  StereoSequence sequence;
-  sequence.root = folders.drive;
-  list_pairs(folders.drive, cameras, &sequence);
-  if (given) return sequence;
-  const KittiRawRig rig =
-      read_kitti_raw_rig(folders.calibration / kCalibration, cameras, first_image_size(sequence, 0),
-                         folders.drive.filename().string());
-  sequence.calibration = rig.rig;
-  sequence.calibration_source = kCalibration;
-  return sequence;
+  RecordedIns ins;
+  const fs::path oxts = folders.drive / "oxts", data = oxts / "data";
+  std::error_code ignored;
+  if (!fs::exists(oxts, ignored)) {
+    ins.remarks.push_back(oxts.string() + ": is not there; there is no INS to compare with");
+    return ins;
+  }
+  require_folder(data, "the packets of the INS");
+  const Packets packets = read_packets(data, read_times_file(oxts / "timestamps.txt").lines);
+  if (packets.readings.empty())
+    refuse(data / (packets.broken > 0 ? packets.first_broken : packets.first_missing), 0,
+           fmt::format("{}, and so is every other packet: {} numbers each are expected",
+                       packets.broken > 0 ? "is no packet of the INS" : "is missing", kFields));
+  const std::vector<std::size_t> kept = ascending(packets.stamps);
+  for (const std::size_t i : kept) ins.readings.push_back(packets.readings[i]);
+  add_remarks(packets, packets.readings.size() - kept.size(), &ins);
+  if (!mount_wanted) return ins;
+
+  const StereoSequence images = open_kitti_raw(folder, true, cameras);
+  const KittiRawRig rig = read_kitti_raw_rig(folders, cameras, first_image_size(images, 0));
+  ins.T_ins_left = (rig.T_left_camera0 * read_kitti_raw_mount(folders)).inverse();
+  ins.mount_source = "calib_imu_to_velo.txt, calib_velo_to_cam.txt and calib_cam_to_cam.txt";
+  return ins;
 }
 
 }  // namespace vergence::app::detail

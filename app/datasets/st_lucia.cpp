@@ -1,15 +1,43 @@
-#include "app/datasets/st_lucia.hpp"
-
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <system_error>
+
+#include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/detail/formats.hpp"
-#include "app/datasets/detail/st_lucia_logs.hpp"
 #include "app/datasets/text_file.hpp"
+#include "core/comparison/geodesy.hpp"
+#include "core/math/so3.hpp"
 
 namespace vergence::app::detail {
 namespace {
+
+std::optional<std::filesystem::path> find_log(const std::filesystem::path& folder,
+                                              std::string_view ending) {
+  std::vector<std::filesystem::path> found;
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error))
+    if (it->path().filename().string().ends_with(ending)) found.push_back(it->path());
+  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
+  if (found.empty()) return std::nullopt;
+  if (found.size() > 1) {
+    std::sort(found.begin(), found.end());
+    refuse(folder, 0,
+           "holds " + std::to_string(found.size()) + " files that end in " + std::string(ending) +
+               " (" + found[0].filename().string() + ", …): one drive a folder is expected");
+  }
+  return found[0];
+}
+
+std::optional<Stamp> stamp_of(std::string_view seconds, std::string_view microseconds) noexcept {
+  constexpr std::int64_t kLatest = 9'000'000'000;  // s: what 64 bits of nanoseconds hold
+  const auto s = parse_integer(seconds), us = parse_integer(microseconds);
+  if (!s || !us || *s < 0 || *s > kLatest || *us < 0 || *us > 999'999) return std::nullopt;
+  return Stamp(*s * 1'000'000'000 + *us * 1'000);
+}
 
 constexpr std::string_view kImageLog = "_MultiCamera0.log";
 
@@ -49,42 +77,277 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
     refuse(
         log, line_number,
         "is not `seconds microseconds width height format` of both cameras and their two images");
-  const auto stamp = st_lucia_stamp(f[0], f[1]);
-  if (!stamp || !st_lucia_stamp(f[5], f[6]))
+  const auto stamp = stamp_of(f[0], f[1]);
+  if (!stamp || !stamp_of(f[5], f[6]))
     refuse(log, line_number, "does not begin with seconds and microseconds below a million");
   return {*stamp, {image_name(images, f[10]), image_name(images, f[11])}};
 }
 
+// ---- the INS
+
+/// `PREFIX_Ins0.log` has twelve fields a line: seconds, microseconds (not padded), latitude and
+/// longitude in degrees, height above the ellipsoid and above the sea, velocity along three axes,
+/// roll, pitch and yaw in radians. Nobody says which axes these are, so they are decided from the
+/// drive: an axis that fits how the position moves is that axis.
+struct StLuciaConventions {
+  enum class Velocity {
+    east_north_up,
+    north_east_down,
+    north_west_up
+  } velocity = Velocity::north_west_up;
+  enum class Yaw {
+    north_to_west,
+    north_to_east,
+    east_to_north
+  } yaw = Yaw::north_to_west;  // where 0 points, and which way it grows
+  bool pitch_first = false;    // fields 10 and 11 are pitch and roll
+  bool nose_up_positive = false;
+};
+
+using Velocity = StLuciaConventions::Velocity;
+using Yaw = StLuciaConventions::Yaw;
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kFast = 5.0;             // m/s: above it the course is where the vehicle points
+constexpr double kApart = 1.0;            // s between the positions whose difference is the motion
+constexpr std::size_t kEnough = 100;      // samples: below, nothing is decided
+constexpr double kTells = 0.3;            // correlation from which the slope decides about pitch
+constexpr std::size_t kMostBroken = 100;  // one line in so many
+
+/// One line as it stands.
+struct Line {
+  Stamp stamp{};
+  Geodetic place{};
+  Vec3 velocity, angles;  // fields 6 to 8, 9 to 11
+};
+
+/// A sample with how its position moves, in the axes at the first place.
+struct Moving {
+  const Line* line = nullptr;
+  Vec3 motion;  // m/s, east, north, up
+};
+
+bool parse_line(std::string_view text, Line* line) noexcept {
+  constexpr std::size_t kFields = 12;
+  std::array<std::string_view, kFields> f;
+  if (split(text, ' ', f) != kFields) return false;
+  const auto stamp = stamp_of(f[0], f[1]);
+  std::array<double, kFields> v{};
+  for (std::size_t i = 2; i < kFields; ++i)
+    if (!parse_number(f[i], &v[i])) return false;
+  if (!stamp) return false;
+  line->stamp = *stamp;
+  line->place = {v[2], v[3], v[4]};
+  line->velocity = {v[6], v[7], v[8]};
+  line->angles = {v[9], v[10], v[11]};
+  return true;
+}
+
+std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::string>* remarks) {
+  const std::string text = read_text(log);
+  Lines lines(text);
+  std::vector<Line> out;
+  std::size_t broken = 0, first_broken = 0;
+  for (std::string_view raw; lines.next(&raw);) {
+    Line line;
+    if (parse_line(raw, &line)) {
+      out.push_back(line);
+    } else if (broken++ == 0) {
+      first_broken = lines.number();
+    }
+  }
+  if (out.empty() || broken > 1 + out.size() / kMostBroken)
+    refuse(log, first_broken,
+           fmt::format("and {} more lines are not twelve numbers; this is not the log of the INS",
+                       broken > 0 ? broken - 1 : 0));
+  if (broken > 0)
+    remarks->push_back(fmt::format("{}: {} lines that are not twelve numbers were left out",
+                                   log.filename().string(), broken));
+  const bool ordered = std::is_sorted(
+      out.begin(), out.end(), [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
+  std::stable_sort(out.begin(), out.end(),
+                   [](const Line& a, const Line& b) { return a.stamp < b.stamp; });
+  const auto twice = std::unique(out.begin(), out.end(),
+                                 [](const Line& a, const Line& b) { return a.stamp == b.stamp; });
+  if (!ordered) remarks->push_back("the samples of the INS were not in the order of their stamps");
+  if (twice != out.end())
+    remarks->push_back(fmt::format(
+        "{} samples of the INS had the stamp of another and were left out", out.end() - twice));
+  out.erase(twice, out.end());
+  return out;
+}
+
+/// Latitude is the field that stays within 90; south and east of Brisbane both columns are places
+/// of their own only one way round.
+void check_places(const std::filesystem::path& log, std::vector<Line>* lines,
+                  std::vector<std::string>* remarks) {
+  const bool exchanged = std::all_of(lines->begin(), lines->end(), [](const Line& l) {
+    return std::abs(l.place.latitude_deg) > 90;
+  });
+  for (Line& line : *lines) {
+    if (exchanged) std::swap(line.place.latitude_deg, line.place.longitude_deg);
+    if (!line.place.plausible())
+      refuse(log, 0,
+             fmt::format("has a place that is none: {} {} {}", line.place.latitude_deg,
+                         line.place.longitude_deg, line.place.height_m));
+  }
+  if (exchanged) remarks->push_back("longitude stands before latitude in the log of the INS");
+}
+
+std::vector<Moving> motions(const std::vector<Line>& lines) {
+  const LocalTangentPlane plane(lines.front().place);
+  std::vector<Vec3> places;
+  places.reserve(lines.size());
+  for (const Line& line : lines) places.push_back(plane.to_enu(line.place));
+  std::vector<Moving> out;
+  std::size_t before = 0, after = 0;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    while ((lines[i].stamp - lines[before].stamp).to_seconds() > kApart / 2) ++before;
+    while (after + 1 < lines.size() &&
+           (lines[after].stamp - lines[i].stamp).to_seconds() < kApart / 2)
+      ++after;
+    const double span = (lines[after].stamp - lines[before].stamp).to_seconds();
+    if (span > 0.9 * kApart && span < 1.5 * kApart)
+      out.push_back({&lines[i], (places[after] - places[before]) / span});
+  }
+  return out;
+}
+
+Vec3 in_enu(const Vec3& v, Velocity axes) noexcept {
+  switch (axes) {
+    case Velocity::east_north_up:
+      return v;
+    case Velocity::north_east_down:
+      return {v.y(), v.x(), -v.z()};
+    case Velocity::north_west_up:
+      return {-v.y(), v.x(), v.z()};
+  }
+  return v;
+}
+
+double yaw_in_enu(double angle, Yaw yaw) noexcept {
+  switch (yaw) {
+    case Yaw::north_to_west:
+      return angle + kPi / 2;
+    case Yaw::north_to_east:
+      return kPi / 2 - angle;
+    case Yaw::east_to_north:
+      return angle;
+  }
+  return angle;
+}
+
+/// The axes in which the velocities are nearest to how the position moves.
+void decide_velocity(const std::vector<Moving>& moving, StLuciaConventions* c) {
+  double least = 1e300;
+  for (const Velocity axes :
+       {Velocity::north_west_up, Velocity::north_east_down, Velocity::east_north_up}) {
+    double sum = 0;
+    for (const Moving& m : moving)
+      sum += (in_enu(m.line->velocity, axes) - m.motion).head<2>().squaredNorm();
+    if (sum >= least) continue;
+    least = sum;
+    c->velocity = axes;
+  }
+}
+
+/// The yaw that points where the vehicle goes; it goes backwards now and then, so the mean of the
+/// cosines counts.
+void decide_yaw(const std::vector<Moving>& fast, StLuciaConventions* c) {
+  double most = -1e300;
+  for (const Yaw yaw : {Yaw::north_to_west, Yaw::north_to_east, Yaw::east_to_north}) {
+    double sum = 0;
+    for (const Moving& m : fast)
+      sum += std::cos(yaw_in_enu(m.line->angles.z(), yaw) - std::atan2(m.motion.y(), m.motion.x()));
+    if (sum <= most) continue;
+    most = sum;
+    c->yaw = yaw;
+  }
+}
+
+double correlation(const std::vector<Moving>& fast, const std::vector<double>& slopes,
+                   Eigen::Index field) {
+  const double n = static_cast<double>(fast.size());
+  double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  for (std::size_t i = 0; i < fast.size(); ++i) {
+    const double a = fast[i].line->angles[field], b = slopes[i];
+    x += a, y += b, xx += a * a, yy += b * b, xy += a * b;
+  }
+  const double spread = (xx - x * x / n) * (yy - y * y / n);
+  return spread > 0 ? (xy - x * y / n) / std::sqrt(spread) : 0;
+}
+
+/// The angle that follows the slope of the path is pitch. False: neither does.
+bool decide_pitch(const std::vector<Moving>& fast, StLuciaConventions* c) {
+  std::vector<double> slopes;
+  for (const Moving& m : fast) {
+    const Vec3 v = in_enu(m.line->velocity, c->velocity);
+    slopes.push_back(std::atan2(v.z(), v.head<2>().norm()));
+  }
+  const double first = correlation(fast, slopes, 0), second = correlation(fast, slopes, 1);
+  if (std::max(std::abs(first), std::abs(second)) < kTells) return false;
+  c->pitch_first = std::abs(first) > std::abs(second);
+  c->nose_up_positive = (c->pitch_first ? first : second) > 0;
+  return true;
+}
+
+const char* to_phrase(Velocity v) noexcept {
+  return v == Velocity::east_north_up     ? "east, north, up"
+         : v == Velocity::north_east_down ? "north, east, down"
+                                          : "north, west, up";
+}
+const char* to_phrase(Yaw y) noexcept {
+  return y == Yaw::north_to_west   ? "from north counter-clockwise"
+         : y == Yaw::north_to_east ? "a compass heading"
+                                   : "from east counter-clockwise";
+}
+
+StLuciaConventions decide(const std::vector<Line>& lines, std::vector<std::string>* remarks) {
+  StLuciaConventions c;
+  const std::vector<Moving> moving = motions(lines);
+  std::vector<Moving> fast;
+  for (const Moving& m : moving)
+    if (m.motion.head<2>().norm() > kFast) fast.push_back(m);
+  if (fast.size() < kEnough) {
+    remarks->push_back(
+        "the drive is too slow or too short to show the INS's axes: north, west, up and yaw from "
+        "north counter-clockwise are taken");
+    return c;
+  }
+  decide_velocity(moving, &c);
+  decide_yaw(fast, &c);
+  const bool slope = decide_pitch(fast, &c);
+  remarks->push_back(fmt::format(
+      "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up{}",
+      to_phrase(c.velocity), to_phrase(c.yaw), c.pitch_first ? 10 : 11,
+      c.nose_up_positive ? "positive" : "negative",
+      slope ? "" : " (taken: the drive is too level to show it)"));
+  return c;
+}
+
+InsSample sample_of(const Line& line, const StLuciaConventions& c, std::uint64_t number) {
+  InsSample s;
+  s.number = number;
+  s.stamp = line.stamp;
+  s.fix = FixStatus::fix_3d;
+  s.attitude_valid = s.velocity_valid = true;
+  s.position = line.place;
+  const Vec3 v = in_enu(line.velocity, c.velocity);
+  s.velocity_enu = {v.x(), v.y(), v.z()};
+  const double roll = line.angles[c.pitch_first ? 1 : 0],
+               pitch = line.angles[c.pitch_first ? 0 : 1];
+  const Mat3 R = exp_so3(Vec3(0, 0, yaw_in_enu(line.angles.z(), c.yaw))) *
+                 exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) *
+                 exp_so3(Vec3(roll, 0, 0));
+  const Eigen::Quaterniond q = quaternion(R);
+  s.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
+  return s;
+}
+
 }  // namespace
 
-std::optional<std::filesystem::path> find_st_lucia_log(const std::filesystem::path& folder,
-                                                       std::string_view ending) {
-  std::vector<std::filesystem::path> found;
-  std::error_code error;
-  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error))
-    if (it->path().filename().string().ends_with(ending)) found.push_back(it->path());
-  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
-  if (found.empty()) return std::nullopt;
-  if (found.size() > 1) {
-    std::sort(found.begin(), found.end());
-    refuse(folder, 0,
-           "holds " + std::to_string(found.size()) + " files that end in " + std::string(ending) +
-               " (" + found[0].filename().string() + ", …): one drive a folder is expected");
-  }
-  return found[0];
-}
-
-std::optional<Stamp> st_lucia_stamp(std::string_view seconds,
-                                    std::string_view microseconds) noexcept {
-  constexpr std::int64_t kLatest = 9'000'000'000;  // s: what 64 bits of nanoseconds hold
-  const auto s = parse_integer(seconds), us = parse_integer(microseconds);
-  if (!s || !us || *s < 0 || *s > kLatest || *us < 0 || *us > 999'999) return std::nullopt;
-  return Stamp(*s * 1'000'000'000 + *us * 1'000);
-}
-
 StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given) {
-  const auto found = find_st_lucia_log(folder, kImageLog);
+  const auto found = find_log(folder, kImageLog);
   if (!found)
     refuse(folder, 0,
            "holds no file that ends in " + std::string(kImageLog) +
@@ -105,6 +368,28 @@ StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given) {
   sequence.calibration = published_calibration();
   sequence.calibration_source = "the calibration published with the data set";
   return sequence;
+}
+
+RecordedIns read_st_lucia_ins(const std::filesystem::path& folder) {
+  RecordedIns ins;
+  const auto found = find_log(folder, "_Ins0.log");
+  if (!found) {
+    ins.remarks.push_back(
+        folder.string() +
+        ": holds no file that ends in _Ins0.log; there is no INS to compare with");
+    return ins;
+  }
+  std::vector<Line> lines = read_lines(*found, &ins.remarks);
+  check_places(*found, &lines, &ins.remarks);
+  const StLuciaConventions conventions = decide(lines, &ins.remarks);
+  ins.readings.reserve(lines.size());
+  for (const Line& line : lines) {
+    RecordedReading reading;
+    reading.sample = sample_of(line, conventions, ins.readings.size());
+    reading.quality.filter_valid = true;  // the log tells nothing else
+    ins.readings.push_back(reading);
+  }
+  return ins;
 }
 
 }  // namespace vergence::app::detail

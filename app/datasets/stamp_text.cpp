@@ -146,7 +146,8 @@ std::optional<Stamp> parse_iso_time(std::string_view text) noexcept {
   constexpr std::size_t kBetween = 10;  // date and time
   if (text.size() < kForm.size() || text.size() > 45) return std::nullopt;
   for (std::size_t i = 0; i < kForm.size(); ++i)
-    if (kForm[i] != '0' && text[i] != kForm[i] &&
+    // Names of files have no colons.
+    if (kForm[i] != '0' && text[i] != kForm[i] && !(kForm[i] == ':' && text[i] == '-') &&
         !(i == kBetween && (text[i] == 'T' || text[i] == 't' || text[i] == '_')))
       return std::nullopt;
   const int year = digits(text.substr(0, 4), 2200), month = digits(text.substr(5, 2), 12),

@@ -1,17 +1,11 @@
 #include "app/datasets/stereo_sequence.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <system_error>
 
 #include "app/config/calibration_file.hpp"
-#include "app/datasets/deep_samples.hpp"
-#include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/formats.hpp"
-#include "app/datasets/detail/kitti_raw.hpp"
-#include "app/datasets/detail/name_order.hpp"
 #include "app/datasets/detail/pairing.hpp"
-#include "app/datasets/detail/side_names.hpp"
 #include "app/datasets/recorded_session.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -186,6 +180,13 @@ std::optional<SequenceFormat> find_format(const std::filesystem::path& folder) {
   return std::nullopt;
 }
 
+RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path& folder,
+                              const std::array<int, 2>& cameras, bool mount_wanted) {
+  if (format == SequenceFormat::kitti_raw) return detail::read_oxts(folder, cameras, mount_wanted);
+  if (format == SequenceFormat::st_lucia) return detail::read_st_lucia_ins(folder);
+  return {};  // bags and sessions have it in StereoSequence::ins
+}
+
 ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,
                            ImageSize* size) {
   return sequence.store ? sequence.store->size(name, size)
@@ -203,31 +204,6 @@ ImageSize first_image_size(const StereoSequence& sequence, std::size_t camera) {
       std::string("has no readable image of the ") + (camera == 0 ? "left" : "right") + " camera");
 }
 
-void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
-  const std::size_t end =
-      first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
-  std::size_t good = 0, bad = 0;
-  std::string sentence;
-  for (std::size_t i = first; i < end; ++i)
-    for (std::size_t k = 0; k < 2; ++k) {
-      const std::string& name = sequence.pairs[i].file[k];
-      if (name.empty()) continue;
-      ImageSize size;
-      if (image_size(sequence, name, &size) != ImageFileStatus::ok) continue;
-      const Intrinsics& camera = sequence.calibration.intrinsics[k];
-      const ImageSize requested{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
-      ++(size == requested ? good : bad);
-      if (size == requested || !sentence.empty()) continue;
-      sentence = (sequence.root / name).string() + ": is " + text(size) +
-                 " pixels, but the calibration of this camera (" + sequence.calibration_source +
-                 ") is for " + text(requested) +
-                 (sequence.side_by_side ? " (twice its width, side by side)" : "") +
-                 "; use the calibration that belongs to these images";
-    }
-  // Single images of another size cost their frames.
-  if (bad > good) throw InputError(sentence);
-}
-
 namespace detail {
 
 void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold) {
@@ -238,95 +214,6 @@ void require_folder(const std::filesystem::path& folder, const char* what_it_sho
       std::filesystem::exists(folder, error)
           ? std::string("is not a folder; a folder with ") + what_it_should_hold + " is expected"
           : std::string("does not exist; a folder with ") + what_it_should_hold + " is expected");
-}
-
-bool is_image_name(const std::string& file) {
-  constexpr std::array kEndings{".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pnm"};
-  const std::string ending = lower(std::filesystem::path(file).extension().string());
-  return !file.starts_with('.') &&
-         std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
-}
-
-std::optional<std::array<std::string, 2>> camera_folders(const std::filesystem::path& root) {
-  namespace fs = std::filesystem;
-  std::error_code ignored;
-  const auto holds_images = [&](const std::string& below) {
-    for (fs::directory_iterator it(root / below, ignored), end; !ignored && it != end;
-         it.increment(ignored))
-      if (is_image_name(it->path().filename().string())) return true;
-    return false;
-  };
-  for (const std::string above : {"", "mav0/", "images/", "data/"}) {
-    std::vector<std::string> names;
-    for (fs::directory_iterator it(root / above, ignored), end; !ignored && it != end;
-         it.increment(ignored))
-      if (std::error_code other; it->is_directory(other))
-        names.push_back(it->path().filename().string());
-    for (const auto& [left, right] : stereo_names(names))
-      for (const char* below : {"", "/data", "/images"})
-        if (holds_images(above + left + below) && holds_images(above + right + below))
-          return std::array{above + left + below, above + right + below};
-  }
-  return std::nullopt;
-}
-
-std::vector<std::string> list_images(const std::filesystem::path& root, const std::string& below) {
-  const std::filesystem::path folder = root / below;
-  require_folder(folder, "images");
-  std::vector<std::string> names;
-  std::string other;  // the ending of a file that is none
-  std::error_code error;
-  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
-       it.increment(error)) {
-    const std::string name = it->path().filename().string();
-    if (is_image_name(name))
-      names.push_back(below.empty() ? name : below + "/" + name);
-    else if (!name.starts_with('.') && it->path().has_extension())
-      other = it->path().extension().string();
-  }
-  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
-  if (names.empty())
-    refuse(folder, 0,
-           other.empty() ? "holds no PNG, JPEG, BMP or PGM image"
-                         : "holds no PNG, JPEG, BMP or PGM image; files of the kind " + other +
-                               " are not read: convert them, for example with `mogrify -format png "
-                               "*" +
-                               other + "`");
-  std::sort(names.begin(), names.end(), in_name_order);
-  return names;
-}
-
-std::vector<StereoPair> merged_pairs(
-    std::span<const Stamp> left, std::span<const Stamp> right,
-    const std::function<std::string(std::size_t camera, std::size_t index)>& name,
-    std::vector<std::string>* assumptions) {
-  const Duration interval = usual_interval(left);
-  const auto together =
-      pair_nearest(left, right, Duration::seconds(kMostApart * interval.to_seconds()));
-  if (const PairOffset offset = pair_offset(left, right, together); offset.farthest > Duration{})
-    assumptions->push_back("images are paired by the nearest stamp, right ones are later by " +
-                           describe(offset));
-  constexpr std::size_t kAlone = std::numeric_limits<std::size_t>::max();
-  std::vector<std::size_t> partner(left.size(), kAlone);
-  std::vector<bool> paired(right.size(), false);
-  for (const auto& [l, r] : together) partner[l] = r, paired[r] = true;
-  std::vector<std::size_t> alone;
-  for (std::size_t r = 0; r < right.size(); ++r)
-    if (!paired[r]) alone.push_back(r);
-  std::stable_sort(alone.begin(), alone.end(),
-                   [&](std::size_t a, std::size_t b) { return right[a] < right[b]; });
-  std::vector<StereoPair> pairs;
-  auto next = alone.begin();
-  const auto take_alone = [&] {
-    pairs.push_back({right[*next], {"", name(1, *next)}});
-    ++next;
-  };
-  for (std::size_t l = 0; l < left.size(); ++l) {
-    while (next != alone.end() && right[*next] < left[l]) take_alone();
-    pairs.push_back({left[l], {name(0, l), partner[l] == kAlone ? "" : name(1, partner[l])}});
-  }
-  while (next != alone.end()) take_alone();
-  return pairs;
 }
 
 }  // namespace detail

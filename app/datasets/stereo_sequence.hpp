@@ -64,7 +64,7 @@ struct StereoSequence {
   std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
   std::shared_ptr<const RecordedIns> ins{};   // that came with the images; nothing: it has files of
                                               // its own (read_recorded_ins()), or there is none
-  int deep_bits = 16;  // of images of 16 bits a sample: so many are used (deep_samples.hpp)
+  int deep_bits = 16;  // of images of 16 bits a sample: so many are used (find_deep_bits())
   bool bayer = false;  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
 
@@ -164,5 +164,10 @@ void check_times(const StereoSequence& sequence);
 /// that has another size than the calibration. Missing and unreadable files pass: their frames are
 /// skipped when they come. Some 10 µs an image.
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count);
+
+/// Cameras of 10, 12 or 14 bits are often kept in 16 bits a sample without being scaled, in PNG and
+/// in bags, which looks black. Sets `deep_bits` of the sequence by the greatest sample of some
+/// images of the drive, and adds a remark where that is below 16.
+void find_deep_bits(StereoSequence* sequence);
 
 }  // namespace vergence::app

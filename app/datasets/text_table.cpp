@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/image_file.hpp"
 #include "app/datasets/stamp_text.hpp"
 
 namespace vergence::app {
@@ -23,8 +24,12 @@ bool begins_row(std::string_view field) noexcept {
   const std::string_view magnitude = field.substr(field.starts_with('-') ? 1 : 0);
   bool nan = magnitude.size() == kNan.size();
   for (std::size_t i = 0; nan && i < kNan.size(); ++i) nan = (magnitude[i] | 0x20) == kNan[i];
-  return nan || parse_number(field, &ignored) || parse_decimal(field, 0) || parse_iso_time(field) ||
-         (field.size() == 10 && field[4] == '-' && field[7] == '-');  // a date, its time follows
+  // A decimal comma counts where it stands: put_decimal_points() puts it right.
+  const std::string_view before = field.substr(0, field.find(','));
+  return nan || parse_number(before, &ignored) || parse_decimal(field, 0) ||
+         parse_iso_time(field) ||
+         (field.size() == 10 && field[4] == '-' && field[7] == '-') ||  // a date, its time follows
+         is_image_name(field);
 }
 
 }  // namespace
@@ -102,6 +107,18 @@ void TextTable::split_into(std::string_view line, std::vector<std::string_view>*
     line.remove_prefix(end == std::string_view::npos ? line.size() : end + 1);
   }
   if (separator_ != ' ' && !fields->empty() && fields->back().empty()) fields->pop_back();
+}
+
+void put_decimal_points(std::string* text) {
+  TextTable table(*text);
+  if (table.separator() != ';' || !table.next()) return;
+  const auto has = [](char sign) {
+    return [sign](std::string_view field) { return field.find(sign) != std::string_view::npos; };
+  };
+  const auto& fields = table.fields();
+  if (std::any_of(fields.begin(), fields.end(), has(',')) &&
+      std::none_of(fields.begin(), fields.end(), has('.')))
+    std::replace(text->begin(), text->end(), ',', '.');
 }
 
 }  // namespace vergence::app

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -40,5 +41,8 @@ class TextTable {
   char separator_ = ' ';
   std::vector<std::string_view> names_, fields_;
 };
+
+/// Tables of some languages have semicolons between numbers like 0,25: the commas become points.
+void put_decimal_points(std::string* text);
 
 }  // namespace vergence::app

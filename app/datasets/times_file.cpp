@@ -1,124 +1,126 @@
 #include "app/datasets/times_file.hpp"
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
+#include "app/datasets/image_file.hpp"
 #include "app/datasets/text_table.hpp"
 
 namespace vergence::app {
 namespace {
+
+using Fields = std::vector<std::string_view>;
 
 bool is_number(std::string_view field) {
   double ignored = 0;
   return parse_number(field, &ignored) || parse_decimal(field, 0);
 }
 
-/// Where in a row what is.
-struct Row {
-  std::size_t time = 0;
-  bool parts = false;  // seconds and nanoseconds, in two columns
-  bool date = false;   // a date and a time of day, in two columns
-  [[nodiscard]] std::size_t first_name() const { return time + (parts || date ? 2 : 1); }
-};
-
-struct Line {
-  std::vector<std::string_view> fields;
-  std::size_t number = 0;
-};
-
-/// Infers the columns from all rows, because an index and nanoseconds cannot be recognised in one.
-Row row_of(const std::vector<Line>& lines) {
-  const std::vector<std::string_view>& first = lines.front().fields;
-  Row row;
-  row.date = first.size() > 1 && !parse_iso_time(first[0]) &&
-             parse_iso_time(std::string(first[0]) + " " + std::string(first[1]));
-  if (row.date || first.size() < 2) return row;
-  const auto all = [&](const auto& is) {
-    return std::all_of(lines.begin(), lines.end(), [&](const Line& line) {
-      return line.fields.size() > 1 && is(line.fields, &line - lines.data());
-    });
-  };
-  const auto start = parse_integer(first[0]);
-  const bool index = start && all([&](const auto& fields, std::ptrdiff_t i) {
-                       return parse_integer(fields[0]) == *start + i &&
-                              (is_number(fields[1]) || parse_iso_time(fields[1]));
-                     });
-  if (index && lines.size() > 1) row.time = 1;
-  constexpr std::int64_t kYear1973 = 100'000'000, kYear5138 = 100'000'000'000,
-                         kNsPerSecond = 1'000'000'000;
-  bool large = false;
-  row.parts = all([&](const auto& fields, std::ptrdiff_t) {
-    if (fields.size() < row.time + 2) return false;
-    const auto s = parse_integer(fields[row.time]), ns = parse_integer(fields[row.time + 1]);
-    large = large || (ns && *ns > 1'000'000);
-    return s && ns && *s >= kYear1973 && *s < kYear5138 && *ns >= 0 && *ns < kNsPerSecond;
-  });
-  row.parts = row.parts && large;
-  return row;
-}
-
-std::array<std::string, 2> names_of(const std::filesystem::path& file, const Line& line,
-                                    std::size_t first) {
-  std::array<std::string, 2> names;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const std::string_view name = line.fields[std::min(first + k, line.fields.size() - 1)];
-    if (name.empty() || name == "." || name == ".." || name.find('/') != std::string_view::npos)
-      refuse(file, line.number,
-             fmt::format("`{}` is no name of an image in its folder", name.substr(0, 40)));
-    names[k] = name;
-  }
-  return names;
+/// The name of an image in its folder: lists have it with or without the folder.
+std::string name_in(const std::filesystem::path& file, std::size_t line, std::string_view field) {
+  const std::string_view name = field.substr(field.rfind('/') + 1);
+  if (name.empty() || field.find("..") != std::string_view::npos || name == ".")
+    refuse(file, line,
+           fmt::format("`{}` is no name of an image in its folder", field.substr(0, 40)));
+  return std::string(name);
 }
 
 }  // namespace
 
+TimeColumns find_time_columns(std::span<const Fields> rows) noexcept {
+  TimeColumns c;
+  const Fields& first = rows.front();
+  const auto all = [&](const auto& is) {
+    return std::all_of(rows.begin(), rows.end(), [&](const Fields& fields) {
+      return fields.size() > c.time + 1 && is(fields, &fields - rows.data());
+    });
+  };
+  const auto start = parse_integer(first[0]);
+  const auto is_time = [](std::string_view field) {
+    return is_number(field) || parse_iso_time(field) || (field.size() == 10 && field[4] == '-');
+  };
+  c.counted = start && rows.size() > 1 && all([&](const Fields& fields, std::ptrdiff_t i) {
+                return parse_integer(fields[0]) == *start + i && is_time(fields[1]);
+              });
+  if (c.counted) c.time = 1;
+  if (!c.counted && is_image_name(first[0]))
+    while (c.time + 1 < first.size() && is_image_name(first[c.time])) ++c.time;
+  if (c.time + 1 >= first.size()) return c;
+  if (!parse_iso_time(first[c.time]) &&
+      parse_iso_time(std::string(first[c.time]) + " " + std::string(first[c.time + 1]))) {
+    c.time_of_day = c.time + 1;
+    return c;
+  }
+  constexpr std::int64_t kYear1973 = 100'000'000, kYear5138 = 100'000'000'000,
+                         kNsPerSecond = 1'000'000'000;
+  bool large = false;
+  const bool parts = all([&](const Fields& fields, std::ptrdiff_t) {
+    const auto s = parse_integer(fields[c.time]), ns = parse_integer(fields[c.time + 1]);
+    large = large || (ns && *ns > 1'000'000);
+    return s && ns && *s >= kYear1973 && *s < kYear5138 && *ns >= 0 && *ns < kNsPerSecond;
+  });
+  if (parts && large) c.nanoseconds = c.time + 1;
+  return c;
+}
+
+std::optional<Stamp> read_time(std::span<const std::string_view> fields, const TimeColumns& columns,
+                               const TimeForm& form) {
+  if (columns.last() >= fields.size()) return std::nullopt;
+  if (columns.time_of_day)
+    return parse_iso_time(std::string(fields[columns.time]) + " " +
+                          std::string(fields[*columns.time_of_day]));
+  const auto stamp = read_time(fields[columns.time], form);
+  if (!stamp || !columns.nanoseconds) return stamp;
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 62, kSecond = 1'000'000'000;
+  const auto ns = parse_integer(fields[*columns.nanoseconds]);
+  if (!ns || *ns < 0 || *ns >= kSecond || std::abs(stamp->ns()) > kFarthest) return std::nullopt;
+  return Stamp(stamp->ns() + *ns);
+}
+
 TimesFile read_times_file(const std::filesystem::path& file, std::optional<TimeUnit> relative) {
   const std::string text = read_text(file);
-  std::vector<Line> lines;
+  std::vector<Fields> rows;
+  std::vector<std::size_t> lines;
   TextTable table(text);
-  while (table.next()) lines.push_back({table.fields(), table.line()});
-  if (lines.empty()) refuse(file, 0, "holds no times; one line a frame is expected");
+  while (table.next()) rows.push_back(table.fields()), lines.push_back(table.line());
+  if (rows.empty()) refuse(file, 0, "holds no times; one line a frame is expected");
 
-  const Row row = row_of(lines);
+  const TimeColumns columns = find_time_columns(rows);
   std::vector<std::string_view> times;
   bool whole = true;
-  for (const Line& line : lines) {
-    if (line.fields.size() <= row.time)
-      refuse(file, line.number, "has fewer columns than the lines before");
-    times.push_back(line.fields[row.time]);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows[i].size() <= columns.last())
+      refuse(file, lines[i], "has fewer columns than the lines before");
+    times.push_back(rows[i][columns.time]);
     whole = whole && times.back().find_first_of(".eE") == std::string_view::npos;
   }
   const TimeForm form =
-      find_time_form(times, row.parts ? std::optional(TimeUnit::seconds) : std::nullopt,
+      find_time_form(times, columns.nanoseconds ? std::optional(TimeUnit::seconds) : std::nullopt,
                      relative.value_or(whole ? TimeUnit::nanoseconds : TimeUnit::seconds));
   TimesFile out;
-  if (row.time > 0) out.remarks.emplace_back("the first column counts the lines");
-  if (row.parts) out.remarks.emplace_back("times are seconds and nanoseconds in two columns");
+  if (columns.counted) out.remarks.emplace_back("the first column counts the lines");
+  if (columns.nanoseconds)
+    out.remarks.emplace_back("times are seconds and nanoseconds in two columns");
   if (const std::string what = describe(form); !what.empty() && form.unit != TimeUnit::nanoseconds)
     out.remarks.push_back(what);
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const Line& line = lines[i];
-    const std::string date = row.date && line.fields.size() > 1
-                                 ? std::string(line.fields[0]) + " " + std::string(line.fields[1])
-                                 : std::string();
-    auto stamp = row.date ? parse_iso_time(date) : read_time(times[i], form);
-    constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
-    if (stamp && row.parts && stamp->ns() > kFarthest) stamp.reset();
-    if (stamp && row.parts)
-      stamp = Stamp(stamp->ns() + parse_integer(line.fields[row.time + 1]).value_or(0));
-    if (!stamp)
-      refuse(file, line.number, fmt::format("`{}` is not a time", times[i].substr(0, 40)));
-    TimesLine entry{*stamp, {}};
-    const std::size_t columns = line.fields.size() - std::min(line.fields.size(), row.first_name());
-    if (columns > 2)
-      refuse(file, line.number,
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Fields& fields = rows[i];
+    const auto stamp = read_time(fields, columns, form);
+    if (!stamp) refuse(file, lines[i], fmt::format("`{}` is not a time", times[i].substr(0, 40)));
+    // Names before the time or behind it; each may have a time of its own (`time left time right`).
+    Fields names(fields.begin() + (columns.counted ? 1 : 0),
+                 fields.begin() + static_cast<std::ptrdiff_t>(columns.time));
+    for (std::size_t k = columns.last() + 1; k < fields.size(); ++k) names.push_back(fields[k]);
+    if (names.size() == 3 && is_number(names[1])) names.erase(names.begin() + 1);
+    if (names.size() > 2)
+      refuse(file, lines[i],
              fmt::format("has {} columns; a time, and one name of an image or two, are expected",
-                         line.fields.size()));
-    if (columns > 0) entry.name = names_of(file, line, row.first_name());
+                         fields.size()));
+    TimesLine entry{*stamp, {}};
+    for (std::size_t k = 0; k < 2 && !names.empty(); ++k)
+      entry.name[k] = name_in(file, lines[i], names[std::min(k, names.size() - 1)]);
     if (!out.lines.empty() && out.lines.front().name[0].empty() != entry.name[0].empty())
-      refuse(file, line.number,
+      refuse(file, lines[i],
              "names an image where other lines do not, or the other way round; every line is of "
              "the same kind");
     out.lines.push_back(std::move(entry));

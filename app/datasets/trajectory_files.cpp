@@ -23,6 +23,7 @@ constexpr double kQuaternionLength = 0.02;
 // Of R Rᵀ − I: three decimals of a matrix keep within it.
 constexpr double kNearRotation = 5e-3;
 constexpr std::int64_t kRowStep = 100'000'000;  // ns: from row to row where a file has no times
+constexpr std::int64_t kMostPoses = 100'000'000;
 constexpr double kRounded = 1e-4;  // beyond, the numbers have lost digits, and it is said
 
 bool present(const fs::path& p) {
@@ -36,15 +37,16 @@ enum class Layout : std::uint8_t { pose, matrix3x4, matrix4x4 };
 /// Which column is what.
 struct Columns {
   Layout layout = Layout::pose;
-  std::optional<std::size_t> stamp{}, nanoseconds{};  // beside a stamp of whole seconds
-  std::array<std::size_t, 7> pose{};                  // x y z, then the quaternion as it is written
-  std::size_t first = 0;                              // of a matrix
-  std::optional<QuaternionOrder> order{};             // told by headings
+  std::optional<TimeColumns> time{};
+  bool counted = false;                    // what stands for a time is the number of the pose
+  std::array<std::size_t, 7> pose{};       // x y z, then the quaternion as it is written
+  std::size_t first = 0;                   // of a matrix
+  std::optional<QuaternionOrder> order{};  // told by headings
   [[nodiscard]] std::size_t needed() const {
     std::size_t last = layout == Layout::pose        ? *std::max_element(pose.begin(), pose.end())
                        : layout == Layout::matrix3x4 ? first + 11
                                                      : first + 15;
-    if (stamp) last = std::max({last, *stamp, nanoseconds.value_or(0)});
+    if (time) last = std::max(last, time->last());
     return last + 1;
   }
 };
@@ -82,7 +84,7 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
   Columns c;
   std::array<std::optional<std::size_t>, 3> position;
   std::array<std::optional<std::size_t>, 4> quaternion;  // x y z w
-  std::optional<std::size_t> exact, seconds;
+  std::optional<std::size_t> exact, seconds, nanoseconds, stamp;
   const auto take = [](std::optional<std::size_t>* place, std::size_t i) {
     if (!*place) *place = i;
   };
@@ -91,27 +93,25 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
     if (word.empty()) continue;
     const std::size_t axis = std::string_view("xyzw").find(word.back());
     if (word.ends_with("nsec") || word.ends_with("nsecs") || word.ends_with("nanosec"))
-      take(&c.nanoseconds, i);
+      take(&nanoseconds, i);
     else if (word.ends_with("secs") || word.ends_with("sec"))
       take(&seconds, i);
     else if (contains(word, {"headerstamp"}))
       exact = i;
     else if (contains(word, {"time", "stamp"}) || word == "t" || word == "ts")
-      take(&c.stamp, i);
+      take(&stamp, i);
     else if (axis < 4 && is_quaternion(word))
       take(&quaternion[axis], i);
     else if (axis < 3 && is_position(word))
       take(&position[axis], i);
   }
-  if (exact) c.stamp = exact;
-  if (seconds && c.nanoseconds)
-    c.stamp = seconds;
-  else
-    c.nanoseconds.reset();
-  if (!c.stamp) c.stamp = seconds;
-  if (!c.stamp || !position[0] || !position[1] || !position[2] || !quaternion[0] ||
-      !quaternion[1] || !quaternion[2] || !quaternion[3])
+  if (exact) stamp = exact;
+  if (!stamp || nanoseconds) stamp = seconds ? seconds : stamp;
+  if (!stamp || !position[0] || !position[1] || !position[2] || !quaternion[0] || !quaternion[1] ||
+      !quaternion[2] || !quaternion[3])
     return std::nullopt;
+  c.time = TimeColumns{.time = *stamp};
+  if (seconds == stamp) c.time->nanoseconds = nanoseconds;
   for (std::size_t k = 0; k < 3; ++k) c.pose[k] = *position[k];
   for (std::size_t k = 0; k < 4; ++k) c.pose[3 + k] = *quaternion[k];
   c.order = QuaternionOrder::xyzw;  // as they stand in `pose`
@@ -155,26 +155,34 @@ bool is_unit(const std::vector<std::string_view>& fields, std::size_t first) {
              kQuaternionLength;
 }
 
-/// By the numbers of a row that has them all. Nothing: it has not.
-std::optional<Columns> columns_of_row(const std::vector<std::string_view>& fields, bool index) {
+/// By the numbers of a row that has them all. Nothing: it has not. `time`: by all rows.
+std::optional<Columns> columns_of_row(const std::vector<std::string_view>& fields,
+                                      const TimeColumns& time) {
   Columns c;
   const std::size_t n = fields.size();
   for (const auto& [layout, numbers] : {std::pair{Layout::matrix3x4, std::size_t{12}},
-                                        std::pair{Layout::matrix4x4, std::size_t{16}}})
-    if ((n == numbers || n == numbers + 1) && is_matrix(fields, n - numbers, layout)) {
-      c.layout = layout;
-      c.first = n - numbers;
-      if (c.first > 0) c.stamp = 0;
-      return c;
-    }
+                                        std::pair{Layout::matrix4x4, std::size_t{16}}}) {
+    const std::size_t first = n - std::min(n, numbers);
+    if (first > time.last() + 1 || !is_matrix(fields, first, layout)) continue;
+    c.layout = layout;
+    c.first = first;
+    // A small whole number before a matrix is that of its frame.
+    const auto number = parse_integer(fields[0]);
+    c.counted = first == 1 && number && *number >= 0 && *number < kMostPoses;
+    if (c.counted)
+      c.time = TimeColumns{};
+    else if (first > 0)
+      c.time = first > time.last() ? time : TimeColumns{};
+    return c;
+  }
   const auto pose_from = [&c](std::size_t first) {
     for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = first + k;
   };
-  for (const std::size_t stamp :
-       index ? std::array<std::size_t, 2>{1, 0} : std::array<std::size_t, 2>{0, 1})
-    if (n >= stamp + 8 && is_unit(fields, stamp + 4)) {
-      c.stamp = stamp;
-      pose_from(stamp + 1);
+  // A count of eight columns is a stamp of its own.
+  for (const TimeColumns& times : {time, TimeColumns{}, TimeColumns{.time = 1}})
+    if (n >= times.last() + 8 && is_unit(fields, times.last() + 4)) {
+      c.time = times;
+      pose_from(times.last() + 1);
       return c;
     }
   if (n != 7 || !is_unit(fields, 3)) return std::nullopt;
@@ -185,7 +193,7 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
 /// The first rows of a file, from which it is told how all are written.
 struct Sample {
   std::vector<std::vector<std::string_view>> rows{};
-  bool index = false;  // the first column counts the rows
+  TimeColumns time{};
   std::vector<std::string_view> names{};
   char separator = ' ';
 };
@@ -196,30 +204,25 @@ Sample sample_of(std::string_view text) {
   TextTable table(text);
   s.names = table.names();
   s.separator = table.separator();
-  while (s.rows.size() < kRows && table.next()) s.rows.push_back(table.fields());
-  s.index = s.rows.size() > 2;
-  std::int64_t expected = 0;
-  for (std::size_t i = 0; s.index && i < s.rows.size(); ++i) {
-    const auto value = s.rows[i].empty() ? std::nullopt : parse_integer(s.rows[i].front());
-    if (i == 0 && value) expected = *value;
-    s.index = value && *value == expected++ && s.rows[i].size() > 8;
-  }
+  while (s.rows.size() < kRows && table.next())
+    if (!table.fields().empty()) s.rows.push_back(table.fields());
+  if (!s.rows.empty()) s.time = find_time_columns(s.rows);
   return s;
 }
 
 Columns columns_of(const fs::path& file, const Sample& sample, std::size_t first_line) {
   if (auto named = columns_of_names(sample.names)) return *named;
   for (const auto& row : sample.rows)
-    if (auto found = columns_of_row(row, sample.index)) return *found;
+    if (auto found = columns_of_row(row, sample.time)) return *found;
   // None is as it should be: the rows say for themselves what is wrong.
   const std::size_t n = sample.rows.front().size();
   Columns c;
   if (n == 12 || n == 13) {
     c.layout = Layout::matrix3x4;
     c.first = n - 12;
-    if (c.first > 0) c.stamp = 0;
+    if (c.first > 0) c.time = TimeColumns{};
   } else if (n >= 8) {
-    c.stamp = 0;
+    c.time = TimeColumns{};
     for (std::size_t k = 0; k < c.pose.size(); ++k) c.pose[k] = 1 + k;
   } else {
     refuse(
@@ -263,8 +266,9 @@ class Reader {
              skipped_ > 0
                  ? fmt::format("has no pose in it: {} rows have numbers that are none", skipped_)
                  : "has no pose in it");
-    out_.timed = columns_.stamp.has_value();
-    out_.rows = rows_;
+    out_.timed = columns_.time && !columns_.counted;
+    out_.numbered = columns_.counted;
+    out_.rows = columns_.counted ? most_ + 1 : rows_;
     put_in_order();
     say();
     return std::move(out_);
@@ -272,12 +276,12 @@ class Reader {
 
  private:
   void find_times() {
-    if (!columns_.stamp || columns_.nanoseconds) return;
+    if (!columns_.time || columns_.time->nanoseconds) return;
     std::vector<std::string_view> times;
     bool whole = true;
     for (const auto& row : sample_.rows) {
-      if (*columns_.stamp >= row.size()) continue;
-      times.push_back(row[*columns_.stamp]);
+      if (columns_.time->time >= row.size()) continue;
+      times.push_back(row[columns_.time->time]);
       whole = whole && parse_integer(times.back()).has_value();
     }
     form_ = find_time_form(times, options_.unit,
@@ -339,23 +343,22 @@ class Reader {
     refuse(file_, line, fmt::format("`{}` is not a finite number", field.substr(0, 40)));
   }
 
-  bool read_stamp(const std::vector<std::string_view>& fields, std::size_t line,
-                  Stamp* stamp) const {
-    if (!columns_.stamp) {
+  bool read_stamp(const std::vector<std::string_view>& fields, std::size_t line, Stamp* stamp) {
+    if (!columns_.time) {
       *stamp = Stamp(static_cast<std::int64_t>(rows_) * kRowStep);
       return true;
     }
-    const std::string_view field = fields[*columns_.stamp];
+    const std::string_view field = fields[columns_.time->time];
     if (is_no_value(field)) return false;
-    auto read = read_time(field, form_);
-    if (read && columns_.nanoseconds) {
-      const auto ns = parse_integer(fields[*columns_.nanoseconds]);
-      constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
-      if (!ns || std::abs(read->ns()) > kFarthest || *ns < 0 || *ns > 999'999'999)
-        read.reset();
-      else
-        *read = Stamp(read->ns() + *ns);
+    if (columns_.counted) {
+      const auto number = parse_integer(field);
+      if (!number || *number < 0 || *number > kMostPoses)
+        refuse(file_, line, fmt::format("`{}` is not the number of a pose", field.substr(0, 40)));
+      most_ = std::max(most_, static_cast<std::size_t>(*number));
+      *stamp = Stamp(*number * kRowStep);
+      return true;
     }
+    const auto read = read_time(fields, *columns_.time, form_);
     if (!read)
       refuse(file_, line,
              fmt::format("`{}` is not a stamp in {}", field.substr(0, 40), to_string(form_.unit)));
@@ -379,6 +382,7 @@ class Reader {
       const bool w_first = out_.order == QuaternionOrder::wxyz;
       const Eigen::Quaterniond q = w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
                                            : Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
+      if (q.norm() == 0) return false;
       if (!(std::abs(q.norm() - 1.0) <= kQuaternionLength))
         refuse(file_, line,
                fmt::format("the quaternion has length {:.6f} and not 1: check the order of the "
@@ -425,8 +429,7 @@ class Reader {
              fmt::format("has only {} different stamps in {} rows: times were written with too few "
                          "digits",
                          poses.size(), all));
-    if (options_.unit || options_.unit_option.empty() || !columns_.stamp || poses.size() < 3)
-      return;
+    if (options_.unit || options_.unit_option.empty() || !out_.timed || poses.size() < 3) return;
     std::vector<std::int64_t> steps(poses.size() - 1);
     for (std::size_t i = 0; i < steps.size(); ++i)
       steps[i] = (poses[i + 1].stamp.ns() / 2 - poses[i].stamp.ns() / 2);  // halves do not overflow
@@ -444,7 +447,8 @@ class Reader {
   void say() {
     auto& remarks = out_.remarks;
     if (skipped_ > 0)
-      remarks.push_back(fmt::format("{} rows without numbers (NaN) are skipped", skipped_));
+      remarks.push_back(fmt::format(
+          "{} rows without numbers (NaN, or a quaternion of zeros) are skipped", skipped_));
     if (repeated_ > 0)
       remarks.push_back(fmt::format("{} rows that repeat a stamp are dropped", repeated_));
     if (moved_ > 0)
@@ -471,7 +475,7 @@ class Reader {
   Columns columns_;
   TimeForm form_;
   bool euroc_ = false;
-  std::size_t rows_ = 0, skipped_ = 0, repeated_ = 0, moved_ = 0;
+  std::size_t rows_ = 0, most_ = 0, skipped_ = 0, repeated_ = 0, moved_ = 0;
   double roughest_ = 0;
   TrajectoryFile out_;
 };
@@ -487,11 +491,11 @@ std::optional<fs::path> first_present(std::initializer_list<fs::path> candidates
   return std::nullopt;
 }
 
-/// Row k at times[k].
+/// Row k at times[k], or frame k.
 void set_times(const fs::path& file, std::span<const Stamp> times, const std::string& times_name,
                TrajectoryFile* trajectory) {
   Trajectory& poses = trajectory->poses;
-  if (trajectory->rows != times.size())
+  if (trajectory->numbered ? trajectory->rows > times.size() : trajectory->rows != times.size())
     refuse(file, 0,
            fmt::format("has {} poses, but {} has {} times", trajectory->rows, times_name,
                        times.size()));
@@ -523,7 +527,8 @@ void bring_to_camera(const fs::path& sensor, Trajectory* poses) {
 }
 
 TrajectoryFile read_file(const fs::path& path, const TrajectoryOptions& options) {
-  const std::string text = read_text(path);
+  std::string text = read_text(path);
+  put_decimal_points(&text);
   Reader reader(path, text, options);
   TrajectoryFile out = reader.read();
   if (!out.timed) set_times_beside(path, &out);

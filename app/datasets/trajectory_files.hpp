@@ -18,10 +18,10 @@
 /// tell which column is which, where there are some.
 ///
 /// Of what is read: stamps strictly ascending, at least one pose, rotations normalised. Rows with
-/// a number that is none (NaN) are skipped, rows that repeat a stamp dropped, the order of the
-/// others is restored; all of that is counted in `remarks`. InputError with file:line: a field that
-/// is no number, a quaternion or a matrix that is no rotation, rows that are no poses, times of
-/// which most repeat one another.
+/// a number that is none (NaN) or a quaternion of zeros are skipped, rows that repeat a stamp
+/// dropped, the order of the others is restored; all of that is counted in `remarks`. InputError
+/// with file:line: a field that is no number, a quaternion or a matrix that is no rotation, rows
+/// that are no poses, times of which most repeat one another.
 namespace vergence::app {
 
 using Trajectory = std::vector<StampedPose>;
@@ -38,7 +38,8 @@ struct TrajectoryFile {
   Trajectory poses{};
   std::vector<std::string> remarks{};  // what was assumed, skipped or put right: a phrase each
   std::size_t rows = 0;                // of the file, also those that are skipped
-  bool timed = true;        // false: the file holds no times; rows are 0.1 s apart, from 0
+  bool numbered = false;  // the file counts its frames: some may be missing, `rows` counts them too
+  bool timed = true;      // false: the file holds no times; rows are 0.1 s apart, from 0
   bool order_told = false;  // headings, a matrix or the user say how rotations are written
   QuaternionOrder order = QuaternionOrder::xyzw;  // as read
 };

@@ -109,6 +109,11 @@ class Parts {
     return nullptr;
   }
   [[nodiscard]] const std::vector<Fact>& all() const { return facts_; }
+  /// What is of camera 0 becomes both cameras'.
+  void share_first() {
+    for (Fact& fact : facts_)
+      if (fact.camera == 0) fact.camera.reset();
+  }
 
  private:
   std::vector<Fact> facts_;
@@ -177,11 +182,16 @@ class RigReader {
     int cameras = 0;
     for (const Fact& fact : parts_.all())
       if (is_lens(fact) && fact.camera) cameras = std::max(cameras, *fact.camera + 1);
-    const bool one_for_both = cameras < 2 && parts_.own(Part::matrix, std::nullopt) == nullptr &&
-                              parts_.own(Part::fx, std::nullopt) != nullptr &&
+    // A rectified pair has one lens and a baseline.
+    const bool one_for_both = cameras < 2 && parts_.find(Part::fx, 0) != nullptr &&
                               (parts_.own(Part::focal_baseline, std::nullopt) != nullptr ||
                                parts_.own(Part::baseline, std::nullopt) != nullptr);
-    if (one_for_both) cameras = 2;
+    if (one_for_both) {
+      cameras = 2;
+      parts_.share_first();
+    }
+    // A model that is not read says more than the lens that is not found.
+    for (int k = 0; k < 2; ++k) (void)model(k);
     if (cameras < 2) fail_missing(files_, "the lens of a second camera");
     if (cameras > kMaxCameras)
       throw InputError(fmt::format("{}: has {} cameras; a rig has up to {}", names_of(files_),
@@ -320,19 +330,20 @@ class RigReader {
   }
 
   void read_size(int k) {
-    const auto side = [](const Fact& fact, const YAML::Node& node) {
-      return static_cast<int>(
-          fact.file->integer(node, fact.key, 1, std::numeric_limits<int>::max()));
+    const auto side = [](const Fact& fact, double value) {
+      constexpr double kLargest = 1 << 16;  // px
+      if (!(value >= 1 && value <= kLargest) || value != std::floor(value))
+        fact.file->fail(fact.node, fact.key + " is no size of an image");
+      return static_cast<int>(value);
     };
     const Fact *width = parts_.find(Part::width, k), *height = parts_.find(Part::height, k),
                *size = parts_.find(Part::size, k);
     if (width != nullptr && height != nullptr) {
-      lens(k).width = side(*width, width->node), lens(k).height = side(*height, height->node);
+      lens(k).width = side(*width, width->file->number(width->node, width->key));
+      lens(k).height = side(*height, height->file->number(height->node, height->key));
     } else if (size != nullptr) {
-      const YAML::Node list = size->node.IsMap() ? size->node["data"] : size->node;
-      if (!list.IsSequence() || list.size() != 2)
-        size->file->fail(size->node, size->key + " is not [width, height]");
-      lens(k).width = side(*size, list[0]), lens(k).height = side(*size, list[1]);
+      const auto values = numbers_of(*size, 2, "[width, height]");
+      lens(k).width = side(*size, values[0]), lens(k).height = side(*size, values[1]);
     } else if (size_) {
       lens(k).width = size_->width, lens(k).height = size_->height;
     } else {
@@ -470,8 +481,20 @@ class RigReader {
     const Fact *length = parts_.own(Part::baseline, std::nullopt),
                *focal = parts_.own(Part::focal_baseline, std::nullopt);
     if (length == nullptr && focal == nullptr) return false;
-    place(1).t.x() = length != nullptr ? -length->file->number(length->node, length->key)
-                                       : -focal->file->number(focal->node, focal->key) / lens(0).fx;
+    // Where lenses of the raw images stand beside it, the focal length is that of the rectified
+    // one.
+    const Fact* rectified = parts_.own(Part::fx, std::nullopt);
+    const double fx = rectified != nullptr
+                          ? rectified->file->number(rectified->node, rectified->key)
+                          : lens(0).fx;
+    const double b = length != nullptr ? length->file->number(length->node, length->key)
+                                       : focal->file->number(focal->node, focal->key) / fx;
+    Mat3 R_rectified[2] = {Mat3::Identity(), Mat3::Identity()};
+    for (int k = 0; k < 2; ++k)
+      if (const Fact* R = parts_.own(Part::rotation, k))
+        R_rectified[k] = matrix_of(numbers_of(*R, 9, "a matrix of 3 x 3"));
+    place(1).R = R_rectified[1].transpose() * R_rectified[0];
+    place(1).t = R_rectified[1].transpose() * Vec3(-b, 0, 0);
     return true;
   }
 
@@ -493,16 +516,8 @@ std::optional<RigCalibration> read_kitti_text(const std::string& name, const std
   if (!lines.next(&line) || !(line.starts_with("P0") || line.starts_with("P2") ||
                               line.starts_with("calib_time") || line.starts_with("S_00")))
     return std::nullopt;
-  RigCalibration rig = read_kitti_projections(
-      name, {line.starts_with("P2") ? 2 : 0, line.starts_with("P2") ? 3 : 1});
-  const KittiCalibrationText file(name, "");
-  const std::string own = "S_rect_00";
-  if (!size && !file.has(own))
-    throw InputError(name + ": holds no image size; add --size WIDTHxHEIGHT");
-  const ImageSize images = file.has(own) ? file.size(own) : *size;
-  for (std::size_t k = 0; k < 2; ++k)
-    rig.intrinsics[k].width = images.width, rig.intrinsics[k].height = images.height;
-  return rig;
+  const bool colour = line.starts_with("P2");
+  return read_kitti_projections(name, {colour ? 2 : 0, colour ? 3 : 1}, size);
 }
 
 /// The files that a configuration names, which lie beside it.
@@ -519,7 +534,26 @@ void add_named_files(std::vector<YamlFile>* files) {
   for (YamlFile& tree : named) files->push_back(std::move(tree));
 }
 
+/// A lens in the middle of a half or a quarter of its image is one of binned images, whose file has
+/// the size of the sensor.
+void check_binning(const std::string& name, const Intrinsics& lens) {
+  constexpr double kNear = 0.12;  // of the image
+  const auto off = [&](double parts) {
+    return std::max(std::abs(parts * lens.cx / lens.width - 0.5),
+                    std::abs(parts * lens.cy / lens.height - 0.5));
+  };
+  for (const int parts : {2, 4})
+    if (off(1) > 2 * kNear - 0.01 && off(parts) < kNear)
+      throw InputError(fmt::format(
+          "{}: the size is {}x{}, but the principal point ({:.1f}, {:.1f}) is the middle of {}x{}: "
+          "the camera matrix is probably that of binned images; write their size",
+          name, lens.width, lens.height, lens.cx, lens.cy, lens.width / parts,
+          lens.height / parts));
+}
+
 void finish(const std::string& name, const CalibrationUse& use, CalibrationFile* calibration) {
+  for (const Intrinsics& lens : calibration->rig.intrinsics)
+    if (lens.width > 0 && lens.height > 0) check_binning(name, lens);
   calibration->source = "given";
   calibration->rig.baseline = calibration->rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&calibration->rig))

@@ -32,8 +32,8 @@ constexpr std::array kWords{
     Words{Part::height, " height imageheight imgheight rows "},
     Words{Part::rectification, " rectification rectificationmatrix rrect "},
     Words{Part::projection, " p projection projectionmatrix prect "},
-    Words{Part::rotation, " r rotation rotationmatrix rmat rstereo om rvec rotationvector "},
-    Words{Part::translation, " t translation translationvector tvec tstereo trans "},
+    Words{Part::rotation, " r rot rotation rotationmatrix rmat om rvec rotationvector "},
+    Words{Part::translation, " t tran trans trns translation translationvector tvec "},
     Words{Part::to_previous, " tcncnm "},
     Words{Part::from_body, " tcamimu tcambody tcb tci "},
     Words{Part::to_body, " timucam tbodycam bodytcam tbs tsc tbc tic "},
@@ -144,6 +144,13 @@ std::string joined(const std::vector<std::string>& tokens) {
   return word;
 }
 
+const Words* find_word(const std::string& word) {
+  const std::string whole = " " + word + " ";
+  return std::find_if(kWords.begin(), kWords.end(), [&](const Words& w) {
+    return w.words.find(whole) != std::string_view::npos;
+  });
+}
+
 /// k1 … k6, p1 and p2 of a scalar: their place in k1 k2 p1 p2 k3 k4 k5 k6.
 std::optional<int> coefficient_of(const std::vector<std::string>& tokens) {
   if (tokens.size() < 2) return std::nullopt;
@@ -230,7 +237,7 @@ class Walk {
         tokens.pop_back();
       else if (!node.IsScalar() || (whole != "u0" && whole != "v0"))
         side = take_side(&tokens);
-      if (!look_up(joined(tokens), groups, &fact)) return;
+      if (!look_up(tokens, groups, &side, &fact)) return;
     }
     for (std::size_t i = groups.size(); !side.number && i-- > 0;) {
       std::vector<std::string> group = tokens_of(groups[i]);
@@ -266,11 +273,18 @@ class Walk {
     return std::max(fact->index, fact->other) == 1;
   }
 
-  static bool look_up(const std::string& word, const std::vector<std::string>& groups, Fact* fact) {
-    const std::string whole = " " + word + " ";
-    const auto known = std::find_if(kWords.begin(), kWords.end(), [&](const Words& w) {
-      return w.words.find(whole) != std::string_view::npos;
-    });
+  /// `KL` is K of the left camera, `stereo_R` is R.
+  static bool look_up(const std::vector<std::string>& tokens,
+                      const std::vector<std::string>& groups, Side* side, Fact* fact) {
+    std::string word = joined(tokens);
+    auto known = find_word(word);
+    if (known == kWords.end() && !side->number && (word.ends_with('l') || word.ends_with('r'))) {
+      known = find_word(word.substr(0, word.size() - 1));
+      if (known != kWords.end()) *side = {word.back() == 'r' ? 1 : 0, true};
+    }
+    if (const std::size_t at = word.find("stereo");
+        known == kWords.end() && at != std::string::npos)
+      known = find_word(word.erase(at, std::string_view("stereo").size()));
     if (known == kWords.end()) return false;
     fact->part = known->part;
     if (!groups.empty() && groups.back() == "roi") {

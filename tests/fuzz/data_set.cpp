@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "app/datasets/recorded_ins.hpp"
-#include "app/datasets/st_lucia.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/errors.hpp"

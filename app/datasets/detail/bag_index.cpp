@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/detail/ascending.hpp"
 #include "app/datasets/detail/jpeg.hpp"
-#include "app/datasets/detail/name_order.hpp"
+#include "app/datasets/detail/names.hpp"
+#include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/detail/sqlite_bag.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"

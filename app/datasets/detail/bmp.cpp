@@ -1,6 +1,7 @@
 #include "app/datasets/detail/bmp.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "app/datasets/detail/image_size.hpp"
 
@@ -21,6 +22,11 @@ std::uint32_t u32(Bytes b, std::size_t at) noexcept { return u16(b, at) | u16(b,
 
 /// A negative height says that the first row is the top one.
 bool top_down(Bytes b) noexcept { return (u32(b, kHeight) & 0x80000000U) != 0; }
+/// Rows of pixels. With bit fields, 32 bits are blue, green, red as everywhere.
+bool is_plain(Bytes b) noexcept {
+  constexpr std::uint32_t kBitFields = 3;
+  return u32(b, kCompression) == 0 || (u32(b, kCompression) == kBitFields && u16(b, kBits) == 32);
+}
 std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
   return (std::size_t{width} * bits + 31) / 32 * 4;
 }
@@ -30,15 +36,17 @@ std::uint8_t luminance(const std::uint8_t* bgr) noexcept {
   return static_cast<std::uint8_t>((114U * bgr[0] + 587U * bgr[1] + 299U * bgr[2] + 500U) / 1000U);
 }
 
-bool palette_is_grey(Bytes b) noexcept {
+/// What the palette makes of its indices; without one they are grey.
+std::array<std::uint8_t, 256> palette_of(Bytes b) noexcept {
+  std::array<std::uint8_t, 256> grey{};
   const std::size_t first = kFileHeader + u32(b, kHeaderSize), end = u32(b, kPixelsAt);
-  std::size_t count = std::min<std::size_t>(256, u32(b, kColours) == 0 ? 256 : u32(b, kColours));
-  if (first >= end) return true;  // none
-  count = std::min(count, (end - first) / 4);
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t c = 0; c < 3; ++c)
-      if (b[first + 4 * i + c] != i) return false;
-  return true;
+  const std::size_t count = u32(b, kColours) == 0 ? 256 : u32(b, kColours),
+                    there = first < end ? (end - first) / 4 : 0;
+  for (std::size_t i = 0; i < grey.size(); ++i)
+    grey[i] = there == 0                   ? static_cast<std::uint8_t>(i)
+              : i < std::min(count, there) ? luminance(&b[first + 4 * i])
+                                           : std::uint8_t{0};
+  return grey;
 }
 
 }  // namespace
@@ -60,8 +68,7 @@ ImageFileStatus check_bmp(Bytes b) noexcept {
   ImageSize size;
   if (const auto status = bmp_size(b, &size); status != ImageFileStatus::ok) return status;
   if (b.size() < kWholeHead) return ImageFileStatus::torn;
-  if (u32(b, kCompression) != 0 || u16(b, kBits) > 32)
-    return ImageFileStatus::ok;  // the decoder refuses it
+  if (!is_plain(b) || u16(b, kBits) > 32) return ImageFileStatus::ok;  // the decoder refuses it
   const std::size_t pixels = u32(b, kPixelsAt);
   const std::size_t needed = row_bytes(static_cast<std::uint32_t>(size.width), u16(b, kBits)) *
                              static_cast<std::size_t>(size.height);
@@ -72,17 +79,16 @@ ImageFileStatus check_bmp(Bytes b) noexcept {
 ImageFileStatus decode_bmp(Bytes b, ImageSize size, std::uint8_t* out,
                            std::size_t stride) noexcept {
   const std::uint32_t bits = u16(b, kBits);
-  if (u32(b, kCompression) != 0 || (bits != 24 && (bits != 8 || !palette_is_grey(b))))
-    return ImageFileStatus::undecodable;
+  if (!is_plain(b) || (bits != 8 && bits != 24 && bits != 32)) return ImageFileStatus::undecodable;
+  const std::array<std::uint8_t, 256> grey =
+      bits == 8 ? palette_of(b) : std::array<std::uint8_t, 256>{};
   const std::size_t width = static_cast<std::size_t>(size.width),
                     height = static_cast<std::size_t>(size.height);
   const std::size_t row = row_bytes(static_cast<std::uint32_t>(size.width), bits);
   for (std::size_t y = 0; y < height; ++y, out += stride) {
     const std::uint8_t* from = &b[u32(b, kPixelsAt) + (top_down(b) ? y : height - 1 - y) * row];
-    if (bits == 8)
-      std::copy_n(from, width, out);
-    else
-      for (std::size_t x = 0; x < width; ++x) out[x] = luminance(from + 3 * x);
+    for (std::size_t x = 0; x < width; ++x)
+      out[x] = bits == 8 ? grey[from[x]] : luminance(from + bits / 8 * x);
   }
   return ImageFileStatus::ok;
 }

@@ -1,17 +1,11 @@
 #pragma once
 #include <array>
 #include <filesystem>
-#include <functional>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "app/datasets/detail/bag_index.hpp"
-#include "app/datasets/image_file.hpp"
+#include "app/datasets/kitti_calibration.hpp"
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "core/math/se3.hpp"
 
 /// What the readers of stereo_sequence.hpp share.
 namespace vergence::app::detail {
@@ -39,29 +33,21 @@ namespace vergence::app::detail {
 [[nodiscard]] RecordedIns read_oxts(const std::filesystem::path& folder,
                                     const std::array<int, 2>& cameras, bool mount_wanted);
 
-/// Pairs of the nearest stamps, within kMostApart of the interval, in the order of the left ones;
-/// images without a partner stand where their stamp belongs. `name`: of an image by camera and
-/// index. That stamps differ is one of *assumptions.
-[[nodiscard]] std::vector<StereoPair> merged_pairs(
-    std::span<const Stamp> left, std::span<const Stamp> right,
-    const std::function<std::string(std::size_t camera, std::size_t index)>& name,
-    std::vector<std::string>* assumptions);
-
-/// The two folders of a drive that have the usual names of a left and a right camera and images in
-/// them, or in `data` or `images` below; as root-relative paths. Nothing: there are none.
-[[nodiscard]] std::optional<std::array<std::string, 2>> camera_folders(
-    const std::filesystem::path& root);
-
 /// Returns true if open_folder() finds images of two cameras below `root`.
 [[nodiscard]] bool holds_stereo_images(const std::filesystem::path& root);
 
-/// By the ending; hidden files, which systems put beside images, are none.
-[[nodiscard]] bool is_image_name(const std::string& file);
+/// The log of the INS in a St Lucia folder (docs/st_lucia.md). Lines that are no twelve numbers are
+/// left out and counted, readings sorted by their stamps; without sigmas, the log has none. What
+/// the drive cannot tell of its axes (it never is fast or steep enough) is the MTi-G's own: x
+/// forward, y left, z up, yaw from north counter-clockwise. Without a log there are no readings,
+/// and a remark. InputError: several logs, more than one line in a hundred broken, positions that
+/// are no places.
+[[nodiscard]] RecordedIns read_st_lucia_ins(const std::filesystem::path& folder);
 
-/// Names of the images in root/below, sorted, as root-relative paths. InputError: no
-/// such folder, no image in it that can be read.
-[[nodiscard]] std::vector<std::string> list_images(const std::filesystem::path& root,
-                                                   const std::string& below);
+/// A drive lies in `folder`, in its date's folder or one above. InputError: it cannot be listed.
+[[nodiscard]] bool holds_kitti_raw(const std::filesystem::path& folder);
+/// `folder`: the drive, its date, or what the date lies in. InputError: no drive in it, or several.
+[[nodiscard]] KittiRawFolders find_kitti_raw(const std::filesystem::path& folder);
 
 /// InputError unless the path is a folder.
 void require_folder(const std::filesystem::path& folder, const char* what_it_should_hold);

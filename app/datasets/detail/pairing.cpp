@@ -99,4 +99,37 @@ std::string describe(const PairOffset& offset) {
                      1e3 * offset.farthest.to_seconds());
 }
 
+bool is_doubtful(const PairOffset& offset, Duration interval) {
+  constexpr Duration kSuspicious = Duration::milliseconds(5);
+  constexpr double kDoubtful = 0.1;  // of the interval
+  const Duration far = std::max({offset.median, -offset.median, offset.farthest});
+  return far > kSuspicious || far.to_seconds() > kDoubtful * interval.to_seconds();
+}
+
+std::string doubt(const std::string& left, const std::string& right, const PairOffset& offset,
+                  Duration interval) {
+  return fmt::format(
+      "the stamps of {} and {} differ by {} at an interval of {:.3g} ms: if the cameras do not "
+      "expose together, poses suffer in turns; if they do, one of the stamps is wrong",
+      left, right, describe(offset), 1e3 * interval.to_seconds());
+}
+
+std::vector<std::size_t> ascending(std::span<const Stamp> stamps) {
+  std::vector<std::size_t> ends, before(stamps.size());
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    const auto place = std::lower_bound(ends.begin(), ends.end(), stamps[i],
+                                        [&](std::size_t e, Stamp s) { return stamps[e] < s; });
+    before[i] = place == ends.begin() ? i : *(place - 1);
+    if (place == ends.end())
+      ends.push_back(i);
+    else if (stamps[i] < stamps[*place])  // of equal ones the first stays
+      *place = i;
+  }
+  std::vector<std::size_t> kept(ends.size());
+  if (ends.empty()) return kept;
+  std::size_t at = ends.back();
+  for (std::size_t n = kept.size(); n-- > 0; at = before[at]) kept[n] = at;
+  return kept;
+}
+
 }  // namespace vergence::app::detail

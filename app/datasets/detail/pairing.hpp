@@ -7,7 +7,7 @@
 
 #include "core/types/time.hpp"
 
-/// Which image of one camera belongs to which of the other.
+/// The order of stamps, and which image of one camera belongs to which of the other.
 namespace vergence::app::detail {
 
 /// Stamps of a pair may be apart by so much of the interval, 40 % with room for its own rounding:
@@ -23,6 +23,10 @@ inline constexpr double kMostApart = 0.404;
                                                                    std::span<const Stamp> right,
                                                                    Duration most);
 
+/// Indices of a longest strictly ascending part of the stamps: what stays when the fewest are left
+/// out that go back or repeat one.
+[[nodiscard]] std::vector<std::size_t> ascending(std::span<const Stamp> stamps);
+
 /// By how much the right stamps of pairs are later.
 struct PairOffset {
   Duration median{};    // signed
@@ -33,5 +37,11 @@ struct PairOffset {
 
 /// "0.312 ms (median; 95 % within 0.4 ms)".
 [[nodiscard]] std::string describe(const PairOffset& offset);
+
+/// Stamps of pairs that are more than 5 ms or 10 % of the interval apart.
+[[nodiscard]] bool is_doubtful(const PairOffset& offset, Duration interval);
+/// What to say then of the two cameras.
+[[nodiscard]] std::string doubt(const std::string& left, const std::string& right,
+                                const PairOffset& offset, Duration interval);
 
 }  // namespace vergence::app::detail

@@ -7,7 +7,6 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/datasets/deep_samples.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/types/bayer.hpp"

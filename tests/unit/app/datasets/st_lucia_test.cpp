@@ -1,9 +1,8 @@
-#include "app/datasets/st_lucia.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <numbers>
 #include <string>
 
@@ -13,6 +12,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/frame_decoder.hpp"
 #include "app/datasets/image_file.hpp"
+#include "app/datasets/recorded_ins.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
 #include "core/types/bayer.hpp"
@@ -23,8 +23,15 @@ namespace vergence::app {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-using Velocity = StLuciaConventions::Velocity;
-using Yaw = StLuciaConventions::Yaw;
+
+enum class Velocity { east_north_up, north_east_down, north_west_up };
+enum class Yaw { north_to_west, north_to_east, east_to_north };
+/// What a log's numbers mean; by default as the MTi-G has it.
+struct Conventions {
+  Velocity velocity = Velocity::north_west_up;
+  Yaw yaw = Yaw::north_to_west;
+  bool pitch_first = false, nose_up_positive = false;
+};
 
 void write(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
@@ -165,7 +172,7 @@ struct Way {
   }
 };
 
-std::vector<std::string> ins_lines(const StLuciaConventions& c, double speed = 1) {
+std::vector<std::string> ins_lines(const Conventions& c, double speed = 1) {
   const GeographicLib::LocalCartesian plane(-27.4975, 153.0137, 60);
   std::vector<std::string> lines;
   Vec3 p = Vec3::Zero();
@@ -195,17 +202,13 @@ std::vector<std::string> ins_lines(const StLuciaConventions& c, double speed = 1
   return lines;
 }
 
-StLuciaIns read(const std::vector<std::string>& lines) {
+RecordedIns read(const std::vector<std::string>& lines) {
   const test::TemporaryFolder folder;
   write(folder / "101215_153851_Ins0.log", fmt::format("{}\n", fmt::join(lines, "\n")));
-  return read_st_lucia_ins(folder.path());
+  return read_recorded_ins(SequenceFormat::st_lucia, folder.path(), {0, 1}, true);
 }
 
-bool says(const StLuciaIns& ins, const std::string& part) {
-  for (const std::string& sentence : ins.remarks)
-    if (sentence.find(part) != std::string::npos) return true;
-  return false;
-}
+std::string said(const RecordedIns& ins) { return fmt::format("{}", fmt::join(ins.remarks, "; ")); }
 
 TEST(StLuciaIns, whateverItsAxesTheDriveShowsThem) {
   for (const Velocity velocity :
@@ -215,13 +218,9 @@ TEST(StLuciaIns, whateverItsAxesTheDriveShowsThem) {
         for (const bool nose_up : {false, true}) {
           SCOPED_TRACE(fmt::format("{} {} {} {}", static_cast<int>(velocity), static_cast<int>(yaw),
                                    pitch_first, nose_up));
-          const StLuciaIns ins = read(ins_lines({velocity, yaw, pitch_first, nose_up}));
-          EXPECT_EQ(ins.conventions.velocity, velocity);
-          EXPECT_EQ(ins.conventions.yaw, yaw);
-          EXPECT_EQ(ins.conventions.pitch_first, pitch_first);
-          EXPECT_EQ(ins.conventions.nose_up_positive, nose_up);
-          ASSERT_EQ(ins.samples.size(), 800U);
-          const InsSample& s = ins.samples[333];
+          const RecordedIns ins = read(ins_lines({velocity, yaw, pitch_first, nose_up}));
+          ASSERT_EQ(ins.readings.size(), 800U);
+          const InsSample& s = ins.readings[333].sample;
           const double t = 333 / Way::kRate;
           const Mat3 R =
               Eigen::Quaterniond(s.q_enu_ins[3], s.q_enu_ins[0], s.q_enu_ins[1], s.q_enu_ins[2])
@@ -235,52 +234,59 @@ TEST(StLuciaIns, whateverItsAxesTheDriveShowsThem) {
         }
 }
 
-TEST(StLuciaIns, aDriveThatShowsNothingIsTakenAsAnMtiG) {
-  const StLuciaIns ins = read(ins_lines({}, 0.3));
-  EXPECT_TRUE(says(ins, "too slow or too short"));
-  EXPECT_EQ(ins.conventions.yaw, Yaw::north_to_west);
-}
+/// What is done to the lines of a log, what is said of it and how many readings are left.
+struct Log {
+  const char* what;
+  std::function<void(std::vector<std::string>*)> spoil;
+  std::size_t readings;
+  const char* said;
+  double speed = 1;
+};
 
-TEST(StLuciaIns, disorderBrokenLinesAndEqualStampsAreMendedAndSaid) {
-  std::vector<std::string> lines = ins_lines({});
-  std::swap(lines[100], lines[500]);
-  lines[200] = lines[199];
-  lines[300] = "1292391546 0 -27.5";
-  const StLuciaIns ins = read(lines);
-  EXPECT_EQ(ins.samples.size(), 798U);
-  for (std::size_t i = 1; i < ins.samples.size(); ++i)
-    ASSERT_LT(ins.samples[i - 1].stamp, ins.samples[i].stamp);
-  EXPECT_TRUE(says(ins, "1 lines that are not twelve numbers"));
-  EXPECT_TRUE(says(ins, "not in the order"));
-  EXPECT_TRUE(says(ins, "1 samples of the INS had the stamp of another"));
-}
-
-TEST(StLuciaIns, longitudeFirstIsSeen) {
-  std::vector<std::string> lines = ins_lines({});
-  for (std::string& line : lines) {
-    const std::size_t a = line.find(' ', line.find(' ') + 1) + 1, b = line.find(' ', a) + 1,
-                      c = line.find(' ', b);
-    line = line.substr(0, a) + line.substr(b, c - b) + " " + line.substr(a, b - a - 1) +
-           line.substr(c);
+TEST(StLuciaIns, logsAreMendedOrRefused) {
+  using Lines = std::vector<std::string>;
+  for (const Log& c : {
+           Log{"shows nothing", [](Lines*) {}, 800, "too slow or too short", 0.3},
+           Log{"out of order", [](Lines* l) { std::swap((*l)[100], (*l)[500]); }, 800,
+               "not in the order"},
+           Log{"a stamp twice", [](Lines* l) { (*l)[200] = (*l)[199]; }, 799,
+               "1 samples of the INS had the stamp of another"},
+           Log{"a broken line", [](Lines* l) { (*l)[300] = "1292391546 0 -27.5"; }, 799,
+               "1 lines that are not twelve numbers"},
+           Log{"longitude first",
+               [](Lines* l) {
+                 for (std::string& line : *l) {
+                   const std::size_t a = line.find(' ', line.find(' ') + 1) + 1,
+                                     b = line.find(' ', a) + 1, d = line.find(' ', b);
+                   line = line.substr(0, a) + line.substr(b, d - b) + " " +
+                          line.substr(a, b - a - 1) + line.substr(d);
+                 }
+               },
+               800, "longitude stands before latitude"},
+           Log{"no log",
+               [](Lines* l) {
+                 *l = {"1 2 3", "4 5 6", "7 8 9"};
+               },
+               0, "Ins0.log:1: and 2 more lines"},
+           Log{"no place", [](Lines* l) { *l = {"1292391531 0 -27.5 153 1e9 0 0 0 0 0 0 0"}; }, 0,
+               "a place that is none"},
+       }) {
+    Lines lines = ins_lines({}, c.speed);
+    c.spoil(&lines);
+    RecordedIns ins;
+    const std::string refused = refusal([&] { ins = read(lines); });
+    EXPECT_NE((refused + said(ins)).find(c.said), std::string::npos)
+        << c.what << refused << said(ins);
+    ASSERT_EQ(ins.readings.size(), c.readings) << c.what;
+    for (std::size_t i = 1; i < ins.readings.size(); ++i)
+      ASSERT_LT(ins.readings[i - 1].sample.stamp, ins.readings[i].sample.stamp);
+    if (c.readings == 0) continue;
+    EXPECT_NEAR(ins.readings[0].sample.position.latitude_deg, -27.4975, 1e-9) << c.what;
   }
-  const StLuciaIns ins = read(lines);
-  EXPECT_TRUE(says(ins, "longitude stands before latitude"));
-  EXPECT_NEAR(ins.samples[0].position.latitude_deg, -27.4975, 1e-9);
-}
-
-TEST(StLuciaIns, whatIsNoSuchLogIsRefused) {
-  EXPECT_NE(refusal([] {
-              (void)read({"1 2 3", "4 5 6", "7 8 9"});
-            }).find("Ins0.log:1: and 2 more lines"),
-            std::string::npos);
-  EXPECT_NE(refusal([] {
-              (void)read({"1292391531 0 -27.5 153 1e9 0 0 0 0 0 0 0"});
-            }).find("a place that is none"),
-            std::string::npos);
   const test::TemporaryFolder empty;
-  const StLuciaIns none = read_st_lucia_ins(empty.path());
-  EXPECT_TRUE(none.samples.empty());
-  EXPECT_TRUE(says(none, "holds no file that ends in _Ins0.log"));
+  EXPECT_NE(said(read_recorded_ins(SequenceFormat::st_lucia, empty.path(), {0, 1}, true))
+                .find("holds no file that ends in _Ins0.log"),
+            std::string::npos);
 }
 
 }  // namespace

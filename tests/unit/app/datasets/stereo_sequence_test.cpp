@@ -58,7 +58,7 @@ TEST_F(Sequence, kittiImagesThatAreMissingKeepTheirPlace) {
 TEST_F(Sequence, kittiSaysWhatIsWrong) {
   test::write_tiny_kitti(folder_, 3);
   folder_.write("times.txt", "0\n0.1\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"image_0/", "times.txt"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"3 left images", "2 lines"}));
   folder_.write("times.txt", "0\n0.1\nnoon\n");
   EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_.path()), {"times.txt:3", "noon"}));
   folder_.write("times.txt", "0\n0.1\n0.2\n");
@@ -137,7 +137,7 @@ TEST_F(Sequence, eurocSaysWhatIsWrong) {
                    {"cam1/sensor.yaml", "T_BS", "orthonormal"}));
   EXPECT_TRUE(says(with("radial-tangential", "fov"), {"cam1/sensor.yaml", "fov"}));
   EXPECT_TRUE(says(with("intrinsics: [60, 61, 35, 24]", "intrinsics: [60, 61, 35]"),
-                   {"cam1/sensor.yaml", "intrinsics", "4 numbers"}));
+                   {"cam1/sensor.yaml", "intrinsics", "needs 4"}));
   EXPECT_TRUE(says(with("intrinsics: [60, 61, 35, 24]", "intrinsics: {a: b}"),
                    {"cam1/sensor.yaml", "intrinsics"}));
   EXPECT_TRUE(says(with("resolution: [70, 48]", "resolution: [1e30, 48]"),
@@ -171,100 +171,6 @@ TEST_F(Sequence, folderWhoseTimesNameTheirImages) {
                    {"times.txt", "left/a.png", "left/000.png"}));
 }
 
-/// How people keep the images of two cameras: from those of a tiny folder, `name` of each by camera
-/// and frame; pairs that come out, and what is assumed.
-struct Layout {
-  const char* what;
-  std::function<std::string(int camera, int frame)> name;  // empty: the image is lost
-  bool times;
-  std::size_t pairs, whole;
-  const char* assumption;
-};
-
-TEST_F(Sequence, imagesAreFoundAndPairedHoweverTheyAreNamed) {
-  constexpr int kFrames = 6;
-  const auto numbered = [](const char* left, const char* right) {
-    return [=](int k, int i) { return fmt::format("{}/{:06d}.png", k == 0 ? left : right, i); };
-  };
-  const auto stamp = [](int i) { return test::kTinyStart + i * test::kTinyStep; };
-  const std::vector<Layout> layouts{
-      {"capitals", numbered("Left", "RIGHT"), true, 6, 6, "is left and"},
-      {"image_left", numbered("image_left", "image_right"), true, 6, 6, "is left and"},
-      {"l, r", numbered("l", "r"), true, 6, 6, "is left and"},
-      {"cam0, cam1", numbered("cam0", "cam1"), true, 6, 6, "is left and"},
-      {"cam0/data", numbered("cam0/data", "cam1/data"), true, 6, 6, "is left and"},
-      {"one folder", [](int k, int i) { return fmt::format("I{}_{:06d}.png", k + 1, i); }, true, 6,
-       6, "I1_000000.png is left"},
-      {"prefixes, one lost on each side",
-       [](int k, int i) {
-         return i == 2 + k ? "" : fmt::format("{0}/{0}_{1}.png", k == 0 ? "left" : "right", i);
-       },
-       false, 6, 4, "0.1 s apart"},
-      {"equal stamps",
-       [&](int k, int i) { return fmt::format("{}/{}.png", k == 0 ? "left" : "right", stamp(i)); },
-       false, 6, 6, "nanoseconds in the images' names"},
-      {"milliseconds, apart",
-       [&](int k, int i) {
-         return fmt::format("{}/{}.png", k == 0 ? "left" : "right", stamp(i) / 1'000'000 + k);
-       },
-       false, 6, 6, "milliseconds in the images' names"},
-      {"nanoseconds, apart, lost on each side",
-       [&](int k, int i) {
-         return i == 1 + 2 * k
-                    ? ""
-                    : fmt::format("{}/{}.png", k == 0 ? "left" : "right", stamp(i) + 312 * k);
-       },
-       false, 6, 4, "nearest stamp"},
-  };
-  for (const Layout& layout : layouts) {
-    const test::TemporaryFolder folder;
-    folder.write("calibration.yaml", test::tiny_calibration());
-    std::string times;
-    for (int i = 0; i < kFrames; ++i) {
-      times += fmt::format("{}\n", stamp(i));
-      for (int k = 0; k < 2; ++k)
-        if (const std::string name = layout.name(k, i); !name.empty()) {
-          test::write_tiny_image(folder / name, test::tiny_seed(i, k));
-          const std::filesystem::path path(name);
-          folder.write((path.parent_path() / ("._" + path.filename().string())).string(), "junk");
-        }
-    }
-    if (layout.times) folder.write("times.txt", times);
-    EXPECT_EQ(find_format(folder.path()), SequenceFormat::folder) << layout.what;
-    const auto s = open_sequence(SequenceFormat::folder, folder.path());
-    EXPECT_EQ(s.pairs.size(), layout.pairs) << layout.what;
-    std::size_t whole = 0;
-    for (const StereoPair& pair : s.pairs) {
-      const auto there = [&](std::size_t k) {
-        return !pair.file[k].empty() && std::filesystem::exists(folder / pair.file[k]);
-      };
-      whole += there(0) && there(1) ? 1 : 0;
-    }
-    EXPECT_EQ(whole, layout.whole) << layout.what;
-    EXPECT_TRUE(says(fmt::format("{}", fmt::join(s.assumptions, "; ")), {layout.assumption}))
-        << layout.what;
-  }
-}
-
-TEST_F(Sequence, kittiWithoutTimesAndInColourIsReadAndItIsSaid) {
-  test::write_tiny_kitti(folder_, 3);
-  std::filesystem::remove(folder_ / "times.txt");
-  std::filesystem::rename(folder_ / "image_0", folder_ / "image_2");
-  std::filesystem::rename(folder_ / "image_1", folder_ / "image_3");
-  for (const char* calibration :
-       {"P2: 60 0 35 0 0 60 24 0 0 0 1 0\nP3: 60 0 35 -30 0 60 24 0 0 0 1 0\n",
-        "P2 60 0 35 0 0 60 24 0 0 0 1 0\r\nP3 60\t0 35 -30 0 60 24 0 0 0 1 0\r\n",
-        "P_rect_02 : 60 0 35 0 0 60 24 0 0 0 1 0\nP_rect_03 : 60 0 35 -30 0 60 24 0 0 0 1 0\n"}) {
-    folder_.write("calib.txt", calibration);
-    EXPECT_EQ(find_format(folder_.path()), SequenceFormat::kitti);
-    const auto s = open_sequence(SequenceFormat::kitti, folder_.path());
-    ASSERT_EQ(s.pairs.size(), 3U);
-    EXPECT_EQ(s.pairs[2].stamp.ns(), 200'000'000);
-    EXPECT_DOUBLE_EQ(s.calibration.baseline, 0.5);
-    EXPECT_EQ(s.assumptions.size(), 2U) << fmt::format("{}", fmt::join(s.assumptions, "; "));
-  }
-}
-
 /// times.txt of pairs that are `step` of the file's own units apart.
 std::string times_of(const char* format, double step, int pairs) {
   std::string text;
@@ -282,8 +188,8 @@ TEST_F(Sequence, timesInAnotherUnitAreRefusedWithTheUnitTheySeemToHave) {
   for (const Case& c :
        {Case{"{:.0f}", 104, "milliseconds?"}, Case{"{:.0f}", 50, "milliseconds?"},
         Case{"{:.0f}", 103700, "microseconds?"}, Case{"{:.0f}", 33333, "microseconds?"},
-        Case{"{:.0f}", 1, "seconds?"}, Case{"{:.1f}", 103.7, "milliseconds?"},
-        Case{"{:.1f}", 103700.5, "microseconds?"}, Case{"{:.1f}", 5e7, "nanoseconds?"}}) {
+        Case{"{:.1f}", 103.7, "milliseconds?"}, Case{"{:.1f}", 103700.5, "microseconds?"},
+        Case{"{:.1f}", 5e7, "nanoseconds?"}}) {
     folder_.write("times.txt", times_of(c.format, c.step, 5));
     const std::string sentence = refusal(SequenceFormat::folder, folder_.path());
     EXPECT_TRUE(says(sentence, {"times.txt", "are these ", c.unit})) << c.format << " " << c.step;
@@ -320,8 +226,7 @@ TEST_F(Sequence, timesThatRunBackwardsAreRefused) {
   EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()),
                    {"times.txt", "of 4 steps", "4 go back", "oldest first"}));
   folder_.write("times.txt", "0.5\n0.5\n0.5\n0.5\n0.5\n");
-  EXPECT_TRUE(
-      says(refusal(SequenceFormat::folder, folder_.path()), {"0 go back and 4 stand still"}));
+  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"4 of 4 repeat"}));
   folder_.write("times.txt", "0.1\n0.2\n0.15\n0.3\n0.4\n");
   EXPECT_NO_THROW((void)open_sequence(SequenceFormat::folder, folder_.path()))
       << "one frame is skipped when it comes";

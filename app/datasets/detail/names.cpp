@@ -1,4 +1,4 @@
-#include "app/datasets/detail/side_names.hpp"
+#include "app/datasets/detail/names.hpp"
 
 #include <algorithm>
 #include <map>
@@ -33,7 +33,12 @@ constexpr std::array kSides{Sides{"left", "right"},
                             Sides{"image_1", "image_2"},
                             Sides{"image1", "image2"},
                             Sides{"i1", "i2"},
-                            Sides{"l", "r"}};
+                            Sides{"caml", "camr"},
+                            Sides{"imgl", "imgr"},
+                            Sides{"l", "r"},
+                            Sides{"c0", "c1"}};
+/// Of images in one folder: frame 12 is `000012_0.png` and `000012_1.png`.
+constexpr Sides kNumbers{"0", "1"};
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return c >= 'a' && c <= 'z'; }
@@ -44,9 +49,11 @@ bool stands_alone(std::string_view name, std::size_t at, std::string_view word) 
   const char before = at > 0 ? name[at - 1] : '/';
   const char after = at + word.size() < name.size() ? name[at + word.size()] : '/';
   if (is_digit(word.back()) && is_digit(after)) return false;
+  if (is_digit(word.front()) && is_digit(before)) return false;
   const bool whole = word.size() > 3 || !is_letter(before);
+  // One letter before a number names a side only where a file's name begins with it: `L0012.png`.
   return whole && (word.size() > 2 || (!is_letter(after) && !is_letter(before) &&
-                                       (is_digit(word.back()) || !is_digit(after))));
+                                       (is_digit(word.back()) || !is_digit(after) || at == 0)));
 }
 
 /// The name with `from` replaced by `to` wherever it stands; nothing: it does not.
@@ -61,7 +68,35 @@ std::optional<std::string> replaced(std::string name, std::string_view from, std
   return any ? std::optional(std::move(name)) : std::nullopt;
 }
 
+/// Takes a run of digits, or one other character, off the front of *text.
+std::string_view take(std::string_view* text) noexcept {
+  const std::size_t digits = std::min(text->find_first_not_of("0123456789"), text->size());
+  const std::string_view part = text->substr(0, std::max<std::size_t>(digits, 1));
+  text->remove_prefix(part.size());
+  return part;
+}
+
+/// A run of digits without its leading zeros; another character as it is.
+std::string_view value_of(std::string_view part) noexcept {
+  return part.substr(std::min(part.find_first_not_of('0'), part.size()));
+}
+
 }  // namespace
+
+bool in_name_order(std::string_view a, std::string_view b) noexcept {
+  std::string_view rest_a = a, rest_b = b;
+  while (!rest_a.empty() && !rest_b.empty()) {
+    const std::string_view value_a = value_of(take(&rest_a)), value_b = value_of(take(&rest_b));
+    const auto is_number = [](std::string_view v) {
+      return v.empty() || (v.front() >= '0' && v.front() <= '9');
+    };
+    if (is_number(value_a) && is_number(value_b) && value_a.size() != value_b.size())
+      return value_a.size() < value_b.size();
+    if (value_a != value_b) return value_a < value_b;
+  }
+  if (rest_a.empty() != rest_b.empty()) return rest_a.empty();
+  return a.size() != b.size() ? a.size() < b.size() : a < b;
+}
 
 std::string lower(std::string_view text) {
   std::string small(text);
@@ -86,24 +121,28 @@ std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::stri
   return pairs;
 }
 
-std::array<std::string, 2> side_prefixes(const std::vector<std::string>& names) {
+std::optional<std::string> without_side(const std::string& name, const std::string& word) {
+  return replaced(lower(name), word, "");
+}
+
+std::array<std::string, 2> side_words(const std::vector<std::string>& files) {
   std::array<std::string, 2> best;
   std::size_t most = 0;
-  for (const Sides& sides : kSides) {
-    std::array<std::size_t, 2> count{};
-    std::array<std::string, 2> written;
-    for (const std::string& name : names) {
-      const std::string small = lower(name);
-      for (std::size_t k = 0; k < 2; ++k) {
-        const std::string_view word = k == 0 ? sides.left : sides.right;
-        if (!small.starts_with(word) || !stands_alone(small, 0, word)) continue;
-        if (count[k]++ == 0) written[k] = name.substr(0, word.size());
-      }
+  const auto count = [&](const Sides& sides) {
+    std::array<std::size_t, 2> of{};
+    for (const std::string& file : files) {
+      const std::string small = lower(file);
+      const bool left = replaced(small, sides.left, "").has_value(),
+                 right = replaced(small, sides.right, "").has_value();
+      if (left != right) ++of[left ? 0 : 1];
     }
-    if (std::min(count[0], count[1]) <= most) continue;
-    most = std::min(count[0], count[1]);
-    best = written;
-  }
+    // A folder of one camera has some names that look like sides, too.
+    if (std::min(of[0], of[1]) <= most || 10 * (of[0] + of[1]) < 9 * files.size()) return;
+    most = std::min(of[0], of[1]);
+    best = {std::string(sides.left), std::string(sides.right)};
+  };
+  for (const Sides& sides : kSides) count(sides);
+  if (most == 0 && files.size() > 2) count(kNumbers);
   return best;
 }
 

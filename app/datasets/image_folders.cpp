@@ -1,0 +1,681 @@
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "app/config/calibration_file.hpp"
+#include "app/datasets/decimal.hpp"
+#include "app/datasets/detail/formats.hpp"
+#include "app/datasets/detail/names.hpp"
+#include "app/datasets/detail/pairing.hpp"
+#include "app/datasets/euroc_sensor.hpp"
+#include "app/datasets/kitti_calibration.hpp"
+#include "app/datasets/text_file.hpp"
+#include "app/datasets/times_file.hpp"
+
+namespace vergence::app::detail {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The images of one camera, in order of their names, and where they lie.
+struct Camera {
+  std::string below{};               // the folder, relative to the drive's
+  std::vector<std::string> names{};  // with their folder
+  std::string side{};                // what in a name tells the camera, in small letters
+  [[nodiscard]] std::string in_folder(const std::string& file) const {
+    return below.empty() ? file : below + "/" + file;
+  }
+};
+using Cameras = std::array<Camera, 2>;
+
+bool present(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(path, ignored);
+}
+
+// ---- where the images are
+
+std::vector<std::string> entries_of(const fs::path& folder, bool folders) {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end;
+       it.increment(ignored)) {
+    const std::string name = it->path().filename().string();
+    std::error_code other;
+    if (folders ? it->is_directory(other) && !name.starts_with('.') : is_image_name(name))
+      names.push_back(name);
+  }
+  std::sort(names.begin(), names.end(), in_name_order);
+  return names;
+}
+
+/// Two folders with the usual names and images in them, or in a folder of one name below both.
+std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& above) {
+  for (const auto& [left, right] : stereo_names(entries_of(root / above, true))) {
+    std::vector<std::string> inner = entries_of(root / above / left, true);
+    inner.insert(inner.begin(), "");
+    for (const std::string& name : inner) {
+      const std::string below = name.empty() ? "" : "/" + name;
+      if (!entries_of(root / (above + left + below), false).empty() &&
+          !entries_of(root / (above + right + below), false).empty())
+        return Cameras{Camera{above + left + below}, Camera{above + right + below}};
+    }
+  }
+  return std::nullopt;
+}
+
+/// Images of both cameras in one folder, told apart by a word of their names.
+std::optional<Cameras> in_one_folder(const fs::path& root, const std::string& above) {
+  const std::vector<std::string> files = entries_of(root / above, false);
+  const std::array<std::string, 2> words = side_words(files);
+  if (words[0].empty()) return std::nullopt;
+  Cameras cameras;
+  for (std::size_t k = 0; k < 2; ++k) {
+    cameras[k].below = above.substr(0, above.empty() ? 0 : above.size() - 1);
+    cameras[k].side = words[k];
+    for (const std::string& file : files)
+      if (without_side(file, words[k]) && !without_side(file, words[1 - k]))
+        cameras[k].names.push_back(cameras[k].in_folder(file));
+  }
+  return cameras;
+}
+
+std::optional<Cameras> find_cameras(const fs::path& root) {
+  for (const char* above : {"", "mav0/", "images/", "data/", "stereo/", "frames/"}) {
+    if (auto cameras = in_two_folders(root, above)) return cameras;
+    if (auto cameras = in_one_folder(root, above)) return cameras;
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> list_images(const fs::path& root, const std::string& below) {
+  const fs::path folder = root / below;
+  require_folder(folder, "images");
+  std::vector<std::string> names;
+  std::string other;  // the ending of a file that is none
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (is_image_name(name))
+      names.push_back(below.empty() ? name : below + "/" + name);
+    else if (!name.starts_with('.') && it->path().has_extension())
+      other = it->path().extension().string();
+  }
+  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
+  if (names.empty())
+    refuse(folder, 0,
+           other.empty() ? "holds no PNG, JPEG, BMP or PGM image"
+                         : "holds no PNG, JPEG, BMP or PGM image; files of the kind " + other +
+                               " are not read: convert them, for example with `mogrify -format png "
+                               "*" +
+                               other + "`");
+  std::sort(names.begin(), names.end(), in_name_order);
+  return names;
+}
+
+Cameras cameras_in(const fs::path& root, const std::array<std::string, 2>& below) {
+  Cameras cameras;
+  for (std::size_t k = 0; k < 2; ++k)
+    cameras[k].below = below[k], cameras[k].names = list_images(root, below[k]);
+  return cameras;
+}
+
+// ---- what names tell
+
+/// The name without its ending and without what tells the camera.
+std::string stem_of(const Camera& camera, const std::string& name) {
+  const std::string stem = fs::path(name).stem().string();
+  return camera.side.empty() ? stem : without_side(stem, camera.side).value_or(stem);
+}
+
+/// The last number in a name, digits and points: `left_0012` → `0012`; empty: it has none.
+std::string_view last_number(std::string_view stem) {
+  constexpr std::string_view kDigits = "0123456789";
+  const std::size_t last = stem.find_last_of(kDigits);
+  if (last == std::string_view::npos) return {};
+  stem = stem.substr(0, last + 1);
+  const std::size_t before = stem.find_last_not_of("0123456789.");
+  stem.remove_prefix(before == std::string_view::npos ? 0 : before + 1);
+  return stem.substr(std::min(stem.find_first_of(kDigits), stem.size()));
+}
+
+/// The last number in a name without its leading zeros.
+std::string number_key(const Camera& camera, const std::string& name) {
+  const std::string stem = stem_of(camera, name);
+  const std::string_view number = last_number(stem);
+  return std::string(number.substr(std::min(number.find_first_not_of('0'), number.size())));
+}
+
+std::optional<std::size_t> number_of(const Camera& camera, const std::string& name) {
+  const std::string stem = stem_of(camera, name);
+  if (last_number(stem).empty()) return std::nullopt;
+  const std::string key = number_key(camera, name);
+  const auto n = key.empty() ? std::optional<std::int64_t>(0) : parse_integer(key);
+  return n && *n >= 0 ? std::optional(static_cast<std::size_t>(*n)) : std::nullopt;
+}
+
+/// The time that a name holds: the whole name as a date and time, seconds and the digits behind
+/// their point (`1403636584_763555584`), or its last number.
+std::string time_in(const std::string& stem) {
+  if (parse_iso_time(stem)) return stem;
+  const std::string_view number = last_number(stem);
+  const std::string_view before =
+      std::string_view(stem).substr(0, static_cast<std::size_t>(number.data() - stem.data()));
+  const bool parts = (number.size() == 9 || number.size() == 6) && before.size() > 10 &&
+                     (before.back() == '_' || before.back() == '-') &&
+                     last_number(before).size() == 10;
+  return (parts ? std::string(last_number(before)) + "." : "") + std::string(number);
+}
+
+/// The times that the names are; nothing: they are none.
+std::optional<std::vector<Stamp>> stamps_in(const Camera& camera, std::string* unit) {
+  std::vector<std::string> texts;
+  for (const std::string& name : camera.names) texts.push_back(time_in(stem_of(camera, name)));
+  const std::vector<std::string_view> numbers(texts.begin(), texts.end());
+  const TimeForm form = find_time_form(numbers, std::nullopt, TimeUnit::nanoseconds);
+  if (!form.absolute) return std::nullopt;
+  std::vector<Stamp> stamps;
+  for (const std::string_view number : numbers) {
+    const auto stamp = read_time(number, form);
+    if (!stamp) return std::nullopt;
+    stamps.push_back(*stamp);
+  }
+  *unit = form.iso ? "date and time" : to_string(form.unit);
+  return stamps;
+}
+
+// ---- pairs by names
+
+/// Both sorted lists by their keys; equal ones meet, the others stand alone. A side that has no
+/// image gets the name it should have had.
+template <class Key>
+std::vector<StereoPair> pair_by_key(const Cameras& cameras, const Key& key) {
+  const auto &left = cameras[0].names, &right = cameras[1].names;
+  const auto missing = [&](std::size_t k, const std::string& other) {
+    return cameras[k].side.empty() ? cameras[k].in_folder(fs::path(other).filename().string()) : "";
+  };
+  std::vector<StereoPair> pairs;
+  std::size_t l = 0, r = 0;
+  while (l < left.size() || r < right.size()) {
+    const auto before = [&] {
+      return in_name_order(key(cameras[0], left[l]), key(cameras[1], right[r]));
+    };
+    const auto behind = [&] {
+      return in_name_order(key(cameras[1], right[r]), key(cameras[0], left[l]));
+    };
+    const bool have_left = l < left.size() && (r == right.size() || !behind());
+    const bool have_right = r < right.size() && (l == left.size() || !before());
+    StereoPair pair;
+    pair.file[0] = have_left ? left[l] : missing(0, right[r]);
+    pair.file[1] = have_right ? right[r] : missing(1, left[l]);
+    l += have_left ? 1 : 0;
+    r += have_right ? 1 : 0;
+    pairs.push_back(std::move(pair));
+  }
+  return pairs;
+}
+
+/// By equal names, else by equal last numbers, whichever half of the images agree on; nothing:
+/// neither.
+std::optional<std::vector<StereoPair>> pair_by_names(Cameras* cameras) {
+  const std::size_t least = std::min((*cameras)[0].names.size(), (*cameras)[1].names.size());
+  const auto met = [](const Cameras& c, const std::vector<StereoPair>& pairs) {
+    return c[0].names.size() + c[1].names.size() - pairs.size();
+  };
+  auto pairs = pair_by_key(*cameras, stem_of);
+  if (2 * met(*cameras, pairs) >= least) return pairs;
+  Cameras numbered = *cameras;
+  for (Camera& camera : numbered) {
+    std::stable_sort(camera.names.begin(), camera.names.end(),
+                     [&](const std::string& a, const std::string& b) {
+                       return in_name_order(number_key(camera, a), number_key(camera, b));
+                     });
+    if (std::adjacent_find(camera.names.begin(), camera.names.end(),
+                           [&](const std::string& a, const std::string& b) {
+                             return number_key(camera, a) == number_key(camera, b);
+                           }) != camera.names.end())
+      return std::nullopt;
+  }
+  pairs = pair_by_key(numbered, number_key);
+  if (2 * met(numbered, pairs) < least) return std::nullopt;
+  *cameras = std::move(numbered);
+  return pairs;
+}
+
+std::vector<StereoPair> pair_in_order(const Cameras& cameras) {
+  std::vector<StereoPair> pairs(cameras[0].names.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    pairs[i].file = {cameras[0].names[i], cameras[1].names[i]};
+  return pairs;
+}
+
+// ---- pairs by stamps
+
+/// Images with their stamps, in the order of their list.
+struct Stamped {
+  std::vector<Stamp> stamps{};
+  std::vector<std::string> names{};
+};
+
+/// Pairs of the nearest stamps, within kMostApart of the interval, in the order of the left ones;
+/// images without a partner stand where their stamp belongs. Nothing: there is no pair.
+std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 2>& cameras,
+                                                      StereoSequence* sequence) {
+  const auto &left = cameras[0].stamps, &right = cameras[1].stamps;
+  const Duration interval = usual_interval(left);
+  const auto together =
+      pair_nearest(left, right, Duration::seconds(kMostApart * interval.to_seconds()));
+  if (together.empty()) return std::nullopt;
+  const PairOffset offset = pair_offset(left, right, together);
+  if (offset.farthest > Duration{})
+    sequence->assumptions.push_back(
+        "images are paired by the nearest stamp, right ones are later by " + describe(offset));
+  if (is_doubtful(offset, interval))
+    sequence->remarks.push_back(doubt("left images", "right images", offset, interval));
+  constexpr std::size_t kAlone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> partner(left.size(), kAlone);
+  std::vector<bool> paired(right.size(), false);
+  for (const auto& [l, r] : together) partner[l] = r, paired[r] = true;
+  std::vector<std::size_t> alone;
+  for (std::size_t r = 0; r < right.size(); ++r)
+    if (!paired[r]) alone.push_back(r);
+  std::stable_sort(alone.begin(), alone.end(),
+                   [&](std::size_t a, std::size_t b) { return right[a] < right[b]; });
+  std::vector<StereoPair> pairs;
+  auto next = alone.begin();
+  const auto take_alone = [&] {
+    pairs.push_back({right[*next], {"", cameras[1].names[*next]}});
+    ++next;
+  };
+  for (std::size_t l = 0; l < left.size(); ++l) {
+    while (next != alone.end() && right[*next] < left[l]) take_alone();
+    pairs.push_back(
+        {left[l], {cameras[0].names[l], partner[l] == kAlone ? "" : cameras[1].names[partner[l]]}});
+  }
+  while (next != alone.end()) take_alone();
+  return pairs;
+}
+
+// ---- lists of times
+
+/// How a data set lists its times.
+struct Lists {
+  std::optional<fs::path> shared{};              // of both cameras
+  std::array<std::optional<fs::path>, 2> own{};  // of each
+  std::optional<TimeUnit> unit{};  // of times that do not count from 1970, where it is fixed
+  bool by_number = false;          // line N is of image N, counted from 0
+};
+
+std::optional<fs::path> list_in(const fs::path& folder) {
+  for (const char* name :
+       {"times.txt", "timestamps.txt", "times.csv", "timestamps.csv", "data.csv"})
+    if (present(folder / name)) return folder / name;
+  return std::nullopt;
+}
+
+/// Beside the images' folders, in them, or between.
+Lists find_lists(const fs::path& root, const Cameras& cameras) {
+  Lists lists;
+  lists.shared = list_in(root);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const fs::path folder = root / cameras[k].below;
+    lists.own[k] = list_in(folder);
+    if (!lists.own[k] && !cameras[k].below.empty()) lists.own[k] = list_in(folder.parent_path());
+  }
+  if (!lists.shared && (lists.own[0] == lists.own[1] || !lists.own[1])) lists.shared = lists.own[0];
+  return lists;
+}
+
+TimesFile read_list(const fs::path& file, const Lists& lists, StereoSequence* sequence) {
+  TimesFile times = read_times_file(file, lists.unit);
+  auto& assumptions = sequence->assumptions;
+  for (const std::string& remark : times.remarks)
+    if (std::find(assumptions.begin(), assumptions.end(), remark) == assumptions.end())
+      assumptions.push_back(remark);
+  return times;
+}
+
+/// The image that a line names, with or without its ending.
+std::string named(const Camera& camera, const std::string& name) {
+  const fs::path first(camera.names.empty() ? "" : camera.names.front());
+  return camera.in_folder(is_image_name(name) ? name : name + first.extension().string());
+}
+
+bool holds(const Camera& camera, const std::string& name) {
+  return std::find(camera.names.begin(), camera.names.end(), name) != camera.names.end();
+}
+
+/// The images of a camera with the stamps of its own list.
+Stamped stamped(const fs::path& root, const Camera& camera, const fs::path& list,
+                const Lists& lists, StereoSequence* sequence) {
+  const TimesFile times = read_list(list, lists, sequence);
+  Stamped out;
+  const auto push = [&out](Stamp stamp, const std::string& name) {
+    out.stamps.push_back(stamp);
+    out.names.push_back(name);
+  };
+  std::string unit;
+  if (!times.lines.front().name[0].empty()) {
+    for (const TimesLine& line : times.lines) push(line.stamp, named(camera, line.name[0]));
+    return out;
+  }
+  if (const auto stamps = stamps_in(camera, &unit)) return {*stamps, camera.names};
+  std::vector<std::string> of_line(times.lines.size());
+  std::size_t end = 0, odd = 0, without = 0;
+  for (const std::string& name : camera.names) {
+    const auto number = number_of(camera, name);
+    if (number && *number < of_line.size())
+      of_line[*number] = name, end = std::max(end, *number + 1);
+    else
+      ++(number ? without : odd);
+  }
+  if (end == 0) refuse(list, 0, "has no line that an image of its camera is of: line N is image N");
+  for (std::size_t i = 0; i < end; ++i) push(times.lines[i].stamp, of_line[i]);
+  const auto say = [&](std::size_t n, const char* what) {
+    if (n > 0)
+      sequence->remarks.push_back(
+          fmt::format("{}: {} {}", list.lexically_relative(root).string(), n, what));
+  };
+  say(odd, "images are not named by their number and are left out");
+  say(without, "images have no line and are left out");
+  say(of_line.size() - end, "lines go on after the last image");
+  sequence->left_out += odd + without;
+  return out;
+}
+
+/// Images as the lines name them; some may be missing, but not all of a side.
+std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<TimesLine>& times,
+                                      const Cameras& cameras) {
+  std::vector<StereoPair> pairs(times.size());
+  for (std::size_t i = 0; i < times.size(); ++i)
+    pairs[i] = {times[i].stamp,
+                {named(cameras[0], times[i].name[0]), named(cameras[1], times[i].name[1])}};
+  for (std::size_t k = 0; k < 2; ++k)
+    if (std::none_of(pairs.begin(), pairs.end(),
+                     [&](const StereoPair& pair) { return holds(cameras[k], pair.file[k]); }))
+      refuse(file, 0,
+             "names no image that is there: the first is " + pairs.front().file[k] +
+                 ", the folder has " + cameras[k].names.front());
+  return pairs;
+}
+
+/// Image N belongs to line N, counted from 0 or from 1; nothing: a name has no number of a line.
+std::optional<std::vector<StereoPair>> pair_by_number(const Cameras& cameras,
+                                                      const std::vector<StereoPair>& pairs,
+                                                      std::size_t lines) {
+  if (pairs.empty()) return std::nullopt;
+  std::vector<std::size_t> numbers;
+  for (const StereoPair& pair : pairs) {
+    const std::size_t k = pair.file[0].empty() ? 1 : 0;
+    const auto n = number_of(cameras[k], pair.file[k]);
+    if (!n || *n > lines) return std::nullopt;
+    numbers.push_back(*n);
+  }
+  const std::size_t first = *std::max_element(numbers.begin(), numbers.end()) == lines ? 1 : 0;
+  if (*std::min_element(numbers.begin(), numbers.end()) < first) return std::nullopt;
+  std::vector<StereoPair> all(lines);
+  for (std::size_t i = 0; i < pairs.size(); ++i) all[numbers[i] - first].file = pairs[i].file;
+  return all;
+}
+
+/// The number of the first pair where their numbers leave none out; nothing: they do, or are none.
+std::optional<std::size_t> first_of_run(const Cameras& cameras,
+                                        const std::vector<StereoPair>& pairs) {
+  std::optional<std::size_t> first;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const std::size_t k = pairs[i].file[0].empty() ? 1 : 0;
+    const auto n = number_of(cameras[k], pairs[i].file[k]);
+    if (i == 0) first = n;
+    if (!n || !first || *n != *first + i) return std::nullopt;
+  }
+  return first;
+}
+
+/// By names, where these give as many pairs as there are times: a name that only one side has is an
+/// image that the other lost. Where both lost one, by the numbers in the names: image N has line N.
+/// Else in order of name, where there is one of each a pair.
+std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vector<TimesLine>& times,
+                                        bool by_number, Cameras* cameras,
+                                        std::vector<std::string>* assumptions) {
+  const std::size_t left = (*cameras)[0].names.size(), right = (*cameras)[1].names.size();
+  std::vector<StereoPair> pairs = pair_by_names(cameras).value_or(std::vector<StereoPair>{});
+  const auto run = first_of_run(*cameras, pairs);
+  if (run && *run > 1 && pairs.size() == times.size())
+    assumptions->push_back(
+        fmt::format("images begin with number {}, that of the first time", *run));
+  // Who counts by lines has as many lines as the drive has frames, lost ones too.
+  const bool whole = pairs.size() == times.size() && !(by_number && !run);
+  if (!whole && !by_number && left == right && left == times.size()) {
+    pairs = pair_in_order(*cameras);
+  } else if (!whole && pairs.size() <= times.size()) {
+    auto numbered = pair_by_number(*cameras, pairs, times.size());
+    if (numbered && !by_number)
+      assumptions->emplace_back(
+          "there are fewer pairs than times: an image belongs to the line of its number");
+    pairs = std::move(numbered).value_or(std::vector<StereoPair>{});
+  }
+  if (pairs.size() != times.size())
+    refuse(
+        folder, 0,
+        fmt::format("has {} left images, {} right ones and {} lines in its list of times; one of "
+                    "each a pair is expected (a line may name its image: stamp,file)",
+                    left, right, times.size()));
+  for (std::size_t i = 0; i < times.size(); ++i) pairs[i].stamp = times[i].stamp;
+  return pairs;
+}
+
+/// Interval assumed without a list of times. Motion is predicted by frames, so a wrong rate affects
+/// stamps and not poses.
+constexpr std::int64_t kAssumedStep = 100'000'000;  // ns
+
+std::vector<StereoPair> pair_without_times(const fs::path& folder, Cameras* cameras,
+                                           StereoSequence* sequence) {
+  std::string unit;
+  const auto left = stamps_in((*cameras)[0], &unit), right = stamps_in((*cameras)[1], &unit);
+  if (left && right)
+    if (auto pairs = pair_by_stamps(
+            {Stamped{*left, (*cameras)[0].names}, Stamped{*right, (*cameras)[1].names}},
+            sequence)) {
+      sequence->assumptions.push_back("times are the " + unit + " in the images' names");
+      return std::move(*pairs);
+    }
+  auto named = pair_by_names(cameras);
+  const auto &of_left = (*cameras)[0].names, &of_right = (*cameras)[1].names;
+  if (!named && of_left.size() != of_right.size())
+    refuse(folder, 0,
+           fmt::format("has {} left images and {} right ones, whose names have no numbers in "
+                       "common; give the images of a pair one name, or write a times.txt whose "
+                       "lines name them: stamp,left file,right file",
+                       of_left.size(), of_right.size()));
+  std::vector<StereoPair> pairs = named ? std::move(*named) : pair_in_order(*cameras);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    pairs[i].stamp = Stamp(static_cast<std::int64_t>(i) * kAssumedStep);
+  sequence->assumptions.emplace_back(
+      "there is no times.txt, so pairs are 0.1 s apart (write one line a pair: the time)");
+  return pairs;
+}
+
+void pair_cameras(Cameras* cameras, const Lists& lists, StereoSequence* sequence) {
+  const fs::path& root = sequence->root;
+  if (!lists.shared && lists.own[0] && lists.own[1]) {
+    sequence->times = *lists.own[0];
+    auto pairs = pair_by_stamps({stamped(root, (*cameras)[0], *lists.own[0], lists, sequence),
+                                 stamped(root, (*cameras)[1], *lists.own[1], lists, sequence)},
+                                sequence);
+    if (!pairs)
+      refuse(*lists.own[1], 0,
+             "has no stamp near one of " + lists.own[0]->string() +
+                 "; the two do not belong together");
+    sequence->pairs = std::move(*pairs);
+    return;
+  }
+  if (!lists.shared) {
+    sequence->pairs = pair_without_times(root, cameras, sequence);
+    return;
+  }
+  sequence->times = *lists.shared;
+  TimesFile times = read_list(*lists.shared, lists, sequence);
+  // Two numbers may be the times of both images, and no names.
+  const std::string& name = times.lines.front().name[0];
+  double ignored = 0;
+  const bool named_there = !name.empty() && (!parse_number(name, &ignored) ||
+                                             holds((*cameras)[0], named((*cameras)[0], name)));
+  sequence->pairs = named_there ? pair_as_named(*lists.shared, times.lines, *cameras)
+                                : pair_with_times(root, times.lines, lists.by_number, cameras,
+                                                  &sequence->assumptions);
+}
+
+// ---- calibrations
+
+/// A file beside the images that may be a calibration of another program; empty: there is none.
+std::string other_calibration(const fs::path& folder) {
+  std::error_code ignored;
+  for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end;
+       it.increment(ignored)) {
+    const std::string ending = lower(it->path().extension().string());
+    if (ending == ".yaml" || ending == ".yml" || ending == ".json" || ending == ".xml")
+      return it->path().filename().string();
+  }
+  return "";
+}
+
+void read_own_calibration(const CalibrationUse& use, const Cameras& cameras,
+                          StereoSequence* sequence) {
+  const fs::path& folder = sequence->root;
+  if (present(folder / "calibration.yaml")) {
+    sequence->calibration = read_calibration(folder / "calibration.yaml", use).rig;
+    sequence->calibration_source = "calibration.yaml";
+    return;
+  }
+  std::array<fs::path, 2> sensors;
+  for (std::size_t k = 0; k < 2; ++k)
+    sensors[k] = (folder / cameras[k].below).parent_path() / "sensor.yaml";
+  if (sensors[0] != sensors[1] && present(sensors[0]) && present(sensors[1])) {
+    sequence->calibration = read_sensor_rig(sensors[0], sensors[1]);
+    sequence->calibration_source = sensors[1].lexically_relative(folder).string();
+    return;
+  }
+  const std::string other = other_calibration(folder);
+  refuse(folder, 0,
+         "has no calibration.yaml; give a calibration with --calibration (of vergence, Kalibr, "
+         "ROS, OpenCV or another program), or --focal and --baseline" +
+             (other.empty() ? "" : "; is " + other + " one?"));
+}
+
+/// The kind of pixels that a PNG says in its head.
+bool is_colour(const fs::path& file) {
+  constexpr std::size_t kKindAt = 25;
+  constexpr std::uint8_t kColours = 2;  // bit of the kind
+  std::vector<std::uint8_t> bytes;
+  return read_image_file(file, &bytes) == ImageFileStatus::ok && bytes.size() > kKindAt &&
+         bytes[0] == 0x89 && (bytes[kKindAt] & kColours) != 0;
+}
+
+}  // namespace
+
+bool holds_stereo_images(const fs::path& root) { return find_cameras(root).has_value(); }
+
+StereoSequence open_folder(const fs::path& folder, bool given, const CalibrationUse& use) {
+  StereoSequence sequence;
+  sequence.root = folder;
+  sequence.side_by_side = present(folder / "both");
+  Cameras cameras;
+  if (auto found = find_cameras(folder); found && !sequence.side_by_side)
+    cameras = std::move(*found);
+  else
+    for (std::size_t k = 0; k < 2; ++k)  // left and right are to be named as missing
+      cameras[k].below = sequence.side_by_side ? "both" : k == 0 ? "left" : "right";
+  // Images in DRIVE/left and DRIVE/right below the folder: the calibration and the times are
+  // theirs.
+  if (const fs::path parent = fs::path(cameras[0].below).parent_path();
+      !parent.empty() && parent == fs::path(cameras[1].below).parent_path() &&
+      !present(folder / "calibration.yaml"))
+    return open_folder(folder / parent, given, use);
+  for (Camera& camera : cameras)
+    if (camera.names.empty()) camera.names = list_images(folder, camera.below);
+  if (sequence.side_by_side ? cameras[0].below != "both" : cameras[0].below != "left")
+    sequence.assumptions.push_back(fmt::format("{} is left and {} is right",
+                                               cameras[0].names.front(), cameras[1].names.front()));
+  sequence.times = folder / "times.txt";
+  pair_cameras(&cameras, find_lists(folder, cameras), &sequence);
+  if (const auto& left = cameras[0].names, &right = cameras[1].names; left.size() != right.size())
+    sequence.remarks.push_back(fmt::format(
+        "there are {} left images and {} right ones: where one camera lost an image without "
+        "leaving a gap in the names or in times.txt, all pairs after it are a frame off; check "
+        "that the names of a pair belong together",
+        left.size(), right.size()));
+  if (!given) read_own_calibration(use, cameras, &sequence);
+  return sequence;
+}
+
+StereoSequence open_euroc(const fs::path& folder, bool given) {
+  StereoSequence sequence;
+  sequence.root = fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
+  for (const char* camera : {"cam0", "cam1"})
+    require_folder(sequence.root / camera, "data.csv, sensor.yaml and data/ of that camera");
+  Cameras cameras = cameras_in(sequence.root, {"cam0/data", "cam1/data"});
+  Lists lists = find_lists(sequence.root, cameras);
+  lists.unit = TimeUnit::nanoseconds;
+  pair_cameras(&cameras, lists, &sequence);
+  if (given) return sequence;
+  sequence.calibration = read_sensor_rig(sequence.root / "cam0" / "sensor.yaml",
+                                         sequence.root / "cam1" / "sensor.yaml");
+  sequence.calibration_source = "cam1/sensor.yaml";
+  return sequence;
+}
+
+StereoSequence open_kitti(const fs::path& folder, bool given) {
+  StereoSequence sequence;
+  sequence.root = folder;
+  const bool colour = !present(folder / "image_0") && present(folder / "image_2");
+  if (colour)
+    sequence.assumptions.emplace_back("the colour images image_2 and image_3 are taken (P2, P3)");
+  Cameras cameras =
+      cameras_in(folder, {colour ? "image_2" : "image_0", colour ? "image_3" : "image_1"});
+  Lists lists = find_lists(folder, cameras);
+  lists.unit = TimeUnit::seconds;
+  lists.by_number = true;
+  pair_cameras(&cameras, lists, &sequence);
+  if (!colour && !given && is_colour(folder / cameras[0].names.front()))
+    sequence.remarks.emplace_back(
+        "image_0 and image_1 hold colour images, but P0 and P1 of calib.txt are those of the grey "
+        "cameras: if these are image_2 and image_3 of the benchmark, P2 and P3 are theirs (give "
+        "them with --calibration, or name the folders so)");
+  if (given) return sequence;
+  sequence.calibration =
+      read_kitti_projections(folder / "calib.txt", colour ? std::array{2, 3} : std::array{0, 1},
+                             first_image_size(sequence, 0));
+  sequence.calibration_source = "calib.txt";
+  return sequence;
+}
+
+StereoSequence open_kitti_raw(const fs::path& folder, bool given,
+                              const std::array<int, 2>& numbers) {
+  if (numbers[0] == numbers[1])
+    refuse(
+        folder, 0,
+        fmt::format("kitti_raw.left and kitti_raw.right are both camera {}; two cameras make a rig",
+                    numbers[0]));
+  const KittiRawFolders folders = find_kitti_raw(folder);
+  StereoSequence sequence;
+  sequence.root = folders.drive;
+  std::array<std::string, 2> below;
+  Lists lists;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const std::string camera = fmt::format("image_{:02d}", numbers[k]);
+    require_folder(folders.drive / camera, "data/ and timestamps.txt of a camera");
+    below[k] = camera + "/data";
+    lists.own[k] = folders.drive / camera / "timestamps.txt";
+  }
+  Cameras cameras = cameras_in(folders.drive, below);
+  pair_cameras(&cameras, lists, &sequence);
+  if (given) return sequence;
+  sequence.calibration = read_kitti_raw_rig(folders, numbers, first_image_size(sequence, 0)).rig;
+  sequence.calibration_source = kKittiRawCalibration;
+  return sequence;
+}
+
+}  // namespace vergence::app::detail

@@ -1,0 +1,175 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/datasets/decimal.hpp"
+#include "app/datasets/stereo_sequence.hpp"
+#include "app/datasets/text_file.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr double
+    kShortestStep = 1e-3,
+    kLongestStep =
+        10;  // s: faster than any stereo camera; farther than motion can be predicted across
+constexpr double kUsual = 0.05;  // s
+
+struct Unit {
+  const char* name;
+  double seconds;
+};
+constexpr std::array kUnits{Unit{"nanoseconds", 1e-9}, Unit{"microseconds", 1e-6},
+                            Unit{"milliseconds", 1e-3}, Unit{"seconds", 1}};
+
+/// The unit that makes a step of `number` the most usual one; `read_as` s a unit is not it.
+const Unit* likely_unit(double number, double read_as) {
+  const Unit* best = nullptr;
+  const auto strange = [number](const Unit& u) {
+    return std::abs(std::log(number * u.seconds / kUsual));
+  };
+  for (const Unit& unit : kUnits) {
+    const double step = number * unit.seconds;
+    if (unit.seconds == read_as || step < kShortestStep || step > kLongestStep) continue;
+    if (best == nullptr || strange(unit) < strange(*best)) best = &unit;
+  }
+  return best;
+}
+
+std::string in_words(double seconds) {
+  if (seconds < 1e-6) return fmt::format("{:.0f} ns", seconds * 1e9);
+  if (seconds < 1e-3) return fmt::format("{:.4g} µs", seconds * 1e6);
+  return fmt::format("{:.4g} s", seconds);
+}
+
+constexpr std::size_t kLooks = 5;  // pairs, spread over the drive: a tunnel is not all of it
+
+/// Nothing: an image of another kind. 0: one that says nothing, for it is missing, torn or black.
+std::optional<std::uint16_t> peak_of(const StereoSequence& s, const std::string& name,
+                                     std::vector<std::uint8_t>* bytes) {
+  if (name.empty()) return std::uint16_t{0};
+  if (s.store) return s.store->peak(name, bytes);
+  return read_image_file(s.root / name, bytes) == ImageFileStatus::ok ? peak_of_deep_image(*bytes)
+                                                                      : std::uint16_t{0};
+}
+
+std::string text(ImageSize s) { return std::to_string(s.width) + "x" + std::to_string(s.height); }
+
+}  // namespace
+
+void check_times(const StereoSequence& sequence) {
+  // Half of what 64 bits hold: no difference of two stamps is beyond them.
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 62;  // ns: 1823 to 2116
+  const std::filesystem::path file = sequence.times.empty() ? sequence.root : sequence.times;
+  for (const StereoPair& pair : sequence.pairs)
+    if (pair.stamp.ns() > kFarthest || pair.stamp.ns() < -kFarthest)
+      refuse(file, 0,
+             fmt::format("has the stamp {} ns, {} s from 1970; those of a drive are between the "
+                         "years 1824 and 2116: are these other units, or is the line broken?",
+                         pair.stamp.ns(), format_seconds(pair.stamp.ns())));
+  if (sequence.pairs.size() < 3) return;
+  std::vector<double> steps;  // s, those forward
+  std::size_t backward = 0;
+  for (std::size_t i = 1; i < sequence.pairs.size(); ++i) {
+    const double step = (static_cast<double>(sequence.pairs[i].stamp.ns()) -
+                         static_cast<double>(sequence.pairs[i - 1].stamp.ns())) *
+                        1e-9;
+    if (sequence.pairs[i].stamp > sequence.pairs[i - 1].stamp)
+      steps.push_back(step);
+    else if (sequence.pairs[i].stamp < sequence.pairs[i - 1].stamp)
+      ++backward;
+  }
+  const std::size_t all = sequence.pairs.size() - 1, still = all - backward - steps.size();
+  if (2 * steps.size() < all && still > backward)
+    refuse(file, 0,
+           fmt::format("has times of which {} of {} repeat the one before: they were written with "
+                       "too few digits",
+                       still, all));
+  if (2 * steps.size() < all)
+    refuse(file, 0,
+           fmt::format("has times that do not go forward: of {} steps from pair to pair {} go back "
+                       "and {} stand still; are the lines in the order "
+                       "of the images, the oldest first?",
+                       all, backward, still));
+  // The lower middle: a gap is no unit.
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  if (*middle >= kShortestStep && *middle <= kLongestStep) return;
+  // Whole numbers were read as nanoseconds, numbers with a point as seconds; a step that is too
+  // short was whole.
+  const double read_as = *middle < kShortestStep ? 1e-9 : 1.0;
+  const Unit* unit = likely_unit(*middle / read_as, read_as);
+  if (*middle == 1e-9 && backward + still == 0)
+    refuse(file, 0,
+           "has times that count the pairs (1, 2, 3 …), as numbers of frames do, and no times: "
+           "leave the file out, and pairs are taken to be 0.1 s apart");
+  const std::string ask = unit != nullptr ? fmt::format("are these {}?", unit->name)
+                                          : "steps of 1 ms to 10 s are those of a drive.";
+  std::string help;
+  if (file.extension() == ".txt") {  // else the format has its one unit
+    help = " Whole numbers are read as nanoseconds, numbers with a point as seconds";
+    if (unit != nullptr && unit->seconds == 1) help += ": write these with a point";
+    if (unit != nullptr && unit->seconds < 1)
+      help +=
+          fmt::format(": divide these by {:.0f} and write them with a point", 1 / unit->seconds);
+  }
+  refuse(file, 0,
+         fmt::format("has pairs that follow one another after {} (median); {}{}", in_words(*middle),
+                     ask, help));
+}
+
+void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {
+  const std::size_t end =
+      first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
+  std::size_t good = 0, bad = 0;
+  std::string sentence;
+  for (std::size_t i = first; i < end; ++i)
+    for (std::size_t k = 0; k < 2; ++k) {
+      const std::string& name = sequence.pairs[i].file[k];
+      if (name.empty()) continue;
+      ImageSize size;
+      if (image_size(sequence, name, &size) != ImageFileStatus::ok) continue;
+      const Intrinsics& camera = sequence.calibration.intrinsics[k];
+      const ImageSize requested{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
+      ++(size == requested ? good : bad);
+      if (size == requested || !sentence.empty()) continue;
+      sentence = (sequence.root / name).string() + ": is " + text(size) +
+                 " pixels, but the calibration of this camera (" + sequence.calibration_source +
+                 ") is for " + text(requested) +
+                 (sequence.side_by_side ? " (twice its width, side by side)" : "") +
+                 "; use the calibration that belongs to these images";
+    }
+  // Single images of another size cost their frames.
+  if (bad > good) throw InputError(sentence);
+}
+
+void find_deep_bits(StereoSequence* sequence) {
+  if (sequence->pairs.empty()) return;
+  std::vector<std::uint8_t> bytes;
+  std::uint16_t peak = 0;
+  for (std::size_t i = 0; i < kLooks; ++i) {
+    const StereoPair& pair = sequence->pairs[i * (sequence->pairs.size() - 1) / (kLooks - 1)];
+    for (const std::string& name : pair.file) {
+      const auto found = peak_of(*sequence, name, &bytes);
+      if (!found) return;
+      peak = std::max(peak, *found);
+    }
+  }
+  if (peak == 0) return;
+  for (const int bits : {10, 12, 14})
+    if (peak < 1U << static_cast<unsigned>(bits)) {
+      sequence->deep_bits = bits;
+      sequence->remarks.push_back(
+          fmt::format("the images have 16 bits a sample, of which {} are used (the greatest sample "
+                      "looked at is {}): they are taken as images of {} bits",
+                      bits, peak, bits));
+      return;
+    }
+}
+
+}  // namespace vergence::app
