@@ -26,6 +26,12 @@ std::string camera_of(std::string_view topic) {
   return std::string(topic.substr(0, slash == std::string_view::npos ? 0 : slash));
 }
 
+/// The CameraInfo of an image's topic: beside it, or below where the topic is the camera's name.
+std::string info_of(const BagIndex& bag, const std::string& topic) {
+  const std::string below = topic + "/camera_info";
+  return bag.infos.contains(below) ? below : camera_of(topic) + "/camera_info";
+}
+
 bool is_rectified(std::string_view topic) {
   // RealSense's image_rect_raw has its own K and D, as raw images have.
   return topic.find("image_rect") != std::string_view::npos &&
@@ -48,9 +54,11 @@ std::string list_of_image_topics(const BagIndex& bag) {
     list +=
         "; encodings that can be read: mono8, mono16, rgb8, bgr8, rgba8, bgra8, 8UC1, 8UC3, 16UC1, "
         "yuv422, yuv422_yuy2, uyvy, yuyv, nv12, nv21, bayer_*8, bayer_*16, and PNG and JPEG";
-  if (list.empty() && !bag.unread.empty())
-    return "none; what is not read: " + bag.unread +
-           ", for messages are those of ROS, in CDR or as ROS 1 has them";
+  if (list.empty() && !bag.others.empty())
+    return fmt::format(
+        "none, for messages are those of ROS, in CDR or as ROS 1 has them; topics that are not "
+        "read: {}",
+        fmt::join(bag.others, ", "));
   return list.empty() ? "none" : list;
 }
 
@@ -72,7 +80,7 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
 int merit(const BagIndex& bag, const Topics& topics, bool given) {
   int sum = 0;
   for (const std::string& topic : topics) {
-    if (given || bag.infos.contains(camera_of(topic) + "/camera_info")) sum += 4;
+    if (given || bag.infos.contains(info_of(bag, topic))) sum += 4;
     if (!is_rectified(topic)) sum += 2;
     if (!topic.ends_with("/compressed")) sum += 1;
   }
@@ -213,7 +221,7 @@ void remark_left_out(const std::string& name, const LeftOut& out,
 
 RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::string& topic,
                       StereoSequence* sequence) {
-  const std::string name = camera_of(topic) + "/camera_info";
+  const std::string name = info_of(bag, topic);
   const auto found = bag.infos.find(name);
   if (found == bag.infos.end())
     refuse(path, 0,
@@ -280,6 +288,11 @@ StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag, bool
     if (bag.images.size() > 2 || chosen[0].find("left") == std::string::npos)
       sequence.assumptions.push_back(chosen[0] + " is left and " + chosen[1] + " is right");
   for (const std::string& name : chosen) remark_mosaics(bag, name, &sequence);
+  if (!given && info_of(bag, chosen[0]) == info_of(bag, chosen[1]))
+    refuse(path, 0,
+           fmt::format("has no CameraInfo of its own for each of {} and {}, only {}; give a "
+                       "calibration with --calibration",
+                       chosen[0], chosen[1], info_of(bag, chosen[0])));
   if (!given) {
     const std::array cameras{camera_info(path, bag, chosen[0], &sequence),
                              camera_info(path, bag, chosen[1], &sequence)};

@@ -127,6 +127,16 @@ Duration usual_interval(const Trajectory& poses) {
   return Duration::nanoseconds(2 * std::min(*middle, std::numeric_limits<std::int64_t>::max() / 2));
 }
 
+/// Stamps of 0 s, 1 s, 2 s … are most often numbers of frames.
+bool counts_frames(const Trajectory& poses) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    if (poses[i].stamp.ns() != poses[0].stamp.ns() + static_cast<std::int64_t>(i) * kSecond ||
+        poses[0].stamp.ns() % kSecond != 0 || std::abs(poses[0].stamp.ns()) > kSecond)
+      return false;
+  return poses.size() > 1;
+}
+
 /// A reference at the estimate's body, and how it came there.
 struct Brought {
   Trajectory poses{};
@@ -222,11 +232,20 @@ std::string rotation_remark(const EvaluationRequest& a, const Files& files,
         path.string(), file.order == QuaternionOrder::xyzw ? "first" : "last", comma, option(file));
   };
   const Trajectory& estimate = files.estimate.poses;
-  if (helps(in_other_order(estimate, files.estimate.order), reference))
-    return order(a.estimate, "", files.estimate);
-  if (!files.reference.poses.empty() && !a.estimate_mount &&
-      helps(estimate, in_other_order(files.reference.poses, files.reference.order)))
-    return order(a.reference, ",", files.reference);
+  const auto of_estimate = [&] {
+    return helps(in_other_order(estimate, files.estimate.order), reference);
+  };
+  const auto of_reference = [&] {
+    return !files.reference.poses.empty() && !a.estimate_mount &&
+           helps(estimate, in_other_order(files.reference.poses, files.reference.order));
+  };
+  // Where both would help, the order that is unusual is the doubtful one.
+  const bool reference_first = files.reference.order == QuaternionOrder::wxyz &&
+                               !files.reference.order_told &&
+                               files.estimate.order == QuaternionOrder::xyzw;
+  if (reference_first && of_reference()) return order(a.reference, ",", files.reference);
+  if (of_estimate()) return order(a.estimate, "", files.estimate);
+  if (of_reference()) return order(a.reference, ",", files.reference);
   if (const auto turn = constant_turn(estimate, reference, options, e))
     return fmt::format(
         "{}: the two bodies have different axes, turned by {:.0f} deg all the way (a camera and an "
@@ -280,6 +299,10 @@ ExitCode run_evaluation(const EvaluationRequest& a) {
   }
   say(a.estimate.string() + " against " + from.path.string() + ": " +
       evaluation_problem(evaluation, options, interval));
+  if (counts_frames(estimate) != counts_frames(reference.poses))
+    say((counts_frames(estimate) ? a.estimate : from.path).string() +
+        ": its first column counts the poses: these are numbers of frames and no times; put the "
+        "times of the frames there");
   return ExitCode::not_usable;
 }
 

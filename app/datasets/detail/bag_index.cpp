@@ -115,11 +115,7 @@ class Indexer {
   }
 
   void take(const BagMessage& message) {
-    if (message.channel->encoding == MessageEncoding::other && bag_.unread.empty())
-      bag_.unread = message.channel->topic + " of " + message.channel->type;
-    if (message.channel->encoding == MessageEncoding::other) return;
-    if (bag_.unread.empty() && message.channel->type.find('/') == std::string::npos)
-      bag_.unread = message.channel->topic + " of " + message.channel->type;
+    if (message.channel->encoding == MessageEncoding::other) return take_other(message);
     const std::string &type = message.channel->type, &topic = message.channel->topic;
     if (type == "sensor_msgs/Image") return take_image(message, false);
     if (type == "sensor_msgs/CompressedImage") return take_image(message, true);
@@ -129,7 +125,16 @@ class Indexer {
     if (type == "sensor_msgs/Imu")
       return take_reading(message, read_ros_attitude, &bag_.attitudes[topic]);
     if (type == "nav_msgs/Odometry")
-      take_reading(message, read_ros_odometry, &bag_.odometry[topic]);
+      return take_reading(message, read_ros_odometry, &bag_.odometry[topic]);
+    take_other(message);
+  }
+
+  void take_other(const BagMessage& message) {
+    constexpr std::size_t kMost = 8;
+    std::string name = message.channel->topic + " of " + message.channel->type;
+    if (bag_.others.size() < kMost &&
+        std::find(bag_.others.begin(), bag_.others.end(), name) == bag_.others.end())
+      bag_.others.push_back(std::move(name));
   }
 
   void take_image(const BagMessage& message, bool compressed) {

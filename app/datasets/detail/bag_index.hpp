@@ -59,8 +59,7 @@ struct BagIndex {
   std::map<std::string, ReadingTopic<RosFix>> fixes{};
   std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};  // without orientation: unreadable
   std::map<std::string, ReadingTopic<RosOdometry>> odometry{};
-  std::string
-      unread{};  // the first topic whose messages are serialised in another way, and its type
+  std::vector<std::string> others{};   // some topics that are not read, each with its type
   std::vector<std::string> remarks{};  // a sentence each
 };
 

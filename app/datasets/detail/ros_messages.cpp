@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "app/datasets/detail/image_size.hpp"
+#include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
 
 namespace vergence::app::detail {
@@ -17,13 +18,17 @@ struct Encoding {
   PixelLayout layout;
   std::uint32_t bytes;  // a pixel
 };
+/// In small letters: drivers write them in any.
 constexpr std::array kEncodings{Encoding{"mono8", PixelLayout::grey, 1},
-                                Encoding{"8UC1", PixelLayout::grey, 1},
+                                Encoding{"8uc1", PixelLayout::grey, 1},
+                                Encoding{"i420", PixelLayout::grey, 1},
+                                Encoding{"yuv420", PixelLayout::grey, 1},
+                                Encoding{"yuv422p", PixelLayout::grey, 1},
                                 Encoding{"nv12", PixelLayout::grey, 1},
                                 Encoding{"nv21", PixelLayout::grey, 1},
                                 Encoding{"nv24", PixelLayout::grey, 1},
                                 Encoding{"mono16", PixelLayout::grey16, 2},
-                                Encoding{"16UC1", PixelLayout::grey16, 2},
+                                Encoding{"16uc1", PixelLayout::grey16, 2},
                                 Encoding{"bayer_rggb8", PixelLayout::bayer, 1},
                                 Encoding{"bayer_bggr8", PixelLayout::bayer, 1},
                                 Encoding{"bayer_gbrg8", PixelLayout::bayer, 1},
@@ -34,10 +39,10 @@ constexpr std::array kEncodings{Encoding{"mono8", PixelLayout::grey, 1},
                                 Encoding{"bayer_grbg16", PixelLayout::bayer16, 2},
                                 Encoding{"rgb8", PixelLayout::rgb, 3},
                                 Encoding{"bgr8", PixelLayout::bgr, 3},
-                                Encoding{"8UC3", PixelLayout::bgr, 3},
+                                Encoding{"8uc3", PixelLayout::bgr, 3},
                                 Encoding{"rgba8", PixelLayout::rgba, 4},
                                 Encoding{"bgra8", PixelLayout::bgra, 4},
-                                Encoding{"8UC4", PixelLayout::bgra, 4},
+                                Encoding{"8uc4", PixelLayout::bgra, 4},
                                 Encoding{"yuyv", PixelLayout::luma_first, 2},
                                 Encoding{"yuv422_yuy2", PixelLayout::luma_first, 2},
                                 Encoding{"uyvy", PixelLayout::luma_second, 2},
@@ -77,7 +82,7 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
     return std::nullopt;
   image.offset = static_cast<std::uint32_t>(in.position());
   for (const Encoding& known : kEncodings) {
-    if (pixels != known.name) continue;
+    if (lower(pixels) != known.name) continue;
     if (image.step < width * known.bytes || std::uint64_t{image.step} * height > image.bytes ||
         image.bytes > size - image.offset)
       return std::nullopt;

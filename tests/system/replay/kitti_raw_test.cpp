@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <sstream>
 #include <string>
@@ -215,79 +216,104 @@ TEST_F(KittiRawReplay, withTheDataSetsOwnCalibrationAndInOtherForms) {
   EXPECT_EQ(run_vergence("replay x --format kitti-raw --out y --also kitti,gpx").code, 2);
 }
 
-TEST_F(KittiRawReplay, withoutAPlacementOtherFormsAreNotWrittenAndThatIsSaid) {
-  const fs::path data = copy();
-  fs::remove_all(data / drive_ / "oxts");
-  const Outcome o = replay(data, "--frames 20 --also kitti,geojson");
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_TRUE(fs::exists(session() / "trajectory.kitti"));
-  EXPECT_FALSE(fs::exists(session() / "drive.geojson"));
-  EXPECT_NE(o.err.find("drive.geojson is not written: the drive was never placed on the earth"),
-            std::string::npos)
-      << o.err;
-  EXPECT_NE(o.err.find("there is no INS to compare with"), std::string::npos) << o.err;
-  EXPECT_TRUE(summary_of(session())["earth"].is_null());
-}
+/// What is done to the drive, what the replay says and what its session holds.
+struct Spoilt {
+  const char* what;
+  std::function<void(const fs::path& data)> spoil;
+  const char* options;
+  int code;
+  std::vector<const char*> said;
+  std::function<void(const fs::path& session)> check = [](const fs::path&) {};
+};
 
-TEST_F(KittiRawReplay, packetsMissingInTheMiddleAndWithoutAFixPauseTheComparison) {
-  const fs::path data = copy();
-  for (int i = 400; i < 460; ++i) fs::remove(packet(data, i));
-  for (int i = 600; i < 660; ++i) {
-    std::string text = read_file(packet(data, i));
-    rewrite(packet(data, i), text.replace(text.find(" 4 9 5 5 5"), 10, " 4 2 0 0 0"));
+TEST_F(KittiRawReplay, aSpoiltDriveIsComparedAsFarAsItGoes) {
+  const auto status = [](int from, int to, const char* words) {
+    return [=](const fs::path& data) {
+      for (int i = from; i < to && fs::exists(packet(data, i)); ++i) {
+        std::string text = read_file(packet(data, i));
+        rewrite(packet(data, i), text.replace(text.find(" 4 9 5 5 5"), 10, words));
+      }
+    };
+  };
+  std::size_t lines = 0;
+  const std::vector<Spoilt> cases{
+      {"no INS",
+       [](const fs::path& data) { fs::remove_all(data / drive_ / "oxts"); },
+       "--frames 20 --also kitti,geojson",
+       0,
+       {"there is no INS to compare with", "drive.geojson is not written"},
+       [](const fs::path& session) {
+         EXPECT_TRUE(fs::exists(session / "trajectory.kitti"));
+         EXPECT_FALSE(fs::exists(session / "drive.geojson"));
+         EXPECT_TRUE(summary_of(session)["earth"].is_null());
+       }},
+      {"packets missing in the middle and without a fix",
+       [&](const fs::path& data) {
+         for (int i = 400; i < 460; ++i) fs::remove(packet(data, i));
+         status(600, 660, " 4 2 0 0 0")(data);
+       },
+       "",
+       0,
+       {"60 packets are missing, the first is 0000000400.txt", "60 of 860 packets have no"},
+       [](const fs::path& session) {
+         EXPECT_EQ(events(session, "ins_gap").size(), 1U);
+         EXPECT_EQ(events(session, "ins_no_fix").size(), 1U);
+         EXPECT_EQ(events(session, "ins_ok").size(), 2U);
+         // 0.6 s without each: at 20 Hz a dozen poses each.
+         EXPECT_NEAR(summary_of(session)["comparison"]["without_ins"].get<double>(), 26, 6);
+       }},
+      {"no fix at all",
+       status(0, 10'000, " 0 0 0 0 0"),
+       "--frames 20",
+       1,
+       {"the INS never had a position"}},
+      {"a list that is shorter and an image that is missing",
+       [&](const fs::path& data) {
+         const fs::path times = data / drive_ / "image_00/timestamps.txt";
+         const std::string text = read_file(times);
+         const std::size_t line = text.find('\n') + 1;
+         lines = text.size() / line;
+         rewrite(times, text.substr(0, 150 * line));  // of some 180
+         fs::remove(data / drive_ / "image_01/data/0000000050.png");
+       },
+       "--quiet",
+       0,
+       {},
+       [&](const fs::path& session) {
+         const auto frames = summary_of(session)["frames"];
+         EXPECT_EQ(frames["read"], 149);
+         EXPECT_GE(frames["read"].get<std::size_t>() + frames["skipped"].get<std::size_t>(), lines);
+         EXPECT_FALSE(events(session, "data").empty());
+       }},
+      {"no mount",
+       [](const fs::path& data) {
+         fs::remove(data / fs::path(drive_).parent_path() / "calib_imu_to_velo.txt");
+       },
+       "--frames 20",
+       2,
+       {"calib_imu_to_velo.txt: is missing"}},
+      {"no mount but the configuration's",
+       [](const fs::path& data) {
+         fs::remove(data / fs::path(drive_).parent_path() / "calib_imu_to_velo.txt");
+       },
+       "--frames 20 --set 'ins.lever_arm_m=[1, 0, 0]'",
+       0,
+       {},
+       [](const fs::path& session) {
+         EXPECT_EQ(summary_of(session)["earth"]["mount"]["lever_arm_m"],
+                   nlohmann::json({1.0, 0.0, 0.0}));
+       }},
+  };
+  for (const Spoilt& c : cases) {
+    fs::remove_all(session()), fs::remove_all(work_ / "data");
+    const fs::path data = copy();
+    c.spoil(data);
+    const Outcome o = replay(data, c.options);
+    ASSERT_EQ(o.code, c.code) << c.what << o.err;
+    for (const char* part : c.said)
+      EXPECT_NE(o.err.find(part), std::string::npos) << c.what << o.err;
+    c.check(session());
   }
-  const Outcome o = replay(data);
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.err.find("oxts: 60 packets are missing, the first is 0000000400.txt"),
-            std::string::npos)
-      << o.err;
-  EXPECT_NE(o.err.find("oxts: 60 of 860 packets have no satellites' fix"), std::string::npos)
-      << o.err;
-  EXPECT_EQ(events(session(), "ins_gap").size(), 1U);
-  EXPECT_EQ(events(session(), "ins_no_fix").size(), 1U);
-  EXPECT_EQ(events(session(), "ins_ok").size(), 2U);
-  // 0.6 s without each: at 20 Hz a dozen poses each.
-  EXPECT_NEAR(summary_of(session())["comparison"]["without_ins"].get<double>(), 26, 6);
-}
-
-TEST_F(KittiRawReplay, anInsWithoutAnyFixEndsWithOne) {
-  const fs::path data = copy();
-  for (const auto& file : fs::directory_iterator(data / drive_ / "oxts/data")) {
-    std::string text = read_file(file.path());
-    rewrite(file.path(), text.replace(text.find(" 4 9 5 5 5"), 10, " 0 0 0 0 0"));
-  }
-  const Outcome o = replay(data, "--frames 20");
-  EXPECT_EQ(o.code, 1) << o.err;
-  EXPECT_NE(o.err.find("the INS never had a position"), std::string::npos) << o.err;
-}
-
-TEST_F(KittiRawReplay, whatIsLeftOutCountsAsSkipped) {
-  const fs::path data = copy();
-  const fs::path times = data / drive_ / "image_00/timestamps.txt";
-  const std::string text = read_file(times);
-  const std::size_t line = text.find('\n') + 1;
-  rewrite(times, text.substr(0, 150 * line));  // of some 180
-  fs::remove(data / drive_ / "image_01/data/0000000050.png");
-  const Outcome o = replay(data, "--quiet");
-  ASSERT_EQ(o.code, 0) << o.err;
-  const auto frames = summary_of(session())["frames"];
-  EXPECT_EQ(frames["read"], 149);
-  EXPECT_EQ(frames["read"].get<int>() + frames["skipped"].get<int>(),
-            static_cast<int>(text.size() / line));
-  EXPECT_FALSE(events(session(), "data").empty());
-}
-
-TEST_F(KittiRawReplay, aMountIsTheConfigurationsWhereItSaysOne) {
-  const fs::path data = copy();
-  fs::remove(data / fs::path(drive_).parent_path() / "calib_imu_to_velo.txt");
-  const Outcome refused = replay(data, "--frames 20");
-  EXPECT_EQ(refused.code, 2);
-  EXPECT_NE(refused.err.find("calib_imu_to_velo.txt: is missing"), std::string::npos)
-      << refused.err;
-  EXPECT_FALSE(fs::exists(session()));
-  ASSERT_EQ(replay(data, "--frames 20 --set 'ins.lever_arm_m=[1, 0, 0]'").code, 0);
-  EXPECT_EQ(summary_of(session())["earth"]["mount"]["lever_arm_m"],
-            nlohmann::json({1.0, 0.0, 0.0}));
 }
 
 }  // namespace

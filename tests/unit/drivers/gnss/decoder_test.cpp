@@ -49,6 +49,34 @@ TEST(GnssDecoder, sentencesOfOneTimeAreOneReading) {
   EXPECT_EQ(all[0].quality.utc_ns, 1709169825'000'000'000);
 }
 
+TEST(GnssDecoder, qualityAndHeightMakeTheFixAndADamagedSentenceNone) {
+  struct Case {
+    const char *quality, *height;
+    FixStatus fix;
+  };
+  for (const Case& c :
+       {Case{"1", "20.5", FixStatus::fix_3d}, Case{"5", "20.5", FixStatus::fix_3d},
+        Case{"9", "20.5", FixStatus::fix_3d}, Case{"1", "", FixStatus::fix_2d},
+        Case{"9", "", FixStatus::fix_2d}, Case{"6", "20.5", FixStatus::dead_reckoning},
+        Case{"0", "20.5", FixStatus::none}, Case{"7", "20.5", FixStatus::none},
+        Case{"8", "20.5", FixStatus::none}}) {
+    Decoder d({Protocol::nmea, 0, {}});
+    const auto all = read(&d,
+                          nmea_sentence("GPGGA,012345.00,2729.85,S,15300.822,E," +
+                                        std::string(c.quality) + ",9,0.9," + c.height + ",M,,M,,"),
+                          HostStamp(1'000'000'000));
+    ASSERT_EQ(all.size(), 1U) << c.quality;
+    EXPECT_EQ(all[0].sample.fix, c.fix) << c.quality << c.height;
+  }
+  // The place of a good RMC, and no height of a GGA whose check sum fails.
+  std::string damaged = epoch("012345.00");
+  damaged[damaged.find(",20.5,") + 1] = '9';
+  Decoder d({Protocol::nmea, 0, {}});
+  const auto all = read(&d, damaged, HostStamp(1'000'000'000));
+  ASSERT_EQ(all.size(), 1U);
+  EXPECT_NE(all[0].sample.fix, FixStatus::fix_3d);
+}
+
 TEST(GnssDecoder, courseCountsOnlyWhileMovingAndHdtBeforeIt) {
   Decoder d({Protocol::nmea, 0, {}});
   EXPECT_EQ(read(&d, epoch("012345.00", "90.0", "0.5"), HostStamp(1'000'000'000))
