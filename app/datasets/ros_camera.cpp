@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "app/datasets/detail/names.hpp"
+
 namespace vergence::app {
 namespace {
 
@@ -13,36 +15,17 @@ constexpr double kSameRectification =
     1e-6;  // relative: focal lengths of the two projection matrices
 
 struct Model {
-  std::string_view word;
+  std::string_view words;  // in small letters and digits
   CameraModelKind kind;
 };
-/// In small letters and digits.
-constexpr std::array kModels{Model{"radtan", CameraModelKind::pinhole_radtan},
-                             Model{"radialtangential", CameraModelKind::pinhole_radtan},
-                             Model{"pinholeradtan", CameraModelKind::pinhole_radtan},
-                             Model{"plumbbob", CameraModelKind::pinhole_radtan},
-                             Model{"brown", CameraModelKind::pinhole_radtan},
-                             Model{"brownconrady", CameraModelKind::pinhole_radtan},
-                             Model{"opencv", CameraModelKind::pinhole_radtan},
-                             Model{"rational", CameraModelKind::pinhole_radtan},
-                             Model{"rationalpolynomial", CameraModelKind::pinhole_radtan},
-                             Model{"standard", CameraModelKind::pinhole_radtan},
-                             Model{"pinhole", CameraModelKind::pinhole_radtan},
-                             Model{"perspective", CameraModelKind::pinhole_radtan},
-                             Model{"none", CameraModelKind::pinhole_radtan},
-                             Model{"rectified", CameraModelKind::pinhole_radtan},
-                             Model{"", CameraModelKind::pinhole_radtan},
-                             Model{"equidistant", CameraModelKind::pinhole_equidistant},
-                             Model{"equidist", CameraModelKind::pinhole_equidistant},
-                             Model{"equi", CameraModelKind::pinhole_equidistant},
-                             Model{"pinholeequidistant", CameraModelKind::pinhole_equidistant},
-                             Model{"pinholeequi", CameraModelKind::pinhole_equidistant},
-                             Model{"fisheye", CameraModelKind::pinhole_equidistant},
-                             Model{"opencvfisheye", CameraModelKind::pinhole_equidistant},
-                             Model{"kannalabrandt", CameraModelKind::pinhole_equidistant},
-                             Model{"kannalabrandt4", CameraModelKind::pinhole_equidistant},
-                             Model{"kannalabrandt8", CameraModelKind::pinhole_equidistant},
-                             Model{"kb4", CameraModelKind::pinhole_equidistant}};
+constexpr std::array kModels{
+    Model{
+        "| radtan | radialtangential | pinholeradtan | plumbbob | brown | brownconrady | opencv | "
+        "rational | rationalpolynomial | standard | pinhole | perspective | none | rectified |  |",
+        CameraModelKind::pinhole_radtan},
+    Model{"| equidistant | equidist | equi | pinholeequidistant | pinholeequi | fisheye | "
+          "opencvfisheye | kannalabrandt | kannalabrandt4 | kannalabrandt8 | kb4 |",
+          CameraModelKind::pinhole_equidistant}};
 
 /// How far a principal point lies from the middle, as a part of the image.
 double off_middle(double x, double y, const ImageSize& size) {
@@ -64,13 +47,13 @@ struct ToImage {
 }  // namespace
 
 std::optional<CameraModelKind> lens_model(std::string_view word) {
-  std::string plain;
-  for (const char c : word) {
-    const char small = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 0x20) : c;
-    if ((small >= 'a' && small <= 'z') || (small >= '0' && small <= '9')) plain.push_back(small);
-  }
+  using detail::lower;
+  std::string plain = "| ";
+  for (const char c : lower(word))
+    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) plain.push_back(c);
+  plain += " |";
   for (const Model& model : kModels)
-    if (plain == model.word) return model.kind;
+    if (model.words.find(plain) != std::string_view::npos) return model.kind;
   return std::nullopt;
 }
 

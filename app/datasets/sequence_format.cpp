@@ -1,6 +1,10 @@
 #include "app/datasets/sequence_format.hpp"
 
+#include <algorithm>
 #include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
 
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
@@ -14,22 +18,14 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
       "right or other usual names, times.txt, calibration.yaml), UQ St Lucia, bags of ROS 2 "
       "(.mcap, .db3) and ROS 1 (.bag) "
       "and sessions with a recording (drive.mcap) are what can be read";
-  if (word == "kitti") return SequenceFormat::kitti;
-  if (word == "kitti-raw") return SequenceFormat::kitti_raw;
-  if (word == "euroc") return SequenceFormat::euroc;
-  if (word == "folder") return SequenceFormat::folder;
-  if (word == "st-lucia") return SequenceFormat::st_lucia;
-  if (word == "mcap") return SequenceFormat::mcap;
-  if (word == "rosbag") return SequenceFormat::rosbag;
-  if (word == "db3") return SequenceFormat::db3;
-  if (word == "session") return SequenceFormat::session;
+  const std::vector<std::string> words{"kitti", "kitti-raw", "euroc", "folder", "st-lucia",
+                                       "mcap",  "rosbag",    "db3",   "session"};
+  if (const auto at = std::find(words.begin(), words.end(), word); at != words.end())
+    return static_cast<SequenceFormat>(at - words.begin());
   if (word != "auto")
-    throw InputError(
-        "--format \"" + word + "\" is not known" +
-        did_you_mean(word, {"auto", "kitti", "kitti-raw", "euroc", "folder", "st-lucia", "mcap",
-                            "rosbag", "db3", "session"}) +
-        "; kitti, kitti-raw, euroc, folder, st-lucia, mcap, rosbag, db3 and session are what "
-        "can be read, and auto finds out which it is");
+    throw InputError(fmt::format(
+        "--format \"{}\" is not known{}; {} are what can be read, and auto finds out which it is",
+        word, did_you_mean(word, words), fmt::join(words, ", ")));
   std::error_code ignored;
   if (const auto bag = bag_format(folder); bag && !std::filesystem::is_directory(folder, ignored))
     return *bag;

@@ -72,28 +72,100 @@ class Truth {
   ReferenceTrack track_;
 };
 
-/// One layout: where images go, and what its text files hold.
+std::string sensor_yaml(const RigCalibration& rig, std::size_t k) {
+  const Intrinsics& lens = rig.intrinsics[k];
+  const auto& d = lens.distortion;
+  const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
+  std::string matrix = rows(rig.T_camera_left[k].inverse());
+  std::replace(matrix.begin(), matrix.end(), ' ', ',');
+  return fmt::format(
+      "sensor_type: camera\ncomment: {} camera; the body is the left camera\nT_BS:\n  cols: 4\n"
+      "  rows: 4\n  data: [{},0,0,0,1]\nresolution: [{}, {}]\ncamera_model: pinhole\n"
+      "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}, {}, {}, "
+      "{}{}]\n",
+      k == 0 ? "left" : "right", matrix, lens.width, lens.height, lens.fx, lens.fy, lens.cx,
+      lens.cy, radtan ? "radial-tangential" : "equidistant", d[0], d[1], d[2], d[3],
+      radtan && d[4] != 0 ? fmt::format(", {}", d[4]) : "");
+}
+
+std::string projections(const RigCalibration& rig) {
+  std::string text;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Intrinsics& i = rig.intrinsics[k];
+    text += fmt::format("P{}: {} 0 {} {} 0 {} {} 0 0 0 1 0\n", k, i.fx, i.cx,
+                        i.fx * rig.T_camera_left[k].t.x(), i.fy, i.cy);
+  }
+  return text;
+}
+
+/// KITTI has no place for distortion and turned cameras.
+void check_rectified(const RigCalibration& rig) {
+  const Transform& T = rig.T_camera_left[1];
+  if (rig.intrinsics[0].has_distortion() || rig.intrinsics[1].has_distortion() ||
+      !T.R.isApprox(Mat3::Identity(), 1e-9) || std::abs(T.t.y()) > 1e-9 || std::abs(T.t.z()) > 1e-9)
+    throw InputError(
+        "--format kitti has no place for distortion and turned cameras, which these images have; "
+        "euroc and folder do");
+}
+
+/// Where images go, and what the text files of the layout hold.
 class Writer {
  public:
-  virtual ~Writer() = default;
-  [[nodiscard]] virtual fs::path image(std::size_t index, Stamp stamp, std::size_t camera) = 0;
-  virtual void note(Stamp stamp) = 0;
-  /// Text files, when all images are there.
-  virtual void finish(const Truth& truth, ExportResult* result) = 0;
-};
+  explicit Writer(const ExportRequest& request) : request_(request) {
+    if (request.format == ExportFormat::kitti) check_rectified(request.calibration.rig);
+    for (std::size_t k = 0; k < 2; ++k) make_folder(images(k));
+  }
+  [[nodiscard]] fs::path image(std::size_t index, Stamp stamp, std::size_t camera) const {
+    return images(camera) / (request_.format == ExportFormat::euroc
+                                 ? fmt::format("{}.png", stamp.ns())
+                                 : fmt::format("{:06}.png", index));
+  }
+  void note(Stamp stamp) { stamps_.push_back(stamp); }
 
-class FolderWriter final : public Writer {
- public:
-  explicit FolderWriter(const ExportRequest& request) : request_(request) {
-    for (const char* side : {"left", "right"}) make_folder(request.out / side);
+  /// Text files, when all images are there.
+  void finish(const Truth& truth, ExportResult* result) const {
+    const fs::path& out = request_.out;
+    switch (request_.format) {
+      case ExportFormat::folder:
+        replace_durably(out / "times.txt",
+                        lines([](Stamp stamp) { return fmt::format("{}", stamp.ns()); }));
+        write_calibration(out / "calibration.yaml", request_.calibration);
+        return write_tum();
+      case ExportFormat::euroc:
+        for (std::size_t k = 0; k < 2; ++k) {
+          const fs::path camera = images(k).parent_path();
+          replace_durably(camera / "data.csv",
+                          "#timestamp [ns],filename\n" + lines([](Stamp stamp) {
+                            return fmt::format("{0},{0}.png", stamp.ns());
+                          }));
+          replace_durably(camera / "sensor.yaml", sensor_yaml(request_.calibration.rig, k));
+        }
+        break;
+      case ExportFormat::kitti:
+        replace_durably(out / "times.txt", lines([this](Stamp stamp) {
+                          return format_seconds((stamp - stamps_.front()).ns());
+                        }));
+        replace_durably(out / "calib.txt", projections(request_.calibration.rig));
+        break;
+    }
+    write_truth(truth, result);
   }
-  fs::path image(std::size_t index, Stamp /*stamp*/, std::size_t camera) override {
-    return request_.out / (camera == 0 ? "left" : "right") / fmt::format("{:06}.png", index);
+
+ private:
+  [[nodiscard]] fs::path images(std::size_t k) const {
+    constexpr std::array<std::array<const char*, 2>, 3> kFolders{
+        {{"left", "right"}, {"mav0/cam0/data", "mav0/cam1/data"}, {"image_0", "image_1"}}};
+    return request_.out / kFolders[static_cast<std::size_t>(request_.format)][k];
   }
-  void note(Stamp stamp) override { times_ += fmt::format("{}\n", stamp.ns()); }
-  void finish(const Truth& /*truth*/, ExportResult* /*result*/) override {
-    replace_durably(request_.out / "times.txt", times_);
-    write_calibration(request_.out / "calibration.yaml", request_.calibration);
+
+  template <class Line>
+  [[nodiscard]] std::string lines(const Line& line) const {
+    std::string text;
+    for (const Stamp stamp : stamps_) text += line(stamp) + "\n";
+    return text;
+  }
+
+  void write_tum() const {
     std::string tum;
     for (const StampedPose& pose : request_.truth) {
       const Eigen::Quaterniond q = quaternion(pose.T_world_body.R);
@@ -105,56 +177,9 @@ class FolderWriter final : public Writer {
     if (!tum.empty()) replace_durably(request_.out / "truth.tum", tum);
   }
 
- private:
-  const ExportRequest& request_;
-  std::string times_;
-};
-
-class EurocWriter final : public Writer {
- public:
-  explicit EurocWriter(const ExportRequest& request) : request_(request) {
-    for (const char* camera : {"cam0", "cam1"}) make_folder(root() / camera / "data");
-  }
-  fs::path image(std::size_t /*index*/, Stamp stamp, std::size_t camera) override {
-    return root() / (camera == 0 ? "cam0" : "cam1") / "data" / fmt::format("{}.png", stamp.ns());
-  }
-  void note(Stamp stamp) override {
-    index_ += fmt::format("{0},{0}.png\n", stamp.ns());
-    stamps_.push_back(stamp);
-  }
-  void finish(const Truth& truth, ExportResult* result) override {
-    for (std::size_t k = 0; k < 2; ++k) {
-      const fs::path camera = root() / (k == 0 ? "cam0" : "cam1");
-      replace_durably(camera / "data.csv", "#timestamp [ns],filename\n" + index_);
-      replace_durably(camera / "sensor.yaml", sensor(k));
-    }
-    write_truth(truth, result);
-  }
-
- private:
-  [[nodiscard]] fs::path root() const { return request_.out / "mav0"; }
-
-  [[nodiscard]] std::string sensor(std::size_t k) const {
-    const Intrinsics& lens = request_.calibration.rig.intrinsics[k];
-    const auto& d = lens.distortion;
-    const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
-    const Transform T_left_camera = request_.calibration.rig.T_camera_left[k].inverse();
-    const std::string coefficients =
-        fmt::format("{}, {}, {}, {}{}", d[0], d[1], d[2], d[3],
-                    radtan && d[4] != 0 ? fmt::format(", {}", d[4]) : "");
-    std::string matrix = rows(T_left_camera);
-    for (char& c : matrix)
-      if (c == ' ') c = ',';
-    return fmt::format(
-        "sensor_type: camera\ncomment: {} camera; the body is the left camera\nT_BS:\n  cols: 4\n"
-        "  rows: 4\n  data: [{},0,0,0,1]\nresolution: [{}, {}]\ncamera_model: pinhole\n"
-        "intrinsics: [{}, {}, {}, {}]\ndistortion_model: {}\ndistortion_coefficients: [{}]\n",
-        k == 0 ? "left" : "right", matrix, lens.width, lens.height, lens.fx, lens.fy, lens.cx,
-        lens.cy, radtan ? "radial-tangential" : "equidistant", coefficients);
-  }
-
   void write_truth(const Truth& truth, ExportResult* result) const {
-    std::string csv;
+    const bool kitti = request_.format == ExportFormat::kitti;
+    std::string text;
     std::size_t without = 0;
     for (const Stamp stamp : stamps_) {
       const auto T = truth.at(stamp);
@@ -163,91 +188,29 @@ class EurocWriter final : public Writer {
         continue;
       }
       const Eigen::Quaterniond q = quaternion(T->R);
-      csv += fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp.ns(),
-                         T->t.x(), T->t.y(), T->t.z(), q.w(), q.x(), q.y(), q.z());
+      text += kitti
+                  ? rows(*T) + "\n"
+                  : fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", stamp.ns(),
+                                T->t.x(), T->t.y(), T->t.z(), q.w(), q.x(), q.y(), q.z());
     }
     if (without > 0 && !truth.empty())
       result->remarks.push_back(
-          fmt::format("{} of {} frames have no truth", without, stamps_.size()));
-    if (csv.empty()) return;
-    const fs::path folder = root() / "state_groundtruth_estimate0";
+          fmt::format("{}{} of {} frames have no truth",
+                      kitti ? "poses.txt, which has a pose for every frame, is not written: " : "",
+                      without, stamps_.size()));
+    if (kitti && without == 0) replace_durably(request_.out / "poses.txt", text);
+    if (kitti || text.empty()) return;
+    const fs::path folder = request_.out / "mav0/state_groundtruth_estimate0";
     make_folder(folder);
     replace_durably(folder / "data.csv",
                     "#timestamp,p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y "
                     "[],q_RS_z []\n" +
-                        csv);
-  }
-
-  const ExportRequest& request_;
-  std::string index_;
-  std::vector<Stamp> stamps_;
-};
-
-class KittiWriter final : public Writer {
- public:
-  explicit KittiWriter(const ExportRequest& request) : request_(request) {
-    const RigCalibration& rig = request.calibration.rig;
-    const Transform& T = rig.T_camera_left[1];
-    const Intrinsics &l = rig.intrinsics[0], &r = rig.intrinsics[1];
-    const bool aligned = T.R.isApprox(Mat3::Identity(), 1e-9) && std::abs(T.t.y()) < 1e-9 &&
-                         std::abs(T.t.z()) < 1e-9;
-    if (l.has_distortion() || r.has_distortion() || !aligned)
-      throw InputError(
-          "--format kitti has no place for distortion and turned cameras, which these images have; "
-          "euroc and folder do");
-    for (const char* camera : {"image_0", "image_1"}) make_folder(request.out / camera);
-  }
-  fs::path image(std::size_t index, Stamp /*stamp*/, std::size_t camera) override {
-    return request_.out / (camera == 0 ? "image_0" : "image_1") / fmt::format("{:06}.png", index);
-  }
-  void note(Stamp stamp) override { stamps_.push_back(stamp); }
-  void finish(const Truth& truth, ExportResult* result) override {
-    std::string times, poses;
-    std::size_t without = 0;
-    for (const Stamp stamp : stamps_) {
-      times += format_seconds((stamp - stamps_.front()).ns()) + "\n";
-      const auto T = truth.at(stamp);
-      if (T)
-        poses += rows(*T) + "\n";
-      else
-        ++without;
-    }
-    replace_durably(request_.out / "times.txt", times);
-    replace_durably(request_.out / "calib.txt", calib());
-    if (without == 0)
-      replace_durably(request_.out / "poses.txt", poses);
-    else if (!truth.empty())
-      result->remarks.push_back(fmt::format(
-          "poses.txt, which has a pose for every frame, is not written: {} of {} have no truth",
-          without, stamps_.size()));
-  }
-
- private:
-  [[nodiscard]] std::string calib() const {
-    std::string text;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const Intrinsics& i = request_.calibration.rig.intrinsics[k];
-      text += fmt::format("P{}: {} 0 {} {} 0 {} {} 0 0 0 1 0\n", k, i.fx, i.cx,
-                          i.fx * request_.calibration.rig.T_camera_left[k].t.x(), i.fy, i.cy);
-    }
-    return text;
+                        text);
   }
 
   const ExportRequest& request_;
   std::vector<Stamp> stamps_;
 };
-
-std::unique_ptr<Writer> make_writer(const ExportRequest& request) {
-  switch (request.format) {
-    case ExportFormat::euroc:
-      return std::make_unique<EurocWriter>(request);
-    case ExportFormat::kitti:
-      return std::make_unique<KittiWriter>(request);
-    case ExportFormat::folder:
-      break;
-  }
-  return std::make_unique<FolderWriter>(request);
-}
 
 bool has_pair(const RecordedFrame& frame) {
   return frame.images[0].offset != 0 && frame.images[1].offset != 0;
@@ -306,7 +269,7 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
   const RecordedFrame& first = first_pair(session);
   check_sizes(first, request.calibration);
   keep_two_cameras(first.given.cameras, &request.calibration, &result.remarks);
-  const std::unique_ptr<Writer> writer = make_writer(request);
+  Writer writer(request);
   std::array<std::vector<std::uint8_t>, 2> pixels;
   std::size_t done = 0;
   for (const RecordedFrame& frame : session.frames()) {
@@ -317,15 +280,15 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
     }
     for (std::size_t k = 0; k < 2; ++k) {
       const RecordedImage& image = frame.images[k];
-      write_png(writer->image(result.frames, frame.given.stamp, k),
+      write_png(writer.image(result.frames, frame.given.stamp, k),
                 {pixels[k].data(), image.width, image.height, image.width});
     }
-    writer->note(frame.given.stamp);
+    writer.note(frame.given.stamp);
     ++result.frames;
   }
   if (result.frames == 0)
     throw InputError("no frame has two images that read back; nothing is exported");
-  writer->finish(Truth(request.truth), &result);
+  writer.finish(Truth(request.truth), &result);
   return result;
 }
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <system_error>
@@ -89,25 +90,39 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
 /// longitude in degrees, height above the ellipsoid and above the sea, velocity along three axes,
 /// roll, pitch and yaw in radians. Nobody says which axes these are, so they are decided from the
 /// drive: an axis that fits how the position moves is that axis.
-struct StLuciaConventions {
-  enum class Velocity {
-    east_north_up,
-    north_east_down,
-    north_west_up
-  } velocity = Velocity::north_west_up;
-  enum class Yaw {
-    north_to_west,
-    north_to_east,
-    east_to_north
-  } yaw = Yaw::north_to_west;  // where 0 points, and which way it grows
-  bool pitch_first = false;    // fields 10 and 11 are pitch and roll
+/// Along which axes a velocity is: rows make east, north, up of it.
+struct Axes {
+  const char* phrase;
+  std::array<int, 9> to_enu;
+};
+constexpr std::array kAxes{Axes{"north, west, up", {0, -1, 0, 1, 0, 0, 0, 0, 1}},
+                           Axes{"north, east, down", {0, 1, 0, 1, 0, 0, 0, 0, -1}},
+                           Axes{"east, north, up", {1, 0, 0, 0, 1, 0, 0, 0, 1}}};
+/// Where a yaw of 0 points, and which way it grows.
+struct Yaw {
+  const char* phrase;
+  double zero;  // rad from east
+  int sign;
+  [[nodiscard]] double in_enu(double angle) const { return zero + sign * angle; }
+};
+constexpr std::array kYaws{Yaw{"from north counter-clockwise", std::numbers::pi / 2, 1},
+                           Yaw{"a compass heading", std::numbers::pi / 2, -1},
+                           Yaw{"from east counter-clockwise", 0, 1}};
+
+/// What a log's numbers mean; by default as the MTi-G has it.
+struct Conventions {
+  Mat3 enu_of_velocity{};
+  const char* axes = kAxes[0].phrase;
+  Yaw yaw = kYaws[0];
+  bool pitch_first = false;  // fields 10 and 11 are pitch and roll
   bool nose_up_positive = false;
 };
 
-using Velocity = StLuciaConventions::Velocity;
-using Yaw = StLuciaConventions::Yaw;
+Mat3 matrix_of(const Axes& axes) {
+  return Eigen::Map<const Eigen::Matrix<int, 3, 3, Eigen::RowMajor>>(axes.to_enu.data())
+      .cast<double>();
+}
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kFast = 5.0;             // m/s: above it the course is where the vehicle points
 constexpr double kApart = 1.0;            // s between the positions whose difference is the motion
 constexpr std::size_t kEnough = 100;      // samples: below, nothing is decided
@@ -213,55 +228,23 @@ std::vector<Moving> motions(const std::vector<Line>& lines) {
   return out;
 }
 
-Vec3 in_enu(const Vec3& v, Velocity axes) noexcept {
-  switch (axes) {
-    case Velocity::east_north_up:
-      return v;
-    case Velocity::north_east_down:
-      return {v.y(), v.x(), -v.z()};
-    case Velocity::north_west_up:
-      return {-v.y(), v.x(), v.z()};
-  }
-  return v;
-}
-
-double yaw_in_enu(double angle, Yaw yaw) noexcept {
-  switch (yaw) {
-    case Yaw::north_to_west:
-      return angle + kPi / 2;
-    case Yaw::north_to_east:
-      return kPi / 2 - angle;
-    case Yaw::east_to_north:
-      return angle;
-  }
-  return angle;
-}
-
-/// The axes in which the velocities are nearest to how the position moves.
-void decide_velocity(const std::vector<Moving>& moving, StLuciaConventions* c) {
-  double least = 1e300;
-  for (const Velocity axes :
-       {Velocity::north_west_up, Velocity::north_east_down, Velocity::east_north_up}) {
+/// The axes in which the velocities are nearest to how the position moves, and the yaw that points
+/// where the vehicle goes; it goes backwards now and then, so the mean of the cosines counts.
+void decide_axes(const std::vector<Moving>& moving, const std::vector<Moving>& fast,
+                 Conventions* c) {
+  double least = 1e300, most = -1e300;
+  for (const Axes& axes : kAxes) {
+    const Mat3 to_enu = matrix_of(axes);
     double sum = 0;
     for (const Moving& m : moving)
-      sum += (in_enu(m.line->velocity, axes) - m.motion).head<2>().squaredNorm();
-    if (sum >= least) continue;
-    least = sum;
-    c->velocity = axes;
+      sum += (to_enu * m.line->velocity - m.motion).head<2>().squaredNorm();
+    if (sum < least) least = sum, c->enu_of_velocity = to_enu, c->axes = axes.phrase;
   }
-}
-
-/// The yaw that points where the vehicle goes; it goes backwards now and then, so the mean of the
-/// cosines counts.
-void decide_yaw(const std::vector<Moving>& fast, StLuciaConventions* c) {
-  double most = -1e300;
-  for (const Yaw yaw : {Yaw::north_to_west, Yaw::north_to_east, Yaw::east_to_north}) {
+  for (const Yaw& yaw : kYaws) {
     double sum = 0;
     for (const Moving& m : fast)
-      sum += std::cos(yaw_in_enu(m.line->angles.z(), yaw) - std::atan2(m.motion.y(), m.motion.x()));
-    if (sum <= most) continue;
-    most = sum;
-    c->yaw = yaw;
+      sum += std::cos(yaw.in_enu(m.line->angles.z()) - std::atan2(m.motion.y(), m.motion.x()));
+    if (sum > most) most = sum, c->yaw = yaw;
   }
 }
 
@@ -278,10 +261,10 @@ double correlation(const std::vector<Moving>& fast, const std::vector<double>& s
 }
 
 /// The angle that follows the slope of the path is pitch. False: neither does.
-bool decide_pitch(const std::vector<Moving>& fast, StLuciaConventions* c) {
+bool decide_pitch(const std::vector<Moving>& fast, Conventions* c) {
   std::vector<double> slopes;
   for (const Moving& m : fast) {
-    const Vec3 v = in_enu(m.line->velocity, c->velocity);
+    const Vec3 v = c->enu_of_velocity * m.line->velocity;
     slopes.push_back(std::atan2(v.z(), v.head<2>().norm()));
   }
   const double first = correlation(fast, slopes, 0), second = correlation(fast, slopes, 1);
@@ -291,19 +274,9 @@ bool decide_pitch(const std::vector<Moving>& fast, StLuciaConventions* c) {
   return true;
 }
 
-const char* to_phrase(Velocity v) noexcept {
-  return v == Velocity::east_north_up     ? "east, north, up"
-         : v == Velocity::north_east_down ? "north, east, down"
-                                          : "north, west, up";
-}
-const char* to_phrase(Yaw y) noexcept {
-  return y == Yaw::north_to_west   ? "from north counter-clockwise"
-         : y == Yaw::north_to_east ? "a compass heading"
-                                   : "from east counter-clockwise";
-}
-
-StLuciaConventions decide(const std::vector<Line>& lines, std::vector<std::string>* remarks) {
-  StLuciaConventions c;
+Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* remarks) {
+  Conventions c;
+  c.enu_of_velocity = matrix_of(kAxes[0]);
   const std::vector<Moving> moving = motions(lines);
   std::vector<Moving> fast;
   for (const Moving& m : moving)
@@ -314,29 +287,27 @@ StLuciaConventions decide(const std::vector<Line>& lines, std::vector<std::strin
         "north counter-clockwise are taken");
     return c;
   }
-  decide_velocity(moving, &c);
-  decide_yaw(fast, &c);
+  decide_axes(moving, fast, &c);
   const bool slope = decide_pitch(fast, &c);
   remarks->push_back(fmt::format(
       "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up{}",
-      to_phrase(c.velocity), to_phrase(c.yaw), c.pitch_first ? 10 : 11,
-      c.nose_up_positive ? "positive" : "negative",
+      c.axes, c.yaw.phrase, c.pitch_first ? 10 : 11, c.nose_up_positive ? "positive" : "negative",
       slope ? "" : " (taken: the drive is too level to show it)"));
   return c;
 }
 
-InsSample sample_of(const Line& line, const StLuciaConventions& c, std::uint64_t number) {
+InsSample sample_of(const Line& line, const Conventions& c, std::uint64_t number) {
   InsSample s;
   s.number = number;
   s.stamp = line.stamp;
   s.fix = FixStatus::fix_3d;
   s.attitude_valid = s.velocity_valid = true;
   s.position = line.place;
-  const Vec3 v = in_enu(line.velocity, c.velocity);
+  const Vec3 v = c.enu_of_velocity * line.velocity;
   s.velocity_enu = {v.x(), v.y(), v.z()};
   const double roll = line.angles[c.pitch_first ? 1 : 0],
                pitch = line.angles[c.pitch_first ? 0 : 1];
-  const Mat3 R = exp_so3(Vec3(0, 0, yaw_in_enu(line.angles.z(), c.yaw))) *
+  const Mat3 R = exp_so3(Vec3(0, 0, c.yaw.in_enu(line.angles.z()))) *
                  exp_so3(Vec3(0, c.nose_up_positive ? -pitch : pitch, 0)) *
                  exp_so3(Vec3(roll, 0, 0));
   const Eigen::Quaterniond q = quaternion(R);
@@ -381,7 +352,7 @@ RecordedIns read_st_lucia_ins(const std::filesystem::path& folder) {
   }
   std::vector<Line> lines = read_lines(*found, &ins.remarks);
   check_places(*found, &lines, &ins.remarks);
-  const StLuciaConventions conventions = decide(lines, &ins.remarks);
+  const Conventions conventions = decide(lines, &ins.remarks);
   ins.readings.reserve(lines.size());
   for (const Line& line : lines) {
     RecordedReading reading;

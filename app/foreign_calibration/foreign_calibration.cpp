@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <sstream>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -25,10 +26,9 @@ namespace fs = std::filesystem;
 /// `left`; where no part is called an image, the last one. Empty: nothing stands there.
 std::string name_in(const std::string& topic) {
   std::string name;
-  std::istringstream parts(topic);
-  for (std::string part; std::getline(parts, part, '/');) {
-    if (part.starts_with("image")) return name;
-    if (!part.empty()) name = part;
+  for (const fs::path& part : fs::path(topic).relative_path()) {
+    if (part.string().starts_with("image")) break;
+    name = part.string();
   }
   return name;
 }
@@ -216,41 +216,40 @@ class RigReader {
   Transform& place(int k) { return out_.rig.T_camera_left[static_cast<std::size_t>(k)]; }
 
   void read_lens(int k) {
-    (void)model(k);  // another one explains numbers that are not those of a pinhole
+    std::array<double, 4> fx_fy_cx_cy{};
     if (const Fact* matrix = parts_.find(Part::matrix, k)) {
       const auto v = numbers_of(*matrix);
-      if (v.size() == 4) {
-        lens(k).fx = v[0], lens(k).fy = v[1], lens(k).cx = v[2], lens(k).cy = v[3];
-      } else if (v.size() == 9) {
-        if (v[1] != 0 || v[3] != 0 || v[6] != 0 || v[7] != 0 || v[8] != 1)
-          matrix->file->fail(matrix->node, matrix->key + " is not [fx 0 cx; 0 fy cy; 0 0 1]");
-        lens(k).fx = v[0], lens(k).fy = v[4], lens(k).cx = v[2], lens(k).cy = v[5];
-      } else {
+      if (v.size() == 4)
+        std::copy(v.begin(), v.end(), fx_fy_cx_cy.begin());
+      else if (v.size() == 9 && v[1] == 0 && v[3] == 0 && v[6] == 0 && v[7] == 0 && v[8] == 1)
+        fx_fy_cx_cy = {v[0], v[4], v[2], v[5]};
+      else
         matrix->file->fail(matrix->node,
-                           fmt::format("{} has {} numbers; fx fy cx cy or a matrix of 3 x 3 is "
-                                       "expected",
-                                       matrix->key, v.size()));
-      }
+                           matrix->key + " is neither fx fy cx cy nor [fx 0 cx; 0 fy cy; 0 0 1]");
     } else {
       const Fact *focal = parts_.find(Part::focal, k), *centre = parts_.find(Part::centre, k);
-      const auto one_of = [&](Part part, const Fact* list, std::size_t place) {
-        if (const Fact* fact = parts_.find(part, k))
-          return fact->file->number(fact->node, fact->key);
+      for (std::size_t i = 0; i < 4; ++i) {
+        constexpr std::array kEach{Part::fx, Part::fy, Part::cx, Part::cy};
+        if (const Fact* fact = parts_.find(kEach[i], k)) {
+          fx_fy_cx_cy[i] = fact->file->number(fact->node, fact->key);
+          continue;
+        }
+        const Fact* list = i < 2 ? focal : centre;
         if (list == nullptr) fail_missing(files_, fmt::format("the camera matrix of camera {}", k));
         const auto values = numbers_of(*list);
         if (values.empty() || (values.size() < 2 && list == centre))
           list->file->fail(list->node, list->key + " is not a list of two numbers");
-        return values[std::min(place, values.size() - 1)];
-      };
-      lens(k).fx = one_of(Part::fx, focal, 0), lens(k).fy = one_of(Part::fy, focal, 1);
-      lens(k).cx = one_of(Part::cx, centre, 0), lens(k).cy = one_of(Part::cy, centre, 1);
+        fx_fy_cx_cy[i] = values[std::min(i % 2, values.size() - 1)];
+      }
     }
+    std::tie(lens(k).fx, lens(k).fy, lens(k).cx, lens(k).cy) = std::tuple_cat(fx_fy_cx_cy);
     read_distortion(k);
     read_size(k);
   }
 
-  /// The lens model that the file says; nothing: it says none.
-  std::optional<CameraModelKind> model(int k) const {
+  /// The lens model that the file says; nothing: it says none. *none: it says that there is no
+  /// distortion.
+  std::optional<CameraModelKind> model(int k, bool* none = nullptr) const {
     std::optional<CameraModelKind> found;
     // What bends the rays counts; `pinhole` stands beside it.
     for (const Part part : {Part::camera_model, Part::distortion_model}) {
@@ -258,8 +257,8 @@ class RigReader {
       if (fact == nullptr || !fact->node.IsScalar()) continue;
       const std::string word = fact->file->text(fact->node, fact->key);
       const auto kind = lens_model(word);
-      const bool said = part == Part::distortion_model ||
-                        fact->key.find("odel") != std::string::npos ||
+      const bool of_rays = part == Part::distortion_model;
+      const bool said = of_rays || fact->key.find("odel") != std::string::npos ||
                         fact->key.find("amera.type") != std::string::npos;
       if (!kind && said)
         fact->file->fail(fact->node,
@@ -267,9 +266,9 @@ class RigReader {
                                      "(plumb_bob) or equidistant (fisheye, Kannala-Brandt) "
                                      "distortion, or none",
                                      fact->key, word.substr(0, 60)));
-      if (kind && !(found && lens_model(word) == CameraModelKind::pinhole_radtan &&
-                    part == Part::distortion_model && word.empty()))
-        found = kind;
+      if (none != nullptr)
+        *none = *none || word == "none" || word == "Rectified" || (word.empty() && of_rays);
+      if (kind && !(found && word.empty())) found = kind;
     }
     if (const Fact* fact = parts_.find(Part::fisheye, k))
       found = fact->file->integer(fact->node, fact->key, 0, 1) == 1
@@ -278,34 +277,22 @@ class RigReader {
     return found;
   }
 
-  /// Says that the words for a model mean no distortion.
-  bool without_distortion(int k) const {
-    for (const Part part : {Part::camera_model, Part::distortion_model})
-      if (const Fact* fact = parts_.find(part, k); fact != nullptr && fact->node.IsScalar()) {
-        const std::string word = fact->node.Scalar();
-        if (word == "none" || word == "Rectified" ||
-            (word.empty() && part == Part::distortion_model))
-          return true;
-      }
-    return false;
-  }
-
   void read_distortion(int k) {
-    const auto said = model(k);
+    bool none = false;
+    const auto said = model(k, &none);
     const bool equidistant = said == CameraModelKind::pinhole_equidistant;
     if (equidistant) lens(k).kind = CameraModelKind::pinhole_equidistant;
-    if (without_distortion(k)) return;
+    if (none) return;
     const Fact* list = parts_.find(Part::distortion, k);
     std::vector<double> values;
     if (list != nullptr) {
       values = numbers_of(*list);
     } else {
       std::map<int, double> by_place;
-      for (int i = 0; i < 8; ++i)
+      for (const bool own : {false, true})
         for (const Fact& fact : parts_.all())
-          if (fact.part == Part::coefficient && fact.index == i &&
-              (fact.camera == k || (!fact.camera && !by_place.contains(i))))
-            by_place[i] = fact.file->number(fact.node, fact.key);
+          if (fact.part == Part::coefficient && (own ? fact.camera == k : !fact.camera))
+            by_place[fact.index] = fact.file->number(fact.node, fact.key);
       if (by_place.empty())
         fail_missing(files_, fmt::format("the list of distortion coefficients of camera {}", k));
       // In radtan's order; an equidistant lens has k1 … k4, or k2 … k5 of those who count the angle
@@ -314,7 +301,7 @@ class RigReader {
       for (const int place : !equidistant           ? Places{0, 1, 2, 3, 4, 5, 6, 7}
                              : by_place.contains(0) ? Places{0, 1, 4, 5}
                                                     : Places{1, 4, 5, 6})
-        values.push_back(by_place.contains(place) ? by_place[place] : 0);
+        values.push_back(by_place[place]);
     }
     if (!said && values.size() == 4 && k == 0)
       remarks_->push_back(
@@ -354,12 +341,13 @@ class RigReader {
   }
 
   void read_name(int k) {
+    const auto text = [&](Part part) {
+      const Fact* fact = parts_.own(part, k);
+      return fact == nullptr ? std::string() : fact->file->text(fact->node, fact->key);
+    };
     std::string& name = out_.names[static_cast<std::size_t>(k)];
-    if (const Fact* fact = parts_.own(Part::topic, k))
-      if (const std::string own = name_in(fact->file->text(fact->node, fact->key)); !own.empty())
-        name = own;
-    if (const Fact* fact = parts_.own(Part::name, k))
-      if (const std::string own = fact->file->text(fact->node, fact->key); !own.empty()) name = own;
+    for (const std::string& own : {name_in(text(Part::topic)), text(Part::name)})
+      if (!own.empty()) name = own;
   }
 
   // ---- where camera k sits
@@ -392,13 +380,10 @@ class RigReader {
   bool from_rotation() {
     const Fact *R = parts_.own(Part::rotation, std::nullopt),
                *T = parts_.own(Part::translation, std::nullopt);
-    if (R == nullptr || T == nullptr) {
-      if (R != nullptr && parts_.find(Part::projection, 1) == nullptr)
-        fail_missing(files_, "the translation of camera 2 from camera 1 (T)");
-      if (T != nullptr && parts_.find(Part::projection, 1) == nullptr)
-        fail_missing(files_, "the rotation of camera 2 from camera 1 (R)");
-      return false;
-    }
+    if ((R == nullptr) != (T == nullptr) && parts_.find(Part::projection, 1) == nullptr)
+      fail_missing(files_, R == nullptr ? "the rotation of camera 2 from camera 1 (R)"
+                                        : "the translation of camera 2 from camera 1 (T)");
+    if (R == nullptr || T == nullptr) return false;
     const auto r = numbers_of(*R);
     if (r.size() != 9 && r.size() != 3)
       R->file->fail(R->node,

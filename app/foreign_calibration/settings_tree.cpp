@@ -128,31 +128,29 @@ std::vector<YamlFile> settings_trees(std::string text, const std::string& name) 
     text = from_xml(&rest, "", 0);
   else if (is_ini(rest))
     text = from_ini(rest);
-  std::vector<YamlFile> trees;
   // Lines stay where they are: what is of other documents is blanked.
-  constexpr int kMostDocuments = 16;
-  int documents = 0;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    if (++documents > kMostDocuments)
-      refuse(name, 0, "has more documents (---) than a calibration has");
-    std::size_t end = text.size(), next = text.size() + 1;
-    for (std::size_t line = begin; line < text.size();) {
-      const std::size_t stop = std::min(text.find('\n', line), text.size());
-      if (std::string_view(text).substr(line, stop - line).starts_with("---")) {
-        end = line;
-        next = stop + 1;
-        break;
-      }
-      line = stop + 1;
-    }
-    std::string document(begin, ' ');
-    for (std::size_t i = 0; i < begin; ++i)
-      if (text[i] == '\n') document[i] = '\n';
-    document += text.substr(begin, end - begin);
+  std::vector<YamlFile> trees;
+  std::string document(text.size(), ' ');
+  std::size_t documents = 1;
+  const auto finish = [&] {
     YamlFile tree = YamlFile::parse(document, name);
     if (!tree.root().IsNull()) trees.push_back(std::move(tree));
-    begin = next;
+    for (char& c : document) c = c == '\n' ? '\n' : ' ';
+  };
+  for (std::size_t line = 0; line < text.size();) {
+    const std::size_t end = std::min(text.find('\n', line), text.size() - 1) + 1;
+    if (text.compare(line, 3, "---") == 0) {
+      constexpr std::size_t kMostDocuments = 16;
+      if (++documents > kMostDocuments)
+        refuse(name, 0, "has more documents (---) than a calibration has");
+      finish();
+      document[end - 1] = '\n';
+    } else {
+      document.replace(line, end - line, text, line, end - line);
+    }
+    line = end;
   }
+  finish();
   return trees;
 }
 

@@ -54,63 +54,51 @@ struct Program {
   bool never = false;  // its files are not read, whatever they hold
 };
 constexpr std::array kPrograms{
-    Program{"value0",
-            "is Basalt's calibration, whose transforms and models are not read; Kalibr's "
-            "camchain or OpenCV's M1 D1 M2 D2 R T of the same rig are",
+    Program{"value0", "is Basalt's calibration, which is not read; Kalibr's camchain of the rig is",
             true},
-    Program{"cameraData",
-            "is DepthAI's calibration of an OAK camera; export the rectified pair as "
-            "ROS camera_info, or write M1 D1 M2 D2 R T in OpenCV's names",
+    Program{"cameraData", "is DepthAI's calibration; export the rectified pair as ROS camera_info",
             true},
-    Program{"LEFT_CAM_",
-            "is the factory file of a ZED camera, which holds all resolutions; write "
-            "M1 D1 M2 D2 R T of yours in OpenCV's names, the baseline in metres",
-            true},
+    Program{
+        "LEFT_CAM_",
+        "is the factory file of a ZED camera, which holds all resolutions; write M1 D1 M2 D2 R T "
+        "of yours in OpenCV's names, the baseline in metres",
+        true},
     Program{"num_of_cam",
-            "is a configuration of VINS: cam0_calib and cam1_calib have to name the "
-            "cameras' files beside it, and body_T_cam0, body_T_cam1 to be given"},
+            "is a configuration of VINS: cam0_calib and cam1_calib have to name the cameras' files "
+            "beside it, and body_T_cam0, body_T_cam1 to be given"},
     Program{"projection_parameters",
-            "is a camera of VINS: give its configuration, which has "
-            "body_T_cam0 and body_T_cam1 and names the cameras' files, or "
-            "both cameras' files with --from-scratch and --baseline"},
-    Program{"Camera.bf",
-            "is a setting of ORB-SLAM2 or ORB-SLAM3: it needs Camera.width and "
-            "Camera.height, and for images that are not rectified LEFT.K, LEFT.D, "
-            "LEFT.R, LEFT.P and RIGHT.…, or Stereo.T_c1_c2"},
+            "is a camera of VINS: give its configuration with body_T_cam0 and body_T_cam1, or both "
+            "cameras' files with --from-scratch and --baseline"},
+    Program{
+        "Camera.bf",
+        "is a setting of ORB-SLAM: it needs Camera.width and Camera.height, and for images that "
+        "are not rectified LEFT.K, LEFT.D, LEFT.R, LEFT.P and RIGHT.…, or Stereo.T_c1_c2"},
     Program{"Camera1.fx", "is a setting of ORB-SLAM3: it needs Camera2.… and Stereo.T_c1_c2"},
     Program{"Camera.type",
-            "is a setting of ORB-SLAM3: it needs Camera1.…, Camera2.… and "
-            "Stereo.T_c1_c2"},
-    Program{"Camera",
-            "is a setting of stella_vslam: it needs cols, rows and focal_x_baseline of a "
-            "rectified pair"},
+            "is a setting of ORB-SLAM3: it needs Camera1.…, Camera2.… and Stereo.T_c1_c2"},
+    Program{"Camera", "is a setting of stella_vslam: it needs cols, rows and focal_x_baseline"},
     Program{"T_BS",
-            "is the sensor file of one camera (EuRoC, Kimera): give both cameras' files, "
-            "left first, with a comma between"},
+            "is of one camera (EuRoC, Kimera): give both files, left first, with a comma between"},
     Program{"projection_matrix", "is camera_info of ROS: both cameras' are needed, with P"},
-    Program{"camera_matrix",
-            "is camera_info of ROS or a lens of OpenCV: both cameras' are needed, "
-            "and where the right one sits"},
-    Program{"cam0",
-            "is a camchain of Kalibr: it needs T_cn_cnm1 of cam1, or T_cam_imu (T_imu_cam) "
-            "of both cameras"}};
+    Program{"camera_matrix", "is one camera's: both are needed, and where the right one sits"},
+    Program{
+        "cam0",
+        "is a camchain of Kalibr: it needs T_cn_cnm1 of cam1, or T_cam_imu (T_imu_cam) of both"}};
 
 /// Parts of a key: letters and digits apart, capitals inside a word begin the next.
 std::vector<std::string> tokens_of(std::string_view key) {
   std::vector<std::string> tokens;
-  char before = 0;
-  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
-  const auto capital = [](char c) { return c >= 'A' && c <= 'Z'; };
-  const auto small = [](char c) { return c >= 'a' && c <= 'z'; };
+  enum { sign, digit, small, capital } before = sign;
   for (const char c : key) {
-    const bool part = digit(c) || capital(c) || small(c);
-    if (part) {
-      const bool begins = !digit(before) && !capital(before) && !small(before);
-      if (begins || digit(c) != digit(before) || (capital(c) && small(before)))
-        tokens.emplace_back();
-      tokens.back().push_back(capital(c) ? static_cast<char>(c | 0x20) : c);
-    }
-    before = c;
+    const auto kind = c >= '0' && c <= '9'   ? digit
+                      : c >= 'a' && c <= 'z' ? small
+                      : c >= 'A' && c <= 'Z' ? capital
+                                             : sign;
+    const bool begins = before == sign || (kind == digit) != (before == digit) ||
+                        (kind == capital && before == small);
+    if (kind != sign && begins) tokens.emplace_back();
+    if (kind != sign) tokens.back().push_back(kind == capital ? static_cast<char>(c | 0x20) : c);
+    before = kind;
   }
   return tokens;
 }

@@ -11,32 +11,40 @@
 /// What programs call the parts of a calibration.
 namespace vergence::app {
 
+/// Of a lens: `matrix` is 3x3 or fx fy cx cy, `focal` one number for both directions or two,
+/// `centre` the principal point, `coefficient` one of k1 … k6, p1, p2 (`index` is its place there),
+/// `fisheye` 0 or 1. Of where a camera sits: `rectification` 3x3 and `projection` 3x4 as ROS has
+/// them, `rotation` (3x3 or a rotation vector) and `translation` of camera 1 from camera 0,
+/// `to_previous` X_camera = T X_camera before, `from_body` X_camera = T X_body, `to_body` X_body =
+/// T X_camera, `between` X_camera `index` = T X_camera `other`, `focal_baseline` the focal length
+/// times the baseline. `file` names another file with the lens of a camera, `other` is known and
+/// not used.
 enum class Part : std::uint8_t {
-  matrix,  // 3x3, or fx fy cx cy
+  matrix,
   fx,
   fy,
   cx,
   cy,
-  focal,        // one for both directions, or two
-  centre,       // principal point: two
-  distortion,   // list of coefficients
-  coefficient,  // one of k1 … k6, p1, p2: `index` is its place there
+  focal,
+  centre,
+  distortion,
+  coefficient,
   camera_model,
   distortion_model,
-  fisheye,  // 0 or 1
-  size,     // [width, height]
+  fisheye,
+  size,
   width,
   height,
-  rectification,  // 3x3
-  projection,     // 3x4
-  rotation,       // of camera 1 from camera 0: 3x3 or a rotation vector
+  rectification,
+  projection,
+  rotation,
   translation,
-  to_previous,  // X_camera = T X_camera before
-  from_body,    // X_camera = T X_body
-  to_body,      // X_body = T X_camera
-  between,      // X_camera `index` = T X_camera `other`
+  to_previous,
+  from_body,
+  to_body,
+  between,
   baseline,
-  focal_baseline,  // focal length times baseline
+  focal_baseline,
   binning_x,
   binning_y,
   roi_x,
@@ -45,8 +53,8 @@ enum class Part : std::uint8_t {
   roi_height,
   topic,
   name,
-  file,   // another file with the lens of a camera
-  other,  // a part that is known and not used
+  file,
+  other
 };
 
 /// A value of a file, with what it is of.

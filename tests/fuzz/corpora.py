@@ -95,6 +95,31 @@ def calibrations() -> dict:
     return {"own": own.encode(), "kalibr": kalibr.encode(), "ros": END.join(t.encode() for t in ros), "opencv": END.join(t.encode() for t in opencv)}
 
 
+def other_calibrations() -> dict:
+    okvis = "  - {T_SC: [0, -1, 0, 0, 1, 0, 0, %s, 0, 0, 1, 0, 0, 0, 0, 1], image_dimension: [96, 72], distortion_coefficients: [0, 0, 0, 0],\n"
+    okvis += "     distortion_type: radialtangential, focal_length: [80, 80], principal_point: [48, 36]}\n"
+    orb = "".join(f"Camera{k}.{key}: {value}\n" for k in (1, 2) for key, value in (("fx", 80.0), ("fy", 80.0), ("cx", 48.0), ("cy", 36.0), ("k1", 0.1)))
+    ini = "[left]\nfx=80\nfy=80\ncx=48\ncy=36\nk1=0\n[right]\nfx=80\nfy=80\ncx=48\ncy=36\nk1=0\n[size]\nwidth=96\nheight=72\nbaseline=0.5\n"
+    xml = "<?xml version=\"1.0\"?>\n<opencv_storage><M1 type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><data>80 0 48 0 80 36 0 0 1</data></M1></opencv_storage>"
+    json = '{"K1": [[80, 0, 48], [0, 80, 36], [0, 0, 1]], "D1": [0, 0, 0, 0], "K2": [[80, 0, 48], [0, 80, 36], [0, 0, 1]], "D2": [0, 0, 0, 0], "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "T": [[-0.5], [0], [0]], "size": [96, 72]}'
+    texts = {"okvis": "%YAML:1.0\ncameras:\n" + okvis % 0 + okvis % 0.5, "orbslam": "%YAML:1.0\n" + orb + "Camera.width: 96\nCamera.height: 72\nStereo.b: 0.5\n",
+             "ini": ini, "xml": xml, "json": json, "kitti": "P0: 80 0 48 0 0 80 36 0 0 0 1 0\nP1: 80 0 48 -40 0 80 36 0 0 0 1 0\n"}
+    return {name: text.encode() for name, text in texts.items()}
+
+
+def texts() -> dict:
+    pose, matrix = "1 2 3 0 0 0.6 0.8", "1 0 0 1 0 1 0 2 0 0 1 3"
+    stamps = [1403636579763555584 + i * 50000000 for i in range(4)]
+    forms = {"tum": "{s} {p}", "ns": "{ns} {p}", "vins": "{ns},1,2,3,0.8,0,0,0.6,", "semicolons": "{c};1;2;3;0;0;0,6;0,8", "matrix": "{m}", "counted": "{i} {m}",
+             "date": "2014-06-24 18:29:0{i}.5 {p}", "parts": "{sec} {nsec} {p}", "index": "{i} {s} {p} 7", "nan": "{s} nan nan nan 0 0 0 0",
+             "times": "{ns}", "named": "{ns},{i}.png", "name_first": "{i}.png {s}", "both": "{s} left/{i}.png {s} right/{i}.png"}
+    heads = {"head": "timestamp,x,y,z,qw,qx,qy,qz\n", "euroc": "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n"}
+    line = lambda form, i: form.format(i=i, ns=stamps[i], sec=stamps[i] // 10**9, nsec=stamps[i] % 10**9, s=f"{stamps[i] // 10**9}.{stamps[i] % 10**9:09d}",  # noqa: E731
+                                       c=f"{i},5", p=pose, m=matrix)
+    out = {name: "".join(line(form, i) + "\n" for i in range(4)).encode() for name, form in forms.items()}
+    return out | {name: head.encode() + out["vins"] for name, head in heads.items()}
+
+
 def data_sets() -> dict:
     """The layouts of data_set.cpp, in its order: a byte for the format, then the files."""
     calibration = calibrations()["own"]
@@ -119,6 +144,12 @@ def data_sets() -> dict:
     return {f"format{i}": bytes([i]) + END.join(texts) for i, texts in enumerate(files)}
 
 
+def bmp(bits: int) -> bytes:
+    palette = b"".join(bytes([i, i, i, 0]) for i in range(256)) if bits == 8 else b""
+    begin, pixels = 54 + len(palette), bytes(3 * ((4 * bits + 31) // 32 * 4))
+    return b"BM" + struct.pack("<IHHI", begin + len(pixels), 0, 0, begin) + struct.pack("<IiiHHIIiiII", 40, 4, 3, 1, bits, 0, len(pixels), 0, 0, 0, 0) + palette + pixels
+
+
 def recordings(program: str, examples: Path) -> dict:
     with tempfile.TemporaryDirectory() as folder:
         session = Path(folder) / "s"
@@ -138,8 +169,9 @@ def main() -> int:
         bags = {p.name: p.read_bytes() for p in (Path(folder) / "bags").iterdir()}
     configurations = {p.name: p.read_bytes() for p in examples.glob("*.yaml")}
     corpora = {"xbus": xbus(), "gnss": gnss(), "trigger": {"script": bytes(range(256))}, "iidc_rom": rom(), "gige_chunks": chunk_data(),
-               "http_request": requests(), "image_file": {"grey.png": png(16, 12, 1)}, "configuration": configurations,
-               "calibration": calibrations(), "data_set": data_sets(), "bag": bags, "recording": recordings(program, examples)}
+               "http_request": requests(), "image_file": {"grey.png": png(16, 12, 1), "grey.pgm": b"P5 4 3 255\n" + bytes(12), "deep.ppm": b"P6\n# c\n2 2\n65535\n" + bytes(24),
+                                                                   "grey.bmp": bmp(8), "colour.bmp": bmp(24), "alpha.bmp": bmp(32)}, "configuration": configurations,
+               "calibration": calibrations() | other_calibrations(), "text_readers": texts(), "data_set": data_sets(), "bag": bags, "recording": recordings(program, examples)}
     for target, inputs in corpora.items():
         folder = out / f"{target}_fuzz"
         folder.mkdir(parents=True, exist_ok=True)

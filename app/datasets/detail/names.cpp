@@ -10,36 +10,29 @@ namespace {
 struct Sides {
   std::string_view left, right;
 };
-/// Those that say more stand first: `left/cam0` is left by `left`.
-constexpr std::array kSides{Sides{"left", "right"},
-                            Sides{"infrared_1", "infrared_2"},
-                            Sides{"infra1", "infra2"},
-                            Sides{"infra_1", "infra_2"},
-                            Sides{"fisheye1", "fisheye2"},
-                            Sides{"cam0", "cam1"},
-                            Sides{"cam_0", "cam_1"},
-                            Sides{"cam00", "cam01"},
-                            Sides{"camera0", "camera1"},
-                            Sides{"camera_0", "camera_1"},
-                            Sides{"image_0", "image_1"},
-                            Sides{"image_00", "image_01"},
-                            Sides{"image0", "image1"},
-                            Sides{"image_2", "image_3"},
-                            Sides{"image_02", "image_03"},
-                            Sides{"img0", "img1"},
-                            Sides{"cam1", "cam2"},
-                            Sides{"cam_1", "cam_2"},
-                            Sides{"camera1", "camera2"},
-                            Sides{"camera_1", "camera_2"},
-                            Sides{"image_1", "image_2"},
-                            Sides{"image1", "image2"},
-                            Sides{"i1", "i2"},
-                            Sides{"caml", "camr"},
-                            Sides{"imgl", "imgr"},
-                            Sides{"l", "r"},
-                            Sides{"c0", "c1"}};
-/// Of images in one folder: frame 12 is `000012_0.png` and `000012_1.png`.
-constexpr Sides kNumbers{"0", "1"};
+/// Words for left and right in turns. Those that say more stand first: `left/cam0` is left by
+/// `left`. The last are those of images in one folder: frame 12 is `000012_0.png` and
+/// `000012_1.png`.
+constexpr std::string_view kSides =
+    "left right infrared_1 infrared_2 infra1 infra2 infra_1 infra_2 fisheye1 fisheye2 cam0 cam1 "
+    "cam_0 cam_1 cam00 cam01 camera0 camera1 camera_0 camera_1 image_0 image_1 image_00 image_01 "
+    "image0 image1 image_2 image_3 image_02 image_03 img0 img1 cam1 cam2 cam_1 cam_2 camera1 "
+    "camera2 camera_1 camera_2 image_1 image_2 image1 image2 i1 i2 caml camr imgl imgr l r c0 c1 "
+    "0 1";
+
+std::vector<Sides> all_sides() {
+  std::vector<Sides> all;
+  for (std::string_view rest = kSides; !rest.empty();) {
+    const auto take = [&rest] {
+      const std::string_view word = rest.substr(0, rest.find(' '));
+      rest.remove_prefix(std::min(word.size() + 1, rest.size()));
+      return word;
+    };
+    const std::string_view left = take();
+    all.push_back({left, take()});
+  }
+  return all;
+}
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return c >= 'a' && c <= 'z'; }
@@ -111,7 +104,8 @@ std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::stri
   std::map<std::string, std::string> there;  // by small letters
   for (const std::string& name : names) there.emplace(lower(name), name);
   std::vector<std::array<std::string, 2>> pairs;
-  for (const Sides& sides : kSides)
+  for (const Sides& sides : all_sides()) {
+    if (is_digit(sides.left[0])) continue;
     for (const auto& [small, name] : there) {
       const auto other = replaced(small, sides.left, sides.right);
       const auto found = other ? there.find(*other) : there.end();
@@ -119,6 +113,7 @@ std::vector<std::array<std::string, 2>> stereo_names(const std::vector<std::stri
                                      [&name = name](const auto& pair) { return pair[0] == name; });
       if (found != there.end() && !taken) pairs.push_back({name, found->second});
     }
+  }
   return pairs;
 }
 
@@ -129,7 +124,7 @@ std::optional<std::string> without_side(const std::string& name, const std::stri
 std::array<std::string, 2> side_words(const std::vector<std::string>& files) {
   std::array<std::string, 2> best;
   std::size_t most = 0;
-  const auto count = [&](const Sides& sides) {
+  for (const Sides& sides : all_sides()) {
     std::array<std::size_t, 2> of{};
     for (const std::string& file : files) {
       const std::string small = lower(file);
@@ -137,13 +132,13 @@ std::array<std::string, 2> side_words(const std::vector<std::string>& files) {
                  right = replaced(small, sides.right, "").has_value();
       if (left != right) ++of[left ? 0 : 1];
     }
-    // A folder of one camera has some names that look like sides, too.
-    if (std::min(of[0], of[1]) <= most || 10 * (of[0] + of[1]) < 9 * files.size()) return;
+    // A folder of one camera has some names that look like sides, too, and numbers say least.
+    if (std::min(of[0], of[1]) <= most || 10 * (of[0] + of[1]) < 9 * files.size() ||
+        (is_digit(sides.left[0]) && (most > 0 || files.size() < 3)))
+      continue;
     most = std::min(of[0], of[1]);
     best = {std::string(sides.left), std::string(sides.right)};
-  };
-  for (const Sides& sides : kSides) count(sides);
-  if (most == 0 && files.size() > 2) count(kNumbers);
+  }
   return best;
 }
 
