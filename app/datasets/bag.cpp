@@ -306,6 +306,12 @@ StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag, bool
   }
   std::array images{std::move(bag.images[chosen[0]].images),
                     std::move(bag.images[chosen[1]].images)};
+  for (std::size_t k = 0; k < 2; ++k)
+    if (images[k].back().image.stamp.ns() == 0)
+      refuse(path, 0,
+             chosen[k] +
+                 " has neither stamps (header.stamp is 0) nor times of recording that "
+                 "could stand instead");
   const auto pairs = pair_images(path, chosen, images, &sequence);
   const std::size_t alone = images[0].size() + images[1].size() - 2 * pairs.size();
   if (alone > 0)

@@ -8,10 +8,7 @@
 #include <array>
 #include <cerrno>
 
-#include "app/datasets/detail/bmp.hpp"
-#include "app/datasets/detail/jpeg.hpp"
-#include "app/datasets/detail/netpbm.hpp"
-#include "app/datasets/detail/png.hpp"
+#include "app/datasets/detail/image_kinds.hpp"
 
 namespace vergence::app {
 namespace {
@@ -21,14 +18,12 @@ using Bytes = std::span<const std::uint8_t>;
 constexpr off_t kMaxFile = off_t{256}
                            << 20;  // bytes; a 100-megapixel grey PNG that does not compress is less
 
-ImageFileStatus size_of(Bytes b, ImageSize* size) noexcept {
-  if (detail::is_png(b)) return detail::png_size(b, size);
-  if (detail::is_jpeg(b)) return detail::jpeg_size(b, size);
-  if (detail::is_bmp(b)) return detail::bmp_size(b, size);
-  if (detail::is_netpbm(b)) return detail::netpbm_size(b, size);
-  // A file of nothing, or of the first bytes of a signature, is a torn write; another content is
-  // another kind of file.
-  return detail::may_become_png(b) ? ImageFileStatus::torn : ImageFileStatus::not_an_image;
+/// Null: none that is read.
+const detail::ImageKind* kind_of(Bytes bytes) noexcept {
+  for (const detail::ImageKind* kind :
+       {&detail::kPng, &detail::kJpeg, &detail::kBmp, &detail::kNetpbm})
+    if (kind->is(bytes)) return kind;
+  return nullptr;
 }
 
 /// A descriptor that closes itself. Opening does not wait, as that of a pipe would.
@@ -102,8 +97,8 @@ const char* to_phrase(ImageFileStatus status) noexcept {
     case ImageFileStatus::torn:
       return "is torn: it ends before the image is complete, or its check sums fail";
     case ImageFileStatus::undecodable:
-      return "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours and "
-             "uncompressed BMP of 8-bit grey or 24 bits can";
+      return "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours, "
+             "uncompressed BMP of 8, 24 or 32 bits can";
     case ImageFileStatus::wrong_size:
       return "has another size than the calibration";
   }
@@ -117,55 +112,47 @@ ImageFileStatus read_image_file(const std::filesystem::path& file,
 
 ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* size) {
   std::vector<std::uint8_t> head;
-  if (const auto status = read_bytes(file, detail::kPngHead, &head); status != ImageFileStatus::ok)
+  std::size_t enough = detail::kPng.head;
+  if (const auto status = read_bytes(file, enough, &head); status != ImageFileStatus::ok)
     return status;
-  if (detail::is_jpeg(head) || detail::is_netpbm(head))
-    if (const auto status =
-            read_bytes(file, std::max(detail::kJpegHead, detail::kNetpbmHead), &head);
-        status != ImageFileStatus::ok)
+  if (const auto* kind = kind_of(head); kind != nullptr && kind->head > enough)
+    if (const auto status = read_bytes(file, kind->head, &head); status != ImageFileStatus::ok)
       return status;
-  return size_of(head, size);
+  return read_image_size(head, size);
 }
 
-ImageFileStatus read_image_size(std::span<const std::uint8_t> head, ImageSize* size) noexcept {
-  return size_of(head, size);
+ImageFileStatus read_image_size(Bytes head, ImageSize* size) noexcept {
+  if (const auto* kind = kind_of(head)) return kind->size(head, size);
+  // A file of nothing, or of the first bytes of a signature, is a torn write; another content is
+  // another kind of file.
+  return detail::may_become_png(head) ? ImageFileStatus::torn : ImageFileStatus::not_an_image;
 }
 
-ImageFileStatus check_image(std::span<const std::uint8_t> bytes, ImageSize* size) noexcept {
-  if (const auto status = size_of(bytes, size); status != ImageFileStatus::ok) return status;
-  if (detail::is_bmp(bytes)) return detail::check_bmp(bytes);
-  if (detail::is_netpbm(bytes)) return detail::check_netpbm(bytes);
-  return detail::is_png(bytes) ? detail::check_png(bytes) : detail::check_jpeg(bytes);
+ImageFileStatus check_image(Bytes bytes, ImageSize* size) noexcept {
+  const auto status = read_image_size(bytes, size);
+  return status == ImageFileStatus::ok ? kind_of(bytes)->check(bytes) : status;
 }
 
-std::optional<std::uint16_t> peak_of_deep_image(std::span<const std::uint8_t> bytes) {
+std::optional<std::uint16_t> peak_of_deep_image(Bytes bytes) {
   ImageSize size;
-  constexpr std::size_t kDepthAt = 24;  // of the header: other depths are not worth decoding
   if (check_image(bytes, &size) != ImageFileStatus::ok) return std::uint16_t{0};
-  if (detail::is_netpbm(bytes)) return detail::netpbm_peak(bytes);
-  if (!detail::is_png(bytes) || bytes.size() <= kDepthAt || bytes[kDepthAt] != 16)
-    return std::nullopt;
+  const detail::ImageKind& kind = *kind_of(bytes);
+  if (!kind.deep(bytes)) return std::nullopt;
   const auto width = static_cast<std::size_t>(size.width);
   std::vector<std::uint8_t> pixels(width * static_cast<std::size_t>(size.height));
   detail::DeepSamples deep;
-  return detail::decode_png(bytes, size, pixels.data(), width, &deep) == ImageFileStatus::ok
+  return kind.decode(bytes, size, pixels.data(), width, &deep) == ImageFileStatus::ok
              ? deep.peak
              : std::uint16_t{0};
 }
 
-ImageFileStatus decode_grey(std::span<const std::uint8_t> bytes, ImageSize size, std::uint8_t* out,
-                            std::size_t stride, int deep_bits) noexcept {
+ImageFileStatus decode_grey(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
+                            int deep_bits) noexcept {
   ImageSize found;
   if (const auto status = check_image(bytes, &found); status != ImageFileStatus::ok) return status;
   if (found != size) return ImageFileStatus::wrong_size;
-  if (detail::is_bmp(bytes)) return detail::decode_bmp(bytes, size, out, stride);
-  if (detail::is_netpbm(bytes)) {
-    detail::decode_netpbm(bytes, out, stride, deep_bits);
-    return ImageFileStatus::ok;
-  }
   detail::DeepSamples deep{deep_bits};
-  return detail::is_png(bytes) ? detail::decode_png(bytes, size, out, stride, &deep)
-                               : detail::decode_jpeg(bytes, size, out, stride);
+  return kind_of(bytes)->decode(bytes, size, out, stride, &deep);
 }
 
 }  // namespace vergence::app

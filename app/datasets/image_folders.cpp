@@ -91,28 +91,25 @@ std::optional<Cameras> find_cameras(const fs::path& root) {
   return std::nullopt;
 }
 
+/// InputError: no such folder, no image in it that can be read.
 std::vector<std::string> list_images(const fs::path& root, const std::string& below) {
   const fs::path folder = root / below;
   require_folder(folder, "images");
-  std::vector<std::string> names;
-  std::string other;  // the ending of a file that is none
-  std::error_code error;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    const std::string name = it->path().filename().string();
-    if (is_image_name(name))
-      names.push_back(below.empty() ? name : below + "/" + name);
-    else if (!name.starts_with('.') && it->path().has_extension())
-      other = it->path().extension().string();
-  }
-  if (error) refuse(folder, 0, "cannot be listed (" + error.message() + "): check its permissions");
-  if (names.empty())
+  std::vector<std::string> names = entries_of(folder, false);
+  if (names.empty()) {
+    std::string advice;  // by the ending of a file that is none
+    std::error_code error;
+    for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+      if (const fs::path& file = it->path(); file.has_extension() && file.stem() != "")
+        advice = fmt::format(
+            "; files of the kind {0} are not read: convert them, for example with `mogrify -format "
+            "png *{0}`",
+            file.extension().string());
     refuse(folder, 0,
-           other.empty() ? "holds no PNG, JPEG, BMP or PGM image"
-                         : "holds no PNG, JPEG, BMP or PGM image; files of the kind " + other +
-                               " are not read: convert them, for example with `mogrify -format png "
-                               "*" +
-                               other + "`");
-  std::sort(names.begin(), names.end(), in_name_order);
+           error ? "cannot be listed (" + error.message() + "): check its permissions"
+                 : "holds no PNG, JPEG, BMP or PGM image" + advice);
+  }
+  for (std::string& name : names) name = below.empty() ? name : below + "/" + name;
   return names;
 }
 
@@ -402,36 +399,28 @@ std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<Ti
   return pairs;
 }
 
-/// Image N belongs to line N, counted from 0 or from 1; nothing: a name has no number of a line.
-std::optional<std::vector<StereoPair>> pair_by_number(const Cameras& cameras,
-                                                      const std::vector<StereoPair>& pairs,
-                                                      std::size_t lines) {
-  if (pairs.empty()) return std::nullopt;
+/// The numbers of pairs by their names; nothing: a name has none, or there are no pairs.
+std::optional<std::vector<std::size_t>> numbers_of(const Cameras& cameras,
+                                                   const std::vector<StereoPair>& pairs) {
   std::vector<std::size_t> numbers;
   for (const StereoPair& pair : pairs) {
     const std::size_t k = pair.file[0].empty() ? 1 : 0;
     const auto n = number_of(cameras[k], pair.file[k]);
-    if (!n || *n > lines) return std::nullopt;
+    if (!n) return std::nullopt;
     numbers.push_back(*n);
   }
-  const std::size_t first = *std::max_element(numbers.begin(), numbers.end()) == lines ? 1 : 0;
-  if (*std::min_element(numbers.begin(), numbers.end()) < first) return std::nullopt;
+  return numbers.empty() ? std::nullopt : std::optional(numbers);
+}
+
+/// Image N belongs to line N, counted from 0 or from 1; empty: a number is beyond the lines.
+std::vector<StereoPair> pair_by_number(const std::vector<std::size_t>& numbers,
+                                       const std::vector<StereoPair>& pairs, std::size_t lines) {
+  const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
+  const std::size_t first = *most == lines ? 1 : 0;
+  if (*most > lines || *least < first) return {};
   std::vector<StereoPair> all(lines);
   for (std::size_t i = 0; i < pairs.size(); ++i) all[numbers[i] - first].file = pairs[i].file;
   return all;
-}
-
-/// The number of the first pair where their numbers leave none out; nothing: they do, or are none.
-std::optional<std::size_t> first_of_run(const Cameras& cameras,
-                                        const std::vector<StereoPair>& pairs) {
-  std::optional<std::size_t> first;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const std::size_t k = pairs[i].file[0].empty() ? 1 : 0;
-    const auto n = number_of(cameras[k], pairs[i].file[k]);
-    if (i == 0) first = n;
-    if (!n || !first || *n != *first + i) return std::nullopt;
-  }
-  return first;
 }
 
 /// By names, where these give as many pairs as there are times: a name that only one side has is an
@@ -442,20 +431,20 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
                                         std::vector<std::string>* assumptions) {
   const std::size_t left = (*cameras)[0].names.size(), right = (*cameras)[1].names.size();
   std::vector<StereoPair> pairs = pair_by_names(cameras).value_or(std::vector<StereoPair>{});
-  const auto run = first_of_run(*cameras, pairs);
-  if (run && *run > 1 && pairs.size() == times.size())
+  const auto numbers = numbers_of(*cameras, pairs);
+  const bool run = numbers && numbers->back() - numbers->front() + 1 == pairs.size();
+  if (run && numbers->front() > 1 && pairs.size() == times.size())
     assumptions->push_back(
-        fmt::format("images begin with number {}, that of the first time", *run));
+        fmt::format("images begin with number {}, that of the first time", numbers->front()));
   // Who counts by lines has as many lines as the drive has frames, lost ones too.
   const bool whole = pairs.size() == times.size() && !(by_number && !run);
   if (!whole && !by_number && left == right && left == times.size()) {
     pairs = pair_in_order(*cameras);
   } else if (!whole && pairs.size() <= times.size()) {
-    auto numbered = pair_by_number(*cameras, pairs, times.size());
-    if (numbered && !by_number)
+    pairs = numbers ? pair_by_number(*numbers, pairs, times.size()) : std::vector<StereoPair>{};
+    if (!pairs.empty() && !by_number)
       assumptions->emplace_back(
           "there are fewer pairs than times: an image belongs to the line of its number");
-    pairs = std::move(numbered).value_or(std::vector<StereoPair>{});
   }
   if (pairs.size() != times.size())
     refuse(

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "app/datasets/detail/bag_scan.hpp"
-#include "app/datasets/detail/mcap.hpp"
 
 namespace vergence::test {
 

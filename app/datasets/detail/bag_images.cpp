@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "app/datasets/detail/png.hpp"
+#include "app/datasets/detail/image_kinds.hpp"
 #include "core/types/bayer.hpp"
 
 namespace vergence::app::detail {

@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/detail/jpeg.hpp"
+#include "app/datasets/detail/image_kinds.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/detail/sqlite_bag.hpp"

@@ -1,7 +1,5 @@
 #include "app/datasets/detail/bag_scan.hpp"
 
-#include "app/datasets/detail/mcap.hpp"
-#include "app/datasets/detail/rosbag.hpp"
 #include "app/datasets/detail/sqlite_bag.hpp"
 
 namespace vergence::app::detail {

@@ -84,4 +84,25 @@ struct BagScan {
 [[nodiscard]] bool unpack_chunk(BagFormat format, const ByteSource& file, std::uint64_t offset,
                                 std::vector<std::uint8_t>* records);
 
+// What the containers do of scan_bag() and unpack_chunk().
+//
+// MCAP (mcap.dev, specification version 0) front to back; neither index nor summary is believed or
+// needed. Chunks without compression are read 9 bytes a record and 22 a message; their check sums
+// are not looked at.
+[[nodiscard]] std::optional<BagScan> scan_mcap(const ByteSource& file, const BagVisitor& each);
+[[nodiscard]] bool unpack_mcap_chunk(const ByteSource& file, std::uint64_t offset,
+                                     std::vector<std::uint8_t>* records);
+
+// ROS 1 bags (wiki.ros.org/Bags/Format/2.0) front to back; index records and the places that they
+// name are passed over. A chunk that its recorder never closed says that it is empty, and its
+// records follow: those of one without compression are read like others of the file.
+[[nodiscard]] std::optional<BagScan> scan_rosbag(const ByteSource& file, const BagVisitor& each);
+[[nodiscard]] bool unpack_rosbag_chunk(const ByteSource& file, std::uint64_t offset,
+                                       std::vector<std::uint8_t>* records);
+
+/// The frame or frames of `packed` as `name` says ("zstd", "lz4", "bz2"), exactly `records.size()`
+/// bytes. False: they are not.
+[[nodiscard]] bool decompress(std::string_view name, std::span<const std::uint8_t> packed,
+                              std::span<std::uint8_t> records) noexcept;
+
 }  // namespace vergence::app::detail

@@ -1,29 +1,28 @@
-#include "app/datasets/detail/bmp.hpp"
+#include "app/datasets/detail/image_kinds.hpp"
 
 #include <algorithm>
 #include <array>
 
-#include "app/datasets/detail/image_size.hpp"
-
 namespace vergence::app::detail {
 namespace {
-
-using Bytes = std::span<const std::uint8_t>;
 
 // Where things stand: the file header of 14 bytes, then the information header.
 constexpr std::size_t kPixelsAt = 10, kHeaderSize = 14, kWidth = 18, kHeight = 22, kBits = 28,
                       kCompression = 30, kColours = 46;
+constexpr std::size_t kBmpHead = 26;  // bytes up to the end of the size
 constexpr std::size_t kFileHeader = 14, kLeastHeader = 40, kWholeHead = kFileHeader + kLeastHeader;
 
-std::uint32_t u16(Bytes b, std::size_t at) noexcept {
+std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
   return b[at] | std::uint32_t{b[at + 1]} << 8U;
 }
-std::uint32_t u32(Bytes b, std::size_t at) noexcept { return u16(b, at) | u16(b, at + 2) << 16U; }
+std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
+  return u16(b, at) | u16(b, at + 2) << 16U;
+}
 
 /// A negative height says that the first row is the top one.
-bool top_down(Bytes b) noexcept { return (u32(b, kHeight) & 0x80000000U) != 0; }
+bool top_down(ImageBytes b) noexcept { return (u32(b, kHeight) & 0x80000000U) != 0; }
 /// Rows of pixels. With bit fields, 32 bits are blue, green, red as everywhere.
-bool is_plain(Bytes b) noexcept {
+bool is_plain(ImageBytes b) noexcept {
   constexpr std::uint32_t kBitFields = 3;
   return u32(b, kCompression) == 0 || (u32(b, kCompression) == kBitFields && u16(b, kBits) == 32);
 }
@@ -37,7 +36,7 @@ std::uint8_t luminance(const std::uint8_t* bgr) noexcept {
 }
 
 /// What the palette makes of its indices; without one they are grey.
-std::array<std::uint8_t, 256> palette_of(Bytes b) noexcept {
+std::array<std::uint8_t, 256> palette_of(ImageBytes b) noexcept {
   std::array<std::uint8_t, 256> grey{};
   const std::size_t first = kFileHeader + u32(b, kHeaderSize), end = u32(b, kPixelsAt);
   const std::size_t count = u32(b, kColours) == 0 ? 256 : u32(b, kColours),
@@ -49,13 +48,11 @@ std::array<std::uint8_t, 256> palette_of(Bytes b) noexcept {
   return grey;
 }
 
-}  // namespace
-
-bool is_bmp(Bytes bytes) noexcept {
+bool is_bmp(ImageBytes bytes) noexcept {
   return bytes.size() >= 2 && bytes[0] == 'B' && bytes[1] == 'M';
 }
 
-ImageFileStatus bmp_size(Bytes b, ImageSize* size) noexcept {
+ImageFileStatus bmp_size(ImageBytes b, ImageSize* size) noexcept {
   if (b.size() < kBmpHead) return ImageFileStatus::torn;
   if (u32(b, kHeaderSize) < kLeastHeader)
     return ImageFileStatus::not_an_image;  // an older kind, or no BMP at all
@@ -64,7 +61,7 @@ ImageFileStatus bmp_size(Bytes b, ImageSize* size) noexcept {
   return accept_size(width, height, size);
 }
 
-ImageFileStatus check_bmp(Bytes b) noexcept {
+ImageFileStatus check_bmp(ImageBytes b) noexcept {
   ImageSize size;
   if (const auto status = bmp_size(b, &size); status != ImageFileStatus::ok) return status;
   if (b.size() < kWholeHead) return ImageFileStatus::torn;
@@ -76,8 +73,8 @@ ImageFileStatus check_bmp(Bytes b) noexcept {
                                                            : ImageFileStatus::torn;
 }
 
-ImageFileStatus decode_bmp(Bytes b, ImageSize size, std::uint8_t* out,
-                           std::size_t stride) noexcept {
+ImageFileStatus decode_bmp(ImageBytes b, ImageSize size, std::uint8_t* out, std::size_t stride,
+                           DeepSamples* /*deep*/) noexcept {
   const std::uint32_t bits = u16(b, kBits);
   if (!is_plain(b) || (bits != 8 && bits != 24 && bits != 32)) return ImageFileStatus::undecodable;
   const std::array<std::uint8_t, 256> grey =
@@ -92,5 +89,10 @@ ImageFileStatus decode_bmp(Bytes b, ImageSize size, std::uint8_t* out,
   }
   return ImageFileStatus::ok;
 }
+
+}  // namespace
+
+const ImageKind kBmp{
+    kBmpHead, is_bmp, bmp_size, check_bmp, [](ImageBytes) noexcept { return false; }, decode_bmp};
 
 }  // namespace vergence::app::detail

@@ -1,4 +1,4 @@
-#include "app/datasets/detail/decompress.hpp"
+#include "app/datasets/detail/bag_scan.hpp"
 
 #include <bzlib.h>
 #include <lz4frame.h>

@@ -1,4 +1,4 @@
-#include "app/datasets/detail/jpeg.hpp"
+#include "app/datasets/detail/image_kinds.hpp"
 
 #include <algorithm>
 #include <csetjmp>
@@ -8,16 +8,12 @@
 
 #include <jerror.h>
 
-#include "app/datasets/detail/image_size.hpp"
-
 namespace vergence::app::detail {
 namespace {
 
-using Bytes = std::span<const std::uint8_t>;
-
 constexpr int kMostScans = 100;  // a progressive image has ten; each costs a pass over all of it
 
-std::uint32_t u16(Bytes b, std::size_t at) noexcept {
+std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
   return (std::uint32_t{b[at]} << 8U) | b[at + 1];
 }
 
@@ -65,7 +61,7 @@ void count_scans(j_common_ptr jpeg) {
 }
 
 /// Between setjmp and the handlers' longjmp nothing may stand that has a destructor.
-bool read_rows(Decoder* d, Bytes bytes, ImageSize size, std::uint8_t* out,
+bool read_rows(Decoder* d, ImageBytes bytes, ImageSize size, std::uint8_t* out,
                std::size_t stride) noexcept {
   if (setjmp(d->leave) != 0) return false;
   jpeg_create_decompress(&d->jpeg);
@@ -88,13 +84,11 @@ bool read_rows(Decoder* d, Bytes bytes, ImageSize size, std::uint8_t* out,
   return true;
 }
 
-}  // namespace
-
-bool is_jpeg(Bytes b) noexcept {
+bool is_jpeg(ImageBytes b) noexcept {
   return b.size() >= 3 && b[0] == 0xff && b[1] == 0xd8 && b[2] == 0xff;
 }
 
-ImageFileStatus jpeg_size(Bytes b, ImageSize* size) noexcept {
+ImageFileStatus jpeg_size(ImageBytes b, ImageSize* size) noexcept {
   std::size_t at = 2;
   while (at + 9 <= b.size()) {
     if (b[at] != 0xff) return ImageFileStatus::torn;
@@ -108,14 +102,14 @@ ImageFileStatus jpeg_size(Bytes b, ImageSize* size) noexcept {
   return ImageFileStatus::torn;
 }
 
-ImageFileStatus check_jpeg(Bytes b) noexcept {
+ImageFileStatus check_jpeg(ImageBytes b) noexcept {
   std::size_t end = b.size();
   while (end > 2 && b[end - 1] == 0) --end;
   return b[end - 2] == 0xff && b[end - 1] == 0xd9 ? ImageFileStatus::ok : ImageFileStatus::torn;
 }
 
-ImageFileStatus decode_jpeg(Bytes bytes, ImageSize size, std::uint8_t* out,
-                            std::size_t stride) noexcept {
+ImageFileStatus decode_jpeg(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
+                            DeepSamples* /*deep*/) noexcept {
   Decoder decoder;
   decoder.jpeg.err = jpeg_std_error(&decoder.errors);
   decoder.jpeg.client_data = &decoder;  // jpeg_create_decompress() keeps it
@@ -128,5 +122,11 @@ ImageFileStatus decode_jpeg(Bytes bytes, ImageSize size, std::uint8_t* out,
          : decoder.damaged ? ImageFileStatus::torn
                            : ImageFileStatus::undecodable;
 }
+
+}  // namespace
+
+const ImageKind kJpeg{
+    kJpegHead,  is_jpeg, jpeg_size, check_jpeg, [](ImageBytes) noexcept { return false; },
+    decode_jpeg};
 
 }  // namespace vergence::app::detail

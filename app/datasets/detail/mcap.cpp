@@ -1,4 +1,4 @@
-#include "app/datasets/detail/mcap.hpp"
+#include "app/datasets/detail/bag_scan.hpp"
 
 #include <libdeflate.h>
 
@@ -6,7 +6,6 @@
 #include <array>
 #include <map>
 
-#include "app/datasets/detail/decompress.hpp"
 #include "app/datasets/detail/little_endian.hpp"
 
 namespace vergence::app::detail {

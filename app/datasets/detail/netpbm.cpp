@@ -1,15 +1,12 @@
-#include "app/datasets/detail/netpbm.hpp"
+#include "app/datasets/detail/image_kinds.hpp"
 
 #include <algorithm>
 #include <array>
 
-#include "app/datasets/detail/image_size.hpp"
-#include "app/datasets/detail/png.hpp"
-
 namespace vergence::app::detail {
 namespace {
 
-using Bytes = std::span<const std::uint8_t>;
+constexpr std::size_t kNetpbmHead = 4096;  // bytes in which the header ends, comments included
 
 struct Header {
   ImageSize size{};
@@ -25,7 +22,7 @@ struct Header {
 bool is_blank(std::uint8_t c) noexcept { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 /// Three whole numbers after the two letters, between them blanks and comments, then one blank.
-ImageFileStatus read_header(Bytes bytes, Header* header) noexcept {
+ImageFileStatus read_header(ImageBytes bytes, Header* header) noexcept {
   std::array<std::uint32_t, 3> numbers{};
   std::size_t at = 2;
   for (std::uint32_t& number : numbers) {
@@ -48,25 +45,19 @@ ImageFileStatus read_header(Bytes bytes, Header* header) noexcept {
   return accept_size(numbers[0], numbers[1], &header->size);
 }
 
-std::uint16_t deep_sample(const std::uint8_t* at) noexcept {
-  return static_cast<std::uint16_t>(at[0] << 8U | at[1]);
-}
-
-}  // namespace
-
-bool is_netpbm(Bytes b) noexcept {
+bool is_netpbm(ImageBytes b) noexcept {
   return b.size() > 2 && b[0] == 'P' && (b[1] == '5' || b[1] == '6') &&
          (is_blank(b[2]) || b[2] == '#');
 }
 
-ImageFileStatus netpbm_size(Bytes head, ImageSize* size) noexcept {
+ImageFileStatus netpbm_size(ImageBytes head, ImageSize* size) noexcept {
   Header header;
   const ImageFileStatus status = read_header(head, &header);
   *size = header.size;
   return status;
 }
 
-ImageFileStatus check_netpbm(Bytes bytes) noexcept {
+ImageFileStatus check_netpbm(ImageBytes bytes) noexcept {
   Header header;
   if (const auto status = read_header(bytes, &header); status != ImageFileStatus::ok) return status;
   const std::size_t needed = header.row() * static_cast<std::size_t>(header.size.height);
@@ -74,19 +65,14 @@ ImageFileStatus check_netpbm(Bytes bytes) noexcept {
                                                                        : ImageFileStatus::torn;
 }
 
-std::optional<std::uint16_t> netpbm_peak(Bytes bytes) noexcept {
+bool is_deep_netpbm(ImageBytes bytes) noexcept {
   Header header;
   (void)read_header(bytes, &header);
-  if (header.samples != 1 || header.bytes_a_sample() != 2) return std::nullopt;
-  std::uint16_t peak = 0;
-  const std::size_t end =
-      header.begin + header.row() * static_cast<std::size_t>(header.size.height);
-  for (std::size_t at = header.begin; at < end; at += 2)
-    peak = std::max(peak, deep_sample(bytes.data() + at));
-  return peak;
+  return header.samples == 1 && header.bytes_a_sample() == 2;
 }
 
-void decode_netpbm(Bytes bytes, std::uint8_t* out, std::size_t stride, int deep_bits) noexcept {
+ImageFileStatus decode_netpbm(ImageBytes bytes, ImageSize /*size*/, std::uint8_t* out,
+                              std::size_t stride, DeepSamples* deep) noexcept {
   Header header;
   (void)read_header(bytes, &header);
   const std::uint8_t* in = bytes.data() + header.begin;
@@ -94,14 +80,25 @@ void decode_netpbm(Bytes bytes, std::uint8_t* out, std::size_t stride, int deep_
                     step = header.bytes_a_sample();
   for (int y = 0; y < header.size.height; ++y, in += header.row(), out += stride)
     for (std::size_t x = 0; x < width; ++x) {
-      // Colour becomes luminance (ITU-R BT.601) of the upper 8 bits.
       const std::uint8_t* pixel = in + x * header.samples * step;
-      out[x] = header.samples == 3
-                   ? static_cast<std::uint8_t>(
-                         (77U * pixel[0] + 150U * pixel[step] + 29U * pixel[2 * step] + 128U) >> 8U)
-               : step == 2 ? narrowed(deep_sample(pixel), deep_bits)
-                           : pixel[0];
+      if (header.samples == 3) {
+        // Colour becomes luminance (ITU-R BT.601) of the upper 8 bits.
+        out[x] = static_cast<std::uint8_t>(
+            (77U * pixel[0] + 150U * pixel[step] + 29U * pixel[2 * step] + 128U) >> 8U);
+      } else if (step == 2) {
+        const auto sample = static_cast<std::uint16_t>(pixel[0] << 8U | pixel[1]);
+        deep->peak = std::max(deep->peak, sample);
+        out[x] = narrowed(sample, deep->bits);
+      } else {
+        out[x] = pixel[0];
+      }
     }
+  return ImageFileStatus::ok;
 }
+
+}  // namespace
+
+const ImageKind kNetpbm{kNetpbmHead,  is_netpbm,      netpbm_size,
+                        check_netpbm, is_deep_netpbm, decode_netpbm};
 
 }  // namespace vergence::app::detail

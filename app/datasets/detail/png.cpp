@@ -1,4 +1,4 @@
-#include "app/datasets/detail/png.hpp"
+#include "app/datasets/detail/image_kinds.hpp"
 
 #include <libdeflate.h>
 #include <png.h>
@@ -8,22 +8,19 @@
 #include <csetjmp>
 #include <cstring>
 
-#include "app/datasets/detail/image_size.hpp"
-
 namespace vergence::app::detail {
 namespace {
 
-using Bytes = std::span<const std::uint8_t>;
-
+constexpr std::size_t kPngHead = 33;  // bytes of the signature and the whole IHDR chunk
 constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
-std::uint32_t u32(Bytes b, std::size_t at) noexcept {
+std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
   return (std::uint32_t{b[at]} << 24U) | (std::uint32_t{b[at + 1]} << 16U) |
          (std::uint32_t{b[at + 2]} << 8U) | b[at + 3];
 }
 
 struct Chunk {
-  Bytes type_and_content;       // four letters, then the content
+  ImageBytes type_and_content;  // four letters, then the content
   std::uint32_t check_sum = 0;  // as the file has it, CRC-32 of both
 
   [[nodiscard]] bool is(const char (&type)[5]) const noexcept {
@@ -32,7 +29,7 @@ struct Chunk {
 };
 
 /// The chunk that begins at *at, and *at behind it. → false: it does not fit into the file
-bool next_chunk(Bytes png, std::size_t* at, Chunk* chunk) noexcept {
+bool next_chunk(ImageBytes png, std::size_t* at, Chunk* chunk) noexcept {
   constexpr std::size_t kFrame = 12;  // length, type, check sum
   if (*at > png.size() || png.size() - *at < kFrame) return false;
   const std::size_t length = u32(png, *at);
@@ -43,7 +40,7 @@ bool next_chunk(Bytes png, std::size_t* at, Chunk* chunk) noexcept {
 }
 
 struct Source {
-  Bytes bytes;
+  ImageBytes bytes;
   std::size_t at = 0;
 };
 
@@ -124,28 +121,27 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
   return true;
 }
 
-}  // namespace
-
-bool is_png(Bytes b) noexcept {
+bool is_png(ImageBytes b) noexcept {
   return b.size() >= kSignature.size() &&
          std::equal(kSignature.begin(), kSignature.end(), b.begin());
 }
 
-bool may_become_png(Bytes b) noexcept {
-  return b.size() < kSignature.size() && std::equal(b.begin(), b.end(), kSignature.begin());
-}
-
-ImageFileStatus png_size(Bytes b, ImageSize* size) noexcept {
+ImageFileStatus png_size(ImageBytes b, ImageSize* size) noexcept {
   if (b.size() < kPngHead) return ImageFileStatus::torn;
   if (std::memcmp(&b[12], "IHDR", 4) != 0) return ImageFileStatus::torn;
   return accept_size(u32(b, 16), u32(b, 20), size);
 }
 
-ImageFileStatus check_png(Bytes b) noexcept {
+bool is_deep_png(ImageBytes b) noexcept {
+  constexpr std::size_t kDepthAt = 24;  // of the header
+  return b.size() > kDepthAt && b[kDepthAt] == 16;
+}
+
+ImageFileStatus check_png(ImageBytes b) noexcept {
   Chunk chunk;
   bool pixels = false;
   for (std::size_t at = kSignature.size(); next_chunk(b, &at, &chunk);) {
-    const Bytes summed = chunk.type_and_content;
+    const ImageBytes summed = chunk.type_and_content;
     if (libdeflate_crc32(0, summed.data(), summed.size()) != chunk.check_sum)
       return ImageFileStatus::torn;
     if (chunk.is("IDAT")) pixels = true;
@@ -154,7 +150,7 @@ ImageFileStatus check_png(Bytes b) noexcept {
   return ImageFileStatus::torn;
 }
 
-ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
+ImageFileStatus decode_png(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
                            DeepSamples* deep) noexcept {
   const Reader reader;
   if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
@@ -162,5 +158,13 @@ ImageFileStatus decode_png(Bytes bytes, ImageSize size, std::uint8_t* out, std::
   return read_rows(reader, &source, size, out, stride, deep) ? ImageFileStatus::ok
                                                              : ImageFileStatus::undecodable;
 }
+
+}  // namespace
+
+bool may_become_png(ImageBytes b) noexcept {
+  return b.size() < kSignature.size() && std::equal(b.begin(), b.end(), kSignature.begin());
+}
+
+const ImageKind kPng{kPngHead, is_png, png_size, check_png, is_deep_png, decode_png};
 
 }  // namespace vergence::app::detail

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/datasets/detail/image_size.hpp"
+#include "app/datasets/detail/image_kinds.hpp"
 #include "app/datasets/detail/names.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
 

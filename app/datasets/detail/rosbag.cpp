@@ -1,11 +1,10 @@
-#include "app/datasets/detail/rosbag.hpp"
+#include "app/datasets/detail/bag_scan.hpp"
 
 #include <algorithm>
 #include <array>
 #include <map>
 #include <string_view>
 
-#include "app/datasets/detail/decompress.hpp"
 #include "app/datasets/detail/little_endian.hpp"
 
 namespace vergence::app::detail {

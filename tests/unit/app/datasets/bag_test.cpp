@@ -39,14 +39,6 @@ std::string camera_info(Wire wire, double fx_times_b, const std::string& model =
       {kWidth, kHeight, model, {-0.1, 0.01, 0.001, 0.002, 0.0}, 60, 61, 35, 24, fx_times_b});
 }
 
-/// Of other images than those of camera_info().
-constexpr const char* kCalibration =
-    "version: 1\nrig: {name: tiny, baseline: 0.5}\ncameras:\n"
-    "  - {name: left, size: [70, 48], model: pinhole-radtan, intrinsics: [60, 60, 35, 24], "
-    "distortion: [0, 0, 0, 0]}\n"
-    "  - {name: right, size: [70, 48], model: pinhole-radtan, intrinsics: [60, 60, 35, 24], "
-    "distortion: [0, 0, 0, 0], T_camera_left: [1, 0, 0, -0.5, 0, 1, 0, 0, 0, 0, 1, 0]}\n";
-
 class Bag : public ::testing::TestWithParam<BagKind> {
  protected:
   Bag() {
@@ -181,28 +173,6 @@ TEST_P(Bag, StampsOfZeroAreReplacedByTheTimeOfRecording) {
   EXPECT_NE(s.assumptions.front().find("1 images have no stamp"), std::string::npos);
 }
 
-TEST_P(Bag, OffsetsWithinPairsAreSaidAndRefusedWhereTheyCouldBeOfTheNeighbour) {
-  struct Case {
-    std::int64_t late;
-    std::size_t remarks;
-    bool refused;
-  };
-  for (const Case& c : {Case{1'000'000, 0, false}, Case{15'000'000, 1, false},
-                        Case{24'000'000, 0, true}, Case{27'000'000, 0, true}}) {
-    begin();
-    writer_->channel(4, "/right/camera_info", "sensor_msgs/CameraInfo");
-    writer_->message(3, kStart, camera_info(wire(), 0));
-    writer_->message(4, kStart, camera_info(wire(), -7.2));
-    for (std::int64_t i = 0; i < 6; ++i) frame(i, c.late);
-    const std::string said = refusal();
-    EXPECT_EQ(!said.empty(), c.refused) << c.late << said;
-    if (!c.refused) {
-      EXPECT_EQ(open().remarks.size(), c.remarks) << c.late;
-      EXPECT_NE(open().assumptions.back().find("right ones are later by"), std::string::npos);
-    }
-  }
-}
-
 TEST_P(Bag, CameraInfoOfAnotherSizeIsRefused) {
   left(kStart, kWidth - 2);
   writer_->message(2, kStart, image(wire(), kStart, kWidth - 2));
@@ -222,15 +192,6 @@ TEST_P(Bag, OtherFilesAreRefusedByWhatTheyBeginWith) {
   } catch (const InputError& e) {
     EXPECT_NE(std::string(e.what()).find("is not a"), std::string::npos) << e.what();
   }
-}
-
-TEST_P(Bag, OneStampFarAheadCostsOneImage) {
-  frame(0);
-  left(kStart + 86'400'000'000'000);
-  for (std::int64_t i = 1; i < 4; ++i) frame(i);
-  const StereoSequence s = open();
-  EXPECT_EQ(s.pairs.size(), 4U);
-  EXPECT_EQ(s.left_out, 1U);
 }
 
 TEST_P(Bag, CutAnywhereIsReadOrRefused) {

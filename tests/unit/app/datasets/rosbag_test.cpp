@@ -1,4 +1,4 @@
-#include "app/datasets/detail/rosbag.hpp"
+#include "app/datasets/detail/bag_scan.hpp"
 
 #include <gtest/gtest.h>
 

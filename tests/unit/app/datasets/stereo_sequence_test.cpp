@@ -276,14 +276,6 @@ TEST_F(Sequence, folderOfForeignNamesNeedsOneOfEach) {
                    {"3 left images and 2 right ones", "stamp,left file,right file"}));
 }
 
-TEST_F(Sequence, folderCountsThatDoNotGoTogetherAreRefused) {
-  test::write_tiny_folder(folder_, 3);
-  folder_.write("times.txt", "1\n2\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"3 left images", "2 lines"}));
-  folder_.write("times.txt", "1\n2\nthree\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), {"times.txt:3", "three"}));
-}
-
 TEST_F(Sequence, aGivenCalibrationReplacesTheDataSetsOwnWhichNeedNotExist) {
   test::write_tiny_kitti(folder_, 1);
   std::filesystem::remove(folder_ / "calib.txt");
