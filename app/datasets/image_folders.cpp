@@ -306,9 +306,10 @@ struct Lists {
   bool by_number = false;          // line N is of image N, counted from 0
 };
 
-std::optional<fs::path> list_in(const fs::path& folder) {
+/// `name_of_euroc`: what EuRoC calls the list in a camera's folder; elsewhere it may be anything.
+std::optional<fs::path> list_in(const fs::path& folder, const char* name_of_euroc = "times.txt") {
   for (const char* name :
-       {"times.txt", "timestamps.txt", "times.csv", "timestamps.csv", "data.csv"})
+       {"times.txt", "timestamps.txt", "times.csv", "timestamps.csv", name_of_euroc})
     if (present(folder / name)) return folder / name;
   return std::nullopt;
 }
@@ -319,8 +320,9 @@ Lists find_lists(const fs::path& root, const Cameras& cameras) {
   lists.shared = list_in(root);
   for (std::size_t k = 0; k < 2; ++k) {
     const fs::path folder = root / cameras[k].below;
-    lists.own[k] = list_in(folder);
-    if (!lists.own[k] && !cameras[k].below.empty()) lists.own[k] = list_in(folder.parent_path());
+    lists.own[k] = list_in(folder, "data.csv");
+    if (!lists.own[k] && cameras[k].below.find('/') != std::string::npos)
+      lists.own[k] = list_in(folder.parent_path(), "data.csv");
   }
   if (!lists.shared && (lists.own[0] == lists.own[1] || !lists.own[1])) lists.shared = lists.own[0];
   return lists;
@@ -342,7 +344,7 @@ std::string named(const Camera& camera, const std::string& name) {
 }
 
 bool holds(const Camera& camera, const std::string& name) {
-  return std::find(camera.names.begin(), camera.names.end(), name) != camera.names.end();
+  return std::binary_search(camera.names.begin(), camera.names.end(), name, in_name_order);
 }
 
 /// The images of a camera with the stamps of its own list.

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "app/datasets/detail/formats.hpp"
+#include "app/datasets/ros_camera.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
@@ -232,6 +233,39 @@ TEST_P(Bag, CutAnywhereIsReadOrRefused) {
     }
   }
   EXPECT_GT(opened, 0U);
+}
+
+// The image: 96 × 72, f = 80 px, its middle the principal point. The sensor: twice as large, or
+// some pixels around it.
+TEST(CameraInfo, BinningAndRegionMakeTheImagesNumbersAsRep104Says) {
+  struct Case {
+    const char* what;
+    double f, cx, cy;  // of CameraInfo
+    ImageSize size;
+    RosCrop crop;  // binning x and y, offset x and y, height, width
+    bool assumed;
+  };
+  constexpr ImageSize kImage{96, 72};
+  for (const Case& c :
+       {Case{"none", 80, 48, 36, kImage, {}, false},
+        Case{"binned", 160, 96, 72, {192, 144}, {2, 2, 0, 0, 0, 0}, false},
+        Case{"a region", 80, 112, 68, {224, 136}, {0, 0, 64, 32, 72, 96}, false},
+        Case{"a region, binned", 160, 136, 92, {272, 184}, {2, 2, 40, 20, 144, 192}, false},
+        Case{"K of the binned image", 80, 48, 36, {192, 144}, {2, 2, 0, 0, 0, 0}, true},
+        Case{"K and size of the binned image", 80, 48, 36, kImage, {2, 2, 0, 0, 0, 0}, true}}) {
+    RosCamera camera;
+    camera.lens.width = c.size.width, camera.lens.height = c.size.height;
+    camera.lens.fx = camera.lens.fy = c.f, camera.lens.cx = c.cx, camera.lens.cy = c.cy;
+    camera.P << c.f, 0, c.cx, -0.11 * c.f, 0, c.f, c.cy, 0, 0, 0, 1, 0;
+    EXPECT_EQ(!apply_crop(c.crop, kImage, &camera).empty(), c.assumed) << c.what;
+    const Intrinsics& k = camera.lens;
+    EXPECT_EQ((ImageSize{k.width, k.height}), kImage) << c.what;
+    EXPECT_NEAR((Vec3(k.fx, k.cx, k.cy) - Vec3(80, 48, 36)).norm(), 0, 1e-12) << c.what;
+    EXPECT_NEAR((Vec3(camera.P(0, 0), camera.P(0, 2), camera.P(1, 2)) - Vec3(80, 48, 36)).norm(), 0,
+                1e-12)
+        << c.what;
+    EXPECT_NEAR(camera.P(0, 3) / camera.P(0, 0), -0.11, 1e-12) << "the baseline stays";
+  }
 }
 
 /// As rosbag2 writes a .db3.
