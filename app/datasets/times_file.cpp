@@ -27,7 +27,7 @@ std::string name_in(const std::filesystem::path& file, std::size_t line, std::st
 
 }  // namespace
 
-TimeColumns find_time_columns(std::span<const Fields> rows) noexcept {
+TimeColumns find_time_columns(std::span<const Fields> rows) {
   TimeColumns c;
   const Fields& first = rows.front();
   const auto all = [&](const auto& is) {

@@ -37,8 +37,7 @@ struct TimeColumns {
 
 /// Infers the columns from all rows, because an index and nanoseconds cannot be recognised in one.
 /// Precondition: there is a row with a field.
-[[nodiscard]] TimeColumns find_time_columns(
-    std::span<const std::vector<std::string_view>> rows) noexcept;
+[[nodiscard]] TimeColumns find_time_columns(std::span<const std::vector<std::string_view>> rows);
 
 /// The time of a row; nothing: it has none of this form.
 [[nodiscard]] std::optional<Stamp> read_time(std::span<const std::string_view> fields,
