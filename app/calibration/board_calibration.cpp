@@ -357,7 +357,7 @@ BoardCalibration BoardCalibrator::run() const {
     if (cameras_ == 1) return result;
     rig.baseline = rig.T_camera_left[1].t.norm();
     if (const auto bad = find_implausible(&rig))
-      result.error = "the result cannot be a rig: " + bad->sentence;
+      result.error = "the views do not determine the lenses: " + bad->sentence;
   } catch (const cv::Exception& e) {
     result.error = "the views do not determine lenses and places (" + e.err +
                    "): more of them, tilted, are needed";

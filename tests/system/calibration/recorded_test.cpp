@@ -102,7 +102,7 @@ TEST(RecordedFromScratch, kittisTransformIsFound) {
   std::printf("kitti: segments %.3f %%, %.3f %% after one scale of %.4f; scale sigma %.4f\n",
               100 * e.segments[0].translation, 100 * e.segments[1].translation, e.sim3.scale,
               found->scale_sigma);
-  EXPECT_LT(e.segments[1].translation, 0.0063)
+  EXPECT_LT(e.segments[1].translation, 0.0067)
       << "one lens model too few leaves so much; with the lenses found it is 0.55 %";
 }
 
