@@ -19,6 +19,12 @@ std::size_t most_tracks(const EstimatorOptions& o) noexcept {
   return static_cast<std::size_t>(o.odometry.features);
 }
 
+/// How far off the epipolar lines of the calibration in use are beyond the matches' own noise, px.
+double misfit_px(const CalibrationDecision& d) noexcept {
+  const double before = d.held_out_before_px, after = d.held_out_after_px;
+  return std::sqrt(std::max(0.0, before * before - after * after));
+}
+
 /// Another rig is adopted: what was learnt of the one before is no prior of it, but for the lenses.
 void forget_rig(std::optional<RigCalibration>* learnt) noexcept {
   if (*learnt) calibration::forget_transforms(&**learnt);
@@ -237,11 +243,16 @@ void OnlineCalibrator::plan_search(const RigSolution& found) noexcept {
 }
 
 /// The claim in use is confirmed, or is no more: the monitor expects as much of it.
-void OnlineCalibrator::set_verified(bool verified) noexcept {
+void OnlineCalibrator::set_verified(bool verified, double misfit_px) noexcept {
   if (verified == verified_) return;
   verified_ = verified;
   ever_verified_ = ever_verified_ || verified;
-  if (found()) monitor_.watch(rig_, verified_);
+  // A claim that is confirmed keeps its lens, and what that leaves differs from place to place.
+  if (found())
+    monitor_.watch(rig_, verified_);
+  else
+    monitor_.expect_scatter(verified_ ? std::max(options_.monitor.found_bias_px, misfit_px)
+                                      : options_.monitor.claimed_bias_px);
 }
 
 CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review, Stamp stamp,
@@ -274,7 +285,8 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
                      ? certain
                      : a.confirmed && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
     d.verified = d.verified && !d.focal.contradicted;
-    if (d.verified || a.contradicted || d.focal.contradicted) set_verified(d.verified);
+    if (d.verified || a.contradicted || d.focal.contradicted)
+      set_verified(d.verified, misfit_px(d));
     watched_ = watched_ || d.verified;
   }
   d.accepted = gate_ == Gate::open;

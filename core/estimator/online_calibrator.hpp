@@ -96,7 +96,8 @@ class OnlineCalibrator {
     int rejections = 0;            // for other reasons than a want of frames
   };
 
-  void set_verified(bool verified) noexcept;
+  /// `misfit_px`: how far off its epipolar lines are.
+  void set_verified(bool verified, double misfit_px) noexcept;
   /// The calibration in use was solved from images, this drive's or an earlier one's, and its
   /// lenses with it: its epipolar lines hold better than those of a claim.
   [[nodiscard]] bool found() const noexcept { return !rig_.covariance.empty(); }

@@ -30,6 +30,8 @@ constexpr int kWitness = 2;  // frames: a point just made was searched for in th
 // px: those of the recorded drives stay below 0.3; it shows a knock in its first frame.
 constexpr int kGraceFrames = 5;
 constexpr double kFarFromLines = 0.5;
+// Times the distance in the frame before: matches of one that is spoilt lie so much farther off.
+constexpr double kSpoilt = 2;
 constexpr int kLearnFrames = 45;  // moving, in agreement
 
 Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
@@ -74,13 +76,17 @@ RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
   distances_ = BoundedVector<float>(arena.make<float>(capacity, "distances to the lines"));
 }
 
+void RigMonitor::expect_scatter(double bias_px) noexcept {
+  for (int k = 1; k < cameras_; ++k) camera(k).monitor.expect_scatter(bias_px);
+}
+
 void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
   rig_ = rig;
   confirmed_ = confirmed;
+  expect_scatter(confirmed ? options_.found_bias_px : options_.claimed_bias_px);
   for (int k = 1; k < cameras_; ++k) {
     Watched& w = camera(k);
     w.learning = true;
-    w.monitor.expect_scatter(confirmed ? options_.found_bias_px : options_.claimed_bias_px);
     const Transform& T = transform(rig_, k);
     set_monitor_reference(k, T,
                           reference_covariance(confirmed ? kConfirmed : kClaimed, T.t.norm()));
@@ -254,7 +260,11 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
   for (int k = 1; k < cameras_; ++k) {
     const int found = collect_stereo(odometry.map(), k, kWitness);
     calibration::DisparityJump jump;
-    if (both_show(outcome, k))
+    // A pose that a spoilt image has drawn off moves the disparities of the frames on both sides.
+    const double distance = distance_to_lines(k), before = camera(k).distance_px;
+    const bool spoilt = distance > kFarFromLines && distance > kSpoilt * before;
+    camera(k).distance_px = distance;
+    if (both_show(outcome, k) && !spoilt)
       jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
     else
       camera(k).jumps.skip(step);

@@ -32,6 +32,8 @@ class RigMonitor {
   /// expected of it.
   void watch(const RigCalibration& rig, bool confirmed) noexcept;
   /// The jump detectors compare with this calibration.
+  /// How much stretches of the drive are expected to disagree, px rms over the image.
+  void expect_scatter(double bias_px) noexcept;
   void set_jump_reference(const RigCalibration& rig) noexcept;
   /// A calibration is adopted; until scene_rebuilt() only jumps count.
   void expect_rebuilt_scene() noexcept { scene_pending_ = true; }
@@ -70,6 +72,7 @@ class RigMonitor {
     bool learning = false;           // the monitor's reference is a claim, its own not yet measured
     int grace = 0;                   // frames whose verdict is no more than a doubt yet
     Transform T_camera_left_before;  // with the cameras unlinked
+    double distance_px = 0;          // of the matches to their epipolar lines, in the newest frame
   };
 
   [[nodiscard]] Watched& camera(int k) noexcept { return *watched_[static_cast<std::size_t>(k)]; }
