@@ -30,7 +30,9 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     note(EstimatorEvent::Kind::time_gap, frame.stamp,
          "no frame for longer than motion can be predicted", out.gap_s);
   in_gap = out.gap_s > 0 && !out.posed;
-  const bool unmatched = !out.posed && out.images_good && out.reason == Reason::no_stereo_matches &&
+  // Images of two instants match by no calibration: cameras out of step say nothing against it.
+  const bool unmatched = !out.posed && out.images_good && out_of_step == 0 &&
+                         out.reason == Reason::no_stereo_matches &&
                          odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kUnmatchedAfter) {

@@ -37,7 +37,7 @@ const std::vector<Kind>& kinds() {
       {"one lens covered", "cover", "camera=1", 3, {"image_dark"}},
       {"both lenses covered", "cover", "camera=-1", 3, {"image_dark"}},
       {"night", "night", "", 5, {"image_dark"}},
-      {"tunnel", "night", "factor=0.1", 5, {"few_features"}},
+      {"tunnel", "night", "factor=0.1", 5, {"few_inliers"}},
       {"exposure stuck, too bright", "exposure", "factor=6", 5, {"few_features"}},
       {"one side dark", "exposure", "camera=1 factor=0.1", 5, {}},
       {"30 % of the frames lost", "lose_frames", "share=0.3", 5, {"no_image"}},
@@ -53,7 +53,7 @@ const std::vector<Kind>& kinds() {
       {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0, {"no_image"}},
       {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0, {"no_image"}},
       {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0, {"/devices/clock_resets"}},
-      {"a bus in the way", "occluder", "", 5, {"no_stereo_matches"}, 9},
+      {"a bus in the way", "occluder", "", 5, {"few_inliers"}, 9},
       {"disk full", "disk_full", "", 3, {"disk_full", "disk_room"}},
       {"recalibration asked for", "recalibrate", "", 0, {"rig_changed", "recalibrating"}, 6},
   };
