@@ -194,6 +194,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
                certain = std::log((1 - kErrorRate) / kErrorRate);
   Assessment a;
   a.confirmed = true;
+  bool sharper = true;  // of every camera the depth is held better than by the claim
   double worst = 0;
   for (int k = 1; k < measured.cameras; ++k) {
     const double depth = judged_depth_m(measured, k, o, pixel_sigma);
@@ -210,6 +211,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
         a.confirmed && s > 0 && odds - before > certain && off <= o.tolerated_depth_percent;
     const bool contradicted = difference > o.tolerated_depth_percent && odds - before < -certain;
     const double least = source == ClaimSource::this_drive ? m : kOfClaim * m;
+    sharper = sharper && s < least;
     a.nearer = a.nearer || (s < least && difference > kChance * s);
     // What is known against one camera counts before what is not known of another.
     if (k > 1 && (contradicted == a.contradicted ? off <= worst : a.contradicted)) continue;
@@ -221,8 +223,11 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     a.difference_percent = difference;
   }
   a.worse = fits_better(log, after, claimed, measured);
-  a.better = (a.nearer && !a.worse) || (misfits(log, after, measured, claimed) &&
-                                        fits_better(log, after, measured, claimed, kRareChance));
+  // Of a full window, what the lines show is no chance of where the structure was.
+  const bool lines =
+      misfits(log, after, measured, claimed) || (sharper && measured.frames >= o.max_frames);
+  a.better =
+      (a.nearer && !a.worse) || (lines && fits_better(log, after, measured, claimed, kRareChance));
   return a;
 }
 

@@ -12,7 +12,7 @@ TEST(Knock, aYawOfThreeTenths) {
   expect_noticed_and_mended({"yaw 0.3 deg", {0, 0.3, 0}, {0, 0, 0}, 30});
 }
 TEST(Knock, aShiftAlongTheViewIsLearnt) {
-  expect_taken_up({"t_z 10 mm", {0, 0, 0}, {0, 0, 10}, 150});
+  expect_taken_up({"t_z 10 mm", {0, 0, 0}, {0, 0, 10}, 150, true, 220});
 }
 
 }  // namespace

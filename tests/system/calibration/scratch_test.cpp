@@ -137,7 +137,7 @@ TEST(FromScratch, isTheSameBitForBitWhateverTheThreads) {
 
 TEST(FromScratch, aDriveThatEndsEarlyIsDecidedAtItsEnd) {
   Course course(from_scratch(street().rig));
-  course.give(street(), 0, 32);
+  course.give(street(), 0, 28);
   EXPECT_TRUE(course.decisions().empty()) << course.story();
   course.finish();
   ASSERT_EQ(course.count_accepted(), 1) << course.story();
