@@ -102,7 +102,12 @@ endfunction()
 
 # A test's own files are compiled less optimised than the product: what takes time is in the libraries. Under sanitizers they are not
 # optimised at all, as that takes as long again as compiling them.
-set(VERGENCE_TEST_OPTIMISATION $<IF:$<BOOL:${VERGENCE_SANITIZE}>,-O0,-O1>)
+# The names of sanitizers have commas, which a generator expression would take for its own.
+if(VERGENCE_SANITIZE)
+  set(VERGENCE_TEST_OPTIMISATION -O0)
+else()
+  set(VERGENCE_TEST_OPTIMISATION -O1)
+endif()
 
 # The tiers of tests (CONTRIBUTING.md); every test is in exactly one of them, which is one of its labels. Building tests_TIER builds what the
 # tests of a tier run; `all` builds none of them.
