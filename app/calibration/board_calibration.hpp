@@ -18,7 +18,7 @@ struct BoardView {
 
 struct BoardCalibrationOptions {
   BoardPattern board{};
-  /// Of the cameras' images, px; as many as cameras, 1 to kMaxCameras.
+  /// Sizes of the cameras' images, px; as many as cameras, 1 to kMaxCameras.
   std::vector<ImageSize> sizes{};
   CameraModelKind model = CameraModelKind::pinhole_radtan;
   bool sixth_order = false;  // radtan: k3 is estimated too; otherwise it is 0
@@ -49,7 +49,7 @@ struct BoardCalibration {
 inline constexpr double kRejectedRatio = 3;  // of the median over the views
 /// rms, px: as good as the detector gets on real images; nothing is wrong with such a view.
 inline constexpr double kNeverRejected = 0.25;
-/// Of a camera; fewer leave focal length and centre open.
+/// Views that a camera needs; fewer leave focal length and centre open.
 inline constexpr std::size_t kMinViews = 3;
 
 /// Each camera alone (calibrateCamera, fisheye::calibrate), then each with camera 0

@@ -154,7 +154,7 @@ Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
   return pair_offset(log[0], log[1], pairs).median;
 }
 
-/// Of the nearest times of recording: nothing where these are none, or do not tell either.
+/// Pairs by the nearest times of recording; nothing where there are none, or they do not decide.
 std::vector<std::array<std::size_t, 2>> pair_by_recording(
     const std::array<std::vector<BagImage>, 2>& images, Duration interval) {
   constexpr double kNear = 0.25;  // of the interval: far from both neighbours

@@ -67,7 +67,7 @@ std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& a
   return std::nullopt;
 }
 
-/// Images of both cameras in one folder, told apart by a word of their names.
+/// Images of both cameras in one folder, distinguished by a word of their names.
 std::optional<Cameras> in_one_folder(const fs::path& root, const std::string& above) {
   const std::vector<std::string> files = entries_of(root / above, false);
   const std::array<std::string, 2> words = side_words(files);

@@ -88,9 +88,9 @@ StereoPair read_pair(const std::filesystem::path& log, std::size_t line_number,
 
 /// `PREFIX_Ins0.log` has twelve fields a line: seconds, microseconds (not padded), latitude and
 /// longitude in degrees, height above the ellipsoid and above the sea, velocity along three axes,
-/// roll, pitch and yaw in radians. Nobody says which axes these are, so they are decided from the
-/// drive: an axis that fits how the position moves is that axis.
-/// Along which axes a velocity is: rows make east, north, up of it.
+/// roll, pitch and yaw in radians. The format does not define the axes, so they are decided from
+/// the drive: an axis that fits how the position moves is that axis. Along which axes a velocity
+/// is: rows make east, north, up of it.
 struct Axes {
   const char* phrase;
   std::array<int, 9> to_enu;

@@ -41,7 +41,7 @@ struct Columns {
   bool counted = false;                    // what stands for a time is the number of the pose
   std::array<std::size_t, 7> pose{};       // x y z, then the quaternion as it is written
   std::size_t first = 0;                   // of a matrix
-  std::optional<QuaternionOrder> order{};  // told by headings
+  std::optional<QuaternionOrder> order{};  // from the headings
   [[nodiscard]] std::size_t needed() const {
     std::size_t last = layout == Layout::pose        ? *std::max_element(pose.begin(), pose.end())
                        : layout == Layout::matrix3x4 ? first + 11

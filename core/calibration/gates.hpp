@@ -37,7 +37,7 @@ inline constexpr double kRareChance = 3.0;  // of a question that every solve as
 ///
 /// The difference d of their depths, at the depth that calibrations are judged at, is evidence
 /// between two hypotheses: the rig is the one of the claim, which is off by no more than a
-/// calibration of its kind is (sigma m), or it is another one (sigma M, kOtherTurn). With s, the
+/// calibration of its kind is (sigma m), or it is another one (sigma M). With s, the
 /// sigma of the measurement,
 ///
 ///     log_odds = log N(d; 0, m² + s²) − log N(d; 0, M² + s²).

@@ -107,6 +107,7 @@ std::size_t CalibrationFrames::most() const noexcept {
 }
 
 std::size_t CalibrationFrames::fewest() const noexcept {
+  // With the six frames held out, a calibration that is given is judged in frame 25.
   constexpr std::size_t kFewest = 20;
   return std::min(kFewest, least());
 }

@@ -84,7 +84,7 @@ struct BagScan {
 [[nodiscard]] bool unpack_chunk(BagFormat format, const ByteSource& file, std::uint64_t offset,
                                 std::vector<std::uint8_t>* records);
 
-// What the containers do of scan_bag() and unpack_chunk().
+// The containers' parts of scan_bag() and unpack_chunk().
 //
 // MCAP (mcap.dev, specification version 0) front to back; neither index nor summary is believed or
 // needed. Chunks without compression are read 9 bytes a record and 22 a message; their check sums

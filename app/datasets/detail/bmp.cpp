@@ -35,7 +35,7 @@ std::uint8_t luminance(const std::uint8_t* bgr) noexcept {
   return static_cast<std::uint8_t>((114U * bgr[0] + 587U * bgr[1] + 299U * bgr[2] + 500U) / 1000U);
 }
 
-/// What the palette makes of its indices; without one they are grey.
+/// Grey levels of the palette's indices; without a palette the indices are grey levels.
 std::array<std::uint8_t, 256> palette_of(ImageBytes b) noexcept {
   std::array<std::uint8_t, 256> grey{};
   const std::size_t first = kFileHeader + u32(b, kHeaderSize), end = u32(b, kPixelsAt);

@@ -13,7 +13,7 @@ namespace vergence::app::detail {
 
 using ImageBytes = std::span<const std::uint8_t>;
 
-/// What is done with grey samples of 16 bits; of colours the upper 8 are taken.
+/// How grey samples of 16 bits become 8; colours keep their upper 8 bits.
 struct DeepSamples {
   int bits = 16;           // as narrowed()'s
   std::uint16_t peak = 0;  // set: the greatest sample; 0 where the file has other samples

@@ -37,7 +37,7 @@ std::vector<Sides> all_sides() {
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return c >= 'a' && c <= 'z'; }
 
-/// Whether `word` stands at `at` of a name in small letters as a word of its own: a number is
+/// True if `word` stands at `at` of a name in small letters as a word of its own: a number is
 /// whole, and a word of one letter has no letter beside it.
 bool stands_alone(std::string_view name, std::size_t at, std::string_view word) {
   const char before = at > 0 ? name[at - 1] : '/';

@@ -25,7 +25,7 @@ namespace vergence::app::detail {
 [[nodiscard]] std::optional<std::string> without_side(const std::string& name,
                                                       const std::string& word);
 
-/// Whether `a` stands before `b` where runs of digits count as numbers, whether they have leading
+/// True if `a` sorts before `b` where runs of digits count as numbers, whether they have leading
 /// zeros or not: `left/2.png` before `left/10.png`. A strict order: names of one number with and
 /// without zeros differ, the one with fewer digits first.
 [[nodiscard]] bool in_name_order(std::string_view a, std::string_view b) noexcept;
