@@ -6,7 +6,6 @@
 #include <new>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "core/estimator/detail/estimator_parts.hpp"
 
@@ -100,9 +99,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       p.state == State::stereo_odometry && p.options.online)
     p.doubt(CalibrationCause::requested, frame.number, frame);
 
-  if (p.relinked && std::exchange(p.superseded, false) && p.calibrator.verified())
-    p.notify_confirmed(frame.stamp);
-  p.odometry.trust_rig(!p.options.online || p.calibrator.verified());
+  p.odometry.trust_rig(!p.doubts.stands(Doubt::calibration));
   odometry::FrameOutcome out = p.odometry.process(frame, p.options.frame_budget);
   p.follow(out, frame);
   if (p.options.online) {
@@ -112,7 +109,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       if (!linked && (p.calibrator.seeking() || p.calibrator.monitor().scene_pending()))
         p.watch_sought(out, frame);
       // Of cameras out of step there is no calibration, also where no lag shows for a while.
-      if (p.out_of_step == 0 || p.state != State::stereo_odometry)
+      if (!p.doubts.stands(Doubt::out_of_step) || p.state != State::stereo_odometry)
         p.calibrator.frames().take(p.odometry, out, frame);
     }
   }
@@ -122,12 +119,16 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     if (out.renewed) p.calibrator.monitor().scene_renewed(p.odometry.map());
     p.calibrate(frame);
   }
-  p.settle_lag(out);
   sample.state = p.state;
-  p.grade(out, frame.pairing, &sample);
-  p.grade_window(out, &sample);
-  p.relinked = out.relinked;
-  if (out.posed) p.propagate(out, &sample);
+  sample.reason = out.reason;
+  if (out.posed) {
+    p.renew_doubts(out, frame.pairing);
+    p.propagate(out, &sample);
+    const DoubtLedger::Entry* why = p.doubts.strongest(p.moves);
+    sample.status = why == nullptr ? PoseStatus::ok : PoseStatus::degraded;
+    sample.reason = why == nullptr ? Reason::none : why->reason;
+    p.weaken_doubts(out, frame.stamp);
+  }
   sample.inliers = out.inliers;
   sample.stereo_inliers = out.stereo_inliers;
   sample.reprojection_px = out.reprojection_px;

@@ -62,39 +62,42 @@ const char* sentence_of(CalibrationCause cause) noexcept {
 
 }  // namespace
 
+/// Another calibration is sought: the rig has changed at `onset`, or is thought to have.
+void Estimator::Parts::seek(CalibrationCause cause, std::uint64_t onset,
+                            const RigFrame& frame) noexcept {
+  transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed,
+             frame.stamp);
+  calibrator.seek(cause, onset, frame.number);
+  doubts.enter(Doubt::rig, Reason::recalibrating, frame.number);
+  doubts.enter(Doubt::calibration, Reason::unverified_calibration, frame.number);
+  length_sigma_percent = kUnlinkedLengthPercent;
+  odometry.unlink();
+}
+
 void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset,
                              const RigFrame& frame) noexcept {
   note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause),
        static_cast<double>(frame.number - std::min(onset, frame.number)));
-  transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed,
-             frame.stamp);
-  calibrator.seek(cause, onset, frame.number);
-  verified = superseded = false;
-  length_sigma_percent = kUnlinkedLengthPercent;
-  odometry.unlink();
+  seek(cause, onset, frame);
 }
 
 /// Left and right hardly match with the calibration in use. One that the drive never confirmed was
 /// not the rig's from the start; one that it did was knocked away.
 void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames) noexcept {
   const CalibrationCause cause =
-      calibrator.ever_verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
+      calibrator.verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
   if (cause == CalibrationCause::collapse)
     note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause), frames);
   else
     note(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, sentence_of(cause), 0);
-  transition(Trigger::rig_changed, frame.stamp);
-  calibrator.seek(cause, frame.number, frame.number);
-  verified = superseded = false;
-  length_sigma_percent = kUnlinkedLengthPercent;
-  odometry.unlink();
+  seek(cause, frame.number, frame);
 }
 
 void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept {
-  if (out_of_step == 0)
+  if (!doubts.stands(Doubt::out_of_step))
     note(EstimatorEvent::Kind::rig_changed, stamp, sentence_of(CalibrationCause::out_of_step),
          lag_frames);
-  out_of_step = kInStepAfter;
+  doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, kInStepAfter);
   // Frames out of step would speak for a lag in the monitor's windows long after its end; those
   // logged for a calibration are dropped with them.
   calibrator.forget_frames();
@@ -104,17 +107,17 @@ void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorVerdict::Kind;
   const calibration::MonitorVerdict v =
-      calibrator.monitor().update(odometry, out, frame, may_lag > 0);
-  undecided = v.undecided;
+      calibrator.monitor().update(odometry, out, frame, doubts.stands(Doubt::late_image));
+  doubts.hold(Doubt::rig, v.undecided, Reason::recalibrating, frame.number);
   shows_no_lag = v.shows_no_lag;
   if (v.kind == K::out_of_step) {
     note_out_of_step(frame.stamp, v.lag_frames);
     return;
   }
-  if (out_of_step > 0) {
+  if (doubts.stands(Doubt::out_of_step)) {
     // A rig out of step fits no calibration: what else the monitor says is of no use until that is
     // over.
-    if (v.in_step && --out_of_step == 0) {
+    if (v.in_step && doubts.weaken(Doubt::out_of_step)) {
       note(EstimatorEvent::Kind::in_step, frame.stamp, "the cameras are in step again", 0);
       calibrator.forget_frames();
     }
@@ -168,37 +171,41 @@ void Estimator::Parts::note_length_sigma(const CalibrationDecision& decision) no
   if (!(decision.depth_sigma_percent > 0)) return;
   if (decision.accepted)
     length_sigma_percent = decision.depth_sigma_percent;
-  else if (odometry.linked() == odometry::Link::linked && verified)
+  else if (odometry.linked() == odometry::Link::linked && calibrator.verified())
     length_sigma_percent =
         std::hypot(decision.depth_sigma_percent, decision.depth_difference_percent);
 }
 
+/// A calibration is adopted. Poses stand on it once the scene is seen through it; until then what
+/// is known against the one before it counts.
+void Estimator::Parts::doubt_until_seen_through(const CalibrationDecision& decision) noexcept {
+  doubts.strike(Doubt::rig);
+  confirmed_percent = decision.depth_sigma_percent;
+  if (doubts.stands(Doubt::calibration) || !decision.verified ||
+      decision.cause == CalibrationCause::contradicted)
+    doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number,
+                 decision.verified ? 1 : DoubtLedger::kUntilStruck);
+  odometry.link(decision.calibration);
+}
+
 /// What the drive has measured of the rig while it went on.
 void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept {
-  if (calibrator.last_gate() == calibration::Gate::out_of_step) {
-    verified = calibrator.verified();
-    return note_out_of_step(stamp, 0);
-  }
-  if (decision.cause == CalibrationCause::contradicted && !verified)
+  if (calibrator.last_gate() == calibration::Gate::out_of_step) return note_out_of_step(stamp, 0);
+  if (decision.cause == CalibrationCause::contradicted && doubts.stands(Doubt::calibration))
     note(EstimatorEvent::Kind::calibration_contradicted, stamp,
          "the calibration in use is not that of the rig", decision.depth_difference_percent);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
          decision.calibration.frames);
     calibrator.refine(decision.calibration);
-    odometry.link(decision.calibration);
-    superseded = decision.cause == CalibrationCause::contradicted;
-    undecided = false;
+    doubt_until_seen_through(decision);
+  } else if (decision.verified && doubts.stands(Doubt::calibration)) {
+    doubts.strike(Doubt::calibration);
+    confirmed_percent = decision.depth_sigma_percent;
+    notify_confirmed(stamp);
+  } else if (!calibrator.verified() && !doubts.stands(Doubt::calibration)) {
+    doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number);
   }
-  notify_verified(decision, stamp);
-}
-
-void Estimator::Parts::notify_verified(const CalibrationDecision& decision, Stamp stamp) noexcept {
-  const bool was_verified = std::exchange(verified, calibrator.verified());
-  if (!verified || was_verified) return;
-  unconfirmed = false;
-  confirmed_percent = decision.depth_sigma_percent;
-  if (!superseded) notify_confirmed(stamp);
 }
 
 void Estimator::Parts::notify_confirmed(Stamp stamp) noexcept {
@@ -220,11 +227,9 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
          decision.calibration.frames);
-    calibrator.use(decision.calibration, decision.lenses);
-    odometry.link(decision.calibration);
-    undecided = false;
+    calibrator.use(decision);
+    doubt_until_seen_through(decision);
     transition(Trigger::calibration_accepted, stamp);
-    notify_verified(decision, stamp);
     return;
   }
   note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason,
@@ -232,11 +237,12 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
   switch (calibrator.last_gate()) {
     case calibration::Gate::no_better:
       calibrator.keep();
+      doubts.strike(Doubt::rig);
       odometry.link(calibrator.in_use());
       transition(Trigger::calibration_kept, stamp);
       break;
     case calibration::Gate::out_of_step:
-      out_of_step = kInStepAfter;
+      doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, kInStepAfter);
       [[fallthrough]];
     default:
       transition(Trigger::calibration_rejected, stamp);

@@ -1,5 +1,6 @@
 #include "core/estimator/detail/estimator_parts.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 /// States and the status of poses.
@@ -12,6 +13,13 @@ constexpr int kUnmatchedAfter = 15;
 // Frames after an image that came twice that would show that camera an exposure behind from then
 // on, before it is believed not to be: the monitor needs nine.
 constexpr int kLagShownAfter = 12;
+// Frames marked after the map was rebuilt.
+constexpr int kRestartedFrames = 10;
+// Frames for which a scene that moves is told of, the first one included: what drives past looks
+// like the scene for single frames.
+constexpr int kMovingFrames = 10;
+// Frames of a window, by the default of odometry.window_keyframes: at speed each is a keyframe.
+constexpr int kWindowFrames = 10;
 
 Covariance6 upper_triangle(const Mat6& C) noexcept {
   Covariance6 out;
@@ -31,7 +39,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
          "no frame for longer than motion can be predicted", out.gap_s);
   in_gap = out.gap_s > 0 && !out.posed;
   // Images of two instants match by no calibration: cameras out of step say nothing against it.
-  const bool unmatched = !out.posed && out.images_good && out_of_step == 0 &&
+  const bool unmatched = !out.posed && out.images_good && !doubts.stands(Doubt::out_of_step) &&
                          out.reason == Reason::no_stereo_matches &&
                          odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
@@ -41,7 +49,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     odometry.reset_extrinsics();
   }
   if (out.uneven) {
-    may_lag = kLagShownAfter;
+    doubts.enter(Doubt::late_image, Reason::image_repeated, frame.number, kLagShownAfter);
     // Frames from before and frames out of step would be one solve, and a rig that is neither's.
     if (calibrator.seeking()) seek_anew(std::nullopt, frame.number, frame);
   }
@@ -50,14 +58,14 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);
-      calibrator.scene_lost();
-      verified = calibrator.verified();
+      lose_track_of_rig(frame.number);
     }
     return;
   }
   without_pose = 0;
   if (out.resumed && calibrator.seeking()) {
     calibrator.keep();
+    doubts.strike(Doubt::rig);
     note(EstimatorEvent::Kind::calibration_resumed, frame.stamp,
          "the calibration from before fits the images again", 0);
   }
@@ -74,18 +82,19 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   if (out.restarted) {
     note(EstimatorEvent::Kind::scene_restarted, frame.stamp,
          "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
-    calibrator.scene_lost();
-    verified = calibrator.verified();
+    lose_track_of_rig(frame.number);
   }
   if (out.relocalised)
     note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points",
          0);
 }
 
-/// A rig that stands, or creeps, looks the same with a camera an exposure behind: such frames say
-/// nothing about it.
-void Estimator::Parts::settle_lag(const odometry::FrameOutcome& out) noexcept {
-  if (may_lag > 0 && shows_no_lag && !out.uneven) --may_lag;
+/// Frames were missed in which nobody watched the rig: the drive has to confirm the calibration
+/// again.
+void Estimator::Parts::lose_track_of_rig(std::uint64_t number) noexcept {
+  calibrator.scene_lost();
+  if (options.online && !doubts.stands(Doubt::calibration))
+    doubts.enter(Doubt::calibration, Reason::unverified_calibration, number);
 }
 
 /// Covariance of the motion since the last pose.
@@ -93,12 +102,12 @@ Mat6 Estimator::Parts::motion_of(const odometry::FrameOutcome& out) const noexce
   return odometry::motion_covariance(out.fit_covariance, out.expected, out.unseen_s);
 }
 
-/// The frame's pose, how uncertain it is by now, and its status by how uncertain its motion is.
+/// The frame's pose, and how uncertain it is by now.
 void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept {
   sample->T_world_left = out.T_left_world.inverse();
   const double length_sigma = 0.01 * length_sigma_percent;
   const Mat6 motion = motion_of(out);
-  grade_motion(out, motion, drift.motion_to(out.T_left_world).t.norm(), sample);
+  doubt_motion(out, motion, drift.motion_to(out.T_left_world).t.norm());
   const Mat6 told = motion + odometry::correction_covariance(out.corrected);
   drift.step(out.T_left_world, told, length_sigma, out.keyframe);
   sample->covariance = upper_triangle(drift.pose());
@@ -109,67 +118,56 @@ void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* 
 
 /// Against the drive's other motions and what the window made of it, where nothing else is known to
 /// be wrong.
-void Estimator::Parts::grade_motion(const odometry::FrameOutcome& out, const Mat6& motion,
-                                    double step_m, PoseSample* sample) noexcept {
-  const bool doubted = out_of_step > 0 || may_lag > 0 || undecided || state == State::recalibrating;
+void Estimator::Parts::doubt_motion(const odometry::FrameOutcome& out, const Mat6& motion,
+                                    double step_m) noexcept {
+  doubts.strike(Doubt::motion);
+  if (doubts.any_up_to(Doubt::rig) || doubts.stands(Doubt::moving_scene)) return;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
-  if (out.status != PoseStatus::ok || doubted) return;
   const WindowCorrection correction{out.corrected.t.norm(), step_m, sigma_m};
   const bool unusual = usual.judges(step_m, sigma_m) && usual.unusual(sigma_m);
-  if (!unusual && !correction.spoils_motion()) return;
-  if (sample->status != PoseStatus::ok) return;
-  sample->status = PoseStatus::degraded;
-  sample->reason = Reason::weak_geometry;
+  doubts.hold(Doubt::motion, unusual || correction.spoils_motion(), Reason::weak_geometry,
+              last_number);
 }
 
-/// What the state of the calibration makes of a pose's status.
-void Estimator::Parts::grade(const odometry::FrameOutcome& out, Pairing pairing,
-                             PoseSample* sample) const noexcept {
-  sample->status = out.posed ? out.status : PoseStatus::lost;
-  sample->reason = out.reason;
-  if (!out.posed) return;
-  if (pairing == Pairing::contradicted && sample->status != PoseStatus::lost) {
-    sample->status = PoseStatus::degraded;
-    sample->reason = Reason::unproven_pairing;
-  } else if (sample->status == PoseStatus::ok && out_of_step > 0) {
-    sample->status = PoseStatus::degraded;
-    sample->reason = Reason::out_of_step;
-  } else if (sample->status == PoseStatus::ok && may_lag > 0 && moves) {
-    // Of a pose that stands there is nothing to be wrong by an exposure.
-    sample->status = PoseStatus::degraded;
-    sample->reason = Reason::image_repeated;
-  } else if (sample->status == PoseStatus::ok && (undecided || state == State::recalibrating)) {
-    sample->status = PoseStatus::degraded;
-    sample->reason = Reason::recalibrating;
-  } else if (options.online && (superseded || !calibrator.verified()) &&
-             (sample->status == PoseStatus::ok || (sample->reason == Reason::moving_scene &&
-                                                   odometry.linked() == odometry::Link::linked))) {
-    // Points are lost by a calibration that does not fit as they are by what moves.
-    sample->status = PoseStatus::degraded;
-    sample->reason = unconfirmed ? Reason::unconfirmed : Reason::unverified_calibration;
-  } else if (out.reason == Reason::uncalibrated) {
-    sample->reason = why_uncalibrated();
-  }
+/// What a posed frame gives to doubt.
+void Estimator::Parts::renew_doubts(const odometry::FrameOutcome& out, Pairing pairing) noexcept {
+  doubts.hold(Doubt::pairing, pairing == Pairing::contradicted, Reason::unproven_pairing,
+              last_number);
+  if (out.restarted)
+    doubts.enter(Doubt::scene, Reason::scene_restarted, last_number, kRestartedFrames + 1);
+  doubts.hold(Doubt::frame, out.status != PoseStatus::ok,
+              out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason, last_number);
+  if (state == State::recalibrating) doubts.enter(Doubt::rig, Reason::recalibrating, last_number);
+  if (out.moving && !doubts.any_up_to(Doubt::rig))
+    doubts.enter(Doubt::moving_scene, Reason::moving_scene, last_number, kMovingFrames);
+  // What was wrong for some frames stays in the window's keyframes and points when it is over: the
+  // window takes it back over the next frames, and their motions are off by it. So as many frames
+  // as were doubted are doubted again, of a window at most.
+  if (out.relinked || out.restarted)
+    doubts.strike(Doubt::window);
+  else if (out.gap_s > 0 || out.renewed)
+    doubts.enter(Doubt::window, Reason::time_gap, last_number, kWindowFrames + 1);
+  else if (doubts.stands(Doubt::rig))
+    doubts.enter(Doubt::window, Reason::recalibrating, last_number,
+                 std::min(doubts[Doubt::window].left + 2, kWindowFrames + 1));
 }
 
-/// What was wrong in the frames before makes of the status of one about which nothing is.
-void Estimator::Parts::grade_window(const odometry::FrameOutcome& out,
-                                    PoseSample* sample) noexcept {
-  if (!out.posed) return;
-  if (out.relinked || out.restarted) return window_doubt.clear();
-  if (out.gap_s > 0 || out.renewed) return window_doubt.add(Reason::time_gap, WindowDoubt::kWindow);
-  if (undecided || state == State::recalibrating) return window_doubt.add(Reason::recalibrating, 1);
-  const Reason why = window_doubt.next();
-  if (why == Reason::none || sample->status != PoseStatus::ok) return;
-  sample->status = PoseStatus::degraded;
-  sample->reason = why;
+/// What a posed frame says against the doubts that stood for it.
+void Estimator::Parts::weaken_doubts(const odometry::FrameOutcome& out, Stamp stamp) noexcept {
+  for (const Doubt doubt : {Doubt::scene, Doubt::moving_scene, Doubt::window})
+    (void)doubts.weaken(doubt);
+  // A rig that stands, or creeps, looks the same with a camera an exposure behind: such frames say
+  // nothing about it.
+  if (shows_no_lag && !out.uneven) (void)doubts.weaken(Doubt::late_image);
+  // The next pose stands on the calibration that was adopted.
+  if (out.relinked && doubts.weaken(Doubt::calibration)) notify_confirmed(stamp);
 }
 
 /// What a pose of cameras that are not linked says of its calibration: the most particular that is
 /// known.
 Reason Estimator::Parts::why_uncalibrated() const noexcept {
   if (calibrator.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
-  if (out_of_step > 0) return Reason::out_of_step;
+  if (doubts.stands(Doubt::out_of_step)) return Reason::out_of_step;
   if (calibrator.missing() != Reason::none) return calibrator.missing();
   return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated
                                                                            : Reason::recalibrating;

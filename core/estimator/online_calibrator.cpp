@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/calibration/posterior.hpp"
 #include "core/estimator/detail/solution_review.hpp"
@@ -45,32 +46,34 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
     : options_(options),
       rig_(rig),
       nominal_(nominal),
-      calibrated_(options.trust != CalibrationTrust::none),
+      state_(options.trust == CalibrationTrust::none ? CalibrationState::none
+                                                     : CalibrationState::unverified),
       frames_(options.calibration, most_tracks(options), arena),
       solve_(options, rig, most_tracks(options), arena, solver),
       monitor_(options.monitor, rig.cameras, most_tracks(options), arena) {
-  if (!calibrated_) return;
+  if (!calibrated()) return;
   monitor_.watch(rig_, false);
   monitor_.set_jump_reference(rig_);
   frames_.begin_segment();
   frames_.want(frames_.fewest());
 }
 
-void OnlineCalibrator::use(const RigCalibration& rig, bool lenses) noexcept {
-  rig_ = rig;
-  calibrated_ = true;
+void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
+  state_ = after(
+      state_, found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
+  rig_ = found.calibration;
   source_ = calibration::ClaimSource::this_drive;
-  found_with_lenses_ = lenses;
-  keep();
+  found_with_lenses_ = found.lenses;
+  forget_rig(&learnt_);
+  monitor_.expect_rebuilt_scene();
+  frames_.begin_segment();
 }
 
 void OnlineCalibrator::keep() noexcept {
+  state_ = after(state_, CalibrationTrigger::kept);
+  // What was learnt before the rig was doubted is no witness of it as it is.
+  if (search_.cause != CalibrationCause::requested) forget_rig(&learnt_);
   monitor_.expect_rebuilt_scene();
-  // What was learnt before the rig was doubted, or before an outage, is no witness of it as it is.
-  if (search_.cause != CalibrationCause::requested || !(watched_ || learnt_since_outage_))
-    forget_rig(&learnt_);
-  watched_ = true;
-  seeking_ = false;
   frames_.begin_segment();
 }
 
@@ -82,7 +85,7 @@ void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
 }
 
 void OnlineCalibrator::scene_rebuilt(const odometry::Odometry& odometry) noexcept {
-  monitor_.scene_rebuilt(odometry.map(), rig_, verified_ && found());
+  monitor_.scene_rebuilt(odometry.map(), rig_, verified() && found());
 }
 
 void OnlineCalibrator::forget_frames() noexcept {
@@ -92,7 +95,7 @@ void OnlineCalibrator::forget_frames() noexcept {
 }
 
 void OnlineCalibrator::scene_lost() noexcept {
-  watched_ = learnt_since_outage_ = false;
+  forget_rig(&learnt_);
   forget_frames();
   monitor_.scene_lost();
 }
@@ -100,8 +103,7 @@ void OnlineCalibrator::scene_lost() noexcept {
 void OnlineCalibrator::seek(std::optional<CalibrationCause> cause, std::uint64_t onset,
                             std::uint64_t now) noexcept {
   search_ = {.cause = cause.value_or(search_.cause), .onset = onset, .since = now};
-  seeking_ = true;
-  verified_ = false;
+  state_ = after(state_, CalibrationTrigger::doubted);
   gate_ = Gate::open;
   solve_.discard();
   frames_.begin_segment(onset);
@@ -110,29 +112,26 @@ void OnlineCalibrator::seek(std::optional<CalibrationCause> cause, std::uint64_t
 }
 
 Reason OnlineCalibrator::missing() const noexcept {
-  if (!seeking_) return Reason::none;
+  if (!seeking()) return Reason::none;
   if (frames_.standing() || gate_ == Gate::needs_motion) return Reason::needs_motion;
   return gate_ == Gate::needs_near_structure ? Reason::needs_near_structure : Reason::none;
 }
 
-bool OnlineCalibrator::can_solve() const noexcept {
-  return (seeking_ || calibrated_) && !solve_.running() && frames_.enough();
-}
+bool OnlineCalibrator::can_solve() const noexcept { return !solve_.running() && frames_.enough(); }
 
 void OnlineCalibrator::start_solve() noexcept {
   frames_.solve_begun();
   BackgroundSolve::Start start;
   start.rig = rig_;
-  start.from_rig = !seeking_;
-  start.sought = seeking_;
+  start.from_rig = !seeking();
+  start.sought = seeking();
   RigCalibration prior;
   if (learnt_) {
     prior = *learnt_;
     start.prior = &prior;
     const calibration::TrackLog& log = frames_.log();
     const double hours = (log.frame(log.size() - 1).stamp - prior.found).to_seconds() / 3600.0;
-    // What was learnt before an outage is no witness that nobody knocked the rig in it.
-    if (seeking_ || !(watched_ || learnt_since_outage_))
+    if (seeking())
       calibration::forget_transforms(&prior);
     else
       calibration::let_drift(hours, options_.calibration, &prior);
@@ -144,11 +143,11 @@ SolutionReview OnlineCalibrator::review(bool last) const noexcept {
   return {solve_.solved(),
           {.options = options_,
            .nominal = nominal_,
-           .in_use = calibrated_ ? &rig_ : nullptr,
+           .in_use = calibrated() ? &rig_ : nullptr,
            .source = source_,
            .log = frames_.log(),
            .focal = solve_.focal_check(),
-           .may_have_changed = !(seeking_ && search_.change_believed),
+           .may_have_changed = !(seeking() && search_.change_believed),
            .last = last}};
 }
 
@@ -158,11 +157,11 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
   if (!solve_.running() || !solve_.next_frame()) return std::nullopt;
   // Frames that stand are not logged: who stops then waits with the decision, for frames that were
   // not used have to speak for it.
-  if (!solve_.outdated(seeking_) && !review(false).held_out_enough()) return std::nullopt;
+  if (!solve_.outdated(seeking()) && !review(false).held_out_enough()) return std::nullopt;
   // What is sought is adopted as soon as the frames after it confirm it; it is rejected only when
   // more of them would not help. What is learnt beside a calibration in use waits for no more than
   // it is judged by.
-  if (solve_.sought() && !solve_.outdated(seeking_) && !solve_.last_turn()) {
+  if (solve_.sought() && !solve_.outdated(seeking()) && !solve_.last_turn()) {
     const SolutionReview now = review(false);
     if (now.gate(now.sought()) != Gate::open) {
       solve_.postpone();
@@ -180,7 +179,7 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide_now(Stamp stamp,
 }
 
 bool OnlineCalibrator::start_last_solve() noexcept {
-  const bool more = seeking_ || frames_.new_since_solve();
+  const bool more = seeking() || frames_.new_since_solve();
   if (solve_.running() || !more || !frames_.enough_for_any()) return false;
   start_solve();
   return true;
@@ -189,7 +188,7 @@ bool OnlineCalibrator::start_last_solve() noexcept {
 std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uint64_t number,
                                                            bool last) noexcept {
   solve_.close();
-  if (solve_.outdated(seeking_)) return std::nullopt;
+  if (solve_.outdated(seeking())) return std::nullopt;
   const SolutionReview now = review(last);
   // Frames of two rigs, or out of step, tell no focal length.
   const Gate gate = now.gate(now.measured(), false);
@@ -210,13 +209,7 @@ CalibrationDecision OnlineCalibrator::judge_sought(const SolutionReview& review,
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
   review.assess_next(found.rig, &d);
-  if (d.accepted) {
-    forget_rig(&learnt_);
-    verified_ = d.verified;
-    ever_verified_ = ever_verified_ || verified_;
-  } else {
-    plan_search(found);
-  }
+  if (!d.accepted) plan_search(found);
   return d;
 }
 
@@ -243,16 +236,15 @@ void OnlineCalibrator::plan_search(const RigSolution& found) noexcept {
 }
 
 /// The claim in use is confirmed, or is no more: the monitor expects as much of it.
-void OnlineCalibrator::set_verified(bool verified, double misfit_px) noexcept {
-  if (verified == verified_) return;
-  verified_ = verified;
-  ever_verified_ = ever_verified_ || verified;
+void OnlineCalibrator::learnt_of_it(CalibrationTrigger what, double misfit_px) noexcept {
+  const CalibrationState before = std::exchange(state_, after(state_, what));
+  if (state_ == before) return;
   // A claim that is confirmed keeps its lens, and what that leaves differs from place to place.
   if (found())
-    monitor_.watch(rig_, verified_);
+    monitor_.watch(rig_, verified());
   else
-    monitor_.expect_scatter(verified_ ? std::max(options_.monitor.found_bias_px, misfit_px)
-                                      : options_.monitor.claimed_bias_px);
+    monitor_.expect_scatter(verified() ? std::max(options_.monitor.found_bias_px, misfit_px)
+                                       : options_.monitor.claimed_bias_px);
 }
 
 CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review, Stamp stamp,
@@ -285,9 +277,10 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
                      ? certain
                      : a.confirmed && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
     d.verified = d.verified && !d.focal.contradicted;
-    if (d.verified || a.contradicted || d.focal.contradicted)
-      set_verified(d.verified, misfit_px(d));
-    watched_ = watched_ || d.verified;
+    if (d.verified)
+      learnt_of_it(CalibrationTrigger::confirmed, misfit_px(d));
+    else if (a.contradicted || d.focal.contradicted)
+      learnt_of_it(CalibrationTrigger::contradicted, misfit_px(d));
   }
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
@@ -305,10 +298,7 @@ void OnlineCalibrator::plan_learning(const RigSolution& found) noexcept {
   } else if (gate_ == Gate::rig_changed) {
     frames_.begin_segment(found.changed_at);
   } else if (frames_.solved_frames() >= frames_.most()) {
-    if (usable) {
-      learnt_ = found.rig;
-      learnt_since_outage_ = true;
-    }
+    if (usable) learnt_ = found.rig;
     frames_.begin_segment(found.newest + 1);
     frames_.want_full();
   } else {

@@ -4,6 +4,7 @@
 #include "core/calibration/gates.hpp"
 #include "core/estimator/background_solve.hpp"
 #include "core/estimator/calibration_frames.hpp"
+#include "core/estimator/calibration_states.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/estimator/rig_monitor.hpp"
 
@@ -13,7 +14,8 @@ class SolutionReview;
 
 /// The rig's calibration while it drives (METHOD §3, §6): collects frames, watches that they fit,
 /// has calibrations solved beside the frames and decides about them. The estimator reports what
-/// was posed and follows its advice; states are the estimator's.
+/// was posed and follows its advice. What is known of the calibration in use is a state of the
+/// table in calibration_states.hpp; the states of the odometry are the estimator's.
 ///
 /// Two things are solved for. *Seeking*: there is no calibration, or the one in use is doubted;
 /// frames since the onset, until one passes the gates. *Learning*: all the time else; what the
@@ -24,7 +26,7 @@ class SolutionReview;
 ///     calibrator.frames().take(odometry, out, frame);  // every posed frame
 ///     if (calibrator.can_solve()) calibrator.start_solve();
 ///     if (const auto decision = calibrator.decide(frame.stamp, frame.number))
-///       if (decision->accepted) calibrator.use(decision->calibration, decision->lenses);
+///       if (decision->accepted) calibrator.use(*decision);
 ///
 /// Threads one, but for the solver's task. Memory from the arena at construction.
 class OnlineCalibrator {
@@ -43,7 +45,9 @@ class OnlineCalibrator {
   /// forgotten, and so is a solve of them that is still under way. No cause: that of the search
   /// before.
   void seek(std::optional<CalibrationCause> cause, std::uint64_t onset, std::uint64_t now) noexcept;
-  [[nodiscard]] bool seeking() const noexcept { return seeking_; }
+  [[nodiscard]] bool seeking() const noexcept {
+    return state_ == CalibrationState::none || state_ == CalibrationState::suspect;
+  }
   /// There are frames enough to solve from and no solve is under way.
   [[nodiscard]] bool can_solve() const noexcept;
   /// Takes a snapshot and starts the solver on it.
@@ -69,22 +73,18 @@ class OnlineCalibrator {
   /// Frames until now say nothing about the rig from here on: monitors and log begin again, the
   /// calibration in use stays.
   void forget_frames() noexcept;
-  /// The scene was lost: what is logged does not go on.
+  /// The scene was lost: what is logged does not go on, and what was learnt of the rig is no
+  /// witness that nobody knocked it meanwhile.
   void scene_lost() noexcept;
-  /// The calibration in use is this one, which the drive has found; `lenses`: with them.
-  void use(const RigCalibration& rig, bool lenses) noexcept;
-  /// The same while learning goes on: the frames stay.
+  /// The calibration in use is the one of this decision, which was sought.
+  void use(const CalibrationDecision& found) noexcept;
+  /// The same of one that was learnt: the frames stay.
   void refine(const RigCalibration& rig) noexcept;
   /// The one in use goes on: what was sought is no better.
   void keep() noexcept;
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
-  [[nodiscard]] bool calibrated() const noexcept { return calibrated_; }
-  /// The drive itself has confirmed the calibration in use (METHOD §6.4).
-  /// After an outage it has to confirm it again, from frames since then alone: epipolar lines,
-  /// which a few frames are enough for, do not show a yaw.
-  [[nodiscard]] bool verified() const noexcept { return verified_ && watched_; }
-  /// It has confirmed one before: what does not fit since then is a change of the rig.
-  [[nodiscard]] bool ever_verified() const noexcept { return ever_verified_; }
+  [[nodiscard]] bool calibrated() const noexcept { return state_ != CalibrationState::none; }
+  [[nodiscard]] bool verified() const noexcept { return state_ == CalibrationState::verified; }
 
  private:
   /// What a calibration is sought for, and how that goes.
@@ -96,8 +96,8 @@ class OnlineCalibrator {
     int rejections = 0;            // for other reasons than a want of frames
   };
 
-  /// `misfit_px`: how far off its epipolar lines are.
-  void set_verified(bool verified, double misfit_px) noexcept;
+  /// `misfit_px`: how far off the epipolar lines of the one in use are.
+  void learnt_of_it(CalibrationTrigger what, double misfit_px) noexcept;
   /// The calibration in use was solved from images, this drive's or an earlier one's, and its
   /// lenses with it: its epipolar lines hold better than those of a claim.
   [[nodiscard]] bool found() const noexcept { return !rig_.covariance.empty(); }
@@ -115,18 +115,13 @@ class OnlineCalibrator {
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;
-  bool calibrated_;
-  bool verified_ = false, ever_verified_ = false;
-  bool watched_ = true;  // frames have been watched without an outage since what is in use was
-                         // confirmed
+  CalibrationState state_;
   calibration::ClaimSource source_ = calibration::ClaimSource::elsewhere;
   bool found_with_lenses_ = false;
   std::optional<RigCalibration> learnt_;  // what closed segments show, with the lenses free
-  bool learnt_since_outage_ = false;      // its transforms are of segments after the last outage
   CalibrationFrames frames_;
   BackgroundSolve solve_;
   RigMonitor monitor_;
-  bool seeking_ = false;
   Search search_;
   calibration::Gate gate_ = calibration::Gate::open;
 };

@@ -131,11 +131,11 @@ double Odometry::new_points(int at_least, FrameOutcome* out) noexcept {
 
 void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept {
   out->status = PoseStatus::degraded;
-  const bool moving = moving_.judge(fit.inliers < kRigidShare * fit.given, link_ == Link::linked);
+  // New points are made by the calibration, and without one they say nothing.
+  out->moving =
+      fit.inliers < kRigidShare * fit.given || (link_ == Link::linked && new_points_.lost());
   const Reason of_images = weakness(images, rig_.cameras);
-  if (restart_cooldown_ > 0)
-    out->reason = Reason::scene_restarted;
-  else if (of_images != Reason::none)
+  if (of_images != Reason::none)
     out->reason = of_images;
   else if (out->gap_s > 0 || gaps_.renewal_due())
     out->reason = Reason::time_gap;
@@ -145,10 +145,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome*
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
     out->reason = Reason::few_inliers;
-  else if (moving) {
-    out->reason = Reason::moving_scene;
-    moving_.tell();
-  } else if (fit.near < kNearEnough)
+  else if (fit.near < kNearEnough)
     out->reason = Reason::weak_geometry;
   else if (link_ == Link::unlinked)
     out->reason = Reason::uncalibrated;
@@ -225,7 +222,6 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     out.effort.points_percent = effort.points_percent;
     (void)new_points(kTrialPoints, &out);
   }
-  if (restart_cooldown_ > 0) --restart_cooldown_;
   return out;
 }
 

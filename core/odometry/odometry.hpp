@@ -6,7 +6,7 @@
 #include "core/odometry/gap_watch.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/motion_model.hpp"
-#include "core/odometry/moving_scene.hpp"
+#include "core/odometry/new_point_watch.hpp"
 #include "core/odometry/pose_estimator.hpp"
 #include "core/odometry/rig_initialiser.hpp"
 #include "core/odometry/window.hpp"
@@ -42,6 +42,7 @@ struct FrameOutcome {
   double gap_s = 0;          // time since the frame before, when it was too long to predict over
   std::uint8_t structured = 0;  // bit k: camera k gave an image that shows something new
   bool images_good = false;     // every camera gave an image, new and with structure
+  bool moving = false;          // what is seen is not one rigid scene, or not the one posed by
   bool uneven = false;  // a camera gave an older image again and another a new one: from here on
                         // the one may be an exposure behind
   double scale =
@@ -168,16 +169,15 @@ class Odometry {
   RigInitialiser initialiser_;
   MotionModel motion_;
   GapWatch gaps_;
-  MovingScene moving_;
+  NewPointWatch new_points_;
 
   int frames_lost_ = 0;        // in a row, with images that show something
   bool stereo_fails_ = false;  // hardly any of the points that the other cameras saw before are
                                // where they should be in this frame
   // There are candidates, made to be tried, that belong to no keyframe; where they begin.
   std::optional<std::size_t> cursor_before_trial_;
-  int frames_untried_ = 0;    // since new points were tried
-  int restart_cooldown_ = 0;  // frames still marked after a restart
-  int keyframe_points_ = 0;   // active points when the last keyframe was made
+  int frames_untried_ = 0;   // since new points were tried
+  int keyframe_points_ = 0;  // active points when the last keyframe was made
 };
 
 }  // namespace vergence::odometry

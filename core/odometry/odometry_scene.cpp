@@ -16,8 +16,7 @@ using detail::weakness;
 
 namespace {
 
-constexpr int kRestartedFrames = 10;  // frames marked after the scene was rebuilt
-constexpr int kStartMatches = 30;     // points across to find the rig's transform from
+constexpr int kStartMatches = 30;  // points across to find the rig's transform from
 
 constexpr double kWorstDirection = 0.1;  // rad, of t, to start from
 constexpr double kWorstRotation = 0.01;  // rad
@@ -64,7 +63,7 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   else {
     map_.clear();
     front_end_.add_points(T_left_world, PointStage::active, &map_);
-    moving_.forget_points();
+    new_points_.forget();
     gaps_.forget();
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
@@ -117,9 +116,6 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
     out->restarted = true;
     out->gap_s = dt;
     out->expect(dt, predicted * motion_.T_left_world().inverse());
-    restart_cooldown_ = kRestartedFrames;
-    out->status = PoseStatus::degraded;
-    out->reason = Reason::scene_restarted;
   }
   out->T_left_world = predicted;
   motion_.assume(predicted, frame.stamp);

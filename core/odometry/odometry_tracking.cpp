@@ -204,7 +204,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     else if (p.missed > kMissesAllowed)
       p.stage = PointStage::dormant;
   }
-  moving_.add(tried, kept);
+  new_points_.add(tried, kept);
   frames_untried_ = tried > 0 ? 0 : frames_untried_ + 1;
   if (cursor_before_trial_) map_.rewind(*cursor_before_trial_);
   cursor_before_trial_.reset();

@@ -4,7 +4,7 @@
 
 #include "core/estimator/detail/usual_spread.hpp"
 #include "core/estimator/detail/window_correction.hpp"
-#include "core/estimator/detail/window_doubt.hpp"
+#include "core/estimator/doubts.hpp"
 #include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
@@ -26,8 +26,13 @@ struct Estimator::Parts {
         calibrator(options, r, nominal, arena, solver),
         length_sigma_percent(o.trust == CalibrationTrust::none
                                  ? kUnlinkedLengthPercent
-                                 : o.calibration.tolerated_depth_percent),
-        unconfirmed(o.trust == CalibrationTrust::unconfirmed) {}
+                                 : o.calibration.tolerated_depth_percent) {
+    if (!options.online) return;
+    doubts.enter(Doubt::calibration,
+                 o.trust == CalibrationTrust::unconfirmed ? Reason::unconfirmed
+                                                          : Reason::unverified_calibration,
+                 0);
+  }
 
   void transition(Trigger trigger, Stamp stamp) noexcept {
     const Transition* t = find_transition(state, trigger);
@@ -51,7 +56,7 @@ struct Estimator::Parts {
     (void)events.push(e);
   }
 
-  void settle_lag(const odometry::FrameOutcome& out) noexcept;
+  void lose_track_of_rig(std::uint64_t number) noexcept;
   [[nodiscard]] Mat6 motion_of(const odometry::FrameOutcome& out) const noexcept;
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void note_length_sigma(const CalibrationDecision& decision) noexcept;
@@ -64,15 +69,15 @@ struct Estimator::Parts {
   void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void doubt_until_seen_through(const CalibrationDecision& decision) noexcept;
+  void seek(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
   void take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept;
-  void notify_verified(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void notify_confirmed(Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void notify_missing(Stamp stamp) noexcept;
-  void grade(const odometry::FrameOutcome& out, Pairing pairing, PoseSample* sample) const noexcept;
-  void grade_window(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
-  void grade_motion(const odometry::FrameOutcome& out, const Mat6& motion, double step_m,
-                    PoseSample* sample) noexcept;
+  void renew_doubts(const odometry::FrameOutcome& out, Pairing pairing) noexcept;
+  void doubt_motion(const odometry::FrameOutcome& out, const Mat6& motion, double step_m) noexcept;
+  void weaken_doubts(const odometry::FrameOutcome& out, Stamp stamp) noexcept;
   [[nodiscard]] Reason why_uncalibrated() const noexcept;
 
   EstimatorOptions options;
@@ -80,23 +85,16 @@ struct Estimator::Parts {
   OnlineCalibrator calibrator;
   odometry::DriftCovariance drift{};
   UsualSpread usual{};
-  WindowDoubt window_doubt{};
+  DoubtLedger doubts{};
   double length_sigma_percent;  // of all lengths, by what is known of the calibration in use
   State state = State::initialising;
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
-  bool unconfirmed;                 // the calibration in use is the last drive's
-  bool undecided = false;           // something is wrong with the rig, and not yet told what
-  bool verified = false;            // the calibration in use, as far as has been told
   double confirmed_percent = 0;     // depth error of the calibration that was confirmed
-  bool relinked = false;            // the frame before took up the calibration that was adopted
   bool focal_contradicted = false;  // and noted
-  bool superseded = false;          // poses still are of a calibration that was contradicted
-  int out_of_step = 0;              // frames for which that is still believed
-  int may_lag = 0;  // a camera may be an exposure behind until so many frames have shown it is not
-  bool shows_no_lag = false;  // this frame
-  bool moves = false;         // this frame's pose, for all that is known of it
+  bool shows_no_lag = false;        // this frame
+  bool moves = false;               // this frame's pose, for all that is known of it
   int without_pose = 0;
   bool in_gap = false;       // and the last event has said so
   int unmatched_frames = 0;  // in a row

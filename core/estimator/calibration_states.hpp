@@ -1,0 +1,60 @@
+#pragma once
+#include <array>
+#include <cstdint>
+
+namespace vergence {
+
+/// What is known of the calibration in use.
+enum class CalibrationState : std::uint8_t {
+  none,        // there is none; one is sought
+  unverified,  // in use, and the drive has not confirmed it
+  verified,    // in use, and the drive has confirmed its depths to the tolerated error
+  suspect,     // the rig seems to have changed; another one is sought
+};
+
+/// What can happen to it.
+enum class CalibrationTrigger : std::uint8_t {
+  adopted,           // what was sought is found
+  adopted_verified,  // the same, by a drive that holds its depths to the tolerated error
+  confirmed,         // by the drive, while it was in use
+  contradicted,      // the same
+  doubted,           // an alarm, or the user wants another one
+  kept,              // what was sought is no better, or the images fit the one before again
+};
+
+struct CalibrationTransition {
+  CalibrationState from;
+  CalibrationTrigger on;
+  CalibrationState to;
+};
+
+/// All edges there are; any other trigger changes nothing.
+inline constexpr std::array kCalibrationTransitions = {
+    CalibrationTransition{CalibrationState::none, CalibrationTrigger::adopted,
+                          CalibrationState::unverified},
+    CalibrationTransition{CalibrationState::none, CalibrationTrigger::adopted_verified,
+                          CalibrationState::verified},
+    CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::confirmed,
+                          CalibrationState::verified},
+    CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::doubted,
+                          CalibrationState::suspect},
+    CalibrationTransition{CalibrationState::verified, CalibrationTrigger::contradicted,
+                          CalibrationState::unverified},
+    CalibrationTransition{CalibrationState::verified, CalibrationTrigger::doubted,
+                          CalibrationState::suspect},
+    CalibrationTransition{CalibrationState::suspect, CalibrationTrigger::adopted,
+                          CalibrationState::unverified},
+    CalibrationTransition{CalibrationState::suspect, CalibrationTrigger::adopted_verified,
+                          CalibrationState::verified},
+    CalibrationTransition{CalibrationState::suspect, CalibrationTrigger::kept,
+                          CalibrationState::unverified},
+};
+
+[[nodiscard]] constexpr CalibrationState after(CalibrationState state,
+                                               CalibrationTrigger trigger) noexcept {
+  for (const CalibrationTransition& t : kCalibrationTransitions)
+    if (t.from == state && t.on == trigger) return t.to;
+  return state;
+}
+
+}  // namespace vergence

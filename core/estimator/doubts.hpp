@@ -1,0 +1,98 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "core/types/pose_sample.hpp"
+
+namespace vergence {
+
+/// What there can be to doubt about poses. Where several doubts stand, the first of them here names
+/// the reason.
+enum class Doubt : std::uint8_t {
+  pairing,       // this frame's images are contradicted to have been exposed together
+  scene,         // the map was rebuilt
+  frame,         // this frame's images, matches or geometry: FrameOutcome::reason
+  out_of_step,   // a camera's images are of another instant
+  late_image,    // a camera may be an exposure behind
+  rig,           // something is wrong with the rig, or it is being recalibrated
+  calibration,   // the drive has not confirmed the calibration that poses stand on
+  moving_scene,  // points of this frame or the last ones do not move as one rigid scene
+  window,        // the window still holds frames that were doubted
+  motion,        // this motion is less certain than the drive's others
+};
+inline constexpr std::size_t kDoubts = static_cast<std::size_t>(Doubt::motion) + 1;
+
+/// The doubts that stand, each with its reason, the frame since when, and how many frames of
+/// evidence against it end it (METHOD §7.4). A pose is `ok` while the ledger is empty; else it is
+/// `degraded` for the strongest reason.
+///
+///     ledger.enter(Doubt::scene, Reason::scene_restarted, frame.number, 10);
+///     if (const DoubtLedger::Entry* why = ledger.strongest(true)) use(why->reason);
+///     ledger.weaken(Doubt::scene);  // a frame that speaks against it
+///
+/// Threads  One. Memory: none of the heap.
+class DoubtLedger {
+ public:
+  /// Only strike() ends it.
+  static constexpr int kUntilStruck = std::numeric_limits<int>::max();
+
+  struct Entry {
+    Reason reason = Reason::none;  // none: it does not stand
+    std::uint64_t since = 0;       // frame number
+    int left = 0;                  // frames of evidence that end it
+  };
+
+  /// One that stands already keeps the frame that it began in.
+  void enter(Doubt doubt, Reason reason, std::uint64_t frame, int left = kUntilStruck) noexcept {
+    Entry& e = at(doubt);
+    e = {reason, e.reason == Reason::none ? frame : e.since, left};
+  }
+  void strike(Doubt doubt) noexcept { at(doubt) = {}; }
+  /// It stands exactly while something is so.
+  void hold(Doubt doubt, bool so, Reason reason, std::uint64_t frame) noexcept {
+    if (so)
+      enter(doubt, reason, frame);
+    else
+      strike(doubt);
+  }
+  /// One frame of evidence against it. True: it was the last one needed.
+  bool weaken(Doubt doubt) noexcept {
+    Entry& e = at(doubt);
+    if (e.reason == Reason::none || e.left == kUntilStruck || --e.left > 0) return false;
+    e = {};
+    return true;
+  }
+
+  [[nodiscard]] const Entry& operator[](Doubt doubt) const noexcept {
+    return entries_[static_cast<std::size_t>(doubt)];
+  }
+  [[nodiscard]] bool stands(Doubt doubt) const noexcept {
+    return (*this)[doubt].reason != Reason::none;
+  }
+  /// The first that stands; nullptr: none. Of a pose that does not move nothing is wrong by an
+  /// exposure.
+  [[nodiscard]] const Entry* strongest(bool moves) const noexcept {
+    for (std::size_t i = 0; i < kDoubts; ++i)
+      if (entries_[i].reason != Reason::none &&
+          (moves || static_cast<Doubt>(i) != Doubt::late_image))
+        return &entries_[i];
+    return nullptr;
+  }
+  /// Whether one of them stands, `last` or stronger.
+  [[nodiscard]] bool any_up_to(Doubt last) const noexcept {
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(last); ++i)
+      if (entries_[i].reason != Reason::none) return true;
+    return false;
+  }
+
+ private:
+  [[nodiscard]] Entry& at(Doubt doubt) noexcept {
+    return entries_[static_cast<std::size_t>(doubt)];
+  }
+
+  std::array<Entry, kDoubts> entries_{};
+};
+
+}  // namespace vergence
