@@ -178,31 +178,33 @@ void Estimator::Parts::note_length_sigma(const CalibrationDecision& decision) no
 
 /// A calibration is adopted. Poses stand on it once the scene is seen through it; until then what
 /// is known against the one before it counts.
-void Estimator::Parts::doubt_until_seen_through(const CalibrationDecision& decision) noexcept {
+void Estimator::Parts::adopt(const CalibrationDecision& decision) noexcept {
   doubts.strike(Doubt::rig);
   confirmed_percent = decision.depth_sigma_percent;
-  if (doubts.stands(Doubt::calibration) || !decision.verified ||
-      decision.cause == CalibrationCause::contradicted)
-    doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number,
-                 decision.verified ? 1 : DoubtLedger::kUntilStruck);
+  doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number,
+               decision.verified ? 1 : DoubtLedger::kUntilStruck);
   odometry.link(decision.calibration);
 }
 
 /// What the drive has measured of the rig while it went on.
 void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept {
   if (calibrator.last_gate() == calibration::Gate::out_of_step) return note_out_of_step(stamp, 0);
-  if (decision.cause == CalibrationCause::contradicted && doubts.stands(Doubt::calibration))
+  const bool was_doubted = doubts.stands(Doubt::calibration),
+             contradicted = decision.cause == CalibrationCause::contradicted;
+  if (contradicted && was_doubted)
     note(EstimatorEvent::Kind::calibration_contradicted, stamp,
          "the calibration in use is not that of the rig", decision.depth_difference_percent);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
          decision.calibration.frames);
     calibrator.refine(decision.calibration);
-    doubt_until_seen_through(decision);
-  } else if (decision.verified && doubts.stands(Doubt::calibration)) {
+    adopt(decision);
+  }
+  if (decision.verified && !contradicted) {
+    // The poses until now are confirmed, too: they stand on what is refined, at most.
     doubts.strike(Doubt::calibration);
     confirmed_percent = decision.depth_sigma_percent;
-    notify_confirmed(stamp);
+    if (was_doubted) notify_confirmed(stamp);
   } else if (!calibrator.verified() && !doubts.stands(Doubt::calibration)) {
     doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number);
   }
@@ -228,7 +230,7 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
          decision.calibration.frames);
     calibrator.use(decision);
-    doubt_until_seen_through(decision);
+    adopt(decision);
     transition(Trigger::calibration_accepted, stamp);
     return;
   }

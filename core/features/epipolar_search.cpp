@@ -86,55 +86,67 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
   // its pixel moves with it.
   const Vec2 anchor = patch.offset[static_cast<std::size_t>(level)].cast<double>();
 
+  struct Step {
+    std::int16_t index, x, y;  // along the curve; px of the level
+  };
+  std::array<Step, kMaxSearchSteps> kept;
   std::array<std::int32_t, kPlaces> offsets;
-  std::array<std::int16_t, kPlaces> step_of;
-  std::array<Eigen::Vector2f, kPlaces> pixel_of;
-  int n = 0;
-  for (int i = 0; i <= steps; ++i) {
-    Vec2 p;
-    const double rho = options.rho_first + (rho_last - options.rho_first) * i / steps;
-    if (curve.at(rho, &p, nullptr) != ProjectStatus::ok) continue;
-    const int cx = static_cast<int>(std::lround(p.x() * scale - anchor.x())),
-              cy = static_cast<int>(std::lround(p.y() * scale - anchor.y()));
-    for (int b = -band; b <= band; ++b) {
-      const int x = cx + (horizontal ? 0 : b), y = cy + (horizontal ? b : 0);
-      if (x < kBlock / 2 || y < kBlock / 2 || x + kBlock / 2 > view.width ||
-          y + kBlock / 2 > view.height)
-        continue;
-      if (options.mask != nullptr && options.mask->hides((Vec2(x, y) + anchor) / scale)) continue;
-      offsets[static_cast<std::size_t>(n)] =
-          static_cast<std::int32_t>((y - kBlock / 2) * view.stride + (x - kBlock / 2));
-      step_of[static_cast<std::size_t>(n)] = static_cast<std::int16_t>(i);
-      pixel_of[static_cast<std::size_t>(n)] = {static_cast<float>(x), static_cast<float>(y)};
-      ++n;
+  int n = 0, places = 0;
+  // The curve is followed in chords: over so few pixels it is off them by a hundredth.
+  constexpr int kChord = 8;  // steps
+  Vec2 p = first * scale - anchor, d = Vec2::Zero();
+  for (int i = 0; i <= steps; ++i, p += d) {
+    if (i % kChord == 0 && i < steps) {
+      const int end = std::min(i + kChord, steps);
+      Vec2 there;
+      if (curve.at(options.rho_first + (rho_last - options.rho_first) * end / steps, &there,
+                   nullptr) != ProjectStatus::ok)
+        break;
+      d = (there * scale - anchor - p) / (end - i);
     }
+    const int x = static_cast<int>(std::floor(p.x() + 0.5)),
+              y = static_cast<int>(std::floor(p.y() + 0.5));
+    const int dx = horizontal ? 0 : band, dy = horizontal ? band : 0;
+    if (x - dx < kBlock / 2 || y - dy < kBlock / 2 || x + dx + kBlock / 2 > view.width ||
+        y + dy + kBlock / 2 > view.height)
+      continue;
+    if (options.mask != nullptr && options.mask->hides((Vec2(x, y) + anchor) / scale)) continue;
+    kept[static_cast<std::size_t>(n++)] = {
+        static_cast<std::int16_t>(i), static_cast<std::int16_t>(x), static_cast<std::int16_t>(y)};
+    const std::ptrdiff_t across = horizontal ? view.stride : 1;
+    const std::ptrdiff_t at = (y - kBlock / 2) * view.stride + (x - kBlock / 2);
+    for (int b = -band; b <= band; ++b)
+      offsets[static_cast<std::size_t>(places++)] = static_cast<std::int32_t>(at + b * across);
   }
   if (n == 0) return result;
   std::array<BlockSums, kPlaces> sums;
-  detail::correlate(block.pixels.data(), view.data, view.stride, offsets.data(), n, sums.data());
+  detail::correlate(block.pixels.data(), view.data, view.stride, offsets.data(), places,
+                    sums.data());
 
+  const int width = 2 * band + 1;
   std::array<float, kMaxSearchSteps> best_of_step;
-  best_of_step.fill(-1.F);
-  int best = -1;
+  int best = 0;
   float best_score = -1.F;
-  for (int k = 0; k < n; ++k) {
+  for (int k = 0; k < places; ++k) {
     const float z = zncc(block, sums[static_cast<std::size_t>(k)]);
-    float& of_step = best_of_step[static_cast<std::size_t>(step_of[static_cast<std::size_t>(k)])];
-    of_step = std::max(of_step, z);
+    float& of_step = best_of_step[static_cast<std::size_t>(k / width)];
+    of_step = k % width == 0 ? z : std::max(of_step, z);
     if (z > best_score) {
       best_score = z;
       best = k;
     }
   }
-  const int best_step = step_of[static_cast<std::size_t>(best)];
+  const Step& at = kept[static_cast<std::size_t>(best / width)];
+  const int aside = best % width - band;
   float second = -1.F;
   constexpr int kNeighbourhood = 3;  // px of the level: the same peak
-  for (int i = 0; i <= steps; ++i)
-    if (std::abs(i - best_step) > kNeighbourhood)
+  for (int i = 0; i < n; ++i)
+    if (std::abs(kept[static_cast<std::size_t>(i)].index - at.index) > kNeighbourhood)
       second = std::max(second, best_of_step[static_cast<std::size_t>(i)]);
   result.zncc = best_score;
-  result.rho = options.rho_first + (rho_last - options.rho_first) * best_step / steps;
-  result.pixel = (pixel_of[static_cast<std::size_t>(best)].cast<double>() + anchor) / scale;
+  result.rho = options.rho_first + (rho_last - options.rho_first) * at.index / steps;
+  result.pixel =
+      (Vec2(at.x + (horizontal ? 0 : aside), at.y + (horizontal ? aside : 0)) + anchor) / scale;
   if (best_score < options.min_zncc)
     result.status = SearchStatus::uncorrelated;
   else if (1.F - best_score > options.unique * (1.F - second))

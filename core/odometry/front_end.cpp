@@ -176,8 +176,15 @@ FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_w
     return f;
   const Transform T_k_origin = T_k_world * p.T_origin_world.inverse();
   const double z = (p.T_origin_world * p.p_world).z();
-  const features::AlignResult a = features::align(p.patch, pyramids_[i], predicted,
-                                                  warp(J, T_k_origin.R, z, p.d_ray_d_pixel), how);
+  const Mat2 A = warp(J, T_k_origin.R, z, p.d_ray_d_pixel);
+  features::AlignResult a = features::align(p.patch, pyramids_[i], predicted, A, how);
+  // From a good prediction the finest level alone gets there; if not, a coarser one sees farther.
+  if (a.status != features::AlignStatus::ok && how.coarsest == how.finest) {
+    features::AlignOptions farther = how;
+    ++farther.coarsest;
+    farther.max_shift *= 2;
+    a = features::align(p.patch, pyramids_[i], predicted, A, farther);
+  }
   if (a.status == features::AlignStatus::ok) (void)finish(k, a.pixel, T_k_origin.t.norm() / z, &f);
   return f;
 }
@@ -229,10 +236,9 @@ void FrontEnd::follow_sample(Map& map, const Transform& T_left_world, int sample
 
 void FrontEnd::follow_all(Map& map, const Transform& T_left_world) noexcept {
   features::AlignOptions how;
-  how.coarsest = 1;
-  how.finest = 0;
+  how.coarsest = how.finest = 0;
   how.min_zncc = kMayMatch;
-  how.max_shift = 8.F;
+  how.max_shift = 4.F;
   follow_into_all(map, T_left_world, how, 1);
 }
 

@@ -69,7 +69,7 @@ struct Estimator::Parts {
   void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
-  void doubt_until_seen_through(const CalibrationDecision& decision) noexcept;
+  void adopt(const CalibrationDecision& decision) noexcept;
   void seek(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
   void take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void notify_confirmed(Stamp stamp) noexcept;
