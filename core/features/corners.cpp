@@ -11,9 +11,9 @@ namespace {
 
 // Vector loads run past the block by up to 16 + 8 pixels: cells nearer to the right edge are cut.
 constexpr int kRightMargin = 28;
-// (grey levels / px)². Below it align() finds a window flat (kMinHessian), so that nothing could be
-// matched: rounding to whole grey levels alone makes 1/24, the largest of a cell's many 1/4.
-constexpr float kFlat = 1.0F;
+// (grey levels / px)². Rounding to whole grey levels alone makes 1/24, the largest of a cell's many
+// 1/4: below it there is nothing to match, and align() finds a window flat (kMinHessian).
+constexpr float kFlat = 0.25F;
 
 struct Grid {
   int cell, columns, rows;

@@ -13,9 +13,11 @@ namespace {
 
 constexpr int kHalf = kPatchSide / 2;  // the middle pixel's index
 constexpr float kSettled = 0.01F;      // px of the level: a tenth of what noise leaves
-constexpr float kMinContrast = 2.0F;   // grey levels, standard deviation of the window
+// What rounding to whole grey levels (1/√12 of one) makes by itself is no contrast: twice its
+// standard deviation, and of a gradient's square 1/24, six times.
+constexpr float kMinContrast = 0.6F;  // grey levels, standard deviation of the window
 constexpr float kMinHessian =
-    1.0F;  // grey levels² / px², least eigenvalue over the window's pixels
+    0.25F;  // grey levels² / px², least eigenvalue over the window's pixels
 
 struct LevelOutcome {
   AlignStatus status;

@@ -296,8 +296,11 @@ int main(int argc, char** argv) {
           9, [&](const RecordedSequence& d) { windows(b, d); });
   const char* spoilt = "drive | what | posed, off | ok, off | posed, online | ok, online | knocks";
   section("times", spoilt, 7, [&](const RecordedSequence& d) { variants(b, d, time_variants()); });
-  section("scenes", spoilt, 7,
-          [&](const RecordedSequence& d) { variants(b, d, scene_variants()); });
+  section("scenes", spoilt, 7, [&](RecordedSequence d) {
+    // From there on it is too dim for any odometry to follow when it is made darker still.
+    if (d.name == "sand_rover") d.sequence = part(d.sequence, 0, 330);
+    variants(b, d, scene_variants());
+  });
   section(
       "planar",
       "sand_rover | frames | posed | ok | posed 0–328 | rms mm | scale | posed 329–427 | rms mm "
