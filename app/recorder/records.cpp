@@ -34,6 +34,8 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
       return "calibration_accepted";
     case EstimatorEvent::Kind::calibration_rejected:
       return "calibration_rejected";
+    case EstimatorEvent::Kind::calibration_taken_up:
+      return "calibration_taken_up";
     case EstimatorEvent::Kind::calibration_waits:
       return "calibration_waits";
     case EstimatorEvent::Kind::calibration_resumed:

@@ -115,7 +115,12 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   }
   p.odometry.rebuild(&out);
   if (p.options.online) {
-    if (out.relinked) p.calibrator.scene_rebuilt(p.odometry);
+    if (out.relinked) {
+      p.calibrator.scene_rebuilt(p.odometry);
+      if (out.relink_due)
+        p.note(EstimatorEvent::Kind::calibration_taken_up, frame.stamp,
+             "the scene is seen through the calibration adopted", 100 * out.points_kept);
+    }
     if (out.renewed) p.calibrator.monitor().scene_renewed(p.odometry.map());
     p.calibrate(frame);
   }

@@ -66,9 +66,11 @@ struct EstimatorEvent {
                                 // the one measured, px
     calibration_accepted,       // value: frames it was solved from
     calibration_rejected,       // why: the reason; value: frames
-    calibration_waits,          // why: what is missing to calibrate
-    calibration_resumed,        // the one from before an alarm is in use again: the scene was lost
-                                // while another was sought, and its images fit this one
+    calibration_taken_up,  // the scene is seen through the calibration that was accepted; value:
+                           // share of its points that fit it, %
+    calibration_waits,     // why: what is missing to calibrate
+    calibration_resumed,   // the one before the last, or from before an alarm, is in use again:
+                           // the scene was lost, and the images fit this one
   } kind = Kind::state;
   State from = State::initialising;
   State to = State::initialising;

@@ -63,8 +63,8 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     return;
   }
   without_pose = 0;
-  if (out.resumed && calibrator.seeking()) {
-    calibrator.keep();
+  if (out.resumed) {
+    calibrator.take_back(odometry.rig());
     doubts.strike(Doubt::rig);
     note(EstimatorEvent::Kind::calibration_resumed, frame.stamp,
          "the calibration from before fits the images again", 0);

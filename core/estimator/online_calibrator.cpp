@@ -77,6 +77,12 @@ void OnlineCalibrator::keep() noexcept {
   frames_.begin_segment();
 }
 
+void OnlineCalibrator::take_back(const RigCalibration& rig) noexcept {
+  state_ = after(state_, CalibrationTrigger::contradicted);
+  rig_ = rig;
+  keep();
+}
+
 void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
   rig_ = rig;
   source_ = calibration::ClaimSource::this_drive;

@@ -82,6 +82,8 @@ class OnlineCalibrator {
   void refine(const RigCalibration& rig) noexcept;
   /// The one in use goes on: what was sought is no better.
   void keep() noexcept;
+  /// The one that was in use before it, or before another was sought, is again: the images fit it.
+  void take_back(const RigCalibration& rig) noexcept;
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
   [[nodiscard]] bool calibrated() const noexcept { return state_ != CalibrationState::none; }
   [[nodiscard]] bool verified() const noexcept { return state_ == CalibrationState::verified; }

@@ -35,11 +35,13 @@ struct FrameOutcome {
   bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
                              // tracks are of no more use
   bool relinked = false;     // it was, in this frame
-  bool resumed = false;      // the calibration from before unlink() was: it fits this frame
-  bool renewal_due = false;  // after a gap rebuild() makes the scene anew from this frame
-  bool renewed = false;      // it did
-  bool initialised = false;  // the rig's transform was found from this frame's images alone
-  double gap_s = 0;          // time since the frame before, when it was too long to predict over
+  bool resumed = false;    // the one in use before the last was: a scene can be made by it, and not
+                           // by the last
+  double points_kept = 0;  // with `relinked`: share of the scene's points that fit the calibration
+  bool renewal_due = false;     // after a gap rebuild() makes the scene anew from this frame
+  bool renewed = false;         // it did
+  bool initialised = false;     // the rig's transform was found from this frame's images alone
+  double gap_s = 0;             // time since the frame before, when it was too long to predict over
   std::uint8_t structured = 0;  // bit k: camera k gave an image that shows something new
   bool images_good = false;     // every camera gave an image, new and with structure
   bool moving = false;          // what is seen is not one rigid scene, or not the one posed by
@@ -99,9 +101,11 @@ class Odometry {
   /// After process() of every frame: what its outcome says is due. Of a link that was taken back
   /// since, nothing.
   void rebuild(FrameOutcome* out) noexcept;
-  /// From the next frame on the cameras are not linked; the scene stays. Should it be lost, the
-  /// calibration until now is the first that another is begun with (FrameOutcome::resumed), if its
-  /// images fit.
+  /// From the next frame on the cameras are not linked; the scene stays.
+  ///
+  /// The calibration before the last one is kept until another takes the last one's place. Where a
+  /// scene has to be begun and cannot be with the one in use, or there is none, it is tried
+  /// (FrameOutcome::resumed).
   void unlink() noexcept;
   /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with
   /// finding it.
@@ -147,8 +151,8 @@ class Odometry {
   /// Takes up a calibration and keeps the scene: what the window saw is what the new lenses make of
   /// the same pixels, points are triangulated again, and the newest pose stays. False: this
   /// frame's matches do not fit it.
-  [[nodiscard]] bool reexpress_scene(const RigCalibration& rig) noexcept;
-  /// The calibration from before unlink() is used again if a scene can be made of this frame by it.
+  [[nodiscard]] bool reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept;
+  /// The calibration before the last is used again if a scene can be made of this frame by it.
   [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
   /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
   /// again.
@@ -160,7 +164,7 @@ class Odometry {
   Link link_;
   bool rig_known_;                          // rig_ has a transform to begin with
   std::optional<RigCalibration> next_rig_;  // taken up with a pose to come
-  std::optional<RigCalibration> last_rig_;  // in use before unlink()
+  std::optional<RigCalibration> last_rig_;  // in use before this one, or before unlink()
   FrontEnd front_end_;
   Map map_;
   WindowAdjuster window_;

@@ -93,6 +93,8 @@ void Odometry::begin_scene(const RigFrame& frame, const ImageCheck& images,
   const bool initialise = unknown && !started;
   if (!started)
     started = (!initialise || initialise_rig(out)) && start_scene(predicted, frame.stamp, out);
+  if (!started && link_ == Link::linked && out->reason == Reason::no_stereo_matches)
+    started = resume(predicted, frame.stamp, out);
   if (!started) {
     if (of_images != Reason::none) out->reason = of_images;
     return;
@@ -145,7 +147,7 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
   if (next_rig_ && out->relink_due) {
     const RigCalibration next = *std::exchange(next_rig_, std::nullopt);
     out->relinked = true;
-    if (!reexpress_scene(next)) {
+    if (!reexpress_scene(next, &out->points_kept)) {
       out->status = PoseStatus::degraded;
       out->reason = Reason::no_stereo_matches;
     }
@@ -163,12 +165,16 @@ bool Odometry::renew_scene(FrameOutcome* out) noexcept {
   return renewed;
 }
 
-bool Odometry::reexpress_scene(const RigCalibration& rig) noexcept {
+bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept {
   const RigCalibration before = rig_;
   std::array<UndistortedCamera, kMaxCameras> old_lenses;
   for (int k = 0; k < rig_.cameras; ++k)
     old_lenses[static_cast<std::size_t>(k)] = front_end_.lens(k);
   const bool was_linked = link_ == Link::linked;
+  if (was_linked) last_rig_ = before;
+  const auto held =
+      std::count_if(map_.points().begin(), map_.points().end(),
+                    [](const MapPoint& p) { return p.holds_poses() && p.now.cameras != 0; });
   take_up(rig);
 
   // A direction seen by the old lens of camera k → pixels of the image → ideal ones of the new
@@ -267,19 +273,32 @@ bool Odometry::reexpress_scene(const RigCalibration& rig) noexcept {
   for (int i = 0; i < kAdjustments && window_.adjust(map_).usable; ++i)
     std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
   const PoseFit newest = poses_.fit_linked(map_, motion_.T_left_world(), false);
+  *points_kept =
+      held == 0 ? 1
+                : std::min(1.0, static_cast<double>(newest.inliers) / static_cast<double>(held));
   if (newest.found) map_.move_world(newest.T_left_world.inverse() * motion_.T_left_world());
   return evidence.fits();
 }
 
 bool Odometry::resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept {
   if (!last_rig_) return false;
+  const bool was_linked = link_ == Link::linked;
+  const RigCalibration now = rig_;
   take_up(*last_rig_);
-  if (start_scene(T_left_world, stamp, out)) {
+  FrameOutcome resumed = *out;
+  if (start_scene(T_left_world, stamp, &resumed)) {
+    *out = resumed;
     out->relinked = out->resumed = true;
+    out->points_kept = 1;
+    last_rig_.reset();
     return true;
   }
-  unlink();
-  reset_extrinsics();
+  if (was_linked) {
+    take_up(now);
+  } else {
+    unlink();
+    reset_extrinsics();
+  }
   return false;
 }
 

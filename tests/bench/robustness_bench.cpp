@@ -105,12 +105,13 @@ void whole(const Bench& b, const RecordedSequence& d) {
                       [](const PoseSample& s) { return s.reason == Reason::moving_scene; });
     const auto first = std::find_if(r->samples.begin(), r->samples.end(),
                                     [](const PoseSample& s) { return s.status == PoseStatus::ok; });
-    row(fmt::format("| {} | {} | {} | {} | {} | {:.1f} | {} | {} | {} | {} | {} |", d.name,
+    row(fmt::format("| {} | {} | {} | {} | {} | {:.1f} | {} | {} | {} | {} | {} | {} |", d.name,
                     r == &online ? "online" : "off", posed(*r), r->ok,
                     first == r->samples.end() ? -1 : first - r->samples.begin(),
                     100 * share_kept_ok(*r, off), moving, millimetres(*r),
                     r->segments_percent > 0 ? fmt::format("{:.3f}", r->segments_percent) : "–",
-                    r->knocks, r->adopted));
+                    r->knocks, r->adopted,
+                    r->adopted > 0 ? fmt::format("{:.1f}", r->points_kept_percent) : "–"));
   }
 }
 
@@ -286,8 +287,9 @@ int main(int argc, char** argv) {
   section(
       "drives",
       "drive | calibration | posed | ok | first ok | ok of those with `off` from frame 36 on, % "
-      "| moving scene | ATE mm | segments % | knocks | adopted",
-      11, [&](const RecordedSequence& d) { whole(b, d); });
+      "| moving scene | ATE mm | segments % | knocks | adopted | points kept "
+      "at adoptions, least, %",
+      12, [&](const RecordedSequence& d) { whole(b, d); });
   section("cold", "drive | starts with a pose within three frames | not, at frame (reason)", 3,
           [&](const RecordedSequence& d) { started = cold_starts(b, d) && started; });
   section("windows",

@@ -114,6 +114,8 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
         if (knocked && row.told_at < 0) row.told_at = at;
         if (!knocked) ++row.knocks;
       }
+      if (event.kind == Kind::calibration_taken_up)
+        row.points_kept_percent = std::min(row.points_kept_percent, event.value);
       if (event.kind == Kind::calibration_confirmed && row.verified_at < 0) row.verified_at = at;
       if (event.kind == Kind::calibration_contradicted && row.contradicted_at < 0) {
         row.contradicted_at = at;

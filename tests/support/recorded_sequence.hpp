@@ -60,6 +60,7 @@ struct DriveOutcome {
   std::optional<RigCalibration> rig;              // in use at the end
   std::vector<PoseSample> samples;                // one a frame
   int adopted = 0, adopted_at = -1;               // calibrations, and the first of them
+  double points_kept_percent = 100;  // of the scene's points, at the adoption that cost most
 };
 
 /// `knock_at`: the frame from which on the images are of a turned camera, if any.

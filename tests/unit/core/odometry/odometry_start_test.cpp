@@ -36,6 +36,32 @@ class LentImage {
   ImageView view_;
 };
 
+// A successor that fails is no reason to have nothing: the calibration before it is kept.
+TEST(OdometryStart, aSceneTheNewCalibrationCannotBeginIsBegunByTheOneBefore) {
+  constexpr int kLink = 5, kDark = 8, kBack = 12;
+  test::Corridor corridor;
+  test::LinkedOdometry f(corridor.rig());
+  RigCalibration wrong = corridor.rig();
+  wrong.T_camera_left[1].R = exp_so3({0.3, 0, 0}) * wrong.T_camera_left[1].R;
+  bool resumed = false;
+  for (int i = 0; i < 20; ++i) {
+    RigFrame frame = corridor.frame(i);
+    if (i >= kDark && i < kBack) frame.images = {};
+    if (i == kLink) f.odometry.link(wrong);
+    FrameOutcome out = f.odometry.process(frame);
+    f.odometry.rebuild(&out);
+    EXPECT_EQ(out.relinked && !out.resumed, i == kLink) << i;
+    // Three frames with images that cannot be followed end the scene.
+    if (i >= kBack + 3) {
+      EXPECT_TRUE(out.posed) << i;
+    }
+    resumed = resumed || out.resumed;
+  }
+  EXPECT_TRUE(resumed);
+  EXPECT_TRUE(
+      f.odometry.rig().T_camera_left[1].R.isApprox(corridor.rig().T_camera_left[1].R, 2e-3));
+}
+
 TEST(OdometryStart, aLeftCameraThatIsGoneIsNotLookedAtInTheMemoryItHad) {
   constexpr int kGone = 6, kBack = 60;
   test::Corridor corridor;
