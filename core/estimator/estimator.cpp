@@ -119,7 +119,7 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       p.calibrator.scene_rebuilt(p.odometry);
       if (out.relink_due)
         p.note(EstimatorEvent::Kind::calibration_taken_up, frame.stamp,
-             "the scene is seen through the calibration adopted", 100 * out.points_kept);
+               "the scene is seen through the calibration adopted", 100 * out.points_kept);
     }
     if (out.renewed) p.calibrator.monitor().scene_renewed(p.odometry.map());
     p.calibrate(frame);

@@ -106,8 +106,8 @@ void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept
 /// What the monitors say of a frame posed with the calibration in use.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorVerdict::Kind;
-  const calibration::MonitorVerdict v =
-      calibrator.monitor().update(odometry, out, frame, doubts.stands(Doubt::late_image));
+  const calibration::MonitorVerdict v = calibrator.monitor().update(
+      odometry, out, frame, calibrator.verified(), doubts.stands(Doubt::late_image));
   doubts.hold(Doubt::rig, v.undecided, Reason::recalibrating, frame.number);
   shows_no_lag = v.shows_no_lag;
   if (v.kind == K::out_of_step) {

@@ -245,12 +245,10 @@ void OnlineCalibrator::plan_search(const RigSolution& found) noexcept {
 void OnlineCalibrator::learnt_of_it(CalibrationTrigger what, double misfit_px) noexcept {
   const CalibrationState before = std::exchange(state_, after(state_, what));
   if (state_ == before) return;
+  monitor_.watch(rig_, verified() && found());
   // A claim that is confirmed keeps its lens, and what that leaves differs from place to place.
-  if (found())
-    monitor_.watch(rig_, verified());
-  else
-    monitor_.expect_scatter(verified() ? std::max(options_.monitor.found_bias_px, misfit_px)
-                                       : options_.monitor.claimed_bias_px);
+  if (verified() && !found())
+    monitor_.expect_scatter(std::max(options_.monitor.found_bias_px, misfit_px));
 }
 
 CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review, Stamp stamp,

@@ -254,7 +254,7 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
 
 MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
                                   const odometry::FrameOutcome& outcome, const RigFrame& frame,
-                                  bool may_lag) noexcept {
+                                  bool verified, bool may_lag) noexcept {
   RigVerdict verdict;
   const Transform step = step_to(outcome.T_left_world);
   for (int k = 1; k < cameras_; ++k) {
@@ -272,10 +272,17 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
       jump.suspected = jump.suspected || jump.confirmed;
       jump.confirmed = false;
     }
-    if (scene_pending_)
+    if (scene_pending_) {
       verdict.add(jump);
-    else
-      verdict.add(monitor_verdict(k, odometry, outcome, frame, found, step), jump);
+      continue;
+    }
+    MonitorVerdict v = monitor_verdict(k, odometry, outcome, frame, found, step);
+    if (!verified &&
+        (v.kind == MonitorVerdict::Kind::knock || v.kind == MonitorVerdict::Kind::drift)) {
+      v.kind = MonitorVerdict::Kind::quiet;
+      v.undecided = true;
+    }
+    verdict.add(v, jump);
   }
   return verdict.of_all();
 }

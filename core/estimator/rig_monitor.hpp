@@ -46,11 +46,15 @@ class RigMonitor {
   void begin_unlinked(const RigCalibration& rig) noexcept;
 
   /// The worst verdict of the further cameras on a posed frame; linked odometry only.
+  /// `verified`: the drive has confirmed the calibration watched. Of a claim a monitor cannot tell
+  /// its own errors, which differ from place to place, from a change of the rig: it leaves the rig
+  /// undecided.
   /// `may_lag`: a camera may be an exposure behind. Disparities that jump are what a lag makes of a
   /// change of speed, too, so they leave the rig undecided; the monitors tell the two apart.
   [[nodiscard]] calibration::MonitorVerdict update(const odometry::Odometry& odometry,
                                                    const odometry::FrameOutcome& outcome,
-                                                   const RigFrame& frame, bool may_lag) noexcept;
+                                                   const RigFrame& frame, bool verified,
+                                                   bool may_lag) noexcept;
   /// The same while the cameras are not linked. A value: the rig has changed, from that frame on.
   [[nodiscard]] std::optional<std::uint64_t> update_unlinked(const odometry::Odometry& odometry,
                                                              const odometry::FrameOutcome& outcome,
