@@ -268,11 +268,14 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
   motion_.scale(factor);
 
   const EpipolarEvidence evidence = front_end_.weigh_points(map_);
-  // Where depths change by a tenth the steps of one keyframe are not enough.
-  constexpr int kAdjustments = 3;
-  for (int i = 0; i < kAdjustments && window_.adjust(map_).usable; ++i)
+  // With the newest frame among the keyframes the points are adjusted to what it sees, too.
+  const std::size_t newest_slot = map_.make_keyframe(motion_.T_left_world(), motion_.stamp());
+  map_.keyframe(newest_slot).T_camera_left = rig_.T_camera_left;
+  for (MapPoint& p : map_.points())
+    if (p.followed()) p.seen[newest_slot] = p.now;
+  if (window_.adjust(map_).usable)
     std::copy_n(window_.T_camera_left().begin(), rig_.cameras, rig_.T_camera_left.begin());
-  const PoseFit newest = poses_.fit_linked(map_, motion_.T_left_world(), false);
+  const PoseFit newest = poses_.fit_linked(map_, map_.keyframe(newest_slot).T_left_world, false);
   *points_kept =
       held == 0 ? 1
                 : std::min(1.0, static_cast<double>(newest.inliers) / static_cast<double>(held));
