@@ -23,8 +23,8 @@ class FocalCheck {
   /// `enabled`: as the options say.
   explicit FocalCheck(bool enabled) noexcept : enabled_(enabled) {}
 
-  /// Before a solve: whether it measures. A lens keeps its focal length: once it was measured well
-  /// and as it was given, it is not measured again.
+  /// Before a solve: whether it measures. A lens keeps its focal length: once a full window
+  /// has measured it as it was given, it is not measured again.
   void begin_solve() noexcept { measures_ = enabled_ && !known_; }
   /// After `lenses`, a solve of the solver's log with the lenses free that `request` asked for;
   /// begins with its result. Frames before the log's do not go in: what they say of the rig was
@@ -39,7 +39,7 @@ class FocalCheck {
 
  private:
   bool enabled_, measures_ = false;
-  bool known_ = false;  // well, and as it was given
+  bool known_ = false;  // by a full window, and as it was given
   FocalMeasurement newest_{}, solved_{};
   double solve_ms_ = 0;
 };

@@ -24,8 +24,8 @@ enum class CalibrationCause : std::uint8_t {
 struct FocalMeasurement {
   double given_px = 0;     // fx of the left camera
   double measured_px = 0;  // 0: it has not been measured
-  double sigma_px = 0;     // 1 sigma, noise only; 0: the measurement is not at its end, and already
-                           // far from the one given
+  double sigma_px = 0;     // 1 sigma, with what lenses leave; 0: the measurement is not at its end,
+                           // and already far from the one given
   bool contradicted = false;  // the one given is certainly not that of the images
 };
 
