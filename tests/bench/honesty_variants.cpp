@@ -273,6 +273,15 @@ constexpr std::array kTimes = {
                    },
                    nullptr},
     HonestyVariant{"a gap of two seconds", nullptr, leave_out_two_seconds},
+    // Three milliradians about each axis, in periods that do not fit each other.
+    HonestyVariant{"right camera not rigid",
+                   [](M*, M* r, N i, N) {
+                     const auto turn = [i](double period) {
+                       return 0.17 * std::sin(2 * CV_PI * static_cast<double>(i) / period);
+                     };
+                     warp(r, pixels(*r, turn(23)), pixels(*r, turn(31)), turn(17), 1);
+                   },
+                   nullptr},
 };
 
 constexpr std::array kScenes = {

@@ -1,7 +1,8 @@
 // Whether poses come out anywhere on the recorded drives, whatever is done to them that an odometry
 // should bear.
 //
-//   robustness_bench [drives|cold|windows|times|scenes|planar|all] [DRIVE|all] [KEY=VALUE …]
+//   robustness_bench [drives|cold|windows|times|scenes|planar|all] [DRIVE|all] [variant=PART]
+//                    [KEY=VALUE …]
 //
 // drives   Whole drives, calibration given, with `calibration.online=off` and online.
 // cold     Starts at every tenth frame, ten frames, calibration
@@ -43,6 +44,7 @@ using test::RecordedSequence;
 
 struct Bench {
   app::Configuration online, off;
+  std::string variant;  // of `times` and `scenes`: part of its name
 };
 
 StereoSequence part(const StereoSequence& s, std::size_t first, std::size_t count) {
@@ -170,6 +172,7 @@ void variants(const Bench& b, const RecordedSequence& d, std::span<const Honesty
   const DriveOutcome untouched = drive(d, d.sequence, b.off, given(b.off, d.sequence));
   row(fmt::format("| {} | untouched | {} | {} | | | |", d.name, posed(untouched), untouched.ok));
   for (const HonestyVariant& v : all) {
+    if (v.name.find(b.variant) == std::string_view::npos) continue;
     const test::TemporaryFolder folder;
     const StereoSequence s = spoil(d, v, folder.path());
     const DriveOutcome off = drive(d, s, b.off, given(b.off, s));
@@ -265,8 +268,14 @@ int main(int argc, char** argv) {
   using namespace vergence;
   using namespace vergence::bench;
   const std::string what = argc > 1 ? argv[1] : "all", only = argc > 2 ? argv[2] : "all";
-  const std::vector<std::string> set(argv + std::min(argc, 3), argv + argc);
-  Bench b{app::load_configuration(std::nullopt, set), app::load_configuration(std::nullopt, set)};
+  std::vector<std::string> set(argv + std::min(argc, 3), argv + argc);
+  std::string variant;
+  if (!set.empty() && set.front().starts_with("variant=")) {
+    variant = set.front().substr(std::string_view("variant=").size());
+    set.erase(set.begin());
+  }
+  Bench b{app::load_configuration(std::nullopt, set), app::load_configuration(std::nullopt, set),
+          variant};
   b.off.online = 0;
   std::vector<RecordedSequence> drives;
   for (const char* name : test::kRecordedDrives)
