@@ -62,8 +62,9 @@ std::size_t RigMonitor::memory_needed(const calibration::MonitorOptions& options
   return static_cast<std::size_t>(cameras - 1) *
              (calibration::Monitor::memory_needed(options) +
               calibration::MotionTrackBuilder::memory_needed(capacity) +
-              calibration::DisparityJumpDetector::memory_needed(capacity)) +
-         capacity * (sizeof(calibration::StereoObservation) + sizeof(float)) + 2 * kCacheLine;
+              calibration::DisparityJumpDetector::memory_needed(capacity) +
+              calibration::PairingEvidence::memory_needed(capacity)) +
+         capacity * sizeof(calibration::StereoObservation) + kCacheLine;
 }
 
 RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
@@ -73,7 +74,6 @@ RigMonitor::RigMonitor(const calibration::MonitorOptions& options, int cameras,
     watched_[static_cast<std::size_t>(k)].emplace(options, capacity, arena);
   stereo_ = BoundedVector<calibration::StereoObservation>(
       arena.make<calibration::StereoObservation>(capacity, "monitored matches"));
-  distances_ = BoundedVector<float>(arena.make<float>(capacity, "distances to the lines"));
 }
 
 void RigMonitor::expect_scatter(double bias_px) noexcept {
@@ -151,6 +151,7 @@ void RigMonitor::scene_lost() noexcept {
     camera(k).monitor.reset();
     camera(k).tracks.reset();
     camera(k).jumps.reset();
+    camera(k).pairing.reset();
   }
 }
 
@@ -213,24 +214,6 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
   return onset;
 }
 
-double RigMonitor::distance_to_lines(int k) noexcept {
-  const EpipolarGeometry lines(transform(rig_, k));
-  const Pinhole left = pinhole(rig_, 0), right = pinhole(rig_, k);
-  distances_.clear();
-  for (const calibration::StereoObservation& o : stereo_) {
-    const Vec2 l((o.left.x() - left.cx) / left.fx, (o.left.y() - left.cy) / left.fy),
-        r((o.right.x() - right.cx) / right.fx, (o.right.y() - right.cy) / right.fy);
-    double distance = 0;
-    if (lines.sampson(l, r, &distance, nullptr) == EpipolarStatus::ok)
-      (void)distances_.push(static_cast<float>(std::abs(distance) * right.fx));
-  }
-  if (distances_.empty()) return 0;
-  const std::span<float> all = distances_.span();
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
-  return *middle;
-}
-
 MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odometry,
                                            const odometry::FrameOutcome& outcome,
                                            const RigFrame& frame, int found,
@@ -244,7 +227,7 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
     --w.grace;
     // A claim that is off is no knock; nothing based on it is `ok`.
     const bool doubted = confirmed_ && (v.undecided || v.kind != MonitorVerdict::Kind::quiet ||
-                                        distance_to_lines(k) > kFarFromLines);
+                                        w.pairing.distance_px() > kFarFromLines);
     v = MonitorVerdict{};
     v.undecided = doubted;
   }
@@ -261,14 +244,16 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
     const int found = collect_stereo(odometry.map(), k, kWitness);
     calibration::DisparityJump jump;
     // A pose that a spoilt image has drawn off moves the disparities of the frames on both sides.
-    const double distance = distance_to_lines(k), before = camera(k).distance_px;
-    const bool spoilt = distance > kFarFromLines && distance > kSpoilt * before;
-    camera(k).distance_px = distance;
+    calibration::PairingEvidence& pairing = camera(k).pairing;
+    const double before = pairing.distance_px();
+    pairing.next(stereo_.span(), transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k));
+    const bool spoilt =
+        pairing.distance_px() > kFarFromLines && pairing.distance_px() > kSpoilt * before;
     if (both_show(outcome, k) && !spoilt)
       jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
     else
       camera(k).jumps.skip(step);
-    if (may_lag) {
+    if (may_lag || pairing.suspected()) {
       jump.suspected = jump.suspected || jump.confirmed;
       jump.confirmed = false;
     }
@@ -277,8 +262,12 @@ MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
       continue;
     }
     MonitorVerdict v = monitor_verdict(k, odometry, outcome, frame, found, step);
-    if (!verified &&
-        (v.kind == MonitorVerdict::Kind::knock || v.kind == MonitorVerdict::Kind::drift)) {
+    const bool change =
+        v.kind == MonitorVerdict::Kind::knock || v.kind == MonitorVerdict::Kind::drift;
+    if (pairing.lag_frames() != 0) {
+      v.kind = MonitorVerdict::Kind::out_of_step;
+      v.lag_frames = pairing.lag_frames();
+    } else if (pairing.suspected() || (!verified && change)) {
       v.kind = MonitorVerdict::Kind::quiet;
       v.undecided = true;
     }

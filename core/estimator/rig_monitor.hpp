@@ -5,13 +5,14 @@
 #include "core/calibration/disparity_jump.hpp"
 #include "core/calibration/monitor.hpp"
 #include "core/calibration/motion_track_builder.hpp"
+#include "core/calibration/pairing_evidence.hpp"
 #include "core/odometry/odometry.hpp"
 
 namespace vergence {
 
 /// Watches, frame by frame, whether the rig still is the one that its calibration describes
 /// (METHOD §4): for each further camera a monitor of the epipolar lines and a detector of jumps in
-/// the disparities.
+/// the disparities, and what tells whether its images are of the left ones' instants.
 ///
 /// With the cameras linked update() compares a posed frame with the calibration watched. While a
 /// calibration is sought the cameras are not linked, and update_unlinked() looks for jumps alone.
@@ -69,14 +70,17 @@ class RigMonitor {
   /// One further camera.
   struct Watched {
     Watched(const calibration::MonitorOptions& options, std::size_t capacity, Arena& arena)
-        : monitor(options, arena), tracks(capacity, arena), jumps(capacity, arena) {}
+        : monitor(options, arena),
+          tracks(capacity, arena),
+          jumps(capacity, arena),
+          pairing(capacity, arena) {}
     calibration::Monitor monitor;
     calibration::MotionTrackBuilder tracks;
     calibration::DisparityJumpDetector jumps;
+    calibration::PairingEvidence pairing;
     bool learning = false;           // the monitor's reference is a claim, its own not yet measured
     int grace = 0;                   // frames whose verdict is no more than a doubt yet
     Transform T_camera_left_before;  // with the cameras unlinked
-    double distance_px = 0;          // of the matches to their epipolar lines, in the newest frame
   };
 
   [[nodiscard]] Watched& camera(int k) noexcept { return *watched_[static_cast<std::size_t>(k)]; }
@@ -95,9 +99,6 @@ class RigMonitor {
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Camera k's matches into `stereo_`; how many of them hold poses.
   int collect_stereo(const odometry::Map& map, int k, int least_found) noexcept;
-  /// Median distance of the matches in `stereo_` to their epipolar lines of the calibration
-  /// watched, px; 0 without any.
-  [[nodiscard]] double distance_to_lines(int k) noexcept;
   [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
                                     const Transform& T_left_world) const noexcept;
 
@@ -105,9 +106,8 @@ class RigMonitor {
   const int cameras_;
   std::array<std::optional<Watched>, kMaxCameras> watched_;  // [k] of camera k ≥ 1
   BoundedVector<calibration::StereoObservation> stereo_;
-  BoundedVector<float> distances_;  // scratch of their median
-  RigCalibration rig_{};            // the one watched
-  bool confirmed_ = false;          // by the drive
+  RigCalibration rig_{};    // the one watched
+  bool confirmed_ = false;  // by the drive
   std::optional<Transform> T_left_world_before_;
   bool scene_pending_ = false;
 };

@@ -1,0 +1,93 @@
+#include "core/calibration/pairing_evidence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/geometry/epipolar.hpp"
+
+namespace vergence::calibration {
+namespace {
+
+constexpr std::size_t kFewestPoints = 25;
+constexpr double kNoise = 0.2;  // px: what two positions known to 0.15 px leave
+// Errors of one frame's points have causes in common (rolling shutter, a lens): they count for so
+// many independent ones, and for no more than one log-likelihood each.
+constexpr double kPointsOfAFrame = 5;
+constexpr double kFollow = 0.1;  // of the usual width, a frame
+// A wrong claim once in a million times (Wald 1945): three frames at least.
+constexpr double kDecided = 13.8;
+
+double median(std::span<float> values) noexcept {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
+  return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
+}
+
+}  // namespace
+
+std::size_t PairingEvidence::memory_needed(std::size_t capacity) noexcept {
+  return capacity * (sizeof(StereoObservation) + 3 * sizeof(float)) + 4 * kCacheLine;
+}
+
+PairingEvidence::PairingEvidence(std::size_t capacity, Arena& arena)
+    : before_(arena.make<StereoObservation>(capacity, "pairing: the frame before")),
+      now_(arena.make<float>(capacity, "pairing: distances")),
+      late_px_(arena.make<float>(capacity, "pairing: distances, camera late")),
+      early_px_(arena.make<float>(capacity, "pairing: distances, left late")) {}
+
+void PairingEvidence::next(std::span<StereoObservation> points, const Transform& T_camera_left,
+                           const Pinhole& left, const Pinhole& camera) noexcept {
+  points = points.first(std::min(points.size(), before_.size()));
+  std::sort(points.begin(), points.end(),
+            [](const StereoObservation& a, const StereoObservation& b) noexcept {
+              return a.track < b.track;
+            });
+  const EpipolarGeometry lines(T_camera_left);
+  const auto distance = [&](const Vec2& in_left, const Vec2& in_camera) noexcept {
+    double d = 0;
+    (void)lines.sampson(ray(left, in_left), ray(camera, in_camera), &d, nullptr);
+    return static_cast<float>(std::abs(d) * camera.fx);
+  };
+  std::size_t n = 0, both = 0;
+  for (const StereoObservation& now : points) {
+    now_[n++] = distance(now.left, now.right);
+    const auto end = before_.begin() + static_cast<std::ptrdiff_t>(count_);
+    const auto before = std::lower_bound(
+        before_.begin(), end, now.track,
+        [](const StereoObservation& o, std::uint32_t track) noexcept { return o.track < track; });
+    if (before == end || before->track != now.track) continue;
+    late_px_[both] = distance(before->left, now.right);
+    early_px_[both++] = distance(now.left, before->right);
+  }
+  std::copy(points.begin(), points.end(), before_.begin());
+  count_ = points.size();
+  distance_px_ = median(now_.first(n));
+  if (both < kFewestPoints) return;
+  const double now = std::max(distance_px_, kNoise);
+  if (usual_px_ == 0) usual_px_ = now;
+  const auto add = [&](double shifted_px, double* sum) noexcept {
+    const double shifted = std::max(shifted_px, kNoise) / usual_px_;
+    const double ratio = std::log(now / usual_px_) - 0.5 * (shifted * shifted - 1);
+    *sum = std::clamp(*sum + kPointsOfAFrame * std::clamp(ratio, -1.0, 1.0), 0.0,
+                      kDecided + kPointsOfAFrame);
+  };
+  add(median(late_px_.first(both)), &late_);
+  add(median(early_px_.first(both)), &early_);
+  if (std::max(late_, early_) < 1) usual_px_ += kFollow * (now - usual_px_);
+}
+
+int PairingEvidence::lag_frames() const noexcept {
+  if (std::max(late_, early_) < kDecided) return 0;
+  return late_ > early_ ? 1 : -1;
+}
+
+bool PairingEvidence::suspected() const noexcept {
+  return std::max(late_, early_) >= 0.5 * kPointsOfAFrame;
+}
+
+}  // namespace vergence::calibration

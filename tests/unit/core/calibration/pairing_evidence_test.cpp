@@ -1,0 +1,91 @@
+#include "core/calibration/pairing_evidence.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/math/random.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::calibration {
+namespace {
+
+constexpr Pinhole kLens{500, 500, 320, 240};
+constexpr std::size_t kPoints = 150;
+
+/// What spoils a drive of 40 frames from frame 20 on.
+struct Case {
+  std::string name;
+  double step_m = 0.3;  // forward, a frame, with a nod of 3 mrad
+  int camera_late = 0, left_late = 0;
+  double knock_rad = 0;  // of pitch
+  int wanted = 0;
+};
+
+Transform T_world_left(const Case& c, int frame) {
+  return {exp_so3({c.step_m > 0 ? 3e-3 * std::sin(1.3 * frame) : 0, 0, 0}),
+          {0, 0, c.step_m * frame}};
+}
+
+Vec2 pixel(const Vec3& X, Random* random) {
+  return {kLens.fx * X.x() / X.z() + kLens.cx + 0.15 * random->normal(),
+          kLens.fy * X.y() / X.z() + kLens.cy + 0.15 * random->normal()};
+}
+
+/// The lag that is seen at the end, and whether one was before the fault.
+std::pair<int, bool> drive(const Case& c) {
+  constexpr int kFrames = 40, kFault = 20;
+  Arena arena(PairingEvidence::memory_needed(kPoints));
+  PairingEvidence evidence(kPoints, arena);
+  Random random(7);
+  const Transform T_right_left{exp_so3({0.002, -0.01, 0.003}), {-0.5, 0.01, 0}};
+  std::vector<Vec3> world;
+  for (std::size_t i = 0; i < kPoints; ++i)
+    world.emplace_back(8 * random.uniform() - 4, 6 * random.uniform() - 3,
+                       16 + 20 * random.uniform());
+  bool before = false;
+  for (int i = 0; i < kFrames; ++i) {
+    const bool fault = i >= kFault;
+    const Transform left = T_world_left(c, i - (fault ? c.left_late : 0)).inverse(),
+                    right = T_world_left(c, i - (fault ? c.camera_late : 0)).inverse();
+    const Transform knock{exp_so3({fault ? c.knock_rad : 0, 0, 0}), Vec3::Zero()};
+    std::vector<StereoObservation> points;
+    for (std::size_t k = 0; k < kPoints; ++k)
+      points.push_back({pixel(left * world[k], &random),
+                        pixel(knock * (T_right_left * (right * world[k])), &random), 0.15,
+                        static_cast<std::uint32_t>(k)});
+    evidence.next(points, T_right_left, kLens, kLens);
+    before = before || (!fault && evidence.lag_frames() != 0);
+  }
+  return {evidence.lag_frames(), before};
+}
+
+TEST(PairingEvidence, tellsALateImageFromAKnockAndFromStanding) {
+  for (const Case& c : std::vector<Case>{{.name = "nothing"},
+                                         {.name = "standing", .step_m = 0},
+                                         {.name = "camera late", .camera_late = 1, .wanted = 1},
+                                         {.name = "left late", .left_late = 1, .wanted = -1},
+                                         {.name = "knocked", .knock_rad = 0.01},
+                                         {.name = "knocked a little", .knock_rad = 0.002}}) {
+    const auto [lag, before] = drive(c);
+    EXPECT_EQ(lag, c.wanted) << c.name;
+    EXPECT_FALSE(before) << c.name;
+  }
+}
+
+TEST(PairingEvidence, measuresTheDistanceFromTheLines) {
+  Arena arena(PairingEvidence::memory_needed(kPoints));
+  PairingEvidence evidence(kPoints, arena);
+  const Transform T_right_left{Mat3::Identity(), {-0.5, 0, 0}};
+  std::vector<StereoObservation> points;
+  for (std::uint32_t k = 0; k < 40; ++k)
+    points.push_back({Vec2(10.0 * k, 8.0 * k), Vec2(10.0 * k - 5, 8.0 * k + 2), 0.15, k});
+  evidence.next(points, T_right_left, kLens, kLens);
+  // Two pixels across, shared by the two images.
+  EXPECT_NEAR(evidence.distance_px(), std::sqrt(2.0), 1e-6);
+}
+
+}  // namespace
+}  // namespace vergence::calibration
