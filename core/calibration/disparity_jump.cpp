@@ -1,4 +1,5 @@
 #include "core/calibration/disparity_jump.hpp"
+#include "core/math/robust.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +10,7 @@ namespace {
 
 constexpr std::size_t kFewestTracks = 25;
 constexpr int kReweightings = 6;
-constexpr double kTukey = 4.7;        // standard deviations: 95 % efficient for normal errors
 constexpr double kLeastScale = 0.05;  // px: corners are found no better
-constexpr double kMadToSigma = 1.4826;
 constexpr double kDepthStep = 1e-3;   // of the depth, for the numeric derivatives
 constexpr double kLeastJump = 0.6;    // px: twice what 95 % of untouched frames stay under
 constexpr double kJumpSigmas = 8.0;   // of the frame's own tracks
@@ -117,18 +116,15 @@ DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
   jump.tracks = static_cast<int>(rows.size());
   if (rows.size() < kFewestTracks) return jump;
   double s = 0, along = 0, scale = 0, variance = 0;
-  const auto middle = static_cast<std::ptrdiff_t>(rows.size() / 2);
-  const auto median = [&](auto value) noexcept {
+  const auto median_of = [&](auto value) noexcept {
     for (std::size_t i = 0; i < rows.size(); ++i) scratch_[i] = value(rows[i]);
-    const auto begin = scratch_.begin();
-    std::nth_element(begin, begin + middle, begin + static_cast<std::ptrdiff_t>(rows.size()));
-    return *(begin + middle);
+    return median(scratch_.first(rows.size()));
   };
-  s = median([](const Row& r) noexcept { return r.e; });
+  s = median_of([](const Row& r) noexcept { return r.e; });
   for (int k = 0; k < kReweightings; ++k) {
-    scale = std::max(kLeastScale, kMadToSigma * median([&](const Row& r) noexcept {
+    scale = std::max(kLeastScale, median_of([&](const Row& r) noexcept {
                                     return std::abs(r.e - s - along * r.along);
-                                  }));
+                                  }) / kMedianOfNormal);
     double w = 0, wa = 0, waa = 0, we = 0, wae = 0;
     for (const Row& r : rows) {
       const double u = (r.e - s - along * r.along) / (kTukey * scale);

@@ -8,6 +8,7 @@
 #include "core/camera/camera.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "core/math/angle.hpp"
+#include "core/math/robust.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::calibration {
@@ -54,9 +55,7 @@ double median_distance(const LoggedFrame& frame, const RigCalibration& rig, int 
     distance[n++] = std::abs(d) * rig.intrinsics[other].fx;
   }
   if (n < 10) return -1.0;
-  const auto middle = distance.begin() + static_cast<std::ptrdiff_t>(n / 2);
-  std::nth_element(distance.begin(), middle, distance.begin() + static_cast<std::ptrdiff_t>(n));
-  return *middle;
+  return median(std::span(distance).first(n));
 }
 
 /// Calls `each` for the newest frames after a number.
@@ -73,9 +72,7 @@ HeldOut fit_of(std::span<double> medians) noexcept {
   HeldOut h;
   h.frames = static_cast<int>(medians.size());
   if (medians.empty()) return h;
-  const auto middle = medians.begin() + static_cast<std::ptrdiff_t>(medians.size() / 2);
-  std::nth_element(medians.begin(), middle, medians.end());
-  h.median_px = *middle;
+  h.median_px = median(medians);
   return h;
 }
 

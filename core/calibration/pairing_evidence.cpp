@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/geometry/epipolar.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::calibration {
 namespace {
@@ -16,13 +17,6 @@ constexpr double kPointsOfAFrame = 5;
 constexpr double kFollow = 0.1;  // of the usual width, a frame
 // A wrong claim once in a million times (Wald 1945): three frames at least.
 constexpr double kDecided = 13.8;
-
-double median(std::span<float> values) noexcept {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
   return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
@@ -66,7 +60,7 @@ void PairingEvidence::next(std::span<StereoObservation> points, const Transform&
   }
   std::copy(points.begin(), points.end(), before_.begin());
   count_ = points.size();
-  distance_px_ = median(now_.first(n));
+  distance_px_ = n > 0 ? static_cast<double>(median(now_.first(n))) : 0;
   if (both < kFewestPoints) return;
   const double now = std::max(distance_px_, kNoise);
   if (usual_px_ == 0) usual_px_ = now;
@@ -76,8 +70,8 @@ void PairingEvidence::next(std::span<StereoObservation> points, const Transform&
     *sum = std::clamp(*sum + kPointsOfAFrame * std::clamp(ratio, -1.0, 1.0), 0.0,
                       kDecided + kPointsOfAFrame);
   };
-  add(median(late_px_.first(both)), &late_);
-  add(median(early_px_.first(both)), &early_);
+  add(static_cast<double>(median(late_px_.first(both))), &late_);
+  add(static_cast<double>(median(early_px_.first(both))), &early_);
   if (std::max(late_, early_) < 1) usual_px_ += kFollow * (now - usual_px_);
 }
 

@@ -1,4 +1,5 @@
 #include "core/calibration/rig_solver.hpp"
+#include "core/math/robust.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -145,9 +146,7 @@ BundleResult RigSolver::adjust(const BundleOptions& how) noexcept {
 double RigSolver::residual_scale() noexcept {
   const std::size_t n = observations_.size();
   std::copy_n(residuals_.begin(), n, sorted_.begin());
-  const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(n / 2);
-  std::nth_element(sorted_.begin(), middle, sorted_.begin() + static_cast<std::ptrdiff_t>(n));
-  return std::max(0.2, std::sqrt(static_cast<double>(*middle)) / kMedianOfTwo);
+  return std::max(0.2, std::sqrt(static_cast<double>(median(sorted_.first(n)))) / kMedianOfTwo);
 }
 
 void RigSolver::drop_outliers(double limit) noexcept {

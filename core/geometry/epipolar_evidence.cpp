@@ -4,19 +4,17 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/math/robust.hpp"
+
 namespace vergence {
 
 EpipolarEvidence weigh_epipolar_distances(std::span<float> distances, double band_px,
                                           double noise_px) noexcept {
   constexpr double kTrueShare = 0.5;
-  // The median of a half Gaussian of width 1.
-  constexpr double kMedianOfHalf = 0.6745;
   EpipolarEvidence e;
   if (distances.empty()) return e;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
   // Half of the band is no core: chance alone makes the median that.
-  e.width_px = std::clamp(static_cast<double>(*middle) / kMedianOfHalf, noise_px,
+  e.width_px = std::clamp(static_cast<double>(median(distances)) / kMedianOfNormal, noise_px,
                           std::max(noise_px, 0.5 * band_px));
   const double peak = band_px * std::sqrt(2 / std::numbers::pi) / e.width_px;
   for (const float distance : distances) {

@@ -6,6 +6,7 @@
 #include "core/geometry/detail/pose_problem.hpp"
 #include "core/geometry/observations.hpp"
 #include "core/math/random.hpp"
+#include "core/math/robust.hpp"
 #include "core/memory/arena.hpp"
 
 namespace vergence {
@@ -14,9 +15,9 @@ struct MlesacOptions {
   int max_hypotheses = 100;  // three-point samples, 1 … 10 000; each gives up to four poses
   int min_hypotheses =
       8;  // even when the prior explains everything: the prior's noise is not the frame's
-  double confidence = 0.999;   // that one sample at least was free of outliers; sets the adaptive
-                               // stop, 0.5 … 0.999999
-  double outlier_cost = 9.21;  // T², squared sigmas: χ² of two coordinates at 99 %
+  double confidence = 0.999;  // that one sample at least was free of outliers; sets the adaptive
+                              // stop, 0.5 … 0.999999
+  double outlier_cost = kChi2OfPixel;
 };
 
 enum class MlesacStatus : std::uint8_t {

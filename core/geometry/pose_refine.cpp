@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/math/linear_solve.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence {
 namespace {
@@ -49,9 +50,7 @@ double PoseRefiner::residual_scale(const Transform& T, double floor) noexcept {
       if (problem_.counts(k, i)) sorted_[n++] = errors[i];
   }
   if (n == 0) return floor;
-  const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(n / 2);
-  std::nth_element(sorted_.begin(), middle, sorted_.begin() + static_cast<std::ptrdiff_t>(n));
-  const double scale = std::sqrt(*middle) / kRayleighMedian;
+  const double scale = std::sqrt(median(sorted_.first(n))) / kRayleighMedian;
   return std::isfinite(scale) ? std::max(floor, scale) : floor;
 }
 

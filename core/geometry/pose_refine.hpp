@@ -4,6 +4,7 @@
 
 #include "core/geometry/detail/pose_problem.hpp"
 #include "core/geometry/observations.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence {
 
@@ -12,7 +13,7 @@ struct PoseRefineOptions {
   double huber = 2.0;  // threshold in scaled sigmas, > 0
   double min_scale =
       1.0;  // floor of the residual scale in given sigmas: a good frame is not believed beyond them
-  double inlier_chi2 = 9.21;   // squared scaled sigmas: χ² of two coordinates at 99 %
+  double inlier_chi2 = kChi2OfPixel;
   double gross_chi2 = 36.0;    // squared scaled sigmas: beyond it an observation does not count in
                                // the second round; > 0
   double small_update = 1e-7;  // rad and m: converged below it

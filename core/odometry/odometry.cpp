@@ -4,6 +4,7 @@
 #include <bit>
 #include <utility>
 
+#include "core/math/robust.hpp"
 #include "core/odometry/detail/frame_steps.hpp"
 #include "core/odometry/drift_covariance.hpp"
 
@@ -73,9 +74,7 @@ bool Odometry::wants_keyframe() const noexcept {
   }
   if (active < options_.keyframe_tracked * keyframe_points_) return true;
   if (n == 0) return true;
-  const auto middle = turn.begin() + static_cast<std::ptrdiff_t>(n / 2);
-  std::nth_element(turn.begin(), middle, turn.begin() + static_cast<std::ptrdiff_t>(n));
-  return *middle > options_.keyframe_parallax * rig_.intrinsics[0].fx;
+  return median(std::span(turn).first(n)) > options_.keyframe_parallax * rig_.intrinsics[0].fx;
 }
 
 double Odometry::renew_scale(std::size_t slot) noexcept {

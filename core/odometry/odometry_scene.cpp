@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/features/epipolar_search.hpp"
+#include "core/math/robust.hpp"
 #include "core/odometry/detail/frame_steps.hpp"
 
 /// How scenes begin and end.
@@ -238,12 +239,7 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
         triangulate(X, T_right_left, &again))
       factors[n++] = again.z() / X.z();
   }
-  double factor = 1;
-  if (n > 0) {
-    const auto middle = factors.begin() + static_cast<std::ptrdiff_t>(n / 2);
-    std::nth_element(factors.begin(), middle, factors.begin() + static_cast<std::ptrdiff_t>(n));
-    factor = *middle;
-  }
+  const double factor = n > 0 ? median(std::span(factors).first(n)) : 1;
   const Vec3 here = motion_.T_left_world().centre();
   for (MapPoint& p : map_.points()) {
     if (p.stage == PointStage::free) continue;

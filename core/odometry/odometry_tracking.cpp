@@ -4,6 +4,7 @@
 #include <bit>
 #include <limits>
 
+#include "core/math/robust.hpp"
 #include "core/odometry/detail/frame_steps.hpp"
 
 /// How a frame's pose is found among the points that are there.
@@ -31,8 +32,7 @@ constexpr double kBorder = 12.0;          // px: nearer to the edge a patch does
 constexpr double kSeenAcross = 0.3;
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden
 constexpr std::uint16_t kFoundEnough =
-    2;                             // rig frames, so four images, before a point holds a pose
-constexpr double kOutlier = 9.21;  // squared sigmas, two coordinates at 99 %
+    2;  // rig frames, so four images, before a point holds a pose
 
 /// A pose of the sample that all points may be followed from.
 bool sample_agrees(const PoseFit& fit, double share) noexcept {
@@ -182,7 +182,7 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
         const bool seen = front_end_.lens(k).ideal().project(
                               rig_.T_camera_left[c] * (fit.T_left_world * p.p_world), &pixel,
                               nullptr) == ProjectStatus::ok;
-        const double limit = kOutlier * p.now.sigma[c] * p.now.sigma[c];
+        const double limit = kChi2OfPixel * p.now.sigma[c] * p.now.sigma[c];
         if (!seen || (pixel - p.now.pixel[c].cast<double>()).squaredNorm() > 4.0 * limit)
           p.now.drop(k);
       }

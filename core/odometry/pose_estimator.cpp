@@ -7,11 +7,11 @@
 #include <utility>
 
 #include "core/math/linear_solve.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::odometry {
 namespace {
 
-constexpr double kOutlier = 9.21;  // squared sigmas, two coordinates at 99 %
 constexpr double kStereoShare =
     0.5;  // of the points found in two cameras, in which both must agree with the pose
 constexpr int kCameraHolds = 8;   // inliers for a camera to count as one that supports the pose
@@ -85,7 +85,7 @@ void PoseEstimator::collect_camera(const Map& map, int k) noexcept {
 PoseRefineOptions PoseEstimator::how_to_refine(bool rough) const noexcept {
   PoseRefineOptions o;
   o.huber = options_.huber;
-  o.inlier_chi2 = kOutlier;
+  o.inlier_chi2 = kChi2OfPixel;
   if (rough || !drop_gross_) o.gross_chi2 = std::numeric_limits<double>::infinity();
   return o;
 }

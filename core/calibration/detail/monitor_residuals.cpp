@@ -4,17 +4,15 @@
 #include <cmath>
 
 #include "core/math/linear_solve.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::calibration::detail {
 namespace {
 
 constexpr int kStereoRounds =
     3;  // of reweighting: the scale falls from that of a knock to that of the noise in two
-constexpr int kMotionRounds = 2;  // the odometry's motion is near, so fewer do
-constexpr double kTukey =
-    4.685;  // robust scales, where a scalar's weight reaches 0: 95 % efficient on Gaussian errors
-constexpr double kTukey3 = 6.0;      // the same for the length of three
-constexpr double kMedian1 = 0.6745;  // median of |normal|
+constexpr int kMotionRounds = 2;     // the odometry's motion is near, so fewer do
+constexpr double kTukey3 = 6.0;      // as kTukey, for the length of three
 constexpr double kMedian3 = 1.5382;  // of the length of three normals
 constexpr double kMinScale = 0.1;    // of the sigma the observations claim
 // An M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')² for Gaussian errors
@@ -107,11 +105,9 @@ bool point_by_theta(const Reference& c, const Triangulated& point, const Vec3& q
 }
 
 template <class Range, class Value>
-double median(Range& scratch, std::size_t n, const Value& value) noexcept {
+double median_of(Range& scratch, std::size_t n, const Value& value) noexcept {
   for (std::size_t i = 0; i < n; ++i) scratch[i] = value(i);
-  const auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(n / 2);
-  std::nth_element(scratch.begin(), middle, scratch.begin() + static_cast<std::ptrdiff_t>(n));
-  return *middle;
+  return vergence::median(std::span(scratch).first(n));
 }
 
 }  // namespace
@@ -152,10 +148,10 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     const auto rest = [&](const StereoRow& row) {
       return row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit);
     };
-    const double middle = median(sizes_, rows_, [&](std::size_t i) {
+    const double middle = median_of(sizes_, rows_, [&](std::size_t i) {
       return std::abs(rest(stereo_[i])) * std::sqrt(stereo_[i].inverse_sigma2);
     });
-    const double scale = std::max(middle / kMedian1, kMinScale);
+    const double scale = std::max(middle / kMedianOfNormal, kMinScale);
     look.evidence = Evidence{};
     Evidence& e = look.evidence;
     for (std::size_t i = 0; i < rows_; ++i) {
@@ -304,7 +300,7 @@ MotionResiduals MonitorResiduals::motion(const Reference& c, const MonitorFrame&
       return (row.r + row.J_theta * theta + row.J_pose * pose).squaredNorm() * row.inverse_sigma2;
     };
     for (std::size_t i = 0; i < n; ++i) motion_[i].weight = size2(motion_[i]);
-    const double middle = median(sizes_, n, [&](std::size_t i) { return motion_[i].weight; });
+    const double middle = median_of(sizes_, n, [&](std::size_t i) { return motion_[i].weight; });
     const double scale = std::max(std::sqrt(middle) / kMedian3, kMinScale);
     A_theta.setZero(), A_pose.setZero(), A_cross.setZero(), g_theta.setZero(), g_pose.setZero();
     for (std::size_t i = 0; i < n; ++i) {

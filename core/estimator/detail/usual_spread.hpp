@@ -2,6 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <span>
+
+#include "core/math/robust.hpp"
 
 namespace vergence {
 
@@ -43,9 +46,7 @@ class UsualSpread {
 
   [[nodiscard]] double median() const noexcept {
     std::array<double, kKept> sorted = sigma_;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(kept_ / 2);
-    std::nth_element(sorted.begin(), middle, sorted.begin() + static_cast<std::ptrdiff_t>(kept_));
-    return *middle;
+    return vergence::median(std::span(sorted).first(kept_));
   }
 
   std::array<double, kKept> sigma_{};
