@@ -1,6 +1,7 @@
 #include "app/foreign_calibration/settings_tree.hpp"
 
 #include <algorithm>
+#include <sstream>
 #include <string_view>
 
 #include <yaml-cpp/yaml.h>
@@ -17,16 +18,12 @@ bool begins_number(std::string_view word) {
 }
 
 /// The numbers of a text between blanks, commas and semicolons, as a YAML list.
-std::string as_list(std::string_view text) {
-  std::string list = "[";
-  std::string_view rest = text;
-  constexpr std::string_view kBetween = " \t\r\n,;";
-  while (!rest.empty()) {
-    rest.remove_prefix(std::min(rest.find_first_not_of(kBetween), rest.size()));
-    const std::string_view word = rest.substr(0, rest.find_first_of(kBetween));
-    if (!word.empty()) list.append(list.size() > 1 ? ", " : "").append(word);
-    rest.remove_prefix(word.size());
-  }
+std::string as_list(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
+  std::istringstream words(text);
+  std::string list;
+  for (std::string word; words >> word;) list += (list.empty() ? "[" : ", ") + word;
   return list + "]";
 }
 
@@ -35,7 +32,7 @@ std::string as_yaml(std::string_view value) {
   value = trimmed(value);
   if (value.starts_with('[') || value.starts_with('{')) return std::string(value);
   const bool several = value.find_first_of(" \t,\n") != std::string_view::npos;
-  if (begins_number(value) && several) return as_list(value);
+  if (begins_number(value) && several) return as_list(std::string(value));
   return begins_number(value) ? std::string(value) : double_quoted(value);
 }
 
@@ -66,13 +63,11 @@ std::string from_xml(std::string_view* rest, std::string_view end, int depth) {
   return map.empty() ? as_yaml(text) : "{" + map + "}";
 }
 
-/// Sections become groups; `key = value` or `key: value`, or a key alone and its numbers below.
+/// Sections become groups; `key = value`, or a key alone and its numbers below.
 std::string from_ini(std::string_view text) {
-  std::string yaml = "{", section, key, numbers;
-  bool first = true, open = false;
+  std::string yaml, indent, key, numbers;
   const auto add = [&](std::string_view name, const std::string& value) {
-    yaml.append(first ? "" : ", ").append(double_quoted(name)).append(": ").append(value);
-    first = false;
+    yaml.append(indent).append(double_quoted(name)).append(": ").append(value).append("\n");
   };
   const auto finish = [&] {
     if (!key.empty() && !numbers.empty()) add(key, as_yaml(numbers));
@@ -81,23 +76,23 @@ std::string from_ini(std::string_view text) {
   Lines lines(text);
   for (std::string_view line; lines.next(&line);) {
     if (line.starts_with(';')) continue;
-    if (line.starts_with('[') && line.ends_with(']') && !begins_number(line.substr(1))) {
-      finish();
-      if (open) yaml += "}";
-      add(line.substr(1, line.size() - 2), "{");
-      first = open = true;
-    } else if (const std::size_t equals = line.find('='); equals != std::string_view::npos) {
-      finish();
-      add(trimmed(line.substr(0, equals)), as_yaml(line.substr(equals + 1)));
-    } else if (begins_number(line)) {
+    if (begins_number(line)) {
       numbers.append(line).append(" ");
+      continue;
+    }
+    finish();
+    if (line.starts_with('[') && line.ends_with(']')) {
+      indent.clear();
+      add(line.substr(1, line.size() - 2), "");
+      indent = "  ";
+    } else if (const std::size_t equals = line.find('='); equals != std::string_view::npos) {
+      add(trimmed(line.substr(0, equals)), as_yaml(line.substr(equals + 1)));
     } else {
-      finish();
       key = line;
     }
   }
   finish();
-  return yaml + (open ? "}}" : "}");
+  return yaml;
 }
 
 bool is_ini(std::string_view text) {
@@ -128,30 +123,23 @@ std::vector<YamlFile> settings_trees(std::string text, const std::string& name) 
     text = from_xml(&rest, "", 0);
   else if (is_ini(rest))
     text = from_ini(rest);
-  // Lines stay where they are: what is of other documents is blanked.
+  if (text.starts_with("---")) text.replace(0, 3, 3, ' ');
   std::vector<YamlFile> trees;
-  std::string document(text.size(), ' ');
-  std::size_t documents = 1;
-  const auto finish = [&] {
+  std::string document;  // after as many ends of lines as stand before it
+  constexpr std::size_t kMostDocuments = 16;
+  rest = text;
+  for (std::size_t documents = 1;; ++documents) {
+    if (documents > kMostDocuments)
+      refuse(name, 0, "has more documents (---) than a calibration has");
+    const std::size_t end = std::min(rest.find("\n---"), rest.size());
+    document.append(rest.substr(0, end));
     YamlFile tree = YamlFile::parse(document, name);
     if (!tree.root().IsNull()) trees.push_back(std::move(tree));
-    for (char& c : document) c = c == '\n' ? '\n' : ' ';
-  };
-  for (std::size_t line = 0; line < text.size();) {
-    const std::size_t end = std::min(text.find('\n', line), text.size() - 1) + 1;
-    if (text.compare(line, 3, "---") == 0) {
-      constexpr std::size_t kMostDocuments = 16;
-      if (++documents > kMostDocuments)
-        refuse(name, 0, "has more documents (---) than a calibration has");
-      finish();
-      document[end - 1] = '\n';
-    } else {
-      document.replace(line, end - line, text, line, end - line);
-    }
-    line = end;
+    if (end == rest.size()) return trees;
+    document.assign(
+        static_cast<std::size_t>(std::count(document.begin(), document.end(), '\n')) + 1, '\n');
+    rest.remove_prefix(std::min(rest.find('\n', end + 1), rest.size()));
   }
-  finish();
-  return trees;
 }
 
 }  // namespace vergence::app

@@ -2,88 +2,72 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <string_view>
+
+#include <fmt/format.h>
 
 namespace vergence::app {
 namespace {
 
 struct Words {
-  Part part;
-  std::string_view words;
+  std::string_view part, words;
 };
 /// The last part of a key in small letters without signs, the camera's words and number taken off.
 constexpr std::array kWords{
-    Words{Part::matrix,
-          " k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics "},
-    Words{Part::fx, " fx mu "},
-    Words{Part::fy, " fy mv "},
-    Words{Part::cx, " cx u0 "},
-    Words{Part::cy, " cy v0 "},
-    Words{Part::focal, " f focal focallength "},
-    Words{Part::centre, " principalpoint pp "},
-    Words{Part::distortion,
+    Words{"matrix", " k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics "},
+    Words{"fx", " fx mu "},
+    Words{"fy", " fy mv "},
+    Words{"cx", " cx u0 "},
+    Words{"cy", " cy v0 "},
+    Words{"focal", " f focal focallength "},
+    Words{"centre", " principalpoint pp "},
+    Words{"distortion",
           " d dist distcoeff distcoeffs distcoef distcoefs distortion distortioncoeffs "
           "distortioncoefficients distortionvector distortionparameters coefficients "},
-    Words{Part::camera_model, " model modeltype cameramodel cameratype type "},
-    Words{Part::distortion_model, " distortionmodel distortiontype "},
-    Words{Part::fisheye, " fisheye fisheyemodel "},
-    Words{Part::size, " size imagesize imgsize imagedimension resolution "},
-    Words{Part::width, " width imagewidth imgwidth cols "},
-    Words{Part::height, " height imageheight imgheight rows "},
-    Words{Part::rectification, " rectification rectificationmatrix rrect "},
-    Words{Part::projection, " p projection projectionmatrix prect "},
-    Words{Part::rotation, " r rot rotation rotationmatrix rmat om rvec rotationvector "},
-    Words{Part::translation, " t tran trans trns translation translationvector tvec "},
-    Words{Part::to_previous, " tcncnm "},
-    Words{Part::from_body, " tcamimu tcambody tcb tci "},
-    Words{Part::to_body, " timucam tbodycam bodytcam tbs tsc tbc tic "},
-    Words{Part::baseline, " baseline b "},
-    Words{Part::focal_baseline, " bf focalxbaseline "},
-    Words{Part::binning_x, " binningx "},
-    Words{Part::binning_y, " binningy "},
-    Words{Part::roi_x, " xoffset "},
-    Words{Part::roi_y, " yoffset "},
-    Words{Part::topic, " rostopic "},
-    Words{Part::name, " cameraname "},
-    Words{Part::file, " calib camcalib "},
-    Words{Part::other, " timeshiftcamimu "}};
+    Words{"camera_model", " model modeltype cameramodel cameratype type "},
+    Words{"distortion_model", " distortionmodel distortiontype "},
+    Words{"fisheye", " fisheye fisheyemodel "},
+    Words{"size", " size imagesize imgsize imagedimension resolution "},
+    Words{"width", " width imagewidth imgwidth cols "},
+    Words{"height", " height imageheight imgheight rows "},
+    Words{"rectification", " rectification rectificationmatrix rrect "},
+    Words{"projection", " p projection projectionmatrix prect "},
+    Words{"rotation", " r rot rotation rotationmatrix rmat om rvec rotationvector "},
+    Words{"translation", " t tran trans trns translation translationvector tvec "},
+    Words{"to_previous", " tcncnm "},
+    Words{"from_body", " tcamimu tcambody tcb tci "},
+    Words{"to_body", " timucam tbodycam bodytcam tbs tsc tbc tic "},
+    Words{"baseline", " baseline b "},
+    Words{"focal_baseline", " bf focalxbaseline "},
+    Words{"binning_x", " binningx "},
+    Words{"binning_y", " binningy "},
+    Words{"roi_x", " roixoffset "},
+    Words{"roi_y", " roiyoffset "},
+    Words{"roi_width", " roiwidth "},
+    Words{"roi_height", " roiheight "},
+    Words{"name", " cameraname "},
+    Words{"file", " calib camcalib "}};
 
 struct Program {
   std::string_view key;  // at the root, or the beginning of one
-  std::string_view sentence;
-  bool never = false;  // its files are not read, whatever they hold
+  std::string_view name;
+  std::string_view needs;  // nothing: its files are not read, whatever they hold
 };
 constexpr std::array kPrograms{
-    Program{"value0", "is Basalt's calibration, which is not read; Kalibr's camchain of the rig is",
-            true},
-    Program{"cameraData", "is DepthAI's calibration; export the rectified pair as ROS camera_info",
-            true},
-    Program{
-        "LEFT_CAM_",
-        "is the factory file of a ZED camera, which holds all resolutions; write M1 D1 M2 D2 R T "
-        "of yours in OpenCV's names, the baseline in metres",
-        true},
-    Program{"num_of_cam",
-            "is a configuration of VINS: cam0_calib and cam1_calib have to name the cameras' files "
-            "beside it, and body_T_cam0, body_T_cam1 to be given"},
-    Program{"projection_parameters",
-            "is a camera of VINS: give its configuration with body_T_cam0 and body_T_cam1, or both "
-            "cameras' files with --from-scratch and --baseline"},
-    Program{
-        "Camera.bf",
-        "is a setting of ORB-SLAM: it needs Camera.width and Camera.height, and for images that "
-        "are not rectified LEFT.K, LEFT.D, LEFT.R, LEFT.P and RIGHT.…, or Stereo.T_c1_c2"},
-    Program{"Camera1.fx", "is a setting of ORB-SLAM3: it needs Camera2.… and Stereo.T_c1_c2"},
-    Program{"Camera.type",
-            "is a setting of ORB-SLAM3: it needs Camera1.…, Camera2.… and Stereo.T_c1_c2"},
-    Program{"Camera", "is a setting of stella_vslam: it needs cols, rows and focal_x_baseline"},
-    Program{"T_BS",
-            "is of one camera (EuRoC, Kimera): give both files, left first, with a comma between"},
-    Program{"projection_matrix", "is camera_info of ROS: both cameras' are needed, with P"},
-    Program{"camera_matrix", "is one camera's: both are needed, and where the right one sits"},
-    Program{
-        "cam0",
-        "is a camchain of Kalibr: it needs T_cn_cnm1 of cam1, or T_cam_imu (T_imu_cam) of both"}};
+    Program{"value0", "Basalt", ""},
+    Program{"cameraData", "DepthAI", ""},
+    Program{"LEFT_CAM_", "ZED (its factory file)", ""},
+    Program{"num_of_cam", "VINS",
+            "the files beside it that cam0_calib and cam1_calib name, body_T_cam0 and body_T_cam1"},
+    Program{"projection_parameters", "VINS", "the configuration with body_T_cam0 and body_T_cam1"},
+    Program{"Camera.bf", "ORB-SLAM",
+            "Camera.width and Camera.height, of raw images LEFT.K, D, R, P and RIGHT.…, too"},
+    Program{"Camera.type", "ORB-SLAM3", "Camera1.…, Camera2.… and Stereo.T_c1_c2"},
+    Program{"Camera", "stella_vslam", "cols, rows and focal_x_baseline"},
+    Program{"T_BS", "EuRoC or Kimera", "both cameras' files, left first, with a comma between"},
+    Program{"projection_matrix", "ROS", "camera_info of both cameras, with P"},
+    Program{"cam0", "Kalibr", "T_cn_cnm1 of cam1, or T_cam_imu (T_imu_cam) of both"}};
 
 /// Parts of a key: letters and digits apart, capitals inside a word begin the next.
 std::vector<std::string> tokens_of(std::string_view key) {
@@ -115,12 +99,13 @@ Side take_side(std::vector<std::string>* tokens) {
     tokens->erase(tokens->begin() + static_cast<std::ptrdiff_t>(i));
     return Side{number, word};
   };
-  for (std::size_t i = 0; i < tokens->size(); ++i)
-    if ((*tokens)[i] == "left" || (*tokens)[i] == "right")
-      return take(i, (*tokens)[i] == "right" ? 1 : 0, true);
-  if (tokens->size() > 1 && (tokens->back() == "l" || tokens->back() == "r"))
-    return take(tokens->size() - 1, tokens->back() == "r" ? 1 : 0, true);
-  for (std::size_t i = tokens->size(); i-- > 0;)
+  const std::size_t n = tokens->size();
+  for (std::size_t i = 0; i < n; ++i)
+    if (const std::string& token = (*tokens)[i];
+        token == "left" || token == "right" ||
+        (n > 1 && i + 1 == n && (token == "l" || token == "r")))
+      return take(i, token[0] == 'r' ? 1 : 0, true);
+  for (std::size_t i = n; i-- > 0;)
     if (const std::string& token = (*tokens)[i]; is_number(token) && token.size() <= 2)
       return take(i, std::stoi(token), false);
   return {};
@@ -139,13 +124,13 @@ const Words* find_word(const std::string& word) {
   });
 }
 
-/// k1 … k6, p1 and p2 of a scalar: their place in k1 k2 p1 p2 k3 k4 k5 k6.
-std::optional<int> coefficient_of(const std::vector<std::string>& tokens) {
-  if (tokens.size() < 2) return std::nullopt;
-  const std::string word = tokens[tokens.size() - 2] + tokens.back();
+/// k1 … k6, p1 or p2 of a scalar, whose number is no camera's; empty: another key.
+std::string_view coefficient_of(const std::vector<std::string>& tokens) {
+  if (tokens.size() < 2) return {};
   constexpr std::array<std::string_view, 8> kNames{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
-  const auto at = std::find(kNames.begin(), kNames.end(), word);
-  return at == kNames.end() ? std::nullopt : std::optional(static_cast<int>(at - kNames.begin()));
+  const auto at =
+      std::find(kNames.begin(), kNames.end(), tokens[tokens.size() - 2] + tokens.back());
+  return at == kNames.end() ? std::string_view() : *at;
 }
 
 bool is_value(const YAML::Node& node) {
@@ -212,10 +197,8 @@ class Walk {
     fact.node.reset(node);
     fact.key = path;
     Side side;
-    const auto coefficient = node.IsScalar() ? coefficient_of(tokens) : std::nullopt;
-    if (coefficient) {
-      fact.part = Part::coefficient;
-      fact.index = *coefficient;
+    if (node.IsScalar()) fact.part = coefficient_of(tokens);
+    if (!fact.part.empty()) {
       tokens.resize(tokens.size() - 2);
       side = take_side(&tokens);
     } else if (!take_transform(tokens, &fact)) {
@@ -232,40 +215,33 @@ class Walk {
       side = take_side(&group);
     }
     fact.camera = side.number;
-    if (side.number && !side.word && fact.part != Part::between) counted_.push_back(facts_.size());
+    if (side.number && !side.word && fact.part != "between") counted_.push_back(facts_.size());
     facts_.push_back(std::move(fact));
   }
 
   /// `T_c1_c2`, `T_cam1_cam0`, `T_right_left`, `Tlr`: between two cameras that the key names.
   static bool take_transform(const std::vector<std::string>& tokens, Fact* fact) {
-    if (fact->node.IsScalar()) return false;
     const std::string word = joined(tokens);
-    fact->part = Part::between;
-    struct Named {
-      std::string_view word;
-      int to, from;
-    };
-    constexpr std::array kNamed{Named{"tlr", 0, 1}, Named{"trl", 1, 0}, Named{"trightleft", 1, 0},
-                                Named{"tleftright", 0, 1}, Named{"tcameraleft", 1, 0}};
-    for (const Named& named : kNamed)
-      if (word == named.word) {
-        fact->index = named.to, fact->other = named.from;
-        return true;
-      }
-    std::vector<int> numbers;
+    std::vector<int> cameras;
+    if (word == "tlr" || word == "trl") cameras = {word[1] == 'r', word[2] == 'r'};
     for (const std::string& token : tokens)
-      if (is_number(token) && token.size() == 1) numbers.push_back(token[0] - '0');
-    if (tokens[0] != "t" || numbers.size() != 2) return false;
-    const int first = std::min(numbers[0], numbers[1]);
-    fact->index = numbers[0] - first, fact->other = numbers[1] - first;
-    return std::max(fact->index, fact->other) == 1;
+      if (token == "left" || token == "right")
+        cameras.push_back(token == "right" ? 1 : 0);
+      else if (is_number(token) && token.size() == 1)
+        cameras.push_back(token[0] - '0');
+    if (fact->node.IsScalar() || (tokens[0] != "t" && word.size() != 3) || cameras.size() != 2 ||
+        std::abs(cameras[0] - cameras[1]) != 1)
+      return false;
+    fact->part = "between";
+    fact->index = cameras[0] > cameras[1] ? 1 : 0;
+    return true;
   }
 
   /// `KL` is K of the left camera, `stereo_R` is R.
   static bool look_up(const std::vector<std::string>& tokens,
                       const std::vector<std::string>& groups, Side* side, Fact* fact) {
     std::string word = joined(tokens);
-    auto known = find_word(word);
+    auto known = find_word((!groups.empty() && groups.back() == "roi" ? "roi" : "") + word);
     if (known == kWords.end() && !side->number && (word.ends_with('l') || word.ends_with('r'))) {
       known = find_word(word.substr(0, word.size() - 1));
       if (known != kWords.end()) *side = {word.back() == 'r' ? 1 : 0, true};
@@ -275,10 +251,6 @@ class Walk {
       known = find_word(word.erase(at, std::string_view("stereo").size()));
     if (known == kWords.end()) return false;
     fact->part = known->part;
-    if (!groups.empty() && groups.back() == "roi") {
-      if (fact->part == Part::width) fact->part = Part::roi_width;
-      if (fact->part == Part::height) fact->part = Part::roi_height;
-    }
     return true;
   }
 
@@ -298,8 +270,11 @@ std::string program_of(const YamlFile& file, bool* never) {
       if (entry.first.IsScalar() &&
           (entry.first.Scalar() == program.key ||
            (program.key.ends_with('_') && entry.first.Scalar().starts_with(program.key)))) {
-        *never = program.never;
-        return std::string(program.sentence);
+        *never = program.needs.empty();
+        return fmt::format(
+            "is of {}{}{}", program.name,
+            *never ? ", which is not read; files of Kalibr, ROS and OpenCV are" : ": it needs ",
+            program.needs);
       }
   return "";
 }

@@ -84,7 +84,7 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
       {left, left, "has no baseline"},
       {replaced(opencv, "M2:", "X2:"), "", "the lens of a second camera is missing"},
       {replaced(opencv, "T:", "X:"), "",
-       "the translation of camera 2 from camera 1 (T) is missing"},
+       "T of camera 2 from camera 1 is missing"},
       {replaced(opencv, "image_width: 640\n", ""), "", "--size"},
       {replaced(opencv, "fisheye_model: 0", "fisheye_model: 7"), "", "fisheye_model is 7"},
   };
@@ -181,11 +181,7 @@ TEST(Kalibr, aCamchainIsReadAsItsOwnDefinitionProjects) {
   const CalibrationFile c =
       parse_any_calibration({{"camchain.yaml", kCamchain}}, std::nullopt, &remarks);
   expect_same(c, reference_of_camchain(kCamchain));
-  EXPECT_EQ(c.names[0], "left");
-  EXPECT_EQ(c.names[1], "cam1");
   EXPECT_EQ(c.rig.intrinsics[1].width, 752);
-  ASSERT_EQ(remarks.size(), 1U);
-  EXPECT_NE(remarks[0].find("T_cam_imu"), std::string::npos);
 }
 
 TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
@@ -197,7 +193,6 @@ TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
     const CalibrationFile back =
         parse_any_calibration({{"camchain.yaml", text}}, std::nullopt, &remarks);
     expect_same(c, back);
-    EXPECT_EQ(back.names[2], "bow");
     ASSERT_EQ(remarks.size(), 1U);
     EXPECT_NE(remarks[0].find("serials"), std::string::npos) << remarks[0];
   }
