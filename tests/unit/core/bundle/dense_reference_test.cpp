@@ -140,14 +140,15 @@ struct Dense {
 
 struct Case {
   const char* name;
-  BundleConfiguration configuration;
-  int cameras;
-  CameraModelKind kind;
-  std::array<double, 5> distortion;
-  BundleLength length;
-  BundleLoss loss;
-  unsigned free;  // intrinsics of every camera
+  int cameras = 2;
+  BundleLength length = BundleLength::exact;
+  BundleLoss loss = BundleLoss::none;
+  CameraModelKind kind = CameraModelKind::pinhole_radtan;
+  std::array<double, 5> distortion{};
+  unsigned free = 0;  // intrinsics of every camera
+  BundleConfiguration configuration = BundleConfiguration::stereo_calibration;
 };
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
 class DenseReference : public ::testing::TestWithParam<Case> {};
 
@@ -232,81 +233,25 @@ TEST_P(DenseReference, oneStepIsTheDenseStep) {
   }
 }
 
-constexpr auto kRadtan = CameraModelKind::pinhole_radtan;
-constexpr auto kFisheye = CameraModelKind::pinhole_equidistant;
-constexpr auto kCalibration = BundleConfiguration::stereo_calibration;
+constexpr auto kMeasured = BundleLength::measured, kExact = BundleLength::exact;
+constexpr auto kNone = BundleLoss::none, kHuber = BundleLoss::huber, kCauchy = BundleLoss::cauchy;
+constexpr auto kRadtan = CameraModelKind::pinhole_radtan,
+               kFisheye = CameraModelKind::pinhole_equidistant;
 constexpr auto kOdometry = BundleConfiguration::stereo_odometry;
+constexpr std::array<double, 5> kBent{-0.1, 0.02, 1e-3, -2e-3, 0.01},
+    kWide{-0.02, 0.01, -0.005, 0.001, 0};
 
 INSTANTIATE_TEST_SUITE_P(
     Every, DenseReference,
-    ::testing::Values(
-        Case{
-            "pinholeExact", kCalibration, 2, kRadtan, {}, BundleLength::exact, BundleLoss::none, 0},
-        Case{"pinholeMeasured",
-             kCalibration,
-             2,
-             kRadtan,
-             {},
-             BundleLength::measured,
-             BundleLoss::huber,
-             0},
-        Case{"threeCamerasCauchy",
-             kCalibration,
-             3,
-             kRadtan,
-             {},
-             BundleLength::exact,
-             BundleLoss::cauchy,
-             0},
-        Case{"fourCameras",
-             kCalibration,
-             4,
-             kRadtan,
-             {},
-             BundleLength::measured,
-             BundleLoss::none,
-             0},
-        Case{"focalLengths",
-             kCalibration,
-             2,
-             kRadtan,
-             {},
-             BundleLength::exact,
-             BundleLoss::none,
-             0b000000011},
-        Case{"radtanAll",
-             kCalibration,
-             2,
-             kRadtan,
-             {-0.1, 0.02, 1e-3, -2e-3, 0.01},
-             BundleLength::exact,
-             BundleLoss::none,
-             0b111111111},
-        Case{"equidistantAll",
-             kCalibration,
-             3,
-             kFisheye,
-             {-0.02, 0.01, -0.005, 0.001, 0},
-             BundleLength::measured,
-             BundleLoss::cauchy,
-             0b011111111},
-        Case{"radtanHeld",
-             kCalibration,
-             2,
-             kRadtan,
-             {-0.1, 0.02, 1e-3, -2e-3, 0.01},
-             BundleLength::exact,
-             BundleLoss::huber,
-             0},
-        Case{"odometry", kOdometry, 2, kRadtan, {}, BundleLength::exact, BundleLoss::huber, 0},
-        Case{"odometryEquidistant",
-             kOdometry,
-             3,
-             kFisheye,
-             {-0.02, 0.01, -0.005, 0.001, 0},
-             BundleLength::exact,
-             BundleLoss::none,
-             0}),
+    ::testing::Values(Case{"pinholeExact"}, Case{"pinholeMeasured", 2, kMeasured, kHuber},
+                      Case{"threeCamerasCauchy", 3, kExact, kCauchy},
+                      Case{"fourCameras", 4, kMeasured},
+                      Case{"focalLengths", 2, kExact, kNone, kRadtan, {}, 0b11},
+                      Case{"radtanAll", 2, kExact, kNone, kRadtan, kBent, 0b111111111},
+                      Case{"equidistantAll", 3, kMeasured, kCauchy, kFisheye, kWide, 0b011111111},
+                      Case{"radtanHeld", 2, kExact, kHuber, kRadtan, kBent},
+                      Case{"odometry", 2, kExact, kHuber, kRadtan, {}, 0, kOdometry},
+                      Case{"odometryEquidistant", 3, kExact, kNone, kFisheye, kWide, 0, kOdometry}),
     [](const auto& one) { return one.param.name; });
 
 }  // namespace

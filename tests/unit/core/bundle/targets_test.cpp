@@ -31,20 +31,5 @@ TEST(BundleTargets, everySimdTargetFindsTheSameOptimum) {
   });
 }
 
-TEST(BundleTargets, oneTargetGivesTheSameBitsTwice) {
-  SimulationOptions s;
-  s.points = 61;
-  Random random(22);
-  const SimulatedRig original = simulate_rig(s, random);
-  OwnAdjuster own(capacities_for(s));
-  test::on_every_target([&](const char* target) {
-    SimulatedRig first = original, second = original;
-    const double cost = own.adjuster.solve(first.problem(), calibration_options()).final_cost;
-    EXPECT_EQ(cost, own.adjuster.solve(second.problem(), calibration_options()).final_cost)
-        << target;
-    EXPECT_EQ(first.T_camera_left[1].t, second.T_camera_left[1].t) << target;
-  });
-}
-
 }  // namespace
 }  // namespace vergence

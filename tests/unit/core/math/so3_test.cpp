@@ -5,8 +5,6 @@
 #include <array>
 #include <numbers>
 
-#include "tests/support/numeric_jacobian.hpp"
-
 namespace vergence {
 namespace {
 
@@ -76,17 +74,6 @@ TEST(So3, atPiEitherSignOfTheAxisIsRight) {
     EXPECT_LT((exp_so3(phi) - R).norm(), 2 * kRounding);
   }
   EXPECT_NEAR(rotation_angle(Vec3(1, -1, -1).asDiagonal()), kPi, kRounding);
-}
-
-TEST(So3, leftJacobianMatchesCentralDifferences) {
-  for (const Vec3& axis : axes())
-    for (const double angle : kAngles) {
-      const Vec3 phi = angle * axis;
-      const auto moved = [&](const Vec3& d) -> Vec3 {
-        return log_so3(exp_so3(phi + d) * exp_so3(phi).transpose());
-      };
-      EXPECT_TRUE(test::jacobian_matches(left_jacobian_so3(phi), moved, 1e-8)) << angle;
-    }
 }
 
 TEST(So3, leftJacobianAgreesWithTheSeriesAtEveryAngle) {

@@ -69,15 +69,5 @@ TEST(BoundedVector, behavesLikeALimitedVector) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) walk_beside_a_model(vector, seed), vector.clear();
 }
 
-TEST(FixedVector, whenFullRefusesAndChangesNothing) {
-  FixedVector<int, 2> vector;
-  EXPECT_TRUE(vector.push(1));
-  EXPECT_TRUE(vector.push(2));
-  EXPECT_FALSE(vector.push(3));
-  EXPECT_EQ(vector.size(), 2U);
-  EXPECT_EQ(vector[0], 1);
-  EXPECT_EQ(vector[1], 2);
-}
-
 }  // namespace
 }  // namespace vergence
