@@ -140,28 +140,31 @@ std::vector<Stamp> stamps_of(const std::vector<BagImage>& images) {
   return stamps;
 }
 
+/// The times at which they were recorded; empty: the bag does not say all of them.
+std::vector<Stamp> recorded(const std::vector<BagImage>& images) {
+  constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
+  std::vector<Stamp> log;
+  for (const BagImage& image : images) {
+    if (image.log_time <= 0 || image.log_time > kFarthest) return {};
+    log.emplace_back(image.log_time);
+  }
+  return log;
+}
+
 /// Median delay by which right images were recorded later than their stamps and the left images
 /// imply.
 Duration recorded_later(const std::array<std::vector<BagImage>, 2>& images,
                         std::span<const std::array<std::size_t, 2>> pairs) {
-  std::array<std::vector<Stamp>, 2> log;
-  for (std::size_t k = 0; k < 2; ++k)
-    for (const BagImage& image : images[k]) {
-      constexpr std::int64_t kFarthest = std::int64_t{1} << 62;
-      if (image.log_time <= 0 || image.log_time > kFarthest) return {};
-      log[k].emplace_back(image.log_time);
-    }
-  return pair_offset(log[0], log[1], pairs).median;
+  const std::array log{recorded(images[0]), recorded(images[1])};
+  return log[0].empty() || log[1].empty() ? Duration{} : pair_offset(log[0], log[1], pairs).median;
 }
 
 /// Pairs by the nearest times of recording; nothing where there are none, or they do not decide.
 std::vector<std::array<std::size_t, 2>> pair_by_recording(
     const std::array<std::vector<BagImage>, 2>& images, Duration interval) {
   constexpr double kNear = 0.25;  // of the interval: far from both neighbours
-  std::array<std::vector<Stamp>, 2> log;
-  for (std::size_t k = 0; k < 2; ++k)
-    for (const BagImage& image : images[k]) log[k].emplace_back(image.log_time);
-  auto pairs = pair_nearest(log[0], log[1], Duration::seconds(kNear * interval.to_seconds()));
+  auto pairs = pair_nearest(recorded(images[0]), recorded(images[1]),
+                            Duration::seconds(kNear * interval.to_seconds()));
   if (2 * pairs.size() < std::min(images[0].size(), images[1].size())) pairs.clear();
   return pairs;
 }

@@ -1,8 +1,10 @@
 #include "app/datasets/decimal.hpp"
 
-#include <array>
 #include <charconv>
+#include <iterator>
 #include <limits>
+
+#include <fmt/format.h>
 
 namespace vergence::app {
 namespace {
@@ -96,21 +98,12 @@ std::string format_seconds(std::int64_t ns) {
 }
 
 void append_seconds(std::string* line, std::int64_t ns) {
-  const bool negative = ns < 0;
+  constexpr std::uint64_t kSecond = 1'000'000'000;
   // The magnitude in unsigned arithmetic: that of the least integer does not fit a signed one.
   const std::uint64_t magnitude =
-      negative ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
-  const auto digits = [](std::uint64_t value, std::array<char, 20>* text) {
-    const char* end = std::to_chars(text->data(), text->data() + text->size(), value).ptr;
-    return std::string_view(text->data(), static_cast<std::size_t>(end - text->data()));
-  };
-  std::array<char, 20> buffer{};  // the largest 64-bit number
-  if (negative) line->push_back('-');
-  line->append(digits(magnitude / 1'000'000'000U, &buffer));
-  line->push_back('.');
-  const std::string_view decimals = digits(magnitude % 1'000'000'000U, &buffer);
-  line->append(static_cast<std::size_t>(kDecimals) - decimals.size(), '0');
-  line->append(decimals);
+      ns < 0 ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
+  fmt::format_to(std::back_inserter(*line), "{}{}.{:09}", ns < 0 ? "-" : "", magnitude / kSecond,
+                 magnitude % kSecond);
 }
 
 std::string_view trimmed(std::string_view text) noexcept {

@@ -145,11 +145,9 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   return pair;
 }
 
-ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Workspace* work) {
+ImageFileStatus FrameDecoder::read(const std::string& name, ImageSize size, std::uint8_t* out,
+                                   std::size_t stride, Workspace* work) const {
   if (name.empty()) return ImageFileStatus::missing;
-  const ImageSize size{pool_.width(), pool_.height()};
-  const std::size_t stride = FramePool::stride(size.width);
-  std::uint8_t* out = pool_.writable(slot).data();
   try {
     if (sequence_.store)
       return sequence_.store->decode(name, size, out, stride, sequence_.deep_bits, &work->bytes);
@@ -159,28 +157,24 @@ ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Work
   } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
     return ImageFileStatus::unreadable;
   }
-  if (!sequence_.bayer) return decode_grey(work->bytes, size, out, stride, sequence_.deep_bits);
-  const ImageFileStatus status =
-      decode_grey(work->bytes, size, work->mosaic.data(), stride, sequence_.deep_bits);
+  return decode_grey(work->bytes, size, out, stride, sequence_.deep_bits);
+}
+
+ImageFileStatus FrameDecoder::load(const std::string& name, FrameSlot slot, Workspace* work) {
+  const ImageSize size{pool_.width(), pool_.height()};
+  const std::size_t stride = FramePool::stride(size.width);
+  std::uint8_t* out = pool_.writable(slot).data();
+  const auto status = read(name, size, sequence_.bayer ? work->mosaic.data() : out, stride, work);
   const auto step = static_cast<std::ptrdiff_t>(stride);
-  if (status == ImageFileStatus::ok)
+  if (sequence_.bayer && status == ImageFileStatus::ok)
     bayer_to_grey(work->mosaic.data(), step, size.width, size.height, out, step);
   return status;
 }
 
 ImageFileStatus FrameDecoder::load_both(const std::string& name, Workspace* work) {
-  if (name.empty()) return ImageFileStatus::missing;
-  try {
-    if (const auto status = read_image_file(sequence_.root / name, &work->bytes);
-        status != ImageFileStatus::ok)
-      return status;
-  } catch (const std::bad_alloc&) {  // a file too long for this machine's memory
-    return ImageFileStatus::unreadable;
-  }
   const int width = pool_.width(), height = pool_.height();
   const std::size_t stride = FramePool::stride(width), wide = FramePool::stride(2 * width);
-  if (const auto status = decode_grey(work->bytes, {2 * width, height}, work->mosaic.data(), wide,
-                                      sequence_.deep_bits);
+  if (const auto status = read(name, {2 * width, height}, work->mosaic.data(), wide, work);
       status != ImageFileStatus::ok)
     return status;
   for (std::size_t k = 0; k < 2; ++k) {

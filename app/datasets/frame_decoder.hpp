@@ -71,6 +71,9 @@ class FrameDecoder {
     std::vector<std::uint8_t>
         mosaic;  // of a raw sequence, rows as the pool's; of one side by side, both images
   };
+  /// A file's, or the store's, image of that size into rows `stride` bytes apart.
+  [[nodiscard]] ImageFileStatus read(const std::string& name, ImageSize size, std::uint8_t* out,
+                                     std::size_t stride, Workspace* work) const;
   /// One image into the slot. Two at once are fine, each with a workspace of its own.
   [[nodiscard]] ImageFileStatus load(const std::string& name, FrameSlot slot, Workspace* work);
   /// A file with both images side by side, into the two slots in hand.

@@ -27,15 +27,6 @@ constexpr std::size_t kMostSmall = 65536;                       // bytes of a me
 constexpr std::size_t kMostDescription = std::size_t{4} << 20;  // bytes
 constexpr std::size_t kMostFrames = 4'000'000;                  // 37 hours at 30 Hz
 
-/// The bytes of a message; empty: too many, or they cannot be read.
-std::vector<std::uint8_t> content(const detail::BagMessage& m, std::size_t most) {
-  std::vector<std::uint8_t> bytes;
-  if (m.place.size > most) return bytes;
-  bytes.resize(m.place.size);
-  if (!m.bytes->read(m.place.offset, bytes)) bytes.clear();
-  return bytes;
-}
-
 /// The check sum that ends a message is that of what stands before it.
 bool check(std::span<const std::uint8_t> bytes, RosReader* in) {
   const std::size_t end = in->position();
@@ -136,15 +127,15 @@ struct RecordedSession::Reader {
   void take(const detail::BagMessage& m, std::uint32_t file) {
     const std::string& type = m.channel->type;
     if (m.channel->topic == SessionDescription::kTopic) return take_description(m);
-    if (type == "sensor_msgs/Image") return take_image(m, file);
-    if (type == "sensor_msgs/CompressedImage") return take_packed_image(m, file);
+    if (type == "sensor_msgs/Image") return take_image(m, file, false);
+    if (type == "sensor_msgs/CompressedImage") return take_image(m, file, true);
     if (type == "vergence_msgs/Frame") return take_frame(m);
     if (type == "vergence_msgs/InsReading") return take_reading(m);
   }
 
   void take_description(const detail::BagMessage& m) {
     if (described) return;
-    const auto bytes = content(m, kMostDescription);
+    const auto bytes = detail::first_bytes(m, kMostDescription);
     RosReader in(bytes, detail::MessageEncoding::cdr);
     const std::string json = in.text();
     if (!in.ok()) refuse(folder, 0, "has a recording whose description is damaged");
@@ -156,33 +147,23 @@ struct RecordedSession::Reader {
     described = true;
   }
 
-  void take_image(const detail::BagMessage& m, std::uint32_t file) {
+  /// A PNG, encoded by a thread of its own, comes behind its frame more often than before it.
+  void take_image(const detail::BagMessage& m, std::uint32_t file, bool png) {
     const auto camera = cameras.find(m.channel->topic);
     if (camera == cameras.end() || m.place.chunk != detail::BagPlace::kNoChunk) return;
-    std::array<std::uint8_t, 256> head{};
-    const auto bytes = std::span(head).first(std::min<std::size_t>(head.size(), m.place.size));
-    if (!m.bytes->read(m.place.offset, bytes)) return;
-    const auto image = detail::read_ros_image(bytes, m.place.size, detail::MessageEncoding::cdr);
-    if (!image || image->layout != detail::PixelLayout::grey ||
-        image->step != static_cast<std::uint32_t>(image->size.width))
-      return;
-    newest[camera->second] = {file, 0, m.place.offset + image->offset, image->size.width,
-                              image->size.height};
-    newest_stamp[camera->second] = image->stamp;
-  }
-
-  /// Encoded by a thread of its own, it comes behind its frame more often than before it.
-  void take_packed_image(const detail::BagMessage& m, std::uint32_t file) {
-    const auto camera = cameras.find(m.channel->topic);
-    if (camera == cameras.end() || m.place.chunk != detail::BagPlace::kNoChunk) return;
-    std::array<std::uint8_t, detail::kRosImageHead> head{};
-    const auto bytes = std::span(head).first(std::min<std::size_t>(head.size(), m.place.size));
-    if (!m.bytes->read(m.place.offset, bytes)) return;
-    const auto image =
-        detail::read_ros_compressed_image(bytes, m.place.size, detail::MessageEncoding::cdr);
+    const auto read = png ? detail::read_ros_compressed_image : detail::read_ros_image;
+    const auto image = read(detail::first_bytes(m, detail::kRosImageHead), m.place.size,
+                            detail::MessageEncoding::cdr, nullptr);
     if (!image || image->bytes == 0) return;
-    packed[{image->stamp, camera->second}] = {file, image->bytes, m.place.offset + image->offset,
-                                              image->size.width, image->size.height};
+    const RecordedImage found{file, png ? image->bytes : 0, m.place.offset + image->offset,
+                              image->size.width, image->size.height};
+    if (png) {
+      packed[{image->stamp, camera->second}] = found;
+    } else if (image->layout == detail::PixelLayout::grey &&
+               image->step == static_cast<std::uint32_t>(image->size.width)) {
+      newest[camera->second] = found;
+      newest_stamp[camera->second] = image->stamp;
+    }
   }
 
   /// Images that the frames do not have yet, among those that were packed.
@@ -200,7 +181,7 @@ struct RecordedSession::Reader {
   }
 
   void take_frame(const detail::BagMessage& m) {
-    const auto record = read_frame(content(m, kMostSmall));
+    const auto record = read_frame(detail::first_bytes(m, kMostSmall));
     if (!record) {
       ++broken;
       return;
@@ -217,7 +198,7 @@ struct RecordedSession::Reader {
   }
 
   void take_reading(const detail::BagMessage& m) {
-    const auto reading = read_reading(content(m, kMostSmall));
+    const auto reading = read_reading(detail::first_bytes(m, kMostSmall));
     if (!reading) {
       ++broken;
       return;
@@ -246,14 +227,7 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
       session.complete_ = session.complete_ && i + 1 == session.files_->list.size();
       continue;
     }
-    if (!scan->finished)
-      session.remarks_.push_back(fmt::format(
-          "{} is unfinished: it was read up to offset {}, where its last whole record ends",
-          file.name, scan->end));
-    if (scan->first_broken)
-      session.remarks_.push_back(fmt::format(
-          "{}: {} chunks and {} records were left out; the first at offset {} is {}", file.name,
-          scan->broken_chunks, scan->broken_records, *scan->first_broken, scan->why_broken));
+    scan->remark(file.name, &session.remarks_);
     session.complete_ = session.complete_ && !scan->first_broken;
   }
   reader.finish();

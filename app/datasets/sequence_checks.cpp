@@ -14,39 +14,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr double
-    kShortestStep = 1e-3,
-    kLongestStep =
-        10;  // s: faster than any stereo camera; farther than motion can be predicted across
-constexpr double kUsual = 0.05;  // s
-
-struct Unit {
-  const char* name;
-  double seconds;
-};
-constexpr std::array kUnits{Unit{"nanoseconds", 1e-9}, Unit{"microseconds", 1e-6},
-                            Unit{"milliseconds", 1e-3}, Unit{"seconds", 1}};
-
-/// The unit that makes a step of `number` the most usual one; `read_as` s a unit is not it.
-const Unit* likely_unit(double number, double read_as) {
-  const Unit* best = nullptr;
-  const auto strange = [number](const Unit& u) {
-    return std::abs(std::log(number * u.seconds / kUsual));
-  };
-  for (const Unit& unit : kUnits) {
-    const double step = number * unit.seconds;
-    if (unit.seconds == read_as || step < kShortestStep || step > kLongestStep) continue;
-    if (best == nullptr || strange(unit) < strange(*best)) best = &unit;
-  }
-  return best;
-}
-
-std::string in_words(double seconds) {
-  if (seconds < 1e-6) return fmt::format("{:.0f} ns", seconds * 1e9);
-  if (seconds < 1e-3) return fmt::format("{:.4g} µs", seconds * 1e6);
-  return fmt::format("{:.4g} s", seconds);
-}
-
+// s: faster than any stereo camera; farther than motion can be predicted across
+constexpr double kShortestStep = 1e-3, kLongestStep = 10;
 constexpr std::size_t kLooks = 5;  // pairs, spread over the drive: a tunnel is not all of it
 
 /// Nothing: an image of another kind. 0: one that says nothing, for it is missing, torn or black.
@@ -100,27 +69,17 @@ void check_times(const StereoSequence& sequence) {
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   if (*middle >= kShortestStep && *middle <= kLongestStep) return;
-  // Whole numbers were read as nanoseconds, numbers with a point as seconds; a step that is too
-  // short was whole.
-  const double read_as = *middle < kShortestStep ? 1e-9 : 1.0;
-  const Unit* unit = likely_unit(*middle / read_as, read_as);
   if (*middle == 1e-9 && backward + still == 0)
     refuse(file, 0,
            "has times that count the pairs (1, 2, 3 …), as numbers of frames do, and no times: "
            "leave the file out, and pairs are taken to be 0.1 s apart");
-  const std::string ask = unit != nullptr ? fmt::format("are these {}?", unit->name)
-                                          : "steps of 1 ms to 10 s are those of a drive.";
-  std::string help;
-  if (file.extension() == ".txt") {  // else the format has its one unit
-    help = " Whole numbers are read as nanoseconds, numbers with a point as seconds";
-    if (unit != nullptr && unit->seconds == 1) help += ": write these with a point";
-    if (unit != nullptr && unit->seconds < 1)
-      help +=
-          fmt::format(": divide these by {:.0f} and write them with a point", 1 / unit->seconds);
-  }
   refuse(file, 0,
-         fmt::format("has pairs that follow one another after {} (median); {}{}", in_words(*middle),
-                     ask, help));
+         fmt::format("has pairs that follow one another after {:.4g} s (median); those of a drive "
+                     "do after 1 ms to 10 s: are these times in other units?{}",
+                     *middle,
+                     file.extension() == ".txt"  // else the format has its one unit
+                         ? " Whole numbers are read as nanoseconds, numbers with a point as seconds"
+                         : ""));
 }
 
 void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::size_t count) {

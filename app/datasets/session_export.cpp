@@ -238,16 +238,6 @@ void check_sizes(const RecordedFrame& frame, const CalibrationFile& calibration)
   }
 }
 
-/// The layouts hold two cameras, and so must their calibration.
-void keep_two_cameras(int recorded, CalibrationFile* calibration,
-                      std::vector<std::string>* remarks) {
-  if (recorded > 2)
-    remarks->push_back(fmt::format(
-        "{} cameras were recorded; the first two are exported, the layout holds no more",
-        recorded));
-  calibration->rig.cameras = 2;
-}
-
 /// False: one of the pair is not there.
 bool load_pair(const RecordedSession& session, const RecordedFrame& frame,
                std::array<std::vector<std::uint8_t>, 2>* pixels) {
@@ -268,7 +258,11 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
   result.remarks = session.remarks();
   const RecordedFrame& first = first_pair(session);
   check_sizes(first, request.calibration);
-  keep_two_cameras(first.given.cameras, &request.calibration, &result.remarks);
+  if (first.given.cameras > 2)
+    result.remarks.push_back(fmt::format(
+        "{} cameras were recorded; the first two are exported, the layout holds no more",
+        first.given.cameras));
+  request.calibration.rig.cameras = 2;
   Writer writer(request);
   std::array<std::vector<std::uint8_t>, 2> pixels;
   std::size_t done = 0;

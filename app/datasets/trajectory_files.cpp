@@ -241,6 +241,14 @@ bool is_euroc_truth(const fs::path& file, const Sample& sample) {
                      [](std::string_view name) { return plain(name) == "prsrx"; });
 }
 
+/// Of those that repeat a stamp the first stays.
+void sort_by_stamp(Trajectory* poses) {
+  if (!std::ranges::is_sorted(*poses, {}, &StampedPose::stamp))
+    std::ranges::stable_sort(*poses, {}, &StampedPose::stamp);
+  const auto repeated = std::ranges::unique(*poses, {}, &StampedPose::stamp);
+  poses->erase(repeated.begin(), repeated.end());
+}
+
 /// One file, read twice: how it is written, and its rows. Memory: its text and its poses.
 class Reader {
  public:
@@ -407,17 +415,10 @@ class Reader {
   /// Restores the order of the stamps and drops rows that repeat one.
   void put_in_order() {
     Trajectory& poses = out_.poses;
-    const auto earlier = [](const StampedPose& a, const StampedPose& b) {
-      return a.stamp < b.stamp;
-    };
     for (std::size_t i = 1; i < poses.size(); ++i)
-      moved_ += earlier(poses[i], poses[i - 1]) ? 1 : 0;
-    if (moved_ > 0) std::stable_sort(poses.begin(), poses.end(), earlier);
+      moved_ += poses[i].stamp < poses[i - 1].stamp ? 1 : 0;
     const std::size_t all = poses.size();
-    poses.erase(
-        std::unique(poses.begin(), poses.end(),
-                    [](const StampedPose& a, const StampedPose& b) { return a.stamp == b.stamp; }),
-        poses.end());
+    sort_by_stamp(&poses);
     repeated_ = all - poses.size();
     if (all > 2 && poses.size() == 1)
       refuse(file_, 0,
@@ -501,12 +502,7 @@ void set_times(const fs::path& file, std::span<const Stamp> times, const std::st
                        times.size()));
   for (StampedPose& pose : poses)
     pose.stamp = times[static_cast<std::size_t>(pose.stamp.ns() / kRowStep)];
-  std::stable_sort(poses.begin(), poses.end(),
-                   [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; });
-  poses.erase(
-      std::unique(poses.begin(), poses.end(),
-                  [](const StampedPose& a, const StampedPose& b) { return a.stamp == b.stamp; }),
-      poses.end());
+  sort_by_stamp(&poses);
   trajectory->timed = true;
 }
 

@@ -43,14 +43,7 @@ std::optional<RecordedSequence> open_recorded(const std::string& name) {
   const auto folder = shared_data("data/" + name);
   if (!folder) return std::nullopt;
   RecordedSequence d{name, app::open_sequence(app::find_format(*folder).value(), *folder), {}};
-  const auto truth = app::find_truth(*folder);
-  if (truth && truth->kind != app::TruthFiles::Kind::kitti) {
-    d.truth = app::read_truth(*truth);
-  } else if (truth) {
-    std::vector<Stamp> times;
-    for (const app::StereoPair& pair : d.sequence.pairs) times.push_back(pair.stamp);
-    d.truth = app::read_kitti(truth->poses, times);
-  }
+  if (app::find_truth(*folder)) d.truth = app::read_trajectory(*folder);
   return d;
 }
 

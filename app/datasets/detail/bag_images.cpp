@@ -14,13 +14,10 @@ std::uint16_t sample_at(const std::uint8_t* row, int x, bool big_endian) noexcep
   return static_cast<std::uint16_t>(at[big_endian ? 0 : 1] << 8U | at[big_endian ? 1 : 0]);
 }
 
-/// Luminance of ITU-R BT.601 in 8 bits, as JPEG has it. `red`, `blue`: place of the colours in a
-/// pixel of `bytes`.
+/// `red`, `blue`: place of the colours in a pixel of `bytes`.
 void colour_to_grey(const std::uint8_t* row, int width, std::size_t bytes, std::size_t red,
                     std::size_t blue, std::uint8_t* out) noexcept {
-  for (int x = 0; x < width; ++x, row += bytes)
-    out[x] =
-        static_cast<std::uint8_t>((77U * row[red] + 150U * row[1] + 29U * row[blue] + 128U) >> 8U);
+  for (int x = 0; x < width; ++x, row += bytes) out[x] = luminance(row[red], row[1], row[blue]);
 }
 
 /// One row of a layout that needs no others.

@@ -70,12 +70,6 @@ std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
   return files;
 }
 
-std::vector<std::uint8_t> first_bytes(const BagMessage& message, std::size_t most) {
-  std::vector<std::uint8_t> bytes(std::min<std::size_t>(most, message.place.size));
-  if (!message.bytes->read(message.place.offset, bytes)) bytes.clear();
-  return bytes;
-}
-
 /// Of `list` what is not in `kept`, an ascending list of indices, goes.
 template <typename T>
 void keep(const std::vector<std::size_t>& kept, std::vector<T>* list) {
@@ -111,7 +105,7 @@ class Indexer {
     const auto scan = scan_bag(bag_.format, *file.bytes, [this](const BagMessage& m) { take(m); });
     if (!scan)
       refuse(path_, 0, fmt::format("{} is not {}", file.name, container_of(bag_.format).beginning));
-    remark(file.name, *scan);
+    scan->remark(file.name, &bag_.remarks);
   }
 
   void take(const BagMessage& message) {
@@ -236,20 +230,6 @@ class Indexer {
     const bool packed = place.chunk != BagPlace::kNoChunk;
     return fmt::format("{}, offset {}{}", bag_.files[file].name,
                        packed ? place.chunk : place.offset, packed ? " (of its chunk)" : "");
-  }
-
-  void remark(const std::string& name, const BagScan& scan) {
-    if (!scan.finished)
-      bag_.remarks.push_back(fmt::format(
-          "{} is unfinished: it was read up to offset {}, where its last whole record ends", name,
-          scan.end));
-    if (scan.first_broken)
-      bag_.remarks.push_back(fmt::format(
-          "{}: {} chunks and {} records were left out; the first at offset {} is {}", name,
-          scan.broken_chunks, scan.broken_records, *scan.first_broken, scan.why_broken));
-    if (scan.orphans > 0)
-      bag_.remarks.push_back(
-          fmt::format("{}: {} messages of no described channel were left out", name, scan.orphans));
   }
 
   const fs::path& path_;

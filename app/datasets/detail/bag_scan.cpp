@@ -1,5 +1,9 @@
 #include "app/datasets/detail/bag_scan.hpp"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+
 #include "app/datasets/detail/sqlite_bag.hpp"
 
 namespace vergence::app::detail {
@@ -12,11 +16,31 @@ std::string plain_type(std::string_view type) {
   return plain;
 }
 
+std::vector<std::uint8_t> first_bytes(const BagMessage& message, std::size_t most) {
+  std::vector<std::uint8_t> bytes(std::min<std::size_t>(most, message.place.size));
+  if (!message.bytes->read(message.place.offset, bytes)) bytes.clear();
+  return bytes;
+}
+
 void BagScan::broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std::string_view why) {
   ++(this->*counter);
   if (first_broken) return;
   first_broken = offset;
   why_broken = why;
+}
+
+void BagScan::remark(const std::string& name, std::vector<std::string>* remarks) const {
+  if (!finished)
+    remarks->push_back(fmt::format(
+        "{} is unfinished: it was read up to offset {}, where its last whole record ends", name,
+        end));
+  if (first_broken)
+    remarks->push_back(
+        fmt::format("{}: {} chunks and {} records were left out; the first at offset {} is {}",
+                    name, broken_chunks, broken_records, *first_broken, why_broken));
+  if (orphans > 0)
+    remarks->push_back(
+        fmt::format("{}: {} messages of no described channel were left out", name, orphans));
 }
 
 std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file, const BagVisitor& each) {

@@ -52,6 +52,9 @@ struct BagMessage {
   std::int64_t log_time = 0;          // ns, when it was recorded
 };
 
+/// The first `most` bytes of a message's content, or all; empty: they cannot be read.
+[[nodiscard]] std::vector<std::uint8_t> first_bytes(const BagMessage& message, std::size_t most);
+
 using BagVisitor = std::function<void(const BagMessage&)>;
 
 /// What a scan met.
@@ -69,6 +72,8 @@ struct BagScan {
 
   /// One more of `counter`, which is broken_chunks or broken_records.
   void broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std::string_view why);
+  /// Says what is missing of the file of this name.
+  void remark(const std::string& name, std::vector<std::string>* remarks) const;
 };
 
 /// Hands every message to `each`, in the file's order (of sqlite in that of log times); content

@@ -30,10 +30,8 @@ std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
   return (std::size_t{width} * bits + 31) / 32 * 4;
 }
 
-/// Luminance of one pixel (blue, green, red), with the weights that PNG and JPEG images get.
-std::uint8_t luminance(const std::uint8_t* bgr) noexcept {
-  return static_cast<std::uint8_t>((114U * bgr[0] + 587U * bgr[1] + 299U * bgr[2] + 500U) / 1000U);
-}
+/// Of one pixel (blue, green, red).
+std::uint8_t grey_of(const std::uint8_t* bgr) noexcept { return luminance(bgr[2], bgr[1], bgr[0]); }
 
 /// Grey levels of the palette's indices; without a palette the indices are grey levels.
 std::array<std::uint8_t, 256> palette_of(ImageBytes b) noexcept {
@@ -43,7 +41,7 @@ std::array<std::uint8_t, 256> palette_of(ImageBytes b) noexcept {
                     there = first < end ? (end - first) / 4 : 0;
   for (std::size_t i = 0; i < grey.size(); ++i)
     grey[i] = there == 0                   ? static_cast<std::uint8_t>(i)
-              : i < std::min(count, there) ? luminance(&b[first + 4 * i])
+              : i < std::min(count, there) ? grey_of(&b[first + 4 * i])
                                            : std::uint8_t{0};
   return grey;
 }
@@ -85,7 +83,7 @@ ImageFileStatus decode_bmp(ImageBytes b, ImageSize size, std::uint8_t* out, std:
   for (std::size_t y = 0; y < height; ++y, out += stride) {
     const std::uint8_t* from = &b[u32(b, kPixelsAt) + (top_down(b) ? y : height - 1 - y) * row];
     for (std::size_t x = 0; x < width; ++x)
-      out[x] = bits == 8 ? grey[from[x]] : luminance(from + bits / 8 * x);
+      out[x] = bits == 8 ? grey[from[x]] : grey_of(from + bits / 8 * x);
   }
   return ImageFileStatus::ok;
 }

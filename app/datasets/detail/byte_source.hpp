@@ -16,15 +16,12 @@ class ByteSource {
                                   std::span<std::uint8_t> out) const noexcept = 0;
 };
 
-/// A file of which there may be more than a process may have open: those read last are kept open,
-/// kMostOpen of them, the others are opened again when they are read.
+/// A file of which there may be more than a process may have open: each thread keeps the one that
+/// it read last open.
 class FileBytes final : public ByteSource {
  public:
-  static constexpr std::size_t kMostOpen = 128;  // of all; the system's usual limit is 1024
-
   /// InputError: no such file, no regular file, or it cannot be opened.
   explicit FileBytes(const std::filesystem::path& file);
-  ~FileBytes() override;
   FileBytes(const FileBytes&) = delete;
   FileBytes& operator=(const FileBytes&) = delete;
   [[nodiscard]] std::uint64_t size() const noexcept override { return size_; }

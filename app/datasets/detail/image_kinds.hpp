@@ -24,6 +24,11 @@ struct DeepSamples {
   return static_cast<std::uint8_t>(std::min(sample >> static_cast<unsigned>(bits - 8), 255));
 }
 
+/// Luminance of ITU-R BT.601 in 8 bits, as JPEG has it.
+[[nodiscard]] inline std::uint8_t luminance(unsigned red, unsigned green, unsigned blue) noexcept {
+  return static_cast<std::uint8_t>((77U * red + 150U * green + 29U * blue + 128U) >> 8U);
+}
+
 /// A width and a height as a file claims them, before anything is taken for them. → ok,
 /// not_an_image: nothing at all, or more than any camera gives
 [[nodiscard]] inline ImageFileStatus accept_size(std::uint32_t width, std::uint32_t height,

@@ -82,9 +82,7 @@ ImageFileStatus decode_netpbm(ImageBytes bytes, ImageSize /*size*/, std::uint8_t
     for (std::size_t x = 0; x < width; ++x) {
       const std::uint8_t* pixel = in + x * header.samples * step;
       if (header.samples == 3) {
-        // Colour becomes luminance (ITU-R BT.601) of the upper 8 bits.
-        out[x] = static_cast<std::uint8_t>(
-            (77U * pixel[0] + 150U * pixel[step] + 29U * pixel[2 * step] + 128U) >> 8U);
+        out[x] = luminance(pixel[0], pixel[step], pixel[2 * step]);  // of the upper 8 bits
       } else if (step == 2) {
         const auto sample = static_cast<std::uint16_t>(pixel[0] << 8U | pixel[1]);
         deep->peak = std::max(deep->peak, sample);

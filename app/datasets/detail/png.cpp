@@ -1,6 +1,5 @@
 #include "app/datasets/detail/image_kinds.hpp"
 
-#include <libdeflate.h>
 #include <png.h>
 
 #include <algorithm>
@@ -17,26 +16,6 @@ constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n'
 std::uint32_t u32(ImageBytes b, std::size_t at) noexcept {
   return (std::uint32_t{b[at]} << 24U) | (std::uint32_t{b[at + 1]} << 16U) |
          (std::uint32_t{b[at + 2]} << 8U) | b[at + 3];
-}
-
-struct Chunk {
-  ImageBytes type_and_content;  // four letters, then the content
-  std::uint32_t check_sum = 0;  // as the file has it, CRC-32 of both
-
-  [[nodiscard]] bool is(const char (&type)[5]) const noexcept {
-    return std::memcmp(type_and_content.data(), type, 4) == 0;
-  }
-};
-
-/// The chunk that begins at *at, and *at behind it. → false: it does not fit into the file
-bool next_chunk(ImageBytes png, std::size_t* at, Chunk* chunk) noexcept {
-  constexpr std::size_t kFrame = 12;  // length, type, check sum
-  if (*at > png.size() || png.size() - *at < kFrame) return false;
-  const std::size_t length = u32(png, *at);
-  if (length > png.size() - *at - kFrame) return false;
-  *chunk = {png.subspan(*at + 4, length + 4), u32(png, *at + 8 + length)};
-  *at += length + kFrame;
-  return true;
 }
 
 struct Source {
@@ -103,7 +82,6 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
   png_infop info = reader.info;
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_read_fn(png, source, read_on);
-  png_set_crc_action(png, PNG_CRC_QUIET_USE, PNG_CRC_QUIET_USE);  // check_png() has them behind it
   constexpr std::array<png_byte, 15> kTexts{'t', 'E', 'X', 't', 0,   'z', 'T', 'X',
                                             't', 0,   'i', 'T', 'X', 't', 0};
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, kTexts.data(), 3);
@@ -118,6 +96,7 @@ bool read_rows(const Reader& reader, Source* source, ImageSize size, std::uint8_
     return false;
   for (int pass = 0; pass < passes; ++pass)
     for (std::uint32_t y = 0; y < height; ++y) png_read_row(png, out + y * stride, nullptr);
+  png_read_end(png, nullptr);  // with the last check sums
   return true;
 }
 
@@ -137,26 +116,13 @@ bool is_deep_png(ImageBytes b) noexcept {
   return b.size() > kDepthAt && b[kDepthAt] == 16;
 }
 
-ImageFileStatus check_png(ImageBytes b) noexcept {
-  Chunk chunk;
-  bool pixels = false;
-  for (std::size_t at = kSignature.size(); next_chunk(b, &at, &chunk);) {
-    const ImageBytes summed = chunk.type_and_content;
-    if (libdeflate_crc32(0, summed.data(), summed.size()) != chunk.check_sum)
-      return ImageFileStatus::torn;
-    if (chunk.is("IDAT")) pixels = true;
-    if (chunk.is("IEND")) return pixels ? ImageFileStatus::ok : ImageFileStatus::torn;
-  }
-  return ImageFileStatus::torn;
-}
-
 ImageFileStatus decode_png(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
                            DeepSamples* deep) noexcept {
   const Reader reader;
   if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
   Source source{bytes};
   return read_rows(reader, &source, size, out, stride, deep) ? ImageFileStatus::ok
-                                                             : ImageFileStatus::undecodable;
+                                                             : ImageFileStatus::torn;
 }
 
 }  // namespace
@@ -165,6 +131,8 @@ bool may_become_png(ImageBytes b) noexcept {
   return b.size() < kSignature.size() && std::equal(b.begin(), b.end(), kSignature.begin());
 }
 
-const ImageKind kPng{kPngHead, is_png, png_size, check_png, is_deep_png, decode_png};
+const ImageKind kPng{kPngHead,    is_png,
+                     png_size,    [](ImageBytes) noexcept { return ImageFileStatus::ok; },
+                     is_deep_png, decode_png};
 
 }  // namespace vergence::app::detail

@@ -13,40 +13,22 @@ namespace {
 
 constexpr std::uint32_t kMostCoefficients = 64;
 
-struct Encoding {
-  std::string_view name;
+struct Encodings {
+  std::string_view names;  // in small letters: drivers write them in any
   PixelLayout layout;
   std::uint32_t bytes;  // a pixel
 };
-/// In small letters: drivers write them in any.
-constexpr std::array kEncodings{Encoding{"mono8", PixelLayout::grey, 1},
-                                Encoding{"8uc1", PixelLayout::grey, 1},
-                                Encoding{"i420", PixelLayout::grey, 1},
-                                Encoding{"yuv420", PixelLayout::grey, 1},
-                                Encoding{"yuv422p", PixelLayout::grey, 1},
-                                Encoding{"nv12", PixelLayout::grey, 1},
-                                Encoding{"nv21", PixelLayout::grey, 1},
-                                Encoding{"nv24", PixelLayout::grey, 1},
-                                Encoding{"mono16", PixelLayout::grey16, 2},
-                                Encoding{"16uc1", PixelLayout::grey16, 2},
-                                Encoding{"bayer_rggb8", PixelLayout::bayer, 1},
-                                Encoding{"bayer_bggr8", PixelLayout::bayer, 1},
-                                Encoding{"bayer_gbrg8", PixelLayout::bayer, 1},
-                                Encoding{"bayer_grbg8", PixelLayout::bayer, 1},
-                                Encoding{"bayer_rggb16", PixelLayout::bayer16, 2},
-                                Encoding{"bayer_bggr16", PixelLayout::bayer16, 2},
-                                Encoding{"bayer_gbrg16", PixelLayout::bayer16, 2},
-                                Encoding{"bayer_grbg16", PixelLayout::bayer16, 2},
-                                Encoding{"rgb8", PixelLayout::rgb, 3},
-                                Encoding{"bgr8", PixelLayout::bgr, 3},
-                                Encoding{"8uc3", PixelLayout::bgr, 3},
-                                Encoding{"rgba8", PixelLayout::rgba, 4},
-                                Encoding{"bgra8", PixelLayout::bgra, 4},
-                                Encoding{"8uc4", PixelLayout::bgra, 4},
-                                Encoding{"yuyv", PixelLayout::luma_first, 2},
-                                Encoding{"yuv422_yuy2", PixelLayout::luma_first, 2},
-                                Encoding{"uyvy", PixelLayout::luma_second, 2},
-                                Encoding{"yuv422", PixelLayout::luma_second, 2}};
+constexpr std::array kEncodings{
+    Encodings{" mono8 8uc1 i420 yuv420 yuv422p nv12 nv21 nv24 ", PixelLayout::grey, 1},
+    Encodings{" mono16 16uc1 ", PixelLayout::grey16, 2},
+    Encodings{" bayer_rggb8 bayer_bggr8 bayer_gbrg8 bayer_grbg8 ", PixelLayout::bayer, 1},
+    Encodings{" bayer_rggb16 bayer_bggr16 bayer_gbrg16 bayer_grbg16 ", PixelLayout::bayer16, 2},
+    Encodings{" rgb8 ", PixelLayout::rgb, 3},
+    Encodings{" bgr8 8uc3 ", PixelLayout::bgr, 3},
+    Encodings{" rgba8 ", PixelLayout::rgba, 4},
+    Encodings{" bgra8 8uc4 ", PixelLayout::bgra, 4},
+    Encodings{" yuyv yuv422_yuy2 ", PixelLayout::luma_first, 2},
+    Encodings{" uyvy yuv422 ", PixelLayout::luma_second, 2}};
 
 /// Returns true if a CompressedImage's format names a Bayer mosaic that was compressed without
 /// demosaicing: its encoding comes first, and `compressed` is followed by the converted encoding.
@@ -81,8 +63,8 @@ std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head, std::
       accept_size(width, height, &image.size) != ImageFileStatus::ok)
     return std::nullopt;
   image.offset = static_cast<std::uint32_t>(in.position());
-  for (const Encoding& known : kEncodings) {
-    if (lower(pixels) != known.name) continue;
+  for (const Encodings& known : kEncodings) {
+    if (known.names.find(" " + lower(pixels) + " ") == std::string_view::npos) continue;
     if (image.step < width * known.bytes || std::uint64_t{image.step} * height > image.bytes ||
         image.bytes > size - image.offset)
       return std::nullopt;

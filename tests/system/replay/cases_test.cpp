@@ -74,9 +74,10 @@ std::string matrix_of(const Pose& p) {
   return fmt::format("{:.9f}", fmt::join(columns.data(), columns.data() + 12, " "));
 }
 
-/// A line of the pattern for every moment: {ns} {us} {ms} {s}: the stamp; {sec} {nsec}: its parts;
-/// {i} {f} {t}: number, 0.05 i and 0.05 i + 4.76; {p} {w}: a pose, {w} with w first, {pc} {wc} with
-/// commas; {m}: its matrix. What stands before a `|` is for every 20th from the fourth on.
+/// A line of the pattern for every moment: {ns} {us} {ms} {s}: the stamp; {sec} {nsec} {usec}:
+/// parts; {i} {f} {t}: number, 0.05 i and 0.05 i + 4.76; {p} {w}: a pose, {w} with w first, {pc}
+/// {wc} with commas; {m}: its matrix. What stands before a `|` is for every 20th from the fourth
+/// on.
 std::string lines(std::string_view pattern, int count, double noise = 0.003) {
   const std::size_t bar = pattern.find('|');
   const std::string_view seldom = pattern.substr(0, bar == std::string_view::npos ? 0 : bar),
@@ -91,7 +92,7 @@ std::string lines(std::string_view pattern, int count, double noise = 0.003) {
                        arg("ns", p.ns), arg("us", p.ns / 1000),
                        arg("ms", static_cast<double>(p.ns) / 1e6),
                        arg("s", fmt::format("{}.{:09d}", sec, nsec)), arg("sec", sec),
-                       arg("nsec", nsec), arg("i", i), arg("f", 0.05 * i),
+                       arg("nsec", nsec), arg("usec", nsec / 1000), arg("i", i), arg("f", 0.05 * i),
                        arg("t", 4.76 + 0.05 * i), arg("p", numbers(p, " ", false)),
                        arg("w", numbers(p, " ", true)), arg("pc", numbers(p, ",", false)),
                        arg("wc", numbers(p, ",", true)), arg("m", matrix_of(p))) +
@@ -555,6 +556,41 @@ std::vector<Case> folders() {
     }
     rows.push_back(std::move(row));
   }
+  const std::string drive = "2014_06_24/2014_06_24_drive_0001_extract/",
+                    dates = lines("2014-06-24 18:29:0{t:.3f}", kFrames);
+  Files raw{{"2014_06_24/calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: -0.81 0.32 -0.8\n"},
+            {"2014_06_24/calib_velo_to_cam.txt", "R: 0 -1 0 0 0 -1 1 0 0\nT: 0 -0.08 -0.27\n"},
+            {drive + "oxts/timestamps.txt", dates}};
+  std::string cameras;
+  for (int k = 0; k < 2; ++k) {
+    raw.emplace_back(drive + fmt::format("image_0{}/timestamps.txt", k), dates);
+    cameras += fmt::format(
+        "S_0{0}: 96 72\nK_0{0}: 80 0 48 0 80 36 0 0 1\nD_0{0}: 0 0 0 0 0\nR_0{0}: 1 0 0 0 1 0 0 0 "
+        "1\n"
+        "T_0{0}: {1} 0 0\nS_rect_0{0}: 64 40\nR_rect_0{0}: 1 0 0 0 1 0 0 0 1\n",
+        k, -kBaseline * k);
+  }
+  raw.emplace_back("2014_06_24/calib_cam_to_cam.txt", cameras);
+  for (int i = 0; i < kFrames; ++i)
+    raw.emplace_back(
+        drive + fmt::format("oxts/data/{:010}.txt", i),
+        fmt::format("{} 8.4 112 0.02 -0.01 1.57 10 0.5 10 0 0.1 0 0 9.8 0 0 9.8 0 0 0 0 0 "
+                    "0 0.05 0.03 4 {} 4 4 0\n",
+                    49 + 4.5e-6 * i, i == 3 ? 0 : 8));
+  rows.push_back({"KITTI raw with its INS", named(drive + "image_0{c}/data/{i:010}.png"), "",
+                  "1 of 6 packets have no satellites' fix", raw});
+  rows.push_back(
+      {"St Lucia with its INS",
+       named("200101_100000_MultiCamera0/cam{c}_{i}.bmp"),
+       "",
+       "too slow or too short",
+       {{"c.yaml", kOwn},
+        {"200101_100000_MultiCamera0.log",
+         lines("{sec} {usec} 96 72 GBRG8 {sec} {usec} 96 72 GBRG8 cam0_{i}.bmp cam1_{i}.bmp",
+               kFrames)},
+        {"200101_100000_Ins0.log",
+         lines("{sec} {usec} -27.5 153.0 60 20 1 0 0 0.01 0.02 0.5", kFrames)}},
+       "--calibration @/c.yaml"});
   std::vector<Case> all;
   for (const Folder& row : rows) all.push_back(folder(row));
   return all;

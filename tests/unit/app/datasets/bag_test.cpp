@@ -2,16 +2,11 @@
 #include <sqlite3.h>
 
 #include <array>
-#include <fstream>
-#include <iterator>
 #include <memory>
-#include <span>
 
-#include "app/datasets/detail/formats.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
-#include "core/math/random.hpp"
 #include "tests/support/ros_messages.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -195,46 +190,6 @@ TEST_P(Bag, OtherFilesAreRefusedByWhatTheyBeginWith) {
   }
 }
 
-TEST_P(Bag, CutAnywhereIsReadOrRefused) {
-  constexpr std::array<std::uint16_t, 2> kInfos{3, 4};
-  constexpr std::uint32_t kSmall = 6;  // px: all cuts of a bag take a second
-  const auto small = [](std::int64_t i) {
-    return image_message(
-        wire(), kStart + i * kStep,
-        {kSmall, kSmall, kSmall, "mono8", std::string(std::size_t{kSmall} * kSmall, 'x')});
-  };
-  begin();
-  writer_->channel(4, "/right/camera_info", "sensor_msgs/CameraInfo");
-  for (const std::uint16_t k : kInfos)
-    writer_->message(
-        k, kStart,
-        camera_info_message(wire(), kStart,
-                            {kSmall, kSmall, "plumb_bob", {}, 6, 6, 3, 3, k == 3 ? 0 : -1.2}));
-  for (std::int64_t i = 0; i < 2; ++i) {
-    writer_->message(1, kStart, small(i));
-    writer_->message(2, kStart, small(i));
-    writer_->close_chunk();
-  }
-  writer_->finish();
-  const std::string whole = writer_->bytes(), name = "cut" + GetParam().ending();
-  const auto container = GetParam().is_mcap() ? detail::BagFormat::mcap : detail::BagFormat::rosbag;
-  const std::span all(reinterpret_cast<const std::uint8_t*>(whole.data()), whole.size());
-  std::size_t opened = 0;
-  for (std::size_t cut = 0; cut < whole.size(); ++cut) {
-    std::vector<detail::BagFile> files;
-    files.push_back({name, std::make_unique<detail::MemoryBytes>(all.first(cut))});
-    try {
-      const StereoSequence s = detail::sequence_of(
-          name, detail::index_bag(container, name, std::move(files)), false, {});
-      EXPECT_LE(s.pairs.size(), 2U);
-      ++opened;
-    } catch (const InputError& e) {
-      EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what();
-    }
-  }
-  EXPECT_GT(opened, 0U);
-}
-
 // The image: 96 × 72, f = 80 px, its middle the principal point. The sensor: twice as large, or
 // some pixels around it.
 TEST(CameraInfo, BinningAndRegionMakeTheImagesNumbersAsRep104Says) {
@@ -322,30 +277,6 @@ TEST(Db3, ABagInSqliteIsReadAlsoSplitAndInItsFolder) {
   ASSERT_EQ(s.store->decode(s.pairs[1].file[1], {kWidth, kHeight}, out.data(), kWidth, 16, &work),
             ImageFileStatus::ok);
   EXPECT_EQ(out[5 * kWidth + 7], static_cast<std::uint8_t>(pixel(7, 5)));
-}
-
-TEST(Db3, ADamagedOneIsReadOrRefused) {
-  const test::TemporaryFolder folder;
-  write_db3(folder / "a.db3", 3);
-  std::ifstream in(folder / "a.db3", std::ios::binary);
-  const std::string whole((std::istreambuf_iterator<char>(in)), {});
-  Random random(5);
-  int opened = 0;
-  for (int run = 0; run < 60; ++run) {
-    std::string bytes = whole;
-    if (run % 3 == 0) bytes.resize(random.below(static_cast<std::uint32_t>(bytes.size())));
-    for (int i = 0; i < run && !bytes.empty(); ++i)
-      bytes[random.below(static_cast<std::uint32_t>(bytes.size()))] =
-          static_cast<char>(random.below(256));
-    try {
-      opened +=
-          open_sequence(SequenceFormat::db3, folder.write("b.db3", bytes)).pairs.empty() ? 0 : 1;
-    } catch (const InputError& e) {
-      EXPECT_NE(std::string(e.what()).find("b.db3"), std::string::npos) << e.what();
-    }
-  }
-  EXPECT_GT(opened, 0);
-  EXPECT_LT(opened, 60);
 }
 
 TEST(Bags, thosePackedAsAWholeAreNamedWithWhatUnpacksThem) {

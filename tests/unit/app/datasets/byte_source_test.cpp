@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <filesystem>
 #include <memory>
@@ -32,7 +31,7 @@ TEST(FileBytes, moreThanAProcessMayHaveOpenAreReadByManyThreads) {
     folder.write(name, "file " + name);
     files.push_back(std::make_unique<FileBytes>(folder / name));
   }
-  EXPECT_LE(descriptors(), before + FileBytes::kMostOpen);
+  EXPECT_LE(descriptors(), before + 1) << "the one of this thread";
   std::atomic<int> wrong{0};
   const auto read_all = [&](std::size_t first) {
     for (std::size_t k = 0; k < kFiles; ++k) {
@@ -48,23 +47,7 @@ TEST(FileBytes, moreThanAProcessMayHaveOpenAreReadByManyThreads) {
     for (std::size_t r = 0; r < 4; ++r) readers.emplace_back(read_all, r * 300);
   }
   EXPECT_EQ(wrong, 0);
-  EXPECT_LE(descriptors(), before + FileBytes::kMostOpen);
-  files.clear();
-  EXPECT_EQ(descriptors(), before);
-}
-
-TEST(FileBytes, oneThatIsRemovedWhileItIsNotOpenCannotBeRead) {
-  const test::TemporaryFolder folder;
-  folder.write("first", "first");
-  const FileBytes first(folder / "first");
-  std::vector<std::unique_ptr<FileBytes>> others;
-  for (std::size_t i = 0; i < FileBytes::kMostOpen; ++i) {
-    folder.write(std::to_string(i), "x");
-    others.push_back(std::make_unique<FileBytes>(folder / std::to_string(i)));
-  }
-  std::filesystem::remove(folder / "first");
-  std::array<std::uint8_t, 5> bytes{};
-  EXPECT_FALSE(first.read(0, bytes));
+  EXPECT_LE(descriptors(), before + 1);
 }
 
 }  // namespace

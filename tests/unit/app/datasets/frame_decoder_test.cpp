@@ -5,6 +5,7 @@
 #include <chrono>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include <fmt/format.h>
@@ -125,30 +126,18 @@ TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
       << seen[2].pair.note.data();
 }
 
-TEST_F(Decoder, timesThatDoNotGoForwardsSkipTheirFrame) {
+TEST_F(Decoder, aTimeThatGoesBackOrLeapsAheadSkipsItsFrameAndNotThoseAfterIt) {
   open(5);
-  folder_.write("times.txt", "0.1\n0.2\n0.3\n0.2\n0.4\n");
-  reopen();
-  const auto seen = drain(0, 5);
-  ASSERT_EQ(seen.size(), 5U);
-  const std::vector<bool> decoded = {true, true, true, false, true};
-  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(seen[i].pair.decoded, decoded[i]) << i;
-  EXPECT_STREQ(seen[3].pair.kind, "time_backwards");
-  EXPECT_EQ(
-      std::string(seen[3].pair.note.data()),
-      "frame 3 skipped: its time 0.200000000 is not later than 0.300000000, the latest before it");
-}
-
-TEST_F(Decoder, aTimeThatLeapsAheadSkipsItsFrameAndNotThoseAfterIt) {
-  open(5);
-  folder_.write("times.txt", "0.1\n1000.2\n0.3\n0.4\n0.5\n");
-  reopen();
-  const auto seen = drain(0, 5);
-  ASSERT_EQ(seen.size(), 5U);
-  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(seen[i].pair.decoded, i != 1) << i;
-  EXPECT_STREQ(seen[1].pair.kind, "time_ahead");
-  EXPECT_EQ(std::string(seen[1].pair.note.data()),
-            "frame 1 skipped: its time 1000.200000000 is later than those of the frames after it");
+  for (const auto& [times, skipped, kind] :
+       {std::tuple{"0.1\n0.2\n0.3\n0.2\n0.4\n", 3U, "time_backwards"},
+        std::tuple{"0.1\n1000.2\n0.3\n0.4\n0.5\n", 1U, "time_ahead"}}) {
+    folder_.write("times.txt", times);
+    reopen();
+    const auto seen = drain(0, 5);
+    ASSERT_EQ(seen.size(), 5U);
+    for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(seen[i].pair.decoded, i != skipped) << i;
+    EXPECT_STREQ(seen[skipped].pair.kind, kind);
+  }
 }
 
 TEST_F(Decoder, aLongNameIsCutNotOverrun) {

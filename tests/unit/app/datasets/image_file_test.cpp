@@ -138,16 +138,6 @@ TEST_F(ImageFile, aBmpInColoursBecomesItsLuminance) {
   EXPECT_EQ(grey_of(painted), 109) << "0.886 · 90 + 0.114 · 255";
 }
 
-TEST_F(ImageFile, aBmpWhoseNumbersLieReadsNothingBeyondItsBytes) {
-  const auto bytes = tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)));
-  for (std::size_t at = 2; at < 54; ++at)
-    for (const int value : {0x00, 0x01, 0x7f, 0x80, 0xff}) {
-      auto lying = bytes;
-      lying[at] = static_cast<std::uint8_t>(value);
-      (void)decode(lying);  // the sanitizers look
-    }
-}
-
 TEST_F(ImageFile, colourAndSixteenBitAreReadAsGrey) {
   cv::Mat grey(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)),
       deep(kTinyHeight, kTinyWidth, CV_16UC1, cv::Scalar(90 * 257)), colour;
@@ -161,10 +151,6 @@ TEST_F(ImageFile, colourAndSixteenBitAreReadAsGrey) {
         << name;
     EXPECT_NEAR(out[3 * kStride + 7], 90, 1) << name;
   }
-}
-
-TEST_F(ImageFile, jpegIsDecoded) {
-  EXPECT_EQ(decode(bytes_of(write("a.jpg"))), ImageFileStatus::ok);
 }
 
 TEST_F(ImageFile, everyTruncationIsTorn) {
@@ -186,53 +172,31 @@ TEST_F(ImageFile, everyTruncationIsTorn) {
   }
 }
 
-TEST_F(ImageFile, aFlippedBitInThePixelsOfAPngIsTorn) {
-  auto bytes = bytes_of(write("a.png"));
-  bytes[bytes.size() / 2] ^= 4U;
-  EXPECT_EQ(decode(bytes), ImageFileStatus::torn);
-}
-
-TEST_F(ImageFile, aChunkLengthBeyondTheFileIsTornNotReadBeyondIt) {
-  auto bytes = bytes_of(write("a.png"));
-  for (std::size_t i = 33; i < 37; ++i) bytes[i] = 0xff;  // length of the chunk after IHDR
-  EXPECT_EQ(decode(bytes), ImageFileStatus::torn);
-}
-
-TEST_F(ImageFile, aHeadThatPromisesGigapixelsIsRefusedBeforeAnythingIsAllocated) {
-  auto bytes = bytes_of(write("a.png"));
-  for (std::size_t i = 16; i < 24; ++i) bytes[i] = 0x7f;
-  EXPECT_EQ(decode(bytes), ImageFileStatus::not_an_image);
-}
-
-TEST_F(ImageFile, otherContentIsNotAnImage) {
-  const std::string text = "this is no image, whatever its name says";
-  EXPECT_EQ(decode({text.begin(), text.end()}), ImageFileStatus::not_an_image);
-}
-
-TEST_F(ImageFile, anotherSizeIsSaid) {
+TEST_F(ImageFile, aSpoiltPngIsRefusedForWhatItIs) {
+  const auto whole = bytes_of(write("a.png"));
+  const auto with = [&](std::size_t first, std::size_t last, std::uint8_t value) {
+    auto bytes = whole;
+    std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(first),
+              bytes.begin() + static_cast<std::ptrdiff_t>(last), value);
+    return decode(bytes);
+  };
+  const std::size_t middle = whole.size() / 2;
+  EXPECT_EQ(with(middle, middle + 1, static_cast<std::uint8_t>(whole[middle] ^ 4U)),
+            ImageFileStatus::torn)
+      << "a bit of the pixels";
+  EXPECT_EQ(with(33, 37, 0xff), ImageFileStatus::torn) << "a length beyond the file";
+  EXPECT_EQ(with(16, 24, 0x7f), ImageFileStatus::not_an_image) << "gigapixels";
+  EXPECT_EQ(with(0, 40, 'x'), ImageFileStatus::not_an_image) << "another content";
   test::write_tiny_image(folder_ / "b.png", 1, kTinyWidth + 1, kTinyHeight);
   EXPECT_EQ(decode(bytes_of(folder_ / "b.png")), ImageFileStatus::wrong_size);
 }
 
-TEST_F(ImageFile, aPipeIsNotWaitedFor) {
-  const std::filesystem::path pipe = folder_ / "pipe.png";
-  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+TEST_F(ImageFile, whatIsNoFileIsNotWaitedFor) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe.png").c_str(), 0600), 0);
   std::vector<std::uint8_t> bytes;
-  EXPECT_EQ(read_image_file(pipe, &bytes), ImageFileStatus::unreadable);
-}
-
-TEST_F(ImageFile, missingFilesAndFoldersAreTold) {
-  std::vector<std::uint8_t> bytes;
+  EXPECT_EQ(read_image_file(folder_ / "pipe.png", &bytes), ImageFileStatus::unreadable);
   EXPECT_EQ(read_image_file(folder_ / "none.png", &bytes), ImageFileStatus::missing);
   EXPECT_EQ(read_image_file(folder_.path(), &bytes), ImageFileStatus::unreadable);
-}
-
-TEST_F(ImageFile, theHeadTellsTheSizeOfPngAndJpeg) {
-  for (const char* name : {"a.png", "a.jpg"}) {
-    ImageSize size;
-    ASSERT_EQ(read_image_size(write(name), &size), ImageFileStatus::ok) << name;
-    EXPECT_EQ(size, kSize) << name;
-  }
 }
 
 TEST_F(ImageFile, aPngThatIsWrittenHoldsExactlyThePixelsAndNoPadding) {

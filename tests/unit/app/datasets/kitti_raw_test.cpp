@@ -16,7 +16,6 @@
 #include "app/runtime/errors.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/math/so3.hpp"
-#include "tests/support/shared_data.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 
 namespace vergence::app {
@@ -355,23 +354,6 @@ TEST(KittiRawIns, PacketsThatAreMissingBrokenOutOfOrderOrWithoutAFix) {
   EXPECT_NE(refused().find("oxts/data: does not exist"), std::string::npos);
   fs::remove_all(f / (kDrive + "/oxts"));
   EXPECT_TRUE(ins(f).readings.empty());
-}
-
-TEST(KittiRawSample, HasTheDataSetsFiguresInAllOfItsParts) {
-  const auto folder = test::shared_data("data/kitti_raw_0039_20");
-  if (!folder) GTEST_SKIP() << test::shared_data_missing("data/kitti_raw_0039_20");
-  const StereoSequence s = open_sequence(SequenceFormat::kitti_raw, *folder);
-  ASSERT_EQ(s.pairs.size(), 20U);
-  EXPECT_EQ(s.pairs[0].stamp.ns(), kStart);
-  EXPECT_EQ(s.calibration.intrinsics[1].distortion[4], -5.314062e-02);
-  EXPECT_NEAR(s.calibration.baseline, 0.53716, 1e-4);
-  const RecordedIns recorded = read_recorded_ins(SequenceFormat::kitti_raw, *folder, {0, 1}, true);
-  ASSERT_EQ(recorded.readings.size(), 30U);
-  EXPECT_TRUE(recorded.remarks.empty());
-  const Vec3 turn = boresight_of(recorded.T_ins_left->R) * 180 / std::numbers::pi;
-  EXPECT_LT(turn.cwiseAbs().maxCoeff(), 1.0) << "mounted forward, by the drawing";
-  // 0.81 and 0.27 m ahead in the data set's drawing.
-  EXPECT_NEAR(recorded.T_ins_left->t.x(), 1.083, 1e-3);
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 #include <zlib.h>
 
 #include <cstdint>
-#include <cstring>
 #include <string_view>
 #include <vector>
 
@@ -80,24 +79,6 @@ inline FileBytes png_noise(const PngKind& kind, int width, int height) {
     }
   }
   return raw;
-}
-
-/// The check sums of all chunks made right again, as far as the lengths lead.
-inline void mend_check_sums(FileBytes* png) {
-  const auto u32 = [png](std::size_t at) {
-    std::uint32_t v = 0;
-    for (std::size_t i = 0; i < 4; ++i) v = v << 8U | (*png)[at + i];
-    return v;
-  };
-  for (std::size_t at = 8; at + 12 <= png->size();) {
-    const std::size_t length = u32(at);
-    if (length > png->size() - at - 12) return;
-    FileBytes sum;
-    append_u32(&sum, static_cast<std::uint32_t>(
-                         crc32(0, png->data() + at + 4, static_cast<uInt>(length + 4))));
-    std::memcpy(png->data() + at + 8 + length, sum.data(), 4);
-    at += length + 12;
-  }
 }
 
 }  // namespace vergence::test

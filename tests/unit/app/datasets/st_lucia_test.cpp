@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <GeographicLib/LocalCartesian.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/frame_decoder.hpp"
@@ -16,7 +17,6 @@
 #include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
 #include "core/types/bayer.hpp"
-#include "tests/support/st_lucia_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -35,6 +35,10 @@ struct Conventions {
 
 void write(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
+}
+void write_mosaic(const std::filesystem::path& file, std::vector<std::uint8_t> pixels, int width,
+                  int height) {
+  ASSERT_TRUE(cv::imwrite(file.string(), cv::Mat(height, width, CV_8U, pixels.data())));
 }
 
 template <class Action>
@@ -64,9 +68,9 @@ class StLuciaImages : public testing::Test {
     std::filesystem::create_directories(folder_ / "101215_153851_MultiCamera0");
     for (int i = 0; i < 2; ++i)
       for (int k = 0; k < 2; ++k)
-        test::write_bytes(
+        write_mosaic(
             folder_ / fmt::format("101215_153851_MultiCamera0/cam{}_image{:05d}.bmp", k, i),
-            test::bmp_of(mosaic(static_cast<std::uint64_t>(10 * i + k)).data(), kWidth, kHeight));
+            mosaic(static_cast<std::uint64_t>(10 * i + k)), kWidth, kHeight);
     write(log_,
           "sec usec w h f sec usec w h f left right\n"
           "1292391531 1234 62 48 raw 1292391531 990 62 48 raw "
@@ -129,8 +133,7 @@ TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOn
   EXPECT_NE(said.find("1024x768"), std::string::npos) << said;
   const std::vector<std::uint8_t> full(1024 * 768, 90);
   for (const char* name : {"cam0_image00000.bmp", "cam1_image00000.bmp"})
-    test::write_bytes(folder_ / "101215_153851_MultiCamera0" / name,
-                      test::bmp_of(full.data(), 1024, 768));
+    write_mosaic(folder_ / "101215_153851_MultiCamera0" / name, full, 1024, 768);
   const StereoSequence s = open_sequence(SequenceFormat::st_lucia, folder_.path());
   EXPECT_NEAR(s.calibration.baseline, 0.750683, 1e-6);
   EXPECT_LT(s.calibration.T_camera_left[1].t.x(), 0) << "the right camera is on the right";
