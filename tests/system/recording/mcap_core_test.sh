@@ -1,8 +1,8 @@
 #!/bin/sh
-# A recording is read by Foxglove's own libraries: mcap_core_test.sh RECORD_SAMPLE SCRIPT FOLDER
+# Recordings of a mock drive are read by Foxglove's own libraries: mcap_core_test.sh VERGENCE CONFIGURATION SCRIPT FOLDER
 # FOLDER keeps the libraries for the next time. Exit 77: npm is not here or reaches no registry.
 set -eu
-sample=$1 script=$2 folder=$3
+vergence=$1 configuration=$2 script=$3 folder=$4
 
 command -v node >/dev/null && command -v npm >/dev/null || {
   echo "SKIPPED: node and npm are not installed: the recording is read by the project's own reader only"
@@ -19,6 +19,9 @@ if ! [ -d node_modules/@mcap/core ]; then
     exit 77
   }
 fi
-rm -rf recorded && mkdir recorded
-"$sample" recorded
-node read.mjs recorded/drive.mcap
+rm -rf raw png
+for format in raw png; do
+  "$vergence" run "$configuration" --fast --quiet --duration 4 --record poses,ins,images,pulses --set record.image_format=$format --out $format \
+    --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0
+done
+node read.mjs "$vergence" raw png

@@ -108,18 +108,6 @@ TEST_F(RecordedDrive, holdsEveryMessageOnceAndIsFinished) {
   EXPECT_EQ(summary_of(session())["devices"]["recording_dropped"], 0);
 }
 
-TEST_F(RecordedDrive, replaysWithAnotherConfigurationAndFromScratch) {
-  const Outcome fewer = replay(session(), out("fewer"), "--set odometry.features=100");
-  EXPECT_LE(fewer.code, 1) << fewer.err;
-  EXPECT_FALSE(text_of(session() / "trajectory.tum") == text_of(out("fewer") / "trajectory.tum"));
-  const Outcome scratch = replay(session(), out("scratch"), "--from-scratch");
-  EXPECT_LE(scratch.code, 1) << scratch.err;
-  EXPECT_FALSE(text_of(session() / "trajectory.tum") == text_of(out("scratch") / "trajectory.tum"));
-  const Outcome other = replay(session(), out("other"),
-                               "--calibration '" + (session() / "calibration.yaml").string() + "'");
-  EXPECT_LE(other.code, 1) << other.err;
-}
-
 TEST_F(RecordedDrive, aDamagedImageIsSaidAndTheRestReplays) {
   const auto damaged = changed("damaged", [](std::string* bytes) {
     // In the middle of three images.
@@ -199,23 +187,6 @@ TEST_F(RecordedDrive, isExportedForOtherPrograms) {
   EXPECT_EQ(kitti.code, 2);
   EXPECT_NE(kitti.err.find("no place for distortion"), std::string::npos) << kitti.err;
   EXPECT_FALSE(std::filesystem::exists(out("kitti")));
-}
-
-TEST(Recorded, ofThreeCamerasTwoAreExportedAndReplayed) {
-  const TemporaryFolder folder;
-  const Outcome run =
-      run_vergence("run '" + std::string(VERGENCE_SOURCE_DIR) +
-                   "/app/config/mock_three.yaml' --fast --duration 3 --record images,ins --out '" +
-                   (folder / "s").string() + "'" + kSmall + " --set cameras.2.size=[320,240]");
-  ASSERT_LE(run.code, 1) << run.err;
-  for (const std::string format : {"folder", "euroc"}) {
-    const Outcome o = export_to(folder / format, folder / "s", "--format " + format);
-    EXPECT_EQ(o.code, 0) << o.err;
-    EXPECT_NE(o.err.find("3 cameras were recorded; the first two are exported"), std::string::npos)
-        << o.err;
-    const Outcome again = replay(folder / format, folder / ("of-" + format));
-    EXPECT_LE(again.code, 1) << again.err;
-  }
 }
 
 // In real time: images are dropped as this machine is busy, and the solver answers when it is done.
