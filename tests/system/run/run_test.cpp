@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/datasets/trajectory_files.hpp"
+#include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
@@ -36,12 +37,16 @@ Outcome drive(const std::filesystem::path& session, const std::string& more) {
 TEST(Run, aMockDrivePosesEveryFrameNearTheTruthWithoutAllocating) {
   const TemporaryFolder folder;
   const auto session = folder / "s";
-  const Outcome o = drive(session, "--duration 25");
+  const Outcome o = drive(session, "--duration 25 --also kitti,enu,geojson,kml");
   ASSERT_EQ(o.code, 0) << o.err;
   const auto summary = summary_of(session);
   EXPECT_EQ(summary["frames"]["read"], 501);
   EXPECT_EQ(summary["frames"]["posed"], 501);
   EXPECT_EQ(summary["allocations_after_seal"], 0);
+  const auto threads = summary["memory"]["allocations_by_thread"];
+  for (const char* name :
+       {"vergence-estim", "vergence-front", "vergence-calib", "vergence-sync", "vergence-record"})
+    EXPECT_EQ(threads.value(name, AllocationGuard::available() ? -1 : 0), 0) << name;
   EXPECT_EQ(summary["devices"]["sets_complete"], 501);
   EXPECT_EQ(summary["devices"]["sets_incomplete"], 0);
   EXPECT_EQ(summary["comparison"]["without_ins"], 0);
@@ -59,6 +64,27 @@ TEST(Run, aMockDrivePosesEveryFrameNearTheTruthWithoutAllocating) {
   for (const char* name : {"trajectory.tum", "reference.tum", "truth.tum", "poses.csv",
                            "events.jsonl", "calibration.yaml", "report.html"})
     EXPECT_GT(std::filesystem::file_size(session / name), 0U) << name;
+
+  const app::Trajectory world = app::read_tum(session / "trajectory.tum"),
+                        enu = app::read_tum(session / "trajectory_enu.tum"),
+                        kitti = app::read_trajectory_file(session / "trajectory.kitti").poses;
+  ASSERT_EQ(world.size(), enu.size());
+  ASSERT_EQ(world.size(), kitti.size());
+  // Every pose, those before the placement too, by one rigid transform.
+  const Transform T_enu_world = enu[0].T_world_body * world[0].T_world_body.inverse();
+  for (std::size_t i = 0; i < world.size(); ++i) {
+    const Transform& T = world[i].T_world_body;
+    EXPECT_LT((T_enu_world * T.t - enu[i].T_world_body.t).norm(), 1e-6);
+    EXPECT_LT((kitti[i].T_world_body.t - T.t).norm() + (kitti[i].T_world_body.R - T.R).norm(),
+              1e-7);
+  }
+  for (const auto& feature :
+       nlohmann::json::parse(text_of(session / "drive.geojson"))["features"]) {
+    const auto& place = feature["geometry"]["coordinates"][0];
+    EXPECT_NEAR(place[0].get<double>(), 153.0137, 0.01);  // longitude first (RFC 7946)
+    EXPECT_NEAR(place[1].get<double>(), -27.4975, 0.01);
+  }
+  EXPECT_NE(text_of(session / "drive.kml").find("<coordinates>153.0"), std::string::npos);
 }
 
 TEST(Run, everyConfigurationThatComesWithTheProgramRunsAsItStands) {
@@ -73,6 +99,7 @@ TEST(Run, everyConfigurationThatComesWithTheProgramRunsAsItStands) {
     const Outcome o = run_vergence("run '" + entry.path().string() +
                                    "' --fast --duration 2 --out '" + (folder / "s").string() + "'");
     EXPECT_EQ(o.code, 0) << entry.path() << ": " << o.err;
+    EXPECT_EQ(summary_of(folder / "s")["allocations_after_seal"], 0) << entry.path();
   }
   EXPECT_GE(files, 1);
 }

@@ -204,6 +204,23 @@ TEST(Comparison, whereTheInsIsAwayPosesGoOnAndAreComparedAgainAfterIt) {
   }
 }
 
+TEST(Comparison, aFixWithoutAHeightCountsForEastAndNorthOnly) {
+  Bench b;
+  b.drive(0, 50, [](double t, InsSample* s) {
+    if (t > 20 && t < 30) s->fix = FixStatus::fix_2d, s->position.height_m = 0;
+    return true;
+  });
+  EXPECT_EQ(b.comparison.counters().jumps, 0U);
+  for (const ComparedPose& c : b.out) {
+    const double t = (c.pose.stamp - at(0)).to_seconds();
+    if (t < 12 || !c.compared) continue;
+    EXPECT_EQ(c.height_known, t < 20 || t > 30) << t;
+    EXPECT_LT(c.error_enu.norm(), 1e-3) << t;
+    EXPECT_FALSE(c.scale_disagrees) << t;
+  }
+  EXPECT_TRUE(b.out[b.out.size() - 2].compared);
+}
+
 TEST(Comparison, aPoseWaitsNoLongerThanItMay) {
   Bench b;
   for (int i = 0; i < 20; ++i) b.comparison.add(b.pose(0.05 * i));  // no INS at all

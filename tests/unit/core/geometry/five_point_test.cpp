@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <opencv2/calib3d.hpp>
 #include <vector>
 
 #include "core/geometry/epipolar.hpp"

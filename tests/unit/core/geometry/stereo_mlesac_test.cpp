@@ -4,11 +4,8 @@
 
 #include <Eigen/LU>
 #include <limits>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/geometry/random_scene.hpp"
 
 namespace vergence {

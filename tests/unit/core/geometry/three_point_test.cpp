@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <limits>
-#include <opencv2/calib3d.hpp>
 #include <vector>
 
-#include "core/memory/allocation_guard.hpp"
 #include "tests/unit/core/geometry/random_scene.hpp"
 
 namespace vergence {
