@@ -1,12 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
-#include <cstdlib>
-#include <memory>
 
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
+#include <opencv2/aruco.hpp>
 
 #include "app/calibration/aprilgrid.hpp"
 #include "app/runtime/errors.hpp"
@@ -16,71 +12,30 @@
 namespace vergence::app {
 namespace {
 
+using test::expect_corners;
 using test::known_rig;
 
-/// An AprilGrid as it is printed, drawn as a camera sees it.
-class GridPainter {
- public:
-  /// `border`: black cells around a tag's code; `from_below`: tag 0 at the lower left.
-  GridPainter(const BoardPattern& board, std::size_t border, bool from_below)
-      : board_(board), border_(border), from_below_(from_below) {
-    const std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*)> family(tag36h11_create(),
-                                                                                  tag36h11_destroy);
-    for (std::size_t id = 0; id < board.corners() / 4; ++id) {
-      image_u8_t* const image = apriltag_to_image(family.get(), static_cast<std::uint32_t>(id));
-      for (std::size_t row = 0; row < kCode; ++row)
-        for (std::size_t column = 0; column < kCode; ++column)
-          white_.push_back(
-              image->buf[(row + 2) * static_cast<std::size_t>(image->stride) + column + 2] > 127);
-      std::free(image->buf);  // the library that makes it has no function for it
-      std::free(image);
+/// `border`: black cells around a tag's code; `from_below`: tag 0 at the lower left.
+test::PrintedBoard printed(const BoardPattern& board, int border, bool from_below) {
+  constexpr int kSide = 80;  // px of a tag
+  const auto family = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
+  const int gap = static_cast<int>(std::lround(kSide * board.spacing)), pitch = kSide + gap,
+            margin = 2 * gap;
+  cv::Mat picture(board.rows * pitch - gap + 2 * margin, board.columns * pitch - gap + 2 * margin,
+                  CV_8U, cv::Scalar(255));
+  // A small square where the corners of four tags meet, and as much of it at the rim.
+  for (int row = 0; row <= board.rows; ++row)
+    for (int column = 0; column <= board.columns; ++column) {
+      const int right = margin + column * pitch, below = margin + row * pitch;
+      picture(cv::Rect(right - gap, below - gap, gap, gap)).setTo(0);
+      if (row == board.rows || column == board.columns) continue;
+      cv::Mat tag;
+      family->drawMarker((from_below ? board.rows - 1 - row : row) * board.columns + column, kSide,
+                         tag, border);
+      tag.copyTo(picture(cv::Rect(right, below, kSide, kSide)));
     }
-  }
-
-  [[nodiscard]] std::vector<std::uint8_t> paint(const Intrinsics& lens,
-                                                const Transform& T_camera_board) const {
-    return test::paint_board(lens, T_camera_board, [this](double x, double y) {
-      return grey(x / board_.square, y / board_.square);
-    });
-  }
-
- private:
-  static constexpr std::size_t kCode = 6;  // cells a side
-  static constexpr double kWhite = test::kPaintedWhite, kBlack = test::kPaintedBlack,
-                          kGrey = test::kPaintedGrey;
-
-  /// x to the right and y up, in sides of a tag from the lower left corner.
-  [[nodiscard]] double grey(double x, double y) const {
-    const double gap = board_.spacing, pitch = 1 + gap;
-    const double width = board_.columns * pitch - gap, height = board_.rows * pitch - gap;
-    const double margin = 2 * gap;
-    if (x < -margin || y < -margin || x > width + margin || y > height + margin) return kGrey;
-    const double column = std::floor(x / pitch), row = std::floor(y / pitch);
-    const double u = x - column * pitch, v = y - row * pitch;
-    const bool across = column >= 0 && column < board_.columns && row >= 0 && row < board_.rows;
-    if (across && u < 1 && v < 1) return of_tag(column, row, u, v);
-    // A small square where the corners of four tags meet, and as much of it at the rim.
-    const bool in_column = u >= 1 || x < 0, in_row = v >= 1 || y < 0;
-    return in_column && in_row && x > -gap && y > -gap && x < width + gap && y < height + gap
-               ? kBlack
-               : kWhite;
-  }
-  [[nodiscard]] double of_tag(double column, double row, double u, double v) const {
-    const double up = from_below_ ? row : board_.rows - 1 - row;
-    const auto id = static_cast<std::size_t>(up * board_.columns + column);
-    const auto cells = static_cast<double>(kCode + 2 * border_);
-    const auto across = static_cast<std::size_t>(u * cells),
-               down = static_cast<std::size_t>((1 - v) * cells);
-    if (across < border_ || down < border_ || across >= kCode + border_ || down >= kCode + border_)
-      return kBlack;
-    return white_[(id * kCode + down - border_) * kCode + across - border_] ? kWhite : kBlack;
-  }
-
-  BoardPattern board_;
-  std::size_t border_;
-  bool from_below_;
-  std::vector<bool> white_;  // of each tag, row by row from the top
-};
+  return {picture, kSide / board.square, double(margin), double(picture.rows - margin), true};
+}
 
 /// Upright in front of the camera, y of the board up; turned about the camera's axes, moved aside.
 Transform shown(const BoardPattern& board, const Vec3& turn, const Vec3& centre) {
@@ -89,28 +44,13 @@ Transform shown(const BoardPattern& board, const Vec3& turn, const Vec3& centre)
   return {R, centre - R * middle};
 }
 
-// In drawn images cornerSubPix is off by a tenth of a pixel here and there, as for checkerboards; a
-// wrong number would be a tag's side, 20 px.
-void expect_corners(const BoardCorners& found, const RigCalibration& rig, const BoardPattern& board,
-                    const Transform& T) {
-  Vec2 sum = Vec2::Zero();
-  for (const BoardCorner& c : found) {
-    Vec2 truth;
-    ASSERT_EQ(Camera(rig.intrinsics[0]).project(T * board.corner(c.index), &truth, nullptr),
-              ProjectStatus::ok);
-    EXPECT_LT((c.pixel - truth).norm(), 0.3) << c.index << ": " << (c.pixel - truth).transpose();
-    sum += c.pixel - truth;
-  }
-  EXPECT_LT(sum.norm(), 0.05 * static_cast<double>(found.size()));
-}
-
 TEST(AprilGrid, cornersAreFoundWhicheverWayItIsPrinted) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const BoardPattern board = parse_aprilgrid("6x6", 0.088, 0.3);
   const Transform T = shown(board, Vec3(0.3, -0.2, 0.1), Vec3(0.02, -0.01, 1.0));
-  for (const std::size_t border : {1U, 2U})
+  for (const int border : {1, 2})
     for (const bool from_below : {true, false}) {
-      const auto pixels = GridPainter(board, border, from_below).paint(rig.intrinsics[0], T);
+      const auto pixels = printed(board, border, from_below).paint(rig.intrinsics[0], T);
       const BoardCorners found =
           find_aprilgrid({pixels.data(), 640, 480, 640}, board, BoardSearch::thorough);
       EXPECT_GT(found.size(), 120U) << "of 144; border " << border << ", below " << from_below;
@@ -121,7 +61,7 @@ TEST(AprilGrid, cornersAreFoundWhicheverWayItIsPrinted) {
 TEST(AprilGrid, aPartOfTheBoardIsEnough) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const BoardPattern board = parse_aprilgrid("6x6", 0.088, 0.3);
-  const GridPainter painter(board, 2, true);
+  const test::PrintedBoard painter = printed(board, 2, true);
   // Into the corners of the image, turned, upside down.
   for (const auto& [turn, centre] : {std::pair(Vec3(0.2, 0.2, 0), Vec3(-0.4, -0.3, 0.9)),
                                      std::pair(Vec3(-0.2, 0.1, 0.4), Vec3(0.4, 0.3, 0.9)),
@@ -144,7 +84,7 @@ TEST(AprilGrid, anotherBoardOrNoneIsNothing) {
   EXPECT_TRUE(find_aprilgrid({}, board, BoardSearch::thorough).empty());
   const BoardPattern wide = parse_aprilgrid("8x4", 0.06, 0.3);
   const auto pixels =
-      GridPainter(wide, 2, true)
+      printed(wide, 2, true)
           .paint(rig.intrinsics[0], shown(wide, Vec3(0.1, 0.1, 0), Vec3(0, 0, 0.9)));
   EXPECT_FALSE(find_aprilgrid({pixels.data(), 640, 480, 640}, wide, BoardSearch::thorough).empty());
   EXPECT_TRUE(find_aprilgrid({pixels.data(), 640, 480, 640}, board, BoardSearch::thorough).empty())

@@ -8,15 +8,14 @@
 #include <opencv2/aruco.hpp>
 
 #include "app/runtime/errors.hpp"
+#include "tests/unit/app/calibration/board_painter.hpp"
 #include "tests/unit/app/calibration/board_scene.hpp"
-#include "tests/unit/app/calibration/charuco_painter.hpp"
 
 namespace vergence::app {
 namespace {
 
-using test::CharucoPainter;
+using test::expect_corners;
 using test::known_rig;
-using test::shown_charuco;
 
 constexpr int kWidth = 640, kHeight = 480;
 
@@ -24,18 +23,35 @@ BoardCorners found_in(const std::vector<std::uint8_t>& pixels, const BoardPatter
   return find_charuco({pixels.data(), kWidth, kHeight, kWidth}, board);
 }
 
-// cornerSubPix's error in drawn images, as for AprilGrids; a wrong index would be a square, 30 px.
-void expect_corners(const BoardCorners& found, const RigCalibration& rig, const BoardPattern& board,
-                    const Transform& T) {
-  Vec2 sum = Vec2::Zero();
-  for (const BoardCorner& c : found) {
-    Vec2 truth;
-    ASSERT_EQ(Camera(rig.intrinsics[0]).project(T * board.corner(c.index), &truth, nullptr),
-              ProjectStatus::ok);
-    EXPECT_LT((c.pixel - truth).norm(), 0.3) << c.index << ": " << (c.pixel - truth).transpose();
-    sum += c.pixel - truth;
-  }
-  EXPECT_LT(sum.norm(), 0.05 * static_cast<double>(found.size()));
+/// `black_first`: the upper left square is black.
+test::PrintedBoard printed_charuco(const BoardPattern& board, bool black_first) {
+  constexpr int kSquare = 120, kMargin = 36;  // px
+  const auto dictionary = cv::aruco::getPredefinedDictionary(static_cast<int>(board.dictionary));
+  const int columns = board.columns + 1, rows = board.rows + 1;
+  cv::Mat picture(rows * kSquare + 2 * kMargin, columns * kSquare + 2 * kMargin, CV_8U,
+                  cv::Scalar(255));
+  const int side = static_cast<int>(std::lround(kSquare * board.marker / board.square));
+  const int gap = (kSquare - side) / 2;
+  int id = 0;
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      cv::Mat square =
+          picture(cv::Rect(kMargin + column * kSquare, kMargin + row * kSquare, kSquare, kSquare));
+      cv::Mat marker;
+      if (((row + column) % 2 == 0) == black_first) {
+        square.setTo(0);
+      } else {
+        dictionary->drawMarker(id++, side, marker, 1);
+        marker.copyTo(square(cv::Rect(gap, gap, side, side)));
+      }
+    }
+  return {picture, kSquare / board.square, kMargin + kSquare, kMargin + kSquare};
+}
+
+/// Its middle at `centre`, turned about it.
+Transform shown_charuco(const BoardPattern& board, const Vec3& turn, const Vec3& centre) {
+  const Mat3 R = exp_so3(turn);
+  return {R, centre - R * (0.5 * (board.corner(0) + board.corner(board.corners() - 1)))};
 }
 
 TEST(Charuco, cornersAreFoundWhicheverWayItIsPrinted) {
@@ -46,7 +62,7 @@ TEST(Charuco, cornersAreFoundWhicheverWayItIsPrinted) {
        {std::pair(odd, true), std::pair(even, true), std::pair(even, false)}) {
     const Transform T = shown_charuco(board, Vec3(0.3, -0.2, 0.1), Vec3(0.02, -0.01, 0.75));
     const BoardCorners found =
-        found_in(CharucoPainter(board, black_first).paint(rig.intrinsics[0], T), board);
+        found_in(printed_charuco(board, black_first).paint(rig.intrinsics[0], T), board);
     EXPECT_GT(found.size(), board.corners() * 9 / 10) << board.words() << black_first;
     expect_corners(found, rig, board, T);
   }
@@ -55,7 +71,7 @@ TEST(Charuco, cornersAreFoundWhicheverWayItIsPrinted) {
 TEST(Charuco, aPartOfTheBoardIsEnough) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const BoardPattern board = parse_charuco("8x7", 0.06, 0.044, "5X5_100");
-  const CharucoPainter painter(board, true);
+  const test::PrintedBoard painter = printed_charuco(board, true);
   for (const auto& [turn, centre] : {std::pair(Vec3(0.2, 0.2, 0), Vec3(-0.3, -0.22, 0.65)),
                                      std::pair(Vec3(0.1, -0.2, M_PI), Vec3(0.3, -0.2, 0.65))}) {
     const Transform T = shown_charuco(board, turn, centre);
@@ -70,7 +86,7 @@ TEST(Charuco, aMarkerThatTheBoardDoesNotHaveIsPassedOver) {
   const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
   const BoardPattern board = parse_charuco("8x7", 0.06, 0.044, "5X5_100");
   const Transform T = shown_charuco(board, Vec3(0.3, -0.2, 0.1), Vec3(0.02, -0.01, 0.85));
-  auto pixels = CharucoPainter(board, true).paint(rig.intrinsics[0], T);
+  auto pixels = printed_charuco(board, true).paint(rig.intrinsics[0], T);
   const BoardCorners alone = found_in(pixels, board);
   ASSERT_FALSE(alone.empty());
   constexpr int kSide = 42, kMargin = 8;
@@ -94,7 +110,7 @@ TEST(Charuco, anotherBoardOrNoneIsNothing) {
   EXPECT_TRUE(found_in(std::vector<std::uint8_t>(kWidth * kHeight, 128), board).empty());
   EXPECT_TRUE(find_charuco({}, board).empty());
   const auto pixels =
-      CharucoPainter(board, true)
+      printed_charuco(board, true)
           .paint(rig.intrinsics[0], shown_charuco(board, Vec3(0.1, 0.1, 0), Vec3(0, 0, 0.75)));
   EXPECT_FALSE(found_in(pixels, board).empty());
   EXPECT_TRUE(found_in(pixels, parse_charuco("6x9", 0.06, 0.044, "5X5_100")).empty())
