@@ -83,12 +83,21 @@ std::optional<Cameras> in_one_folder(const fs::path& root, const std::string& ab
   return cameras;
 }
 
+std::optional<Cameras> cameras_of(const fs::path& root, const std::string& above) {
+  auto cameras = in_two_folders(root, above);
+  return cameras ? cameras : in_one_folder(root, above);
+}
+
+/// In the folder, else in the one folder below it that has some.
 std::optional<Cameras> find_cameras(const fs::path& root) {
-  for (const char* above : {"", "mav0/", "images/", "data/", "stereo/", "frames/"}) {
-    if (auto cameras = in_two_folders(root, above)) return cameras;
-    if (auto cameras = in_one_folder(root, above)) return cameras;
+  std::optional<Cameras> found = cameras_of(root, "");
+  if (found) return found;
+  for (const std::string& name : entries_of(root, true)) {
+    auto cameras = cameras_of(root, name + "/");
+    if (cameras && found) return std::nullopt;
+    if (cameras) found = std::move(cameras);
   }
-  return std::nullopt;
+  return found;
 }
 
 /// InputError: no such folder, no image in it that can be read.
@@ -583,7 +592,7 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   // theirs.
   if (const fs::path parent = fs::path(cameras[0].below).parent_path();
       !parent.empty() && parent == fs::path(cameras[1].below).parent_path() &&
-      !present(folder / "calibration.yaml"))
+      !present(folder / "calibration.yaml") && !list_in(folder))
     return open_folder(folder / parent, given, use);
   for (Camera& camera : cameras)
     if (camera.names.empty()) camera.names = list_images(folder, camera.below);
@@ -602,7 +611,7 @@ StereoSequence open_folder(const fs::path& folder, bool given, const Calibration
   return sequence;
 }
 
-StereoSequence open_euroc(const fs::path& folder, bool given) {
+StereoSequence open_euroc(const fs::path& folder, bool given, const CalibrationUse& use) {
   StereoSequence sequence;
   sequence.root = fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
   for (const char* camera : {"cam0", "cam1"})
@@ -611,10 +620,7 @@ StereoSequence open_euroc(const fs::path& folder, bool given) {
   Lists lists = find_lists(sequence.root, cameras);
   lists.unit = TimeUnit::nanoseconds;
   pair_cameras(&cameras, lists, &sequence);
-  if (given) return sequence;
-  sequence.calibration = read_sensor_rig(sequence.root / "cam0" / "sensor.yaml",
-                                         sequence.root / "cam1" / "sensor.yaml");
-  sequence.calibration_source = "cam1/sensor.yaml";
+  if (!given) read_own_calibration(use, cameras, &sequence);
   return sequence;
 }
 
@@ -657,7 +663,8 @@ StereoSequence open_kitti_raw(const fs::path& folder, bool given,
   Lists lists;
   for (std::size_t k = 0; k < 2; ++k) {
     const std::string camera = fmt::format("image_{:02d}", numbers[k]);
-    require_folder(folders.drive / camera, "data/ and timestamps.txt of a camera");
+    require_folder(folders.drive / camera,
+                   "data/ and timestamps.txt of a camera (kitti_raw.left and .right say which)");
     below[k] = camera + "/data";
     lists.own[k] = folders.drive / camera / "timestamps.txt";
   }

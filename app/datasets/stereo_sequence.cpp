@@ -25,7 +25,7 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
     case SequenceFormat::kitti_raw:
       return detail::open_kitti_raw(folder, given, cameras);
     case SequenceFormat::euroc:
-      return detail::open_euroc(folder, given);
+      return detail::open_euroc(folder, given, use);
     case SequenceFormat::folder:
       return detail::open_folder(folder, given, use);
     case SequenceFormat::st_lucia:

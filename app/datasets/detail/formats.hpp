@@ -15,7 +15,8 @@ namespace vergence::app::detail {
 /// `cameras`: left and right, of 00 to 03.
 [[nodiscard]] StereoSequence open_kitti_raw(const std::filesystem::path& folder, bool given,
                                             const std::array<int, 2>& cameras);
-[[nodiscard]] StereoSequence open_euroc(const std::filesystem::path& folder, bool given);
+[[nodiscard]] StereoSequence open_euroc(const std::filesystem::path& folder, bool given,
+                                        const CalibrationUse& use);
 [[nodiscard]] StereoSequence open_folder(const std::filesystem::path& folder, bool given,
                                          const CalibrationUse& use);
 [[nodiscard]] StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given);

@@ -17,7 +17,8 @@ constexpr std::string_view kSides =
     "left right infrared_1 infrared_2 infra1 infra2 infra_1 infra_2 fisheye1 fisheye2 cam0 cam1 "
     "cam_0 cam_1 cam00 cam01 camera0 camera1 camera_0 camera_1 image_0 image_1 image_00 image_01 "
     "image0 image1 image_2 image_3 image_02 image_03 img0 img1 cam1 cam2 cam_1 cam_2 camera1 "
-    "camera2 camera_1 camera_2 image_1 image_2 image1 image2 i1 i2 caml camr imgl imgr l r c0 c1 "
+    "camera2 camera_1 camera_2 image_1 image_2 image1 image2 i1 i2 caml camr imgl imgr lcam rcam l "
+    "r c0 c1 "
     "0 1";
 
 std::vector<Sides> all_sides() {

@@ -481,6 +481,7 @@ std::vector<Case> folders() {
       {"33 cam0, cam1", named("cam{c}/{i:06}.png")},
       {"33 camL/img", named("cam{L}/img/{i:06}.png")},
       {"33 stereo/left", named("stereo/{side}/{i:06}.png")},
+      {"33 4Seasons", named("undistorted_images/cam{c}/{ns}.png"), "{ns} {s} 5.0"},
       {"33 image_00 without lists", named("image_0{c}/{i:06}.png")},
       {"33 libviso2", named("I{c1}_{i:06}.png"), "{ns}", "I1_000000.png is left"},
       {"33 sides at the end", named("{i:06}_{side}.png")},
