@@ -5,12 +5,8 @@
 //   drives [--only NAME]       every recorded drive: calibration given, wrong, found
 //   focal [--only NAME]        focal lengths that are off: told or not
 //   stretches [--only NAME]    how far disjoint stretches of a drive agree
-//   jumps [--only NAME]        how far disparities jump on rigs that nobody touched
 //
 // All take --set KEY=VALUE.
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -22,9 +18,7 @@
 #include "app/config/configuration.hpp"
 #include "app/runtime/thread_runner.hpp"
 #include "app/session/drive_calibration.hpp"
-#include "core/calibration/disparity_jump.hpp"
 #include "core/calibration/stretches.hpp"
-#include "core/camera/camera.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/recorded_sequence.hpp"
@@ -166,58 +160,6 @@ void print_stretches(const std::string& name,
   std::fflush(stdout);
 }
 
-/// A logged observation as a pinhole camera without distortion has it.
-Vec2 undistorted(const Camera& camera, const Intrinsics& k, const Eigen::Vector2f& raw) {
-  Vec3 ray = Vec3::UnitZ();
-  (void)camera.unproject(raw.cast<double>(), &ray);
-  return {k.fx * ray.x() / ray.z() + k.cx, k.fy * ray.y() / ray.z() + k.cy};
-}
-
-void print_jumps(const RecordedSequence& d, const app::Configuration& c) {
-  const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
-  const auto features = static_cast<std::size_t>(c.odometry.features);
-  Arena arena(calibration::DisparityJumpDetector::memory_needed(features));
-  calibration::DisparityJumpDetector detector(features, arena);
-  const RigCalibration& rig = given.file.rig;
-  const std::array cameras{Camera(rig.intrinsics[0]), Camera(rig.intrinsics[1])};
-  const auto pinhole = [&](std::size_t k) {
-    return Pinhole{rig.intrinsics[k].fx, rig.intrinsics[k].fy, rig.intrinsics[k].cx,
-                   rig.intrinsics[k].cy};
-  };
-  detector.set_reference(rig.T_camera_left[1], pinhole(0), pinhole(1));
-  std::vector<double> shifts;
-  std::vector<calibration::StereoObservation> stereo;
-  int confirmed = 0;
-  Transform before;
-  std::uint64_t newest = 0;
-  (void)app::drive_once(
-      {d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given,
-      [&](const Estimator& e, const PoseSample&) {
-        if (e.tracks().empty()) return;
-        const calibration::LoggedFrame& f = e.tracks().frame(e.tracks().size() - 1);
-        if (f.number <= newest && newest > 0) return;
-        stereo.clear();
-        for (const calibration::LoggedObservation& o : f.observations)
-          if (o.by(0) && o.by(1))
-            stereo.push_back({undistorted(cameras[0], rig.intrinsics[0], o.raw[0]),
-                              undistorted(cameras[1], rig.intrinsics[1], o.raw[1]),
-                              static_cast<double>(o.sigma), o.track});
-        const calibration::DisparityJump jump =
-            detector.next(f.number, stereo, f.T_left_world * before.inverse());
-        if (jump.measured) shifts.push_back(std::abs(jump.px));
-        confirmed += jump.confirmed ? 1 : 0;
-        before = f.T_left_world;
-        newest = f.number;
-      });
-  if (shifts.empty()) return;
-  std::sort(shifts.begin(), shifts.end());
-  fmt::print(
-      "{:12s} {} frames: shift {:.3f} px median, {:.3f} 95 %, {:.3f} largest; {} confirmed\n",
-      d.name, shifts.size(), shifts[shifts.size() / 2],
-      shifts[std::min(shifts.size() - 1, shifts.size() * 95 / 100)], shifts.back(), confirmed);
-  std::fflush(stdout);
-}
-
 /// The paper's rig on the mock's streets, its true calibration in use.
 void rendered_stretches(const app::Configuration& c) {
   constexpr std::uint64_t kFrames = 240;
@@ -300,12 +242,11 @@ int main(int argc, char** argv) {
   try {
     if (what == "drives") return for_drives(set, only, run_drive);
     if (what == "focal") return for_drives(set, only, print_focal_lengths);
-    if (what == "jumps") return for_drives(set, only, print_jumps);
     if (what == "stretches") return run_stretches(set, only);
   } catch (const std::exception& e) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
     return 2;
   }
-  fmt::print(stderr, "calibration_bench: drives, focal, stretches or jumps is wanted\n");
+  fmt::print(stderr, "calibration_bench: drives, focal or stretches is wanted\n");
   return 2;
 }

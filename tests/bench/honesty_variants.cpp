@@ -146,49 +146,27 @@ void halve(cv::Mat* image) { cv::resize(*image, *image, {}, 0.5, 0.5, cv::INTER_
 using M = cv::Mat;
 using N = std::size_t;
 
+/// The right image moved and turned, from the start or half-way on.
+template <bool HalfWay, int Pixels, int YawCentidegrees, int PitchCentidegrees,
+          int RollCentidegrees, int ZoomPercent>
+void knock(M* /*left*/, M* right, N i, N n) {
+  if (!HalfWay || later(i, n))
+    warp(right, Pixels + pixels(*right, 0.01 * YawCentidegrees),
+         pixels(*right, 0.01 * PitchCentidegrees), 0.01 * RollCentidegrees, 1 + 0.01 * ZoomPercent);
+}
+
 constexpr std::array kVariants = {
     HonestyVariant{"untouched", nullptr, nullptr},
-    HonestyVariant{"yaw 0.3° from the start",
-                   [](M*, M* r, N, N) { warp(r, pixels(*r, 0.3), 0, 0, 1); }, nullptr},
-    HonestyVariant{"yaw 1° from the start", [](M*, M* r, N, N) { warp(r, pixels(*r, 1), 0, 0, 1); },
-                   nullptr},
-    HonestyVariant{"yaw 0.3° half-way",
-                   [](M*, M* r, N i, N n) {
-                     if (later(i, n)) warp(r, pixels(*r, 0.3), 0, 0, 1);
-                   },
-                   nullptr},
-    HonestyVariant{"yaw −0.3° half-way",
-                   [](M*, M* r, N i, N n) {
-                     if (later(i, n)) warp(r, pixels(*r, -0.3), 0, 0, 1);
-                   },
-                   nullptr},
-    HonestyVariant{"2 px to the side half-way",
-                   [](M*, M* r, N i, N n) {
-                     if (later(i, n)) warp(r, 2, 0, 0, 1);
-                   },
-                   nullptr},
-    HonestyVariant{"−2 px to the side half-way",
-                   [](M*, M* r, N i, N n) {
-                     if (later(i, n)) warp(r, -2, 0, 0, 1);
-                   },
-                   nullptr},
-    HonestyVariant{"pitch 0.3° half-way",
-                   [](M*, M* r, N i, N n) {
-                     if (later(i, n)) warp(r, 0, pixels(*r, 0.3), 0, 1);
-                   },
-                   nullptr},
-    HonestyVariant{"roll 0.5° half-way",
-                   [](M*, M* r, N i, N n) {
-                     if (later(i, n)) warp(r, 0, 0, 0.5, 1);
-                   },
-                   nullptr},
-    HonestyVariant{"zoom 1 % from the start", [](M*, M* r, N, N) { warp(r, 0, 0, 0, 1.01); },
-                   nullptr},
-    HonestyVariant{"zoom 1 % half-way",
-                   [](M*, M* r, N i, N n) {
-                     if (later(i, n)) warp(r, 0, 0, 0, 1.01);
-                   },
-                   nullptr},
+    HonestyVariant{"yaw 0.3° from the start", knock<false, 0, 30, 0, 0, 0>, nullptr},
+    HonestyVariant{"yaw 1° from the start", knock<false, 0, 100, 0, 0, 0>, nullptr},
+    HonestyVariant{"yaw 0.3° half-way", knock<true, 0, 30, 0, 0, 0>, nullptr},
+    HonestyVariant{"yaw −0.3° half-way", knock<true, 0, -30, 0, 0, 0>, nullptr},
+    HonestyVariant{"2 px to the side half-way", knock<true, 2, 0, 0, 0, 0>, nullptr},
+    HonestyVariant{"−2 px to the side half-way", knock<true, -2, 0, 0, 0, 0>, nullptr},
+    HonestyVariant{"pitch 0.3° half-way", knock<true, 0, 0, 30, 0, 0>, nullptr},
+    HonestyVariant{"roll 0.5° half-way", knock<true, 0, 0, 0, 50, 0>, nullptr},
+    HonestyVariant{"zoom 1 % from the start", knock<false, 0, 0, 0, 0, 1>, nullptr},
+    HonestyVariant{"zoom 1 % half-way", knock<true, 0, 0, 0, 0, 1>, nullptr},
     HonestyVariant{"both zoomed by 25 % from the start",
                    [](M* l, M* r, N, N) {
                      warp(l, 0, 0, 0, 1.25);

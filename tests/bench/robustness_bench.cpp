@@ -17,17 +17,15 @@
 // Tables are markdown, for docs/benchmarks.md. Settings apply to every run.
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <cstdlib>
 #include <fstream>
-#include <numeric>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
-#include <Eigen/Eigenvalues>
 
 #include "app/session/drive_calibration.hpp"
+#include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
 #include "tests/bench/honesty_variants.hpp"
 #include "tests/support/recorded_sequence.hpp"
@@ -182,69 +180,33 @@ void variants(const Bench& b, const RecordedSequence& d, std::span<const Honesty
   }
 }
 
+/// Of positions of frames in [first, last): turned, moved, scaled and shifted in time onto the
+/// track, which is flat.
 struct PlanarFit {
-  double rms_m = 0, scale = 0, offset_s = 0;
-  int poses = 0;
+  double rms_m = HUGE_VAL, scale = 0;
+  std::size_t poses = 0;
 };
 
-/// Of positions of frames in [first, last), on the plane that they spread along most; turned,
-/// moved, scaled and shifted in time onto the track.
 PlanarFit fit_planar(const DriveOutcome& r, std::size_t first, std::size_t last) {
   const auto folder = test::shared_data("data/sand_rover").value();
-  std::vector<double> seconds, frame_s;
-  std::vector<std::complex<double>> track;
   std::ifstream truth(folder / "truth_planar.txt"), times(folder / "times_1hz.txt");
-  for (double t = 0, x = 0, y = 0; truth >> t >> x >> y;) {
-    seconds.push_back(t);
-    track.emplace_back(x, y);
-  }
-  for (double t = 0; times >> t;) frame_s.push_back(t);
-
-  std::vector<std::size_t> frames;
-  Eigen::MatrixX3d positions(static_cast<Eigen::Index>(r.samples.size()), 3);
-  for (const PoseSample& s : r.samples) {
-    if (s.frame < first || s.frame >= last || s.status == PoseStatus::lost) continue;
-    positions.row(static_cast<Eigen::Index>(frames.size())) = s.T_world_left.t.transpose();
-    frames.push_back(s.frame);
-  }
+  std::vector<StampedPose> track, poses;
+  for (double t = 0, x = 0, y = 0; truth >> t >> x >> y;)
+    track.push_back({Stamp{} + Duration::seconds(t), {Mat3::Identity(), Vec3(x, y, 0)}});
+  std::vector<Stamp> stamps;
+  for (double t = 0; times >> t;) stamps.push_back(Stamp{} + Duration::seconds(t));
+  for (const PoseSample& s : r.samples)
+    if (s.frame >= first && s.frame < last && s.status != PoseStatus::lost)
+      poses.push_back({stamps.at(s.frame), s.T_world_left});
+  EvaluationOptions options;
+  options.max_gap = Duration::seconds(1e6);
   PlanarFit best;
-  best.poses = static_cast<int>(frames.size());
-  best.rms_m = HUGE_VAL;
-  if (frames.size() < 3) return best;
-  const auto n = static_cast<Eigen::Index>(frames.size());
-  const Eigen::MatrixX3d centred =
-      positions.topRows(n).rowwise() - positions.topRows(n).colwise().mean();
-  const Eigen::SelfAdjointEigenSolver<Mat3> axes(centred.transpose() * centred);
-  // The plane may be seen from below: the track's and its mirror image are both tried.
-  for (const double side : {1.0, -1.0}) {
-    for (double offset = -5; offset <= 5; offset += 0.05) {
-      std::vector<std::complex<double>> a, b;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const double t = frame_s[frames[static_cast<std::size_t>(i)]] + offset;
-        const auto next = std::upper_bound(seconds.begin(), seconds.end(), t);
-        if (next == seconds.begin() || next == seconds.end()) continue;
-        const auto j = static_cast<std::size_t>(next - seconds.begin());
-        const double w = (t - seconds[j - 1]) / (seconds[j] - seconds[j - 1]);
-        const Vec3 p = centred.row(i).transpose();
-        a.emplace_back(p.dot(axes.eigenvectors().col(2)), side * p.dot(axes.eigenvectors().col(1)));
-        b.push_back((1 - w) * track[j - 1] + w * track[j]);
-      }
-      if (a.size() < 3) continue;
-      const auto count = static_cast<double>(a.size());
-      const auto mean_a = std::accumulate(a.begin(), a.end(), std::complex<double>{}) / count;
-      const auto mean_b = std::accumulate(b.begin(), b.end(), std::complex<double>{}) / count;
-      std::complex<double> cross{};
-      double square = 0, error = 0;
-      for (std::size_t i = 0; i < a.size(); ++i) {
-        cross += std::conj(a[i] - mean_a) * (b[i] - mean_b);
-        square += std::norm(a[i] - mean_a);
-      }
-      const std::complex<double> turn = cross / square;
-      for (std::size_t i = 0; i < a.size(); ++i)
-        error += std::norm(b[i] - mean_b - turn * (a[i] - mean_a));
-      const double rms = std::sqrt(error / count);
-      if (rms < best.rms_m) best = {rms, std::abs(turn), offset, best.poses};
-    }
+  for (double offset = -5; offset <= 5; offset += 0.05) {
+    std::vector<StampedPose> shifted = poses;
+    for (StampedPose& p : shifted) p.stamp = p.stamp + Duration::seconds(offset);
+    const TrajectoryEvaluation e = evaluate(shifted, track, options);
+    if (e.status == EvaluationStatus::ok && e.ate_sim3.rmse < best.rms_m)
+      best = {e.ate_sim3.rmse, e.sim3.scale, poses.size()};
   }
   return best;
 }
