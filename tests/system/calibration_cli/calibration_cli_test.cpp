@@ -145,17 +145,6 @@ TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEn
   EXPECT_NE(o.err.find("the next drive will not know"), std::string::npos) << o.err;
 }
 
-TEST_F(CalibrationCli, theSameDecisionsWhateverTheThreads) {
-  for (const char* threads : {"1", "2"})
-    ASSERT_EQ(drive(threads, fmt::format("--from-scratch {} --threads {} --set rig.state_dir=none",
-                                         kLongEnough, threads))
-                  .code,
-              0);
-  for (const char* file :
-       {"trajectory.tum", "calibrations.csv", "calibration.yaml", "events.jsonl", "residuals.csv"})
-    EXPECT_EQ(read_file(session("1") / file), read_file(session("2") / file)) << file;
-}
-
 TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) {
   ASSERT_EQ(drive("first", "--duration 1").code, 0);
   const fs::path mine = session("first") / "calibration.yaml";
