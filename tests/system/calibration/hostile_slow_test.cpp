@@ -125,24 +125,5 @@ TEST(HostileSlow, aBusThatFillsTheViewIsNoKnockAndCalibratesNothingFalse) {
   expect_nothing_false(calibrated);
 }
 
-TEST(HostileSlow, standingForAMinuteIsNoKnock) {
-  RenderedDriveOptions options;
-  options.drive.kind = mock::DriveKind::still;
-  options.from_s = 3;
-  const StereoDrive still = film(options, 12);
-  Course course(with_calibration(still.rig));
-  for (std::uint64_t i = 0; i < 1800; ++i) {
-    RigFrame frame;
-    frame.number = i;
-    frame.stamp = still.stamps[0] + Duration::seconds(static_cast<double>(i) / 30.0);
-    frame.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k) frame.images[k] = still.pairs[i % still.size()][k].view();
-    course.give(frame, still.truth[0]);
-  }
-  EXPECT_EQ(course.first(EstimatorEvent::Kind::rig_changed), nullptr) << course.story();
-  EXPECT_EQ(count_ok(course.answers(), 0, 1800), 1800) << course.story();
-  EXPECT_EQ(wrong_ok(course.answers(), {}), "");
-}
-
 }  // namespace
 }  // namespace vergence::test

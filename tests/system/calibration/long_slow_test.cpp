@@ -12,37 +12,6 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-TEST(LongSlow, twentyPlacesOfTheDriveGiveTheTransformFromSixtyFrames) {
-  double rotation = 0, across = 0, along = 0;
-  int n = 0;
-  for (const double start : RenderedDrive::starts({}, 20, 3.0, 5.0)) {
-    RenderedDriveOptions options;
-    options.from_s = start;
-    RenderedDrive drive(options);
-    CourseSetting setting = from_scratch(options.rig);
-    setting.options.calibration.min_frames = setting.options.calibration.max_frames = 60;
-    Course course(setting);
-    for (std::uint64_t i = 0; i < 110 && course.accepted() == nullptr; ++i)
-      course.give(drive.frame(i), drive.T_enu_left(i));
-    ASSERT_NE(course.accepted(), nullptr) << start << " s\n" << course.story();
-    const RigError e = rig_error(course.accepted()->calibration, 1, options.rig.T_camera_left[1]);
-    std::printf("%.2f s: %s\n", start, to_string(e).c_str());
-    EXPECT_LT(e.rotation, 0.15e-3) << start;
-    EXPECT_LT(std::abs(e.t.y()), 1.8e-3) << start;
-    EXPECT_LT(std::abs(e.t.z()), 4.5e-3) << start;
-    rotation += e.rotation * e.rotation;
-    across += e.t.y() * e.t.y();
-    along += e.t.z() * e.t.z();
-    ++n;
-  }
-  std::printf("root means: rotation %.4f mrad, t_y %.3f mm, t_z %.3f mm\n",
-              1e3 * std::sqrt(rotation / n), 1e3 * std::sqrt(across / n),
-              1e3 * std::sqrt(along / n));
-  EXPECT_LT(std::sqrt(rotation / n), 0.06e-3);
-  EXPECT_LT(std::sqrt(across / n), 0.6e-3);
-  EXPECT_LT(std::sqrt(along / n), 1.8e-3);
-}
-
 TEST(LongSlow, tenDrivesWithoutAKnockRaiseNoAlarm) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     RenderedDriveOptions options;

@@ -6,9 +6,6 @@
 #include <numbers>
 #include <optional>
 
-#include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
-
 #include "core/comparison/trajectory_metrics.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/system/calibration/course.hpp"
@@ -104,50 +101,6 @@ TEST(RecordedFromScratch, kittisTransformIsFound) {
               found->scale_sigma);
   EXPECT_LT(e.segments[1].translation, 0.0067)
       << "one lens model too few leaves so much; with the lenses found it is 0.55 %";
-}
-
-/// The right images as a camera turned by `degrees` would have taken them: x' ~ K R K⁻¹ x.
-StereoDrive with_right_turned(StereoDrive drive, const Mat3& R) {
-  const Intrinsics& c = drive.rig.intrinsics[1];
-  Mat3 K = Mat3::Identity();
-  K(0, 0) = c.fx, K(1, 1) = c.fy, K(0, 2) = c.cx, K(1, 2) = c.cy;
-  const Mat3 H = K * R * K.inverse();
-  cv::Mat homography(3, 3, CV_64F);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) homography.at<double>(i, j) = H(i, j);
-  for (auto& pair : drive.pairs) {
-    const Picture before = pair[1];
-    const cv::Mat source(before.height, before.width, CV_8U,
-                         const_cast<std::uint8_t*>(before.bytes.data()),
-                         static_cast<std::size_t>(before.stride));
-    cv::Mat target(before.height, before.width, CV_8U, pair[1].bytes.data(),
-                   static_cast<std::size_t>(before.stride));
-    cv::warpPerspective(source, target, homography, target.size(), cv::INTER_CUBIC,
-                        cv::BORDER_REPLICATE);
-  }
-  return drive;
-}
-
-TEST(RecordedFromScratch, kittisRightCameraTurnedIsFoundTurned) {
-  const auto drive = excerpt(kKitti);
-  if (!drive) GTEST_SKIP() << shared_data_missing(kKitti.folder);
-  const auto straight = calibrate(*drive, kFrames);
-  ASSERT_TRUE(straight);
-  const TrajectoryEvaluation before = odometry_with(*drive, *straight);
-  for (const Vec3& degrees : {Vec3(0.3, 0.2, 0.25), Vec3(-1.2, 1.0, 1.2)}) {
-    const Mat3 R = exp_so3(kDegree * degrees);
-    const StereoDrive rotated = with_right_turned(*drive, R);
-    const auto found = calibrate(rotated, kFrames);
-    ASSERT_TRUE(found);
-    const Vec3 off = turned(*found, R * straight->T_camera_left[1].R);
-    const TrajectoryEvaluation after = odometry_with(rotated, *found);
-    std::printf(
-        "kitti turned by %.2f deg: %.4f deg off; segments %.3f %% against %.3f %% unturned\n",
-        degrees.norm(), off.norm(), 100 * after.segments[0].translation,
-        100 * before.segments[0].translation);
-    EXPECT_LT(off.norm(), 0.015) << off.transpose();
-    EXPECT_LT(after.segments[0].translation, 1.2 * before.segments[0].translation);
-  }
 }
 
 }  // namespace

@@ -19,7 +19,9 @@ constexpr double kSpeed = 3.0, kSeconds = 5.0;  // m/s for so long: the drives l
 // The largest errors allowed from 60 frames.
 constexpr double kRotation = 0.15e-3, kAcross = 1.8e-3, kAlong = 4.5e-3;  // rad; m of t_y; m of t_z
 
-std::vector<double> starts() { return RenderedDrive::starts({}, 3, kSpeed, kSeconds); }
+std::vector<double> starts(int count = 3) {
+  return RenderedDrive::starts({}, count, kSpeed, kSeconds);
+}
 
 RenderedDriveOptions drive_from(double seconds) {
   RenderedDriveOptions o;
@@ -73,22 +75,26 @@ void expect_poses_all_the_time(const Course& course) {
   EXPECT_GT(count_ok(course.answers(), 0, 1000), 0) << course.story();
 }
 
-TEST(FromScratch, threePlacesOfTheDriveGiveTheTransform) {
+TEST(FromScratch, twentyPlacesOfTheDriveGiveTheTransform) {
   const Transform truth = paper_rig().T_camera_left[1];
-  {
-    Course course(from_sixty(street().rig));
-    course.give(street(), 0, street().size());
-    expect_found(course, truth);
-    expect_poses_all_the_time(course);
-  }
-  for (std::size_t start = 1; start < starts().size(); ++start) {
-    const RenderedDriveOptions options = drive_from(starts()[start]);
+  Vec3 squares = Vec3::Zero();  // rotation, t_y, t_z
+  const std::vector<double> places = starts(20);
+  for (const double start : places) {
+    SCOPED_TRACE(start);
+    const RenderedDriveOptions options = drive_from(start);
     RenderedDrive drive(options);
     Course course(from_sixty(options.rig));
     for (std::uint64_t i = 0; i < 110; ++i) course.give(drive.frame(i), drive.T_enu_left(i));
     expect_found(course, truth);
     expect_poses_all_the_time(course);
+    ASSERT_NE(course.accepted(), nullptr);
+    const RigError e = rig_error(course.accepted()->calibration, 1, truth);
+    squares += Vec3(e.rotation, e.t.y(), e.t.z()).cwiseAbs2();
   }
+  const Vec3 rms = (squares / static_cast<double>(places.size())).cwiseSqrt();
+  EXPECT_LT(rms.x(), 0.06e-3);
+  EXPECT_LT(rms.y(), 0.6e-3);
+  EXPECT_LT(rms.z(), 1.8e-3);
 }
 
 TEST(FromScratch, allocatesNothingOnAnyThread) {
@@ -230,6 +236,15 @@ TEST(StandingStill, fromScratchSaysThatItNeedsMotionAndAdoptsNothing) {
   EXPECT_NE(course.first(EstimatorEvent::Kind::calibration_waits), nullptr) << course.story();
   course.finish();
   EXPECT_EQ(course.count_accepted(), 0) << course.story();
+}
+
+TEST(StandingStill, aMinuteIsNoKnock) {
+  const Standing place(standing_drive());
+  Course course(with_calibration(place.still.rig));
+  place.give(&course, 0, 1800);
+  EXPECT_EQ(course.first(EstimatorEvent::Kind::rig_changed), nullptr) << course.story();
+  EXPECT_EQ(count_ok(course.answers(), 0, 1800), 1800) << course.story();
+  EXPECT_EQ(wrong_ok(course.answers(), {}), "");
 }
 
 TEST(StandingStill, aKnockIsNoticedAndWaitsForMotion) {
