@@ -270,18 +270,5 @@ TEST(OdometryInBadConditions, exchangedCamerasLeaveNoTraceWhenTheyArePutBack) {
   }
 }
 
-TEST(OdometryInBadConditions, withTwoThreadsTheyAreTheSameBitForBit) {
-  for (const Edit& edit : {cover(drive(), Cover::right, kFirst, kLast), swap_cameras(kFirst, kLast),
-                           leave_out(kFirst, kFirst + 40)}) {
-    const Replay one = replay(drive(), edit, 1), two = replay(drive(), edit, 2);
-    ASSERT_EQ(one.answers.size(), two.answers.size());
-    for (std::size_t i = 0; i < one.answers.size(); ++i) {
-      EXPECT_EQ(one.answers[i].sample.reason, two.answers[i].sample.reason);
-      EXPECT_EQ(one.answers[i].sample.T_world_left.t, two.answers[i].sample.T_world_left.t);
-    }
-    EXPECT_EQ(two.allocations, 0U);
-  }
-}
-
 }  // namespace
 }  // namespace vergence::test

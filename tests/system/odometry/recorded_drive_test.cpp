@@ -46,17 +46,6 @@ TEST_P(RecordedDrive, withItsCamerasExchangedNeverGivesAPose) {
   for (const Answer& a : r.answers) EXPECT_EQ(a.sample.status, PoseStatus::lost) << a.sample.frame;
 }
 
-TEST_P(RecordedDrive, withItsRightCameraCoveredIsNotOkFromThere) {
-  expect_no_wrong_ok(replay(drive_, cover(drive_, Cover::right, 20, drive_.size()), 2), 20,
-                     drive_.size());
-}
-
-TEST_P(RecordedDrive, blackFramesAreLost) {
-  const Replay r = replay(drive_, cover(drive_, Cover::both, 20, 30), 2);
-  expect_no_wrong_ok(r, 20, 30);
-  EXPECT_NE(r.answers.back().sample.status, PoseStatus::lost) << story(r.answers);
-}
-
 TEST_P(RecordedDrive, afterTwoSecondsWithoutFramesItSaysSo) {
   const std::size_t back = 20 + GetParam().frames_of_a_gap;
   const Replay r = replay(drive_, leave_out(20, back), 2);
