@@ -5,11 +5,20 @@
 //   drives [--only NAME]       every recorded drive: calibration given, wrong, found
 //   focal [--only NAME]        focal lengths that are off: told or not
 //   stretches [--only NAME]    how far disjoint stretches of a drive agree
+//   solves [--only NAME]       a solve of so many frames against the one of the whole drive: the
+//                              difference of their depths (root mean over the image, at the depth
+//                              that calibrations are judged at) over the sigma that the solve
+//                              states
 //
 // All take --set KEY=VALUE.
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
+#include <deque>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +27,8 @@
 #include "app/config/configuration.hpp"
 #include "app/runtime/thread_runner.hpp"
 #include "app/session/drive_calibration.hpp"
+#include "core/calibration/agreement.hpp"
+#include "core/calibration/health.hpp"
 #include "core/calibration/stretches.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"
@@ -30,6 +41,8 @@ namespace {
 
 using app::StartingCalibration;
 using app::StereoSequence;
+using calibration::RigSolution;
+using calibration::Stretches;
 using test::drive_recorded;
 using test::DriveOutcome;
 using test::RecordedSequence;
@@ -188,12 +201,63 @@ void rendered_stretches(const app::Configuration& c) {
   print_stretches("mock", stretches);
 }
 
-int for_drives(
-    const std::vector<std::string>& set, const std::string& only,
-    const std::function<void(const RecordedSequence&, const app::Configuration&)>& each) {
+constexpr std::array<std::size_t, 5> kStretches = {15, 25, 50, 75, 100};
+
+/// Solutions of all stretches of a drive, by their length.
+std::array<std::vector<RigSolution>, kStretches.size()> solve_stretches(
+    const RecordedSequence& d, app::Configuration c, const StartingCalibration& given) {
+  c.calibration.min_frames = std::min<int>(c.calibration.min_frames, kStretches.front());
+  const auto features = static_cast<std::size_t>(c.odometry.features);
+  Arena arena(kStretches.size() *
+              Stretches::memory_needed(c.calibration, c.monitor, given.file.rig.cameras, features));
+  std::deque<Stretches> stretches;
+  for (const std::size_t n : kStretches)
+    stretches.emplace_back(Stretches::Kind::alone, given.file.rig, given.file.rig, n, c.calibration,
+                           c.monitor, features, arena);
+  std::array<std::vector<RigSolution>, kStretches.size()> solved;
+  const app::DrivePass pass{d.sequence, c, 0, d.sequence.pairs.size(), {}, {}};
+  (void)app::drive_once(pass, given, [&](const Estimator& e, const PoseSample& /*sample*/) {
+    for (std::size_t i = 0; i < kStretches.size(); ++i) {
+      const auto s = stretches[i].take(e.tracks());
+      if (s && s->status == calibration::RigSolveStatus::ok) solved[i].push_back(*s);
+    }
+  });
+  return solved;
+}
+
+void print_solves(const RecordedSequence& d, const app::Configuration& c) {
+  const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
+  const app::DrivePass pass{d.sequence, c, 0, d.sequence.pairs.size(), {}, {}};
+  const app::DriveCalibration whole = app::calibrate_drive(pass, given);
+  if (!whole.rig) return;
+  const auto solved = solve_stretches(d, c, given);
+  for (std::size_t i = 0; i < kStretches.size(); ++i) {
+    double squares = 0, largest = 0, sigma = 0, percent = 0;
+    for (const RigSolution& s : solved[i]) {
+      const double depth =
+          calibration::judged_depth_m(s.rig, 1, c.calibration, c.odometry.pixel_sigma);
+      const double off = calibration::depth_difference_percent(*whole.rig, s.rig, 1, depth),
+                   own = calibration::depth_error_percent(s.rig, 1, depth), z = off / own;
+      squares += z * z;
+      largest = std::max(largest, z);
+      sigma += own;
+      percent += off * off;
+    }
+    const auto n = static_cast<double>(solved[i].size());
+    if (solved[i].empty()) continue;
+    fmt::print("| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", d.name, kStretches[i],
+               solved[i].size(), sigma / n, std::sqrt(percent / n), std::sqrt(squares / n),
+               largest);
+    std::fflush(stdout);
+  }
+}
+
+int for_drives(const std::vector<std::string>& set, const std::string& only,
+               const std::function<void(const RecordedSequence&, const app::Configuration&)>& each,
+               std::span<const char* const> drives = test::kRecordedSequences) {
   const app::Configuration c = app::load_configuration(std::nullopt, set);
   int n = 0;
-  for (const char* name : test::kRecordedSequences) {
+  for (const char* name : drives) {
     if (!only.empty() && only != name) continue;
     if (const auto d = test::open_recorded(name)) {
       each(*d, c);
@@ -243,10 +307,16 @@ int main(int argc, char** argv) {
     if (what == "drives") return for_drives(set, only, run_drive);
     if (what == "focal") return for_drives(set, only, print_focal_lengths);
     if (what == "stretches") return run_stretches(set, only);
+    if (what == "solves") {
+      fmt::print(
+          "| drive | frames | solves | sigma % | off % | off over sigma, rms | largest "
+          "|\n|---|---|---|---|---|---|---|\n");
+      return for_drives(set, only, print_solves, vergence::test::kRecordedDrives);
+    }
   } catch (const std::exception& e) {
     fmt::print(stderr, "calibration_bench: {}\n", e.what());
     return 2;
   }
-  fmt::print(stderr, "calibration_bench: drives, focal or stretches is wanted\n");
+  fmt::print(stderr, "calibration_bench: drives, focal, stretches or solves is wanted\n");
   return 2;
 }

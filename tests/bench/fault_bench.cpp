@@ -1,8 +1,8 @@
 // Drives of the mock with faults, as the table of docs/faults.md:
 //   fault_bench [single | long | pairs | random] [COUNT [FIRST] | part of a name]
 // The first 20 of `random`, all of the others, unless COUNT says how many, from FIRST (1) on.
-// Ends with 1 where an `ok` pose was wrong, a session is not whole, the program failed or is not
-// usable any more, and with 2 where there is nothing to drive or to judge by.
+// Ends with 1 where an `ok` pose was wrong, a session is not whole, the program failed, did not say
+// it or is not usable any more, and with 2 where there is nothing to drive or to judge by.
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
@@ -50,13 +50,15 @@ int main(int argc, char** argv) {
     const auto [drive, result] = drive_until_recovered(c, untouched.normal);
     fmt::print("{}", fault_table_line(c, drive, result));
     std::fflush(stdout);
-    bad += is_bad(drive, result) ? 1 : 0;
+    const std::string missing = unsaid(c, drive, untouched.drive);
+    if (!missing.empty()) fmt::print("not said: {}\n", missing);
+    bad += is_bad(drive, result) || !missing.empty() ? 1 : 0;
     unusable += result.recovery_s ? 0 : 1;
   }
   fmt::print(
       "\n{} of {} with a wrong `ok`, an `ok` at a time without truth, an exit that is not 0 or "
       "without a "
-      "whole session, {} not usable any more within a minute\n",
+      "whole session, or not said, {} not usable any more within a minute\n",
       bad, cases.size(), unusable);
   return bad + unusable > 0 ? 1 : 0;
 }

@@ -1,4 +1,5 @@
-// Faults two at a time, and 500 random schedules.
+// What a long stand does. `fault_bench` drives the other long faults, two at a time and 500 random
+// schedules.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,24 +9,6 @@
 
 namespace vergence::test {
 namespace {
-
-void expect_honest(const std::vector<FaultCase>& cases) {
-  const Untouched untouched = untouched_drive();
-  ASSERT_EQ(untouched.unfit, "");
-  for (const FaultCase& c : cases) {
-    const auto [drive, result] = drive_until_recovered(c, untouched.normal);
-    SCOPED_TRACE(fault_table_line(c, drive, result) + drive.err);
-    EXPECT_FALSE(is_bad(drive, result)) << "from line " << result.honesty.first_wrong;
-    EXPECT_TRUE(result.recovery_s) << "not usable any more";
-    EXPECT_EQ(unsaid(c, drive, untouched.drive), "");
-  }
-}
-
-TEST(FaultPairs, leaveNoWrongOkAndAWholeSession) { expect_honest(fault_pairs()); }
-
-TEST(LongFaults, aStandAStalledDiskAndAClockThatIsSetLeaveNoWrongOkAndAWholeSession) {
-  expect_honest(long_faults());
-}
 
 // A drift of millimetres a second is normal on the way and a hundred metres in an hour's stand.
 TEST(LongFaults, aStandOfTenMinutesMovesThePoseByCentimetres) {
@@ -48,17 +31,6 @@ TEST(LongFaults, aStandOfTenMinutesMovesThePoseByCentimetres) {
   EXPECT_LT((a->inverse() * *b).t.norm(), 1e-9) << "it does not stand";
   EXPECT_LT(motion.t.norm(), kMost);
 }
-
-class ManyFaults : public ::testing::TestWithParam<std::uint64_t> {};
-
-TEST_P(ManyFaults, atRandomLeaveNoWrongOkAndAWholeSession) {
-  constexpr std::uint64_t kEach = 50;
-  std::vector<FaultCase> cases;
-  for (std::uint64_t i = 1; i <= kEach; ++i) cases.push_back(random_faults(GetParam() * kEach + i));
-  expect_honest(cases);
-}
-
-INSTANTIATE_TEST_SUITE_P(Seeds, ManyFaults, ::testing::Range<std::uint64_t>(0, 10));
 
 }  // namespace
 }  // namespace vergence::test
