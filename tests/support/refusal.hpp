@@ -1,4 +1,6 @@
 #pragma once
+#include <gtest/gtest.h>
+
 #include <string>
 
 #include "app/runtime/errors.hpp"
@@ -21,6 +23,16 @@ std::string refusal_of(const F& f) {
 
 inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
+}
+
+/// Every part stands in the text.
+template <class... Parts>
+testing::AssertionResult says(const std::string& text, const Parts&... parts) {
+  std::string missing;
+  for (const std::string& part : {std::string(parts)...})
+    if (!contains(text, part)) missing += " `" + part + "`";
+  if (missing.empty()) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "`" << text << "` lacks" << missing;
 }
 
 }  // namespace vergence::test

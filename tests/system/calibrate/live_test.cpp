@@ -12,6 +12,7 @@
 
 #include "app/config/calibration_file.hpp"
 #include "tests/support/gige_camera.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/gige/socket_buffer.hpp"
 #include "tests/unit/app/calibration/board_picture.hpp"
@@ -77,7 +78,7 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
   over = true;
   pulses.join();
   ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(o.out.find("Nothing is missing"), std::string::npos) << o.out;
+  EXPECT_TRUE(test::says(o.out, "Nothing is missing"));
   const app::CalibrationFile c = app::read_calibration(out);
   EXPECT_EQ(c.serials[0], "BOARD-0");
   EXPECT_GE(c.rig.frames, 12);

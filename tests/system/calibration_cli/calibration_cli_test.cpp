@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/config/calibration_file.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
@@ -73,8 +74,8 @@ TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
   ASSERT_EQ(o.code, 0) << o.err;
   const auto rows = lines("s", "calibrations.csv");
   ASSERT_GE(rows.size(), 2U);
-  EXPECT_NE(rows[1].find(",from_scratch,"), std::string::npos)
-      << "nothing was given: the first row is of the first attempt: " << rows[1];
+  EXPECT_TRUE(test::says(rows[1], ",from_scratch,"))
+      << "nothing was given: the first row is of the first attempt: ";
   const auto accepted = [](const std::string& row) {
     return row.find(",accepted,from_scratch,") != std::string::npos;
   };
@@ -115,8 +116,7 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
 
   const Outcome second = drive("second", "--duration 4");
   ASSERT_EQ(second.code, 0) << second.err;
-  EXPECT_NE(lines("second", "calibrations.csv").at(1).find(",accepted,state_file,"),
-            std::string::npos);
+  EXPECT_TRUE(test::says(lines("second", "calibrations.csv").at(1), ",accepted,state_file,"));
   EXPECT_GT(frames_with("second", "unconfirmed"), 0U)
       << "until the monitor has seen that it still is true";
   EXPECT_EQ(app::read_calibration(session("second") / "calibration.yaml").rig.T_camera_left[1].t,
@@ -124,17 +124,15 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
 
   const Outcome other = drive("other", "--duration 1 --set cameras.1.serial=another");
   EXPECT_EQ(other.code, 0);
-  EXPECT_NE(other.err.find("another"), std::string::npos)
-      << "told why it is not used: " << other.err;
-  EXPECT_NE(lines("other", "calibrations.csv").at(1).find(",accepted,given,"), std::string::npos);
+  EXPECT_TRUE(test::says(other.err, "another")) << "told why it is not used";
+  EXPECT_TRUE(test::says(lines("other", "calibrations.csv").at(1), ",accepted,given,"));
   EXPECT_EQ(read_file(state()), kept) << "nothing was accepted since";
 
   EXPECT_EQ(events("other", "calibration").size(), 1U) << "and its session has the sentence, too";
 
   const Outcome lenses = drive("lenses", "--duration 1 --set rig.nominal.focal_px=250");
-  EXPECT_NE(lenses.err.find("is not used: when it was found the configuration had the intrinsics"),
-            std::string::npos)
-      << lenses.err;
+  EXPECT_TRUE(test::says(lenses.err,
+                         "is not used: when it was found the configuration had the intrinsics"));
 }
 
 TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEnd) {
@@ -142,7 +140,7 @@ TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEn
   const Outcome o = drive("s", std::string("--from-scratch ") + kLongEnough);
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(events("s", "calibration_not_kept").size(), events("s", "calibration_accepted").size());
-  EXPECT_NE(o.err.find("the next drive will not know"), std::string::npos) << o.err;
+  EXPECT_TRUE(test::says(o.err, "the next drive will not know"));
 }
 
 TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) {
@@ -152,14 +150,14 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
   fs::copy_file(mine, state());
   const Outcome o = drive("s", fmt::format("--duration 1 --calibration '{}'", mine.string()));
   EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_NE(lines("s", "calibrations.csv").at(1).find(",accepted,given,calibration.yaml,"),
-            std::string::npos);
+  EXPECT_TRUE(
+      test::says(lines("s", "calibrations.csv").at(1), ",accepted,given,calibration.yaml,"));
   const Outcome refused =
       drive("t", fmt::format("--duration 1 --calibration '{}' --set cameras.0.size=[640,480] --set "
                              "cameras.1.size=[640,480]",
                              mine.string()));
   EXPECT_EQ(refused.code, 2);
-  EXPECT_NE(refused.err.find("cameras.0.size is 640 x 480"), std::string::npos) << refused.err;
+  EXPECT_TRUE(test::says(refused.err, "cameras.0.size is 640 x 480"));
 }
 
 TEST_F(CalibrationCli, aScheduledWishRecalibrates) {
@@ -196,7 +194,7 @@ TEST_F(CalibrationCli, aBaselineTwiceTooLongDisagreesWithTheIns) {
                           "mock.calibration_error.length_percent=100 --set rig.state_dir=none");
   ASSERT_EQ(o.code, 0) << o.err;
   ASSERT_EQ(events("s", "scale_disagrees").size(), 1U);
-  EXPECT_NE(events("s", "scale_disagrees")[0].find("longer than the INS's"), std::string::npos);
+  EXPECT_TRUE(test::says(events("s", "scale_disagrees")[0], "longer than the INS's"));
   EXPECT_GT(summary("s")["comparison"]["scale_disagrees"].get<int>(), 0);
   EXPECT_NEAR(summary("s")["truth"]["path_ratio"].get<double>(), 2, 0.05)
       << "the estimator stays as it is: images cannot tell";

@@ -14,6 +14,7 @@
 
 #include "core/math/random.hpp"
 #include "core/math/se3.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/ros_messages.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
@@ -789,7 +790,7 @@ TEST_P(Input, isReadOrRefusedAsPeopleExpect) {
     EXPECT_EQ(o.code, c.code) << o.err;
   std::istringstream parts(c.says);
   for (std::string part; std::getline(parts, part, '|');)
-    EXPECT_NE((o.err + o.out).find(part), std::string::npos) << part << '\n' << o.err << o.out;
+    EXPECT_TRUE(test::says(o.err + o.out, part)) << part << '\n' << o.err << o.out;
   for (const char sign : o.err + o.out)
     ASSERT_TRUE(sign == '\n' || sign == '\t' || static_cast<unsigned char>(sign) >= 0x20)
         << "a raw byte";

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
@@ -88,9 +89,7 @@ TEST(LongReplay, tenThousandFramesTakeNoMoreMemoryThanTheirListsAndGiveOnePage) 
   // Lists of files, stamps and poses, the report's tables: some 2.5 kB a frame. An image is 77 kB.
   EXPECT_LT(after - before, 2.5e-3 * (kFrames - 1000) + 2);
   EXPECT_LT(page, 3e6);
-  EXPECT_NE(whole.err.find(" left"), std::string::npos)
-      << "the progress tells what is left of minutes\n"
-      << whole.err;
+  EXPECT_TRUE(test::says(whole.err, " left")) << "the progress tells what is left of minutes\n";
 }
 
 }  // namespace

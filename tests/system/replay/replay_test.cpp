@@ -15,6 +15,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/child_program.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/system/replay/replayed_folder.hpp"
 
 namespace vergence::test {
@@ -40,10 +41,9 @@ TEST_F(ReplayedFolder, aDriveTooShortToConfirmItsCalibrationSaysSo) {
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(summary()["calibration"]["verified"], false);
   EXPECT_TRUE(summary()["calibration"]["verified_frame"].is_null());
-  EXPECT_NE(o.err.find("the drive has not confirmed its calibration"), std::string::npos) << o.err;
-  EXPECT_NE(read_file(session() / "poses.csv").find("degraded,unverified_calibration"),
-            std::string::npos);
-  EXPECT_NE(read_file(session() / "report.html").find("not verified"), std::string::npos);
+  EXPECT_TRUE(test::says(o.err, "the drive has not confirmed its calibration"));
+  EXPECT_TRUE(test::says(read_file(session() / "poses.csv"), "degraded,unverified_calibration"));
+  EXPECT_TRUE(test::says(read_file(session() / "report.html"), "not verified"));
 }
 
 TEST_F(ReplayedFolder, theSameBytesWithOneThreadAndTwo) {
@@ -104,10 +104,10 @@ TEST_F(ReplayedFolder, swappedFoldersAreNotToBeUsedAndSaySo) {
   fs::rename(data() / "other", data() / "right");
   const Outcome o = replay();
   EXPECT_EQ(o.code, 1) << o.err;
-  EXPECT_NE(o.err.find("do not use these poses: "), std::string::npos) << o.err;
-  EXPECT_NE(o.err.find("of 24 frames)"), std::string::npos) << o.err;
-  EXPECT_NE(read_file(session() / "report.html").find("Do not use"), std::string::npos);
-  EXPECT_EQ(read_file(session() / "report.html").find("is missing"), std::string::npos)
+  EXPECT_TRUE(test::says(o.err, "do not use these poses: "));
+  EXPECT_TRUE(test::says(o.err, "of 24 frames)"));
+  EXPECT_TRUE(test::says(read_file(session() / "report.html"), "Do not use"));
+  EXPECT_FALSE(test::contains(read_file(session() / "report.html"), "is missing"))
       << "nothing is, but what is so by design";
 }
 
@@ -127,7 +127,7 @@ TEST_F(ReplayedFolder, focalLengthAndBaselineNeedEachOther) {
                           "--focal 500 --baseline 0.5 --calibration c.yaml"}) {
     const Outcome o = replay(bad);
     EXPECT_EQ(o.code, 2) << bad << o.err;
-    EXPECT_NE(o.err.find("--"), std::string::npos) << bad;
+    EXPECT_TRUE(test::says(o.err, "--")) << bad;
     EXPECT_FALSE(fs::exists(session())) << bad;
   }
 }
@@ -181,7 +181,7 @@ TEST_F(ReplayedFolder, ofImagesThatAreMissingAThousandAreListedAndTheRestCounted
   for (std::string line; std::getline(events, line);)
     if (line.find("image_missing") != std::string::npos) ++listed, last = line;
   EXPECT_EQ(listed, 1001U);
-  EXPECT_NE(last.find("1000 frames could not be read"), std::string::npos) << last;
+  EXPECT_TRUE(test::says(last, "1000 frames could not be read"));
   EXPECT_EQ(summary()["frames"]["skipped"], kMissing);
 }
 

@@ -14,6 +14,7 @@
 
 #include "app/datasets/trajectory_files.hpp"
 #include "core/memory/allocation_guard.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
@@ -84,7 +85,7 @@ TEST(Run, aMockDrivePosesEveryFrameNearTheTruthWithoutAllocating) {
     EXPECT_NEAR(place[0].get<double>(), 153.0137, 0.01);  // longitude first (RFC 7946)
     EXPECT_NEAR(place[1].get<double>(), -27.4975, 0.01);
   }
-  EXPECT_NE(text_of(session / "drive.kml").find("<coordinates>153.0"), std::string::npos);
+  EXPECT_TRUE(test::says(text_of(session / "drive.kml"), "<coordinates>153.0"));
 }
 
 TEST(Run, everyConfigurationThatComesWithTheProgramRunsAsItStands) {
@@ -198,10 +199,9 @@ TEST(Run, atNightControlledExposuresKeepThePosesAndAreTheSameOnEveryRun) {
   const Outcome o = drive(
       folder / "c", "--duration 2 --quiet --set exposure.mode=auto --set exposure.max_us=60000");
   EXPECT_EQ(o.code, 2);
-  EXPECT_NE(o.err.find("exposure.max_us is 60000, longer than the 50000 µs between two pulses "
-                       "(trigger.rate 20)"),
-            std::string::npos)
-      << o.err;
+  EXPECT_TRUE(test::says(o.err,
+                         "exposure.max_us is 60000, longer than the 50000 µs between two pulses "
+                         "(trigger.rate 20)"));
 }
 
 TEST(Run, onADiskThatStaysFullFilesAreWholeOrNotThereAndTheExitCodeSaysSo) {
@@ -215,11 +215,10 @@ TEST(Run, onADiskThatStaysFullFilesAreWholeOrNotThereAndTheExitCodeSaysSo) {
   EXPECT_EQ(o.code, 4) << o.err;
   for (const char* name : {"summary.json", "summary.json.new", "report.html", "report.html.new"})
     EXPECT_FALSE(std::filesystem::exists(session / name)) << name;
-  EXPECT_NE(o.err.find("summary.json: cannot be written (File too large): check the folder's "
-                       "permissions and the disk's space"),
-            std::string::npos)
-      << o.err;
-  EXPECT_NE(o.err.find("poses.csv"), std::string::npos) << o.err;
+  EXPECT_TRUE(test::says(o.err,
+                         "summary.json: cannot be written (File too large): check the folder's "
+                         "permissions and the disk's space"));
+  EXPECT_TRUE(test::says(o.err, "poses.csv"));
   const std::string poses = text_of(session / "poses.csv");
   EXPECT_LE(poses.size(), 2048U);
 }
@@ -241,7 +240,7 @@ TEST(Run, faultsActAndTheDriveGoesOn) {
   EXPECT_GT(summary["devices"]["camera0_unpaired"].get<int>(), 2);
   EXPECT_EQ(summary["devices"]["clock_resets"], 1);
   EXPECT_EQ(summary["allocations_after_seal"], 0);
-  EXPECT_NE(o.err.find("camera 1 is gone"), std::string::npos) << o.err;
+  EXPECT_TRUE(test::says(o.err, "camera 1 is gone"));
 }
 
 TEST(Run, aCameraThatNeverComesBackIsADeviceThatFailed) {
@@ -249,7 +248,7 @@ TEST(Run, aCameraThatNeverComesBackIsADeviceThatFailed) {
   const Outcome o =
       drive(folder / "s", "--duration 4 --fault 'camera_gone@2 camera=1 duration_s=0'" + kSmall);
   EXPECT_EQ(o.code, 3) << o.err;
-  EXPECT_NE(o.err.find("camera 1 was gone at the end"), std::string::npos) << o.err;
+  EXPECT_TRUE(test::says(o.err, "camera 1 was gone at the end"));
   EXPECT_EQ(summary_of(folder / "s")["frames"]["read"], 81) << "the drive went on with the other";
 }
 
@@ -267,7 +266,7 @@ TEST_P(RunWithABadIns, saysSoAndDrivesOn) {
       drive(session, std::string("--duration 9 --fault '") + GetParam().fault + "'" + kSmall);
   EXPECT_EQ(o.code, GetParam().code) << o.err;
   EXPECT_GE(events(session, GetParam().event).size(), 1U) << text_of(session / "events.jsonl");
-  EXPECT_NE(o.err.find("INS"), std::string::npos) << o.err;
+  EXPECT_TRUE(test::says(o.err, "INS"));
   const auto summary = summary_of(session);
   EXPECT_EQ(summary["frames"]["posed"], 181);
   EXPECT_EQ(summary["allocations_after_seal"], 0);
@@ -292,7 +291,7 @@ TEST_P(RunRefuses, whatIsImpossibleWithASentenceAndExitsTwo) {
   const TemporaryFolder folder;
   const Outcome o = drive(folder / "s", GetParam().arguments);
   EXPECT_EQ(o.code, 2) << o.err;
-  EXPECT_NE(o.err.find(GetParam().says), std::string::npos) << o.err;
+  EXPECT_TRUE(test::says(o.err, GetParam().says));
   EXPECT_FALSE(std::filesystem::exists(folder / "s")) << "nothing is begun";
 }
 

@@ -95,9 +95,9 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
     if (!cases[i].second.empty()) in += "," + folder.write("second.yaml", cases[i].second).string();
     const std::string said =
         refusal_of([&] { (void)read_any_calibration(in, std::nullopt, &none); });
-    EXPECT_NE(said.find(cases[i].key), std::string::npos) << "case " << i << " said: " << said;
-    EXPECT_EQ(said.find('\n'), std::string::npos) << said;
-    EXPECT_NE(said.find(folder.path().string()), std::string::npos) << "which file: " << said;
+    EXPECT_TRUE(test::says(said, cases[i].key)) << "case " << i;
+    EXPECT_FALSE(test::contains(said, "\n")) << said;
+    EXPECT_TRUE(test::says(said, folder.path().string())) << "which file";
   }
   EXPECT_THROW((void)read_any_calibration((folder / "none").string(), std::nullopt, &none),
                InputError);
@@ -105,8 +105,8 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
 
 TEST(Conversion, wordsOfTheCommandLineAreChecked) {
   EXPECT_EQ(parse_format("ros"), CalibrationFormat::ros);
-  EXPECT_NE(refusal_of([] { (void)parse_format("kalbr"); }).find("did you mean \"kalibr\""),
-            std::string::npos);
+  EXPECT_TRUE(
+      test::says(refusal_of([] { (void)parse_format("kalbr"); }), "did you mean \"kalibr\""));
   EXPECT_EQ(parse_size("640x480"), (ImageSize{640, 480}));
   for (const char* bad : {"", "640", "640x", "x480", "640x-1", "640x480x3", "640*480"})
     EXPECT_THROW((void)parse_size(bad), InputError) << bad;
@@ -159,7 +159,7 @@ TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
         parse_any_calibration({{"camchain.yaml", text}}, std::nullopt, &remarks);
     expect_same(c, back);
     ASSERT_EQ(remarks.size(), 1U);
-    EXPECT_NE(remarks[0].find("serials"), std::string::npos) << remarks[0];
+    EXPECT_TRUE(test::says(remarks[0], "serials"));
   }
 }
 
@@ -303,8 +303,8 @@ TEST(OpenCvStereo, fourCoefficientsThatMayBeOfAFisheyeLensAreSaid) {
   Remarks remarks;
   EXPECT_EQ(read(text(four, ""), &remarks), CameraModelKind::pinhole_radtan);
   ASSERT_EQ(remarks.size(), 1U);
-  EXPECT_NE(remarks[0].find("stereo.yml: four distortion coefficients"), std::string::npos);
-  EXPECT_NE(remarks[0].find("fisheye_model: 1"), std::string::npos) << remarks[0];
+  EXPECT_TRUE(test::says(remarks[0], "stereo.yml: four distortion coefficients"));
+  EXPECT_TRUE(test::says(remarks[0], "fisheye_model: 1"));
 
   remarks.clear();
   EXPECT_EQ(read(text(four, "fisheye_model: 1\n"), &remarks), CameraModelKind::pinhole_equidistant);

@@ -6,12 +6,14 @@
 #include <span>
 
 #include "tests/support/bag_writer.hpp"
+#include "tests/support/refusal.hpp"
 
 namespace vergence::app::detail {
 namespace {
 
 using test::BagKind;
 using test::McapWriter;
+using test::RosbagWriter;
 
 /// Two chunks of two messages each.
 std::string small_file(const BagKind& kind) {
@@ -146,7 +148,7 @@ TEST(Mcap, ChunkThatClaimsTooMuchIsSkippedWithASentence) {
   EXPECT_EQ(found.contents, std::vector<std::string>{"after"});
   EXPECT_EQ(found.scan.broken_chunks, 1U);
   EXPECT_EQ(found.scan.first_broken, here);
-  EXPECT_NE(found.scan.why_broken.find("larger than 64 MiB"), std::string::npos);
+  EXPECT_TRUE(test::says(found.scan.why_broken, "larger than 64 MiB"));
 }
 
 TEST(Mcap, MessageOfNoChannelIsCounted) {
@@ -158,6 +160,87 @@ TEST(Mcap, MessageOfNoChannelIsCounted) {
     EXPECT_TRUE(found.contents.empty());
     EXPECT_EQ(found.scan.orphans, 1U);
   }
+}
+
+std::string u32(std::uint32_t v) {
+  return {static_cast<char>(v), static_cast<char>(v >> 8U), static_cast<char>(v >> 16U),
+          static_cast<char>(v >> 24U)};
+}
+
+Found scan_rosbag_of(const std::string& bytes) { return scan({"rosbag", "none"}, bytes).value(); }
+
+const RosbagWriter::Fields kConnection{
+    {"op", "\x07"}, {"conn", u32(1)}, {"topic", "/left/image_raw"}};
+const std::string kAbout = u32(22) + "type=sensor_msgs/Image";
+RosbagWriter::Fields message_of(std::uint32_t connection) {
+  return {{"op", "\x02"}, {"conn", u32(connection)}, {"time", std::string(8, '\1')}};
+}
+
+// A recorder writes sizes into a chunk's head when it closes the chunk.
+TEST(Rosbag, MessagesOfAChunkThatWasNeverClosedAreRead) {
+  RosbagWriter writer;
+  writer.record({{"op", "\x05"}, {"compression", "none"}, {"size", u32(0)}}, "");
+  writer.record(kConnection, kAbout);
+  writer.record(message_of(1), "first");
+  const std::size_t end = writer.bytes().size();
+  writer.record(message_of(1), "second");
+  const Found found = scan_rosbag_of(writer.bytes().substr(0, writer.bytes().size() - 1));
+  EXPECT_EQ(found.contents, std::vector<std::string>{"first"});
+  EXPECT_FALSE(found.scan.finished);
+  EXPECT_EQ(found.scan.end, end);
+  EXPECT_FALSE(found.scan.first_broken);
+}
+
+TEST(Rosbag, WithoutAnIndexItIsUnfinished) {
+  RosbagWriter writer("lz4");
+  writer.channel(1, "/left/image_raw", "sensor_msgs/Image");
+  writer.message(1, 5, "first");
+  writer.close_chunk();
+  const Found found = scan_rosbag_of(writer.bytes());
+  EXPECT_EQ(found.contents.size(), 1U);
+  EXPECT_FALSE(found.scan.finished);
+  EXPECT_EQ(found.scan.end, writer.bytes().size());
+}
+
+// Offsets of the index, counts and places of chunks: nothing rests on them.
+TEST(Rosbag, AnIndexThatLiesDoesNoHarm) {
+  RosbagWriter writer("bz2");
+  writer.channel(1, "/left/image_raw", "sensor_msgs/Image");
+  for (const char* content : {"first", "second"}) {
+    writer.message(1, 5, content);
+    writer.close_chunk();
+  }
+  writer.finish();
+  std::string lies = writer.bytes();
+  for (std::size_t at = lies.find("chunk_pos="); at != std::string::npos;
+       at = lies.find("chunk_pos=", at + 1))
+    lies.replace(at + 10, 8, "\xff\xff\xff\xff\xff\xff\xff\x7f");
+  for (std::size_t at = lies.find("count="); at != std::string::npos;
+       at = lies.find("count=", at + 1))
+    lies.replace(at + 6, 4, "\xff\xff\xff\xff");
+  lies.replace(lies.find("index_pos=") + 10, 8, "\x01\x01\x01\x01\x01\x01\x01\x01");
+  ASSERT_NE(lies, writer.bytes());
+  EXPECT_EQ(scan_rosbag_of(lies).contents, (std::vector<std::string>{"first", "second"}));
+}
+
+TEST(Rosbag, WhatContradictsItselfIsSkippedWithASentence) {
+  RosbagWriter writer;
+  writer.record(kConnection, kAbout);
+  const std::size_t here = writer.bytes().size();
+  writer.record({{"op", "\x05"}, {"compression", "lz4"}, {"size", u32(0xffffffff)}}, "x");
+  writer.record({{"op", "\x05"}, {"compression", "gzip"}, {"size", u32(9)}}, "x");
+  writer.record({{"op", "\x05"}, {"compression", "bz2"}}, "x");
+  writer.record({{"op", "\x05"}, {"compression", "bz2"}, {"size", u32(9)}}, "x");
+  writer.record({{"op", "\x07"}, {"conn", u32(2)}}, kAbout);
+  writer.record({{"op", "\x02"}}, "of no connection");
+  writer.record({{"no op", ""}}, "");
+  writer.record(message_of(1), "after");
+  const Found found = scan_rosbag_of(writer.bytes());
+  EXPECT_EQ(found.contents, std::vector<std::string>{"after"});
+  EXPECT_EQ(found.scan.broken_chunks, 4U);
+  EXPECT_EQ(found.scan.broken_records, 3U);
+  EXPECT_EQ(found.scan.first_broken, here);
+  EXPECT_TRUE(test::says(found.scan.why_broken, "larger than 64 MiB"));
 }
 
 }  // namespace

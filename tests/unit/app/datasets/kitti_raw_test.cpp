@@ -16,13 +16,15 @@
 #include "app/runtime/errors.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/math/so3.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/unit/app/datasets/tiny_drive.hpp"
 
 namespace vergence::app {
 namespace {
 
 namespace fs = std::filesystem;
-using test::sentence_of;
+using test::refusal_of;
+using test::says;
 
 constexpr std::int64_t kStart = 1'317'045'935'500'923'136;  // 2011-09-26 14:05:35.500923136 UTC
 constexpr std::int64_t kStep = 100'000'000;                 // ns
@@ -215,9 +217,9 @@ TEST(KittiRaw, WhatIsLostCostsItsFramesAndWhatIsNoneIsRefused) {
     write_drive(f);
     c.spoil(f);
     StereoSequence s;
-    const std::string refused = sentence_of<InputError>([&] { s = open(f); });
+    const std::string refused = refusal_of([&] { s = open(f); });
     EXPECT_EQ(refused.empty(), c.whole > 0) << c.what << ": " << refused;
-    EXPECT_NE((refused + joined(s.remarks)).find(c.said), std::string::npos)
+    EXPECT_TRUE(test::says(refused + joined(s.remarks), c.said))
         << c.what << ": " << refused << joined(s.remarks);
     std::size_t whole = 0;
     for (const StereoPair& pair : s.pairs)
@@ -226,15 +228,11 @@ TEST(KittiRaw, WhatIsLostCostsItsFramesAndWhatIsNoneIsRefused) {
   }
   const test::TemporaryFolder f;
   write_drive(f);
-  EXPECT_NE(sentence_of<InputError>([&] {
-              (void)open(f, {2, 2});
-            }).find("are both camera 2"),
-            std::string::npos);
+  EXPECT_TRUE(test::says(refusal_of([&] { (void)open(f, {2, 2}); }), "are both camera 2"));
   fs::create_directories(f / "2011_09_26/2011_09_26_drive_0002_extract/oxts");
-  EXPECT_NE(sentence_of<InputError>([&] {
-              (void)open_sequence(SequenceFormat::kitti_raw, f / "2011_09_26");
-            }).find("holds 2 drives (2011_09_26_drive_0001_extract, "),
-            std::string::npos);
+  EXPECT_TRUE(test::says(
+      refusal_of([&] { (void)open_sequence(SequenceFormat::kitti_raw, f / "2011_09_26"); }),
+      "holds 2 drives (2011_09_26_drive_0001_extract, "));
 }
 
 TEST(KittiRaw, StampsAreUtcToTheNanosecond) {
@@ -324,7 +322,7 @@ TEST(KittiRawIns, PacketsThatAreMissingBrokenOutOfOrderOrWithoutAFix) {
   for (const char* said :
        {"1 packets are missing, the first is 0000000002.txt", "2 packets are not the 30 numbers",
         "1 stamps go back", "1 packets have no line"})
-    EXPECT_NE(joined(recorded.remarks).find(said), std::string::npos) << said;
+    EXPECT_TRUE(test::says(joined(recorded.remarks), said)) << said;
 
   write_drive(f);
   struct Status {
@@ -340,18 +338,17 @@ TEST(KittiRawIns, PacketsThatAreMissingBrokenOutOfOrderOrWithoutAFix) {
   recorded = ins(f);
   for (std::size_t i = 0; i < statuses.size(); ++i)
     EXPECT_EQ(recorded.readings[i].sample.fix, statuses[i].fix) << statuses[i].words;
-  EXPECT_NE(joined(recorded.remarks).find("4 of 10 packets have no satellites' fix"),
-            std::string::npos);
+  EXPECT_TRUE(test::says(joined(recorded.remarks), "4 of 10 packets have no satellites' fix"));
 
-  const auto refused = [&] { return sentence_of<InputError>([&] { (void)ins(f); }); };
+  const auto refused = [&] { return refusal_of([&] { (void)ins(f); }); };
   replace(f, kImu, "R: 1 0 0", "R: 1 0.1 0");
-  EXPECT_NE(refused().find("calib_imu_to_velo.txt:2: R: is no rotation"), std::string::npos);
+  EXPECT_TRUE(test::says(refused(), "calib_imu_to_velo.txt:2: R: is no rotation"));
   fs::remove(f / kImu);
-  EXPECT_NE(refused().find("calib_imu_to_velo.txt: is missing"), std::string::npos);
+  EXPECT_TRUE(test::says(refused(), "calib_imu_to_velo.txt: is missing"));
   for (int i = 0; i < kPackets; ++i) f.write(oxts_name(i), "1 2 3\n");
-  EXPECT_NE(refused().find("0000000000.txt: is no packet of the INS"), std::string::npos);
+  EXPECT_TRUE(test::says(refused(), "0000000000.txt: is no packet of the INS"));
   fs::remove_all(f / (kDrive + "/oxts/data"));
-  EXPECT_NE(refused().find("oxts/data: does not exist"), std::string::npos);
+  EXPECT_TRUE(test::says(refused(), "oxts/data: does not exist"));
   fs::remove_all(f / (kDrive + "/oxts"));
   EXPECT_TRUE(ins(f).readings.empty());
 }

@@ -17,10 +17,14 @@
 #include "app/runtime/errors.hpp"
 #include "core/math/random.hpp"
 #include "core/types/bayer.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
 namespace {
+
+using test::refusal_of;
+using test::says;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -39,16 +43,6 @@ void write(const std::filesystem::path& file, const std::string& text) {
 void write_mosaic(const std::filesystem::path& file, std::vector<std::uint8_t> pixels, int width,
                   int height) {
   ASSERT_TRUE(cv::imwrite(file.string(), cv::Mat(height, width, CV_8U, pixels.data())));
-}
-
-template <class Action>
-std::string refusal(const Action& action) {
-  try {
-    action();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
 }
 
 // ---- images
@@ -128,9 +122,9 @@ TEST_F(StLuciaImages, greyIsMadeOfTheMosaic) {
 
 TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOnly) {
   const std::string said =
-      refusal([&] { (void)open_sequence(SequenceFormat::st_lucia, folder_.path()); });
-  EXPECT_NE(said.find("62x48"), std::string::npos) << said;
-  EXPECT_NE(said.find("1024x768"), std::string::npos) << said;
+      refusal_of([&] { (void)open_sequence(SequenceFormat::st_lucia, folder_.path()); });
+  EXPECT_TRUE(test::says(said, "62x48"));
+  EXPECT_TRUE(test::says(said, "1024x768"));
   const std::vector<std::uint8_t> full(1024 * 768, 90);
   for (const char* name : {"cam0_image00000.bmp", "cam1_image00000.bmp"})
     write_mosaic(folder_ / "101215_153851_MultiCamera0" / name, full, 1024, 768);
@@ -141,19 +135,19 @@ TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOn
 
 TEST_F(StLuciaImages, brokenFoldersAreNamed) {
   write(log_, "1292391531 1234 62 48 raw 1292391531 990 62 48 raw cam0_image00000.bmp\n");
-  EXPECT_NE(refusal([&] { (void)open(); }).find("MultiCamera0.log:1:"), std::string::npos);
+  EXPECT_TRUE(says(refusal_of([&] { (void)open(); }), "MultiCamera0.log:1:"));
   write(log_,
         "1292391531 1000000 62 48 raw 1292391531 990 62 48 raw cam0_image00000.bmp "
         "cam1_image00000.bmp\n");
-  EXPECT_NE(refusal([&] { (void)open(); }).find("below a million"), std::string::npos);
+  EXPECT_TRUE(says(refusal_of([&] { (void)open(); }), "below a million"));
   write(log_, "sec usec\n");
-  EXPECT_NE(refusal([&] { (void)open(); }).find("names no images"), std::string::npos);
+  EXPECT_TRUE(says(refusal_of([&] { (void)open(); }), "names no images"));
   write(folder_ / "101215_160000_MultiCamera0.log", "");
-  EXPECT_NE(refusal([&] { (void)open(); }).find("2 files"), std::string::npos);
+  EXPECT_TRUE(says(refusal_of([&] { (void)open(); }), "2 files"));
   std::filesystem::remove(folder_ / "101215_160000_MultiCamera0.log");
   std::filesystem::remove(log_);
-  EXPECT_NE(refusal([&] { (void)open(); }).find("holds no file that ends in _MultiCamera0.log"),
-            std::string::npos);
+  EXPECT_TRUE(
+      says(refusal_of([&] { (void)open(); }), "holds no file that ends in _MultiCamera0.log"));
 }
 
 // ---- INS
@@ -277,9 +271,8 @@ TEST(StLuciaIns, logsAreMendedOrRefused) {
     Lines lines = ins_lines({}, c.speed);
     c.spoil(&lines);
     RecordedIns ins;
-    const std::string refused = refusal([&] { ins = read(lines); });
-    EXPECT_NE((refused + said(ins)).find(c.said), std::string::npos)
-        << c.what << refused << said(ins);
+    const std::string refused = refusal_of([&] { ins = read(lines); });
+    EXPECT_TRUE(test::says(refused + said(ins), c.said)) << c.what << refused << said(ins);
     ASSERT_EQ(ins.readings.size(), c.readings) << c.what;
     for (std::size_t i = 1; i < ins.readings.size(); ++i)
       ASSERT_LT(ins.readings[i - 1].sample.stamp, ins.readings[i].sample.stamp);
@@ -287,9 +280,9 @@ TEST(StLuciaIns, logsAreMendedOrRefused) {
     EXPECT_NEAR(ins.readings[0].sample.position.latitude_deg, -27.4975, 1e-9) << c.what;
   }
   const test::TemporaryFolder empty;
-  EXPECT_NE(said(read_recorded_ins(SequenceFormat::st_lucia, empty.path(), {0, 1}, true))
-                .find("holds no file that ends in _Ins0.log"),
-            std::string::npos);
+  EXPECT_TRUE(
+      test::says(said(read_recorded_ins(SequenceFormat::st_lucia, empty.path(), {0, 1}, true)),
+                 "holds no file that ends in _Ins0.log"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 /// Data sets of a few tiny images, in each of the layouts that are read.
@@ -119,17 +120,6 @@ inline void truncate_file(const std::filesystem::path& file, double part) {
   std::filesystem::resize_file(
       file,
       static_cast<std::uintmax_t>(part * static_cast<double>(std::filesystem::file_size(file))));
-}
-
-/// The sentence with which `f` refuses; empty when it does not.
-template <class Error, class F>
-std::string sentence_of(F&& f) {
-  try {
-    f();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
 }
 
 }  // namespace vergence::test
