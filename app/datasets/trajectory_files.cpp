@@ -243,10 +243,11 @@ bool is_euroc_truth(const fs::path& file, const Sample& sample) {
 
 /// Of those that repeat a stamp the first stays.
 void sort_by_stamp(Trajectory* poses) {
-  if (!std::ranges::is_sorted(*poses, {}, &StampedPose::stamp))
-    std::ranges::stable_sort(*poses, {}, &StampedPose::stamp);
-  const auto repeated = std::ranges::unique(*poses, {}, &StampedPose::stamp);
-  poses->erase(repeated.begin(), repeated.end());
+  const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; };
+  if (!std::is_sorted(poses->begin(), poses->end(), earlier))
+    std::stable_sort(poses->begin(), poses->end(), earlier);
+  const auto same = [](const StampedPose& a, const StampedPose& b) { return a.stamp == b.stamp; };
+  poses->erase(std::unique(poses->begin(), poses->end(), same), poses->end());
 }
 
 /// One file, read twice: how it is written, and its rows. Memory: its text and its poses.

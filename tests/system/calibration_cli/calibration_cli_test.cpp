@@ -13,6 +13,7 @@
 #include "app/config/calibration_file.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/system/run/session.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {
@@ -29,15 +30,14 @@ class CalibrationCli : public ::testing::Test {
   [[nodiscard]] std::string arguments(const std::string& name, const std::string& more) const {
     return fmt::format(
         "run '{}/app/config/mock.yaml' --quiet --out '{}' --set rig.state_dir='{}' --set "
-        "cameras.0.size=[320,240] "
-        "--set cameras.1.size=[320,240] --set mock.texture_detail=0 --set cameras.0.name=links {}",
-        VERGENCE_SOURCE_DIR, session(name).string(), (folder_ / "state").string(), more);
+        "cameras.0.name=links{} {}",
+        VERGENCE_SOURCE_DIR, session(name).string(), (folder_ / "state").string(), kSmall, more);
   }
   [[nodiscard]] Outcome drive(const std::string& name, const std::string& more) const {
     return run_vergence(arguments(name, "--fast " + more));
   }
   [[nodiscard]] nlohmann::json summary(const std::string& name) const {
-    return nlohmann::json::parse(read_file(session(name) / "summary.json"));
+    return summary_of(session(name));
   }
   [[nodiscard]] std::vector<std::string> lines(const std::string& name,
                                                const std::string& file) const {
@@ -46,15 +46,9 @@ class CalibrationCli : public ::testing::Test {
     for (std::string line; std::getline(in, line);) found.push_back(line);
     return found;
   }
-  /// Sentences of the events of one kind.
   [[nodiscard]] std::vector<std::string> events(const std::string& name,
                                                 const std::string& kind) const {
-    std::vector<std::string> found;
-    for (const std::string& line : lines(name, "events.jsonl")) {
-      const auto event = nlohmann::json::parse(line);
-      if (event["kind"] == kind) found.push_back(event["sentence"]);
-    }
-    return found;
+    return test::events(session(name), kind);
   }
   [[nodiscard]] std::size_t frames_with(const std::string& name, const std::string& word) const {
     const auto poses = lines(name, "poses.csv");

@@ -35,7 +35,7 @@ TEST(Hangup, closesTheSession) {
   for (const bool terminal : {false, true}) {
     const fs::path session = folder / (terminal ? "terminal" : "none");
     Drive drive(session, terminal, 600);
-    ASSERT_TRUE(within(60s, [&] { return lines_of(session / "poses.csv") > 5; }));
+    ASSERT_TRUE(within(60, [&] { return lines_of(session / "poses.csv") > 5; }));
     if (terminal)
       drive.close_terminal();
     else

@@ -1,12 +1,11 @@
 #pragma once
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "tests/support/child_program.hpp"
+#include "tests/support/within.hpp"
 #include "tests/system/run/session.hpp"
 
 namespace vergence::test {
@@ -35,22 +34,6 @@ class Drive : public ChildProgram {
     return words;
   }
 };
-
-template <class Holds>
-bool within(std::chrono::seconds limit, const Holds& holds) {
-  const auto end = std::chrono::steady_clock::now() + limit;
-  while (!holds())
-    if (std::chrono::steady_clock::now() > end)
-      return false;
-    else
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  return true;
-}
-
-[[nodiscard]] inline std::string head_of(const std::filesystem::path& file) {
-  const std::string text = text_of(file);
-  return text.substr(0, text.find('\n'));
-}
 
 [[nodiscard]] inline std::size_t lines_of(const std::filesystem::path& file) {
   const std::string text = text_of(file);

@@ -53,7 +53,7 @@ TEST(Run, aTerminalThatTakesNothingHoldsUpNeitherSigtermNorTheEnd) {
   const Pipe errors;
   errors.fill();
   Drive stopped(folder / "s", false, 600, {}, errors.input());
-  ASSERT_TRUE(within(60s, [&] { return lines_of(folder / "s" / "poses.csv") > 5; }));
+  ASSERT_TRUE(within(60, [&] { return lines_of(folder / "s" / "poses.csv") > 5; }));
   stopped.signal(SIGTERM);
   EXPECT_EQ(stopped.wait(30s), 143);
   expect_whole(folder / "s");

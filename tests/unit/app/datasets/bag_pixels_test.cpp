@@ -42,6 +42,15 @@ ImageMessage image_of(const char* encoding, int channels) {
   return image;
 }
 
+/// Every pixel within `most` of what `wanted` says of its place.
+template <class Wanted>
+void expect_grey(const Grey& out, const Wanted& wanted, const std::string& what, double most = 0) {
+  ASSERT_EQ(out.size(), std::size_t{kWidth} * kHeight) << what;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      ASSERT_NEAR(out[static_cast<std::size_t>(y * kWidth + x)], wanted(x, y), most) << what;
+}
+
 class BagPixels : public ::testing::TestWithParam<BagKind> {
  protected:
   /// The same message left and right; until the next one.
@@ -88,10 +97,8 @@ TEST_P(BagPixels, GreyIsAsItIs) {
        {Case{"mono8", 1, 0}, Case{"8UC1", 1, 0}, Case{"nv12", 1, 0}, Case{"nv21", 1, 0},
         Case{"yuyv", 2, 0}, Case{"yuv422_yuy2", 2, 0}, Case{"uyvy", 2, 1}, Case{"yuv422", 2, 1}}) {
     const Grey out = grey_of(image_of(c.encoding, c.bytes));
-    ASSERT_FALSE(out.empty()) << refusal_;
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x)
-        ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, c.grey)) << c.encoding;
+    expect_grey(
+        out, [&](int x, int y) { return value(x, y, c.grey); }, c.encoding + refusal_);
   }
 }
 
@@ -101,15 +108,11 @@ TEST_P(BagPixels, ColoursAreWeighedAsBt601Does) {
     const int red = encoding[0] == 'r' ? 0 : 2;
     const bool alpha = std::string_view(encoding).find('a') != std::string_view::npos;
     const Grey out = grey_of(image_of(encoding, alpha ? 4 : 3));
-    ASSERT_FALSE(out.empty()) << refusal_;
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x)
-        // Half a step of rounding, and 255 times what the weights in 256ths are off by.
-        ASSERT_NEAR(
-            out[static_cast<std::size_t>(y * kWidth + x)],
-            0.299 * value(x, y, red) + 0.587 * value(x, y, 1) + 0.114 * value(x, y, 2 - red),
-            0.5 + 255 * 0.0018)
-            << encoding;
+    const auto weighed = [&](int x, int y) {
+      return 0.299 * value(x, y, red) + 0.587 * value(x, y, 1) + 0.114 * value(x, y, 2 - red);
+    };
+    // Half a step of rounding, and 255 times what the weights in 256ths are off by.
+    expect_grey(out, weighed, encoding + refusal_, 0.5 + 255 * 0.0018);
   }
 }
 
@@ -146,14 +149,11 @@ TEST_P(BagPixels, PngAndJpegAreToldByTheirBytes) {
     ASSERT_TRUE(cv::imencode(ending, picture, file));
     const Grey out =
         grey_of_file("mono8; what a transport writes here", std::string(file.begin(), file.end()));
-    ASSERT_FALSE(out.empty()) << refusal_;
     const cv::Mat wanted = cv::imdecode(file, cv::IMREAD_GRAYSCALE);
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x)
-        // Two decoders of JPEG may differ by their rounding.
-        ASSERT_NEAR(out[static_cast<std::size_t>(y * kWidth + x)], wanted.at<std::uint8_t>(y, x),
-                    ending[1] == 'p' ? 0 : 1)
-            << ending;
+    // Two decoders of JPEG may differ by their rounding.
+    expect_grey(
+        out, [&](int x, int y) { return wanted.at<std::uint8_t>(y, x); }, ending + refusal_,
+        ending[1] == 'p' ? 0 : 1);
   }
   EXPECT_TRUE(grey_of_file("png", "no image at all").empty());
 }
@@ -171,10 +171,8 @@ TEST_P(BagPixels, PngOfTwelveBitsInSixteenIsTakenForWhatItIs) {
   StereoSequence s = sequence_of("sensor_msgs/CompressedImage", message);
   find_deep_bits(&s);
   EXPECT_EQ(s.deep_bits, 12);
-  const Grey out = right_of(s);
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x)
-      ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, 0));
+  expect_grey(
+      right_of(s), [](int x, int y) { return value(x, y, 0); }, "png");
 }
 
 // TUM VI's and many industrial cameras' way.
@@ -197,11 +195,8 @@ TEST_P(BagPixels, SixteenBitsAreReadInEitherByteOrderAndAsManyAsAreUsed) {
             sequence_of("sensor_msgs/Image", image_message(GetParam().wire(), kStart, image));
         find_deep_bits(&s);
         EXPECT_EQ(s.deep_bits, bits);
-        const Grey out = right_of(s);
-        for (int y = 0; y < kHeight; ++y)
-          for (int x = 0; x < kWidth; ++x)
-            ASSERT_EQ(out[static_cast<std::size_t>(y * kWidth + x)], value(x, y, 0))
-                << encoding << big_endian << bits;
+        expect_grey(
+            right_of(s), [](int x, int y) { return value(x, y, 0); }, encoding);
       }
 }
 
