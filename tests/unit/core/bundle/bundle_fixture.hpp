@@ -19,6 +19,29 @@ inline BundleOptions calibration_options() {
   return o;
 }
 
+/// With covariances; intrinsics exact unless a test says otherwise.
+inline BundleOptions with_covariance() {
+  BundleOptions o = calibration_options();
+  o.covariance = true;
+  for (BundleIntrinsics& i : o.intrinsics) i.held_sigma = {};
+  return o;
+}
+
+inline SimulationOptions tight(int points = SimulationOptions{}.points) {
+  SimulationOptions s;
+  s.generator = SimulationGenerator::tight;
+  s.start_points = -1;
+  s.points = points;
+  return s;
+}
+
+/// The way from one transform to another as a left perturbation (φ, τ).
+inline Vec6 way(const Transform& from, const Transform& to) {
+  Vec6 e;
+  e << log_so3(to.R * from.R.transpose()), to.t - from.t;
+  return e;
+}
+
 /// Largest distance between the free rigs' centres and the truth, m.
 inline double pose_error(const SimulatedRig& rig) {
   double worst = 0;

@@ -63,9 +63,7 @@ double ratio(int poses, int life, std::uint64_t seed, const std::function<Vec2(c
   size.poses = poses;
   size.points = kPoints;
   OwnAdjuster own(capacities_for(size));
-  BundleOptions o = calibration_options();
-  o.covariance = true;
-  for (BundleIntrinsics& i : o.intrinsics) i.held_sigma = {};
+  BundleOptions o = with_covariance();
   const SimulatedRig start = small_motion(poses, life, random, field);
   SimulatedRig rig = start, again = start;
   const BundleResult tracks = own.adjuster.solve(rig.problem(), o);

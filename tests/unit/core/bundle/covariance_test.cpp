@@ -7,13 +7,8 @@
 namespace vergence {
 namespace {
 
-/// Error of T_camera_left[1] as the left perturbation (φ, τ) that takes the truth to the estimate.
-Vec6 error_of(const SimulatedRig& rig) {
-  Vec6 e;
-  e << log_so3(rig.T_camera_left[1].R * rig.true_cameras[1].R.transpose()),
-      rig.T_camera_left[1].t - rig.true_cameras[1].t;
-  return e;
-}
+/// Of T_camera_left[1], from the truth.
+Vec6 error_of(const SimulatedRig& rig) { return way(rig.true_cameras[1], rig.T_camera_left[1]); }
 
 /// eᵀ C⁻¹ e in the space where C is not singular: with an exact length the direction of t is left
 /// out.
@@ -27,21 +22,6 @@ double normalised_squared(const Vec6& e, const Mat6& C, const Vec3& t, bool exac
   const Vec5 small = J * e;
   const Eigen::Matrix<double, 5, 5> own = J * C * J.transpose();
   return small.dot(own.ldlt().solve(small));
-}
-
-SimulationOptions tight() {
-  SimulationOptions s;
-  s.generator = SimulationGenerator::tight;
-  s.start_points = -1;
-  return s;
-}
-
-BundleOptions with_covariance() {
-  BundleOptions o = calibration_options();
-  o.covariance = true;
-  for (BundleIntrinsics& i : o.intrinsics)
-    i.held_sigma = {};  // intrinsics exact unless a test says otherwise
-  return o;
 }
 
 // The standard error of a mean of 1000 draws of χ²(5) is 0.100, of χ²(6) 0.110: three of them

@@ -13,28 +13,11 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-SimulationOptions tight(int points) {
-  SimulationOptions s;
-  s.generator = SimulationGenerator::tight;
-  s.start_points = -1;
-  s.points = points;
-  return s;
-}
-
-/// To the very minimum, with covariances; intrinsics exact unless a test says otherwise.
+/// To the very minimum.
 BundleOptions to_the_minimum() {
-  BundleOptions o = calibration_options();
-  o.covariance = true;
+  BundleOptions o = with_covariance();
   o.cost_tolerance = 1e-12;
-  for (BundleIntrinsics& i : o.intrinsics) i.held_sigma = {};
   return o;
-}
-
-/// The way from one transform to another as a left perturbation (φ, τ).
-Vec6 way(const Transform& from, const Transform& to) {
-  Vec6 e;
-  e << log_so3(to.R * from.R.transpose()), to.t - from.t;
-  return e;
 }
 
 RigCalibration calibration_of(const SimulatedRig& rig, const RigCovariance& covariance) {
