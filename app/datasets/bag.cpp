@@ -136,6 +136,7 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
 
 std::vector<Stamp> stamps_of(const std::vector<BagImage>& images) {
   std::vector<Stamp> stamps;
+  stamps.reserve(images.size());
   for (const BagImage& image : images) stamps.push_back(image.image.stamp);
   return stamps;
 }

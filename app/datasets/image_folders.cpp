@@ -578,6 +578,7 @@ bool is_colour(const fs::path& file) {
 
 bool holds_stereo_images(const fs::path& root) { return find_cameras(root).has_value(); }
 
+// NOLINTNEXTLINE(misc-no-recursion): a folder deeper each time
 StereoSequence open_folder(const fs::path& folder, bool given, const CalibrationUse& use) {
   StereoSequence sequence;
   sequence.root = folder;

@@ -90,8 +90,8 @@ std::vector<Fact> with_cameras(const std::vector<YamlFile>& files) {
     return std::any_of(facts.begin(), facts.end(),
                        [](const Fact& f) { return is_lens(f) && !f.camera; });
   };
-  std::vector<std::vector<Fact>> of_files;
-  for (const YamlFile& file : files) of_files.push_back(facts_of(file));
+  std::vector<std::vector<Fact>> of_files(files.size());
+  std::transform(files.begin(), files.end(), of_files.begin(), facts_of);
   const bool one_each = std::count_if(of_files.begin(), of_files.end(), nameless) > 1;
   std::vector<Fact> all;
   int camera = 0;

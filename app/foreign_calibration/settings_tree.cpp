@@ -38,6 +38,7 @@ std::string as_yaml(std::string_view value) {
 
 /// OpenCV's XML: elements become keys, an element with text only its value. `depth`: of nesting, at
 /// most as deep as such files are.
+// NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
 std::string from_xml(std::string_view* rest, std::string_view end, int depth) {
   constexpr int kDeepest = 20;
   std::string map;

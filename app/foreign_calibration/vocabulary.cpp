@@ -157,6 +157,7 @@ class Walk {
   }
 
  private:
+  // NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
   void visit(const YAML::Node& node, const std::string& above,
              const std::vector<std::string>& groups, int depth) {
     constexpr int kDeepest = 12;
