@@ -38,6 +38,10 @@ struct CameraConfiguration {
                     // of the bandwidth
 };
 
+/// Whether any camera at all could be asked for this: empty, or what is wrong with it, as in `a
+/// size of 0 x 480`.
+[[nodiscard]] std::string find_invalid(const CameraConfiguration& requested);
+
 /// What brightness is set with while a camera streams.
 struct ExposureSetting {
   Duration exposure{};
@@ -144,12 +148,6 @@ class CameraDevice {
   /// Of sensor or housing, °C, where the device tells. Talks to the device as set_exposure() does;
   /// any thread but that of wait().
   [[nodiscard]] virtual std::optional<double> temperature_c() noexcept { return std::nullopt; }
-  /// Virtual time, which other devices may run ahead of: waits, at most `limit`, until all that
-  /// this camera delivers before `instant` (frames, its going and coming back) is there to be
-  /// taken. False: not yet. Consumer's thread. A real camera delivers when it does: always true.
-  [[nodiscard]] virtual bool delivered_until(HostStamp /*instant*/, Duration /*limit*/) noexcept {
-    return true;
-  }
   /// One sentence about the last call that was not `ok`: what was refused, what the camera offers,
   /// what to do. Empty: the status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }

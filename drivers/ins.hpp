@@ -89,9 +89,6 @@ class InsDevice {
   [[nodiscard]] virtual std::string last_error() const { return {}; }
   /// One sentence about what works, but not as asked. Empty: nothing. As last_error().
   [[nodiscard]] virtual std::string remark() const { return {}; }
-  /// It lives in a virtual time of its own, beside the other devices: its next reading is there for
-  /// the waiting, whatever they do.
-  [[nodiscard]] virtual bool keeps_own_time() const noexcept { return false; }
   [[nodiscard]] virtual InsStatistics statistics() const noexcept = 0;
 };
 

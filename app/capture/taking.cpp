@@ -69,7 +69,6 @@ Taking take_sets(DriveDevices& devices, const TakingOptions& options, const Sign
   taking.delivered.assign(n, 0);
   taking.gone.assign(n, false);
   Acquisition::Options o = devices.acquisition_options();
-  o.wait_when_full = devices.mock() != nullptr;
   const HostMoment now = moment_now();
   o.tie_stamp = now.day;
   o.tie_host = devices.mock() != nullptr ? devices.start() : now.host;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "app/runtime/nearest.hpp"
+#include "app/runtime/withdrawn.hpp"
 
 namespace vergence::app {
 namespace {
@@ -15,6 +16,8 @@ constexpr std::size_t kShown = 60;  // bytes of a text from outside in a sentenc
 std::string no_such_option(const std::string& name, const CameraSettings& camera) {
   std::vector<std::string> names;
   for (const OptionRow& row : option_rows(camera.options)) names.push_back(row.name);
+  if (const std::string why = why_withdrawn(Withdrawn::Kind::camera_option, name); !why.empty())
+    return fmt::format("there is no option \"{}\"{}", name, why);
   const std::string near = did_you_mean(name, names);
   return fmt::format("there is no option \"{}\"{} {} cameras have {}", name.substr(0, kShown),
                      near.empty() ? ";" : near, camera.driver, fmt::join(names, ", "));

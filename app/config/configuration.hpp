@@ -70,7 +70,6 @@ struct InsSettings {
   double rate = 120;       // Hz
   double sync_out_hz = 0;  // 0: as the device has it; negative: off
   double sync_out_width_ms = 1;
-  xsens::SyncIn sync_in = xsens::SyncIn::leave;
   double processing_ms = 2;               // from a sample to its first byte on the line
   std::array<double, 3> lever_arm_m{};    // of the left camera in the INS's body: forward, left, up
   std::array<double, 3> boresight_deg{};  // roll, pitch, yaw
@@ -125,19 +124,11 @@ struct CalibrationErrorSettings {
 
 struct MockSettings {
   enum class Ins : std::uint8_t { noisy, ideal };
-  enum class InsLine : std::uint8_t { none, mti_g, mti_g_710 };
-  enum class BoardLine : std::uint8_t { none, usb, ftdi };
 
   std::string world = "suburb";
   vergence::mock::DriveKind drive = vergence::mock::DriveKind::loop;
   vergence::mock::Pattern pattern = vergence::mock::Pattern::grey;
   Ins ins = Ins::noisy;
-  InsLine ins_line = InsLine::none;
-  int ins_latency_timer_ms = 16;  // 0: no converter
-  double ins_late_percent = 1, ins_late_ms = 4;
-  BoardLine board_line = BoardLine::none;
-  int board_latency_timer_ms = 1;  // of `ftdi`
-  double board_late_percent = 1, board_late_ms = 2;
   std::int64_t seed = 1;
   int texture_detail = 1;
   int noise = 1;

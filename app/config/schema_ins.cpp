@@ -24,14 +24,6 @@ Group ins() {
               "Pulses a second at the INS's SyncOut; 0: as the device has it, -1: none. An "
               "MTi-G-700/710 makes 400 Hz / n, no 30.")
       .number("sync_out_width_ms", &I::sync_out_width_ms, 0.1, 100, "ms", "Length of such a pulse.")
-      .choice<xsens::SyncIn>(
-          "sync_in", &I::sync_in,
-          {{"leave", xsens::SyncIn::leave},
-           {"off", xsens::SyncIn::off},
-           {"rising", xsens::SyncIn::rising},
-           {"falling", xsens::SyncIn::falling}},
-          "What an edge at SyncIn marks: `leave` as the device has it, `off`, `rising` or "
-          "`falling`.")
       .number("processing_ms", &I::processing_ms, 0, 50, "ms",
               "From a sample to its first byte on the line, as the device's manual says; it goes "
               "into every stamp.")

@@ -67,31 +67,6 @@ Group mock() {
               "Sensors: `grey`, or `gbrg` (Bayer).")
       .choice("ins", &M::ins, {{"noisy", M::Ins::noisy}, {"ideal", M::Ins::ideal}},
               "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
-      .choice(
-          "ins_line", &M::ins_line,
-          {{"none", M::InsLine::none},
-           {"mti-g", M::InsLine::mti_g},
-           {"mti-g-710", M::InsLine::mti_g_710}},
-          "With `--fast`: the INS as bytes on a simulated line, read by the real driver: `mti-g` "
-          "or `mti-g-710`; `none`.")
-      .integer("ins_latency_timer_ms", &M::ins_latency_timer_ms, 0, 255, "ms",
-               "Latency timer of that line's USB converter; 0: there is none.")
-      .number("ins_late_percent", &M::ins_late_percent, 0, 100, "%",
-              "Of its reads: they come late …")
-      .number("ins_late_ms", &M::ins_late_ms, 0, 1000, "ms",
-              "… by an exponential time of this mean.")
-      .choice(
-          "board_line", &M::board_line,
-          {{"none", M::BoardLine::none}, {"usb", M::BoardLine::usb}, {"ftdi", M::BoardLine::ftdi}},
-          "With `--fast`: the trigger board as bytes on a simulated line, read by the real "
-          "driver, its pulses trigger the cameras: `usb`, "
-          "packets as they are full, or `ftdi`, a converter with a latency timer; `none`.")
-      .integer("board_latency_timer_ms", &M::board_latency_timer_ms, 0, 255, "ms",
-               "With `ftdi`: latency timer of that line's USB converter.")
-      .number("board_late_percent", &M::board_late_percent, 0, 100, "%",
-              "Of its reads: they come late …")
-      .number("board_late_ms", &M::board_late_ms, 0, 1000, "ms",
-              "… by an exponential time of this mean.")
       .integer("texture_detail", &M::texture_detail, 0, 2, "",
                "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel (8, 32, 128 MB).")
       .integer("noise", &M::noise, 0, 1, "", "1: shot and read noise of the sensors; 0: none.")

@@ -9,7 +9,6 @@
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/devices/serial_devices.hpp"
-#include "app/devices/simulated_devices.hpp"
 #include "app/devices/software_trigger.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
@@ -86,7 +85,8 @@ void start_acquisition(Acquisition* acquisition, PulseObserver* observer) {
 }
 
 DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string>& faults,
-                           bool fast, std::optional<double> duration_s) {
+                           bool fast, std::optional<double> duration_s)
+    : fast_(fast) {
   if (!all_mock(c)) {
     if (fast)
       throw InputError("--fast is virtual time, which real cameras do not keep; run without it");
@@ -99,22 +99,7 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
   mock_ = make_mock_drive(c, faults, !fast, duration_s);
   for (int k = 0; k < mock_.rig->cameras(); ++k) cameras_.push_back(&mock_.rig->camera(k));
   if (mock_.has_ins) ins_ = &mock_.rig->ins();
-  if (mock_.has_ins && c.mock.ins_line != MockSettings::InsLine::none) {
-    if (!fast)
-      throw InputError(
-          "mock.ins_line: that line is one in virtual time; run with --fast, or set it to none");
-    opened_ins_ = make_simulated_ins(c, *mock_.rig, &remarks_);
-    ins_ = opened_ins_.get();
-  }
   trigger_ = &mock_.rig->trigger();
-  if (c.mock.board_line != MockSettings::BoardLine::none) {
-    if (!fast)
-      throw InputError(
-          "mock.board_line: that line is one in virtual time; run with --fast, or set it to none");
-    simulated_board_ = make_simulated_board(c, mock_.rig.get(), &board_driver_, &remarks_);
-    trigger_ = simulated_board_.get();
-    board_keeps_own_time_ = true;
-  }
   sync_ = sync_options(c, mock_.rig->cameras());
   frames_ = mock_.rig->pulses(c.trigger.rate);
 }
@@ -131,7 +116,6 @@ void DriveDevices::open_real(const Configuration& c) {
   if (c.trigger.driver == "board") {
     board_ = open_trigger_board(c.trigger, pulses, &remarks_);
     trigger_ = board_.get();
-    board_driver_ = board_.get();
   }
   std::vector<DeviceTiming> timings;
   for (const OpenedCamera& camera : opened_) timings.push_back(camera.device->timing());
@@ -149,7 +133,7 @@ void DriveDevices::open_real(const Configuration& c) {
 Acquisition::Options DriveDevices::acquisition_options() const {
   Acquisition::Options o;
   o.sync = sync_;
-  o.board_keeps_own_time = board_keeps_own_time_;
+  o.wait_when_full = fast_;
   return o;
 }
 

@@ -34,12 +34,10 @@ class DriveDevices {
     return trigger_;
   }  // null: pulses come from elsewhere, or none
   [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
-  /// Its pulses are not known before they are made: Acquisition::Options::board_keeps_own_time.
-  [[nodiscard]] bool board_keeps_own_time() const noexcept { return board_keeps_own_time_; }
   /// What an acquisition has to know of these devices; the rest as it stands.
   [[nodiscard]] Acquisition::Options acquisition_options() const;
-  /// The driver of a board on a line, simulated or not; null: there is none.
-  [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_driver_; }
+  /// The driver of a board on a line; null: there is none.
+  [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_.get(); }
   /// Sentences about what works, but not as well as it should.
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
 
@@ -64,13 +62,11 @@ class DriveDevices {
   std::unique_ptr<InsDevice> opened_ins_;
   std::unique_ptr<TriggerDevice> software_;
   std::unique_ptr<trigger_board::Device> board_;
-  std::unique_ptr<TriggerDevice> simulated_board_;
-  const trigger_board::Device* board_driver_ = nullptr;
   std::vector<CameraDevice*> cameras_;
   InsDevice* ins_ = nullptr;
   TriggerDevice* trigger_ = nullptr;
   SyncOptions sync_;
-  bool board_keeps_own_time_ = false;
+  bool fast_ = false;  // virtual time
   std::vector<std::string> remarks_;
   std::uint64_t frames_ = 0;
   HostStamp start_{};

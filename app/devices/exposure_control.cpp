@@ -53,9 +53,6 @@ class ExposureControl::Watched final : public CameraDevice {
     return camera_->set_exposure(requested, actual);
   }
   std::optional<double> temperature_c() noexcept override { return camera_->temperature_c(); }
-  bool delivered_until(HostStamp instant, Duration limit) noexcept override {
-    return camera_->delivered_until(instant, limit);
-  }
   std::string last_error() const override { return camera_->last_error(); }
   std::string remark() const override { return camera_->remark(); }
   CameraStatistics statistics() const noexcept override { return camera_->statistics(); }

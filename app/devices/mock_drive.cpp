@@ -106,10 +106,8 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     o.blur_samples = c.mock.blur_samples;
     o.ideal_ins = c.mock.ins == MockSettings::Ins::ideal;
     o.clock_drift_ppm = c.mock.clock_drift_ppm;
-    o.fed = c.mock.board_line != MockSettings::BoardLine::none;
-    o.reports_taken =
-        !o.fed &&
-        c.sync.mode == SyncMode::board;  // else nobody asks for a pause, nor need take them
+    // Else nobody asks for a pause, nor need take them.
+    o.reports_taken = c.sync.mode == SyncMode::board;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
       o.trigger_delay[k] = trigger_delay(c, k);
     o.exposures_follow = exposes_by_itself(c);

@@ -19,19 +19,12 @@ xsens::Options xsens_options(const InsRequest& request) {
   o.baud = request.baud;
   o.sync_out_hz = request.sync_out_hz;
   o.sync_out_width_ms = request.sync_out_width_ms;
-  o.sync_in = request.sync_in;
   o.processing = Duration::seconds(request.processing_ms * 1e-3);
   return o;
 }
 
 std::unique_ptr<InsDriver> make_xsens(const InsRequest& request) {
   return std::make_unique<xsens::Driver>(xsens_options(request));
-}
-
-std::unique_ptr<InsDevice> open_xsens_on(std::unique_ptr<LinePlace> place,
-                                         const InsRequest& request, DeviceStatus* status,
-                                         std::string* error) {
-  return xsens::open_on(std::move(place), xsens_options(request), status, error);
 }
 
 template <gnss::Protocol kProtocol>
@@ -42,12 +35,6 @@ gnss::Options gnss_options(const InsRequest& request) {
 template <gnss::Protocol kProtocol>
 std::unique_ptr<InsDriver> make_gnss(const InsRequest& request) {
   return std::make_unique<gnss::Driver>(gnss_options<kProtocol>(request));
-}
-
-template <gnss::Protocol kProtocol>
-std::unique_ptr<InsDevice> open_gnss_on(std::unique_ptr<LinePlace> place, const InsRequest& request,
-                                        DeviceStatus* status, std::string* error) {
-  return gnss::open_on(std::move(place), gnss_options<kProtocol>(request), status, error);
 }
 
 const InsDriverRow& row_of(const InsRequest& request) {
@@ -62,20 +49,20 @@ const InsDriverRow& row_of(const InsRequest& request) {
 
 const std::vector<InsDriverRow>& ins_driver_rows() {
   static const std::vector<InsDriverRow> rows{
-      {"xsens", "XSens MTi-G or MTi-G-700/710 on a serial port", &make_xsens, &open_xsens_on},
+      {"xsens", "XSens MTi-G or MTi-G-700/710 on a serial port", &make_xsens},
       {"nmea", "satellite receiver or compass that sends NMEA 0183 on a serial port",
-       &make_gnss<gnss::Protocol::nmea>, &open_gnss_on<gnss::Protocol::nmea>},
+       &make_gnss<gnss::Protocol::nmea>},
       {"ubx", "u-blox receiver that sends UBX-NAV-PVT on a serial port",
-       &make_gnss<gnss::Protocol::ubx>, &open_gnss_on<gnss::Protocol::ubx>},
+       &make_gnss<gnss::Protocol::ubx>},
   };
   return rows;
 }
 
 InsRequest ins_request(const InsSettings& s) {
-  return {s.driver,      s.port,
-          s.rate,        static_cast<std::uint32_t>(s.baud),
-          s.sync_out_hz, s.sync_out_width_ms,
-          s.sync_in,     s.processing_ms};
+  return {s.driver,       s.port,
+          s.rate,         static_cast<std::uint32_t>(s.baud),
+          s.sync_out_hz,  s.sync_out_width_ms,
+          s.processing_ms};
 }
 
 const InsDriverRow* find_ins_driver(const std::string& name) {

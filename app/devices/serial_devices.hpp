@@ -19,7 +19,6 @@ struct InsRequest {
   std::uint32_t baud = 0;  // 0: as the device has it
   double sync_out_hz = 0;  // 0: as the device has it; negative: off
   double sync_out_width_ms = 1;
-  xsens::SyncIn sync_in = xsens::SyncIn::leave;
   double processing_ms = 2;
 };
 
@@ -30,9 +29,6 @@ struct InsDriverRow {
   const char* name;     // of `ins.driver`
   const char* meaning;  // for lists
   std::unique_ptr<InsDriver> (*make)(const InsRequest& request);
-  /// On any line, a recorded one for instance. Null: *status and *error say why.
-  std::unique_ptr<InsDevice> (*open_on)(std::unique_ptr<LinePlace> place, const InsRequest& request,
-                                        DeviceStatus* status, std::string* error);
 };
 
 /// The table of drivers for real INS: everything that talks to one is chosen here. The mock's INS

@@ -7,7 +7,7 @@ namespace vergence::app {
 
 /// Something of an earlier version that a user may still write, and what to do now.
 struct Withdrawn {
-  enum class Kind { key, record_topic, option, command } kind;
+  enum class Kind { key, camera_option, record_topic, option, command } kind;
   std::string_view name;     // record.roll_s, replay --through-devices, completion
   std::string_view instead;  // the end of an error message: what replaced it
 };

@@ -57,7 +57,6 @@ LiveSource::LiveSource(const RunRequest& request)
 
 void LiveSource::make_acquisition() {
   Acquisition::Options o = devices_.acquisition_options();
-  o.wait_when_full = request_.fast;
   o.stamp_grid = stamp_grid(configuration_);
   const HostMoment tie = request_.fast ? HostMoment{kVirtualEpoch, devices_.start()} : moment_now();
   o.tie_stamp = tie.day;
@@ -115,7 +114,7 @@ void LiveSource::start(std::vector<std::string>* faults) {
   start_acquisition(acquisition_.get(), pulse_observer_);
   begun_ = std::chrono::steady_clock::now();
   start_ = start_ + (devices_.start() - assumed);  // a mock in real time knows it only now
-  if (devices_.mock() == nullptr || devices_.board_keeps_own_time()) return;
+  if (devices_.mock() == nullptr) return;
   truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
   if (!truth_.empty()) write_truth(faults);
 }
@@ -206,12 +205,7 @@ std::chrono::steady_clock::time_point LiveSource::end() const {
 
 void LiveSource::halt() noexcept { acquisition_->join(); }
 
-void LiveSource::finish(Progress* progress, std::vector<std::string>* faults) {
-  if (devices_.mock() != nullptr &&
-      devices_.board_keeps_own_time()) {  // whose pulses nobody knew before they were made
-    truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
-    write_truth(faults);
-  }
+void LiveSource::finish(Progress* progress, std::vector<std::string>* /*faults*/) {
   if (exposure_) exposure_->settle();
   if (exposure_ && exposure_->counters().unsupported)
     progress->say(

@@ -99,8 +99,7 @@ void Acquisition::work() {
     // Twice: whatever arrived before an item of the first look is there at the second.
     look();
     look();
-    int device = earliest();
-    if (await_cameras(device)) device = earliest();
+    const int device = earliest();
     if (device >= 0) {
       if (static_cast<std::size_t>(device) < cameras_.size())
         take_frame(static_cast<std::size_t>(device));
@@ -127,14 +126,13 @@ void Acquisition::work() {
 
 void Acquisition::look() {
   const bool always = options_.wait_when_full;
-  for (auto& head : heads_) head.look({this, &stop_, always, false});
+  for (auto& head : heads_) head.look(this, always);
   look_ins();
-  board_head_.look({this, &stop_, always, options_.board_keeps_own_time});
+  board_head_.look(this, always);
 }
 
 void Acquisition::look_ins() {
-  const bool own_time = ins_ != nullptr && ins_->keeps_own_time();
-  ins_head_.look({this, &stop_, options_.wait_when_full, own_time});
+  ins_head_.look(this, options_.wait_when_full);
   if (ins_head_.back) {
     ins_head_.back = false;
     ins_clock_->restart();
@@ -153,40 +151,14 @@ int Acquisition::earliest() const {
       device = static_cast<int>(k);
       first = heads_[k].value.arrival;
     }
-  // What keeps a time of its own may be ahead of the cameras: until one of them has something, an
-  // earlier image may still come.
-  const bool images_may_come =
-      device < 0 &&
-      std::any_of(heads_.begin(), heads_.end(), [](const auto& h) { return !h.ended && !h.gone; });
-  const bool any_camera = device >= 0;
   // At the same instant pulses and then the INS go first: the images may need them.
-  const bool ins_waits = images_may_come && ins_ != nullptr && ins_->keeps_own_time();
-  if (ins_head_.held && !ins_waits && (!any_camera || ins_head_.value.arrival <= first)) {
+  if (ins_head_.held && (device < 0 || ins_head_.value.arrival <= first)) {
     device = ins_place();
     first = ins_head_.value.arrival;
   }
-  const bool board_waits = images_may_come && options_.board_keeps_own_time;
-  if (board_head_.held && !board_waits && (device < 0 || board_head_.value.arrival <= first))
+  if (board_head_.held && (device < 0 || board_head_.value.arrival <= first))
     device = ins_place() + 1;
   return device;
-}
-
-/// Before an item is taken of a device that is ahead in a time of its own, while every camera is
-/// gone: one may come back before it. True: the cameras were looked at again.
-bool Acquisition::await_cameras(int device) {
-  constexpr Duration kPatience = Duration::milliseconds(100);
-  const bool of_ins = device == ins_place(), of_board = device > ins_place();
-  const bool ahead = (of_board && options_.board_keeps_own_time) ||
-                     (of_ins && ins_ != nullptr && ins_->keeps_own_time());
-  const bool all_gone = std::all_of(heads_.begin(), heads_.end(),
-                                    [](const auto& h) { return (h.gone || h.ended) && !h.held; });
-  if (!ahead || !all_gone) return false;
-  const HostStamp instant = of_board ? board_head_.value.arrival : ins_head_.value.arrival;
-  for (CameraDevice* camera : cameras_)
-    while (!camera->delivered_until(instant, kPatience))
-      if (stop_.load(std::memory_order_acquire)) return false;
-  for (auto& head : heads_) head.look({this, &stop_, options_.wait_when_full, false});
-  return true;
 }
 
 void Acquisition::take_frame(std::size_t k) {

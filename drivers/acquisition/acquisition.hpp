@@ -85,9 +85,6 @@ class Acquisition final : private Notifier {
     HostStamp tie_host{};  // … was this time of the host's clock
     Duration stamp_grid =
         Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
-    /// The board lives in a virtual time of its own, beside the other devices: its next report is
-    /// there for the waiting.
-    bool board_keeps_own_time = false;
     PulseObserver* pulse_observer = nullptr;  // set by start(); null: pulses are not recorded
   };
 
@@ -130,7 +127,6 @@ class Acquisition final : private Notifier {
   /// Which device's oldest item arrived first: a camera, or after those the INS, the board. −1:
   /// none.
   [[nodiscard]] int earliest() const;
-  bool await_cameras(int device);
   [[nodiscard]] int ins_place() const noexcept { return static_cast<int>(heads_.size()); }
   void take_frame(std::size_t k);
   void take_reading();

@@ -1,9 +1,7 @@
 #pragma once
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <thread>
 
 #include "drivers/device.hpp"
 
@@ -15,12 +13,6 @@ namespace vergence {
 /// Ownership  The device outlives it. Threads: the acquisition's, which calls all of it.
 template <class Device, class Value>
 struct DeviceHead {
-  struct Look {
-    Notifier* ready;                // what a device that is started again notifies
-    const std::atomic<bool>* stop;  // ends every wait
-    bool ask_always;                // virtual time: a device that is gone is asked at each look
-    bool own_time;                  // its next item is there for the waiting: wait for it
-  };
   static constexpr std::int64_t kAskAgain =
       1'000'000'000;  // ns: opening a bus device takes a while, a second more is no loss
   static constexpr std::int64_t kRest =
@@ -36,31 +28,23 @@ struct DeviceHead {
   std::int64_t ask_ns = 0;          // when it is next asked to come back, steady clock
   Value value{};
 
-  void look(const Look& l) {
+  /// `ready`: what a device that is started again notifies. `ask_always` (virtual time): a device
+  /// that is gone is asked at each look.
+  void look(Notifier* ready, bool ask_always) {
     if (device == nullptr) ended = true;
-    if (held || ended || (gone && !start_again(l))) return;
-    constexpr Duration kPatience = Duration::milliseconds(100);
-    DeviceStatus status = DeviceStatus::timeout;
-    do {
-      status = device->wait(l.own_time ? kPatience : Duration{}, &value);
-    } while (status == DeviceStatus::timeout && l.own_time &&
-             !l.stop->load(std::memory_order_acquire));
+    if (held || ended || (gone && !start_again(ready, ask_always))) return;
+    const DeviceStatus status = device->wait(Duration{}, &value);
     event = status == DeviceStatus::gone;
     held = status == DeviceStatus::ok || event;
     ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;
   }
 
  private:
-  [[nodiscard]] bool start_again(const Look& l) {
+  [[nodiscard]] bool start_again(Notifier* ready, bool ask_always) {
     const auto now = [] { return std::chrono::steady_clock::now().time_since_epoch().count(); };
     const std::int64_t begun = now();
-    if (!l.ask_always && begun < ask_ns) return false;
-    DeviceStatus status = device->start(l.ready);
-    // Its time passes by itself: as long as it is not back, nothing says what else may go on.
-    while (status == DeviceStatus::gone && l.own_time && !l.stop->load(std::memory_order_acquire)) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      status = device->start(l.ready);
-    }
+    if (!ask_always && begun < ask_ns) return false;
+    const DeviceStatus status = device->start(ready);
     const std::int64_t done = now();
     ask_ns = done + std::max(kAskAgain, kRest * (done - begun));
     ended = status == DeviceStatus::ended;

@@ -30,7 +30,6 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
   }
   [[nodiscard]] std::string last_error() const final { return last_error_; }
   [[nodiscard]] std::string remark() const final { return remark_; }
-  [[nodiscard]] bool keeps_own_time() const noexcept final { return this->virtual_time(); }
   [[nodiscard]] InsStatistics statistics() const noexcept final {
     InsStatistics s;
     s.delivered = delivered_.load(std::memory_order_relaxed);

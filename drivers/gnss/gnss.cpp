@@ -15,15 +15,10 @@ std::vector<DeviceInfo> Driver::enumerate() {
 std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* status) {
   const std::string name = only_usb_serial_port(port, status, &last_error_);
   if (name.empty()) return nullptr;
-  return open_on(std::make_unique<SerialPort>(name), options_, status, &last_error_);
-}
-
-std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place, const Options& options,
-                                   DeviceStatus* status, std::string* error) {
-  auto device = std::make_unique<Device>(std::move(place), options);
+  auto device = std::make_unique<Device>(std::make_unique<SerialPort>(name), options_);
   *status = device->connect();
   if (*status == DeviceStatus::ok) return device;
-  *error = device->last_error();
+  last_error_ = device->last_error();
   return nullptr;
 }
 

@@ -6,7 +6,6 @@
 
 #include "drivers/gnss/options.hpp"
 #include "drivers/ins.hpp"
-#include "drivers/serial/byte_line.hpp"
 
 namespace vergence::gnss {
 
@@ -27,10 +26,5 @@ class Driver final : public InsDriver {
   Options options_;
   std::string last_error_;
 };
-
-/// The same on any line: recordings, tests. Null: *status and *error say why.
-[[nodiscard]] std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place,
-                                                 const Options& options, DeviceStatus* status,
-                                                 std::string* error);
 
 }  // namespace vergence::gnss

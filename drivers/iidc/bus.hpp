@@ -97,10 +97,6 @@ class CameraBus : public RegisterPort {
 
   /// One sentence about the last call that was not ok; empty: the status says it all.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
-  /// One sentence about what will be tight with `sharing` cameras of this shape and rate; empty:
-  /// nothing.
-  [[nodiscard]] virtual std::string remark(const StreamShape& shape, double rate_hz,
-                                           int sharing) const = 0;
 };
 
 }  // namespace vergence::iidc

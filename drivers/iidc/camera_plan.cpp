@@ -124,16 +124,8 @@ class Planner {
  private:
   DeviceStatus check_numbers() {
     constexpr int kMost = 65535;
-    if (!(requested_.rate_hz > 0) || !std::isfinite(requested_.rate_hz) || requested_.width <= 0 ||
-        requested_.height <= 0 || requested_.offset_x < 0 || requested_.offset_y < 0 ||
-        !std::isfinite(requested_.gain_db)) {
-      last_error_ = "size and rate must be above zero";
-      return DeviceStatus::bad_configuration;
-    }
-    if (requested_.exposure <= Duration{} ||
-        requested_.exposure.to_seconds() * requested_.rate_hz > 1) {
-      last_error_ = text("an exposure of %.0f us does not fit between two images at %g Hz",
-                         requested_.exposure.to_seconds() * 1e6, requested_.rate_hz);
+    if (const std::string invalid = find_invalid(requested_); !invalid.empty()) {
+      last_error_ = invalid + " is no configuration";
       return DeviceStatus::bad_configuration;
     }
     if (requested_.width > kMost || requested_.height > kMost || requested_.offset_x > kMost ||

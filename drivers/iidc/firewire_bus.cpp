@@ -8,11 +8,10 @@
 #include <cerrno>
 #include <cstring>
 #include <exception>
+#include <map>
 #include <mutex>
-#include <vector>
 
 #include "drivers/clock.hpp"
-#include "drivers/iidc/budget_words.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 #include "drivers/iidc/identity.hpp"
 #include "drivers/iidc/iidc.hpp"
@@ -35,11 +34,9 @@ void silence_library() {
 
 }  // namespace
 
-std::unique_ptr<FirewireBus> FirewireBus::open(std::string_view requested,
-                                               std::shared_ptr<BusLedger> ledger,
-                                               DeviceStatus* status, std::string* message) {
+std::unique_ptr<FirewireBus> FirewireBus::open(std::string_view requested, DeviceStatus* status,
+                                               std::string* message) {
   std::unique_ptr<FirewireBus> bus(new FirewireBus);
-  bus->ledger_ = std::move(ledger);
   *status = bus->open_node(requested);
   if (*status == DeviceStatus::ok) return bus;
   *message = bus->last_error_;
@@ -106,7 +103,6 @@ FirewireBus::~FirewireBus() {
   end_ring();
   close_node();
   if (wake_ >= 0) (void)::close(wake_);
-  ledger_->remove(this);
 }
 
 /// A camera that was given up while its node is there (silent, out of step) still captures where an
@@ -182,29 +178,11 @@ void FirewireBus::end_ring() noexcept {
 DeviceStatus FirewireBus::allocate(const StreamShape& shape) noexcept {
   end_ring();
   ring_.set_shape(shape);
-  try {
-    ledger_->put(this, node_.bus, {shape.packet_bytes, shape.speed, shape.image_bytes});
-  } catch (const std::exception&) {
-    return DeviceStatus::failed;
-  }
   return DeviceStatus::ok;
-}
-
-DeviceStatus FirewireBus::set_up() {
-  last_error_ = ledger_->last_error(node_.bus);
-  if (!last_error_.empty()) return DeviceStatus::no_bandwidth;
-  return ring_.set_up(camera_, node_.device, &last_error_);
 }
 
 void FirewireBus::give_back(FrameSlot slot) noexcept {
   if (ring_.give_back(slot) && wake_ >= 0) (void)!::write(wake_, "\1\0\0\0\0\0\0", 8);
-}
-
-std::string FirewireBus::remark(const StreamShape& shape, double, int sharing) const {
-  const std::vector<BusShare> shares(static_cast<std::size_t>(std::max(sharing, 1)),
-                                     {shape.packet_bytes, shape.speed, shape.image_bytes});
-  const std::string text = budget_error(shares);
-  return text.empty() ? text : "if all are on one bus, " + text;
 }
 
 namespace {
@@ -221,16 +199,17 @@ class FirewireDriver final : public CameraDriver {
   }
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {
     last_error_.clear();
-    auto bus = FirewireBus::open(serial, ledger_, status, &last_error_);
+    auto bus = FirewireBus::open(serial, status, &last_error_);
     if (bus == nullptr) return nullptr;
     const ConfigRom rom = bus->rom();
-    auto clock = bus->clock();
-    return std::make_unique<IidcCamera>(std::move(bus), rom, std::move(clock));
+    auto& clock = clocks_[bus->bus()];
+    if (clock == nullptr) clock = std::make_shared<SharedClock>();
+    return std::make_unique<IidcCamera>(std::move(bus), rom, clock);
   }
   std::string last_error() const override { return last_error_; }
 
  private:
-  std::shared_ptr<BusLedger> ledger_ = std::make_shared<BusLedger>();
+  std::map<std::string, std::shared_ptr<SharedClock>> clocks_;  // by bus
   std::string last_error_;
 };
 

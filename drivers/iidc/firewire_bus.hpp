@@ -8,7 +8,6 @@
 #include <thread>
 
 #include "drivers/iidc/bus.hpp"
-#include "drivers/iidc/bus_ledger.hpp"
 #include "drivers/iidc/firewire_nodes.hpp"
 #include "drivers/iidc/firewire_ring.hpp"
 
@@ -20,19 +19,18 @@ namespace vergence::iidc {
 ///            held.
 /// Threads    A thread polls the capture between start() and stop(), never without a limit:
 ///            libdc1394's own wait has none.
-/// Budget     Known before the start from what all cameras of the ledger need on this bus.
 class FirewireBus final : public CameraBus {
  public:
   /// `requested` as names_camera(). Null: *status and *error say why.
   [[nodiscard]] static std::unique_ptr<FirewireBus> open(std::string_view requested,
-                                                         std::shared_ptr<BusLedger> ledger,
                                                          DeviceStatus* status, std::string* error);
   ~FirewireBus() override;
   FirewireBus(const FirewireBus&) = delete;
   FirewireBus& operator=(const FirewireBus&) = delete;
 
   [[nodiscard]] const ConfigRom& rom() const noexcept { return node_.rom; }
-  [[nodiscard]] std::shared_ptr<SharedClock> clock() const { return ledger_->clock(node_.bus); }
+  /// The bus it hangs on: cameras of one bus have one clock.
+  [[nodiscard]] const std::string& bus() const noexcept { return node_.bus; }
   [[nodiscard]] DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override;
   [[nodiscard]] DeviceStatus write(std::uint64_t address, std::uint32_t value) noexcept override;
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return info_; }
@@ -46,21 +44,17 @@ class FirewireBus final : public CameraBus {
     return ring_.bytes(slot);
   }
   [[nodiscard]] std::string last_error() const override { return last_error_; }
-  [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz,
-                                   int sharing) const override;
 
  private:
   FirewireBus() = default;
   [[nodiscard]] DeviceStatus open_node(std::string_view requested);
   void close_node() noexcept;
-  [[nodiscard]] DeviceStatus set_up();
   void end_ring() noexcept;
   void end_capture() noexcept;
   void stream() noexcept;
   [[nodiscard]] bool take_one() noexcept;
   [[nodiscard]] DeviceStatus failure(HostStamp begun) const noexcept;
 
-  std::shared_ptr<BusLedger> ledger_;
   FirewireNode node_{};
   DeviceInfo info_{};
   BusTraits traits_{true, BusSpeed::s800, largest_packet(BusSpeed::s800), 0};

@@ -27,7 +27,8 @@ DeviceStatus FirewireRing::set_up(dc1394camera_t* camera, const std::string& dev
   if (result == DC1394_NO_BANDWIDTH || result == DC1394_NO_ISO_CHANNEL) {
     *error = "the bus has no room left for its " +
              std::to_string(bandwidth_units(shape_.packet_bytes, shape_.speed)) +
-             " bandwidth units, or no channel: another program streams on it";
+             " of 4915 bandwidth units, or no channel: lower the rate or the image size, use S800 "
+             "or a second bus; or another program streams on it";
     return DeviceStatus::no_bandwidth;
   }
   if (result != DC1394_SUCCESS) {

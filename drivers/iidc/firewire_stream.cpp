@@ -35,7 +35,8 @@ DeviceStatus FirewireBus::start(StreamSink* sink) noexcept {
     if (!ring_.any_kept()) end_ring();
     if (ring_.captured()) {
       ring_.resume();
-    } else if (const DeviceStatus status = set_up(); status != DeviceStatus::ok) {
+    } else if (const DeviceStatus status = ring_.set_up(camera_, node_.device, &last_error_);
+               status != DeviceStatus::ok) {
       return status;
     }
     sink_ = sink;

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <mutex>
 
 #include "drivers/camera.hpp"
 #include "drivers/iidc/camera_plan.hpp"
@@ -18,11 +19,20 @@ struct ReadFrame {
   DeviceStamp exposure_start{};
 };
 
-/// Bus clocks that several cameras may share: who unwraps 128 s of it.
+/// The clock that cameras stamp by, which wraps after 128 s: all cameras of an IEEE 1394 bus share
+/// one, so that their counts of wraps agree.
+///
+/// Threads  Any, for nanoseconds each.
 class SharedClock {
  public:
-  virtual ~SharedClock() = default;
-  [[nodiscard]] virtual std::int64_t unwrap(std::int64_t wrapped_ns, HostStamp at) noexcept = 0;
+  [[nodiscard]] std::int64_t unwrap(std::int64_t wrapped_ns, HostStamp at) noexcept {
+    const std::lock_guard lock(mutex_);
+    return unwrapper_.unwrap(wrapped_ns, at.ns());
+  }
+
+ private:
+  std::mutex mutex_;
+  CycleUnwrapper unwrapper_;
 };
 
 /// Reads number, stamp and wholeness out of what the stream brings.

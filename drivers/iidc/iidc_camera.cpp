@@ -7,25 +7,10 @@
 #include "drivers/clock.hpp"
 
 namespace vergence::iidc {
-namespace {
-
-/// A clock that nobody shares.
-class OwnClock final : public SharedClock {
- public:
-  std::int64_t unwrap(std::int64_t wrapped_ns, HostStamp at) noexcept override {
-    return unwrapper_.unwrap(wrapped_ns, at.ns());
-  }
-
- private:
-  CycleUnwrapper unwrapper_;
-};
-
-}  // namespace
-
 IidcCamera::IidcCamera(std::unique_ptr<CameraBus> bus, const ConfigRom& rom,
                        std::shared_ptr<SharedClock> clock, Duration patience)
     : bus_(std::move(bus)),
-      clock_(clock != nullptr ? std::move(clock) : std::make_shared<OwnClock>()),
+      clock_(clock != nullptr ? std::move(clock) : std::make_shared<SharedClock>()),
       registers_(bus_.get(), rom.command_base, patience) {}
 
 IidcCamera::~IidcCamera() { stop(); }
@@ -65,7 +50,6 @@ DeviceStatus IidcCamera::configure_or_throw(const CameraConfiguration& requested
     converted_.allocate(plan.options.buffers, FramePool::stride(plan.size.width) *
                                                   static_cast<std::size_t>(plan.size.height));
   plan_ = plan;
-  sharing_ = requested.sharing;
   configured_ = true;
   last_error_.clear();
   if (actual != nullptr) {
@@ -249,12 +233,8 @@ std::optional<double> IidcCamera::temperature_c() noexcept {
 }
 
 std::string IidcCamera::remark() const {
-  if (!configured_) return {};
-  std::string text = bus_->remark(plan_.shape, plan_.rate_hz, sharing_);
-  if (!plan_.info.has(FrameInfoItem::counter))
-    text += std::string(text.empty() ? "" : "; ") +
-            "it embeds no counter and no stamp: lost images are noticed by their times only";
-  return text;
+  if (!configured_ || plan_.info.has(FrameInfoItem::counter)) return {};
+  return "it embeds no counter and no stamp: lost images are noticed by their times only";
 }
 
 // ---- the stream's thread

@@ -80,7 +80,6 @@ class IidcCamera final : public CameraDevice, private StreamSink {
                        // trigger_once(), set_exposure(), temperature_c()
   CameraRegisters registers_;
   CameraPlan plan_{};
-  int sharing_ = 1;
   bool configured_ = false;
   std::string last_error_;
 

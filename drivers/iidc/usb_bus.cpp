@@ -529,37 +529,6 @@ void UsbBus::stop() noexcept {
   sink_ = nullptr;
 }
 
-std::string UsbBus::remark(const StreamShape& shape, double rate_hz, int sharing) const {
-  std::string out;
-  const double need = static_cast<double>(shape.frame_bytes) * rate_hz * sharing,
-               have = traits_.bytes_per_second * kUsbPractical;
-  std::array<char, 220> text{};
-  if (need > have) {
-    (void)std::snprintf(text.data(), text.size(),
-                        "%d cameras of %.1f MB/s each are %.1f MB/s, one USB controller carries "
-                        "about %.0f: give each its own, or lower the rate",
-                        sharing, static_cast<double>(shape.frame_bytes) * rate_hz / 1e6, need / 1e6,
-                        have / 1e6);
-    out = text.data();
-  }
-  const double megabytes =
-      static_cast<double>(kTransfers * shape.frame_bytes) * sharing / 1048576.0;
-  int limit = 0;
-  if (std::FILE* f = std::fopen("/sys/module/usbcore/parameters/usbfs_memory_mb", "r")) {
-    // NOLINTNEXTLINE(cert-err34-c): a number that the kernel wrote
-    if (std::fscanf(f, "%d", &limit) != 1) limit = 0;
-    (void)std::fclose(f);
-  }
-  if (limit > 0 && megabytes > limit) {
-    (void)std::snprintf(text.data(), text.size(),
-                        "%d cameras need %.0f MB of USB memory, the kernel gives %d: echo %d > "
-                        "/sys/module/usbcore/parameters/usbfs_memory_mb",
-                        sharing, megabytes, limit, static_cast<int>(megabytes * 2) + 1);
-    out += (out.empty() ? "" : "; ") + std::string(text.data());
-  }
-  return out;
-}
-
 namespace {
 
 class UsbDriver final : public CameraDriver {

@@ -95,8 +95,6 @@ class UsbBus final : public CameraBus {
     return memory_->bytes(slot);
   }
   [[nodiscard]] std::string last_error() const override { return last_error_; }
-  [[nodiscard]] std::string remark(const StreamShape& shape, double rate_hz,
-                                   int sharing) const override;
 
  private:
   struct Flight {

@@ -52,14 +52,8 @@ std::size_t MockRig::image_bytes() const noexcept {
   return sum;
 }
 HostStamp MockRig::start() const noexcept { return impl_->scheduler.start(); }
-std::array<PulseExposure, kMaxCameras> MockRig::feed(HostStamp edge) {
-  return impl_->scheduler.feed(edge);
-}
-void MockRig::end_feed() noexcept { impl_->scheduler.end_feed(); }
 std::vector<Duration> MockRig::pulse_times() const {
-  const PulsePlan plan = impl_->context.options.fed
-                             ? impl_->scheduler.fed_plan()
-                             : impl_->scheduler.plan_of(impl_->trigger.configuration());
+  const PulsePlan plan = impl_->scheduler.plan_of(impl_->trigger.configuration());
   std::vector<Duration> times;
   times.reserve(plan.size());
   for (std::size_t i = 0; i < plan.size(); ++i) times.push_back(plan.at(i).time);

@@ -26,7 +26,6 @@ struct MockRigOptions {
       1;  // poses averaged over an exposure: 1 is none; the time to render grows with it
   bool ideal_ins = false;
   double clock_drift_ppm = 30;  // largest of the devices' clocks; each has its own
-  bool jitter = true;           // of the arrivals
   Duration duration{};          // of the drive; zero: all of it
   std::array<Duration, kMaxCameras>
       trigger_delay{};  // from a pulse's edge to the start of the exposure, by camera
@@ -34,12 +33,6 @@ struct MockRigOptions {
   /// runs no farther ahead of them than what decides at which pulse a pause begins: the fourth
   /// after the newest report taken, on every run.
   bool reports_taken = false;
-  /// Virtual time: the pulses come from a board that is not the rig's own, by MockRig::feed().
-  /// trigger() then only begins and ends the drive; nothing is reported there.
-  bool fed = false;
-  /// Images from the one at which set_exposure() is called to the first that has it; later, where
-  /// those are made already.
-  int exposure_latency = 2;
   /// Virtual time: who waits for camera 0 asks for the next image once the last is done with, and
   /// may set the exposure before. No image is then made while one is still looked at:
   /// set_exposure() acts at the same image on every run.
@@ -77,20 +70,14 @@ class MockRig {
   [[nodiscard]] InsDevice& ins() noexcept;
   [[nodiscard]] TriggerDevice& trigger() noexcept;
   [[nodiscard]] const RigTruth& truth() const noexcept;
-  /// With `fed`: the next pulse of that board, in order, after the start; what the cameras do, by
-  /// the pulse's edge. Pulses before start() find nobody armed; the first after the drive ends it.
-  /// One thread; never waits.
-  [[nodiscard]] std::array<PulseExposure, kMaxCameras> feed(HostStamp edge);
-  /// No more will come.
-  void end_feed() noexcept;
   /// Image memory, bytes; after the cameras are configured.
   [[nodiscard]] std::size_t image_bytes() const noexcept;
 
   /// The host's time at the drive's start; known once the trigger was started (virtual time: always
   /// the same).
   [[nodiscard]] HostStamp start() const noexcept;
-  /// With `fed`, when it has ended: the pulses that came. Else when the board pulses, pauses apart:
-  /// since the drive's start, by the host's clock. After the trigger is configured.
+  /// When the board pulses, pauses apart: since the drive's start, by the host's clock. After the
+  /// trigger is configured.
   [[nodiscard]] std::vector<Duration> pulse_times() const;
   /// Pulses of the whole drive at this rate.
   [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;

@@ -1,7 +1,6 @@
 #include "drivers/serial/detail/fd_line.hpp"
 
 #include <errno.h>
-#include <libserialport.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <termios.h>
@@ -23,52 +22,18 @@ timespec left_until(HostStamp deadline) noexcept {
 
 }  // namespace
 
-void UniqueFd::reset(int fd) noexcept {
-  if (fd_ >= 0)
-    (void)::close(fd_);  // nothing can be done about a failure: the descriptor is free either way
-  fd_ = fd;
-}
-
-void PortCloser::operator()(sp_port* port) const noexcept {
-  (void)::sp_close(port);
-  ::sp_free_port(port);
-}
-
-DeviceStatus set_port(sp_port* port, const LineSettings& settings) noexcept {
-  if (::sp_set_baudrate(port, static_cast<int>(settings.baud)) != SP_OK ||
-      ::sp_set_bits(port, 8) != SP_OK || ::sp_set_parity(port, SP_PARITY_NONE) != SP_OK ||
-      ::sp_set_stopbits(port, settings.stop_bits) != SP_OK ||
-      ::sp_set_flowcontrol(port, SP_FLOWCONTROL_NONE) != SP_OK)
-    return ::sp_input_waiting(port) < 0 ? DeviceStatus::gone : DeviceStatus::unsupported;
-  // The library reports success for a speed that the driver rounded away.
-  sp_port_config* config = nullptr;
-  if (::sp_new_config(&config) != SP_OK) return DeviceStatus::failed;
-  int baud = 0;
-  const bool read_back =
-      ::sp_get_config(port, config) == SP_OK && ::sp_get_config_baudrate(config, &baud) == SP_OK;
-  ::sp_free_config(config);
-  const double error = static_cast<double>(baud) / static_cast<double>(settings.baud) - 1;
-  return read_back && error < 0.03 && error > -0.03 ? DeviceStatus::ok : DeviceStatus::unsupported;
-}
-
-FdLine::FdLine(UniquePort port, UniqueFd tty, UniqueFd wake, const LineSettings& settings) noexcept
-    : port_(std::move(port)),
-      tty_(std::move(tty)),
-      wake_(std::move(wake)),
-      fd_(tty_.get()),
-      settings_(settings) {
-  if (port_) (void)::sp_get_port_handle(port_.get(), &fd_);
-}
+FdLine::FdLine(UniqueFd tty, UniqueFd wake, const LineSettings& settings) noexcept
+    : tty_(std::move(tty)), wake_(std::move(wake)), settings_(settings) {}
 
 FdLine::~FdLine() {
   // Else close() waits up to half a minute for a device that takes no bytes.
-  (void)::tcflush(fd_, TCIOFLUSH);
+  (void)::tcflush(tty_.get(), TCIOFLUSH);
 }
 
 LineRead FdLine::read(std::span<std::uint8_t> out, Duration limit) noexcept {
   const HostStamp deadline = monotonic_now() + limit;
   for (;;) {  // ends: each turn that brings nothing is an interruption, bounded by the deadline
-    std::array<pollfd, 2> fds{{{fd_, POLLIN, 0}, {wake_.get(), POLLIN, 0}}};
+    std::array<pollfd, 2> fds{{{tty_.get(), POLLIN, 0}, {wake_.get(), POLLIN, 0}}};
     const timespec left = left_until(deadline);
     const int n = ::ppoll(fds.data(), fds.size(), &left, nullptr);
     if (n < 0 && errno != EINTR) return {DeviceStatus::failed, 0, monotonic_now()};
@@ -79,7 +44,7 @@ LineRead FdLine::read(std::span<std::uint8_t> out, Duration limit) noexcept {
       return {DeviceStatus::stopped, 0, {}};
     }
     if (n > 0 && fds[0].revents != 0) {
-      const ssize_t got = ::read(fd_, out.data(), out.size());
+      const ssize_t got = ::read(tty_.get(), out.data(), out.size());
       // After the read: bytes that came while it was on its way would else have arrived before they
       // were sent.
       const HostStamp arrival = monotonic_now();
@@ -97,14 +62,14 @@ LineRead FdLine::read(std::span<std::uint8_t> out, Duration limit) noexcept {
 DeviceStatus FdLine::write(std::span<const std::uint8_t> bytes, Duration limit) noexcept {
   const HostStamp deadline = monotonic_now() + limit;
   while (!bytes.empty()) {  // ends: every turn writes, or is bounded by the deadline
-    const ssize_t put = ::write(fd_, bytes.data(), bytes.size());
+    const ssize_t put = ::write(tty_.get(), bytes.data(), bytes.size());
     if (put > 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(put));
       continue;
     }
     if (put < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
       return DeviceStatus::gone;
-    pollfd p{fd_, POLLOUT, 0};
+    pollfd p{tty_.get(), POLLOUT, 0};
     const timespec left = left_until(deadline);
     const int n = ::ppoll(&p, 1, &left, nullptr);
     if (n < 0 && errno != EINTR) return DeviceStatus::failed;
@@ -118,14 +83,13 @@ DeviceStatus FdLine::set_baud(std::uint32_t baud) noexcept {
   LineSettings requested = settings_;
   requested.baud = baud;
   discard_input();
-  const DeviceStatus status =
-      port_ ? set_port(port_.get(), requested) : set_raw_tty(fd_, requested);
+  const DeviceStatus status = set_raw_tty(tty_.get(), requested);
   if (status == DeviceStatus::ok) settings_ = requested;
   discard_input();
   return status;
 }
 
-void FdLine::discard_input() noexcept { (void)::tcflush(fd_, TCIFLUSH); }
+void FdLine::discard_input() noexcept { (void)::tcflush(tty_.get(), TCIFLUSH); }
 
 void FdLine::wake() noexcept {
   const std::uint64_t one = 1;

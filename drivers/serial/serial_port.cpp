@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -26,13 +28,6 @@ fs::path resolved(const std::string& port) {
   std::error_code error;
   fs::path real = fs::canonical(port, error);
   return error ? fs::path(port) : real;
-}
-
-bool known_to_library(const fs::path& real) {
-  std::error_code error;
-  return real.parent_path() == "/dev" &&
-         fs::exists(fs::path("/sys/class/tty") / real.filename(), error) &&
-         real.filename() != "tty";
 }
 
 DeviceStatus status_of(int system_error) noexcept {
@@ -56,7 +51,16 @@ DeviceStatus status_of(int system_error) noexcept {
 
 std::string text(const char* t) { return t == nullptr ? std::string() : std::string(t); }
 
-SerialPortInfo info_of(const sp_port* port) {
+struct PortFreer {
+  void operator()(sp_port* port) const noexcept { ::sp_free_port(port); }
+};
+
+/// What the system tells of a port that is there; nothing: it has vanished, or has no hardware.
+std::optional<SerialPortInfo> info_of(const std::string& name) {
+  sp_port* found = nullptr;
+  if (::sp_get_port_by_name(name.c_str(), &found) != SP_OK) return std::nullopt;
+  const std::unique_ptr<sp_port, PortFreer> owned(found);
+  const sp_port* port = found;
   SerialPortInfo info;
   info.port = text(::sp_get_port_name(port));
   info.description = text(::sp_get_port_description(port));
@@ -101,22 +105,8 @@ DeviceStatus hold(int fd) noexcept {
   return ::ioctl(fd, TIOCEXCL) == 0 ? DeviceStatus::ok : status_of(errno);
 }
 
-/// What the library opens, or a plain tty. Not ok: both empty.
-DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, UniquePort* port,
-                      UniqueFd* tty) {
-  if (known_to_library(real)) {
-    sp_port* found = nullptr;
-    if (::sp_get_port_by_name(real.c_str(), &found) != SP_OK) return DeviceStatus::not_found;
-    UniquePort opened(found);
-    if (const sp_return r = ::sp_open(found, SP_MODE_READ_WRITE); r != SP_OK)
-      return r == SP_ERR_FAIL ? status_of(::sp_last_error_code()) : DeviceStatus::failed;
-    int fd = -1;
-    if (::sp_get_port_handle(found, &fd) != SP_OK) return DeviceStatus::failed;
-    if (const DeviceStatus s = hold(fd); s != DeviceStatus::ok) return s;
-    if (const DeviceStatus s = set_port(found, settings); s != DeviceStatus::ok) return s;
-    *port = std::move(opened);
-    return DeviceStatus::ok;
-  }
+/// Not ok: *tty is as it was.
+DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, UniqueFd* tty) {
   UniqueFd fd(::open(real.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!fd.valid()) return status_of(errno);
   if (::isatty(fd.get()) == 0) return DeviceStatus::unsupported;
@@ -133,12 +123,8 @@ DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, Unique
 // opens the ports of a PC to see whether they are there.
 std::vector<SerialPortInfo> list_serial_ports() {
   std::vector<SerialPortInfo> ports;
-  for (const std::string& name : names_of_ttys()) {
-    sp_port* found = nullptr;
-    if (::sp_get_port_by_name(name.c_str(), &found) != SP_OK) continue;  // it has vanished since
-    const UniquePort port(found);
-    ports.push_back(info_of(found));
-  }
+  for (const std::string& name : names_of_ttys())
+    if (auto info = info_of(name)) ports.push_back(std::move(*info));
   return ports;
 }
 
@@ -214,18 +200,21 @@ std::unique_ptr<ByteLine> SerialPort::open(const LineSettings& settings, DeviceS
     return nullptr;
   }
   const fs::path real = resolved(found);
-  UniquePort port;
   UniqueFd tty;
-  *status = open_tty(real, settings, &port, &tty);
+  *status = open_tty(real, settings, &tty);
   if (*status != DeviceStatus::ok) return nullptr;
   UniqueFd wake(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (!wake.valid()) {
     *status = DeviceStatus::failed;
     return nullptr;
   }
-  if (port && !converter_.decided())
-    converter_.opened(list_serial_ports(), text(::sp_get_port_usb_serial(port.get())));
-  auto line = std::make_unique<FdLine>(std::move(port), std::move(tty), std::move(wake), settings);
+  if (!converter_.decided()) {
+    const std::vector<SerialPortInfo> ports = list_serial_ports();
+    const auto same = [&](const SerialPortInfo& p) { return p.port == real.string(); };
+    if (const auto port = std::find_if(ports.begin(), ports.end(), same); port != ports.end())
+      converter_.opened(ports, port->usb_serial);
+  }
+  auto line = std::make_unique<FdLine>(std::move(tty), std::move(wake), settings);
   line->discard_input();
   return line;
 }

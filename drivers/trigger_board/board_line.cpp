@@ -6,27 +6,6 @@
 
 namespace vergence::trigger_board {
 
-namespace {
-
-constexpr std::size_t kTextAtLeast = 12;  // so many printable bytes in a row are no accident
-
-/// The first bytes may be the end of something, or of another baud rate.
-std::string_view longest_text(std::string_view received) noexcept {
-  const auto printable = [](char c) {
-    return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\t';
-  };
-  std::string_view best;
-  for (std::size_t from = 0; from < received.size(); ++from) {
-    std::size_t to = from;
-    while (to < received.size() && printable(received[to])) ++to;
-    if (to - from > best.size()) best = received.substr(from, to - from);
-    from = to;
-  }
-  return best;
-}
-
-}  // namespace
-
 void BoardLine::attach(ByteLine* line) noexcept {
   before_ = counters();
   decoder_ = {};
@@ -119,12 +98,6 @@ std::string BoardLine::received_instead() const {
     return "it speaks Xbus, as an XSens INS does";
   if (received.find("$G") != std::string_view::npos)
     return "it speaks NMEA 0183, as a GNSS receiver does";
-  if (const std::string_view text = longest_text(received); text.size() >= kTextAtLeast) {
-    std::string some(text.substr(0, 40));
-    std::replace_if(
-        some.begin(), some.end(), [](char c) { return c < ' '; }, ' ');
-    return "it writes text (\"" + some + "\")";
-  }
   return "its bytes are no frames of the trigger protocol";
 }
 

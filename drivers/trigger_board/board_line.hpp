@@ -103,8 +103,6 @@ class PauseRequest {
 
   /// The pulses of the message to send now, which sent() must follow. 0: none.
   [[nodiscard]] std::uint32_t due(HostStamp now) noexcept;
-  /// Pulses of a message that was sent and waits for its answer. 0: none does.
-  [[nodiscard]] std::uint32_t unanswered() const noexcept { return open_.pulses; }
   /// It went to the line with this sequence number.
   void sent(std::uint8_t sequence, HostStamp now) noexcept;
   /// A STATUS with this sequence number came; another message's is none of ours.

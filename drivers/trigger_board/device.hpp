@@ -69,10 +69,6 @@ class Device final : public TriggerDevice,
   /// Any thread; at most a tenth of a second old.
   [[nodiscard]] BoardStatistics board_statistics() const noexcept { return statistics_.get(); }
 
-  /// Pulses of a pause whose message was sent and is not answered yet. On the device's own thread,
-  /// in a call of its line.
-  [[nodiscard]] std::uint32_t unanswered_pause() const noexcept { return pause_.unanswered(); }
-
  private:
   [[nodiscard]] DeviceStatus open();
   [[nodiscard]] DeviceStatus meet(TriggerInfo* who);

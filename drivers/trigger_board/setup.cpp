@@ -242,7 +242,6 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
   const std::array<std::uint8_t, 1> version{trigger_protocol_version};
   const Answer answer = ask(trigger_hello, version, trigger_info, limit);
   if (answer == Answer::silent) return DeviceStatus::timeout;
-  if (answer == Answer::refused && error_ == trigger_error_version) return name_version();
   if (answer != Answer::ok) return verdict(answer, trigger_hello);
   // The version is the first byte in every version; what comes after it, only in this one.
   const unsigned theirs = frame_.size > 0 ? frame_.payload[0] : 0U;
@@ -260,25 +259,6 @@ DeviceStatus Setup::other_version(unsigned theirs) {
       "the trigger board speaks version %u of the protocol and this program version %d; flash this "
       "release's firmware",
       theirs, static_cast<int>(trigger_protocol_version));
-  return DeviceStatus::unsupported;
-}
-
-/// A board refuses every version but its own: the one that it does not refuse is its.
-DeviceStatus Setup::name_version() {
-  constexpr std::uint8_t kNewest = 32;
-  constexpr Duration kSoon = Duration::milliseconds(150);
-  for (std::uint8_t v = 0; v < kNewest; ++v) {
-    if (v == trigger_protocol_version) continue;
-    const std::array<std::uint8_t, 1> version{v};
-    const Answer answer = ask(trigger_hello, version, trigger_info, kSoon);
-    if (answer == Answer::ok) return other_version(v);
-    if (answer != Answer::refused) break;
-  }
-  last_error_ = text(
-      "the trigger board does not speak version %d of the protocol, as this program does, nor any "
-      "below %d; flash this release's "
-      "firmware",
-      static_cast<int>(trigger_protocol_version), static_cast<int>(kNewest));
   return DeviceStatus::unsupported;
 }
 

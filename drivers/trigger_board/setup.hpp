@@ -64,7 +64,6 @@ class Setup {
                                         TriggerStatus* status, Fits fits);
   [[nodiscard]] DeviceStatus hello(Duration limit, TriggerInfo* info);
   [[nodiscard]] DeviceStatus other_version(unsigned theirs);
-  [[nodiscard]] DeviceStatus name_version();
   [[nodiscard]] DeviceStatus verdict(Answer answer, std::uint8_t type);
 
   ByteLine& line_;

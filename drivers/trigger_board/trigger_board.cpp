@@ -37,7 +37,11 @@ std::vector<std::string> Driver::candidates() const {
 std::unique_ptr<Device> Driver::open_port(const std::string& port, DeviceStatus* status) {
   Options options = options_;
   options.native_usb = options.native_usb || is_native_usb(port);
-  return open_on(ports_.at(port), options, status, &last_error_);
+  auto device = std::make_unique<Device>(ports_.at(port), options);
+  *status = device->connect();
+  if (*status == DeviceStatus::ok) return device;
+  last_error_ = device->last_error();
+  return nullptr;
 }
 
 std::vector<DeviceInfo> Driver::enumerate() {
@@ -89,15 +93,6 @@ std::unique_ptr<Device> Driver::open_board(std::string_view where, DeviceStatus*
 
 std::unique_ptr<TriggerDevice> Driver::open(std::string_view where, DeviceStatus* status) {
   return open_board(where, status);
-}
-
-std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place, const Options& options,
-                                DeviceStatus* status, std::string* error) {
-  auto device = std::make_unique<Device>(std::move(place), options);
-  *status = device->connect();
-  if (*status == DeviceStatus::ok) return device;
-  *error = device->last_error();
-  return nullptr;
 }
 
 }  // namespace vergence::trigger_board

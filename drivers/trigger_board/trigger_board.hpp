@@ -55,9 +55,4 @@ class Driver final : public TriggerDriver {
 /// The port is the board's own USB: bytes take no time on a line.
 [[nodiscard]] bool is_native_usb(const std::string& port);
 
-/// The same on any line: simulators, recordings, tests. Null: *status and *error say why.
-[[nodiscard]] std::unique_ptr<Device> open_on(std::unique_ptr<LinePlace> place,
-                                              const Options& options, DeviceStatus* status,
-                                              std::string* error);
-
 }  // namespace vergence::trigger_board

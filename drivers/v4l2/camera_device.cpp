@@ -347,10 +347,11 @@ DeviceStatus V4l2Camera::start_streaming() {
     return refuse(DeviceStatus::no_bandwidth,
                   "its bus has no room for another stream: a lower rate, a smaller size, or a port "
                   "of another USB controller");
-  const std::string advice = media_advice(node_.path);
-  return refuse(DeviceStatus::failed, std::string("it does not begin to stream: ") +
-                                          std::strerror(error) +
-                                          (advice.empty() ? "" : "\n" + advice));
+  // EPIPE, ENOLINK: the links or formats of the sensor's media controller do not fit together.
+  const bool pipeline = error == EPIPE || error == ENOLINK;
+  return refuse(DeviceStatus::failed,
+                std::string("it does not begin to stream: ") + std::strerror(error) +
+                    (pipeline ? "; look at the chain behind it with media-ctl -p" : ""));
 }
 
 /// After it the owner alone has the camera.

@@ -62,11 +62,6 @@ bool same_file(const fs::path& a, const fs::path& b) {
 
 }  // namespace
 
-void UniqueFd::reset(int fd) noexcept {
-  if (fd_ >= 0) (void)::close(fd_);
-  fd_ = fd;
-}
-
 int control(int fd, unsigned long request, void* argument) noexcept {
   int result = 0;
   do result = ::ioctl(fd, request, argument);

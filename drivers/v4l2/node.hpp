@@ -3,32 +3,12 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "drivers/device.hpp"
+#include "drivers/unique_fd.hpp"
 
 namespace vergence::v4l2 {
-
-/// A descriptor that closes itself.
-class UniqueFd {
- public:
-  UniqueFd() noexcept = default;
-  explicit UniqueFd(int fd) noexcept : fd_(fd) {}
-  UniqueFd(UniqueFd&& o) noexcept : fd_(std::exchange(o.fd_, -1)) {}
-  UniqueFd& operator=(UniqueFd&& o) noexcept {
-    if (this != &o) reset(std::exchange(o.fd_, -1));
-    return *this;
-  }
-  ~UniqueFd() { reset(); }
-
-  void reset(int fd = -1) noexcept;
-  [[nodiscard]] int get() const noexcept { return fd_; }
-  [[nodiscard]] bool valid() const noexcept { return fd_ >= 0; }
-
- private:
-  int fd_ = -1;
-};
 
 /// ioctl(2), again after a signal. → 0 or the errno.
 [[nodiscard]] int control(int fd, unsigned long request, void* argument) noexcept;

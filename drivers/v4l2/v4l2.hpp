@@ -1,6 +1,5 @@
 #pragma once
 #include <memory>
-#include <string>
 
 #include "drivers/camera.hpp"
 
@@ -25,13 +24,5 @@ namespace vergence::v4l2 {
 /// Errors     configure(): also `busy`, another program streams from it. start(): also `failed`,
 ///            the sentence has the kernel's reason.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_driver();
-
-/// What a field engineer needs when a node refuses to stream: the chain of entities from the sensor
-/// to that node with the formats of their pads, and the media-ctl commands that look at it and mend
-/// it. Empty: the node has no media controller (USB cameras need none), or does not exist. Several
-/// lines.
-///
-/// Threads  Any; opens and closes device nodes. Allocates.
-[[nodiscard]] std::string media_advice(const std::string& node);
 
 }  // namespace vergence::v4l2

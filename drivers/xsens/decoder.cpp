@@ -207,11 +207,8 @@ void place(const std::optional<std::array<double, 2>>& latitude_longitude,
 template <class Data>
 void fill_motion(const Data& d, LocalFrame orientation_frame, LocalFrame velocity_frame,
                  InsSample* s) noexcept {
-  std::optional<std::array<double, 4>> q = d.quaternion;
-  if (!q && d.euler_deg) q = quaternion_of_euler(*d.euler_deg);
-  if (!q && d.rotation_matrix) q = quaternion_of_matrix(*d.rotation_matrix);
-  if (q) {
-    if (const auto enu = enu_attitude(*q, orientation_frame)) {
+  if (d.quaternion) {
+    if (const auto enu = enu_attitude(*d.quaternion, orientation_frame)) {
       s->q_enu_ins = *enu;
       s->attitude_valid = true;
     }
@@ -238,20 +235,6 @@ std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& w
   if (!(n > kLeast && n < kMost)) return std::nullopt;
   const Eigen::Quaterniond enu = enu_from(frame) * Eigen::Quaterniond(q.coeffs() / n);
   return std::array{enu.x(), enu.y(), enu.z(), enu.w()};
-}
-
-std::array<double, 4> quaternion_of_euler(const Three& deg) noexcept {
-  const Eigen::Quaterniond q =
-      Eigen::AngleAxisd(deg[2] * kRadiansPerDegree, Eigen::Vector3d::UnitZ()) *
-      Eigen::AngleAxisd(deg[1] * kRadiansPerDegree, Eigen::Vector3d::UnitY()) *
-      Eigen::AngleAxisd(deg[0] * kRadiansPerDegree, Eigen::Vector3d::UnitX());
-  return {q.w(), q.x(), q.y(), q.z()};
-}
-
-std::array<double, 4> quaternion_of_matrix(const std::array<double, 9>& rows) noexcept {
-  const Eigen::Quaterniond q(
-      Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data())));
-  return {q.w(), q.x(), q.y(), q.z()};
 }
 
 std::array<double, 3> enu_vector(const Three& v, LocalFrame frame) noexcept {
@@ -428,8 +411,7 @@ bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t 
     receiver_ = receiver_of(*d.gnss_pvt, arrival_);
   }
   // A receiver's message has no sample of its own.
-  if (!d.sample_time_fine ||
-      !(d.quaternion || d.euler_deg || d.rotation_matrix || d.latitude_longitude_deg)) {
+  if (!d.sample_time_fine || !(d.quaternion || d.latitude_longitude_deg)) {
     const bool receivers = d.gnss_pvt || d.satellites;
     counters_.malformed += receivers || d.sample_time_fine ? 0U : 1U;
     counters_.incomplete += !receivers && d.sample_time_fine ? 1U : 0U;

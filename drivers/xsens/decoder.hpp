@@ -123,11 +123,6 @@ class SampleCounter {
 /// boresight's affair.
 [[nodiscard]] std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& wxyz,
                                                                 xbus::LocalFrame frame) noexcept;
-/// The same of roll, pitch, yaw in degrees, and of a rotation matrix row by row.
-[[nodiscard]] std::array<double, 4> quaternion_of_euler(
-    const xbus::Three& roll_pitch_yaw_deg) noexcept;  // → w x y z
-[[nodiscard]] std::array<double, 4> quaternion_of_matrix(
-    const std::array<double, 9>& rows) noexcept;  // → w x y z
 [[nodiscard]] std::array<double, 3> enu_vector(const xbus::Three& v,
                                                xbus::LocalFrame frame) noexcept;
 

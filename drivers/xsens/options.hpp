@@ -7,20 +7,11 @@
 
 namespace vergence::xsens {
 
-/// What SyncIn shall do.
-enum class SyncIn : std::uint8_t {
-  leave,  // as the device has it
-  off,
-  rising,  // an edge marks the time (MTi-G-700/710), or makes the MTi-G send its newest sample
-  falling,
-};
-
 /// How an XSens INS is to be set. Defaults leave alone what is not named.
 struct Options {
   std::uint32_t baud = 0;        // 0: as the device has it
   double sync_out_hz = 0;        // 0: as the device has it; negative: off
   double sync_out_width_ms = 1;  // of its pulse
-  SyncIn sync_in = SyncIn::leave;
   Duration processing = Duration::milliseconds(
       2);  // from a sample to its first byte on the wire: acquisition and filter
 };

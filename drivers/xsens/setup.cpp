@@ -375,14 +375,7 @@ DeviceStatus Setup::set_legacy_lines(double rate_hz, StreamSettings* stream) {
       if (const DeviceStatus s = out(parameter, value); s != DeviceStatus::ok) return s;
     stream->sync_out_hz = actual;
   }
-  if (options_.sync_in == SyncIn::leave) return DeviceStatus::ok;
-  constexpr std::uint16_t kSendLatest = 4, kRising = 1, kFalling = 2;
-  const std::uint16_t mode =
-      options_.sync_in == SyncIn::off
-          ? std::uint16_t{0}
-          : static_cast<std::uint16_t>(kSendLatest |
-                                       (options_.sync_in == SyncIn::rising ? kRising : kFalling));
-  return set_legacy_line(MessageId::legacy_sync_in, LegacySync::mode, mode);
+  return DeviceStatus::ok;
 }
 
 namespace {
@@ -469,7 +462,7 @@ DeviceStatus Setup::set_mark4(double rate_hz, StreamSettings* stream) {
 }
 
 DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
-  if (options_.sync_out_hz == 0 && options_.sync_in == SyncIn::leave) return DeviceStatus::ok;
+  if (options_.sync_out_hz == 0) return DeviceStatus::ok;
   if (const DeviceStatus s =
           write(MessageId::sync_settings, {}, "the question for its synchronisation lines");
       s != DeviceStatus::ok)
@@ -480,37 +473,23 @@ DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
     return DeviceStatus::unsupported;
   }
   // The list replaces the old one: other entries, the receiver's clock among them, stay.
-  const auto ours = [this](const SyncEntry& e) {
-    return (options_.sync_out_hz != 0 && e.function == kSyncIntervalTransition &&
-            e.line == kSyncLineOut) ||
-           (options_.sync_in != SyncIn::leave && e.function == kSyncTriggerIndication &&
-            e.line == kSyncLineIn1);
-  };
   SyncSettings requested;
   for (const SyncEntry& e : has.items())
-    if (!ours(e)) requested.entries[requested.count++] = e;
-  const auto add = [&requested](const SyncEntry& e) {
-    if (requested.count == requested.entries.size()) return false;
-    requested.entries[requested.count++] = e;
-    return true;
-  };
-  bool room = true;
+    if (e.function != kSyncIntervalTransition || e.line != kSyncLineOut)
+      requested.entries[requested.count++] = e;
   if (options_.sync_out_hz > 0) {
+    if (requested.count == requested.entries.size()) {
+      last_error_ =
+          "its list of synchronisation settings is full; clear it with the maker's program";
+      return DeviceStatus::unsupported;
+    }
     double actual = 0;
     const std::uint16_t skip = sync_out_skip(kSyncOutBase, options_.sync_out_hz, &actual);
     const auto width = static_cast<std::uint16_t>(
         std::clamp(std::lround(options_.sync_out_width_ms * 10), 1L, 1000L));
-    room = add({kSyncIntervalTransition, kSyncLineOut, kSyncPositive, 0, 0, skip, width, 0});
+    requested.entries[requested.count++] = {
+        kSyncIntervalTransition, kSyncLineOut, kSyncPositive, 0, 0, skip, width, 0};
     stream->sync_out_hz = actual;
-  }
-  if (options_.sync_in == SyncIn::rising || options_.sync_in == SyncIn::falling)
-    room =
-        add({kSyncTriggerIndication, kSyncLineIn1,
-             options_.sync_in == SyncIn::rising ? kSyncPositive : kSyncNegative, 0, 0, 0, 0, 0}) &&
-        room;
-  if (!room) {
-    last_error_ = "its list of synchronisation settings is full; clear it with the maker's program";
-    return DeviceStatus::unsupported;
   }
   if (requested == has) return DeviceStatus::ok;
   std::array<std::uint8_t, kSyncEntrySize * kMostSyncEntries> bytes{};

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "drivers/ins.hpp"
-#include "drivers/serial/byte_line.hpp"
 #include "drivers/xsens/options.hpp"
 
 namespace vergence::xsens {
@@ -30,10 +29,5 @@ class Driver final : public InsDriver {
   Options options_;
   std::string last_error_;
 };
-
-/// The same on any line: simulators, tests. Null: *status and *error say why.
-[[nodiscard]] std::unique_ptr<InsDevice> open_on(std::unique_ptr<LinePlace> place,
-                                                 const Options& options, DeviceStatus* status,
-                                                 std::string* error);
 
 }  // namespace vergence::xsens

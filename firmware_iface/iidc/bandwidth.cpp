@@ -23,10 +23,4 @@ std::size_t packet_for_units(unsigned units, BusSpeed speed) noexcept {
   return quadlets <= 3 ? 0 : std::min((quadlets - 3) * 4, largest_packet(speed));
 }
 
-unsigned total_units(std::span<const BusShare> shares) noexcept {
-  unsigned sum = 0;
-  for (const BusShare& s : shares) sum += bandwidth_units(s.packet_bytes, s.speed);
-  return sum;
-}
-
 }  // namespace vergence::iidc

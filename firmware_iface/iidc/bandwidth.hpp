@@ -1,7 +1,6 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string_view>
 
 /// How much of an IEEE 1394 bus a stream takes.
@@ -25,12 +24,5 @@ inline constexpr unsigned kBandwidthUnits = 4915;
 }
 /// The largest packet, a multiple of four, that these units carry; never above largest_packet().
 [[nodiscard]] std::size_t packet_for_units(unsigned units, BusSpeed speed) noexcept;
-
-struct BusShare {
-  std::size_t packet_bytes = 0;
-  BusSpeed speed = BusSpeed::s400;
-  std::size_t image_bytes = 0;  // of the stream: for the rate in the advice
-};
-[[nodiscard]] unsigned total_units(std::span<const BusShare> shares) noexcept;
 
 }  // namespace vergence::iidc

@@ -128,12 +128,9 @@ struct SyncEntry {
   std::int16_t delay = 0;   // 100 µs
   constexpr bool operator==(const SyncEntry&) const noexcept = default;
 };
-inline constexpr std::uint8_t kSyncTriggerIndication = 3;
 inline constexpr std::uint8_t kSyncIntervalTransition = 4;  // SyncOut
-inline constexpr std::uint8_t kSyncLineIn1 = 2;
 inline constexpr std::uint8_t kSyncLineOut = 4;
 inline constexpr std::uint8_t kSyncPositive = 1;
-inline constexpr std::uint8_t kSyncNegative = 2;
 inline constexpr double kSyncOutBase = 400;  // Hz: SyncOut counts this, whatever the data rate
 inline constexpr std::size_t kSyncEntrySize = 12;
 inline constexpr std::size_t kMostSyncEntries = 16;

@@ -56,12 +56,6 @@ def gnss() -> dict:
             "pvt": ubx(1, 7, pvt)}
 
 
-def chunk_data() -> dict:
-    exposure = struct.pack(">d", 8000.0)
-    tail = exposure + struct.pack(">II", 0x1234, len(exposure)) + b"\0\0\0\1" + struct.pack(">II", 0x99, 4)
-    return {"real": struct.pack(">IBBBB", 0x1234, 0, 0, 8, 3) + tail, "integer": struct.pack(">IBBBB", 0x99, 0, 0, 4, 2) + tail}
-
-
 def rom() -> dict:
     quadlets = [0x04040000, 0x31333934, 0x2000A002, 0x00B09D01, 0x00123456, 0x00030000, 0x0300B09D, 0x0C0083C0, 0xD1000002, 0,
                 0x00030000, 0x1200A02D, 0x13000102, 0xD4000002, 0, 0x00040000, 0x403C0000, 0x81000003, 0x82000008, 0x38000010,
@@ -168,7 +162,7 @@ def main() -> int:
         write_bags(Path(folder) / "bags")
         bags = {p.name: p.read_bytes() for p in (Path(folder) / "bags").iterdir()}
     configurations = {p.name: p.read_bytes() for p in examples.glob("*.yaml")}
-    corpora = {"xbus": xbus(), "gnss": gnss(), "trigger": {"script": bytes(range(256))}, "iidc_rom": rom(), "gige_chunks": chunk_data(),
+    corpora = {"xbus": xbus(), "gnss": gnss(), "trigger": {"script": bytes(range(256))}, "iidc_rom": rom(),
                "http_request": requests(), "image_file": {"grey.png": png(16, 12, 1), "grey.pgm": b"P5 4 3 255\n" + bytes(12), "deep.ppm": b"P6\n# c\n2 2\n65535\n" + bytes(24),
                                                                    "grey.bmp": bmp(8), "colour.bmp": bmp(24), "alpha.bmp": bmp(32)}, "configuration": configurations,
                "calibration": calibrations() | other_calibrations(), "text_readers": texts(), "data_set": data_sets(), "bag": bags, "recording": recordings(program, examples)}

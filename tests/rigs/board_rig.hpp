@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "drivers/clock.hpp"
-#include "drivers/mock/simulators/board_simulator.hpp"
 #include "tests/rigs/emulator.hpp"
 #include "tests/support/device_terminal.hpp"
+#include "tests/support/simulators/board_simulator.hpp"
 
 namespace vergence::test {
 
@@ -24,36 +24,35 @@ class BoardBehindConverter {
   static constexpr const char* kWire = "/run/vergence-board";
 
   /// `told`: of every pulse as it is made; returns what the cameras' exposure outputs do.
-  explicit BoardBehindConverter(mock::PulseSource told = {},
-                                mock::BoardSimulatorOptions options = {})
+  explicit BoardBehindConverter(PulseSource told = {}, BoardSimulatorOptions options = {})
       : converter_("sim_ftdi", {"--wire", kWire, "--serial", "VGBOARD1"}), told_(std::move(told)) {
     options.power_on = monotonic_now();
-    auto board = std::make_unique<mock::BoardSimulator>(
-        [this](const mock::SimulatedPulse& pulse) { return take(pulse); }, options);
+    auto board = std::make_unique<BoardSimulator>(
+        [this](const SimulatedPulse& pulse) { return take(pulse); }, options);
     board_ = std::make_unique<DeviceOnDescriptor>(::open(kWire, O_RDWR | O_NOCTTY | O_NONBLOCK),
                                                   std::move(board));
   }
 
   [[nodiscard]] Emulator& converter() noexcept { return converter_; }
   /// Every pulse that was made, with its true time.
-  [[nodiscard]] std::vector<mock::SimulatedPulse> pulses() const {
+  [[nodiscard]] std::vector<SimulatedPulse> pulses() const {
     const std::lock_guard lock(mutex_);
     return pulses_;
   }
 
  private:
-  mock::SimulatedExposures take(const mock::SimulatedPulse& pulse) {
+  SimulatedExposures take(const SimulatedPulse& pulse) {
     {
       const std::lock_guard lock(mutex_);
       pulses_.push_back(pulse);
     }
-    return told_ ? told_(pulse) : mock::SimulatedExposures{};
+    return told_ ? told_(pulse) : SimulatedExposures{};
   }
 
   Emulator converter_;
-  mock::PulseSource told_;
+  PulseSource told_;
   mutable std::mutex mutex_;
-  std::vector<mock::SimulatedPulse> pulses_;
+  std::vector<SimulatedPulse> pulses_;
   std::unique_ptr<DeviceOnDescriptor> board_;
 };
 

@@ -33,8 +33,8 @@ constexpr std::int64_t ahead_ns(LoopSize size) noexcept {
   throw std::runtime_error(node + ": " + what + ": " + std::strerror(error));
 }
 
-v4l2::UniqueFd open_rw(const std::string& node) {
-  v4l2::UniqueFd fd(::open(node.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+UniqueFd open_rw(const std::string& node) {
+  UniqueFd fd(::open(node.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
   if (!fd.valid()) fail(node, "open", errno);
   return fd;
 }
@@ -45,7 +45,7 @@ void must(const std::string& node, int fd, unsigned long request, void* argument
 }
 
 void set_timings(const std::string& node, LoopSize size) {
-  const v4l2::UniqueFd fd = open_rw(node);
+  const UniqueFd fd = open_rw(node);
   v4l2_dv_timings vga = V4L2_DV_BT_DMT_640X480P60;
   v4l2_dv_timings hd = V4L2_DV_BT_CEA_1280X720P30;
   v4l2_dv_timings& t = size == LoopSize::vga ? vga : hd;
@@ -71,7 +71,7 @@ v4l2_buffer description(std::uint32_t index, std::uint32_t bytes) {
 }  // namespace
 
 void set_control(const std::string& node, const std::string& key, std::int64_t value) {
-  const v4l2::UniqueFd fd = open_rw(node);
+  const UniqueFd fd = open_rw(node);
   v4l2::Controls controls;
   controls.add(fd.get());
   const v4l2::Control* c = controls.find(key);

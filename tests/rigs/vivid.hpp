@@ -69,7 +69,7 @@ class VividPlayer {
 
  private:
   struct Output {
-    v4l2::UniqueFd fd;
+    UniqueFd fd;
     std::vector<std::span<std::uint8_t>> buffers;
     std::vector<std::int64_t> numbers;  // by buffer; they are shown in the order of buffers
     std::size_t current = 0;            // the buffer that is shown

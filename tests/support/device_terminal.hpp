@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "drivers/clock.hpp"
-#include "drivers/mock/simulators/device_model.hpp"
+#include "tests/support/simulators/device_model.hpp"
 
 namespace vergence::test {
 
@@ -28,7 +28,7 @@ namespace vergence::test {
 /// destruction.
 class DeviceOnDescriptor {
  public:
-  DeviceOnDescriptor(int descriptor, std::unique_ptr<mock::DeviceModel> device)
+  DeviceOnDescriptor(int descriptor, std::unique_ptr<DeviceModel> device)
       : descriptor_(descriptor), device_(std::move(device)) {
     if (descriptor_ < 0) throw std::runtime_error("no terminal for the simulated device");
     thread_ = std::thread([this] { work(); });
@@ -71,7 +71,7 @@ class DeviceOnDescriptor {
   }
 
   int descriptor_;
-  std::unique_ptr<mock::DeviceModel> device_;
+  std::unique_ptr<DeviceModel> device_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };
@@ -79,7 +79,7 @@ class DeviceOnDescriptor {
 /// The same behind a pseudo-terminal: port() is what a driver opens.
 class DeviceOnTerminal {
  public:
-  explicit DeviceOnTerminal(std::unique_ptr<mock::DeviceModel> device)
+  explicit DeviceOnTerminal(std::unique_ptr<DeviceModel> device)
       : master_(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
     if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0)
       throw std::runtime_error("no pseudo-terminal");

@@ -96,15 +96,6 @@ void GigeCamera::tear_frames(int exposures) {
   impl_->tear_ += exposures;
 }
 void GigeCamera::set_loss(double share) { impl_->sender.set_loss(share); }
-void GigeCamera::garble_chunks(int exposures) {
-  const std::lock_guard lock(impl_->mutex_);
-  impl_->garble_ += exposures;
-}
-double GigeCamera::exposed(std::uint64_t number) const {
-  const std::lock_guard lock(impl_->mutex_);
-  const auto at = impl_->exposed_.find(number);
-  return at == impl_->exposed_.end() ? 0 : at->second;
-}
 void GigeCamera::lie_about_size(int width, int height) {
   const std::lock_guard lock(impl_->mutex_);
   impl_->lie_width_ = width;
@@ -119,7 +110,6 @@ GigeCameraReport GigeCamera::report() const {
   r.starts = impl_->starts_;
   return r;
 }
-std::vector<std::uint64_t> GigeCamera::whole() const { return impl_->sender.whole(); }
 std::uint32_t GigeCamera::read(std::uint32_t address) const { return impl_->get(address); }
 void GigeCamera::write(std::uint32_t address, std::uint32_t value) { impl_->set(address, value); }
 std::uint64_t GigeCamera::ticks(HostStamp host) const { return impl_->ticks(host); }

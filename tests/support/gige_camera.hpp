@@ -21,13 +21,8 @@ struct GigeCameraOptions {
   bool extended_ids = false;           // 64-bit block ids
   bool old_names =
       false;  // ExposureTimeAbs, GainRaw, AcquisitionFrameRateAbs as cameras before SFNC 2.0
-  bool discoverable = true;  // answers broadcasts
-  std::uint64_t seed = 1;    // of the packets that are lost
-  bool chunks = false;       // has chunk data: the exposure, the time stamp
-  std::uint32_t chunk_payload =
-      0x4001;  // payload type then: image with chunks; 5: extended chunk data; 4: chunk data
-  /// How long image `number` was really exposed, µs, of what the registers say; empty: as they say.
-  std::function<double(std::uint64_t number, double us)> exposures{};
+  bool discoverable = true;   // answers broadcasts
+  std::uint64_t seed = 1;     // of the packets that are lost
   bool number_images = true;  // the first 8 bytes of an image are its number, little endian
   /// Pixels of image `number`, width × height bytes that stay valid; empty: a pattern of the
   /// simulator's own.
@@ -71,8 +66,7 @@ class GigeCamera {
   void lose_frames(int exposures);  // the next ones are not sent at all
   void tear_frames(
       int exposures);  // of the next ones one packet of data is not sent and not sent again
-  void set_loss(double share);        // of the packets, those sent again too
-  void garble_chunks(int exposures);  // the next ones have nonsense behind their pixels
+  void set_loss(double share);  // of the packets, those sent again too
   void lie_about_size(int width,
                       int height);  // sends this size, whatever the registers say; 0: honest again
   /// A pulse at Line1: one exposure of image `number` where the camera waits for one. `when`: its
@@ -82,14 +76,9 @@ class GigeCamera {
   void take_control(bool taken);
 
   [[nodiscard]] GigeCameraReport report() const;
-  /// Numbers of the images that were sent whole, in order.
-  [[nodiscard]] std::vector<std::uint64_t> whole() const;
   /// A bootstrap register or one of the features.
   [[nodiscard]] std::uint32_t read(std::uint32_t address) const;
   void write(std::uint32_t address, std::uint32_t value);
-  /// How long image `number` was exposed, µs, as its chunk data say where it has them; 0: there is
-  /// no such image.
-  [[nodiscard]] double exposed(std::uint64_t number) const;
   /// The device clock at a time of the host's, in its ticks.
   [[nodiscard]] std::uint64_t ticks(HostStamp host) const;
   [[nodiscard]] bool acquiring() const;
@@ -115,8 +104,7 @@ inline constexpr std::uint32_t width = 0x10000, height = 0x10004, offset_x = 0x1
                                locked = 0x1005C, ptp_enable = 0x10060, ptp_status = 0x10064,
                                gain_raw = 0x10068, sensor_width = 0x1006C, sensor_height = 0x10070,
                                line_selector = 0x10074, line_mode = 0x10078, line_source = 0x1007C,
-                               chunk_mode = 0x10080, chunk_selector = 0x10084,
-                               chunk_enable = 0x10088, temperature = 0x1008C;
+                               chunk_mode = 0x10080, temperature = 0x1008C;
 }  // namespace gige_register
 
 /// The GenICam description of such a camera.

@@ -82,8 +82,6 @@ void GigeCamera::Impl::reset() {
   put(exposure_auto, 2);  // as many cameras come: on
   put(gain_auto, 2);
   put(line_selector, 1);
-  chunks_enabled_ = 1;
-  put(chunk_enable, 1);
   put(ptp_status, 3);
   acquiring_ = false;
   controller_ = {};
@@ -92,10 +90,7 @@ void GigeCamera::Impl::reset() {
 }
 
 std::uint32_t GigeCamera::Impl::payload() const {
-  const std::uint32_t pixels = word(width) * word(height) * (word(pixel_format) >> 16U & 0xFFU) / 8;
-  if (word(chunk_mode) == 0) return pixels;
-  return pixels + 8 + (has_chunk(kSelectExposure) ? exposure_bytes() + 8 : 0) +
-         (has_chunk(kSelectTimestamp) ? 16 : 0);
+  return word(width) * word(height) * (word(pixel_format) >> 16U & 0xFFU) / 8;
 }
 
 void GigeCamera::Impl::take_control(bool taken) {
@@ -277,14 +272,6 @@ std::uint32_t GigeCamera::Impl::store(std::uint32_t address, std::uint32_t value
     case ptp_enable:
       put(ptp_status, value != 0 ? 9 : 3);
       break;
-    case chunk_selector:
-      put(chunk_enable, has_chunk(value & 31U) ? 1 : 0);
-      break;
-    case chunk_enable: {
-      const std::uint32_t bit = 1U << (word(chunk_selector) & 31U);
-      chunks_enabled_ = (value != 0 ? chunks_enabled_ | bit : chunks_enabled_ & ~bit) | 1U;
-      break;
-    }
     case kPacketSize:
       put(address, value & ~kFireTest);
       follow_registers();

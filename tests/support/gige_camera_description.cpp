@@ -13,91 +13,40 @@ class Description {
  public:
   void integer(const char* name, std::uint32_t address, const std::string& limits,
                const char* access = "RW") {
-    feature(name);
-    text_ +=
-        fmt::format("<Integer Name=\"{0}\"><pValue>{0}Reg</pValue>{1}</Integer>\n", name, limits);
-    text_ += fmt::format(
-        "<IntReg "
-        "Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</"
-        "AccessMode><pPort>Device</pPort>"
-        "<Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></"
-        "IntReg>\n",
-        name, address, access);
+    feature("Integer", name, limits, "IntReg", address, kUnsigned, access);
   }
   void number(const char* name, std::uint32_t address, double least, double most,
               const char* unit) {
-    feature(name);
-    text_ += fmt::format(
-        "<Float "
-        "Name=\"{0}\"><pValue>{0}Reg</pValue><Min>{1}</Min><Max>{2}</Max><Unit>{3}</Unit></"
-        "Float>\n",
-        name, least, most, unit);
-    text_ += fmt::format(
-        "<FloatReg "
-        "Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>RW</"
-        "AccessMode><pPort>Device</pPort>"
-        "<Cachable>NoCache</Cachable><Endianess>BigEndian</Endianess></FloatReg>\n",
-        name, address);
+    feature("Float", name,
+            fmt::format("<Min>{}</Min><Max>{}</Max><Unit>{}</Unit>", least, most, unit), "FloatReg",
+            address, "");
   }
   void boolean(const char* name, std::uint32_t address) {
-    feature(name);
-    text_ += fmt::format(
-        "<Boolean "
-        "Name=\"{0}\"><pValue>{0}Reg</pValue><OnValue>1</OnValue><OffValue>0</OffValue></"
-        "Boolean>\n",
-        name);
-    reg(name, address, "RW");
+    feature("Boolean", name, "<OnValue>1</OnValue><OffValue>0</OffValue>", "IntReg", address,
+            kUnsigned);
   }
   void command(const char* name, std::uint32_t address) {
-    feature(name);
-    text_ += fmt::format(
-        "<Command Name=\"{0}\"><pValue>{0}Reg</pValue><CommandValue>1</CommandValue></Command>\n",
-        name);
-    reg(name, address, "WO");
+    feature("Command", name, kOne, "IntReg", address, kUnsigned, "WO");
   }
   void choice(const char* name, std::uint32_t address,
               const std::vector<std::pair<const char*, std::uint32_t>>& entries) {
-    feature(name);
-    text_ += fmt::format("<Enumeration Name=\"{}\">", name);
+    std::string all;
     for (const auto& [entry, value] : entries)
-      text_ += fmt::format("<EnumEntry Name=\"{}\"><Value>{}</Value></EnumEntry>", entry, value);
-    text_ += fmt::format("<pValue>{}Reg</pValue></Enumeration>\n", name);
-    reg(name, address, "RW");
+      all += fmt::format("<EnumEntry Name=\"{}\"><Value>{}</Value></EnumEntry>", entry, value);
+    feature("Enumeration", name, all, "IntReg", address, kUnsigned);
   }
   void bits(const char* name, std::uint32_t address, int lsb, int msb, const std::string& limits) {
-    feature(name);
-    text_ +=
-        fmt::format("<Integer Name=\"{0}\"><pValue>{0}Reg</pValue>{1}</Integer>\n", name, limits);
-    masked(name, address, lsb, msb, "RW");
+    feature("Integer", name, limits, "MaskedIntReg", address, mask(lsb, msb));
   }
   void bit_command(const char* name, std::uint32_t address, int bit) {
-    feature(name);
-    text_ += fmt::format(
-        "<Command Name=\"{0}\"><pValue>{0}Reg</pValue><CommandValue>1</CommandValue></Command>\n",
-        name);
-    masked(name, address, bit, bit, "RW");
+    feature("Command", name, kOne, "MaskedIntReg", address, mask(bit, bit));
   }
   void text(const char* name, std::uint32_t address, int length) {
-    feature(name);
+    list(name);
     text_ += fmt::format(
-        "<StringReg "
-        "Name=\"{}\"><Address>{}</Address><Length>{}</Length><AccessMode>RO</"
-        "AccessMode><pPort>Device</pPort></StringReg>\n",
+        "<StringReg Name=\"{}\"><Address>{}</Address><Length>{}</Length>"
+        "<AccessMode>RO</AccessMode><pPort>Device</pPort></StringReg>\n",
         name, address, length);
-  }
-  /// A number in the chunk `id` (hexadecimal).
-  void chunk(const char* name, const char* id, int length, const char* endianness) {
-    feature(name);
-    const std::string reg = fmt::format("{}Reg", name);
-    text_ +=
-        fmt::format("<Float Name=\"{}\"><pValue>{}</pValue><Unit>us</Unit></Float>\n", name, reg);
-    text_ += fmt::format(
-        "<FloatReg "
-        "Name=\"{0}\"><Address>0</Address><Length>{1}</Length><AccessMode>RO</"
-        "AccessMode><pPort>{0}Port</pPort>"
-        "<Cachable>NoCache</Cachable><Endianess>{2}</Endianess></FloatReg>\n<Port "
-        "Name=\"{0}Port\"><ChunkID>{3}</ChunkID></Port>\n",
-        reg, length, endianness, id);
   }
   [[nodiscard]] std::string done() const {
     return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
@@ -114,24 +63,22 @@ class Description {
   }
 
  private:
-  void feature(const char* name) { features_ += fmt::format("<pFeature>{}</pFeature>\n", name); }
-  void reg(const char* name, std::uint32_t address, const char* access) {
-    text_ += fmt::format(
-        "<IntReg "
-        "Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</"
-        "AccessMode><pPort>Device</pPort>"
-        "<Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></"
-        "IntReg>\n",
-        name, address, access);
+  static constexpr const char* kUnsigned = "<Sign>Unsigned</Sign>";
+  static constexpr const char* kOne = "<CommandValue>1</CommandValue>";
+  static std::string mask(int lsb, int msb) {
+    return fmt::format("<LSB>{}</LSB><MSB>{}</MSB>{}", lsb, msb, kUnsigned);
   }
-  void masked(const char* name, std::uint32_t address, int lsb, int msb, const char* access) {
+  void list(const char* name) { features_ += fmt::format("<pFeature>{}</pFeature>\n", name); }
+  /// A node of this kind, and the register behind it.
+  void feature(const char* kind, const char* name, const std::string& inner, const char* reg_kind,
+               std::uint32_t address, const std::string& of_reg, const char* access = "RW") {
+    list(name);
+    text_ += fmt::format("<{0} Name=\"{1}\">{2}<pValue>{1}Reg</pValue></{0}>\n", kind, name, inner);
     text_ += fmt::format(
-        "<MaskedIntReg "
-        "Name=\"{}Reg\"><Address>{}</Address><Length>4</Length><AccessMode>{}</"
-        "AccessMode><pPort>Device</pPort>"
-        "<Cachable>NoCache</Cachable><LSB>{}</LSB><MSB>{}</MSB><Sign>Unsigned</"
-        "Sign><Endianess>BigEndian</Endianess></MaskedIntReg>\n",
-        name, address, access, lsb, msb);
+        "<{0} Name=\"{1}Reg\"><Address>{2}</Address><Length>4</Length>"
+        "<AccessMode>{3}</AccessMode><pPort>Device</pPort><Cachable>NoCache</Cachable>{4}"
+        "<Endianess>BigEndian</Endianess></{0}>\n",
+        reg_kind, name, address, access, of_reg);
   }
   std::string features_, text_;
 };
@@ -187,14 +134,7 @@ std::string gige_description(const GigeCameraOptions& o) {
     d.choice("PtpStatus", ptp_status,
              {{"Initializing", 1}, {"Disabled", 3}, {"Listening", 4}, {"Master", 6}, {"Slave", 9}});
   }
-  if (o.chunks) {
-    d.boolean("ChunkModeActive", chunk_mode);
-    d.choice("ChunkSelector", chunk_selector,
-             {{"Image", 0}, {"ExposureTime", 1}, {"Timestamp", 2}});
-    d.boolean("ChunkEnable", chunk_enable);
-    d.chunk(o.old_names ? "ChunkExposureTimeAbs" : "ChunkExposureTime", "A5A50002",
-            o.old_names ? 4 : 8, o.old_names ? "LittleEndian" : "BigEndian");
-  }
+  d.boolean("ChunkModeActive", chunk_mode);
   // Of the bootstrap registers; bit 0 is the most significant one.
   d.bits("GevSCPSPacketSize", 0xD04, 31, 16,
          fmt::format("<Min>{}</Min><Max>{}</Max><Inc>4</Inc>", gvcp::kSmallestPacket,

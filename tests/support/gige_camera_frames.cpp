@@ -14,10 +14,6 @@ using namespace gvcp;
 
 constexpr std::size_t kLatchedPulses = 256;  // exposed one after the other, stamped with their own
                                              // time: a busy machine's delays are none
-// Numbers of chunks.
-constexpr std::uint32_t kImageChunk = 0xA5A50001, kExposureChunk = 0xA5A50002,
-                        kTimestampChunk = 0xA5A50003;
-
 }  // namespace
 
 void GigeCamera::Impl::pulse(std::uint64_t number, std::uint32_t source, HostStamp when) {
@@ -54,43 +50,7 @@ GvspFrame GigeCamera::Impl::make_frame(std::uint64_t number, HostStamp when) {
   }
   if (options.number_images)
     for (std::size_t i = 0; i < 8; ++i) f.pixels[i] = static_cast<std::uint8_t>(number >> (8 * i));
-  if (word(chunk_mode) != 0) append_chunks(&f);
   return f;
-}
-
-/// Precondition: mutex_ held, the exposure is known.
-void GigeCamera::Impl::append_chunks(GvspFrame* f) {
-  f->payload_type = options.chunk_payload;
-  const std::size_t pixels = f->pixels.size();
-  Wire w;
-  w.u32(kImageChunk).u32(static_cast<std::uint32_t>(pixels));
-  if (has_chunk(kSelectTimestamp)) w.u64(f->ticks).u32(kTimestampChunk).u32(8);
-  if (has_chunk(kSelectExposure)) {
-    const double us = exposed_[f->number];
-    if (options.old_names) {
-      const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(us));  // little endian
-      for (std::uint32_t i = 0; i < 4; ++i) w.u8(bits >> (8 * i) & 0xFFU);
-    } else {
-      w.u64(std::bit_cast<std::uint64_t>(us));
-    }
-    w.u32(kExposureChunk).u32(exposure_bytes());
-  }
-  f->pixels.insert(f->pixels.end(), w.bytes().begin(), w.bytes().end());
-  if (garble_ > 0) {
-    --garble_;
-    std::uint32_t noise = static_cast<std::uint32_t>(f->number) * 2654435761U;
-    for (std::size_t i = pixels; i < f->pixels.size(); ++i) {
-      noise = noise * 1664525U + 1013904223U;
-      f->pixels[i] = static_cast<std::uint8_t>(noise >> 24U);
-    }
-  }
-}
-
-/// µs, as the wire has it. Precondition: mutex_ held.
-double GigeCamera::Impl::exposure_of(std::uint64_t number) const {
-  const auto set = static_cast<double>(real(exposure_time));
-  const double us = options.exposures ? options.exposures(number, set) : set;
-  return options.old_names ? static_cast<double>(static_cast<float>(us)) : us;
 }
 
 void GigeCamera::Impl::expose() {
@@ -116,10 +76,8 @@ void GigeCamera::Impl::expose() {
       when = HostStamp(static_cast<std::int64_t>(number) * period);
       last = when;
     }
-    const double us = exposure_of(number);
-    exposed_[number] = us;
     lock.unlock();
-    sleep_until(when + Duration::seconds(us * 1e-6));
+    sleep_until(when + exposure);
     lock.lock();
     if (triggered && !pulses_.empty()) pulses_.pop_front();
     if (!acquiring_ || !powered_ || silent_) continue;

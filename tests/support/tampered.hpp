@@ -7,16 +7,16 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/mock/simulators/device_model.hpp"
+#include "tests/support/simulators/device_model.hpp"
 
 namespace vergence::test {
 
 /// A device whose bytes somebody tampers with on their way to the host.
-class Tampered final : public mock::DeviceModel {
+class Tampered final : public DeviceModel {
  public:
   using Tamper =
       std::function<void(HostStamp at, std::vector<std::uint8_t>* frame)>;  // whole, as it was made
-  explicit Tampered(std::shared_ptr<mock::DeviceModel> device, Tamper tamper = {})
+  explicit Tampered(std::shared_ptr<DeviceModel> device, Tamper tamper = {})
       : device_(std::move(device)), tamper_(std::move(tamper)) {}
   void tamper(Tamper tamper) { tamper_ = std::move(tamper); }
   /// Of what the host sends; true: it is lost on the way.
@@ -37,7 +37,7 @@ class Tampered final : public mock::DeviceModel {
   bool ended() const override { return device_->ended(); }
 
  private:
-  std::shared_ptr<mock::DeviceModel> device_;
+  std::shared_ptr<DeviceModel> device_;
   Tamper tamper_;
   Loss loss_;
 };

@@ -38,9 +38,6 @@ class WatchedCamera final : public CameraDevice {
   ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
   void release(FrameSlot slot) noexcept override { camera_->release(slot); }
   void stop() noexcept override { camera_->stop(); }
-  bool delivered_until(HostStamp instant, Duration limit) noexcept override {
-    return camera_->delivered_until(instant, limit);
-  }
   CameraStatistics statistics() const noexcept override { return camera_->statistics(); }
 
   std::array<HostStamp, 64>

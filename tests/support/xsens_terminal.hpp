@@ -2,8 +2,8 @@
 #include <memory>
 
 #include "drivers/clock.hpp"
-#include "drivers/mock/simulators/xsens_simulator.hpp"
 #include "tests/support/device_terminal.hpp"
+#include "tests/support/simulators/xsens_simulator.hpp"
 
 namespace vergence::test {
 
@@ -18,10 +18,10 @@ namespace vergence::test {
 }
 
 /// A simulated XSens INS that rests so, from now on.
-[[nodiscard]] inline std::unique_ptr<mock::XsensSimulator> resting_xsens(
-    mock::XsensSimulatorOptions options = {}) {
+[[nodiscard]] inline std::unique_ptr<XsensSimulator> resting_xsens(
+    XsensSimulatorOptions options = {}) {
   options.power_on = monotonic_now();
-  return std::make_unique<mock::XsensSimulator>(resting_sample, options);
+  return std::make_unique<XsensSimulator>(resting_sample, options);
 }
 
 }  // namespace vergence::test

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <span>
 
 #include "drivers/clock.hpp"
 
@@ -100,13 +99,8 @@ bool FrameReceiver::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame)
   frame->arrival = arrival;
   const bool stamp_at_end = applied_->options.stamp_at_end;
   const ExposureSetting& had = exposures_.at(arrival - applied_->plan.transfer - last_exposure_);
-  const auto reported = whole ? reported_exposure(buffer) : std::nullopt;
-  frame->status =
-      whole && right_size(buffer, reported.has_value()) ? FrameStatus::complete : FrameStatus::torn;
-  const bool complete = frame->status == FrameStatus::complete;
-  if (complete && !reported && applied_->exposure_chunk)
-    without_exposure_.fetch_add(1, std::memory_order_relaxed);
-  frame->exposure = complete && reported ? *reported : had.exposure;
+  frame->status = whole && right_size(buffer) ? FrameStatus::complete : FrameStatus::torn;
+  frame->exposure = had.exposure;
   frame->gain_db = had.gain_db;
   last_exposure_ = frame->exposure;
   const Duration before = applied_->plan.transfer + (stamp_at_end ? Duration{} : frame->exposure);
@@ -118,27 +112,14 @@ bool FrameReceiver::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame)
   return true;
 }
 
-/// Precondition: the frame came whole.
-std::optional<Duration> FrameReceiver::reported_exposure(ArvBuffer* buffer) const noexcept {
-  if (!applied_->exposure_chunk) return std::nullopt;
-  std::size_t bytes = 0;
-  const auto* data = static_cast<const std::uint8_t*>(arv_buffer_get_data(buffer, &bytes));
-  return exposure_in_chunks(std::span(data, bytes).subspan(std::min(applied_->pixels, bytes)),
-                            *applied_->exposure_chunk);
-}
-
 /// A frame that came whole may still be another than the one that was asked for.
-bool FrameReceiver::right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept {
+bool FrameReceiver::right_size(ArvBuffer* buffer) noexcept {
   gint x = 0, y = 0, width = 0, height = 0;
   std::size_t bytes = 0;
   (void)arv_buffer_get_data(buffer, &bytes);
-  if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_CHUNK_DATA) {
+  // A leader of chunk data does not say.
+  if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_CHUNK_DATA)
     arv_buffer_get_image_region(buffer, &x, &y, &width, &height);
-  } else if (chunks_in_place) {  // such a leader does not say; what is where it has to be behind
-                                 // the pixels does
-    width = width_;
-    height = height_;
-  }
   if (width == width_ && height == height_ && bytes >= applied_->payload) {
     wrong_sizes_.store(0, std::memory_order_relaxed);
     return true;

@@ -96,17 +96,11 @@ class FrameReceiver {
   [[nodiscard]] int wrong_height() const noexcept {
     return wrong_height_.load(std::memory_order_relaxed);
   }
-  /// Whole frames since reset_counts() whose chunk data did not have the exposure.
-  [[nodiscard]] std::uint64_t without_exposure() const noexcept {
-    return without_exposure_.load(std::memory_order_relaxed);
-  }
-  void reset_counts() noexcept { without_exposure_.store(0, std::memory_order_relaxed); }
 
  private:
   void take(ArvBuffer* buffer) noexcept;
   [[nodiscard]] bool describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept;
-  [[nodiscard]] bool right_size(ArvBuffer* buffer, bool chunks_in_place) noexcept;
-  [[nodiscard]] std::optional<Duration> reported_exposure(ArvBuffer* buffer) const noexcept;
+  [[nodiscard]] bool right_size(ArvBuffer* buffer) noexcept;
   void recycle() noexcept;
 
   FrameQueue& queue_;
@@ -121,7 +115,6 @@ class FrameReceiver {
   std::vector<FrameSlot> free_;  // converting: slots that are the transport's
   std::atomic<std::int64_t> last_buffer_ns_{0};
   std::atomic<int> wrong_sizes_{0}, wrong_width_{0}, wrong_height_{0};
-  std::atomic<std::uint64_t> without_exposure_{0};
 };
 
 }  // namespace vergence::gige

@@ -54,14 +54,7 @@ GigeCamera::~GigeCamera() {
   session_.reset();
 }
 
-std::string GigeCamera::remark() const {
-  std::string remark = remark_.get();
-  const std::uint64_t unknown = receiver_.without_exposure();
-  if (unknown == 0) return remark;
-  return remark + (remark.empty() ? "" : "; ") + std::to_string(unknown) +
-         " images came without their exposure in the chunk data: it was reckoned; if that is most "
-         "of them, set the option chunks to off";
-}
+std::string GigeCamera::remark() const { return remark_.get(); }
 
 DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
@@ -70,17 +63,8 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
       return last_error_.refuse(DeviceStatus::busy, "the camera streams; stop it first");
     if (queue_.held() != 0)
       return last_error_.refuse(DeviceStatus::busy, "images are still in use; release them first");
-    if (requested.width <= 0 || requested.height <= 0 || requested.offset_x < 0 ||
-        requested.offset_y < 0)
-      return last_error_.refuse(
-          DeviceStatus::bad_configuration,
-          "a region of " + size_text(requested.width, requested.height) + " px is none");
-    if (!(requested.rate_hz > 0) || requested.exposure <= Duration{} ||
-        requested.exposure.to_seconds() * requested.rate_hz > 1)
-      return last_error_.refuse(
-          DeviceStatus::bad_configuration,
-          "rate and exposure must be positive, the exposure shorter than the time "
-          "between two images");
+    if (const std::string invalid = find_invalid(requested); !invalid.empty())
+      return last_error_.refuse(DeviceStatus::bad_configuration, invalid + " is no configuration");
     Options options;
     if (std::string why;
         !take_options(requested.options, option_table(), "GigE cameras", &options, &why))
@@ -96,7 +80,6 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
     options_ = options;
     applied_ = std::move(applied);
     in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
-    receiver_.reset_counts();
     memory_.allocate(*applied_.format, requested_.width, requested_.height, applied_.payload,
                      static_cast<std::size_t>(options_.buffers));
     slots_.set_most(static_cast<std::size_t>(options_.buffers));
@@ -236,8 +219,7 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
     if (session_ == nullptr || standing() != DeviceStatus::ok)
       return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
     ExposureSetting taken;
-    if (const DeviceStatus s = session_->change_exposure(requested, options_, &taken);
-        s != DeviceStatus::ok)
+    if (const DeviceStatus s = session_->change_exposure(requested, &taken); s != DeviceStatus::ok)
       return last_error_.refuse(s, session_->last_error());
     requested_.exposure = taken.exposure;  // also after it was unplugged
     requested_.gain_db = taken.gain_db;

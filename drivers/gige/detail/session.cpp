@@ -1,8 +1,5 @@
 #include "drivers/gige/detail/session.hpp"
 
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -34,8 +31,6 @@ constexpr std::array kNames{
     Names{Purpose::ptp_latch, {"PtpDataSetLatch", "GevIEEE1588DataSetLatch", nullptr, nullptr}},
     Names{Purpose::chunk_mode, {"ChunkModeActive", "ChunkMode", nullptr, nullptr}},
     Names{Purpose::temperature, {"DeviceTemperature", "DeviceTemperatureAbs"}},
-    Names{Purpose::chunk_exposure,
-          {"ChunkExposureTime", "ChunkExposureTimeAbs", "ChunkExposure", nullptr}},
 };
 
 std::string shown(double v) {
@@ -205,13 +200,6 @@ constexpr std::int64_t kBufferedFrames = 8;           // that the socket holds w
 
 std::string text_of(const char* text) { return text == nullptr ? "" : text; }
 
-/// Aravis falls back in silence.
-bool may_open_packet_socket() {
-  const int fd = ::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0);
-  if (fd >= 0) (void)::close(fd);
-  return fd >= 0;
-}
-
 std::string address_of(GSocketAddress* address) {
   if (address == nullptr || !G_IS_INET_SOCKET_ADDRESS(address)) return "";
   const Memory<char> text(
@@ -326,15 +314,7 @@ bool Session::in_control() {
 DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, void* user) {
   const Options& o = a.options;
   ArvGvDevice* gv = ARV_GV_DEVICE(device_.get());
-  if (o.packet_socket && !may_open_packet_socket()) {
-    last_error_ =
-        "the packet socket needs CAP_NET_RAW: sudo setcap cap_net_raw+ep on the program, or set "
-        "the option packet_socket to off";
-    return DeviceStatus::no_permission;
-  }
-  arv_gv_device_set_stream_options(gv, o.packet_socket
-                                           ? ARV_GV_STREAM_OPTION_NONE
-                                           : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  arv_gv_device_set_stream_options(gv, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   Error error;
   stream_.reset(arv_device_create_stream(device_.get(), callback, user, error.out()));
   if (stream_ == nullptr || !ARV_IS_GV_STREAM(stream_.get())) {
@@ -362,9 +342,7 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
   if (o.resend == Resend::on && !can) note("the camera says that it cannot send packets again");
   const Duration period = Duration::seconds(1 / a.actual.rate_hz);
   const Duration retention =
-      o.frame_retention > Duration{}
-          ? o.frame_retention
-          : std::clamp(period * 3, Duration::milliseconds(60), Duration::milliseconds(100));
+      std::clamp(period * 3, Duration::milliseconds(60), Duration::milliseconds(100));
   g_object_set(stream_.get(), "packet-resend",
                resend ? ARV_GV_STREAM_PACKET_RESEND_ALWAYS : ARV_GV_STREAM_PACKET_RESEND_NEVER,
                "frame-retention", static_cast<guint>(retention.ns() / 1000), "packet-timeout",
@@ -424,21 +402,6 @@ DeviceStatus Session::trigger() {
                : DeviceStatus::ok;
 }
 
-namespace {
-
-const char* feature_value(TriggerOverlap overlap) {
-  switch (overlap) {
-    case TriggerOverlap::readout:
-      return "ReadOut";
-    case TriggerOverlap::previous_frame:
-      return "PreviousFrame";
-    default:
-      return "Off";
-  }
-}
-
-}  // namespace
-
 DeviceStatus Session::apply(const CameraConfiguration& requested, const Options& options,
                             Applied* applied) {
   Applied a;
@@ -449,17 +412,17 @@ DeviceStatus Session::apply(const CameraConfiguration& requested, const Options&
   arv_device_execute_command(device_.get(), "AcquisitionStop",
                              error.out());  // what a killed program left running
   features_.choose_if_there("AcquisitionMode", "Continuous");
-  if (options.heartbeat_ms > 0 &&
-      !features_.set("GevHeartbeatTimeout", options.heartbeat_ms, "ms", nullptr))
-    return refuse(DeviceStatus::unsupported, features_.last_error());
   DeviceStatus status = set_format(requested, &a);
   if (status == DeviceStatus::ok) status = set_region(requested);
   if (status == DeviceStatus::ok) status = set_trigger(requested, options);
-  if (status == DeviceStatus::ok) status = set_exposure(requested, options, &a);
+  if (status == DeviceStatus::ok) status = set_exposure(requested, &a);
   if (status == DeviceStatus::ok) status = set_rate(requested, &a);
   if (status == DeviceStatus::ok) status = set_clock(options, &a);
   if (status != DeviceStatus::ok) return status;
-  set_chunks(options, &a);
+  // With chunk data, which another program may have left on, a leader need not tell the image's
+  // size.
+  if (const char* chunks = features_.find(Purpose::chunk_mode))
+    (void)features_.switch_on(chunks, false);
   for (const auto& [name, value] : options.features)
     if (!features_.set_text(name, value))
       return refuse(DeviceStatus::unsupported, features_.last_error());
@@ -468,10 +431,10 @@ DeviceStatus Session::apply(const CameraConfiguration& requested, const Options&
     return refuse(DeviceStatus::unsupported,
                   "the camera does not say how large a frame is (PayloadSize)");
   a.payload = static_cast<std::size_t>(*payload);
-  a.pixels = static_cast<std::size_t>(requested.width) *
-             static_cast<std::size_t>(requested.height) *
-             (a.format->how == GreyFormat::How::words ? 2 : 1);
-  if (a.payload < a.pixels)
+  const std::size_t pixels = static_cast<std::size_t>(requested.width) *
+                             static_cast<std::size_t>(requested.height) *
+                             (a.format->how == GreyFormat::How::words ? 2 : 1);
+  if (a.payload < pixels)
     return refuse(DeviceStatus::unsupported, "the camera's frames of " + std::to_string(a.payload) +
                                                  " bytes are smaller than the image");
   status = set_packets(requested, options, &a);
@@ -550,38 +513,23 @@ DeviceStatus Session::set_trigger(const CameraConfiguration& requested, const Op
     features_.choose_if_there("TriggerActivation", "RisingEdge");
   else if (!features_.choose("TriggerActivation", "FallingEdge"))
     return refuse(DeviceStatus::unsupported, features_.last_error());
-  if (o.overlap != TriggerOverlap::unset &&
-      !features_.choose("TriggerOverlap", feature_value(o.overlap)))
-    return refuse(DeviceStatus::unsupported, features_.last_error());
   const char* delay = features_.find(Purpose::trigger_delay);
-  if (delay == nullptr && o.trigger_delay_us > 0)
-    return refuse(DeviceStatus::unsupported, "the camera has no delay of its trigger");
-  if (delay != nullptr && !features_.set(delay, o.trigger_delay_us, "us", nullptr))
-    return refuse(DeviceStatus::unsupported, features_.last_error());
-  if (!o.exposure_line.empty() && (!features_.choose("LineSelector", o.exposure_line) ||
-                                   !features_.choose("LineMode", "Output") ||
-                                   !features_.choose("LineSource", "ExposureActive")))
+  if (delay != nullptr && !features_.set(delay, 0, "us", nullptr))
     return refuse(DeviceStatus::unsupported, features_.last_error());
   return DeviceStatus::ok;
 }
 
-DeviceStatus Session::set_exposure(const CameraConfiguration& requested, const Options& o,
-                                   Applied* a) {
+DeviceStatus Session::set_exposure(const CameraConfiguration& requested, Applied* a) {
   for (const char* automatic : {"ExposureAuto", "GainAuto"})
     features_.choose_if_there(automatic, "Off");
-  if (o.exposure_mode == ExposureMode::trigger_width) {
-    if (!features_.choose("ExposureMode", "TriggerWidth"))
-      return refuse(DeviceStatus::unsupported, features_.last_error());
-  } else {
-    features_.choose_if_there("ExposureMode", "Timed");
-    const char* exposure = features_.find(Purpose::exposure);
-    if (exposure == nullptr)
-      return refuse(DeviceStatus::unsupported, "the camera's exposure cannot be set");
-    double us = 0;
-    if (!features_.set(exposure, requested.exposure.to_seconds() * 1e6, "us", &us))
-      return refuse(DeviceStatus::unsupported, features_.last_error());
-    a->actual.exposure = Duration::seconds(us * 1e-6);
-  }
+  features_.choose_if_there("ExposureMode", "Timed");
+  const char* exposure = features_.find(Purpose::exposure);
+  if (exposure == nullptr)
+    return refuse(DeviceStatus::unsupported, "the camera's exposure cannot be set");
+  double us = 0;
+  if (!features_.set(exposure, requested.exposure.to_seconds() * 1e6, "us", &us))
+    return refuse(DeviceStatus::unsupported, features_.last_error());
+  a->actual.exposure = Duration::seconds(us * 1e-6);
   features_.choose_if_there("GainSelector", "All");
   const char* gain = features_.find(Purpose::gain);
   if (gain == nullptr) {
@@ -608,10 +556,9 @@ DeviceStatus Session::set_exposure(const CameraConfiguration& requested, const O
   return DeviceStatus::ok;
 }
 
-DeviceStatus Session::change_exposure(const ExposureSetting& requested, const Options& o,
-                                      ExposureSetting* actual) {
+DeviceStatus Session::change_exposure(const ExposureSetting& requested, ExposureSetting* actual) {
   const char* exposure = features_.find(Purpose::exposure);
-  if (o.exposure_mode == ExposureMode::trigger_width || exposure == nullptr)
+  if (exposure == nullptr)
     return refuse(DeviceStatus::unsupported, "the camera's exposure cannot be set");
   const auto set_nearest = [this](const char* name, double value, const char* unit, double* taken) {
     const auto limits = features_.bounds(name);
@@ -683,35 +630,6 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
     note("the camera's clock does not follow the network's yet (PTP is " +
          (word.empty() ? "silent" : word) + "); is there a master?");
   return DeviceStatus::ok;
-}
-
-/// Which exposure a frame had is best known by the camera. One that cannot say is no trouble: it is
-/// reckoned, then.
-void Session::set_chunks(const Options& o, Applied* a) {
-  const char* mode = features_.find(Purpose::chunk_mode);
-  if (mode == nullptr) return;
-  if (o.chunks && ask_for_exposures(mode, a)) return;
-  (void)features_.switch_on(mode, false);  // what another program left on
-}
-
-bool Session::ask_for_exposures(const char* mode, Applied* a) {
-  if (!features_.switch_on(mode, true)) return false;
-  // Cameras before GigE Vision 2.0: only then the leader still tells the image's size.
-  if (features_.has("GevSCCFGExtendedChunkData"))
-    (void)features_.switch_on("GevSCCFGExtendedChunkData", true);
-  const auto offered = features_.choices("ChunkSelector");
-  bool enabled = false;
-  for (const char* name : {"ExposureTime", "ExposureTimeAbs", "Exposure"}) {
-    if (enabled || std::find(offered.begin(), offered.end(), name) == offered.end()) continue;
-    enabled = features_.choose("ChunkSelector", name) && features_.switch_on("ChunkEnable", true);
-  }
-  if (!enabled) return false;
-  const char* exposure = features_.find(Purpose::chunk_exposure);
-  if (exposure != nullptr) a->exposure_chunk = find_chunk_field(device_.get(), exposure);
-  if (!a->exposure_chunk)
-    note(
-        "the camera's chunk data has the exposure in a way that is not known here: it is reckoned");
-  return a->exposure_chunk.has_value();
 }
 
 DeviceStatus Session::set_packets(const CameraConfiguration& requested, const Options& o,

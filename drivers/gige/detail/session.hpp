@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "drivers/camera.hpp"
-#include "drivers/gige/detail/chunks.hpp"
 #include "drivers/gige/detail/glib.hpp"
 #include "drivers/gige/detail/grey.hpp"
 #include "drivers/gige/detail/link.hpp"
@@ -25,9 +24,8 @@ enum class Purpose : std::uint8_t {
   ptp_enable,
   ptp_status,
   ptp_latch,
-  chunk_mode,      // whether frames have chunk data at all
-  chunk_exposure,  // in a frame's chunk data; µs
-  temperature,     // °C
+  chunk_mode,   // whether frames have chunk data at all
+  temperature,  // °C
 };
 
 /// The GenICam features of an open camera, with sentences for what it does not have.
@@ -86,10 +84,8 @@ struct Applied {
   CameraConfiguration actual{};
   Options options{};
   const GreyFormat* format = nullptr;
-  std::size_t payload = 0;                     // bytes a frame on the wire, chunk data among them
-  std::size_t pixels = 0;                      // of these, in front
-  std::optional<ChunkField> exposure_chunk{};  // frames say their exposure there
-  std::uint64_t tick_frequency = 0;            // Hz; 0: the camera has no clock
+  std::size_t payload = 0;           // bytes a frame on the wire
+  std::uint64_t tick_frequency = 0;  // Hz; 0: the camera has no clock
   LinkPlan plan{};
   Interface link{};
 };
@@ -113,7 +109,7 @@ class Session {
                                    Applied* applied);
 
   /// Makes the stream; the callback comes from its thread, from the first push() on. → ok,
-  /// no_permission, gone, failed
+  /// gone, failed
   [[nodiscard]] DeviceStatus open_stream(const Applied& applied, ArvStreamCallback callback,
                                          void* user);
   /// Precondition: a stream is open.
@@ -127,7 +123,7 @@ class Session {
   /// The nearest that the camera has, also while it streams. *actual: as read back. → ok,
   /// unsupported, gone
   [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& requested,
-                                             const Options& options, ExposureSetting* actual);
+                                             ExposureSetting* actual);
 
   /// °C; nothing where it does not tell.
   [[nodiscard]] std::optional<double> temperature_c() const;
@@ -145,16 +141,13 @@ class Session {
   [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string sentence);
   [[nodiscard]] DeviceStatus set_format(const CameraConfiguration& requested, Applied* applied);
   [[nodiscard]] DeviceStatus set_region(const CameraConfiguration& requested);
-  [[nodiscard]] DeviceStatus set_exposure(const CameraConfiguration& requested,
-                                          const Options& options, Applied* applied);
+  [[nodiscard]] DeviceStatus set_exposure(const CameraConfiguration& requested, Applied* applied);
   [[nodiscard]] DeviceStatus set_trigger(const CameraConfiguration& requested,
                                          const Options& options);
   [[nodiscard]] DeviceStatus set_rate(const CameraConfiguration& requested, Applied* applied);
   [[nodiscard]] DeviceStatus set_packets(const CameraConfiguration& requested,
                                          const Options& options, Applied* applied);
   [[nodiscard]] DeviceStatus set_clock(const Options& options, Applied* applied);
-  void set_chunks(const Options& options, Applied* applied);
-  [[nodiscard]] bool ask_for_exposures(const char* mode, Applied* applied);
   void enlarge_socket_buffer(const Applied& applied);
   void note(const std::string& sentence) { remark_ += (remark_.empty() ? "" : "; ") + sentence; }
 

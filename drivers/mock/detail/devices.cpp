@@ -19,9 +19,7 @@ MockCamera::MockCamera(RigContext* rig, int k)
 DeviceStatus MockCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   const Intrinsics& lens = rig_->truth->mounted().intrinsics[static_cast<std::size_t>(k_)];
-  if (!(requested.rate_hz > 0) || requested.exposure <= Duration{} ||
-      requested.exposure.to_seconds() * requested.rate_hz > 1)
-    return DeviceStatus::bad_configuration;
+  if (!find_invalid(requested).empty()) return DeviceStatus::bad_configuration;
   if (requested.width != lens.width || requested.height != lens.height)
     return DeviceStatus::unsupported;
   if (stream.streaming() || out_.load() > 0 || (rig_->pulsing.load() && !rig_->options.real_time))
@@ -53,8 +51,9 @@ DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
       requested.exposure.to_seconds() * configuration_.rate_hz > 1)
     return DeviceStatus::bad_configuration;
   const ExposureSetting taken{requested.exposure, std::clamp(requested.gain_db, 0.0, kMostGain)};
-  const auto latency = static_cast<std::uint64_t>(std::max(1, rig_->options.exposure_latency));
-  const std::uint64_t from = std::max(rig_->looked_at.load() + latency, rig_->planned.load());
+  // The next image but one, or later where more are made already.
+  constexpr std::uint64_t kLatency = 2;
+  const std::uint64_t from = std::max(rig_->looked_at.load() + kLatency, rig_->planned.load());
   // Of what is past only the last is of use.
   const std::uint64_t planned = rig_->planned.load();
   const std::uint64_t past = planned > MockRig::kSlots ? planned - MockRig::kSlots : 0;
@@ -118,11 +117,6 @@ CameraStatistics MockCamera::statistics() const noexcept {
   s.lost = lost.load(std::memory_order_relaxed);
   s.starts = starts_.load(std::memory_order_relaxed);
   return s;
-}
-
-bool MockCamera::delivered_until(HostStamp instant, Duration limit) noexcept {
-  return rig_->options.real_time || !rig_->pulsing.load() ||
-         rig_->delivered.wait_for(instant, limit);
 }
 
 void MockCamera::take(std::span<const Transform> T_camera_enu,

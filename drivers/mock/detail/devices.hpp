@@ -64,35 +64,6 @@ class ExposurePlan {
   std::vector<Change> changes_;  // by pulse, the first is in force
 };
 
-/// How far the deliveries of a rig in virtual time have come.
-///
-/// Threads  advance(), restart(): the one that delivers. wait_for(): any.
-class DeliveryProgress {
- public:
-  void restart() noexcept { set(std::numeric_limits<std::int64_t>::min()); }
-  /// Everything that arrives before `instant` has been delivered.
-  void advance(HostStamp instant) noexcept { set(instant.ns()); }
-  /// Whether that is so of this instant, after at most `limit`.
-  [[nodiscard]] bool wait_for(HostStamp instant, Duration limit) noexcept {
-    std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, std::chrono::nanoseconds(limit.ns()),
-                             [&] { return until_ns_ >= instant.ns(); });
-  }
-
- private:
-  void set(std::int64_t until_ns) noexcept {
-    {
-      const std::lock_guard lock(mutex_);
-      until_ns_ = until_ns;
-    }
-    changed_.notify_all();
-  }
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::int64_t until_ns_ = std::numeric_limits<std::int64_t>::min();
-};
-
 using vergence::Delivery;
 using vergence::Stream;
 
@@ -108,7 +79,6 @@ struct RigContext {
   std::atomic<int> unseen{0};
   std::atomic<bool> looking{false};
   std::atomic<std::uint64_t> planned{0};  // pulses whose exposures are settled
-  DeliveryProgress delivered{};           // virtual time
 };
 
 inline constexpr Duration kTransfer = Duration::milliseconds(5);       // of an image over its bus
@@ -136,7 +106,6 @@ class MockCamera final : public CameraDevice {
   void release(FrameSlot slot) noexcept override;
   void stop() noexcept override;
   CameraStatistics statistics() const noexcept override;
-  bool delivered_until(HostStamp instant, Duration limit) noexcept override;
 
   // The scheduler's side.
   Stream<Frame, 64> stream;

@@ -11,8 +11,8 @@ namespace vergence::mock {
 /// When the mock's board pulses, over a whole drive: rate, varied intervals and its own restarts
 /// are known beforehand; only a pause is asked for while it drives.
 ///
-/// Threads  As any value; const after construction but for append(). Time: since the drive's start,
-///          by the host's clock.
+/// Threads  As any value; const after construction. Time: since the drive's start, by the host's
+///          clock.
 class PulsePlan {
  public:
   struct Slot {
@@ -29,11 +29,6 @@ class PulsePlan {
   PulsePlan() = default;
   /// The first pulse at 0, the last not after `length`.
   PulsePlan(const TriggerConfiguration& c, Duration length, const std::vector<Fault>& faults);
-
-  /// Pulses that somebody else makes: none yet, about so far apart.
-  explicit PulsePlan(Duration period) : period_(period), boots_{Duration{}} {}
-  /// The next of them, later than those before.
-  void append(Duration time) { slots_.push_back({time, slots_.size(), 0}); }
 
   [[nodiscard]] std::size_t size() const noexcept { return slots_.size(); }
   /// Beyond the last: evenly on.

@@ -89,45 +89,11 @@ PulsePlan Scheduler::plan_of(const TriggerConfiguration& c) const {
   return {c, length(), rig_.truth->faults()};
 }
 
-std::array<PulseExposure, kMaxCameras> Scheduler::feed(HostStamp edge) {
-  std::array<PulseExposure, kMaxCameras> exposures{};
-  const Duration time = edge - start_;
-  if (time < Duration{}) return exposures;
-  if (time > length()) {
-    end_feed();
-    return exposures;
-  }
-  fed_.append(time);
-  const std::uint64_t slot = fed_.size() - 1;
-  for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
-    const MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
-    if (!pulsed(k) || unplugged_at(time, k) || !camera.stream.streaming()) continue;
-    const Duration begins = camera.trigger_delay();
-    if (exposure_of(*rig_.truth, rig_.options.seed, {slot, time + begins, &fed_}, k).missed)
-      continue;
-    exposures[static_cast<std::size_t>(k)] = {true, begins,
-                                              begins + camera.configuration().exposure};
-  }
-  feed_.push(time);
-  return exposures;
-}
-
-bool Scheduler::has_slot(std::uint64_t n) {
-  while (rig_.options.fed && plan_.size() < n + 2) {
-    const auto time = feed_.next();
-    if (!time) break;
-    plan_.append(*time);
-  }
-  return n < plan_.size();
-}
-
 void Scheduler::begin(const TriggerConfiguration& c) {
   halt();
   board_ = c;
-  plan_ = rig_.options.fed ? PulsePlan(Duration::seconds(1 / c.rate_hz)) : plan_of(c);
-  fed_ = plan_;
+  plan_ = plan_of(c);
   stop_ = false;
-  rig_.delivered.restart();
   constexpr Duration kLead =
       Duration::milliseconds(100);  // the first pictures are rendered before they are due
   if (rig_.options.real_time) start_ = monotonic_now() + kLead;
@@ -139,7 +105,6 @@ void Scheduler::begin(const TriggerConfiguration& c) {
 void Scheduler::halt() noexcept {
   stop_.store(true, std::memory_order_release);
   rig_.room.signal();
-  feed_.wake();
   if (producer_.joinable()) producer_.join();
   queue_.join();
   rig_.pulsing = false;
@@ -151,7 +116,6 @@ std::uint64_t Scheduler::pulses(double rate_hz) const noexcept {
 
 HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device,
                               std::uint64_t number) const noexcept {
-  if (!rig_.options.jitter) return least;
   Random random(mixed(rig_.options.seed, number), device);
   const double late = -static_cast<double>(kJitterMean.ns()) * std::log(1 - random.uniform());
   return least + std::min(kJitterMost, Duration::nanoseconds(std::llround(late)));
@@ -161,7 +125,7 @@ HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device,
 
 void Scheduler::produce() {
   (void)pthread_setname_np(pthread_self(), "vergence-mock");
-  for (std::uint64_t n = 0; !stopping() && has_slot(n); ++n) {
+  for (std::uint64_t n = 0; !stopping() && n < plan_.size(); ++n) {
     while (rig_.options.reports_taken && !rig_.options.real_time && !stopping()) {
       const WakeEvent::Ticket seen = rig_.room.ticket();
       if (trigger_->stream.empty() || !trigger_->stream.streaming()) break;
@@ -176,7 +140,7 @@ void Scheduler::produce() {
       if (!rig_.options.real_time) queue_.deliver_until(host_of(n + 1));
       continue;
     }
-    if (!rig_.options.fed) make_report(n);
+    make_report(n);
     if (rig_.options.real_time && !wait_for_its_turn(n)) {
       for (const auto& camera : cameras_) camera->lost.fetch_add(1, std::memory_order_relaxed);
       continue;

@@ -2,12 +2,10 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <queue>
 #include <thread>
 #include <vector>
 
@@ -18,52 +16,6 @@
 #include "drivers/mock/rig_truth.hpp"
 
 namespace vergence::mock {
-
-/// Times of pulses that somebody else makes, on their way to the scheduler.
-///
-/// Threads  push(), end(): who feeds. next(): the scheduler's producer. wake(): any.
-/// Memory   Grows with what is not taken.
-class PulseFeed {
- public:
-  /// `stop`: next() ends. It outlives the feed; wake() follows its setting.
-  explicit PulseFeed(const std::atomic<bool>& stop) : stop_(stop) {}
-
-  /// Since the drive's start. Nothing happens after end().
-  void push(Duration time) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (!over_) times_.push(time);
-    }
-    changed_.notify_all();
-  }
-  void end() noexcept {
-    {
-      const std::lock_guard lock(mutex_);
-      over_ = true;
-    }
-    changed_.notify_all();
-  }
-  void wake() noexcept {
-    { const std::lock_guard lock(mutex_); }
-    changed_.notify_all();
-  }
-  /// Waits for it; nothing: there is no more, or it was stopped.
-  [[nodiscard]] std::optional<Duration> next() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return !times_.empty() || over_ || stop_; });
-    if (times_.empty() || stop_) return std::nullopt;
-    const Duration time = times_.front();
-    times_.pop();
-    return time;
-  }
-
- private:
-  const std::atomic<bool>& stop_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::queue<Duration> times_;
-  bool over_ = false;
-};
 
 /// The slots of a pulse plan that a pause leaves out.
 ///
@@ -145,10 +97,6 @@ class Scheduler final : public PulseListener {
   void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept override {
     pauses_.request(from, pulses, boot);
   }
-  [[nodiscard]] std::array<PulseExposure, kMaxCameras> feed(HostStamp edge);
-  void end_feed() noexcept { feed_.end(); }
-  /// After the drive.
-  [[nodiscard]] const PulsePlan& fed_plan() const noexcept { return fed_; }
   [[nodiscard]] PulsePlan plan_of(const TriggerConfiguration& c) const;
   /// The host's time at the drive's start.
   [[nodiscard]] HostStamp start() const noexcept { return start_; }
@@ -170,8 +118,6 @@ class Scheduler final : public PulseListener {
       1'000'000'000'000};  // 1000 s after a machine's start, on every run
 
   void produce();
-  /// Whether there is a slot n. Fed: once the one after it is known too, or that there is none.
-  [[nodiscard]] bool has_slot(std::uint64_t n);
   [[nodiscard]] Duration length() const noexcept;
   void wait_for_exposures();
   [[nodiscard]] bool wait_for_its_turn(std::uint64_t pulse);
@@ -214,10 +160,8 @@ class Scheduler final : public PulseListener {
   std::size_t link_events_ = 0;  // of the plan, posted
   bool resumed_ = true;          // the next pulse is the first after a start or a pause
   PauseWindow pauses_;
-  PulsePlan fed_;  // of who feeds
   std::array<Sender, kMaxCameras> senders_{};
   std::atomic<bool> stop_{false};
-  PulseFeed feed_{stop_};
   DeliveryQueue queue_{rig_, cameras_, ins_, stop_};
   std::thread producer_;
 };

@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <cstring>
 #include <deque>
-#include <map>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -29,8 +28,6 @@ inline constexpr std::uint32_t kHeartbeat = 0x938, kTicksHigh = 0x93C, kTicksLow
                                kStreamPort = 0xD00, kPacketSize = 0xD04, kPacketDelay = 0xD08,
                                kStreamTarget = 0xD18;
 inline constexpr std::uint32_t kSmallestPacket = 576, kLargestPacket = 16'000;  // bytes
-// Places in ChunkSelector.
-inline constexpr std::uint32_t kSelectExposure = 1, kSelectTimestamp = 2;
 
 [[nodiscard]] inline std::uint32_t from_wire(const std::uint8_t* p) {
   return static_cast<std::uint32_t>(p[0]) << 24U | static_cast<std::uint32_t>(p[1]) << 16U |
@@ -75,8 +72,7 @@ class GigeCamera::Impl {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   bool silent_ = false;
-  int lose_ = 0, tear_ = 0, garble_ = 0;
-  std::map<std::uint64_t, double> exposed_;  // µs, by image
+  int lose_ = 0, tear_ = 0;
   int lie_width_ = 0, lie_height_ = 0;
   std::uint64_t starts_ = 0;
 
@@ -89,11 +85,6 @@ class GigeCamera::Impl {
   bool value_fits(std::uint32_t address, std::uint32_t value) const;
   void expose();
   GvspFrame make_frame(std::uint64_t number, HostStamp when);
-  void append_chunks(GvspFrame* frame);
-  [[nodiscard]] double exposure_of(std::uint64_t number) const;
-  [[nodiscard]] bool has_chunk(std::uint32_t selected) const {
-    return (chunks_enabled_ >> selected & 1U) != 0;
-  }
   void follow_registers();
   [[nodiscard]] bool may_write(const sockaddr_in& from, std::uint32_t address) const;
   [[nodiscard]] std::uint32_t word(std::uint32_t address) const {
@@ -103,9 +94,6 @@ class GigeCamera::Impl {
     return std::bit_cast<float>(word(address));
   }
   [[nodiscard]] std::uint32_t payload() const;
-  [[nodiscard]] std::uint32_t exposure_bytes() const {
-    return options.old_names ? 4 : 8;
-  }  // a float or a double
   void put(std::uint32_t address, std::uint32_t value) {
     for (std::uint32_t i = 0; i < 4; ++i)
       memory_[address + i] = static_cast<std::uint8_t>(value >> (24U - 8U * i));
@@ -125,7 +113,6 @@ class GigeCamera::Impl {
       pulses_;                   // triggers not yet served: the image's number, and when
   std::uint64_t triggered_ = 0;  // by software
   std::uint64_t block_ = 0;
-  std::uint32_t chunks_enabled_ = 1;  // bits by ChunkSelector; the image always is
   std::thread answering_, exposing_;
 };
 

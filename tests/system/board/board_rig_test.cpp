@@ -75,7 +75,7 @@ class BoardRig : public ::testing::Test {
   /// in it).
   void expect_true_edges(const std::vector<Pulse>& told) {
     std::map<std::uint64_t, HostStamp> made;
-    for (const mock::SimulatedPulse& p : board_.pulses()) made[p.number] = p.edge;
+    for (const test::SimulatedPulse& p : board_.pulses()) made[p.number] = p.edge;
     for (const Pulse& p : told) {
       ASSERT_TRUE(made.contains(p.number)) << p.number;
       ASSERT_TRUE(p.mapped);

@@ -11,8 +11,8 @@
 
 #include "app/datasets/trajectory_files.hpp"
 #include "app/devices/mock_drive.hpp"
-#include "drivers/mock/simulators/board_simulator.hpp"
 #include "tests/support/gige_camera.hpp"
+#include "tests/support/simulators/board_simulator.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/thread_allocations.hpp"
 #include "tests/support/xsens_terminal.hpp"
@@ -162,14 +162,14 @@ TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
 }
 
 /// A trigger board on a terminal whose pulses the cameras expose at.
-std::unique_ptr<mock::BoardSimulator> board_of(const Wires& wires) {
-  mock::BoardSimulatorOptions o;
+std::unique_ptr<test::BoardSimulator> board_of(const Wires& wires) {
+  test::BoardSimulatorOptions o;
   o.power_on = monotonic_now();
-  return std::make_unique<mock::BoardSimulator>(
-      [&wires, n = std::uint64_t{0}](const mock::SimulatedPulse& pulse) mutable {
+  return std::make_unique<test::BoardSimulator>(
+      [&wires, n = std::uint64_t{0}](const test::SimulatedPulse& pulse) mutable {
         for (const auto& camera : wires.cameras) camera->pulse(n, pulse.edge);
         ++n;
-        return mock::SimulatedExposures{};
+        return test::SimulatedExposures{};
       },
       o);
 }
@@ -206,44 +206,6 @@ TEST(GigeRun, aRecordedDriveReplaysBitForBit) {
   EXPECT_EQ(test::read_file(folder / "s" / "trajectory.tum"),
             test::read_file(folder / "again" / "trajectory.tum"));
   EXPECT_GT(summary_of(folder / "s")["frames"]["read"].get<int>(), 4);
-}
-
-TEST(GigeRun, whatCannotBeDrivenIsRefusedInASentence) {
-  const Wires wires(nullptr);
-  const TemporaryFolder folder;
-  struct Refusal {
-    int code;  // 3: what is asked for is in order, and not there
-    const char *settings, *word;
-  };
-  for (const Refusal& r : {
-           Refusal{3, "--set cameras.1.serial=NOT-HERE", "cameras.1"},
-           {3, "--set ins.driver=xsens --set ins.port=/dev/ttyNotThere --set ins.rate=100", "ins:"},
-           {3,
-            "--set trigger.driver=board --set sync.mode=board --set trigger.port=/dev/ttyNotThere "
-            "--set cameras.0.trigger=hardware --set cameras.1.trigger=hardware",
-            "trigger:"},
-           {2, "--set cameras.0.size=[1600,1200] --set cameras.1.size=[1600,1200]", "16 to 640 px"},
-           {2, "--set cameras.0.options.trigger_line=Line9", "Software, Line1, Line2"},
-           {2, "--set cameras.0.options.paket_size=9000", "paket_size"},
-           {2, "--set cameras.0.trigger=free --set cameras.1.trigger=free", "sync.mode"},
-           {2, "--set cameras.0.trigger=soft", "cameras.0.trigger"},
-           {2, "--set cameras.1.driver=mock", "one world"},
-           {2, "--set cameras.0.driver=gigevision", "gigevision"},
-           {2, "--fast", "--fast"},
-           {2,
-            "--set trigger.rate=900 --set cameras.0.exposure_us=100 --set "
-            "cameras.1.exposure_us=100 --set cameras.0.options.link_mbps=1000",
-            "trigger.rate"},
-           {3, "", "another program"},
-       }) {
-    wires.cameras[1]->take_control(*r.settings == '\0');
-    const Outcome o =
-        run_vergence("run '" + kExample + "' --duration 2 --out '" + (folder / "s").string() + "'" +
-                     wires.settings() + " " + r.settings);
-    EXPECT_EQ(o.code, r.code) << r.settings << ": " << o.err;
-    EXPECT_NE(o.err.find(r.word), std::string::npos) << o.err;
-    EXPECT_FALSE(std::filesystem::exists(folder / "s")) << r.settings;
-  }
 }
 
 }  // namespace

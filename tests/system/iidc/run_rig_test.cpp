@@ -167,9 +167,9 @@ TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
   Emulator cameras("sim_usb_iidc", {"--cameras", "2", "--film", film_folder, "--film-hz", "4"});
   ASSERT_TRUE(await_cameras(driver.get(), 2));
   std::atomic<bool> wired{true};
-  BoardBehindConverter board([&](const mock::SimulatedPulse& pulse) {
+  BoardBehindConverter board([&](const test::SimulatedPulse& pulse) {
     if (wired) cameras.command("trigger " + std::to_string(pulse.edge.ns()));
-    return mock::SimulatedExposures{};
+    return test::SimulatedExposures{};
   });
   const auto await_port = [](const char* port) {
     for (int i = 0; i < 1000 && !std::filesystem::exists(port); ++i)

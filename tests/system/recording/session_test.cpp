@@ -260,7 +260,7 @@ TEST(Recorded, aDriveRecordedAsPngReplaysBitForBitAndIsExported) {
 TEST(Recorded, thePulsesOfATriggerBoardAreRecordedAndTheDriveIsTheSame) {
   const TemporaryFolder folder;
   const std::string chain = "run '" + std::string(VERGENCE_SOURCE_DIR) +
-                            "/app/config/mock_chain.yaml' --fast --duration 4" + kSmall;
+                            "/app/config/mock_board.yaml' --fast --duration 4" + kSmall;
   const Outcome plain = run_vergence(chain + " --out '" + (folder / "plain").string() + "'");
   ASSERT_LE(plain.code, 1) << plain.err;
   const Outcome o =

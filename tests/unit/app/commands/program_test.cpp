@@ -61,10 +61,13 @@ TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {
                     run = "run '" + (folder / "rig.yaml").string() + "'" + out + " --set ";
   for (const Withdrawn& row : withdrawn()) {
     const std::string name(row.name);
-    const std::string words = row.kind == Kind::key            ? run + name + "=1"
-                              : row.kind == Kind::record_topic ? run + "'record=[" + name + "]'"
-                              : row.kind == Kind::option       ? name + " x" + out
-                                                               : name;
+    const std::string words =
+        row.kind == Kind::key ? run + name + "=1"
+        : row.kind == Kind::camera_option
+            ? run + "cameras.0.driver=gige --set cameras.0.options." + name + "=1"
+        : row.kind == Kind::record_topic ? run + "'record=[" + name + "]'"
+        : row.kind == Kind::option       ? name + " x" + out
+                                         : name;
     const Outcome outcome = run_vergence(words);
     EXPECT_TRUE(refused_in_one_sentence(outcome)) << name;
     EXPECT_TRUE(contains(outcome.err, std::string(row.instead))) << name << ": " << outcome.err;

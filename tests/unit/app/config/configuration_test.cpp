@@ -223,7 +223,7 @@ TEST(CameraOptionKeys, WhatCannotBeIsRefusedWithItsPlaceAndWhatThereIs) {
             "drive.yaml:2: cameras.0.options: buffers is \"3\"; it takes 4 to 48");
   const std::string unknown = said("{paket_size: 9000}");
   for (const char* part : {"drive.yaml:2", "there is no option \"paket_size\"",
-                           "did you mean \"packet_size\"?", "trigger_overlap"})
+                           "did you mean \"packet_size\"?", "trigger_line"})
     EXPECT_NE(unknown.find(part), std::string::npos) << unknown;
   for (const char* bad :
        {"{buffers: }", "{trigger_line: a b}", "{buffers: [4]}", "buffers", "buffers=", "=4"})

@@ -36,7 +36,7 @@ TEST(InsDrivers, whatCannotBeOpenedIsToldInOneSentence) {
 
 TEST(InsDrivers, readsARealTerminalInRealTime) {
   for (const xbus::Generation generation : {xbus::Generation::legacy, xbus::Generation::mark4}) {
-    mock::XsensSimulatorOptions sensor;
+    test::XsensSimulatorOptions sensor;
     sensor.generation = generation;
     test::DeviceOnTerminal terminal(test::resting_xsens(sensor));
     std::vector<std::string> remarks;

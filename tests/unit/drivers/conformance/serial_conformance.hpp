@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/mock/simulators/simulators.hpp"
+#include "tests/support/simulators/simulators.hpp"
 #include "tests/support/tampered.hpp"
 
 /// The one suite that every device on a serial line passes (INS, satellite receiver, trigger
@@ -21,7 +21,7 @@
 ///   struct Joined {
 ///     using Item = Pulse;                   // what wait() gives
 ///     static constexpr double kRate = 30;   // of them in a second
-///     Joined(const mock::SimulatedLineOptions&, Duration duration, test::Tampered::Tamper);
+///     Joined(const SimulatedLineOptions&, Duration duration, test::Tampered::Tamper);
 ///     DeviceStatus configure();
 ///     TriggerDevice& device();
 ///     static std::pair<std::uint64_t, DeviceStamp> order(const Item&);  // its number, and its
@@ -60,7 +60,7 @@ template <class Item, class Device>
 }
 
 /// Something else on the port: says the same every 200 ms, and answers as it is told.
-class Talker final : public mock::DeviceModel {
+class Talker final : public DeviceModel {
  public:
   using Answer = std::function<std::vector<std::uint8_t>(std::span<const std::uint8_t>)>;
   Talker(std::string says, std::uint32_t baud, Answer answer = {})
@@ -98,7 +98,7 @@ template <class Joined>
 struct SerialConformance : ::testing::Test {
   using Item = typename Joined::Item;
 
-  void begin(const mock::SimulatedLineOptions& line = {}, Tampered::Tamper tamper = {},
+  void begin(const SimulatedLineOptions& line = {}, Tampered::Tamper tamper = {},
              double seconds = 30) {
     rig = std::make_unique<Joined>(line, Duration::seconds(seconds), std::move(tamper));
     ASSERT_EQ(rig->configure(), DeviceStatus::ok) << rig->device().last_error();
@@ -139,7 +139,7 @@ TYPED_TEST_P(SerialConformance, stopsAndStartsAgain) {
 }
 
 TYPED_TEST_P(SerialConformance, comesBackAfterItWasUnpluggedWithOrWithoutItsSupply) {
-  mock::SimulatedLineOptions line;
+  SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(13), true}, {at_s(18), at_s(20), false}};
   this->begin(line);
   const auto all = this->take_to_the_end();
@@ -148,7 +148,7 @@ TYPED_TEST_P(SerialConformance, comesBackAfterItWasUnpluggedWithOrWithoutItsSupp
 }
 
 TYPED_TEST_P(SerialConformance, startsAnewAfterAStopWhileItWasGone) {
-  mock::SimulatedLineOptions line;
+  SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(13), true}};
   this->begin(line, {}, 120);
   typename TypeParam::Item last;
@@ -168,7 +168,7 @@ TYPED_TEST_P(SerialConformance, noiseIsSilenceAndSilenceIsGone) {
 }
 
 TYPED_TEST_P(SerialConformance, bitsThatFlipCostMessagesAndNothingElse) {
-  mock::SimulatedLineOptions line;
+  SimulatedLineOptions line;
   line.corrupt = 2e-4;
   this->begin(line);
   const auto all = this->take_to_the_end();

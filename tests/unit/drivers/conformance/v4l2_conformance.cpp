@@ -49,7 +49,7 @@ class V4l2Rig final : public ConformanceRig {
 
  private:
   std::unique_ptr<CameraDevice> camera_;
-  v4l2::UniqueFd cable_;
+  UniqueFd cable_;
 };
 
 }  // namespace

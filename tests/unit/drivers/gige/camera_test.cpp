@@ -72,8 +72,7 @@ TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
       "Software, Line1, Line2");
   refused(
       [](auto* c) {
-        c->trigger = CameraTrigger::hardware;
-        c->options = gige::Options{.overlap = gige::TriggerOverlap::previous_frame};
+        c->options = gige::Options{.features = {{"TriggerOverlap", "PreviousFrame"}}};
       },
       "Off, ReadOut");
   refused([](auto* c) { c->options = gige::Options{.features = {{"Gamma", "2"}}}; }, "Gamma");
@@ -84,15 +83,17 @@ TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
   EXPECT_EQ(b.reg(reg::width), 320U);
 }
 
-TEST(GigeCamera, hardwareTriggerSetsLineEdgeOverlapAndDelay) {
+TEST(GigeCamera, hardwareTriggerSetsLineEdgeAndTheFeaturesThatAreNamed) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   c.trigger = CameraTrigger::hardware;
   c.options = gige::Options{.line = "Line2",
                             .edge = gige::TriggerEdge::falling,
-                            .overlap = gige::TriggerOverlap::readout,
-                            .trigger_delay_us = 250,
-                            .exposure_line = "Line2"};
+                            .features = {{"TriggerOverlap", "ReadOut"},
+                                         {"TriggerDelay", "250"},
+                                         {"LineSelector", "Line2"},
+                                         {"LineMode", "Output"},
+                                         {"LineSource", "ExposureActive"}}};
   b.configure(c);
   EXPECT_EQ(b.reg(reg::trigger_mode), 1U);
   EXPECT_EQ(b.reg(reg::trigger_source), 2U);
@@ -120,15 +121,6 @@ TEST(GigeCamera, everyPulseIsOneFrameAndRestIsNoError) {
   EXPECT_EQ(b.camera->trigger_once(), DeviceStatus::unsupported);
 }
 
-TEST(GigeCamera, itsTemperatureIsReadWhileItStreams) {
-  GigeBench b;
-  b.configure(b.wish());
-  EXPECT_FALSE(b.camera->temperature_c()) << "not streaming";
-  b.start();
-  ASSERT_TRUE(b.camera->temperature_c());
-  EXPECT_DOUBLE_EQ(*b.camera->temperature_c(), 41.5);
-}
-
 TEST(GigeCamera, stampsAreTheCamerasClockInNanoseconds) {
   GigeCameraOptions o;
   o.tick_frequency = 62'500'000;
@@ -148,6 +140,30 @@ TEST(GigeCamera, stampsAreTheCamerasClockInNanoseconds) {
   }
   EXPECT_EQ(b.camera->timing().resolution, Duration::nanoseconds(16));
   EXPECT_GE(b.camera->timing().least_delay, Duration::milliseconds(2));
+}
+
+TEST(GigeCamera, chunkDataThatAnotherProgramLeftOnAreSwitchedOff) {
+  GigeBench b;
+  b.simulator->write(reg::chunk_mode, 1);
+  b.configure(b.wish());
+  EXPECT_EQ(b.reg(reg::chunk_mode), 0U);
+}
+
+TEST(GigeCamera, stampsOfTheEndGoBackByTheExposure) {
+  GigeBench b;
+  CameraConfiguration c = b.wish();
+  test::give<gige::Options>(&c, "stamp_at", "end");
+  b.configure(c);
+  b.start();
+  const auto frames = b.take(10);
+  ASSERT_EQ(b.numbers.size(), frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    // Image n is exposed at n periods of 20 ms; a tick is 8 ns.
+    const auto ticks =
+        b.simulator->ticks(HostStamp(static_cast<std::int64_t>(b.numbers[i]) * 20'000'000));
+    EXPECT_EQ(frames[i].exposure_start,
+              DeviceStamp(static_cast<std::int64_t>(ticks) * 8) - c.exposure);
+  }
 }
 
 TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {

@@ -1,8 +1,5 @@
-#include <linux/capability.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
-#include "tests/support/camera_options.hpp"
 #include "tests/unit/drivers/gige/gige_bench_rig.hpp"
 
 namespace vergence::test {
@@ -149,31 +146,6 @@ TEST(GigeTrouble, losingControlToSomebodyElseIsGone) {
   EXPECT_EQ(b.take(3).size(), 3U);
   b.simulator->take_control(true);
   EXPECT_TRUE(goes(&b, 12));
-}
-
-/// Takes CAP_NET_RAW from this thread, or gives it back.
-void allow_raw_sockets(bool allowed) {
-  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
-  __user_cap_data_struct data[2]{};
-  ASSERT_EQ(::syscall(SYS_capget, &header, data), 0);
-  constexpr unsigned kBit = 1U << CAP_NET_RAW;
-  data[0].effective =
-      allowed ? data[0].effective | (data[0].permitted & kBit) : data[0].effective & ~kBit;
-  ASSERT_EQ(::syscall(SYS_capset, &header, data), 0);
-}
-
-TEST(GigeTrouble, thePacketSocketNeedsPermission) {
-  GigeBench b;
-  CameraConfiguration c = b.wish();
-  test::give<gige::Options>(&c, "packet_socket", "on");
-  b.configure(c);
-  allow_raw_sockets(false);
-  EXPECT_EQ(b.camera->start(nullptr), DeviceStatus::no_permission);
-  EXPECT_NE(b.camera->last_error().find("CAP_NET_RAW"), std::string::npos);
-  allow_raw_sockets(true);
-  if (::geteuid() != 0) return;
-  b.start();
-  EXPECT_EQ(b.take(20).size(), 20U) << "through the packet socket";
 }
 
 }  // namespace

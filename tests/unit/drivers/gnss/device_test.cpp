@@ -34,7 +34,7 @@ std::string nmea_epoch(int i) {
 }
 
 /// A receiver that sends an epoch every 100 ms.
-class Model final : public mock::DeviceModel {
+class Model final : public test::DeviceModel {
  public:
   using Epoch = std::string (*)(int number);
   Model(Epoch epoch, HostStamp start, Duration duration)
@@ -133,10 +133,10 @@ TEST(GnssDevice, anotherRateIsRefusedWithTheReceiversOwn) {
 struct JoinedReceiver {
   using Item = InsReading;
   static constexpr double kRate = 10;
-  JoinedReceiver(const mock::SimulatedLineOptions& line, Duration duration,
+  JoinedReceiver(const test::SimulatedLineOptions& line, Duration duration,
                  test::Tampered::Tamper tamper, std::uint32_t baud = 0)
       : model(std::make_shared<Model>(ubx_epoch, HostStamp{}, duration)),
-        receiver(std::make_unique<mock::SimulatedPlace>(
+        receiver(std::make_unique<test::SimulatedPlace>(
                      std::make_shared<test::Tampered>(model, std::move(tamper)), line),
                  {Protocol::ubx, baud, {}}) {}
   DeviceStatus configure() {

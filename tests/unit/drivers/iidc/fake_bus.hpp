@@ -71,7 +71,6 @@ class FakeBus final : public iidc::CameraBus {
   void give_back(FrameSlot slot) noexcept override { memory_.release(slot); }
   const std::uint8_t* bytes(FrameSlot slot) const noexcept override { return memory_.bytes(slot); }
   std::string last_error() const override { return "the fake bus says so"; }
-  std::string remark(const iidc::StreamShape&, double, int) const override { return {}; }
 
   [[nodiscard]] HostStamp now() const { return HostStamp(kStart + elapsed_); }
   [[nodiscard]] std::int64_t camera_now() const { return kCameraStart + elapsed_; }

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/math/random.hpp"
-#include "drivers/iidc/bus_ledger.hpp"
 
 namespace vergence::iidc {
 namespace {
@@ -34,10 +33,9 @@ std::vector<std::uint8_t> image(std::uint32_t counter, std::int64_t camera_ns, R
 
 TEST(FrameReader, NoiseIsNeverTakenForTheNextFramesBeginning) {
   Random random(9);
-  BusLedger ledger;
   FrameReader reader;
-  const auto clock = ledger.clock("bus");
-  reader.begin(plan(), true, clock.get());
+  SharedClock clock;
+  reader.begin(plan(), true, &clock);
   for (std::uint32_t n = 0; n < 20'000; ++n) {
     const auto pixels = image(n, 1'000'000'000 + n * std::int64_t{100'000'000}, &random);
     Arrival a;
@@ -53,13 +51,12 @@ TEST(FrameReader, NoiseIsNeverTakenForTheNextFramesBeginning) {
 
 TEST(FrameReader, AnyBytesGiveAnAnswer) {
   Random random(10);
-  BusLedger ledger;
-  const auto clock = ledger.clock("bus");
+  SharedClock clock;
   for (const std::uint32_t items : {0U, 0x8000'0001U, 0x8000'0040U, 0x8000'0041U, 0x8000'03FFU}) {
     FrameReader reader;
     CameraPlan p = plan();
     p.info = FrameInfoLayout::of(items);
-    reader.begin(p, true, clock.get());
+    reader.begin(p, true, &clock);
     std::uint64_t last = 0;
     bool any = false;
     for (int n = 0; n < 3000; ++n) {
@@ -99,22 +96,6 @@ TEST(FrameReader, BusStampsTellGapsWhereNothingIsEmbedded) {
   }
   EXPECT_EQ(missing, 3U);
   EXPECT_EQ(last, 8U);
-}
-
-TEST(BusLedger, CamerasOfOneBusShareItsRoomAndItsClock) {
-  BusLedger ledger;
-  const int a = 0, b = 0;
-  const BusShare large{6680, BusSpeed::s800, 1280 * 960};
-  ledger.put(&a, "card0", large);
-  EXPECT_EQ(ledger.last_error("card0"), "");
-  ledger.put(&b, "card0", large);
-  EXPECT_NE(ledger.last_error("card0").find("6692 of the bus's 4915"), std::string::npos);
-  EXPECT_EQ(ledger.last_error("card1"), "");
-  ledger.put(&b, "card1", large);
-  EXPECT_EQ(ledger.last_error("card0"), "");
-  ledger.remove(&a);
-  EXPECT_EQ(ledger.clock("card0"), ledger.clock("card0"));
-  EXPECT_NE(ledger.clock("card0"), ledger.clock("card1"));
 }
 
 }  // namespace

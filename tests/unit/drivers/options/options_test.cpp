@@ -19,21 +19,13 @@ const std::map<std::string, Texts>& other_values() {
                                                   {"packet_delay_us", "12.5"},
                                                   {"link_mbps", "1000"},
                                                   {"link_cameras", "2"},
-                                                  {"packet_socket", "on"},
                                                   {"resend", "off"},
-                                                  {"frame_retention_ms", "20"},
                                                   {"socket_buffer_kb", "8192"},
                                                   {"buffers", "16"},
                                                   {"trigger_line", "Line2"},
                                                   {"trigger_edge", "falling"},
-                                                  {"trigger_overlap", "readout"},
-                                                  {"trigger_delay_us", "10"},
-                                                  {"exposure_mode", "trigger_width"},
-                                                  {"exposure_line", "Line3"},
                                                   {"stamp_at", "end"},
                                                   {"ptp", "on"},
-                                                  {"chunks", "off"},
-                                                  {"heartbeat_ms", "5000"},
                                                   {"feature.BlackLevel", "3"}}},
                                                 {"iidc-usb",
                                                  {{"trigger_source", "3"},
@@ -89,10 +81,8 @@ TEST(CameraOptions, aValueThatCannotBeChangesNothing) {
         {"packet_size", "575"},
         {"packet_delay_us", "nan"},
         {"buffers", "3"},
-        {"heartbeat_ms", "1e9"},
         {"link_cameras", "1.5"},
         {"resend", "perhaps"},
-        {"chunks", "on"},
         {"trigger_edge", ""},
         {"trigger_line", ""},
         {"feature.", "1"}}},
@@ -119,19 +109,6 @@ TEST(CameraOptions, aValueThatCannotBeChangesNothing) {
   CameraOptions none;
   EXPECT_FALSE(set_option("buffers", "8", &none));
   EXPECT_FALSE(default_options("mock").has_value());
-}
-
-TEST(CameraOptions, switchesTakeWhatPeopleWrite) {
-  for (const auto& [text, on] : {std::pair{"on", true},
-                                 {"yes", true},
-                                 {"true", true},
-                                 {"off", false},
-                                 {"no", false},
-                                 {"false", false}}) {
-    CameraOptions o = iidc::Options{};
-    ASSERT_TRUE(set_option("format7", text, &o));
-    EXPECT_EQ(std::get<iidc::Options>(o).format7, std::optional(on)) << text;
-  }
 }
 
 TEST(CameraOptions, aDriverTakesItsOwnKindAndWhatIsPossible) {

@@ -52,7 +52,7 @@ TEST(Board, isMetSetAndRead) {
 TEST(Board, isFoundAtWhicheverBaudRateItHas) {
   for (const auto& [baud, asked] :
        {std::pair{115200U, 0U}, {460800U, 0U}, {921600U, 0U}, {57600U, 57600U}}) {
-    mock::BoardSimulatorOptions board = board_for(Duration::seconds(20));
+    test::BoardSimulatorOptions board = board_for(Duration::seconds(20));
     board.baud = baud;
     BoardRig rig(board, {}, {.baud = asked});
     rig.start();
@@ -61,11 +61,11 @@ TEST(Board, isFoundAtWhicheverBaudRateItHas) {
 }
 
 TEST(Board, exposureFeedbackComesWithItsPulse) {
-  mock::BoardSimulatorOptions board = board_for(Duration::seconds(20));
+  test::BoardSimulatorOptions board = board_for(Duration::seconds(20));
   board.clock_ppm = 0;
   BoardRig rig(board, direct_line());
-  rig.exposures = [](const mock::SimulatedPulse& p) {
-    mock::SimulatedExposures e;
+  rig.exposures = [](const test::SimulatedPulse& p) {
+    test::SimulatedExposures e;
     e[0] = {true, p.edge + Duration::microseconds(35), p.edge + Duration::microseconds(8035)};
     e[1] = {p.number % 5 != 3, p.edge + Duration::microseconds(41),
             p.edge + Duration::microseconds(6041 + p.number)};
@@ -115,7 +115,7 @@ TEST(Board, aPauseIsAGapWithoutLoss) {
 }
 
 TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
-  mock::BoardSimulatorOptions board = board_for(Duration::seconds(40));
+  test::BoardSimulatorOptions board = board_for(Duration::seconds(40));
   for (int i = 0; i < 20; ++i)
     board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
   BoardRig rig(board, direct_line());
@@ -142,8 +142,8 @@ TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
 TEST(Board, overStopsAndStartsNumbersGoOnAndNoReportIsLost) {
   for (const std::uint8_t feedback : std::array<std::uint8_t, 2>{0, 1}) {
     BoardRig rig(board_for(Duration::seconds(200)), direct_line());
-    rig.exposures = [](const mock::SimulatedPulse& p) {
-      mock::SimulatedExposures e;
+    rig.exposures = [](const test::SimulatedPulse& p) {
+      test::SimulatedExposures e;
       e[0] = {true, p.edge + Duration::microseconds(35), p.edge + Duration::milliseconds(30)};
       return e;
     };
@@ -188,7 +188,7 @@ TEST(Board, oneThatRanBeforeTheProgramIsStoppedFirst) {
 }
 
 TEST(Board, oneThatStopsByItselfIsStartedAgain) {
-  std::shared_ptr<mock::BoardSimulator> simulator;
+  std::shared_ptr<test::BoardSimulator> simulator;
   bool done = false;
   BoardRig rig(board_for(Duration::seconds(20)), direct_line(), {},
                [&](HostStamp at, std::vector<std::uint8_t>*) {
@@ -205,7 +205,7 @@ TEST(Board, oneThatStopsByItselfIsStartedAgain) {
 }
 
 TEST(Board, secondsOfPpsAndTheInsAreCountedAndTheTicksLocked) {
-  mock::BoardSimulatorOptions board = board_for(Duration::seconds(60));
+  test::BoardSimulatorOptions board = board_for(Duration::seconds(60));
   board.pps = true;
   board.clock_ppm = 30;
   board.ins_interval = Duration::milliseconds(40);
@@ -221,7 +221,7 @@ TEST(Board, secondsOfPpsAndTheInsAreCountedAndTheTicksLocked) {
 }
 
 TEST(Board, anotherOneInItsPlaceIsNotTaken) {
-  mock::SimulatedLineOptions line;
+  test::SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(11)}, {at_s(20), at_s(21)}};
   BoardRig rig(board_for(Duration::seconds(60)), line, {},
                [&](HostStamp at, std::vector<std::uint8_t>* bytes) {
@@ -248,7 +248,7 @@ TEST(Configuration, whatCannotBeIsRefusedWithTheKeyToChange) {
     const char* key;
     Options options{};
   };
-  mock::BoardSimulatorOptions board = board_for(Duration::seconds(100));
+  test::BoardSimulatorOptions board = board_for(Duration::seconds(100));
   board.lines = 2;
   board.feedback_inputs = 1;
   board.has_pps = board.has_ins = false;
@@ -284,7 +284,7 @@ TEST(Configuration, whatCannotBeIsRefusedWithTheKeyToChange) {
 struct JoinedBoard {
   using Item = Pulse;
   static constexpr double kRate = 30;
-  JoinedBoard(const mock::SimulatedLineOptions& line, Duration duration,
+  JoinedBoard(const test::SimulatedLineOptions& line, Duration duration,
               test::Tampered::Tamper tamper)
       : rig(board_for(duration), line, {}, std::move(tamper)) {}
   DeviceStatus configure() { return rig.device->configure(thirty_hertz(), nullptr); }

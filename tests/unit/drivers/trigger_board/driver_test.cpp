@@ -9,7 +9,7 @@ namespace {
 struct Machine {
   struct Port {
     SerialPortInfo info;
-    std::shared_ptr<mock::DeviceModel> device;
+    std::shared_ptr<test::DeviceModel> device;
     DeviceStatus trouble = DeviceStatus::ok;
   };
   std::vector<Port> ports;
@@ -27,11 +27,11 @@ struct Machine {
     DeviceStatus status_;
   };
 
-  std::shared_ptr<mock::BoardSimulator> add_board(const char* port, std::uint8_t last_of_serial) {
-    mock::BoardSimulatorOptions o;
+  std::shared_ptr<test::BoardSimulator> add_board(const char* port, std::uint8_t last_of_serial) {
+    test::BoardSimulatorOptions o;
     o.serial[11] = last_of_serial;
     o.baud = 115200;  // a board's own USB takes every rate; this one the first
-    auto board = std::make_shared<mock::BoardSimulator>(mock::PulseSource{}, o);
+    auto board = std::make_shared<test::BoardSimulator>(test::PulseSource{}, o);
     ports.push_back({{port, "", 0x0483, 0x5740, "", {}}, board});
     return board;
   }
@@ -53,7 +53,7 @@ struct Machine {
                            if (p.info.port != name) continue;
                            if (p.trouble != DeviceStatus::ok)
                              return std::make_unique<Refusing>(p.trouble);
-                           return std::make_unique<mock::SimulatedPlace>(p.device,
+                           return std::make_unique<test::SimulatedPlace>(p.device,
                                                                          test::direct_line());
                          }
                          return std::make_unique<Refusing>(DeviceStatus::not_found);
@@ -98,23 +98,6 @@ TEST(Driver, opensByPortBySerialNumberOrTheOnlyOne) {
   EXPECT_EQ(driver.open("30002b000b513336343931cc", &s), nullptr);
   EXPECT_EQ(s, DeviceStatus::not_found);
   EXPECT_NE(driver.last_error().find("30002b000b513336343931cc"), std::string::npos);
-}
-
-TEST(Driver, saysWhyThereIsNone) {
-  Machine m;
-  Driver driver = m.driver();
-  DeviceStatus s = DeviceStatus::ok;
-  EXPECT_EQ(driver.open("", &s), nullptr);
-  EXPECT_EQ(s, DeviceStatus::not_found);
-  EXPECT_NE(driver.last_error().find("plug it in"), std::string::npos);
-  m.add("/dev/ttyUSB9", 0x0403, 0x6001, DeviceStatus::no_permission);
-  EXPECT_EQ(driver.open("", &s), nullptr);
-  EXPECT_EQ(s, DeviceStatus::no_permission);
-  EXPECT_EQ(driver.open("/dev/ttyUSB9", &s), nullptr);
-  EXPECT_EQ(s, DeviceStatus::no_permission);
-  EXPECT_EQ(driver.open("/dev/nothing", &s), nullptr);
-  EXPECT_EQ(s, DeviceStatus::not_found);
-  EXPECT_FALSE(driver.last_error().empty());
 }
 
 }  // namespace

@@ -58,10 +58,10 @@ struct TerminalRig {
     requested.rate_hz = 100;
     EXPECT_EQ(device.configure(requested, nullptr), DeviceStatus::ok) << device.last_error();
   }
-  static std::unique_ptr<mock::BoardSimulator> simulator() {
-    mock::BoardSimulatorOptions o;
+  static std::unique_ptr<test::BoardSimulator> simulator() {
+    test::BoardSimulatorOptions o;
     o.power_on = monotonic_now();
-    return std::make_unique<mock::BoardSimulator>(mock::PulseSource{}, o);
+    return std::make_unique<test::BoardSimulator>(test::PulseSource{}, o);
   }
   static Options options() {
     Options o;

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/mock/simulators/simulators.hpp"
 #include "drivers/trigger_board/trigger_board.hpp"
+#include "tests/support/simulators/simulators.hpp"
 #include "tests/support/tampered.hpp"
 #include "tests/unit/drivers/conformance/serial_conformance.hpp"
 
@@ -29,13 +29,13 @@ namespace vergence::test {
 }
 
 /// A line without a converter: the board's own USB, or a UART of the host.
-[[nodiscard]] inline mock::SimulatedLineOptions direct_line() {
-  mock::SimulatedLineOptions o;
+[[nodiscard]] inline SimulatedLineOptions direct_line() {
+  SimulatedLineOptions o;
   o.converter = false;
   return o;
 }
-[[nodiscard]] inline mock::BoardSimulatorOptions board_for(Duration duration) {
-  mock::BoardSimulatorOptions o;
+[[nodiscard]] inline BoardSimulatorOptions board_for(Duration duration) {
+  BoardSimulatorOptions o;
   o.duration = duration;
   return o;
 }
@@ -47,27 +47,26 @@ namespace vergence::test {
 
 /// A driver's device on a simulated line to a simulated board, and what the board really did.
 struct BoardRig {
-  explicit BoardRig(const mock::BoardSimulatorOptions& board = {},
-                    const mock::SimulatedLineOptions& line = {},
+  explicit BoardRig(const BoardSimulatorOptions& board = {}, const SimulatedLineOptions& line = {},
                     const trigger_board::Options& options = {}, Tampered::Tamper tamper = {})
-      : simulator(std::make_shared<mock::BoardSimulator>(
-            [this](const mock::SimulatedPulse& p) {
+      : simulator(std::make_shared<BoardSimulator>(
+            [this](const SimulatedPulse& p) {
               edges[{p.boot, p.number}] = p.edge;
-              return exposures ? exposures(p) : mock::SimulatedExposures{};
+              return exposures ? exposures(p) : SimulatedExposures{};
             },
             board)) {
     between = std::make_shared<Tampered>(simulator, std::move(tamper));
-    auto owned = std::make_unique<mock::SimulatedPlace>(between, line);
+    auto owned = std::make_unique<SimulatedPlace>(between, line);
     place = owned.get();
     device = std::make_unique<trigger_board::Device>(std::move(owned), options);
   }
 
   std::map<std::pair<std::uint32_t, std::uint64_t>, HostStamp>
       edges;  // by boot and number; of the device's thread while it runs
-  mock::PulseSource exposures;
-  std::shared_ptr<mock::BoardSimulator> simulator;
+  PulseSource exposures;
+  std::shared_ptr<BoardSimulator> simulator;
   std::shared_ptr<Tampered> between;
-  mock::SimulatedPlace* place = nullptr;
+  SimulatedPlace* place = nullptr;
   std::unique_ptr<trigger_board::Device> device;
   int times_gone = 0;
 

@@ -16,7 +16,7 @@ using test::thirty_hertz;
 struct Case {
   const char* name;
   double p99_us, rms_us;
-  void (*change)(mock::BoardSimulatorOptions*, mock::SimulatedLineOptions*);
+  void (*change)(test::BoardSimulatorOptions*, test::SimulatedLineOptions*);
   Options options{};
 };
 class Stamps : public ::testing::TestWithParam<Case> {};
@@ -28,15 +28,15 @@ TEST_P(Stamps, areRightAndNeverBeyondTheirBound) {
   std::vector<double> us;
   double squares = 0, largest_bound = 0;
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
-    mock::BoardSimulatorOptions board = board_for(Duration::seconds(60));
-    mock::SimulatedLineOptions line = direct_line();
+    test::BoardSimulatorOptions board = board_for(Duration::seconds(60));
+    test::SimulatedLineOptions line = direct_line();
     board.seed = line.seed = seed;
     board.clock_ppm = seed % 2 == 0 ? 50 : -50;
     c.change(&board, &line);
     BoardRig rig(board, line, c.options);
     // As a camera does: the report comes at the end of its exposure.
-    rig.exposures = [](const mock::SimulatedPulse& p) {
-      mock::SimulatedExposures x;
+    rig.exposures = [](const test::SimulatedPulse& p) {
+      test::SimulatedExposures x;
       x[0] =
           x[1] = {true, p.edge + Duration::microseconds(30), p.edge + Duration::microseconds(8030)};
       return x;
@@ -61,7 +61,7 @@ TEST_P(Stamps, areRightAndNeverBeyondTheirBound) {
   EXPECT_LE(p99, c.p99_us);
 }
 
-void two_milliseconds_of_jitter(mock::SimulatedLineOptions* line) {
+void two_milliseconds_of_jitter(test::SimulatedLineOptions* line) {
   line->fifo = 64;
   line->late_fraction = line->sent_late_fraction = 1;
   line->late_mean = line->sent_late_mean = Duration::milliseconds(2);
@@ -71,7 +71,7 @@ void two_milliseconds_of_jitter(mock::SimulatedLineOptions* line) {
 /// packet waits for a frame of the bus, 1 ms, and half of that is in the stamps, where nothing on
 /// the host can see it. It is within the bound.
 template <int kMilliseconds>
-void converter(mock::BoardSimulatorOptions*, mock::SimulatedLineOptions* line) {
+void converter(test::BoardSimulatorOptions*, test::SimulatedLineOptions* line) {
   line->converter = true;
   line->latency_timer = Duration::milliseconds(kMilliseconds);
 }

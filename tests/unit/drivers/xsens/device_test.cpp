@@ -25,7 +25,7 @@ class BothGenerations : public ::testing::TestWithParam<Generation> {
 };
 
 TEST_P(BothGenerations, isFoundSetAndRead) {
-  mock::XsensSimulatorOptions sensor = simulated(GetParam(), 8);
+  test::XsensSimulatorOptions sensor = simulated(GetParam(), 8);
   XsensRig rig(sensor);
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(rig.device->identity().generation, GetParam());
@@ -54,7 +54,7 @@ TEST_P(BothGenerations, isFoundSetAndRead) {
 }
 
 TEST_P(BothGenerations, valuesAreThoseOfTheDriveInEastNorthUp) {
-  mock::XsensSimulatorOptions sensor = simulated(GetParam(), 4);
+  test::XsensSimulatorOptions sensor = simulated(GetParam(), 4);
   XsensRig rig(sensor);
   const auto all = rig.drive();
   ASSERT_GT(all.size(), 100U);
@@ -102,7 +102,7 @@ std::pair<std::int64_t, std::int64_t> gap_in(const Times& times, const OfTime& n
 // Cameras that SyncOut triggers are paired by a gap: every pulse on either side of it has to have
 // its reading, also behind a converter that keeps bytes for 16 ms.
 TEST(XsensDevice, aPauseLosesNoReadingOnEitherSideAndTheFirstAfterItIsMarked) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 30);
+  test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 30);
   Options options;
   options.sync_out_hz = 25;
   XsensRig rig(sensor, {}, options);
@@ -125,7 +125,7 @@ TEST(XsensDevice, aPauseLosesNoReadingOnEitherSideAndTheFirstAfterItIsMarked) {
 }
 
 TEST(XsensDevice, aStopEndsThePulsesWhereSyncOutIsInUse) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4);
+  test::XsensSimulatorOptions sensor = simulated(Generation::mark4);
   Options options;
   options.sync_out_hz = 25;
   XsensRig rig(sensor, {}, options);
@@ -136,22 +136,20 @@ TEST(XsensDevice, aStopEndsThePulsesWhereSyncOutIsInUse) {
 }
 
 TEST_P(BothGenerations, whatIsSetAlreadyIsNotWrittenAgain) {
-  mock::XsensSimulatorOptions sensor = simulated(GetParam());
+  test::XsensSimulatorOptions sensor = simulated(GetParam());
   XsensRig rig(sensor);
   Options options;
   options.sync_out_hz = 25;
-  options.sync_in = SyncIn::rising;
   rig.device = std::make_unique<Device>(
-      std::make_unique<mock::SimulatedPlace>(rig.simulator, mock::SimulatedLineOptions{}), options);
+      std::make_unique<test::SimulatedPlace>(rig.simulator, test::SimulatedLineOptions{}), options);
   ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->last_error();
-  const mock::XsensWrites first = rig.simulator->writes();
+  const test::XsensWrites first = rig.simulator->writes();
   EXPECT_GT(first.outputs + first.layout, 0);
   EXPECT_GT(first.sync_out + first.sync_settings, 0);
   ASSERT_EQ(rig.device->configure(100, nullptr), DeviceStatus::ok) << rig.device->last_error();
-  const mock::XsensWrites& second = rig.simulator->writes();
-  const auto asked_for = [](const mock::XsensWrites& w) {
-    return std::array{w.outputs,  w.layout,  w.period,       w.skip,
-                      w.sync_out, w.sync_in, w.sync_settings};
+  const test::XsensWrites& second = rig.simulator->writes();
+  const auto asked_for = [](const test::XsensWrites& w) {
+    return std::array{w.outputs, w.layout, w.period, w.skip, w.sync_out, w.sync_settings};
   };
   EXPECT_EQ(asked_for(second), asked_for(first));
   EXPECT_EQ(second.baud, 0);
@@ -186,7 +184,7 @@ TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
 }
 
 TEST_P(BothGenerations, isFoundAtAnotherBaudRateAndBroughtToTheOneAskedFor) {
-  mock::XsensSimulatorOptions sensor = simulated(GetParam(), 30);
+  test::XsensSimulatorOptions sensor = simulated(GetParam(), 30);
   sensor.baud = 57600;
   sensor.layout = {0x0004, 0x001};  // what that rate carries
   Options options;
@@ -216,7 +214,7 @@ TEST_P(BothGenerations, aLineTooSlowIsRefusedWithWhatWouldDo) {
 }
 
 TEST_P(BothGenerations, oneThatLostItsSettingsIsSetAgain) {
-  mock::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
+  test::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
   XsensRig rig(sensor);
   // From 9 s on its messages hold nothing that was asked for, until it is told to stop measuring.
   bool lost = false;
@@ -266,7 +264,7 @@ struct Timing {
 class Stamps : public ::testing::TestWithParam<Timing> {};
 
 TEST_P(BothGenerations, oneThatFellSilentIsToldToMeasureAgain) {
-  mock::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
+  test::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
   sensor.silences = {HostStamp(9'000'000'000)};
   XsensRig rig(sensor);
   EXPECT_GT(rig.drive().back().arrival, HostStamp(19'500'000'000));
@@ -277,12 +275,12 @@ TEST_P(Stamps, areRightWithinThreeTenthsOfAMillisecondAfterTwentySeconds) {
   const Timing& t = GetParam();
   std::vector<double> errors;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    mock::XsensSimulatorOptions sensor = simulated(t.generation);
+    test::XsensSimulatorOptions sensor = simulated(t.generation);
     sensor.baud = t.baud;
     sensor.clock_ppm = seed == 2 ? -50 : 50;
     sensor.seed = seed;
     sensor.duration = Duration::seconds(80);
-    mock::SimulatedLineOptions line;
+    test::SimulatedLineOptions line;
     line.converter = t.latency_ms > 0;
     line.latency_timer = Duration::milliseconds(t.latency_ms);
     line.seed = seed;
@@ -317,7 +315,7 @@ INSTANTIATE_TEST_SUITE_P(
 // ---- what is special to one of them, and what is none
 
 TEST(Mark4, atOneHertzALostSampleIsNoSilence) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 40);
+  test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 40);
   XsensRig rig(sensor);
   rig.between->tamper([n = 0](HostStamp at, std::vector<std::uint8_t>* bytes) mutable {
     if (at > HostStamp(9'000'000'000) && at < HostStamp(20'000'000'000) && ++n % 3 != 0)
@@ -329,7 +327,7 @@ TEST(Mark4, atOneHertzALostSampleIsNoSilence) {
 }
 
 TEST(Mark4, positionsThatAreMissingNowAndThenMakeNoHoleInTheFix) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
+  test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
   sensor.missing_position = 0.2;
   XsensRig rig(sensor);
   const auto all = rig.drive();
@@ -339,7 +337,7 @@ TEST(Mark4, positionsThatAreMissingNowAndThenMakeNoHoleInTheFix) {
 }
 
 TEST(Mark4, aDriveWithoutAFixIsToldAndGoesOn) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
+  test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
   XsensRig rig(sensor, {}, {}, [](std::uint64_t n, Duration t) {
     InsSample s = easy_drive(n, t);
     if (t > Duration::seconds(8)) s.fix = FixStatus::none;
@@ -359,7 +357,7 @@ TEST(Mark4, aDriveWithoutAFixIsToldAndGoesOn) {
 }
 
 TEST(Mark4, syncOutIsMarkedInTheStream) {
-  mock::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
+  test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
   Options options;
   options.sync_out_hz = 25;
   XsensRig rig(sensor, {}, options);
@@ -375,8 +373,8 @@ TEST(AnotherMake, isNamed) {
         {"\xB5\x62\x01\x07 some more bytes", "u-blox"},
         {"hello hello hello", "no Xbus"},
         {"", "silent"}}) {
-    Device device(std::make_unique<mock::SimulatedPlace>(std::make_shared<test::Talker>(says, 9600),
-                                                         mock::SimulatedLineOptions{}),
+    Device device(std::make_unique<test::SimulatedPlace>(std::make_shared<test::Talker>(says, 9600),
+                                                         test::SimulatedLineOptions{}),
                   {});
     EXPECT_EQ(device.connect(), DeviceStatus::not_found);
     EXPECT_NE(device.last_error().find(word), std::string::npos) << device.last_error();
@@ -387,7 +385,7 @@ template <Generation kGeneration>
 struct JoinedSensor {
   using Item = InsReading;
   static constexpr double kRate = 100;
-  JoinedSensor(const mock::SimulatedLineOptions& line, Duration duration,
+  JoinedSensor(const test::SimulatedLineOptions& line, Duration duration,
                test::Tampered::Tamper tamper)
       : rig(simulated(kGeneration, duration.to_seconds()), line, {}, easy_drive,
             std::move(tamper)) {}

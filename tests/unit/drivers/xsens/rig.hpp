@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/mock/simulators/simulators.hpp"
 #include "drivers/xsens/device.hpp"
+#include "tests/support/simulators/simulators.hpp"
 #include "tests/support/tampered.hpp"
 #include "tests/unit/drivers/conformance/serial_conformance.hpp"
 
@@ -30,9 +30,9 @@ namespace vergence::test {
 }
 
 /// The simulator of a generation with what goes with it.
-[[nodiscard]] inline mock::XsensSimulatorOptions simulated(xbus::Generation generation,
-                                                           double seconds = 0) {
-  mock::XsensSimulatorOptions o;
+[[nodiscard]] inline XsensSimulatorOptions simulated(xbus::Generation generation,
+                                                     double seconds = 0) {
+  XsensSimulatorOptions o;
   if (seconds > 0) o.duration = Duration::seconds(seconds);
   o.generation = generation;
   o.device_id = generation == xbus::Generation::legacy ? 0x00500123 : 0x07701234;
@@ -41,15 +41,15 @@ namespace vergence::test {
 
 /// A driver's device on a simulated line.
 struct XsensRig {
-  explicit XsensRig(const mock::XsensSimulatorOptions& sensor = {},
-                    const mock::SimulatedLineOptions& line = {}, const xsens::Options& options = {},
-                    mock::InsSource source = easy_drive, Tampered::Tamper tamper = {})
-      : simulator(std::make_shared<mock::XsensSimulator>(std::move(source), sensor)),
+  explicit XsensRig(const XsensSimulatorOptions& sensor = {}, const SimulatedLineOptions& line = {},
+                    const xsens::Options& options = {}, InsSource source = easy_drive,
+                    Tampered::Tamper tamper = {})
+      : simulator(std::make_shared<XsensSimulator>(std::move(source), sensor)),
         between(std::make_shared<Tampered>(simulator, std::move(tamper))),
-        device(std::make_unique<xsens::Device>(
-            std::make_unique<mock::SimulatedPlace>(between, line), options)) {}
+        device(std::make_unique<xsens::Device>(std::make_unique<SimulatedPlace>(between, line),
+                                               options)) {}
 
-  std::shared_ptr<mock::XsensSimulator> simulator;
+  std::shared_ptr<XsensSimulator> simulator;
   std::shared_ptr<Tampered> between;
   std::unique_ptr<xsens::Device> device;
 
@@ -70,7 +70,7 @@ struct XsensRig {
 };
 
 /// |mapped − true| of every reading after `settled` of the first, in milliseconds, ascending.
-[[nodiscard]] inline std::vector<double> stamp_errors_ms(const mock::XsensSimulator& simulator,
+[[nodiscard]] inline std::vector<double> stamp_errors_ms(const XsensSimulator& simulator,
                                                          const std::vector<InsReading>& readings,
                                                          std::int64_t origin_ns, Duration settled) {
   std::vector<double> errors;

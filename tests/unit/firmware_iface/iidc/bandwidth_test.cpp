@@ -31,11 +31,5 @@ TEST(Bandwidth, TheLargestPacketForAShareFitsAndTheNextDoesNot) {
     }
 }
 
-TEST(Bandwidth, SharesAddUp) {
-  const BusShare one{4608, BusSpeed::s800, 1280 * 960};
-  EXPECT_EQ(total_units(std::array{one, one}), 4620U);
-  EXPECT_EQ(total_units({}), 0U);
-}
-
 }  // namespace
 }  // namespace vergence::iidc

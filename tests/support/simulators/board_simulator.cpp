@@ -1,11 +1,11 @@
-#include "drivers/mock/simulators/board_simulator.hpp"
+#include "tests/support/simulators/board_simulator.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
-namespace vergence::mock {
+namespace vergence::test {
 namespace {
 
 constexpr Duration kSecond = Duration::seconds(1);
@@ -202,4 +202,4 @@ void BoardSimulator::plan() {
   next_ = std::max(now_, at);
 }
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

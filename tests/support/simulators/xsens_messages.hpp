@@ -5,10 +5,10 @@
 
 #include "core/math/random.hpp"
 #include "core/types/ins_sample.hpp"
-#include "drivers/mock/simulators/xsens_settings.hpp"
-#include "drivers/mock/simulators/xsens_simulator_options.hpp"
+#include "tests/support/simulators/xsens_settings.hpp"
+#include "tests/support/simulators/xsens_simulator_options.hpp"
 
-namespace vergence::mock {
+namespace vergence::test {
 
 /// The data messages of a simulated XSens INS, of both generations: what it sends of a sample.
 ///
@@ -60,4 +60,4 @@ class XsensMessages {
   std::deque<Sample> history_;
 };
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

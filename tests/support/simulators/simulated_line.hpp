@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "core/types/time.hpp"
-#include "drivers/mock/simulators/device_model.hpp"
 #include "drivers/serial/byte_line.hpp"
+#include "tests/support/simulators/device_model.hpp"
 
-namespace vergence::mock {
+namespace vergence::test {
 
 /// The line is unplugged for a while.
 struct Outage {
@@ -135,4 +135,4 @@ class SimulatedPlace final : public LinePlace {
   std::shared_ptr<World> world_;
 };
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

@@ -1,4 +1,4 @@
-#include "drivers/mock/simulators/simulated_line.hpp"
+#include "tests/support/simulators/simulated_line.hpp"
 
 #include <time.h>
 
@@ -13,7 +13,7 @@
 
 #include "core/math/random.hpp"
 
-namespace vergence::mock {
+namespace vergence::test {
 
 std::optional<HostStamp> OutageSchedule::next() const noexcept {
   if (at_ == outages_.size()) return std::nullopt;
@@ -418,4 +418,4 @@ bool SimulatedPlace::pass(Duration time) {
   return true;
 }
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

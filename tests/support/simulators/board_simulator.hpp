@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "core/math/random.hpp"
-#include "drivers/mock/simulators/device_model.hpp"
 #include "firmware_iface/trigger/board/board.h"
+#include "tests/support/simulators/device_model.hpp"
 
-namespace vergence::mock {
+namespace vergence::test {
 
 /// A pulse that left the board.
 struct SimulatedPulse {
@@ -114,4 +114,4 @@ class BoardSimulator final : public DeviceModel {
   std::optional<HostStamp> next_{};
 };
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

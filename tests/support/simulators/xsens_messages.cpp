@@ -1,10 +1,10 @@
-#include "drivers/mock/simulators/xsens_messages.hpp"
+#include "tests/support/simulators/xsens_messages.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-namespace vergence::mock {
+namespace vergence::test {
 namespace {
 
 using namespace xbus;
@@ -68,23 +68,6 @@ std::array<double, 4> quaternion_of(const Matrix& R) noexcept {
   return q;
 }
 
-Three euler_deg_of(const Matrix& R) noexcept {
-  constexpr double kDegree = 180 / 3.14159265358979323846;
-  return {kDegree * std::atan2(R[2][1], R[2][2]),
-          -kDegree * std::asin(std::clamp(R[2][0], -1.0, 1.0)),
-          kDegree * std::atan2(R[1][0], R[0][0])};
-}
-
-std::array<double, 9> flat(const Matrix& R) noexcept {
-  return {R[0][0], R[0][1], R[0][2], R[1][0], R[1][1], R[1][2], R[2][0], R[2][1], R[2][2]};
-}
-
-Three gravity_in_body(const InsSample& s) noexcept {
-  constexpr double kGravity = 9.79;
-  const Matrix R = attitude_in(LocalFrame::enu, s);
-  return {kGravity * R[2][0], kGravity * R[2][1], kGravity * R[2][2]};
-}
-
 std::uint32_t status_of(const InsSample& s) noexcept {
   const bool fix = s.fix == FixStatus::fix_2d || s.fix == FixStatus::fix_3d;
   std::uint32_t status = kStatusSelfTest | kStatusClockSynced;
@@ -129,8 +112,6 @@ XsensMessages::Message XsensMessages::legacy(const Sample& now) {
   const InsSample& s = now.sample;
   const Matrix R = attitude_in(frame, s);
   d.quaternion = quaternion_of(R);
-  d.euler_deg = euler_deg_of(R);
-  d.rotation_matrix = flat(R);
   d.latitude_longitude_deg = std::array{s.position.latitude_deg, s.position.longitude_deg};
   d.altitude_m = s.position.height_m;
   d.velocity = in_frame(frame, s.velocity_enu);
@@ -188,18 +169,6 @@ XsensMessages::Message XsensMessages::mark4(const Sample& now, Random* random) {
       case PacketId::quaternion:
         packets.put_numbers(e.id, quaternion_of(attitude_in(frame, s)));
         break;
-      case PacketId::euler:
-        packets.put_numbers(e.id, euler_deg_of(attitude_in(frame, s)));
-        break;
-      case PacketId::rotation_matrix:
-        packets.put_numbers(e.id, flat(attitude_in(frame, s)));
-        break;
-      case PacketId::acceleration:
-        packets.put_numbers(e.id, gravity_in_body(s));
-        break;
-      case PacketId::rate_of_turn:
-        packets.put_numbers(e.id, Three{});
-        break;
       case PacketId::latitude_longitude:
         if (place)
           packets.put_numbers(e.id, std::array{s.position.latitude_deg, s.position.longitude_deg});
@@ -216,9 +185,6 @@ XsensMessages::Message XsensMessages::mark4(const Sample& now, Random* random) {
                                                             now.device_ns)
                                       ? kStatusSyncOutMarker
                                       : 0U));
-        break;
-      case PacketId::status_byte:
-        packets.put(e.id, std::array{static_cast<std::uint8_t>(status_of(s))});
         break;
       default:
         break;
@@ -255,4 +221,4 @@ XsensMessages::Message XsensMessages::fix() {
   return message(MessageId::mtdata2, packets.payload());
 }
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

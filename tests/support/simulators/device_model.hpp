@@ -6,7 +6,7 @@
 
 #include "core/types/time.hpp"
 
-namespace vergence::mock {
+namespace vergence::test {
 
 /// A device at the far end of a simulated serial line: bytes in, bytes out, at times of the host's
 /// clock (which the device does not know; its own clock is the model's affair).
@@ -29,4 +29,4 @@ class DeviceModel {
   [[nodiscard]] virtual bool ended() const { return false; }
 };
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

@@ -5,7 +5,7 @@
 #include "core/types/time.hpp"
 #include "firmware_iface/xbus/xbus.hpp"
 
-namespace vergence::mock {
+namespace vergence::test {
 
 struct XsensSimulatorOptions {
   xbus::Generation generation = xbus::Generation::mark4;
@@ -24,7 +24,6 @@ struct XsensSimulatorOptions {
   int fix_age = 5;  // samples that a receiver's message is older than the inertial one before it
   double missing_position =
       0;  // of the inertial messages: they come without latitude and longitude (MTi-G-700/710)
-  std::vector<HostStamp> dips{};      // the supply dips: the sensor restarts, by itself
   std::vector<HostStamp> silences{};  // the sensor stops sending until it is told to measure again
   // Settings stored in the device; the simulator's own defaults when empty or zero.
   xbus::OutputConfiguration outputs{};
@@ -33,4 +32,4 @@ struct XsensSimulatorOptions {
   std::uint64_t seed = 1;
 };
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

@@ -1,11 +1,11 @@
-#include "drivers/mock/simulators/xsens_simulator.hpp"
+#include "tests/support/simulators/xsens_simulator.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
-namespace vergence::mock {
+namespace vergence::test {
 namespace {
 
 using namespace xbus;
@@ -141,7 +141,6 @@ std::optional<HostStamp> XsensSimulator::next() const {
   if (mode_ == Mode::waking) consider(waits_for_host_until_);
   if (mode_ == Mode::measuring && sample_at_ <= options_.power_on + options_.duration)
     consider(sample_at_);
-  if (dips_done_ < options_.dips.size()) consider(options_.dips[dips_done_]);
   if (silences_done_ < options_.silences.size()) consider(options_.silences[silences_done_]);
   if (!first && now_ <= options_.power_on + options_.duration)
     consider(options_.power_on + options_.duration + Duration::nanoseconds(1));
@@ -150,11 +149,6 @@ std::optional<HostStamp> XsensSimulator::next() const {
 
 void XsensSimulator::produce(HostStamp at, std::vector<std::uint8_t>* out) {
   now_ = std::max(now_, at);
-  if (dips_done_ < options_.dips.size() && now_ >= options_.dips[dips_done_]) {
-    ++dips_done_;
-    power_cycle(now_);
-    send(now_ + kStartTime + kAnswerTime, id_of(MessageId::error), std::array{kErrorPowerDip});
-  }
   if (reset_at_ && now_ >= *reset_at_) {
     reset_at_.reset();
     power_cycle(now_);
@@ -194,4 +188,4 @@ void XsensSimulator::take_sample() {
   plan_sample();
 }
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

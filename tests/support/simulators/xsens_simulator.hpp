@@ -8,13 +8,13 @@
 
 #include "core/math/random.hpp"
 #include "core/types/ins_sample.hpp"
-#include "drivers/mock/simulators/device_model.hpp"
-#include "drivers/mock/simulators/xsens_messages.hpp"
-#include "drivers/mock/simulators/xsens_settings.hpp"
-#include "drivers/mock/simulators/xsens_simulator_options.hpp"
 #include "firmware_iface/xbus/xbus.hpp"
+#include "tests/support/simulators/device_model.hpp"
+#include "tests/support/simulators/xsens_messages.hpp"
+#include "tests/support/simulators/xsens_settings.hpp"
+#include "tests/support/simulators/xsens_simulator_options.hpp"
 
-namespace vergence::mock {
+namespace vergence::test {
 
 /// What the simulated sensor measures: the reading of this number at a time of the drive. Called in
 /// order of the numbers, none left out.
@@ -91,10 +91,10 @@ class XsensSimulator final : public DeviceModel {
   HostStamp sample_at_{};       // of the next sample; while measuring
   std::int64_t sample_ns_ = 0;  // the same by the device's clock
   std::uint64_t samples_ = 0;
-  std::size_t dips_done_ = 0, silences_done_ = 0;
+  std::size_t silences_done_ = 0;
   std::deque<std::int64_t> sample_times_;
   XsensSettings settings_;
   XsensMessages messages_;
 };
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

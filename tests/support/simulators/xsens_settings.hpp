@@ -4,16 +4,15 @@
 #include <span>
 #include <vector>
 
-#include "drivers/mock/simulators/xsens_simulator_options.hpp"
 #include "firmware_iface/xbus/xbus.hpp"
+#include "tests/support/simulators/xsens_simulator_options.hpp"
 
-namespace vergence::mock {
+namespace vergence::test {
 
 /// How often a host wrote which setting: a driver that changes only what differs leaves these at
 /// zero the second time.
 struct XsensWrites {
-  int outputs = 0, layout = 0, period = 0, skip = 0, sync_in = 0, sync_out = 0, sync_settings = 0,
-      baud = 0;
+  int outputs = 0, layout = 0, period = 0, skip = 0, sync_out = 0, sync_settings = 0, baud = 0;
   int heading = 0;  // message D6 taken as the heading: meant for the other generation
   int refused = 0;  // messages answered with an error
 };
@@ -70,8 +69,8 @@ class XsensSettings {
   xbus::MtdataLayout layout_;
   std::uint16_t period_, skip_ = 0, scenario_ = 6, string_output_ = 0;
   xbus::SyncSettings sync_;
-  std::array<std::uint32_t, 4> legacy_sync_in_{}, legacy_sync_out_{0, 0, 0, 29491};  // by parameter
+  std::array<std::uint32_t, 4> legacy_sync_out_{0, 0, 0, 29491};  // by parameter
   XsensWrites writes_;
 };
 
-}  // namespace vergence::mock
+}  // namespace vergence::test

@@ -1,10 +1,10 @@
-#include "drivers/mock/simulators/xsens_settings.hpp"
+#include "tests/support/simulators/xsens_settings.hpp"
 
 #include <algorithm>
 #include <cstdlib>
 #include <string_view>
 
-namespace vergence::mock {
+namespace vergence::test {
 namespace {
 
 using namespace xbus;
@@ -142,19 +142,17 @@ XsensSettings::Reply XsensSettings::handle_legacy(const Message& m) {
     case MessageId::data_length_request:
       write_u16(payload, static_cast<std::uint16_t>(layout_.payload_size().value_or(0)));
       return answer(m, std::span(payload).first(2));
-    case MessageId::legacy_sync_in:
     case MessageId::legacy_sync_out: {
-      auto& settings = m.is(MessageId::legacy_sync_in) ? legacy_sync_in_ : legacy_sync_out_;
       LegacySync parameter{};
       std::uint32_t value = 0;
       if (read_legacy_sync(m.payload, &parameter, &value)) {
-        settings[static_cast<std::size_t>(parameter)] = value;
-        ++(m.is(MessageId::legacy_sync_in) ? writes_.sync_in : writes_.sync_out);
+        legacy_sync_out_[static_cast<std::size_t>(parameter)] = value;
+        ++writes_.sync_out;
         return answer(m, {});
       }
       if (m.payload.size() != 1 || m.payload[0] > 3) return refuse(kErrorParameter);
-      const std::size_t n =
-          write_legacy_sync(static_cast<LegacySync>(m.payload[0]), settings[m.payload[0]], payload);
+      const std::size_t n = write_legacy_sync(static_cast<LegacySync>(m.payload[0]),
+                                              legacy_sync_out_[m.payload[0]], payload);
       return answer(m, std::span(payload).first(n));
     }
     default:
@@ -219,4 +217,4 @@ bool XsensSettings::sync_out_within(std::int64_t from_ns, std::int64_t to_ns) co
   return false;
 }
 
-}  // namespace vergence::mock
+}  // namespace vergence::test
