@@ -31,39 +31,6 @@ struct Queue : ::testing::Test {
   Frame out{};
 };
 
-TEST_F(Queue, framesComeInTheirOrderAndAreCounted) {
-  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout);
-  ASSERT_TRUE(queue.offer(frame(5)));
-  ASSERT_TRUE(queue.offer(frame(2, FrameStatus::torn)));
-  EXPECT_EQ(ready.count, 2);
-  ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
-  EXPECT_EQ(out.counter, 105U);
-  ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
-  EXPECT_EQ(out.slot, 2U);
-  queue.count_lost(3);
-  queue.count_underrun();
-  queue.count_start();
-  const CameraStatistics s = queue.statistics();
-  EXPECT_EQ(s.delivered, 2U);
-  EXPECT_EQ(s.torn, 1U);
-  EXPECT_EQ(s.lost, 3U);
-  EXPECT_EQ(s.underruns, 1U);
-  EXPECT_EQ(s.starts, 1U);
-}
-
-TEST_F(Queue, aSlotIsOutFromItsOfferToItsRelease) {
-  EXPECT_FALSE(queue.is_out(63));
-  ASSERT_TRUE(queue.offer(frame(63)));
-  EXPECT_TRUE(queue.is_out(63));
-  EXPECT_EQ(queue.held(), 0U) << "nobody has it yet";
-  ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
-  EXPECT_EQ(queue.held(), 1U);
-  EXPECT_EQ(queue.out(), 1U);
-  EXPECT_TRUE(queue.release(63));
-  EXPECT_FALSE(queue.release(63)) << "once";
-  EXPECT_FALSE(queue.is_out(63));
-}
-
 TEST_F(Queue, everySlotThereCanBeHasAPlace) {
   for (FrameSlot s = 0; s < FramePool::kMaxSlots; ++s) ASSERT_TRUE(queue.offer(frame(s)));
   EXPECT_EQ(queue.out(), FramePool::kMaxSlots);
@@ -71,17 +38,6 @@ TEST_F(Queue, everySlotThereCanBeHasAPlace) {
     ASSERT_EQ(queue.wait({}, &out), DeviceStatus::ok);
     EXPECT_EQ(out.slot, s);
   }
-}
-
-TEST_F(Queue, whatWasOfferedBeforeALossIsStillHandedOut) {
-  ASSERT_TRUE(queue.offer(frame(1)));
-  queue.lose(HostStamp(42));
-  EXPECT_FALSE(queue.offer(frame(2)));
-  EXPECT_EQ(ready.count, 2) << "of the frame and of the loss";
-  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::ok);
-  EXPECT_EQ(queue.wait(Duration::seconds(9), &out), DeviceStatus::gone);
-  EXPECT_EQ(out.arrival, HostStamp(42));
-  EXPECT_TRUE(queue.started());
 }
 
 TEST_F(Queue, aDeviceThatIsBackIsGoneUntilItIsBegunAgain) {
@@ -123,18 +79,6 @@ TEST_F(Queue, aStopHandsOutNothingAndWhatNobodyTookIsDrained) {
   EXPECT_TRUE(queue.release(1)) << "over the stop";
 }
 
-TEST_F(Queue, whoWaitsIsWokenByAFrameALossAndAStop) {
-  const auto woken_by = [&](auto action, DeviceStatus expected) {
-    std::thread other([&] { action(); });
-    EXPECT_EQ(queue.wait(Duration::seconds(60), &out), expected);
-    other.join();
-  };
-  woken_by([&] { EXPECT_TRUE(queue.offer(frame(7))); }, DeviceStatus::ok);
-  woken_by([&] { queue.lose(HostStamp(1)); }, DeviceStatus::gone);
-  queue.begin(nullptr);
-  woken_by([&] { queue.end(); }, DeviceStatus::stopped);
-}
-
 /// Asks again and again, as a drive does, until it is not a time-out or `most` has passed.
 DeviceStatus ask(FrameQueue* queue, Duration most, Frame* out) {
   const HostStamp begun = monotonic_now();
@@ -162,11 +106,6 @@ TEST_F(Queue, ASilentDeviceIsGoneAndStreamsAgainAfterAStart) {
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::ok);
 }
 
-TEST_F(Queue, WhoMayRestIsNeverSilent) {
-  queue.begin(&ready);
-  EXPECT_EQ(ask(&queue, kSilence * 2, &out), DeviceStatus::timeout);
-}
-
 TEST_F(Queue, ImagesThatFoundNoSlotAreNoSilence) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence * 20);
@@ -189,12 +128,6 @@ TEST_F(Queue, WhoDidNotAskCannotTellSilence) {
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout) << "it was away itself";
   EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::gone);
-}
-
-TEST_F(Queue, OneLongWaitTellsSilence) {
-  queue.begin(&ready, kSilence);
-  queue.count_underrun();
-  EXPECT_EQ(queue.wait(Duration::milliseconds(1500), &out), DeviceStatus::gone);
 }
 
 TEST(LongestSilence, IsTenIntervalsOfAFreeRunningCameraAndTwoSecondsAtLeast) {

@@ -25,14 +25,6 @@ TEST(GigeBlocks, sixteenBitIdsSkipZeroWhenTheyWrap) {
   }
 }
 
-TEST(GigeBlocks, gapsAreCountedAcrossTheWrap) {
-  BlockCounter blocks;
-  EXPECT_EQ(blocks.next(65'530)->counter, 0U);
-  const auto step = blocks.next(3);  // 65531 … 65535, 1, 2 are missing
-  EXPECT_EQ(step->counter, 8U);
-  EXPECT_EQ(step->missing, 7U);
-}
-
 TEST(GigeBlocks, wideIdsDoNotWrap) {
   BlockCounter blocks;
   EXPECT_EQ(blocks.next(65'534)->counter, 0U);
@@ -69,18 +61,6 @@ TEST(GigeLink, theDelayLeavesRoomForTheOtherCameras) {
             Duration::microseconds(5));
 }
 
-TEST(GigeLink, aGigabitCarriesTwoCamerasOf1280By960At30HzAndNotAt45) {
-  for (const int size : {1500, 9000}) {
-    EXPECT_LT(plan_link({1280 * 960, 30, 2, false}, size, kGigabit, kComputed).share, kMostOfPeriod)
-        << size;
-    EXPECT_GT(plan_link({1280 * 960, 45, 2, false}, size, kGigabit, kComputed).share, kMostOfPeriod)
-        << size;
-    const double most = highest_rate({1280 * 960, 45, 2, false}, size, kGigabit);
-    EXPECT_GT(most, 38) << size;
-    EXPECT_LT(most, 45) << size;
-  }
-}
-
 TEST(GigeLink, packetsFitInterfaceCameraAndStep) {
   EXPECT_EQ(choose_packet_size(0, 1500, 576, 16'000, 4), 1500);
   EXPECT_EQ(choose_packet_size(0, 65'536, 576, 16'000, 4), 9000) << "what switches carry";
@@ -89,14 +69,6 @@ TEST(GigeLink, packetsFitInterfaceCameraAndStep) {
   EXPECT_EQ(choose_packet_size(0, 1503, 577, 9000, 4), 1501);
   EXPECT_EQ(choose_packet_size(16'000, 65'536, 576, 16'000, 4), 16'000);
   EXPECT_EQ(choose_packet_size(9000, 1500, 576, 16'000, 4), 1500) << "never fragmented";
-}
-
-TEST(GigeLink, theLoopbackIsFoundByItsAddress) {
-  const Interface lo = interface_of("127.0.0.1");
-  EXPECT_EQ(lo.name, "lo");
-  EXPECT_GE(lo.mtu, 1500);
-  EXPECT_TRUE(interface_of("203.0.113.77").name.empty());
-  EXPECT_TRUE(interface_of("nonsense").name.empty());
 }
 
 TEST(GigeGrey, theCheapestFormatIsTaken) {
@@ -117,57 +89,6 @@ TEST(GigeGrey, wordsKeepTheirHighestEightBits) {
   EXPECT_EQ(out[64], 128);
   EXPECT_EQ(out[65], 174);
   EXPECT_EQ(out[2], 7) << "padding is not touched";
-}
-
-TEST(GigeSlotReturns, slotsOutAreLimitedAndComeBack) {
-  FrameQueue queue;
-  SlotReturns slots(queue);
-  slots.set_most(3);
-  Frame frame;
-  EXPECT_FALSE(slots.offer(frame)) << "stopped";
-  queue.begin(nullptr);
-  for (FrameSlot s = 0; s < 3; ++s) {
-    frame.slot = s;
-    EXPECT_TRUE(slots.offer(frame));
-  }
-  frame.slot = 3;
-  EXPECT_FALSE(slots.offer(frame));
-  EXPECT_EQ(queue.statistics().underruns, 1U) << "not that of the stopped one";
-  EXPECT_EQ(queue.wait(Duration{}, &frame), DeviceStatus::ok);
-  EXPECT_EQ(frame.slot, 0);
-  slots.release(0);
-  EXPECT_TRUE(slots.is_out(0)) << "on its way";
-  FrameSlot back = 9;
-  EXPECT_TRUE(slots.returned(&back));
-  EXPECT_EQ(back, 0);
-  EXPECT_FALSE(slots.is_out(0));
-  EXPECT_FALSE(slots.returned(&back));
-  frame.slot = 3;
-  EXPECT_TRUE(slots.offer(frame));
-}
-
-TEST(GigeSlotReturns, aNewBeginningKeepsOnlyWhatTheConsumerHolds) {
-  FrameQueue queue;
-  SlotReturns slots(queue);
-  slots.set_most(4);
-  queue.begin(nullptr);
-  Frame frame;
-  for (FrameSlot s = 0; s < 4; ++s) {
-    frame.slot = s;
-    EXPECT_TRUE(slots.offer(frame));
-  }
-  ASSERT_EQ(queue.wait(Duration{}, &frame), DeviceStatus::ok);  // 0, kept
-  ASSERT_EQ(queue.wait(Duration{}, &frame), DeviceStatus::ok);  // 1, given back
-  slots.release(1);
-  queue.end();
-  slots.take_back();
-  queue.begin(nullptr);
-  EXPECT_EQ(queue.wait(Duration{}, &frame), DeviceStatus::timeout)
-      << "2 and 3 are of the stream before";
-  EXPECT_TRUE(slots.is_out(0));
-  for (FrameSlot s = 1; s < 4; ++s) EXPECT_FALSE(slots.is_out(s)) << s;
-  FrameSlot back = 9;
-  EXPECT_FALSE(slots.returned(&back)) << "1 is the transport's already";
 }
 
 }  // namespace

@@ -30,12 +30,6 @@ TEST(Faults, aFaultIsReadFromOneLine) {
   EXPECT_EQ(f.shift, Vec3::Zero());
 }
 
-TEST(Faults, theBusesOfThePageAreTaken) {
-  const Fault overtaking = parse_fault("occluder@5 left_m=3 ahead_m=-14 speed_mps=5");
-  EXPECT_DOUBLE_EQ(overtaking.shift.x(), -14);
-  EXPECT_NO_THROW((void)parse_fault("occluder@5 turn_deg=90 ahead_m=4 left_m=30 speed_mps=-6"));
-}
-
 TEST(Faults, everyKindStandsInTheTableAtItsPlaceAndTakesItsOwnParametersAtBothEnds) {
   for (std::size_t i = 0; i < fault_rows().size(); ++i) {
     const FaultRow& row = fault_rows()[i];

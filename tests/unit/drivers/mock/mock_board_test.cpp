@@ -82,23 +82,6 @@ struct Bench {
   bool is_gone = false;
 };
 
-TEST(MockBoard, evenPulsesAreReportedEveryOneOfThemByAClockOfItsOwn) {
-  Bench b({}, at_20_hz());
-  b.drive();
-  ASSERT_EQ(b.pulses.size(), 81U);
-  for (std::size_t i = 0; i < b.pulses.size(); ++i) {
-    EXPECT_EQ(b.pulses[i].number, i);
-    EXPECT_EQ(b.pulses[i].boot, b.pulses[0].boot);
-    EXPECT_EQ(b.pulses[i].resumed, i == 0);
-    EXPECT_NEAR((b.pulses[i].edge - b.pulses[0].edge).to_seconds(), 0.05 * static_cast<double>(i),
-                4 * 30e-6 + 1e-6);
-    EXPECT_FALSE(b.pulses[i].exposure[0].seen) << "no feedback is wired";
-    EXPECT_GE(b.pulses[i].arrival,
-              b.rig->start() + b.rig->pulse_times()[i] + b.rig->trigger().timing().least_delay);
-  }
-  EXPECT_NE(b.pulses[0].boot, 0U);
-}
-
 TEST(MockBoard, variedIntervalsAreLongerAndShorterAsTheProtocolSays) {
   TriggerConfiguration c = at_20_hz();
   c.vary = Duration::milliseconds(2);
@@ -194,15 +177,6 @@ TEST(MockBoard, anUnpluggedBoardStopsWithItsLineUnlessItHasASupplyOfItsOwn) {
   EXPECT_EQ(powered.pulses[40].number, 50U);
   EXPECT_EQ(powered.pulses[40].boot, powered.pulses[39].boot);
   EXPECT_EQ(powered.rig->trigger().statistics().lost, 10U);
-}
-
-TEST(MockBoard, onlyTheLinesThatAreAskedForArePulsed) {
-  TriggerConfiguration c = at_20_hz();
-  c.lines = 0b01;
-  Bench b({}, c, 1);
-  b.drive();
-  EXPECT_EQ(b.frames[0].size(), 21U);
-  EXPECT_EQ(b.frames[1].size(), 0U);
 }
 
 }  // namespace

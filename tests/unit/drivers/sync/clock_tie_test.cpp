@@ -36,22 +36,5 @@ TEST(ClockTie, theGateGrowsWithTheTimeSinceTheNewestPairAndNeverReachesAFifthOfT
   EXPECT_EQ(noisy.gate(DeviceStamp(0)), kInterval / 5);
 }
 
-TEST(ClockTie, forgetsTheRateWhenCleared) {
-  ClockTie tie(kNoise, kInterval);
-  tie.add(DeviceStamp(0), DeviceStamp(0));
-  tie.add(DeviceStamp(0) + kInterval, DeviceStamp(0) + kInterval + Duration::microseconds(10));
-  tie.clear();
-  tie.add(DeviceStamp(0), DeviceStamp(500));
-  EXPECT_EQ(tie.edge_of(DeviceStamp(0) + Duration::seconds(1)),
-            DeviceStamp(500) + Duration::seconds(1));
-}
-
-TEST(ClockTie, aPairThatIsNotLaterIsPassedOver) {
-  ClockTie tie(kNoise, kInterval);
-  tie.add(DeviceStamp(1000), DeviceStamp(1000));
-  tie.add(DeviceStamp(1000), DeviceStamp(9000));
-  EXPECT_EQ(tie.edge_of(DeviceStamp(1000)), DeviceStamp(1000));
-}
-
 }  // namespace
 }  // namespace vergence

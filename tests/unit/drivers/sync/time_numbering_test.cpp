@@ -74,46 +74,5 @@ TEST(TimeNumbering, whatIsBeforeTheFirstSetOrBetweenOpenOnesIsOfNone) {
   EXPECT_EQ(numbering.number_of(1, 1020 * kMs, &sets).number, 0U) << "has gone out";
 }
 
-/// From 60 s to the time that is given, one frame of each camera 50 ms after the other.
-void expect_a_new_count_after_three_frames(std::int64_t from) {
-  TimeNumbering numbering(options(SyncMode::ptp));
-  OpenSets sets;
-  sets.close(&open(&sets, 4, 60'000 * kMs));
-  open(&sets, 5, 60'050 * kMs);
-  for (std::size_t frame = 0; frame < 2; ++frame) {
-    const std::int64_t time = from + static_cast<std::int64_t>(frame) * 50 * kMs;
-    const TimeNumbering::Number n = numbering.number_of(frame % 2, time, &sets);
-    EXPECT_FALSE(n.clock_set);
-    EXPECT_FALSE(n.number);
-  }
-  const TimeNumbering::Number n = numbering.number_of(0, from + 100 * kMs, &sets);
-  EXPECT_TRUE(n.clock_set);
-  EXPECT_EQ(n.number, 6U);
-  EXPECT_EQ(sets.flushed_below(), 6U) << "set 5 waits for nobody";
-  open(&sets, 6, from + 100 * kMs);
-  for (int frame = 0; frame < 5; ++frame)
-    EXPECT_EQ(numbering.number_of(1, from + 150 * kMs, &sets).number, 7U)
-        << "what was before the count is no measure";
-}
-
-TEST(TimeNumbering, aClockThatWasSetBeginsANewCountAfterThreeFrames) {
-  expect_a_new_count_after_three_frames(1000 * kMs);
-  expect_a_new_count_after_three_frames(1'700'000'000'000 * kMs);
-}
-
-TEST(TimeNumbering, theClockOfOneCameraIsApartWhileTheOthersFramesFit) {
-  TimeNumbering numbering(options(SyncMode::ptp));
-  OpenSets sets;
-  sets.close(&open(&sets, 4, 60'000 * kMs));
-  for (int frame = 0; frame < 4; ++frame) {
-    EXPECT_EQ(numbering.apart(1), frame > 2);
-    EXPECT_FALSE(numbering.number_of(1, 1'700'000'000'000 * kMs, &sets).number);
-    EXPECT_EQ(numbering.number_of(0, 60'050 * kMs, &sets).number, 5U);
-  }
-  EXPECT_FALSE(numbering.apart(0));
-  EXPECT_EQ(numbering.number_of(1, 60'050 * kMs, &sets).number, 5U);
-  EXPECT_FALSE(numbering.apart(1));
-}
-
 }  // namespace
 }  // namespace vergence

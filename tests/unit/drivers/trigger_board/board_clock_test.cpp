@@ -57,36 +57,5 @@ TEST(BoardClock, answersThatCannotBeAreRefused) {
   EXPECT_EQ(clock.quality().refused, 5U);
 }
 
-TEST(BoardClock, aClockThatWasSetBackIsBelievedAtTheThirdAnswer) {
-  BoardClock clock;
-  std::int64_t now = 100'000;
-  const auto ask = [&](std::int64_t back) {
-    now += 10'000;
-    const std::uint32_t token = clock.ask(host(now));
-    return clock.answer(pong(token, static_cast<std::uint64_t>(now - back + 200),
-                             static_cast<std::uint64_t>(now - back + 200)),
-                        host(now + 400));
-  };
-  for (int i = 0; i < 20; ++i) ASSERT_EQ(ask(0), PongWord::taken);
-  EXPECT_EQ(ask(90'000), PongWord::backward);
-  EXPECT_EQ(clock.resets_by_set_back(), 0U);
-  EXPECT_EQ(ask(90'000), PongWord::backward);
-  EXPECT_EQ(ask(90'000), PongWord::backward);
-  EXPECT_EQ(clock.resets_by_set_back(), 1U);
-  EXPECT_EQ(ask(90'000), PongWord::taken);
-  const MappedStamp m =
-      clock.map(stamp_of_tick(static_cast<std::uint64_t>(now - 90'000)), host(now));
-  EXPECT_LE(std::abs((m.host - host(now)).ns()), m.error.ns());
-}
-
-TEST(BoardClock, questionsThatNobodyAnswersAreCounted) {
-  BoardClock clock;
-  for (std::size_t i = 0; i < BoardClock::kOpen + 10; ++i)
-    (void)clock.ask(host(static_cast<std::int64_t>(i) * 1000));
-  EXPECT_EQ(clock.quality().unanswered, 10U);
-  clock.reopen({});
-  EXPECT_EQ(clock.quality().unanswered, BoardClock::kOpen + 10);
-}
-
 }  // namespace
 }  // namespace vergence::trigger_board

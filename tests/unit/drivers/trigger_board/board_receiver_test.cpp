@@ -58,45 +58,12 @@ struct Receiving : ::testing::Test {
   BoardReceiver receiver{pause, [this](const Pulse& p) { pulses.push_back(p); }};
 };
 
-TEST_F(Receiving, anEventIsAPulseWithTheHostsTimeAndItsArrival) {
-  event(0, kPeriod);
-  event(1, 2 * kPeriod);
-  ASSERT_EQ(pulses.size(), 2U);
-  EXPECT_EQ(pulses[1].number, 1U);
-  EXPECT_TRUE(pulses[1].mapped);
-  EXPECT_EQ(pulses[1].arrival, arrival);
-  EXPECT_EQ(receiver.last_frame(), arrival);
-  EXPECT_EQ(receiver.finding(), Finding::none);
-}
-
 TEST_F(Receiving, nothingIsHandedOutWhileItIsBeingSetUp) {
   receiver.hold();
   event(0, kPeriod);
   event(0, kPeriod, kBoot + 1);
   EXPECT_TRUE(pulses.empty());
   EXPECT_EQ(receiver.finding(), Finding::none) << "a change of the board is none yet";
-}
-
-TEST_F(Receiving, anotherBootIsFoundByAnyFrameThatHasOne) {
-  event(0, kPeriod, kBoot + 1);
-  EXPECT_TRUE(pulses.empty());
-  EXPECT_EQ(receiver.finding(), Finding::reboot);
-  receiver.clear_finding();
-  receiver.begin_boot(kBoot + 1, 0, TriggerConfig{}, {});
-  EXPECT_EQ(receiver.counters().reboots, 1U);
-  event(0, kPeriod, kBoot + 1);
-  EXPECT_EQ(pulses.size(), 1U);
-}
-
-TEST_F(Receiving, aBoardThatStoppedOrHasAnotherConfigurationIsHalted) {
-  status(trigger_running, kMark);
-  EXPECT_EQ(receiver.finding(), Finding::none);
-  status(trigger_running, kMark + 1);
-  EXPECT_EQ(receiver.finding(), Finding::halted);
-  receiver.forget_halt();
-  EXPECT_EQ(receiver.finding(), Finding::none);
-  status(trigger_stopped, kMark);
-  EXPECT_EQ(receiver.finding(), Finding::halted);
 }
 
 TEST_F(Receiving, numbersThatCannotBeEndInInvalidAfterAFewInARow) {
@@ -122,21 +89,6 @@ TEST_F(Receiving, afterOneWrongTickItGoesOnOnceTheBoardIsSetUpAnew) {
   for (std::uint32_t n = 100; n < 120; ++n) event(n, (n + 1) * kPeriod);
   EXPECT_EQ(pulses.size(), before + 20);
   EXPECT_EQ(receiver.finding(), Finding::none);
-}
-
-TEST_F(Receiving, aStatusWithTheSequenceOfAPauseAnswersIt) {
-  pause.add(3);
-  ASSERT_EQ(pause.due(arrival), 3U);
-  pause.sent(11, arrival);
-  status(trigger_running, kMark, 11);
-  EXPECT_EQ(pause.due(arrival + PauseRequest::kAnswerLimit * 2), 0U);
-}
-
-TEST_F(Receiving, framesOfNoKnownTypeOrSizeAreCounted) {
-  accept(frame_of(0x7E, 3));
-  accept(frame_of(trigger_event, trigger_event_payload_size - 1));
-  EXPECT_EQ(receiver.counters().frames_unknown, 2U);
-  EXPECT_TRUE(pulses.empty());
 }
 
 }  // namespace

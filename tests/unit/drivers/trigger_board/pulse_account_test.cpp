@@ -31,28 +31,6 @@ struct Accounted : ::testing::Test {
   Pulse pulse{};
 };
 
-TEST_F(Accounted, numbersThatNobodyToldOfAreLost) {
-  ASSERT_TRUE(take(1));
-  EXPECT_FALSE(pulse.resumed);
-  ASSERT_TRUE(take(5));
-  EXPECT_EQ(pulse.number, 5U);
-  EXPECT_EQ(pulse.edge, DeviceStamp(static_cast<std::int64_t>(6 * kPeriod) * 1000));
-  EXPECT_EQ(account.counters().lost, 3U);
-  EXPECT_EQ(account.counters().pulses, 3U);
-}
-
-TEST_F(Accounted, aPauseThatWasAskedForLosesNothing) {
-  account.expect_pause(4);
-  ASSERT_TRUE(take(1));
-  EXPECT_FALSE(pulse.resumed) << "it was in the timer already";
-  ASSERT_TRUE(take(6, 1));
-  EXPECT_TRUE(pulse.resumed);
-  EXPECT_EQ(account.counters().left_out, 4U);
-  EXPECT_EQ(account.counters().lost, 0U);
-  ASSERT_TRUE(take(8));
-  EXPECT_EQ(account.counters().lost, 1U) << "the pause is over";
-}
-
 TEST_F(Accounted, aPauseWhoseFirstReportIsLostIsStillAPause) {
   account.expect_pause(4);
   ASSERT_TRUE(take(1));
@@ -105,13 +83,6 @@ TEST_F(Accounted, repeatedOldAndBackwardEventsAreRefusedByName) {
   EXPECT_TRUE(take(2));
   EXPECT_EQ(account.refused_in_row(), 0);
   EXPECT_EQ(account.counters().lost, 0U);
-}
-
-TEST_F(Accounted, aClockSetBackIsForgottenWhenToldSo) {
-  ASSERT_TRUE(take(1));
-  EXPECT_FALSE(account.take(event(2, 10), &pulse));
-  account.forget_time();
-  EXPECT_TRUE(account.take(event(2, 3 * kPeriod - 100), &pulse));
 }
 
 TEST(PulseAccount, numbersGoOnOverThirtyTwoBits) {

@@ -43,24 +43,6 @@ struct Exchange : ::testing::Test {
   Frame frame{};
 };
 
-TEST_F(Exchange, framesComeInTheirOrderAndTheirBuffersGoBack) {
-  ASSERT_TRUE(offer(2, 7));
-  ASSERT_TRUE(offer(0, 8, FrameStatus::torn));
-  EXPECT_EQ(ready.count, 2);
-  ASSERT_EQ(exchange.wait({}, &frame), DeviceStatus::ok);
-  EXPECT_EQ(frame.counter, 7U);
-  EXPECT_TRUE(exchange.release(frame.slot));
-  ASSERT_EQ(exchange.wait({}, &frame), DeviceStatus::ok);
-  EXPECT_EQ(frame.counter, 8U);
-  EXPECT_EQ(exchange.wait({}, &frame), DeviceStatus::timeout);
-  const auto returned = exchange.take_returned();
-  ASSERT_EQ(returned.list().size(), 1U);
-  EXPECT_EQ(returned.list()[0], 2U);
-  EXPECT_EQ(exchange.take_returned().count, 0U) << "taken once";
-  EXPECT_EQ(exchange.statistics().delivered, 2U);
-  EXPECT_EQ(exchange.statistics().torn, 1U);
-}
-
 TEST_F(Exchange, theKernelKeepsItsReserve) {
   EXPECT_FALSE(exchange.hold_buffer(0, 0, kBufferReserve - 1));
   EXPECT_EQ(exchange.statistics().underruns, 1U);

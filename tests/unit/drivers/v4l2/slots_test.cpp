@@ -18,23 +18,6 @@ std::vector<Mapping> memory(std::size_t count, int fill) {
   return list;
 }
 
-TEST(V4l2Slots, buffersAreSlotsWithTheDriversRows) {
-  Slots slots;
-  slots.use_buffers(60, 40, 64);
-  slots.install(memory(4, 10));
-  ASSERT_EQ(slots.buffers(), 4U);
-  const FrameSlot slot = slots.hold_buffer(2);
-  const ImageView view = slots.view(slot);
-  EXPECT_EQ(view.data, slots.buffer(2).data()) << "no copy";
-  EXPECT_EQ(view.stride, 64);
-  EXPECT_EQ(view.at(59, 39), 12);
-  EXPECT_FALSE(slots.may_enqueue(2)) << "held";
-  EXPECT_TRUE(slots.may_enqueue(1));
-  EXPECT_EQ(slots.release(slot), 2U);
-  EXPECT_TRUE(slots.may_enqueue(2));
-  EXPECT_EQ(slots.held(), 0U);
-}
-
 TEST(V4l2Slots, anImageMayBeginBehindAHeader) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
@@ -86,21 +69,6 @@ TEST(V4l2Slots, moreBuffersThanSlotsAreNotUsed) {
   EXPECT_EQ(held.size(), Slots::kMost);
   for (const FrameSlot slot : held) (void)slots.release(slot);
   EXPECT_EQ(slots.held(), 0U);
-}
-
-TEST(V4l2Slots, convertedImagesComeFromAPool) {
-  Slots slots;
-  slots.use_pool(60, 40);
-  slots.install(memory(4, 10));
-  EXPECT_EQ(slots.buffer(3)[0], 13);
-  std::vector<FrameSlot> held;
-  while (const auto slot = slots.hold_pooled()) held.push_back(*slot);
-  EXPECT_EQ(held.size(), Slots::kPool);
-  EXPECT_TRUE(slots.may_enqueue(0)) << "buffers are never held";
-  EXPECT_EQ(slots.view(held[0]).stride, static_cast<std::ptrdiff_t>(FramePool::stride(60)));
-  for (const FrameSlot slot : held) EXPECT_EQ(slots.release(slot), std::nullopt);
-  slots.use_buffers(60, 40, 64);
-  EXPECT_TRUE(slots.in_place());
 }
 
 }  // namespace

@@ -22,19 +22,6 @@ TEST(BoardRecords, aFullRingDropsTheNewestAndCounts) {
   EXPECT_FALSE(record_pop(ring.get(), &record));
 }
 
-TEST(BoardRecords, indicesWrap) {
-  auto ring = std::make_unique<ByteRing>();
-  ring->written = ring->read = 0xFFFFFF80;
-  ByteRecord record{};
-  for (std::uint32_t i = 0; i < 1000; ++i) {
-    byte_push(ring.get(), {i, static_cast<std::uint8_t>(i)});
-    if (i % 2 == 0) continue;
-    for (int k = 0; k < 2; ++k) ASSERT_TRUE(byte_pop(ring.get(), &record));
-    ASSERT_EQ(record.count, i);
-  }
-  EXPECT_EQ(ring->lost, 0U);
-}
-
 TEST(BoardRecords, oneWritesWhileAnotherReadsAndNothingIsTornOrLostUncounted) {
   auto ring = std::make_unique<RecordRing>();
   constexpr std::uint32_t kAll = 200'000;

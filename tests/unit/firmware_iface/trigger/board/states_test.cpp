@@ -8,24 +8,6 @@ namespace {
 
 using Bytes = VirtualBoard::Bytes;
 
-TEST(BoardTalk, helloIsAnsweredByWhatTheBoardIs) {
-  VirtualBoard b;
-  b.send(trigger_hello, {trigger_protocol_version});
-  const auto answers = b.take(trigger_info);
-  ASSERT_EQ(answers.size(), 1U);
-  EXPECT_EQ(answers[0].sequence, b.sequence);
-  TriggerInfo info{};
-  ASSERT_TRUE(trigger_get_info(answers[0].payload, answers[0].size, &info));
-  EXPECT_EQ(info.version, trigger_protocol_version);
-  EXPECT_EQ(info.boot_id, VirtualBoard::kBootId);
-  EXPECT_EQ(info.tick_hz, VirtualBoard::kHz);
-  EXPECT_EQ(info.lines, 4);
-  EXPECT_EQ(info.feedback_inputs, 2);
-  EXPECT_EQ(info.has_pps, 1);
-  EXPECT_EQ(info.has_ins, 1);
-  EXPECT_EQ(info.serial[11], 12);
-}
-
 TEST(BoardTalk, whatIsRefusedIsRefusedByName) {
   VirtualBoard b;
   b.send(trigger_hello, {trigger_protocol_version + 1});
@@ -166,27 +148,6 @@ TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
   TriggerStatus s{};
   ASSERT_TRUE(trigger_get_status(told[0].payload, told[0].size, &s));
   EXPECT_EQ(s.state, trigger_running);
-}
-
-TEST(BoardStates, numbersGoOnAcrossStopAndStart) {
-  VirtualBoard b;
-  b.start(100'000);
-  b.run_for_us(96'000);
-  b.send(trigger_stop);
-  const TriggerStatus stopped = b.status();
-  EXPECT_EQ(stopped.state, trigger_stopped);
-  EXPECT_EQ(stopped.pulses, 10U);
-  b.run_for_us(500'000);
-  EXPECT_EQ(b.made.size(), 10U) << "no pulse after STOP was answered";
-  b.frames.clear();
-  b.start(50'000);
-  b.run_for_us(50'000);
-  const auto events = b.events();
-  ASSERT_EQ(events.size(), 3U);
-  EXPECT_EQ(events[0].pulse, 10U);
-  EXPECT_EQ(events[0].flags, 1);
-  EXPECT_EQ(events[1].pulse, 11U);
-  EXPECT_EQ(events[1].flags, 0);
 }
 
 TEST(BoardStates, stopIsAnsweredAfterAPulseThatCouldNotBeTakenBack) {

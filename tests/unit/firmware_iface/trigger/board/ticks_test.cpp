@@ -260,22 +260,5 @@ TEST_F(Disciplined, aSecondPhaseIsTakenOverAfterAFewSeconds) {
   EXPECT_EQ(b.status().pps_locked, 1);
 }
 
-TEST(BoardTicks, otherTimersToo) {
-  for (const std::uint32_t hz : {1'000'000U, 16'000'000U, 72'000'000U, 1'000'000'000U}) {
-    TickDiscipline d{};
-    tick_init(&d, hz, 100, 7);
-    std::uint64_t at = 7;
-    for (int k = 0; k < 100; ++k) {
-      at += hz + hz / 20'000;  // 50 ppm
-      EXPECT_TRUE(tick_pps(&d, at, at + 10));
-      tick_advance(&d, at + hz / 2);
-    }
-    EXPECT_TRUE(d.locked);
-    const auto second = static_cast<double>(tick_of(&d, at + hz + hz / 20'000) - tick_of(&d, at));
-    EXPECT_NEAR(second, 1e6, 1.01) << hz;
-    EXPECT_EQ(tick_length(&d, hz + hz / 20'000), 1'000'000U);
-  }
-}
-
 }  // namespace
 }  // namespace vergence
