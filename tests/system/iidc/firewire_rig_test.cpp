@@ -30,12 +30,12 @@ TEST_F(IidcRig, ACameraThatFindsNoRoomOnTheBusSaysSo) {
   CameraConfiguration wide = usual();
   wide.width = 1280;
   wide.height = 960;
-  wide.rate_hz = 20;  // 3088 bytes a packet at S400: 3100 units each
+  wide.rate_hz = 20;  // at S400 3064 of 4915 units each
   wide.sharing = 2;
   ASSERT_NO_FATAL_FAILURE(begin(wide));
   EXPECT_EQ(cameras_[0]->start(nullptr), DeviceStatus::ok) << cameras_[0]->last_error();
   EXPECT_EQ(cameras_[1]->start(nullptr), DeviceStatus::no_bandwidth);
-  EXPECT_NE(cameras_[1]->last_error().find("3100 of 4915"), std::string::npos)
+  EXPECT_NE(cameras_[1]->last_error().find("3064 of 4915"), std::string::npos)
       << cameras_[1]->last_error();
   (void)end();
 }
