@@ -19,10 +19,10 @@
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/recorder/recorder.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/runtime/version.hpp"
+#include "app/session/recorder.hpp"
 
 namespace vergence::app {
 namespace {

@@ -17,7 +17,7 @@ namespace {
 struct ReplayArguments {
   CommonOptions common;
   std::string data, format = "auto", out, model = "radtan";
-  std::optional<std::string> calibration, also;
+  std::optional<std::string> calibration;
   BagTopics topics;
   std::int64_t start = 0;
   std::optional<std::int64_t> frames;
@@ -78,7 +78,6 @@ ReplayRequest replay_request(const ReplayArguments& a) {
                                                              ? recorded_settings(r.data)
                                                              : std::vector<std::string>{});
   r.session.quiet = a.common.quiet;
-  if (a.also) r.session.also = parse_other_formats(*a.also);
   r.session.print_memory = a.memory;
   return r;
 }
@@ -142,7 +141,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   command->add_flag("--calibrate-first", a->calibrate_first,
                     "Calibrate from the whole drive, lenses included, then drive with what was "
                     "found (twice the drive more)");
-  declare_session_options(*command, &a->also, &a->memory, &a->page);
+  declare_session_options(*command, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {
     ReplayRequest request = replay_request(*a);

@@ -160,11 +160,6 @@ struct RecordSettings {
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
 };
 
-/// `sessions:` the folders that drives leave side by side.
-struct SessionsSettings {
-  int quota_mb = 0;  // 0: none
-};
-
 /// `publish:` what others see of a running session (docs/publish.md). Empty: nothing.
 struct PublishSettings {
   std::string lines{};       // unix:///PATH, udp://HOST:PORT
@@ -198,7 +193,6 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
-  SessionsSettings sessions{};
   RealtimeSettings realtime{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   int preset = 0;  // odometry.preset: 1: small, what other keys are that nobody gave

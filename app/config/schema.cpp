@@ -19,7 +19,7 @@ const std::vector<Group>& schema() {
       groups::sync(),     groups::odometry(),   groups::calibration_options(),
       groups::monitor(),  groups::comparison(), groups::kitti_raw(),
       groups::mock(),     groups::record(),     groups::publish(),
-      groups::sessions(), groups::realtime(),   groups::faults()};
+      groups::realtime(), groups::faults()};
   return all;
 }
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "app/datasets/trajectory_files.hpp"
-#include "app/recorder/ins_file.hpp"
+#include "app/session/ins_file.hpp"
 #include "core/comparison/mount.hpp"
 
 namespace vergence::app {

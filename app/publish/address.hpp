@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace vergence::app {
 
@@ -15,11 +14,9 @@ struct HostPort {
   [[nodiscard]] bool loopback() const;
   /// As it stands in a URL: brackets around an IPv6 address.
   [[nodiscard]] std::string text() const;
+  /// What a viewer opens: where the host is every address (0.0.0.0, ::), this machine's name.
+  [[nodiscard]] HostPort link() const;
 };
-
-/// What others open to come to this machine: where the host is every address (0.0.0.0, ::), those
-/// of its interfaces, at most eight of them; otherwise the host itself.
-[[nodiscard]] std::vector<HostPort> addresses_of(const HostPort& address);
 
 /// Where the lines go.
 struct LineAddress {

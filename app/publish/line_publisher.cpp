@@ -25,15 +25,14 @@ void LinePublisher::stop() noexcept {
 }
 
 void LinePublisher::on_pose(const PoseSample& sample) noexcept {
-  if (!poses_.push(PublishedPose::of(sample, monotonic_now())))
-    dropped_.fetch_add(1, std::memory_order_relaxed);
+  if (!poses_.push({sample, monotonic_now()})) dropped_.fetch_add(1, std::memory_order_relaxed);
   wake_.signal();
 }
 
 void LinePublisher::on_placement(const Placement& placement, const Geodetic& origin) noexcept {
   // Eight that wait are more than a session has in its first minutes; the newest is then lost
   // until the next one.
-  (void)placements_.push({PoseNumbers::of(placement.T_enu_world), origin});
+  (void)placements_.push({placement.T_enu_world, origin});
 }
 
 void LinePublisher::work() noexcept {
@@ -44,16 +43,17 @@ void LinePublisher::work() noexcept {
   for (;;) {
     const WakeEvent::Ticket seen = wake_.ticket();
     const bool last = stop_.load(std::memory_order_acquire);
-    for (PublishedPose pose; poses_.pop(&pose);) send(pose);
+    for (Outgoing pose; poses_.pop(&pose);) send(pose);
     if (last) return;
     wake_.wait(seen);
   }
 }
 
-void LinePublisher::send(const PublishedPose& pose) {
-  for (PublishedPlacement placement; placements_.pop(&placement);) earth_.emplace(placement);
-  std::optional<EarthNumbers> on_earth;
-  if (earth_ && pose.status != PoseStatus::lost) on_earth = earth_->of(pose.world_left);
+void LinePublisher::send(const Outgoing& outgoing) {
+  const PoseSample& pose = outgoing.pose;
+  for (PublishedPlacement placement; placements_.pop(&placement);) placement_ = placement;
+  std::optional<EarthPose> on_earth;
+  if (placement_ && pose.status != PoseStatus::lost) on_earth = placement_->of(pose.T_world_left);
   const HostStamp now = monotonic_now();
   std::optional<double> age_ms;
   if (tie_) age_ms = (tie_->stamp_at(now) - pose.stamp).to_seconds() * 1e3;
@@ -61,7 +61,7 @@ void LinePublisher::send(const PublishedPose& pose) {
   socket_->send(line_);
   ++lines_;
   const HostStamp sent = monotonic_now();
-  behind_pose_.add((sent - pose.out).to_seconds() * 1e3);
+  behind_pose_.add((sent - outgoing.out).to_seconds() * 1e3);
   if (!tie_) return;
   age_.add((tie_->stamp_at(sent) - pose.stamp).to_seconds() * 1e3);
   constexpr std::uint64_t kBetween = 64;  // lines: a percentile walks through thousands of bins

@@ -10,7 +10,7 @@
 
 #include "app/publish/line_socket.hpp"
 #include "app/publish/pose_line.hpp"
-#include "app/recorder/histogram.hpp"
+#include "app/session/histogram.hpp"
 #include "app/session/session_observer.hpp"
 #include "core/memory/ring.hpp"
 #include "drivers/common/wake_event.hpp"
@@ -43,12 +43,16 @@ class LinePublisher final : public SessionObserver {
 
  private:
   void work() noexcept;
-  void send(const PublishedPose& pose);
+  struct Outgoing {
+    PoseSample pose{};
+    HostStamp out{};  // when the estimator was done
+  };
+  void send(const Outgoing& outgoing);
   void stop() noexcept;
 
   std::unique_ptr<LineSocket> socket_;
   std::optional<ClockTie> tie_{};  // before the first pose
-  Ring<PublishedPose, 64> poses_;
+  Ring<Outgoing, 64> poses_;
   Ring<PublishedPlacement, 8> placements_;
   std::atomic<std::uint64_t> dropped_{0};
   std::atomic<double> age_p99_ms_{-1};
@@ -56,7 +60,7 @@ class LinePublisher final : public SessionObserver {
   std::atomic<bool> stop_{false};
 
   // Of the thread.
-  std::optional<Earth> earth_{};
+  std::optional<PublishedPlacement> placement_{};
   std::string line_;
   std::uint64_t lines_ = 0;
   TimeHistogram age_, behind_pose_;  // ms

@@ -22,7 +22,6 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kBetweenUpdates{100};  // 10 a second: what an eye follows
-constexpr milliseconds kAlone{500};           // without a viewer: rings of 256 frames hold longer
 constexpr milliseconds kFarewell{200};        // for the end of the drive to reach its viewers
 constexpr int kNiceness = 5;                  // beside the estimator's threads
 
@@ -46,7 +45,6 @@ LivePage::LivePage(const Options& options, SessionRequests* requests,
 
 LivePage::~LivePage() {
   stop_.store(true, std::memory_order_release);
-  server_.wake();
   thread_.join();
 }
 
@@ -73,23 +71,17 @@ void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
 }
 
 void LivePage::on_placement(const Placement& placement, const Geodetic& origin) noexcept {
-  push(&placements_, {PoseNumbers::of(placement.T_enu_world), origin});
+  push(&placements_, {placement.T_enu_world, origin});
 }
 
-void LivePage::on_compared(const PoseRecord& pose) noexcept { push(&compared_, pose); }
+void LivePage::on_report(const FrameReport& report) noexcept { push(&reports_, report); }
 void LivePage::on_event(const EventRecord& event) noexcept { push(&events_, event); }
 void LivePage::on_calibration(const CalibrationRecord& calibration) noexcept {
   push(&calibrations_, calibration);
 }
 
-void LivePage::on_temperature(int camera, double celsius) noexcept {
-  temperatures_[static_cast<std::size_t>(camera)].store(static_cast<float>(celsius),
-                                                        std::memory_order_relaxed);
-}
-
 std::vector<std::pair<std::string, std::uint64_t>> LivePage::counters() {
   ended_.store(true, std::memory_order_release);
-  server_.wake();
   return {{"page_updates", counts_.updates.load(std::memory_order_relaxed)},
           {"page_dropped", counts_.dropped.load(std::memory_order_relaxed)}};
 }
@@ -101,10 +93,10 @@ void LivePage::work() {
   // On Linux a thread has a niceness of its own.
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   while (!stop_.load(std::memory_order_acquire)) {
-    const bool watched = server_.viewers() > 0;
-    const auto until = shown_ + kBetweenUpdates - Clock::now();
-    const auto wait = std::chrono::ceil<milliseconds>(until);
-    server_.step(watched ? std::clamp(wait, milliseconds(0), kBetweenUpdates) : kAlone);
+    const auto wait = std::chrono::ceil<milliseconds>(shown_ + kBetweenUpdates - Clock::now());
+    // The end of the drive is looked for as often.
+    server_.step(server_.viewers() > 0 ? std::clamp(wait, milliseconds(0), kBetweenUpdates)
+                                       : kBetweenUpdates);
     drain();
     if (server_.viewers() > 0 && Clock::now() >= shown_ + kBetweenUpdates) show();
   }
@@ -123,11 +115,8 @@ void LivePage::drain() {
   for (CalibrationRecord record; calibrations_.pop(&record);) state_.add(record);
   for (PublishedPlacement placement; placements_.pop(&placement);) state_.add(placement);
   for (LiveFrame frame; frames_.pop(&frame);) state_.add(frame);
-  for (PoseRecord pose; compared_.pop(&pose);) state_.add(pose);
+  for (FrameReport report; reports_.pop(&report);) state_.add(report);
   for (EventRecord event; events_.pop(&event);) state_.add(event);
-  for (std::size_t k = 0; k < temperatures_.size(); ++k)
-    if (const float celsius = temperatures_[k].load(std::memory_order_relaxed); celsius != 0)
-      state_.set_temperature(k, celsius);
   if (ended) state_.end();
 }
 

@@ -46,11 +46,9 @@ class LivePage final : public SessionObserver {
   void on_pose(const PoseSample& sample) noexcept override;
   void on_tracks(const calibration::TrackLog& tracks) noexcept override;
   void on_placement(const Placement& placement, const Geodetic& origin) noexcept override;
-  void on_compared(const PoseRecord& pose) noexcept override;
+  void on_report(const FrameReport& report) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
-  [[nodiscard]] bool wants_temperatures() const noexcept override { return true; }
-  void on_temperature(int camera, double celsius) noexcept override;
   /// Shows the end of the drive first.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
 
@@ -74,11 +72,10 @@ class LivePage final : public SessionObserver {
 
   // From it to the page's.
   Ring<LiveFrame, 256> frames_;
-  Ring<PoseRecord, 256> compared_;
+  Ring<FrameReport, 256> reports_;
   Ring<EventRecord, 64> events_;
   Ring<CalibrationRecord, 8> calibrations_;
   Ring<PublishedPlacement, 8> placements_;
-  std::array<std::atomic<float>, kMaxCameras> temperatures_{};  // °C; 0: none told
   /// For summary.json.
   struct Counts {
     std::atomic<std::uint64_t> updates{0}, dropped{0};

@@ -11,8 +11,8 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "app/publish/pose_line.hpp"
-#include "app/recorder/histogram.hpp"
-#include "app/recorder/records.hpp"
+#include "app/session/histogram.hpp"
+#include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
@@ -54,7 +54,8 @@ class LiveTrail {
 /// One frame for the live page, with what has been counted up to it: figures stay true when
 /// frames are left out.
 struct LiveFrame {
-  PublishedPose pose{};
+  PoseSample pose{};
+  HostStamp out{};  // when the estimator was done
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
   std::uint64_t missing = 0;  // numbers of frames that never came
   double path_m = 0;
@@ -73,13 +74,10 @@ class LiveState {
 
   void begin(const SessionStart& start) { start_ = start; }
   void add(const LiveFrame& frame);
-  void add(const PoseRecord& compared);
+  void add(const FrameReport& report);
   void add(const EventRecord& event);
   void add(const CalibrationRecord& calibration);
   void add(const PublishedPlacement& placement);
-  void set_temperature(std::size_t camera, float celsius) noexcept {
-    temperatures_[camera] = celsius;
-  }
   void end() noexcept { ended_ = true; }
 
   /// The rig in use, for the judgement of points; not known yet: nullptr.
@@ -100,10 +98,9 @@ class LiveState {
   SessionStart start_{};
   std::optional<LiveFrame> newest_{};
   double interval_s_ = 0;  // between frames, on the host's clock
-  std::array<std::optional<float>, kMaxCameras> temperatures_{};  // °C
   bool ended_ = false;
   TimeHistogram estimate_;
-  std::optional<PoseRecord> compared_{};
+  std::optional<FrameReport> report_{};
   LiveTrail trail_;
   std::deque<EventRecord> events_{};
   std::uint64_t events_seen_ = 0, events_shown_ = 0;

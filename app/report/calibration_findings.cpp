@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "app/report/advice.hpp"
-#include "app/report/fit_pattern.hpp"
 
 namespace vergence::app::report {
 namespace {
@@ -142,43 +141,6 @@ void judge_calibration(const Session& s, const Usability& use, Findings* j) {
     }
   }
   advise_on_causes(s, j);
-}
-
-void judge_lenses(const Session& s, const Analysis& a, Findings* j) {
-  const Fit begin = fit_of(s, false), end = fit_of(s, true);
-  const bool verified = flag_at(s.summary, "calibration.verified").value_or(false);
-  const bool found_others =
-      begin.pattern == FitPattern::lens &&
-      a.ok > 0;  // the lens of the beginning; the poses since stand on another
-  const Fit& fit = begin.pattern == FitPattern::lens ? begin : end;
-  if (fit.pattern == FitPattern::fine || fit.pattern == FitPattern::unknown ||
-      (verified && &fit == &end))
-    return;
-  const std::string grows = fmt::format(
-      "residuals grow towards the edges of the image, from {:.1f} px in the middle to {:.1f} px",
-      fit.middle_px, fit.edge_px);
-  constexpr const char* kHelp =
-      "Lens numbers: rectified images have distortion [0, 0, 0, 0], raw ones never; look whether "
-      "model, order and image size are those of "
-      "this lens. --calibrate-first finds the lens from the drive, vergence calibrate from a "
-      "checkerboard.";
-  if (fit.pattern == FitPattern::turned) {
-    j->find(Grade::care, grows + ": a turn between the cameras, or the lens");
-    return j->advise(
-        "The calibration does not fit the images' edges: --calibrate-first finds a better one from "
-        "the whole drive.");
-  }
-  j->advise(kHelp);
-  if (found_others) {
-    j->find(
-        Grade::care,
-        fmt::format(
-            "the lens numbers given are wrong ({}); the drive found others{}", grows,
-            a.confirmed_s ? fmt::format(" and confirmed them at {:.1f} s", *a.confirmed_s) : ""));
-    return;
-  }
-  j->find(Grade::bad, grows + ": the lens");
-  j->give_up(grows + ": the lens", kHelp);
 }
 
 void judge_verification(const Session& s, const Analysis& a, const Usability& use, Findings* j) {

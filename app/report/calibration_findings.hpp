@@ -15,8 +15,6 @@ void judge_mistake(const Session& s, const Analysis& a, Findings* j);
 void judge_focal_length(const Session& s, Findings* j);
 /// How well it is known, and whether the last attempt at it succeeded.
 void judge_calibration(const Session& s, const Usability& use, Findings* j);
-/// What matches far from their epipolar lines near the image's edges say of the lenses.
-void judge_lenses(const Session& s, const Analysis& a, Findings* j);
 /// Whether the drive itself has confirmed what its poses stand on.
 void judge_verification(const Session& s, const Analysis& a, const Usability& use, Findings* j);
 /// What events about calibrations and lengths ask for.

@@ -271,30 +271,6 @@ bool read_six(const CsvRows& rows, const char* prefix, std::array<double, 6>* ou
   return true;
 }
 
-/// Nothing: a number is missing or makes no rectangle of an image.
-std::optional<ResidualRow> parse_residual(const CsvRows& rows) {
-  ResidualRow r;
-  r.at_the_end = rows.text(rows.column("calibration")) == "end";
-  const auto camera = rows.integer(rows.column("camera"));
-  const auto left = rows.number(rows.column("left_px")), top = rows.number(rows.column("top_px"));
-  const auto width = rows.number(rows.column("width_px")),
-             height = rows.number(rows.column("height_px"));
-  const auto mean = rows.number(rows.column("mean_px"));
-  if (!camera || *camera < 1 || *camera >= kMaxCameras || !left || !top || !width || !height ||
-      !mean)
-    return std::nullopt;
-  constexpr double kLargest = 1e5;  // px
-  const bool inside = *left >= 0 && *top >= 0 && *width > 0 && *height > 0 &&
-                      *left + *width <= kLargest && *top + *height <= kLargest;
-  if (!inside || !(std::abs(*mean) <= kLargest)) return std::nullopt;
-  r.camera = static_cast<int>(*camera);
-  r.left = *left, r.top = *top, r.width = *width, r.height = *height;
-  r.mean_px = *mean;
-  r.matches = std::clamp(rows.number(rows.column("matches")).value_or(0.0), 0.0, 1e9);
-  r.scatter_px = std::clamp(rows.number(rows.column("scatter_px")).value_or(0.0), 0.0, kLargest);
-  return r;
-}
-
 void read_calibrations(const fs::path& folder, Session* session) {
   auto lines =
       open_part(folder / "calibrations.csv", "how the calibration changed is not known", session);
@@ -333,23 +309,6 @@ void read_calibrations(const fs::path& folder, Session* session) {
     session->calibrations.push_back(std::move(c));
   }
   report_damage("calibrations.csv", *lines, rows.torn_rows() + unreadable, 0, session);
-}
-
-void read_residuals(const fs::path& folder, Session* session) {
-  std::error_code error;
-  if (!fs::exists(folder / "residuals.csv", error)) return;
-  auto lines = open_part(folder / "residuals.csv",
-                         "how the calibration fits the images is not known", session);
-  if (!lines) return;
-  CsvRows rows([&lines](std::string_view* line) { return lines->next(line); });
-  std::size_t unreadable = 0;
-  while (rows.next() && session->residuals.size() < kMostResiduals) {
-    if (const auto row = parse_residual(rows))
-      session->residuals.push_back(*row);
-    else
-      ++unreadable;
-  }
-  report_damage("residuals.csv", *lines, rows.torn_rows() + unreadable, 0, session);
 }
 
 std::optional<Event> parse_event(std::string_view line) {
@@ -473,7 +432,6 @@ Session read_session(const fs::path& folder, std::size_t most_frames) {
                                              most_frames, &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
-  read_residuals(folder, &session);
   read_events(folder, &session);
   return session;
 }

@@ -60,16 +60,6 @@ struct CalibrationRow {
   double judged_depth_m = kNone, depth_sigma_percent = kNone, depth_difference_percent = kNone;
 };
 
-/// A line of residuals.csv: a part of the left image.
-struct ResidualRow {
-  bool at_the_end =
-      false;  // with the calibration in use there; else with the one that the drive began with
-  int camera = 1;
-  double left = 0, top = 0, width = 0, height = 0;  // px
-  double mean_px = 0;
-  double matches = 0, scatter_px = 0;  // 0: an older session does not say
-};
-
 struct Event {
   Stamp stamp{};
   std::string kind{}, sentence{};
@@ -83,7 +73,6 @@ struct Session {
   std::vector<std::string> reasons{""};  // words of poses.csv, the empty one first
   std::vector<StampedPose> reference{};  // reference.tum
   std::vector<CalibrationRow> calibrations{};
-  std::vector<ResidualRow> residuals{};  // empty: not known, which is no fault of a session
   std::vector<Event> events{};
   std::size_t events_dropped = 0;  // beyond kMostEvents
   nlohmann::json summary{};        // null when it is missing or no JSON
@@ -103,7 +92,6 @@ inline constexpr std::size_t kMostFrames =
     4'000'000;  // 37 hours at 30 Hz; further ones are left out and told
 inline constexpr std::size_t kMostEvents = 200'000;
 inline constexpr std::size_t kMostCalibrations = 20'000;
-inline constexpr std::size_t kMostResiduals = 4'000;
 inline constexpr std::size_t kLongestText =
     300;  // characters kept of a word or sentence from outside
 

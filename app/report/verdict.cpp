@@ -191,7 +191,6 @@ Verdict judge(const Session& session, const Analysis& analysis) {
   if (analysis.read > 0 || outages.empty()) judge_frames(session, analysis, use, &j);
   if (analysis.source != ErrorSource::none) judge_drift(session, analysis, broken, &j);
   judge_calibration(session, use, &j);
-  judge_lenses(session, analysis, &j);
   // Of a drive without a frame nothing else is to be asked.
   if (analysis.read > 0) judge_verification(session, analysis, use, &j);
   advise_on_events(session, &j);

@@ -206,7 +206,7 @@ void DriveRecorder::on_event(const EventRecord& event) noexcept {
 
 void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcept {
   if (!calibration.decided || !calibration.accepted) return;
-  rig_ = calibration.rig.rig();
+  rig_ = calibration.calibration;
   calibrated_ = true;
   if (settings_.poses != 0) post_rig(calibration.stamp);
 }

@@ -117,7 +117,7 @@ void EstimationLoop::compare(const PoseSample& sample, float decode_ms) noexcept
   if (comparison_)
     comparison_->add(sample, decode_ms);
   else
-    output_.post(PoseRecord::of(sample, decode_ms, reference_.at(sample.stamp)));
+    output_.post(FrameReport::of(sample, decode_ms, reference_.at(sample.stamp)));
 }
 
 }  // namespace vergence::app

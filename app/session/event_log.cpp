@@ -54,7 +54,7 @@ void EventLog::note(const Estimator& estimator) noexcept {
     if (is_for_user(event.kind)) (void)notices_.push(record);
   }
   for (const CalibrationDecision& decision : estimator.calibrations()) {
-    output_->post(CalibrationRecord::of(decision));
+    output_->post(CalibrationRecord{decision});
     note_change(decision);
   }
   matches_.take(estimator.tracks());
@@ -124,7 +124,6 @@ void EventLog::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
     progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
                               notice.sentence.data()));
-  for (const std::string& sentence : output_->take_errors()) progress->say("vergence: " + sentence);
   ProgressSnapshot newest;
   bool any = false;
   while (glimpses_.pop(&newest)) any = true;

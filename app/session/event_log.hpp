@@ -3,8 +3,8 @@
 #include <limits>
 #include <string_view>
 
-#include "app/recorder/match_sample.hpp"
 #include "app/runtime/progress.hpp"
+#include "app/session/match_sample.hpp"
 #include "app/session/session_observer.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/memory/ring.hpp"

@@ -31,8 +31,8 @@ void InsComparison::add(const PoseSample& pose, float decode_ms) noexcept {
 
 void InsComparison::drain() noexcept {
   for (ComparedPose pose; comparison_.next(&pose);) {
-    output_->post(
-        PoseRecord::of(pose, decode_ms_[static_cast<std::size_t>(drained_++ % decode_ms_.size())]));
+    output_->post(FrameReport::of(
+        pose, decode_ms_[static_cast<std::size_t>(drained_++ % decode_ms_.size())]));
     if (pose.ins_valid) ++matches_;
     measure_way(pose);
     measure_errors(pose);
@@ -124,9 +124,8 @@ void InsComparison::take_placement(Stamp stamp) noexcept {
     placements_.push_back({stamp, p});
     if (placements_.size() == kMostPlacements)
       event_log_.log(stamp, "placements_full",
-                     "the drive was placed on the earth anew so often that trajectory_enu.tum, "
-                     "drive.geojson and drive.kml keep this placement from here on; poses.csv has "
-                     "every one",
+                     "the drive was placed on the earth anew so often that summary.json has no "
+                     "further placement; poses.csv has every one",
                      true);
   }
   output_->post(p, comparison_.plane().origin());

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "app/recorder/earth_figures.hpp"
+#include "app/session/earth_figures.hpp"
 #include "app/session/event_log.hpp"
 #include "app/session/ins_events.hpp"
 #include "app/session/session_observer.hpp"

@@ -60,7 +60,7 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
       skipped_(sequence_.left_out) {
   facts_.begin = std::move(begin);
   facts_.truth = std::move(truth);
-  facts_.frames = facts_.expected_frames = count_;
+  facts_.frames = count_;
   facts_.first = sequence_.pairs[request.start].stamp;
   if (!ins_.readings.empty())
     facts_.ins = SourceIns{ins_.options, InsSource::recording, ins_.mount_source,

@@ -1,13 +1,11 @@
 #include "app/session/session_files.hpp"
 
 #include <cstring>
-#include <limits>
 
 #include <nlohmann/json.hpp>
 
 #include "app/config/calibration_file.hpp"
 #include "app/config/calibration_state.hpp"
-#include "app/recorder/residual_field.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/thread_runner.hpp"
@@ -68,25 +66,6 @@ void forget_faults_of(const std::filesystem::path& file, std::vector<std::string
   std::erase_if(*faults, [&name](const std::string& fault) { return fault.starts_with(name); });
 }
 
-/// residuals.csv, where there are matches.
-void write_residuals(const std::filesystem::path& session,
-                     const std::optional<RigCalibration>& before, const RigCalibration& at_the_end,
-                     const MatchSample& sample, std::vector<std::string>* faults) {
-  const auto field = [&sample](const RigCalibration& rig, std::uint64_t from, std::uint64_t until) {
-    return residual_field(sample.matches(), rig, from, until);
-  };
-  const std::vector<ResidualCell> end =
-      field(at_the_end, sample.last_change(), std::numeric_limits<std::uint64_t>::max());
-  if (end.empty()) return;
-  const std::vector<ResidualCell> begin =
-      before ? field(*before, 0, sample.first_change()) : std::vector<ResidualCell>{};
-  try {
-    replace_durably(session / "residuals.csv", format_residuals(begin, end));
-  } catch (const InputError& e) {
-    faults->emplace_back(e.what());
-  }
-}
-
 }  // namespace
 
 void begin_session(const std::filesystem::path& session, const StartingCalibration& begin,
@@ -120,7 +99,7 @@ std::string verification_sentence(const SummaryInput& input) {
 }
 
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
-                 const SummaryInput& input, const SessionTotals& totals, const MatchSample& matches,
+                 const SummaryInput& input, const SessionTotals& totals,
                  std::vector<std::string>* faults) {
   if (!input.calibrated) return;
   CalibrationFile file = begin.file;
@@ -128,9 +107,6 @@ void end_session(const std::filesystem::path& session, const StartingCalibration
   if (totals.accepted > 0) file.source = "online";
   forget_faults_of(session / "calibration.yaml", faults);
   write_session_calibration(session, file, faults);
-  // With one calibration throughout there is nothing to compare.
-  write_residuals(session, totals.accepted > 0 ? input.before : std::nullopt, input.calibration,
-                  matches, faults);
 }
 
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "app/config/calibration_file.hpp"
-#include "app/recorder/match_sample.hpp"
-#include "app/recorder/summary.hpp"
 #include "app/report/report.hpp"
 #include "app/runtime/progress.hpp"
+#include "app/session/match_sample.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
+#include "app/session/summary.hpp"
 #include "core/types/parallel.hpp"
 
 /// What every command that writes a session folder does alike.
@@ -53,11 +53,10 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
 /// none.
 [[nodiscard]] std::string verification_sentence(const SummaryInput& input);
 
-/// calibration.yaml as it is in use at the end, if there is one, and residuals.csv, if there are
-/// matches to look at it with. A sentence of *faults that calibration.yaml could not be written at
-/// the start gives way to what becomes of it now.
+/// calibration.yaml as it is in use at the end, if there is one. A sentence of *faults that
+/// calibration.yaml could not be written at the start gives way to what becomes of it now.
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
-                 const SummaryInput& input, const SessionTotals& totals, const MatchSample& matches,
+                 const SummaryInput& input, const SessionTotals& totals,
                  std::vector<std::string>* faults);
 
 /// summary.json of the session; what goes wrong becomes a sentence of *faults.

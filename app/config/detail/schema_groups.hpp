@@ -183,7 +183,6 @@ class Rows {
 [[nodiscard]] Group kitti_raw();
 [[nodiscard]] Group record();
 [[nodiscard]] Group publish();
-[[nodiscard]] Group sessions();
 [[nodiscard]] Group realtime();
 
 }  // namespace vergence::app::groups

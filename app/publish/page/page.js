@@ -62,7 +62,6 @@ function showNow(now) {
     ["images belong together", now.pairing],
     ["residual", number(now.reprojection_px, 2) + " px"],
     ["pose lines, age at p99", now.line_age_p99_ms === null || now.line_age_p99_ms === undefined ? "no lines" : number(now.line_age_p99_ms, 1) + " ms"],
-    ["temperature", (now.temperatures_c || []).map((t) => t === null ? "–" : number(t, 1) + " °C").join(" · ") || "not told"],
     ["latitude", now.earth ? number(now.earth.latitude_deg, 6) + "°" : "not placed yet"],
     ["longitude", now.earth ? number(now.earth.longitude_deg, 6) + "°" : "not placed yet"],
     ["heading", now.earth ? number(now.earth.heading_deg, 1) + "°" : "not placed yet"],

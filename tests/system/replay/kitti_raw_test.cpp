@@ -14,7 +14,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/recorder/ins_file.hpp"
+#include "app/session/ins_file.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/kitti_raw_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -171,51 +171,6 @@ TEST_F(KittiRawReplay, aDriveReplayedFromTheDataSetsFilesIsTheDriveItselfOnTheEa
   EXPECT_NE(o.err.find("beside the INS after the placement"), std::string::npos) << o.err;
 }
 
-TEST_F(KittiRawReplay, withTheDataSetsOwnCalibrationAndInOtherForms) {
-  const Outcome o = replay(*master_ / "data", "--quiet --also kitti,enu,geojson,kml");
-  ASSERT_EQ(o.code, 0) << o.err;
-  const app::Trajectory world = app::read_tum(session() / "trajectory.tum"),
-                        enu = app::read_tum(session() / "trajectory_enu.tum");
-  ASSERT_EQ(world.size(), enu.size());
-  // Every pose, those before the placement too, by one rigid transform; where poses.csv has east it
-  // is the same.
-  const Transform T_enu_world = enu[0].T_world_body * world[0].T_world_body.inverse();
-  const auto rows = rows_of(session());
-  for (std::size_t i = 0; i < world.size(); ++i) {
-    EXPECT_LT((T_enu_world * world[i].T_world_body.t - enu[i].T_world_body.t).norm(), 1e-6);
-    auto row = rows[i];
-    if (row["east"].empty()) continue;
-    EXPECT_NEAR(std::stod(row["east"]), enu[i].T_world_body.t.x(), 1e-4);
-  }
-  EXPECT_FALSE(rows.back().at("east").empty());
-
-  std::istringstream kitti(read_file(session() / "trajectory.kitti"));
-  std::size_t lines = 0;
-  for (std::string line; std::getline(kitti, line); ++lines) {
-    std::istringstream numbers(line);
-    std::array<double, 12> m{};
-    for (double& v : m) ASSERT_TRUE(numbers >> v);
-    EXPECT_NEAR(m[3], world[lines].T_world_body.t.x(), 1e-8);
-    EXPECT_NEAR(m[10], world[lines].T_world_body.R(2, 2), 1e-8);
-  }
-  EXPECT_EQ(lines, world.size());
-
-  const auto json = nlohmann::json::parse(read_file(session() / "drive.geojson"));
-  EXPECT_EQ(json["type"], "FeatureCollection");
-  std::size_t points = 0;
-  for (const auto& feature : json["features"]) {
-    const auto& place = feature["geometry"]["coordinates"][0];
-    EXPECT_NEAR(place[0].get<double>(), 153.0137, 0.01);  // longitude first (RFC 7946)
-    EXPECT_NEAR(place[1].get<double>(), -27.4975, 0.01);
-    EXPECT_TRUE(feature["properties"]["stroke"].is_string());
-    if (feature["properties"].contains("status"))
-      points += feature["geometry"]["coordinates"].size();
-  }
-  EXPECT_GE(points, world.size());
-  EXPECT_NE(read_file(session() / "drive.kml").find("<coordinates>153.0"), std::string::npos);
-  EXPECT_EQ(run_vergence("replay x --format kitti-raw --out y --also kitti,gpx").code, 2);
-}
-
 /// What is done to the drive, what the replay says and what its session holds.
 struct Spoilt {
   const char* what;
@@ -239,14 +194,10 @@ TEST_F(KittiRawReplay, aSpoiltDriveIsComparedAsFarAsItGoes) {
   const std::vector<Spoilt> cases{
       {"no INS",
        [](const fs::path& data) { fs::remove_all(data / drive_ / "oxts"); },
-       "--frames 20 --also kitti,geojson",
+       "--frames 20",
        0,
-       {"there is no INS to compare with", "drive.geojson is not written"},
-       [](const fs::path& session) {
-         EXPECT_TRUE(fs::exists(session / "trajectory.kitti"));
-         EXPECT_FALSE(fs::exists(session / "drive.geojson"));
-         EXPECT_TRUE(summary_of(session)["earth"].is_null());
-       }},
+       {"there is no INS to compare with"},
+       [](const fs::path& session) { EXPECT_TRUE(summary_of(session)["earth"].is_null()); }},
       {"packets missing in the middle and without a fix",
        [&](const fs::path& data) {
          for (int i = 400; i < 460; ++i) fs::remove(packet(data, i));

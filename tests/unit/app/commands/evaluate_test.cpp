@@ -11,7 +11,7 @@
 
 #include "app/commands/commands.hpp"
 #include "app/evaluation/evaluation_report.hpp"
-#include "app/recorder/ins_file.hpp"
+#include "app/session/ins_file.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/se3.hpp"

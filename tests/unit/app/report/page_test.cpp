@@ -104,7 +104,7 @@ TEST(Page, isMadeOfEveryTornSession) {
   const test::TemporaryFolder whole;
   writer_of(300).write(whole.path());
   for (const char* gone : {"summary.json", "poses.csv", "trajectory.tum", "reference.tum",
-                           "calibrations.csv", "calibration.yaml", "events.jsonl", "residuals.csv"})
+                           "calibrations.csv", "calibration.yaml", "events.jsonl"})
     for (const double kept : {-1.0, 0.0, 0.37, 0.99}) {  // of the file; negative: no file
       const test::TemporaryFolder folder;
       std::filesystem::copy(whole.path(), folder.path(), std::filesystem::copy_options::recursive);
@@ -116,8 +116,7 @@ TEST(Page, isMadeOfEveryTornSession) {
             text.substr(0, static_cast<std::size_t>(kept * static_cast<double>(text.size()))));
       const std::string html = page_of(folder.path());
       EXPECT_TRUE(self_contained(html)) << gone << " " << kept;
-      const bool may_be_gone = std::string(gone) == "trajectory.tum" ||
-                               (std::string(gone) == "residuals.csv" && kept < 0);
+      const bool may_be_gone = std::string(gone) == "trajectory.tum";
       if (!may_be_gone && (kept < 0 || kept == 0.37)) {
         EXPECT_TRUE(contains(html, "What is missing")) << gone << " " << kept;
       }

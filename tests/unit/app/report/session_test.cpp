@@ -103,11 +103,6 @@ TEST(ReadSession, aWholeOneHasNothingMissing) {
   EXPECT_NEAR(s.calibrations[4].depth_sigma_percent, 0.1, 1e-9);
   EXPECT_NEAR(s.calibrations[4].depth_difference_percent, 0.24, 1e-9);
   EXPECT_EQ(s.reference.size(), 392U);
-  ASSERT_EQ(s.residuals.size(), 94U);
-  EXPECT_FALSE(s.residuals[0].at_the_end);
-  EXPECT_EQ(s.residuals[0].mean_px, -1.4);
-  EXPECT_TRUE(s.residuals[93].at_the_end);
-  EXPECT_EQ(s.residuals[93].left, 480);
   EXPECT_TRUE(s.calibration.has_value());
   EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);
 }
@@ -207,26 +202,6 @@ TEST(ReadSession, tornJsonIsSaidAndNeverHalfTaken) {
   EXPECT_TRUE(says(s, "events.jsonl: 1 damaged line left out"));
   ASSERT_EQ(s.events.size(), 2U);
   EXPECT_EQ(s.events[1].kind, "") << "a kind that is no text";
-}
-
-TEST(ReadSession, residualsThatAreNoPlaceOfAnImageAreLeftOut) {
-  const test::TemporaryFolder folder;
-  folder.write("trajectory.tum", "1.5 0 0 0 0 0 0 1\n");
-  const std::string head =
-      "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
-  folder.write("residuals.csv", head +
-                                    "end,1,0,0,80,80,40,0.5,0.25\n"
-                                    "end,9,0,0,80,80,40,0.5,0.25\n"
-                                    "end,1,-5,0,80,80,40,0.5,0.25\n"
-                                    "end,1,0,0,0,80,40,0.5,0.25\n"
-                                    "end,1,0,0,80,1e300,40,0.5,0.25\n"
-                                    "end,1,0,0,80,80,40,nan,0.25\n"
-                                    "end,1,0,0,80,80,40\n"
-                                    "end,1,0,0,80,80,40,0.5,0.2");
-  const Session s = read_session(folder.path());
-  EXPECT_EQ(s.residuals.size(), 1U);
-  EXPECT_TRUE(says(s, "residuals.csv: 6 damaged lines"));
-  EXPECT_TRUE(says(s, "residuals.csv: the last line is torn"));
 }
 
 TEST(NumberAt, isNothingWhereThereIsNoFiniteNumber) {

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "app/report/fit_pattern.hpp"
 #include "app/report/outages.hpp"
 #include "app/report/report.hpp"
 #include "app/report/usability.hpp"
@@ -373,50 +372,6 @@ TEST(Usability, OfDrivesWithoutAnOkFrame) {
     EXPECT_EQ(v.usable, drives[i].usable) << i;
     EXPECT_NE(v.main_reason.find(drives[i].main_reason), std::string::npos)
         << i << ": " << v.main_reason;
-  }
-}
-
-/// 8 × 6 cells of 100 matches whose distances are `middle` px at the centre and grow with the
-/// square of the radius to `corner`.
-void add_field(bool at_the_end, double middle, double corner, double scatter, Session* s) {
-  for (int i = 0; i < 48; ++i) {
-    ResidualRow r;
-    r.at_the_end = at_the_end;
-    r.width = 80, r.height = 80, r.left = i % 8 * 80.0, r.top = i / 8 * 80.0;
-    const double radius = std::hypot(r.left + 40 - 320, r.top + 40 - 240) / std::hypot(320, 240);
-    r.mean_px = (i % 2 == 0 ? 1 : -1) * (middle + (corner - middle) * radius * radius);
-    r.matches = 100, r.scatter_px = scatter;
-    s->residuals.push_back(r);
-  }
-}
-
-TEST(FitPattern, GrowsTowardsTheEdges) {
-  const auto pattern = [](double middle, double corner, double scatter) {
-    Session s;
-    add_field(true, middle, corner, scatter, &s);
-    EXPECT_EQ(fit_of(s, false).pattern, FitPattern::unknown);
-    return fit_of(s, true).pattern;
-  };
-  EXPECT_EQ(pattern(0.1, 0.4, 0.3), FitPattern::fine);
-  EXPECT_EQ(pattern(0.5, 3, 0.3), FitPattern::turned) << "near and far points alike";
-  EXPECT_EQ(pattern(0.5, 3, 0.7), FitPattern::lens);
-  EXPECT_EQ(pattern(3, 3, 0.7), FitPattern::fine) << "the same everywhere is no lens";
-  Session few;
-  add_field(true, 0.5, 3, 0.7, &few);
-  for (ResidualRow& r : few.residuals) r.matches = 3;
-  EXPECT_EQ(fit_of(few, true).pattern, FitPattern::unknown);
-}
-
-TEST(FitPattern, WrongLensIsNotUsableUntilTheDriveHasFoundIt) {
-  for (const bool at_the_end : {true, false}) {
-    Case c;
-    c.calibration()["verified"] = !at_the_end;
-    add_field(at_the_end, 0.5, 3, 0.7, &c.session);
-    if (!at_the_end) add_field(true, 0.03, 0.05, 0.25, &c.session);
-    const Verdict v = judge(c.session, c.analysis);
-    EXPECT_EQ(v.grade, at_the_end ? bad : care);
-    EXPECT_EQ(v.usable, !at_the_end);
-    EXPECT_TRUE(any_has(v.reasons, at_the_end ? ": the lens" : "the lens numbers given are wrong"));
   }
 }
 

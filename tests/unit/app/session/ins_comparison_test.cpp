@@ -1,5 +1,7 @@
 #include "app/session/ins_comparison.hpp"
 
+#include "app/session/recorder.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -43,7 +45,8 @@ struct ComparedSession {
   }
   const test::TemporaryFolder folder;
   Recorder recorder{folder.path(), {.ins = true}};
-  SessionOutput output{&recorder, {}};
+  const std::array<SessionObserver*, 1> observers{&recorder};
+  SessionOutput output{observers};
   const std::unique_ptr<EventLog> log = std::make_unique<EventLog>();
   const ComparisonOptions options{};
   Arena arena{Comparison::bytes_needed(options)};

@@ -1,0 +1,172 @@
+#pragma once
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "app/session/calibration_keeper.hpp"
+#include "app/session/ins_file.hpp"
+#include "app/session/line_file.hpp"
+#include "app/session/records.hpp"
+#include "app/session/session_folder.hpp"
+#include "app/session/session_observer.hpp"
+#include "app/session/session_totals.hpp"
+#include "core/memory/ring.hpp"
+#include "drivers/common/wake_event.hpp"
+
+namespace vergence::app {
+
+class LineFile;
+
+/// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
+/// noise alone, `wide_` with uncertain intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 … k4 of
+/// an equidistant lens. Latency in frames since the alarm, the request or the start; held-out
+/// errors are medians before and after. `kept`: what the drive measured is no better than what is
+/// in use. The last five are those of CalibrationDecision.
+inline constexpr const char* kCalibrationsHeader =
+    "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_"
+    "before_px,held_out_after_px,scale_sigma,"
+    "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_"
+    "ry,wide_rz,wide_tx,wide_ty,wide_tz,"
+    "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,sigma_"
+    "d3,"
+    "left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_left_d2,sigma_left_d3,"
+    "judged_depth_m,depth_sigma_percent,depth_difference_percent,verified,lenses";
+
+/// Writes trajectory.tum, reference.tum (gone at the end if there was no reference), poses.csv,
+/// calibrations.csv, events.jsonl and, with an INS, ins.csv of a session as it goes on, on a thread
+/// of its own: the estimator never waits for a disk.
+///
+///     make_session_folder("sessions/monday");
+///     Recorder recorder("sessions/monday", {});
+///     recorder.on_report(FrameReport::of(sample, 0, std::nullopt));  // of each frame
+///     const std::unique_ptr<SessionTotals> totals = recorder.close();
+///
+/// What has been posted is in the files as soon as the thread comes to it, at the latest after a
+/// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
+/// records give the same bytes.
+/// Threads  on_…(): one producer. take_errors(): one consumer. close(): the owner's, after the
+///          last of these. The recorder's own is sealed: what takes heap memory is done by others.
+/// Memory   Fixed, whatever the length of the drive; with keep_trajectory close() reads the
+///          trajectories back from their files.
+/// Full     wait: the producer waits (replay). drop: the record is dropped and counted (live).
+///          Readings have a ring of their own: they never push out a pose. So have calibrations,
+///          which poses would push out while the disk stands still; they are written in their turn.
+/// Errors   The constructor throws InputError. When the disk takes no more: an error and an event
+///          `disk_full`; lines wait as LineFile says, and are written again every kRetry to the
+///          files that were opened at the start. An event `disk_room` when all was taken, with the
+///          number of lines lost. A file that lacks lines is a fault of the totals.
+class Recorder final : public SessionObserver {
+ public:
+  enum class WhenFull : std::uint8_t { wait, drop };
+  struct Options {
+    WhenFull when_full = WhenFull::wait;
+    bool keep_trajectory = true;
+    bool ins = false;  // readings are posted: ins.csv is there
+    Stamp first{};     // of the recorder's own events before the first pose
+    /// Called on a thread of its own with every calibration that was accepted while driving, and
+    /// with the one that the drive began with when it is confirmed first: files may be written
+    /// there. May be empty.
+    KeepCalibration keep{};
+    /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault
+    /// says. Called on the recorder's thread with the stamp of every pose. May be empty.
+    std::function<bool(Stamp)> disk_full{};
+  };
+
+  /// `folder` exists: make_session_folder().
+  Recorder(const std::filesystem::path& folder, const Options& options);
+  ~Recorder() override;
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  void on_report(const FrameReport& report) noexcept override { post(report); }
+  void on_event(const EventRecord& event) noexcept override { post(event); }
+  void on_calibration(const CalibrationRecord& calibration) noexcept override;
+  /// Precondition: Options::ins.
+  void on_reading(const InsRecord& reading) noexcept override;
+  /// Bytes taken at the beginning: lines that may wait, attempts to calibrate.
+  [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
+  /// Sentences about the disk since the last call.
+  [[nodiscard]] std::vector<std::string> take_errors();
+  /// Writes what is waiting, closes the files. Once.
+  [[nodiscard]] std::unique_ptr<SessionTotals> close();
+
+ private:
+  static constexpr std::chrono::seconds kRetry{3};  // between two attempts to write
+  static constexpr std::size_t kRing = 128;         // records: seconds of frames with their events
+  static constexpr std::size_t kReadings = 1024;    // 2.5 s of the fastest INS
+  static constexpr std::size_t kCalibrations = 8;   // they come seconds apart
+
+  using Record = std::variant<FrameReport, EventRecord>;
+  /// What waits for the recorder's thread.
+  template <class Value, std::size_t N>
+  struct Queue {
+    Ring<Value, N> ring{};
+    std::atomic<std::uint64_t> dropped{0};
+    std::size_t high_water = 0;  // the producer's
+  };
+  /// A calibration, and how many records had been taken into their ring before it.
+  struct Placed {
+    CalibrationRecord calibration{};
+    std::uint64_t after = 0;
+  };
+  /// What keeps calibrations in their turn among the records.
+  struct Turn {
+    std::uint64_t posted = 0;      // records; the producer's
+    std::uint64_t written = 0;     // records; of the recorder's thread, as the next
+    std::optional<Placed> next{};  // whose turn has not come yet
+  };
+  /// False: dropped.
+  template <class Value, std::size_t N>
+  bool push(Queue<Value, N>* queue, const Value& value) noexcept;
+  void work();
+  bool take();
+  bool take_calibrations();
+  bool take_outcome();
+  void post(const Record& record) noexcept;
+  void write(const FrameReport& report);
+  void write(const EventRecord& event);
+  void write(const CalibrationRecord& calibration);
+  void write(const InsRecord& reading);
+  void report_kept(bool kept) noexcept;
+  void flush();
+  void pretend(Stamp stamp);
+  void note_disk(const LineFile* failed, int fault);
+  [[nodiscard]] std::uint64_t lost_lines() const;
+  void stop_and_join() noexcept;
+  using ErrorSentence = std::array<char, 512>;  // ends with 0, cut at the array's end
+  template <class... Arguments>
+  void report_error(const char* format, const Arguments&... arguments) noexcept;
+  void read_back();
+
+  struct Files;
+  Options options_;
+  std::unique_ptr<Files> files_;
+  TotalsBuilder totals_;
+  std::string line_;  // being formatted
+  std::size_t memory_ = 0;
+  Stamp newest_;  // of the poses
+  bool disk_full_ = false, pretended_ = false;
+  std::chrono::steady_clock::time_point retry_due_{};  // while disk_full_
+
+  Queue<Record, kRing> records_;
+  Queue<InsRecord, kReadings> readings_;
+  Queue<Placed, kCalibrations> calibrations_;
+  Turn turn_;
+  WakeEvent filled_, freed_;
+  std::atomic<bool> stop_{false};
+  Ring<ErrorSentence, 16> error_sentences_;    // full: the newest are lost
+  std::vector<std::string> errors_;            // of close()
+  std::unique_ptr<CalibrationKeeper> keeper_;  // null: nothing is kept
+  std::thread thread_;
+};
+
+}  // namespace vergence::app
