@@ -20,86 +20,6 @@ constexpr double kBlack = 6, kDim = 30;  // mean, grey levels
 constexpr double kFlat = 1.5;            // contrast, grey levels: less is noise
 constexpr double kBlurred = 0.2;         // of the sharpest camera's sharpness
 
-/// A grey picture of float pixels, small enough to be searched through.
-struct Small {
-  int width = 0, height = 0;
-  std::vector<float> pixels;
-  [[nodiscard]] float at(int x, int y) const {
-    return pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                  static_cast<std::size_t>(x)];
-  }
-};
-
-constexpr int kSearchedWidth = 240;  // px, about
-constexpr int kRadius = 4;           // of a patch, px of the small picture
-constexpr int kPatch = (2 * kRadius + 1) * (2 * kRadius + 1);
-
-Small shrunk(const ImageView& image) {
-  const int factor = std::max(1, image.width / kSearchedWidth);
-  Small s;
-  s.width = image.width / factor;
-  s.height = image.height / factor;
-  s.pixels.resize(static_cast<std::size_t>(s.width) * static_cast<std::size_t>(s.height));
-  const float scale = 1.0F / static_cast<float>(factor * factor);
-  for (int y = 0; y < s.height; ++y)
-    for (int x = 0; x < s.width; ++x) {
-      int sum = 0;
-      for (int v = 0; v < factor; ++v)
-        for (int u = 0; u < factor; ++u) sum += image.at(x * factor + u, y * factor + v);
-      s.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(s.width) +
-               static_cast<std::size_t>(x)] = static_cast<float>(sum) * scale;
-    }
-  return s;
-}
-
-/// A patch less its mean, of length 1. False: flat.
-bool cut(const Small& s, int x, int y, std::array<float, kPatch>* patch) {
-  float sum = 0;
-  std::size_t i = 0;
-  for (int v = -kRadius; v <= kRadius; ++v)
-    for (int u = -kRadius; u <= kRadius; ++u) sum += (*patch)[i++] = s.at(x + u, y + v);
-  const float mean = sum / kPatch;
-  float squares = 0;
-  for (float& p : *patch) p -= mean, squares += p * p;
-  constexpr float kLeastDeviation = 6;  // grey levels
-  if (squares < kLeastDeviation * kLeastDeviation * kPatch) return false;
-  const float scale = 1 / std::sqrt(squares);
-  for (float& p : *patch) p *= scale;
-  return true;
-}
-
-float correlation(const std::array<float, kPatch>& a, const std::array<float, kPatch>& b) {
-  float sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
-}
-
-/// Where the patch around (x, y) of the first picture is in the second: by how much further left.
-/// False: nowhere, or at several places.
-bool find_shift(const Small& first, const Small& second, int x, int y, int* shift) {
-  std::array<float, kPatch> requested{}, seen{};
-  if (!cut(first, x, y, &requested)) return false;
-  const int reach = first.width / 4, up = std::max(1, first.height * 6 / 100);
-  constexpr float kAlike = 0.85F, kSecondBest = 0.92F;
-  float best = 0, second_best = 0;
-  int where = 0;
-  for (int u = std::max(kRadius, x - reach); u <= std::min(second.width - 1 - kRadius, x + reach);
-       ++u) {
-    float here = 0;  // of this column
-    for (int v = std::max(kRadius, y - up); v <= std::min(second.height - 1 - kRadius, y + up); ++v)
-      if (cut(second, u, v, &seen)) here = std::max(here, correlation(requested, seen));
-    if (here > best) {
-      if (u - where > 2) second_best = std::max(second_best, best);
-      best = here;
-      where = u;
-    } else if (u - where > 2) {
-      second_best = std::max(second_best, here);
-    }
-  }
-  *shift = x - where;
-  return best > kAlike && second_best < kSecondBest * best;
-}
-
 PictureRemark remark(bool unusable, std::string sentence) {
   return {unusable, std::move(sentence)};
 }
@@ -181,36 +101,6 @@ bool are_identical(const ImageView& a, const ImageView& b) noexcept {
   for (int y = 0; y < a.height; ++y)
     if (std::memcmp(a.row(y), b.row(y), static_cast<std::size_t>(a.width)) != 0) return false;
   return figures_of(a).contrast >= kFlat;
-}
-
-HorizontalShift horizontal_shift(const ImageView& first, const ImageView& second) {
-  HorizontalShift result;
-  const Small a = shrunk(first), b = shrunk(second);
-  constexpr int kColumns = 12, kRows = 8;
-  std::vector<int> shifts;
-  for (int j = 0; j < kRows; ++j)
-    for (int i = 0; i < kColumns; ++i) {
-      const int x = kRadius + (a.width - 2 * kRadius - 1) * (2 * i + 1) / (2 * kColumns);
-      const int y = kRadius + (a.height - 2 * kRadius - 1) * (2 * j + 1) / (2 * kRows);
-      int shift = 0;
-      if (x < a.width - kRadius && y < a.height - kRadius && find_shift(a, b, x, y, &shift))
-        shifts.push_back(shift);
-    }
-  if (shifts.empty()) return result;
-  result.patches = static_cast<int>(shifts.size());
-  result.negative = static_cast<double>(
-                        std::count_if(shifts.begin(), shifts.end(), [](int s) { return s < 0; })) /
-                    result.patches;
-  std::nth_element(shifts.begin(), shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2),
-                   shifts.end());
-  result.median = static_cast<double>(shifts[shifts.size() / 2]) / a.width;
-  return result;
-}
-
-bool look_exchanged(const HorizontalShift& shift) noexcept {
-  constexpr int kEnough = 10;
-  constexpr double kMost = 0.8, kBeyondRotation = -0.02;
-  return shift.patches >= kEnough && shift.negative > kMost && shift.median < kBeyondRotation;
 }
 
 }  // namespace vergence::app

@@ -33,20 +33,4 @@ struct PictureRemark {
 /// not called that.
 [[nodiscard]] bool are_identical(const ImageView& a, const ImageView& b) noexcept;
 
-/// How much further left things are in the second picture than in the first.
-struct HorizontalShift {
-  int patches = 0;      // that were found in both
-  double median = 0;    // of their shift, as a share of the image's width; with a left and a right
-                        // picture positive
-  double negative = 0;  // share of the patches that shift the other way
-};
-/// By normalised correlation of patches between the pictures at an eighth to a half of their size;
-/// some milliseconds. For cameras that look about the same way, one beside the other: it allows for
-/// 6 % of the height between them.
-/// Precondition: of one size.
-[[nodiscard]] HorizontalShift horizontal_shift(const ImageView& first, const ImageView& second);
-/// Enough patches, and most of them shifted the wrong way by more than rotations of a degree or two
-/// would make of it.
-[[nodiscard]] bool look_exchanged(const HorizontalShift& shift) noexcept;
-
 }  // namespace vergence::app

@@ -25,8 +25,7 @@ ExitCode examine_machine(const DoctorArguments& a) {
     options.drivers.push_back(n.driver);  // without a configuration: all
   const Machine machine = Machine::here();
   const Inventory inventory = take_inventory(machine, options);
-  const std::vector<Finding> findings =
-      run_checks({machine, inventory, needs, a.out, a.configuration});
+  const std::vector<Finding> findings = run_checks({machine, inventory, needs, a.out});
   std::cout << (a.json ? doctor_json(findings)
                        : doctor_text(findings, needs.given, Terminal::of_stdout()));
   const bool any = std::any_of(findings.begin(), findings.end(),

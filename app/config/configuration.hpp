@@ -153,9 +153,6 @@ struct RecordSettings {
   int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
   double keep_s = 0;                               // 0: everything
   int roll_mb = 0;                                 // 0: one file
-  int memory_mb = 0;                               // 0: as much as six seconds take, and keep_s
-  int image_format = 0;                            // kRawImages …
-  static constexpr int kRawImages = 0, kPngImages = 1;
 
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
 };

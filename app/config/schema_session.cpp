@@ -44,17 +44,11 @@ Group record() {
       .choice("images", &R::images, off_on,
               "All images that the estimator was given, with their cameras: what `replay --format "
               "session` needs.")
-      .choice("image_format", &R::image_format, {"raw", "png"},
-              "`raw`: `sensor_msgs/Image`, as it is; `png`: `sensor_msgs/CompressedImage`, half of "
-              "the disk for some of a processor (docs/recording.md).")
       .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
       .number("keep_s", &R::keep_s, 0, 3600, "s",
               "0: everything; else only what was so long before an event and so long after it.")
       .integer("roll_mb", &R::roll_mb, 0, 10'000'000, "MB",
                "Size at which a file ends and the next one begins; 0: one file.")
-      .integer("memory_mb", &R::memory_mb, 0, 1'000'000, "MB",
-               "What may wait for the disk, or for an event; 0: as much as six seconds take, and "
-               "`keep_s`.")
       .done();
 }
 

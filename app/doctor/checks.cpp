@@ -52,9 +52,6 @@ Needs needs_of(const Configuration& c) {
     n.driver = s.driver;
     n.serial = s.serial;
     n.bytes = bytes_per_pixel(s) * s.width * s.height;
-    n.options = s.options;
-    const auto* v4l2 = std::get_if<v4l2::Options>(&s.options);
-    n.rate_hz = c.trigger.rate * (v4l2 != nullptr ? v4l2->thin : 1);
     needs.cameras.push_back(std::move(n));
   }
   needs.ins_driver = c.ins.driver;
@@ -66,12 +63,6 @@ Needs needs_of(const Configuration& c) {
 
 bool is_real_driver(const std::string& driver) {
   return !driver.empty() && driver != "none" && driver != "mock";
-}
-
-bool CheckContext::is_of_service() const {
-  return configuration.lexically_normal() == "/etc/vergence/rig.yaml" &&
-         (machine.exists("/etc/systemd/system/vergence.service") ||
-          machine.exists("/usr/lib/systemd/system/vergence.service"));
 }
 
 std::vector<Finding> run_checks(const CheckContext& context) {

@@ -29,9 +29,7 @@ struct Finding {
 struct CameraNeed {
   std::string key, name;  // `cameras.0`, `left`
   std::string driver, serial;
-  double bytes = 0;    // of an image on its way
-  double rate_hz = 0;  // that the camera runs at, which may be more than the rig's
-  CameraOptions options;
+  double bytes = 0;  // of an image on its way
 };
 
 /// What a drive with a configuration asks of the machine.
@@ -56,12 +54,7 @@ struct CheckContext {
   const Machine& machine;
   const Inventory& inventory;
   const Needs& needs;
-  std::filesystem::path out = ".";           // where sessions go
-  std::filesystem::path configuration = {};  // of `needs`; empty: none
-
-  /// Returns true for the configuration of an installed service, which drives with permissions and
-  /// limits of its own.
-  [[nodiscard]] bool is_of_service() const;
+  std::filesystem::path out = ".";  // where sessions go
 };
 
 /// All checks; those about devices that are neither there nor asked for have no finding. Problems

@@ -1,13 +1,10 @@
 #include <algorithm>
-#include <cmath>
-#include <map>
 #include <set>
 
 #include <fmt/format.h>
 #include <strings.h>
 
 #include "app/doctor/checks.hpp"
-#include "drivers/iidc/usb_bus.hpp"
 
 namespace vergence::app {
 namespace {
@@ -126,28 +123,6 @@ std::vector<std::string> camera_nodes(const CheckContext& p) {
   return nodes;
 }
 
-void check_usb_memory(const CheckContext& p, std::vector<Finding>* findings) {
-  constexpr const char* kFile = "/sys/module/usbcore/parameters/usbfs_memory_mb";
-  double megabytes = 0;
-  for (const CameraNeed& n : p.needs.of("iidc-usb"))
-    megabytes += static_cast<double>(iidc::UsbBus::kTransfers) * n.bytes / 1048576;
-  const auto limit = p.machine.number(kFile);
-  if (!limit || megabytes <= 0) return;
-  Finding f{"usb_memory",
-            FindingState::ok,
-            fmt::format("the IIDC cameras need {:.1f} MB of USB memory, the kernel gives {}",
-                        megabytes, *limit == 0 ? "any" : fmt::format("{} MB", *limit)),
-            {}};
-  if (*limit > 0 && megabytes > static_cast<double>(*limit)) {
-    const int enough = std::max(64, static_cast<int>(std::ceil(2 * megabytes)));
-    f.state = FindingState::problem;
-    f.mend = {fmt::format("echo {} | sudo tee {}", enough, kFile),
-              fmt::format("echo 'w {} - - - - {}' | sudo tee /etc/tmpfiles.d/vergence-usb.conf",
-                          kFile, enough)};
-  }
-  findings->push_back(std::move(f));
-}
-
 /// Serial ports that matter: those of the configuration, without one all on USB.
 std::vector<const FoundPort*> ports_of(const CheckContext& p, bool ins, bool trigger) {
   const Needs& n = p.needs;
@@ -236,7 +211,6 @@ std::vector<const DeviceInfo*> match_cameras(const CheckContext& p) {
 void check_devices(const CheckContext& p, std::vector<Finding>* findings) {
   check_cameras(p, findings);
   check_nodes(p, {"camera_permission", "video", camera_nodes(p)}, findings);
-  check_usb_memory(p, findings);
   check_port(p, "ins", p.needs.ins_driver, p.needs.ins_port, findings);
   check_port(p, "trigger", p.needs.trigger_driver, p.needs.trigger_port, findings);
   check_serial_permission(p, findings);

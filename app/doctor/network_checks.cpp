@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <map>
 #include <optional>
+#include <set>
 
 #include <fmt/format.h>
 
 #include "app/doctor/checks.hpp"
-#include "drivers/gige/link_budget.hpp"
 
 namespace vergence::app {
 namespace {
@@ -20,7 +19,6 @@ constexpr double kBufferedImages = 8, kMinImages = 2;
 constexpr std::int64_t kMinBuffer = std::int64_t{4} << 20;
 constexpr std::int64_t kRecommendedBuffer = 10'485'760;
 constexpr int kJumbo = 9000, kStandard = 1500;  // bytes
-constexpr double kMega = 1e6, kGigabit = 1e9;   // bit/s
 
 std::optional<std::uint32_t> ipv4(const std::string& text) {
   in_addr a{};
@@ -45,27 +43,19 @@ const InterfaceAddress* way_to(const Machine& m, std::uint32_t address) {
 struct Reached {
   std::string place;                          // its address
   bool found = false;                         // it answered the broadcast
-  const CameraNeed* need = nullptr;           // null: no configuration asks for it
   const InterfaceAddress* through = nullptr;  // null: in no network of this host
 };
 
 std::vector<Reached> gige_cameras(const CheckContext& p) {
   std::vector<Reached> all;
-  const auto matched = match_cameras(p);
   for (const DriverFindings& d : p.inventory.drivers)
-    for (const DeviceInfo& c : d.cameras) {
-      if (d.name != "gige") continue;
-      const auto at = std::find(matched.begin(), matched.end(), &c);
-      all.push_back({c.place, true,
-                     at == matched.end()
-                         ? nullptr
-                         : &p.needs.cameras[static_cast<std::size_t>(at - matched.begin())],
-                     nullptr});
-    }
+    for (const DeviceInfo& c : d.cameras)
+      if (d.name == "gige") all.push_back({c.place, true, nullptr});
   // A camera that is configured by its address need not answer a broadcast.
+  const auto matched = match_cameras(p);
   for (std::size_t k = 0; k < matched.size(); ++k)
     if (matched[k] == nullptr && p.needs.cameras[k].driver == "gige")
-      all.push_back({p.needs.cameras[k].serial, false, &p.needs.cameras[k], nullptr});
+      all.push_back({p.needs.cameras[k].serial, false, nullptr});
   for (Reached& r : all)
     if (const auto address = ipv4(r.place)) r.through = way_to(p.machine, *address);
   return all;
@@ -136,42 +126,6 @@ void check_mtu(const std::string& name, int mtu, std::vector<Finding>* findings)
   findings->push_back(std::move(f));
 }
 
-/// The driver's own plan for the cameras on one interface. `speed`: bit/s.
-void check_load(const std::string& name, const std::vector<const CameraNeed*>& needs, int mtu,
-                double speed, std::vector<Finding>* findings) {
-  double used = 0, highest = 0, megabytes = 0;
-  for (const CameraNeed* n : needs) {
-    const auto* given = std::get_if<gige::Options>(&n->options);
-    const gige::Options options = given != nullptr ? *given : gige::Options{};
-    gige::LinkDemand d;
-    d.image_bytes = static_cast<std::int64_t>(n->bytes);
-    d.rate_hz = n->rate_hz;
-    d.cameras = options.link_cameras > 0 ? options.link_cameras : static_cast<int>(needs.size());
-    d.mtu = mtu;
-    d.packet_size = options.packet_size;
-    d.speed = static_cast<std::int64_t>(options.link_mbps > 0 ? options.link_mbps * kMega : speed);
-    const gige::LinkBudget budget = gige::link_budget(d);
-    if (budget.used >= used) used = budget.used, highest = budget.highest_hz;
-    megabytes += n->bytes * n->rate_hz / kMega;
-  }
-  Finding f{
-      "link",
-      FindingState::ok,
-      fmt::format("{}: cameras {}, {:.0f} MB/s of images, {:.0f} % of what {:.0f} Mbit/s carry",
-                  name, needs.size(), megabytes, 100 * used, speed / kMega),
-      {}};
-  if (used > 1) {
-    f.state = FindingState::problem;
-    f.message += fmt::format(
-        "; they fit up to {:.1f} Hz (trigger.rate), with smaller images, or on links of their own",
-        highest);
-  } else if (speed < kGigabit) {
-    f.state = FindingState::advice;
-    f.message += "; GigE cameras need a gigabit: check cable and switch";
-  }
-  findings->push_back(std::move(f));
-}
-
 }  // namespace
 
 void check_network(const CheckContext& p, std::vector<Finding>* findings) {
@@ -179,22 +133,12 @@ void check_network(const CheckContext& p, std::vector<Finding>* findings) {
   if (cameras.empty()) return;
   check_receive_buffer(p, findings);
   check_reach(cameras, findings);
-  std::map<std::string, std::vector<const CameraNeed*>> links;
-  for (const Reached& r : cameras) {
-    if (r.through == nullptr) continue;
-    auto& needs = links[r.through->name];
-    if (r.need != nullptr) needs.push_back(r.need);
-  }
-  for (const auto& [name, needs] : links) {
-    const std::string folder = "/sys/class/net/" + name;
-    const int mtu = static_cast<int>(
-        std::clamp<std::int64_t>(p.machine.number(folder + "/mtu").value_or(kStandard), 68, 65536));
-    const auto megabits = std::clamp<std::int64_t>(p.machine.number(folder + "/speed").value_or(0),
-                                                   0, 1'000'000);  // 0 or -1: unknown
-    check_mtu(name, mtu, findings);
-    if (!needs.empty())
-      check_load(name, needs, mtu, megabits > 0 ? static_cast<double>(megabits) * kMega : kGigabit,
-                 findings);
+  std::set<std::string> links;
+  for (const Reached& r : cameras)
+    if (r.through != nullptr) links.insert(r.through->name);
+  for (const std::string& name : links) {
+    const auto mtu = p.machine.number("/sys/class/net/" + name + "/mtu").value_or(kStandard);
+    check_mtu(name, static_cast<int>(std::clamp<std::int64_t>(mtu, 68, 65536)), findings);
   }
 }
 

@@ -10,8 +10,7 @@
 namespace vergence::app {
 namespace {
 
-/// Limits of this process, where threads or memory ask for them. The installed service has limits
-/// of its own, so that a refusal is advice then.
+/// Limits of this process, where threads or memory ask for them.
 void check_limits(const CheckContext& p, std::vector<Finding>* findings) {
   constexpr std::int64_t kLockedMemory = std::int64_t{512} << 20;  // of two cameras and threads
   struct Limit {
@@ -39,9 +38,7 @@ void check_limits(const CheckContext& p, std::vector<Finding>* findings) {
                           *limit < 0 ? "none" : std::to_string(*limit)),
               {}};
     if (!enough) {
-      f.state = p.is_of_service() ? FindingState::advice : l.refused;
-      if (p.is_of_service())
-        f.message += "; that counts by hand, the service has limits of its own";
+      f.state = l.refused;
       f.mend = {fmt::format("echo '{} - {}' | sudo tee -a /etc/security/limits.d/60-vergence.conf",
                             p.machine.user, l.item)};
     }
@@ -75,7 +72,7 @@ void check_disk(const CheckContext& p, std::vector<Finding>* findings) {
     f.state = FindingState::problem;
     f.message = fmt::format("the file system of {} is read-only: no session can be written", where);
     f.mend = {fmt::format("findmnt -T '{}'", p.out.string())};
-  } else if (!room->may_write && p.needs.given && !p.is_of_service()) {
+  } else if (!room->may_write && p.needs.given) {
     f.state = FindingState::problem;
     f.message = fmt::format("{} may not write at {}: name a folder of your own by --out",
                             p.machine.user, where);

@@ -102,11 +102,6 @@ void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
   for (int y = 0; y < image.height; ++y) out->raw({image.row(y), width});
 }
 
-void write_compressed_image(CdrWriter* out, Stamp stamp, std::string_view frame,
-                            std::string_view format, std::span<const std::uint8_t> file) noexcept {
-  out->header(stamp, frame).text(format).count(file.size()).raw(file);
-}
-
 void write_camera_info(CdrWriter* out, Stamp stamp, std::string_view frame,
                        const RigCalibration& rig, int camera, bool calibrated) noexcept {
   const Intrinsics& lens = rig.intrinsics[static_cast<std::size_t>(camera)];
@@ -246,8 +241,6 @@ constexpr std::array kDefinitions{
     Definition{"sensor_msgs/Image",
                "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
                "uint8 is_bigendian\nuint32 step\nuint8[] data\n"},
-    Definition{"sensor_msgs/CompressedImage",
-               "std_msgs/Header header\nstring format\nuint8[] data\n"},
     Definition{"sensor_msgs/CameraInfo",
                "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\n"
                "float64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\nuint32 binning_x\n"
@@ -320,18 +313,13 @@ constexpr std::array kDefinitions{
     Definition{"diagnostic_msgs/KeyValue", "string key\nstring value\n"},
 };
 
-constexpr std::array<std::string_view, kRosTypes> kNames{"sensor_msgs/msg/Image",
-                                                         "sensor_msgs/msg/CompressedImage",
-                                                         "sensor_msgs/msg/CameraInfo",
-                                                         "sensor_msgs/msg/NavSatFix",
-                                                         "sensor_msgs/msg/Imu",
-                                                         "nav_msgs/msg/Odometry",
-                                                         "diagnostic_msgs/msg/DiagnosticArray",
-                                                         "tf2_msgs/msg/TFMessage",
-                                                         "std_msgs/msg/String",
-                                                         "vergence_msgs/msg/Frame",
-                                                         "vergence_msgs/msg/InsReading",
-                                                         "vergence_msgs/msg/Pulse"};
+constexpr std::array<std::string_view, kRosTypes> kNames{
+    "sensor_msgs/msg/Image",     "sensor_msgs/msg/CameraInfo",
+    "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/Imu",
+    "nav_msgs/msg/Odometry",     "diagnostic_msgs/msg/DiagnosticArray",
+    "tf2_msgs/msg/TFMessage",    "std_msgs/msg/String",
+    "vergence_msgs/msg/Frame",   "vergence_msgs/msg/InsReading",
+    "vergence_msgs/msg/Pulse"};
 
 const Definition* find(std::string_view name) {
   for (const Definition& d : kDefinitions)

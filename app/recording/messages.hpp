@@ -33,9 +33,6 @@ void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
                                                        std::size_t frame) noexcept {
   return 64 + frame + static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
-/// sensor_msgs/CompressedImage of a file's bytes.
-void write_compressed_image(CdrWriter* out, Stamp stamp, std::string_view frame,
-                            std::string_view format, std::span<const std::uint8_t> file) noexcept;
 
 /// sensor_msgs/CameraInfo of camera `camera`: k and d of the lens; r and p those of the pair that
 /// rectifies it with camera 0 where a calibration is there, else r the identity and p of k.
@@ -98,7 +95,6 @@ void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse, Stamp edge) no
 /// others.
 enum class RosType : std::uint8_t {
   image,
-  compressed_image,
   camera_info,
   nav_sat_fix,
   imu,
@@ -110,7 +106,7 @@ enum class RosType : std::uint8_t {
   ins_reading,  // vergence_msgs/msg/InsReading
   pulse,        // vergence_msgs/msg/Pulse
 };
-inline constexpr int kRosTypes = 12;
+inline constexpr int kRosTypes = 11;
 
 /// `sensor_msgs/msg/Image`.
 [[nodiscard]] std::string_view ros_type_name(RosType type) noexcept;

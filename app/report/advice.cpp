@@ -21,8 +21,8 @@ constexpr std::array kPose{
     Advice{"no_stereo_matches",
            "Left and right do not fit this calibration: look for folders of different drives, "
            "T_camera_left inverted (X_camera = R X_left "
-           "+ t), wrong "
-           "lens numbers, or cameras that do not expose together; --from-scratch finds the "
+           "+ t), distortion given for images that are rectified already, wrong lens numbers, or "
+           "cameras that do not expose together; --from-scratch finds the "
            "transform itself."},
     Advice{"cameras_swapped",
            "Left and right are swapped, or T_camera_left is inverted: swap cables, folders or the "

@@ -136,14 +136,10 @@ void error_plots(const Session& s, const Analysis& a, std::string* out) {
       Kind{"Heading error, degrees (clockwise is positive)", &a.heading_deg, "curve s-third",
            false}};
   for (const Kind& k : kinds) {
-    const std::string over_time = curve_plot(
-        {k.caption, XAxis::time_s, a.time_s, *k.values, a.breaks, k.css, k.from_zero}, a, s.frames);
-    if (over_time.empty()) continue;
-    *out += figure(std::string(k.caption) + " · over time", over_time);
-    *out += figure(std::string(k.caption) + " · over the distance travelled",
-                   curve_plot({k.caption, XAxis::distance_m, a.distance_m, *k.values, a.breaks,
-                               k.css, k.from_zero},
-                              a, s.frames));
+    if (const std::string plot =
+            curve_plot({k.caption, *k.values, k.css, k.from_zero}, a, s.frames);
+        !plot.empty())
+      *out += figure(std::string(k.caption) + " · over time", plot);
   }
 }
 
@@ -156,28 +152,19 @@ std::string errors_head(const Analysis& a) {
                           : ""));
 }
 
-void running_plots(const Session& s, const Analysis& a, const TimingPicture& timing,
-                   std::string* out) {
+void running_plots(const Session& s, const Analysis& a, std::string* out) {
   if (const std::string bands = bands_picture(s, a); !bands.empty())
     *out += figure("Status and state · over time", bands);
-  std::vector<double> inliers;
-  for (const Frame& f : s.frames) inliers.push_back(f.inliers >= 0 && f.posed ? f.inliers : kNone);
-  const std::string caption = "Inliers (points that hold the pose)";
-  if (const std::string plot = curve_plot(
-          {caption, XAxis::time_s, a.time_s, inliers, a.breaks, "curve s-ours", true}, a, s.frames);
-      !plot.empty())
-    *out += figure(caption + " · over time", plot);
-  if (timing.svg.empty()) return;
-  *out +=
-      figure(fmt::format("Time a frame · {} of {} over the frame interval of {:.0f} ms (dashed)",
-                         grouped(timing.over_budget), grouped(timing.frames), a.interval_s * 1e3),
-             timing.svg);
-  std::vector<double> times;
-  for (const Frame& f : s.frames) times.push_back(f.estimate_ms);
-  *out += figure(
-      "Time a frame, ms · over time",
-      curve_plot({"Time a frame", XAxis::time_s, a.time_s, times, a.breaks, "curve s-ours", true},
-                 a, s.frames));
+  std::vector<double> inliers, times;
+  for (const Frame& f : s.frames) {
+    inliers.push_back(f.inliers >= 0 && f.posed ? f.inliers : kNone);
+    times.push_back(f.estimate_ms);
+  }
+  for (const auto& [caption, values] : {std::pair{"Inliers (points that hold the pose)", &inliers},
+                                        std::pair{"Time a frame, ms", &times}})
+    if (const std::string plot = curve_plot({caption, *values, "curve s-ours", true}, a, s.frames);
+        !plot.empty())
+      *out += figure(std::string(caption) + " · over time", plot);
 }
 
 /// A single one that the drive began with is no curve.
@@ -227,7 +214,6 @@ std::string footer(const Session& s) {
 }  // namespace
 
 std::string page_html(const Session& session, const Analysis& analysis, const Verdict& verdict) {
-  const TimingPicture timing = timing_picture(session, analysis);
   const std::string title = escape(title_line(session, analysis), 400);
   std::string out =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>"
@@ -241,14 +227,14 @@ std::string page_html(const Session& session, const Analysis& analysis, const Ve
     out += section("wide", "What is missing in this session", list(missing));
   out += map_section(session, analysis);
   std::string running;
-  running_plots(session, analysis, timing, &running);
+  running_plots(session, analysis, &running);
   out += running + errors_head(analysis);
   if (analysis.source != ErrorSource::none) error_plots(session, analysis, &out);
   calibration_sections(session, analysis, &out);
   out += section("wide long", "Events",
                  session.events.empty() ? "<p>None was recorded.</p>" : events_table(session));
   out += section("wide long", "Figures",
-                 "<div class=\"two\">" + figures_table(session, analysis, timing) + "</div>");
+                 "<div class=\"two\">" + figures_table(session, analysis) + "</div>");
   out += "</div>\n" + footer(session) + "</main></body></html>\n";
   return out;
 }

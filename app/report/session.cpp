@@ -342,15 +342,14 @@ void read_events(const fs::path& folder, Session* session) {
 
 void read_summary(const fs::path& folder, Session* session) {
   const auto text = read_part(folder / "summary.json", kLargestSummary,
-                              "the session was not closed (killed, or the power went); figures are "
-                              "reckoned again from the other files",
+                              "the session was not closed (killed, or the power went); its figures "
+                              "are not known",
                               session);
   if (!text) return;
   session->summary = nlohmann::json::parse(*text, nullptr, false);
   if (session->summary.is_object()) return;
   session->summary = nullptr;
-  session->missing.emplace_back(
-      "summary.json is torn; figures are reckoned again from the other files");
+  session->missing.emplace_back("summary.json is torn; its figures are not known");
 }
 
 /// A drive that never found a calibration has none to write; its calibrations.csv and its summary

@@ -203,16 +203,18 @@ std::string event_row(const Session& s, const EventRun& run) {
 }  // namespace
 
 std::string grouped(std::size_t count) {
-  std::string text = std::to_string(count);
-  for (std::size_t i = text.size(); i > 3; i -= 3)
-    text.insert(i - 3, " ");  // narrow no-break space
+  const std::string digits = std::to_string(count);
+  std::string text;
+  for (std::size_t i = 0; i < digits.size(); ++i) {
+    if (i > 0 && (digits.size() - i) % 3 == 0) text += ' ';
+    text += digits[i];
+  }
   return text;
 }
 
 std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
 
-std::string figures_table(const Session& session, const Analysis& analysis,
-                          const TimingPicture& timing) {
+std::string figures_table(const Session& session, const Analysis& analysis) {
   Figures f;
   f.group("Drive");
   if (analysis.duration_s > 0) f.row("duration", duration_text(analysis.duration_s, 0.1));
@@ -220,7 +222,6 @@ std::string figures_table(const Session& session, const Analysis& analysis,
   frames_group(session, analysis, &f);
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
   block_group(session, "timing_ms", "Time a frame, ms", &f);
-  if (timing.frames > 0) f.row("frames over the frame interval", grouped(timing.over_budget));
   calibration_group(session, analysis, &f);
   block_group(session, "truth", "Against the truth of the mock drive (metres, radians)", &f);
   block_group(session, "devices", "Devices", &f);

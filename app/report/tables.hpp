@@ -2,7 +2,6 @@
 #include <string>
 
 #include "app/report/analysis.hpp"
-#include "app/report/plots.hpp"
 #include "app/report/session.hpp"
 
 /// The page's tables as HTML.
@@ -10,8 +9,7 @@ namespace vergence::app::report {
 
 /// Counts, errors, times, calibration, memory, drops: what is known; a figure that does not exist
 /// has no row.
-[[nodiscard]] std::string figures_table(const Session& session, const Analysis& analysis,
-                                        const TimingPicture& timing);
+[[nodiscard]] std::string figures_table(const Session& session, const Analysis& analysis);
 
 /// The word for the calibration and the depth errors it predicts, at the start and at the end.
 /// Empty when the summary has neither.
@@ -28,7 +26,7 @@ namespace vergence::app::report {
 /// `0.004 m`, `54.34 m`: millimetres below a decimetre.
 [[nodiscard]] std::string metres(double value);
 
-/// 12 400 with a thin space between thousands.
+/// 12 400: a space between thousands.
 [[nodiscard]] std::string grouped(std::size_t count);
 
 }  // namespace vergence::app::report

@@ -31,11 +31,9 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
       rig_(facts.begin.file.rig),
       calibrated_(facts.begin.trust != CalibrationTrust::none) {
   for (std::size_t k = 0; k < frames_.size(); ++k) frame_names_[k] = frames_[k];
-  if (as_png(settings_)) encoder_.emplace(recording_, encoder_options(facts));
 }
 
 void DriveRecorder::close(std::vector<std::string>* faults) {
-  if (encoder_) encoder_->close();
   recording_.close();
   if (const std::uint64_t lost = recording_.counters().lost; lost > 0)
     faults->push_back(fmt::format(
@@ -81,9 +79,6 @@ bool DriveRecorder::post_pixels(const RigFrame& frame, std::size_t camera) noexc
   const ImageView& image = frame.images[camera];
   const std::string_view name = frame_names_[camera];
   std::uint32_t& crc = frame_.image_crc[camera];
-  if (encoder_)
-    return !stopped_.load(std::memory_order_relaxed) &&
-           encoder_->post(image_topic(camera), frame.stamp, name, image, &crc);
   bool written = false;
   crc =
       post(image_topic(camera), frame.stamp,
@@ -149,7 +144,6 @@ void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
 void DriveRecorder::post_health(const PoseSample& sample) noexcept {
   last_health_ = sample.stamp;
   const RecordingCounters c = recording_.counters();
-  const std::uint64_t not_encoded = encoder_ ? encoder_->dropped() : 0;
   const auto number = [](std::uint64_t v) { return static_cast<std::int64_t>(v); };
   const std::array pose{
       DiagnosticValue{"frame", number(sample.frame)}, DiagnosticValue{"inliers", sample.inliers},
@@ -159,10 +153,10 @@ void DriveRecorder::post_health(const PoseSample& sample) noexcept {
                           DiagnosticValue{"spread_ns", frame_.spread.ns()},
                           DiagnosticValue{"pairing", frame_.pairing}};
   const std::array drops{DiagnosticValue{"dropped_messages", number(c.dropped)},
-                         DiagnosticValue{"dropped_images", number(c.dropped_images + not_encoded)},
+                         DiagnosticValue{"dropped_images", number(c.dropped_images)},
                          DiagnosticValue{"lost_messages", number(c.lost)},
                          DiagnosticValue{"queue_high_water_bytes", number(c.queue_high_water)}};
-  const bool lossless = c.dropped + c.lost + not_encoded == 0;
+  const bool lossless = c.dropped + c.lost == 0;
   const std::array status{
       Diagnostic{level_of(sample.status), "vergence: pose", to_string(sample.reason), pose},
       Diagnostic{DiagnosticLevel::ok, "vergence: clocks", "", clocks},
@@ -223,13 +217,10 @@ void DriveRecorder::on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noex
 
 std::vector<std::pair<std::string, std::uint64_t>> DriveRecorder::counters() {
   const RecordingCounters c = recording_.counters();
-  const std::uint64_t not_encoded = encoder_ ? encoder_->dropped() : 0;
-  return {{"recorded_messages", c.messages},
-          {"recorded_bytes", c.bytes},
-          {"recording_dropped", c.dropped},
-          {"recording_dropped_images", c.dropped_images + not_encoded},
-          {"recording_lost", c.lost},
-          {"recording_queue_high_water_bytes", c.queue_high_water}};
+  return {
+      {"recorded_messages", c.messages}, {"recorded_bytes", c.bytes},
+      {"recording_dropped", c.dropped},  {"recording_dropped_images", c.dropped_images},
+      {"recording_lost", c.lost},        {"recording_queue_high_water_bytes", c.queue_high_water}};
 }
 
 }  // namespace vergence::app

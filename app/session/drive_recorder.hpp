@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "app/config/configuration.hpp"
-#include "app/recording/image_encoder.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/recording.hpp"
 #include "app/session/frame_source.hpp"
@@ -24,7 +23,7 @@ namespace vergence::app {
 ///
 /// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
 ///            PulseObserver, a queue each. The rest: the owner's.
-/// Memory     The recording's queues and the encoder's, at construction.
+/// Memory     The recording's queues, at construction.
 /// Errors     The constructor throws InputError: no room, no file. Afterwards sentences.
 class DriveRecorder final : public SessionObserver, public PulseObserver {
  public:
@@ -47,9 +46,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   /// Nothing more is recorded. The estimator's thread.
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
-  [[nodiscard]] std::size_t memory() const noexcept {
-    return recording_.counters().queue_bytes + (encoder_ ? encoder_->memory() : 0);
-  }
+  [[nodiscard]] std::size_t memory() const noexcept { return recording_.counters().queue_bytes; }
 
  private:
   template <class Write>
@@ -67,7 +64,6 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   std::array<std::string_view, kMaxCameras> frame_names_{};
   const std::string folder_;
   Recording recording_;
-  std::optional<ImageEncoder> encoder_;  // record.image_format: png
 
   // Of the estimator's thread.
   RigCalibration rig_;

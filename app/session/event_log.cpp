@@ -53,20 +53,8 @@ void EventLog::note(const Estimator& estimator) noexcept {
     output_->post(record);
     if (is_for_user(event.kind)) (void)notices_.push(record);
   }
-  for (const CalibrationDecision& decision : estimator.calibrations()) {
+  for (const CalibrationDecision& decision : estimator.calibrations())
     output_->post(CalibrationRecord{decision});
-    note_change(decision);
-  }
-  matches_.take(estimator.tracks());
-}
-
-/// A rig that was knocked fits no match from before: a calibration is looked at with those of its
-/// own rig only.
-void EventLog::note_change(const CalibrationDecision& decision) noexcept {
-  using Cause = CalibrationCause;
-  const bool changed = decision.cause == Cause::knock || decision.cause == Cause::drift ||
-                       decision.cause == Cause::collapse;
-  if (decision.accepted && changed) matches_.rig_changed(decision.onset_frame);
 }
 
 /// Frames in a row without all of their work are one event.

@@ -25,7 +25,7 @@ constexpr std::size_t kPulseQueue = std::size_t{1} << 20;  // bytes
 // reading of the INS (740), of a pulse (300).
 constexpr double kFrameRecords = 2048, kReadingRecords = 1024, kPulseRecords = 512;
 
-std::vector<RecordedTopic> topics(const CalibrationFile& file, bool png) {
+std::vector<RecordedTopic> topics(const CalibrationFile& file) {
   std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
                                  {"/vergence/frame", RosType::frame, false},
                                  {"/vergence/odometry", RosType::odometry, false},
@@ -38,8 +38,7 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file, bool png) {
                                  {"/vergence/pulse", RosType::pulse, false}};
   for (const std::string& name : recorded_names(file)) {
     const std::string images = "/" + name + "/image_raw";
-    out.push_back(png ? RecordedTopic{images + "/compressed", RosType::compressed_image, false}
-                      : RecordedTopic{images, RosType::image, false});
+    out.push_back({images, RosType::image, false});
     out.push_back({"/" + name + "/camera_info", RosType::camera_info, false});
   }
   return out;
@@ -74,7 +73,7 @@ std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts&
   if (facts.ins) d.mount_source = facts.ins->mount_source;
   d.settings = settings_of(c);
   for (std::size_t k = 0; k < static_cast<std::size_t>(facts.begin.file.rig.cameras); ++k)
-    d.cameras.push_back(topics(facts.begin.file, as_png(c.record))[image_topic(k)].name);
+    d.cameras.push_back(topics(facts.begin.file)[image_topic(k)].name);
   const std::string json = to_json(d);
   std::vector<std::uint8_t> bytes(json.size() + 16);
   CdrWriter out(bytes);
@@ -111,7 +110,6 @@ constexpr double kMostQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
 
 /// Bytes of images a second, and how many seconds of them are held.
 double wanted_queue_bytes(const Configuration& c, const SourceFacts& facts) {
-  if (c.record.memory_mb > 0) return static_cast<double>(c.record.memory_mb) * 0x1p20;
   if (c.record.images == 0) return small_bytes(c);
   const double held = facts.when_full == Recorder::WhenFull::wait
                           ? kLeastHeld
@@ -122,10 +120,10 @@ double wanted_queue_bytes(const Configuration& c, const SourceFacts& facts) {
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
   const double bytes = wanted_queue_bytes(c, facts);
   if (bytes > kMostQueue)
-    throw InputError(fmt::format(
-        "record.memory_mb, record.keep_s: {:.0f} MB of images are to wait, more than this machine "
-        "can address",
-        bytes / 1e6));
+    throw InputError(
+        fmt::format("record.keep_s: {:.0f} MB of images are to wait, more than this machine "
+                    "can address",
+                    bytes / 1e6));
   return static_cast<std::size_t>(bytes);
 }
 
@@ -140,25 +138,11 @@ std::vector<std::string> recorded_names(const CalibrationFile& file) {
   return distinct_names({file.names.begin(), file.names.begin() + file.rig.cameras});
 }
 
-bool as_png(const RecordSettings& settings) noexcept {
-  return settings.images != 0 && settings.image_format == RecordSettings::kPngImages;
-}
-
-ImageEncoder::Options encoder_options(const SourceFacts& facts) {
-  ImageEncoder::Options o;
-  o.queue = png_queue;
-  o.waiting = static_cast<std::size_t>(kLeastHeld * frame_bytes(facts));
-  o.when_full = when_full(facts);
-  return o;
-}
-
 Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
   Recording::Options o;
-  const bool png = as_png(c.record);
-  o.files.topics = topics(facts.begin.file, png);
-  o.queues = {png ? static_cast<std::size_t>(small_bytes(c)) : queue_bytes(c, facts),
+  o.files.topics = topics(facts.begin.file);
+  o.queues = {queue_bytes(c, facts),
               kPulseQueue + static_cast<std::size_t>(kept_bytes(c, kPulseRecords, c.trigger.rate))};
-  if (png) o.queues.push_back(queue_bytes(c, facts));
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
   o.files.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;

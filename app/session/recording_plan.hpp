@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "app/config/configuration.hpp"
-#include "app/recording/image_encoder.hpp"
 #include "app/recording/recording.hpp"
 #include "app/session/frame_source.hpp"
 
@@ -12,7 +11,7 @@
 namespace vergence::app {
 
 /// Queues of a recording, one for each thread that posts.
-enum Queue : std::size_t { estimator_queue, acquisition_queue, png_queue };
+enum Queue : std::size_t { estimator_queue, acquisition_queue };
 
 /// Topics of a recording. Of a camera there are two, from first_camera_topic on.
 enum Topic : std::size_t {
@@ -37,9 +36,6 @@ constexpr std::size_t image_topic(std::size_t camera) noexcept {
 /// Names of the cameras in topics and as frames of reference: those of the calibration, each once.
 [[nodiscard]] std::vector<std::string> recorded_names(const CalibrationFile& file);
 
-/// Images are recorded, and as PNG.
-[[nodiscard]] bool as_png(const RecordSettings& settings) noexcept;
-[[nodiscard]] ImageEncoder::Options encoder_options(const SourceFacts& facts);
 [[nodiscard]] Recording::Options recording_options(const Configuration& configuration,
                                                    const SourceFacts& facts);
 

@@ -78,15 +78,13 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
                           const SessionTotals& totals, const EstimatorOptions& options,
-                          const MatchSample& matches, SummaryInput* input) {
+                          SummaryInput* input) {
   input->calibrated = estimator.calibrated();
   input->online = options.online;
   input->verified = options.online && estimator.verified();
   input->calibration = estimator.calibration();
   input->calibration_source = totals.accepted > 0 ? "online" : begin.source;
   if (begin.trust != CalibrationTrust::none) input->before = begin.file.rig;
-  if (input->before)
-    input->mistake = find_mistake(matches.matches(), *input->before, matches.first_change());
   input->options = options.calibration;
 }
 

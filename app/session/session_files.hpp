@@ -10,7 +10,6 @@
 #include "app/config/calibration_file.hpp"
 #include "app/report/report.hpp"
 #include "app/runtime/progress.hpp"
-#include "app/session/match_sample.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
 #include "app/session/summary.hpp"
@@ -47,7 +46,7 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 /// The calibration's part of the summary.
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
                           const SessionTotals& totals, const EstimatorOptions& options,
-                          const MatchSample& matches, SummaryInput* input);
+                          SummaryInput* input);
 
 /// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is
 /// none.

@@ -247,8 +247,7 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
     input.comparison = comparison->counters();
     input.earth = comparison->earth(facts_.ins->mount_source);
   }
-  describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(),
-                       loop_.event_log().matches(), &input);
+  describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(), &input);
   input.allocations_after_seal = allocations;
   input.frame_budget = loop_.options().frame_budget;
   input.allocations = threads_.figures();

@@ -163,9 +163,6 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
                                     {"sigma_px", totals.focal.sigma_px},
                                     {"contradicted", totals.focal.contradicted}}
                              : Json();
-  json["mistake"] = input.mistake != CalibrationMistake::none
-                        ? Json(std::string(to_string(input.mistake)))
-                        : Json();
   json["before"] = input.before ? health_json(*input.before, input.options) : Json();
   json["from_scratch"] = from_scratch_json(totals);
   json["accepted"] = totals.accepted;

@@ -9,7 +9,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/session/calibration_mistake.hpp"
 #include "app/session/earth_figures.hpp"
 #include "app/session/recorder.hpp"
 #include "core/calibration/options.hpp"
@@ -45,7 +44,6 @@ struct SummaryInput {
   bool online = true;     // the rig was watched; false: nothing could confirm a calibration
   bool verified = false;  // the drive itself has confirmed the calibration in use at the end
   std::optional<RigCalibration> before{};     // the drive began with it; none: from scratch
-  CalibrationMistake mistake{};               // that `before` shows
   calibration::CalibrationOptions options{};  // what its words mean
   std::uint64_t allocations_after_seal = 0;
   Duration frame_budget{};  // zero: none

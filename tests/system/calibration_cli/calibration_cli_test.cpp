@@ -137,25 +137,6 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
       << lenses.err;
 }
 
-TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEnd) {
-  folder_.write("state", "a file where the folder should be");
-  const Outcome o = drive("s", std::string("--from-scratch ") + kLongEnough);
-  EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_EQ(events("s", "calibration_not_kept").size(), events("s", "calibration_accepted").size());
-  EXPECT_NE(o.err.find("the next drive will not know"), std::string::npos) << o.err;
-}
-
-TEST_F(CalibrationCli, theSameDecisionsWhateverTheThreads) {
-  for (const char* threads : {"1", "2"})
-    ASSERT_EQ(drive(threads, fmt::format("--from-scratch {} --threads {} --set rig.state_dir=none",
-                                         kLongEnough, threads))
-                  .code,
-              0);
-  for (const char* file :
-       {"trajectory.tum", "calibrations.csv", "calibration.yaml", "events.jsonl"})
-    EXPECT_EQ(read_file(session("1") / file), read_file(session("2") / file)) << file;
-}
-
 TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) {
   ASSERT_EQ(drive("first", "--duration 1").code, 0);
   const fs::path mine = session("first") / "calibration.yaml";
@@ -171,17 +152,6 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
                              mine.string()));
   EXPECT_EQ(refused.code, 2);
   EXPECT_NE(refused.err.find("cameras.0.size is 640 x 480"), std::string::npos) << refused.err;
-}
-
-TEST_F(CalibrationCli, aScheduledWishRecalibrates) {
-  const Outcome o = drive("s", "--duration 9 --fault recalibrate@4");
-  // 1 if no frame was ok: the wish comes before the calibration in use is verified.
-  ASSERT_LE(o.code, 1) << o.err;
-  const auto attempts = summary("s")["recalibrations"];
-  ASSERT_GE(attempts.size(), 1U);
-  EXPECT_EQ(attempts[0]["reason"], "requested");
-  EXPECT_GT(attempts[0]["latency_frames"].get<int>(), 0);
-  EXPECT_GT(frames_with("s", "recalibrating"), 0U);
 }
 
 TEST_F(CalibrationCli, sigusr1AsksARunningDriveForANewCalibration) {

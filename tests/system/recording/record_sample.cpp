@@ -8,17 +8,14 @@
 #include <vector>
 
 #include "app/recording/messages.hpp"
-#include "app/recording/png_encoder.hpp"
 #include "app/recording/recording.hpp"
 
 namespace vergence::app {
 namespace {
 
-constexpr std::array kTopics{RosType::image,       RosType::compressed_image,
-                             RosType::camera_info, RosType::nav_sat_fix,
-                             RosType::imu,         RosType::odometry,
-                             RosType::diagnostics, RosType::tf,
-                             RosType::text,        RosType::frame,
+constexpr std::array kTopics{RosType::image,       RosType::camera_info, RosType::nav_sat_fix,
+                             RosType::imu,         RosType::odometry,    RosType::diagnostics,
+                             RosType::tf,          RosType::text,        RosType::frame,
                              RosType::ins_reading, RosType::pulse};
 
 void write(CdrWriter* out, RosType type, Stamp stamp) {
@@ -52,11 +49,6 @@ void write(CdrWriter* out, RosType type, Stamp stamp) {
   switch (type) {
     case RosType::image:
       return write_image(out, stamp, "left", {pixels.data(), 4, 3, 4});
-    case RosType::compressed_image: {
-      std::vector<std::uint8_t> file;
-      (void)encode_png({pixels.data(), 4, 3, 4}, &file);
-      return write_compressed_image(out, stamp, "left", "png", file);
-    }
     case RosType::camera_info:
       return write_camera_info(out, stamp, "right", rig, 1, true);
     case RosType::nav_sat_fix:

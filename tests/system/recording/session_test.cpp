@@ -261,30 +261,6 @@ TEST(RecordedTruth, reachesAFrameThatIsStampedMicrosecondsAfterItsEnd) {
   }
 }
 
-TEST(Recorded, aDriveRecordedAsPngReplaysBitForBitAndIsExported) {
-  const TemporaryFolder folder;
-  const std::string session = (folder / "s").string();
-  ASSERT_LE(drive(session, "--fast --duration 5 --set record.image_format=png").code, 1);
-  int packed = 0, plain = 0;
-  for (const auto& m : test::read_mcap(folder / "s" / "drive.mcap").messages) {
-    packed += m.type == "sensor_msgs/CompressedImage" ? 1 : 0;
-    plain += m.type == "sensor_msgs/Image" ? 1 : 0;
-  }
-  EXPECT_EQ(packed, 2 * summary_of(session)["frames"]["read"].get<int>());
-  EXPECT_EQ(plain, 0);
-  ASSERT_LE(replay(session, folder / "again").code, 1);
-  expect_same_poses(session, folder / "again");
-  EXPECT_EQ(summary_of(folder / "again")["devices"]["images_missing"], 0);
-  // As a bag like any other, and as a folder of images.
-  const Outcome bag = replay(folder / "s" / "drive.mcap", folder / "bag",
-                             "--calibration '" + session + "/calibration.yaml' --frames 20");
-  EXPECT_LE(bag.code, 1) << bag.err;
-  const Outcome o = export_to(folder / "data", session, "--format folder");
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_LE(replay(folder / "data", folder / "third").code, 1);
-  expect_same_poses(session, folder / "third");
-}
-
 TEST(Recorded, thePulsesOfATriggerBoardAreRecordedAndTheDriveIsTheSame) {
   const TemporaryFolder folder;
   const std::string chain = "run '" + std::string(VERGENCE_SOURCE_DIR) +

@@ -1,9 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
-#include <array>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -14,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "tests/support/child_program.hpp"
 #include "tests/system/replay/replayed_folder.hpp"
 
 namespace vergence::test {
@@ -68,13 +63,6 @@ TEST_F(ReplayedFolder, aDriveTooShortToConfirmItsCalibrationSaysSo) {
   EXPECT_NE(read_file(session() / "report.html").find("not verified"), std::string::npos);
 }
 
-TEST_F(ReplayedFolder, whereNothingWatchesTheRigPosesAreOkAndTheCalibrationIsNotVerified) {
-  ASSERT_EQ(replay("--set calibration.online=off").code, 0);
-  EXPECT_EQ(summary()["frames"]["ok"], kFrames);
-  EXPECT_EQ(summary()["calibration"]["verified"], false);
-  EXPECT_EQ(summary()["calibration"]["online"], false);
-}
-
 TEST_F(ReplayedFolder, theSameBytesWithOneThreadAndTwo) {
   ASSERT_EQ(replay("--threads 1").code, 0);
   const fs::path other = work_ / "other";
@@ -113,29 +101,6 @@ TEST_F(ReplayedFolder, whatIsMissingNamesTheWayOut) {
   expect_refused("T_left_camera is the inverse of what is read: give T_camera_left");
 }
 
-/// → whether a terminal shows it before it closes.
-bool shows(int terminal, const std::string& words) {
-  std::string shown;
-  std::array<char, 256> piece;
-  while (shown.find(words) == std::string::npos) {
-    const auto n = ::read(terminal, piece.data(), piece.size());
-    if (n <= 0) return false;
-    shown.append(piece.data(), static_cast<std::size_t>(n));
-  }
-  return true;
-}
-
-TEST_F(ReplayedFolder, whoStopsTheCalibrationStopsTheReplay) {
-  for (const int number : {SIGINT, SIGTERM}) {
-    ChildProgram program(
-        {"replay", data(), "--format", "folder", "--calibrate-first", "--out", session()},
-        {.terminal = true});
-    ASSERT_TRUE(shows(program.terminal(), "calibrating from the drive"));
-    program.signal(number);
-    EXPECT_EQ(program.wait(), 128 + number);
-  }
-}
-
 TEST_F(ReplayedFolder, theLayoutIsFoundOut) {
   const Outcome o =
       run_vergence("replay '" + data().string() + "' --quiet --out '" + session().string() + "'");
@@ -146,19 +111,6 @@ TEST_F(ReplayedFolder, theLayoutIsFoundOut) {
   EXPECT_EQ(none.code, 2);
   EXPECT_NE(none.err.find("holds no drive that is known: KITTI (image_0"), std::string::npos)
       << none.err;
-}
-
-TEST_F(ReplayedFolder, swappedFoldersAreNotToBeUsedAndSaySo) {
-  fs::rename(data() / "left", data() / "other");
-  fs::rename(data() / "right", data() / "left");
-  fs::rename(data() / "other", data() / "right");
-  const Outcome o = replay();
-  EXPECT_EQ(o.code, 1) << o.err;
-  EXPECT_NE(o.err.find("do not use these poses: "), std::string::npos) << o.err;
-  EXPECT_NE(o.err.find("of 24 frames)"), std::string::npos) << o.err;
-  EXPECT_NE(read_file(session() / "report.html").find("Do not use"), std::string::npos);
-  EXPECT_EQ(read_file(session() / "report.html").find("is missing"), std::string::npos)
-      << "nothing is, but what is so by design";
 }
 
 TEST_F(ReplayedFolder, aReferenceBesideTheImagesIsComparedWith) {
@@ -207,24 +159,6 @@ TEST_F(ReplayedFolder, whatIsWrongWithAFrameCostsThatFrame) {
     spoil();
     expect_skipped(1);
   }
-}
-
-TEST_F(ReplayedFolder, aSessionThatExistsIsNotTouched) {
-  fs::create_directories(session());
-  std::ofstream(session() / "mine.txt") << "precious";
-  EXPECT_EQ(replay().code, 2);
-  EXPECT_EQ(read_file(session() / "mine.txt"), "precious");
-  EXPECT_EQ(std::distance(fs::directory_iterator(session()), fs::directory_iterator{}), 1);
-}
-
-TEST_F(ReplayedFolder, blackImagesOnlyEndWithOneAndSayWhy) {
-  for (std::size_t i = 0; i < kFrames; ++i)
-    for (int k = 0; k < 2; ++k)
-      ASSERT_TRUE(cv::imwrite((data() / image_name(k, i)).string(),
-                              cv::Mat(480, 640, CV_8U, cv::Scalar(2))));
-  const Outcome o = replay();
-  EXPECT_EQ(o.code, 1) << o.err;
-  EXPECT_NE(read_file(session() / "poses.csv").find("image_dark"), std::string::npos);
 }
 
 TEST_F(ReplayedFolder, imagesOfTwelveBitsInSixteenGiveThePosesOfTheirEight) {

@@ -43,16 +43,6 @@ TEST(Program, VersionAndHelpGoToStandardOutput) {
     EXPECT_TRUE(contains(help.out, std::string("\n  ") + word + " ")) << word;
 }
 
-TEST(Program, EveryCommandHasItsHelp) {
-  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices",
-                           "doctor", "snap", "report"}) {
-    const Outcome help = run_vergence(std::string(word) + " --help");
-    EXPECT_EQ(help.code, 0) << word;
-    EXPECT_TRUE(contains(help.out, std::string("vergence ") + word)) << help.out;
-    EXPECT_EQ(help.err, "") << word;
-  }
-}
-
 TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {
   using Kind = Withdrawn::Kind;
   const test::TemporaryFolder folder;

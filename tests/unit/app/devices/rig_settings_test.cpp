@@ -35,13 +35,6 @@ void expect_equal(const RigCalibration& a, const RigCalibration& b) {
   }
 }
 
-TEST(RigSettings, withoutErrorsTheEstimatorIsGivenTheRigAsMounted) {
-  const Configuration c = configured({"rig.nominal.baseline_m=0.3", "rig.nominal.k1=-0.1"});
-  expect_equal(nominal_rig(c), mounted_rig(c));
-  EXPECT_DOUBLE_EQ(mounted_rig(c).baseline, 0.3);
-  EXPECT_EQ(mounted_rig(c).intrinsics[1].distortion[0], -0.1);
-}
-
 TEST(RigSettings, aCamerasOwnNumbersGoBeforeThoseOfTheRig) {
   const RigCalibration rig = mounted_rig(
       configured({"rig.nominal.k1=-0.1", "cameras.1.intrinsics=[500, 501, 322, 241]",
@@ -101,15 +94,6 @@ TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
   const Transform moved = drive.rig->truth().calibration(Duration::seconds(6)).T_camera_left[1] *
                           mounted_rig(c).T_camera_left[1].inverse();
   EXPECT_NEAR(log_so3(moved.R).x(), 0.2 * std::numbers::pi / 180, 1e-12);
-}
-
-TEST(RigSettings, aCamerasLensIsOfTheModelThatItsKeySays) {
-  const RigCalibration rig = mounted_rig(configured(
-      {"cameras.1.model=pinhole-equidistant", "cameras.1.intrinsics=[300, 301, 322, 241]",
-       "cameras.1.distortion=[0.003, 0.0007, -0.002, 0.0002]"}));
-  EXPECT_EQ(rig.intrinsics[0].kind, CameraModelKind::pinhole_radtan);
-  EXPECT_EQ(rig.intrinsics[1].kind, CameraModelKind::pinhole_equidistant);
-  EXPECT_EQ(rig.intrinsics[1].distortion[3], 0.0002);
 }
 
 TEST(RigSettings, aLensThatNobodyWouldReadIsRefusedByItsKey) {

@@ -34,20 +34,19 @@ struct FakeMachine {
       at = inventory.drivers.insert(at, app::DriverFindings{driver, "", true, {}, ""});
     at->cameras.push_back({driver, serial, "A camera", place});
   }
-  void need(const std::string& driver, const std::string& serial, double bytes, double rate) {
+  void need(const std::string& driver, const std::string& serial, double bytes) {
     app::CameraNeed n;
     n.key = "cameras." + std::to_string(needs.cameras.size());
     n.driver = driver;
     n.serial = serial;
     n.bytes = bytes;
-    n.rate_hz = rate;
     needs.given = true;
     needs.cameras.push_back(n);
   }
   /// The findings of one check, the worst first.
   [[nodiscard]] std::vector<app::Finding> of(const std::string& check) const {
     std::vector<app::Finding> some;
-    for (app::Finding& f : app::run_checks({machine, inventory, needs, ".", configuration}))
+    for (app::Finding& f : app::run_checks({machine, inventory, needs, "."}))
       if (f.check == check) some.push_back(std::move(f));
     return some;
   }
@@ -59,7 +58,6 @@ struct FakeMachine {
   std::vector<std::string> closed;  // nodes that may not be opened
   std::string group = "video";      // of all nodes
   std::optional<app::DiskRoom> room = app::DiskRoom{std::uint64_t{1} << 40};
-  std::filesystem::path configuration;  // of `needs`
 };
 
 inline bool contains(const std::string& text, const std::string& part) {

@@ -141,13 +141,6 @@ TEST(Recording, imagesNeverPushOutSmallMessages) {
   EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 1000));
 }
 
-TEST(Recording, aMessageLargerThanItsQueueIsDroppedAlsoWhenOneWaits) {
-  const TemporaryFolder folder;
-  Recording recording(folder.path(), options());
-  EXPECT_TRUE(recording.begin(0, kImage, Stamp(1), 5U << 20U, true).empty());
-  EXPECT_EQ(recording.counters().dropped_images, 1U);
-}
-
 TEST(Recording, shortWritesLoseNothing) {
   const TemporaryFolder folder;
   FaultyDisk disk;
@@ -233,52 +226,6 @@ TEST(Recording, whatTheDiskTookAndDidNotKeepIsCountedAndSaid) {
             std::string::npos)
       << errors[0];
   EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
-}
-
-TEST(Recording, aDiskThatFailsForAWhileIsTriedAgainInTheSameFile) {
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  Recording::Options o = options();
-  o.files.disk = &disk;
-  Recording recording(folder.path(), o);
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
-  await_chunks(recording, 1);
-  disk.error = EIO;
-  for (int i = 100; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
-  std::this_thread::sleep_for(200ms);
-  disk.error = 0;
-  const auto chunks = recording.counters().chunks;
-  await_chunks(recording, chunks + 1);  // within RecordingFiles::kRetry
-  recording.close();
-  const auto errors = recording.take_errors();
-  ASSERT_EQ(errors.size(), 2U);
-  EXPECT_NE(errors[0].find("Input/output error"), std::string::npos) << errors[0];
-  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 200));
-  EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
-}
-
-TEST(Recording, aDiskWithoutRoomForTheNextFileHasNoEmptyOnes) {
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  Recording::Options o = options();
-  o.files.disk = &disk;
-  o.files.roll_bytes = 1000;  // after the first chunk
-  Recording recording(folder.path(), o);
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
-  await_chunks(recording, 1);
-  disk.room = 0;
-  for (int i = 100; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
-  std::this_thread::sleep_for(300ms);
-  disk.room = ~std::uint64_t{0};
-  recording.close();
-  const std::uint64_t files = recording.counters().files;
-  std::vector<int> all;
-  for (std::uint64_t f = 0; f < files; ++f) {
-    const auto more = numbers(folder / ("drive_" + std::to_string(f) + ".mcap"));
-    EXPECT_FALSE(more.empty()) << f;
-    all.insert(all.end(), more.begin(), more.end());
-  }
-  EXPECT_EQ(all, sequence(0, 200));
 }
 
 TEST(Recording, aDiskThatTakesNoFileAtTheBeginningIsRefused) {

@@ -8,10 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "app/report/plots.hpp"
 #include "app/report/report.hpp"
-#include "app/report/tables.hpp"
-#include "app/report/verdict.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/session_writer.hpp"
@@ -59,7 +56,6 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
                            "Horizontal error",
                            "Vertical error",
                            "Heading error",
-                           "over the distance travelled",
                            "rotation x, degrees",
                            "translation z, mm",
                            ">verified</text>",
@@ -157,96 +153,6 @@ TEST(Page, hugeAndNonsensicalNumbersStayWellFormed) {
   const std::string html = page_of(folder.path());
   EXPECT_TRUE(self_contained(html));
   EXPECT_FALSE(contains(html, "\"nan") || contains(html, "\"inf"));
-}
-
-TEST(Page, manyEventsAreCondensed) {
-  report::Session s;
-  for (int i = 0; i < 5000; ++i)
-    s.events.push_back({Stamp(i), "dropped", "number " + std::to_string(i)});
-  const std::string table = report::events_table(s);
-  EXPECT_LT(table.size(), 40'000U);
-  for (const char* part :
-       {"number 0<", "number 79<", "number 4920<", "number 4999<", "4 840 rows are left out"})
-    EXPECT_TRUE(contains(table, part)) << part;
-  EXPECT_FALSE(contains(table, "number 80<"));
-}
-
-TEST(Bands, aSingleLostFrameAmongManyShows) {
-  report::Session s;
-  for (int i = 0; i < 50'000; ++i) {
-    report::Frame f;
-    f.stamp = Stamp(i * 50'000'000LL);
-    f.status = i == 31'234 ? PoseStatus::lost : PoseStatus::ok;
-    f.state = State::stereo_odometry;
-    f.posed = i != 31'234;
-    s.frames.push_back(f);
-  }
-  const std::string svg = report::bands_picture(s, report::analyse(s));
-  EXPECT_TRUE(contains(svg, "class=\"f-bad\""));
-  EXPECT_FALSE(contains(svg, "class=\"f-care\""));
-}
-
-report::Session session_with(nlohmann::json summary) {
-  report::Session s;
-  for (int i = 0; i < 10; ++i) {
-    report::Frame f;
-    f.stamp = Stamp(i * 400'000'000'000LL);
-    f.status = PoseStatus::ok;
-    f.posed = true;
-    s.frames.push_back(f);
-  }
-  s.summary = std::move(summary);
-  return s;
-}
-
-std::string page_of(const report::Session& s) {
-  const report::Analysis a = report::analyse(s);
-  return report::page_html(s, a, report::judge(s, a));
-}
-
-TEST(Page, countersStandInFullAndRowsThatAreLeftOutAreCounted) {
-  nlohmann::json devices = {{"frames", 1'234'567}, {"lost", -200'000}, {"share", 0.123456}};
-  for (int i = 0; i < 50; ++i) devices["x" + std::to_string(i)] = i;
-  const std::string html = page_of(session_with({{"devices", devices}}));
-  EXPECT_TRUE(contains(html, ">" + report::grouped(1'234'567) + "<"));
-  EXPECT_TRUE(contains(html, ">-" + report::grouped(200'000) + "<"));
-  EXPECT_TRUE(contains(html, ">0.12346<"));
-  EXPECT_TRUE(contains(html, "… 13 more in summary.json"));
-}
-
-TEST(Page, whatALiveDriveLacksNeverCameAndWasNotUnreadable) {
-  nlohmann::json summary = {{"frames", {{"skipped", 5}}}};
-  EXPECT_TRUE(contains(page_of(session_with(summary)), "skipped (not readable)"));
-  EXPECT_TRUE(contains(page_of(session_with(summary)), "0 lost, 5 skipped"));
-  summary["time"] = {{"mode", "counter"}};
-  const std::string html = page_of(session_with(summary));
-  EXPECT_FALSE(contains(html, "not readable"));
-  EXPECT_TRUE(contains(html, "never came, or were dropped"));
-  EXPECT_TRUE(contains(html, "0 lost, 5 never came"));
-}
-
-/// A drive north whose second half was placed anew, 100 m further east.
-TEST(Page, theStepToASecondPlacementIsNotDrawnAsDriven) {
-  report::Session s;
-  for (int i = 0; i < 200; ++i) {
-    report::Frame f;
-    f.stamp = Stamp(i * 50'000'000LL);
-    f.status = PoseStatus::ok;
-    f.posed = f.placed = f.has_ins = f.compared = true;
-    f.enu = {i < 100 ? 0.0 : 100.0, static_cast<double>(i), 0};
-    f.ins = {0, static_cast<double>(i), 0};
-    s.frames.push_back(f);
-  }
-  s.events = {{s.frames[0].stamp, "placement", ""}, {s.frames[100].stamp, "placement", ""}};
-  const std::string map = report::map_picture(report::analyse(s), s.frames);
-  const auto pieces = [&map](const std::string& css) {
-    const std::size_t begin = map.find("d=\"", map.find(css)) + 3;
-    const std::string path = map.substr(begin, map.find('"', begin) - begin);
-    return std::count(path.begin(), path.end(), 'M');
-  };
-  EXPECT_EQ(pieces("map-ours"), 2);
-  EXPECT_EQ(pieces("map-theirs"), 1);
-  EXPECT_TRUE(contains(page_of(s), "and anew where it was placed again"));
 }
 
 TEST(WriteReport, replacesAnOlderPageAndLeavesNothingElse) {

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "app/report/decimation.hpp"
-#include "app/report/style.hpp"
 #include "core/math/random.hpp"
 #include "tests/unit/app/report/xml_check.hpp"
 
@@ -36,15 +35,6 @@ TEST(Escape, longTextIsCutAtAWholeCharacter) {
   EXPECT_EQ(escape(std::string(1000, 'x'), 5), "xxxxx…");
   EXPECT_EQ(escape("äää", 3), "ä…");
   EXPECT_EQ(escape("abc", 3), "abc");
-}
-
-TEST(Coordinate, isShortAndAlwaysANumber) {
-  EXPECT_EQ(coordinate(1.26), "1.3");
-  EXPECT_EQ(coordinate(3.0), "3");
-  EXPECT_EQ(coordinate(-0.01), "0");
-  EXPECT_EQ(coordinate(std::nan("")), "0");
-  EXPECT_EQ(coordinate(std::numeric_limits<double>::infinity()), "0");
-  EXPECT_EQ(coordinate(1e300), "1000000");
 }
 
 TEST(Ticks, areRoundFewAndWithinTheAxis) {
@@ -91,35 +81,6 @@ TEST(SvgElement, isWellFormedWhateverGoesIn) {
   EXPECT_NE(text.find("d=\"M0 1h0M0 1L2 3 4 5\""), std::string::npos) << text;
 }
 
-/// WCAG 2: relative luminance of #rrggbb.
-double luminance(const char* colour) {
-  const auto channel = [&](int k) {
-    const double c =
-        static_cast<double>(std::stoi(
-            std::string(colour).substr(static_cast<std::size_t>(1 + 2 * k), 2), nullptr, 16)) /
-        255;
-    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-  };
-  return 0.2126 * channel(0) + 0.7152 * channel(1) + 0.0722 * channel(2);
-}
-
-double contrast(const char* a, const char* b) {
-  const double x = luminance(a), y = luminance(b);
-  return (std::max(x, y) + 0.05) / (std::min(x, y) + 0.05);
-}
-
-TEST(Colours, areReadableOnBothGroundsInBothThemes) {
-  EXPECT_NEAR(contrast("#000000", "#ffffff"), 21, 1e-9);
-  for (const Colour& c : kColours)
-    for (const Colour& ground : {kPage, kPanel}) {
-      const double requested = c.text ? 4.5 : 3.0;
-      EXPECT_GE(contrast(c.light, ground.light), requested)
-          << c.name << " on " << ground.name << ", light";
-      EXPECT_GE(contrast(c.dark, ground.dark), requested)
-          << c.name << " on " << ground.name << ", dark";
-    }
-}
-
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 struct Curve {
@@ -134,12 +95,6 @@ Curve noise(std::size_t n) {
     c.y.push_back(random.normal());
   }
   return c;
-}
-
-std::size_t points(const std::vector<Line>& lines) {
-  std::size_t n = 0;
-  for (const Line& line : lines) n += line.size();
-  return n;
 }
 
 TEST(Decimate, everyColumnKeepsItsExtremesItsFirstAndItsLastValue) {
@@ -205,12 +160,6 @@ TEST(Thin, noPointLeftOutIsFartherThanTheStepFromAPointKept) {
       nearest = std::min(nearest, std::hypot(p.x - c.x[i], p.y - c.y[i]));
     ASSERT_LE(nearest, 2.0) << i;
   }
-}
-
-TEST(Thin, theCountIsBoundedHoweverLongTheWay) {
-  Curve c = noise(20'000);
-  for (double& v : c.y) v *= 1000;
-  EXPECT_LE(points(thin(c.x, c.y, {}, 0.1, 500)), 500U);
 }
 
 }  // namespace

@@ -149,17 +149,6 @@ TEST(Summary, whatLimitsADepthIsNoiseOrIntrinsics) {
   EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "intrinsics");
 }
 
-TEST(Summary, anUnknownCalibrationHasNoNumbers) {
-  auto totals = std::make_unique<SessionTotals>();
-  SummaryInput in = input();
-  in.calibrated = false;
-  in.truth = TruthFigures{};
-  const auto json = summary_json(*totals, in);
-  EXPECT_TRUE(json["calibration"]["T_right_left"].is_null());
-  EXPECT_TRUE(json["calibration"]["before"].is_null());
-  EXPECT_TRUE(json["truth"]["calibration"].is_null());
-}
-
 TEST(Summary, recalibrationsAreListedAndTheFirstFromScratchStandsApart) {
   auto totals = std::make_unique<SessionTotals>();
   totals->attempts = {
