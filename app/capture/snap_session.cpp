@@ -12,9 +12,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/capture/capture_settings.hpp"
-#include "app/capture/picture_check.hpp"
-#include "app/capture/picture_files.hpp"
 #include "app/capture/taking.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/drive_devices.hpp"
@@ -22,7 +19,7 @@
 #include "app/runtime/signals.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/runtime/version.hpp"
-#include "app/session/recorder.hpp"
+#include "app/session/session_files.hpp"
 
 namespace vergence::app {
 namespace {

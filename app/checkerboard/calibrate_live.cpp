@@ -10,11 +10,11 @@
 
 #include "app/calibration/board_detector.hpp"
 #include "app/calibration/view_collector.hpp"
-#include "app/capture/capture_settings.hpp"
+#include "app/capture/taking.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/drive_devices.hpp"
-#include "app/runtime/distinct_names.hpp"
+#include "app/runtime/nearest.hpp"
 #include "app/runtime/signals.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 #include "drivers/clock.hpp"

@@ -10,7 +10,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/session_export.hpp"
 #include "app/runtime/progress.hpp"
-#include "app/session/session_folder.hpp"
+#include "app/session/session_files.hpp"
 
 namespace vergence::app {
 namespace {

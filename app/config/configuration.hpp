@@ -224,4 +224,11 @@ struct Configuration {
 /// however they were written.
 [[nodiscard]] std::string configuration_hash(const Configuration& configuration);
 
+/// One option. Empty: done, or the driver has no options; else half a sentence about what is wrong.
+[[nodiscard]] std::string set_camera_option(const std::string& name, const std::string& value,
+                                            CameraSettings* camera);
+
+/// All of them, `NAME=VALUE …`: those not named are as they begin. As set_camera_option().
+[[nodiscard]] std::string set_camera_options(const std::string& text, CameraSettings* camera);
+
 }  // namespace vergence::app

@@ -14,7 +14,7 @@
 
 #include <fmt/format.h>
 
-#include "app/publish/file_descriptor.hpp"
+#include "app/publish/line_socket.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "app/publish/address.hpp"
+#include "app/publish/line_socket.hpp"
 
 struct MHD_Connection;
 struct MHD_Daemon;

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/report/advice.hpp"
+#include "app/report/verdict.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
@@ -45,18 +45,9 @@ json event_json(const EventRecord& event, Stamp first) {
 }
 
 json camera_json(const RigCalibration& rig, std::size_t k) {
-  const Intrinsics& lens = rig.intrinsics[k];
   const Transform& T = rig.T_camera_left[k];
   const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;
-  json camera{{"width", lens.width},
-              {"height", lens.height},
-              {"fisheye", lens.kind == CameraModelKind::pinhole_equidistant},
-              {"k", {lens.fx, lens.fy, lens.cx, lens.cy}},
-              {"d", lens.distortion},
-              {"t", {T.t.x(), T.t.y(), T.t.z()}}};
-  json& rows = camera["r"] = json::array();
-  for (int i = 0; i < 9; ++i) rows.push_back(T.R(i / 3, i % 3));
-  json& figures = camera["figures"] = json::array();
+  json figures = json::array();
   const auto& sigma = rig.sigma_wide[k];
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
@@ -64,7 +55,7 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
     figures.push_back({rounded(i < 3 ? turn[axis] : T.t[axis] * unit, i < 3 ? 4 : 2),
                        sigma[i] > 0 ? rounded(2 * sigma[i] * unit, i < 3 ? 4 : 2) : nullptr});
   }
-  return camera;
+  return {{"figures", figures}};
 }
 
 constexpr double kSilenceSeconds = 1;  // without a frame: nobody reads an old status as today's …
@@ -127,7 +118,6 @@ void LiveState::add(const CalibrationRecord& calibration) {
   measured_.reset();
   if (calibration.decided) confirmed_ = was_confirmed_ = calibration.verified;
   in_use_ = calibration;
-  rig_ = calibration.calibration;
 }
 
 void LiveState::add(const PublishedPlacement& placement) {
@@ -184,14 +174,10 @@ json LiveState::frame_json(HostStamp now) const {
 
 json LiveState::calibration_json() const {
   json out{{"cameras", json::array()}, {"history", json::array()}};
-  if (rig_)
-    for (std::size_t k = 0; k < static_cast<std::size_t>(rig_->cameras); ++k)
-      out["cameras"].push_back(camera_json(*rig_, k));
-  if (measured_) {
-    const RigCalibration& rig = measured_->calibration;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
-      out["measured"].push_back(camera_json(rig, k));
-  }
+  for (const auto& [key, record] : {std::pair("cameras", &in_use_), {"measured", &measured_}})
+    if (*record)
+      for (int k = 0; k < (*record)->calibration.cameras; ++k)
+        out[key].push_back(camera_json((*record)->calibration, static_cast<std::size_t>(k)));
   out["confirmed"] = confirmed_;
   if (in_use_) {
     out["cause"] = in_use_->cause_word();
@@ -295,8 +281,7 @@ const LiveFrame& LiveFrameBuilder::add(const PoseSample& sample, HostStamp now) 
 
 namespace {
 
-/// Steps of the map that an extent is worth: fewer would show no way any more.
-constexpr float kLeastSteps = 100;
+constexpr float kMostStep = 16;  // m: a map of longer ones shows no way any more
 
 float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
@@ -317,37 +302,16 @@ void LiveTrail::add(const Place& place) {
 
 void LiveTrail::thin() {
   shown_ = 0;
-  while (places_.size() > kMost / 2) {
-    if (2 * least_step_m_ * kLeastSteps > extent()) {
-      // Round and round a yard: what was driven first lies under what came later.
-      places_.erase(places_.begin(), places_.begin() + kMost / 2);
-      return;
-    }
-    least_step_m_ *= 2;
-    drop_near();
+  if (least_step_m_ >= kMostStep) {
+    places_.erase(places_.begin(), places_.begin() + kMost / 2);
+    return;
   }
-}
-
-void LiveTrail::drop_near() {
-  std::size_t kept = 0;
-  for (std::size_t i = 1; i < places_.size(); ++i) {
-    if (distance(places_[i].world, places_[kept].world) >= least_step_m_)
-      places_[++kept] = places_[i];
-    else
-      places_[kept].status = std::max(places_[kept].status, places_[i].status);
+  least_step_m_ *= 2;
+  for (std::size_t i = 0; i < places_.size(); i += 2) {
+    places_[i].status = std::max(places_[i].status, places_[i + 1].status);
+    places_[i / 2] = places_[i];
   }
-  places_.resize(kept + 1);
-}
-
-float LiveTrail::extent() const {
-  float longest = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto [least, most] = std::minmax_element(
-        places_.begin(), places_.end(),
-        [axis](const Place& a, const Place& b) { return a.world[axis] < b.world[axis]; });
-    longest = std::max(longest, most->world[axis] - least->world[axis]);
-  }
-  return longest;
+  places_.resize(kMost / 2);
 }
 
 }  // namespace vergence::app

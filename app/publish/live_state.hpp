@@ -10,10 +10,10 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "app/publish/pose_line.hpp"
-#include "app/session/histogram.hpp"
+#include "app/publish/line_publisher.hpp"
 #include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
+#include "app/session/session_totals.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
 #include "drivers/clock.hpp"
@@ -24,8 +24,7 @@ namespace vergence::app {
 /// worst status of all that was driven up to the next one.
 ///
 /// Threads  One.
-/// Full     After kMost places those that are near others go; where the drive goes round and round,
-///          the oldest do.
+/// Full     After kMost places every other one goes, so 64 km are shown; then the oldest do.
 class LiveTrail {
  public:
   static constexpr std::size_t kMost = 4000;
@@ -43,8 +42,6 @@ class LiveTrail {
 
  private:
   void thin();
-  void drop_near();
-  [[nodiscard]] float extent() const;
 
   std::vector<Place> places_{};
   float least_step_m_ = 0.5F;
@@ -80,9 +77,6 @@ class LiveState {
   void add(const PublishedPlacement& placement);
   void end() noexcept { ended_ = true; }
 
-  /// The rig in use, for the judgement of points; not known yet: nullptr.
-  [[nodiscard]] const RigCalibration* rig() const noexcept { return rig_ ? &*rig_ : nullptr; }
-
   /// All there is to know, for a viewer who has just come. `now` tells whether frames still come.
   [[nodiscard]] std::string hello(HostStamp now) const;
   /// What is new since the last call, for the others. `line_age_ms`: of the pose lines, 99th
@@ -109,7 +103,6 @@ class LiveState {
   std::optional<CalibrationRecord> measured_{};  // by the drive, beside the one in use
   bool confirmed_ = false;
   bool was_confirmed_ = false;  // before the last event that says otherwise
-  std::optional<RigCalibration> rig_{};
   bool calibration_new_ = false;
   std::optional<PublishedPlacement> placement_{};
   bool placement_new_ = false;

@@ -56,19 +56,6 @@ void write_pose_transform(CdrWriter* out, const PoseSample& sample) noexcept;
 void write_rig_transforms(CdrWriter* out, Stamp stamp, const RigCalibration& rig,
                           std::span<const std::string_view> names) noexcept;
 
-/// diagnostic_msgs/DiagnosticStatus, level as ROS has it.
-enum class DiagnosticLevel : std::uint8_t { ok = 0, warn = 1, error = 2, stale = 3 };
-struct DiagnosticValue {
-  std::string_view key;
-  std::int64_t value = 0;
-};
-struct Diagnostic {
-  DiagnosticLevel level = DiagnosticLevel::ok;
-  std::string_view name, message;
-  std::span<const DiagnosticValue> values;
-};
-void write_diagnostics(CdrWriter* out, Stamp stamp, std::span<const Diagnostic> status) noexcept;
-
 void write_text(CdrWriter* out, std::string_view text) noexcept;  // std_msgs/String
 
 /// What one call of the estimator was given beside the images, and what came of it.
@@ -99,14 +86,13 @@ enum class RosType : std::uint8_t {
   nav_sat_fix,
   imu,
   odometry,
-  diagnostics,
   tf,
   text,
   frame,        // vergence_msgs/msg/Frame
   ins_reading,  // vergence_msgs/msg/InsReading
   pulse,        // vergence_msgs/msg/Pulse
 };
-inline constexpr int kRosTypes = 11;
+inline constexpr int kRosTypes = 10;
 
 /// `sensor_msgs/msg/Image`.
 [[nodiscard]] std::string_view ros_type_name(RosType type) noexcept;

@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "app/report/decimation.hpp"
 #include "app/report/svg.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/math/angle.hpp"

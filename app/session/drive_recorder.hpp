@@ -14,10 +14,13 @@
 #include "app/recording/recording.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/session_observer.hpp"
-#include "app/session/solver_watch.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "drivers/acquisition/acquired.hpp"
 
 namespace vergence::app {
+
+/// Queues of a recording, one for each thread that posts.
+enum Queue : std::size_t { estimator_queue, acquisition_queue };
 
 /// `record:` of the configuration: what goes through a session into drive.mcap (docs/recording.md).
 ///
@@ -50,13 +53,11 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
 
  private:
   template <class Write>
-  std::uint32_t post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
-                     const Write& write, std::size_t queue = 0) noexcept;
-  [[nodiscard]] bool post_pixels(const RigFrame& frame, std::size_t camera) noexcept;
+  bool post(std::size_t topic, Stamp stamp, const Write& write, std::size_t queue = estimator_queue,
+            std::size_t most = kMessageRoom, bool bulky = false) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
-  [[nodiscard]] bool rig_is_due(bool each_second) const noexcept;
-  void post_health(const PoseSample& sample) noexcept;
+  [[nodiscard]] bool rig_is_due(Stamp stamp) const noexcept;
 
   const RecordSettings& settings_;
   const SolverWatch& watch_;
@@ -72,7 +73,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   std::atomic<bool> stopped_{false};
   FrameRecord frame_{};
   std::uint64_t frames_seen_ = 0;
-  Stamp last_health_{};
+  Stamp last_rig_{};
 };
 
 }  // namespace vergence::app

@@ -13,8 +13,7 @@
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/session/line_file.hpp"
-#include "app/session/record_lines.hpp"
+#include "app/session/records.hpp"
 #include "app/session/session_files.hpp"
 #include "drivers/clock.hpp"
 

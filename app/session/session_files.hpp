@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/report/report.hpp"
 #include "app/runtime/progress.hpp"
+#include "app/session/recorder.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
 #include "app/session/summary.hpp"
@@ -17,6 +19,15 @@
 
 /// What every command that writes a session folder does alike.
 namespace vergence::app {
+
+/// Whether the folder of a session is there, empty. InputError: it exists and is not empty, or is
+/// no folder.
+bool check_session_folder(const std::filesystem::path& folder);
+/// Makes the folder of a session. False: it was there, empty. InputError: it exists and is not
+/// empty, is no folder, or cannot be made.
+bool make_session_folder(const std::filesystem::path& folder);
+/// Undoes make_session_folder(): removes what is in the folder, and with `made` the folder itself.
+void discard_session_folder(const std::filesystem::path& folder, bool made) noexcept;
 
 /// What an arena needs beside its contents: the first piece is aligned, too.
 [[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }

@@ -19,7 +19,6 @@
 #include "app/session/drive_recorder.hpp"
 #include "app/session/drive_threads.hpp"
 #include "app/session/estimation_loop.hpp"
-#include "app/session/memory_figures.hpp"
 #include "app/session/session_files.hpp"
 #include "core/memory/allocation_guard.hpp"
 

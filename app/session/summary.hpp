@@ -9,8 +9,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/session/earth_figures.hpp"
-#include "app/session/recorder.hpp"
+#include "app/session/ins_comparison.hpp"
+#include "app/session/session_totals.hpp"
 #include "core/calibration/options.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/types/calibration.hpp"

@@ -119,13 +119,7 @@ TimingMonitor::Sentence TimingMonitor::of_set(const SyncedSet& set) noexcept {
 TimingMonitor::Sentence TimingMonitor::of_reading(const AcquiredReading& reading) noexcept {
   constexpr int kMany = 3;  // satellites: one more or less is not worth a word
   const InsQuality& q = reading.quality;
-  ++satellites_.readings;
-  satellites_.without_fix += reading.sample.fix == FixStatus::none ? 1 : 0;
   const int count = q.satellites;
-  if (count > 0) {
-    satellites_.least = satellites_.most == 0 ? count : std::min(satellites_.least, count);
-    satellites_.most = std::max(satellites_.most, count);
-  }
   const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid ||
                        reading.sample.fix != fix_ ||
                        std::abs(count - int{quality_.satellites}) >= kMany;
@@ -150,10 +144,6 @@ TimingMonitor::Sentence TimingMonitor::of_utc(const AcquiredReading& reading) no
   if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return {};
   const double ahead =
       static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
-  utc_.least_s = utc_.readings == 0 ? ahead : std::min(utc_.least_s, ahead);
-  utc_.most_s = utc_.readings == 0 ? ahead : std::max(utc_.most_s, ahead);
-  ++utc_.readings;
-  utc_.sum_s += ahead;
   if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return {};
   utc_reported_ = true;
   reported_ahead_s_ = ahead;
@@ -175,7 +165,7 @@ void TimingMonitor::note_pose(const AcquiredFrame& frame, float estimate_ms,
 nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                                            const DriveDevices& devices) const {
   Json clocks = Json::array(), board = Json::object(), ins = Json::object(),
-       cameras = Json::array(), utc, satellites;
+       cameras = Json::array();
   bool all_proven = proves_pairing(mode_);
   for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
     clocks.push_back(clock_json(fmt::format("camera {}", k), c.cameras[k]));
@@ -213,16 +203,6 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
     board = {{"pulses", s.pulses},     {"lost", s.lost},       {"malformed", s.malformed},
              {"overruns", s.overruns}, {"reboots", c.reboots}, {"starts", s.starts}};
   }
-  if (utc_.readings > 0)
-    utc = {{"readings", utc_.readings},
-           {"host_ahead_s", utc_.sum_s / static_cast<double>(utc_.readings)},
-           {"least_s", utc_.least_s},
-           {"most_s", utc_.most_s}};
-  if (satellites_.readings > 0)
-    satellites = {{"readings", satellites_.readings},
-                  {"without_fix", satellites_.without_fix},
-                  {"least", satellites_.least},
-                  {"most", satellites_.most}};
   const Json pairing = {{"mode", to_string(mode_)},
                         {"sentence", proof_sentence(mode_)},
                         {"can_be_proven", proves_pairing(mode_)},
@@ -247,9 +227,7 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
           {"pairing", pairing},
           {"board", board},
           {"ins", ins},
-          {"latency_ms", latency_json(latency_, virtual_)},
-          {"utc", utc},
-          {"satellites", satellites}};
+          {"latency_ms", latency_json(latency_, virtual_)}};
 }
 
 }  // namespace vergence::app

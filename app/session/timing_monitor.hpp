@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/devices/drive_devices.hpp"
-#include "app/session/histogram.hpp"
+#include "app/session/session_totals.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 
 namespace vergence::app {
@@ -51,15 +51,7 @@ class TimingMonitor {
   InsQuality quality_{};  // as told last
   FixStatus fix_ = FixStatus::none;
   bool any_quality_ = false, utc_reported_ = false;
-  double reported_ahead_s_ = 0;
-  struct {
-    std::uint64_t readings = 0;  // with a valid UTC
-    double sum_s = 0, least_s = 0, most_s = 0;
-  } utc_;  // of the session's stamps ahead of the INS's UTC
-  struct {
-    std::uint64_t readings = 0, without_fix = 0;
-    int least = 0, most = 0;  // satellites, where they are told
-  } satellites_;
+  double reported_ahead_s_ = 0;  // of the session's stamps ahead of the INS's UTC
 };
 
 }  // namespace vergence::app

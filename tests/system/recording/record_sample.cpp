@@ -13,10 +13,10 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::array kTopics{RosType::image,       RosType::camera_info, RosType::nav_sat_fix,
-                             RosType::imu,         RosType::odometry,    RosType::diagnostics,
-                             RosType::tf,          RosType::text,        RosType::frame,
-                             RosType::ins_reading, RosType::pulse};
+constexpr std::array kTopics{RosType::image, RosType::camera_info, RosType::nav_sat_fix,
+                             RosType::imu,   RosType::odometry,    RosType::tf,
+                             RosType::text,  RosType::frame,       RosType::ins_reading,
+                             RosType::pulse};
 
 void write(CdrWriter* out, RosType type, Stamp stamp) {
   std::array<std::uint8_t, 12> pixels{};
@@ -44,8 +44,6 @@ void write(CdrWriter* out, RosType type, Stamp stamp) {
   frame.number = 3;
   frame.sample = pose;
   const std::array<std::string_view, 2> names{"left", "right"};
-  const std::array values{DiagnosticValue{"dropped", 3}, DiagnosticValue{"behind_ns", -12}};
-  const std::array status{Diagnostic{DiagnosticLevel::warn, "vergence: drops", "late", values}};
   switch (type) {
     case RosType::image:
       return write_image(out, stamp, "left", {pixels.data(), 4, 3, 4});
@@ -57,8 +55,6 @@ void write(CdrWriter* out, RosType type, Stamp stamp) {
       return write_imu(out, ins);
     case RosType::odometry:
       return write_odometry(out, pose);
-    case RosType::diagnostics:
-      return write_diagnostics(out, stamp, status);
     case RosType::tf:
       return write_rig_transforms(out, stamp, rig, names);
     case RosType::text:

@@ -103,7 +103,6 @@ TEST_F(RecordedDrive, holdsEveryMessageOnceAndIsFinished) {
   EXPECT_LT(count["/right/image_raw"], frames);  // it was gone
   EXPECT_EQ(count["/ins/fix"], count["/vergence/ins_reading"]);
   EXPECT_EQ(count["/vergence/session"], 1);
-  EXPECT_GT(count["/diagnostics"], 12);
   EXPECT_GE(count["/tf_static"], 1);
   EXPECT_EQ(summary_of(session())["devices"]["recording_dropped"], 0);
 }

@@ -1,4 +1,4 @@
-#include "app/capture/picture_check.hpp"
+#include "app/capture/taking.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "app/capture/picture_files.hpp"
 #include "core/math/random.hpp"
 #include "tests/support/refusal.hpp"
 
@@ -78,19 +77,6 @@ TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
   for (const PictureRemark& r : remarks) EXPECT_TRUE(r.unusable);
 }
 
-TEST(Judgement, aBrightSkyAndADimSceneAreOnlyToldOf) {
-  Picture sky = squares(320, 240), dim = sky;
-  for (int y = 0; y < 40; ++y)
-    for (int x = 0; x < 320; ++x) sky.at(x, y) = 255;
-  for (int y = 0; y < 240; ++y)
-    for (int x = 0; x < 320; ++x) dim.at(x, y) = static_cast<std::uint8_t>(dim.at(x, y) / 6);
-  const auto remarks = judged({sky, dim});
-  ASSERT_GE(remarks.size(), 2U);
-  EXPECT_TRUE(contains(remarks[0].sentence, "left: 17 % of it is white"));
-  EXPECT_TRUE(contains(remarks[1].sentence, "right is underexposed"));
-  for (const PictureRemark& r : remarks) EXPECT_FALSE(r.unusable);
-}
-
 TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
   const Picture sharp = squares(320, 240);
   Picture blurred = sharp;
@@ -108,17 +94,6 @@ TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
   EXPECT_FALSE(remarks[0].unusable);
   EXPECT_TRUE(contains(remarks[0].sentence, "right is much less sharp than left"))
       << remarks[0].sentence;
-}
-
-TEST(Identity, oneCameraTwiceIsFoundAndACapIsNotCalledThat) {
-  const Picture a = squares(320, 240);
-  Picture b = a;
-  EXPECT_TRUE(are_identical(a.view(), b.view()));
-  b.at(319, 239) ^= 1;
-  EXPECT_FALSE(are_identical(a.view(), b.view()));
-  const Picture black(320, 240, 0);
-  EXPECT_FALSE(are_identical(black.view(), black.view()));
-  EXPECT_FALSE(are_identical(a.view(), Picture(320, 239, 1).view()));
 }
 
 TEST(PictureFiles, namesOfCamerasAreNamesOfFiles) {

@@ -74,16 +74,6 @@ TEST(RigSettings, intrinsicsErrorsHaveTheirSigmasAndTheirSeed) {
   EXPECT_NEAR(std::sqrt(focal / (2 * kSeeds)), 1e-3, 1e-3 * 5 / std::sqrt(2000.0));
 }
 
-TEST(RigSettings, aWrongTransformIsTheTrueOneKnocked) {
-  const Configuration c =
-      configured({"mock.calibration_error.pitch_deg=0.2", "mock.calibration_error.y_m=0.004"});
-  const Transform wrong =
-      nominal_rig(c).T_camera_left[1] * mounted_rig(c).T_camera_left[1].inverse();
-  EXPECT_TRUE(log_so3(wrong.R).isApprox(Vec3(0.2 * std::numbers::pi / 180, 0, 0), 1e-12));
-  EXPECT_TRUE(wrong.t.isApprox(Vec3(0, 0.004, 0), 1e-12));
-  EXPECT_EQ(nominal_rig(c).baseline, 0.75) << "what was measured is the length, and that is right";
-}
-
 TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
   const Configuration c =
       configured({"mock.intrinsics_error.principal_point_px=2", "mock.calibration_error.yaw_deg=1",

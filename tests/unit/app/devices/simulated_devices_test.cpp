@@ -166,59 +166,6 @@ INSTANTIATE_TEST_SUITE_P(
         FaultCase{"ins", {"ins_gone@4 duration_s=2"}, Kind::acquiring, 2, 2}),
     [](const auto& i) { return std::string(i.param.name); });
 
-struct Blink {
-  double at, seconds;
-  int camera;  // -1: every one
-  bool own_ins;
-};
-class BlinkingCameras : public ::testing::TestWithParam<Blink> {};
-
-// While no camera is there nothing but the images' own time holds back board and INS, which have
-// theirs: the pairing must be as after any other start.
-TEST_P(BlinkingCameras, areProvenAgainWithinASecond) {
-  const auto [at, seconds, camera, own_ins] = GetParam();
-  char fault[80];
-  (void)std::snprintf(fault, sizeof fault, "camera_gone@%.3f camera=%d duration_s=%.3f", at, camera,
-                      seconds);
-  const Configuration c = own_ins ? chain() : chain({"mock.ins_line=none"});
-  const Driven d = drive(c, {fault});
-  // Of the pulses: 0.75 s after a start each, the blink, and some at its ends and the drive's.
-  constexpr double kProof = 0.75;
-  const bool proven_before = at > kProof;
-  const double unused = camera >= 0     ? kProof
-                        : proven_before ? kProof + seconds + kProof
-                                        : at + seconds + kProof;
-  EXPECT_GE(static_cast<double>(stamp_errors(d).size()), (kSeconds - unused) * 20 - 5) << fault;
-  const int back = camera < 0 ? 2 : 1, proven = proven_before ? 2 + back : 2;
-  EXPECT_EQ(test::count(d.others, DeviceEvent::Kind::camera_gone), back);
-  EXPECT_EQ(test::count(d.others, DeviceEvent::Kind::camera_back), back);
-  EXPECT_EQ(test::count(d.others, DeviceEvent::Kind::proven), proven);
-  EXPECT_LE(test::worst_acquisition(d.others), 1);
-  if (seconds < 0.3) return;
-  const Driven again = drive(c, {fault});
-  ASSERT_EQ(d.sets.size(), again.sets.size());
-  for (std::size_t i = 0; i < d.sets.size(); ++i)
-    ASSERT_EQ(d.sets[i].stamp, again.sets[i].stamp) << i;
-}
-
-std::vector<Blink> blinks() {
-  std::vector<Blink> all;
-  for (const double seconds : {0.05, 0.1, 0.17, 0.3}) {
-    for (const double at : {0.0, 0.31, 2.02, 8.0}) all.push_back({at, seconds, -1, true});
-    for (const int camera : {0, 1}) all.push_back({5.5, seconds, camera, true});
-  }
-  for (const double seconds : {0.05, 2.0}) all.push_back({3, seconds, -1, false});
-  return all;
-}
-INSTANTIATE_TEST_SUITE_P(Schedules, BlinkingCameras, ::testing::ValuesIn(blinks()));
-
-TEST(SimulatedBoardLine, aBoardThatNeverComesBackEndsNothingButItsPulses) {
-  const Driven d = drive(chain(), {"board_gone@4 duration_s=0"});
-  const std::size_t sets = stamp_errors(d).size();
-  EXPECT_GT(sets, 50U);
-  EXPECT_LT(sets, 85U);
-}
-
 Configuration brief_drive(const std::string& line, const std::vector<std::string>& more = {}) {
   std::vector<std::string> set{"mock.ins_line=" + line, "mock.ins=ideal"};
   set.insert(set.end(), more.begin(), more.end());
@@ -265,19 +212,6 @@ INSTANTIATE_TEST_SUITE_P(Lines, SimulatedIns, ::testing::Values("mti-g", "mti-g-
                          [](const auto& one) {
                            return std::string(one.param) == "mti-g" ? "legacy" : "mark4";
                          });
-
-TEST(SimulatedInsConfiguration, isRefusedWhereItCannotBe) {
-  const auto refusal = [](const Configuration& c, bool fast) {
-    return test::refusal_of([&] { const DriveDevices devices(c, {}, fast, 1.0); });
-  };
-  EXPECT_NE(refusal(brief_drive("mti-g"), false).find("--fast"), std::string::npos);
-  EXPECT_THROW((void)brief_drive("mti-h"), InputError) << "it is not read at all";
-  EXPECT_NE(refusal(brief_drive("mti-g", {"ins.rate=110"}), true).find("ins.rate"),
-            std::string::npos);
-  EXPECT_NE(refusal(brief_drive("mti-g-710", {"ins.rate=400"}), true).find("ins.baud"),
-            std::string::npos);
-  EXPECT_EQ(refusal(brief_drive("mti-g-710", {"ins.rate=400", "ins.baud=460800"}), true), "");
-}
 
 }  // namespace
 }  // namespace vergence::app

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "app/publish/file_descriptor.hpp"
+#include "app/publish/line_socket.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
 

@@ -159,17 +159,6 @@ TEST(LiveState, framesThatStopAreSilenceAfterASecond) {
   EXPECT_TRUE(now(69.5)["silent"].get<bool>()) << "an outage is no interval";
 }
 
-TEST(LiveState, rareFramesAreNoSilence) {
-  LiveState state;
-  for (int i = 0; i < 20; ++i) state.add(come(2.0 * i));
-  const auto silent = [&](double seconds) {
-    const HostStamp now(Duration::seconds(seconds).ns());
-    return json::parse(state.update(now, -1))["now"]["silent"].get<bool>();
-  };
-  EXPECT_FALSE(silent(42));
-  EXPECT_TRUE(silent(45));
-}
-
 TEST(LiveState, eventsAndCalibrationsAreTheNewest) {
   LiveState state;
   for (int i = 0; i < 1000; ++i) state.add(event("mark", std::to_string(i)));
@@ -183,7 +172,6 @@ TEST(LiveState, eventsAndCalibrationsAreTheNewest) {
 
 TEST(LiveState, aCalibrationStandsWithTwoSigmaAndWhatTheDriveMeasuredBesideIt) {
   LiveState state;
-  EXPECT_EQ(state.rig(), nullptr);
   state.add(calibration(false, -0.75));
   json c = json::parse(state.update(kNow, -1))["calibration"];
   EXPECT_FALSE(c["confirmed"].get<bool>());
@@ -198,7 +186,6 @@ TEST(LiveState, aCalibrationStandsWithTwoSigmaAndWhatTheDriveMeasuredBesideIt) {
   EXPECT_EQ(c["measured"][1]["figures"][3][0], -751.0);
   EXPECT_EQ(c["measured"][1]["figures"][3][1], 2.0);
   EXPECT_FALSE(json::parse(state.update(kNow, -1)).contains("calibration")) << "told once";
-  ASSERT_NE(state.rig(), nullptr);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "app/publish/pose_line.hpp"
+#include "app/publish/line_publisher.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/publish/line_publisher.hpp"
 #include "core/math/so3.hpp"
 #include "core/memory/allocation_guard.hpp"
 

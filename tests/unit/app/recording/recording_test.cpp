@@ -80,18 +80,6 @@ TEST(Recording, readsBackAsPosted) {
   EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 1000));
 }
 
-TEST(Recording, messagesAreInTheFileSoonWithoutItsEnd) {
-  const TemporaryFolder folder;
-  Recording recording(folder.path(), options());
-  for (int i = 0; i < 10; ++i) ASSERT_TRUE(post(&recording, i));
-  const auto begun = std::chrono::steady_clock::now();
-  while (numbers(folder / "drive.mcap").size() < 10 &&
-         std::chrono::steady_clock::now() - begun < 5s)
-    std::this_thread::sleep_for(1ms);
-  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 10));
-  EXPECT_FALSE(read_mcap(folder / "drive.mcap").scan.finished);
-}
-
 TEST(Recording, splitsBySizeAsRosbagNamesIt) {
   const TemporaryFolder folder;
   Recording::Options o = options();
@@ -139,45 +127,6 @@ TEST(Recording, imagesNeverPushOutSmallMessages) {
   EXPECT_EQ(recording.counters().dropped, 1U);
   EXPECT_EQ(recording.counters().dropped_images, 1U);
   EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 1000));
-}
-
-TEST(Recording, shortWritesLoseNothing) {
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  disk.most = 777;
-  Recording::Options o = options();
-  o.files.disk = &disk;
-  Recording recording(folder.path(), o);
-  for (int i = 0; i < 500; ++i) ASSERT_TRUE(post(&recording, i));
-  recording.close();
-  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 500));
-  EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
-}
-
-TEST(Recording, aFullDiskLosesNothingWhileTheQueueHasRoomAndIsSaidOnce) {
-  const TemporaryFolder folder;
-  FaultyDisk disk;
-  Recording::Options o = options();
-  o.files.disk = &disk;
-  Recording recording(folder.path(), o);
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
-  std::this_thread::sleep_for(200ms);
-  const auto size = std::filesystem::file_size(folder / "drive.mcap");
-  disk.room = size + 100;  // part of the next chunk
-  for (int i = 100; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
-  std::this_thread::sleep_for(700ms);
-  // What was taken of the chunk is cut off again.
-  EXPECT_EQ(std::filesystem::file_size(folder / "drive.mcap"), size);
-  auto errors = recording.take_errors();
-  ASSERT_EQ(errors.size(), 1U);
-  EXPECT_NE(errors[0].find("No space left"), std::string::npos) << errors[0];
-  disk.room = ~std::uint64_t{0};
-  recording.close();
-  errors = recording.take_errors();
-  ASSERT_EQ(errors.size(), 1U);
-  EXPECT_NE(errors[0].find("again; 0 messages were lost"), std::string::npos) << errors[0];
-  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 200));
-  EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
 }
 
 TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {

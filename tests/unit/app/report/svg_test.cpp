@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "app/report/decimation.hpp"
 #include "core/math/random.hpp"
 #include "tests/unit/app/report/xml_check.hpp"
 
@@ -31,12 +30,6 @@ TEST(Escape, goodUtf8StaysAndBrokenIsReplaced) {
   EXPECT_EQ(escape("\xf4\x90\x80\x80"), mark + mark + mark + mark);  // beyond Unicode
 }
 
-TEST(Escape, longTextIsCutAtAWholeCharacter) {
-  EXPECT_EQ(escape(std::string(1000, 'x'), 5), "xxxxx…");
-  EXPECT_EQ(escape("äää", 3), "ä…");
-  EXPECT_EQ(escape("abc", 3), "abc");
-}
-
 TEST(Ticks, areRoundFewAndWithinTheAxis) {
   for (const auto& [low, high] : {std::pair{0.0, 1.0},
                                   {-3.7, 12.9},
@@ -54,17 +47,6 @@ TEST(Ticks, areRoundFewAndWithinTheAxis) {
   }
   EXPECT_EQ(nice_ticks(0, 10, 5), (std::vector<double>{0, 2, 4, 6, 8, 10}));
   EXPECT_EQ(time_ticks(0, 1650, 6), (std::vector<double>{0, 300, 600, 900, 1200, 1500}));
-}
-
-TEST(Ticks, labelsHaveTheDecimalsTheyNeed) {
-  EXPECT_EQ(tick_label(0.5, 0.1), "0.5");
-  EXPECT_EQ(tick_label(-2, 1), "−2");
-  EXPECT_EQ(tick_label(1e-17, 0.1), "0.0");
-  EXPECT_EQ(time_label(65, 5), "1:05");
-  EXPECT_EQ(time_label(3723, 60), "1:02:03");
-  EXPECT_EQ(time_label(4.5, 0.5), "4.5");
-  EXPECT_EQ(duration_text(3599.7, 1), "1:00:00 h");
-  EXPECT_EQ(duration_text(1.2e7, 1), "139 days");
 }
 
 TEST(SvgElement, isWellFormedWhateverGoesIn) {
@@ -118,28 +100,6 @@ TEST(Decimate, everyColumnKeepsItsExtremesItsFirstAndItsLastValue) {
   }
   EXPECT_TRUE(std::is_sorted(lines[0].begin(), lines[0].end(),
                              [](const Point& a, const Point& b) { return a.x < b.x; }));
-}
-
-TEST(Decimate, whereThereIsNoValueTheLineEnds) {
-  Curve c = noise(10);
-  c.y[0] = kNan, c.y[4] = kNan, c.y[5] = std::numeric_limits<double>::infinity(), c.y[7] = kNan;
-  const auto lines = decimate(c.x, c.y, {}, 0, 10, 1000);
-  ASSERT_EQ(lines.size(), 3U);
-  EXPECT_EQ(lines[0].front().x, 1);
-  EXPECT_EQ(lines[0].back().x, 3);
-  ASSERT_EQ(lines[1].size(), 1U);
-  EXPECT_EQ(lines[1].front().x, 6);
-  EXPECT_EQ(lines[2].front().x, 8);
-}
-
-TEST(Decimate, aBreakCutsEvenWithinAColumn) {
-  const Curve c = noise(10);
-  std::vector<std::uint8_t> breaks(10, 0);
-  breaks[5] = 1;
-  const auto lines = decimate(c.x, c.y, breaks, 0, 10, 1);
-  ASSERT_EQ(lines.size(), 2U);
-  EXPECT_EQ(lines[0].back().x, 4);
-  EXPECT_EQ(lines[1].front().x, 5);
 }
 
 TEST(Thin, noPointLeftOutIsFartherThanTheStepFromAPointKept) {

@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "app/runtime/distinct_names.hpp"
-
 namespace vergence::app {
 namespace {
 
@@ -29,13 +27,6 @@ TEST(Nearest, GivesNothingWhenNothingIsNear) {
   EXPECT_EQ(nearest("xyzzy", {"replay", "evaluate"}), std::nullopt);
   EXPECT_EQ(nearest("replay", {}), std::nullopt);
   EXPECT_EQ(did_you_mean("xyzzy", {"replay"}), "");
-}
-
-TEST(DistinctNames, onlyThoseThatAreThereAlreadyAreChanged) {
-  EXPECT_EQ(distinct_names({"left", "right", "camera2"}), (Names{"left", "right", "camera2"}));
-  EXPECT_EQ(distinct_names({"left", "left", "left"}), (Names{"left", "left_1", "left_2"}));
-  EXPECT_EQ(distinct_names({"left", "left_1", "left"}), (Names{"left", "left_1", "left_2"}));
-  EXPECT_EQ(distinct_names({"left", "left", "left_1"}), (Names{"left", "left_1", "left_1_1"}));
 }
 
 }  // namespace

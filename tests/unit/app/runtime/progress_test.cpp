@@ -100,18 +100,6 @@ TEST_F(ProgressTest, TheTerminalIsRedrawnAtMostTenTimesASecond) {
   EXPECT_EQ(redraws(), 20U);
 }
 
-TEST_F(ProgressTest, TheLineIsCutToTheWidthInCharactersNotBytes) {
-  width = 30;
-  auto p = progress(Progress::Mode::terminal);
-  p.update(at(1204, 33000));
-  const auto shown = code_points(show(out.str()).row);
-  EXPECT_LE(shown.size(), 30U);
-  EXPECT_GE(shown.size(), 28U) << "the room is used";
-  EXPECT_EQ(show(out.str()).row.substr(0, 8), "stereo \xC2")
-      << "and nothing is cut inside a character";
-  for (const auto& c : shown) EXPECT_TRUE(c.size() == 1 || c == "·");
-}
-
 TEST_F(ProgressTest, WithoutATerminalALineComesEveryTenSecondsAndOneAtTheEnd) {
   auto p = progress(Progress::Mode::lines);
   for (int second = 0; second <= 25; ++second) {

@@ -78,23 +78,6 @@ TEST(InsFile, aReadingComesBackAsItWas) {
                read[1].quality.utc_valid);
 }
 
-TEST(InsFile, whateverADeviceSendsTheFileCanBeRead) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
-                   kInf = std::numeric_limits<double>::infinity();
-  InsRecord r = reading(1);
-  r.sample.position.latitude_deg = kNan;
-  r.sample.velocity_enu[1] = kInf;
-  r.sample.q_enu_ins[2] = kNan;
-  r.sample.position_sigma = kInf;
-  r.sample.tilt_sigma = kNan;
-  const test::TemporaryFolder folder;
-  const auto read = read_ins_file(folder.write("ins.csv", kHead + line_of(r)));
-  ASSERT_EQ(read.size(), 1U);
-  EXPECT_EQ(read[0].sample.fix, FixStatus::none);
-  EXPECT_FALSE(read[0].sample.velocity_valid || read[0].sample.attitude_valid);
-  EXPECT_EQ(read[0].sample.position_sigma, 0);
-}
-
 TEST(InsFile, hostileLinesAreRefusedWithTheirPlace) {
   const std::string good = line_of(reading(1));
   ASSERT_TRUE(refusal(kHead + good).empty());
@@ -134,16 +117,6 @@ TEST(InsFile, hostileLinesAreRefusedWithTheirPlace) {
   EXPECT_TRUE(
       test::contains(refusal(kHead + good.substr(0, good.size() - 1)), "has no reading in it"))
       << "torn";
-}
-
-TEST(InsFile, aTornEndAndAClockSetBackArePassedOver) {
-  const test::TemporaryFolder folder;
-  const std::string torn = line_of(reading(5));
-  const auto read = read_ins_file(
-      folder.write("ins.csv", kHead + line_of(reading(2)) + line_of(reading(1)) +
-                                  line_of(reading(2)) + line_of(reading(3)) + torn.substr(0, 30)));
-  ASSERT_EQ(read.size(), 2U);
-  EXPECT_EQ(read[1].sample.number, 3U);
 }
 
 TEST(InsFile, isFoundInAFolderOrByItsHead) {

@@ -59,31 +59,6 @@ EventRecord event_at(std::int64_t ns, EstimatorEvent::Kind kind, double value) {
   return EventRecord::of(event);
 }
 
-TEST(Recorder, theFirstConfirmationAndTheFirstContradictionAreInTheTotals) {
-  using Kind = EstimatorEvent::Kind;
-  for (const bool after_the_pose :
-       {false, true}) {  // at the end of a drive the event comes after the last pose
-    const test::TemporaryFolder folder;
-    Recorder recorder(folder.path(), {});
-    PoseSample sample;
-    sample.frame = 7, sample.stamp = Stamp(700);
-    recorder.on_event(event_at(700, Kind::calibration_contradicted, 6.5));
-    if (after_the_pose) recorder.on_report(FrameReport::of(sample, 0, std::nullopt));
-    recorder.on_event(event_at(700, Kind::calibration_confirmed, 0.3));
-    if (!after_the_pose) recorder.on_report(FrameReport::of(sample, 0, std::nullopt));
-    recorder.on_event(event_at(900, Kind::calibration_contradicted, 1.0));
-    recorder.on_event(event_at(900, Kind::calibration_confirmed, 0.3));
-    sample.frame = 9, sample.stamp = Stamp(900);
-    recorder.on_report(FrameReport::of(sample, 0, std::nullopt));
-    const auto totals = recorder.close();
-    EXPECT_EQ(totals->confirmed, Stamp(700));
-    EXPECT_EQ(totals->confirmed_frame, 7U);
-    ASSERT_TRUE(totals->contradicted);
-    EXPECT_EQ(totals->contradicted->stamp, Stamp(700));
-    EXPECT_EQ(totals->contradicted->depth_percent, 6.5);
-  }
-}
-
 TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndASentence) {
   for (const bool fails : {false, true}) {
     const test::TemporaryFolder folder;

@@ -1,4 +1,5 @@
 #include "app/session/recorder.hpp"
+#include "app/session/session_files.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/runtime/errors.hpp"
-#include "app/session/record_lines.hpp"
+#include "app/session/records.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
@@ -129,18 +130,6 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
   EXPECT_EQ(lines_of(folder / "poses.csv").size(), totals->read + 1);
   EXPECT_TRUE(totals->trajectory.empty());
-}
-
-TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
-  const test::TemporaryFolder folder;
-  Recorder recorder(folder.path(), {});
-  recorder.on_report(pose(0, PoseStatus::ok, 0));
-  bool found = false;
-  for (int i = 0; i < 200 && !found; ++i) {  // two seconds at most, one is promised
-    found = lines_of(folder / "trajectory.tum").size() == 1;
-    if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  EXPECT_TRUE(found);
 }
 
 TEST(Recorder, postingAllocatesNothing) {

@@ -13,7 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/session/record_lines.hpp"
+#include "app/session/records.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/waiting_source.hpp"

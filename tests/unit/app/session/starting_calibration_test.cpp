@@ -100,23 +100,6 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
 }
 
-TEST(StartingCalibration, ofAFileWithAnotherBaselineTheUserHears) {
-  const test::TemporaryFolder folder;
-  const Configuration c = configuration(folder);
-  const auto remarks_for = [&](double baseline) {
-    CalibrationFile file = found(c, 0);
-    apply_use({.baseline = baseline}, &file.rig);
-    write_calibration(folder / "mine.yaml", file);
-    return starting_calibration(c, {.file = folder / "mine.yaml"}, kSerials).remarks;
-  };
-  EXPECT_TRUE(remarks_for(0.755).empty());
-  ASSERT_EQ(remarks_for(0.3).size(), 1U);
-  EXPECT_NE(remarks_for(0.3)[0].find("mine.yaml: has a baseline of 0.3 m, the configuration says "
-                                     "0.750003 m: all lengths go by the file"),
-            std::string::npos)
-      << remarks_for(0.3)[0];
-}
-
 TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   const test::TemporaryFolder folder;
   Configuration c = configuration(folder, "gige");
@@ -126,21 +109,6 @@ TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::none);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::unconfirmed);
-}
-
-TEST(NominalGeometry, isParallelButForCamerasMountedFartherThanTheGates) {
-  RigCalibration mounted;
-  mounted.cameras = 3;
-  mounted.T_camera_left[1] = {exp_so3({0, 0.05, 0}), Vec3(-0.5, 0.01, 0)};
-  mounted.T_camera_left[2] = {exp_so3({0.5, 0, 0}), Vec3(0, -0.3, 0)};  // below, looking up
-  mounted.baseline = mounted.T_camera_left[1].t.norm();
-  RigCalibration given = mounted;
-  given.baseline = 2 * mounted.baseline;  // measured twice too long
-  const RigCalibration nominal = nominal_geometry(given, mounted, {});
-  EXPECT_EQ(nominal.T_camera_left[1].R, Mat3(Mat3::Identity()));
-  EXPECT_EQ(nominal.T_camera_left[1].t, Vec3(-given.baseline, 0, 0));
-  EXPECT_EQ(nominal.T_camera_left[2].R, mounted.T_camera_left[2].R);
-  EXPECT_TRUE(nominal.T_camera_left[2].t.isApprox(2 * mounted.T_camera_left[2].t, 1e-12));
 }
 
 /// Frames that nobody can read: each pass is over at once.
