@@ -12,9 +12,9 @@
 #include "app/config/configuration.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/recording.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/session_observer.hpp"
-#include "app/runtime/background_thread.hpp"
 #include "drivers/acquisition/acquired.hpp"
 
 namespace vergence::app {

@@ -121,19 +121,6 @@ TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
   }
 }
 
-TEST(CalibrationCovariance, FlawsInMemoryAreFoundToo) {
-  RigCovariance covariance;
-  EXPECT_FALSE(find_flaw(covariance));
-  covariance.set(3, 3, -1);
-  EXPECT_TRUE(find_flaw(covariance));
-  covariance.set(3, 3, 0);
-  covariance.set(3, 4, 1e-9);
-  EXPECT_TRUE(find_flaw(covariance)) << "tied to nothing";
-  covariance.set(3, 4, std::numeric_limits<double>::infinity());
-  EXPECT_TRUE(find_flaw(covariance));
-  EXPECT_FALSE(find_flaw(example().rig.covariance));
-}
-
 TEST(CalibrationCovariance, FromScratchTheLensesStayAndThePlacesGo) {
   const RigCalibration before = example().rig;
   RigCalibration rig = before;

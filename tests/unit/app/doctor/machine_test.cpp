@@ -49,19 +49,6 @@ TEST(Machine, ReadsLimitsAndCapabilities) {
   EXPECT_FALSE(f.machine.limit("Max absent"));
 }
 
-TEST(Machine, ThisOneAnswers) {
-  const Machine m = Machine::here();
-  EXPECT_FALSE(m.user.empty());
-  EXPECT_TRUE(m.limit("Max open files"));
-  EXPECT_TRUE(m.may_use("/dev/null"));
-  EXPECT_FALSE(m.may_use("/dev/there-is-no-such-node"));
-  const test::TemporaryFolder folder;
-  const auto room = m.room_at(folder / "not/there/yet");
-  ASSERT_TRUE(room);
-  EXPECT_FALSE(room->read_only);
-  EXPECT_TRUE(room->may_write);
-}
-
 TEST(Machine, RoomBehindAClosedFolderMayNotBeWritten) {
   const test::TemporaryFolder folder;
   (void)folder.write("closed/a/b/file", "");

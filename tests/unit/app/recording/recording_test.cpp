@@ -129,6 +129,32 @@ TEST(Recording, imagesNeverPushOutSmallMessages) {
   EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 1000));
 }
 
+void await_chunks(const Recording& recording, std::uint64_t chunks) {
+  while (recording.counters().chunks < chunks) std::this_thread::sleep_for(1ms);
+}
+
+TEST(Recording, aDiskThatFailsForAWhileIsTriedAgainInTheSameFile) {
+  const TemporaryFolder folder;
+  FaultyDisk disk;
+  Recording::Options o = options();
+  o.files.disk = &disk;
+  Recording recording(folder.path(), o);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(post(&recording, i));
+  await_chunks(recording, 1);
+  disk.error = EIO;
+  for (int i = 100; i < 200; ++i) ASSERT_TRUE(post(&recording, i));
+  std::this_thread::sleep_for(200ms);
+  disk.error = 0;
+  const auto chunks = recording.counters().chunks;
+  await_chunks(recording, chunks + 1);  // within RecordingFiles::kRetry
+  recording.close();
+  const auto errors = recording.take_errors();
+  ASSERT_EQ(errors.size(), 2U);
+  EXPECT_NE(errors[0].find("Input/output error"), std::string::npos) << errors[0];
+  EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 200));
+  EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
+}
+
 TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {
   const TemporaryFolder folder;
   FaultyDisk disk;
@@ -146,10 +172,6 @@ TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {
   ASSERT_EQ(errors.size(), 2U);
   EXPECT_NE(errors[1].find("no summary"), std::string::npos) << errors[1];
   EXPECT_TRUE(numbers(folder / "drive.mcap").empty());
-}
-
-void await_chunks(const Recording& recording, std::uint64_t chunks) {
-  while (recording.counters().chunks < chunks) std::this_thread::sleep_for(1ms);
 }
 
 // The system tells of it once, and the file's end finds nothing wrong.

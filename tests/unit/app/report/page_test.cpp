@@ -75,19 +75,6 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
   EXPECT_FALSE(contains(html, ">nan")) << "a number that is not there has no row";
 }
 
-TEST(Page, withoutAReferenceSaysSoAndHasNoErrorPlots) {
-  const test::TemporaryFolder folder;
-  auto writer = writer_of(500);
-  writer.ins = false;
-  writer.write(folder.path());
-  const std::string html = page_of(folder.path());
-  EXPECT_TRUE(contains(html, "There was no reference"));
-  EXPECT_TRUE(contains(html, "not known"));
-  for (const char* part : {"Horizontal error", "Vertical error", "Heading error", "north"})
-    EXPECT_FALSE(contains(html, part)) << part;
-  EXPECT_TRUE(self_contained(html));
-}
-
 TEST(Page, isMadeOfEveryTornSession) {
   const test::TemporaryFolder whole;
   writer_of(300).write(whole.path());

@@ -95,5 +95,16 @@ TEST_F(ServiceManagerTest, aSlowLoopIsAliveAndAHungOneIsNot) {
   EXPECT_EQ(manager.heard(), "") << "whatever the devices do";
 }
 
+TEST_F(ServiceManagerTest, aLoopThatWaitsIsAliveWhileTheDevicesThreadGoesRound) {
+  ServiceManager service = started(3s);
+  for (int second = 0; second < 10; ++second)
+    service.alive(7, true, static_cast<std::uint64_t>(second), begin + second * 1s);
+  for (int i = 0; i < 9; ++i) EXPECT_NE(manager.heard(), "") << i;
+  while (!manager.heard().empty()) {
+  }
+  for (int second = 10; second < 20; ++second) service.alive(7, true, 9, begin + second * 1s);
+  EXPECT_EQ(manager.heard(), "") << "a device holds that thread up";
+}
+
 }  // namespace
 }  // namespace vergence::app

@@ -1,18 +1,12 @@
 #include "app/session/ins_comparison.hpp"
 
-#include "app/session/recorder.hpp"
-
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <cstdio>
-#include <functional>
 #include <memory>
-#include <numbers>
 #include <string>
 
+#include "app/session/recorder.hpp"
 #include "core/comparison/geodesy.hpp"
-#include "core/math/random.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -113,26 +107,6 @@ TEST(InsComparison, countsAScaleThatDisagreesOnlyWhereThereIsAnIns) {
   EXPECT_EQ(counter(comparison, "scale_disagrees"), 200U);
   (void)session.recorder.close();
 }
-
-/// A place that wanders as an MTi-G's: each axis keeps exp(-dt / 60 s) of its error.
-class WanderingPlace {
- public:
-  static constexpr double kHorizontal = 2.12, kVertical = 4;  // m
-  explicit WanderingPlace(std::uint64_t seed) : random_(seed) {
-    error_ = sigmas().cwiseProduct(draw());
-  }
-  Vec3 error_after(double seconds) {
-    const double keep = std::exp(-seconds / 60);
-    error_ = keep * error_ + std::sqrt(1 - keep * keep) * sigmas().cwiseProduct(draw());
-    return error_;
-  }
-
- private:
-  static Vec3 sigmas() { return {kHorizontal, kHorizontal, kVertical}; }
-  Vec3 draw() { return {random_.normal(), random_.normal(), random_.normal()}; }
-  Random random_;
-  Vec3 error_;
-};
 
 }  // namespace
 }  // namespace vergence::app

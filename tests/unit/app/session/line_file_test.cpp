@@ -3,11 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <string>
-
-#include <nlohmann/json.hpp>
 
 #include "tests/support/temporary_folder.hpp"
 

@@ -49,6 +49,28 @@ std::function<bool(Stamp)> full_from_to(std::uint64_t first, std::uint64_t last)
   };
 }
 
+TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
+  const test::TemporaryFolder folder;
+  Recorder::Options options;
+  options.disk_full = full_from_to(20, 40);
+  Recorder recorder(folder.path(), options);
+  for (std::uint64_t i = 0; i < 100; ++i)
+    recorder.on_report(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  const auto totals = recorder.close();
+  EXPECT_TRUE(totals->faults.empty());
+  EXPECT_EQ(totals->lost_lines, 0U);
+  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 100U);
+  EXPECT_EQ(lines_of(folder / "poses.csv").size(), 101U);
+  EXPECT_EQ(told(folder.path(), "disk_full").size(), 1U);
+  EXPECT_EQ(told(folder.path(), "disk_room"),
+            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
+  const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
+  EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
+  const auto errors = recorder.take_errors();
+  ASSERT_EQ(errors.size(), 1U) << "once, not for every file";
+  EXPECT_NE(errors[0].find("No space left on device"), std::string::npos) << errors[0];
+}
+
 TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
   const test::TemporaryFolder folder;
   constexpr std::uint64_t kFrames = 14'000;  // 170 bytes each in poses.csv: twice what memory holds

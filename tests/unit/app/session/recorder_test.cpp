@@ -1,5 +1,4 @@
 #include "app/session/recorder.hpp"
-#include "app/session/session_files.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,6 +12,7 @@
 
 #include "app/runtime/errors.hpp"
 #include "app/session/records.hpp"
+#include "app/session/session_files.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
@@ -130,6 +130,18 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
   EXPECT_EQ(lines_of(folder / "poses.csv").size(), totals->read + 1);
   EXPECT_TRUE(totals->trajectory.empty());
+}
+
+TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  recorder.on_report(pose(0, PoseStatus::ok, 0));
+  bool found = false;
+  for (int i = 0; i < 200 && !found; ++i) {  // two seconds at most, one is promised
+    found = lines_of(folder / "trajectory.tum").size() == 1;
+    if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(found);
 }
 
 TEST(Recorder, postingAllocatesNothing) {
