@@ -116,8 +116,6 @@ void calibration_group(const Session& s, const Analysis& a, Figures* f) {
   }
   if (const std::string word = text_at(s.summary, "calibration.word"); !word.empty())
     f->row("health", word);
-  if (const std::string by = text_at(s.summary, "calibration.limited_by"); !by.empty())
-    f->row("limited by", by);
   verification_rows(s, a, f);
 }
 

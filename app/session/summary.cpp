@@ -98,6 +98,21 @@ Json health_json(const RigCalibration& rig, const calibration::CalibrationOption
       {"depth_error_percent", depth}};
 }
 
+/// What most of the depth error at 20 m is from: the noise of the images that the calibration was
+/// found from, which more driving lessens, or intrinsics that are not known better. Null without
+/// sigmas.
+Json limited_by(const RigCalibration& rig) {
+  if (!has_sigmas(rig) || !given(rig.sigma_noise[1])) return nullptr;
+  constexpr double kDepth = 20;  // m: where the word is found
+  RigCalibration noise = rig;
+  noise.sigma_wide = rig.sigma_noise;  // without their correlations: no less than it is
+  for (Mat6& covariance : noise.covariance_wide) covariance.setZero();
+  noise.covariance = {};
+  const double wide = calibration::depth_error_percent(rig, 1, kDepth),
+               by_noise = calibration::depth_error_percent(noise, 1, kDepth);
+  return by_noise * by_noise < 0.5 * wide * wide ? "intrinsics" : "noise";
+}
+
 Json matrix_json(const Transform& T) {
   Json matrix = Json::array();
   for (int row = 0; row < 3; ++row) {
@@ -133,6 +148,7 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
                {"frames", rig.frames}};
   const Json health = health_json(rig, input.options);
   for (const auto& [key, value] : health.items()) json[key] = value;
+  json["limited_by"] = limited_by(rig);
   json["online"] = input.online;
   json["verified"] = input.verified;
   json["verified_frame"] = totals.confirmed_frame ? Json(*totals.confirmed_frame) : Json();

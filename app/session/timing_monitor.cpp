@@ -54,17 +54,6 @@ Json clock_json(const std::string& device, const ClockRecord& clock) {
           {"worst_error_us", rounded(us(clock.worst_error()))}};
 }
 
-Json pings_json(const trigger_board::TimeQuality& q) {
-  const double pps_age_s = q.pps_age.to_seconds();  // negative: never seen
-  return {{"asked", q.asked},
-          {"answered", q.answered},
-          {"rtt_least_us", rounded(us(q.rtt_least))},
-          {"rtt_median_us", rounded(us(q.rtt_median))},
-          {"rtt_most_us", rounded(us(q.rtt_most))},
-          {"pps_locked", q.pps_locked},
-          {"pps_age_s", pps_age_s >= 0 ? Json(rounded(pps_age_s)) : Json()}};
-}
-
 Json latency_json(const TimeHistogram& latency, bool is_virtual) {
   if (latency.count() == 0) return nullptr;
   return {{"mean", rounded(latency.mean())},
@@ -184,11 +173,7 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                          {"torn", s.torn},
                          {"underruns", s.underruns}}}});
   }
-  if (c.board.stamps() > 0) {
-    clocks.push_back(clock_json("board", c.board));
-    if (devices.board() != nullptr)
-      clocks.back()["pings"] = pings_json(devices.board()->board_statistics().time);
-  }
+  if (c.board.stamps() > 0) clocks.push_back(clock_json("board", c.board));
   if (devices.ins() != nullptr) {
     clocks.push_back(clock_json("INS", c.ins));
     const InsStatistics s = devices.ins()->statistics();

@@ -2,7 +2,6 @@
 // what record_sample put in: node read_with_mcap_core.mjs FILE
 import { readFileSync } from "node:fs";
 import assert from "node:assert/strict";
-import { inflateSync } from "node:zlib";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { parse } from "@foxglove/rosmsg";
 import { MessageReader } from "@foxglove/rosmsg2-serialization";
@@ -55,14 +54,6 @@ assert.deepEqual([image.width, image.height, image.step, image.encoding], [4, 3,
 assert.deepEqual([...image.data], [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
 assert.equal(BigInt(image.header.stamp.sec) * 1000000000n + BigInt(image.header.stamp.nanosec),
   1336964645250000000n + 49n * 33333333n);
-// The same pixels as PNG: rows of the filter Sub, inflated by node's own zlib.
-const packed = last.get("sensor_msgs/msg/CompressedImage");
-assert.equal(packed.format, "png");
-const png = Buffer.from(packed.data);
-assert.equal(png.toString("latin1", 1, 4), "PNG");
-const content = png.indexOf("IDAT") + 4;
-assert.deepEqual([...inflateSync(png.subarray(content, content + png.readUInt32BE(content - 8)))],
-  [1, 0, 1, 1, 1, 1, 4, 1, 1, 1, 1, 8, 1, 1, 1]);
 const info = last.get("sensor_msgs/msg/CameraInfo");
 assert.equal(info.distortion_model, "plumb_bob");
 assert.ok(Math.abs(info.p[3] + 450.5 * 0.75) < 1e-9);

@@ -29,9 +29,7 @@ using test::TemporaryFolder;
 using test::text_of;
 
 const std::string kMock = std::string(VERGENCE_SOURCE_DIR) + "/app/config/mock.yaml";
-const std::string kRecord =
-    " --set record.poses=on --set record.ins=on --set record.images=on --set "
-    "record.memory_mb=64";
+const std::string kRecord = " --set record.poses=on --set record.ins=on --set record.images=on";
 
 Outcome drive(const std::filesystem::path& session, const std::string& more) {
   return run_vergence("run '" + kMock + "' --out '" + session.string() + "'" + kSmall + kRecord +

@@ -123,6 +123,18 @@ TEST(Summary, aYawSigmaTellsTheDepthErrorAndTheWord) {
   }
 }
 
+TEST(Summary, whatLimitsADepthIsNoiseOrIntrinsics) {
+  auto totals = std::make_unique<SessionTotals>();
+  SummaryInput in = input();
+  in.calibration = with_yaw_sigma(2e-4);
+  EXPECT_TRUE(summary_json(*totals, in)["calibration"]["limited_by"].is_null())
+      << "without the noise's part nobody knows";
+  in.calibration.sigma_noise[1] = in.calibration.sigma_wide[1];
+  EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "noise");
+  in.calibration.sigma_noise[1][1] = 1e-4;  // a quarter of the variance
+  EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "intrinsics");
+}
+
 TEST(Summary, recalibrationsAreListedAndTheFirstFromScratchStandsApart) {
   auto totals = std::make_unique<SessionTotals>();
   totals->attempts = {
