@@ -280,9 +280,15 @@ bool HttpServer::send_event(Viewer* viewer, std::string_view name, std::string_v
 }
 
 void HttpServer::broadcast(std::string_view name, std::string_view json, Skipped skipped) {
-  for (Viewer& v : viewers_)
-    if (v.greeted && !send_event(&v, name, json) && skipped == Skipped::greet_again)
-      v.greeted = false;
+  for (Viewer& v : viewers_) {
+    if (!v.greeted) continue;
+    if (skipped == Skipped::greet_again)
+      v.greeted = send_event(&v, name, json);
+    else if (!v.pending())
+      (void)send_event(&v, name, json);
+    else if (v.sent == 0 && v.out.size() + json.size() <= kMostEventBytes)
+      v.out += fmt::format("event: {}\ndata: {}\n\n", name, json);  // behind what is just made
+  }
 }
 
 void HttpServer::greet(std::string_view name, const std::function<std::string()>& json) {
