@@ -12,17 +12,14 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/capture/capture_settings.hpp"
-#include "app/capture/picture_check.hpp"
-#include "app/capture/picture_files.hpp"
 #include "app/capture/taking.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/recorder/recorder.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/runtime/version.hpp"
+#include "app/session/session_files.hpp"
 
 namespace vergence::app {
 namespace {
@@ -41,20 +38,6 @@ double rounded(double v, int decimals) {
 
 bool is_mock(const Configuration& c) { return c.cameras[0].driver == "mock"; }
 
-/// The same cameras, made to expose another way; nobody else's pulses are needed then.
-Configuration triggered(Configuration c, CameraTrigger how) {
-  for (CameraSettings& s : c.cameras) s.trigger = how;
-  c.trigger.driver = "none";
-  c.ins.driver = "none";
-  if (how == CameraTrigger::free) {
-    c.sync.mode = SyncMode::software;
-    c.sync.tolerance_ms = std::max(c.sync.tolerance_ms, 0.5e3 / c.trigger.rate);
-  } else if (c.sync.mode != SyncMode::software) {
-    c.sync.mode = SyncMode::counter;
-  }
-  return c;
-}
-
 /// Everything of one call.
 class Snap {
  public:
@@ -65,8 +48,7 @@ class Snap {
   ExitCode run();
 
  private:
-  [[nodiscard]] Taking attempt(const Configuration& configuration);
-  [[nodiscard]] Taking without_pulses(Taking taking);
+  [[nodiscard]] Taking attempt();
   void note(const std::string& sentence) {
     notes_.push_back(sentence);
     say(sentence);
@@ -90,8 +72,8 @@ class Snap {
   bool unusable_ = false;
 };
 
-Taking Snap::attempt(const Configuration& c) {
-  devices_.reset();  // a camera opens once
+Taking Snap::attempt() {
+  const Configuration& c = configuration_;
   // A mock: in virtual time, as long as the sets need and a second more.
   const std::optional<double> duration =
       is_mock(c) ? std::optional(1 + request_.count / c.trigger.rate) : std::nullopt;
@@ -105,36 +87,8 @@ Taking Snap::attempt(const Configuration& c) {
   return take_sets(*devices_, o, signals_, [this](const TakenSet& set) { keep(set); });
 }
 
-/// Nothing came with a hardware trigger: the cameras are asked by command, or run freely.
-Taking Snap::without_pulses(Taking taking) {
-  for (const CameraTrigger how : {CameraTrigger::software, CameraTrigger::free}) {
-    const Configuration c = triggered(configuration_, how);
-    try {
-      note(fmt::format("no pulse triggers the cameras within {:g} s; {}", request_.wait_s,
-                       how == CameraTrigger::software
-                           ? "they are asked one after the other by command (trigger: software)"
-                           : "they run freely (trigger: free), images are paired by their stamps"));
-      taking = attempt(c);
-    } catch (const InputError& e) {
-      if (how == CameraTrigger::free) throw;
-      note(std::string("by command they cannot be triggered: ") + e.what());
-      continue;
-    }
-    const bool any = std::any_of(taking.delivered.begin(), taking.delivered.end(),
-                                 [](std::uint64_t n) { return n > 0; });
-    if (any || taking.end != Taking::End::timeout) break;
-  }
-  return taking;
-}
-
 ExitCode Snap::run() {
-  Taking taking = attempt(configuration_);
-  const bool nothing = std::all_of(taking.delivered.begin(), taking.delivered.end(),
-                                   [](std::uint64_t n) { return n == 0; });
-  const bool gone = std::find(taking.gone.begin(), taking.gone.end(), true) != taking.gone.end();
-  if (taking.end == Taking::End::timeout && nothing && !gone &&
-      configuration_.cameras[0].trigger == CameraTrigger::hardware && !is_mock(configuration_))
-    taking = without_pulses(std::move(taking));
+  const Taking taking = attempt();
   if (!sets_.empty()) write_report();
   return verdict(taking);
 }
@@ -154,19 +108,6 @@ std::vector<PictureRemark> Snap::look_at(const TakenSet& set,
             {true,
              fmt::format("{} and {} are the same picture: one camera twice? give each its serial",
                          names_[i], names_[k])});
-  // Only a second camera that sits to the right of the first says something by the side things move
-  // to.
-  const Vec3 t = mounted_rig(configuration_).T_camera_left[1].t;
-  const bool to_the_right =
-      t.x() < 0 && std::abs(t.x()) > 2 * std::max(std::abs(t.y()), std::abs(t.z()));
-  const bool sound = std::none_of(remarks.begin(), remarks.end(),
-                                  [](const PictureRemark& r) { return r.unusable; });
-  if (to_the_right && sound && set.images.size() > 1 &&
-      look_exchanged(horizontal_shift(set.images[0], set.images[1])))
-    remarks.push_back({true, fmt::format("{0} and {1} are probably exchanged: things lie further "
-                                         "right in the picture of {1}; exchange their "
-                                         "serials (or cables)",
-                                         names_[0], names_[1])});
   return remarks;
 }
 
@@ -254,7 +195,8 @@ ExitCode Snap::verdict(const Taking& taking) const {
     if (taking.delivered[k] > 0) continue;
     silent = true;
     say(fmt::format(
-        "{} {}; check its cable, its power, and what triggers it ({}.trigger)",
+        "{} {}; check its cable, its power, and what triggers it ({}.trigger; `free` needs no "
+        "pulse)",
         camera_title(names_[k], devices_->cameras()[k]->info()),
         taking.gone[k] ? "has gone" : fmt::format("sent no image within {:g} s", request_.wait_s),
         fmt::format("cameras.{}", k)));

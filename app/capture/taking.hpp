@@ -1,13 +1,50 @@
 #pragma once
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "app/config/configuration.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/runtime/signals.hpp"
+#include "core/types/image.hpp"
 
 namespace vergence::app {
+
+struct PictureFigures {
+  double mean = 0;       // grey levels
+  double contrast = 0;   // standard deviation, grey levels
+  double saturated = 0;  // share of pixels at 254 and above
+  double dark = 0;       // share of pixels at 4 and below
+  double sharpness = 0;  // mean squared gradient (central differences), (grey levels / px)²: falls
+                         // with blur, rises with noise
+};
+/// Precondition: not empty. Images of one row or column have no sharpness.
+[[nodiscard]] PictureFigures figures_of(const ImageView& image) noexcept;
+
+/// One thing that strikes the eye.
+struct PictureRemark {
+  bool unusable = false;  // these pictures are no good; else they could be better
+  std::string sentence;
+};
+
+/// Exposure of each picture, and sharpness of each against the sharpest.
+[[nodiscard]] std::vector<PictureRemark> judge_pictures(std::span<const std::string> names,
+                                                        std::span<const PictureFigures> figures);
+
+/// Whether two pictures are the same pixel for pixel: one camera twice. Flat ones (a lens cap) are
+/// not called that.
+[[nodiscard]] bool are_identical(const ImageView& a, const ImageView& b) noexcept;
+
+/// The configuration of a capture, for which of the devices only the cameras and what triggers them
+/// are used: pictures need no position and the INS may be elsewhere, so it is left out, unless its
+/// SyncOut makes the pulses.
+[[nodiscard]] Configuration capture_configuration(const Configuration& configuration);
+
+/// Names of the cameras for files and sentences: those of the configuration (letters, digits, `_`
+/// and `-`, everything else becomes `_`), `camera0` … where there is none, each once.
+[[nodiscard]] std::vector<std::string> camera_names(const Configuration& configuration,
+                                                    int cameras);
 
 /// One synchronised set, while its images are there.
 struct TakenSet {

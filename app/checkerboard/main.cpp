@@ -1,12 +1,127 @@
 // What of `vergence calibrate` needs OpenCV. `vergence` starts it with its own words; nobody has to
 // know its name.
-#include "app/checkerboard/board_command.hpp"
+#include <iostream>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "app/calibration/conversion.hpp"
+#include "app/checkerboard/calibrate_session.hpp"
+#include "app/command_line/calibrate_options.hpp"
 #include "app/command_line/program.hpp"
+
+namespace vergence::app {
+namespace {
+
+CameraModelKind parse_model(const std::string& word) {
+  return word == "equidistant" ? CameraModelKind::pinhole_equidistant
+                               : CameraModelKind::pinhole_radtan;
+}
+
+BoardPattern board_of(const CalibrateOptions& a) {
+  const int boards =
+      (a.board.empty() ? 0 : 1) + (a.aprilgrid.empty() ? 0 : 1) + (a.charuco.empty() ? 0 : 1);
+  if (boards == 0)
+    throw InputError(
+        "--board is missing: the board's inner corners along and down, like 9x6; or --aprilgrid: "
+        "its tags along and up, like 6x6; or --charuco: its squares along and down, like 11x8");
+  if (boards > 1)
+    throw InputError("--board, --aprilgrid and --charuco are different boards; give one");
+  if (!a.square)
+    throw InputError(fmt::format("--square is missing: the side of a {} in metres, like 0.025",
+                                 a.aprilgrid.empty() ? "square" : "tag"));
+  if (!a.aprilgrid.empty()) return parse_aprilgrid(a.aprilgrid, *a.square, a.spacing);
+  if (!a.board.empty()) return parse_checkerboard(a.board, *a.square);
+  if (!a.marker)
+    throw InputError("--marker is missing: the side of a marker in metres, like 0.018");
+  return parse_charuco(a.charuco, *a.square, *a.marker, a.dictionary);
+}
+
+CalibrateRequest request_of(const CalibrateOptions& a) {
+  const BoardPattern board = board_of(a);
+  if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
+  if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100))
+    throw InputError("--baseline needs metres, more than 0 and less than 100");
+  if (a.sixth_order && a.model == "equidistant")
+    throw InputError("--k3 belongs to radtan; equidistant has k1 to k4");
+  CalibrateRequest r;
+  r.board = board;
+  r.model = parse_model(a.model);
+  r.sixth_order = a.sixth_order;
+  r.out = a.out;
+  r.measured_baseline = a.baseline;
+  if (a.keep_views) r.keep_views = *a.keep_views;
+  r.json = a.json;
+  r.quiet = a.common.quiet;
+  check_writable(r.out, a.force);
+  return r;
+}
+
+ExitCode convert(const CalibrateOptions& a) {
+  ConversionRequest r;
+  r.in = a.convert[0];
+  r.out = a.convert[1];
+  if (!a.to.empty() && !a.format.empty())
+    throw InputError("--to and --format both say what OUT is to be; give --to");
+  if (!a.to.empty() || !a.format.empty()) r.format = parse_format(a.to.empty() ? a.format : a.to);
+  const CalibrationFormat format = r.format ? *r.format : format_of_name(r.out);
+  for (const std::filesystem::path& file : files_written(r.out, format))
+    if (std::filesystem::exists(file) && !a.force)
+      throw InputError(
+          file.string() +
+          ": is there already, and nothing is overwritten; add --force, or name another file");
+  if (!a.size.empty()) r.size = parse_size(a.size);
+  for (const std::string& sentence : convert_calibration(r))
+    std::cerr << "vergence: " << sentence << '\n';
+  std::vector<std::string> written;
+  for (const std::filesystem::path& file : files_written(r.out, format))
+    written.push_back(file.string());
+  std::cerr << fmt::format("{}: written as {}\n", fmt::join(written, ", "), describe(format));
+  return ExitCode::done;
+}
+
+ExitCode calibrate_board_live(const CalibrateOptions& a) {
+  if (!a.right.empty() || !a.more_cameras.empty())
+    throw InputError("calibrate: a CONFIG has its cameras; --right and --camera go with --left");
+  return calibrate_live(request_of(a), a.common.configuration(a.configuration));
+}
+
+ExitCode calibrate_board_images(const CalibrateOptions& a) {
+  if (a.keep_views)
+    throw InputError("--keep-views is for live views; image files are kept as they are");
+  if (a.right.empty() && !a.more_cameras.empty())
+    throw InputError("--camera is for a third and fourth camera; --right comes first");
+  std::vector<std::vector<std::string>> patterns{a.left};
+  if (!a.right.empty()) patterns.push_back(a.right);
+  for (const std::string& pattern : a.more_cameras) patterns.push_back({pattern});
+  if (patterns.size() > kMaxCameras)
+    throw InputError(
+        fmt::format("a rig has up to {} cameras, {} are given", kMaxCameras, patterns.size()));
+  return calibrate_images(request_of(a), patterns);
+}
+
+ExitCode run(const CalibrateOptions& a) {
+  switch (a.way()) {
+    case CalibrateWay::board_images:
+      return calibrate_board_images(a);
+    case CalibrateWay::board_live:
+      return calibrate_board_live(a);
+    case CalibrateWay::convert:
+      return convert(a);
+    case CalibrateWay::drive:
+      break;
+  }
+  throw InputError("calibrate --drive needs no board: 'vergence calibrate' does it");
+}
+
+}  // namespace
+}  // namespace vergence::app
 
 int main(int argc, char** argv) {
   using namespace vergence::app;
-  return static_cast<int>(run_program(
-      argc, argv, [](CLI::App& root, const ProgramWords& /*words*/, ExitCode* exit_code) {
-        add_board_calibration(root, exit_code);
-      }));
+  const auto declare = [](CLI::App& root, const ProgramWords& /*words*/, ExitCode* exit_code) {
+    const auto a = std::make_shared<CalibrateOptions>();
+    a->declare(root)->callback([a, exit_code] { *exit_code = run(*a); });
+  };
+  return static_cast<int>(run_program(argc, argv, declare));
 }

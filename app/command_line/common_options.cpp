@@ -16,12 +16,7 @@ void CommonOptions::declare(CLI::App& command) {
   command.add_flag("--quiet", quiet, "No progress line");
 }
 
-void declare_session_options(CLI::App& command, std::optional<std::string>* also, bool* memory,
-                             bool* page) {
-  command
-      .add_option("--also", *also,
-                  "The drive in other forms as well, e.g. kitti,enu,geojson,kml (docs/session.md)")
-      ->type_name("WORDS");
+void declare_session_options(CLI::App& command, bool* memory, bool* page) {
   command.add_flag("--memory", *memory, "Print what memory is held, by whom");
   command.add_flag("--page", *page,
                    "Show the session on a page in a browser: publish.http, 127.0.0.1:8080 unless "

@@ -27,10 +27,8 @@ struct CommonOptions {
                                             const std::vector<std::string>& before = {}) const;
 };
 
-/// Of the commands that write a session: `--also WORDS`, which parse_other_formats() reads,
-/// `--memory` and `--page`.
-void declare_session_options(CLI::App& command, std::optional<std::string>* also, bool* memory,
-                             bool* page);
+/// Of the commands that write a session: `--memory` and `--page`.
+void declare_session_options(CLI::App& command, bool* memory, bool* page);
 
 /// `--left-topic`, `--right-topic` of the commands that read a bag's images.
 void declare_image_topics(CLI::App& command, std::string* left, std::string* right);

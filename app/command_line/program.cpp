@@ -13,7 +13,6 @@
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/runtime/version.hpp"
-#include "app/runtime/withdrawn.hpp"
 #include "core/features/simd_target.hpp"
 
 #include <CLI/Config.hpp>

@@ -2,7 +2,6 @@
 #include <optional>
 
 #include "app/command_line/calibrate_options.hpp"
-#include "app/command_line/checkerboard_tool.hpp"
 #include "app/commands/commands.hpp"
 #include "app/datasets/sequence_format.hpp"
 #include "app/session/drive_calibration.hpp"

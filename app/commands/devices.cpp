@@ -2,12 +2,12 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
 #include "app/doctor/report.hpp"
-#include "app/doctor/udev_rules.hpp"
 
 namespace vergence::app {
 namespace {
@@ -38,15 +38,14 @@ void write_rules(const std::string& file, const std::string& rules) {
 }
 
 void list(const DevicesArguments& a, bool rules_asked) {
-  Needs needs;
-  if (!a.rig.empty()) needs = needs_of(load_configuration(a.rig, {}));
-  if (needs.given && !rules_asked)
+  std::optional<Configuration> drive;
+  if (!a.rig.empty()) drive = load_configuration(a.rig, {});
+  if (drive && !rules_asked)
     throw InputError("--rig says whose rules are written; add --write-udev");
   const Machine machine = Machine::here();
   const Inventory inventory = take_inventory(machine, {});
   std::string rules;
-  if (rules_asked)
-    rules = udev_rules(needs.given ? ports_of_rig(inventory, needs, machine) : inventory);
+  if (rules_asked) rules = udev_rules(drive ? ports_of_rig(inventory, *drive, machine) : inventory);
   const bool to_stdout = a.rules == "-";
   if (rules_asked && !to_stdout) write_rules(a.rules, rules);
   if (a.json)

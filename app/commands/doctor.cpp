@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
+#include "app/devices/rig_settings.hpp"
 #include "app/doctor/report.hpp"
 
 namespace vergence::app {
@@ -18,17 +20,17 @@ struct DoctorArguments {
 };
 
 ExitCode examine_machine(const DoctorArguments& a) {
-  Needs needs;
-  if (!a.configuration.empty()) needs = needs_of(load_configuration(a.configuration, a.set));
+  std::optional<Configuration> drive;
+  if (!a.configuration.empty()) drive = load_configuration(a.configuration, a.set);
   InventoryOptions options;
-  for (const CameraNeed& n : needs.cameras)
-    options.drivers.push_back(n.driver);  // without a configuration: all
+  for (int k = 0; drive && k < camera_count(*drive); ++k)  // without a configuration: all
+    options.drivers.push_back(drive->cameras[static_cast<std::size_t>(k)].driver);
   const Machine machine = Machine::here();
   const Inventory inventory = take_inventory(machine, options);
   const std::vector<Finding> findings =
-      run_checks({machine, inventory, needs, a.out, a.configuration});
+      run_checks({machine, inventory, drive ? &*drive : nullptr, a.out});
   std::cout << (a.json ? doctor_json(findings)
-                       : doctor_text(findings, needs.given, Terminal::of_stdout()));
+                       : doctor_text(findings, drive.has_value(), Terminal::of_stdout()));
   const bool any = std::any_of(findings.begin(), findings.end(),
                                [](const Finding& f) { return f.state == FindingState::problem; });
   return any ? ExitCode::not_usable : ExitCode::done;

@@ -17,21 +17,16 @@ namespace {
 struct ReplayArguments {
   CommonOptions common;
   std::string data, format = "auto", out, model = "radtan";
-  std::optional<std::string> calibration, also;
+  std::optional<std::string> calibration;
   BagTopics topics;
   std::int64_t start = 0;
   std::optional<std::int64_t> frames;
   std::optional<double> baseline, focal;
-  std::optional<std::string> distortion;
   bool from_scratch = false, calibrate_first = false, memory = false, page = false;
 };
 
 std::optional<KnownNumbers> known_numbers(const ReplayArguments& a) {
-  if (!a.focal) {
-    if (a.distortion)
-      throw InputError("--distortion goes with --focal; a calibration.yaml has its own");
-    return std::nullopt;
-  }
+  if (!a.focal) return std::nullopt;
   if (a.calibration)
     throw InputError(
         "--focal is for rigs without a calibration; give it or --calibration, not both");
@@ -46,9 +41,6 @@ std::optional<KnownNumbers> known_numbers(const ReplayArguments& a) {
   known.baseline = *a.baseline;
   known.model = a.model == "equidistant" ? CameraModelKind::pinhole_equidistant
                                          : CameraModelKind::pinhole_radtan;
-  if (a.distortion) known.distortion = parse_distortion(*a.distortion);
-  if (known.distortion.size() > 4 && known.model == CameraModelKind::pinhole_equidistant)
-    throw InputError("--distortion: an equidistant lens has k1,k2,k3,k4");
   return known;
 }
 
@@ -78,7 +70,6 @@ ReplayRequest replay_request(const ReplayArguments& a) {
                                                              ? recorded_settings(r.data)
                                                              : std::vector<std::string>{});
   r.session.quiet = a.common.quiet;
-  if (a.also) r.session.also = parse_other_formats(*a.also);
   r.session.print_memory = a.memory;
   return r;
 }
@@ -129,10 +120,6 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
                    "from the whole drive first, "
                    "or with --from-scratch during the drive, and written")
       ->type_name("PX");
-  command
-      ->add_option("--distortion", a->distortion,
-                   "--focal: the lenses' coefficients, as far as somebody knows")
-      ->type_name("K1,K2,P1,P2");
   command->add_option("--model", a->model, "--focal: radtan, or equidistant for fisheye lenses")
       ->check(CLI::IsMember({"radtan", "equidistant"}))
       ->capture_default_str();
@@ -142,7 +129,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   command->add_flag("--calibrate-first", a->calibrate_first,
                     "Calibrate from the whole drive, lenses included, then drive with what was "
                     "found (twice the drive more)");
-  declare_session_options(*command, &a->also, &a->memory, &a->page);
+  declare_session_options(*command, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {
     ReplayRequest request = replay_request(*a);

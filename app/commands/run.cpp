@@ -16,7 +16,7 @@ struct RunArguments {
   CommonOptions common;
   std::string configuration, out;
   std::vector<std::string> faults;
-  std::optional<std::string> calibration, also, record;
+  std::optional<std::string> calibration, record;
   std::optional<double> duration_s;
   bool fast = false, from_scratch = false, memory = false, page = false;
 };
@@ -35,7 +35,6 @@ RunRequest run_request(const RunArguments& a) {
   r.duration_s = a.duration_s;
   r.fast = a.fast;
   r.session.quiet = a.common.quiet;
-  if (a.also) r.session.also = parse_other_formats(*a.also);
   r.session.print_memory = a.memory;
   return r;
 }
@@ -78,7 +77,7 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
           "--record", a->record,
           "What is recorded into drive.mcap, e.g. poses,ins,images,pulses (docs/recording.md)")
       ->type_name("WORDS");
-  declare_session_options(*command, &a->also, &a->memory, &a->page);
+  declare_session_options(*command, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {
     RunRequest request = run_request(*a);

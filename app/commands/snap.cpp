@@ -47,16 +47,12 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
       ->type_name("DIR");
   command->add_option("--count", a->count, "Take so many sets, one after the other")
       ->type_name("N");
-  command
-      ->add_option(
-          "--wait", a->wait_s,
-          "Longest wait for a set; then cameras that wait for a pulse are triggered by command")
-      ->type_name("S");
+  command->add_option("--wait", a->wait_s, "Longest wait for a set")->type_name("S");
   command->add_option("--set", a->set, "Set a key of the configuration; as often as needed")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   command->footer(
-      "Exit code: 0 done, 1 the pictures are no good (black, white, twice the same, exchanged), 2 "
+      "Exit code: 0 done, 1 the pictures are no good (black, white, twice the same), 2 "
       "bad arguments,\n"
       "3 a camera is not there or sent nothing.");
   command->callback([a, exit_code] { *exit_code = take_pictures(snap_request(*a)); });

@@ -1,22 +1,24 @@
 #include "app/config/configuration.hpp"
 
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <charconv>
 #include <map>
 #include <set>
+#include <sstream>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
-#include "app/config/camera_options.hpp"
 #include "app/config/schema.hpp"
 #include "app/config/yaml_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
-#include "app/runtime/withdrawn.hpp"
 
 namespace vergence::app {
+
 namespace {
 
 // A configuration is a tree of a few dozen leaves; aliases could unfold a small file into billions.
@@ -372,6 +374,54 @@ std::string configuration_hash(const Configuration& configuration) {
   for (const char c : canonical_text(configuration))
     hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
   return fmt::format("{:016x}", hash);
+}
+
+namespace {
+
+constexpr std::size_t kShown = 60;  // bytes of a text from outside in a sentence
+
+std::string no_such_option(const std::string& name, const CameraSettings& camera) {
+  std::vector<std::string> names;
+  for (const OptionRow& row : option_rows(camera.options)) names.push_back(row.name);
+  if (const std::string why = why_withdrawn(Withdrawn::Kind::camera_option, name); !why.empty())
+    return fmt::format("there is no option \"{}\"{}", name, why);
+  const std::string near = did_you_mean(name, names);
+  return fmt::format("there is no option \"{}\"{} {} cameras have {}", name.substr(0, kShown),
+                     near.empty() ? ";" : near, camera.driver, fmt::join(names, ", "));
+}
+
+}  // namespace
+
+std::string set_camera_option(const std::string& name, const std::string& value,
+                              CameraSettings* camera) {
+  if (std::holds_alternative<std::monostate>(camera->options)) {
+    const auto begin = default_options(camera->driver);
+    if (!begin) return {};
+    camera->options = *begin;
+  }
+  if (set_option(name, value, &camera->options)) return {};
+  const OptionRow* row = find_option(camera->options, name);
+  if (row == nullptr) return no_such_option(name, *camera);
+  return fmt::format("{} is \"{}\"; it takes {}", name.substr(0, kShown), value.substr(0, kShown),
+                     row->values);
+}
+
+std::string set_camera_options(const std::string& text, CameraSettings* camera) {
+  camera->options = {};
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const auto equals = word.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == word.size())
+      return fmt::format(
+          "\"{}\" is no option; they are NAME=VALUE, as in packet_size=9000, or a "
+          "group {{packet_size: 9000}}",
+          word.substr(0, kShown));
+    if (std::string why =
+            set_camera_option(word.substr(0, equals), word.substr(equals + 1), camera);
+        !why.empty())
+      return why;
+  }
+  return {};
 }
 
 }  // namespace vergence::app

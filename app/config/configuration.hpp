@@ -144,16 +144,8 @@ struct RecordSettings {
   int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
   double keep_s = 0;                               // 0: everything
   int roll_mb = 0;                                 // 0: one file
-  int memory_mb = 0;                               // 0: as much as six seconds take, and keep_s
-  int image_format = 0;                            // kRawImages …
-  static constexpr int kRawImages = 0, kPngImages = 1;
 
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
-};
-
-/// `sessions:` the folders that drives leave side by side.
-struct SessionsSettings {
-  int quota_mb = 0;  // 0: none
 };
 
 /// `publish:` what others see of a running session (docs/publish.md). Empty: nothing.
@@ -189,7 +181,6 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
-  SessionsSettings sessions{};
   RealtimeSettings realtime{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   int preset = 0;  // odometry.preset: 1: small, what other keys are that nobody gave
@@ -223,5 +214,12 @@ struct Configuration {
 /// 16 hexadecimal digits (FNV-1a, 64 bit) of canonical_text(): equal for equal configurations,
 /// however they were written.
 [[nodiscard]] std::string configuration_hash(const Configuration& configuration);
+
+/// One option. Empty: done, or the driver has no options; else half a sentence about what is wrong.
+[[nodiscard]] std::string set_camera_option(const std::string& name, const std::string& value,
+                                            CameraSettings* camera);
+
+/// All of them, `NAME=VALUE …`: those not named are as they begin. As set_camera_option().
+[[nodiscard]] std::string set_camera_options(const std::string& text, CameraSettings* camera);
 
 }  // namespace vergence::app

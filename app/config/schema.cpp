@@ -1,16 +1,812 @@
 #include "app/config/schema.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <iterator>
+#include <limits>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "app/config/detail/schema_groups.hpp"
+#include "app/config/configuration.hpp"
 #include "app/runtime/realtime.hpp"
 
 namespace vergence::app {
+
+namespace groups {
+namespace {
+
+/// Rows whose values are fields of one part of the configuration. `part` gives that part, of a
+/// Configuration const or not.
+template <class Settings>
+class Rows {
+ public:
+  template <class Part>
+  Rows(std::string prefix, std::string meaning, Part part)
+      : prefix_(std::move(prefix)),
+        part_([part](Configuration& c) -> Settings& { return part(c); }),
+        const_part_([part](const Configuration& c) -> const Settings& { return part(c); }) {
+    group_.name = prefix_.substr(0, prefix_.find('.'));
+    group_.meaning = std::move(meaning);
+  }
+
+  /// Any integral field.
+  template <class Integer>
+  Rows& integer(const char* name, Integer Settings::*field, std::int64_t least, std::int64_t most,
+                const char* unit, const char* meaning) {
+    add(
+        name, KeyType::integer, static_cast<double>(least), static_cast<double>(most), unit,
+        meaning,
+        [field](Settings& s, const KeyValue& v) {
+          s.*field = static_cast<Integer>(std::get<std::int64_t>(v));
+        },
+        [field](const Settings& s) -> KeyValue { return static_cast<std::int64_t>(s.*field); });
+    return *this;
+  }
+
+  Rows& number(const char* name, double Settings::*field, double least, double most,
+               const char* unit, const char* meaning) {
+    add(
+        name, KeyType::number, least, most, unit, meaning,
+        [field](Settings& s, const KeyValue& v) { s.*field = std::get<double>(v); },
+        [field](const Settings& s) -> KeyValue { return s.*field; });
+    return *this;
+  }
+
+  /// A list: one key for each number, `name.0` and so on.
+  template <std::size_t N>
+  Rows& numbers(const char* name, std::array<double, N> Settings::*field, double least, double most,
+                const char* unit, const std::array<const char*, N>& meanings) {
+    for (std::size_t i = 0; i < N; ++i)
+      add(
+          name + ("." + std::to_string(i)), KeyType::number, least, most, unit, meanings[i],
+          [field, i](Settings& s, const KeyValue& v) { (s.*field)[i] = std::get<double>(v); },
+          [field, i](const Settings& s) -> KeyValue { return (s.*field)[i]; });
+    return *this;
+  }
+
+  Rows& text(const char* name, std::string Settings::*field, std::size_t longest,
+             const char* meaning) {
+    add(
+        name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
+        [field](Settings& s, const KeyValue& v) { s.*field = std::get<std::string>(v); },
+        [field](const Settings& s) -> KeyValue { return s.*field; });
+    return *this;
+  }
+
+  /// A number that is chosen by its word: the first stands for 0.
+  Rows& choice(const char* name, int Settings::*field, const std::vector<std::string>& words,
+               const char* meaning) {
+    add(
+        name, KeyType::text, 0, 0, "", meaning,
+        [field, words](Settings& s, const KeyValue& v) {
+          s.*field = static_cast<int>(
+              std::find(words.begin(), words.end(), std::get<std::string>(v)) - words.begin());
+        },
+        [field, words](const Settings& s) -> KeyValue {
+          return words[static_cast<std::size_t>(s.*field)];
+        });
+    group_.keys.back().words = words;
+    return *this;
+  }
+
+  /// One of the values of an enumeration, by its word.
+  template <class Enum>
+  Rows& choice(const char* name, Enum Settings::*field,
+               const std::vector<std::pair<std::string, Enum>>& choices, const char* meaning) {
+    add(
+        name, KeyType::text, 0, 0, "", meaning,
+        [field, choices](Settings& s, const KeyValue& v) {
+          for (const auto& [word, value] : choices)
+            if (word == std::get<std::string>(v)) s.*field = value;
+        },
+        [field, choices](const Settings& s) -> KeyValue {
+          for (const auto& [word, value] : choices)
+            if (value == s.*field) return word;
+          return std::string();
+        });
+    for (const auto& [word, value] : choices) group_.keys.back().words.push_back(word);
+    return *this;
+  }
+
+  /// A text that is one of a few words.
+  Rows& word(const char* name, std::string Settings::*field, std::vector<std::string> words,
+             const char* meaning) {
+    text(name, field, 0, meaning);
+    group_.keys.back().words = std::move(words);
+    return *this;
+  }
+
+  /// The options of a camera's driver, as one text.
+  Rows& options(const char* name, CameraOptions Settings::*field, std::size_t longest,
+                const char* meaning) {
+    add(
+        name, KeyType::text, 0, static_cast<double>(longest), "", meaning,
+        [](Settings& s, const KeyValue& v) {
+          (void)set_camera_options(std::get<std::string>(v), &s);
+        },
+        [field](const Settings& s) -> KeyValue { return options_text(s.*field); });
+    return *this;
+  }
+
+  /// The rows of another part, behind these.
+  Rows& also(Group&& other) {
+    std::move(other.keys.begin(), other.keys.end(), std::back_inserter(group_.keys));
+    return *this;
+  }
+
+  [[nodiscard]] Group done() { return std::move(group_); }
+
+ private:
+  void add(const std::string& name, KeyType type, double least, double most, const char* unit,
+           const char* meaning, std::function<void(Settings&, const KeyValue&)> set,
+           std::function<KeyValue(const Settings&)> get) {
+    group_.keys.push_back({prefix_ + "." + name,
+                           type,
+                           unit,
+                           least,
+                           most,
+                           meaning,
+                           [part = part_, set = std::move(set)](
+                               Configuration& c, const KeyValue& v) { set(part(c), v); },
+                           [part = const_part_, get = std::move(get)](const Configuration& c) {
+                             return get(part(c));
+                           },
+                           {}});
+  }
+
+  std::string prefix_;
+  std::function<Settings&(Configuration&)> part_;
+  std::function<const Settings&(const Configuration&)> const_part_;
+  Group group_;
+};
+
+Group general() {
+  Group group;
+  group.meaning = "Keys that belong to no group.";
+  group.keys.push_back(
+      {"threads", KeyType::integer, "", 1, 2,
+       "Threads of the estimator: with 2 the second image is searched and tracked beside the "
+       "first; the poses are the same.",
+       [](Configuration& c, const KeyValue& v) {
+         c.threads = static_cast<int>(std::get<std::int64_t>(v));
+       },
+       [](const Configuration& c) -> KeyValue { return std::int64_t{c.threads}; }});
+  return group;
+}
+
+Group kitti_raw() {
+  using K = KittiRawSettings;
+  return Rows<K>(
+             "kitti_raw", "Replays of KITTI raw drives.",
+             [](auto& c) -> auto& { return c.kitti_raw; })
+      .integer("left", &K::left, 0, 3, "", "Left camera of a drive, `image_NN`: 0 grey, 2 colour.")
+      .integer("right", &K::right, 0, 3, "", "Right camera: 1 grey, 3 colour.")
+      .done();
+}
+
+Group record() {
+  using R = RecordSettings;
+  const std::vector<std::string> off_on{"off", "on"};
+  return Rows<R>(
+             "record",
+             "What is recorded into `drive.mcap` of the session (docs/recording.md). A list, "
+             "`record: [poses, ins, images]`, switches its words on.",
+             [](auto& c) -> auto& { return c.record; })
+      .choice("poses", &R::poses, off_on, "Odometry and transforms of every frame.")
+      .choice("ins", &R::ins, off_on, "All readings of the INS, as they were compared.")
+      .choice("images", &R::images, off_on,
+              "All images that the estimator was given, with their cameras: what `replay --format "
+              "session` needs.")
+      .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
+      .number("keep_s", &R::keep_s, 0, 3600, "s",
+              "0: everything; else only what was so long before an event and so long after it.")
+      .integer("roll_mb", &R::roll_mb, 0, 10'000'000, "MB",
+               "Size at which a file ends and the next one begins; 0: one file.")
+      .done();
+}
+
+Group publish() {
+  using P = PublishSettings;
+  return Rows<P>(
+             "publish", "What others see of a running session, live or replayed (docs/publish.md).",
+             [](auto& c) -> auto& { return c.publish; })
+      .text("lines", &P::lines, 200,
+            "One JSON object a frame goes there: `unix:///PATH` (a stream socket that readers "
+            "connect to) or `udp://HOST:PORT`; empty: nowhere.")
+      .text("http", &P::http, 200,
+            "HOST:PORT of the live page, e.g. `127.0.0.1:8080`; beyond this machine viewers need "
+            "the token. Empty: no page.")
+      .text("token_file", &P::token_file, 400,
+            "File whose first line is the page's token, 16 to 128 letters and digits; empty: a "
+            "new one each session, shown when it starts.")
+      .integer("viewers", &P::viewers, 1, 16, "viewers", "So many may look at the page at a time.")
+      .done();
+}
+
+Group realtime() {
+  using R = RealtimeSettings;
+  return Rows<R>(
+             "realtime",
+             "Scheduling and memory of the threads of a drive (docs/realtime.md). What the system "
+             "refuses is said, and the drive goes on.",
+             [](auto& c) -> auto& { return c.realtime; })
+      .integer("priority", &R::priority, 0, 90, "",
+               "SCHED_FIFO priority of the threads of cameras, trigger and synchroniser; the "
+               "estimator has one less, the INS two, files three, the solver none. 0: no thread "
+               "has one.")
+      .text("affinity", &R::affinity, 64,
+            "Processors of these threads, as taskset has them: `0-1,3`. Empty: any.")
+      .text("solver_affinity", &R::solver_affinity, 64,
+            "Processors of the calibration solver. Empty: any.")
+      .choice("lock_memory", &R::lock_memory, {"off", "on"},
+              "`on`: memory is locked before the first frame (mlockall), so that none of it is "
+              "ever fetched from a disk.")
+      .number("frame_budget_ms", &R::frame_budget_ms, 0, 10000, "ms",
+              "What the estimator may take for a frame of a live drive before it leaves out work "
+              "that the pose does not wait for. 0: the frame interval.")
+      .done();
+}
+
+std::vector<std::pair<std::string, trigger_board::Edge>> edges() {
+  using trigger_board::Edge;
+  return {{"none", Edge::none}, {"rising", Edge::rising}, {"falling", Edge::falling}};
+}
+
+std::vector<std::pair<std::string, SyncMode>> sync_modes() {
+  std::vector<std::pair<std::string, SyncMode>> modes;
+  for (const SyncMode mode :
+       {SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe, SyncMode::bus,
+        SyncMode::ptp, SyncMode::one_picture, SyncMode::counter, SyncMode::software})
+    modes.emplace_back(to_string(mode), mode);
+  return modes;
+}
+
+Group rig() {
+  using R = RigSettings;
+  return Rows<R>(
+             "rig", "The rig as a whole.", [](auto& c) -> auto& { return c.rig; })
+      .text("name", &R::name, 64, "Name of the rig in the calibration.yaml that a session writes.")
+      .number("nominal.baseline_m", &R::baseline_m, 0.02, 10, "m",
+              "Distance of the right camera from the left one, to its right.")
+      .number("nominal.focal_px", &R::focal_px, 0, 20000, "px",
+              "Focal length of every camera; 0: 0.72 of the image's width.")
+      .number("nominal.k1", &R::k1, -1, 1, "",
+              "First radial coefficient of every lens, of the model that it has.")
+      .number("nominal.k2", &R::k2, -1, 1, "", "Second radial coefficient of every lens.")
+      .text(
+          "state_dir", &R::state_dir, 400,
+          "Folder of `calibration_state.yaml`, the last calibration accepted or confirmed: written "
+          "at once, where the next `run` begins. Empty: "
+          "`$XDG_STATE_HOME/vergence/NAME`, without that variable "
+          "`~/.local/state/vergence/NAME`; `none`: there is none.")
+      .done();
+}
+
+Group cameras() {
+  using C = CameraSettings;
+  Group all;
+  for (std::size_t k = 0; k < kMaxCameras; ++k) {
+    Group one =
+        Rows<C>(
+            "cameras." + std::to_string(k), "The cameras, a list; the first is the left one.",
+            [k](auto& c) -> auto& { return c.cameras[k]; })
+            .text("driver", &C::driver, 16,
+                  "What talks to it: `mock`, `gige`, `iidc-usb`, `iidc-1394` or `v4l2`. Empty: "
+                  "there is no such camera.")
+            .text("name", &C::name, 32, "How it is called in messages and in calibration.yaml.")
+            .text("serial", &C::serial, 64,
+                  "Which one, where there are several; empty: the next one. GigE: or its address.")
+            .choice<PictureHalf>(
+                "half", &C::half,
+                {{"whole", PictureHalf::whole},
+                 {"left", PictureHalf::left},
+                 {"right", PictureHalf::right}},
+                "Of a camera that gives both images side by side in one picture: which one this "
+                "is. Two entries with one `serial` then are one camera of twice the `size.0`.")
+            .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
+            .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
+            .integer("offset.0", &C::offset_x, 0, 16384, "px",
+                     "Left edge of the region that is read out, on the sensor.")
+            .integer("offset.1", &C::offset_y, 0, 16384, "px", "Upper edge of that region.")
+            .text("pixel_format", &C::pixel_format, 32,
+                  "The device's own name (`Mono8`, `BayerGB8`, `GREY`); empty: the cheapest that "
+                  "gives grey.")
+            .choice<CameraTrigger>(
+                "trigger", &C::trigger,
+                {{"hardware", CameraTrigger::hardware},
+                 {"software", CameraTrigger::software},
+                 {"free", CameraTrigger::free}},
+                "What makes it expose: `hardware`, a pulse at its input; `software`, a command "
+                "at `trigger.rate`; `free`, its own "
+                "clock. All cameras alike.")
+            .options(
+                "options", &C::options, 400,
+                "What only this kind of camera has (docs/cameras): `NAME=VALUE …`, or a group: "
+                "`{packet_size: 9000}`.")
+            .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
+                    "Time of an exposure; 8000 is daylight in the mock's world.")
+            .number("trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
+                    "From a pulse's edge to the start of the exposure: of the input (10 to 100 µs "
+                    "if it is opto-coupled) and of the camera. "
+                    "With `sync.mode` `board`, `ins_syncout` or `master_strobe` it goes into every "
+                    "stamp, unless `trigger.feedback` measures it.")
+            .number("stamp_jitter_us", &C::stamp_jitter_us, 0, 5000, "µs",
+                    "By how much its stamps may be off the pulses; 0: what this driver's stamps "
+                    "have (20, of a camera that only the host "
+                    "stamps 1000). With more than half of `trigger.vary_us` only a pause proves "
+                    "the pairing.")
+            .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
+            .text("mask", &C::mask, 400,
+                  "PNG or PGM of the image's size, 0 where nothing is to be looked for: the "
+                  "vehicle itself, dirt. A relative path begins "
+                  "at this file's folder.")
+            .choice<CameraModelKind>(
+                "model", &C::model,
+                {{"pinhole-radtan", CameraModelKind::pinhole_radtan},
+                 {"pinhole-equidistant", CameraModelKind::pinhole_equidistant}},
+                "What its lens is like: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a "
+                "fisheye lens, k1 k2 k3 k4.")
+            .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
+                     {"Focal length along x of this camera's lens; all four 0: the lens is that of "
+                      "`rig.nominal`.",
+                      "Focal length along y.", "Principal point of that lens, x.",
+                      "Principal point of that lens, y."})
+            .numbers("distortion", &C::distortion, -2, 2, "",
+                     {"With `intrinsics`: first radial coefficient, k1.",
+                      "Second radial coefficient, k2.",
+                      "First tangential coefficient, p1; of an equidistant lens k3.",
+                      "Second tangential coefficient, p2; of an equidistant lens k4.",
+                      "Third radial coefficient, k3; an equidistant lens has none."})
+            .numbers(
+                "T_camera_left", &C::T_camera_left, -20, 20, "1, m",
+                {"Where the camera sits, X_camera = R X_left + t, as rows of [R t]: r11. All zero: "
+                 "parallel, N baselines to "
+                 "the right.",
+                 "The same transform: r12 of its rotation.",
+                 "The same transform: r13 of its rotation.", "The same transform: t1 in metres.",
+                 "The same transform: r21 of its rotation.",
+                 "The same transform: r22 of its rotation.",
+                 "The same transform: r23 of its rotation.", "The same transform: t2 in metres.",
+                 "The same transform: r31 of its rotation.",
+                 "The same transform: r32 of its rotation.",
+                 "The same transform: r33 of its rotation.", "The same transform: t3 in metres."})
+            .done();
+    all.name = one.name;
+    all.meaning = one.meaning;
+    std::move(one.keys.begin(), one.keys.end(), std::back_inserter(all.keys));
+  }
+  all.list = "cameras.";
+  return all;
+}
+
+Group exposure() {
+  using E = ExposureSettings;
+  return Rows<E>(
+             "exposure",
+             "Exposure and gain of all cameras together, while driving (docs/cameras.md).",
+             [](auto& c) -> auto& { return c.exposure; })
+      .choice("mode", &E::mode, {"fixed", "auto"},
+              "`fixed`: as `cameras` says. `auto`: by the brightness of camera 0's images, the "
+              "same for all cameras; they begin with camera "
+              "0's.")
+      .number("target", &E::target, 20, 200, "grey levels",
+              "Mean of the image aimed at, of what its mask shows.")
+      .number("saturated_percent", &E::saturated_percent, 0, 50, "%",
+              "Share of the pixels that may be at the end of the scale.")
+      .number("min_us", &E::min_us, 5, 100000, "µs", "Shortest exposure that is chosen.")
+      .number("max_us", &E::max_us, 10, 200000, "µs",
+              "Longest exposure, for the sake of motion blur; what is missing then comes from the "
+              "gain.")
+      .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Largest gain that is chosen.")
+      .integer(
+          "settle_frames", &E::settle_frames, 2, 60, "frames",
+          "Images after a change until one is judged again: one more than the cameras take for it.")
+      .done();
+}
+
+Group trigger() {
+  using T = TriggerSettings;
+  return Rows<T>(
+             "trigger", "What makes the cameras expose together.",
+             [](auto& c) -> auto& { return c.trigger; })
+      .text("driver", &T::driver, 16,
+            "What makes the pulses: `board`, a trigger board on a serial port "
+            "(docs/trigger_board.md); `mock`, with mock cameras; `none`: "
+            "something that reports nothing, or nothing at all.")
+      .text("port", &T::port, 200,
+            "Serial port of the board, `/dev/ttyACM0`, or its serial number. Empty: the only board "
+            "there is.")
+      .integer("baud", &T::baud, 0, 3000000, "baud",
+               "Rate of that line where it has one; 0: found by asking.")
+      .number("rate", &T::rate, 1, 200, "Hz", "Pulses, and so images of every camera, a second.")
+      .number("width_us", &T::width_us, 1, 100000, "µs",
+              "Length of a pulse; what the cameras' inputs need.")
+      .number("vary_us", &T::vary_us, 0, 20000, "µs",
+              "Every interval is longer or shorter by this, in an order that does not repeat: the "
+              "cameras' own stamps then prove at any time "
+              "which frame is of which pulse. 0: even intervals, a pause proves it.")
+      .integer("lines", &T::lines, 0, 15, "",
+               "Outputs that are pulsed, a mask: bit k is line k, wired to camera k. 0: one for "
+               "each camera.")
+      .integer("active_low", &T::active_low, 0, 15, "",
+               "Of these, the ones whose pulse is low: a mask.")
+      .integer("feedback", &T::feedback, 0, 15, "",
+               "Inputs that the cameras' exposure-active outputs are wired to, a mask: stamps are "
+               "then the measured middle of the exposure.")
+      .integer("feedback_active_low", &T::feedback_active_low, 0, 15, "",
+               "Of these, the ones that are low while a camera exposes.")
+      .choice(
+          "pps", &T::pps, edges(),
+          "Edge of the GNSS receiver's pulse per second at the board: `none` is wired, `rising` "
+          "or `falling`.")
+      .choice("ins", &T::ins, edges(),
+              "Edge of the INS's SyncOut at the board: `none` is wired, `rising` or `falling`.")
+      .done();
+}
+
+Group sync() {
+  using S = SyncSettings;
+  return Rows<S>(
+             "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
+      .choice<SyncMode>(
+          "mode", &S::mode, sync_modes(),
+          "By what images are paired, and what proves it (docs/time.md). Proven: `board`, by a "
+          "trigger board's pulses; `ins_syncout`, by "
+          "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE "
+          "1394 cycle timer; `ptp`, stamps of one PTP "
+          "clock; `one_picture`, both images come in one (`cameras.N.half`). Not proven: "
+          "`counter`, exposure n of every camera belongs together; "
+          "`software`, what was exposed within "
+          "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
+      .number("hold_ms", &S::hold_ms, 1, 10000, "ms",
+              "How long the images of a pulse wait for one that is late.")
+      .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
+              "With `software`, `bus`, `ptp` and `one_picture`: the farthest that exposures of one "
+              "set are apart.")
+      .done();
+}
+
+Group ins() {
+  using I = InsSettings;
+  return Rows<I>(
+             "ins", "The inertial navigation system that the pose is compared with.",
+             [](auto& c) -> auto& { return c.ins; })
+      .text("driver", &I::driver, 16,
+            "What talks to it: `xsens`, `nmea` or `ubx` (satellite receivers), `mock` (with mock "
+            "cameras), or `none`.")
+      .text("port", &I::port, 200,
+            "Serial port of the INS, `/dev/ttyUSB0` or better a link that stays: "
+            "`/dev/serial/by-id/…`. Empty: the only one on USB.")
+      .integer("baud", &I::baud, 0, 2000000, "baud",
+               "Rate of that line; the device is brought to it. 0: as the device has it, which is "
+               "looked for.")
+      .number("rate", &I::rate, 1, 400, "Hz",
+              "Readings of the INS a second; an MTi-G-700/710 takes the nearest it has (100 for "
+              "120). With "
+              "`nmea` and `ubx` what the receiver sends.")
+      .number("sync_out_hz", &I::sync_out_hz, -1, 400, "Hz",
+              "Pulses a second at the INS's SyncOut; 0: as the device has it, -1: none. An "
+              "MTi-G-700/710 makes 400 Hz / n, no 30.")
+      .number("sync_out_width_ms", &I::sync_out_width_ms, 0.1, 100, "ms", "Length of such a pulse.")
+      .number("processing_ms", &I::processing_ms, 0, 50, "ms",
+              "From a sample to its first byte on the line, as the device's manual says; it goes "
+              "into every stamp.")
+      .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
+               {"Where the left camera sits in the INS's body: forward.",
+                "The same place, to the left.", "The same place, upwards."})
+      .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",
+               {"How the rig's forward-left-up axes are turned against the INS's: roll.",
+                "The same turn, its pitch.", "The same turn, its yaw."})
+      .done();
+}
+
+Group comparison() {
+  using C = ComparisonSettings;
+  return Rows<C>(
+             "comparison", "The comparison with the INS.",
+             [](auto& c) -> auto& { return c.comparison; })
+      .number("placement_m", &C::placement_m, 1, 100000, "m",
+              "Distance driven with a valid fix after which the path is placed on the earth.")
+      .number("correlation_s", &C::correlation_s, 0.1, 3600, "s",
+              "For so long the INS's position errors resemble one another.")
+      .number("heading_sigma_deg", &C::heading_sigma_deg, 0, 180, "°",
+              "Of the INS's heading as the camera has it, mount included: so it weighs in the "
+              "placement. 0: not at all, or with a mount "
+              "published by a data set "
+              "0.3°.")
+      .number("max_gap_ms", &C::max_gap_ms, 1, 10000, "ms",
+              "Readings farther apart than this are not interpolated between.")
+      .number("max_wait_ms", &C::max_wait_ms, 1, 3000, "ms",
+              "A pose waits so long for the reading after it.")
+      .number("jump_m", &C::jump_m, 0.1, 1e6, "m",
+              "A step of the INS's position beyond this (and 60 m/s) is a jump.")
+      .number("scale_tolerance", &C::scale_tolerance, 0.001, 1, "",
+              "Relative difference of the path lengths that is reported.")
+      .done();
+}
+
+Group odometry() {
+  using O = OdometryOptions;
+  constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
+  Rows<O> rows(
+      "odometry",
+      "How motion is found from the images. The defaults suit road vehicles and hand-held rigs; "
+      "change one at a time.",
+      [](auto& c) -> auto& { return c.odometry; });
+  rows.integer("features", &O::features, 50, 1000, "points",
+               "Points tracked in each image: more of them cost time and hold the pose better "
+               "where texture is poor. They are spread "
+               "over a grid of cells of the size that this number asks for.")
+      .choice("first_pair", &O::first_pair, {"corners", "surf"},
+              "What is matched across the first images of a rig that is calibrated from scratch: "
+              "the corners that are tracked anyway, or "
+              "SURF-64; docs/front_ends.md compares them.")
+      .integer("pyramid_levels", &O::pyramid_levels, 2, 6, "levels",
+               "Sizes of the image that are searched, each half of the one before: more levels "
+               "follow faster motion.")
+      .number("band_px", &O::band_px, 0.5, 5, "px",
+              "Half the width of the band along the epipolar line in which a match across is "
+              "sought: wide for a poor calibration.")
+      .number("pixel_sigma", &O::pixel_sigma, 0.02, 5, "px",
+              "Standard deviation of a tracked corner's position, each coordinate, at full "
+              "resolution; the scale of all residuals.")
+      .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
+              "Added to it (in quadrature) for a patch seen from one depth further to the side "
+              "than where it was cut: its slope is unknown.")
+      .number("huber", &O::huber, 1, 10, "sigmas",
+              "Residuals beyond this count less and less (Huber's weight).")
+      .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
+               "Keyframes that are adjusted together with their points.")
+      .number("rig_turn_sigma", &O::rig_turn_sigma, 0, 0.05, "rad",
+              "What the turn between two cameras that shifts all disparities alike may be off by, "
+              "where their calibration does not say less: "
+              "it is estimated with every window. 0: the calibration is held as exact.")
+      .integer("window_steps", &O::window_steps, 1, 30, "steps",
+               "Most solver steps of one such adjustment.")
+      .number("keyframe_parallax", &O::keyframe_parallax, 0.005, 0.3, "rad",
+              "Median turn of the rays to the points since the last keyframe that makes a new one.")
+      .number("keyframe_tracked", &O::keyframe_tracked, 0.1, 1, "",
+              "A new keyframe is made when less than this share of the last one's points is still "
+              "tracked.")
+      .integer("min_inliers", &O::min_inliers, 6, 200, "points",
+               "A pose on fewer points than this is not believed: status `lost`.")
+      .integer("ok_inliers", &O::ok_inliers, 6, 1000, "points",
+               "A pose on fewer points than this is `degraded` with the reason `few_inliers`; not "
+               "below `min_inliers`.")
+      .integer("mlesac_hypotheses", &O::mlesac_hypotheses, 10, 1000, "",
+               "Most poses tried on random point triples, a frame.")
+      .integer("seed", &O::seed, 0, kLargestSeed, "",
+               "Seed of that sampling: the same seed gives the same poses.");
+  return rows
+      .also(Rows<Configuration>(
+                "odometry", "", [](auto& c) -> auto& { return c; })
+                .choice("preset", &Configuration::preset, {"default", "small"},
+                        "`small`, for small boards: `odometry.features` 250, "
+                        "`odometry.window_keyframes` 8, `calibration.max_frames` 100 and "
+                        "`calibration.max_observations` 50000 where they are not given; what it "
+                        "costs and saves is in docs/deployment.md.")
+                .done())
+      .done();
+}
+
+Group calibration_options() {
+  using C = calibration::CalibrationOptions;
+  return Rows<C>(
+             "calibration",
+             "How the stereo transform is found and kept while driving; docs/calibration.md tells "
+             "more.",
+             [](auto& c) -> auto& { return c.calibration; })
+      .integer("min_frames", &C::min_frames, 5, 150, "frames",
+               "Frames with motion that are gathered before a calibration is tried; not above "
+               "`max_frames`.")
+      .integer("max_frames", &C::max_frames, 10, 150, "frames",
+               "The newest so many are kept, and solved at once.")
+      .number("rotation_sigma_mrad", &C::rotation_sigma_mrad, 0.001, 10, "mrad",
+              "Enough: predicted sigma of each rotation axis, noise only, at which a calibration "
+              "is solved before `max_frames`.")
+      .number("translation_sigma_mm", &C::translation_sigma_mm, 0.01, 1000, "mm",
+              "The same of the translation across the baseline, for a baseline of 0.75 m and in "
+              "proportion to it.")
+      .integer("adopt_after", &C::adopt_after, 0, 1000, "frames",
+               "A result is adopted when the frames after its snapshot confirm it, 6 of them or "
+               "more; so many frames after the snapshot it is decided about, one way or the other. "
+               "In a replay and with `--fast` the solver is waited for: alike on every machine.")
+      .integer(
+          "max_observations", &C::max_observations, 10'000, 1'000'000, "",
+          "Observations that one solve takes; of more, frames are taken at wider steps: time and "
+          "memory.")
+      .choice("focal_lengths", &C::estimate_focal_lengths, {"hold", "estimate"},
+              "`estimate`: the focal length of each further camera is found with the transform, by "
+              "its prior; `hold`: it is believed.")
+      .choice("intrinsics", &C::refine_intrinsics, {"hold", "refine"},
+              "`refine`: focal lengths and principal points of all cameras are found, too, by "
+              "their priors.")
+      .choice("lenses", &C::estimate_lenses, {"hold", "estimate"},
+              "`estimate`: focal lengths, principal points and distortion are part of what the "
+              "drive measures, and are taken from it where "
+              "it shows that those given are off; `hold`: they are believed.")
+      .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%",
+              "Prior sigma of a focal length.")
+      .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px",
+              "What a coordinate of a principal point that is held may be off by; with "
+              "`intrinsics: refine` its prior sigma.")
+      .number("lens_centre_sigma_px", &C::lens_centre_sigma_px, 0.01, 100, "px",
+              "Prior sigma of a further camera's principal point with `lenses: estimate`; one in "
+              "calibration.yaml goes before it.")
+      .number("distortion_sigma", &C::distortion_sigma, 1e-5, 1, "",
+              "The same of a radial coefficient (k1, k2), of an equidistant lens k1 to k4.")
+      .number("tangential_sigma", &C::tangential_sigma, 1e-6, 0.1, "",
+              "The same of a tangential coefficient (p1, p2).")
+      .number("max_direction_deg", &C::max_direction_deg, 0.1, 180, "°",
+              "A calibration whose translation points farther from the nominal one is rejected.")
+      .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
+              "The same of the rotation; the first calibration of a drive from scratch is asked "
+              "for its direction only.")
+      .number("needs_motion_m", &C::needs_motion_m, 0.01, 1000, "m",
+              "Way within the frames gathered (or three baselines) below which the reason is "
+              "`needs_motion`.")
+      .integer("needs_near_points", &C::needs_near_points, 0, 1000, "points",
+               "Near points among those gathered below which the reason is `needs_near_structure`.")
+      .number("near_baselines", &C::near_baselines, 5, 500, "baselines",
+              "Nearer than this a point is near.")
+      .number("drift_mrad", &C::drift_mrad, 0, 100, "mrad/√h",
+              "How far a rig that nobody touches wanders in an hour, as a random walk: what is "
+              "known of it grows old by this.")
+      .number("tolerated_depth_percent", &C::tolerated_depth_percent, 0.1, 50, "%",
+              "Depth error up to which the drive has confirmed a calibration; until then poses are "
+              "`degraded: unverified_calibration`.")
+      .number("tolerated_depth_m", &C::tolerated_depth_m, 0.5, 500, "m",
+              "The depth at which that is asked; on a short baseline nearer, where a single match "
+              "is no better than that.")
+      .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
+              "Predicted depth error at 20 m up to which a calibration is called `good`.")
+      .number("usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
+              "The same up to which it `can be improved`; beyond, the word is `recalibrate`.")
+      .also(Rows<Configuration>(
+                "calibration", "", [](auto& c) -> auto& { return c; })
+                .choice("online", &Configuration::online, {"off", "on"},
+                        "`off`: nothing watches the rig, the calibration given is used to the end.")
+                .done())
+      .done();
+}
+
+Group monitor() {
+  using M = calibration::MonitorOptions;
+  return Rows<M>(
+             "monitor", "What watches whether the calibration in use is still true.",
+             [](auto& c) -> auto& { return c.monitor; })
+      .number("threshold", &M::threshold, 20, 500, "",
+              "Statistic that raises a knock or a drift: higher for fewer false alarms, lower for "
+              "smaller knocks found sooner.")
+      .number("bias_px", &M::bias_px, 0, 1, "px",
+              "Slow error that imperfect intrinsics leave in the matches across and that is no "
+              "knock, at least.")
+      .number("found_bias_px", &M::found_bias_px, 0, 2, "px",
+              "The same with a calibration that was found from images and is confirmed, expected "
+              "until the monitor has measured it.")
+      .number("claimed_bias_px", &M::claimed_bias_px, 0, 5, "px",
+              "The same with a calibration that is given.")
+      .integer("min_matches", &M::min_matches, 12, 1000, "matches",
+               "A frame with fewer matches across measures nothing.")
+      .integer("short_window", &M::short_window, 1, 10, "frames",
+               "Shortest window of moving frames that is tested: for large knocks.")
+      .integer("long_window", &M::long_window, 60, 1800, "frames",
+               "Longest window of moving frames that is tested: for drift.")
+      .number("lag_frames", &M::lag_frames, 0.1, 1, "frames",
+              "Least lag of a camera behind the others that is called `out_of_step`.")
+      .number("lag_sigmas", &M::lag_sigmas, 3, 20, "sigmas",
+              "By how much that lag has to stand out from every fixed transform.")
+      .integer("collapse_frames", &M::collapse_frames, 2, 60, "frames",
+               "So many frames in a row without the matches across that there should be are a "
+               "`collapse`.")
+      .number("collapse_share", &M::collapse_share, 0.01, 0.9, "",
+              "Of the matches expected: finding fewer is that.")
+      .integer("collapse_expected", &M::collapse_expected, 10, 1000, "matches",
+               "Matches that must be expected before their absence says anything.")
+      .done();
+}
+
+Group intrinsics_error() {
+  using E = IntrinsicsErrorSettings;
+  constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
+  return Rows<E>(
+             "mock.intrinsics_error", "", [](auto& c) -> auto& { return c.mock.intrinsics_error; })
+      .number("principal_point_px", &E::principal_point_px, 0, 50, "px",
+              "Sigma of the error of each principal point coordinate that the estimator is given; "
+              "what is rendered stays exact.")
+      .number("focal_percent", &E::focal_percent, 0, 10, "%",
+              "Sigma of the error of the focal length that it is given, one draw a camera.")
+      .integer("seed", &E::seed, 0, kLargestSeed, "",
+               "Of these errors: the same seed, the same errors.")
+      .done();
+}
+
+Group calibration_error() {
+  using E = CalibrationErrorSettings;
+  return Rows<E>(
+             "mock.calibration_error", "",
+             [](auto& c) -> auto& { return c.mock.calibration_error; })
+      .number("pitch_deg", &E::pitch_deg, -45, 45, "°",
+              "Camera 1 of the transform that the estimator is given, against the true one: turned "
+              "about its x axis.")
+      .number("yaw_deg", &E::yaw_deg, -45, 45, "°", "The same, turned about its y axis.")
+      .number("roll_deg", &E::roll_deg, -45, 45, "°", "The same, turned about its z axis.")
+      .number("x_m", &E::x_m, -1, 1, "m", "The same, shifted along its x axis.")
+      .number("y_m", &E::y_m, -1, 1, "m", "The same, shifted along its y axis.")
+      .number("z_m", &E::z_m, -1, 1, "m", "The same, shifted along its z axis.")
+      .number("length_percent", &E::length_percent, -60, 200, "%",
+              "By how much every length that it is given is too long, the baseline's included; "
+              "images alone cannot show it.")
+      .done();
+}
+
+Group mock() {
+  using M = MockSettings;
+  using Kind = vergence::mock::DriveKind;
+  constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
+  return Rows<M>(
+             "mock", "The world and the vehicle of the mock drivers; see docs/mock.md.",
+             [](auto& c) -> auto& { return c.mock; })
+      .text("world", &M::world, 16, "What is driven through: `suburb`.")
+      .choice("drive", &M::drive,
+              {{"loop", Kind::loop},
+               {"figure-eight", Kind::figure_eight},
+               {"straight", Kind::straight},
+               {"brief", Kind::brief},
+               {"still", Kind::still}},
+              "Where: `loop` (1 km), `figure-eight`, `straight`, `brief` (120 m) or `still`.")
+      .integer("seed", &M::seed, 0, kLargestSeed, "",
+               "Of the town, the vehicle's unrest and all noise: the same seed, the same drive.")
+      .choice("pattern", &M::pattern,
+              {{"grey", vergence::mock::Pattern::grey}, {"gbrg", vergence::mock::Pattern::gbrg}},
+              "Sensors: `grey`, or `gbrg` (Bayer).")
+      .choice("ins", &M::ins, {{"noisy", M::Ins::noisy}, {"ideal", M::Ins::ideal}},
+              "Errors of the INS: `noisy` as an MTi-G, or `ideal`.")
+      .integer("texture_detail", &M::texture_detail, 0, 2, "",
+               "Resolution of the facades: 4.7, 2.3 or 1.2 cm a texel (8, 32, 128 MB).")
+      .integer("noise", &M::noise, 0, 1, "", "1: shot and read noise of the sensors; 0: none.")
+      .integer("blur_samples", &M::blur_samples, 1, 16, "",
+               "Poses averaged over an exposure: 1 is no motion blur; time grows with it.")
+      .number("speed", &M::speed, 0.01, 20, "m/s", "Speed on the straights.")
+      .number("suspension", &M::suspension, 0, 3, "",
+              "Gain on pitch, roll and heave of the springs.")
+      .number("vibration", &M::vibration, 0, 5, "", "Gain on the shake at 6 to 12 Hz.")
+      .number(
+          "stop_s", &M::stop_s, 1, 3600, "s",
+          "Length of each stop, and of the standing start and end, which last a minute at most.")
+      .number("hill_deg", &M::hill_deg, 0, 5, "°", "Steepest slope of the streets.")
+      .number("clock_drift_ppm", &M::clock_drift_ppm, 0, 150, "ppm",
+              "Largest drift of the devices' clocks; each has its own.")
+      .also(intrinsics_error())
+      .also(calibration_error())
+      .done();
+}
+
+Group faults() {
+  Group group;
+  group.name = "faults";
+  group.list = "faults.";
+  group.meaning =
+      "What goes wrong in the mock, a list; docs/mock.md has the kinds and their parameters.";
+  for (std::size_t i = 0; i < kMostFaults; ++i)
+    group.keys.push_back(
+        {"faults." + std::to_string(i), KeyType::text, "", 0, 200,
+         "`KIND@SECONDS NAME=NUMBER …`, or the same as a group: `{at: 42, kind: knock, camera: 1, "
+         "pitch_deg: 0.2}`.",
+         [i](Configuration& c, const KeyValue& v) { c.faults[i] = std::get<std::string>(v); },
+         [i](const Configuration& c) -> KeyValue { return c.faults[i]; }});
+  return group;
+}
+
+}  // namespace
+}  // namespace groups
 
 const std::vector<Group>& schema() {
   static const std::vector<Group> all{
@@ -19,7 +815,7 @@ const std::vector<Group>& schema() {
       groups::sync(),     groups::odometry(),   groups::calibration_options(),
       groups::monitor(),  groups::comparison(), groups::kitti_raw(),
       groups::mock(),     groups::record(),     groups::publish(),
-      groups::sessions(), groups::realtime(),   groups::faults()};
+      groups::realtime(), groups::faults()};
   return all;
 }
 
@@ -86,6 +882,85 @@ std::string range_text(const Key& key) {
   if (key.most >= 0x1p63) return fmt::format("from {}", key.least);
   return fmt::format("{} … {}", static_cast<std::int64_t>(key.least),
                      static_cast<std::int64_t>(key.most));
+}
+
+namespace {
+
+constexpr std::string_view kOpening = R"(# Configuration
+
+Every key that `vergence` understands, with its default. Nothing has to be set: without a configuration the defaults act.
+This page is written from the table that the program checks its input with (`app/config/schema.cpp`).
+
+A configuration is a YAML file. Keys stand in groups:
+
+```yaml
+rig: {name: van}
+odometry:
+  features: 400
+  band_px: 3
+threads: 2
+```
+
+One key can be set on the command line, with any command that runs, as often as needed; the last one wins, over the file too.
+Dots stand for groups, numbers for the items of a list:
+
+```sh
+vergence replay DATA --format folder --out session --set odometry.features=400 --set odometry.band_px=3
+```
+
+`--threads N` and `--seed N` are short for `--set threads=N` and `--set odometry.seed=N`.
+
+A key that does not exist is an error that names the nearest one that does; so is a value of the wrong type or outside its range,
+a key that is given twice, and two keys that contradict each other. The sentence names the file and the line; the program exits with 2.
+
+Units stand in the column `unit`; pixels are those of the image as it was taken. `summary.json` of a session holds `configuration_hash`, equal for
+equal values of all keys however they were written.
+)";
+
+std::string cell(const std::string& text) { return text.empty() ? "–" : text; }
+
+std::string default_text(const Key& key) {
+  const std::string text = to_text(key.get(Configuration{}));
+  return text.empty() ? "empty" : "`" + text + "`";
+}
+
+std::string_view type_text(KeyType type) {
+  switch (type) {
+    case KeyType::integer:
+      return "integer";
+    case KeyType::number:
+      return "number";
+    case KeyType::text:
+      return "text";
+  }
+  return "";
+}
+
+/// The items of a list have the same keys: item 0 stands for all, as N.
+std::string documented_name(const Group& group, const Key& key) {
+  if (group.list.empty()) return key.name;
+  const std::string first = group.list + "0";
+  return key.name.starts_with(first) ? group.list + "N" + key.name.substr(first.size())
+                                     : std::string();
+}
+
+}  // namespace
+
+std::string configuration_document() {
+  std::string page(kOpening);
+  for (const Group& group : schema()) {
+    page += group.name.empty() ? std::string("\n## Without a group\n\n")
+                               : "\n## `" + group.name + "`\n\n";
+    page += group.meaning + "\n\n";
+    page += "| key | default | type | unit | range | meaning |\n|---|---|---|---|---|---|\n";
+    for (const Key& key : group.keys) {
+      const std::string name = documented_name(group, key);
+      if (name.empty()) continue;
+      page += fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", name, default_text(key),
+                          type_text(key.type), cell(key.unit), range_text(key), key.meaning);
+    }
+  }
+  return page;
 }
 
 }  // namespace vergence::app

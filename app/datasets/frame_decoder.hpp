@@ -8,7 +8,7 @@
 
 #include "app/datasets/image_file.hpp"
 #include "app/datasets/stereo_sequence.hpp"
-#include "app/runtime/thread_runner.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "core/memory/frame_pool.hpp"
 #include "core/memory/ring.hpp"
 #include "drivers/common/wake_event.hpp"
@@ -97,7 +97,7 @@ class FrameDecoder {
   WakeEvent freed_;   // signalled by the consumer: room in the ring, slots in the pool
   std::atomic<bool> stop_{false};
   std::atomic<bool> finished_{false};
-  ThreadRunner both_{ThreadRunner::Worker::of_reader};
+  ThreadRunner both_{BackgroundThread::Role::reader};
   std::thread thread_;
 };
 

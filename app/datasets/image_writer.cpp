@@ -1,22 +1,21 @@
 #include "app/datasets/image_writer.hpp"
 
-#include <cstdint>
-#include <fstream>
-#include <vector>
+#include <png.h>
 
-#include "app/recording/png_encoder.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
 
 void write_png(const std::filesystem::path& file, const ImageView& image) {
-  std::vector<std::uint8_t> bytes;
-  const bool encoded = encode_png(image, &bytes);
-  std::ofstream out(file, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()),
-            static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!encoded || !out) throw InputError(file.string() + ": cannot be written; is the disk full?");
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  png.width = static_cast<png_uint_32>(image.width);
+  png.height = static_cast<png_uint_32>(image.height);
+  png.format = PNG_FORMAT_GRAY;
+  png.flags = PNG_IMAGE_FLAG_FAST;
+  if (::png_image_write_to_file(&png, file.c_str(), 0, image.row(0), static_cast<int>(image.stride),
+                                nullptr) == 0)
+    throw InputError(file.string() + ": cannot be written; is the disk full?");
 }
 
 }  // namespace vergence::app

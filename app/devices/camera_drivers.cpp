@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "app/devices/device_sentences.hpp"
+#include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "drivers/common/side_by_side_camera.hpp"

@@ -5,11 +5,10 @@
 
 #include <fmt/format.h>
 
-#include "app/devices/device_sentences.hpp"
 #include "app/devices/drive_sync.hpp"
+#include "app/devices/mock_drive.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/devices/serial_devices.hpp"
-#include "app/devices/software_trigger.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "drivers/clock.hpp"

@@ -1,8 +1,10 @@
 #include "app/devices/mock_drive.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -12,6 +14,7 @@
 #include "app/runtime/nearest.hpp"
 
 namespace vergence::app {
+
 namespace {
 
 /// Checks a key that takes one of a few words where cameras are the mock's.

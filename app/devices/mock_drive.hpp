@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "app/config/configuration.hpp"
-#include "app/devices/rig_settings.hpp"
 #include "core/types/stamped_pose.hpp"
 #include "drivers/mock/mock_rig.hpp"
 

@@ -6,7 +6,6 @@
 
 #include "app/config/configuration.hpp"
 #include "app/doctor/inventory.hpp"
-#include "app/doctor/machine.hpp"
 
 /// The checks of `vergence doctor`. Each is a function of the context and of the machine's files.
 namespace vergence::app {
@@ -25,43 +24,17 @@ struct Finding {
   std::vector<std::string> mend;  // commands as they are typed, the lasting one last
 };
 
-/// One camera, as far as the machine below it is concerned.
-struct CameraNeed {
-  std::string key, name;  // `cameras.0`, `left`
-  std::string driver, serial;
-  double bytes = 0;    // of an image on its way
-  double rate_hz = 0;  // that the camera runs at, which may be more than the rig's
-  CameraOptions options;
-};
-
-/// What a drive with a configuration asks of the machine.
-struct Needs {
-  bool given = false;  // false: no configuration; then only what is plugged in is checked
-  std::vector<CameraNeed> cameras;
-  std::string ins_driver, ins_port;
-  std::string trigger_driver, trigger_port;
-  int realtime_priority = 0;  // realtime.priority; 0: no thread asks for one
-  bool lock_memory = false;   // realtime.lock_memory
-
-  [[nodiscard]] std::vector<CameraNeed> of(const std::string& driver) const;
-};
-
-/// InputError: a hole in the list of cameras.
-[[nodiscard]] Needs needs_of(const Configuration& configuration);
-
 /// Returns true if a driver talks to a device: it is neither empty nor `none` nor `mock`.
 [[nodiscard]] bool is_real_driver(const std::string& driver);
 
 struct CheckContext {
   const Machine& machine;
   const Inventory& inventory;
-  const Needs& needs;
-  std::filesystem::path out = ".";           // where sessions go
-  std::filesystem::path configuration = {};  // of `needs`; empty: none
+  const Configuration* drive = nullptr;  // null: only what is plugged in is checked
+  std::filesystem::path out = ".";       // where sessions go
 
-  /// Returns true for the configuration of an installed service, which drives with permissions and
-  /// limits of its own.
-  [[nodiscard]] bool is_of_service() const;
+  /// Of a drive that nobody plans: no cameras, no INS, no trigger.
+  [[nodiscard]] const Configuration& needs() const;
 };
 
 /// All checks; those about devices that are neither there nor asked for have no finding. Problems
@@ -74,7 +47,7 @@ void check_network(const CheckContext& context, std::vector<Finding>* findings);
 void check_system(const CheckContext& context, std::vector<Finding>* findings);
 
 /// The found camera that a configuration means: by serial or place; an empty serial is the next
-/// that no other entry names. Null: none. One entry for each of needs.cameras.
+/// that no other entry names. Null: none. One for each camera of the configuration.
 [[nodiscard]] std::vector<const DeviceInfo*> match_cameras(const CheckContext& context);
 
 }  // namespace vergence::app

@@ -12,10 +12,8 @@
 
 #include "app/datasets/trajectory_files.hpp"
 #include "app/evaluation/evaluation_report.hpp"
-#include "app/evaluation/ins_mount.hpp"
-#include "app/evaluation/mount_report.hpp"
-#include "app/recorder/ins_file.hpp"
 #include "app/runtime/terminal_text.hpp"
+#include "app/session/ins_file.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 

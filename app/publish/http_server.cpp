@@ -1,19 +1,20 @@
 #include "app/publish/http_server.hpp"
 
+#include <microhttpd.h>
 #include <netdb.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
-#include <poll.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <exception>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "app/publish/line_socket.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {
@@ -21,45 +22,62 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPatience{5000};  // for a request to arrive, for an answer to be read
-constexpr int kBacklog = 64;
-constexpr int kAcceptsAStep = 256;
+constexpr unsigned kPatience = 4;  // s: for a request to arrive, for an answer to be read
+constexpr int kBacklog = 1024;
 constexpr int kSendBuffer =
     256 * 1024;  // bytes: a slow viewer sees the newest, not the last minute
 
 /// What a browser may do with anything from here: nothing but what the page itself holds.
-constexpr const char* kHeaders =
-    "Cache-Control: no-store\r\n"
-    "X-Content-Type-Options: nosniff\r\n"
-    "X-Frame-Options: DENY\r\n"
-    "Referrer-Policy: no-referrer\r\n"
-    "Content-Security-Policy: default-src 'none'; style-src 'unsafe-inline'; script-src "
-    "'unsafe-inline'; img-src data: blob:; connect-src 'self'; base-uri 'none'; form-action "
-    "'none'; frame-ancestors 'none'\r\n";
+constexpr std::array<std::pair<const char*, const char*>, 6> kHeaders{{
+    {"Connection", "close"},
+    {"Cache-Control", "no-store"},
+    {"X-Content-Type-Options", "nosniff"},
+    {"X-Frame-Options", "DENY"},
+    {"Referrer-Policy", "no-referrer"},
+    {"Content-Security-Policy",
+     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: "
+     "blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
+}};
 
-const char* words_of(int status) {
-  switch (status) {
-    case 200:
-      return "OK";
-    case 204:
-      return "No Content";
-    case 400:
-      return "Bad Request";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 413:
-      return "Content Too Large";
-    case 421:
-      return "Misdirected Request";
-    case 431:
-      return "Request Header Fields Too Large";
-    default:
-      return "Service Unavailable";
+/// The name in a Host header, without port and brackets.
+std::string_view name_of(std::string_view host) noexcept {
+  if (host.starts_with('[')) {
+    const auto end = host.find(']');
+    return end == std::string_view::npos ? host : host.substr(1, end - 1);
   }
+  return host.substr(0, host.find(':'));
+}
+
+bool names_this_machine(std::string_view host, const HttpPolicy& policy) noexcept {
+  const std::string_view name = name_of(host);
+  if (name == policy.host || name == "localhost" || name == "::1") return true;
+  return name.starts_with("127.") &&
+         name.find_first_not_of("0123456789.") == std::string_view::npos;
+}
+
+/// Equal, in a time that tells nothing of where they differ. No token is no key.
+bool same_token(std::string_view a, std::string_view b) noexcept {
+  if (a.size() != b.size() || b.empty()) return false;
+  unsigned difference = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    difference |=
+        static_cast<unsigned>(static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]));
+  return difference == 0;
+}
+
+bool same_origin(const HttpRequest& r) noexcept {
+  constexpr std::string_view kScheme = "http://";
+  return r.origin.empty() ||
+         (r.origin.starts_with(kScheme) && r.origin.substr(kScheme.size()) == r.host);
+}
+
+HttpDecision decide_action(HttpRoute route, const HttpRequest& r,
+                           const HttpPolicy& policy) noexcept {
+  if (!r.token_in_header || !same_token(r.token, policy.token))
+    return {HttpRoute::refuse, 403, "the token is not that of this session"};
+  if (!same_origin(r)) return {HttpRoute::refuse, 403, "asked for by another site"};
+  if (r.has_body) return {HttpRoute::refuse, 413, "nothing is to be sent"};
+  return {route, 204, ""};
 }
 
 FileDescriptor listen_at(const HostPort& address) {
@@ -77,6 +95,7 @@ FileDescriptor listen_at(const HostPort& address) {
   FileDescriptor socket(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   constexpr int kOn = 1;
   (void)::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &kOn, sizeof kOn);
+  (void)::setsockopt(socket.get(), SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer);
   const bool listens = socket && ::bind(socket.get(), found->ai_addr, found->ai_addrlen) == 0 &&
                        ::listen(socket.get(), kBacklog) == 0;
   const int error = errno;
@@ -88,204 +107,207 @@ FileDescriptor listen_at(const HostPort& address) {
   return socket;
 }
 
+std::string_view header_of(MHD_Connection* c, const char* name) noexcept {
+  const char* value = ::MHD_lookup_connection_value(c, MHD_HEADER_KIND, name);
+  return value == nullptr ? std::string_view() : value;
+}
+
+/// Takes the response over.
+bool send(MHD_Connection* c, unsigned status, const char* type, MHD_Response* response) noexcept {
+  if (response == nullptr) return false;
+  (void)::MHD_add_response_header(response, "Content-Type", type);
+  for (const auto& [name, value] : kHeaders) (void)::MHD_add_response_header(response, name, value);
+  const bool queued = ::MHD_queue_response(c, status, response) == MHD_YES;
+  ::MHD_destroy_response(response);
+  return queued;
+}
+
+bool send(MHD_Connection* c, unsigned status, const char* type, std::string_view body) {
+  std::string bytes(body);
+  return send(c, status, type,
+              ::MHD_create_response_from_buffer(bytes.size(), bytes.data(), MHD_RESPMEM_MUST_COPY));
+}
+
 }  // namespace
+
+HttpDecision decide(const HttpRequest& r, const HttpPolicy& policy) noexcept {
+  struct Action {
+    std::string_view path;
+    HttpRoute route;
+  };
+  constexpr std::array kActions{Action{"/recalibrate", HttpRoute::recalibrate},
+                                Action{"/mark", HttpRoute::mark},
+                                Action{"/stop-recording", HttpRoute::stop_recording}};
+  if (!policy.token_to_read && !names_this_machine(r.host, policy))
+    return {HttpRoute::refuse, 421, "this page is for this machine: open it by its address"};
+  if (r.method == "POST") {
+    for (const Action& action : kActions)
+      if (r.path == action.path) return decide_action(action.route, r, policy);
+    return {HttpRoute::refuse, 404, "there is no such action"};
+  }
+  if (r.method != "GET") return {HttpRoute::refuse, 405, "only GET and POST are understood"};
+  if (r.path == "/") return {HttpRoute::page, 200, ""};
+  if (r.path != "/events") return {HttpRoute::refuse, 404, "there is no such page"};
+  if (policy.token_to_read && !same_token(r.token, policy.token))
+    return {HttpRoute::refuse, 403, "the token is not that of this session"};
+  return {HttpRoute::events, 200, ""};
+}
+
+/// No exception may pass through the library.
+struct HttpServer::Callbacks {
+  static MHD_Result request(void* server, MHD_Connection* c, const char* url, const char* method,
+                            const char* /*version*/, const char* /*body*/, std::size_t* /*size*/,
+                            void** /*state*/) noexcept {
+    static_cast<HttpServer*>(server)->asking_.remove(c);
+    HttpRequest r;
+    r.method = method;
+    r.path = url;
+    r.host = header_of(c, "Host");
+    r.origin = header_of(c, "Origin");
+    r.token = header_of(c, "X-Vergence-Token");
+    r.token_in_header = !r.token.empty();
+    if (const char* token = ::MHD_lookup_connection_value(c, MHD_GET_ARGUMENT_KIND, "token");
+        token != nullptr && !r.token_in_header)
+      r.token = token;
+    const std::string_view length = header_of(c, "Content-Length");
+    r.has_body = (!length.empty() && length != "0") || !header_of(c, "Transfer-Encoding").empty();
+    try {
+      return static_cast<HttpServer*>(server)->answer(c, r) ? MHD_YES : MHD_NO;
+    } catch (const std::exception&) {
+      return MHD_NO;
+    }
+  }
+
+  static void connection(void* server, MHD_Connection* c, void** /*state*/,
+                         MHD_ConnectionNotificationCode what) noexcept {
+    auto& asking = static_cast<HttpServer*>(server)->asking_;
+    asking.remove(c);
+    if (what != MHD_CONNECTION_NOTIFY_STARTED) return;
+    try {
+      asking.push_back(c);
+    } catch (const std::exception&) {
+    }
+    if (asking.size() <= kAsking) return;
+    // The library closes what has come to its end.
+    const MHD_ConnectionInfo* socket =
+        ::MHD_get_connection_info(asking.front(), MHD_CONNECTION_INFO_CONNECTION_FD);
+    if (socket != nullptr) (void)::shutdown(socket->connect_fd, SHUT_RDWR);
+    asking.pop_front();
+  }
+
+  static ssize_t read(void* viewer, std::uint64_t /*at*/, char* to, std::size_t most) noexcept {
+    auto* v = static_cast<Viewer*>(viewer);
+    if (!v->pending()) {
+      v->asleep = true;
+      ::MHD_suspend_connection(v->connection);
+      return 0;
+    }
+    const std::size_t n = v->out.copy(to, most, v->sent);
+    v->sent += n;
+    return static_cast<ssize_t>(n);
+  }
+
+  static void gone(void* viewer) noexcept {
+    auto* v = static_cast<Viewer*>(viewer);
+    v->server->viewers_.remove_if([v](const Viewer& other) { return &other == v; });
+  }
+};
 
 HttpServer::HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page,
                        std::size_t viewers, Action action)
-    : policy_(std::move(policy)),
-      page_(page),
-      most_viewers_(viewers),
-      action_(std::move(action)),
-      listener_(listen_at(address)),
-      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
-
-void HttpServer::wake() noexcept {
-  constexpr std::uint64_t kOne = 1;
-  (void)!::write(wake_.get(), &kOne, sizeof kOne);
+    : policy_(std::move(policy)), page_(page), most_viewers_(viewers), action_(std::move(action)) {
+  FileDescriptor listener = listen_at(address);
+  daemon_.reset(::MHD_start_daemon(
+      MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr, &Callbacks::request, this,
+      MHD_OPTION_NOTIFY_CONNECTION, &Callbacks::connection, this, MHD_OPTION_LISTEN_SOCKET,
+      listener.get(), MHD_OPTION_CONNECTION_LIMIT, kConnections, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+      kRequestBytes, MHD_OPTION_CONNECTION_TIMEOUT, kPatience, MHD_OPTION_STRICT_FOR_CLIENT, 1,
+      MHD_OPTION_END));
+  if (daemon_ == nullptr)
+    throw InputError("publish.http: the system has no memory or files left for the page");
+  listener.release();
 }
 
-std::size_t HttpServer::viewers() const noexcept {
-  return static_cast<std::size_t>(std::count_if(connections_.begin(), connections_.end(),
-                                                [](const Connection& c) { return c.looks(); }));
+HttpServer::~HttpServer() {
+  for (Viewer& viewer : viewers_) wake(&viewer);  // the library does not stop above sleepers
+}
+
+void HttpServer::StopDaemon::operator()(MHD_Daemon* daemon) const noexcept {
+  ::MHD_stop_daemon(daemon);
 }
 
 void HttpServer::step(milliseconds timeout) {
-  std::array<pollfd, kConnections + 2> polled{};
-  polled[kConnections] = {listener_.get(), POLLIN, 0};
-  polled[kConnections + 1] = {wake_.get(), POLLIN, 0};
-  bool waits = false;  // somebody has a deadline
-  for (std::size_t i = 0; i < kConnections; ++i) {
-    const Connection& c = connections_[i];
-    polled[i] = {c.socket.get(), static_cast<short>(c.pending() ? POLLIN | POLLOUT : POLLIN), 0};
-    waits = waits || c.phase == Phase::reading || c.pending();
-  }
-  const milliseconds limit = waits ? std::min(timeout, milliseconds(500)) : timeout;
-  (void)::poll(polled.data(), polled.size(), static_cast<int>(limit.count()));
-  std::uint64_t ignored = 0;
-  if (polled[kConnections + 1].revents != 0) (void)!::read(wake_.get(), &ignored, sizeof ignored);
-  for (std::size_t i = 0; i < kConnections; ++i) {
-    Connection& c = connections_[i];
-    const auto happened = static_cast<unsigned>(polled[i].revents);
-    if (c.phase == Phase::free || happened == 0) continue;
-    if ((happened & (POLLIN | POLLHUP | POLLERR)) != 0) read(&c);
-    if (c.phase != Phase::free && (happened & POLLOUT) != 0) write(&c);
-  }
-  if (polled[kConnections].revents != 0) accept_clients();
-  drop_late();
+  (void)::MHD_run_wait(daemon_.get(), static_cast<std::int32_t>(timeout.count()));
 }
 
-/// A free place, or that of the one who has been asking for longest; viewers keep theirs.
-HttpServer::Connection* HttpServer::place() {
-  Connection* oldest = nullptr;
-  for (Connection& c : connections_) {
-    if (c.phase == Phase::free) return &c;
-    if (!c.looks() && (oldest == nullptr || c.progress < oldest->progress)) oldest = &c;
-  }
-  ++counters_.pushed_out;
-  close(oldest);  // there is one: most_viewers_ is below kConnections
-  return oldest;
-}
-
-void HttpServer::accept_clients() {
-  for (int i = 0; i < kAcceptsAStep; ++i) {
-    FileDescriptor socket(
-        ::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-    if (!socket) return;
-    constexpr int kOn = 1;
-    (void)::setsockopt(socket.get(), IPPROTO_TCP, TCP_NODELAY, &kOn, sizeof kOn);
-    (void)::setsockopt(socket.get(), SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof kSendBuffer);
-    Connection* c = place();
-    c->socket = std::move(socket);
-    c->phase = Phase::reading;
-    c->progress = Clock::now();
-  }
-}
-
-void HttpServer::close(Connection* c) noexcept {
-  c->socket.reset();
-  c->phase = Phase::free;
-  c->in.clear();
-  c->out.clear();
-  c->out.shrink_to_fit();
-  c->sent = 0;
-}
-
-void HttpServer::read(Connection* c) {
-  std::array<char, kMostRequestBytes> bytes;
-  const ssize_t n = ::recv(c->socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
-  if (n == 0 || (n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR))
-    return close(c);
-  // Of a request that is being answered, whatever else comes is nothing.
-  if (n < 0 || c->phase != Phase::reading) return;
-  c->in.append(bytes.data(),
-               std::min(static_cast<std::size_t>(n), kMostRequestBytes - c->in.size()));
-  answer(c);
-}
-
-void HttpServer::answer(Connection* c) {
-  HttpRequest request;
-  const HttpParse parsed = parse_http_request(c->in, &request);
-  if (parsed == HttpParse::incomplete) return;
-  ++counters_.requests;
-  HttpDecision decision{HttpRoute::refuse, 400, "this is no HTTP request"};
-  if (parsed == HttpParse::too_large)
-    decision = {HttpRoute::refuse, 431, "the request is too long"};
-  if (parsed == HttpParse::complete) decision = decide(request, policy_);
-  if (decision.route == HttpRoute::events && viewers() >= most_viewers_)
+bool HttpServer::answer(MHD_Connection* c, const HttpRequest& request) {
+  HttpDecision decision = decide(request, policy_);
+  if (decision.route == HttpRoute::events && viewers_.size() >= most_viewers_)
     decision = {HttpRoute::refuse, 503, "as many as publish.viewers allows are looking already"};
   switch (decision.route) {
     case HttpRoute::refuse:
-      ++counters_.refused;
-      return respond(c, decision.status, "text/plain; charset=utf-8",
-                     std::string(decision.sentence) + "\n");
+      return send(c, decision.status, "text/plain; charset=utf-8",
+                  std::string(decision.sentence) + "\n");
     case HttpRoute::page:
-      return respond(c, decision.status, "text/html; charset=utf-8", page_);
+      return send(c, decision.status, "text/html; charset=utf-8", page_);
     case HttpRoute::events:
-      ++counters_.viewers;
-      c->phase = Phase::greeting;
-      c->out = fmt::format(
-          "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\n{}\r\n"
-          "retry: 1000\n\n",
-          kHeaders);
-      return write(c);
+      return begin_events(c);
     default:
       action_(decision.route);
-      return respond(c, decision.status, "text/plain", "");
+      return send(c, decision.status, "text/plain", "");
   }
 }
 
-void HttpServer::respond(Connection* c, int status, std::string_view type, std::string_view body) {
-  c->phase = Phase::answering;
-  c->out = fmt::format(
-      "HTTP/1.1 {} {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n{}\r\n{}",
-      status, words_of(status), type, body.size(), kHeaders, body);
-  c->progress = Clock::now();
-  write(c);
+bool HttpServer::begin_events(MHD_Connection* c) {
+  constexpr std::size_t kBlock = 16384;  // bytes that are sent at a time
+  viewers_.push_back({this, c, "retry: 1000\n\n"});
+  MHD_Response* response = ::MHD_create_response_from_callback(
+      MHD_SIZE_UNKNOWN, kBlock, &Callbacks::read, &viewers_.back(), &Callbacks::gone);
+  if (response == nullptr) viewers_.pop_back();
+  return send(c, 200, "text/event-stream", response);
 }
 
-void HttpServer::write(Connection* c) {
-  if (c->pending()) {
-    const ssize_t n = ::send(c->socket.get(), c->out.data() + c->sent, c->out.size() - c->sent,
-                             MSG_DONTWAIT | MSG_NOSIGNAL);
-    if (n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) return close(c);
-    if (n > 0) {
-      c->sent += static_cast<std::size_t>(n);
-      c->progress = Clock::now();
-    }
-  }
-  if (c->pending()) return;
-  c->out.clear();
-  c->sent = 0;
-  if (c->phase != Phase::answering) return;
-  (void)::shutdown(c->socket.get(), SHUT_WR);
-  close(c);
+void HttpServer::wake(Viewer* viewer) noexcept {
+  if (std::exchange(viewer->asleep, false)) ::MHD_resume_connection(viewer->connection);
 }
 
-/// Who sends no request, or does not read.
-void HttpServer::drop_late() {
-  const auto now = Clock::now();
-  for (Connection& c : connections_) {
-    const bool owes = c.phase == Phase::reading || (c.phase != Phase::free && c.pending());
-    if (!owes || now - c.progress < kPatience) continue;
-    if (c.looks()) ++counters_.slow_viewers;
-    close(&c);
-  }
-}
-
-bool HttpServer::send_event(Connection* c, std::string_view name, std::string_view json) {
-  if (c->pending() || json.size() > kMostEventBytes) {
-    ++counters_.skipped;
-    return false;
-  }
-  c->out = fmt::format("event: {}\ndata: {}\n\n", name, json);
-  c->progress = Clock::now();
-  write(c);
+bool HttpServer::send_event(Viewer* viewer, std::string_view name, std::string_view json) {
+  if (viewer->pending() || json.size() > kMostEventBytes) return false;
+  viewer->out = fmt::format("event: {}\ndata: {}\n\n", name, json);
+  viewer->sent = 0;
+  wake(viewer);
   return true;
 }
 
 void HttpServer::broadcast(std::string_view name, std::string_view json, Skipped skipped) {
-  for (Connection& c : connections_)
-    if (c.phase == Phase::viewing && !send_event(&c, name, json) && skipped == Skipped::greet_again)
-      c.phase = Phase::greeting;
+  for (Viewer& v : viewers_) {
+    if (!v.greeted) continue;
+    if (skipped == Skipped::greet_again)
+      v.greeted = send_event(&v, name, json);
+    else if (!v.pending())
+      (void)send_event(&v, name, json);
+    else if (v.sent == 0 && v.out.size() + json.size() <= kMostEventBytes)
+      v.out += fmt::format("event: {}\ndata: {}\n\n", name, json);  // behind what is just made
+  }
 }
 
 void HttpServer::greet(std::string_view name, const std::function<std::string()>& json) {
   std::string text;
-  for (Connection& c : connections_) {
-    if (c.phase != Phase::greeting || c.pending()) continue;
+  for (Viewer& v : viewers_) {
+    if (v.greeted || v.pending()) continue;
     if (text.empty()) text = json();
-    c.phase = Phase::viewing;
-    (void)send_event(&c, name, text);
+    v.greeted = true;
+    (void)send_event(&v, name, text);
   }
 }
 
 void HttpServer::flush(milliseconds timeout) {
-  const auto end = Clock::now() + timeout;
+  const auto end = std::chrono::steady_clock::now() + timeout;
   const auto waits = [this] {
-    return std::any_of(connections_.begin(), connections_.end(),
-                       [](const Connection& c) { return c.pending(); });
+    return std::any_of(viewers_.begin(), viewers_.end(),
+                       [](const Viewer& v) { return v.pending(); });
   };
-  while (waits() && Clock::now() < end) step(milliseconds(20));
+  while (waits() && std::chrono::steady_clock::now() < end) step(milliseconds(20));
 }
 
 }  // namespace vergence::app

@@ -1,27 +1,51 @@
 #pragma once
-#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <list>
+#include <memory>
 #include <string>
 #include <string_view>
 
-#include "app/publish/file_descriptor.hpp"
-#include "app/publish/http_request.hpp"
+#include "app/publish/line_socket.hpp"
+
+struct MHD_Connection;
+struct MHD_Daemon;
 
 namespace vergence::app {
 
-struct HttpCounters {
-  std::uint64_t requests = 0;      // that were answered
-  std::uint64_t refused = 0;       // … with a refusal
-  std::uint64_t pushed_out = 0;    // connections closed because others waited for their place
-  std::uint64_t viewers = 0;       // that began to look
-  std::uint64_t slow_viewers = 0;  // … and were dropped because they did not read
-  std::uint64_t skipped = 0;       // events that a viewer had no room for
+/// What the live page needs of a request's head.
+struct HttpRequest {
+  std::string_view method{}, path{};  // path without the query
+  std::string_view token{};           // of the header X-Vergence-Token, or the query `token=`
+  std::string_view host{}, origin{};
+  bool token_in_header = false;
+  bool has_body = false;
 };
 
-/// A few connections at a time: one page, one stream of events, a few actions.
+/// Whom the live page answers.
+struct HttpPolicy {
+  std::string token{};
+  bool token_to_read = false;  // bound beyond this machine
+  std::string host{};          // of the configuration; a Host header may name it
+};
+
+enum class HttpRoute : std::uint8_t { refuse, page, events, recalibrate, mark, stop_recording };
+
+struct HttpDecision {
+  HttpRoute route = HttpRoute::refuse;
+  unsigned status = 200;
+  const char* sentence = "";  // of a refusal
+};
+
+/// The page itself holds nothing of the session and is for everyone; events want the token where
+/// the policy says so; actions always, in a header that no other site's page can send, from no
+/// other origin. On this machine the Host header must name it: a name that somebody else lets
+/// point here does not (DNS rebinding).
+[[nodiscard]] HttpDecision decide(const HttpRequest& request, const HttpPolicy& policy) noexcept;
+
+/// One page, one stream of events, a few actions, by libmicrohttpd.
 ///
 ///     HttpServer server(address, policy, page, 4, [&](HttpRoute route) { act(route); });
 ///     while (!ended) {
@@ -31,16 +55,16 @@ struct HttpCounters {
 ///       server.broadcast("update", state.update(now, -1), HttpServer::Skipped::greet_again);
 ///     }
 ///
-/// Own code, because Debian's cpp-httplib is a compiled library that brings OpenSSL and brotli: six
-/// shared libraries more, and `--version` at 14 MB where 12 are allowed; it gives every connection
-/// a thread, and its queue of connections has no bound.
-/// Threads  One calls everything; wake(): any. Nothing waits but step(), for its timeout.
-/// Memory   kConnections places; of each at most one event or the page that waits to be sent.
+/// Threads  One calls everything. Nothing waits but step() and flush(), for their timeouts.
+/// Memory   kConnections connections of kRequestBytes; of each viewer at most one event that waits
+///          to be sent. Who sends no request, or does not read, is dropped after a few seconds.
 /// Errors   The constructor throws InputError: the port is in use, the address is not this
-///          machine's. Afterwards whatever a client does ends its connection, and counts.
+///          machine's. Afterwards whatever a client does ends its connection.
 class HttpServer {
  public:
-  static constexpr std::size_t kConnections = 24;  // kMostViewers, and some who ask for the page
+  static constexpr unsigned kConnections = 64;
+  static constexpr std::size_t kAsking = 24;  // connections without a request; the oldest goes
+  static constexpr std::size_t kRequestBytes = std::size_t{8} << 10U;  // browsers send some 600
   static constexpr std::size_t kMostEventBytes = std::size_t{4} << 20U;
 
   using Action = std::function<void(HttpRoute)>;
@@ -48,13 +72,14 @@ class HttpServer {
   /// `page`: the HTML, outlives it. `viewers`: at most so many at a time.
   HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page, std::size_t viewers,
              Action action);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
 
   /// Waits for clients, at most `timeout`, and serves them.
   void step(std::chrono::milliseconds timeout);
-  /// Ends a step() that waits.
-  void wake() noexcept;
 
-  [[nodiscard]] std::size_t viewers() const noexcept;
+  [[nodiscard]] std::size_t viewers() const noexcept { return viewers_.size(); }
   /// An event for every viewer that has had its greeting; who has not read the last one skips it,
   /// and is greeted anew where what follows builds on it.
   enum class Skipped : std::uint8_t { harmless, greet_again };
@@ -63,41 +88,36 @@ class HttpServer {
   void greet(std::string_view name, const std::function<std::string()>& json);
   /// Sends what waits, at most for so long.
   void flush(std::chrono::milliseconds timeout);
-  [[nodiscard]] const HttpCounters& counters() const noexcept { return counters_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-  enum class Phase : std::uint8_t { free, reading, answering, greeting, viewing };
-  struct Connection {
-    FileDescriptor socket{};
-    Phase phase = Phase::free;
-    std::string in{}, out{};
+  /// Who reads the stream of events. The library asks for its bytes, and sleeps while there are
+  /// none.
+  struct Viewer {
+    HttpServer* server = nullptr;
+    MHD_Connection* connection = nullptr;
+    std::string out{};
     std::size_t sent = 0;  // of `out`
-    Clock::time_point progress{};
+    bool greeted = false, asleep = false;
 
     [[nodiscard]] bool pending() const noexcept { return sent < out.size(); }
-    [[nodiscard]] bool looks() const noexcept {
-      return phase == Phase::greeting || phase == Phase::viewing;
-    }
   };
+  struct StopDaemon {
+    void operator()(MHD_Daemon* daemon) const noexcept;
+  };
+  struct Callbacks;  // of the library
 
-  void accept_clients();
-  Connection* place();
-  void read(Connection* c);
-  void answer(Connection* c);
-  void respond(Connection* c, int status, std::string_view type, std::string_view body);
-  void write(Connection* c);
-  void close(Connection* c) noexcept;
-  void drop_late();
-  [[nodiscard]] bool send_event(Connection* c, std::string_view name, std::string_view json);
+  [[nodiscard]] bool answer(MHD_Connection* connection, const HttpRequest& request);
+  [[nodiscard]] bool begin_events(MHD_Connection* connection);
+  [[nodiscard]] bool send_event(Viewer* viewer, std::string_view name, std::string_view json);
+  static void wake(Viewer* viewer) noexcept;
 
-  HttpPolicy policy_;
-  std::string_view page_;
-  std::size_t most_viewers_;
-  Action action_;
-  FileDescriptor listener_, wake_;
-  std::array<Connection, kConnections> connections_{};
-  HttpCounters counters_{};
+  const HttpPolicy policy_;
+  const std::string_view page_;
+  const std::size_t most_viewers_;
+  const Action action_;
+  std::list<Viewer> viewers_;
+  std::list<MHD_Connection*> asking_;  // that have sent no request yet, the oldest first
+  std::unique_ptr<MHD_Daemon, StopDaemon> daemon_;  // last: it uses the others
 };
 
 }  // namespace vergence::app

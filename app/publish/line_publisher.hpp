@@ -9,13 +9,28 @@
 #include <vector>
 
 #include "app/publish/line_socket.hpp"
-#include "app/publish/pose_line.hpp"
-#include "app/recorder/histogram.hpp"
 #include "app/session/session_observer.hpp"
+#include "app/session/session_totals.hpp"
+#include "core/comparison/comparison.hpp"
 #include "core/memory/ring.hpp"
+#include "core/types/pose_sample.hpp"
 #include "drivers/common/wake_event.hpp"
 
 namespace vergence::app {
+
+/// Where the odometry's world lies on the earth.
+struct PublishedPlacement {
+  Transform T_enu_world{};
+  Geodetic origin{};  // of enu
+
+  [[nodiscard]] EarthPose of(const Transform& T_world_left) const;
+};
+
+/// One JSON object and a line feed (docs/publish.md is its schema). `age_ms`: from mid-exposure
+/// to now, where stamps are tied to this machine's clock. `dropped`: lines that were not made
+/// since the start. `line` is replaced; its memory is used again.
+void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& earth,
+                     std::optional<double> age_ms, std::uint64_t dropped, std::string* line);
 
 /// `publish.lines`: one JSON object a frame to robots and bridges (docs/publish.md).
 ///
@@ -43,12 +58,16 @@ class LinePublisher final : public SessionObserver {
 
  private:
   void work() noexcept;
-  void send(const PublishedPose& pose);
+  struct Outgoing {
+    PoseSample pose{};
+    HostStamp out{};  // when the estimator was done
+  };
+  void send(const Outgoing& outgoing);
   void stop() noexcept;
 
   std::unique_ptr<LineSocket> socket_;
   std::optional<ClockTie> tie_{};  // before the first pose
-  Ring<PublishedPose, 64> poses_;
+  Ring<Outgoing, 64> poses_;
   Ring<PublishedPlacement, 8> placements_;
   std::atomic<std::uint64_t> dropped_{0};
   std::atomic<double> age_p99_ms_{-1};
@@ -56,7 +75,7 @@ class LinePublisher final : public SessionObserver {
   std::atomic<bool> stop_{false};
 
   // Of the thread.
-  std::optional<Earth> earth_{};
+  std::optional<PublishedPlacement> placement_{};
   std::string line_;
   std::uint64_t lines_ = 0;
   TimeHistogram age_, behind_pose_;  // ms

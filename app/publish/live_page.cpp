@@ -6,23 +6,117 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/datasets/jpeg_writer.hpp"
 #include "app/publish/page_parts.hpp"  // made by CMake from app/publish/page/
 #include "app/report/style.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
+
+void LiveImages::reserve(std::size_t image_bytes) {
+  for (Picture& picture : pictures_) picture.rows.resize(image_bytes);
+}
+
+void LiveImages::want() noexcept {
+  Owner nobody = Owner::nobody;
+  (void)owner_.compare_exchange_strong(nobody, Owner::estimator, std::memory_order_acq_rel);
+}
+
+void LiveImages::take_images(const RigFrame& frame) noexcept {
+  if (owner_.load(std::memory_order_acquire) != Owner::estimator) return;
+  for (std::size_t k = 0; k < pictures_.size(); ++k) {
+    Picture& picture = pictures_[k];
+    const ImageView image = static_cast<int>(k) < frame.cameras ? frame.images[k] : ImageView{};
+    picture.width = picture.height = 0;
+    if (image.empty()) continue;
+    const int step = (image.width + kWidth - 1) / kWidth, taken = std::min(step, 2);
+    const auto width = static_cast<std::size_t>(image.width);
+    const auto rows = static_cast<std::size_t>(image.height / step * taken);
+    if (width * rows > picture.rows.size()) continue;  // no image of this rig
+    std::uint8_t* out = picture.rows.data();
+    for (int y = 0; y + step <= image.height; y += step)
+      for (int i = 0; i < taken; ++i, out += width) std::memcpy(out, image.row(y + i), width);
+    picture.width = image.width;
+    picture.height = image.height;
+    picture.step = step;
+    picture.taken = taken;
+  }
+  frame_ = frame.number;
+  points_.clear();
+  owner_.store(Owner::filling, std::memory_order_relaxed);
+}
+
+void LiveImages::take_points(const RigFrame& frame, const calibration::TrackLog& tracks) noexcept {
+  if (owner_.load(std::memory_order_relaxed) != Owner::filling) return;
+  if (!tracks.empty() && tracks.frame(tracks.size() - 1).number == frame.number)
+    for (const calibration::LoggedObservation& o : tracks.frame(tracks.size() - 1).observations) {
+      if (!o.by(0)) continue;
+      LivePoint point{{o.raw[0].x(), o.raw[0].y()}, {}, o.by(1)};
+      if (point.both) point.right = {o.raw[1].x(), o.raw[1].y()};
+      if (!points_.push(point)) break;  // as many as a page can show
+    }
+  owner_.store(Owner::viewer, std::memory_order_release);
+}
+
+namespace {
+
+/// Means of `step` columns by `taken` rows.
+std::vector<std::uint8_t> shrunk(const LiveImages::Picture& p, int width, int height) {
+  std::vector<std::uint8_t> out(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const int count = p.step * p.taken;
+  auto to = out.begin();
+  for (int y = 0; y < height; ++y) {
+    const std::uint8_t* band =
+        p.rows.data() + static_cast<std::size_t>(y * p.taken) * static_cast<std::size_t>(p.width);
+    for (int x = 0; x < width; ++x) {
+      int sum = count / 2;
+      for (int row = 0; row < p.taken; ++row)
+        for (int i = 0; i < p.step; ++i) sum += band[row * p.width + x * p.step + i];
+      *to++ = static_cast<std::uint8_t>(sum / count);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string thumbnail(const LiveImages::Picture& picture) {
+  const int width = picture.width / picture.step, height = picture.height / picture.step;
+  if (width < 1 || height < 1) return {};
+  constexpr int kQuality = 70;  // grey blocks do not show beside the points
+  const std::vector<std::uint8_t> pixels = shrunk(picture, width, height);
+  return grey_jpeg({pixels.data(), width, height, width}, kQuality);
+}
+
+std::string base64(std::string_view bytes) {
+  constexpr const char* kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  const auto byte = [&bytes](std::size_t i) {
+    return i < bytes.size() ? static_cast<unsigned>(static_cast<unsigned char>(bytes[i])) : 0U;
+  };
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const unsigned three = byte(i) << 16U | byte(i + 1) << 8U | byte(i + 2);
+    for (unsigned k = 0; k < 4; ++k)
+      out += i + k > bytes.size() ? '=' : kDigits[three >> (18U - 6U * k) & 63U];
+  }
+  return out;
+}
+
 namespace {
 
 using std::chrono::milliseconds;
 
 constexpr milliseconds kBetweenUpdates{100};  // 10 a second: what an eye follows
-constexpr milliseconds kAlone{500};           // without a viewer: rings of 256 frames hold longer
 constexpr milliseconds kFarewell{200};        // for the end of the drive to reach its viewers
 constexpr int kNiceness = 5;                  // beside the estimator's threads
 
@@ -46,7 +140,6 @@ LivePage::LivePage(const Options& options, SessionRequests* requests,
 
 LivePage::~LivePage() {
   stop_.store(true, std::memory_order_release);
-  server_.wake();
   thread_.join();
 }
 
@@ -73,23 +166,17 @@ void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
 }
 
 void LivePage::on_placement(const Placement& placement, const Geodetic& origin) noexcept {
-  push(&placements_, {PoseNumbers::of(placement.T_enu_world), origin});
+  push(&placements_, {placement.T_enu_world, origin});
 }
 
-void LivePage::on_compared(const PoseRecord& pose) noexcept { push(&compared_, pose); }
+void LivePage::on_report(const FrameReport& report) noexcept { push(&reports_, report); }
 void LivePage::on_event(const EventRecord& event) noexcept { push(&events_, event); }
 void LivePage::on_calibration(const CalibrationRecord& calibration) noexcept {
   push(&calibrations_, calibration);
 }
 
-void LivePage::on_temperature(int camera, double celsius) noexcept {
-  temperatures_[static_cast<std::size_t>(camera)].store(static_cast<float>(celsius),
-                                                        std::memory_order_relaxed);
-}
-
 std::vector<std::pair<std::string, std::uint64_t>> LivePage::counters() {
   ended_.store(true, std::memory_order_release);
-  server_.wake();
   return {{"page_updates", counts_.updates.load(std::memory_order_relaxed)},
           {"page_dropped", counts_.dropped.load(std::memory_order_relaxed)}};
 }
@@ -101,10 +188,10 @@ void LivePage::work() {
   // On Linux a thread has a niceness of its own.
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   while (!stop_.load(std::memory_order_acquire)) {
-    const bool watched = server_.viewers() > 0;
-    const auto until = shown_ + kBetweenUpdates - Clock::now();
-    const auto wait = std::chrono::ceil<milliseconds>(until);
-    server_.step(watched ? std::clamp(wait, milliseconds(0), kBetweenUpdates) : kAlone);
+    const auto wait = std::chrono::ceil<milliseconds>(shown_ + kBetweenUpdates - Clock::now());
+    // The end of the drive is looked for as often.
+    server_.step(server_.viewers() > 0 ? std::clamp(wait, milliseconds(0), kBetweenUpdates)
+                                       : kBetweenUpdates);
     drain();
     if (server_.viewers() > 0 && Clock::now() >= shown_ + kBetweenUpdates) show();
   }
@@ -123,11 +210,8 @@ void LivePage::drain() {
   for (CalibrationRecord record; calibrations_.pop(&record);) state_.add(record);
   for (PublishedPlacement placement; placements_.pop(&placement);) state_.add(placement);
   for (LiveFrame frame; frames_.pop(&frame);) state_.add(frame);
-  for (PoseRecord pose; compared_.pop(&pose);) state_.add(pose);
+  for (FrameReport report; reports_.pop(&report);) state_.add(report);
   for (EventRecord event; events_.pop(&event);) state_.add(event);
-  for (std::size_t k = 0; k < temperatures_.size(); ++k)
-    if (const float celsius = temperatures_[k].load(std::memory_order_relaxed); celsius != 0)
-      state_.set_temperature(k, celsius);
   if (ended) state_.end();
 }
 
@@ -153,16 +237,11 @@ void LivePage::show_images() {
     out["images"].push_back({{"width", picture.width},
                              {"height", picture.height},
                              {"jpeg", base64(thumbnail(picture))}});
-  const RigCalibration* rig = state_.rig();
-  std::vector<JudgedPoint> judged(images_.points().size());
-  if (rig != nullptr && rig->cameras > 1) judged = judge_points(images_.points(), *rig);
   auto& points = out["points"] = nlohmann::json::array();
   // Tenths of pixels, as integers: half the bytes.
   const auto tenths = [](float v) { return static_cast<int>(v * 10 + 0.5F); };
-  for (std::size_t i = 0; i < judged.size(); ++i) {
-    const LivePoint& p = images_.points()[i];
-    nlohmann::json point{tenths(p.left[0]), tenths(p.left[1]), judged[i].rejected ? 1 : 0,
-                         tenths(judged[i].depth_m)};
+  for (const LivePoint& p : images_.points()) {
+    nlohmann::json point{tenths(p.left[0]), tenths(p.left[1])};
     if (p.both) {
       point.push_back(tenths(p.right[0]));
       point.push_back(tenths(p.right[1]));

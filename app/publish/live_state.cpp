@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/report/advice.hpp"
+#include "app/report/verdict.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
@@ -45,18 +45,9 @@ json event_json(const EventRecord& event, Stamp first) {
 }
 
 json camera_json(const RigCalibration& rig, std::size_t k) {
-  const Intrinsics& lens = rig.intrinsics[k];
   const Transform& T = rig.T_camera_left[k];
   const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;
-  json camera{{"width", lens.width},
-              {"height", lens.height},
-              {"fisheye", lens.kind == CameraModelKind::pinhole_equidistant},
-              {"k", {lens.fx, lens.fy, lens.cx, lens.cy}},
-              {"d", lens.distortion},
-              {"t", {T.t.x(), T.t.y(), T.t.z()}}};
-  json& rows = camera["r"] = json::array();
-  for (int i = 0; i < 9; ++i) rows.push_back(T.R(i / 3, i % 3));
-  json& figures = camera["figures"] = json::array();
+  json figures = json::array();
   const auto& sigma = rig.sigma_wide[k];
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
@@ -64,18 +55,7 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
     figures.push_back({rounded(i < 3 ? turn[axis] : T.t[axis] * unit, i < 3 ? 4 : 2),
                        sigma[i] > 0 ? rounded(2 * sigma[i] * unit, i < 3 ? 4 : 2) : nullptr});
   }
-  return camera;
-}
-
-/// By camera, null where it tells none; empty where none does.
-json temperatures_json(const std::array<std::optional<float>, kMaxCameras>& celsius) {
-  json out = json::array();
-  for (std::size_t k = 0; k < celsius.size(); ++k) {
-    if (!celsius[k]) continue;
-    while (out.size() < k) out.push_back(nullptr);
-    out.push_back(rounded(*celsius[k], 1));
-  }
-  return out;
+  return {{"figures", figures}};
 }
 
 constexpr double kSilenceSeconds = 1;  // without a frame: nobody reads an old status as today's …
@@ -85,28 +65,31 @@ constexpr double kSmoothing = 8;       // frames
 }  // namespace
 
 void LiveState::add(const LiveFrame& frame) {
-  if (newest_) take_interval(frame.pose.out);
+  if (newest_) take_interval(frame.out);
   newest_ = frame;
   estimate_.add(static_cast<double>(frame.pose.estimate_ms));
 }
 
 /// A gap counts as twice the interval at most: an outage does not make the next one unseen.
 void LiveState::take_interval(HostStamp out) noexcept {
-  const double gap = (out - newest_->pose.out).to_seconds();
+  const double gap = (out - newest_->out).to_seconds();
   if (interval_s_ <= 0) interval_s_ = gap;
   interval_s_ += (std::min(gap, 2 * interval_s_) - interval_s_) / kSmoothing;
 }
 
-void LiveState::add(const PoseRecord& compared) {
-  compared_ = compared;
-  if (compared.status == PoseStatus::lost && !compared.ins_valid) return;
+void LiveState::add(const FrameReport& report) {
+  report_ = report;
+  const PoseStatus status = report.pose.status;
+  if (status == PoseStatus::lost && !report.ins_valid) return;
   LiveTrail::Place place;
-  for (std::size_t i = 0; i < 3; ++i) place.world[i] = static_cast<float>(compared.world_left.t[i]);
-  place.status = static_cast<std::uint8_t>(compared.status);
-  if (compared.status == PoseStatus::lost && !trail_.places().empty())
+  const auto number = [](double v) { return static_cast<float>(v); };
+  const Vec3& t = report.pose.T_world_left.t;
+  place.world = {number(t.x()), number(t.y()), number(t.z())};
+  place.status = static_cast<std::uint8_t>(status);
+  if (status == PoseStatus::lost && !trail_.places().empty())
     place.world = trail_.places().back().world;
-  if (compared.ins_valid)
-    place.ins = {static_cast<float>(compared.ins.enu[0]), static_cast<float>(compared.ins.enu[1])};
+  const Vec3& ins = report.reference.T_enu_left.t;
+  if (report.ins_valid) place.ins = {number(ins.x()), number(ins.y())};
   trail_.add(place);
 }
 
@@ -135,7 +118,6 @@ void LiveState::add(const CalibrationRecord& calibration) {
   measured_.reset();
   if (calibration.decided) confirmed_ = was_confirmed_ = calibration.verified;
   in_use_ = calibration;
-  rig_ = calibration.rig.rig();
 }
 
 void LiveState::add(const PublishedPlacement& placement) {
@@ -145,8 +127,8 @@ void LiveState::add(const PublishedPlacement& placement) {
 
 json LiveState::frame_json(HostStamp now) const {
   const LiveFrame& f = *newest_;
-  const double silence = (now - f.pose.out).to_seconds();
-  const PublishedPose& p = f.pose;
+  const double silence = (now - f.out).to_seconds();
+  const PoseSample& p = f.pose;
   const std::string_view reason = to_string(p.reason);
   json out{{"frame", p.frame},
            {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
@@ -159,7 +141,6 @@ json LiveState::frame_json(HostStamp now) const {
            {"inliers", p.inliers},
            {"stereo_inliers", p.stereo_inliers},
            {"reprojection_px", rounded(p.reprojection_px, 3)},
-           {"temperatures_c", temperatures_json(temperatures_)},
            {"estimate_ms", rounded(p.estimate_ms, 2)},
            {"estimate_p50_ms", rounded(estimate_.percentile(0.5), 2)},
            {"estimate_p99_ms", rounded(estimate_.percentile(0.99), 2)},
@@ -174,37 +155,33 @@ json LiveState::frame_json(HostStamp now) const {
            {"pairing", to_words(f.pairing)},
            {"age_ms", f.age_ms < 0 ? json(nullptr) : rounded(f.age_ms, 2)}};
   if (p.status != PoseStatus::lost)
-    for (const double v : p.world_left.t) out["position_m"].push_back(rounded(v, 3));
-  if (compared_ && compared_->compared) {
-    const auto& e = compared_->error;
+    for (const double v : p.T_world_left.t) out["position_m"].push_back(rounded(v, 3));
+  if (report_ && report_->compared) {
+    const auto e = report_->error();
     out["ins"] = {{"across_m", rounded(std::hypot(e[0], e[1]), 2)},
                   {"up_m", rounded(e[2], 2)},
                   {"heading_deg", rounded(e[3], 2)}};
   }
-  if (compared_ && compared_->placed) {
-    const EarthNumbers& ours = compared_->ours;
+  if (report_ && report_->placed) {
+    const EarthPose& ours = report_->ours;
     out["earth"] = {{"latitude_deg", rounded(ours.position.latitude_deg, 7)},
                     {"longitude_deg", rounded(ours.position.longitude_deg, 7)},
                     {"height_m", rounded(ours.position.height_m, 2)},
-                    {"heading_deg", rounded(ours.heading_deg, 1)}};
+                    {"heading_deg", rounded(compass_heading_deg(ours.yaw), 1)}};
   }
   return out;
 }
 
 json LiveState::calibration_json() const {
   json out{{"cameras", json::array()}, {"history", json::array()}};
-  if (rig_)
-    for (std::size_t k = 0; k < static_cast<std::size_t>(rig_->cameras); ++k)
-      out["cameras"].push_back(camera_json(*rig_, k));
-  if (measured_) {
-    const RigCalibration rig = measured_->rig.rig();
-    for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
-      out["measured"].push_back(camera_json(rig, k));
-  }
+  for (const auto& [key, record] : {std::pair("cameras", &in_use_), {"measured", &measured_}})
+    if (*record)
+      for (int k = 0; k < (*record)->calibration.cameras; ++k)
+        out[key].push_back(camera_json((*record)->calibration, static_cast<std::size_t>(k)));
   out["confirmed"] = confirmed_;
   if (in_use_) {
-    out["cause"] = in_use_->cause;
-    out["frames"] = in_use_->rig.frames;
+    out["cause"] = in_use_->cause_word();
+    out["frames"] = in_use_->calibration.frames;
     const CalibrationRecord& known = measured_ ? *measured_ : *in_use_;
     out["depth"] = known.depth_sigma_percent > 0
                        ? json({{"at_m", rounded(known.judged_depth_m, 1)},
@@ -216,7 +193,7 @@ json LiveState::calibration_json() const {
                               {"what", c.accepted ? "in use"
                                        : c.learnt ? "kept"
                                                   : "rejected"},
-                              {"cause", c.cause},
+                              {"cause", c.cause_word()},
                               {"reason", c.why()}});
   return out;
 }
@@ -224,7 +201,7 @@ json LiveState::calibration_json() const {
 namespace {
 
 json placement_json(const PublishedPlacement& placement) {
-  const Transform T = placement.T_enu_world.transform();
+  const Transform& T = placement.T_enu_world;
   json rows = json::array();
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 4; ++j) rows.push_back(j < 3 ? T.R(i, j) : T.t(i));
@@ -284,7 +261,8 @@ void LiveFrameBuilder::add(const RigFrame& frame) noexcept {
 }
 
 const LiveFrame& LiveFrameBuilder::add(const PoseSample& sample, HostStamp now) noexcept {
-  now_.pose = PublishedPose::of(sample, now);
+  now_.pose = sample;
+  now_.out = now;
   ++now_.read;
   ++(sample.status == PoseStatus::ok         ? now_.ok
      : sample.status == PoseStatus::degraded ? now_.degraded
@@ -303,8 +281,7 @@ const LiveFrame& LiveFrameBuilder::add(const PoseSample& sample, HostStamp now) 
 
 namespace {
 
-/// Steps of the map that an extent is worth: fewer would show no way any more.
-constexpr float kLeastSteps = 100;
+constexpr float kMostStep = 16;  // m: a map of longer ones shows no way any more
 
 float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
@@ -325,37 +302,16 @@ void LiveTrail::add(const Place& place) {
 
 void LiveTrail::thin() {
   shown_ = 0;
-  while (places_.size() > kMost / 2) {
-    if (2 * least_step_m_ * kLeastSteps > extent()) {
-      // Round and round a yard: what was driven first lies under what came later.
-      places_.erase(places_.begin(), places_.begin() + kMost / 2);
-      return;
-    }
-    least_step_m_ *= 2;
-    drop_near();
+  if (least_step_m_ >= kMostStep) {
+    places_.erase(places_.begin(), places_.begin() + kMost / 2);
+    return;
   }
-}
-
-void LiveTrail::drop_near() {
-  std::size_t kept = 0;
-  for (std::size_t i = 1; i < places_.size(); ++i) {
-    if (distance(places_[i].world, places_[kept].world) >= least_step_m_)
-      places_[++kept] = places_[i];
-    else
-      places_[kept].status = std::max(places_[kept].status, places_[i].status);
+  least_step_m_ *= 2;
+  for (std::size_t i = 0; i < places_.size(); i += 2) {
+    places_[i].status = std::max(places_[i].status, places_[i + 1].status);
+    places_[i / 2] = places_[i];
   }
-  places_.resize(kept + 1);
-}
-
-float LiveTrail::extent() const {
-  float longest = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto [least, most] = std::minmax_element(
-        places_.begin(), places_.end(),
-        [axis](const Place& a, const Place& b) { return a.world[axis] < b.world[axis]; });
-    longest = std::max(longest, most->world[axis] - least->world[axis]);
-  }
-  return longest;
+  places_.resize(kMost / 2);
 }
 
 }  // namespace vergence::app

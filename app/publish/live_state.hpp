@@ -10,10 +10,10 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "app/publish/pose_line.hpp"
-#include "app/recorder/histogram.hpp"
-#include "app/recorder/records.hpp"
+#include "app/publish/line_publisher.hpp"
+#include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
+#include "app/session/session_totals.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
 #include "drivers/clock.hpp"
@@ -24,8 +24,7 @@ namespace vergence::app {
 /// worst status of all that was driven up to the next one.
 ///
 /// Threads  One.
-/// Full     After kMost places those that are near others go; where the drive goes round and round,
-///          the oldest do.
+/// Full     After kMost places every other one goes, so 64 km are shown; then the oldest do.
 class LiveTrail {
  public:
   static constexpr std::size_t kMost = 4000;
@@ -43,8 +42,6 @@ class LiveTrail {
 
  private:
   void thin();
-  void drop_near();
-  [[nodiscard]] float extent() const;
 
   std::vector<Place> places_{};
   float least_step_m_ = 0.5F;
@@ -54,7 +51,8 @@ class LiveTrail {
 /// One frame for the live page, with what has been counted up to it: figures stay true when
 /// frames are left out.
 struct LiveFrame {
-  PublishedPose pose{};
+  PoseSample pose{};
+  HostStamp out{};  // when the estimator was done
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
   std::uint64_t missing = 0;  // numbers of frames that never came
   double path_m = 0;
@@ -73,17 +71,11 @@ class LiveState {
 
   void begin(const SessionStart& start) { start_ = start; }
   void add(const LiveFrame& frame);
-  void add(const PoseRecord& compared);
+  void add(const FrameReport& report);
   void add(const EventRecord& event);
   void add(const CalibrationRecord& calibration);
   void add(const PublishedPlacement& placement);
-  void set_temperature(std::size_t camera, float celsius) noexcept {
-    temperatures_[camera] = celsius;
-  }
   void end() noexcept { ended_ = true; }
-
-  /// The rig in use, for the judgement of points; not known yet: nullptr.
-  [[nodiscard]] const RigCalibration* rig() const noexcept { return rig_ ? &*rig_ : nullptr; }
 
   /// All there is to know, for a viewer who has just come. `now` tells whether frames still come.
   [[nodiscard]] std::string hello(HostStamp now) const;
@@ -100,10 +92,9 @@ class LiveState {
   SessionStart start_{};
   std::optional<LiveFrame> newest_{};
   double interval_s_ = 0;  // between frames, on the host's clock
-  std::array<std::optional<float>, kMaxCameras> temperatures_{};  // °C
   bool ended_ = false;
   TimeHistogram estimate_;
-  std::optional<PoseRecord> compared_{};
+  std::optional<FrameReport> report_{};
   LiveTrail trail_;
   std::deque<EventRecord> events_{};
   std::uint64_t events_seen_ = 0, events_shown_ = 0;
@@ -112,7 +103,6 @@ class LiveState {
   std::optional<CalibrationRecord> measured_{};  // by the drive, beside the one in use
   bool confirmed_ = false;
   bool was_confirmed_ = false;  // before the last event that says otherwise
-  std::optional<RigCalibration> rig_{};
   bool calibration_new_ = false;
   std::optional<PublishedPlacement> placement_{};
   bool placement_new_ = false;

@@ -80,11 +80,10 @@ void Publishing::open_page(const Configuration& configuration) {
     page_ = std::make_unique<LivePage>(
         options, &requests_, [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
     // Behind a # it is in no address that is asked for, so in nobody's log.
-    for (const HostPort& address : addresses_of(options.address))
-      links_.push_back(settings.token_file.empty()
-                           ? fmt::format("http://{}/#{}", address.text(), options.policy.token)
-                           : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
-                                         address.text(), settings.token_file));
+    link_ = settings.token_file.empty()
+                ? fmt::format("http://{}/#{}", options.address.link().text(), options.policy.token)
+                : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
+                              options.address.link().text(), settings.token_file);
   } catch (const InputError& e) {
     fmt::print(stderr, "vergence: {}; the drive goes on without its page\n", e.what());
   }
@@ -97,7 +96,7 @@ void page_by_default(Configuration* configuration) {
 void Publishing::attach(SessionOptions* session) {
   if (page_) {
     session->observers.push_back(page_.get());
-    for (const std::string& link : links_) fmt::print(stderr, "live page: {}\n", link);
+    fmt::print(stderr, "live page: {}\n", link_);
   }
   if (lines_) session->observers.push_back(lines_.get());
   session->requests = &requests_;

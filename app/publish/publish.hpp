@@ -1,7 +1,6 @@
 #pragma once
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "app/config/configuration.hpp"
 #include "app/publish/line_publisher.hpp"
@@ -29,7 +28,7 @@ class Publishing {
   SessionRequests requests_;
   std::unique_ptr<LinePublisher> lines_;  // outlives the page, which shows its latency
   std::unique_ptr<LivePage> page_;
-  std::vector<std::string> links_{};  // to the page, for a person to open
+  std::string link_{};  // to the page, for a person to open
 };
 
 /// `--page`: the live page on this machine, where the configuration names no address.

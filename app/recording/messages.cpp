@@ -70,23 +70,6 @@ Rectification rectification(const RigCalibration& rig, int camera, bool calibrat
   return r;
 }
 
-void put_diagnostic(CdrWriter* out, const Diagnostic& d) noexcept {
-  out->put(static_cast<std::uint8_t>(d.level)).text(d.name).text(d.message).text("vergence");
-  out->count(d.values.size());
-  for (const DiagnosticValue& value : d.values) {
-    std::array<char, 24> digits{};
-    auto* end = digits.data() + digits.size();
-    auto* at = end;
-    const bool negative = value.value < 0;
-    auto rest = negative ? 0U - static_cast<std::uint64_t>(value.value)
-                         : static_cast<std::uint64_t>(value.value);
-    do *--at = static_cast<char>('0' + rest % 10), rest /= 10;
-    while (rest > 0);
-    if (negative) *--at = '-';
-    out->text(value.key).text({at, static_cast<std::size_t>(end - at)});
-  }
-}
-
 }  // namespace
 
 std::uint32_t crc32_of(std::span<const std::uint8_t> bytes) noexcept {
@@ -100,11 +83,6 @@ void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
   out->header(stamp, frame).put(height).put(width).text("mono8").boolean(false).put(width);
   out->count(std::size_t{width} * height);
   for (int y = 0; y < image.height; ++y) out->raw({image.row(y), width});
-}
-
-void write_compressed_image(CdrWriter* out, Stamp stamp, std::string_view frame,
-                            std::string_view format, std::span<const std::uint8_t> file) noexcept {
-  out->header(stamp, frame).text(format).count(file.size()).raw(file);
 }
 
 void write_camera_info(CdrWriter* out, Stamp stamp, std::string_view frame,
@@ -199,11 +177,6 @@ void write_rig_transforms(CdrWriter* out, Stamp stamp, const RigCalibration& rig
   }
 }
 
-void write_diagnostics(CdrWriter* out, Stamp stamp, std::span<const Diagnostic> status) noexcept {
-  out->header(stamp, "").count(status.size());
-  for (const Diagnostic& d : status) put_diagnostic(out, d);
-}
-
 void write_text(CdrWriter* out, std::string_view text) noexcept { out->text(text); }
 
 void write_frame(CdrWriter* out, const FrameRecord& f) noexcept {
@@ -246,8 +219,6 @@ constexpr std::array kDefinitions{
     Definition{"sensor_msgs/Image",
                "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
                "uint8 is_bigendian\nuint32 step\nuint8[] data\n"},
-    Definition{"sensor_msgs/CompressedImage",
-               "std_msgs/Header header\nstring format\nuint8[] data\n"},
     Definition{"sensor_msgs/CameraInfo",
                "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\n"
                "float64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\nuint32 binning_x\n"
@@ -264,8 +235,6 @@ constexpr std::array kDefinitions{
     Definition{"nav_msgs/Odometry",
                "std_msgs/Header header\nstring child_frame_id\n"
                "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"},
-    Definition{"diagnostic_msgs/DiagnosticArray",
-               "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"},
     Definition{"tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
     Definition{"std_msgs/String", "string data\n"},
     // What one call of the estimator was given and what came of it: all that a replay needs beside
@@ -314,24 +283,13 @@ constexpr std::array kDefinitions{
     Definition{"geometry_msgs/TransformStamped",
                "std_msgs/Header header\nstring child_frame_id\n"
                "geometry_msgs/Transform transform\n"},
-    Definition{"diagnostic_msgs/DiagnosticStatus",
-               "byte level\nstring name\nstring message\nstring hardware_id\n"
-               "diagnostic_msgs/KeyValue[] values\n"},
-    Definition{"diagnostic_msgs/KeyValue", "string key\nstring value\n"},
 };
 
-constexpr std::array<std::string_view, kRosTypes> kNames{"sensor_msgs/msg/Image",
-                                                         "sensor_msgs/msg/CompressedImage",
-                                                         "sensor_msgs/msg/CameraInfo",
-                                                         "sensor_msgs/msg/NavSatFix",
-                                                         "sensor_msgs/msg/Imu",
-                                                         "nav_msgs/msg/Odometry",
-                                                         "diagnostic_msgs/msg/DiagnosticArray",
-                                                         "tf2_msgs/msg/TFMessage",
-                                                         "std_msgs/msg/String",
-                                                         "vergence_msgs/msg/Frame",
-                                                         "vergence_msgs/msg/InsReading",
-                                                         "vergence_msgs/msg/Pulse"};
+constexpr std::array<std::string_view, kRosTypes> kNames{
+    "sensor_msgs/msg/Image",  "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/NavSatFix",
+    "sensor_msgs/msg/Imu",    "nav_msgs/msg/Odometry",      "tf2_msgs/msg/TFMessage",
+    "std_msgs/msg/String",    "vergence_msgs/msg/Frame",    "vergence_msgs/msg/InsReading",
+    "vergence_msgs/msg/Pulse"};
 
 const Definition* find(std::string_view name) {
   for (const Definition& d : kDefinitions)

@@ -33,9 +33,6 @@ void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
                                                        std::size_t frame) noexcept {
   return 64 + frame + static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
-/// sensor_msgs/CompressedImage of a file's bytes.
-void write_compressed_image(CdrWriter* out, Stamp stamp, std::string_view frame,
-                            std::string_view format, std::span<const std::uint8_t> file) noexcept;
 
 /// sensor_msgs/CameraInfo of camera `camera`: k and d of the lens; r and p those of the pair that
 /// rectifies it with camera 0 where a calibration is there, else r the identity and p of k.
@@ -58,19 +55,6 @@ void write_pose_transform(CdrWriter* out, const PoseSample& sample) noexcept;
 /// `left` → every other camera. `names`: the frames of the cameras.
 void write_rig_transforms(CdrWriter* out, Stamp stamp, const RigCalibration& rig,
                           std::span<const std::string_view> names) noexcept;
-
-/// diagnostic_msgs/DiagnosticStatus, level as ROS has it.
-enum class DiagnosticLevel : std::uint8_t { ok = 0, warn = 1, error = 2, stale = 3 };
-struct DiagnosticValue {
-  std::string_view key;
-  std::int64_t value = 0;
-};
-struct Diagnostic {
-  DiagnosticLevel level = DiagnosticLevel::ok;
-  std::string_view name, message;
-  std::span<const DiagnosticValue> values;
-};
-void write_diagnostics(CdrWriter* out, Stamp stamp, std::span<const Diagnostic> status) noexcept;
 
 void write_text(CdrWriter* out, std::string_view text) noexcept;  // std_msgs/String
 
@@ -98,19 +82,17 @@ void write_pulse(CdrWriter* out, Stamp stamp, const Pulse& pulse, Stamp edge) no
 /// others.
 enum class RosType : std::uint8_t {
   image,
-  compressed_image,
   camera_info,
   nav_sat_fix,
   imu,
   odometry,
-  diagnostics,
   tf,
   text,
   frame,        // vergence_msgs/msg/Frame
   ins_reading,  // vergence_msgs/msg/InsReading
   pulse,        // vergence_msgs/msg/Pulse
 };
-inline constexpr int kRosTypes = 12;
+inline constexpr int kRosTypes = 10;
 
 /// `sensor_msgs/msg/Image`.
 [[nodiscard]] std::string_view ros_type_name(RosType type) noexcept;

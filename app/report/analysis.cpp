@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "app/report/decimation.hpp"
 #include "app/report/svg.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/math/angle.hpp"
@@ -20,8 +19,6 @@ constexpr double kPlacement =
     100.0;  // m: the stretch that lays the trajectory on its reference, as with the INS
 constexpr double kPercent = 100.0;
 constexpr double kWideGap = 4.0;  // frame intervals: nothing is drawn across more
-constexpr std::size_t kMostEvaluated =
-    200'000;  // poses: the figures of a longer torn session are left out, not waited for
 
 void measure_time(const Session& s, Analysis* a) {
   std::vector<double> steps;
@@ -333,27 +330,6 @@ void take_metrics(const Session& s, Analysis* a) {
                              : "";
 }
 
-/// What summary.json would have said.
-void reckon_metrics(const Session& s, Analysis* a) {
-  const std::vector<StampedPose> ours = posed_frames(s);
-  if (ours.size() > kMostEvaluated || s.reference.size() > kMostEvaluated || ours.size() < 3 ||
-      s.reference.empty())
-    return;
-  EvaluationOptions options;
-  constexpr int kNearStep = 10;  // poses: a tenth of the segments gives the mean as well
-  options.segments = {SegmentOptions{}, {{10, 20, 30, 40, 50}, kNearStep, false}};
-  const TrajectoryEvaluation e = evaluate(ours, s.reference, options);
-  if (e.status != EvaluationStatus::ok) return;
-  const bool far = e.segments[0].count > 0;
-  const SegmentErrors& used = e.segments[far ? 0 : 1];
-  a->scale = e.sim3.scale, a->ate_m = e.ate_se3.rmse, a->end_error = e.end_error_ratio;
-  if (used.count == 0) return;
-  a->drift = used.translation;
-  a->rotation_deg_per_m = used.rotation * kDegreesPerRadian;
-  a->drift_sentence =
-      far ? "mean of all segments of 100 to 800 m" : "mean of segments of 10 to 50 m";
-}
-
 /// Positions of both at the frames that have both, the INS's in enu.
 MatchedTrajectories positions_with_ins(const Session& s) {
   constexpr std::size_t kMostPairs = 20'000;
@@ -429,10 +405,7 @@ Analysis analyse(const Session& session) {
   a.vertical = spread_of(a.vertical_m);
   a.heading = spread_of(a.heading_deg);
   if (a.source == ErrorSource::none) return a;
-  if (session.summary.is_object())
-    take_metrics(session, &a);
-  else
-    reckon_metrics(session, &a);
+  take_metrics(session, &a);
   if (a.source == ErrorSource::ins) drift_by_positions(session, &a);
   return a;
 }

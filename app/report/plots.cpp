@@ -7,20 +7,35 @@
 
 #include <fmt/format.h>
 
-#include "app/report/decimation.hpp"
-#include "app/report/frame.hpp"
 #include "app/report/svg.hpp"
+#include "core/math/angle.hpp"
 
 namespace vergence::app::report {
 namespace {
 
-constexpr int kColumns = 740;  // of a curve, two a unit of the paper: sharp on a fine screen
+/// The box of a plot: where data lies on the paper, and its axes.
+struct PlotBox {
+  double left = 58, right = kPlotWidth - 12, top = 8, bottom = kPlotHeight - 36;  // on the paper
+  double x0 = 0, x1 = 1, y0 = 0, y1 = 1;  // of the data, x0 < x1, y0 < y1
 
-/// An axis from the first to the last value, never empty.
-void fit_x(PlotBox* box, double low, double high) {
-  box->x0 = low;
-  box->x1 = high > low ? high : low + 1;
-}
+  [[nodiscard]] double x(double v) const noexcept {
+    return left + (v - x0) / (x1 - x0) * (right - left);
+  }
+  [[nodiscard]] double y(double v) const noexcept {
+    return bottom - (v - y0) / (y1 - y0) * (bottom - top);
+  }
+  [[nodiscard]] Line line(const Line& data) const;
+  void draw_time_axis(Svg* svg) const;
+  void draw_y_axis(Svg* svg) const;
+  /// Sets y0 and y1 around values with some air; equal values get a box, too. from_zero: y0 is 0.
+  void fit_y(double low, double high, bool from_zero);
+};
+
+}  // namespace
+
+namespace {
+
+constexpr int kColumns = 740;  // of a curve, two a unit of the paper: sharp on a fine screen
 
 std::vector<Line> on_paper(const PlotBox& box, const std::vector<Line>& lines) {
   std::vector<Line> placed;
@@ -51,9 +66,10 @@ void draw_holes(const PlotBox& box, std::span<const double> time, std::span<cons
 
 }  // namespace
 
-PlotBox time_box(const Analysis& a) {
+/// From the first frame to the last along x.
+[[nodiscard]] static PlotBox time_box(const Analysis& a) {
   PlotBox box;
-  fit_x(&box, 0, a.duration_s);
+  box.x1 = a.duration_s > 0 ? a.duration_s : 1;  // never empty
   return box;
 }
 
@@ -73,31 +89,22 @@ void PlotBox::fit_y(double low, double high, bool from_zero) {
   y1 = high + air;
 }
 
-void PlotBox::draw_x_axis(Svg* svg, XAxis axis) const {
+void PlotBox::draw_time_axis(Svg* svg) const {
   constexpr int kMost = 6;
-  const bool kilometres = axis == XAxis::distance_m && x1 - x0 >= 3000;
-  const double unit = kilometres ? 1000.0 : 1.0;
-  const auto ticks =
-      axis == XAxis::time_s ? time_ticks(x0, x1, kMost) : nice_ticks(x0 / unit, x1 / unit, kMost);
+  const auto ticks = time_ticks(x0, x1, kMost);
   const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 1;
   for (const double t : ticks) {
-    const double at = x(t * unit);
+    const double at = x(t);
     svg->line("tick", at, top, at, bottom);
-    const std::string label = axis == XAxis::time_s ? time_label(t, step) : tick_label(t, step);
     // The outer ones keep clear of the other axis's numbers and of the edge.
     const bool first = at<left + 14, last = at> right - 14;
-    svg->text("",
-              first  ? Anchor::start
-              : last ? Anchor::end
-                     : Anchor::middle,
-              first ? left - 3 : std::min(at, right + 10), bottom + 16, label);
+    const Anchor anchor = first ? Anchor::start : last ? Anchor::end : Anchor::middle;
+    svg->text("", anchor, first ? left - 3 : std::min(at, right + 10), bottom + 16,
+              time_label(t, step));
   }
   svg->line("axis", left, bottom, right, bottom);
-  const char* words = kilometres                  ? "driven, km"
-                      : axis == XAxis::distance_m ? "driven, m"
-                      : x1 - x0 > 60              ? "time, min:s"
-                                                  : "time, s";
-  svg->text("", Anchor::middle, (left + right) / 2, bottom + 32, words);
+  svg->text("", Anchor::middle, (left + right) / 2, bottom + 32,
+            x1 - x0 > 60 ? "time, min:s" : "time, s");
 }
 
 void PlotBox::draw_y_axis(Svg* svg) const {
@@ -112,7 +119,7 @@ void PlotBox::draw_y_axis(Svg* svg) const {
 
 std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
                        std::span<const Frame> frames) {
-  PlotBox box;
+  PlotBox box = time_box(analysis);
   double low = 0, high = 0;
   bool any = false;
   for (const double v : plot.y) {
@@ -122,14 +129,13 @@ std::string curve_plot(const CurvePlot& plot, const Analysis& analysis,
     any = true;
   }
   if (!any) return {};
-  fit_x(&box, plot.x.front(), plot.x.back());
   box.fit_y(low, high, plot.from_zero);
   Svg svg(kPlotWidth, kPlotHeight, plot.description);
-  if (plot.axis == XAxis::time_s) draw_holes(box, analysis.time_s, frames, &svg);
-  box.draw_x_axis(&svg, plot.axis);
+  draw_holes(box, analysis.time_s, frames, &svg);
+  box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
-  svg.lines(plot.css,
-            on_paper(box, decimate(plot.x, plot.y, plot.breaks, box.x0, box.x1, kColumns)));
+  svg.lines(plot.css, on_paper(box, decimate(analysis.time_s, plot.y, analysis.breaks, box.x0,
+                                             box.x1, kColumns)));
   return std::move(svg).finish();
 }
 
@@ -234,66 +240,260 @@ std::string bands_picture(const Session& session, const Analysis& analysis) {
     draw_lane(lanes[i], box,
               box.top + kLaneHeight * static_cast<double>(i) + (i >= kStatuses ? kApart : 0), &svg);
   draw_events(session, box, events_top, &svg);
-  box.draw_x_axis(&svg, XAxis::time_s);
+  box.draw_time_axis(&svg);
   return std::move(svg).finish();
 }
 
-// ---- timing
+// ---- calibration
 
 namespace {
 
-std::vector<double> times_of(const Session& s) {
-  std::vector<double> times;
-  for (const Frame& f : s.frames)
-    if (f.estimate_ms >= 0) times.push_back(f.estimate_ms);
-  std::sort(times.begin(), times.end());
-  return times;
+constexpr double kMillimetres = 1e3;
+
+struct Held {  // a value that held for a while
+  double from = 0, to = 0, value = 0, two_sigma = kNone;
+};
+
+struct Mark {  // a value that was found and not taken
+  double at = 0, value = 0, two_sigma = kNone;
+};
+
+struct CalibrationCurve {
+  std::vector<Held> held;
+  std::vector<Mark> rejected, measured;
+  [[nodiscard]] bool empty() const { return held.empty() && rejected.empty() && measured.empty(); }
+};
+
+struct Component {
+  double value = 0, sigma = kNone;
+};
+
+/// A number of a row in the unit it is shown in.
+Component component_of(const CalibrationRow& c, int component) {
+  const double unit = component < 3 ? kDegreesPerRadian : kMillimetres;
+  const auto k = static_cast<std::size_t>(component);
+  return {c.value[k] * unit, c.has_sigma ? c.sigma[k] * unit : kNone};
+}
+
+CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int camera, int component) {
+  CalibrationCurve curve;
+  for (const CalibrationRow& c : s.calibrations) {
+    if (c.camera != camera) continue;
+    const Component number = component_of(c, component);
+    const double since = s.frames.empty() ? 0
+                                          : (static_cast<double>(c.stamp.ns()) -
+                                             static_cast<double>(s.frames.front().stamp.ns())) *
+                                                1e-9;
+    const double at = std::clamp(since, 0.0, a.duration_s);
+    if (c.accepted) {
+      if (!curve.held.empty()) curve.held.back().to = at;
+      curve.held.push_back({at, a.duration_s, number.value, 2 * number.sigma});
+    } else if (!c.kept) {
+      curve.rejected.push_back({at, number.value, kNone});
+    } else if (std::isfinite(c.depth_sigma_percent)) {  // else the solve came to nothing
+      curve.measured.push_back({at, number.value, 2 * number.sigma});
+    }
+  }
+  return curve;
+}
+
+void fit_calibration(const CalibrationCurve& curve, PlotBox* box) {
+  double low = 1e300, high = -1e300;
+  const auto include = [&](double v) { low = std::min(low, v), high = std::max(high, v); };
+  for (const Held& h : curve.held) {
+    const double s = std::isfinite(h.two_sigma) ? h.two_sigma : 0;
+    include(h.value - s), include(h.value + s);
+  }
+  for (const Mark& m : curve.rejected) include(m.value);
+  for (const Mark& m : curve.measured) {
+    const double s = std::isfinite(m.two_sigma) ? m.two_sigma : 0;
+    include(m.value - s), include(m.value + s);
+  }
+  box->fit_y(low, high, false);
+}
+
+void draw_held(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
+  Line steps;
+  for (const Held& h : curve.held) {
+    if (h.two_sigma > 0)
+      svg->rect("band", box.x(h.from), box.y(h.value + h.two_sigma), box.x(h.to) - box.x(h.from),
+                box.y(h.value - h.two_sigma) - box.y(h.value + h.two_sigma));
+    steps.push_back({box.x(h.from), box.y(h.value)});
+    steps.push_back({box.x(h.to), box.y(h.value)});
+  }
+  if (!steps.empty()) svg->lines("curve s-ours", {steps});
+  for (const Held& h : curve.held) svg->circle("f-ours", box.x(h.from), box.y(h.value), 2.6);
+}
+
+void draw_marks(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
+  for (const Mark& m : curve.measured) {
+    const double x = box.x(m.at);
+    if (m.two_sigma > 0)
+      svg->line("whisker", x, box.y(m.value + m.two_sigma), x, box.y(m.value - m.two_sigma));
+    svg->circle("seen", x, box.y(m.value), 2.8);
+  }
+  for (const Mark& m : curve.rejected) svg->circle("hollow", box.x(m.at), box.y(m.value), 3.2);
+}
+
+void draw_confirmation(double at_s, const PlotBox& box, Svg* svg) {
+  const double x = box.x(at_s);
+  svg->line("confirmed", x, box.top, x, box.bottom);
+  const bool near_the_end = x > box.right - 60;
+  svg->text("good", near_the_end ? Anchor::end : Anchor::start, x + (near_the_end ? -5 : 5),
+            box.top + 11, "verified");
 }
 
 }  // namespace
 
-TimingPicture timing_picture(const Session& session, const Analysis& analysis) {
-  TimingPicture picture;
-  const std::vector<double> times = times_of(session);
-  picture.frames = times.size();
-  if (times.empty()) return picture;
-  const double budget = analysis.interval_s * 1e3;
-  picture.over_budget =
-      budget > 0 ? static_cast<std::size_t>(times.end() -
-                                            std::upper_bound(times.begin(), times.end(), budget))
-                 : 0;
-  // The axis reaches to the budget and to nearly all frames; what is slower than its end stands in
-  // the last bar.
-  const double most = times[std::min(times.size() - 1, times.size() * 999 / 1000)];
-  constexpr int kBars = 60;
-  PlotBox box;
-  box.x0 = 0;
-  box.x1 = std::max({most, budget > 20 * most ? 0.0 : budget, 1e-3}) * 1.08;
-  std::array<std::size_t, kBars> bars{};
-  for (const double t : times)
-    ++bars[static_cast<std::size_t>(std::min(t / box.x1 * kBars, kBars - 1.0))];
-  box.fit_y(0, static_cast<double>(*std::max_element(bars.begin(), bars.end())), true);
-  Svg svg(kPlotWidth, kPlotHeight, "How many frames took how many milliseconds");
+std::string calibration_plot(const Session& session, const Analysis& analysis, int camera,
+                             int component) {
+  const CalibrationCurve curve = calibration_curve(session, analysis, camera, component);
+  if (curve.empty()) return {};
+  PlotBox box = time_box(analysis);
+  box.left = 74;  // four decimals
+  fit_calibration(curve, &box);
+  Svg svg(kPlotWidth, kPlotHeight, "A number of the calibration over time with two sigmas");
+  box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
-  const auto ticks = nice_ticks(box.x0, box.x1, 6);
-  for (const double t : ticks)
-    svg.text("", t == 0.0 ? Anchor::start : Anchor::middle, box.x(t) - (t == 0.0 ? 3 : 0),
-             box.bottom + 16, tick_label(t, ticks.size() > 1 ? ticks[1] - ticks[0] : 1));
-  svg.text("", Anchor::middle, (box.left + box.right) / 2, box.bottom + 32,
-           "from the images to the pose, ms");
-  const double width = (box.right - box.left) / kBars;
-  for (int i = 0; i < kBars; ++i) {
-    const auto n = static_cast<double>(bars[static_cast<std::size_t>(i)]);
-    if (n <= 0) continue;
-    const double height =
-        std::max(1.0, box.bottom - box.y(n));  // a single frame among thousands still shows
-    svg.rect("f-ours", box.left + width * i + 0.5, box.bottom - height, width - 1, height);
+  if (analysis.confirmed_s) draw_confirmation(*analysis.confirmed_s, box, &svg);
+  draw_held(curve, box, &svg);
+  draw_marks(curve, box, &svg);
+  return std::move(svg).finish();
+}
+
+// ---- map
+
+namespace {
+
+constexpr double kMargin = 16, kFoot = 38, kLeast = 190,
+                 kMost = 420;  // of the paper; kFoot: room for the scale bar
+constexpr double kThin = 0.4;  // of the paper: finer than the line is wide
+constexpr std::size_t kMostPoints = 20'000;
+
+struct Bounds {
+  double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
+  bool any = false;
+  void include(double x, double y) {
+    if (!std::isfinite(x) || !std::isfinite(y)) return;
+    if (!any) *this = {x, x, y, y, true};
+    x0 = std::min(x0, x), x1 = std::max(x1, x), y0 = std::min(y0, y), y1 = std::max(y1, y);
   }
-  svg.line("axis", box.left, box.bottom, box.right, box.bottom);
-  if (budget > 0 && budget <= box.x1)
-    svg.line("budget", box.x(budget), box.top, box.x(budget), box.bottom);
-  picture.svg = std::move(svg).finish();
-  return picture;
+};
+
+/// From metres to the paper, one scale for both axes; up is up.
+struct MapScale {
+  double per_metre = 1, x_middle = 0, y_middle = 0, height = kLeast;
+  [[nodiscard]] double x(double v) const { return kPlotWidth / 2 + (v - x_middle) * per_metre; }
+  [[nodiscard]] double y(double v) const {
+    return kMargin + (height - kMargin - kFoot) / 2 - (v - y_middle) * per_metre;
+  }
+};
+
+MapScale scale_for(const Bounds& b) {
+  constexpr double kSmallest =
+      1;  // m: a vehicle that stands still is a dot, not its noise enlarged
+  const double width = std::max(b.x1 - b.x0, kSmallest), depth = std::max(b.y1 - b.y0, kSmallest);
+  MapScale s;
+  s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMost - kMargin - kFoot) / depth);
+  s.height = std::clamp(depth * s.per_metre + kMargin + kFoot, kLeast, kMost);
+  s.x_middle = (b.x0 + b.x1) / 2, s.y_middle = (b.y0 + b.y1) / 2;
+  return s;
+}
+
+std::vector<double> placed(const std::vector<double>& values, const MapScale& s, bool vertical) {
+  std::vector<double> out(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    out[i] = vertical ? s.y(values[i]) : s.x(values[i]);
+  return out;
+}
+
+void draw_path(const char* css, const std::vector<double>& x, const std::vector<double>& y,
+               const std::vector<std::uint8_t>& breaks, const MapScale& s, Svg* svg) {
+  const std::vector<double> on_x = placed(x, s, false), on_y = placed(y, s, true);
+  svg->lines(css, thin(on_x, on_y, breaks, kThin, kMostPoints));
+}
+
+/// Our way also breaks off where the drive was placed on the earth anew: that step was not driven.
+std::vector<std::uint8_t> breaks_of_ours(const Analysis& a) {
+  std::vector<std::uint8_t> breaks = a.breaks;
+  for (std::size_t i = 0; i < std::min(breaks.size(), a.placed_anew.size()); ++i)
+    if (a.placed_anew[i] != 0) breaks[i] = 1;
+  return breaks;
+}
+
+/// Where the path breaks off because there was no pose, a small red mark.
+void draw_breaks(const Analysis& a, const MapScale& s, Svg* svg) {
+  constexpr double kApart = 6;  // of the paper: marks nearer than that say the same
+  Point last{-1e9, -1e9};
+  for (std::size_t i = 1; i < a.ours_x.size(); ++i) {
+    const bool ends =
+        std::isfinite(a.ours_x[i - 1]) && (!std::isfinite(a.ours_x[i]) || a.breaks[i] != 0);
+    if (!ends) continue;
+    const Point p{s.x(a.ours_x[i - 1]), s.y(a.ours_y[i - 1])};
+    if (std::hypot(p.x - last.x, p.y - last.y) < kApart) continue;
+    svg->lines("curve s-bad", {{{p.x - 4, p.y - 4}, {p.x + 4, p.y + 4}},
+                               {{p.x - 4, p.y + 4}, {p.x + 4, p.y - 4}}});
+    last = p;
+  }
+}
+
+/// Degraded stretches lie over the path in their own colour.
+void draw_degraded(const Analysis& a, std::span<const Frame> frames, const MapScale& s, Svg* svg) {
+  std::vector<double> x = a.ours_x;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (frames[i].status != PoseStatus::degraded) x[i] = kNone;
+  draw_path("curve map-care s-care", x, a.ours_y, breaks_of_ours(a), s, svg);
+}
+
+void draw_ends(const Analysis& a, const MapScale& s, Svg* svg) {
+  const auto there = [&a](std::size_t i) { return std::isfinite(a.ours_x[i]); };
+  std::size_t first = 0, last = a.ours_x.size();
+  while (first < last && !there(first)) ++first;
+  if (first == last) return;
+  while (!there(last - 1)) --last;
+  svg->circle("f-ours", s.x(a.ours_x[first]), s.y(a.ours_y[first]), 4.5);
+  const double x = s.x(a.ours_x[last - 1]), y = s.y(a.ours_y[last - 1]);
+  svg->rect("f-ours", x - 4, y - 4, 8, 8);
+}
+
+void draw_scale_bar(const MapScale& s, Svg* svg) {
+  const auto ticks = nice_ticks(0, 150 / s.per_metre, 2);
+  const double metres = ticks.size() > 1 ? ticks[1] : 1;
+  const double y = s.height - 14, length = metres * s.per_metre;
+  svg->lines("curve s-ink",
+             {{{kMargin, y - 5}, {kMargin, y}, {kMargin + length, y}, {kMargin + length, y - 5}}});
+  const std::string words =
+      metres >= 1000 ? fmt::format("{:g} km", metres / 1000) : fmt::format("{:g} m", metres);
+  svg->text("strong", Anchor::start, kMargin + length + 8, y + 1, words);
+}
+
+void draw_north(const MapScale& s, Svg* svg) {
+  const double x = kPlotWidth - kMargin - 8, y = s.height - 12;
+  svg->polygon("f-ink", {{x, y - 22}, {x + 6, y}, {x, y - 5}, {x - 6, y}});
+  svg->text("strong", Anchor::end, x - 12, y - 2, "north");
+}
+
+}  // namespace
+
+std::string map_picture(const Analysis& analysis, std::span<const Frame> frames) {
+  Bounds bounds;
+  for (std::size_t i = 0; i < analysis.ours_x.size(); ++i) {
+    bounds.include(analysis.ours_x[i], analysis.ours_y[i]);
+    bounds.include(analysis.theirs_x[i], analysis.theirs_y[i]);
+  }
+  if (!bounds.any) return {};
+  const MapScale scale = scale_for(bounds);
+  Svg svg(kPlotWidth, scale.height, "The drive from above");
+  draw_path("curve map-theirs s-theirs", analysis.theirs_x, analysis.theirs_y, analysis.breaks,
+            scale, &svg);
+  draw_path("curve map-ours s-ours", analysis.ours_x, analysis.ours_y, breaks_of_ours(analysis),
+            scale, &svg);
+  draw_degraded(analysis, frames, scale, &svg);
+  draw_breaks(analysis, scale, &svg);
+  draw_ends(analysis, scale, &svg);
+  draw_scale_bar(scale, &svg);
+  if (analysis.map_is_enu) draw_north(scale, &svg);
+  return std::move(svg).finish();
 }
 
 }  // namespace vergence::app::report

@@ -14,13 +14,10 @@ namespace vergence::app::report {
 
 inline constexpr double kPlotWidth = 440, kPlotHeight = 190;
 
-enum class XAxis : std::uint8_t { time_s, distance_m };
-
+/// A curve over the time of the frames.
 struct CurvePlot {
   std::string description;
-  XAxis axis = XAxis::time_s;
-  std::span<const double> x, y;          // of one size
-  std::span<const std::uint8_t> breaks;  // of the same, or empty
+  std::span<const double> y;  // a value a frame
   const char* css = "curve s-ours";
   bool from_zero = false;  // the y axis begins at 0
 };
@@ -34,13 +31,6 @@ struct CurvePlot {
 /// A lane for every status and state that occurred, and one for events. In a pixel column that
 /// holds several, each shows.
 [[nodiscard]] std::string bands_picture(const Session& session, const Analysis& analysis);
-
-/// Times of the frames with the budget as a line. `over_budget`: how many frames took longer.
-struct TimingPicture {
-  std::string svg;
-  std::size_t frames = 0, over_budget = 0;
-};
-[[nodiscard]] TimingPicture timing_picture(const Session& session, const Analysis& analysis);
 
 /// One number of a camera's calibration as it held over the drive, with a band of ± 2 sigma; hollow
 /// red marks are rejected ones, hollow grey ones what the drive measured beside one that was kept.

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,10 +16,96 @@
 
 #include "app/datasets/decimal.hpp"
 #include "app/datasets/text_file.hpp"
-#include "app/report/csv.hpp"
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app::report {
+
+FileLines::FileLines(const std::filesystem::path& file) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(file, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    refuse(file, 0, "is no file: a folder, a pipe or a device");  // a pipe would wait for ever
+  in_.open(file, std::ios::binary);
+  if (!in_) refuse(file, 0, std::string("cannot be opened (") + std::strerror(errno) + ")");
+}
+
+bool FileLines::read_block() {
+  std::array<char, 1U << 16U> block;
+  in_.read(block.data(), block.size());
+  if (in_.gcount() <= 0) return false;
+  read_.erase(0, at_);
+  at_ = 0;
+  if (read_.size() > kLongestLine) read_.resize(kLongestLine);
+  read_.append(block.data(), static_cast<std::size_t>(in_.gcount()));
+  return true;
+}
+
+bool FileLines::next_whole(std::string_view* line) {
+  for (std::size_t looked = at_;;) {
+    const std::size_t end = read_.find('\n', looked);
+    if (end != std::string::npos) {
+      *line = std::string_view(read_).substr(at_, end - at_);
+      at_ = end + 1;
+      return true;
+    }
+    const std::size_t left = std::min(read_.size() - at_, kLongestLine);
+    if (!read_block()) {
+      torn_ = left > 0;
+      return false;
+    }
+    looked = left;
+  }
+}
+
+bool FileLines::next(std::string_view* line) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  for (std::string_view whole; next_whole(&whole);) {
+    if (!std::exchange(begun_, true) && whole.starts_with(kByteOrderMark))
+      whole.remove_prefix(kByteOrderMark.size());
+    *line = trimmed(whole);
+    if (!line->empty() && line->front() != '#') return true;
+  }
+  return false;
+}
+
+CsvRows::CsvRows(NextLine next_line) : next_line_(std::move(next_line)) {
+  std::string_view head;
+  if (!next_line_(&head)) return;
+  std::vector<std::string_view> names(kMostColumns);
+  names.resize(std::min(split(head, ',', names), kMostColumns));
+  names_.assign(names.begin(), names.end());
+  fields_.resize(names_.size());
+}
+
+std::optional<std::size_t> CsvRows::column(std::string_view name) const noexcept {
+  const auto found = std::find(names_.begin(), names_.end(), name);
+  if (found == names_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - names_.begin());
+}
+
+bool CsvRows::next() {
+  std::string_view line;
+  while (next_line_(&line)) {
+    if (split(line, ',', fields_) == names_.size()) return true;
+    ++torn_;
+  }
+  return false;
+}
+
+std::string_view CsvRows::text(std::optional<std::size_t> column) const noexcept {
+  return column ? fields_[*column] : std::string_view{};
+}
+
+std::optional<double> CsvRows::number(std::optional<std::size_t> column) const noexcept {
+  double value = 0;
+  if (!parse_number(text(column), &value)) return std::nullopt;
+  return value;
+}
+
+std::optional<std::int64_t> CsvRows::integer(std::optional<std::size_t> column) const noexcept {
+  return parse_integer(text(column));
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -271,30 +359,6 @@ bool read_six(const CsvRows& rows, const char* prefix, std::array<double, 6>* ou
   return true;
 }
 
-/// Nothing: a number is missing or makes no rectangle of an image.
-std::optional<ResidualRow> parse_residual(const CsvRows& rows) {
-  ResidualRow r;
-  r.at_the_end = rows.text(rows.column("calibration")) == "end";
-  const auto camera = rows.integer(rows.column("camera"));
-  const auto left = rows.number(rows.column("left_px")), top = rows.number(rows.column("top_px"));
-  const auto width = rows.number(rows.column("width_px")),
-             height = rows.number(rows.column("height_px"));
-  const auto mean = rows.number(rows.column("mean_px"));
-  if (!camera || *camera < 1 || *camera >= kMaxCameras || !left || !top || !width || !height ||
-      !mean)
-    return std::nullopt;
-  constexpr double kLargest = 1e5;  // px
-  const bool inside = *left >= 0 && *top >= 0 && *width > 0 && *height > 0 &&
-                      *left + *width <= kLargest && *top + *height <= kLargest;
-  if (!inside || !(std::abs(*mean) <= kLargest)) return std::nullopt;
-  r.camera = static_cast<int>(*camera);
-  r.left = *left, r.top = *top, r.width = *width, r.height = *height;
-  r.mean_px = *mean;
-  r.matches = std::clamp(rows.number(rows.column("matches")).value_or(0.0), 0.0, 1e9);
-  r.scatter_px = std::clamp(rows.number(rows.column("scatter_px")).value_or(0.0), 0.0, kLargest);
-  return r;
-}
-
 void read_calibrations(const fs::path& folder, Session* session) {
   auto lines =
       open_part(folder / "calibrations.csv", "how the calibration changed is not known", session);
@@ -335,23 +399,6 @@ void read_calibrations(const fs::path& folder, Session* session) {
   report_damage("calibrations.csv", *lines, rows.torn_rows() + unreadable, 0, session);
 }
 
-void read_residuals(const fs::path& folder, Session* session) {
-  std::error_code error;
-  if (!fs::exists(folder / "residuals.csv", error)) return;
-  auto lines = open_part(folder / "residuals.csv",
-                         "how the calibration fits the images is not known", session);
-  if (!lines) return;
-  CsvRows rows([&lines](std::string_view* line) { return lines->next(line); });
-  std::size_t unreadable = 0;
-  while (rows.next() && session->residuals.size() < kMostResiduals) {
-    if (const auto row = parse_residual(rows))
-      session->residuals.push_back(*row);
-    else
-      ++unreadable;
-  }
-  report_damage("residuals.csv", *lines, rows.torn_rows() + unreadable, 0, session);
-}
-
 std::optional<Event> parse_event(std::string_view line) {
   if (line.size() > kLongestEventLine) return std::nullopt;
   const auto json = nlohmann::json::parse(line, nullptr, false);
@@ -383,15 +430,14 @@ void read_events(const fs::path& folder, Session* session) {
 
 void read_summary(const fs::path& folder, Session* session) {
   const auto text = read_part(folder / "summary.json", kLargestSummary,
-                              "the session was not closed (killed, or the power went); figures are "
-                              "reckoned again from the other files",
+                              "the session was not closed (killed, or the power went); its figures "
+                              "are not known",
                               session);
   if (!text) return;
   session->summary = nlohmann::json::parse(*text, nullptr, false);
   if (session->summary.is_object()) return;
   session->summary = nullptr;
-  session->missing.emplace_back(
-      "summary.json is torn; figures are reckoned again from the other files");
+  session->missing.emplace_back("summary.json is torn; its figures are not known");
 }
 
 /// A drive that never found a calibration has none to write; its calibrations.csv and its summary
@@ -473,7 +519,6 @@ Session read_session(const fs::path& folder, std::size_t most_frames) {
                                              most_frames, &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
-  read_residuals(folder, &session);
   read_events(folder, &session);
   return session;
 }

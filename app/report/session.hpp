@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -15,8 +17,69 @@
 #include "core/types/pose_sample.hpp"
 #include "core/types/stamped_pose.hpp"
 
-/// A session folder as it was found, whole or torn.
 namespace vergence::app::report {
+
+/// The lines of a file one after the other as Lines gives those of a text, whatever the file's
+/// length. What follows the last line's end is left out: a killed writer leaves it, and a number
+/// cut in the middle looks like another one.
+///
+/// Memory  A block, or the longest line; of a line beyond kLongestLine some bytes are lost, so that
+///         it is a damaged one.
+/// Errors  The constructor throws InputError: not there, no file, not readable.
+class FileLines {
+ public:
+  static constexpr std::size_t kLongestLine = std::size_t{1} << 20U;  // bytes
+
+  explicit FileLines(const std::filesystem::path& file);
+  /// False at the end. The view holds until the next call.
+  [[nodiscard]] bool next(std::string_view* line);
+  /// At the end: the file does not end with a line's end.
+  [[nodiscard]] bool torn() const noexcept { return torn_; }
+  /// At the end: the rest could not be read.
+  [[nodiscard]] bool failed() const noexcept { return in_.bad(); }
+
+ private:
+  [[nodiscard]] bool next_whole(std::string_view* line);
+  [[nodiscard]] bool read_block();
+
+  std::ifstream in_;
+  std::string read_{};  // and not given yet, from at_ on
+  std::size_t at_ = 0;
+  bool begun_ = false, torn_ = false;
+};
+
+/// Rows of a table whose first line names the columns, commas between, nothing quoted: what the
+/// recorder writes.
+///
+/// Ownership  Fields are views into the line last given.
+/// Errors     A row with another number of fields than the head is passed over and counted.
+class CsvRows {
+ public:
+  /// Gives the next line; false at the end.
+  using NextLine = std::function<bool(std::string_view*)>;
+  explicit CsvRows(NextLine next_line);
+  /// Position of a column by its name; nothing when the table lacks it.
+  [[nodiscard]] std::optional<std::size_t> column(std::string_view name) const noexcept;
+  /// False at the end.
+  [[nodiscard]] bool next();
+
+  /// Of the row last given. Empty where the column does not exist.
+  [[nodiscard]] std::string_view text(std::optional<std::size_t> column) const noexcept;
+  /// Nothing: empty, or not one finite number.
+  [[nodiscard]] std::optional<double> number(std::optional<std::size_t> column) const noexcept;
+  [[nodiscard]] std::optional<std::int64_t> integer(
+      std::optional<std::size_t> column) const noexcept;
+
+  [[nodiscard]] bool has_head() const noexcept { return !names_.empty(); }
+  [[nodiscard]] std::size_t torn_rows() const noexcept { return torn_; }
+
+ private:
+  static constexpr std::size_t kMostColumns = 256;
+  NextLine next_line_;
+  std::vector<std::string> names_;
+  std::vector<std::string_view> fields_;
+  std::size_t torn_ = 0;
+};
 
 inline constexpr double kNone =
     std::numeric_limits<double>::quiet_NaN();  // a number that is not there
@@ -60,16 +123,6 @@ struct CalibrationRow {
   double judged_depth_m = kNone, depth_sigma_percent = kNone, depth_difference_percent = kNone;
 };
 
-/// A line of residuals.csv: a part of the left image.
-struct ResidualRow {
-  bool at_the_end =
-      false;  // with the calibration in use there; else with the one that the drive began with
-  int camera = 1;
-  double left = 0, top = 0, width = 0, height = 0;  // px
-  double mean_px = 0;
-  double matches = 0, scatter_px = 0;  // 0: an older session does not say
-};
-
 struct Event {
   Stamp stamp{};
   std::string kind{}, sentence{};
@@ -83,7 +136,6 @@ struct Session {
   std::vector<std::string> reasons{""};  // words of poses.csv, the empty one first
   std::vector<StampedPose> reference{};  // reference.tum
   std::vector<CalibrationRow> calibrations{};
-  std::vector<ResidualRow> residuals{};  // empty: not known, which is no fault of a session
   std::vector<Event> events{};
   std::size_t events_dropped = 0;  // beyond kMostEvents
   nlohmann::json summary{};        // null when it is missing or no JSON
@@ -103,7 +155,6 @@ inline constexpr std::size_t kMostFrames =
     4'000'000;  // 37 hours at 30 Hz; further ones are left out and told
 inline constexpr std::size_t kMostEvents = 200'000;
 inline constexpr std::size_t kMostCalibrations = 20'000;
-inline constexpr std::size_t kMostResiduals = 4'000;
 inline constexpr std::size_t kLongestText =
     300;  // characters kept of a word or sentence from outside
 

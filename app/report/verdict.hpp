@@ -1,6 +1,8 @@
 #pragma once
 #include <cstdint>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -8,6 +10,20 @@
 #include "app/report/session.hpp"
 
 namespace vergence::app::report {
+
+/// What the word of a pose's reason, or the kind of an event of a frame that was skipped, asks of
+/// the user.
+struct Advice {
+  std::string_view word;  // of poses.csv or events.jsonl
+  const char* sentence;
+};
+
+/// Reasons of poses.csv.
+[[nodiscard]] std::span<const Advice> pose_advice() noexcept;
+/// Kinds of events.jsonl: frames of a recording that were not read.
+[[nodiscard]] std::span<const Advice> skip_advice() noexcept;
+/// Empty: nothing is known of that word.
+[[nodiscard]] std::string_view advice_for(std::string_view word) noexcept;
 
 enum class Grade : std::uint8_t { good, care, bad };
 [[nodiscard]] const char* to_words(Grade) noexcept;  // "Good", "Usable with care", "Do not use"

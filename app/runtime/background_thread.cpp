@@ -4,25 +4,46 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <array>
 #include <cassert>
+#include <chrono>
 
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
+
 namespace {
 
 constexpr int kNice =
     5;  // a third of the share of a thread at 0: poses come first, and the solver still ends
+constexpr std::chrono::microseconds kSpin{20};  // a wake-up through the kernel costs 5 to 50 µs
 
-/// On Linux the priority is the calling thread's own, in spite of the name. A refusal costs nothing
-/// but that share.
-void yield_to_others() noexcept {
-  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
+void relax() noexcept {
+#if defined(__x86_64__) || defined(__i386__)
+  __builtin_ia32_pause();
+#elif defined(__aarch64__)
+  asm volatile("yield");
+#endif
 }
+
+/// Returns when `counter` is no longer `old`: spins first, then sleeps.
+void await_change(const std::atomic<std::uint32_t>& counter, std::uint32_t old) noexcept {
+  constexpr int kPausesPerLook = 32;  // about 1 µs: reading the clock is not for free
+  const auto until = std::chrono::steady_clock::now() + kSpin;
+  do {
+    for (int i = 0; i < kPausesPerLook; ++i) {
+      if (counter.load(std::memory_order_acquire) != old) return;
+      relax();
+    }
+  } while (std::chrono::steady_clock::now() < until);
+  counter.wait(old, std::memory_order_acquire);
+}
+
+constexpr std::array kNames{"vergence-calib", "vergence-front", "vergence-right"};  // by Role
 
 }  // namespace
 
-BackgroundThread::BackgroundThread() : thread_([this] { work(); }) {}
+BackgroundThread::BackgroundThread(Role role) : thread_([this, role] { work(role); }) {}
 
 BackgroundThread::~BackgroundThread() {
   wait();
@@ -44,18 +65,17 @@ bool BackgroundThread::busy() noexcept {
 }
 
 void BackgroundThread::wait() noexcept {
-  const std::uint32_t asked = asked_.load(std::memory_order_relaxed);
-  for (std::uint32_t done = done_.load(std::memory_order_acquire); done != asked;
-       done = done_.load(std::memory_order_acquire))
-    done_.wait(done, std::memory_order_acquire);
+  if (busy()) await_change(done_, asked_.load(std::memory_order_relaxed) - 1);
 }
 
-void BackgroundThread::work() noexcept {
-  (void)pthread_setname_np(pthread_self(), "vergence-calib");
-  yield_to_others();
-  AllocationGuard::seal_thread();
+void BackgroundThread::work(Role role) noexcept {
+  (void)pthread_setname_np(pthread_self(), kNames.at(static_cast<std::size_t>(role)));
+  // On Linux the priority is the calling thread's own, in spite of the name. A refusal costs
+  // nothing but that share.
+  if (role == Role::solver) (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
+  if (role != Role::reader) AllocationGuard::seal_thread();
   for (std::uint32_t answered = 0;; ++answered) {
-    asked_.wait(answered, std::memory_order_acquire);
+    await_change(asked_, answered);
     if (stop_) return;
     (*task_)();
     done_.fetch_add(1, std::memory_order_release);

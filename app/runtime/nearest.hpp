@@ -1,11 +1,29 @@
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include <fmt/format.h>
+
 namespace vergence::app {
+
+/// The same names, each once: what makes topics or files of them would put two cameras into one.
+/// `left`, `left` → `left`, `left_1`.
+[[nodiscard]] inline std::vector<std::string> distinct_names(
+    const std::vector<std::string>& names) {
+  std::vector<std::string> distinct;
+  for (const std::string& name : names) {
+    std::string own = name;
+    for (int n = 1; std::count(distinct.begin(), distinct.end(), own) > 0; ++n)
+      own = fmt::format("{}_{}", name, n);
+    distinct.push_back(own);
+  }
+  return distinct;
+}
 
 /// Insertions, deletions, replacements and exchanges of neighbours that turn `a` into `b`, bytes,
 /// upper and lower case alike (optimal string alignment). O(|a|·|b|) time, O(|b|) memory; only the
@@ -20,5 +38,18 @@ namespace vergence::app {
 /// `; did you mean "X"?` for a sentence, or "" when nothing is near.
 [[nodiscard]] std::string did_you_mean(std::string_view word,
                                        const std::vector<std::string>& known);
+
+/// Something of an earlier version that a user may still write, and what to do now.
+struct Withdrawn {
+  enum class Kind { key, camera_option, record_topic, option, command } kind;
+  std::string_view name;     // record.roll_s, replay --through-devices, completion
+  std::string_view instead;  // the end of an error message: what replaced it
+};
+
+[[nodiscard]] std::span<const Withdrawn> withdrawn();
+
+/// `; it was removed: …` for an error message about an unknown name; empty where no earlier version
+/// had it.
+[[nodiscard]] std::string why_withdrawn(Withdrawn::Kind kind, std::string_view name);
 
 }  // namespace vergence::app

@@ -5,12 +5,10 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <memory>
-#include <ostream>
+#include <iostream>
 
 #include <fmt/format.h>
 
-#include "app/runtime/progress_output.hpp"
 #include "drivers/clock.hpp"
 
 namespace vergence::app {
@@ -55,30 +53,14 @@ Progress::Mode mode_of_stderr(bool quiet) {
   return ::isatty(STDERR_FILENO) == 1 && !dumb ? Progress::Mode::terminal : Progress::Mode::lines;
 }
 
-Progress::Output output_to(std::ostream& out) {
-  return [&out](std::string_view text, bool /*may_wait*/) {
-    out << text << std::flush;
-    return true;
-  };
-}
-
-Progress::Output output_to_stderr() {
-  return [out = std::make_shared<ProgressOutput>(STDERR_FILENO)](
-             std::string_view text, bool may_wait) { return out->write(text, may_wait); };
-}
-
 }  // namespace
-
-Progress::Progress(Output out, Mode mode, std::function<HostStamp()> clock,
-                   std::function<int()> width)
-    : out_(std::move(out)), mode_(mode), clock_(std::move(clock)), width_(std::move(width)) {}
 
 Progress::Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock,
                    std::function<int()> width)
-    : Progress(output_to(out), mode, std::move(clock), std::move(width)) {}
+    : out_(out), mode_(mode), clock_(std::move(clock)), width_(std::move(width)) {}
 
 Progress Progress::on_stderr(bool quiet) {
-  return {output_to_stderr(), mode_of_stderr(quiet), monotonic_now, width_of_stderr};
+  return {std::cerr, mode_of_stderr(quiet), monotonic_now, width_of_stderr};
 }
 
 Progress::~Progress() { finish(); }
@@ -110,22 +92,14 @@ void Progress::say(std::string_view sentence) {
 }
 
 void Progress::put_line(std::string_view line) {
-  std::string text = wiped();
-  if (untaken_ > 0)
-    text += fmt::format("vergence: lines that were not taken before this one: {}\n", untaken_);
-  text.append(line).append(1, '\n');
-  if (!out_(text, true)) {
-    ++untaken_;
-    return;
-  }
+  out_ << wiped() << line << '\n' << std::flush;
   columns_ = 0;
-  untaken_ = 0;
 }
 
 void Progress::finish() {
   if (!started_) return;
   if (!drawn_) draw(clock_());
-  if (mode_ == Mode::terminal) (void)out_("\n", true);
+  if (mode_ == Mode::terminal) out_ << '\n' << std::flush;
   columns_ = 0;
   started_ = false;
 }
@@ -172,8 +146,8 @@ void Progress::redraw(const std::string& whole) {
   std::string text = "\r";
   text += shown;
   if (columns_ > columns) text.append(std::min(columns_, room) - columns, ' ');
-  drawn_ = out_(text, false);
-  if (drawn_) columns_ = columns;
+  out_ << text << std::flush;
+  columns_ = columns;
 }
 
 /// What takes the line off the terminal.

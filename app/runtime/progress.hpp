@@ -30,18 +30,13 @@ struct ProgressState {
 /// lines     one line every 10 s, the last one at finish(): for files and pipes
 /// quiet     nothing
 /// Threads   One caller. Time  Monotonic, from the clock handed in. Errors  A stream that fails is
-///           ignored. One that takes nothing for a while holds nobody up (ProgressOutput): lines
-///           are dropped, and how many is said where the next one is taken.
+///           ignored.
 class Progress {
  public:
   enum class Mode : std::uint8_t { terminal, lines, quiet };
-  /// Takes all of a text, or none (false). `may_wait`: for a while; else it is taken now or never.
-  using Output = std::function<bool(std::string_view text, bool may_wait)>;
-
   /// `width` in columns is asked at every redraw, as a terminal may be resized; < 1: not known, 80.
   Progress(std::ostream& out, Mode mode, std::function<HostStamp()> clock,
            std::function<int()> width);
-  Progress(Output out, Mode mode, std::function<HostStamp()> clock, std::function<int()> width);
   /// On standard error with the machine's clock: terminal or lines by what standard error is.
   [[nodiscard]] static Progress on_stderr(bool quiet);
   /// Ends the line as finish() does.
@@ -64,7 +59,7 @@ class Progress {
   [[nodiscard]] std::string wiped() const;
   void put_line(std::string_view line);
 
-  Output out_;
+  std::ostream& out_;
   Mode mode_;
   std::function<HostStamp()> clock_;
   std::function<int()> width_;
@@ -74,8 +69,7 @@ class Progress {
   bool drawn_ = false;                  // the last update is on the screen
   HostStamp first_time_{}, drawn_time_{};
   std::uint64_t first_frame_ = 0;
-  std::size_t columns_ = 0;    // of the line on the terminal now
-  std::uint64_t untaken_ = 0;  // lines, since one was taken
+  std::size_t columns_ = 0;  // of the line on the terminal now
 };
 
 }  // namespace vergence::app

@@ -24,8 +24,7 @@ struct ProcessThread {
 };
 
 /// All threads of this program into `threads`, by /proc/self/task; none where there is none such. A
-/// thread that has just begun may still have its creator's name. Memory: of the vector alone, where
-/// it grows.
+/// thread that has just begun may still have its creator's name.
 void process_threads(std::vector<ProcessThread>* threads);
 
 /// How urgent a thread is, by its name (docs/realtime.md has the table).

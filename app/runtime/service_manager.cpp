@@ -1,18 +1,11 @@
 #include "app/runtime/service_manager.hpp"
 
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
+#include <systemd/sd-daemon.h>
 
-#include <algorithm>
-#include <charconv>
 #include <condition_variable>
-#include <cstddef>
 #include <cstdlib>
-#include <cstring>
 #include <exception>
 #include <mutex>
-#include <string_view>
 
 #include <fmt/format.h>
 
@@ -24,54 +17,23 @@ constexpr std::chrono::nanoseconds kUnwatched = std::chrono::seconds(1);  // bet
 constexpr std::chrono::minutes kLongestClosing{10};
 constexpr const char* kMoreTime = "WATCHDOG=1\nEXTEND_TIMEOUT_USEC=60000000";
 
-std::string environment(const char* name) {
-  const char* value = std::getenv(name);
-  return value != nullptr ? value : "";
-}
-
-/// WATCHDOG_USEC, if it is meant for this process.
-std::chrono::nanoseconds watchdog_of_environment() {
-  const std::string pid = environment("WATCHDOG_PID"), text = environment("WATCHDOG_USEC");
-  if (!pid.empty() && pid != std::to_string(::getpid())) return {};
-  std::int64_t us = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), us);
-  constexpr std::int64_t kLongest = 3'600'000'000;  // an hour
-  if (error != std::errc() || us <= 0) return {};
-  return std::chrono::microseconds(std::min(us, kLongest));
-}
-
 }  // namespace
 
-ServiceManager::ServiceManager()
-    : ServiceManager(environment("NOTIFY_SOCKET"), watchdog_of_environment()) {}
-
-ServiceManager::ServiceManager(const std::string& socket, std::chrono::nanoseconds watchdog)
-    : socket_(socket), interval_(watchdog / kSigns) {
-  sockaddr_un address;
-  const bool known = !socket.empty() && (socket.front() == '/' || socket.front() == '@') &&
-                     socket.size() < sizeof address.sun_path;
-  if (known) fd_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-}
-
-ServiceManager::~ServiceManager() {
-  closing_ = {};  // its thread ends before what it sends to is closed
-  if (fd_ >= 0) ::close(fd_);
+ServiceManager::ServiceManager() : asked_(std::getenv("NOTIFY_SOCKET") != nullptr) {
+  std::uint64_t us = 0;
+  if (::sd_watchdog_enabled(0, &us) > 0) interval_ = std::chrono::microseconds(us) / kSigns;
 }
 
 void ServiceManager::send(const std::string& lines) noexcept {
-  if (fd_ < 0) return;
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::memcpy(address.sun_path, socket_.data(), socket_.size());  // its size was checked
-  if (socket_.front() == '@') address.sun_path[0] = '\0';
-  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket_.size());
-  (void)::sendto(fd_, lines.data(), lines.size(), MSG_NOSIGNAL,
-                 reinterpret_cast<const sockaddr*>(&address), size);
+  if (asked_) (void)::sd_notify(0, lines.c_str());
 }
 
-void ServiceManager::alive(std::uint64_t beats, std::uint64_t items,
+void ServiceManager::alive(std::uint64_t items, bool waiting, std::uint64_t rounds,
                            std::chrono::steady_clock::time_point now) noexcept {
-  if (fd_ < 0 || beats == beats_) return;
+  if (waiting && rounds != rounds_) ++idle_;
+  rounds_ = rounds;
+  const std::uint64_t beats = items + idle_;
+  if (!asked_ || beats == beats_) return;
   const bool watched = interval_.count() > 0;
   const std::chrono::nanoseconds interval = watched ? interval_ : kUnwatched;
   if (any_ && now - last_ < interval) return;
@@ -83,7 +45,7 @@ void ServiceManager::alive(std::uint64_t beats, std::uint64_t items,
 }
 
 void ServiceManager::stopping() noexcept {
-  if (fd_ < 0 || closing_.joinable()) return;
+  if (!asked_ || closing_.joinable()) return;
   send("STOPPING=1\nWATCHDOG=1");
   const std::chrono::nanoseconds interval = interval_.count() > 0 ? interval_ : kUnwatched;
   try {

@@ -14,7 +14,6 @@
 #include "app/datasets/frame_decoder.hpp"
 #include "app/devices/camera_masks.hpp"
 #include "app/runtime/background_thread.hpp"
-#include "app/session/given_calibration.hpp"
 #include "app/session/session_files.hpp"
 #include "app/session/starting_calibration.hpp"
 #include "core/calibration/gates.hpp"

@@ -1,21 +1,169 @@
 #include "app/session/drive_recorder.hpp"
 
 #include <algorithm>
+#include <filesystem>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 
-#include "app/session/recording_plan.hpp"
+#include "app/config/calibration_file.hpp"
+#include "app/config/schema.hpp"
+#include "app/recording/messages.hpp"
+#include "app/recording/session_description.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/nearest.hpp"
+#include "app/runtime/version.hpp"
 
 namespace vergence::app {
+
 namespace {
 
-constexpr Duration kHealth = Duration::seconds(1);
+/// Topics of a recording. Of a camera there are two, from first_camera_topic on.
+enum Topic : std::size_t {
+  session_topic,
+  frame_topic,
+  odometry_topic,
+  tf_topic,
+  tf_static_topic,
+  reading_topic,
+  fix_topic,
+  imu_topic,
+  pulse_topic,
+  first_camera_topic
+};
 
-DiagnosticLevel level_of(PoseStatus status) {
-  return status == PoseStatus::ok         ? DiagnosticLevel::ok
-         : status == PoseStatus::degraded ? DiagnosticLevel::warn
-                                          : DiagnosticLevel::error;
+/// A camera's images; its CameraInfo is the next one.
+constexpr std::size_t image_topic(std::size_t camera) noexcept {
+  return first_camera_topic + 2 * camera;
+}
+
+/// Names of the cameras in topics and as frames of reference: those of the calibration, each once.
+std::vector<std::string> recorded_names(const CalibrationFile& file) {
+  return distinct_names({file.names.begin(), file.names.begin() + file.rig.cameras});
+}
+
+constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue without images
+constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
+constexpr std::size_t kPulseQueue = std::size_t{1} << 20;  // bytes
+// Bytes that are recorded of each, and some to spare: of a frame beside its images (1310), of a
+// reading of the INS (740), of a pulse (300).
+constexpr double kFrameRecords = 2048, kReadingRecords = 1024, kPulseRecords = 512;
+
+std::vector<RecordedTopic> topics(const CalibrationFile& file) {
+  std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
+                                 {"/vergence/frame", RosType::frame, false},
+                                 {"/vergence/odometry", RosType::odometry, false},
+                                 {"/tf", RosType::tf, false},
+                                 {"/tf_static", RosType::tf, true},
+                                 {"/vergence/ins_reading", RosType::ins_reading, false},
+                                 {"/ins/fix", RosType::nav_sat_fix, false},
+                                 {"/ins/imu", RosType::imu, false},
+                                 {"/vergence/pulse", RosType::pulse, false}};
+  for (const std::string& name : recorded_names(file)) {
+    const std::string images = "/" + name + "/image_raw";
+    out.push_back({images, RosType::image, false});
+    out.push_back({"/" + name + "/camera_info", RosType::camera_info, false});
+  }
+  return out;
+}
+
+/// Keys that are not as they are when nobody says anything.
+std::vector<std::string> settings_of(const Configuration& c) {
+  const Configuration defaults;
+  std::vector<std::string> out;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys)
+      if (std::string value = to_text(key.get(c)); value != to_text(key.get(defaults))) {
+        if (key.name.ends_with(".mask"))  // beside the configuration, wherever the replay runs
+          value = std::filesystem::absolute(c.folder / value).string();
+        out.push_back(key.name + "=" + value);
+      }
+  return out;
+}
+
+std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts& facts) {
+  SessionDescription d;
+  d.program = version();
+  d.calibration = format_calibration(facts.begin.file);
+  CalibrationFile nominal = facts.begin.file;
+  nominal.rig = facts.begin.nominal;
+  d.nominal = format_calibration(nominal);
+  d.trust = facts.begin.trust;
+  d.cause = facts.begin.cause;
+  d.source = facts.begin.source;
+  d.adoption = facts.adoption;
+  d.ins = facts.ins.has_value();
+  if (facts.ins) d.mount_source = facts.ins->mount_source;
+  d.settings = settings_of(c);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(facts.begin.file.rig.cameras); ++k)
+    d.cameras.push_back(topics(facts.begin.file)[image_topic(k)].name);
+  const std::string json = to_json(d);
+  std::vector<std::uint8_t> bytes(json.size() + 16);
+  CdrWriter out(bytes);
+  write_text(&out, json);
+  bytes.resize(out.size());
+  return bytes;
+}
+
+/// Of all cameras' images of one frame.
+double frame_bytes(const SourceFacts& facts) {
+  double bytes = 0;
+  for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
+    const Intrinsics& lens = facts.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
+    bytes += static_cast<double>(lens.width) * lens.height;
+  }
+  return bytes;
+}
+
+/// What an event would keep of records that small.
+double kept_bytes(const Configuration& c, double record_bytes, double rate) {
+  return c.record.keep_s * rate * record_bytes;
+}
+
+/// Of the estimator's thread without images: of frames, and of the INS as it was compared.
+double small_bytes(const Configuration& c) {
+  return kSmall + kept_bytes(c, kFrameRecords, c.trigger.rate) +
+         kept_bytes(c, kReadingRecords, c.ins.rate);
+}
+
+constexpr double kLeastHeld = 16;  // frames that wait: a replay waits for room
+
+/// What an address of this machine reaches; a 32-bit one's program has 3 GB for all.
+constexpr double kMostQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
+
+/// Bytes of images a second, and how many seconds of them are held.
+double wanted_queue_bytes(const Configuration& c, const SourceFacts& facts) {
+  if (c.record.images == 0) return small_bytes(c);
+  const double held = facts.when_full == Recorder::WhenFull::wait
+                          ? kLeastHeld
+                          : (kDiskS + c.record.keep_s) * c.trigger.rate;
+  return small_bytes(c) + frame_bytes(facts) * std::max(held, kLeastHeld);
+}
+
+std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
+  const double bytes = wanted_queue_bytes(c, facts);
+  if (bytes > kMostQueue)
+    throw InputError(
+        fmt::format("record.keep_s: {:.0f} MB of images are to wait, more than this machine "
+                    "can address",
+                    bytes / 1e6));
+  return static_cast<std::size_t>(bytes);
+}
+
+Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
+  Recording::Options o;
+  o.files.topics = topics(facts.begin.file);
+  o.queues = {queue_bytes(c, facts),
+              kPulseQueue + static_cast<std::size_t>(kept_bytes(c, kPulseRecords, c.trigger.rate))};
+  o.files.preamble = {{session_topic, description(c, facts)}};
+  o.start = facts.first;
+  o.files.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
+  o.keep = Duration::seconds(c.record.keep_s);
+  o.when_full = facts.when_full == Recorder::WhenFull::wait ? Recording::WhenFull::wait
+                                                            : Recording::WhenFull::drop;
+  return o;
 }
 
 }  // namespace
@@ -31,11 +179,9 @@ DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
       rig_(facts.begin.file.rig),
       calibrated_(facts.begin.trust != CalibrationTrust::none) {
   for (std::size_t k = 0; k < frames_.size(); ++k) frame_names_[k] = frames_[k];
-  if (as_png(settings_)) encoder_.emplace(recording_, encoder_options(facts));
 }
 
 void DriveRecorder::close(std::vector<std::string>* faults) {
-  if (encoder_) encoder_->close();
   recording_.close();
   if (const std::uint64_t lost = recording_.counters().lost; lost > 0)
     faults->push_back(fmt::format(
@@ -44,19 +190,17 @@ void DriveRecorder::close(std::vector<std::string>* faults) {
         folder_, lost));
 }
 
-/// → CRC-32 of what `write` returns, the bytes of its pixels; 0: dropped.
+/// Whether it is in the queue.
 template <class Write>
-std::uint32_t DriveRecorder::post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
-                                  const Write& write, std::size_t queue) noexcept {
-  if (stopped_.load(std::memory_order_relaxed)) return 0;
+bool DriveRecorder::post(std::size_t topic, Stamp stamp, const Write& write, std::size_t queue,
+                         std::size_t most, bool bulky) noexcept {
+  if (stopped_.load(std::memory_order_relaxed)) return false;
   const auto room = recording_.begin(queue, topic, stamp, most, bulky);
-  if (room.empty()) return 0;
+  if (room.empty()) return false;
   CdrWriter out(room);
-  const std::size_t pixels = write(&out);
-  if (!out.ok()) return 0;
-  const std::uint32_t crc = pixels > 0 ? crc32_of(out.written().last(pixels)) : 0;
-  recording_.commit(queue, out.size());
-  return crc;
+  write(&out);
+  if (out.ok()) recording_.commit(queue, out.size());
+  return out.ok();
 }
 
 void DriveRecorder::on_frame(const RigFrame& frame) noexcept {
@@ -76,119 +220,60 @@ void DriveRecorder::on_frame(const RigFrame& frame) noexcept {
   }
 }
 
-/// False: dropped.
-bool DriveRecorder::post_pixels(const RigFrame& frame, std::size_t camera) noexcept {
+void DriveRecorder::post_image(const RigFrame& frame, std::size_t camera) noexcept {
   const ImageView& image = frame.images[camera];
   const std::string_view name = frame_names_[camera];
-  std::uint32_t& crc = frame_.image_crc[camera];
-  if (encoder_)
-    return !stopped_.load(std::memory_order_relaxed) &&
-           encoder_->post(image_topic(camera), frame.stamp, name, image, &crc);
-  bool written = false;
-  crc =
-      post(image_topic(camera), frame.stamp,
-           image_message_size(image.width, image.height, name.size()), true, [&](CdrWriter* out) {
-             write_image(out, frame.stamp, name, image);
-             written = out->ok();
-             return static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-           });
-  return written;
-}
-
-void DriveRecorder::post_image(const RigFrame& frame, std::size_t camera) noexcept {
-  if (!post_pixels(frame, camera)) return;
-  const std::string_view name = frame_names_[camera];
+  const auto write = [&](CdrWriter* out) {
+    write_image(out, frame.stamp, name, image);
+    const auto pixels =
+        static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+    if (out->ok()) frame_.image_crc[camera] = crc32_of(out->written().last(pixels));
+  };
+  if (!post(image_topic(camera), frame.stamp, write, estimator_queue,
+            image_message_size(image.width, image.height, name.size()), true))
+    return;
   frame_.images_recorded = static_cast<std::uint8_t>(frame_.images_recorded | 1U << camera);
-  post(image_topic(camera) + 1, frame.stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(image_topic(camera) + 1, frame.stamp, [&](CdrWriter* out) {
     write_camera_info(out, frame.stamp, name, rig_, static_cast<int>(camera), calibrated_);
-    return std::size_t{0};
   });
 }
 
 void DriveRecorder::post_rig(Stamp stamp) noexcept {
   const auto cameras = static_cast<std::size_t>(rig_.cameras);
   const std::uint64_t files = recording_.counters().files;  // before: it is in that one or a later
-  post(tf_static_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
+  post(tf_static_topic, stamp, [&](CdrWriter* out) {
     write_rig_transforms(out, stamp, rig_, std::span(frame_names_).first(cameras));
     rig_in_file_ = files;
-    return std::size_t{0};
+    last_rig_ = stamp;
   });
 }
 
 /// Who opens one file of several has no other. Where only what is around events is kept, each
 /// second may be the first that is.
-bool DriveRecorder::rig_is_due(bool each_second) const noexcept {
+bool DriveRecorder::rig_is_due(Stamp stamp) const noexcept {
   if (!calibrated_) return false;
-  return rig_in_file_ != recording_.counters().files || (each_second && settings_.keep_s > 0);
+  return rig_in_file_ != recording_.counters().files ||
+         (settings_.keep_s > 0 && stamp - last_rig_ >= Duration::seconds(1));
 }
 
 void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
   frame_.sample = sample;
   frame_.solver_done = watch_.found_idle();
-  post(frame_topic, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
-    write_frame(out, frame_);
-    return std::size_t{0};
-  });
+  post(frame_topic, sample.stamp, [&](CdrWriter* out) { write_frame(out, frame_); });
   if (settings_.poses == 0) return;
-  const bool health = frames_seen_ == 1 || sample.stamp - last_health_ >= kHealth ||
-                      sample.status != PoseStatus::ok;
-  if (rig_is_due(health)) post_rig(sample.stamp);
-  post(odometry_topic, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
-    write_odometry(out, sample);
-    return std::size_t{0};
-  });
+  if (rig_is_due(sample.stamp)) post_rig(sample.stamp);
+  post(odometry_topic, sample.stamp, [&](CdrWriter* out) { write_odometry(out, sample); });
   if (sample.status != PoseStatus::lost)
-    post(tf_topic, sample.stamp, kMessageRoom, false, [&](CdrWriter* out) {
-      write_pose_transform(out, sample);
-      return std::size_t{0};
-    });
-  if (health) post_health(sample);
-}
-
-/// Once a second, and with every pose that is not ok.
-void DriveRecorder::post_health(const PoseSample& sample) noexcept {
-  last_health_ = sample.stamp;
-  const RecordingCounters c = recording_.counters();
-  const std::uint64_t not_encoded = encoder_ ? encoder_->dropped() : 0;
-  const auto number = [](std::uint64_t v) { return static_cast<std::int64_t>(v); };
-  const std::array pose{
-      DiagnosticValue{"frame", number(sample.frame)}, DiagnosticValue{"inliers", sample.inliers},
-      DiagnosticValue{"stereo_inliers", sample.stereo_inliers},
-      DiagnosticValue{"estimate_us", static_cast<std::int64_t>(1000 * sample.estimate_ms)}};
-  const std::array clocks{DiagnosticValue{"stamp_error_ns", frame_.stamp_error.ns()},
-                          DiagnosticValue{"spread_ns", frame_.spread.ns()},
-                          DiagnosticValue{"pairing", frame_.pairing}};
-  const std::array drops{DiagnosticValue{"dropped_messages", number(c.dropped)},
-                         DiagnosticValue{"dropped_images", number(c.dropped_images + not_encoded)},
-                         DiagnosticValue{"lost_messages", number(c.lost)},
-                         DiagnosticValue{"queue_high_water_bytes", number(c.queue_high_water)}};
-  const bool lossless = c.dropped + c.lost + not_encoded == 0;
-  const std::array status{
-      Diagnostic{level_of(sample.status), "vergence: pose", to_string(sample.reason), pose},
-      Diagnostic{DiagnosticLevel::ok, "vergence: clocks", "", clocks},
-      Diagnostic{lossless ? DiagnosticLevel::ok : DiagnosticLevel::warn, "vergence: recording",
-                 lossless ? "" : "not all is recorded", drops}};
-  post(diagnostics_topic, sample.stamp, 2 * kMessageRoom, false, [&](CdrWriter* out) {
-    write_diagnostics(out, sample.stamp, status);
-    return std::size_t{0};
-  });
+    post(tf_topic, sample.stamp, [&](CdrWriter* out) { write_pose_transform(out, sample); });
 }
 
 void DriveRecorder::on_reading(const InsRecord& reading) noexcept {
   if (settings_.ins == 0) return;
   const Stamp stamp = reading.sample.stamp;
-  post(reading_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
-    write_ins_reading(out, reading.sample, reading.quality);
-    return std::size_t{0};
-  });
-  post(fix_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
-    write_nav_sat_fix(out, reading.sample);
-    return std::size_t{0};
-  });
-  post(imu_topic, stamp, kMessageRoom, false, [&](CdrWriter* out) {
-    write_imu(out, reading.sample);
-    return std::size_t{0};
-  });
+  post(reading_topic, stamp,
+       [&](CdrWriter* out) { write_ins_reading(out, reading.sample, reading.quality); });
+  post(fix_topic, stamp, [&](CdrWriter* out) { write_nav_sat_fix(out, reading.sample); });
+  post(imu_topic, stamp, [&](CdrWriter* out) { write_imu(out, reading.sample); });
 }
 
 void DriveRecorder::on_event(const EventRecord& event) noexcept {
@@ -196,40 +281,27 @@ void DriveRecorder::on_event(const EventRecord& event) noexcept {
   recalibrate_ = recalibrate_ || kind == "recalibration_requested" ||
                  (kind == "fault" && sentence.starts_with("recalibrate"));
   if (frames_seen_ > 0) recording_.mark_event(event.stamp);  // before it is set-up
-  if (settings_.poses == 0) return;
-  const std::array status{Diagnostic{DiagnosticLevel::ok, kind, sentence, {}}};
-  post(diagnostics_topic, event.stamp, kMessageRoom, false, [&](CdrWriter* out) {
-    write_diagnostics(out, event.stamp, status);
-    return std::size_t{0};
-  });
 }
 
 void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcept {
   if (!calibration.decided || !calibration.accepted) return;
-  rig_ = calibration.rig.rig();
+  rig_ = calibration.calibration;
   calibrated_ = true;
   if (settings_.poses != 0) post_rig(calibration.stamp);
 }
 
 void DriveRecorder::on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept {
   post(
-      pulse_topic, arrival, kMessageRoom, false,
-      [&](CdrWriter* out) {
-        write_pulse(out, arrival, pulse, edge);
-        return std::size_t{0};
-      },
+      pulse_topic, arrival, [&](CdrWriter* out) { write_pulse(out, arrival, pulse, edge); },
       acquisition_queue);
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> DriveRecorder::counters() {
   const RecordingCounters c = recording_.counters();
-  const std::uint64_t not_encoded = encoder_ ? encoder_->dropped() : 0;
-  return {{"recorded_messages", c.messages},
-          {"recorded_bytes", c.bytes},
-          {"recording_dropped", c.dropped},
-          {"recording_dropped_images", c.dropped_images + not_encoded},
-          {"recording_lost", c.lost},
-          {"recording_queue_high_water_bytes", c.queue_high_water}};
+  return {
+      {"recorded_messages", c.messages}, {"recorded_bytes", c.bytes},
+      {"recording_dropped", c.dropped},  {"recording_dropped_images", c.dropped_images},
+      {"recording_lost", c.lost},        {"recording_queue_high_water_bytes", c.queue_high_water}};
 }
 
 }  // namespace vergence::app

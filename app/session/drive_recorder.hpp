@@ -10,21 +10,23 @@
 #include <vector>
 
 #include "app/config/configuration.hpp"
-#include "app/recording/image_encoder.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/recording.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/session_observer.hpp"
-#include "app/session/solver_watch.hpp"
 #include "drivers/acquisition/acquired.hpp"
 
 namespace vergence::app {
+
+/// Queues of a recording, one for each thread that posts.
+enum Queue : std::size_t { estimator_queue, acquisition_queue };
 
 /// `record:` of the configuration: what goes through a session into drive.mcap (docs/recording.md).
 ///
 /// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
 ///            PulseObserver, a queue each. The rest: the owner's.
-/// Memory     The recording's queues and the encoder's, at construction.
+/// Memory     The recording's queues, at construction.
 /// Errors     The constructor throws InputError: no room, no file. Afterwards sentences.
 class DriveRecorder final : public SessionObserver, public PulseObserver {
  public:
@@ -47,19 +49,15 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   /// Nothing more is recorded. The estimator's thread.
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
-  [[nodiscard]] std::size_t memory() const noexcept {
-    return recording_.counters().queue_bytes + (encoder_ ? encoder_->memory() : 0);
-  }
+  [[nodiscard]] std::size_t memory() const noexcept { return recording_.counters().queue_bytes; }
 
  private:
   template <class Write>
-  std::uint32_t post(std::size_t topic, Stamp stamp, std::size_t most, bool bulky,
-                     const Write& write, std::size_t queue = 0) noexcept;
-  [[nodiscard]] bool post_pixels(const RigFrame& frame, std::size_t camera) noexcept;
+  bool post(std::size_t topic, Stamp stamp, const Write& write, std::size_t queue = estimator_queue,
+            std::size_t most = kMessageRoom, bool bulky = false) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
-  [[nodiscard]] bool rig_is_due(bool each_second) const noexcept;
-  void post_health(const PoseSample& sample) noexcept;
+  [[nodiscard]] bool rig_is_due(Stamp stamp) const noexcept;
 
   const RecordSettings& settings_;
   const SolverWatch& watch_;
@@ -67,7 +65,6 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   std::array<std::string_view, kMaxCameras> frame_names_{};
   const std::string folder_;
   Recording recording_;
-  std::optional<ImageEncoder> encoder_;  // record.image_format: png
 
   // Of the estimator's thread.
   RigCalibration rig_;
@@ -76,7 +73,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   std::atomic<bool> stopped_{false};
   FrameRecord frame_{};
   std::uint64_t frames_seen_ = 0;
-  Stamp last_health_{};
+  Stamp last_rig_{};
 };
 
 }  // namespace vergence::app

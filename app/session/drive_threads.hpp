@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "app/config/configuration.hpp"
-#include "app/recorder/summary.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/runtime/realtime.hpp"
+#include "app/session/summary.hpp"
 
 namespace vergence::app {
 

@@ -1,6 +1,9 @@
 #pragma once
 #include <atomic>
+#include <cstddef>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "app/datasets/reference_track.hpp"
@@ -10,13 +13,22 @@
 #include "app/session/event_log.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/ins_comparison.hpp"
-#include "app/session/memory_figures.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_runner.hpp"
-#include "app/session/solver_watch.hpp"
 #include "core/estimator/estimator.hpp"
+#include "core/memory/arena.hpp"
 
 namespace vergence::app {
+
+/// Bytes taken by one holder, an arena's with what it holds by name.
+struct MemoryRow {
+  std::string name{};
+  std::size_t bytes = 0;
+  std::span<const ArenaRow> parts{};
+};
+
+/// The table of --memory on stdout, before the drive.
+void print_memory_table(const std::vector<MemoryRow>& memory);
 
 /// What the estimator's thread does: takes what the source delivers, poses it, compares it with
 /// the INS, and hands everything on to the session's output.

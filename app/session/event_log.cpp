@@ -53,20 +53,8 @@ void EventLog::note(const Estimator& estimator) noexcept {
     output_->post(record);
     if (is_for_user(event.kind)) (void)notices_.push(record);
   }
-  for (const CalibrationDecision& decision : estimator.calibrations()) {
-    output_->post(CalibrationRecord::of(decision));
-    note_change(decision);
-  }
-  matches_.take(estimator.tracks());
-}
-
-/// A rig that was knocked fits no match from before: a calibration is looked at with those of its
-/// own rig only.
-void EventLog::note_change(const CalibrationDecision& decision) noexcept {
-  using Cause = CalibrationCause;
-  const bool changed = decision.cause == Cause::knock || decision.cause == Cause::drift ||
-                       decision.cause == Cause::collapse;
-  if (decision.accepted && changed) matches_.rig_changed(decision.onset_frame);
+  for (const CalibrationDecision& decision : estimator.calibrations())
+    output_->post(CalibrationRecord{decision});
 }
 
 /// Frames in a row without all of their work are one event.
@@ -124,7 +112,6 @@ void EventLog::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
     progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
                               notice.sentence.data()));
-  for (const std::string& sentence : output_->take_errors()) progress->say("vergence: " + sentence);
   ProgressSnapshot newest;
   bool any = false;
   while (glimpses_.pop(&newest)) any = true;

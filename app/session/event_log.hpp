@@ -3,7 +3,6 @@
 #include <limits>
 #include <string_view>
 
-#include "app/recorder/match_sample.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/session/session_observer.hpp"
 #include "core/estimator/estimator.hpp"
@@ -12,12 +11,11 @@
 namespace vergence::app {
 
 /// What becomes of each frame beside its line in poses.csv: events and calibrations for the
-/// recorder, the state of things for the progress line, sentences for the user, a sample of the
-/// matches across.
+/// recorder, the state of things for the progress line, sentences for the user.
 ///
 /// Threads  note…(), log(): the estimator's, sealed. show(): the caller's. After the estimator's
 ///          thread has joined all is anyone's.
-/// Memory   Fixed, most of it the sample of matches: not for a stack. Full: of the states for the
+/// Memory   Fixed. Full: of the states for the
 ///          line the newest are lost, the next one tells the same and more; of the sentences too,
 ///          and events.jsonl has them.
 class EventLog {
@@ -36,8 +34,6 @@ class EventLog {
   void log(Stamp stamp, const char* kind, std::string_view sentence, bool to_user) noexcept;
   void log(const EventRecord& event, bool to_user) noexcept;
 
-  /// Matches of the drive so far. Before the estimator's thread has joined they are its own.
-  [[nodiscard]] const MatchSample& matches() const noexcept { return matches_; }
   /// Points and observations over the estimator's capacity.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
@@ -55,7 +51,6 @@ class EventLog {
     double from_ins_m = -1;  // negative: not compared
   };
 
-  void note_change(const CalibrationDecision& decision) noexcept;
   void note_effort(const PoseSample& sample) noexcept;
 
   SessionOutput* output_ = nullptr;
@@ -65,7 +60,6 @@ class EventLog {
   Vec3 last_position_ = Vec3::Zero();
   bool posed_ = false;
   int whole_frames_ = std::numeric_limits<int>::max() / 2;  // since one had no time for its work
-  MatchSample matches_;
   Ring<ProgressSnapshot, 64> glimpses_;
   Ring<EventRecord, 32> notices_;
 };

@@ -9,15 +9,15 @@
 #include <vector>
 
 #include "app/datasets/trajectory_files.hpp"
-#include "app/recorder/ins_file.hpp"
-#include "app/recorder/recorder.hpp"
-#include "app/recorder/summary.hpp"
 #include "app/recording/session_description.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
 #include "app/session/ins_comparison.hpp"
+#include "app/session/ins_file.hpp"
+#include "app/session/recorder.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
+#include "app/session/summary.hpp"
 #include "drivers/acquisition/acquired.hpp"
 
 namespace vergence::app {
@@ -63,7 +63,6 @@ struct SourceFacts {
   Recorder::WhenFull when_full = Recorder::WhenFull::wait;
   std::function<bool(Stamp)> disk_full{};  // of Recorder::Options
   std::uint64_t frames = 0;                // of the whole drive; 0: nobody knows
-  std::size_t expected_frames = 0;         // 0: nobody knows
   Stamp first{};                           // of the drive
   std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
   std::optional<SourceIns> ins{};
@@ -80,9 +79,8 @@ struct SourceFacts {
 /// Where a session's frames, readings and device events come from: devices (LiveSource), or a
 /// recorded drive (RecordedSource). SessionRunner does the rest, the same for both.
 ///
-/// Threads  next(), done(): the estimator's, sealed. stop(): any. temperature_c(): one of its own,
-///          beside all the others. The rest: the caller's; finish() and what comes after it when
-///          the estimator's has joined.
+/// Threads  next(), done(): the estimator's, sealed. stop(): any. The rest: the caller's; finish()
+///          and what comes after it when the estimator's has joined.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
@@ -105,8 +103,6 @@ class FrameSource {
   [[nodiscard]] virtual std::uint64_t rounds() const noexcept { return 0; }
   /// Called every 50 ms while frames come.
   virtual void look() {}
-  /// Of a camera, °C, where it tells; asks the device, which may take seconds.
-  [[nodiscard]] virtual std::optional<double> temperature_c(int /*camera*/) { return std::nullopt; }
   /// Called once when next() has ended, which the estimator may take time to conclude: stops what
   /// still delivers.
   virtual void halt() noexcept {}

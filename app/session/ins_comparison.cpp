@@ -1,11 +1,169 @@
 #include "app/session/ins_comparison.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
+#include "core/comparison/comparison.hpp"
+#include "core/math/angle.hpp"
+
 namespace vergence::app {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json placement_json(const PlacementRecord& record) {
+  const Placement& p = record.placement;
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) rows.push_back(p.T_enu_world.R(row, column));
+    rows.push_back(p.T_enu_world.t(row));
+  }
+  return {{"stamp_ns", record.stamp.ns()},
+          {"T_enu_world", rows},
+          {"fitted_over_m", p.distance},
+          {"residual_m", p.residual},
+          {"heading_sigma_deg", p.rotation_sigma.z() * kDegreesPerRadian}};
+}
+
+Json errors_json(const EarthErrors& e) {
+  if (e.poses == 0) return nullptr;
+  return {
+      {"poses", e.poses},
+      {"horizontal_rms_m", e.horizontal_rms_m},
+      {"horizontal_max_m", e.horizontal_most_m},
+      {"horizontal_end_m", e.horizontal_end_m},
+      {"horizontal_end_percent", e.way_m > 0 ? Json(100 * e.horizontal_end_m / e.way_m) : Json()},
+      {"up_rms_m", e.up_rms_m},
+      {"up_end_m", e.up_end_m},
+      {"heading_rms_deg", e.heading_rms_deg},
+      {"heading_max_deg", e.heading_most_deg},
+      {"heading_end_deg", e.heading_end_deg}};
+}
+
+}  // namespace
+
+Json earth_json(const EarthFigures& figures) {
+  if (!figures.origin) return nullptr;
+  const Vec3 turn = boresight_of(figures.T_ins_left.R) * kDegreesPerRadian;
+  const Vec3& arm = figures.T_ins_left.t;
+  Json placements = Json::array();
+  for (const PlacementRecord& record : figures.placements)
+    placements.push_back(placement_json(record));
+  return {{"origin",
+           {{"latitude_deg", figures.origin->latitude_deg},
+            {"longitude_deg", figures.origin->longitude_deg},
+            {"height_m", figures.origin->height_m}}},
+          {"mount",
+           {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
+            {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
+            {"source", figures.mount_source}}},
+          {"placements", placements},
+          {"way_m", figures.errors.way_m},
+          {"errors", errors_json(figures.errors)}};
+}
+
+void InsEvents::note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept {
+  note_attitude(sample);
+  if (contradicted && !std::exchange(contradiction_noted_, true))
+    event_log_.log(
+        sample.stamp, "ins_attitude",
+        "the INS's attitude is more than 30 degrees off the way that is driven: it is not "
+        "used while it is; check its filter, and ins.boresight_deg",
+        true);
+  if (jumps == jumps_) return;
+  jumps_ = jumps;
+  event_log_.log(
+      sample.stamp, "ins_jump",
+      "the INS's position leapt: not interpolated across, errors from here on contain the leap",
+      true);
+}
+
+void InsEvents::note(const ComparedPose& pose, std::uint64_t matches) noexcept {
+  if (source_ != InsSource::none) note_match(pose, matches);
+  note_scale(pose);
+}
+
+void InsEvents::note(const Placement& p, Stamp stamp) noexcept {
+  std::array<char, 160> text{};
+  (void)std::snprintf(text.data(), text.size(),
+                      "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m",
+                      p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual);
+  event_log_.log(stamp, "placement", text.data(), false);
+}
+
+/// Once a drive: a receiver never has one, an INS has it after it has aligned.
+void InsEvents::note_attitude(const InsSample& sample) noexcept {
+  if (sample.attitude_valid || sample.heading_source == HeadingSource::none ||
+      std::exchange(attitude_noted_, true))
+    return;
+  const bool heading = sample.heading_source == HeadingSource::heading;
+  event_log_.log(sample.stamp, "ins_without_attitude",
+                 heading ? "the INS gives no roll and pitch: taken as level; position and measured "
+                           "heading are compared"
+                         : "the INS gives no attitude: taken as level; position and course are "
+                           "compared",
+                 false);
+}
+
+void InsEvents::note_match(const ComparedPose& pose, std::uint64_t matches) noexcept {
+  constexpr std::uint64_t kSettled = 3;  // poses: one missed reading is no event
+  match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
+  last_match_ = pose.ins;
+  if (match_run_ != kSettled) return;
+  const bool recorded = source_ == InsSource::recording;
+  switch (pose.ins) {
+    case InsMatch::ok:
+      if (matches > kSettled)
+        event_log_.log(pose.pose.stamp, "ins_ok",
+                       "the INS has a position again; the comparison goes on", false);
+      break;
+    case InsMatch::none:
+      event_log_.log(
+          pose.pose.stamp, "ins_silent",
+          recorded
+              ? "the recording has no reading of the INS here: these poses are not compared"
+              : "the INS is silent: the drive goes on without it; check its cable and its rate",
+          true);
+      break;
+    case InsMatch::gap:
+      event_log_.log(pose.pose.stamp, "ins_gap",
+                     "readings of the INS are missing: these poses are not compared", true);
+      break;
+    case InsMatch::no_fix:
+      event_log_.log(pose.pose.stamp, "ins_no_fix",
+                     recorded ? "the INS had no position: the comparison pauses"
+                              : "the INS has no position: the comparison pauses; check its antenna",
+                     true);
+      break;
+    case InsMatch::jump:  // told with the reading: it may fall between two frames
+      break;
+  }
+}
+
+void InsEvents::note_scale(const ComparedPose& pose) noexcept {
+  if (pose.scale_disagrees == scale_disagrees_) return;
+  scale_disagrees_ = pose.scale_disagrees;
+  std::array<char, 200> text{};
+  if (scale_disagrees_)
+    (void)std::snprintf(
+        text.data(), text.size(),
+        "the distance travelled comes out %.1f %% %s than the INS's over %.0f m: images cannot "
+        "tell, measure the baseline again",
+        100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter",
+        scale_stretch_m_);
+  else
+    (void)std::snprintf(text.data(), text.size(),
+                        "the distance travelled agrees with the INS again");
+  event_log_.log(pose.pose.stamp, scale_disagrees_ ? "scale_disagrees" : "scale_agrees",
+                 text.data(), scale_disagrees_);
+}
 
 InsComparison::InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
                              EventLog& event_log)
@@ -31,8 +189,8 @@ void InsComparison::add(const PoseSample& pose, float decode_ms) noexcept {
 
 void InsComparison::drain() noexcept {
   for (ComparedPose pose; comparison_.next(&pose);) {
-    output_->post(
-        PoseRecord::of(pose, decode_ms_[static_cast<std::size_t>(drained_++ % decode_ms_.size())]));
+    output_->post(FrameReport::of(
+        pose, decode_ms_[static_cast<std::size_t>(drained_++ % decode_ms_.size())]));
     if (pose.ins_valid) ++matches_;
     measure_way(pose);
     measure_errors(pose);
@@ -124,9 +282,8 @@ void InsComparison::take_placement(Stamp stamp) noexcept {
     placements_.push_back({stamp, p});
     if (placements_.size() == kMostPlacements)
       event_log_.log(stamp, "placements_full",
-                     "the drive was placed on the earth anew so often that trajectory_enu.tum, "
-                     "drive.geojson and drive.kml keep this placement from here on; poses.csv has "
-                     "every one",
+                     "the drive was placed on the earth anew so often that summary.json has no "
+                     "further placement; poses.csv has every one",
                      true);
   }
   output_->post(p, comparison_.plane().origin());

@@ -2,17 +2,79 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "app/recorder/earth_figures.hpp"
+#include <nlohmann/json_fwd.hpp>
+
 #include "app/session/event_log.hpp"
-#include "app/session/ins_events.hpp"
 #include "app/session/session_observer.hpp"
 #include "core/comparison/comparison.hpp"
+#include "core/comparison/placement.hpp"
+#include "core/math/se3.hpp"
+#include "core/types/ins_sample.hpp"
 
 namespace vergence::app {
+
+/// A placement and from when on it holds.
+struct PlacementRecord {
+  Stamp stamp{};
+  Placement placement{};
+};
+
+/// Errors against the INS after the placement, over the poses that were compared.
+struct EarthErrors {
+  std::uint64_t poses = 0;
+  double way_m = 0;  // of the INS across the ground from its first fix on, straight across holes
+  double horizontal_rms_m = 0, horizontal_most_m = 0, horizontal_end_m = 0;
+  double up_rms_m = 0, up_end_m = 0;                                      // ours − INS
+  double heading_rms_deg = 0, heading_most_deg = 0, heading_end_deg = 0;  // the end clockwise
+};
+
+/// Where a drive lies on the earth, and how far from the INS it is there.
+struct EarthFigures {
+  std::optional<Geodetic> origin{};  // of enu; nothing: the INS never had a fix
+  std::vector<PlacementRecord> placements{};
+  EarthErrors errors{};
+  Transform T_ins_left{};      // the mount that the comparison took
+  std::string mount_source{};  // where it is from
+};
+
+/// Null without an origin.
+[[nodiscard]] nlohmann::ordered_json earth_json(const EarthFigures& figures);
+
+enum class InsSource : std::uint8_t { none, device, recording };
+
+/// Events about an INS and its comparison with the poses: each once, where something changes.
+/// Threads: the estimator's, sealed.
+class InsEvents {
+ public:
+  /// Without a source nothing is said about its silence. `event_log` outlives this.
+  InsEvents(InsSource source, double scale_stretch_m, EventLog& event_log) noexcept
+      : source_(source), scale_stretch_m_(scale_stretch_m), event_log_(event_log) {}
+
+  /// A reading, after the comparison has counted `jumps` of the position. `contradicted`: an
+  /// attitude did not go with the way driven.
+  void note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept;
+  /// A pose that has met its readings, the `matches`-th that found any.
+  void note(const ComparedPose& pose, std::uint64_t matches) noexcept;
+  void note(const Placement& placement, Stamp stamp) noexcept;
+
+ private:
+  void note_attitude(const InsSample& sample) noexcept;
+  void note_match(const ComparedPose& pose, std::uint64_t matches) noexcept;
+  void note_scale(const ComparedPose& pose) noexcept;
+
+  const InsSource source_;
+  const double scale_stretch_m_;
+  EventLog& event_log_;
+  bool attitude_noted_ = false, contradiction_noted_ = false, scale_disagrees_ = false;
+  std::uint64_t jumps_ = 0;
+  InsMatch last_match_ = InsMatch::ok;
+  std::uint64_t match_run_ = 0;  // poses in a row with that
+};
 
 /// What a drive does with its INS, live or recorded alike: the comparison pose by pose into the
 /// recorder, and what there is to tell of it.

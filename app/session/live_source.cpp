@@ -9,12 +9,11 @@
 
 #include <fmt/format.h>
 
-#include "app/datasets/decimal.hpp"
 #include "app/devices/camera_masks.hpp"
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/recorder/line_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/session/records.hpp"
 #include "app/session/session_files.hpp"
 #include "drivers/clock.hpp"
 
@@ -81,7 +80,6 @@ void LiveSource::make_facts() {
   if (!request_.fast) facts_.frame_interval = Duration::seconds(1.0 / configuration_.trigger.rate);
   facts_.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
   facts_.frames = devices_.frames();
-  facts_.expected_frames = static_cast<std::size_t>(devices_.frames());  // 0: nobody knows
   if (devices_.ins() != nullptr)
     facts_.ins =
         SourceIns{comparison_options(configuration_), InsSource::device, "the configuration", 0};
@@ -218,11 +216,10 @@ void LiveSource::write_truth(std::vector<std::string>* faults) const {
     LineFile file(request_.session.out / "truth.tum");
     constexpr std::size_t kTogether = 1000;  // lines: a tenth of what a file keeps waiting
     std::size_t lines = 0;
+    std::string line;
     for (const StampedPose& pose : truth_) {
-      const PoseNumbers n = PoseNumbers::of(pose.T_world_body);
-      (void)file.append(fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
-                                    format_seconds(pose.stamp.ns()), n.t[0], n.t[1], n.t[2], n.q[0],
-                                    n.q[1], n.q[2], n.q[3]));
+      format_tum(pose.stamp, pose.T_world_body, &line);
+      (void)file.append(line);
       if (++lines % kTogether == 0) (void)file.flush();
     }
     if (!file.close() || file.lost_lines() > 0)
@@ -291,7 +288,7 @@ void LiveSource::describe(const SessionTotals& totals, const Estimator& estimato
                                           c.sync.acquiring.begin() + facts_.begin.file.rig.cameras);
   input->skipped = c.dropped_sets + c.sync.missed + *acquiring;
   input->devices = counters();
-  input->time = time_.figures(c, devices_);
+  input->time = time_.json(c, devices_);
   if (devices_.mock() != nullptr) input->truth = truth_figures(totals, estimator);
 }
 

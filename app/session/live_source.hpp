@@ -45,9 +45,6 @@ class LiveSource final : public FrameSource {
   void stop() noexcept override { acquisition_->stop(); }
   [[nodiscard]] std::uint64_t rounds() const noexcept override { return acquisition_->rounds(); }
   void look() override;
-  [[nodiscard]] std::optional<double> temperature_c(int camera) override {
-    return devices_.cameras()[static_cast<std::size_t>(camera)]->temperature_c();
-  }
   void halt() noexcept override;
   void finish(Progress* progress, std::vector<std::string>* faults) override;
   void describe(const SessionTotals& totals, const Estimator& estimator,

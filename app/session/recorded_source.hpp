@@ -6,14 +6,31 @@
 #include <vector>
 
 #include "app/datasets/frame_decoder.hpp"
+#include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/replay_session.hpp"
-#include "app/session/replayed_ins.hpp"
 #include "app/session/session_files.hpp"
+#include "core/comparison/comparison.hpp"
 #include "core/memory/frame_pool.hpp"
 
 namespace vergence::app {
+
+/// The INS of a drive that is replayed, and how it is compared.
+struct ReplayedIns {
+  std::vector<RecordedReading>
+      readings{};  // around the frames that are replayed; empty: there is no INS
+  ComparisonOptions options{};
+  std::string mount_source{};
+  std::vector<std::string> remarks{};  // sentences
+};
+
+/// Of the frames [request.start, …) of the sequence. A mount that the configuration says
+/// (`ins.lever_arm_m`, `ins.boresight_deg`) stands before the data set's own;
+/// `comparison.max_gap_ms` and `max_wait_ms` are no less than one and a half of the recording's
+/// usual interval. InputError: as read_recorded_ins() and comparison_options() say.
+[[nodiscard]] ReplayedIns replayed_ins(const ReplayRequest& request,
+                                       const StereoSequence& sequence);
 
 /// A recorded drive as the source of a session. Nothing is dropped; an INS that was recorded comes
 /// in the order of its stamps, before the frames that are not older.

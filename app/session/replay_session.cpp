@@ -9,7 +9,6 @@
 
 #include "app/session/drive_calibration.hpp"
 #include "app/session/recorded_source.hpp"
-#include "app/session/replayed_ins.hpp"
 #include "app/session/session_runner.hpp"
 #include "app/session/session_source.hpp"
 #include "app/session/starting_calibration.hpp"
@@ -87,12 +86,10 @@ bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
 void calibrate_unknown(ReplayRequest request, const SignalGuard& signals, StereoSequence* sequence,
                        StartingCalibration* begin) {
   if (calibrate_first(request, signals, *sequence, begin) || signals.stop_requested()) return;
-  if (!request.known || !request.known->distortion.empty() ||
-      request.known->model != CameraModelKind::pinhole_radtan)
-    return;
+  if (!request.known || request.known->model != CameraModelKind::pinhole_radtan) return;
   if (!request.session.quiet)
     fmt::print(stderr, "vergence: once more, with the distortion of a wide lens to begin with\n");
-  request.known->distortion = {-0.28, 0.07, 0, 0};
+  request.known->wide = true;
   StereoSequence wide = open_drive(request);
   StartingCalibration other = replayed_calibration(request.configuration, wide, true);
   if (!calibrate_first(request, signals, wide, &other)) return;

@@ -8,8 +8,8 @@
 #include "app/config/configuration.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/session/given_calibration.hpp"
 #include "app/session/session_runner.hpp"
+#include "app/session/starting_calibration.hpp"
 
 namespace vergence::app {
 

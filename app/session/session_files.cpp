@@ -1,18 +1,62 @@
 #include "app/session/session_files.hpp"
 
 #include <cstring>
-#include <limits>
+#include <string>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 
 #include "app/config/calibration_file.hpp"
 #include "app/config/calibration_state.hpp"
-#include "app/recorder/residual_field.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/runtime/thread_runner.hpp"
 
 namespace vergence::app {
+
+bool check_session_folder(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  const std::string name = folder.string();
+  if (name.empty()) throw InputError("--out is empty; name a folder for the session");
+  std::error_code error;
+  if (!fs::exists(folder, error)) return false;
+  if (!fs::is_directory(folder, error))
+    throw InputError(name +
+                     ": is not a folder; name a new or empty one for the session with --out");
+  const bool empty = fs::is_empty(folder, error);
+  if (error)
+    throw InputError(name + ": cannot be looked into (" + error.message() +
+                     "): check its permissions");
+  if (!empty)
+    throw InputError(
+        name +
+        ": is not empty, and nothing is ever overwritten; name a new or empty folder with --out");
+  return true;
+}
+
+bool make_session_folder(const std::filesystem::path& folder) {
+  if (check_session_folder(folder)) return false;
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw InputError(folder.string() + ": cannot be made (" + error.message() +
+                     "): check that disk and the folder above it");
+  return true;
+}
+
+void discard_session_folder(const std::filesystem::path& folder, bool made) noexcept {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (made) {
+    fs::remove_all(folder, error);
+    return;
+  }
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code ignored;
+    fs::remove_all(entry->path(), ignored);
+  }
+}
 
 std::unique_ptr<PairRunner> make_runner(int threads) {
   if (threads >= 2) return std::make_unique<ThreadRunner>();
@@ -68,25 +112,6 @@ void forget_faults_of(const std::filesystem::path& file, std::vector<std::string
   std::erase_if(*faults, [&name](const std::string& fault) { return fault.starts_with(name); });
 }
 
-/// residuals.csv, where there are matches.
-void write_residuals(const std::filesystem::path& session,
-                     const std::optional<RigCalibration>& before, const RigCalibration& at_the_end,
-                     const MatchSample& sample, std::vector<std::string>* faults) {
-  const auto field = [&sample](const RigCalibration& rig, std::uint64_t from, std::uint64_t until) {
-    return residual_field(sample.matches(), rig, from, until);
-  };
-  const std::vector<ResidualCell> end =
-      field(at_the_end, sample.last_change(), std::numeric_limits<std::uint64_t>::max());
-  if (end.empty()) return;
-  const std::vector<ResidualCell> begin =
-      before ? field(*before, 0, sample.first_change()) : std::vector<ResidualCell>{};
-  try {
-    replace_durably(session / "residuals.csv", format_residuals(begin, end));
-  } catch (const InputError& e) {
-    faults->emplace_back(e.what());
-  }
-}
-
 }  // namespace
 
 void begin_session(const std::filesystem::path& session, const StartingCalibration& begin,
@@ -99,15 +124,13 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
                           const SessionTotals& totals, const EstimatorOptions& options,
-                          const MatchSample& matches, SummaryInput* input) {
+                          SummaryInput* input) {
   input->calibrated = estimator.calibrated();
   input->online = options.online;
   input->verified = options.online && estimator.verified();
   input->calibration = estimator.calibration();
   input->calibration_source = totals.accepted > 0 ? "online" : begin.source;
   if (begin.trust != CalibrationTrust::none) input->before = begin.file.rig;
-  if (input->before)
-    input->mistake = find_mistake(matches.matches(), *input->before, matches.first_change());
   input->options = options.calibration;
 }
 
@@ -120,7 +143,7 @@ std::string verification_sentence(const SummaryInput& input) {
 }
 
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
-                 const SummaryInput& input, const SessionTotals& totals, const MatchSample& matches,
+                 const SummaryInput& input, const SessionTotals& totals,
                  std::vector<std::string>* faults) {
   if (!input.calibrated) return;
   CalibrationFile file = begin.file;
@@ -128,9 +151,6 @@ void end_session(const std::filesystem::path& session, const StartingCalibration
   if (totals.accepted > 0) file.source = "online";
   forget_faults_of(session / "calibration.yaml", faults);
   write_session_calibration(session, file, faults);
-  // With one calibration throughout there is nothing to compare.
-  write_residuals(session, totals.accepted > 0 ? input.before : std::nullopt, input.calibration,
-                  matches, faults);
 }
 
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,

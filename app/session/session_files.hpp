@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -8,16 +9,25 @@
 #include <vector>
 
 #include "app/config/calibration_file.hpp"
-#include "app/recorder/match_sample.hpp"
-#include "app/recorder/summary.hpp"
 #include "app/report/report.hpp"
 #include "app/runtime/progress.hpp"
+#include "app/session/recorder.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/starting_calibration.hpp"
+#include "app/session/summary.hpp"
 #include "core/types/parallel.hpp"
 
 /// What every command that writes a session folder does alike.
 namespace vergence::app {
+
+/// Whether the folder of a session is there, empty. InputError: it exists and is not empty, or is
+/// no folder.
+bool check_session_folder(const std::filesystem::path& folder);
+/// Makes the folder of a session. False: it was there, empty. InputError: it exists and is not
+/// empty, is no folder, or cannot be made.
+bool make_session_folder(const std::filesystem::path& folder);
+/// Undoes make_session_folder(): removes what is in the folder, and with `made` the folder itself.
+void discard_session_folder(const std::filesystem::path& folder, bool made) noexcept;
 
 /// What an arena needs beside its contents: the first piece is aligned, too.
 [[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }
@@ -47,17 +57,16 @@ void begin_session(const std::filesystem::path& session, const StartingCalibrati
 /// The calibration's part of the summary.
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
                           const SessionTotals& totals, const EstimatorOptions& options,
-                          const MatchSample& matches, SummaryInput* input);
+                          SummaryInput* input);
 
 /// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is
 /// none.
 [[nodiscard]] std::string verification_sentence(const SummaryInput& input);
 
-/// calibration.yaml as it is in use at the end, if there is one, and residuals.csv, if there are
-/// matches to look at it with. A sentence of *faults that calibration.yaml could not be written at
-/// the start gives way to what becomes of it now.
+/// calibration.yaml as it is in use at the end, if there is one. A sentence of *faults that
+/// calibration.yaml could not be written at the start gives way to what becomes of it now.
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
-                 const SummaryInput& input, const SessionTotals& totals, const MatchSample& matches,
+                 const SummaryInput& input, const SessionTotals& totals,
                  std::vector<std::string>* faults);
 
 /// summary.json of the session; what goes wrong becomes a sentence of *faults.

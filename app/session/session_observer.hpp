@@ -7,9 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "app/recorder/ins_file.hpp"
-#include "app/recorder/recorder.hpp"
-#include "app/recorder/records.hpp"
+#include "app/session/ins_file.hpp"
+#include "app/session/records.hpp"
 #include "core/calibration/track_log.hpp"
 #include "core/comparison/placement.hpp"
 #include "core/types/calibration.hpp"
@@ -58,7 +57,7 @@ struct SessionRequests {
 ///            ring is the observer's loss, to be counted by it. Events of before the first frame
 ///            and after the last come from the caller's thread, while the estimator's does not run.
 /// Order      on_frame(), on_pose() of the same frame, then its events and calibrations;
-///            on_compared() of a frame once its INS readings are there, frames in order.
+///            on_report() of a frame once its INS readings are there, frames in order.
 ///            Live and replayed alike.
 /// Errors     Nothing throws. What an observer does changes neither poses nor files.
 class SessionObserver {
@@ -78,9 +77,9 @@ class SessionObserver {
   /// The odometry's world was placed on the earth; `origin` is that of enu. Acts from the next
   /// pose on.
   virtual void on_placement(const Placement& /*placement*/, const Geodetic& /*origin*/) noexcept {}
-  /// The line of poses.csv: the pose placed on the earth, the INS beside it. Without an INS at
-  /// once; with one after the readings around the frame have come.
-  virtual void on_compared(const PoseRecord& /*pose*/) noexcept {}
+  /// All there is to say of a frame: the pose placed on the earth, the INS beside it. Without an
+  /// INS at once; with one after the readings around the frame have come.
+  virtual void on_report(const FrameReport& /*report*/) noexcept {}
   /// A reading of the INS, stamped on the session's clock; in order of arrival.
   virtual void on_reading(const InsRecord& /*reading*/) noexcept {}
   /// A line of events.jsonl.
@@ -88,59 +87,41 @@ class SessionObserver {
   /// A calibration that was accepted or rejected, or that the session begins with.
   virtual void on_calibration(const CalibrationRecord& /*calibration*/) noexcept {}
 
-  /// Whether on_temperature() is to be called: the cameras are asked only where somebody wants it.
-  [[nodiscard]] virtual bool wants_temperatures() const noexcept { return false; }
-  /// A camera told its temperature. The caller's thread, every few seconds, while the estimator's
-  /// runs.
-  virtual void on_temperature(int /*camera*/, double /*celsius*/) noexcept {}
-
   /// For summary.json, block `devices`. The caller's thread, once, after the last frame.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> counters() { return {}; }
 };
 
-/// Where all that a session has to say goes: the recorder, and every observer.
+/// Where all that a session has to say goes: to every observer, in their order.
 ///
-/// Ownership  Recorder and observers outlive the last call. Threads: as SessionObserver.
-/// Memory     None of its own.
+/// Ownership  Observers outlive the last call. Threads: as SessionObserver. Memory: none.
 class SessionOutput {
  public:
   SessionOutput() = default;
-  SessionOutput(Recorder* recorder, std::span<SessionObserver* const> observers) noexcept
-      : recorder_(recorder), observers_(observers) {}
+  explicit SessionOutput(std::span<SessionObserver* const> observers) noexcept
+      : observers_(observers) {}
 
-  void post(const RigFrame& frame) noexcept {
-    for (SessionObserver* o : observers_) o->on_frame(frame);
-  }
-  void post(const PoseSample& sample) noexcept {
-    for (SessionObserver* o : observers_) o->on_pose(sample);
-  }
+  void post(const RigFrame& frame) noexcept { tell(&SessionObserver::on_frame, frame); }
+  void post(const PoseSample& sample) noexcept { tell(&SessionObserver::on_pose, sample); }
   void post(const calibration::TrackLog& tracks) noexcept {
-    for (SessionObserver* o : observers_) o->on_tracks(tracks);
+    tell(&SessionObserver::on_tracks, tracks);
   }
   void post(const Placement& placement, const Geodetic& origin) noexcept {
-    for (SessionObserver* o : observers_) o->on_placement(placement, origin);
+    tell(&SessionObserver::on_placement, placement, origin);
   }
-  void post(const PoseRecord& pose) noexcept {
-    recorder_->post(Record(pose));
-    for (SessionObserver* o : observers_) o->on_compared(pose);
-  }
-  void post(const EventRecord& event) noexcept {
-    recorder_->post(Record(event));
-    for (SessionObserver* o : observers_) o->on_event(event);
-  }
+  void post(const FrameReport& report) noexcept { tell(&SessionObserver::on_report, report); }
+  void post(const EventRecord& event) noexcept { tell(&SessionObserver::on_event, event); }
   void post(const CalibrationRecord& calibration) noexcept {
-    recorder_->post(calibration);
-    for (SessionObserver* o : observers_) o->on_calibration(calibration);
+    tell(&SessionObserver::on_calibration, calibration);
   }
   /// Precondition: Recorder::Options::ins.
-  void post(const InsRecord& reading) noexcept {
-    recorder_->post(reading);
-    for (SessionObserver* o : observers_) o->on_reading(reading);
-  }
-  [[nodiscard]] std::vector<std::string> take_errors() { return recorder_->take_errors(); }
+  void post(const InsRecord& reading) noexcept { tell(&SessionObserver::on_reading, reading); }
 
  private:
-  Recorder* recorder_ = nullptr;
+  template <class Call, class... Values>
+  void tell(Call call, const Values&... values) noexcept {
+    for (SessionObserver* o : observers_) (o->*call)(values...);
+  }
+
   std::span<SessionObserver* const> observers_{};
 };
 

@@ -19,11 +19,7 @@
 #include "app/session/drive_recorder.hpp"
 #include "app/session/drive_threads.hpp"
 #include "app/session/estimation_loop.hpp"
-#include "app/session/heartbeat.hpp"
-#include "app/session/memory_figures.hpp"
 #include "app/session/session_files.hpp"
-#include "app/session/session_quota.hpp"
-#include "app/session/temperature_watch.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
@@ -44,7 +40,6 @@ class SessionRunner {
   [[nodiscard]] SessionStart session_start() const;
   void say_remarks(Progress* progress);
   void estimate() noexcept;
-  void pass_on_temperatures();
   void watch(Progress* progress);
   void start_source(std::vector<std::string>* faults);
   [[nodiscard]] std::thread start_estimating();
@@ -70,21 +65,14 @@ class SessionRunner {
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<DriveRecorder> recording_;  // null: nothing is recorded
   std::vector<SessionObserver*> observers_;
-  std::vector<std::string> removed_;  // sessions over the quota: a sentence each
 
-  ServiceManager service_;  // of the caller's thread, as the next
-  Heartbeat heart_;
-  std::mutex mutex_;  // with done_, for the caller's thread that waits
+  ServiceManager service_;  // of the caller's thread
+  std::mutex mutex_;        // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
-  struct {
-    std::uint64_t number = 0;  // SessionMark
-    bool made = false;         // it was not there before
-  } folder_;
-  bool halted_ = false;        // the caller's thread alone
-  ResidentMemory resident_{};  // at the drive's end
-  DriveThreads threads_;       // of the caller's thread
-  TemperatureWatch temperatures_;
+  bool folder_made_ = false;  // it was not there before
+  bool halted_ = false;       // the caller's thread alone
+  DriveThreads threads_;      // of the caller's thread
 };
 
 SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
@@ -95,8 +83,7 @@ SessionRunner::SessionRunner(FrameSource& source, const Configuration& configura
       request_(options),
       signals_(signals),
       loop_(source, configuration, options),
-      threads_(configuration.realtime),
-      temperatures_(source) {}
+      threads_(configuration.realtime) {}
 
 void SessionRunner::estimate() noexcept {
   loop_.run();
@@ -105,29 +92,17 @@ void SessionRunner::estimate() noexcept {
   changed_.notify_one();
 }
 
-void SessionRunner::pass_on_temperatures() {
-  const TemperatureWatch::Celsius celsius = temperatures_.take_new();
-  for (std::size_t k = 0; k < celsius.size(); ++k)
-    if (celsius[k])
-      for (SessionObserver* observer : request_.observers)
-        observer->on_temperature(static_cast<int>(k), *celsius[k]);
-}
-
 void SessionRunner::watch(Progress* progress) {
   constexpr std::chrono::milliseconds kLook{50};
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
     if (signals_.stop_requested()) source_.stop();
     source_.look();
-    const std::uint64_t items = loop_.items();
-    service_.alive(heart_.beats(items, loop_.waiting(), source_.rounds()), items,
+    service_.alive(loop_.items(), loop_.waiting(), source_.rounds(),
                    std::chrono::steady_clock::now());
     if (facts_.on_request && signals_.take_calibration_request()) loop_.ask_calibration();
     lock.unlock();
-    if (loop_.drained())
-      halt_source();
-    else
-      pass_on_temperatures();
+    if (loop_.drained()) halt_source();
     threads_.look(progress);
     loop_.event_log().show(progress, facts_.frames);
     say_recording_errors(progress);
@@ -142,7 +117,6 @@ void SessionRunner::watch(Progress* progress) {
 /// cameras that are slow to stop may take longer than the watchdog waits.
 void SessionRunner::halt_source() noexcept {
   service_.stopping();
-  temperatures_.end();
   if (!halted_) source_.halt();
   halted_ = true;
 }
@@ -178,7 +152,7 @@ void SessionRunner::leave_no_folder() {
   std::vector<std::string> ignored;
   if (recording_) recording_->close(&ignored);
   if (recorder_) (void)recorder_->close();
-  discard_session_folder(request_.out, folder_.made);
+  discard_session_folder(request_.out, folder_made_);
 }
 
 void SessionRunner::say_recording_errors(Progress* progress) {
@@ -190,13 +164,7 @@ void SessionRunner::say_recording_errors(Progress* progress) {
 }
 
 void SessionRunner::open(std::vector<std::string>* faults) {
-  // A session that is refused costs no other one, and on a full disk there is room for its folder
-  // only when the quota has made some.
-  (void)check_session_folder(request_.out);
-  if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
-    removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
-  folder_.number = next_session_number(request_.out);
-  folder_.made = make_session_folder(request_.out);
+  folder_made_ = make_session_folder(request_.out);
   try {
     open_files(faults);
   } catch (const std::exception&) {
@@ -209,14 +177,13 @@ void SessionRunner::open_files(std::vector<std::string>* faults) {
   Recorder::Options to_record;
   to_record.first = facts_.first;
   to_record.when_full = facts_.when_full;
-  to_record.expected_frames = facts_.expected_frames;
   to_record.keep_trajectory = trajectory_is_asked_for();
   to_record.ins = loop_.comparison() != nullptr;
   to_record.keep = calibration_keeper(request_.out, facts_.begin.file, facts_.begin.state);
   to_record.disk_full = facts_.disk_full;
-  to_record.number = folder_.number;
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
-  observers_ = request_.observers;
+  observers_ = {recorder_.get()};
+  observers_.insert(observers_.end(), request_.observers.begin(), request_.observers.end());
   if (configuration_.record.any()) {
     recording_ =
         std::make_unique<DriveRecorder>(request_.out, configuration_, facts_, loop_.solver_watch());
@@ -225,14 +192,13 @@ void SessionRunner::open_files(std::vector<std::string>* faults) {
   }
   const SessionStart start = session_start();
   for (SessionObserver* observer : observers_) observer->on_start(start);
-  loop_.open(SessionOutput(recorder_.get(), observers_), recording_.get());
+  loop_.open(SessionOutput(observers_), recording_.get());
   begin_session(request_.out, facts_.begin, facts_.first, &loop_.output(), faults);
 }
 
 /// Whether anything at the end is made of the whole drive's poses, which then are all in memory.
 bool SessionRunner::trajectory_is_asked_for() const {
-  return loop_.comparison() != nullptr || !facts_.truth.empty() || facts_.knows_truth ||
-         !request_.also.empty();
+  return loop_.comparison() != nullptr || !facts_.truth.empty() || facts_.knows_truth;
 }
 
 SessionStart SessionRunner::session_start() const {
@@ -252,10 +218,6 @@ SessionStart SessionRunner::session_start() const {
 }
 
 void SessionRunner::say_remarks(Progress* progress) {
-  for (const std::string& sentence : removed_) {
-    progress->say("vergence: " + sentence);
-    loop_.event_log().log(facts_.first, "session_removed", sentence, false);
-  }
   for (const SourceRemark& remark : facts_.remarks) {
     if (remark.say) progress->say("vergence: " + remark.sentence);
     if (remark.kind != nullptr)
@@ -284,13 +246,11 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
     input.comparison = comparison->counters();
     input.earth = comparison->earth(facts_.ins->mount_source);
   }
-  describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(),
-                       loop_.event_log().matches(), &input);
+  describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(), &input);
   input.allocations_after_seal = allocations;
   input.frame_budget = loop_.options().frame_budget;
   input.allocations = threads_.figures();
   for (const MemoryRow& row : memory()) input.memory.emplace_back(row.name, row.bytes);
-  input.resident = named(resident_);
   input.configuration_hash = configuration_hash(configuration_);
   input.assumptions = facts_.assumptions;
   source_.describe(totals, loop_.estimator(), &input);
@@ -301,12 +261,9 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
 
 void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput& input,
                                 std::vector<std::string>* faults, Progress* progress) {
-  end_session(request_.out, facts_.begin, input, totals, loop_.event_log().matches(), faults);
+  end_session(request_.out, facts_.begin, input, totals, faults);
   write_session_summary(request_.out, totals, input, faults);
   faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
-  for (const std::string& sentence : write_other_formats(
-           request_.out, request_.also, totals, input.earth.value_or(EarthFigures{}), faults))
-    progress->say("vergence: " + sentence);
   for (const std::string& sentence : recorder_->take_errors())
     progress->say("vergence: " + sentence);
   for (const std::string& sentence : *faults) progress->say("vergence: " + sentence);
@@ -356,17 +313,11 @@ ExitCode SessionRunner::run() {
   (void)::malloc_trim(0);  // what setting up took and gave back goes to the system
   threads_.lock_memory(&progress);
   start_source(&faults);
-  if (std::any_of(request_.observers.begin(), request_.observers.end(),
-                  [](const SessionObserver* o) { return o->wants_temperatures(); }))
-    temperatures_.begin();
   std::thread estimating = start_estimating();
   service_.ready();
   watch(&progress);
   estimating.join();
-  resident_ = resident_memory({{"estimator_bytes", &loop_.estimator_arena()},
-                               {"comparison_bytes", &loop_.comparison_arena()}});
   progress.finish();
-  if (request_.print_memory) print_memory_table(resident_);
   source_.finish(&progress, &faults);
 
   if (recording_) recording_->close(&faults);

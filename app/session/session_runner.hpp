@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "app/config/configuration.hpp"
-#include "app/recorder/other_formats.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/signals.hpp"
 #include "app/session/frame_source.hpp"
@@ -15,7 +14,6 @@ namespace vergence::app {
 /// What a session is to write and to say, whatever its source.
 struct SessionOptions {
   std::filesystem::path out;
-  std::vector<OtherFormat> also{};  // written beside the session's own files
   bool quiet = false;
   bool print_memory = false;  // a table of what is held, on stdout
   std::vector<SessionObserver*> observers{};

@@ -41,7 +41,7 @@ SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSessi
   SourceFacts facts;
   facts.begin = other ? std::move(*other) : recorded_beginning(d, request.data.string());
   facts.adoption = as_then ? d.adoption : Adoption::after_fixed_frames;
-  facts.frames = facts.expected_frames = end - first;
+  facts.frames = end - first;
   facts.first = session.frames()[first].given.stamp;
   if (d.ins && !session.readings().empty())
     facts.ins = SourceIns{comparison_options(request.configuration), InsSource::recording,

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/datasets/recorded_session.hpp"
-#include "app/runtime/thread_runner.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "app/session/frame_source.hpp"
 #include "app/session/replay_session.hpp"
 
@@ -54,7 +54,7 @@ class SessionSource final : public FrameSource {
   std::size_t next_frame_ = 0, next_reading_ = 0;
   bool recalibration_said_ = false;  // of the next frame
   std::uint64_t images_missing_ = 0;
-  ThreadRunner reader_{ThreadRunner::Worker::of_reader};  // decoding takes heap
+  ThreadRunner reader_{BackgroundThread::Role::reader};  // decoding takes heap
 };
 
 /// What a recorded session began with. InputError: the recording's description is damaged.

@@ -2,18 +2,68 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+#include <system_error>
 
 #include <fmt/format.h>
 
+#include "app/config/calibration_file.hpp"
 #include "app/config/calibration_state.hpp"
-#include "app/config/configured_rig.hpp"
+#include "app/datasets/text_file.hpp"
 #include "app/devices/rig_settings.hpp"
+#include "app/foreign_calibration/foreign_calibration.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/session/given_calibration.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
 namespace vergence::app {
+
+namespace {
+
+/// Ours is one file: a pair or a folder of them is refused with the other formats.
+bool is_foreign(const std::string& in) {
+  std::error_code ignored;
+  return !std::filesystem::is_regular_file(in, ignored) || !is_own_calibration(in);
+}
+
+}  // namespace
+
+CalibrationFile read_given_calibration(const std::string& in, const CalibrationUse& use,
+                                       const std::optional<ImageSize>& size,
+                                       std::vector<std::string>* remarks) {
+  return read_any_calibration(in, size, remarks, use);
+}
+
+GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
+                                   std::vector<std::string>* remarks) {
+  return {in, [in, use, remarks](const StereoSequence& sequence) {
+            // The images are only looked at for a file that may lack their size.
+            const std::optional<ImageSize> size =
+                is_foreign(in) ? std::optional(first_image_size(sequence, 0)) : std::nullopt;
+            return read_given_calibration(in, use, size, remarks);
+          }};
+}
+
+GivenCalibration given_calibration(const KnownNumbers& known) {
+  return {"--focal", [known](const StereoSequence& sequence) {
+            const ImageSize size = first_image_size(sequence, 0);
+            CalibrationFile file;
+            file.source = "given";
+            RigCalibration& rig = file.rig;
+            rig.cameras = 2;
+            rig.baseline = known.baseline;
+            Intrinsics lens;
+            lens.kind = known.model;
+            lens.width = size.width, lens.height = size.height;
+            lens.fx = lens.fy = known.focal;
+            lens.cx = (size.width - 1) / 2.0, lens.cy = (size.height - 1) / 2.0;
+            if (known.wide) lens.distortion = {-0.28, 0.07, 0, 0, 0};
+            rig.intrinsics = {lens, lens};
+            make_parallel(&rig);
+            return file;
+          }};
+}
+
 namespace {
 
 /// The device's own serial says which camera it is: what the configuration finds it by may be an

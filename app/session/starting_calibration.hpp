@@ -14,6 +14,30 @@
 /// the configuration (METHOD §3).
 namespace vergence::app {
 
+/// What is known of a rig without a calibration: both cameras alike, principal points in the middle
+/// of the images.
+struct KnownNumbers {
+  double focal = 0;     // px
+  double baseline = 0;  // m
+  CameraModelKind model = CameraModelKind::pinhole_radtan;
+  bool wide = false;  // begins with the distortion of a usual lens of 80 to 100 degrees
+};
+
+/// calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or a folder with
+/// them) or OpenCV stereo YAML, told by
+/// content, with what is wanted of it applied. `size`: of the images, where a file has none. What a
+/// format did not carry over is a sentence of *remarks.
+/// Errors     InputError
+[[nodiscard]] CalibrationFile read_given_calibration(const std::string& in,
+                                                     const CalibrationUse& use,
+                                                     const std::optional<ImageSize>& size,
+                                                     std::vector<std::string>* remarks);
+
+/// For open_sequence().
+[[nodiscard]] GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
+                                                 std::vector<std::string>* remarks);
+[[nodiscard]] GivenCalibration given_calibration(const KnownNumbers& known);
+
 /// What the command line says about it.
 struct CalibrationSource {
   bool from_scratch = false;

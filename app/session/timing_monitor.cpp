@@ -41,26 +41,27 @@ const char* word_of(FixStatus fix) noexcept {
   return "";
 }
 
-ClockFigures clock_figures(std::string device, const ClockRecord& clock) {
-  ClockFigures f;
-  f.device = std::move(device);
-  f.stamps = clock.stamps();
-  f.drift_ppm = clock.drift_ppm();
-  f.error_us = us(clock.error());
-  f.worst_error_us = us(clock.worst_error());
-  return f;
+using Json = nlohmann::ordered_json;
+
+/// Three digits after the point: nanoseconds of microseconds, and a thousandth of a ppm.
+double rounded(double value) { return std::round(value * 1e3) / 1e3; }
+
+Json clock_json(const std::string& device, const ClockRecord& clock) {
+  return {{"device", device},
+          {"stamps", clock.stamps()},
+          {"drift_ppm", rounded(clock.drift_ppm())},
+          {"error_us", rounded(us(clock.error()))},
+          {"worst_error_us", rounded(us(clock.worst_error()))}};
 }
 
-ClockFigures::Pings pings_of(const trigger_board::TimeQuality& q) {
-  ClockFigures::Pings p;
-  p.asked = q.asked;
-  p.answered = q.answered;
-  p.rtt_least_us = us(q.rtt_least);
-  p.rtt_median_us = us(q.rtt_median);
-  p.rtt_most_us = us(q.rtt_most);
-  p.pps_locked = q.pps_locked;
-  p.pps_age_s = q.pps_age.to_seconds();
-  return p;
+Json latency_json(const TimeHistogram& latency, bool is_virtual) {
+  if (latency.count() == 0) return nullptr;
+  return {{"mean", rounded(latency.mean())},
+          {"p50", rounded(latency.percentile(0.5))},
+          {"p99", rounded(latency.percentile(0.99))},
+          {"p99_9", rounded(latency.percentile(0.999))},
+          {"max", rounded(latency.max())},
+          {"virtual", is_virtual}};
 }
 
 }  // namespace
@@ -107,13 +108,7 @@ TimingMonitor::Sentence TimingMonitor::of_set(const SyncedSet& set) noexcept {
 TimingMonitor::Sentence TimingMonitor::of_reading(const AcquiredReading& reading) noexcept {
   constexpr int kMany = 3;  // satellites: one more or less is not worth a word
   const InsQuality& q = reading.quality;
-  ++satellites_.readings;
-  satellites_.without_fix += reading.sample.fix == FixStatus::none ? 1 : 0;
   const int count = q.satellites;
-  if (count > 0) {
-    satellites_.least = satellites_.most == 0 ? count : std::min(satellites_.least, count);
-    satellites_.most = std::max(satellites_.most, count);
-  }
   const bool changed = !any_quality_ || q.filter_valid != quality_.filter_valid ||
                        reading.sample.fix != fix_ ||
                        std::abs(count - int{quality_.satellites}) >= kMany;
@@ -138,10 +133,6 @@ TimingMonitor::Sentence TimingMonitor::of_utc(const AcquiredReading& reading) no
   if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return {};
   const double ahead =
       static_cast<double>(reading.sample.stamp.ns() - reading.quality.utc_ns) * 1e-9;
-  utc_.least_s = utc_.readings == 0 ? ahead : std::min(utc_.least_s, ahead);
-  utc_.most_s = utc_.readings == 0 ? ahead : std::max(utc_.most_s, ahead);
-  ++utc_.readings;
-  sum_ahead_s_ += ahead;
   if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return {};
   utc_reported_ = true;
   reported_ahead_s_ = ahead;
@@ -160,72 +151,68 @@ void TimingMonitor::note_pose(const AcquiredFrame& frame, float estimate_ms,
   latency_.add(ms);
 }
 
-TimeFigures TimingMonitor::figures(const AcquisitionCounters& c,
-                                   const DriveDevices& devices) const {
-  TimeFigures f;
-  const auto cameras = devices.cameras().size();
-  for (std::size_t k = 0; k < cameras; ++k)
-    f.clocks.push_back(clock_figures(fmt::format("camera {}", k), c.cameras[k]));
-  if (c.board.stamps() > 0) {
-    f.clocks.push_back(clock_figures("board", c.board));
-    if (devices.board() != nullptr)
-      f.clocks.back().pings = pings_of(devices.board()->board_statistics().time);
+nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
+                                           const DriveDevices& devices) const {
+  Json clocks = Json::array(), board = Json::object(), ins = Json::object(),
+       cameras = Json::array();
+  bool all_proven = proves_pairing(mode_);
+  for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
+    clocks.push_back(clock_json(fmt::format("camera {}", k), c.cameras[k]));
+    const CameraStatistics s = devices.cameras()[k]->statistics();
+    all_proven = all_proven && c.proven[k];
+    cameras.push_back({{"proven", proves_pairing(mode_) && c.proven[k]},
+                       {"acquisitions", c.sync.acquisitions[k]},
+                       {"losses",
+                        {{"missed_trigger", c.sync.missed_trigger[k]},
+                         {"lost", c.sync.lost[k]},
+                         {"acquiring", c.sync.acquiring[k]},
+                         {"contradictions", c.sync.contradictions[k]},
+                         {"late", c.sync.late[k]},
+                         {"duplicate", c.sync.duplicate[k]},
+                         {"absent", c.sync.absent[k]},
+                         {"torn", s.torn},
+                         {"underruns", s.underruns}}}});
   }
+  if (c.board.stamps() > 0) clocks.push_back(clock_json("board", c.board));
   if (devices.ins() != nullptr) {
-    f.clocks.push_back(clock_figures("INS", c.ins));
+    clocks.push_back(clock_json("INS", c.ins));
     const InsStatistics s = devices.ins()->statistics();
-    f.ins = {{"lost", s.lost},
-             {"malformed", s.malformed},
-             {"restarts", s.restarts},
-             {"overruns", s.overruns},
-             {"dropped", c.dropped_readings}};
+    ins = {{"lost", s.lost},
+           {"malformed", s.malformed},
+           {"restarts", s.restarts},
+           {"overruns", s.overruns},
+           {"dropped", c.dropped_readings}};
   }
   if (devices.trigger() != nullptr) {
     const TriggerStatistics s = devices.trigger()->statistics();
-    f.board = {{"pulses", s.pulses},     {"lost", s.lost},       {"malformed", s.malformed},
-               {"overruns", s.overruns}, {"reboots", c.reboots}, {"starts", s.starts}};
+    board = {{"pulses", s.pulses},     {"lost", s.lost},       {"malformed", s.malformed},
+             {"overruns", s.overruns}, {"reboots", c.reboots}, {"starts", s.starts}};
   }
-  f.clock_resets = c.clock_resets;
-  f.worst_stamp_error_us = static_cast<double>(c.worst_stamp_error_ns) * 1e-3;
-  f.latency = latency_;
-  f.latency_is_virtual = virtual_;
-  f.utc = utc_;
-  if (utc_.readings > 0) f.utc.host_ahead_s = sum_ahead_s_ / static_cast<double>(utc_.readings);
-  f.satellites = satellites_;
-
-  PairingFigures& p = f.pairing;
-  p.mode = to_string(mode_);
-  p.sentence = proof_sentence(mode_);
-  p.can_be_proven = proves_pairing(mode_);
-  p.worst_acquisition_s = c.sync.worst_acquisition.to_seconds();
-  p.pauses = c.pauses;
-  p.pauses_refused = c.pauses_refused;
-  p.sets = {{"complete", c.sync.complete},
-            {"incomplete", c.sync.incomplete},
-            {"unproven", c.sync.unproven},
-            {"unreported", c.sync.unreported},
-            {"pulses", c.pulses},
-            {"pulses_missed", c.sync.missed},
-            {"pushed_out", c.sync.pushed_out},
-            {"overtaken", c.dropped_sets},
-            {"torn", c.torn}};
-  for (std::size_t k = 0; k < cameras; ++k) {
-    const CameraStatistics s = devices.cameras()[k]->statistics();
-    CameraPairing camera;
-    camera.proven = c.proven[k];
-    camera.acquisitions = c.sync.acquisitions[k];
-    camera.losses = {{"missed_trigger", c.sync.missed_trigger[k]},
-                     {"lost", c.sync.lost[k]},
-                     {"acquiring", c.sync.acquiring[k]},
-                     {"contradictions", c.sync.contradictions[k]},
-                     {"late", c.sync.late[k]},
-                     {"duplicate", c.sync.duplicate[k]},
-                     {"absent", c.sync.absent[k]},
-                     {"torn", s.torn},
-                     {"underruns", s.underruns}};
-    p.cameras.push_back(std::move(camera));
-  }
-  return f;
+  const Json pairing = {{"mode", to_string(mode_)},
+                        {"sentence", proof_sentence(mode_)},
+                        {"can_be_proven", proves_pairing(mode_)},
+                        {"proven", all_proven},
+                        {"worst_acquisition_s", rounded(c.sync.worst_acquisition.to_seconds())},
+                        {"pauses", c.pauses},
+                        {"pauses_refused", c.pauses_refused},
+                        {"sets",
+                         {{"complete", c.sync.complete},
+                          {"incomplete", c.sync.incomplete},
+                          {"unproven", c.sync.unproven},
+                          {"unreported", c.sync.unreported},
+                          {"pulses", c.pulses},
+                          {"pulses_missed", c.sync.missed},
+                          {"pushed_out", c.sync.pushed_out},
+                          {"overtaken", c.dropped_sets},
+                          {"torn", c.torn}}},
+                        {"cameras", cameras}};
+  return {{"clocks", clocks},
+          {"clock_resets", c.clock_resets},
+          {"worst_stamp_error_us", rounded(static_cast<double>(c.worst_stamp_error_ns) * 1e-3)},
+          {"pairing", pairing},
+          {"board", board},
+          {"ins", ins},
+          {"latency_ms", latency_json(latency_, virtual_)}};
 }
 
 }  // namespace vergence::app

@@ -1,8 +1,11 @@
 #pragma once
 #include <array>
+#include <cstdint>
+
+#include <nlohmann/json.hpp>
 
 #include "app/devices/drive_devices.hpp"
-#include "app/recorder/time_figures.hpp"
+#include "app/session/session_totals.hpp"
 #include "drivers/acquisition/acquisition.hpp"
 
 namespace vergence::app {
@@ -10,7 +13,7 @@ namespace vergence::app {
 /// What a drive tells of time: clocks, pairing, latencies, its stamps against the INS's UTC. Events
 /// as sentences, figures for summary.json.
 ///
-/// Threads  note…(): the estimator's, sealed. figures(): any, after that has joined. Memory: fixed;
+/// Threads  note…(): the estimator's, sealed. json(): any, after that has joined. Memory: fixed;
 ///          sentences are in place.
 class TimingMonitor {
  public:
@@ -34,8 +37,9 @@ class TimingMonitor {
   /// meaningless in virtual time.
   void note_pose(const AcquiredFrame& frame, float estimate_ms, HostStamp now) noexcept;
 
-  [[nodiscard]] TimeFigures figures(const AcquisitionCounters& counters,
-                                    const DriveDevices& devices) const;
+  /// The block `time` of summary.json.
+  [[nodiscard]] nlohmann::ordered_json json(const AcquisitionCounters& counters,
+                                            const DriveDevices& devices) const;
 
  private:
   [[nodiscard]] Sentence of_utc(const AcquiredReading& reading) noexcept;
@@ -47,9 +51,7 @@ class TimingMonitor {
   InsQuality quality_{};  // as told last
   FixStatus fix_ = FixStatus::none;
   bool any_quality_ = false, utc_reported_ = false;
-  double reported_ahead_s_ = 0, sum_ahead_s_ = 0;
-  UtcFigures utc_{};
-  SatelliteFigures satellites_{};
+  double reported_ahead_s_ = 0;  // of the session's stamps ahead of the INS's UTC
 };
 
 }  // namespace vergence::app

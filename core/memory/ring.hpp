@@ -18,7 +18,7 @@ namespace vergence {
 template <class T, std::size_t N>
 class Ring {
   static_assert(N > 0 && (N & (N - 1)) == 0, "a power of two, so that counters wrap");
-  static_assert(std::is_trivially_copyable_v<T>, "slot handles and small values only");
+  static_assert(std::is_trivially_destructible_v<T>, "slot handles and small values only");
 
  public:
   /// False: full, nothing changed.

@@ -30,7 +30,7 @@ set(libraries_of_both
   "libglib2.0-0 (>= 2.74)" "libhwy1 (>= 1.0.3)" "libjpeg62-turbo (>= 1:2.1)" "libpng16-16 (>= 1.6.2)" "libserialport0" "libstdc++6 (>= 12)"
   "libusb-1.0-0 (>= 2:1.0.26)" "libyaml-cpp0.7")
 list(JOIN libraries_of_both ", " libraries_of_both)
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "adduser, ${libraries_of_both}, libbz2-1.0, liblz4-1, libzstd1 (>= 1.5.2)")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "adduser, ${libraries_of_both}, libbz2-1.0, liblz4-1, libmicrohttpd12 (>= 0.9.75), libsqlite3-0 (>= 3.40), libsystemd0 (>= 246), libzstd1 (>= 1.5.2)")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME vergence)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "vergence-checkerboard, systemd, udev")

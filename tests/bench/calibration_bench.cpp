@@ -25,7 +25,7 @@
 #include <fmt/format.h>
 
 #include "app/config/configuration.hpp"
-#include "app/runtime/thread_runner.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "app/session/drive_calibration.hpp"
 #include "core/calibration/agreement.hpp"
 #include "core/calibration/health.hpp"

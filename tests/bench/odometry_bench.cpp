@@ -25,7 +25,6 @@
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/background_thread.hpp"
-#include "app/runtime/thread_runner.hpp"
 #include "app/runtime/version.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"

@@ -63,12 +63,6 @@ def rom() -> dict:
     return {"camera": struct.pack(f"<{len(quadlets)}I", *quadlets)}
 
 
-def requests() -> dict:
-    host = b"Host: 127.0.0.1:8080\r\n"
-    return {"page": b"GET / HTTP/1.1\r\n" + host + b"\r\n", "events": b"GET /events?token=0123456789abcdef HTTP/1.1\r\n" + host + b"\r\n",
-            "mark": b"POST /mark HTTP/1.1\r\n" + host + b"X-Vergence-Token: 0123456789abcdef\r\nContent-Length: 0\r\n\r\n"}
-
-
 def calibrations() -> dict:
     row = "[1, 0, 0, -0.5, 0, 1, 0, 0, 0, 0, 1, 0]"
     own = f"version: 1\nrig: {{name: tiny, baseline: 0.5}}\ncameras:\n  - {{name: left, {LENS}}}\n  - {{name: right, {LENS}, T_camera_left: {row}}}\n"
@@ -163,7 +157,7 @@ def main() -> int:
         bags = {p.name: p.read_bytes() for p in (Path(folder) / "bags").iterdir()}
     configurations = {p.name: p.read_bytes() for p in examples.glob("*.yaml")}
     corpora = {"xbus": xbus(), "gnss": gnss(), "trigger": {"script": bytes(range(256))}, "iidc_rom": rom(),
-               "http_request": requests(), "image_file": {"grey.png": png(16, 12, 1), "grey.pgm": b"P5 4 3 255\n" + bytes(12), "deep.ppm": b"P6\n# c\n2 2\n65535\n" + bytes(24),
+               "image_file": {"grey.png": png(16, 12, 1), "grey.pgm": b"P5 4 3 255\n" + bytes(12), "deep.ppm": b"P6\n# c\n2 2\n65535\n" + bytes(24),
                                                                    "grey.bmp": bmp(8), "colour.bmp": bmp(24), "alpha.bmp": bmp(32)}, "configuration": configurations,
                "calibration": calibrations() | other_calibrations(), "text_readers": texts(), "data_set": data_sets(), "bag": bags, "recording": recordings(program, examples)}
     for target, inputs in corpora.items():

@@ -8,8 +8,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "app/recorder/summary.hpp"
 #include "app/session/drive_calibration.hpp"
+#include "app/session/summary.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"

@@ -29,7 +29,6 @@ struct SessionWriter {
     write_calibrations(folder);
     write_events(folder);
     write_summary(folder);
-    write_residuals(folder);
     std::ofstream(folder / "calibration.yaml")
         << "version: 1\nrig: {name: demo, baseline: 0.75}\ncameras:\n"
            "  - {name: left, size: [640, 480], model: pinhole-radtan, intrinsics: [450, 450, 320, "
@@ -173,16 +172,6 @@ struct SessionWriter {
     row(0.45, "accepted", "requested", "", 0.0001, 0.0003);
     row(0.7, "accepted", "knock", "", 0.0009, 0.0003);
     row(0.8, "kept", "refinement", "the calibration in use fits as well", 0.0008, 0.0002);
-  }
-
-  /// A turn about the axis of view, and what is left after it was found; a corner without tracks.
-  static void write_residuals(const std::filesystem::path& folder) {
-    std::ofstream out(folder / "residuals.csv");
-    out << "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
-    for (const auto& [when, size] : {std::pair{"begin", 1.4}, std::pair{"end", 0.03}})
-      for (int i = 0; i < 47; ++i)
-        out << fmt::format("{},1,{},{},80,80,40,{:.4f},0.25\n", when, i % 8 * 80, i / 8 * 80,
-                           size * (i % 8 - 3.5) / 3.5);
   }
 
   void write_events(const std::filesystem::path& folder) const {

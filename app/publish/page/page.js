@@ -11,10 +11,10 @@ const STATES = {initialising: "starting", parallel_monocular: "without a calibra
 const token = () => location.hash.slice(1).replace(/[^\w-]/g, "");
 const CAUSES = {given: "given", state_file: "from the last drive", whole_drive: "from the whole drive", knock: "found anew after a knock",
                 collapse: "found anew after a hard knock", drift: "found anew after a drift"};
-const drive = {trail: [], placement: null, rig: [], now: null, can: {}, ended: false};
+const drive = {trail: [], placement: null, now: null, can: {}, ended: false};
 const BLANK = new Map(["status", "state", "why", "frame", "frames", "path", "from_ins", "ins_more", "inliers", "stereo", "ms", "ms_more",
                        "age", "image_frame"].map(id => [id, $(id).textContent]));
-let picture = null, hover = null, drawing = false;
+let picture = null, drawing = false;
 
 // ---- figures
 
@@ -62,7 +62,6 @@ function showNow(now) {
     ["images belong together", now.pairing],
     ["residual", number(now.reprojection_px, 2) + " px"],
     ["pose lines, age at p99", now.line_age_p99_ms === null || now.line_age_p99_ms === undefined ? "no lines" : number(now.line_age_p99_ms, 1) + " ms"],
-    ["temperature", (now.temperatures_c || []).map((t) => t === null ? "–" : number(t, 1) + " °C").join(" · ") || "not told"],
     ["latitude", now.earth ? number(now.earth.latitude_deg, 6) + "°" : "not placed yet"],
     ["longitude", now.earth ? number(now.earth.longitude_deg, 6) + "°" : "not placed yet"],
     ["heading", now.earth ? number(now.earth.heading_deg, 1) + "°" : "not placed yet"],
@@ -99,7 +98,6 @@ function showEvents(list, anew) {
 }
 
 function showCalibration(c) {
-  drive.rig = c.cameras;
   const words = c.cameras.length < 2 ? "none yet: drive past things at the roadside"
     : `${CAUSES[c.cause] || "found: " + (c.cause || "").replaceAll("_", " ")}, ${c.confirmed ? "confirmed by the drive" : "not confirmed yet"}`;
   show("calibration_words", words + (c.depth ? ` · depth ±${number(2 * c.depth.sigma_percent, 1)} % at ${number(c.depth.at_m, 0)} m` : ""));
@@ -170,28 +168,17 @@ function drawMap() {
 
 // ---- images
 
-const NEAR = 2, FAR = 80;
-const hue = depth => 240 * Math.min(1, Math.max(0, Math.log(depth / NEAR) / Math.log(FAR / NEAR)));
-
 function decode(jpeg) {
   if (!jpeg) return Promise.resolve(null);
   const bytes = Uint8Array.from(atob(jpeg), c => c.charCodeAt(0));
   return createImageBitmap(new Blob([bytes], {type: "image/jpeg"}));
 }
 
-function mark(g, x, y, point, size) {
+// Seen by both cameras: a disc; by one alone: a ring.
+function mark(g, x, y, both, size) {
   g.lineWidth = size / 2;
-  if (point.rejected) {
-    g.strokeStyle = "#ff4fb0";
-    g.beginPath(); g.moveTo(x - size, y - size); g.lineTo(x + size, y + size); g.moveTo(x + size, y - size); g.lineTo(x - size, y + size); g.stroke();
-  } else if (point.depth > 0) {
-    const h = hue(point.depth);
-    g.fillStyle = `hsl(${h} 100% ${h > 200 ? 70 : 55}%)`;
-    g.beginPath(); g.arc(x, y, size, 0, 7); g.fill();
-  } else {
-    g.strokeStyle = "#d0d6dc";
-    g.beginPath(); g.arc(x, y, size, 0, 7); g.stroke();
-  }
+  g.beginPath(); g.arc(x, y, size, 0, 7);
+  if (both) { g.fillStyle = "#35d0ff"; g.fill(); } else { g.strokeStyle = "#d0d6dc"; g.stroke(); }
 }
 
 function drawImage(canvas, side) {
@@ -205,82 +192,9 @@ function drawImage(canvas, side) {
   const scale = width / image.width, size = 2.6 * ratio;
   for (const p of picture.points) {
     const at = side ? p.right : p.left;
-    if (at) mark(g, at[0] * scale, at[1] * scale, p, size);
-  }
-  if (hover) drawHover(g, side, scale, ratio);
-}
-
-// The pixel's ray, undistorted, by steps towards the distorted point.
-function ray(camera, [u, v]) {
-  const [fx, fy, cx, cy] = camera.k, x = (u - cx) / fx, y = (v - cy) / fy;
-  if (camera.fisheye) {
-    const far = Math.hypot(x, y);
-    if (far < 1e-9) return [0, 0];
-    let angle = far;
-    for (let i = 0; i < 20; ++i) angle = far / (1 + stretch(camera.d, angle * angle));
-    const s = Math.tan(Math.min(angle, 1.5)) / far;
-    return [x * s, y * s];
-  }
-  let [a, b] = [x, y];
-  for (let i = 0; i < 20; ++i) { const [dx, dy] = distort(camera, a, b); a += x - dx; b += y - dy; }
-  return [a, b];
-}
-const stretch = (d, s) => s * (d[0] + s * (d[1] + s * (d[2] + s * d[3])));
-function distort(camera, x, y) {
-  const d = camera.d, s = x * x + y * y;
-  if (camera.fisheye) {
-    const r = Math.sqrt(s), angle = Math.atan(r), k = r > 1e-9 ? angle * (1 + stretch(d, angle * angle)) / r : 1;
-    return [x * k, y * k];
-  }
-  const k = 1 + s * (d[0] + s * (d[1] + s * d[4]));
-  return [x * k + 2 * d[2] * x * y + d[3] * (s + 2 * x * x), y * k + d[2] * (s + 2 * y * y) + 2 * d[3] * x * y];
-}
-
-// Where the ray of a left pixel runs in the right image, from near to far.
-function epipolar(pixel) {
-  const [left, right] = drive.rig, [a, b] = ray(left, pixel), r = right.r, t = right.t, line = [];
-  for (let i = 0; i <= 60; ++i) {
-    const depth = 0.5 * 2000 ** (i / 60);
-    const p = [0, 1, 2].map(j => (r[3 * j] * a + r[3 * j + 1] * b + r[3 * j + 2]) * depth + t[j]);
-    if (p[2] < 0.1) continue;
-    const [x, y] = distort(right, p[0] / p[2], p[1] / p[2]);
-    line.push([right.k[0] * x + right.k[2], right.k[1] * y + right.k[3]]);
-  }
-  return line;
-}
-
-function drawHover(g, side, scale, ratio) {
-  g.strokeStyle = "#ffe600"; g.lineWidth = 2 * ratio;
-  if (side === 0) {
-    g.beginPath(); g.arc(hover.pixel[0] * scale, hover.pixel[1] * scale, 7 * ratio, 0, 7); g.stroke();
-    return;
-  }
-  if (drive.rig.length > 1) {
-    g.beginPath();
-    epipolar(hover.pixel).forEach(([x, y], i) => { if (i) g.lineTo(x * scale, y * scale); else g.moveTo(x * scale, y * scale); });
-    g.stroke();
-  }
-  if (hover.point && hover.point.right) {
-    g.beginPath(); g.arc(hover.point.right[0] * scale, hover.point.right[1] * scale, 7 * ratio, 0, 7); g.stroke();
+    if (at) mark(g, at[0] * scale, at[1] * scale, p.right, size);
   }
 }
-
-function pointAt(event) {
-  if (!picture || !picture.images[0].width) return;
-  const box = $("left").getBoundingClientRect(), scale = picture.images[0].width / box.width;
-  const pixel = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
-  let nearest = null, best = 14 * scale;
-  for (const p of picture.points) {
-    const d = Math.hypot(p.left[0] - pixel[0], p.left[1] - pixel[1]);
-    if (d < best) { best = d; nearest = p; }
-  }
-  hover = {pixel: nearest ? nearest.left : pixel, point: nearest};
-  show("hover_words", nearest ? nearest.rejected ? "rejected: off its line" : nearest.depth > 0 ? `depth ${number(nearest.depth, 1)} m` : "no depth" : "epipolar line");
-  redraw();
-}
-$("left").addEventListener("pointermove", pointAt);
-$("left").addEventListener("pointerdown", pointAt);
-$("left").addEventListener("pointerleave", () => { hover = null; show("hover_words", "point at the left image for the epipolar line"); redraw(); });
 
 function redraw() {
   if (drawing) return;
@@ -303,7 +217,7 @@ async function showImages(message) {
   const bitmaps = await Promise.all(message.images.map(i => decode(i.jpeg)));
   forgetPicture();
   picture = {frame: message.frame, images: message.images.map((i, k) => ({width: i.width, height: i.height, bitmap: bitmaps[k]})),
-             points: message.points.map(p => ({left: [p[0] / 10, p[1] / 10], rejected: p[2] === 1, depth: p[3] / 10, right: p.length > 4 ? [p[4] / 10, p[5] / 10] : null}))};
+             points: message.points.map(p => ({left: [p[0] / 10, p[1] / 10], right: p.length > 2 ? [p[2] / 10, p[3] / 10] : null}))};
   show("image_frame", "frame " + message.frame + " · " + picture.points.length + " points");
   redraw();
 }
@@ -324,7 +238,7 @@ function blank() {
   $("times").replaceChildren();
   for (const id of ["left", "right"]) $(id).getContext("2d").clearRect(0, 0, $(id).width, $(id).height);
   forgetPicture();
-  hover = drive.now = null;
+  drive.now = null;
 }
 
 function begin(message) {

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "app/runtime/background_thread.hpp"
-#include "app/runtime/thread_runner.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::test {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Counts what the program needs before it does anything: shared libraries, memory, time.
 
-  slim.py PROGRAM [--libraries 45] [--megabytes 12] [--milliseconds 20] [--no-memory]
+  slim.py PROGRAM [--libraries 50] [--megabytes 14] [--milliseconds 20] [--no-memory]
 
 `PROGRAM --version` is held at its only line by a pipe that is full: /proc then tells what it has mapped and what it took.
 Time is told, and a limit only where it is given: what else the machine does is in it.
@@ -72,8 +72,8 @@ def fastest(program, runs=20):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program")
-    parser.add_argument("--libraries", type=int, default=45)
-    parser.add_argument("--megabytes", type=float, default=12)
+    parser.add_argument("--libraries", type=int, default=50)
+    parser.add_argument("--megabytes", type=float, default=14)
     parser.add_argument("--milliseconds", type=float)
     parser.add_argument("--no-memory", action="store_true", help="of a build with sanitizers only the libraries count")
     given = parser.parse_args()

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "app/runtime/thread_runner.hpp"
+#include "app/runtime/background_thread.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "core/memory/frame_pool.hpp"
 

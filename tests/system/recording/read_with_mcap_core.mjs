@@ -4,7 +4,6 @@
 import { closeSync, openSync, readFileSync, writeSync } from "node:fs";
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { inflateSync } from "node:zlib";
 import { McapIndexedReader, McapStreamReader, McapWriter } from "@mcap/core";
 import { parse } from "@foxglove/rosmsg";
 import { MessageReader } from "@foxglove/rosmsg2-serialization";
@@ -16,25 +15,6 @@ function crc32(bytes) {
     for (let bit = 0; bit < 8; ++bit) crc = crc & 1 ? (crc >>> 1) ^ 0xedb88320 : crc >>> 1;
   }
   return ~crc >>> 0;
-}
-
-/// Of a PNG whose rows have the filter Sub or none, inflated by node's own zlib.
-function pixels_of(png, width, height) {
-  assert.equal(png.toString("latin1", 1, 4), "PNG");
-  const parts = [];
-  for (let at = 8; at < png.length; at += 12 + png.readUInt32BE(at))
-    if (png.toString("latin1", at + 4, at + 8) === "IDAT")
-      parts.push(png.subarray(at + 8, at + 8 + png.readUInt32BE(at)));
-  const rows = inflateSync(Buffer.concat(parts));
-  assert.equal(rows.length, (width + 1) * height);
-  const pixels = Buffer.alloc(width * height);
-  for (let y = 0; y < height; ++y) {
-    const filter = rows[y * (width + 1)];
-    assert.ok(filter < 2);
-    for (let x = 0; x < width; ++x)
-      pixels[y * width + x] = rows[y * (width + 1) + 1 + x] + (filter && x ? pixels[y * width + x - 1] : 0);
-  }
-  return pixels;
 }
 
 function csv(file) {
@@ -122,7 +102,6 @@ async function check(vergence, session) {
   const pulse = last.get("/vergence/pulse");
   assert.equal(BigInt(times.get("/vergence/pulse")), pulse.number + 1n);
   assert.ok(JSON.parse(last.get("/vergence/session").data).calibration.includes("baseline: 0.75"));
-  assert.equal(last.get("/diagnostics").status[0].values.find((v) => v.key === "inliers").value, pose.inliers);
   near(last.get("/tf_static").transforms[0].transform.translation.x, 0.75, 1e-12);
   const info = last.get("/right/camera_info");
   assert.equal(info.distortion_model, "plumb_bob");
@@ -131,11 +110,10 @@ async function check(vergence, session) {
   // Pixels by the check sums that their frame has of them.
   const frame = last.get("/vergence/frame");
   ["left", "right"].forEach((side, k) => {
-    const raw = last.get(`/${side}/image_raw`), packed = last.get(`/${side}/image_raw/compressed`);
-    assert.equal(stamp((raw ?? packed).header.stamp), frame.stamp_ns);
-    if (raw) assert.deepEqual([raw.width, raw.height, raw.step, raw.encoding], [320, 240, 320, "mono8"]);
-    else assert.equal(packed.format, "png");
-    assert.equal(crc32(raw ? raw.data : pixels_of(Buffer.from(packed.data), 320, 240)), frame.image_crc[k]);
+    const raw = last.get(`/${side}/image_raw`);
+    assert.equal(stamp(raw.header.stamp), frame.stamp_ns);
+    assert.deepEqual([raw.width, raw.height, raw.step, raw.encoding], [320, 240, 320, "mono8"]);
+    assert.equal(crc32(raw.data), frame.image_crc[k]);
   });
 
   // Cut anywhere: whole messages, in order, never a fault.
@@ -154,7 +132,7 @@ async function check(vergence, session) {
     ["replay", `${session}/copy.mcap`, "--quiet", "--out", `${session}/again`], { encoding: "utf8" });
   assert.ok(replay.status < 2, replay.stderr);
   const frames = JSON.parse(readFileSync(`${session}/again/summary.json`)).frames.read;
-  assert.equal(frames, times.get("/left/image_raw") ?? times.get("/left/image_raw/compressed"));
+  assert.equal(frames, times.get("/left/image_raw"));
   console.log(`${count} messages of ${times.size} topics read by index and front to back`);
 }
 

@@ -154,17 +154,6 @@ TEST(SnapGige, pulsesGivePairsAndThePicturesAreThoseThatWereSent) {
   }
 }
 
-TEST(SnapGige, withoutPulsesItAsksByCommandAndSaysSo) {
-  const Wires wires;
-  const TemporaryFolder folder;
-  const Outcome o = snap(folder, "gige.yaml", wires.settings() + " --wait 1");
-  EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_TRUE(contains(o.err, "no pulse triggers the cameras within 1 s")) << o.err;
-  const json all = report(folder);
-  EXPECT_EQ(all["trigger"], "software");
-  EXPECT_FALSE(all["notes"].empty());
-}
-
 TEST(SnapGige, aCameraThatSendsNothingEndsWithThreeAndItsName) {
   const Wires wires;
   wires.cameras[1]->silence(true);

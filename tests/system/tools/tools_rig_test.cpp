@@ -155,14 +155,6 @@ TEST_F(ToolsRig, whatTheDoctorPrintsMends) {
   ASSERT_EQ(slow["state"], "advice") << slow;
   mend(slow);
   EXPECT_EQ(finding("", "latency_timer")["state"], "ok");
-
-  const std::string large =
-      "'" + kConfigurations +
-      "iidc_usb.yaml' --set cameras.0.size=[4096,4096] --set cameras.1.size=[4096,4096]";
-  const json little = finding(large, "usb_memory");
-  ASSERT_EQ(little["state"], "problem") << little;
-  mend(little);
-  EXPECT_EQ(finding(large, "usb_memory")["state"], "ok");
 }
 
 }  // namespace

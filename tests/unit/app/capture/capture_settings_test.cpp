@@ -1,4 +1,4 @@
-#include "app/capture/capture_settings.hpp"
+#include "app/capture/taking.hpp"
 
 #include <gtest/gtest.h>
 

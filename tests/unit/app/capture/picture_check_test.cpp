@@ -1,4 +1,4 @@
-#include "app/capture/picture_check.hpp"
+#include "app/capture/taking.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "app/capture/picture_files.hpp"
 #include "core/math/random.hpp"
 #include "tests/support/refusal.hpp"
 
@@ -28,20 +27,18 @@ struct Picture {
   std::vector<std::uint8_t> pixels;
 };
 
-/// Random squares of 8 px, whose pattern lies `shift(y)` further left in it.
-template <class Shift>
-Picture squares(int w, int h, std::uint64_t seed, Shift shift) {
-  constexpr int kSquare = 8, kMore = 64;
-  Random random(seed);
-  const int columns = w / kSquare + 2 * kMore, rows = h / kSquare + 1;
+/// Random squares of 8 px.
+Picture squares(int w, int h) {
+  constexpr int kSquare = 8;
+  Random random(1);
+  const int columns = w / kSquare + 1, rows = h / kSquare + 1;
   std::vector<std::uint8_t> levels;
   for (int i = 0; i < columns * rows; ++i)
     levels.push_back(static_cast<std::uint8_t>(40 + random.below(170)));
   Picture p(w, h, 0);
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x) {
-      const int u = (x + shift(y)) / kSquare + kMore;
-      p.at(x, y) = levels[static_cast<std::size_t>(y / kSquare * columns + u)];
+      p.at(x, y) = levels[static_cast<std::size_t>(y / kSquare * columns + x / kSquare)];
     }
   return p;
 }
@@ -80,21 +77,8 @@ TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
   for (const PictureRemark& r : remarks) EXPECT_TRUE(r.unusable);
 }
 
-TEST(Judgement, aBrightSkyAndADimSceneAreOnlyToldOf) {
-  Picture sky = squares(320, 240, 1, [](int) { return 0; }), dim = sky;
-  for (int y = 0; y < 40; ++y)
-    for (int x = 0; x < 320; ++x) sky.at(x, y) = 255;
-  for (int y = 0; y < 240; ++y)
-    for (int x = 0; x < 320; ++x) dim.at(x, y) = static_cast<std::uint8_t>(dim.at(x, y) / 6);
-  const auto remarks = judged({sky, dim});
-  ASSERT_GE(remarks.size(), 2U);
-  EXPECT_TRUE(contains(remarks[0].sentence, "left: 17 % of it is white"));
-  EXPECT_TRUE(contains(remarks[1].sentence, "right is underexposed"));
-  for (const PictureRemark& r : remarks) EXPECT_FALSE(r.unusable);
-}
-
 TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
-  const Picture sharp = squares(320, 240, 1, [](int) { return 0; });
+  const Picture sharp = squares(320, 240);
   Picture blurred = sharp;
   constexpr int kRadius = 12;  // px: three squares run into one
   for (int y = 0; y < 240; ++y)
@@ -110,44 +94,6 @@ TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
   EXPECT_FALSE(remarks[0].unusable);
   EXPECT_TRUE(contains(remarks[0].sentence, "right is much less sharp than left"))
       << remarks[0].sentence;
-}
-
-TEST(Identity, oneCameraTwiceIsFoundAndACapIsNotCalledThat) {
-  const auto still = [](int) { return 0; };
-  const Picture a = squares(320, 240, 1, still);
-  Picture b = a;
-  EXPECT_TRUE(are_identical(a.view(), b.view()));
-  b.at(319, 239) ^= 1;
-  EXPECT_FALSE(are_identical(a.view(), b.view()));
-  const Picture black(320, 240, 0);
-  EXPECT_FALSE(are_identical(black.view(), black.view()));
-  EXPECT_FALSE(are_identical(a.view(), Picture(320, 239, 1).view()));
-}
-
-TEST(Exchange, nearThingsLieFurtherLeftInTheRightPicture) {
-  // 4 px far away at the top, 60 px near at the bottom: a street.
-  const auto depth = [](int y) { return 4 + y / 8; };
-  const Picture left = squares(640, 480, 3, [](int) { return 0; }),
-                right = squares(640, 480, 3, depth);
-  const HorizontalShift fine = horizontal_shift(left.view(), right.view());
-  EXPECT_GE(fine.patches, 10);
-  EXPECT_GT(fine.median, 0.02);
-  EXPECT_FALSE(look_exchanged(fine));
-  const HorizontalShift exchanged = horizontal_shift(right.view(), left.view());
-  EXPECT_LT(exchanged.median, -0.02);
-  EXPECT_TRUE(look_exchanged(exchanged));
-}
-
-TEST(Exchange, nothingIsSaidWithoutEnoughToGoBy) {
-  const Picture grey(640, 480, 100), one = squares(640, 480, 1, [](int) { return 0; }),
-                                     other = squares(640, 480, 2, [](int) { return 0; });
-  EXPECT_FALSE(look_exchanged(horizontal_shift(grey.view(), grey.view())));
-  EXPECT_FALSE(look_exchanged(horizontal_shift(one.view(), other.view())))
-      << "two different scenes";
-  EXPECT_FALSE(look_exchanged(horizontal_shift(one.view(), one.view())));
-  EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(8, 8, 9).view(), Picture(8, 8, 9).view())))
-      << "smaller than a patch";
-  EXPECT_FALSE(look_exchanged(horizontal_shift(Picture(1, 1, 9).view(), Picture(1, 1, 9).view())));
 }
 
 TEST(PictureFiles, namesOfCamerasAreNamesOfFiles) {

@@ -11,7 +11,7 @@
 
 #include "app/commands/commands.hpp"
 #include "app/evaluation/evaluation_report.hpp"
-#include "app/recorder/ins_file.hpp"
+#include "app/session/ins_file.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/math/se3.hpp"
@@ -103,34 +103,6 @@ TEST(EvaluateCommand, everyKnownAnswerToSixDigits) {
                 pair == "c");  // the straight one, and only that
     }
   }
-}
-
-TEST(EvaluateCommand, dataSetFoldersAreReferencesOfTheirOwn) {
-  const auto kitti = test::shared_data("data/kitti06_51"),
-             estimate = test::shared_data("data/eval/c_estimate.tum");
-  const auto euroc = test::shared_data("data/euroc_mh01"),
-             camera = test::shared_data("data/eval/euroc_mh01_left_camera.tum");
-  if (!kitti || !estimate || !euroc || !camera) GTEST_SKIP() << test::shared_data_missing("data");
-  Outcome o =
-      evaluate_command({estimate->string(), kitti->string(), "--json", "--lengths", "100,200"});
-  ASSERT_EQ(o.code, ExitCode::done) << o.err;
-  auto got = nlohmann::json::parse(o.out);
-  EXPECT_NEAR(got["ate_se3_m"]["rmse"].get<double>(), 0.14752451, 1e-6);
-  EXPECT_EQ(got["segments"][0]["n"], 0);                   // 59.9 m hold no segment of 100 m:
-  EXPECT_TRUE(got["segments"][0]["t_percent"].is_null());  // none, not zero
-  EXPECT_TRUE(got["segments"][0]["per_length"]["100"]["t_percent"].is_null());
-  o = evaluate_command({estimate->string(), kitti->string(), "--json"});
-  got = nlohmann::json::parse(o.out);
-  ASSERT_EQ(got["segments"].size(), 1U);
-  EXPECT_EQ(got["segments"][0]["lengths"], nlohmann::json({10, 20, 30, 40, 50}))
-      << "unasked the lengths that it is long enough for";
-  EXPECT_GT(got["segments"][0]["t_percent"], 0);
-
-  o = evaluate_command({camera->string(), euroc->string(), "--json"});
-  ASSERT_EQ(o.code, ExitCode::done) << o.err;
-  got = nlohmann::json::parse(o.out);
-  EXPECT_EQ(got["matched"], 105);
-  EXPECT_LT(got["ate_unaligned_m"]["max"].get<double>(), 2e-9);
 }
 
 TEST(EvaluateCommand, trajectoriesWithoutCommonTimeAreNotUsable) {

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "app/runtime/nearest.hpp"
 #include "app/runtime/version.hpp"
-#include "app/runtime/withdrawn.hpp"
 #include "core/features/simd_target.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -43,16 +43,6 @@ TEST(Program, VersionAndHelpGoToStandardOutput) {
     EXPECT_TRUE(contains(help.out, std::string("\n  ") + word + " ")) << word;
 }
 
-TEST(Program, EveryCommandHasItsHelp) {
-  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices",
-                           "doctor", "snap", "report"}) {
-    const Outcome help = run_vergence(std::string(word) + " --help");
-    EXPECT_EQ(help.code, 0) << word;
-    EXPECT_TRUE(contains(help.out, std::string("vergence ") + word)) << help.out;
-    EXPECT_EQ(help.err, "") << word;
-  }
-}
-
 TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {
   using Kind = Withdrawn::Kind;
   const test::TemporaryFolder folder;
@@ -80,18 +70,6 @@ TEST(Program, AnUnknownCommandNamesTheNearest) {
   EXPECT_TRUE(contains(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?"))
       << outcome.err;
   EXPECT_TRUE(refused_in_one_sentence(run_vergence("''")));
-}
-
-TEST(Program, AnUnknownOptionNamesTheNearest) {
-  const Outcome outcome = run_vergence("--verison");
-  EXPECT_TRUE(refused_in_one_sentence(outcome));
-  EXPECT_TRUE(contains(outcome.err, "unknown option \"--verison\"; did you mean \"--version\"?"))
-      << outcome.err;
-  const Outcome of_command = run_vergence("evaluate a.tum b.tum --jsno");
-  EXPECT_TRUE(refused_in_one_sentence(of_command));
-  EXPECT_TRUE(
-      contains(of_command.err, "evaluate: unknown option \"--jsno\"; did you mean \"--json\"?"))
-      << of_command.err;
 }
 
 TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {

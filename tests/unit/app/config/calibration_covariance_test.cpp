@@ -83,19 +83,6 @@ TEST(CalibrationCovariance, WhatIsWrittenReadsBackToTheSameDoublesAndStaysACovar
   EXPECT_EQ(format_calibration(parse_calibration(text, "c.yaml")), text);
 }
 
-TEST(CalibrationCovariance, CamerasThatNamesDoNotTellApartGoByIndex) {
-  for (const auto& names : {std::pair{"left", "left"}, std::pair{"1", "0"}, std::pair{"", "right"},
-                            std::pair{"a.rx", "a"}}) {
-    CalibrationFile c = example();
-    c.names[0] = names.first, c.names[1] = names.second;
-    const std::string text = format_calibration(c);
-    EXPECT_NE(text.find("parameters: [1.rx, 1.tx, 1.tz, 0.k1, "), std::string::npos) << text;
-    expect_same(parse_calibration(text, "c.yaml").rig.covariance, c.rig.covariance);
-  }
-  EXPECT_EQ(refusal(with_block("[1.rx, left.k1]", "[1e-6, 0, 1e-4]")), "")
-      << "an index is understood beside names";
-}
-
 TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
   const std::string two = "[right.rx, right.ry]";
   struct Row {
@@ -132,19 +119,6 @@ TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
     const std::string sentence = refusal(r.yaml);
     EXPECT_TRUE(sentence.starts_with(r.beginning) && test::contains(sentence, r.says)) << sentence;
   }
-}
-
-TEST(CalibrationCovariance, FlawsInMemoryAreFoundToo) {
-  RigCovariance covariance;
-  EXPECT_FALSE(find_flaw(covariance));
-  covariance.set(3, 3, -1);
-  EXPECT_TRUE(find_flaw(covariance));
-  covariance.set(3, 3, 0);
-  covariance.set(3, 4, 1e-9);
-  EXPECT_TRUE(find_flaw(covariance)) << "tied to nothing";
-  covariance.set(3, 4, std::numeric_limits<double>::infinity());
-  EXPECT_TRUE(find_flaw(covariance));
-  EXPECT_FALSE(find_flaw(example().rig.covariance));
 }
 
 TEST(CalibrationCovariance, FromScratchTheLensesStayAndThePlacesGo) {

@@ -158,26 +158,6 @@ TEST(StateFile, FoundUnderAnotherConfigurationItIsNotUsedAndTheSentenceSaysWhatC
           [](ConfiguredRig* rig) { rig->baseline = 0.7512; });
 }
 
-TEST(StateFile, WhatAGivenCalibrationHadOtherwiseThanTheConfigurationIsNoChangeOfIt) {
-  const test::TemporaryFolder folder;
-  const auto path = folder / "calibration_state.yaml";
-  CalibrationFile found = configured();
-  found.rig.T_camera_left[1].t *= 0.7512 / 0.75;
-  found.rig.baseline = 0.7512;
-  for (Intrinsics& lens : found.rig.intrinsics) lens.kind = CameraModelKind::pinhole_equidistant;
-  write_state(path, found);
-  EXPECT_TRUE(read_state(path, configured()).calibration)
-      << read_state(path, configured()).sentence;
-
-  found.rig.T_camera_left[1].t *= 0.3 / 0.7512;
-  found.rig.baseline = 0.3;
-  write_state(path, found);
-  const CalibrationState state = read_state(path, configured());
-  EXPECT_FALSE(state.calibration) << "nobody named that file for this drive";
-  EXPECT_NE(state.sentence.find("baseline is 0.3 m, the configuration's 0.75 m"), std::string::npos)
-      << state.sentence;
-}
-
 TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
   const test::TemporaryFolder folder;
   folder.write("calibration_state.yaml", "version: 1\ncameras: [{name: left");

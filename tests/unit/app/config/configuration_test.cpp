@@ -33,14 +33,6 @@ TEST(Configuration, ReadsNestedAndDottedKeys) {
   EXPECT_EQ(parse_configuration("odometry.features: 401", "drive.yaml", {}).odometry.features, 401);
 }
 
-TEST(Configuration, TheLastSetWinsOverEarlierOnesAndTheFile) {
-  const auto c =
-      parse_configuration("odometry: {features: 400}", "drive.yaml",
-                          {"odometry.features=500", "odometry.features=600", "rig.name=a: b"});
-  EXPECT_EQ(c.odometry.features, 600);
-  EXPECT_EQ(c.rig.name, "a: b") << "a value is taken as it stands";
-}
-
 TEST(Configuration, AnUnknownKeyNamesTheNearestFileAndLine) {
   EXPECT_EQ(
       refusal("threads: 1\nodometry:\n  featurs: 3\n"),
@@ -89,19 +81,6 @@ TEST(Configuration, ValuesOfTheWrongTypeAreRefusedWithTheirPlace) {
   EXPECT_TRUE(contains(refusal("[1, 2]"), "is not a configuration"));
   EXPECT_TRUE(
       contains(refusal("rig: {name: " + std::string(65, 'x') + "}"), "longer than 64 bytes"));
-}
-
-TEST(Configuration, NotANumberIsNeverInsideARange) {
-  EXPECT_NE(refusal("odometry: {band_px: nan}"), "");
-  EXPECT_NE(refusal("odometry: {band_px: .nan}"), "");
-  EXPECT_NE(refusal("odometry: {band_px: inf}"), "");
-}
-
-TEST(Configuration, AKeyThatStandsTwiceIsRefused) {
-  EXPECT_EQ(refusal("odometry:\n  features: 300\n  features: 301\n"),
-            "drive.yaml:3: the key \"odometry.features\" is given twice");
-  EXPECT_TRUE(
-      contains(refusal("odometry: {features: 300}\nodometry.features: 301\n"), "is given twice"));
 }
 
 TEST(Configuration, KeysThatContradictEachOtherAreRefused) {

@@ -173,35 +173,9 @@ TEST(Schema, EveryOptionOfTheCoreCanBeSetInTheRangeItsHeaderStates) {
   expect_rows_for(declared_fields("core/calibration/monitor.hpp", "MonitorOptions"), "monitor");
 }
 
-TEST(Schema, AKeyOfAFewWordsTakesTheseOnly) {
-  EXPECT_EQ(parse_configuration(
-                "calibration: {focal_lengths: hold, intrinsics: refine, online: off}", "", {})
-                .calibration.estimate_focal_lengths,
-            0);
-  EXPECT_EQ(parse_configuration("calibration: {intrinsics: refine}", "", {})
-                .calibration.refine_intrinsics,
-            1);
-  EXPECT_EQ(parse_configuration("calibration: {lenses: hold}", "", {}).calibration.estimate_lenses,
-            0);
-  EXPECT_EQ(parse_configuration("calibration: {online: off}", "", {}).online, 0);
-  EXPECT_EQ(
-      test::refusal_of([] {
-        (void)parse_configuration("calibration: {focal_lengths: holds}", "drive.yaml", {});
-      }),
-      "drive.yaml:1: calibration.focal_lengths is \"holds\"; did you mean \"hold\"?; it is one "
-      "of hold, estimate");
-}
-
 TEST(Schema, TheDocumentIsWrittenFromTheTable) {
   EXPECT_EQ(file_text("docs/configuration.md"), configuration_document())
       << "write it again: ninja -C build docs";
-}
-
-TEST(Schema, TheDocumentsExampleIsUnderstood) {
-  const std::string page = configuration_document();
-  const auto start = page.find("```yaml\n") + 8;
-  EXPECT_NO_THROW(static_cast<void>(
-      parse_configuration(page.substr(start, page.find("```", start) - start), "example", {})));
 }
 
 }  // namespace

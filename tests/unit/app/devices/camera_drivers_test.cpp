@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "app/devices/software_trigger.hpp"
+#include "app/devices/drive_sync.hpp"
 #include "tests/support/gige_camera.hpp"
 #include "tests/support/refusal.hpp"
 

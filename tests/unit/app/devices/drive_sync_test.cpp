@@ -99,15 +99,5 @@ INSTANTIATE_TEST_SUITE_P(
                 "it is one of none, rising, falling"},
         BadCase{"sync: {mode: software, tolerance_ms: 100}", "at most half of the interval"}));
 
-TEST(DriveSync, aCameraThatOnlyTheHostStampsHasTheNoiseOfThat) {
-  const Configuration c = parse_configuration(
-      "cameras: [{driver: v4l2}, {driver: gige, stamp_jitter_us: 70, trigger_delay_us: 25}]", "t",
-      {});
-  const SyncOptions o = sync_options(c, 2);
-  EXPECT_EQ(o.camera[0].jitter, Duration::milliseconds(1));
-  EXPECT_EQ(o.camera[1].jitter, Duration::microseconds(70));
-  EXPECT_EQ(o.camera[1].delay, Duration::microseconds(25));
-}
-
 }  // namespace
 }  // namespace vergence::app

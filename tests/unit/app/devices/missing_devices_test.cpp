@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "app/devices/camera_drivers.hpp"
-#include "app/devices/device_sentences.hpp"
 #include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -28,22 +27,6 @@ Refusal refusal_of(const std::function<void()>& open, std::string* sentence) {
     return Refusal::device;
   }
   return Refusal::none;
-}
-
-TEST(MissingDevices, theStatusDecidesWhoIsAtFault) {
-  std::string sentence;
-  for (const DeviceStatus status :
-       {DeviceStatus::unsupported, DeviceStatus::bad_configuration, DeviceStatus::no_bandwidth})
-    EXPECT_EQ(refusal_of([&] { refuse_device(status, "so"); }, &sentence), Refusal::input)
-        << to_string(status);
-  for (const DeviceStatus status :
-       {DeviceStatus::not_found, DeviceStatus::gone, DeviceStatus::timeout, DeviceStatus::busy,
-        DeviceStatus::no_permission, DeviceStatus::failed})
-    EXPECT_EQ(refusal_of([&] { refuse_device(status, "so"); }, &sentence), Refusal::device)
-        << to_string(status);
-  EXPECT_EQ(sentence, "so");
-  EXPECT_EQ(refusal_of([] { require_configured("it", DeviceStatus::ok, ""); }, &sentence),
-            Refusal::none);
 }
 
 struct Absent {

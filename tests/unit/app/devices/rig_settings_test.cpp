@@ -35,13 +35,6 @@ void expect_equal(const RigCalibration& a, const RigCalibration& b) {
   }
 }
 
-TEST(RigSettings, withoutErrorsTheEstimatorIsGivenTheRigAsMounted) {
-  const Configuration c = configured({"rig.nominal.baseline_m=0.3", "rig.nominal.k1=-0.1"});
-  expect_equal(nominal_rig(c), mounted_rig(c));
-  EXPECT_DOUBLE_EQ(mounted_rig(c).baseline, 0.3);
-  EXPECT_EQ(mounted_rig(c).intrinsics[1].distortion[0], -0.1);
-}
-
 TEST(RigSettings, aCamerasOwnNumbersGoBeforeThoseOfTheRig) {
   const RigCalibration rig = mounted_rig(
       configured({"rig.nominal.k1=-0.1", "cameras.1.intrinsics=[500, 501, 322, 241]",
@@ -81,16 +74,6 @@ TEST(RigSettings, intrinsicsErrorsHaveTheirSigmasAndTheirSeed) {
   EXPECT_NEAR(std::sqrt(focal / (2 * kSeeds)), 1e-3, 1e-3 * 5 / std::sqrt(2000.0));
 }
 
-TEST(RigSettings, aWrongTransformIsTheTrueOneKnocked) {
-  const Configuration c =
-      configured({"mock.calibration_error.pitch_deg=0.2", "mock.calibration_error.y_m=0.004"});
-  const Transform wrong =
-      nominal_rig(c).T_camera_left[1] * mounted_rig(c).T_camera_left[1].inverse();
-  EXPECT_TRUE(log_so3(wrong.R).isApprox(Vec3(0.2 * std::numbers::pi / 180, 0, 0), 1e-12));
-  EXPECT_TRUE(wrong.t.isApprox(Vec3(0, 0.004, 0), 1e-12));
-  EXPECT_EQ(nominal_rig(c).baseline, 0.75) << "what was measured is the length, and that is right";
-}
-
 TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
   const Configuration c =
       configured({"mock.intrinsics_error.principal_point_px=2", "mock.calibration_error.yaw_deg=1",
@@ -101,15 +84,6 @@ TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
   const Transform moved = drive.rig->truth().calibration(Duration::seconds(6)).T_camera_left[1] *
                           mounted_rig(c).T_camera_left[1].inverse();
   EXPECT_NEAR(log_so3(moved.R).x(), 0.2 * std::numbers::pi / 180, 1e-12);
-}
-
-TEST(RigSettings, aCamerasLensIsOfTheModelThatItsKeySays) {
-  const RigCalibration rig = mounted_rig(configured(
-      {"cameras.1.model=pinhole-equidistant", "cameras.1.intrinsics=[300, 301, 322, 241]",
-       "cameras.1.distortion=[0.003, 0.0007, -0.002, 0.0002]"}));
-  EXPECT_EQ(rig.intrinsics[0].kind, CameraModelKind::pinhole_radtan);
-  EXPECT_EQ(rig.intrinsics[1].kind, CameraModelKind::pinhole_equidistant);
-  EXPECT_EQ(rig.intrinsics[1].distortion[3], 0.0002);
 }
 
 TEST(RigSettings, aLensThatNobodyWouldReadIsRefusedByItsKey) {

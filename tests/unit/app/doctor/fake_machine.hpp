@@ -34,20 +34,21 @@ struct FakeMachine {
       at = inventory.drivers.insert(at, app::DriverFindings{driver, "", true, {}, ""});
     at->cameras.push_back({driver, serial, "A camera", place});
   }
-  void need(const std::string& driver, const std::string& serial, double bytes, double rate) {
-    app::CameraNeed n;
-    n.key = "cameras." + std::to_string(needs.cameras.size());
-    n.driver = driver;
-    n.serial = serial;
-    n.bytes = bytes;
-    n.rate_hz = rate;
-    needs.given = true;
-    needs.cameras.push_back(n);
+  /// A camera of 1280 x 960 pixels in the configuration.
+  void need(const std::string& driver, const std::string& serial) {
+    app::CameraSettings& c = drive.cameras[cameras++];
+    c.driver = driver;
+    c.serial = serial;
+    c.width = 1280, c.height = 960;
+    given = true;
+  }
+  [[nodiscard]] app::CheckContext context() const {
+    return {machine, inventory, given ? &drive : nullptr, "."};
   }
   /// The findings of one check, the worst first.
   [[nodiscard]] std::vector<app::Finding> of(const std::string& check) const {
     std::vector<app::Finding> some;
-    for (app::Finding& f : app::run_checks({machine, inventory, needs, ".", configuration}))
+    for (app::Finding& f : app::run_checks(context()))
       if (f.check == check) some.push_back(std::move(f));
     return some;
   }
@@ -55,11 +56,12 @@ struct FakeMachine {
   TemporaryFolder folder;
   app::Machine machine;
   app::Inventory inventory;
-  app::Needs needs;
+  app::Configuration drive;
+  bool given = false;  // the configuration counts
+  std::size_t cameras = 0;
   std::vector<std::string> closed;  // nodes that may not be opened
   std::string group = "video";      // of all nodes
   std::optional<app::DiskRoom> room = app::DiskRoom{std::uint64_t{1} << 40};
-  std::filesystem::path configuration;  // of `needs`
 };
 
 inline bool contains(const std::string& text, const std::string& part) {

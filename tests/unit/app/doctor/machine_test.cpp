@@ -1,4 +1,4 @@
-#include "app/doctor/machine.hpp"
+#include "app/doctor/inventory.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -32,16 +32,6 @@ TEST(Machine, ReadsNumbersAndNothingElse) {
     EXPECT_FALSE(f.machine.number(name)) << name;
 }
 
-TEST(Machine, ReadsPrintableTextOfRegularFilesUpToAPage) {
-  const FakeMachine f;
-  f.file("/sys/serial", "A\033[2J\tB\xc3\xbc\n");
-  EXPECT_EQ(f.machine.line("/sys/serial"), "A?[2J?B??");
-  f.file("/sys/long", std::string(1'000'000, 'x'));
-  EXPECT_EQ(f.machine.text("/sys/long")->size(), Machine::kMaxText);
-  ASSERT_EQ(::mkfifo((f.folder / "sys/pipe").c_str(), 0600), 0);
-  EXPECT_FALSE(f.machine.text("/sys/pipe")) << "reading would wait";
-}
-
 TEST(Machine, ReadsLimitsAndCapabilities) {
   const FakeMachine f;
   f.file("/proc/self/status", "Name:\tx\nCapPrm:\t0000000000000000\nCapEff:\t0000000000003000\n");
@@ -57,30 +47,6 @@ TEST(Machine, ReadsLimitsAndCapabilities) {
   EXPECT_EQ(f.machine.limit("Max realtime priority"), -1);
   EXPECT_FALSE(f.machine.limit("Max nonsense"));
   EXPECT_FALSE(f.machine.limit("Max absent"));
-}
-
-TEST(Machine, ThisOneAnswers) {
-  const Machine m = Machine::here();
-  EXPECT_FALSE(m.user.empty());
-  EXPECT_TRUE(m.limit("Max open files"));
-  EXPECT_TRUE(m.may_use("/dev/null"));
-  EXPECT_FALSE(m.may_use("/dev/there-is-no-such-node"));
-  const test::TemporaryFolder folder;
-  const auto room = m.room_at(folder / "not/there/yet");
-  ASSERT_TRUE(room);
-  EXPECT_FALSE(room->read_only);
-  EXPECT_TRUE(room->may_write);
-}
-
-TEST(Machine, FollowsLinksInsideItsRoot) {
-  const FakeMachine f;
-  f.file("/dev/ttyUSB0", "");
-  std::filesystem::create_symlink("ttyUSB0", f.folder / "dev/ins");
-  std::filesystem::create_symlink("nothing", f.folder / "dev/dangling");
-  std::filesystem::create_symlink("/", f.folder / "dev/outside");
-  EXPECT_EQ(f.machine.target("/dev/ins"), "/dev/ttyUSB0");
-  for (const char* path : {"/dev/ttyUSB0", "/dev/dangling", "/dev/outside", "/dev/missing"})
-    EXPECT_EQ(f.machine.target(path), path);
 }
 
 TEST(Machine, RoomBehindAClosedFolderMayNotBeWritten) {

@@ -14,16 +14,6 @@ namespace {
 
 using test::contains;
 
-TEST(TerminalText, BreaksAtBlanksAndCountsLetters) {
-  EXPECT_EQ(wrapped("one two  three", 7), (std::vector<std::string>{"one two", "three"}));
-  EXPECT_EQ(wrapped("a-word-longer-than-the-line b", 5),
-            (std::vector<std::string>{"a-word-longer-than-the-line", "b"}));
-  EXPECT_EQ(wrapped("  ", 5), std::vector<std::string>{""});
-  EXPECT_EQ(padded("µ", 3), "µ  ");
-  EXPECT_EQ(padded("long", 2), "long");
-  EXPECT_EQ(harmless("a\033[2J\nb\x7f"), "a [2J b ");
-}
-
 TEST(DoctorReport, CommandsStayWholeAndDevicesCannotSteerTheTerminal) {
   const std::string command = "sudo sysctl -w net.core.rmem_max=10485760 # longer than the line";
   const std::vector<Finding> findings{

@@ -1,4 +1,4 @@
-#include "app/doctor/udev_rules.hpp"
+#include "app/doctor/report.hpp"
 
 #include <gtest/gtest.h>
 
@@ -58,13 +58,6 @@ TEST(UdevRules, NameEveryDeviceByItsSerial) {
   EXPECT_FALSE(contains(rules, "mouse"));
 }
 
-TEST(UdevRules, AreNotNeededWithoutDevicesOnABus) {
-  Inventory i;
-  i.ports = {port(0, 0, "")};
-  EXPECT_TRUE(holds_as_rules(udev_rules(i)));
-  EXPECT_FALSE(contains(udev_rules(i), "GROUP"));
-}
-
 TEST(UdevRules, NamePortsOfARigByWhatTheConfigurationHasThere) {
   const test::FakeMachine f;
   Inventory i;
@@ -72,12 +65,11 @@ TEST(UdevRules, NamePortsOfARigByWhatTheConfigurationHasThere) {
   i.ports[1].info.port = "/dev/ttyUSB1";
   i.ports[2].info.port = "/dev/ttyACM0";
   i.usb = {usb(0x1E10, "1", {})};
-  Needs needs;
-  needs.given = true;
-  needs.ins_driver = "xsens";
-  needs.ins_port = "/dev/ttyUSB1";
-  needs.trigger_driver = "board";
-  needs.trigger_port = "C3";
+  Configuration needs;
+  needs.ins.driver = "xsens";
+  needs.ins.port = "/dev/ttyUSB1";
+  needs.trigger.driver = "board";
+  needs.trigger.port = "C3";
   const std::string rules = udev_rules(ports_of_rig(i, needs, f.machine));
   EXPECT_TRUE(holds_as_rules(rules));
   for (const char* name : {"vergence/ins-B2", "vergence/trigger-C3", "vergence/camera-1"})

@@ -11,7 +11,6 @@
 #include <filesystem>
 #include <string>
 
-#include "app/publish/file_descriptor.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -1,15 +1,13 @@
-#include "app/publish/live_images.hpp"
+#include "app/publish/live_page.hpp"
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "app/datasets/image_file.hpp"
-#include "core/camera/camera.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "core/memory/arena.hpp"
 
@@ -17,19 +15,6 @@ namespace vergence::app {
 namespace {
 
 constexpr int kWidth = 960, kHeight = 720;
-
-RigCalibration rig() {
-  RigCalibration r;
-  r.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k) {
-    Intrinsics& lens = r.intrinsics[k];
-    lens.width = kWidth, lens.height = kHeight;
-    lens.fx = lens.fy = 700, lens.cx = 480, lens.cy = 360;
-    lens.distortion = {-0.1, 0.02, 0, 0, 0};
-  }
-  r.T_camera_left[1].t = {-0.5, 0, 0};
-  return r;
-}
 
 class Images : public testing::Test {
  protected:
@@ -111,30 +96,6 @@ TEST_F(Images, anImageOfAnotherSizeThanTheRigsIsLeftOut) {
   ASSERT_TRUE(images_->ready());
   EXPECT_EQ(images_->pictures()[0].width, 0);
   EXPECT_TRUE(thumbnail(images_->pictures()[0]).empty() || images_->pictures()[0].width > 0);
-}
-
-TEST(JudgedPoints, haveTheirDepthOrAreRejected) {
-  const RigCalibration r = rig();
-  const Camera left(r.intrinsics[0]), right(r.intrinsics[1]);
-  const auto seen = [&](const Vec3& p, double off_px) {
-    Vec2 a, b;
-    EXPECT_EQ(left.project(p, &a, nullptr), ProjectStatus::ok);
-    EXPECT_EQ(right.project(r.T_camera_left[1] * p, &b, nullptr), ProjectStatus::ok);
-    return LivePoint{{static_cast<float>(a.x()), static_cast<float>(a.y())},
-                     {static_cast<float>(b.x()), static_cast<float>(b.y() + off_px)},
-                     true};
-  };
-  LivePoint alone = seen({0, 0, 8}, 0);
-  alone.both = false;
-  const std::vector points{seen({1, -1, 8}, 0), seen({-2, 0.5, 30}, 0),
-                           seen({1, 1, 8}, 2 * 3.0 * 1.5), alone};
-  const auto judged = judge_points(points, r);
-  EXPECT_NEAR(judged[0].depth_m, 8, 0.01);
-  EXPECT_NEAR(judged[1].depth_m, 30, 0.1);
-  EXPECT_FALSE(judged[0].rejected);
-  EXPECT_TRUE(judged[2].rejected) << "9 px off its line, 6.4 px by Sampson";
-  EXPECT_EQ(judged[3].depth_m, 0);
-  EXPECT_FALSE(judged[3].rejected);
 }
 
 TEST(Base64, knownAnswersOfRfc4648) {

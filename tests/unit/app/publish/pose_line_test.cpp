@@ -1,4 +1,4 @@
-#include "app/publish/pose_line.hpp"
+#include "app/publish/line_publisher.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,14 +13,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/publish/line_publisher.hpp"
 #include "core/math/so3.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
 namespace {
 
-PublishedPose sample() {
+PoseSample sample() {
   PoseSample s;
   s.frame = 12;
   s.stamp = Stamp(1'577'836'800'500'000'001);
@@ -36,10 +35,10 @@ PublishedPose sample() {
   s.stereo_inliers = 33;
   s.reprojection_px = 0.25;
   s.estimate_ms = 7.5F;
-  return PublishedPose::of(s, HostStamp(5));
+  return s;
 }
 
-nlohmann::json line_of(const PublishedPose& pose, const std::optional<EarthNumbers>& earth,
+nlohmann::json line_of(const PoseSample& pose, const std::optional<EarthPose>& earth,
                        std::optional<double> age) {
   std::string line = "what was there before";
   write_pose_line(pose, earth, age, 7, &line);
@@ -49,10 +48,10 @@ nlohmann::json line_of(const PublishedPose& pose, const std::optional<EarthNumbe
 }
 
 TEST(PoseLine, hasWhatTheSchemaSays) {
-  EarthNumbers earth;
-  earth.enu = {1, 2, 3};
+  EarthPose earth;
+  earth.T_enu_left.t = {1, 2, 3};
   earth.position = {-27.4975, 153.0137, 60};
-  earth.heading_deg = 358.25;
+  earth.yaw = (90 - 358.25) * std::numbers::pi / 180;
   const auto j = line_of(sample(), earth, 21.5);
   EXPECT_EQ(j["version"], 1);
   EXPECT_EQ(j["frame"], 12);
@@ -61,9 +60,10 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   EXPECT_EQ(j["status"], "degraded");
   EXPECT_EQ(j["reason"], "few_inliers");
   EXPECT_EQ(j["pose"]["position_m"], (std::vector<double>{1.25, -2.5, 3.125}));
-  const PoseNumbers numbers = sample().world_left;
+  const Eigen::Quaterniond q = quaternion(sample().T_world_left.R);
   for (std::size_t i = 0; i < 4; ++i)
-    EXPECT_NEAR(j["pose"]["orientation_xyzw"][i].get<double>(), numbers.q[i], 1e-9);
+    EXPECT_NEAR(j["pose"]["orientation_xyzw"][i].get<double>(),
+                q.coeffs()[static_cast<Eigen::Index>(i)], 1e-9);
   ASSERT_EQ(j["covariance"].size(), 21U);
   EXPECT_DOUBLE_EQ(j["covariance"][0], 0.25);
   EXPECT_DOUBLE_EQ(j["covariance"][20], 1e-6);  // four digits are written
@@ -83,9 +83,9 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
 }
 
 TEST(PoseLine, ofALostFrameHasNoPlace) {
-  PublishedPose lost = sample();
+  PoseSample lost = sample();
   lost.status = PoseStatus::lost;
-  const auto j = line_of(lost, EarthNumbers{}, std::nullopt);
+  const auto j = line_of(lost, EarthPose{}, std::nullopt);
   EXPECT_TRUE(j["pose"].is_null());
   EXPECT_TRUE(j["covariance"].is_null());
   EXPECT_TRUE(j["earth"].is_null());
@@ -93,8 +93,8 @@ TEST(PoseLine, ofALostFrameHasNoPlace) {
 }
 
 TEST(PoseLine, staysJsonWithNumbersThatAreNone) {
-  PublishedPose pose = sample();
-  pose.world_left.t[1] = std::numeric_limits<double>::infinity();
+  PoseSample pose = sample();
+  pose.T_world_left.t[1] = std::numeric_limits<double>::infinity();
   pose.motion_covariance[3] = std::numeric_limits<float>::infinity();
   pose.reprojection_px = std::numeric_limits<double>::quiet_NaN();
   const auto j = line_of(pose, std::nullopt, 1e300);

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <thread>
 
-#include "app/recording/disk.hpp"
+#include "app/recording/mcap_file.hpp"
 
 namespace vergence::test {
 

@@ -65,49 +65,6 @@ TEST(Analysis, driftAfterTheFirstHundredMetresShowsInFullAndWithItsSign) {
   EXPECT_NEAR(a.vertical.end, 2, 1e-9);
 }
 
-/// The first `waiting` frames say that the calibration was not confirmed, frame 300 says it again.
-Session unverified_drive(std::size_t waiting) {
-  Session s = bent_drive(600);
-  s.reasons = {"", "unverified_calibration", "few_inliers"};
-  const auto degrade = [&s](std::size_t i, std::uint16_t reason) {
-    s.frames[i].status = PoseStatus::degraded;
-    s.frames[i].reason = reason;
-  };
-  for (std::size_t i = 0; i < waiting; ++i) degrade(i, i == 7 ? 2 : 1);
-  degrade(300, 1);
-  return s;
-}
-
-TEST(Analysis, framesThatOnlyWaitedForTheCalibrationAreCountedApart) {
-  Session s = unverified_drive(100);
-  s.events = {{s.frames[100].stamp, "calibration_confirmed", ""},
-              {s.frames[400].stamp, "calibration_confirmed", ""}};
-  const Analysis a = analyse(s);
-  EXPECT_EQ(a.degraded, 101U);
-  EXPECT_EQ(a.waited, 99U)
-      << "neither the one with another fault nor the one after the first confirmation";
-  EXPECT_EQ(a.waited_by_reason, (std::vector<std::size_t>{0, 99, 0}));
-  ASSERT_TRUE(a.confirmed_s);
-  EXPECT_NEAR(*a.confirmed_s, 10, 1e-9);
-}
-
-TEST(Analysis, aStraightWayIsLaidByAttitudesAndKeepsItsVerticalError) {
-  Session s;
-  for (int i = 0; i < 120; ++i) {
-    Frame f;
-    f.stamp = Stamp(i * kStep);
-    f.posed = true;
-    f.T_world_left.t = {0, -0.01 * i, 0.5 * i};
-    s.frames.push_back(f);
-    f.T_world_left.t.y() = 0;
-    s.reference.push_back({f.stamp, f.T_world_left});
-  }
-  const Analysis a = analyse(s);
-  EXPECT_NE(a.source_sentence.find("attitudes"), std::string::npos);
-  EXPECT_NEAR(a.vertical_m.back() - a.vertical_m.front(), 0.01 * 119, 1e-9)
-      << "a climb that the reference lacks is not turned away";
-}
-
 TEST(Analysis, withoutAReferenceThereAreNoErrorsAndItIsSaid) {
   Session other_time = with_reference(bent_drive(50), Transform{});
   for (StampedPose& p : other_time.reference) p.stamp = Stamp(p.stamp.ns() + 3'600'000'000'000);
@@ -139,48 +96,6 @@ TEST(Analysis, lostFramesHaveNoPlaceAndMissingOnesABreak) {
   EXPECT_EQ(std::count(a.breaks.begin(), a.breaks.end(), 1), 1);
   EXPECT_EQ(a.lost, 5U);
   EXPECT_NEAR(a.ok_share.value(), 85.0 / 90.0, 1e-12);
-}
-
-TEST(Analysis, turnedRightIsAPositiveHeadingErrorWhicheverWayUpTheReferenceHasIt) {
-  Mat3 up;
-  up << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  for (const Mat3& axes : {Mat3(Mat3::Identity()), up}) {
-    Session s = with_reference(bent_drive(600), {axes, Vec3::Zero()});
-    for (std::size_t i = 400; i < 600; ++i)
-      s.frames[i].T_world_left.R = exp_so3({0, 2 * kDegree, 0}) * s.frames[i].T_world_left.R;
-    EXPECT_NEAR(analyse(s).heading.end, 2, 1e-6);
-  }
-}
-
-TEST(Analysis, withoutASummaryFramesAreMissedByTheirNumbers) {
-  Session s = bent_drive(100);
-  for (std::size_t i = 0; i < 100; ++i) s.frames[i].number = static_cast<std::int64_t>(i) + 7;
-  s.frames.erase(s.frames.begin() + 70, s.frames.begin() + 80);
-  s.frames.back().number = std::numeric_limits<std::int64_t>::max();
-  const Analysis a = analyse(s);
-  EXPECT_EQ(a.skipped, 10U) << "the number of the last one is damage: there was no time";
-  EXPECT_NEAR(a.ok_share.value(), 0.9, 1e-12);
-  s.summary = {{"frames", {{"skipped", 3}}}};
-  EXPECT_EQ(analyse(s).skipped, 3U);
-}
-
-TEST(Analysis, aSecondPlacementIsToldWithItsTime) {
-  Session s = bent_drive(100);
-  for (std::size_t i = 10; i < 100; ++i) {
-    s.frames[i].placed = s.frames[i].has_ins = s.frames[i].compared = true;
-    s.frames[i].enu = {i < 60 ? 100.0 : 0.0, 0.5 * static_cast<double>(i), 0};
-  }
-  s.events = {{s.frames[10].stamp, "placement", ""}};
-  Analysis a = analyse(s);
-  EXPECT_EQ(std::count(a.placed_anew.begin(), a.placed_anew.end(), 1), 0);
-  EXPECT_NE(a.source_sentence.find("then frozen"), std::string::npos);
-  s.events.push_back({s.frames[60].stamp, "placement", ""});
-  a = analyse(s);
-  EXPECT_EQ(a.placed_anew[60], 1);
-  EXPECT_EQ(std::count(a.placed_anew.begin(), a.placed_anew.end(), 1), 1);
-  EXPECT_EQ(a.source_sentence.find("frozen"), std::string::npos);
-  EXPECT_NE(a.source_sentence.find("placed 2 times, at 1.0 s, 6.0 s"), std::string::npos)
-      << a.source_sentence;
 }
 
 TEST(Analysis, errorsToTheInsAreThoseOfTheFile) {
@@ -219,23 +134,6 @@ TEST(Analysis, driftAgainstTheInsIsByPositionsWhateverItsAttitudeAndThePlacement
   // 300 m of ours are an arc of 300/102 rad on a circle of 102 m; the ways differ by 2 m of radius
   // over its chord.
   EXPECT_NEAR(a.drift.value(), 2 * 2 * std::sin(150.0 / 102) / 300, 2e-4);
-}
-
-TEST(Analysis, withoutASummaryTheFiguresAreReckonedAgain) {
-  Session s = with_reference(bent_drive(600), Transform{});
-  for (StampedPose& p : s.reference) p.T_world_body.t *= 1.03;
-  const Analysis a = analyse(s);
-  EXPECT_NEAR(a.scale.value(), 1.03, 1e-6);
-  ASSERT_TRUE(a.drift.has_value());
-  EXPECT_NEAR(*a.drift, 0.03 / 1.03, 0.006)
-      << "segments of a bent way are a little shorter than their nominal length";
-}
-
-TEST(Analysis, extremeStampsDoNotOverflow) {
-  Session s = bent_drive(2);
-  s.frames[0].stamp = Stamp(std::numeric_limits<std::int64_t>::min());
-  s.frames[1].stamp = Stamp(std::numeric_limits<std::int64_t>::max());
-  EXPECT_NEAR(analyse(s).duration_s, 1.8446744e10, 1e4);
 }
 
 }  // namespace

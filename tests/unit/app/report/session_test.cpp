@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "app/datasets/text_file.hpp"
-#include "app/report/csv.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/session_writer.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -53,15 +52,6 @@ TEST(FileLines, whatFollowsTheLastLineEndIsTorn) {
   EXPECT_FALSE(torn);
 }
 
-TEST(FileLines, aLineWithoutAnEndTakesNoMoreMemoryThanAnother) {
-  bool torn = false;
-  const auto all = lines_of("a\n" + std::string(3 * FileLines::kLongestLine, 'x') + "\nb\n", &torn);
-  ASSERT_EQ(all.size(), 3U);
-  EXPECT_LT(all[1].size(), FileLines::kLongestLine + 100'000);
-  EXPECT_EQ(all[2], "b");
-  EXPECT_THROW(FileLines("/"), InputError);
-}
-
 TEST(CsvRows, columnsAreFoundByNameAndDamagedRowsAreCounted) {
   Lines lines("a,b,c\n1,,x\n1,2\n3,4.5,y,z\n7,8,\n");
   CsvRows rows([&lines](std::string_view* line) { return lines.next(line); });
@@ -103,11 +93,6 @@ TEST(ReadSession, aWholeOneHasNothingMissing) {
   EXPECT_NEAR(s.calibrations[4].depth_sigma_percent, 0.1, 1e-9);
   EXPECT_NEAR(s.calibrations[4].depth_difference_percent, 0.24, 1e-9);
   EXPECT_EQ(s.reference.size(), 392U);
-  ASSERT_EQ(s.residuals.size(), 94U);
-  EXPECT_FALSE(s.residuals[0].at_the_end);
-  EXPECT_EQ(s.residuals[0].mean_px, -1.4);
-  EXPECT_TRUE(s.residuals[93].at_the_end);
-  EXPECT_EQ(s.residuals[93].left, 480);
   EXPECT_TRUE(s.calibration.has_value());
   EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);
 }
@@ -117,22 +102,6 @@ TEST(ReadSession, aFolderThatIsNoSessionIsRefused) {
   EXPECT_THROW((void)read_session(folder.path()), InputError);
   EXPECT_THROW((void)read_session(folder / "nowhere"), InputError);
   EXPECT_THROW((void)read_session(folder.write("file", "x")), InputError);
-}
-
-TEST(ReadSession, ofADriveOfDaysItsBeginningIsReadAndThatIsTold) {
-  const test::TemporaryFolder folder;
-  test::SessionWriter writer;
-  writer.frames = 400;
-  writer.write(folder.path());
-  const Session s = read_session(folder.path(), 100);
-  EXPECT_EQ(s.frames.size(), 100U);
-  EXPECT_EQ(s.reference.size(), 100U);
-  EXPECT_EQ(s.missing, std::vector<std::string>{}) << "its files are whole";
-  ASSERT_EQ(s.left_out.size(), 2U);
-  EXPECT_EQ(s.left_out[0], "poses.csv has more than 100 lines; the rest is left out");
-  EXPECT_EQ(read_session(folder.path(), 400).left_out, std::vector<std::string>{});
-  std::filesystem::remove(folder / "poses.csv");
-  EXPECT_EQ(read_session(folder.path(), 50).frames.size(), 50U) << "of trajectory.tum";
 }
 
 TEST(ReadSession, everyFileThatIsMissingIsSaid) {
@@ -193,51 +162,6 @@ TEST(ReadSession, withoutPosesTheTrajectoryStandsIn) {
   EXPECT_EQ(s.frames[0].stamp.ns(), 1'500'000'000);
   EXPECT_TRUE(s.frames[1].posed);
   EXPECT_FALSE(s.frames[1].status.has_value());
-}
-
-TEST(ReadSession, tornJsonIsSaidAndNeverHalfTaken) {
-  const test::TemporaryFolder folder;
-  folder.write("summary.json", "{\"frames\": {\"read\": 5, ");
-  folder.write("events.jsonl",
-               "{\"stamp_ns\":1,\"kind\":\"state\",\"sentence\":\"a\"}\n[1,2]\n{\"stamp_ns\":\"x\","
-               "\"kind\":7}\n{\"stamp_ns\":2,\"ki");
-  const Session s = read_session(folder.path());
-  EXPECT_TRUE(s.summary.is_null());
-  EXPECT_TRUE(says(s, "summary.json is torn"));
-  EXPECT_TRUE(says(s, "events.jsonl: 1 damaged line left out"));
-  ASSERT_EQ(s.events.size(), 2U);
-  EXPECT_EQ(s.events[1].kind, "") << "a kind that is no text";
-}
-
-TEST(ReadSession, residualsThatAreNoPlaceOfAnImageAreLeftOut) {
-  const test::TemporaryFolder folder;
-  folder.write("trajectory.tum", "1.5 0 0 0 0 0 0 1\n");
-  const std::string head =
-      "calibration,camera,left_px,top_px,width_px,height_px,matches,mean_px,scatter_px\n";
-  folder.write("residuals.csv", head +
-                                    "end,1,0,0,80,80,40,0.5,0.25\n"
-                                    "end,9,0,0,80,80,40,0.5,0.25\n"
-                                    "end,1,-5,0,80,80,40,0.5,0.25\n"
-                                    "end,1,0,0,0,80,40,0.5,0.25\n"
-                                    "end,1,0,0,80,1e300,40,0.5,0.25\n"
-                                    "end,1,0,0,80,80,40,nan,0.25\n"
-                                    "end,1,0,0,80,80,40\n"
-                                    "end,1,0,0,80,80,40,0.5,0.2");
-  const Session s = read_session(folder.path());
-  EXPECT_EQ(s.residuals.size(), 1U);
-  EXPECT_TRUE(says(s, "residuals.csv: 6 damaged lines"));
-  EXPECT_TRUE(says(s, "residuals.csv: the last line is torn"));
-}
-
-TEST(NumberAt, isNothingWhereThereIsNoFiniteNumber) {
-  const auto json = nlohmann::json::parse(R"({"a": {"b": 1.5, "c": null, "d": "7", "e": [1]}})");
-  EXPECT_EQ(number_at(json, "a.b"), 1.5);
-  for (const char* path : {"a.c", "a.d", "a.e", "a", "b", "a.b.c", ""})
-    EXPECT_FALSE(number_at(json, path)) << path;
-  EXPECT_FALSE(number_at(nlohmann::json(), "a"));
-  EXPECT_EQ(text_at(json, "a.d"), "7");
-  EXPECT_EQ(flag_at(nlohmann::json::parse(R"({"a": {"b": false, "c": 0}})"), "a.b"), false);
-  EXPECT_FALSE(flag_at(nlohmann::json::parse(R"({"a": {"b": false, "c": 0}})"), "a.c"));
 }
 
 }  // namespace

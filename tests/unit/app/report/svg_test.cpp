@@ -6,8 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "app/report/decimation.hpp"
-#include "app/report/style.hpp"
 #include "core/math/random.hpp"
 #include "tests/unit/app/report/xml_check.hpp"
 
@@ -32,21 +30,6 @@ TEST(Escape, goodUtf8StaysAndBrokenIsReplaced) {
   EXPECT_EQ(escape("\xf4\x90\x80\x80"), mark + mark + mark + mark);  // beyond Unicode
 }
 
-TEST(Escape, longTextIsCutAtAWholeCharacter) {
-  EXPECT_EQ(escape(std::string(1000, 'x'), 5), "xxxxx…");
-  EXPECT_EQ(escape("äää", 3), "ä…");
-  EXPECT_EQ(escape("abc", 3), "abc");
-}
-
-TEST(Coordinate, isShortAndAlwaysANumber) {
-  EXPECT_EQ(coordinate(1.26), "1.3");
-  EXPECT_EQ(coordinate(3.0), "3");
-  EXPECT_EQ(coordinate(-0.01), "0");
-  EXPECT_EQ(coordinate(std::nan("")), "0");
-  EXPECT_EQ(coordinate(std::numeric_limits<double>::infinity()), "0");
-  EXPECT_EQ(coordinate(1e300), "1000000");
-}
-
 TEST(Ticks, areRoundFewAndWithinTheAxis) {
   for (const auto& [low, high] : {std::pair{0.0, 1.0},
                                   {-3.7, 12.9},
@@ -66,17 +49,6 @@ TEST(Ticks, areRoundFewAndWithinTheAxis) {
   EXPECT_EQ(time_ticks(0, 1650, 6), (std::vector<double>{0, 300, 600, 900, 1200, 1500}));
 }
 
-TEST(Ticks, labelsHaveTheDecimalsTheyNeed) {
-  EXPECT_EQ(tick_label(0.5, 0.1), "0.5");
-  EXPECT_EQ(tick_label(-2, 1), "−2");
-  EXPECT_EQ(tick_label(1e-17, 0.1), "0.0");
-  EXPECT_EQ(time_label(65, 5), "1:05");
-  EXPECT_EQ(time_label(3723, 60), "1:02:03");
-  EXPECT_EQ(time_label(4.5, 0.5), "4.5");
-  EXPECT_EQ(duration_text(3599.7, 1), "1:00:00 h");
-  EXPECT_EQ(duration_text(1.2e7, 1), "139 days");
-}
-
 TEST(SvgElement, isWellFormedWhateverGoesIn) {
   Svg svg(100, 50, "a \"quoted\" <name>");
   svg.line("axis", 0, 0, std::nan(""), 1);
@@ -89,35 +61,6 @@ TEST(SvgElement, isWellFormedWhateverGoesIn) {
   EXPECT_EQ(text.find("nan"), std::string::npos);
   EXPECT_EQ(text.find("<script"), std::string::npos);
   EXPECT_NE(text.find("d=\"M0 1h0M0 1L2 3 4 5\""), std::string::npos) << text;
-}
-
-/// WCAG 2: relative luminance of #rrggbb.
-double luminance(const char* colour) {
-  const auto channel = [&](int k) {
-    const double c =
-        static_cast<double>(std::stoi(
-            std::string(colour).substr(static_cast<std::size_t>(1 + 2 * k), 2), nullptr, 16)) /
-        255;
-    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-  };
-  return 0.2126 * channel(0) + 0.7152 * channel(1) + 0.0722 * channel(2);
-}
-
-double contrast(const char* a, const char* b) {
-  const double x = luminance(a), y = luminance(b);
-  return (std::max(x, y) + 0.05) / (std::min(x, y) + 0.05);
-}
-
-TEST(Colours, areReadableOnBothGroundsInBothThemes) {
-  EXPECT_NEAR(contrast("#000000", "#ffffff"), 21, 1e-9);
-  for (const Colour& c : kColours)
-    for (const Colour& ground : {kPage, kPanel}) {
-      const double requested = c.text ? 4.5 : 3.0;
-      EXPECT_GE(contrast(c.light, ground.light), requested)
-          << c.name << " on " << ground.name << ", light";
-      EXPECT_GE(contrast(c.dark, ground.dark), requested)
-          << c.name << " on " << ground.name << ", dark";
-    }
 }
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -134,12 +77,6 @@ Curve noise(std::size_t n) {
     c.y.push_back(random.normal());
   }
   return c;
-}
-
-std::size_t points(const std::vector<Line>& lines) {
-  std::size_t n = 0;
-  for (const Line& line : lines) n += line.size();
-  return n;
 }
 
 TEST(Decimate, everyColumnKeepsItsExtremesItsFirstAndItsLastValue) {
@@ -165,28 +102,6 @@ TEST(Decimate, everyColumnKeepsItsExtremesItsFirstAndItsLastValue) {
                              [](const Point& a, const Point& b) { return a.x < b.x; }));
 }
 
-TEST(Decimate, whereThereIsNoValueTheLineEnds) {
-  Curve c = noise(10);
-  c.y[0] = kNan, c.y[4] = kNan, c.y[5] = std::numeric_limits<double>::infinity(), c.y[7] = kNan;
-  const auto lines = decimate(c.x, c.y, {}, 0, 10, 1000);
-  ASSERT_EQ(lines.size(), 3U);
-  EXPECT_EQ(lines[0].front().x, 1);
-  EXPECT_EQ(lines[0].back().x, 3);
-  ASSERT_EQ(lines[1].size(), 1U);
-  EXPECT_EQ(lines[1].front().x, 6);
-  EXPECT_EQ(lines[2].front().x, 8);
-}
-
-TEST(Decimate, aBreakCutsEvenWithinAColumn) {
-  const Curve c = noise(10);
-  std::vector<std::uint8_t> breaks(10, 0);
-  breaks[5] = 1;
-  const auto lines = decimate(c.x, c.y, breaks, 0, 10, 1);
-  ASSERT_EQ(lines.size(), 2U);
-  EXPECT_EQ(lines[0].back().x, 4);
-  EXPECT_EQ(lines[1].front().x, 5);
-}
-
 TEST(Thin, noPointLeftOutIsFartherThanTheStepFromAPointKept) {
   Random random(3);
   Curve c;
@@ -205,12 +120,6 @@ TEST(Thin, noPointLeftOutIsFartherThanTheStepFromAPointKept) {
       nearest = std::min(nearest, std::hypot(p.x - c.x[i], p.y - c.y[i]));
     ASSERT_LE(nearest, 2.0) << i;
   }
-}
-
-TEST(Thin, theCountIsBoundedHoweverLongTheWay) {
-  Curve c = noise(20'000);
-  for (double& v : c.y) v *= 1000;
-  EXPECT_LE(points(thin(c.x, c.y, {}, 0.1, 500)), 500U);
 }
 
 }  // namespace

@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "app/runtime/distinct_names.hpp"
-
 namespace vergence::app {
 namespace {
 
@@ -20,22 +18,10 @@ TEST(EditDistance, KnownAnswers) {
   EXPECT_EQ(edit_distance("Features", "features"), 0U) << "upper and lower case alike";
 }
 
-TEST(Nearest, PicksTheLeastDistant) {
-  EXPECT_EQ(nearest("evalute", {"replay", "evaluate", "simulate"}), "evaluate");
-  EXPECT_EQ(nearest("thread", {"threads"}), "threads");
-}
-
 TEST(Nearest, GivesNothingWhenNothingIsNear) {
   EXPECT_EQ(nearest("xyzzy", {"replay", "evaluate"}), std::nullopt);
   EXPECT_EQ(nearest("replay", {}), std::nullopt);
   EXPECT_EQ(did_you_mean("xyzzy", {"replay"}), "");
-}
-
-TEST(DistinctNames, onlyThoseThatAreThereAlreadyAreChanged) {
-  EXPECT_EQ(distinct_names({"left", "right", "camera2"}), (Names{"left", "right", "camera2"}));
-  EXPECT_EQ(distinct_names({"left", "left", "left"}), (Names{"left", "left_1", "left_2"}));
-  EXPECT_EQ(distinct_names({"left", "left_1", "left"}), (Names{"left", "left_1", "left_2"}));
-  EXPECT_EQ(distinct_names({"left", "left", "left_1"}), (Names{"left", "left_1", "left_1_1"}));
 }
 
 }  // namespace

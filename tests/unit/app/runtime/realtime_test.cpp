@@ -71,18 +71,6 @@ TEST(Realtime, aThreadIsSetOnceAndALaterOneWhenItComes) {
   EXPECT_EQ(system.priorities[9], 40);
 }
 
-TEST(Realtime, theSolverHasProcessorsOfItsOwn) {
-  FakeSystem system;
-  RealtimeRequest request;
-  request.affinity = parse_cpu_list("0");
-  request.solver_affinity = parse_cpu_list("1-3");
-  RealtimeThreads threads(request, system);
-  (void)threads.apply(kDrive);
-  const std::map<pid_t, int> expected{{2, 1}, {3, 1}, {4, 1}, {5, 1}, {6, 3}};
-  EXPECT_EQ(system.processors, expected);
-  EXPECT_TRUE(system.priorities.empty());
-}
-
 TEST(Realtime, aRefusalIsOneSentenceWithWhatAllowsIt) {
   FakeSystem system;
   system.fifo_error = EPERM;

@@ -8,7 +8,6 @@
 #include <thread>
 #include <vector>
 
-#include "app/runtime/thread_runner.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
@@ -101,37 +100,6 @@ TEST(ThreadRunner, everyRunIsDoneWhenItReturnsHoweverLongAHalfTakes) {
     ASSERT_EQ(left, i + 1);
     ASSERT_EQ(right, i + 1);
   }
-}
-
-TEST(ThreadRunner, sleepingBetweenRunsLosesNoWakeUp) {
-  ThreadRunner runner;
-  int count = 0;
-  auto nothing = [] {};
-  auto add = [&] { ++count; };
-  for (int i = 0; i < 20; ++i) {
-    std::this_thread::sleep_for(
-        std::chrono::milliseconds(1));  // far beyond the spin: the worker sleeps
-    runner.run(TaskRef(nothing), TaskRef(add));
-  }
-  EXPECT_EQ(count, 20);
-}
-
-TEST(ThreadRunner, joinsWithoutEverHavingRun) { const ThreadRunner runner; }
-
-TEST(ThreadRunner, allocatesNothingPerRunAndSealsItsWorker) {
-  if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
-  ThreadRunner runner;
-  bool worker_sealed = false;
-  auto nothing = [] {};
-  auto look = [&] { worker_sealed = AllocationGuard::thread_sealed(); };
-  const auto before = AllocationGuard::allocations_after_seal();
-  {
-    const SealedScope sealed;
-    for (int i = 0; i < 1000; ++i) runner.run(TaskRef(nothing), TaskRef(look));
-  }
-  EXPECT_TRUE(worker_sealed);
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
 }
 
 }  // namespace

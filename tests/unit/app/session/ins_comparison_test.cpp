@@ -2,15 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <cstdio>
-#include <functional>
 #include <memory>
-#include <numbers>
 #include <string>
 
+#include "app/session/recorder.hpp"
 #include "core/comparison/geodesy.hpp"
-#include "core/math/random.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -43,7 +39,8 @@ struct ComparedSession {
   }
   const test::TemporaryFolder folder;
   Recorder recorder{folder.path(), {.ins = true}};
-  SessionOutput output{&recorder, {}};
+  const std::array<SessionObserver*, 1> observers{&recorder};
+  SessionOutput output{observers};
   const std::unique_ptr<EventLog> log = std::make_unique<EventLog>();
   const ComparisonOptions options{};
   Arena arena{Comparison::bytes_needed(options)};
@@ -109,67 +106,6 @@ TEST(InsComparison, countsAScaleThatDisagreesOnlyWhereThereIsAnIns) {
   // the last that has a reading.
   EXPECT_EQ(counter(comparison, "scale_disagrees"), 200U);
   (void)session.recorder.close();
-}
-
-/// A place that wanders as an MTi-G's: each axis keeps exp(-dt / 60 s) of its error.
-class WanderingPlace {
- public:
-  static constexpr double kHorizontal = 2.12, kVertical = 4;  // m
-  explicit WanderingPlace(std::uint64_t seed) : random_(seed) {
-    error_ = sigmas().cwiseProduct(draw());
-  }
-  Vec3 error_after(double seconds) {
-    const double keep = std::exp(-seconds / 60);
-    error_ = keep * error_ + std::sqrt(1 - keep * keep) * sigmas().cwiseProduct(draw());
-    return error_;
-  }
-
- private:
-  static Vec3 sigmas() { return {kHorizontal, kHorizontal, kVertical}; }
-  Vec3 draw() { return {random_.normal(), random_.normal(), random_.normal()}; }
-  Random random_;
-  Vec3 error_;
-};
-
-/// The way that is told of a drive along `place_at`, of an INS at 100 Hz.
-double way_of(const std::function<Vec3(double)>& place_at, double seconds, std::uint64_t seed) {
-  ComparedSession session;
-  InsComparison& comparison = session.comparison;
-  const LocalTangentPlane plane(Geodetic{48, 11, 500});
-  WanderingPlace wandering(seed);
-  constexpr double kStep = 0.01;  // s
-  for (int i = 0; i < static_cast<int>(seconds / kStep); ++i) {
-    const double t = i * kStep;
-    InsRecord r = reading(plane, t, place_at(t) + wandering.error_after(kStep));
-    r.sample.position_sigma = WanderingPlace::kHorizontal;
-    r.sample.height_sigma = WanderingPlace::kVertical;
-    comparison.add(r);
-    if (i % 5 != 0) continue;
-    PoseSample pose;
-    pose.stamp = at(t - 0.003);
-    pose.status = PoseStatus::ok;
-    comparison.add(pose, 0);
-    comparison.drain();
-  }
-  comparison.finish();
-  (void)session.recorder.close();
-  return comparison.earth("the test").errors.way_m;
-}
-
-/// Round two circles of 30 m at 5.6 m/s. Along the way the place wanders by 0.39 m a root second,
-/// 0.34 % of 400 s: three of it, and the bends' 0.3 %, are within the 2 %.
-TEST(InsComparison, theWayIsThatOfTheDriveNotOfTheInssNoise) {
-  constexpr double kRadius = 30, kRate = 5.6 / kRadius, kSeconds = 400;
-  const auto figure_eight = [&](double t) {
-    const double turned = std::fmod(kRate * t, 4 * std::numbers::pi);
-    const double side = turned < 2 * std::numbers::pi ? 1 : -1;
-    return Vec3(kRadius * std::sin(turned), side * kRadius * (1 - std::cos(turned)), 0);
-  };
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    const double truth = kRadius * kRate * kSeconds, way = way_of(figure_eight, kSeconds, seed);
-    std::printf("[ figures  ] %.1f m of %.1f m\n", way, truth);
-    EXPECT_NEAR(way, truth, 0.02 * truth) << "seed " << seed;
-  }
 }
 
 }  // namespace

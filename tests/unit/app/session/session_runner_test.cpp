@@ -13,7 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/recorder/record_lines.hpp"
+#include "app/session/records.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/waiting_source.hpp"
@@ -30,7 +30,7 @@ Stamp at(int n) { return kStart + Duration::milliseconds(50) * n; }
 class BlackSource final : public test::WaitingSource {
  public:
   explicit BlackSource(int frames) : WaitingSource(Milliseconds(0)), count_(frames) {
-    facts_.frames = facts_.expected_frames = static_cast<std::uint64_t>(frames);
+    facts_.frames = static_cast<std::uint64_t>(frames);
     facts_.first = at(0);
     facts_.remarks.push_back({"a remark", "data", false});
   }
@@ -73,8 +73,8 @@ class Notebook final : public SessionObserver {
   void on_pose(const PoseSample& sample) noexcept override {
     (void)lines_.push({'p', sample.stamp});
   }
-  void on_compared(const PoseRecord& pose) noexcept override {
-    (void)lines_.push({'c', pose.stamp});
+  void on_report(const FrameReport& report) noexcept override {
+    (void)lines_.push({'c', report.pose.stamp});
   }
   void on_event(const EventRecord& event) noexcept override {
     const std::string_view kind = event.kind;
@@ -172,33 +172,6 @@ TEST(SessionRunner, whatAnObserverAsksForActsOnceWhereTheSessionCanAndItsCounter
   std::ifstream in(options.out / "summary.json");
   const std::string summary(std::istreambuf_iterator<char>(in), {});
   EXPECT_NE(summary.find("\"asked\": 17"), std::string::npos);
-}
-
-TEST(SessionRunner, theQuotaMakesRoomBeforeTheFolderAndASessionThatIsRefusedCostsNone) {
-  const test::TemporaryFolder folder;
-  const auto make_old = [&folder] {
-    folder.write("old/poses.csv", kPosesHeader);
-    folder.write("old/summary.json", "{}");
-    folder.write("old/drive.mcap", "");
-    std::filesystem::resize_file(folder / "old/drive.mcap", 2'000'000);
-  };
-  const Configuration configuration = load_configuration(std::nullopt, {"sessions.quota_mb=1"});
-  const SignalGuard signals;
-  SessionOptions options;
-  options.out = folder / "taken";
-  options.quiet = true;
-  make_old();
-  folder.write("taken/notes.txt", "mine");
-  BlackSource refused(2);
-  EXPECT_THROW((void)run_session(refused, configuration, options, signals), InputError);
-  EXPECT_TRUE(std::filesystem::exists(folder / "old"));
-
-  // A folder that cannot be made, as on a full disk: the old session went first.
-  options.out = folder / "new";
-  std::filesystem::create_symlink(folder / "none" / "new", options.out);
-  BlackSource without_room(2);
-  EXPECT_THROW((void)run_session(without_room, configuration, options, signals), InputError);
-  EXPECT_FALSE(std::filesystem::exists(folder / "old"));
 }
 
 }  // namespace

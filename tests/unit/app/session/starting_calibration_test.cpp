@@ -10,7 +10,6 @@
 #include "app/config/calibration_state.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/session/drive_calibration.hpp"
-#include "app/session/given_calibration.hpp"
 #include "app/session/session_files.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -101,23 +100,6 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
 }
 
-TEST(StartingCalibration, ofAFileWithAnotherBaselineTheUserHears) {
-  const test::TemporaryFolder folder;
-  const Configuration c = configuration(folder);
-  const auto remarks_for = [&](double baseline) {
-    CalibrationFile file = found(c, 0);
-    apply_use({.baseline = baseline}, &file.rig);
-    write_calibration(folder / "mine.yaml", file);
-    return starting_calibration(c, {.file = folder / "mine.yaml"}, kSerials).remarks;
-  };
-  EXPECT_TRUE(remarks_for(0.755).empty());
-  ASSERT_EQ(remarks_for(0.3).size(), 1U);
-  EXPECT_NE(remarks_for(0.3)[0].find("mine.yaml: has a baseline of 0.3 m, the configuration says "
-                                     "0.750003 m: all lengths go by the file"),
-            std::string::npos)
-      << remarks_for(0.3)[0];
-}
-
 TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   const test::TemporaryFolder folder;
   Configuration c = configuration(folder, "gige");
@@ -127,59 +109,6 @@ TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::none);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::unconfirmed);
-}
-
-TEST(NominalGeometry, isParallelButForCamerasMountedFartherThanTheGates) {
-  RigCalibration mounted;
-  mounted.cameras = 3;
-  mounted.T_camera_left[1] = {exp_so3({0, 0.05, 0}), Vec3(-0.5, 0.01, 0)};
-  mounted.T_camera_left[2] = {exp_so3({0.5, 0, 0}), Vec3(0, -0.3, 0)};  // below, looking up
-  mounted.baseline = mounted.T_camera_left[1].t.norm();
-  RigCalibration given = mounted;
-  given.baseline = 2 * mounted.baseline;  // measured twice too long
-  const RigCalibration nominal = nominal_geometry(given, mounted, {});
-  EXPECT_EQ(nominal.T_camera_left[1].R, Mat3(Mat3::Identity()));
-  EXPECT_EQ(nominal.T_camera_left[1].t, Vec3(-given.baseline, 0, 0));
-  EXPECT_EQ(nominal.T_camera_left[2].R, mounted.T_camera_left[2].R);
-  EXPECT_TRUE(nominal.T_camera_left[2].t.isApprox(2 * mounted.T_camera_left[2].t, 1e-12));
-}
-
-const std::string kKalibr = R"(cam0:
-  {camera_model: pinhole, distortion_model: none, distortion_coeffs: [], intrinsics: [460, 460, 320, 240], resolution: [640, 480]}
-cam1:
-  {camera_model: pinhole, distortion_model: none, distortion_coeffs: [], intrinsics: [461, 461, 321, 241], resolution: [640, 480],
-   T_cn_cnm1: [[1, 0, 0, -0.3], [0, 1, 0, 0.003], [0, 0, 1, 0], [0, 0, 0, 1]]}
-)";
-
-const std::string kOpenCv = R"(cameraMatrix1: [[460, 0, 320], [0, 460, 240], [0, 0, 1]]
-cameraMatrix2: [[461, 0, 321], [0, 461, 241], [0, 0, 1]]
-distCoeffs1: [0, 0, 0, 0]
-distCoeffs2: [0, 0, 0, 0]
-R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-T: [-0.3, 0, 0]
-)";
-
-const std::string kOurs = R"({version: 1, cameras: [
-{size: [640, 480], model: pinhole-radtan, intrinsics: [460, 460, 320, 240]},
-{size: [640, 480], model: pinhole-radtan, intrinsics: [461, 461, 321, 241], T_camera_left: [1, 0, 0, -0.3, 0, 1, 0, 0, 0, 0, 1, 0]}]}
-)";
-
-CalibrationFile read(const std::filesystem::path& file, const CalibrationUse& use = {}) {
-  std::vector<std::string> remarks;
-  return read_given_calibration(file.string(), use, ImageSize{640, 480}, &remarks);
-}
-
-TEST(GivenCalibration, theBaselineOfTheCommandLineCountsForEveryFormat) {
-  const test::TemporaryFolder folder;
-  for (const auto& [name, text] :
-       {std::pair{"chain.yaml", kKalibr}, {"stereo.yml", kOpenCv}, {"ours.yaml", kOurs}}) {
-    const auto file = folder.write(name, text);
-    const RigCalibration rig = read(file, {.baseline = 0.6}).rig;
-    EXPECT_EQ(rig.baseline, 0.6) << name;
-    EXPECT_NEAR(rig.T_camera_left[1].t.norm(), 0.6, 1e-12) << name;
-    EXPECT_EQ(read(file, {.length_only = true}).rig.T_camera_left[1].t.y(), 0)
-        << name << ": from scratch no place is read";
-  }
 }
 
 /// Frames that nobody can read: each pass is over at once.

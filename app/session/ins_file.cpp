@@ -1,0 +1,193 @@
+#include "app/session/ins_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <span>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "app/datasets/decimal.hpp"
+#include "app/datasets/text_file.hpp"
+#include "core/math/angle.hpp"
+
+namespace vergence::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kQuaternionLength =
+    0.02;  // how far from 1: nine decimals keep it far closer, other columns rarely do
+constexpr std::array<std::string_view, 4> kFixes{"none", "dead_reckoning", "fix_2d", "fix_3d"};
+constexpr std::size_t kColumns = 23;
+static_assert(std::count(kInsHeader.begin(), kInsHeader.end(), ',') + 1 == kColumns);
+
+template <std::size_t N>
+bool finite(const std::array<double, N>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+void append_sigma(std::string* line, double sigma, double unit) {
+  *line += ',';
+  if (sigma > 0 && std::isfinite(sigma))
+    fmt::format_to(std::back_inserter(*line), "{:.6g}", sigma * unit);
+}
+
+/// One line on its way in: its columns one after the other, each refused with file:line.
+class Columns {
+ public:
+  Columns(const fs::path& file, std::size_t line, std::span<const std::string_view> fields)
+      : file_(file), line_(line), fields_(fields) {}
+
+  [[nodiscard]] std::int64_t integer(const char* what, std::int64_t least, std::int64_t most) {
+    const std::string_view field = fields_[next_++];
+    const auto value = parse_integer(field);
+    if (!value || *value < least || *value > most) refuse(field, what);
+    return *value;
+  }
+  [[nodiscard]] std::int64_t integer_or_nothing(const char* what, std::int64_t least,
+                                                std::int64_t most) {
+    if (!fields_[next_].empty()) return integer(what, least, most);
+    ++next_;
+    return 0;
+  }
+  /// False: all of them are empty.
+  template <std::size_t N>
+  [[nodiscard]] bool numbers(const char* what, std::array<double, N>* values) {
+    const auto mine = fields_.subspan(next_, N);
+    next_ += N;
+    if (std::all_of(mine.begin(), mine.end(), [](std::string_view f) { return f.empty(); }))
+      return false;
+    for (std::size_t i = 0; i < N; ++i)
+      if (!parse_number(mine[i], &(*values)[i])) refuse(mine[i], what);
+    return true;
+  }
+  [[nodiscard]] double sigma() {
+    std::array<double, 1> value{};
+    if (numbers("a sigma", &value) && value[0] < 0) refuse(fields_[next_ - 1], "a sigma");
+    return value[0];
+  }
+  [[nodiscard]] FixStatus fix() {
+    const auto found = std::find(kFixes.begin(), kFixes.end(), fields_[next_++]);
+    if (found == kFixes.end()) refuse(fields_[next_ - 1], "none, dead_reckoning, fix_2d or fix_3d");
+    return static_cast<FixStatus>(found - kFixes.begin());
+  }
+  [[noreturn]] void refuse(std::string_view field, const char* what) const {
+    app::refuse(file_, line_, "`" + std::string(field.substr(0, 40)) + "` is not " + what);
+  }
+  [[noreturn]] void refuse(const std::string& sentence) const {
+    app::refuse(file_, line_, sentence);
+  }
+
+ private:
+  const fs::path& file_;
+  std::size_t line_;
+  std::span<const std::string_view> fields_;
+  std::size_t next_ = 0;
+};
+
+InsRecord parse(Columns columns) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  InsRecord r;
+  InsSample& s = r.sample;
+  s.stamp = Stamp(columns.integer("a stamp in whole nanoseconds", 0, kMost));
+  s.stamp_error = Duration::nanoseconds(columns.integer("a bound in whole nanoseconds", 0, kMost));
+  s.number = static_cast<std::uint64_t>(columns.integer("a reading's number", 0, kMost));
+  s.fix = columns.fix();
+  std::array<double, 3> place{};
+  if (columns.numbers("a coordinate", &place)) {
+    s.position = {place[0], place[1], place[2]};
+    if (!s.position.plausible()) columns.refuse("the position is no place on the earth");
+  } else {
+    s.fix = FixStatus::none;
+  }
+  s.velocity_valid = columns.numbers("a velocity", &s.velocity_enu);
+  s.attitude_valid = columns.numbers("a part of a quaternion", &s.q_enu_ins);
+  const auto& q = s.q_enu_ins;
+  const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
+  if (!(std::abs(length - 1) <= kQuaternionLength))
+    columns.refuse(fmt::format("the quaternion has length {:.3g} and not 1", length));
+  s.position_sigma = columns.sigma();
+  s.height_sigma = columns.sigma();
+  s.velocity_sigma = columns.sigma();
+  s.tilt_sigma = columns.sigma() / kDegreesPerRadian;
+  s.heading_sigma = columns.sigma() / kDegreesPerRadian;
+  r.quality.status = static_cast<std::uint32_t>(
+      columns.integer("a status word", 0, std::numeric_limits<std::uint32_t>::max()));
+  r.quality.satellites =
+      static_cast<std::uint8_t>(columns.integer_or_nothing("a number of satellites", 0, 255));
+  r.quality.filter_valid = columns.integer("0 or 1", 0, 1) != 0;
+  r.quality.utc_ns = columns.integer_or_nothing("a time in whole nanoseconds", 0, kMost);
+  r.quality.utc_valid = r.quality.utc_ns != 0;
+  return r;
+}
+
+}  // namespace
+
+void format_ins_record(const InsRecord& record, std::string* line) {
+  const InsSample& s = record.sample;
+  const InsQuality& q = record.quality;
+  line->clear();
+  const auto out = std::back_inserter(*line);
+  fmt::format_to(out, "{},{},{},{}", s.stamp.ns(), s.stamp_error.ns(), s.number,
+                 kFixes[static_cast<std::size_t>(s.fix)]);
+  if (s.fix != FixStatus::none && s.position.plausible())
+    fmt::format_to(out, ",{:.10f},{:.10f},{:.5f}", s.position.latitude_deg,
+                   s.position.longitude_deg, s.position.height_m);
+  else
+    *line += ",,,";
+  const bool velocity = s.velocity_valid && finite(s.velocity_enu),
+             attitude = s.attitude_valid && finite(s.q_enu_ins);
+  for (const double v : s.velocity_enu)
+    velocity ? fmt::format_to(out, ",{:.6f}", v) : fmt::format_to(out, ",");
+  for (const double v : s.q_enu_ins)
+    attitude ? fmt::format_to(out, ",{:.9f}", v) : fmt::format_to(out, ",");
+  append_sigma(line, s.position_sigma, 1);
+  append_sigma(line, s.height_sigma, 1);
+  append_sigma(line, s.velocity_sigma, 1);
+  append_sigma(line, s.tilt_sigma, kDegreesPerRadian);
+  append_sigma(line, s.heading_sigma, kDegreesPerRadian);
+  fmt::format_to(out, ",{},", q.status);
+  if (q.satellites != 0) fmt::format_to(out, "{}", q.satellites);
+  fmt::format_to(out, ",{},", q.filter_valid ? 1 : 0);
+  if (q.utc_valid && q.utc_ns > 0) fmt::format_to(out, "{}", q.utc_ns);
+  *line += '\n';
+}
+
+fs::path find_ins_file(const fs::path& path) {
+  std::error_code ignored;
+  const fs::path file = fs::is_directory(path, ignored) ? path / "ins.csv" : path;
+  if (!fs::is_regular_file(file, ignored)) return {};
+  std::ifstream in(file, std::ios::binary);
+  std::string head(kInsHeader.size(), '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  return file.filename() == "ins.csv" || (in && head == kInsHeader) ? file : fs::path{};
+}
+
+std::vector<InsRecord> read_ins_file(const fs::path& file) {
+  std::string text = read_text(file);
+  text.resize(text.rfind('\n') + 1);  // npos + 1 is 0
+  Lines lines(text);
+  std::string_view line;
+  if (!lines.next(&line) || line != kInsHeader)
+    refuse(file, 1, "is not the head of an ins.csv as `vergence run` writes it");
+  std::vector<InsRecord> records;
+  while (lines.next(&line)) {
+    std::array<std::string_view, kColumns> fields;
+    const std::size_t count = split(line, ',', fields);
+    if (count != kColumns)
+      refuse(file, lines.number(),
+             fmt::format("has {} columns where a reading has {}", count, kColumns));
+    const InsRecord record = parse(Columns(file, lines.number(), fields));
+    if (records.empty() || records.back().sample.stamp < record.sample.stamp)
+      records.push_back(record);
+  }
+  if (records.empty()) refuse(file, 0, "has no reading in it");
+  return records;
+}
+
+}  // namespace vergence::app

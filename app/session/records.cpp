@@ -1,0 +1,395 @@
+#include "app/session/records.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <iterator>
+#include <numbers>
+#include <string_view>
+#include <variant>
+
+#include <fmt/format.h>
+
+#include "app/datasets/decimal.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/terminal_text.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app {
+
+LineFile::LineFile(const std::filesystem::path& file, std::size_t pending)
+    : path_(file),
+      pending_(pending),
+      fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644)) {
+  if (fd_ < 0)
+    throw InputError(file.string() + ": cannot be written (" + std::strerror(errno) +
+                     "): check that disk and the folder's permissions");
+  waiting_.reserve(pending_);
+}
+
+LineFile::~LineFile() { close(); }
+
+bool LineFile::append(std::string_view line) {
+  const auto fits = [&] { return waiting_.size() + line.size() <= pending_; };
+  // A full buffer between two of the owner's flushes is no sign of a full disk.
+  if (!fits() && (fault_ != 0 || !flush() || !fits())) {
+    ++lost_lines_;
+    return false;
+  }
+  waiting_.append(line);
+  return true;
+}
+
+bool LineFile::flush() {
+  if (fd_ < 0) return false;
+  std::size_t done = 0;
+  fault_ = pretend_full_ && !waiting_.empty() ? ENOSPC : 0;
+  while (done < waiting_.size() && fault_ == 0) {
+    const ssize_t n = ::write(fd_, waiting_.data() + done, waiting_.size() - done);
+    if (n > 0)
+      done += static_cast<std::size_t>(n);
+    else if (n == 0 || errno != EINTR)
+      fault_ = n == 0 ? ENOSPC : errno;
+  }
+  waiting_.erase(0, done);
+  return fault_ == 0;
+}
+
+void LineFile::write_back() noexcept {
+  (void)::sync_file_range(fd_, 0, 0, SYNC_FILE_RANGE_WRITE);  // a pipe refuses: nothing is lost
+}
+
+bool LineFile::close() {
+  if (fd_ < 0) return fault_ == 0;
+  // Pipes cannot be synchronised and report EINVAL, which is no loss.
+  if (flush() && ::fdatasync(fd_) != 0 && errno != EINVAL) fault_ = errno;
+  if (::close(fd_) != 0 && fault_ == 0) fault_ = errno;
+  fd_ = -1;
+  return fault_ == 0;
+}
+
+namespace {
+
+/// The words of events.jsonl, in the order of EstimatorEvent::Kind.
+const char* kind_word(EstimatorEvent::Kind kind) noexcept {
+  switch (kind) {
+    case EstimatorEvent::Kind::state:
+      return "state";
+    case EstimatorEvent::Kind::scene_restarted:
+      return "scene_restarted";
+    case EstimatorEvent::Kind::time_gap:
+      return "time_gap";
+    case EstimatorEvent::Kind::relocalised:
+      return "relocalised";
+    case EstimatorEvent::Kind::dropped:
+      return "dropped";
+    case EstimatorEvent::Kind::rig_changed:
+      return "rig_changed";
+    case EstimatorEvent::Kind::in_step:
+      return "in_step";
+    case EstimatorEvent::Kind::calibration_confirmed:
+      return "calibration_confirmed";
+    case EstimatorEvent::Kind::calibration_contradicted:
+      return "calibration_contradicted";
+    case EstimatorEvent::Kind::focal_length_contradicted:
+      return "focal_length_contradicted";
+    case EstimatorEvent::Kind::calibration_accepted:
+      return "calibration_accepted";
+    case EstimatorEvent::Kind::calibration_rejected:
+      return "calibration_rejected";
+    case EstimatorEvent::Kind::calibration_taken_up:
+      return "calibration_taken_up";
+    case EstimatorEvent::Kind::calibration_waits:
+      return "calibration_waits";
+    case EstimatorEvent::Kind::calibration_resumed:
+      return "calibration_resumed";
+  }
+  return "";
+}
+
+/// What stands before the reason that the estimator gives.
+const char* opening(EstimatorEvent::Kind kind) noexcept {
+  switch (kind) {
+    case EstimatorEvent::Kind::calibration_accepted:
+      return "a new calibration is in use";
+    case EstimatorEvent::Kind::calibration_rejected:
+      return "a calibration was rejected";
+    case EstimatorEvent::Kind::calibration_waits:
+      return "the calibration waits";
+    case EstimatorEvent::Kind::calibration_resumed:
+      return "the last calibration is in use again";
+    default:
+      return "";
+  }
+}
+
+/// As much of the text as fits, in whole UTF-8 characters, with a 0 behind it.
+template <std::size_t N>
+void copy_text(std::string_view text, std::array<char, N>* out) noexcept {
+  std::size_t n = std::min(text.size(), N - 1);
+  if (n < text.size())
+    while (n > 0 && (static_cast<unsigned char>(text[n]) & 0xc0U) == 0x80U) --n;
+  std::copy_n(text.begin(), n, out->begin());
+  (*out)[n] = 0;
+}
+
+}  // namespace
+
+FrameReport FrameReport::of(const PoseSample& sample, float decode_ms,
+                            const std::optional<Transform>& T_reference_left) noexcept {
+  FrameReport r;
+  r.pose = sample;
+  r.decode_ms = decode_ms;
+  r.T_reference_left = T_reference_left;
+  return r;
+}
+
+FrameReport FrameReport::of(const ComparedPose& pose, float decode_ms) noexcept {
+  return {pose, decode_ms,
+          pose.ins_valid ? std::optional(pose.reference.T_enu_left) : std::nullopt};
+}
+
+std::array<double, 4> FrameReport::error() const noexcept {
+  // A compass counts clockwise, a yaw the other way.
+  return {error_enu.x(), error_enu.y(), error_enu.z(), -error_yaw * (180.0 / std::numbers::pi)};
+}
+
+void EventRecord::set_sentence(std::string_view text) noexcept { copy_text(text, &sentence); }
+
+EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
+  EventRecord r;
+  r.stamp = event.stamp;
+  r.kind = kind_word(event.kind);
+  const bool state = event.kind == EstimatorEvent::Kind::state;
+  if (state) {
+    std::array<char, 256> text{};
+    const auto from = to_string(event.from), to = to_string(event.to);
+    (void)std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()),
+                        from.data(), static_cast<int>(to.size()), to.data(), event.why);
+    r.set_sentence(text.data());
+    // The words are string literals: views of them end with 0.
+    r.fields[0] = {"from", from.data()};
+    r.fields[1] = {"to", to.data()};
+  } else {
+    const char* begin = opening(event.kind);
+    const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
+    std::array<char, 256> text{};
+    if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
+      (void)std::snprintf(text.data(), text.size(), "%s: its depths are off by %.1f %%", why,
+                          event.value);
+    else if (event.kind == EstimatorEvent::Kind::focal_length_contradicted)
+      (void)std::snprintf(text.data(), text.size(), "%s: the drive measures %.0f px", why,
+                          event.value);
+    else
+      (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
+                          *begin != 0 && *why != 0 ? ": " : "", why);
+    r.set_sentence(text.data());
+    r.fields[0] = {"value", event.value};
+  }
+  return r;
+}
+
+CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stamp,
+                                           const char* cause, std::string_view origin) noexcept {
+  CalibrationRecord r;
+  r.stamp = stamp;
+  r.accepted = true;
+  r.calibration = rig;
+  r.decided = false;
+  r.began_as = cause;
+  copy_text(origin, &r.origin);
+  return r;
+}
+
+namespace {
+
+/// east … heading_deg, a comma before each; empty where there is nothing.
+void append_earth(std::string* line, bool valid, const EarthPose& e) {
+  if (!valid) {
+    *line += ",,,,,,,";
+    return;
+  }
+  const auto out = std::back_inserter(*line);
+  for (const double v : e.T_enu_left.t) fmt::format_to(out, ",{:.4f}", v);
+  // 1e-9 degrees are a tenth of a millimetre.
+  fmt::format_to(out, ",{:.9f},{:.9f},{:.4f},{:.4f}", e.position.latitude_deg,
+                 e.position.longitude_deg, e.position.height_m, compass_heading_deg(e.yaw));
+}
+
+/// x y z qx qy qz qw, `between` before each.
+void append_transform(std::string* line, const Transform& T, char between) {
+  const auto out = std::back_inserter(*line);
+  const Eigen::Quaterniond q = quaternion(T.R);
+  for (const double v : {T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(), q.z(), q.w()})
+    fmt::format_to(out, "{}{:.9f}", between, v);
+}
+
+}  // namespace
+
+void format_frame(const FrameReport& r, std::string* line) {
+  const PoseSample& p = r.pose;
+  const bool posed = p.status != PoseStatus::lost;
+  line->clear();
+  const auto out = std::back_inserter(*line);
+  fmt::format_to(out, "{},{},{},{},{}", p.frame, p.stamp.ns(), to_string(p.state),
+                 to_string(p.status), to_string(p.reason));
+  if (posed)
+    append_transform(line, p.T_world_left, ',');
+  else
+    *line += ",,,,,,,";
+  append_earth(line, r.placed, r.ours);
+  append_earth(line, r.ins_valid, r.reference);
+  for (const double v : r.error())
+    if (r.compared)
+      fmt::format_to(out, ",{:.4f}", v);
+    else
+      *line += ',';
+  fmt::format_to(out, ",{}", p.inliers);
+  if (posed)
+    fmt::format_to(out, ",{:.4f}", p.reprojection_px);
+  else
+    *line += ',';
+  fmt::format_to(out, ",{:.3f}\n", p.estimate_ms);
+}
+
+void format_tum(Stamp stamp, const Transform& T, std::string* line) {
+  line->clear();
+  append_seconds(line, stamp.ns());
+  append_transform(line, T, ' ');
+  *line += '\n';
+}
+
+namespace {
+
+/// A comma and a number for each; commas alone where all are zero, which stands for "not given".
+template <std::size_t N>
+void append_sigmas(std::string* line, const std::array<double, N>& values) {
+  const bool given = std::any_of(values.begin(), values.end(), [](double v) { return v > 0; });
+  for (const double v : values)
+    if (given)
+      fmt::format_to(std::back_inserter(*line), ",{:.9f}", v);
+    else
+      *line += ',';
+}
+
+/// The first four coefficients and their sigmas.
+void append_distortion(std::string* line, const Intrinsics& lens) {
+  std::array<double, 4> sigma{};
+  std::copy_n(lens.distortion_sigma.begin(), sigma.size(), sigma.begin());
+  for (std::size_t i = 0; i < sigma.size(); ++i)
+    fmt::format_to(std::back_inserter(*line), ",{:.9f}", lens.distortion[i]);
+  append_sigmas(line, sigma);
+}
+
+/// A comma, and a word or sentence as one field.
+void append_field(std::string* line, std::string_view text) {
+  *line += ',';
+  for (const char c : text) *line += c == ',' || c == '\n' || c == '"' ? ';' : c;
+}
+
+}  // namespace
+
+void format_calibration(const CalibrationRecord& c, int camera, std::string* line) {
+  const auto k = static_cast<std::size_t>(camera);
+  const RigCalibration& rig = c.calibration;
+  line->clear();
+  const auto out = std::back_inserter(*line);
+  fmt::format_to(out, "{},{}", c.stamp.ns(),
+                 c.accepted ? "accepted"
+                 : c.learnt ? "kept"
+                            : "rejected");
+  append_field(line, c.cause_word());
+  append_field(line, c.why());
+  fmt::format_to(out, ",{}", rig.frames);
+  if (c.decided)
+    fmt::format_to(out, ",{},{},{:.4f},{:.4f},{:.4f},{:.6f}", c.latency_frames, c.onset_frame,
+                   rig.reprojection_px, c.held_out_before_px, c.held_out_after_px, rig.scale_sigma);
+  else
+    fmt::format_to(out, ",,,{:.4f},,,{:.6f}", rig.reprojection_px, rig.scale_sigma);
+  const Transform& T = rig.T_camera_left[k];
+  const Vec3 phi = log_so3(T.R);
+  fmt::format_to(out, ",{}", k);
+  for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()})
+    fmt::format_to(out, ",{:.9f}", v);
+  append_sigmas(line, rig.sigma_noise[k]);
+  append_sigmas(line, rig.sigma_wide[k]);
+  const Intrinsics& lens = rig.intrinsics[k];
+  fmt::format_to(out, ",{:.5f},{:.5f},{:.5f},{:.5f}", lens.fx, lens.fy, lens.cx, lens.cy);
+  append_sigmas(line, lens.sigma);
+  append_distortion(line, lens);
+  append_distortion(line, rig.intrinsics[0]);
+  if (c.decided && c.judged_depth_m > 0)
+    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.judged_depth_m, c.depth_sigma_percent,
+                   c.depth_difference_percent, c.verified, c.lenses);
+  else
+    *line += ",,,,,";
+  *line += '\n';
+}
+
+namespace {
+
+void append_text(std::string* line, std::string_view text) {
+  constexpr std::string_view kReplacement = "\xef\xbf\xbd";
+  *line += '"';
+  while (!text.empty()) {
+    const std::size_t n = utf8_length(text);
+    const char c = text.front();
+    if (n == 0)
+      *line += kReplacement;
+    else if (c == '"' || c == '\\')
+      (*line += '\\') += c;
+    else if (static_cast<unsigned char>(c) < 0x20)
+      fmt::format_to(std::back_inserter(*line), "\\u{:04x}", static_cast<unsigned>(c));
+    else
+      *line += text.substr(0, n);
+    text.remove_prefix(n == 0 ? 1 : n);
+  }
+  *line += '"';
+}
+
+void append_value(std::string* line, std::int64_t value) {
+  fmt::format_to(std::back_inserter(*line), "{}", value);
+}
+
+/// The shortest digits that read back the same; always recognisable as a number with a point.
+void append_value(std::string* line, double value) {
+  if (!std::isfinite(value)) {
+    *line += "null";
+    return;
+  }
+  const std::size_t begin = line->size();
+  fmt::format_to(std::back_inserter(*line), "{}", value);
+  if (line->find_first_of(".e", begin) == std::string::npos) *line += ".0";
+}
+
+void append_value(std::string* line, const char* value) { append_text(line, value); }
+
+}  // namespace
+
+void format_event(const EventRecord& event, std::string* line) {
+  line->clear();
+  fmt::format_to(std::back_inserter(*line), "{{\"stamp_ns\":{},\"kind\":", event.stamp.ns());
+  append_text(line, event.kind);
+  *line += ",\"sentence\":";
+  append_text(line, event.sentence.data());
+  *line += ",\"fields\":{";
+  bool any = false;
+  for (const EventField& f : event.fields) {
+    if (f.name == nullptr) continue;
+    if (any) *line += ',';
+    any = true;
+    append_text(line, f.name);
+    *line += ':';
+    std::visit([line](auto value) { append_value(line, value); }, f.value);
+  }
+  *line += "}}\n";
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,83 @@
+#include "app/session/session_totals.hpp"
+
+#include <cmath>
+
+namespace vergence::app {
+
+void WorkDropped::add(const FrameEffort& effort) noexcept {
+  if (effort.whole()) return;
+  ++frames;
+  const bool window = effort.window_keyframes > 0 && effort.window_steps > 0;
+  points += effort.points_percent < 100 ? 1 : 0;
+  keyframes += window && effort.window_keyframes != FrameEffort::kAll ? 1 : 0;
+  steps += window && effort.window_steps != FrameEffort::kAll ? 1 : 0;
+  windows += window ? 0 : 1;
+}
+
+TotalsBuilder::TotalsBuilder() { totals_.attempts.reserve(kMostAttempts); }
+
+std::size_t TotalsBuilder::memory() const noexcept {
+  return totals_.attempts.capacity() * sizeof(CalibrationAttempt);
+}
+
+void TotalsBuilder::add(const FrameReport& report) {
+  const PoseSample& p = report.pose;
+  newest_ = p.stamp;
+  newest_frame_ = p.frame;
+  ++totals_.read;
+  match_confirmed();
+  ++(p.status == PoseStatus::ok         ? totals_.ok
+     : p.status == PoseStatus::degraded ? totals_.degraded
+                                        : totals_.lost);
+  totals_.estimate.add(static_cast<double>(p.estimate_ms));
+  if (p.state != State::stereo_odometry && p.state != State::lost)
+    totals_.calibrating.add(static_cast<double>(p.estimate_ms));
+  totals_.decode.add(static_cast<double>(report.decode_ms));
+  totals_.work_dropped.add(p.effort);
+  for (std::size_t i = 0; i < p.stage_ms.size(); ++i)
+    totals_.stages[i].add(static_cast<double>(p.stage_ms[i]));
+  if (p.status == PoseStatus::lost) return;
+  const Vec3& t = p.T_world_left.t;
+  if (last_position_) {
+    const Vec3 step = t - *last_position_;
+    totals_.path_m += std::hypot(step.x(), step.y(), step.z());
+  }
+  last_position_ = t;
+}
+
+/// An event comes before the pose of its frame, or after the last one.
+void TotalsBuilder::match_confirmed() {
+  if (totals_.confirmed == newest_ && !totals_.confirmed_frame && totals_.read > 0)
+    totals_.confirmed_frame = newest_frame_;
+}
+
+void TotalsBuilder::add(const EventRecord& e) {
+  const std::string_view kind = e.kind;
+  if (kind == "calibration_confirmed" && !totals_.confirmed) {
+    totals_.confirmed = e.stamp;
+    match_confirmed();
+  } else if (kind == "calibration_contradicted" && !totals_.contradicted) {
+    const double* percent = std::get_if<double>(&e.fields[0].value);
+    totals_.contradicted = {e.stamp, percent != nullptr ? *percent : 0.0};
+  }
+}
+
+bool TotalsBuilder::add(const CalibrationRecord& c) {
+  if (c.focal.measured_px > 0) totals_.focal = c.focal;
+  if (c.learnt && !c.accepted) return false;  // the drive goes on: nothing was attempted
+  ++(c.accepted ? totals_.accepted : totals_.rejected);
+  if (totals_.attempts.size() == kMostAttempts) totals_.attempts.erase(totals_.attempts.begin());
+  const CalibrationAttempt attempt{c.stamp,          c.cause_word(),       c.reason,  c.accepted,
+                                   c.latency_frames, c.calibration.frames, c.solve_ms};
+  totals_.attempts.push_back(attempt);
+  if (FromScratch& search = totals_.from_scratch;
+      !search.found && attempt.cause == "from_scratch") {
+    if (attempt.accepted)
+      search.found = attempt;
+    else
+      ++search.rejected;
+  }
+  return c.accepted;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,137 @@
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/session/records.hpp"
+
+namespace vergence::app {
+
+/// Times in fixed memory, however many: mean and largest exact, percentiles to 0.25 %.
+///
+/// Bins grow by the factor 1 + 1/200 from 1 µs on; 4000 of them reach 460 s. Threads  One.
+class TimeHistogram {
+ public:
+  void add(double ms) noexcept {
+    if (!(ms >= 0)) return;  // NaN is no time
+    ++count_;
+    sum_ += ms;
+    max_ = std::max(max_, ms);
+    const double place = std::log(std::max(ms, kLeast) / kLeast) / kLogStep;
+    ++bins_[std::min(static_cast<std::size_t>(place), kBins - 1)];
+  }
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  /// ms; 0 without a time.
+  [[nodiscard]] double mean() const noexcept {
+    return count_ == 0 ? 0 : sum_ / static_cast<double>(count_);
+  }
+  [[nodiscard]] double max() const noexcept { return max_; }
+  /// The least time that at least the share q of all does not exceed: the middle of its bin, at
+  /// most max(). 0 without a time.
+  [[nodiscard]] double percentile(double q) const noexcept {
+    if (count_ == 0) return 0;
+    const auto requested = std::max<std::uint64_t>(
+        1, static_cast<std::uint64_t>(std::ceil(q * static_cast<double>(count_))));
+    std::uint64_t seen = 0;
+    for (std::size_t i = 0; i < kBins; ++i) {
+      seen += bins_[i];
+      if (seen >= requested)
+        return std::min(max_, kLeast * std::exp((static_cast<double>(i) + 0.5) * kLogStep));
+    }
+    return max_;
+  }
+
+ private:
+  static constexpr std::size_t kBins = 4000;
+  static constexpr double kLeast = 1e-3;                    // ms
+  static constexpr double kLogStep = 0.004987541511038968;  // ln(1.005)
+  std::array<std::uint32_t, kBins> bins_{};
+  std::uint64_t count_ = 0;
+  double sum_ = 0, max_ = 0;
+};
+
+/// One attempt to calibrate while driving.
+struct CalibrationAttempt {
+  Stamp stamp{};
+  std::string_view cause{}, reason{};  // CalibrationCause's word; why it was rejected: constants
+  bool accepted = false;
+  int latency_frames = 0, frames = 0;
+  double solve_ms = 0;
+};
+
+/// The search of a drive that began without a calibration.
+struct FromScratch {
+  std::optional<CalibrationAttempt> found{};  // the first that was accepted
+  std::uint64_t rejected = 0;                 // before it
+};
+
+/// The calibration in use was not that of the rig.
+struct Contradiction {
+  Stamp stamp{};
+  double depth_percent = 0;  // by which its depths were off
+};
+
+/// Frames whose time was over before their work was done (docs/realtime.md), and what was left out.
+struct WorkDropped {
+  std::uint64_t frames = 0, points = 0, keyframes = 0, steps = 0, windows = 0;
+
+  void add(const FrameEffort& effort) noexcept;
+};
+
+/// What a session has come to: for summary.json.
+struct SessionTotals {
+  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
+  TimeHistogram estimate, decode;                          // ms
+  TimeHistogram calibrating;  // ms, of the frames in other states than stereo_odometry and lost
+  std::array<TimeHistogram, kStages> stages;
+  std::vector<CalibrationAttempt> attempts;  // the newest kMostAttempts
+  std::uint64_t accepted = 0, rejected = 0;  // of all of them
+  FromScratch from_scratch{};
+  std::optional<Stamp> confirmed{};  // when the drive first confirmed the calibration in use
+  std::optional<std::uint64_t> confirmed_frame{};  // the frame of that stamp
+  std::optional<Contradiction>
+      contradicted{};                   // the first time that it showed another one than was in use
+  FocalMeasurement focal{};             // the newest
+  double path_m = 0;                    // sum of the steps between successive poses
+  std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum, read back
+  std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
+  std::uint64_t dropped_records = 0;    // the ring was full (live only)
+  std::uint64_t dropped_readings = 0;   // theirs was
+  std::uint64_t lost_lines = 0;         // the disk took no more
+  WorkDropped work_dropped{};
+  std::size_t ring_high_water = 0;
+  std::vector<std::string> faults;  // a sentence for each file that is not whole
+};
+
+inline constexpr std::size_t kMostAttempts = 1000;  // in summary.json; calibrations.csv has all
+
+/// Adds up what the records of a session come to. One thread; takes no memory but at construction:
+/// room for kMostAttempts.
+class TotalsBuilder {
+ public:
+  TotalsBuilder();
+
+  void add(const FrameReport& report);
+  void add(const EventRecord& event);
+  /// An attempt that was decided. True: it was accepted.
+  bool add(const CalibrationRecord& calibration);
+
+  [[nodiscard]] std::size_t memory() const noexcept;
+  [[nodiscard]] SessionTotals& totals() noexcept { return totals_; }
+
+ private:
+  void match_confirmed();
+
+  SessionTotals totals_{};
+  std::optional<Vec3> last_position_{};
+  Stamp newest_{};
+  std::uint64_t newest_frame_ = 0;
+};
+
+}  // namespace vergence::app

@@ -1,0 +1,149 @@
+#include "app/session/ins_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "app/session/recorder.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "tests/support/refusal.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::app {
+namespace {
+
+InsRecord reading(std::uint64_t number) {
+  InsRecord r;
+  r.sample.number = number;
+  r.sample.stamp = Stamp(1'577'836'800'123'456'789 + static_cast<std::int64_t>(number) * 8'333'333);
+  r.sample.stamp_error = Duration::nanoseconds(180'123);
+  r.sample.fix = FixStatus::fix_3d;
+  r.sample.position = {-27.4975123456, 153.0137654321, 61.12345};
+  r.sample.velocity_valid = r.sample.attitude_valid = true;
+  r.sample.velocity_enu = {12.345678, -0.5, 0.000001};
+  r.sample.q_enu_ins = {0.5, -0.5, 0.5, 0.5};
+  r.sample.position_sigma = 2.5;
+  r.sample.heading_sigma = 0.0174532925;
+  r.quality = {0xfe000007U, true, 1'577'836'800'100'000'000, 11, 0, true, false};
+  return r;
+}
+
+std::string line_of(const InsRecord& record) {
+  std::string line;
+  format_ins_record(record, &line);
+  return line;
+}
+
+const std::string kHead = std::string(kInsHeader) + "\n";
+
+/// The sentence that refuses the file; empty: it was taken.
+std::string refusal(const std::string& text) {
+  const test::TemporaryFolder folder;
+  return test::refusal_of([&] { (void)read_ins_file(folder.write("ins.csv", text)); });
+}
+
+TEST(InsFile, aReadingComesBackAsItWas) {
+  const test::TemporaryFolder folder;
+  InsRecord bare;
+  bare.sample.number = 8;
+  bare.sample.stamp = reading(8).sample.stamp;
+  const auto read =
+      read_ins_file(folder.write("ins.csv", kHead + line_of(reading(7)) + line_of(bare)));
+  ASSERT_EQ(read.size(), 2U);
+  const InsRecord &a = read[0], b = reading(7);
+  EXPECT_EQ(a.sample.stamp, b.sample.stamp);
+  EXPECT_EQ(a.sample.stamp_error.ns(), 180'123);
+  EXPECT_EQ(a.sample.number, 7U);
+  EXPECT_EQ(a.sample.fix, FixStatus::fix_3d);
+  EXPECT_NEAR(a.sample.position.latitude_deg, b.sample.position.latitude_deg, 1e-10);
+  EXPECT_NEAR(a.sample.position.longitude_deg, b.sample.position.longitude_deg, 1e-10);
+  EXPECT_NEAR(a.sample.position.height_m, b.sample.position.height_m, 1e-5);
+  EXPECT_TRUE(a.sample.velocity_valid && a.sample.attitude_valid);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(a.sample.velocity_enu[i], b.sample.velocity_enu[i], 1e-6);
+  EXPECT_EQ(a.sample.q_enu_ins, b.sample.q_enu_ins);
+  EXPECT_EQ(a.sample.position_sigma, 2.5);
+  EXPECT_EQ(a.sample.height_sigma, 0);
+  EXPECT_NEAR(a.sample.heading_sigma, b.sample.heading_sigma, 1e-7);
+  EXPECT_EQ(a.quality.status, 0xfe000007U);
+  EXPECT_EQ(a.quality.satellites, 11);
+  EXPECT_TRUE(a.quality.filter_valid && a.quality.utc_valid);
+  EXPECT_EQ(a.quality.utc_ns, b.quality.utc_ns);
+  EXPECT_EQ(read[1].sample.fix, FixStatus::none);
+  EXPECT_FALSE(read[1].sample.velocity_valid || read[1].sample.attitude_valid ||
+               read[1].quality.utc_valid);
+}
+
+TEST(InsFile, hostileLinesAreRefusedWithTheirPlace) {
+  const std::string good = line_of(reading(1));
+  ASSERT_TRUE(refusal(kHead + good).empty());
+  const auto with = [&](std::size_t column, const std::string& value) {
+    std::vector<std::string> fields(1);
+    for (const char c : good.substr(0, good.size() - 1))
+      if (c == ',')
+        fields.emplace_back();
+      else
+        fields.back() += c;
+    fields[column] = value;
+    std::string line;
+    for (const std::string& f : fields) line += (line.empty() ? "" : ",") + f;
+    return refusal(kHead + line_of(reading(0)) + line + "\n");
+  };
+  EXPECT_TRUE(
+      test::contains(with(0, "1.5"), "ins.csv:3: `1.5` is not a stamp in whole nanoseconds"))
+      << with(0, "1.5");
+  EXPECT_TRUE(test::contains(with(0, "99999999999999999999"), "is not a stamp"));
+  EXPECT_TRUE(test::contains(with(1, "-1"), "is not a bound"));
+  EXPECT_TRUE(test::contains(with(3, "great"), "`great` is not none, dead_reckoning"));
+  EXPECT_TRUE(test::contains(with(4, "153"), "no place on the earth"));
+  EXPECT_TRUE(test::contains(with(5, ""), "`` is not a coordinate"));
+  EXPECT_TRUE(test::contains(with(7, "nan"), "`nan` is not a velocity"));
+  EXPECT_TRUE(test::contains(with(10, "7"), "the quaternion has length"));
+  EXPECT_TRUE(test::contains(with(10, "1e308"), "the quaternion has length"));
+  EXPECT_TRUE(test::contains(with(14, "-2"), "`-2` is not a sigma"));
+  EXPECT_TRUE(test::contains(with(19, "4294967296"), "is not a status word"));
+  EXPECT_TRUE(test::contains(with(20, "256"), "is not a number of satellites"));
+  EXPECT_TRUE(test::contains(with(21, "yes"), "`yes` is not 0 or 1"));
+  EXPECT_TRUE(test::contains(with(22, "later"), "is not a time"));
+  EXPECT_TRUE(test::contains(with(22, "1,2"), "has 24 columns where a reading has 23"));
+  EXPECT_TRUE(test::contains(refusal(kHead + "1,2\n"), "ins.csv:2: has 2 columns"));
+  EXPECT_TRUE(test::contains(refusal("a,b\n" + good), "ins.csv:1: is not the head"));
+  EXPECT_TRUE(test::contains(refusal(""), "is not the head"));
+  EXPECT_TRUE(test::contains(refusal(kHead), "has no reading in it"));
+  EXPECT_TRUE(
+      test::contains(refusal(kHead + good.substr(0, good.size() - 1)), "has no reading in it"))
+      << "torn";
+}
+
+TEST(InsFile, isFoundInAFolderOrByItsHead) {
+  const test::TemporaryFolder folder;
+  EXPECT_TRUE(find_ins_file(folder.path()).empty());
+  EXPECT_TRUE(find_ins_file(folder / "none").empty());
+  EXPECT_TRUE(find_ins_file(folder.write("a.tum", "1 0 0 0 0 0 0 1\n")).empty());
+  EXPECT_EQ(find_ins_file(folder.write("renamed.csv", kHead)), folder / "renamed.csv");
+  folder.write("ins.csv", kHead);
+  EXPECT_EQ(find_ins_file(folder.path()), folder / "ins.csv");
+}
+
+TEST(InsFile, theRecorderWritesEveryReadingAndThePostingThreadTakesNoMemory) {
+  const test::TemporaryFolder folder;
+  constexpr std::uint64_t kReadings = 5000;
+  Recorder recorder(folder.path(), {.ins = true});
+  std::string expected = kHead;
+  const auto before = AllocationGuard::allocations_after_seal();
+  AllocationGuard::seal_thread();
+  for (std::uint64_t i = 0; i < kReadings; ++i) recorder.on_reading(reading(i));
+  AllocationGuard::unseal_thread();
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  const auto totals = recorder.close();
+  for (std::uint64_t i = 0; i < kReadings; ++i) expected += line_of(reading(i));
+  EXPECT_EQ(test::read_file(folder / "ins.csv"), expected);
+  EXPECT_EQ(totals->dropped_readings, 0U);
+}
+
+}  // namespace
+}  // namespace vergence::app

@@ -1,0 +1,94 @@
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <functional>
+
+#include <nlohmann/json.hpp>
+
+#include "app/session/recorder.hpp"
+#include "app/session/records.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/session/recorder_inputs.hpp"
+
+namespace vergence::app {
+namespace {
+
+TEST(Recorder, aFullDiskIsASentenceAndTheOtherFilesAreWhole) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_symlink("/dev/full", folder / "poses.csv");
+  Recorder recorder(folder.path(), {});
+  for (std::uint64_t i = 0; i < 10; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
+  const auto totals = recorder.close();
+  const auto errors = recorder.take_errors();
+  ASSERT_EQ(errors.size(), 1U);  // once, not for every line
+  EXPECT_NE(errors[0].find("poses.csv"), std::string::npos);
+  ASSERT_EQ(totals->faults.size(), 1U);
+  EXPECT_NE(totals->faults[0].find("poses.csv"), std::string::npos) << totals->faults[0];
+  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 10U);
+  EXPECT_EQ(totals->read, 10U);
+}
+
+/// Sentences of the events of one kind.
+std::vector<std::string> told(const std::filesystem::path& folder, const std::string& kind) {
+  std::vector<std::string> sentences;
+  for (const std::string& line : lines_of(folder / "events.jsonl")) {
+    const auto event = nlohmann::json::parse(line);
+    if (event["kind"] == kind) sentences.push_back(event["sentence"]);
+  }
+  return sentences;
+}
+
+/// Frames [first, last) of a drive find the disk full.
+std::function<bool(Stamp)> full_from_to(std::uint64_t first, std::uint64_t last) {
+  return [=](Stamp s) {
+    return s >= Stamp(kStamp + static_cast<std::int64_t>(first) * 50'000'000) &&
+           s < Stamp(kStamp + static_cast<std::int64_t>(last) * 50'000'000);
+  };
+}
+
+TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
+  const test::TemporaryFolder folder;
+  Recorder::Options options;
+  options.disk_full = full_from_to(20, 40);
+  Recorder recorder(folder.path(), options);
+  for (std::uint64_t i = 0; i < 100; ++i)
+    recorder.on_report(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  const auto totals = recorder.close();
+  EXPECT_TRUE(totals->faults.empty());
+  EXPECT_EQ(totals->lost_lines, 0U);
+  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 100U);
+  EXPECT_EQ(lines_of(folder / "poses.csv").size(), 101U);
+  EXPECT_EQ(told(folder.path(), "disk_full").size(), 1U);
+  EXPECT_EQ(told(folder.path(), "disk_room"),
+            std::vector<std::string>{"the disk takes lines again; 0 were lost"});
+  const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
+  EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
+  const auto errors = recorder.take_errors();
+  ASSERT_EQ(errors.size(), 1U) << "once, not for every file";
+  EXPECT_NE(errors[0].find("No space left on device"), std::string::npos) << errors[0];
+}
+
+TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
+  const test::TemporaryFolder folder;
+  constexpr std::uint64_t kFrames = 14'000;  // 170 bytes each in poses.csv: twice what memory holds
+  Recorder::Options options;
+  options.disk_full = full_from_to(10, kFrames - 10);
+  Recorder recorder(folder.path(), options);
+  for (std::uint64_t i = 0; i < kFrames; ++i)
+    recorder.on_report(pose(i, PoseStatus::ok, 0.1 * static_cast<double>(i)));
+  const auto totals = recorder.close();
+  EXPECT_EQ(totals->faults.size(), 2U) << "trajectory.tum and poses.csv lack lines";
+  ASSERT_GT(totals->lost_lines, 1000U);
+  const std::size_t written =
+      lines_of(folder / "trajectory.tum").size() + lines_of(folder / "poses.csv").size() - 1;
+  EXPECT_EQ(written + totals->lost_lines, 2 * kFrames);
+  EXPECT_EQ(told(folder.path(), "disk_room"),
+            std::vector<std::string>{"the disk takes lines again; " +
+                                     std::to_string(totals->lost_lines) + " were lost"});
+}
+
+}  // namespace
+}  // namespace vergence::app

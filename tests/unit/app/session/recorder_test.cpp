@@ -1,0 +1,168 @@
+#include "app/session/recorder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <future>
+#include <thread>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "app/runtime/errors.hpp"
+#include "app/session/records.hpp"
+#include "app/session/session_files.hpp"
+#include "core/memory/allocation_guard.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/session/recorder_inputs.hpp"
+
+namespace vergence::app {
+namespace {
+
+TEST(SessionFolder, isMadeOrTakenWhenEmptyAndRefusedOtherwise) {
+  const test::TemporaryFolder folder;
+  EXPECT_TRUE(make_session_folder(folder / "a/b/session"));
+  EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b/session"));
+  EXPECT_FALSE(make_session_folder(folder / "a/b/session")) << "empty: taken";
+  folder.write("a/b/session/notes.txt", "mine");
+  EXPECT_THROW(make_session_folder(folder / "a/b/session"), InputError);
+  EXPECT_THROW(make_session_folder(folder / "a/b/session/notes.txt"), InputError);
+  EXPECT_THROW(make_session_folder(folder / "a/b/session/notes.txt/below"), InputError);
+  EXPECT_THROW(make_session_folder(""), InputError);
+  EXPECT_EQ(test::read_file(folder / "a/b/session/notes.txt"), "mine");
+  discard_session_folder(folder / "a/b/session", false);
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "a/b/session")) << "as it was";
+  discard_session_folder(folder / "a/b/session", true);
+  EXPECT_FALSE(std::filesystem::exists(folder / "a/b/session"));
+}
+
+TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  FrameReport first = pose(0, PoseStatus::ok, 0);
+  first.T_reference_left = Transform{Mat3::Identity(), {1, 2, 3}};
+  recorder.on_report(first);
+  recorder.on_report(pose(1, PoseStatus::lost, 9));
+  recorder.on_report(pose(2, PoseStatus::degraded, 1.5));
+  const auto totals = recorder.close();
+
+  const auto tum = lines_of(folder / "trajectory.tum");
+  ASSERT_EQ(tum.size(), 2U);
+  EXPECT_EQ(tum[0],
+            "1403636584.763555584 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 "
+            "0.000000000 1.000000000");
+  EXPECT_EQ(tum[1].substr(0, 32), "1403636584.863555584 1.500000000");
+  const auto reference = lines_of(folder / "reference.tum");
+  ASSERT_EQ(reference.size(), 1U);
+  EXPECT_EQ(reference[0].substr(0, 54), "1403636584.763555584 1.000000000 2.000000000 3.0000000");
+
+  const auto csv = lines_of(folder / "poses.csv");
+  ASSERT_EQ(csv.size(), 4U);
+  EXPECT_EQ(csv[0], kPosesHeader);
+  for (const std::string& line : csv)
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 32) << line;  // 33 columns
+  EXPECT_EQ(csv[2], "1,1403636584813555584,stereo_odometry,lost,few_inliers" +
+                        std::string(26, ',') + "100,,7.500");
+  EXPECT_EQ(csv[3].substr(0, 64),
+            "2,1403636584863555584,stereo_odometry,degraded,few_inliers,1.500");
+
+  EXPECT_EQ(totals->read, 3U);
+  EXPECT_EQ(totals->ok, 1U);
+  EXPECT_EQ(totals->degraded, 1U);
+  EXPECT_EQ(totals->lost, 1U);
+  EXPECT_DOUBLE_EQ(totals->path_m, 1.5);
+  EXPECT_EQ(totals->trajectory.size(), 2U);
+  EXPECT_NEAR(totals->decode.mean(), 2.0, 1e-9);
+  EXPECT_TRUE(totals->faults.empty());
+}
+
+TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  EventRecord event;
+  event.stamp = Stamp(kStamp);
+  event.kind = "image_torn";
+  event.set_sentence("left/\"a\"\n\xff.png is torn");
+  event.fields[0] = {"frame", std::int64_t{7}};
+  event.fields[1] = {"seconds", 0.5};
+  event.fields[2] = {"word", "late"};
+  event.fields[3] = {"whole", 2.0};
+  recorder.on_event(event);
+  EstimatorEvent change;
+  change.stamp = Stamp(kStamp);
+  change.from = State::initialising;
+  change.to = State::stereo_odometry;
+  change.why = "trusted calibration";
+  recorder.on_event(EventRecord::of(change));
+  (void)recorder.close();
+  const auto lines = lines_of(folder / "events.jsonl");
+  ASSERT_EQ(lines.size(), 2U);
+  const auto torn = nlohmann::json::parse(lines[0]), state = nlohmann::json::parse(lines[1]);
+  EXPECT_EQ(torn["stamp_ns"], kStamp);
+  EXPECT_EQ(torn["kind"], "image_torn");
+  EXPECT_EQ(torn["fields"]["frame"], 7);
+  EXPECT_EQ(torn["fields"]["seconds"], 0.5);
+  EXPECT_EQ(torn["fields"]["word"], "late");
+  EXPECT_TRUE(torn["fields"]["whole"].is_number_float()) << lines[0];
+  EXPECT_EQ(state["kind"], "state");
+  EXPECT_EQ(state["sentence"], "initialising to stereo_odometry: trusted calibration");
+  EXPECT_EQ(state["fields"]["to"], "stereo_odometry");
+}
+
+TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
+  const test::TemporaryFolder folder;
+  std::promise<void> posted;
+  Recorder::Options options{.when_full = Recorder::WhenFull::drop, .keep_trajectory = false};
+  // The recorder's thread hangs at the first pose until all are posted. A producer that waited for
+  // it would do so until it is let go after all, and nothing would be dropped.
+  options.disk_full = [all_posted = posted.get_future().share(), hung = false](Stamp) mutable {
+    if (!std::exchange(hung, true)) (void)all_posted.wait_for(std::chrono::seconds(10));
+    return false;
+  };
+  Recorder recorder(folder.path(), options);
+  constexpr std::uint64_t kFrames = 1000;  // many times what may wait
+  for (std::uint64_t i = 0; i < kFrames; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
+  posted.set_value();
+  const auto totals = recorder.close();
+  EXPECT_GT(totals->dropped_records, 0U);
+  EXPECT_GT(totals->read, 0U);
+  EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
+  EXPECT_EQ(lines_of(folder / "poses.csv").size(), totals->read + 1);
+  EXPECT_TRUE(totals->trajectory.empty());
+}
+
+TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  recorder.on_report(pose(0, PoseStatus::ok, 0));
+  bool found = false;
+  for (int i = 0; i < 200 && !found; ++i) {  // two seconds at most, one is promised
+    found = lines_of(folder / "trajectory.tum").size() == 1;
+    if (!found) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST(Recorder, postingAllocatesNothing) {
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder.path(), {});
+  EstimatorEvent event;
+  event.why = "a state changed";
+  const CalibrationDecision made = decision(false);
+  const auto before = AllocationGuard::allocations_after_seal();
+  {
+    const SealedScope sealed;
+    for (std::uint64_t i = 0; i < 1000; ++i) {
+      recorder.on_report(pose(i, PoseStatus::ok, 0));
+      recorder.on_event(EventRecord::of(event));
+      recorder.on_calibration(CalibrationRecord{made});
+    }
+  }
+  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+}
+
+}  // namespace
+}  // namespace vergence::app

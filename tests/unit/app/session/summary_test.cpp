@@ -1,0 +1,181 @@
+#include "app/session/summary.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "app/session/session_totals.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app {
+namespace {
+
+TEST(TimeHistogram, meanAndMaxAreExactAndPercentilesWithinTheirBin) {
+  auto h = std::make_unique<TimeHistogram>();
+  for (int i = 1; i <= 1000; ++i) h->add(0.01 * i);
+  EXPECT_NEAR(h->mean(), 5.005, 1e-9);
+  EXPECT_DOUBLE_EQ(h->max(), 10.0);
+  for (const double q : {0.5, 0.99, 0.999})
+    EXPECT_NEAR(h->percentile(q), 10.0 * q, 0.0026 * 10.0 * q) << q;
+  EXPECT_LE(h->percentile(1.0), h->max());
+}
+
+SummaryInput input() {
+  SummaryInput in;
+  in.calibration.cameras = 2;
+  in.calibration.T_camera_left[1].t = {-0.5, 0, 0};
+  in.memory = {{"a_bytes", 3}, {"b_bytes", 4}};
+  in.skipped = 2;
+  in.configuration_hash = "0123";
+  return in;
+}
+
+TEST(Summary, hasTheKeysOfTheContractAndNullWhereThereIsNoReference) {
+  auto totals = std::make_unique<SessionTotals>();
+  totals->read = 5, totals->ok = 3, totals->degraded = 1, totals->lost = 1;
+  totals->estimate.add(8);
+  for (int i = 0; i < 99; ++i) totals->stages[std::size_t(Stage::track)].add(1);
+  totals->stages[std::size_t(Stage::track)].add(16);
+  const auto json = summary_json(*totals, input());
+  for (const char* key :
+       {"frames", "timing_ms", "metrics", "calibration", "recalibrations", "allocations_after_seal",
+        "memory", "drops", "version", "simd", "configuration_hash"})
+    EXPECT_TRUE(json.contains(key)) << key;
+  EXPECT_TRUE(json["metrics"].is_null());
+  EXPECT_EQ(
+      json["frames"],
+      (nlohmann::ordered_json{
+          {"read", 5}, {"posed", 4}, {"ok", 3}, {"degraded", 1}, {"lost", 1}, {"skipped", 2}}));
+  EXPECT_EQ(json["timing_ms"]["mean"], 8.0);
+  for (const char* key : {"p50", "p99", "p99_9", "max"})
+    EXPECT_TRUE(json["timing_ms"].contains(key)) << key;
+  for (const char* stage : {"decode", "pyramid", "detect", "track", "match", "pose", "window"}) {
+    EXPECT_TRUE(json["timing_ms"]["stages"].contains(stage)) << stage;
+    EXPECT_EQ(json["timing_ms"]["stage_distributions"][stage].size(), 4u) << stage;
+  }
+  const auto& track = json["timing_ms"]["stage_distributions"]["track"];
+  EXPECT_NEAR(track["p50"], 1.0, 0.0035);  // half a bin, and microseconds
+  EXPECT_EQ(track["max"], 16.0);
+  EXPECT_EQ(json["memory"]["sum_bytes"], 7);
+  EXPECT_TRUE(json["calibration"]["word"].is_null());
+  EXPECT_TRUE(json["calibration"]["depth_error_percent"]["20"].is_null());
+}
+
+TEST(Summary, metricsOfAKnownScaleComeOutAndLongSegmentsOfAShortDriveAreNull) {
+  // A bent path of about 80 m, the estimate 2 % too long: one scale explains all of it.
+  std::vector<StampedPose> estimate, reference;
+  for (int i = 0; i <= 160; ++i) {
+    StampedPose p{Stamp(i * 100'000'000LL), {}};
+    const double angle = 0.005 * i;
+    p.T_world_body = {exp_so3({0, angle, 0}),
+                      {100 * (1 - std::cos(angle)), 0, 100 * std::sin(angle)}};
+    reference.push_back(p);
+    p.T_world_body.t *= 1.02;
+    estimate.push_back(p);
+  }
+  auto totals = std::make_unique<SessionTotals>();
+  SummaryInput in = input();
+  in.evaluation = evaluate(estimate, reference, summary_evaluation_options());
+  const auto metrics = summary_json(*totals, in)["metrics"];
+  EXPECT_NEAR(metrics["scale"].get<double>(), 1 / 1.02, 1e-12);
+  EXPECT_NEAR(metrics["ate_sim3_m"].get<double>(), 0, 1e-9);
+  EXPECT_NEAR(metrics["segment_error_scaled_percent"].get<double>(), 0, 1e-9);
+  EXPECT_GT(metrics["segment_error_short_percent"].get<double>(), 1.9);
+  EXPECT_NEAR(metrics["rotation_error_deg_per_m"].get<double>(), 0, 1e-9);
+  EXPECT_NEAR(metrics["path_m"].get<double>(), 80, 0.01);
+  EXPECT_NE(metrics.dump().find("\"segment_error_percent\":null"), std::string::npos)
+      << metrics.dump();
+}
+
+RigCalibration with_yaw_sigma(double sigma) {
+  RigCalibration rig;
+  rig.cameras = 2;
+  for (std::size_t k = 0; k < 2; ++k)
+    rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 1500, .fy = 1500, .cx = 320, .cy = 240};
+  rig.T_camera_left[1].t = {-0.1, 0, 0};
+  rig.sigma_wide[1] = {1e-9, sigma, 1e-9, 0, 1e-9, 1e-9};
+  return rig;
+}
+
+TEST(Summary, aYawSigmaTellsTheDepthErrorAndTheWord) {
+  // A yaw error σ moves the disparity by f σ (a narrow lens: the same everywhere), so σ_z/z = z
+  // σ/b: at 20 m 200 σ.
+  const std::array<std::pair<double, const char*>, 3> cases{
+      {{8e-5, "good"}, {2e-4, "can be improved"}, {4e-4, "recalibrate"}}};
+  for (const auto& [sigma, word] : cases) {
+    auto totals = std::make_unique<SessionTotals>();
+    SummaryInput in = input();
+    in.calibration = with_yaw_sigma(sigma);
+    in.before = with_yaw_sigma(8e-5);
+    const auto json = summary_json(*totals, in)["calibration"];
+    EXPECT_EQ(json["word"], word);
+    EXPECT_EQ(json["before"]["word"], "good");
+    for (const int z : {1, 5, 10, 20, 50})
+      EXPECT_NEAR(json["depth_error_percent"][std::to_string(z)].get<double>(),
+                  100 * z * sigma / 0.1, 0.03 * 100 * z * sigma / 0.1)
+          << z;
+  }
+}
+
+TEST(Summary, whatLimitsADepthIsNoiseOrIntrinsics) {
+  auto totals = std::make_unique<SessionTotals>();
+  SummaryInput in = input();
+  in.calibration = with_yaw_sigma(2e-4);
+  EXPECT_TRUE(summary_json(*totals, in)["calibration"]["limited_by"].is_null())
+      << "without the noise's part nobody knows";
+  in.calibration.sigma_noise[1] = in.calibration.sigma_wide[1];
+  EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "noise");
+  in.calibration.sigma_noise[1][1] = 1e-4;  // a quarter of the variance
+  EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "intrinsics");
+}
+
+TEST(Summary, recalibrationsAreListedAndTheFirstFromScratchStandsApart) {
+  auto totals = std::make_unique<SessionTotals>();
+  totals->attempts = {
+      {Stamp(10), "from_scratch", "too little motion", false, 40, 25, 9.0},
+      {Stamp(20), "from_scratch", "", true, 75, 60, 12.0},
+      {Stamp(30), "knock", "held-out frames do not fit better", false, 90, 25, 11.0},
+      {Stamp(40), "knock", "", true, 150, 60, 13.0}};
+  totals->from_scratch = {totals->attempts[1], 1};
+  totals->calibrating.add(4);
+  const auto json = summary_json(*totals, input());
+  ASSERT_EQ(json["recalibrations"].size(), 2U);
+  EXPECT_EQ(json["recalibrations"][0]["accepted"], false);
+  EXPECT_EQ(json["recalibrations"][0]["why"], "held-out frames do not fit better");
+  EXPECT_EQ(json["recalibrations"][1]["reason"], "knock");
+  EXPECT_EQ(json["recalibrations"][1]["stamp_ns"], 40);
+  EXPECT_EQ(json["recalibrations"][1]["latency_frames"], 150);
+  EXPECT_EQ(json["calibration"]["from_scratch"]["latency_frames"], 75);
+  EXPECT_EQ(json["calibration"]["from_scratch"]["rejected_before"], 1);
+  EXPECT_EQ(json["timing_ms"]["while_calibrating"]["mean"], 4.0);
+}
+
+TEST(Summary, errorsOfACalibrationAreInUnitsAndInSigmas) {
+  auto totals = std::make_unique<SessionTotals>();
+  SummaryInput in = input();
+  in.calibration = with_yaw_sigma(1e-3);
+  RigCalibration truth = in.calibration;
+  const Vec3 turn(0.001, -0.002, 0.003);
+  in.calibration.T_camera_left[1].R = exp_so3(turn) * truth.T_camera_left[1].R;
+  in.calibration.T_camera_left[1].t += Vec3(0, 0.004, 0);
+  in.truth = TruthFigures{std::nullopt, calibration_errors(in.calibration, truth)};
+  const auto json = summary_json(*totals, in)["truth"];
+  ASSERT_EQ(json["calibration"].size(), 1U);
+  const auto& camera = json["calibration"][0];
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(camera["rotation_rad"][i].get<double>(), turn(static_cast<int>(i)), 1e-12);
+  EXPECT_NEAR(camera["translation_m"][1].get<double>(), 0.004, 1e-15);
+  EXPECT_NEAR(camera["sigmas_wide"][1].get<double>(), -2, 1e-9);
+  EXPECT_TRUE(camera["sigmas_wide"][3].is_null()) << "held: no sigma";
+  EXPECT_TRUE(camera["sigmas_noise"].is_null());
+  EXPECT_NEAR(json["calibration_error"][2].get<double>(), 0.003, 1e-12);
+}
+
+}  // namespace
+}  // namespace vergence::app
