@@ -156,6 +156,11 @@ struct PublishSettings {
   int viewers = 4;
 };
 
+/// `sessions:` the folders that drives leave side by side.
+struct SessionsSettings {
+  int quota_mb = 0;  // 0: none
+};
+
 /// `realtime:` scheduling of the drive's threads (docs/realtime.md).
 struct RealtimeSettings {
   int priority = 0;        // SCHED_FIFO of the most urgent threads; 0: none
@@ -181,6 +186,7 @@ struct Configuration {
   MockSettings mock{};
   RecordSettings record{};
   PublishSettings publish{};
+  SessionsSettings sessions{};
   RealtimeSettings realtime{};
   std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   int preset = 0;  // odometry.preset: 1: small, what other keys are that nobody gave

@@ -230,6 +230,17 @@ Group publish() {
       .done();
 }
 
+Group sessions() {
+  using S = SessionsSettings;
+  return Rows<S>(
+             "sessions", "The session folders beside the one of `--out`.",
+             [](auto& c) -> auto& { return c.sessions; })
+      .integer("quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
+               "What they may take together: before a drive the oldest that are over it are "
+               "removed, whole. 0: none is ever removed.")
+      .done();
+}
+
 Group realtime() {
   using R = RealtimeSettings;
   return Rows<R>(
@@ -815,7 +826,7 @@ const std::vector<Group>& schema() {
       groups::sync(),     groups::odometry(),   groups::calibration_options(),
       groups::monitor(),  groups::comparison(), groups::kitti_raw(),
       groups::mock(),     groups::record(),     groups::publish(),
-      groups::realtime(), groups::faults()};
+      groups::sessions(), groups::realtime(),   groups::faults()};
   return all;
 }
 

@@ -99,11 +99,7 @@ void LiveState::add(const EventRecord& event) {
   const std::string_view kind = event.kind;
   const bool confirmed = kind == "calibration_confirmed";
   if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed") {
-    was_confirmed_ = confirmed_;
     confirmed_ = confirmed;
-    calibration_new_ = true;
-  } else if (kind == "in_step") {
-    confirmed_ = was_confirmed_;  // that they were out of step was said of the rig
     calibration_new_ = true;
   }
   ++events_seen_;
@@ -116,7 +112,7 @@ void LiveState::add(const CalibrationRecord& calibration) {
   if (calibration.learnt) measured_ = calibration;
   if (!calibration.accepted) return;
   measured_.reset();
-  if (calibration.decided) confirmed_ = was_confirmed_ = calibration.verified;
+  if (calibration.decided) confirmed_ = calibration.verified;
   in_use_ = calibration;
 }
 

@@ -102,7 +102,6 @@ class LiveState {
   std::optional<CalibrationRecord> in_use_{};
   std::optional<CalibrationRecord> measured_{};  // by the drive, beside the one in use
   bool confirmed_ = false;
-  bool was_confirmed_ = false;  // before the last event that says otherwise
   bool calibration_new_ = false;
   std::optional<PublishedPlacement> placement_{};
   bool placement_new_ = false;

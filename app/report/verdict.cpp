@@ -73,8 +73,10 @@ constexpr std::array kPose{
            "The calibration in use was no longer, or not yet, confirmed by the drive: turns and "
            "near things at the roadside confirm it."},
     Advice{"recalibrating",
-           "The rig no longer fitted its calibration: look for a camera that was knocked or is "
-           "loose on its mount."},
+           "The rig did not fit its calibration. If it did before, look for a camera that was "
+           "knocked or is loose on its mount; if it never did, check the calibration given: "
+           "T_camera_left, or its rotation, may be inverted, or the lenses be those of images that "
+           "were not yet rectified."},
     Advice{
         "uncalibrated",
         "No calibration had been found yet: these poses only bridge the time until there is one."},

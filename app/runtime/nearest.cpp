@@ -98,8 +98,6 @@ constexpr std::array kTable{
               "device bytes are no longer recorded; images and ins hold all that a replay reads"},
     Withdrawn{Kind::key, "record.image_format", "images are recorded as they are"},
     Withdrawn{Kind::key, "record.memory_mb", "six seconds of images wait for the disk"},
-    Withdrawn{Kind::key, "sessions.quota_mb",
-              "remove old session folders by systemd-tmpfiles or cron (docs/session.md)"},
     Withdrawn{Kind::option, "run --also",
               "poses.csv has latitude, longitude and height of every frame; see docs/session.md"},
     Withdrawn{Kind::option, "replay --also",

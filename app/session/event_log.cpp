@@ -14,7 +14,7 @@ constexpr int kWholeAgain = 100;  // frames, after which dropped work is news
 /// What a user wants to hear of at once.
 bool is_for_user(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
-  return kind == Kind::rig_changed || kind == Kind::in_step ||
+  return kind == Kind::rig_changed || kind == Kind::out_of_step || kind == Kind::in_step ||
          kind == Kind::calibration_confirmed || kind == Kind::calibration_contradicted ||
          kind == Kind::focal_length_contradicted || kind == Kind::calibration_accepted ||
          kind == Kind::calibration_rejected || kind == Kind::calibration_waits ||

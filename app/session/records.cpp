@@ -92,6 +92,8 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
       return "dropped";
     case EstimatorEvent::Kind::rig_changed:
       return "rig_changed";
+    case EstimatorEvent::Kind::out_of_step:
+      return "out_of_step";
     case EstimatorEvent::Kind::in_step:
       return "in_step";
     case EstimatorEvent::Kind::calibration_confirmed:

@@ -20,6 +20,7 @@
 #include "app/session/drive_threads.hpp"
 #include "app/session/estimation_loop.hpp"
 #include "app/session/session_files.hpp"
+#include "app/session/session_quota.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
@@ -70,9 +71,10 @@ class SessionRunner {
   std::mutex mutex_;        // with done_, for the caller's thread that waits
   std::condition_variable changed_;
   bool done_ = false;
-  bool folder_made_ = false;  // it was not there before
-  bool halted_ = false;       // the caller's thread alone
-  DriveThreads threads_;      // of the caller's thread
+  bool folder_made_ = false;          // it was not there before
+  std::vector<std::string> removed_;  // sessions over the quota: a sentence each
+  bool halted_ = false;               // the caller's thread alone
+  DriveThreads threads_;              // of the caller's thread
 };
 
 SessionRunner::SessionRunner(FrameSource& source, const Configuration& configuration,
@@ -164,6 +166,9 @@ void SessionRunner::say_recording_errors(Progress* progress) {
 }
 
 void SessionRunner::open(std::vector<std::string>* faults) {
+  // On a full disk there is room for the folder only when the quota has made some.
+  if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
+    removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
   folder_made_ = make_session_folder(request_.out);
   try {
     open_files(faults);
@@ -218,6 +223,10 @@ SessionStart SessionRunner::session_start() const {
 }
 
 void SessionRunner::say_remarks(Progress* progress) {
+  for (const std::string& sentence : removed_) {
+    progress->say("vergence: " + sentence);
+    loop_.event_log().log(facts_.first, "session_removed", sentence, false);
+  }
   for (const SourceRemark& remark : facts_.remarks) {
     if (remark.say) progress->say("vergence: " + remark.sentence);
     if (remark.kind != nullptr)

@@ -55,8 +55,9 @@ struct EstimatorEvent {
     time_gap,
     relocalised,
     dropped,
-    rig_changed,  // the monitor raised; value: frames since the onset, or the lag in frames of
-                  // cameras out of step
+    rig_changed,  // the monitor raised, or the user asked; value: frames since the onset
+    out_of_step,  // the cameras' images are not of the same instant; value: the lag in frames, 0
+                  // where it is not known
     in_step,      // cameras that were out of step are so no more
     calibration_confirmed,      // the drive has confirmed the calibration in use; value: its depth
                                 // error, %

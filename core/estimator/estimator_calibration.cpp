@@ -95,7 +95,7 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
 
 void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept {
   if (!doubts.stands(Doubt::out_of_step))
-    note(EstimatorEvent::Kind::rig_changed, stamp, sentence_of(CalibrationCause::out_of_step),
+    note(EstimatorEvent::Kind::out_of_step, stamp, sentence_of(CalibrationCause::out_of_step),
          lag_frames);
   doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, kInStepAfter);
   // Frames out of step would speak for a lag in the monitor's windows long after its end; those

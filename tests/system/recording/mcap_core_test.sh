@@ -19,9 +19,7 @@ if ! [ -d node_modules/@mcap/core ]; then
     exit 77
   }
 fi
-rm -rf raw png
-for format in raw png; do
-  "$vergence" run "$configuration" --fast --quiet --duration 4 --record poses,ins,images,pulses --set record.image_format=$format --out $format \
-    --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0
-done
-node read.mjs "$vergence" raw png
+rm -rf drive
+"$vergence" run "$configuration" --fast --quiet --duration 4 --record poses,ins,images,pulses --out drive \
+  --set cameras.0.size=[320,240] --set cameras.1.size=[320,240] --set mock.texture_detail=0
+node read.mjs "$vergence" drive

@@ -213,7 +213,6 @@ TEST_F(ImageFile, aPngThatIsWrittenHoldsExactlyThePixelsAndNoPadding) {
             ImageFileStatus::ok);
   EXPECT_EQ(out, pixels);
   EXPECT_THROW(write_png(folder_ / "no such folder/w.png", image), InputError);
-  EXPECT_THROW(write_png("/dev/full", image), InputError);
 }
 
 }  // namespace
