@@ -260,5 +260,21 @@ TEST(EvaluateCommand, refusesArgumentsThatMakeNoSense) {
   EXPECT_EQ(evaluate_command({a}).code, ExitCode::bad_input);
 }
 
+// Without times row belongs to row, and that takes as many.
+TEST(Evaluate, kittiPosesOfAnotherNumberAreRefused) {
+  const test::TemporaryFolder folder;
+  const auto write = [&](const char* name, int rows) {
+    std::string text;
+    for (int i = 0; i < rows; ++i) text += fmt::format("1 0 0 {} 0 1 0 0 0 0 1 0\n", i);
+    folder.write(name, text);
+    return (folder / name).string();
+  };
+  const std::string ten = write("ten.txt", 10);
+  EXPECT_NE(evaluate_command({ten, ten}).code, ExitCode::bad_input);
+  for (const int other : {9, 11})
+    EXPECT_EQ(evaluate_command({write("other.txt", other), ten}).code, ExitCode::bad_input)
+        << other;
+}
+
 }  // namespace
 }  // namespace vergence::app

@@ -279,7 +279,13 @@ TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
   }
   EXPECT_TRUE(trial.monitor().look(night).needs_texture);
   night.expected_stereo = 200;
-  for (int i = 0; i < 4; ++i) EXPECT_EQ(trial.monitor().look(night).kind, Kind::quiet);
+  // A dark frame in between neither counts nor clears.
+  calibration::MonitorFrame dark;
+  dark.frame = night.frame;
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(trial.monitor().look(night).kind, Kind::quiet);
+    EXPECT_EQ(trial.monitor().look(dark).kind, Kind::quiet);
+  }
   EXPECT_EQ(trial.monitor().look(night).kind, Kind::collapse);
 }
 
