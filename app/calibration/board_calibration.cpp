@@ -16,6 +16,11 @@
 namespace vergence::app {
 namespace {
 
+/// As CV_Error(), which would put the path of this file into the program.
+[[noreturn]] void refuse(const char* why) {
+  throw cv::Exception(cv::Error::StsNoConv, why, "board_calibration", "", 0);
+}
+
 constexpr int kMaxRounds = 8;        // of rejecting views
 constexpr std::size_t kGroups = 10;  // of the jackknife: each costs a calibration
 const cv::TermCriteria kCriteria{cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-10};
@@ -137,8 +142,7 @@ double BoardCalibrator::calibrate_fisheye(const Points3& object, const Points2& 
       // Another start may converge.
     }
   }
-  if (!std::isfinite(best))
-    CV_Error(cv::Error::StsNoConv, "no start of the fisheye lens converges");
+  if (!std::isfinite(best)) refuse("no start of the fisheye lens converges");
   return best;
 }
 
@@ -184,8 +188,7 @@ void BoardCalibrator::calibrate_alone(std::size_t camera, const std::vector<std:
                   std::sqrt(static_cast<double>(image[i].size()));
     }
   }
-  if (!cv::checkRange(lens.K) || !cv::checkRange(lens.D))
-    CV_Error(cv::Error::StsNoConv, "the lens is not finite");
+  if (!cv::checkRange(lens.K) || !cv::checkRange(lens.D)) refuse("the lens is not finite");
   for (std::size_t i = 0; i < at.size(); ++i) {
     s->view_rms[at[i]] = std::max(s->view_rms[at[i]], errors[i]);
     if (camera == 0) s->T_left_board[at[i]] = transform_from(rvecs[i], tvecs[i]);
@@ -233,7 +236,7 @@ void BoardCalibrator::calibrate_pair(std::size_t camera, const std::vector<std::
       radtan() ? second.D : none[1], size(0), R, T, E, F, by_view,
       refine ? cv::CALIB_USE_INTRINSIC_GUESS | k3_flag() : cv::CALIB_FIX_INTRINSIC, kCriteria);
   if (!std::isfinite(rms) || !cv::checkRange(R) || !cv::checkRange(T))
-    CV_Error(cv::Error::StsNoConv, "the pair is not finite");
+    refuse("the pair is not finite");
   if (camera == 1) s->rms = rms;
   s->T_camera_left[camera] = transform_from(R, T);
   for (std::size_t i = 0; i < at.size(); ++i) {
