@@ -14,6 +14,9 @@ constexpr double kNoise = 0.2;  // px: what two positions known to 0.15 px leave
 // Errors of one frame's points have causes in common (rolling shutter, a lens): they count for so
 // many independent ones, and for no more than one log-likelihood each.
 constexpr double kPointsOfAFrame = 5;
+// Page's reference value: what chance makes of the ratio of two widths, each known to a tenth, of a
+// rig that stands. Without it the sum would wander up to any bound.
+constexpr double kReference = 0.25;
 constexpr double kFollow = 0.1;  // of the usual width, a frame
 // A wrong claim once in a million times (Wald 1945): three frames at least.
 constexpr double kDecided = 13.8;
@@ -67,7 +70,7 @@ void PairingEvidence::next(std::span<StereoObservation> points, const Transform&
   const auto add = [&](double shifted_px, double* sum) noexcept {
     const double shifted = std::max(shifted_px, kNoise) / usual_px_;
     const double ratio = std::log(now / usual_px_) - 0.5 * (shifted * shifted - 1);
-    *sum = std::clamp(*sum + kPointsOfAFrame * std::clamp(ratio, -1.0, 1.0), 0.0,
+    *sum = std::clamp(*sum + kPointsOfAFrame * (std::clamp(ratio, -1.0, 1.0) - kReference), 0.0,
                       kDecided + kPointsOfAFrame);
   };
   add(static_cast<double>(median(late_px_.first(both))), &late_);

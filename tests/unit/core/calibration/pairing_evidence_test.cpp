@@ -75,6 +75,25 @@ TEST(PairingEvidence, tellsALateImageFromAKnockAndFromStanding) {
   }
 }
 
+TEST(PairingEvidence, ofARigThatStandsForLongNoiseMakesNoLag) {
+  Arena arena(PairingEvidence::memory_needed(kPoints));
+  PairingEvidence evidence(kPoints, arena);
+  Random random(3);
+  std::vector<StereoObservation> points(kPoints);
+  for (int i = 0; i < 10'000; ++i) {
+    for (std::uint32_t k = 0; k < kPoints; ++k) {
+      const double x = 4.0 * k, y = 3.0 * k;
+      points[k] = {{x + 0.5 * random.normal(), y + 0.5 * random.normal()},
+                   {x - 5 + 0.5 * random.normal(), y + 0.5 * random.normal()},
+                   0.5,
+                   k};
+    }
+    evidence.next(points, {Mat3::Identity(), {-0.5, 0, 0}}, kLens, kLens);
+    ASSERT_EQ(evidence.lag_frames(), 0) << i;
+    ASSERT_FALSE(evidence.suspected()) << i;
+  }
+}
+
 TEST(PairingEvidence, measuresTheDistanceFromTheLines) {
   Arena arena(PairingEvidence::memory_needed(kPoints));
   PairingEvidence evidence(kPoints, arena);
