@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/devices/drive_sync.hpp"
 #include "core/math/random.hpp"
 #include "tests/support/refusal.hpp"
 
@@ -101,6 +102,22 @@ TEST(PictureFiles, namesOfCamerasAreNamesOfFiles) {
   c.cameras[0].name = "../left eye";
   c.cameras[2].name = "camera1";
   EXPECT_EQ(camera_names(c, 3), (std::vector<std::string>{"___left_eye", "camera1", "camera1_2"}));
+}
+
+Configuration example(const std::string& name) {
+  return load_configuration(VERGENCE_SOURCE_DIR "/app/config/" + name, {});
+}
+
+TEST(CaptureSettings, anInsThatTriggersTheCamerasStays) {
+  const Configuration c = capture_configuration(example("ins_syncout.yaml"));
+  EXPECT_EQ(c.ins.driver, "xsens");
+  EXPECT_EQ(sync_options(c, 2).mode, SyncMode::ins_syncout) << "as the user's file is, it works";
+}
+
+TEST(CaptureSettings, anInsThatPicturesDoWithoutIsLeftOut) {
+  const Configuration given = example("mock.yaml");
+  ASSERT_EQ(given.ins.driver, "mock");
+  EXPECT_EQ(capture_configuration(given).ins.driver, "none");
 }
 
 }  // namespace

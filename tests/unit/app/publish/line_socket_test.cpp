@@ -1,6 +1,5 @@
 #include "app/publish/line_socket.hpp"
 
-#include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -41,19 +40,6 @@ class UnixLines : public testing::Test {
   std::string path_ = (folder_.path() / "pose.sock").string();
   LineAddress address_{LineAddress::Kind::unix_socket, path_, {}};
 };
-
-TEST_F(UnixLines, everyReaderGetsEveryLineFromWhenItCameOn) {
-  const auto socket = open_line_socket(address_, "k");
-  socket->send("nobody\n");
-  const FileDescriptor a = reader_of(path_);
-  socket->send("one\n");
-  const FileDescriptor b = reader_of(path_);
-  socket->send("two\n");
-  EXPECT_EQ(all_of(a), "one\ntwo\n");
-  EXPECT_EQ(all_of(b), "two\n");
-  EXPECT_EQ(socket->counters().sent, 3U);
-  EXPECT_EQ(socket->counters().readers, 2U);
-}
 
 TEST_F(UnixLines, theGroupMayReadWhateverTheUmaskAndNobodyElse) {
   const mode_t before = ::umask(0077);
@@ -127,22 +113,6 @@ TEST_F(UnixLines, aFileLeftBehindIsReplacedAnotherProgramsIsNot) {
   LineAddress nowhere = address_;
   nowhere.path = (folder_.path() / "no" / "pose.sock").string();
   EXPECT_THROW((void)open_line_socket(nowhere, "k"), InputError);
-}
-
-TEST(UdpLines, goToTheirAddressOneALine) {
-  const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  ASSERT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  socklen_t size = sizeof address;
-  ASSERT_EQ(::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size), 0);
-  const auto lines =
-      open_line_socket({LineAddress::Kind::udp, "", {"127.0.0.1", ntohs(address.sin_port)}}, "k");
-  lines->send("one\n");
-  lines->send("two\n");
-  EXPECT_EQ(all_of(socket), "one\ntwo\n");
-  EXPECT_EQ(lines->counters().sent, 2U);
 }
 
 }  // namespace
