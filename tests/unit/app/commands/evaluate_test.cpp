@@ -73,12 +73,6 @@ void expect_same(const nlohmann::json& expected, const nlohmann::json& got,
   }
 }
 
-std::string joined(const nlohmann::json& lengths) {
-  std::string out;
-  for (const auto& length : lengths) out += (out.empty() ? "" : ",") + length.dump();
-  return out;
-}
-
 TEST(EvaluateCommand, everyKnownAnswerToSixDigits) {
   const auto folder = test::shared_data("data/eval");
   if (!folder) GTEST_SKIP() << test::shared_data_missing("data/eval");
@@ -90,7 +84,8 @@ TEST(EvaluateCommand, everyKnownAnswerToSixDigits) {
       const Outcome o = evaluate_command(
           {(*folder / (pair + "_estimate.tum")).string(),
            (*folder / (pair + "_reference.tum")).string(), "--json", "--lengths",
-           joined(segments["lengths"]), "--step", segments["step"].dump(), "--associate",
+           fmt::format("{}", fmt::join(segments["lengths"].get<std::vector<double>>(), ",")),
+           "--step", segments["step"].dump(), "--associate",
            name == "b_nearest" ? "nearest" : "interpolate", "--max-gap",
            pair == "b" ? "0.1" : "0.2", "--axes", pair < "c" ? "flu" : "camera"});
       ASSERT_EQ(o.code, ExitCode::done) << o.err;
@@ -105,38 +100,30 @@ TEST(EvaluateCommand, everyKnownAnswerToSixDigits) {
   }
 }
 
-TEST(EvaluateCommand, trajectoriesWithoutCommonTimeAreNotUsable) {
-  const test::TemporaryFolder folder;
-  const auto a = folder.write("a.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n"),
-             b = folder.write("b.tum", "101 0 0 0 0 0 0 1\n102 1 0 0 0 0 0 1\n");
-  const Outcome o = evaluate_command({a.string(), b.string(), "--json"});
-  EXPECT_EQ(o.code, ExitCode::not_usable);
-  EXPECT_EQ(nlohmann::json::parse(o.out)["matched"], 0);
-  EXPECT_NE(
-      o.err.find("no pose of the estimate has a reference at its time (2 before the reference"),
-      std::string::npos)
-      << o.err;
+/// A drive round corners on rolling ground, at 6 m/s along x.
+Transform place_at(double t) {
+  Transform T;
+  T.R = exp_so3(Vec3(0, 0, 0.9 * std::sin(0.15 * t) + 0.4 * std::sin(0.6 * t))) *
+        exp_so3(Vec3(0.06 * std::sin(0.9 * t), 0.08 * std::sin(0.7 * t), 0));
+  T.t = {6 * t, 25 * std::sin(0.15 * t), std::sin(0.7 * t)};
+  return T;
+}
+
+std::string tum_line(double stamp, const Transform& T) {
+  const Eigen::Quaterniond q(T.R);
+  return fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", stamp,
+                     T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(), q.z(), q.w());
 }
 
 TEST(EvaluateCommand, estimatesTheMountBetweenTwoBodies) {
-  // A drive round corners on rolling ground; the reference sits 0.8 m forward and 0.3 m left of the
-  // estimate, its clock 30 ms late.
+  // The reference sits 0.8 m forward and 0.3 m left of the estimate, its clock 30 ms late.
   const test::TemporaryFolder folder;
   std::string ours, theirs;
-  const auto line = [](double stamp, const Transform& T) {
-    const Eigen::Quaterniond q(T.R);
-    return fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", stamp,
-                       T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(), q.z(), q.w());
-  };
+  const Transform T_ours_theirs{exp_so3(Vec3(0, 0, 0.1)), Vec3(0.8, 0.3, 0)};
   for (int i = 0; i < 2400; ++i) {
-    const double t = 0.05 * i, yaw = 0.9 * std::sin(0.15 * t) + 0.4 * std::sin(0.6 * t);
-    Transform T_world_body;
-    T_world_body.R = exp_so3(Vec3(0, 0, yaw)) *
-                     exp_so3(Vec3(0.06 * std::sin(0.9 * t), 0.08 * std::sin(0.7 * t), 0));
-    T_world_body.t = {6 * t, 25 * std::sin(0.15 * t), std::sin(0.7 * t)};
-    ours += line(1000 + t, T_world_body);
-    theirs +=
-        line(1000.03 + t, T_world_body * Transform{exp_so3(Vec3(0, 0, 0.1)), Vec3(0.8, 0.3, 0)});
+    const double at = 0.05 * i;
+    ours += tum_line(1000 + at, place_at(at));
+    theirs += tum_line(1000.03 + at, place_at(at) * T_ours_theirs);
   }
   const std::string a = folder.write("ours.tum", ours).string(),
                     b = folder.write("theirs.tum", theirs).string();
@@ -151,34 +138,20 @@ TEST(EvaluateCommand, estimatesTheMountBetweenTwoBodies) {
               0.8 * std::sin(0.1) - 0.3 * std::cos(0.1), 0.02);
   EXPECT_NEAR(mount["clock_offset_s"]["value"].get<double>(), 0.03, 1e-3);
   EXPECT_LT(mount["lever_arm_m"]["x"]["sigma"].get<double>(), 0.1);
-  const Outcome table = evaluate_command({a, b, "--axes", "flu", "--estimate-mount"});
-  EXPECT_NE(table.out.find("reported, not applied"), std::string::npos) << table.out;
 }
 
-/// A session of a drive round corners on rolling ground with its INS: the left camera 0.9 m forward
+/// A session of that drive with its INS: the left camera 0.9 m forward
 /// and 0.4 m left of it, turned by 2° of yaw, the INS's stamps 12 ms late.
 std::string session_with_ins(const test::TemporaryFolder& folder, const std::string& name) {
   const LocalTangentPlane plane({-27.5, 153, 60});
   Transform T_ins_left = mount_of({0.9, 0.4, 0}, {0, 0, 2 * M_PI / 180});
   std::string ours, readings = std::string(kInsHeader) + "\n", line;
-  const auto T_enu_ins = [](double t) {
-    Transform T;
-    T.R = exp_so3(Vec3(0, 0, 0.9 * std::sin(0.15 * t) + 0.4 * std::sin(0.6 * t))) *
-          exp_so3(Vec3(0.06 * std::sin(0.9 * t), 0.08 * std::sin(0.7 * t), 0));
-    T.t = {6 * t, 25 * std::sin(0.15 * t), std::sin(0.7 * t)};
-    return T;
-  };
   const Transform T_world_enu =
-      (T_enu_ins(0) * T_ins_left).inverse();  // the odometry begins where it is
+      (place_at(0) * T_ins_left).inverse();  // the odometry begins where it is
   for (int i = 0; i < 4800; ++i) {
     const double t = 0.025 * i;
-    const Transform T = T_enu_ins(t);
-    if (i % 2 == 0) {
-      const Transform left = T_world_enu * T * T_ins_left;
-      const Eigen::Quaterniond q(left.R);
-      ours += fmt::format("{:.9f} {:.9f} {:.9f} {:.9f} {:.12f} {:.12f} {:.12f} {:.12f}\n", 1000 + t,
-                          left.t.x(), left.t.y(), left.t.z(), q.x(), q.y(), q.z(), q.w());
-    }
+    const Transform T = place_at(t);
+    if (i % 2 == 0) ours += tum_line(1000 + t, T_world_enu * T * T_ins_left);
     InsRecord r;
     r.sample.stamp = Stamp(1'000'012'000'000 + i * 25'000'000LL);
     r.sample.fix = FixStatus::fix_3d;
@@ -187,7 +160,7 @@ std::string session_with_ins(const test::TemporaryFolder& folder, const std::str
     const Eigen::Quaterniond q(R_local_enu * T.R);
     r.sample.attitude_valid = r.sample.velocity_valid = true;
     r.sample.q_enu_ins = {q.x(), q.y(), q.z(), q.w()};
-    const Vec3 v = R_local_enu * (T_enu_ins(t + 1e-4).t - T_enu_ins(t - 1e-4).t) / 2e-4;
+    const Vec3 v = R_local_enu * (place_at(t + 1e-4).t - place_at(t - 1e-4).t) / 2e-4;
     r.sample.velocity_enu = {v.x(), v.y(), v.z()};
     format_ins_record(r, &line);
     readings += line;
@@ -218,10 +191,6 @@ TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
     EXPECT_LT(told["end_error_start_aligned_percent"], 0.5);
     EXPECT_EQ(told["ins_mount"]["boresight_deg"][2], 2);
   }
-  const Outcome table = evaluate_command({session, ins});
-  EXPECT_NE(table.out.find("brought to the left camera by " + session + "/summary.json: the test"),
-            std::string::npos)
-      << table.out;
   EXPECT_FALSE(figures(session, "flu").contains("ins_mount")) << "both are forward, left, up";
 
   // Nobody says how it sits: what is left is the boresight of two degrees.
@@ -232,8 +201,6 @@ TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
     EXPECT_NEAR(axes["heading_error_deg"]["rms"].get<double>(), 2, 0.27) << summary;
     EXPECT_EQ(axes["ins_mount"]["source"], "nobody: the axes alone");
   }
-  EXPECT_NE(evaluate_command({session, ins}).out.find("nobody says how the camera sits"),
-            std::string::npos);
 }
 
 TEST(EvaluateCommand, refusesArgumentsThatMakeNoSense) {

@@ -6,8 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "app/runtime/nearest.hpp"
-#include "app/runtime/version.hpp"
-#include "core/features/simd_target.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
@@ -27,20 +25,6 @@ testing::AssertionResult refused_in_one_sentence(const Outcome& outcome) {
     return testing::AssertionSuccess();
   return testing::AssertionFailure() << "exit code " << outcome.code << ", stdout \"" << outcome.out
                                      << "\", stderr \"" << outcome.err << '"';
-}
-
-TEST(Program, VersionAndHelpGoToStandardOutput) {
-  const Outcome version_asked = run_vergence("--version");
-  EXPECT_EQ(version_asked.code, 0);
-  EXPECT_EQ(version_asked.out,
-            "vergence " + std::string(version()) + ", " + features::simd_target() + "\n");
-  EXPECT_EQ(version_asked.err, "");
-  const Outcome help = run_vergence("--help");
-  EXPECT_EQ(help.code, 0);
-  EXPECT_EQ(help.err, "");
-  for (const char* word : {"run", "replay", "evaluate", "simulate", "calibrate", "devices",
-                           "doctor", "snap", "report"})
-    EXPECT_TRUE(contains(help.out, std::string("\n  ") + word + " ")) << word;
 }
 
 TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {

@@ -24,14 +24,10 @@ InsRequest xsens_on(const std::string& port, double rate) {
   return r;
 }
 
-TEST(InsDrivers, whatCannotBeOpenedIsToldInOneSentence) {
+TEST(InsDrivers, anUnknownOneIsRefusedWithTheNearest) {
   InsRequest unknown;
   unknown.driver = "xsense";
-  EXPECT_NE(refusal(unknown).find("did you mean"), std::string::npos) << refusal(unknown);
-  EXPECT_NE(refusal(xsens_on("/dev/ttyNotThere", 100))
-                .find("/dev/ttyNotThere cannot be opened: not found"),
-            std::string::npos)
-      << refusal(xsens_on("/dev/ttyNotThere", 100));
+  EXPECT_NE(refusal(unknown).find("did you mean"), std::string::npos);
 }
 
 TEST(InsDrivers, readsARealTerminalInRealTime) {

@@ -1,15 +1,86 @@
 #pragma once
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "app/recording/messages.hpp"
+#include "app/recording/recording.hpp"
 #include "tests/support/recording_reader.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/unit/app/recording/killed_recording.hpp"
 
 namespace vergence::test {
+
+/// When each message was posted: shared with the process that is killed.
+struct PostTimes {
+  static constexpr std::uint32_t kMost = 1U << 16U;
+  std::atomic<std::uint32_t> posted{0};
+  std::array<std::int64_t, kMost> at_ns{};  // steady clock
+};
+
+inline std::int64_t steady_ns() {
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+struct Killed {
+  std::uint32_t posted = 0;      // messages
+  std::int64_t killed_ns = 0;    // just before the signal
+  std::vector<std::int64_t> at;  // of each message
+};
+
+/// A process of its own records a text of 100 bytes every millisecond and an image every 33, and is
+/// killed after so long.
+inline Killed record_and_kill(const std::filesystem::path& folder,
+                              std::chrono::microseconds after) {
+  void* shared =
+      ::mmap(nullptr, sizeof(PostTimes), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (shared == MAP_FAILED) return {};
+  auto* times = new (shared) PostTimes;
+  const pid_t child = ::fork();
+  if (child == 0) {
+    app::Recording::Options o;
+    o.files.topics = {{"/text", app::RosType::text, false}, {"/image", app::RosType::image, false}};
+    o.queues = {8U << 20U};
+    app::Recording recording(folder, o);
+    for (std::uint32_t n = 0; n < PostTimes::kMost; ++n) {
+      const Stamp stamp(std::int64_t{n} * 1'000'000);
+      if (n % 33 == 0 && !recording.begin(0, 1, stamp, 100'000, true).empty())
+        recording.commit(0, 100'000);
+      const auto room = recording.begin(0, 0, stamp, 128);
+      if (room.empty()) ::_exit(2);
+      app::CdrWriter out(room);
+      app::write_text(&out, std::to_string(n) + std::string(100, '.'));
+      recording.commit(0, out.size());
+      times->at_ns[n] = steady_ns();
+      times->posted.store(n + 1, std::memory_order_release);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    ::_exit(1);
+  }
+  while (times->posted.load(std::memory_order_acquire) == 0)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(after);
+  Killed killed;
+  killed.killed_ns = steady_ns();
+  killed.posted = times->posted.load(std::memory_order_acquire);
+  ::kill(child, SIGKILL);
+  (void)::waitpid(child, nullptr, 0);
+  killed.at.assign(times->at_ns.begin(), times->at_ns.begin() + killed.posted);
+  ::munmap(shared, sizeof(PostTimes));
+  return killed;
+}
 
 /// Kills a recording `kills` times; every message up to the last one that is there reads back.
 /// → ms before each kill from which on messages are lost
