@@ -10,6 +10,7 @@
 
 #include "tests/support/recording_reader.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/session/recorder_inputs.hpp"
 
 namespace vergence::app {
 namespace {
@@ -71,22 +72,16 @@ class RecordedPoses {
     return Stamp(1'577'836'800'000'000'000) +
            Duration::milliseconds(50) * static_cast<std::int64_t>(number_);
   }
-  static SourceFacts two_cameras() {
+  static SourceFacts calibrated_pair() {
     SourceFacts facts;
-    RigCalibration& rig = facts.begin.file.rig;
-    rig.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k)
-      rig.intrinsics[k] = {.width = 160, .height = 120, .fx = 100, .fy = 100, .cx = 80, .cy = 60};
-    rig.T_camera_left[1].t = {-0.5, 0, 0};
-    rig.baseline = 0.5;
-    facts.begin.nominal = rig;
+    facts.begin.file.rig = facts.begin.nominal = two_cameras();
     return facts;
   }
 
   test::TemporaryFolder folder_;
   IdleSolver solver_;
   SolverWatch watch_{solver_};
-  SourceFacts facts_ = two_cameras();
+  SourceFacts facts_ = calibrated_pair();
   Configuration configuration_;
   DriveRecorder recorder_;
   std::uint64_t number_ = 0;

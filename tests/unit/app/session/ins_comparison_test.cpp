@@ -47,6 +47,13 @@ struct ComparedSession {
   InsComparison comparison{options, InsSource::device, arena, *log};
 };
 
+std::uint64_t counter(const InsComparison& comparison, const std::string& name) {
+  for (const auto& [key, count] : comparison.counters())
+    if (key == name) return count;
+  ADD_FAILURE() << name;
+  return 0;
+}
+
 /// A drive whose scene is begun anew after every tunnel: each time it is placed on the earth anew.
 TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
   ComparedSession session;
@@ -70,19 +77,8 @@ TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
   comparison.finish();
   const EarthFigures earth = comparison.earth("the test");
   EXPECT_EQ(earth.placements.size(), static_cast<std::size_t>(kRestarts + 1));
-  for (const auto& [name, count] : comparison.counters()) {
-    if (name == "placements") {
-      EXPECT_EQ(count, earth.placements.size());
-    }
-  }
+  EXPECT_EQ(counter(comparison, "placements"), earth.placements.size());
   (void)session.recorder.close();
-}
-
-std::uint64_t counter(const InsComparison& comparison, const std::string& name) {
-  for (const auto& [key, count] : comparison.counters())
-    if (key == name) return count;
-  ADD_FAILURE() << name;
-  return 0;
 }
 
 /// A way a tenth too long, at 10 Hz for a minute, the last third of it without an INS.

@@ -8,8 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "app/session/recorder.hpp"
-#include "core/memory/allocation_guard.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -127,22 +125,6 @@ TEST(InsFile, isFoundInAFolderOrByItsHead) {
   EXPECT_EQ(find_ins_file(folder.write("renamed.csv", kHead)), folder / "renamed.csv");
   folder.write("ins.csv", kHead);
   EXPECT_EQ(find_ins_file(folder.path()), folder / "ins.csv");
-}
-
-TEST(InsFile, theRecorderWritesEveryReadingAndThePostingThreadTakesNoMemory) {
-  const test::TemporaryFolder folder;
-  constexpr std::uint64_t kReadings = 5000;
-  Recorder recorder(folder.path(), {.ins = true});
-  std::string expected = kHead;
-  const auto before = AllocationGuard::allocations_after_seal();
-  AllocationGuard::seal_thread();
-  for (std::uint64_t i = 0; i < kReadings; ++i) recorder.on_reading(reading(i));
-  AllocationGuard::unseal_thread();
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
-  const auto totals = recorder.close();
-  for (std::uint64_t i = 0; i < kReadings; ++i) expected += line_of(reading(i));
-  EXPECT_EQ(test::read_file(folder / "ins.csv"), expected);
-  EXPECT_EQ(totals->dropped_readings, 0U);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include "app/session/recorder.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
-#include "tests/unit/app/session/standing_file.hpp"
 
 namespace vergence::app {
 namespace {
@@ -85,29 +84,6 @@ TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndA
     EXPECT_EQ(event["kind"], fails ? "calibration_not_kept" : "calibration_kept");
     EXPECT_EQ(recorder.take_errors().size(), fails ? 1U : 0U);
   }
-}
-
-// What waits for a disk that stands still fills the poses' ring within seconds.
-TEST(Recorder, aCalibrationThatIsFoundWhileTheDiskStandsStillIsKept) {
-  const test::TemporaryFolder folder;
-  test::StandingFile poses(folder / "poses.csv");
-  std::vector<int> kept;
-  Recorder::Options options;
-  options.when_full = Recorder::WhenFull::drop;
-  options.keep = [&kept](const RigCalibration& rig, bool /*found*/) {
-    kept.push_back(rig.frames);
-    return Kept{false, "kept"};
-  };
-  Recorder recorder(folder.path(), options);
-  constexpr std::uint64_t kFrames = 300;
-  for (std::uint64_t i = 0; i < kFrames; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
-  recorder.on_calibration(CalibrationRecord{decision(true)});
-  poses.take_all();
-  const auto totals = recorder.close();
-  EXPECT_EQ(kept, std::vector<int>{60});
-  EXPECT_EQ(totals->accepted, 1U);
-  EXPECT_GT(totals->dropped_records, 0U) << "poses, of which the next ones say the same";
-  EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
 }
 
 TEST(Recorder, whatTheDriveBeganWithIsKeptOnceItIsConfirmedUnlessAnotherWasFoundBefore) {

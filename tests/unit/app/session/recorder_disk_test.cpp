@@ -1,7 +1,4 @@
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <functional>
@@ -15,21 +12,6 @@
 
 namespace vergence::app {
 namespace {
-
-TEST(Recorder, aFullDiskIsASentenceAndTheOtherFilesAreWhole) {
-  const test::TemporaryFolder folder;
-  std::filesystem::create_symlink("/dev/full", folder / "poses.csv");
-  Recorder recorder(folder.path(), {});
-  for (std::uint64_t i = 0; i < 10; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
-  const auto totals = recorder.close();
-  const auto errors = recorder.take_errors();
-  ASSERT_EQ(errors.size(), 1U);  // once, not for every line
-  EXPECT_NE(errors[0].find("poses.csv"), std::string::npos);
-  ASSERT_EQ(totals->faults.size(), 1U);
-  EXPECT_NE(totals->faults[0].find("poses.csv"), std::string::npos) << totals->faults[0];
-  EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 10U);
-  EXPECT_EQ(totals->read, 10U);
-}
 
 /// Sentences of the events of one kind.
 std::vector<std::string> told(const std::filesystem::path& folder, const std::string& kind) {
@@ -88,6 +70,20 @@ TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
   EXPECT_EQ(told(folder.path(), "disk_room"),
             std::vector<std::string>{"the disk takes lines again; " +
                                      std::to_string(totals->lost_lines) + " were lost"});
+}
+
+TEST(LineFile, moreThanMayWaitIsHandedOverWhileTheDiskTakesIt) {
+  const test::TemporaryFolder folder;
+  LineFile file(folder / "a.txt", 16);
+  std::string all;
+  for (int i = 10; i < 50; ++i) {
+    const std::string line = "line " + std::to_string(i) + '\n';
+    EXPECT_TRUE(file.append(line)) << i;
+    all += line;
+  }
+  EXPECT_TRUE(file.close());
+  EXPECT_EQ(file.lost_lines(), 0U);
+  EXPECT_EQ(test::read_file(folder / "a.txt"), all);
 }
 
 }  // namespace

@@ -3,20 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <fstream>
-#include <iterator>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "app/session/records.hpp"
 #include "core/memory/fixed_vector.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/unit/app/session/waiting_source.hpp"
 
 namespace vergence::app {
 namespace {
@@ -27,14 +21,24 @@ constexpr Stamp kStart{1'577'836'800'000'000'000};
 Stamp at(int n) { return kStart + Duration::milliseconds(50) * n; }
 
 /// Black images, an event and a frame that cannot be read among them: no pose ever.
-class BlackSource final : public test::WaitingSource {
+class BlackSource final : public FrameSource {
  public:
-  explicit BlackSource(int frames) : WaitingSource(Milliseconds(0)), count_(frames) {
+  explicit BlackSource(int frames) : count_(frames) {
+    RigCalibration& rig = facts_.begin.file.rig;
+    rig.cameras = 2;
+    for (std::size_t k = 0; k < 2; ++k)
+      rig.intrinsics[k] = {
+          .width = kWidth, .height = kHeight, .fx = 100, .fy = 100, .cx = 79.5, .cy = 59.5};
+    rig.T_camera_left[1].t = {-0.5, 0, 0};
+    rig.baseline = 0.5;
+    facts_.begin.nominal = rig;
     facts_.frames = static_cast<std::uint64_t>(frames);
     facts_.first = at(0);
     facts_.remarks.push_back({"a remark", "data", false});
   }
 
+  [[nodiscard]] const SourceFacts& facts() const noexcept override { return facts_; }
+  void start(std::vector<std::string>* /*faults*/) override {}
   [[nodiscard]] bool next(SourceItem* item) noexcept override {
     if (next_ == count_) return false;
     if (next_ == 2 && !noted_) {
@@ -46,19 +50,32 @@ class BlackSource final : public test::WaitingSource {
       *item = event;
       return true;
     }
-    *item = black_frame(static_cast<std::uint64_t>(next_), at(next_));
+    SourceFrame frame;
+    frame.rig.number = static_cast<std::uint64_t>(next_);
+    frame.rig.stamp = at(next_);
+    frame.rig.cameras = 2;
+    for (std::size_t k = 0; k < 2; ++k)
+      frame.rig.images[k] = {pixels_.data(), kWidth, kHeight, kWidth};
+    *item = frame;
     ++next_;
     ++held_;
     return true;
   }
   void done(const PoseSample& /*sample*/) noexcept override { --held_; }
+  void stop() noexcept override {}
   void finish(Progress* /*progress*/, std::vector<std::string>* /*faults*/) override {
     ++finished_;
   }
+  void describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,
+                SummaryInput* /*input*/) const override {}
+  void print_figures(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
+                     Progress* /*progress*/) const override {}
   [[nodiscard]] int held() const { return held_; }
   [[nodiscard]] int finished() const { return finished_; }
 
  private:
+  SourceFacts facts_;
+  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight);
   int count_, next_ = 0, held_ = 0, finished_ = 0;
   bool noted_ = false;
 };
@@ -121,57 +138,6 @@ TEST(SessionRunner, ObserversSeeFramePoseAndLineInTurnAndFramesGoBack) {
   EXPECT_EQ(first.images(), 4) << "views of pixels, while it is called";
   EXPECT_EQ(source.held(), 0);
   EXPECT_EQ(source.finished(), 1);
-}
-
-/// Asks for everything with the first frame, as a viewer of a live page would.
-class Asking final : public SessionObserver {
- public:
-  explicit Asking(SessionRequests* requests) : requests_(requests) {}
-  void on_start(const SessionStart& start) noexcept override { start_ = start; }
-  void on_frame(const RigFrame& /*frame*/) noexcept override {
-    if (frames_++ == 0) requests_->recalibrate = requests_->mark = requests_->stop_recording = true;
-  }
-  void on_event(const EventRecord& event) noexcept override {
-    marks_ += std::string_view(event.kind) == "mark" ? 1 : 0;
-    others_ += std::string_view(event.kind) == "recalibration_requested" ||
-                       std::string_view(event.kind) == "recording_stopped"
-                   ? 1
-                   : 0;
-  }
-  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override {
-    return {{"asked", 17}};
-  }
-
-  SessionStart start_{};
-  int frames_ = 0, marks_ = 0, others_ = 0;
-
- private:
-  SessionRequests* requests_;
-};
-
-TEST(SessionRunner, whatAnObserverAsksForActsOnceWhereTheSessionCanAndItsCountersAreInTheSummary) {
-  const test::TemporaryFolder folder;
-  BlackSource source(4);
-  SessionRequests requests;
-  Asking asking(&requests);
-  SessionOptions options;
-  options.out = folder.path() / "session";
-  options.quiet = true;
-  options.observers = {&asking};
-  options.requests = &requests;
-  const SignalGuard signals;
-  testing::internal::CaptureStderr();
-  (void)run_session(source, load_configuration(std::nullopt, {}), options, signals);
-  (void)testing::internal::GetCapturedStderr();
-  EXPECT_EQ(asking.start_.name, "session");
-  EXPECT_EQ(asking.start_.first, at(0));
-  EXPECT_EQ(asking.start_.image_bytes, static_cast<std::size_t>(kWidth * kHeight));
-  EXPECT_FALSE(asking.start_.tie.has_value()) << "no clock of this machine's";
-  EXPECT_EQ(asking.marks_, 1);
-  EXPECT_EQ(asking.others_, 0) << "this source does not recalibrate on request, nothing records";
-  std::ifstream in(options.out / "summary.json");
-  const std::string summary(std::istreambuf_iterator<char>(in), {});
-  EXPECT_NE(summary.find("\"asked\": 17"), std::string::npos);
 }
 
 }  // namespace

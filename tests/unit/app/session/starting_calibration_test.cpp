@@ -2,17 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include <csignal>
 #include <filesystem>
 #include <optional>
 #include <string>
 
 #include "app/config/calibration_state.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/session/drive_calibration.hpp"
 #include "app/session/session_files.hpp"
 #include "core/math/so3.hpp"
-#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/app/session/recorder_inputs.hpp"
 
 namespace vergence::app {
 namespace {
@@ -111,47 +109,6 @@ TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::unconfirmed);
 }
 
-/// Frames that nobody can read: each pass is over at once.
-StereoSequence unreadable() {
-  StereoSequence sequence;
-  sequence.root = "/none";
-  for (int i = 0; i < 3; ++i) sequence.pairs.push_back({Stamp(i), {"left.png", "right.png"}, true});
-  RigCalibration& rig = sequence.calibration;
-  rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k)
-    rig.intrinsics[k] = {.width = 160, .height = 120, .fx = 100, .fy = 100, .cx = 80, .cy = 60};
-  rig.T_camera_left[1].t = {-0.5, 0, 0};
-  rig.baseline = 0.5;
-  return sequence;
-}
-
-TEST(DriveCalibration, whatStopsItIsStillThereForWhoAskedForIt) {
-  const StereoSequence sequence = unreadable();
-  const Configuration configuration = load_configuration(std::nullopt, {});
-  const StartingCalibration given = replayed_calibration(configuration, sequence, true);
-  Progress progress = Progress::on_stderr(true);
-  const SignalGuard signals;
-  const DrivePass pass{sequence, configuration, 0, sequence.pairs.size(), {}, {}};
-  DriveCalibration found = calibrate_with_progress(pass, given, signals, &progress);
-  EXPECT_NE(found.why.find("no calibration was found"), std::string::npos) << found.why;
-  std::raise(SIGTERM);
-  found = calibrate_with_progress(pass, given, signals, &progress);
-  EXPECT_FALSE(found.rig);
-  EXPECT_EQ(found.why, "it was interrupted");
-  EXPECT_EQ(signals.stop_code(), ExitCode::terminated);
-}
-
-CalibrationFile two_cameras() {
-  CalibrationFile file;
-  RigCalibration& rig = file.rig;
-  rig.cameras = 2;
-  for (std::size_t k = 0; k < 2; ++k)
-    rig.intrinsics[k] = {.width = 160, .height = 120, .fx = 100, .fy = 100, .cx = 80, .cy = 60};
-  rig.T_camera_left[1].t = {-0.5, 0, 0};
-  rig.baseline = 0.5;
-  return file;
-}
-
 /// What is said of a calibration that was found, where files cannot be written.
 Kept kept(bool session_fails, bool has_state, bool state_fails) {
   const test::TemporaryFolder folder;
@@ -161,7 +118,9 @@ Kept kept(bool session_fails, bool has_state, bool state_fails) {
   std::filesystem::create_directory(folder / "session");
   if (session_fails) in_the_way("session/calibration.yaml");
   if (state_fails) in_the_way("state.yaml");
-  const CalibrationFile file = two_cameras();
+  CalibrationFile file;
+  file.rig = two_cameras();
+  file.rig.baseline = file.rig.T_camera_left[1].t.norm();
   const auto state = has_state ? std::optional(folder / "state.yaml") : std::nullopt;
   const Kept kept = calibration_keeper(folder / "session", file, state)(file.rig, true);
   EXPECT_EQ(std::filesystem::exists(folder / "state.yaml"), has_state && !state_fails);

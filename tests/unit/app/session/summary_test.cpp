@@ -36,29 +36,20 @@ SummaryInput input() {
   return in;
 }
 
-TEST(Summary, hasTheKeysOfTheContractAndNullWhereThereIsNoReference) {
+TEST(Summary, countsFramesAndTimesAndHasNullWhereThereIsNoReference) {
   auto totals = std::make_unique<SessionTotals>();
   totals->read = 5, totals->ok = 3, totals->degraded = 1, totals->lost = 1;
   totals->estimate.add(8);
   for (int i = 0; i < 99; ++i) totals->stages[std::size_t(Stage::track)].add(1);
   totals->stages[std::size_t(Stage::track)].add(16);
   const auto json = summary_json(*totals, input());
-  for (const char* key :
-       {"frames", "timing_ms", "metrics", "calibration", "recalibrations", "allocations_after_seal",
-        "memory", "drops", "version", "simd", "configuration_hash"})
-    EXPECT_TRUE(json.contains(key)) << key;
   EXPECT_TRUE(json["metrics"].is_null());
   EXPECT_EQ(
       json["frames"],
       (nlohmann::ordered_json{
           {"read", 5}, {"posed", 4}, {"ok", 3}, {"degraded", 1}, {"lost", 1}, {"skipped", 2}}));
   EXPECT_EQ(json["timing_ms"]["mean"], 8.0);
-  for (const char* key : {"p50", "p99", "p99_9", "max"})
-    EXPECT_TRUE(json["timing_ms"].contains(key)) << key;
-  for (const char* stage : {"decode", "pyramid", "detect", "track", "match", "pose", "window"}) {
-    EXPECT_TRUE(json["timing_ms"]["stages"].contains(stage)) << stage;
-    EXPECT_EQ(json["timing_ms"]["stage_distributions"][stage].size(), 4u) << stage;
-  }
+  EXPECT_EQ(json["timing_ms"]["stage_distributions"].size(), json["timing_ms"]["stages"].size());
   const auto& track = json["timing_ms"]["stage_distributions"]["track"];
   EXPECT_NEAR(track["p50"], 1.0, 0.0035);  // half a bin, and microseconds
   EXPECT_EQ(track["max"], 16.0);
@@ -133,27 +124,6 @@ TEST(Summary, whatLimitsADepthIsNoiseOrIntrinsics) {
   EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "noise");
   in.calibration.sigma_noise[1][1] = 1e-4;  // a quarter of the variance
   EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "intrinsics");
-}
-
-TEST(Summary, recalibrationsAreListedAndTheFirstFromScratchStandsApart) {
-  auto totals = std::make_unique<SessionTotals>();
-  totals->attempts = {
-      {Stamp(10), "from_scratch", "too little motion", false, 40, 25, 9.0},
-      {Stamp(20), "from_scratch", "", true, 75, 60, 12.0},
-      {Stamp(30), "knock", "held-out frames do not fit better", false, 90, 25, 11.0},
-      {Stamp(40), "knock", "", true, 150, 60, 13.0}};
-  totals->from_scratch = {totals->attempts[1], 1};
-  totals->calibrating.add(4);
-  const auto json = summary_json(*totals, input());
-  ASSERT_EQ(json["recalibrations"].size(), 2U);
-  EXPECT_EQ(json["recalibrations"][0]["accepted"], false);
-  EXPECT_EQ(json["recalibrations"][0]["why"], "held-out frames do not fit better");
-  EXPECT_EQ(json["recalibrations"][1]["reason"], "knock");
-  EXPECT_EQ(json["recalibrations"][1]["stamp_ns"], 40);
-  EXPECT_EQ(json["recalibrations"][1]["latency_frames"], 150);
-  EXPECT_EQ(json["calibration"]["from_scratch"]["latency_frames"], 75);
-  EXPECT_EQ(json["calibration"]["from_scratch"]["rejected_before"], 1);
-  EXPECT_EQ(json["timing_ms"]["while_calibrating"]["mean"], 4.0);
 }
 
 TEST(Summary, errorsOfACalibrationAreInUnitsAndInSigmas) {
