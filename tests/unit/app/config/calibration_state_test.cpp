@@ -7,6 +7,7 @@
 #include <string>
 
 #include "app/runtime/errors.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -80,42 +81,6 @@ CalibrationFile two_cameras() {
   return file;
 }
 
-TEST(StateFile, WhatWasWrittenIsReadAgainForTheSameRig) {
-  const test::TemporaryFolder folder;
-  const auto path = folder / "not/there/yet/calibration_state.yaml";
-  EXPECT_FALSE(read_state(path, two_cameras()).calibration);
-  EXPECT_EQ(read_state(path, two_cameras()).sentence, "") << "a first drive is nothing to tell";
-  write_state(path, two_cameras());
-  const CalibrationState state = read_state(path, two_cameras());
-  ASSERT_TRUE(state.calibration) << state.sentence;
-  EXPECT_EQ(state.calibration->rig.T_camera_left[1].t, two_cameras().rig.T_camera_left[1].t);
-  EXPECT_EQ(state.calibration->serials, two_cameras().serials);
-}
-
-TEST(StateFile, OfAnotherRigIsNotUsedAndTheSentenceSaysWhy) {
-  const test::TemporaryFolder folder;
-  const auto path = folder / "calibration_state.yaml";
-  write_state(path, two_cameras());
-  const auto refused = [&](const char* why, const auto& change) {
-    CalibrationFile expected = two_cameras();
-    change(&expected);
-    const CalibrationState state = read_state(path, expected);
-    EXPECT_FALSE(state.calibration) << why;
-    EXPECT_NE(state.sentence.find(why), std::string::npos) << state.sentence;
-    EXPECT_NE(state.sentence.find("calibration_state.yaml: is not used"), std::string::npos)
-        << state.sentence;
-  };
-  refused("serial \"102\", the one that is there \"103\"",
-          [](CalibrationFile* c) { c->serials[1] = "103"; });
-  refused("2 cameras, the configuration has 3", [](CalibrationFile* c) { c->rig.cameras = 3; });
-  refused("640 x 480", [](CalibrationFile* c) { c->rig.intrinsics[0].width = 1280; });
-  refused("lens model", [](CalibrationFile* c) {
-    c->rig.intrinsics[1].kind = CameraModelKind::pinhole_equidistant;
-  });
-  refused("baseline of 0.75 m, the configuration says 0.76 m",
-          [](CalibrationFile* c) { c->rig.baseline = 0.76; });
-}
-
 /// The same with what the configuration says of it, in which cameras are asked for by address.
 CalibrationFile configured() {
   CalibrationFile file = two_cameras();
@@ -128,34 +93,58 @@ CalibrationFile configured() {
   return file;
 }
 
-TEST(StateFile, FoundUnderAnotherConfigurationItIsNotUsedAndTheSentenceSaysWhatChanged) {
+TEST(StateFile, OfAnotherRigOrConfigurationIsNotUsedAndTheSentenceSaysWhy) {
   const test::TemporaryFolder folder;
-  const auto path = folder / "calibration_state.yaml";
+  const auto path = folder / "not/there/yet/calibration_state.yaml";
+  const CalibrationState first = read_state(path, configured());
+  EXPECT_FALSE(first.calibration);
+  EXPECT_EQ(first.sentence, "") << "a first drive is nothing to tell";
   write_state(path, configured());
   const CalibrationState same = read_state(path, configured());
   ASSERT_TRUE(same.calibration) << same.sentence;
+  EXPECT_EQ(same.calibration->serials, configured().serials);
   EXPECT_EQ(same.calibration->configured->cameras[1].T_camera_left,
             configured().configured->cameras[1].T_camera_left);
-  const auto refused = [&](const char* why, const auto& change) {
-    CalibrationFile expected = configured();
-    change(&*expected.configured);
-    const CalibrationState state = read_state(path, expected);
-    EXPECT_FALSE(state.calibration) << why;
-    EXPECT_NE(state.sentence.find(why), std::string::npos) << state.sentence;
+  struct Change {
+    const char* why;
+    void (*of)(CalibrationFile*);
   };
-  refused("intrinsics [460, 460, 320, 240] for camera 1, it has [500, 460, 320, 240] now",
-          [](ConfiguredRig* rig) { rig->cameras[1].intrinsics[0] = 500; });
-  refused("distortion [0, 0, 0, 0, 0] for camera 0, it has [-0.2, 0, 0, 0, 0] now",
-          [](ConfiguredRig* rig) { rig->cameras[0].distortion[0] = -0.2; });
-  refused("offset [0, 0] for camera 0, it has [200, 100] now", [](ConfiguredRig* rig) {
-    rig->cameras[0].offset = {200, 100};
-  });
-  refused("another place for camera 1",
-          [](ConfiguredRig* rig) { rig->cameras[1].T_camera_left[2] = 0.087; });
-  refused("model pinhole-radtan for camera 1, it has pinhole-equidistant now",
-          [](ConfiguredRig* rig) { rig->cameras[1].model = CameraModelKind::pinhole_equidistant; });
-  refused("baseline of 0.75 m, the configuration says 0.7512 m",
-          [](ConfiguredRig* rig) { rig->baseline = 0.7512; });
+  for (const Change& c : {
+           Change{"serial \"102\", the one that is there \"103\"",
+                  [](CalibrationFile* f) { f->serials[1] = "103"; }},
+           Change{"2 cameras, the configuration has 3",
+                  [](CalibrationFile* f) { f->rig.cameras = 3; }},
+           Change{"640 x 480", [](CalibrationFile* f) { f->rig.intrinsics[0].width = 1280; }},
+           Change{"lens model",
+                  [](CalibrationFile* f) {
+                    f->configured.reset();
+                    f->rig.intrinsics[1].kind = CameraModelKind::pinhole_equidistant;
+                  }},
+           Change{"baseline of 0.75 m, the configuration says 0.76 m",
+                  [](CalibrationFile* f) { f->configured.reset(), f->rig.baseline = 0.76; }},
+           Change{"intrinsics [460, 460, 320, 240] for camera 1, it has [500, 460, 320, 240] now",
+                  [](CalibrationFile* f) { f->configured->cameras[1].intrinsics[0] = 500; }},
+           Change{"distortion [0, 0, 0, 0, 0] for camera 0, it has [-0.2, 0, 0, 0, 0] now",
+                  [](CalibrationFile* f) { f->configured->cameras[0].distortion[0] = -0.2; }},
+           Change{"offset [0, 0] for camera 0, it has [200, 100] now",
+                  [](CalibrationFile* f) {
+                    f->configured->cameras[0].offset = {200, 100};
+                  }},
+           Change{"another place for camera 1",
+                  [](CalibrationFile* f) { f->configured->cameras[1].T_camera_left[2] = 0.087; }},
+           Change{"model pinhole-radtan for camera 1, it has pinhole-equidistant now",
+                  [](CalibrationFile* f) {
+                    f->configured->cameras[1].model = CameraModelKind::pinhole_equidistant;
+                  }},
+           Change{"baseline of 0.75 m, the configuration says 0.7512 m",
+                  [](CalibrationFile* f) { f->configured->baseline = 0.7512; }},
+       }) {
+    CalibrationFile expected = configured();
+    c.of(&expected);
+    const CalibrationState state = read_state(path, expected);
+    EXPECT_FALSE(state.calibration) << c.why;
+    EXPECT_TRUE(test::says(state.sentence, c.why, "calibration_state.yaml: is not used"));
+  }
 }
 
 TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {

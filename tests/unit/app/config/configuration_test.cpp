@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -48,10 +49,6 @@ TEST(Configuration, ListItemsAreNamedByNumber) {
   EXPECT_EQ(c.cameras[0].width, 800);
   EXPECT_EQ(c.cameras[0].height, 600);
   EXPECT_EQ(c.cameras[1].serial, "c");
-  EXPECT_TRUE(contains(refusal("cameras: [{serail: a}]"),
-                       "drive.yaml:1: there is no key \"cameras.0.serail\""));
-  EXPECT_TRUE(
-      contains(refusal("cameras: [{}, {}, {}, {}, {driver: mock}]"), "there is no key \"cameras."));
 }
 
 TEST(Configuration, AFaultIsALineOrAGroup) {
@@ -60,40 +57,37 @@ TEST(Configuration, AFaultIsALineOrAGroup) {
       "drive.yaml", {});
   EXPECT_EQ(c.faults[0], "knock@42.0 camera=1 pitch_deg=0.2");
   EXPECT_EQ(c.faults[1], "cover@3 camera=0");
-  EXPECT_TRUE(
-      contains(refusal("faults: [{kind: knock}]"), "drive.yaml:1: faults.0 needs `kind` and `at`"));
-  EXPECT_TRUE(contains(refusal("faults: [{kind: knock, at: [1, 2]}]"), "faults.0"))
-      << refusal("faults: [{kind: knock, at: [1, 2]}]");
   EXPECT_EQ(refusal("faults: []"), "");
 }
 
-TEST(Configuration, ValuesOfTheWrongTypeAreRefusedWithTheirPlace) {
-  EXPECT_TRUE(contains(refusal("odometry:\n  features: many"),
-                       "drive.yaml:2: odometry.features is \"many\", not an integer"));
-  EXPECT_TRUE(contains(refusal("odometry: {features: 300.5}"), "not an integer"));
-  EXPECT_TRUE(contains(refusal("odometry: {features: 99999999999999999999}"), "not an integer"));
-  EXPECT_TRUE(contains(refusal("odometry: {band_px: 2px}"), "not a number"));
-  EXPECT_TRUE(contains(refusal("odometry: {features: }"), "not an integer"));
-  EXPECT_TRUE(contains(refusal("odometry: {features: [1, 2]}"), "takes one value"));
-  EXPECT_TRUE(contains(refusal("odometry: {features: {a: 1}}"), "takes one value"));
-  EXPECT_TRUE(contains(refusal("threads: []"), "takes one value"));
-  EXPECT_TRUE(contains(refusal("odometry: 3"), "is a group of keys"));
-  EXPECT_TRUE(contains(refusal("[1, 2]"), "is not a configuration"));
-  EXPECT_TRUE(
-      contains(refusal("rig: {name: " + std::string(65, 'x') + "}"), "longer than 64 bytes"));
-}
-
-TEST(Configuration, KeysThatContradictEachOtherAreRefused) {
-  EXPECT_TRUE(contains(refusal("odometry: {min_inliers: 60, ok_inliers: 50}"),
-                       "drive.yaml: odometry.ok_inliers (50) is below odometry.min_inliers (60)"));
-}
-
-TEST(Configuration, WhatIsNotYamlIsSaidWithItsLine) {
-  EXPECT_TRUE(contains(refusal("threads: 1\nodometry: {features: 300\n"), "drive.yaml:"))
-      << refusal("threads: 1\nodometry: {features: 300\n");
-  EXPECT_TRUE(contains(refusal("a: 1\n---\nb: 2\n"), "several YAML documents"));
-  EXPECT_NE(refusal("threads: *unknown"), "");
-  EXPECT_NE(refusal(std::string(100'000, '[')), "") << "nested beyond any stack";
+TEST(Configuration, WhatCannotBeIsRefusedWithItsPlace) {
+  const std::string long_name = "rig: {name: " + std::string(65, 'x') + "}";
+  for (const auto& [yaml, says] : std::vector<std::pair<std::string, const char*>>{
+           {"odometry:\n  features: many", "drive.yaml:2: odometry.features is \"many\""},
+           {"odometry: {features: 300.5}", "not an integer"},
+           {"odometry: {features: 99999999999999999999}", "not an integer"},
+           {"odometry: {band_px: 2px}", "not a number"},
+           {"odometry: {features: }", "not an integer"},
+           {"odometry: {features: [1, 2]}", "takes one value"},
+           {"odometry: {features: {a: 1}}", "takes one value"},
+           {"threads: []", "takes one value"},
+           {"odometry: 3", "is a group of keys"},
+           {"[1, 2]", "is not a configuration"},
+           {long_name, "longer than 64 bytes"},
+           {"odometry: {min_inliers: 60, ok_inliers: 50}",
+            "odometry.ok_inliers (50) is below odometry.min_inliers (60)"},
+           {"cameras: [{serail: a}]", "drive.yaml:1: there is no key \"cameras.0.serail\""},
+           {"cameras: [{}, {}, {}, {}, {driver: mock}]", "there is no key \"cameras."},
+           {"faults: [{kind: knock}]", "drive.yaml:1: faults.0 needs `kind` and `at`"},
+           {"faults: [{kind: knock, at: [1, 2]}]", "faults.0"},
+           {"record: [poses, pictures]\n", "drive.yaml:1: record lists \"pictures\""},
+           {"record: images\n", "is a group of keys"},
+           {"threads: 1\nodometry: {features: 300\n", "drive.yaml:"},
+           {"a: 1\n---\nb: 2\n", "several YAML documents"},
+           {"threads: *unknown", "drive.yaml"},
+           {std::string(100'000, '['), "drive.yaml"},  // nested beyond any stack
+       })
+    EXPECT_TRUE(test::says(refusal(yaml), says)) << yaml.substr(0, 80);
 }
 
 TEST(Configuration, AliasesThatUnfoldWithoutEndAreStopped) {
@@ -143,9 +137,6 @@ TEST(Configuration, AListOfWhatIsRecordedSwitchesItsWordsOn) {
   EXPECT_EQ(keys.record.ins, 1);
   EXPECT_EQ(keys.record.images, 0);
   EXPECT_EQ(keys.record.keep_s, 30);
-  EXPECT_TRUE(
-      contains(refusal("record: [poses, pictures]\n"), "drive.yaml:1: record lists \"pictures\""));
-  EXPECT_TRUE(contains(refusal("record: images\n"), "is a group of keys"));
 }
 
 TEST(Configuration, aPresetIsWhatKeysAreThatNobodyGave) {

@@ -3,9 +3,6 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <map>
-#include <regex>
-#include <set>
 #include <sstream>
 #include <string>
 
@@ -77,15 +74,6 @@ TEST(Schema, EveryRowsRangeIsEnforcedAtBothEnds) {
   EXPECT_GE(rows, 19);
 }
 
-TEST(Schema, EveryDefaultIsInsideItsRange) {
-  for (const Group& group : schema())
-    for (const Key& key : group.keys) {
-      SCOPED_TRACE(key.name);
-      if (key.type == KeyType::text) continue;
-      EXPECT_TRUE(accepts(key, key.get(Configuration{})));
-    }
-}
-
 TEST(Schema, EveryKeyChangesItsOwnValueOnly) {
   for (const Group& group : schema())
     for (const Key& key : group.keys) {
@@ -108,69 +96,6 @@ TEST(Schema, EveryKeyChangesItsOwnValueOnly) {
           EXPECT_EQ(same, other.name != key.name) << other.name;
         }
     }
-}
-
-TEST(Schema, NamesAreUniqueAndInTheirGroup) {
-  std::set<std::string> names;
-  for (const Group& group : schema())
-    for (const Key& key : group.keys) {
-      EXPECT_TRUE(names.insert(key.name).second) << key.name;
-      EXPECT_EQ(key.name.substr(0, key.name.find('.')), group.name.empty() ? key.name : group.name);
-      EXPECT_GT(key.meaning.size(), 20U) << key.name;
-    }
-}
-
-/// The fields of a struct as its header declares them: name and the range in its comment, where
-/// there is one.
-std::map<std::string, std::string> declared_fields(const std::string& header_file,
-                                                   const std::string& name_of_struct) {
-  std::istringstream header(file_text(header_file));
-  // A field whose line is full has its value, or its comment, on the next one.
-  const std::regex field(R"(^  (?:bool|int|double|std::\w+) (\w+) =.*)"),
-      range(R"(, ([0-9.]+ … [0-9.]+))");
-  std::map<std::string, std::string> fields;
-  bool inside = false;
-  std::string last;
-  for (std::string line; std::getline(header, line);) {
-    if (line.starts_with("struct")) inside = line.starts_with("struct " + name_of_struct + " ");
-    if (line.starts_with("};")) inside = false;
-    if (!inside) continue;
-    std::smatch name, numbers;
-    if (std::regex_match(line, name, field)) fields[last = name[1]] = "";
-    if (!last.empty() && fields[last].empty() && std::regex_search(line, numbers, range))
-      fields[last] = numbers[1].str();
-  }
-  return fields;
-}
-
-/// Every field has a row in the group, by its own name or that in `renamed`, with the range that
-/// its header states.
-void expect_rows_for(const std::map<std::string, std::string>& declared,
-                     const std::string& group_name,
-                     const std::map<std::string, std::string>& renamed = {}) {
-  ASSERT_GE(declared.size(), 8U) << "the header is read";
-  std::map<std::string, const Key*> rows;
-  for (const Group& group : schema())
-    if (group.name == group_name)
-      for (const Key& key : group.keys) rows[key.name.substr(group_name.size() + 1)] = &key;
-  for (const auto& [field, range] : declared) {
-    const auto other = renamed.find(field);
-    const std::string& name = other == renamed.end() ? field : other->second;
-    ASSERT_TRUE(rows.contains(name))
-        << "the schema (app/config/schema_*.cpp) has no row for " << group_name << "'s " << field;
-    if (range.empty()) continue;
-    EXPECT_EQ(range_text(*rows[name]), range) << name;
-  }
-}
-
-TEST(Schema, EveryOptionOfTheCoreCanBeSetInTheRangeItsHeaderStates) {
-  expect_rows_for(declared_fields("core/odometry/options.hpp", "OdometryOptions"), "odometry");
-  expect_rows_for(declared_fields("core/calibration/options.hpp", "CalibrationOptions"),
-                  "calibration",
-                  {{"estimate_focal_lengths", "focal_lengths"},
-                   {"refine_intrinsics", "intrinsics"},
-                   {"estimate_lenses", "lenses"}});
-  expect_rows_for(declared_fields("core/calibration/monitor.hpp", "MonitorOptions"), "monitor");
 }
 
 TEST(Schema, TheDocumentIsWrittenFromTheTable) {
