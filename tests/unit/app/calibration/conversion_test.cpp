@@ -1,20 +1,121 @@
 #include "app/calibration/conversion.hpp"
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+#include <opencv2/calib3d.hpp>
 
 #include "app/runtime/errors.hpp"
+#include "core/camera/camera.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/unit/app/calibration/conversion_references.hpp"
+#include "tests/unit/app/calibration/board_scene.hpp"
 
 namespace vergence::app {
 namespace {
 
-using namespace test;
+constexpr double kSamePixel = 1e-9;
+
+/// What a format's file says, in OpenCV's terms: X_camera = R X_left + t.
+struct Reference {
+  cv::Mat K, D, R, t;
+  bool fisheye = false;
+};
+
+Vec2 project(const Reference& r, const Vec3& X_left) {
+  const cv::Mat in_camera =
+      r.R * (cv::Mat_<double>(3, 1) << X_left.x(), X_left.y(), X_left.z()) + r.t;
+  const std::vector<cv::Point3d> X{
+      {in_camera.at<double>(0), in_camera.at<double>(1), in_camera.at<double>(2)}};
+  const cv::Mat none = cv::Mat::zeros(3, 1, CV_64F);
+  std::vector<cv::Point2d> x;
+  if (r.fisheye)
+    cv::fisheye::projectPoints(X, x, none, none, r.K, r.D);
+  else
+    cv::projectPoints(X, none, none, r.K, r.D, x);
+  return {x[0].x, x[0].y};
+}
+
+std::vector<Vec3> points() {
+  Random random(31);
+  std::vector<Vec3> points;
+  for (int i = 0; i < 200; ++i) {
+    const double z = random.uniform(0.5, 20);
+    points.emplace_back(z * random.uniform(-0.45, 0.45), z * random.uniform(-0.35, 0.35), z);
+  }
+  return points;
+}
+
+/// Both project every point to the same pixel in every camera.
+void expect_same(const CalibrationFile& ours, const std::vector<Reference>& theirs) {
+  ASSERT_EQ(static_cast<std::size_t>(ours.rig.cameras), theirs.size());
+  for (std::size_t k = 0; k < theirs.size(); ++k) {
+    const Camera camera(ours.rig.intrinsics[k]);
+    double worst = 0;
+    for (const Vec3& X : points()) {
+      Vec2 x;
+      ASSERT_EQ(camera.project(ours.rig.T_camera_left[k] * X, &x, nullptr), ProjectStatus::ok);
+      worst = std::max(worst, (x - project(theirs[k], X)).norm());
+    }
+    EXPECT_LT(worst, kSamePixel) << "camera " << k;
+  }
+}
+
+void expect_same(const CalibrationFile& a, const CalibrationFile& b) {
+  ASSERT_EQ(a.rig.cameras, b.rig.cameras);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(a.rig.cameras); ++k) {
+    EXPECT_EQ(a.rig.intrinsics[k].width, b.rig.intrinsics[k].width);
+    EXPECT_EQ(a.rig.intrinsics[k].height, b.rig.intrinsics[k].height);
+    EXPECT_EQ(a.rig.intrinsics[k].kind, b.rig.intrinsics[k].kind);
+    const Camera one(a.rig.intrinsics[k]), other(b.rig.intrinsics[k]);
+    for (const Vec3& X : points()) {
+      Vec2 x, y;
+      ASSERT_EQ(one.project(a.rig.T_camera_left[k] * X, &x, nullptr), ProjectStatus::ok);
+      ASSERT_EQ(other.project(b.rig.T_camera_left[k] * X, &y, nullptr), ProjectStatus::ok);
+      ASSERT_LT((x - y).norm(), kSamePixel) << "camera " << k;
+    }
+  }
+}
+
+CalibrationFile ours(CameraModelKind kind, int cameras = 2) {
+  CalibrationFile c;
+  c.rig = known_rig(cameras, kind);
+  for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k)
+    c.rig.T_camera_left[k].R =
+        normalised(exp_so3(Vec3(0.02, -0.05, 0.013)) * c.rig.T_camera_left[k].R);
+  c.names = {"port", "starboard", "bow", "stern"};
+  c.serials[0] = "4711";
+  return c;
+}
+
+constexpr std::array kModels{CameraModelKind::pinhole_radtan, CameraModelKind::pinhole_equidistant};
+
+cv::Mat diagonal(double fx, double fy, double cx, double cy) {
+  return (cv::Mat_<double>(3, 3) << fx, 0, cx, 0, fy, cy, 0, 0, 1);
+}
+
+cv::Mat matrix(const YAML::Node& list, int rows, int columns) {
+  cv::Mat m(rows, columns, CV_64F);
+  for (int i = 0; i < rows * columns; ++i)
+    m.at<double>(i / columns, i % columns) = list[static_cast<std::size_t>(i)].as<double>();
+  return m;
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  const auto at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return at == std::string::npos ? text : text.replace(at, what.size(), by);
+}
+
+using test::known_rig;
+using test::refusal_of;
 
 TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
   const test::TemporaryFolder folder;
@@ -37,17 +138,23 @@ TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
     }
   }
   // Two files with a comma.
-  Remarks remarks;
-  const std::string pair = (folder / "a.yaml").string() + "," + (folder / "b.yaml").string();
-  write_any_calibration(pair, CalibrationFormat::ros, ours(kModels[0]), &remarks);
-  expect_same(ours(kModels[0]), read_any_calibration(pair, std::nullopt, &remarks));
+  for (const auto& [format, ending] :
+       {std::pair(CalibrationFormat::ros, ".yaml"), std::pair(CalibrationFormat::opencv, ".yml")}) {
+    Remarks remarks;
+    const std::string first = (folder / "a").string(), second = (folder / "b").string(),
+                      pair = first + ending + "," + second + ending;
+    write_any_calibration(pair, format, ours(kModels[0]), &remarks);
+    expect_same(ours(kModels[0]), read_any_calibration(pair, std::nullopt, &remarks));
+  }
 }
 
 TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
   Remarks none;
+  const std::string kalibr = format_kalibr(ours(kModels[0]), &none);
   const auto [left, right] = format_ros(ours(kModels[0]), &none);
   const auto parts = format_opencv(ours(kModels[0]), &none);
   const std::string opencv = "%YAML:1.0\n---\n" + parts[0] + parts[1];
+  const char* kLens = "[520, 521, 322, 238]";
   struct Case {
     std::string text, second, key;
   };
@@ -56,23 +163,18 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
       {"just words", "", "is not a group of keys"},
       {"a: [1, 2", "", "is not YAML"},
       {"a: 1", "", "the lens of a second camera is missing"},
-      {replaced(kCamchain, "camera_model: pinhole", "camera_model: omni"), "",
+      {replaced(kalibr, "camera_model: pinhole", "camera_model: omni"), "",
        "cam0.camera_model is \"omni\""},
-      {replaced(kCamchain, "distortion_model: radtan", "distortion_model: fov"), "",
+      {replaced(kalibr, "distortion_model: radtan", "distortion_model: fov"), "",
        "cam0.distortion_model is \"fov\""},
-      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]",
-                "[458.654, .nan, 367.215, 248.375]"),
-       "", "cam0.intrinsics"},
-      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]",
-                "[458.654, 1e308, 367.215, 248.375]"),
-       "", "cameras.0.intrinsics"},
-      {replaced(kCamchain, "[458.654, 457.296, 367.215, 248.375]", "[458.654, 457.296]"), "",
-       "cam0.intrinsics is neither"},
-      {replaced(kCamchain, "[752, 480]", "[752]"), "", "cam0.resolution"},
-      {replaced(kCamchain, "[752, 480]", "[99999999999, 480]"), "", "cam0.resolution"},
-      {replaced(kCamchain, "  T_cn_cnm1:", "  T_unknown:"), "", "T_cn_cnm1 of cam1"},
-      {replaced(kCamchain, "[0.9999972564,", "[0.5,"), "", "not orthonormal"},
-      {replaced(kCamchain, "-0.1100738084", "-110.0738084"), "", "m from the left one"},
+      {replaced(kalibr, kLens, "[520, .nan, 322, 238]"), "", "cam0.intrinsics"},
+      {replaced(kalibr, kLens, "[520, 1e308, 322, 238]"), "", "cameras.0.intrinsics"},
+      {replaced(kalibr, kLens, "[520, 521]"), "", "cam0.intrinsics is neither"},
+      {replaced(kalibr, "[640, 480]", "[640]"), "", "cam0.resolution"},
+      {replaced(kalibr, "[640, 480]", "[99999999999, 480]"), "", "cam0.resolution"},
+      {replaced(kalibr, "  T_cn_cnm1:", "  T_unknown:"), "", "T_cn_cnm1 of cam1"},
+      {replaced(kalibr, "T_cn_cnm1:\n  - [", "T_cn_cnm1:\n  - [5"), "", "not orthonormal"},
+      {replaced(kalibr, ", -0.12]", ", -120]"), "", "m from the left one"},
       {"cam0: {camera_model: pinhole}", "", "the lens of a second camera is missing"},
       {"cam0: 7", "", "the lens of a second camera is missing"},
       {left, "", "the lens of a second camera is missing"},
@@ -139,14 +241,6 @@ std::vector<Reference> reference_of_camchain(const std::string& text) {
     references.push_back(r);
   }
   return references;
-}
-
-TEST(Kalibr, aCamchainIsReadAsItsOwnDefinitionProjects) {
-  Remarks remarks;
-  const CalibrationFile c =
-      parse_any_calibration({{"camchain.yaml", kCamchain}}, std::nullopt, &remarks);
-  expect_same(c, reference_of_camchain(kCamchain));
-  EXPECT_EQ(c.rig.intrinsics[1].width, 752);
 }
 
 TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
@@ -253,64 +347,33 @@ TEST(OpenCvStereo, whatIsWrittenIsReadByOpenCvAndProjectsAsOurs) {
   }
 }
 
-TEST(OpenCvStereo, whatOpenCvWritesIsReadAsItProjects) {
-  const CalibrationFile truth = ours(CameraModelKind::pinhole_radtan);
-  std::array<Reference, 2> references;
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Intrinsics& lens = truth.rig.intrinsics[k];
-    references[k].K = diagonal(lens.fx, lens.fy, lens.cx, lens.cy);
-    references[k].D = cv::Mat::zeros(1, 14, CV_64F);
-    for (int i = 0; i < 5; ++i)
-      references[k].D.at<double>(i) = lens.distortion[static_cast<std::size_t>(i)];
-    const Transform& T = truth.rig.T_camera_left[k];
-    references[k].t = (cv::Mat_<double>(3, 1) << T.t.x(), T.t.y(), T.t.z());
-    references[k].R = cv::Mat(3, 3, CV_64F);
-    for (int i = 0; i < 9; ++i) references[k].R.at<double>(i / 3, i % 3) = T.R(i / 3, i % 3);
-  }
-  // As the sample does: lenses in one file, places in another.
-  cv::FileStorage lenses("a.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY),
-      places("b.yml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
-  lenses << "M1" << references[0].K << "D1" << references[0].D << "M2" << references[1].K << "D2"
-         << references[1].D;
-  places << "R" << references[1].R << "T" << references[1].t;
-  const std::vector<CalibrationText> files{{"intrinsics.yml", lenses.releaseAndGetString()},
-                                           {"extrinsics.yml", places.releaseAndGetString()}};
-  Remarks remarks;
-  EXPECT_THROW((void)parse_any_calibration(files, std::nullopt, &remarks), InputError) << "no size";
-  expect_same(parse_any_calibration(files, ImageSize{640, 480}, &remarks),
-              {references[0], references[1]});
-}
-
 /// As cv::fisheye::stereoCalibrate's answer is written: nothing but the count tells its D from that
 /// of a lens with k1 k2 p1 p2, which is legal, too.
 TEST(OpenCvStereo, fourCoefficientsThatMayBeOfAFisheyeLensAreSaid) {
-  const std::string lens =
-      "!!opencv-matrix {rows: 3, cols: 3, dt: d, data: [290, 0, 320, 0, 291, "
-      "240, 0, 0, 1]}\n";
-  const auto text = [&](const std::string& d, const std::string& more) {
-    return "%YAML:1.0\n---\nM1: " + lens + "D1: " + d + "M2: " + lens + "D2: " + d +
-           "R: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n"
-           "T: {rows: 3, cols: 1, data: [-0.12, 0, 0]}\nimageSize: [640, 480]\n" +
-           more;
-  };
-  const std::string four = "{rows: 4, cols: 1, data: [-0.02, 0.008, -0.004, 0.0008]}\n",
-                    five = "{rows: 1, cols: 5, data: [-0.02, 0.008, -0.004, 0.0008, 0]}\n";
-  const auto read = [](const std::string& yaml, Remarks* remarks) {
-    return parse_any_calibration({{"stereo.yml", yaml}}, std::nullopt, remarks)
-        .rig.intrinsics[1]
-        .kind;
-  };
   Remarks remarks;
-  EXPECT_EQ(read(text(four, ""), &remarks), CameraModelKind::pinhole_radtan);
-  ASSERT_EQ(remarks.size(), 1U);
-  EXPECT_TRUE(test::says(remarks[0], "stereo.yml: four distortion coefficients"));
-  EXPECT_TRUE(test::says(remarks[0], "fisheye_model: 1"));
-
-  remarks.clear();
-  EXPECT_EQ(read(text(four, "fisheye_model: 1\n"), &remarks), CameraModelKind::pinhole_equidistant);
-  EXPECT_EQ(read(text(four, "fisheye_model: 0\n"), &remarks), CameraModelKind::pinhole_radtan);
-  EXPECT_EQ(read(text(five, ""), &remarks), CameraModelKind::pinhole_radtan);
-  EXPECT_TRUE(remarks.empty()) << remarks[0];
+  const auto parts = format_opencv(ours(CameraModelKind::pinhole_radtan), &remarks);
+  const std::string five = "%YAML:1.0\n---\n" + parts[0] + parts[1];
+  std::string four = five;
+  for (int k = 0; k < 2; ++k)
+    four = replaced(replaced(four, "cols: 5", "cols: 4"), "-0.0005, 0]", "-0.0005]");
+  const std::string model = "fisheye_model: 0\n";
+  struct Case {
+    std::string text;
+    CameraModelKind kind;
+    std::size_t remarks;
+  };
+  for (const Case& c :
+       {Case{replaced(four, model, ""), CameraModelKind::pinhole_radtan, 1},
+        Case{replaced(four, model, "fisheye_model: 1\n"), CameraModelKind::pinhole_equidistant, 0},
+        Case{four, CameraModelKind::pinhole_radtan, 0},
+        Case{replaced(five, model, ""), CameraModelKind::pinhole_radtan, 0}}) {
+    remarks.clear();
+    const auto read = parse_any_calibration({{"stereo.yml", c.text}}, std::nullopt, &remarks);
+    EXPECT_EQ(read.rig.intrinsics[1].kind, c.kind) << c.text;
+    ASSERT_EQ(remarks.size(), c.remarks) << c.text;
+    for (const std::string& remark : remarks)
+      EXPECT_TRUE(test::says(remark, "stereo.yml", "fisheye_model: 1"));
+  }
 }
 
 }  // namespace
