@@ -214,14 +214,6 @@ TEST_P(BagIns, TopicThatIsNoneIsRefused) {
   }
 }
 
-TEST_P(BagIns, WithoutOrientationNothingIsCompared) {
-  for (const double t : {0.0, 0.01})
-    write(4, t, [&](std::int64_t ns) { return imu_message(wire(), ns, {0, 0, 0, 1}, -1); });
-  fix(0);
-  const std::string said = all(open());
-  EXPECT_TRUE(says(said, "the NavSatFix of /fix has no orientation beside it"));
-}
-
 // Of two, one is named: the choice is not what is missing.
 TEST_P(BagIns, WithoutOrientationNothingIsComparedWithANamedFixEither) {
   writer_->channel(6, "/gps/fix", "sensor_msgs/NavSatFix");

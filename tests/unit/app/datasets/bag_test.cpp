@@ -267,15 +267,6 @@ TEST(Db3, ABagInSqliteIsReadAlsoSplitAndInItsFolder) {
   EXPECT_EQ(out[5 * kWidth + 7], static_cast<std::uint8_t>(pixel(7, 5)));
 }
 
-TEST(Bags, thosePackedAsAWholeAreNamedWithWhatUnpacksThem) {
-  for (const auto& [name, command] :
-       {std::pair{"d.mcap.zstd", "zstd -d d.mcap.zstd"},
-        std::pair{"d_0.db3.zst", "zstd -d d_0.db3.zst"},
-        std::pair{"d.bag.gz", "gunzip -k d.bag.gz"}, std::pair{"d.zip", "unzip d.zip"}})
-    EXPECT_TRUE(test::says(unpack_advice(name), command)) << name;
-  EXPECT_EQ(unpack_advice("d.mcap"), "");
-}
-
 INSTANTIATE_TEST_SUITE_P(Kinds, Bag,
                          ::testing::Values(BagKind{"mcap", ""}, BagKind{"mcap", "lz4"},
                                            BagKind{"rosbag", "none"}, BagKind{"rosbag", "lz4"},

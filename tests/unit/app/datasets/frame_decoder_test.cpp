@@ -167,16 +167,6 @@ TEST_F(Decoder, endsAtAnyMomentWhileTheConsumerHoldsPairsBack) {
   }
 }
 
-TEST_F(Decoder, stopWakesAConsumerThatWaits) {
-  open(1);
-  FrameDecoder decoder(sequence_, 0, 1, pool_);
-  DecodedPair pair;
-  ASSERT_TRUE(decoder.next(&pair));
-  std::thread other([&] { decoder.stop(); });
-  EXPECT_FALSE(decoder.next(&pair));
-  other.join();
-}
-
 TEST_F(Decoder, theConsumersSideAllocatesNothing) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";

@@ -54,7 +54,7 @@ struct Row {
 };
 
 TEST(Trajectory, isReadHoweverProgramsWriteIt) {
-  const std::string q = " 0 0 0.70710678 0.70710678", w = ",0.70710678,0,0,0.70710678";
+  const std::string q = " 0 0 0.70710678 0.70710678";
   const std::string moved = " 1 2 3" + q;
   const std::array rows{
       Row{"seconds",
@@ -65,8 +65,6 @@ TEST(Trajectory, isReadHoweverProgramsWriteIt) {
           "5" +
               moved,
           1, 5'000'000'000, ""},
-      Row{"commas and headings", "time,tx,ty,tz,qw,qx,qy,qz\n1.5,1,2,3" + w + "\n", 1,
-          1'500'000'000, ""},
       Row{"semicolons", "1.5; 1; 2; 3; 0; 0; 0.70710678; 0.70710678\n", 1, 1'500'000'000, ""},
       Row{"columns in another order",
           "# qx qy qz qw x y z timestamp\n0 0 0.70710678 0.70710678 1 2 3 1.5\n", 1, 1'500'000'000,
@@ -77,9 +75,6 @@ TEST(Trajectory, isReadHoweverProgramsWriteIt) {
           "orientation.y,field.pose.orientation.z,field.pose.orientation.w\n"
           "1403636584999000000,1,1403636584763555584,map,1,2,3,0,0,0.70710678,0.70710678\n",
           1, kFirst, "nanoseconds"},
-      Row{"seconds and nanoseconds",
-          "secs,nsecs,x,y,z,qx,qy,qz,qw\n1403636584,763555584,1,2,3,0,0,0.70710678,0.70710678\n", 1,
-          kFirst, ""},
       Row{"an index and more columns",
           "0 1.5" + moved + " 7 7\n1 1.6" + moved + " 7 7\n2 1.7" + moved + " 7 7\n", 3,
           1'500'000'000, ""},

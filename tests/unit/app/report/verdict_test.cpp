@@ -64,6 +64,12 @@ struct Case {
     analysis.degraded = degraded, analysis.lost = lost, analysis.ok = 1000 - degraded - lost;
     analysis.ok_share = 1e-3 * static_cast<double>(analysis.ok);
   }
+  /// Camera 0 is away.
+  void outage(double from_s, double to_s) {
+    event(from_s, "camera_gone", "camera 0 is gone"),
+        event(to_s, "camera_back", "camera 0 is back");
+  }
+  void given(bool verified) { attempt(true, "given", 0, 0), calibration()["verified"] = verified; }
 };
 
 struct Row {
@@ -75,6 +81,26 @@ struct Row {
 };
 
 TEST(Verdict, GradeReasonAndAdviceByFinding) {
+  const auto drift = [](double d) { return [d](Case& c) { c.analysis.drift = d; }; };
+  const auto lost = [](std::size_t n) { return [n](Case& c) { c.frames_of(0, n); }; };
+  const auto weak_by = [](const char* what) {
+    return [what](Case& c) { c.calibration() = {{"word", "recalibrate"}, {"limited_by", what}}; };
+  };
+  const auto near_sigma = [](double percent) {
+    return [percent](Case& c) {
+      c.calibration()["word"] = "recalibrate";
+      CalibrationRow& row = c.attempt(true, "refinement", 1, 0.2);
+      row.judged_depth_m = 2.4, row.depth_sigma_percent = percent;
+    };
+  };
+  const auto rejected = [](const char* cause, double before_px) {
+    return [=](Case& c) {
+      c.attempt(true, "from_scratch", 0, 0.2), c.attempt(false, cause, before_px, 0.2);
+    };
+  };
+  const auto event = [](double s, const char* kind, const char* sentence) {
+    return [=](Case& c) { c.event(s, kind, sentence); };
+  };
   const std::vector<Row> rows{
       {"nothing is wrong", [](Case&) {}, good},
       {"no reference",
@@ -83,60 +109,29 @@ TEST(Verdict, GradeReasonAndAdviceByFinding) {
       {"an INS without a placement",
        [](Case& c) { c.analysis.source = ErrorSource::none, c.analysis.ins_unplaced = true; }, care,
        "not placed on the earth", "comparison.placement_m"},
-      {"drift of 2 %", [](Case& c) { c.analysis.drift = 0.02; }, good},
-      {"drift above 2 %", [](Case& c) { c.analysis.drift = 0.021; }, care},
-      {"drift of 5 %", [](Case& c) { c.analysis.drift = 0.05; }, care},
-      {"drift above 5 %", [](Case& c) { c.analysis.drift = 0.051; }, bad},
+      {"drift of 2 %", drift(0.02), good},
+      {"drift above 2 %", drift(0.021), care},
+      {"drift of 5 %", drift(0.05), care},
+      {"drift above 5 %", drift(0.051), bad},
       {"lengths", [](Case& c) { c.analysis.scale = 0.96; }, care, "too long"},
-      {"5 % lost", [](Case& c) { c.frames_of(0, 50); }, care},
-      {"20 % lost", [](Case& c) { c.frames_of(0, 200); }, bad},
+      {"5 % lost", lost(50), care},
+      {"20 % lost", lost(200), bad},
       {"no pose",
        [](Case& c) {
          for (Frame& f : c.session.frames) f.posed = false;
        },
        bad, "never was a pose"},
-      {"weak by lenses",
-       [](Case& c) {
-         c.calibration() = {{"word", "recalibrate"}, {"limited_by", "intrinsics"}};
-       },
-       bad, "calibration", "driving on does not help"},
-      {"weak by noise",
-       [](Case& c) {
-         c.calibration() = {{"word", "recalibrate"}, {"limited_by", "noise"}};
-       },
-       bad, "calibration", "near and far structure"},
-      {"short baseline, known well near",
-       [](Case& c) {
-         c.calibration()["word"] = "recalibrate";
-         CalibrationRow& row = c.attempt(true, "refinement", 1, 0.2);
-         row.judged_depth_m = 2.4, row.depth_sigma_percent = 1.0;
-       },
-       care, "1.0 % at 2.4 m"},
-      {"short baseline, not known near",
-       [](Case& c) {
-         c.calibration()["word"] = "recalibrate";
-         CalibrationRow& row = c.attempt(true, "refinement", 1, 0.2);
-         row.judged_depth_m = 2.4, row.depth_sigma_percent = 3.0;
-       },
-       bad},
+      {"weak by lenses", weak_by("intrinsics"), bad, "calibration", "driving on does not help"},
+      {"weak by noise", weak_by("noise"), bad, "calibration", "near and far structure"},
+      {"short baseline, known well near", near_sigma(1), care, "1.0 % at 2.4 m"},
+      {"short baseline, not known near", near_sigma(3), bad},
       {"a knock that was mended", [](Case& c) { c.attempt(true, "knock", 1.4, 0.2); }, good, "",
        "knocked"},
-      {"rejected",
-       [](Case& c) {
-         c.attempt(true, "from_scratch", 0, 0.2);
-         c.attempt(false, "drift", 1.4, 0.2);
-       },
-       care, "", "it is worse"},
-      {"rejected, and the one in use fits as well",
-       [](Case& c) {
-         c.attempt(true, "from_scratch", 0, 0.2);
-         c.attempt(false, "requested", 0.2, 0.2);
-       },
-       good},
+      {"rejected", rejected("drift", 1.4), care, "", "it is worse"},
+      {"rejected, and the one in use fits as well", rejected("requested", 0.2), good},
       {"measured and kept",
        [](Case& c) {
-         c.attempt(true, "given", 0, 0);
-         c.attempt(false, "refinement", 1.4, 0.2).kept = true;
+         c.attempt(true, "given", 0, 0), c.attempt(false, "refinement", 1.4, 0.2).kept = true;
        },
        good},
       {"never a calibration", [](Case& c) { c.attempt(false, "from_scratch", 0, 0.9); }, care,
@@ -149,25 +144,15 @@ TEST(Verdict, GradeReasonAndAdviceByFinding) {
          c.frames_of(400, 0);
          c.analysis.waited = 400, c.analysis.confirmed_s = 20;
          c.analysis.by_reason = c.analysis.waited_by_reason = {0, 400};
-         c.attempt(true, "given", 0, 0);
-         c.calibration()["verified"] = true;
+         c.given(true);
        },
        good},
-      {"not verified",
-       [](Case& c) { c.attempt(true, "given", 0, 0), c.calibration()["verified"] = false; }, care,
-       "has not confirmed its calibration", "near things at the roadside"},
-      {"not verified at the end",
-       [](Case& c) {
-         c.attempt(true, "given", 0, 0), c.calibration()["verified"] = false;
-         c.analysis.confirmed_s = 20;
-       },
+      {"not verified", [](Case& c) { c.given(false); }, care, "has not confirmed its calibration",
+       "near things at the roadside"},
+      {"not verified at the end", [](Case& c) { c.given(false), c.analysis.confirmed_s = 20; },
        care, "at the end is not verified"},
-      {"nothing watched",
-       [](Case& c) {
-         c.attempt(true, "given", 0, 0), c.calibration()["verified"] = false;
-         c.calibration()["online"] = false;
-       },
-       care, "nothing watched it"},
+      {"nothing watched", [](Case& c) { c.given(false), c.calibration()["online"] = false; }, care,
+       "nothing watched it"},
       {"torn, waited in vain",
        [](Case& c) {
          c.session.summary = nullptr, c.attempt(true, "given", 0, 0);
@@ -188,12 +173,8 @@ TEST(Verdict, GradeReasonAndAdviceByFinding) {
                                             {"contradicted", true}};
        },
        bad, "711 ± 12", "--focal"},
-      {"scale of the INS, calibration not kept",
-       [](Case& c) {
-         c.event(1, "scale_disagrees", "90.0 % longer"),
-             c.event(2, "calibration_not_kept", "no room");
-       },
-       care, "lengths disagree", "no room"},
+      {"scale of the INS", event(1, "scale_disagrees", "90.0 % longer"), care, "lengths disagree"},
+      {"calibration not kept", event(2, "calibration_not_kept", "no room"), good, "", "no room"},
       {"torn",
        [](Case& c) {
          c.session.summary = nullptr, c.session.missing = {"summary.json is missing"};
@@ -206,42 +187,30 @@ TEST(Verdict, GradeReasonAndAdviceByFinding) {
        good, "", "frame interval"},
       {"allocations", [](Case& c) { c.session.summary["allocations_after_seal"] = 3; }, good, "",
        "Memory was taken 3 times"},
-      {"lines dropped",
-       [](Case& c) {
-         c.session.summary["drops"] = {{"lines", 4}};
-       },
-       care, "4 lines"},
+      {"lines dropped", [](Case& c) { c.session.summary["drops"]["lines"] = 4; }, care, "4 lines"},
       // Outages
-      {"a camera that never came back",
-       [](Case& c) { c.event(49.96, "camera_gone", "camera 1 is gone; check it"); }, bad,
-       "no frame after 50.0 s: camera 1 was gone", "Camera 1 was gone from 50.0 s on, to the end"},
-      {"a board that never came back", [](Case& c) { c.event(49.96, "board_gone", "x"); }, bad,
+      {"a camera that never came back", event(49.96, "camera_gone", "camera 1 is gone; check it"),
+       bad, "no frame after 50.0 s: camera 1 was gone",
+       "Camera 1 was gone from 50.0 s on, to the end"},
+      {"a board that never came back", event(49.96, "board_gone", "x"), bad,
        "the trigger board was gone"},
-      {"a camera that the others drove on without",
-       [](Case& c) { c.event(30, "camera_gone", "camera 1 is gone"); }, care,
-       "camera 1 was gone from 30.0 s to the end"},
+      {"a camera that the others drove on without", event(30, "camera_gone", "camera 1 is gone"),
+       care, "camera 1 was gone from 30.0 s to the end"},
       {"a loose cable",
        [](Case& c) {
-         for (int i = 0; i < 50; ++i)
-           c.event(10 + 0.6 * i, "camera_gone", "camera 0 is gone"),
-               c.event(10.3 + 0.6 * i, "camera_back", "camera 0 is back");
+         for (int i = 0; i < 50; ++i) c.outage(10 + 0.6 * i, 10.3 + 0.6 * i);
        },
        good, "", "Camera 0 was gone 50 times for 15.0 s"},
       {"a hole breaks the way, so that lengths say nothing",
        [](Case& c) {
          c.analysis.scale = 1.045;
          for (std::size_t i = 400; i < 800; ++i) c.session.frames[i].posed = false;
-         c.event(20, "camera_gone", "camera 0 is gone"),
-             c.event(40, "camera_back", "camera 0 is back");
+         c.outage(20, 40);
        },
        care, "camera 0 was gone for 20.0 s"},
       {"a short outage leaves lengths to be judged",
-       [](Case& c) {
-         c.analysis.scale = 1.045;
-         c.event(20, "camera_gone", "camera 0 is gone"),
-             c.event(23, "camera_back", "camera 0 is back");
-       },
-       care, "lengths come out", "Lengths disagree"},
+       [](Case& c) { c.analysis.scale = 1.045, c.outage(20, 23); }, care, "lengths come out",
+       "Lengths disagree"},
       {"an outage after the frames that are read",
        [](Case& c) {
          c.session.left_out = {"poses.csv has more lines"};
