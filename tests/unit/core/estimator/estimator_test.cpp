@@ -120,18 +120,6 @@ TEST(Estimator, aPoseThatStandsGetsNoMoreUncertain) {
   }
 }
 
-TEST(Estimator, theFirstFrameSaysThatACalibrationWasGiven) {
-  Standing s;
-  EXPECT_EQ(s.estimator.state(), State::initialising);
-  (void)s.give(0);
-  ASSERT_EQ(s.estimator.events().size(), 1U);
-  EXPECT_EQ(s.estimator.events()[0].kind, EstimatorEvent::Kind::state);
-  EXPECT_EQ(s.estimator.events()[0].from, State::initialising);
-  EXPECT_EQ(s.estimator.events()[0].to, State::stereo_odometry);
-  (void)s.give(1);
-  EXPECT_TRUE(s.estimator.events().empty());
-}
-
 TEST(Estimator, ofAContradictedPairingTheFirstImageAloneIsUsedAndThePoseSaysSo) {
   Standing contradicted, one_camera;
   for (int i = 0; i < 3; ++i) {
