@@ -118,56 +118,6 @@ TEST_F(Calibrate, oneCameraAlone) {
   EXPECT_TRUE(test::says(o.err, "one camera makes no rig"));
 }
 
-TEST_F(Calibrate, viewsWithoutABoardAreSaidAndSkipped) {
-  const fs::path odd = file("odd");
-  fs::create_directories(odd);
-  for (const char* side : {"left", "right"})
-    for (int i = 0; i < 6; ++i)
-      fs::copy_file(file(fmt::format("{}/{:02}.png", side, i)),
-                    odd / fmt::format("{}{}.png", side, i));
-  const cv::Mat grey(480, 640, CV_8U, cv::Scalar(90));
-  ASSERT_TRUE(cv::imwrite((odd / "right3.png").string(), grey));
-  fs::remove(odd / "right5.png");
-  const Outcome o = run_vergence(fmt::format(
-      "calibrate --quiet --left '{0}/left*.png' --right '{0}/right*.png'{1} --out '{0}/c.yaml'",
-      odd.string(), kArguments));
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_TRUE(
-      test::says(o.err, "no board of 9x6 inner corners in " + (odd / "right3.png").string()));
-  EXPECT_TRUE(
-      test::says(o.err, "left5.png: skipped, not every camera has an image of that number"));
-  EXPECT_EQ(app::read_calibration(odd / "c.yaml").rig.frames, 4);
-}
-
-TEST_F(Calibrate, viewsThatDoNotDetermineTheLensAreRefused) {
-  struct Row {
-    const char* name;
-    double tilted;  // as a share of the tilt that determines a lens
-    bool moved;
-    const char* said;
-  };
-  const RigCalibration rig = known_rig(1, CameraModelKind::pinhole_radtan);
-  const BoardPainter painter(rig.intrinsics[0]);
-  for (const Row& row :
-       {Row{"once", 1, false, "only 1 of 14 views show the board differently; 4 are the least"},
-        Row{"frontal", 0.05, true, "the views do not determine the lens of camera 0"}}) {
-    fs::create_directories(file(row.name));
-    for (std::size_t i = 0; i < 14; ++i) {
-      Transform T = shown_around(kBoard, rig)[row.moved ? i : 0];
-      T.R = exp_so3(row.tilted * log_so3(T.R));
-      auto pixels = painter.paint(kBoard, T);
-      ASSERT_TRUE(cv::imwrite(file(fmt::format("{}/{:02}.png", row.name, i)).string(),
-                              cv::Mat(480, 640, CV_8U, pixels.data())));
-    }
-    const fs::path out = file(std::string(row.name) + ".yaml");
-    const Outcome o = run_vergence(fmt::format("calibrate --quiet --left '{}/*.png'{} --out '{}'",
-                                               file(row.name).string(), kArguments, out.string()));
-    EXPECT_EQ(o.code, 1) << row.name << o.err;
-    EXPECT_TRUE(test::says(o.err, row.said));
-    EXPECT_FALSE(fs::exists(out)) << row.name;
-  }
-}
-
 TEST_F(Calibrate, anotherBoardIsSaidOnceAndNotForEveryView) {
   const Outcome o =
       run_vergence("calibrate --quiet" + images() + " --board 8x5 --square 0.04 --out '" +

@@ -12,20 +12,6 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-TEST(LongSlow, tenDrivesWithoutAKnockRaiseNoAlarm) {
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    RenderedDriveOptions options;
-    options.drive.seed = seed;
-    options.from_s = 8 + 6 * static_cast<double>(seed);
-    RenderedDrive drive(options);
-    Course course(with_calibration(options.rig));
-    for (std::uint64_t i = 0; i < 200; ++i) course.give(drive.frame(i), drive.T_enu_left(i));
-    EXPECT_EQ(course.first(EstimatorEvent::Kind::rig_changed), nullptr) << seed << '\n'
-                                                                        << course.story();
-    EXPECT_EQ(wrong_ok(course.answers(), {}), "") << seed;
-  }
-}
-
 TEST(LongSlow, aPitchThatCreepsIsNoticedAndFollowed) {
   RenderedDriveOptions options;
   const Transform T = options.rig.T_camera_left[1];

@@ -83,25 +83,5 @@ TEST(RecordedFromScratch, eurocsPublishedTransformIsFound) {
   EXPECT_LT(with_found.ate_se3.rmse, with_published.ate_se3.rmse + 1e-3);
 }
 
-TEST(RecordedFromScratch, kittisTransformIsFound) {
-  const auto drive = excerpt(kKitti);
-  if (!drive) GTEST_SKIP() << shared_data_missing(kKitti.folder);
-  const auto found = calibrate(*drive, kFrames);
-  ASSERT_TRUE(found);
-  print("kitti", *found);
-  // What an offline adjustment of the same images comes to, whose own directions are good to some
-  // hundredths of a degree: the nominal rectification leaves residuals that are no noise.
-  const Vec3 off = turned(*found, exp_so3(kDegree * Vec3(0.032, 0.042, -0.040)));
-  std::printf("kitti: %.4f %.4f %.4f deg off, %.4f in all\n", off.x(), off.y(), off.z(),
-              off.norm());
-  for (int i = 0; i < 3; ++i) EXPECT_LT(std::abs(off[i]), 0.02) << i;
-  const TrajectoryEvaluation e = odometry_with(*drive, *found);
-  std::printf("kitti: segments %.3f %%, %.3f %% after one scale of %.4f; scale sigma %.4f\n",
-              100 * e.segments[0].translation, 100 * e.segments[1].translation, e.sim3.scale,
-              found->scale_sigma);
-  EXPECT_LT(e.segments[1].translation, 0.0067)
-      << "one lens model too few leaves so much; with the lenses found it is 0.55 %";
-}
-
 }  // namespace
 }  // namespace vergence::test

@@ -2,14 +2,11 @@
 // rendered.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "core/calibration/gates.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/system/calibration/course.hpp"
-#include "tests/system/odometry/faults.hpp"
 
 namespace vergence::test {
 namespace {
@@ -111,63 +108,6 @@ TEST(FromScratch, allocatesNothingOnAnyThread) {
   }
 }
 
-bool same_bits(const Transform& a, const Transform& b) { return a.R == b.R && a.t == b.t; }
-
-TEST(FromScratch, isTheSameBitForBitWhateverTheThreads) {
-  CourseSetting one = from_scratch(street().rig), several = one;
-  one.threads = 1;
-  Course a(one), b(several), again(several);
-  for (Course* course : {&a, &b, &again}) course->give(street(), 0, 75);
-  for (const Course* other : {&b, &again}) {
-    ASSERT_EQ(a.answers().size(), other->answers().size());
-    for (std::size_t i = 0; i < a.answers().size(); ++i) {
-      const PoseSample &p = a.answers()[i].sample, &q = other->answers()[i].sample;
-      ASSERT_EQ(p.status, q.status) << i;
-      ASSERT_EQ(p.state, q.state) << i;
-      ASSERT_EQ(p.reason, q.reason) << i;
-      ASSERT_EQ(p.inliers, q.inliers) << i;
-      ASSERT_TRUE(same_bits(p.T_world_left, q.T_world_left)) << i;
-    }
-    ASSERT_EQ(a.decisions().size(), other->decisions().size());
-    for (std::size_t i = 0; i < a.decisions().size(); ++i) {
-      const CalibrationDecision &c = a.decisions()[i].decision, &d = other->decisions()[i].decision;
-      EXPECT_EQ(a.decisions()[i].frame, other->decisions()[i].frame);
-      EXPECT_EQ(c.accepted, d.accepted);
-      EXPECT_TRUE(same_bits(c.calibration.T_camera_left[1], d.calibration.T_camera_left[1]));
-      EXPECT_EQ(c.calibration.sigma_noise[1], d.calibration.sigma_noise[1]);
-      EXPECT_EQ(c.calibration.sigma_wide[1], d.calibration.sigma_wide[1]);
-    }
-  }
-  EXPECT_FALSE(a.decisions().empty()) << a.story();
-}
-
-TEST(FromScratch, aDriveThatEndsEarlyIsDecidedAtItsEnd) {
-  Course course(from_scratch(street().rig));
-  course.give(street(), 0, 28);
-  EXPECT_TRUE(course.decisions().empty()) << course.story();
-  course.finish();
-  ASSERT_EQ(course.count_accepted(), 1) << course.story();
-  const RigError e = rig_error(course.accepted()->calibration, 1, street().rig.T_camera_left[1]);
-  // From 25 frames.
-  EXPECT_LT(e.rotation, 0.25e-3) << to_string(e);
-  EXPECT_LT(std::abs(e.t.y()), 2.5e-3) << to_string(e);
-  EXPECT_LT(std::abs(e.t.z()), 8e-3) << to_string(e);
-}
-
-TEST(FromScratch, exchangedCamerasAreNeverAdoptedAndItSaysWhy) {
-  Course course(from_scratch(street().rig));
-  course.give(street(), 0, street().size(), swap_cameras(0, street().size()));
-  course.finish();
-  EXPECT_EQ(course.count_accepted(), 0) << course.story();
-  EXPECT_TRUE(course.rejected_for(calibration::reason(calibration::Gate::cameras_swapped)))
-      << course.story();
-  EXPECT_EQ(count_ok(course.answers(), 0, street().size()), 0) << course.story();
-  EXPECT_TRUE(std::any_of(course.answers().begin(), course.answers().end(), [](const Answer& a) {
-    return a.sample.reason == Reason::cameras_swapped;
-  })) << course.story();
-  EXPECT_FALSE(course.estimator().calibrated());
-}
-
 /// The right camera's image is the one of the frame before.
 bool one_late(std::size_t i, RigFrame* frame) {
   if (i == 0) return false;
@@ -187,43 +127,13 @@ TEST(FromScratch, aCameraAFrameLateFromTheStartIsRefused) {
   EXPECT_EQ(count_ok(course.answers(), 0, street().size()), 0) << course.story();
 }
 
-TEST(WithACalibration, aCameraAFrameLateFromTheStartIsTold) {
-  Course course(with_calibration(street().rig));
-  course.give(street(), 0, street().size(), one_late);
-  course.finish();
-  EXPECT_EQ(wrong_ok(course.answers(), {}), "") << course.story();
-  EXPECT_NE(course.first(EstimatorEvent::Kind::rig_changed), nullptr) << course.story();
-  EXPECT_EQ(course.count_accepted(), 0) << course.story();
-}
-
-/// A place where the rig stands: a few pictures with noise of their own, again and again.
-struct Standing {
-  static constexpr std::size_t kPictures = 6;
-  StereoDrive still;
-  explicit Standing(const RenderedDriveOptions& options) : still(film(options, kPictures)) {}
-  void give(Course* course, std::uint64_t first, std::uint64_t last) const {
-    for (std::uint64_t i = first; i < last; ++i) {
-      RigFrame frame;
-      frame.number = i;
-      frame.stamp = still.stamps[0] + Duration::seconds(static_cast<double>(i) / 30.0);
-      frame.cameras = 2;
-      for (std::size_t k = 0; k < 2; ++k) frame.images[k] = still.pairs[i % kPictures][k].view();
-      course->give(frame, still.truth[0]);
-    }
-  }
-};
-
-RenderedDriveOptions standing_drive() {
-  RenderedDriveOptions o;
-  o.drive.kind = mock::DriveKind::still;
-  o.from_s = 3;
-  return o;
-}
-
 TEST(StandingStill, fromScratchSaysThatItNeedsMotionAndAdoptsNothing) {
-  const Standing place(standing_drive());
-  Course course(from_scratch(place.still.rig));
-  place.give(&course, 0, 60);
+  RenderedDriveOptions options;
+  options.drive.kind = mock::DriveKind::still;
+  options.from_s = 3;
+  const StereoDrive still = film(options, 60);
+  Course course(from_scratch(still.rig));
+  course.give(still, 0, still.size());
   EXPECT_EQ(course.count_accepted(), 0) << course.story();
   EXPECT_FALSE(course.estimator().calibrated());
   for (const Answer& a : course.answers()) {
@@ -236,40 +146,6 @@ TEST(StandingStill, fromScratchSaysThatItNeedsMotionAndAdoptsNothing) {
   EXPECT_NE(course.first(EstimatorEvent::Kind::calibration_waits), nullptr) << course.story();
   course.finish();
   EXPECT_EQ(course.count_accepted(), 0) << course.story();
-}
-
-TEST(StandingStill, aMinuteIsNoKnock) {
-  const Standing place(standing_drive());
-  Course course(with_calibration(place.still.rig));
-  place.give(&course, 0, 1800);
-  EXPECT_EQ(course.first(EstimatorEvent::Kind::rig_changed), nullptr) << course.story();
-  EXPECT_EQ(count_ok(course.answers(), 0, 1800), 1800) << course.story();
-  EXPECT_EQ(wrong_ok(course.answers(), {}), "");
-}
-
-TEST(StandingStill, aKnockIsNoticedAndWaitsForMotion) {
-  const Standing before(standing_drive());
-  RenderedDriveOptions knocked = standing_drive();
-  knocked.rig.T_camera_left[1] = perturbed(knocked.rig.T_camera_left[1],
-                                           Vec3(0.5 * std::numbers::pi / 180, 0, 0), Vec3::Zero());
-  const Standing after(knocked);
-  Course course(with_calibration(before.still.rig));
-  constexpr std::uint64_t kKnock = 40, kEnd = 100;
-  before.give(&course, 0, kKnock);
-  EXPECT_EQ(count_ok(course.answers(), 0, kKnock), static_cast<int>(kKnock)) << course.story();
-  after.give(&course, kKnock, kEnd);
-  // A rig that stood from the start has not confirmed its calibration: it may never have been the
-  // right one.
-  const Told* noticed = course.first(EstimatorEvent::Kind::calibration_contradicted);
-  ASSERT_NE(noticed, nullptr) << course.story();
-  EXPECT_GE(noticed->frame, kKnock);
-  EXPECT_LE(noticed->frame, kKnock + 15) << course.story();
-  EXPECT_EQ(course.count_accepted(), 0) << course.story();
-  EXPECT_EQ(course.estimator().state(), State::recalibrating) << course.story();
-  const PoseSample& last = course.answers().back().sample;
-  EXPECT_EQ(last.status, PoseStatus::degraded);
-  EXPECT_EQ(last.reason, Reason::needs_motion) << course.story();
-  EXPECT_EQ(wrong_ok(course.answers(), {}), "") << course.story();
 }
 
 TEST(ThreeCameras, allTransformsAreFound) {

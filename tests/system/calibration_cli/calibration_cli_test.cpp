@@ -154,17 +154,6 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
   EXPECT_TRUE(test::says(refused.err, "cameras.0.size is 640 x 480"));
 }
 
-TEST_F(CalibrationCli, aScheduledWishRecalibrates) {
-  const Outcome o = drive("s", "--duration 9 --fault recalibrate@4");
-  // 1 if no frame was ok: the wish comes before the calibration in use is verified.
-  ASSERT_LE(o.code, 1) << o.err;
-  const auto attempts = summary("s")["recalibrations"];
-  ASSERT_GE(attempts.size(), 1U);
-  EXPECT_EQ(attempts[0]["reason"], "requested");
-  EXPECT_GT(attempts[0]["latency_frames"].get<int>(), 0);
-  EXPECT_GT(frames_with("s", "recalibrating"), 0U);
-}
-
 TEST_F(CalibrationCli, sigusr1AsksARunningDriveForANewCalibration) {
   // In real time; the signal comes once the first poses are in the file.
   const std::string command = arguments("s", "--duration 5");

@@ -182,34 +182,4 @@ TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
   (void)end();
 }
 
-TEST_F(IidcRig, GivenUpForItsSilenceWhileAnImageIsHeldItIsOpenedAnewBesideIt) {
-  ASSERT_NO_FATAL_FAILURE(begin(usual()));
-  ASSERT_NO_FATAL_FAILURE(start());
-  ASSERT_TRUE(taker_->take(10));
-  Frame held;
-  ASSERT_EQ(cameras_[0]->wait(Duration::seconds(2), &held), DeviceStatus::ok);
-  const std::uint32_t number = read_stamp(cameras_[0]->view(held.slot)).number;
-  emulator_->command("mute 0 1");
-  Frame frame;
-  DeviceStatus status = DeviceStatus::timeout;
-  const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (status != DeviceStatus::gone && std::chrono::steady_clock::now() < limit) {
-    status = cameras_[0]->wait(Duration::milliseconds(200), &frame);
-    if (status == DeviceStatus::ok) cameras_[0]->release(frame.slot);
-  }
-  ASSERT_EQ(status, DeviceStatus::gone);
-  emulator_->command("mute 0 0");
-  ASSERT_TRUE(start_again(cameras_[0].get())) << cameras_[0]->last_error();
-  EXPECT_EQ(read_stamp(cameras_[0]->view(held.slot)).number, number);
-  cameras_[0]->release(held.slot);
-  taker_->restarted(0);
-  ASSERT_TRUE(taker_->take(10)) << cameras_[0]->last_error();
-  cameras_[0]->stop();
-  taker_->restarted(0);
-  ASSERT_EQ(cameras_[0]->start(nullptr), DeviceStatus::ok) << cameras_[0]->last_error();
-  ASSERT_TRUE(taker_->take(3));
-  EXPECT_EQ(taker_->account(0).wrong + taker_->account(1).wrong, 0U);
-  (void)end();
-}
-
 }  // namespace vergence::test

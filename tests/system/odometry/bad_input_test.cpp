@@ -75,15 +75,6 @@ TEST(OdometryInBadConditions, aDriveThatBeginsInTheDarkStartsWithTheFirstLight) 
   v.expect_recovery(0);
 }
 
-TEST(OdometryInBadConditions, oneCoveredCameraIsDegraded) {
-  for (const Cover side : {Cover::left, Cover::right}) {
-    const Verdict v(cover(drive(), side, kFirst, kLast), kFirst, kLast);
-    v.expect_status(PoseStatus::degraded);
-    v.expect_reason(Reason::image_dark);
-    v.expect_recovery(kAfterRestart);
-  }
-}
-
 TEST(OdometryInBadConditions, aCameraCoveredForGoodIsNeverOkAgain) {
   for (const Cover side : {Cover::left, Cover::right}) {
     const Verdict v(cover(drive(), side, 20, drive().size()), 20, drive().size());
@@ -176,41 +167,6 @@ TEST(OdometryInBadConditions, afterTwoSecondsWithoutFramesItSaysSoAndStartsAnew)
   const Vec3 way = restart->sample.T_world_left.t - last.t;
   EXPECT_LT(way.norm(), 1.01 * frames * step.norm());
   EXPECT_GT(way.norm(), 0.5 * frames * step.norm());
-}
-
-constexpr std::size_t kGapEnds = kFirst + 12;  // 0.65 s, more than max_gap_s
-constexpr std::size_t kWindow = 10;            // frames until the window is renewed after it
-
-TEST(OdometryInBadConditions, aShortGapIsMarkedAndBridged) {
-  const Verdict v(leave_out(kFirst, kGapEnds), kGapEnds, kGapEnds + 1 + kWindow);
-  v.expect_reason(Reason::time_gap);
-  v.expect_recovery(0);
-}
-
-TEST(OdometryInBadConditions, aGapWhoseFirstFrameIsOfNoUseIsMarkedFromTheNextOn) {
-  constexpr std::size_t kEnds = kFirst + 10, kMarked = kEnds + 2 + kWindow, kAgo = 100;
-  const Edit gap = leave_out(kFirst, kEnds);
-  const Edit one_image = take_away(1, kEnds, kEnds + 1);
-  const Edit of_elsewhere = [](std::size_t i, RigFrame* f) {
-    for (std::size_t k = 0; i == kEnds && k < 2; ++k)
-      f->images[k] = drive().pairs[kEnds - kAgo][k].view();
-    return true;
-  };
-  for (const Edit& spoil : {one_image, of_elsewhere}) {
-    const Verdict v([&](std::size_t i, RigFrame* f) { return spoil(i, f) && gap(i, f); }, kEnds,
-                    kMarked);
-    EXPECT_EQ(v.at(kEnds + 1)->sample.reason, Reason::time_gap) << story(v.replayed.answers);
-    EXPECT_EQ(count_ok(v.replayed.answers, kMarked, drive().size()),
-              static_cast<int>(drive().size() - kMarked))
-        << story(v.replayed.answers);
-  }
-}
-
-TEST(OdometryInBadConditions, anEvenDriveIsAnOrdinaryOneHoweverSlowItIs) {
-  const Replay r = replay(
-      still_drive(), [](std::size_t i, RigFrame*) { return i % 11 == 0; }, 1, kCalibrationHeld);
-  ASSERT_EQ(r.answers.size(), 6U);
-  for (const Answer& a : r.answers) EXPECT_EQ(a.sample.status, PoseStatus::ok);
 }
 
 TEST(OdometryInBadConditions, oneLostFrameInThreeIsNothing) {

@@ -12,11 +12,10 @@ struct Excerpt {
   const char* name;
   const char* folder;  // below the shared root
   app::SequenceFormat format;
-  std::size_t frames;           // all of them, or enough of them
-  std::size_t frames_of_a_gap;  // two seconds
+  std::size_t frames;  // all of them, or enough of them
 };
-inline constexpr Excerpt kKitti{"kitti", "data/kitti06_51", app::SequenceFormat::kitti, 51, 20};
-inline constexpr Excerpt kEuroc{"euroc", "data/euroc_mh01", app::SequenceFormat::euroc, 80, 40};
+inline constexpr Excerpt kKitti{"kitti", "data/kitti06_51", app::SequenceFormat::kitti, 51};
+inline constexpr Excerpt kEuroc{"euroc", "data/euroc_mh01", app::SequenceFormat::euroc, 80};
 
 /// The frames that have a truth, decoded. Throws what the readers of files throw.
 [[nodiscard]] StereoDrive load(const Excerpt& excerpt, const std::filesystem::path& folder);

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -121,23 +120,6 @@ TEST_F(RecordedDrive, aDamagedImageIsSaidAndTheRestReplays) {
   EXPECT_FALSE(test::contains(o.err, "what it was given in the drive")) << o.err;
   EXPECT_EQ(summary_of(out("of-damaged"))["frames"]["read"],
             summary_of(session())["frames"]["read"]);
-}
-
-TEST_F(RecordedDrive, aTornRecordingReplaysUpToItsEnd) {
-  const auto torn =
-      changed("torn", [](std::string* bytes) { bytes->resize(bytes->size() * 2 / 3); });
-  const Outcome o = replay(torn, out("of-torn"));
-  EXPECT_LE(o.code, 1) << o.err;
-  EXPECT_TRUE(test::says(o.err, "is unfinished"));
-  // A writer that was starved for long has written few, large chunks.
-  const auto whole = test::read_mcap(torn / "drive.mcap").messages;
-  const auto frames = std::count_if(whole.begin(), whole.end(), [](const test::ReadMessage& m) {
-    return m.type == "vergence_msgs/Frame";
-  });
-  ASSERT_GT(frames, 0);
-  EXPECT_EQ(summary_of(out("of-torn"))["frames"]["read"], frames);
-  const std::string poses = text_of(out("of-torn") / "trajectory.tum");
-  EXPECT_TRUE(text_of(session() / "trajectory.tum").starts_with(poses));
 }
 
 TEST_F(RecordedDrive, recordingsOfOtherVersionsAndProgramsAreRefusedWithASentence) {

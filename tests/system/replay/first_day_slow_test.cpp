@@ -10,18 +10,6 @@
 namespace vergence::test {
 namespace {
 
-TEST_F(FirstDay, focalLengthAndBaselineAreEnoughOnKitti) {
-  const auto folder = shared_data("data/kitti00_151");
-  if (!folder) GTEST_SKIP() << shared_data_missing("data/kitti00_151");
-  const Outcome o = replay(*folder, "--focal 718.9 --baseline 0.537");
-  ASSERT_EQ(o.code, 0) << o.err;
-  EXPECT_GT(summary()["frames"]["ok"], 100);
-  const double drift = summary()["metrics"]["segment_error_short_percent"];
-  std::printf("kitti 00 from focal length and baseline: segments of 10 to 50 m %.2f %%\n", drift);
-  EXPECT_LT(drift, 2.5) << "2.0 % with the data set's own calibration (docs/calibration.md)";
-  EXPECT_NO_THROW((void)app::read_calibration(session() / "calibration.yaml"));
-}
-
 TEST_F(FirstDay, focalLengthAndBaselineAreEnoughOnEurocsDistortedImages) {
   const auto folder = shared_data("data/euroc_mh01");
   if (!folder) GTEST_SKIP() << shared_data_missing("data/euroc_mh01");

@@ -6,13 +6,11 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <sstream>
 #include <string>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/child_program.hpp"
 #include "tests/support/refusal.hpp"
@@ -140,30 +138,6 @@ TEST_F(ReplayedFolder, aBaselineGivenScalesTheWay) {
   EXPECT_NEAR(summary()["path_m"].get<double>(), 2 * way, 0.02 * way);
   EXPECT_NEAR(summary()["calibration"]["baseline_m"].get<double>(), 2 * length, 1e-9);
   EXPECT_EQ(run_vergence("replay x --format folder --out y --baseline 0").code, 2);
-}
-
-TEST_F(ReplayedFolder, whatIsWrongWithAFrameCostsThatFrame) {
-  const fs::path left = data() / image_name(0, 3);
-  std::string times = read_file(data() / "times.txt");
-  const std::size_t line = times.find('\n') + 1;
-  for (const std::function<void()>& spoil : std::initializer_list<std::function<void()>>{
-           [&] { fs::remove(data() / image_name(1, 9)); },
-           [&] { fs::resize_file(left, fs::file_size(left) / 2); },
-           [&] { cv::imwrite(left.string(), cv::Mat(100, 100, CV_8U, cv::Scalar(90))); },
-           [&] { write("times.txt", times.replace(12 * line, line, times.substr(0, line))); }}) {
-    fs::remove_all(data()), fs::remove_all(session());
-    fs::copy(*master_ / ".", data(), fs::copy_options::recursive);
-    spoil();
-    expect_skipped(1);
-  }
-}
-
-TEST_F(ReplayedFolder, aSessionThatExistsIsNotTouched) {
-  fs::create_directories(session());
-  std::ofstream(session() / "mine.txt") << "precious";
-  EXPECT_EQ(replay().code, 2);
-  EXPECT_EQ(read_file(session() / "mine.txt"), "precious");
-  EXPECT_EQ(std::distance(fs::directory_iterator(session()), fs::directory_iterator{}), 1);
 }
 
 TEST_F(ReplayedFolder, ofImagesThatAreMissingAThousandAreListedAndTheRestCounted) {

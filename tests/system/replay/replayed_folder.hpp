@@ -69,15 +69,6 @@ class ReplayedFolder : public ::testing::Test {
     EXPECT_NE(o.err.find(named), std::string::npos) << o.err;
     EXPECT_FALSE(fs::exists(session() / "trajectory.tum"));
   }
-  void expect_skipped(std::size_t frames) const {
-    const Outcome o = replay();
-    EXPECT_EQ(o.code, 0) << o.err;
-    const auto s = summary();
-    EXPECT_EQ(s["frames"]["skipped"], frames);
-    EXPECT_EQ(s["frames"]["read"], kFrames - frames);
-    EXPECT_EQ(s["frames"]["posed"], kFrames - frames);
-    EXPECT_NE(read_file(session() / "events.jsonl").find("skipped"), std::string::npos);
-  }
   void write(const std::string& name, const std::string& text) const {
     std::ofstream(data() / name, std::ios::binary) << text;
   }

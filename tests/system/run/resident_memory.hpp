@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
-#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -94,29 +93,15 @@ inline int frames_written(const std::filesystem::path& session) {
   return static_cast<int>(std::count(std::istreambuf_iterator<char>(file), {}, '\n')) - 1;
 }
 
-/// How many of the last frames that a session has written have a pose to use.
-inline int usable_of_the_last(const std::filesystem::path& session, std::size_t frames) {
-  std::ifstream file(session / "poses.csv");
-  std::deque<bool> last;
-  for (std::string line; std::getline(file, line);) {
-    last.push_back(line.find(",lost,") == std::string::npos);
-    if (last.size() > frames) last.pop_front();
-  }
-  return static_cast<int>(std::count(last.begin(), last.end(), true));
-}
-
 /// Resident once the drive has settled, and the last before its end or before `wall` is over.
 struct Growth {
   std::optional<Resident> settled{};
   Resident at_the_end{};
   int handles_settled = 0, handles_at_the_end = 0;
   int frames = 0;
-  int usable = 0;         // of the last kLastFrames
   int status = 0;         // of waitpid, of a drive that ended by itself
   bool too_slow = false;  // `wall` was over while frames still came
 };
-
-constexpr std::size_t kLastFrames = 1000;
 
 inline Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
   constexpr int kReport = 5;  // frames before the end: what is written then takes memory of its own
@@ -149,7 +134,6 @@ inline Growth growth_of(const SlowDrive& drive, std::chrono::seconds wall) {
     }
     std::this_thread::sleep_for(kLook);
   }
-  growth.usable = usable_of_the_last(folder / "s", kLastFrames);
   return growth;
 }
 

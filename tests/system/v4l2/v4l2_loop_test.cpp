@@ -66,40 +66,6 @@ class V4l2Loop : public ::testing::Test {
   std::unique_ptr<CameraDriver> driver_ = make_driver();
 };
 
-TEST_F(V4l2Loop, everyImageShownArrivesWholeInOrderAndInItsOwnCamera) {
-  VividPlayer player({node(1), node(3)}, kInterval_ns, draw_number);
-  std::unique_ptr<CameraDevice> cameras[2] = {streaming(0, configuration(59.94)),
-                                              streaming(1, configuration(59.94))};
-  std::int64_t newest[2] = {-1, -1};
-  std::uint64_t frames[2] = {}, noise[2] = {}, skipped[2] = {};
-  while (newest[0] < 40 && newest[1] < 40) {
-    for (std::size_t k = 0; k < 2; ++k) {
-      Frame frame;
-      ASSERT_EQ(cameras[k]->wait(Duration::seconds(3), &frame), DeviceStatus::ok);
-      const std::int64_t number = number_in(cameras[k]->view(frame.slot), k);
-      cameras[k]->release(frame.slot);
-      ++frames[k];
-      if (number < 0) {
-        ++noise[k];
-        continue;
-      }
-      EXPECT_GE(number, newest[k]) << "camera " << k << ": an image from before";
-      if (newest[k] >= 0 && number > newest[k] + 1)
-        skipped[k] += static_cast<std::uint64_t>(number - newest[k] - 1);
-      newest[k] = number;
-    }
-    ASSERT_LT(frames[0], 2000U);
-  }
-  for (std::size_t k = 0; k < 2; ++k) {
-    EXPECT_EQ(cameras[k]->statistics().torn, 0U);
-    // Where the player came too late the test camera makes noise of its own; an image is missing
-    // only with the frames it was shown in.
-    const CameraStatistics s = cameras[k]->statistics();
-    EXPECT_LE(skipped[k] * 4, s.lost + s.underruns + noise[k]) << "camera " << k;
-    EXPECT_LT(noise[k], frames[k] / 4);
-  }
-}
-
 /// A frame that a thinned camera kept.
 struct Kept {
   std::int64_t number = 0;
