@@ -2,8 +2,55 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include "core/estimator/doubts.hpp"
+#include "core/estimator/transitions.hpp"
+
 namespace vergence {
 namespace {
+
+constexpr std::array kStateNames = {"none", "unverified", "verified", "suspect"};
+constexpr std::array kTriggerNames = {"adopted",      "adopted_verified", "confirmed",
+                                      "contradicted", "doubted",          "kept"};
+constexpr std::array kEstimatorTriggerNames = {"calibration_given",
+                                               "pair_found",
+                                               "frames_enough",
+                                               "calibration_accepted",
+                                               "calibration_rejected",
+                                               "calibration_kept",
+                                               "rig_changed",
+                                               "requested",
+                                               "pose_lost",
+                                               "pose_found",
+                                               "pose_found_doubtful",
+                                               "pose_found_uncalibrated"};
+constexpr std::array kDoubtNames = {"pairing",    "scene", "frame",       "out_of_step",
+                                    "late_image", "rig",   "calibration", "moving_scene",
+                                    "window",     "motion"};
+static_assert(kDoubtNames.size() == kDoubts);
+
+std::string readme() {
+  std::ifstream file(VERGENCE_SOURCE_DIR "/core/README.md");
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::string edge(std::string_view from, std::string_view to, std::string_view on) {
+  return std::string(from) + " --> " + std::string(to) + ": " + std::string(on) + "\n";
+}
+
+std::ptrdiff_t arrows(const std::string& text) {
+  std::ptrdiff_t n = 0;
+  for (std::size_t at = 0; (at = text.find("--> ", at)) != std::string::npos; ++at) ++n;
+  return n;
+}
 
 TEST(CalibrationStates, onlyDoubtLeadsToSuspectAndOnlyADriveToVerified) {
   using S = CalibrationState;
@@ -16,6 +63,29 @@ TEST(CalibrationStates, onlyDoubtLeadsToSuspectAndOnlyADriveToVerified) {
   }
   EXPECT_EQ(after(S::none, T::doubted), S::none);
   EXPECT_EQ(after(S::suspect, T::confirmed), S::suspect);
+}
+
+TEST(CalibrationStates, theDrawingsInTheReadmeAreTheTables) {
+  const std::string text = readme();
+  for (const CalibrationTransition& t : kCalibrationTransitions) {
+    const std::string line = edge(kStateNames[static_cast<std::size_t>(t.from)],
+                                  kStateNames[static_cast<std::size_t>(t.to)],
+                                  kTriggerNames[static_cast<std::size_t>(t.on)]);
+    EXPECT_NE(text.find(line), std::string::npos) << line;
+  }
+  for (const Transition& t : kTransitions) {
+    const std::string line = edge(to_string(t.from), to_string(t.to),
+                                  kEstimatorTriggerNames[static_cast<std::size_t>(t.on)]);
+    EXPECT_NE(text.find(line), std::string::npos) << line;
+  }
+  EXPECT_EQ(arrows(text),
+            static_cast<std::ptrdiff_t>(kCalibrationTransitions.size() + kTransitions.size()));
+  std::size_t at = 0;
+  for (const char* name : kDoubtNames) {
+    const std::size_t row = text.find("| `" + std::string(name) + "` |", at);
+    ASSERT_NE(row, std::string::npos) << name << " is missing, or out of its order";
+    at = row;
+  }
 }
 
 }  // namespace
