@@ -129,20 +129,6 @@ INSTANTIATE_TEST_SUITE_P(WhateverTheCamera, ExposureControl,
                          ::testing::Combine(::testing::Values(1, 2, 3, 4),
                                             ::testing::Values(1.0, 0.5)));
 
-TEST(ExposureController, usesGainOnlyBeyondTheLongestExposureAndGivesItBackFirst) {
-  ExposureOptions o;
-  ExposureController controller(o, {o.most, 0});
-  Brightness dark{20, 60, 0, 1728};
-  for (int i = 0; i < 3 * o.settle_frames; ++i) (void)controller.step(dark);
-  EXPECT_EQ(controller.setting().exposure, o.most);
-  EXPECT_GT(controller.setting().gain_db, 5);
-  const double gain = controller.setting().gain_db;
-  Brightness bright{150, 249, 0.0, 1728};
-  for (int i = 0; i < o.settle_frames; ++i) (void)controller.step(bright);
-  EXPECT_LT(controller.setting().gain_db, gain);
-  EXPECT_EQ(controller.setting().exposure, o.most);
-}
-
 TEST(ExposureController, inTheDeadBandAndWithoutSamplesNothingChanges) {
   const ExposureOptions o;
   ExposureController controller(o, {Duration::microseconds(2000), 0});

@@ -1,107 +1,30 @@
-#include "drivers/mock/mock_rig.hpp"
-
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <numbers>
-#include <string>
-#include <vector>
 
 #include "drivers/sync/clock_mapper.hpp"
-#include "tests/support/small_mock.hpp"
+#include "tests/unit/drivers/mock/mock_bench.hpp"
 
 namespace vergence::mock {
 namespace {
 
-constexpr double kRate = 20;
-
-MockRigOptions options(double seconds) {
+MockBench drive_with(const std::vector<std::string>& faults, double seconds = 3,
+                     bool ideal = false) {
   MockRigOptions o;
   o.duration = Duration::seconds(seconds);
-  o.noise = false;
-  return o;
-}
-
-struct Seen {
-  Frame frame;
-  double mean = 0;  // grey
-};
-
-/// What a whole drive brings, device by device; frames are released at once.
-struct Harvest {
-  std::array<std::vector<Seen>, 2> frames;
-  std::array<int, 2> gone{};
-  std::array<CameraStatistics, 2> statistics;
-  std::vector<InsReading> readings;
-  InsStatistics ins;
-  HostStamp start;
-};
-
-double mean_of(const ImageView& v) {
-  double sum = 0;
-  for (int y = 0; y < v.height; ++y)
-    for (int x = 0; x < v.width; ++x) sum += v.at(x, y);
-  return sum / (v.width * v.height);
-}
-
-void start_cameras(MockRig* rig) {
-  for (int k = 0; k < 2; ++k) {
-    EXPECT_EQ(rig->camera(k).configure(test::small_camera(kRate), nullptr), DeviceStatus::ok);
-    EXPECT_EQ(rig->camera(k).start(nullptr), DeviceStatus::ok);
-  }
-  EXPECT_EQ(rig->trigger().configure({kRate}, nullptr), DeviceStatus::ok);
-  EXPECT_EQ(rig->trigger().start(nullptr), DeviceStatus::ok);
-}
-
-Harvest drive(MockRig* rig) {
-  Harvest h;
-  EXPECT_EQ(rig->ins().configure(120, nullptr), DeviceStatus::ok);
-  EXPECT_EQ(rig->ins().start(nullptr), DeviceStatus::ok);
-  start_cameras(rig);
-  h.start = rig->start();
-  std::array<bool, 3> ended{};
-  while (!(ended[0] && ended[1] && ended[2])) {
-    for (int k = 0; k < 2; ++k) {
-      Frame f;
-      const auto i = static_cast<std::size_t>(k);
-      const DeviceStatus status = rig->camera(k).wait(Duration{}, &f);
-      if (status == DeviceStatus::ok) {
-        h.frames[i].push_back({f, mean_of(rig->camera(k).view(f.slot))});
-        rig->camera(k).release(f.slot);
-      } else if (status == DeviceStatus::gone) {
-        const DeviceStatus again = rig->camera(k).start(nullptr);
-        h.gone[i] += again == DeviceStatus::ok ? 1 : 0;
-        ended[i] = ended[i] || again == DeviceStatus::ended;
-      } else {
-        ended[i] = ended[i] || status == DeviceStatus::ended;
-      }
-    }
-    InsReading r;
-    const DeviceStatus status = rig->ins().wait(Duration::microseconds(100), &r);
-    if (status == DeviceStatus::ok) h.readings.push_back(r);
-    ended[2] = ended[2] || status == DeviceStatus::ended;
-  }
-  for (int k = 0; k < 2; ++k)
-    h.statistics[static_cast<std::size_t>(k)] = rig->camera(k).statistics();
-  h.ins = rig->ins().statistics();
-  return h;
-}
-
-Harvest drive_with(const std::vector<std::string>& faults, double seconds = 3, bool ideal = false) {
-  MockRigOptions o = options(seconds);
   o.ideal_ins = ideal;
-  MockRig rig(test::small_truth(faults), o);
-  return drive(&rig);
+  MockBench b(faults, o);
+  b.drive();
+  return b;
 }
 
 TEST(MockRig, arrivalsKeepTheStatedDelaysAndDeviceStampsTheirClock) {
-  MockRig rig(test::small_truth({}), options(3));
-  const Harvest h = drive(&rig);
-  const DeviceTiming timing = rig.camera(1).timing();
+  const MockBench h = drive_with({});
+  const DeviceTiming timing = h.rig->camera(1).timing();
   ClockMapper mapper({timing.least_delay, timing.delay_spread, timing.resolution});
   for (std::size_t i = 0; i < h.frames[1].size(); ++i) {
     const Frame& f = h.frames[1][i].frame;
-    const HostStamp truth = h.start + Duration::milliseconds(50) * static_cast<std::int64_t>(i);
+    const HostStamp truth =
+        h.rig->start() + Duration::milliseconds(50) * static_cast<std::int64_t>(i);
     EXPECT_GE(f.arrival, truth + timing.least_delay);
     EXPECT_LE(f.arrival, truth + timing.least_delay + timing.delay_spread);
     const MappedStamp m = mapper.map(f.exposure_start, f.arrival);
@@ -110,7 +33,7 @@ TEST(MockRig, arrivalsKeepTheStatedDelaysAndDeviceStampsTheirClock) {
 }
 
 TEST(MockRig, aCoveredLensIsBlackForItsTimeAndOnlyThere) {
-  const Harvest h = drive_with({"cover@1 camera=1 duration_s=1"});
+  const MockBench h = drive_with({"cover@1 camera=1 duration_s=1"});
   for (const Seen& s : h.frames[1]) {
     const bool covered = s.frame.counter >= 20 && s.frame.counter < 40;
     EXPECT_EQ(s.mean < 1, covered) << s.frame.counter;
@@ -121,7 +44,7 @@ TEST(MockRig, aCoveredLensIsBlackForItsTimeAndOnlyThere) {
 // Frames of 0.8 s on would arrive after the camera is gone: none of them does, and no event of its
 // return is taken for a frame.
 TEST(MockRig, framesThatAreOnTheWayAsACameraGoesAreLostWithIt) {
-  const Harvest h = drive_with(
+  const MockBench h = drive_with(
       {"late_frames@0.5 camera=1 duration_s=0.5 share=1", "camera_gone@1 camera=1 duration_s=0.5"});
   EXPECT_EQ(h.gone[1], 1);
   EXPECT_GE(h.statistics[1].lost, 3U);
@@ -135,15 +58,15 @@ TEST(MockRig, framesThatAreOnTheWayAsACameraGoesAreLostWithIt) {
 }
 
 TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
-  const Harvest lost = drive_with({"lose_frames@0 camera=0 share=0.3 duration_s=0"});
+  const MockBench lost = drive_with({"lose_frames@0 camera=0 share=0.3 duration_s=0"});
   EXPECT_GT(lost.statistics[0].lost, 5U);
   EXPECT_EQ(lost.frames[0].size() + lost.statistics[0].lost, 61U);
   EXPECT_EQ(lost.frames[1].size(), 61U);
 
-  const Harvest doubled = drive_with({"duplicate_frames@0 camera=0 share=1 duration_s=1"});
+  const MockBench doubled = drive_with({"duplicate_frames@0 camera=0 share=1 duration_s=1"});
   EXPECT_EQ(doubled.frames[0].size(), 81U);
 
-  const Harvest late = drive_with({"late_frames@1 camera=0 share=1 delay_s=0.3 duration_s=0.1"});
+  const MockBench late = drive_with({"late_frames@1 camera=0 share=1 delay_s=0.3 duration_s=0.1"});
   ASSERT_EQ(late.frames[0].size(), 61U);
   std::vector<std::uint64_t> order;
   for (const Seen& s : late.frames[0]) order.push_back(s.frame.counter);
@@ -151,7 +74,7 @@ TEST(MockRig, lostLateAndDoubledFramesShowInCountersAndArrivals) {
 }
 
 TEST(MockRig, ofABrokenPairOneImageAtRandomNeverArrives) {
-  const Harvest h = drive_with({"break_pairs@0 duration_s=0"});
+  const MockBench h = drive_with({"break_pairs@0 duration_s=0"});
   EXPECT_EQ(h.frames[0].size() + h.frames[1].size(), 61U);
   EXPECT_GT(h.frames[0].size(), 15U);
   EXPECT_GT(h.frames[1].size(), 15U);
@@ -160,7 +83,7 @@ TEST(MockRig, ofABrokenPairOneImageAtRandomNeverArrives) {
 }
 
 TEST(MockRig, aPulseThatACameraDoesNotSeeIsNeitherExposedNorCounted) {
-  const Harvest good = drive_with({}), h = drive_with({"missed_trigger@0.98 camera=1 pulses=2"});
+  const MockBench good = drive_with({}), h = drive_with({"missed_trigger@0.98 camera=1 pulses=2"});
   EXPECT_EQ(h.frames[0].size(), 61U);
   ASSERT_EQ(h.frames[1].size(), 59U);
   EXPECT_EQ(h.statistics[1].lost, 0U);
@@ -173,7 +96,8 @@ TEST(MockRig, aPulseThatACameraDoesNotSeeIsNeitherExposedNorCounted) {
 }
 
 TEST(MockRig, aLaggingCameraSendsTheImageBeforeWithTheCounterAndStampOfThisOne) {
-  const Harvest good = drive_with({}, 6), lagging = drive_with({"lag@4 camera=1 duration_s=1"}, 6);
+  const MockBench good = drive_with({}, 6),
+                  lagging = drive_with({"lag@4 camera=1 duration_s=1"}, 6);
   ASSERT_EQ(lagging.frames[1].size(), good.frames[1].size());
   for (std::size_t i = 1; i < good.frames[1].size(); ++i) {
     const bool late = i >= 80 && i < 100;
@@ -186,8 +110,8 @@ TEST(MockRig, aLaggingCameraSendsTheImageBeforeWithTheCounterAndStampOfThisOne) 
 }
 
 TEST(MockRig, swappedCablesExchangeTheImagesAndNothingElse) {
-  const Harvest good = drive_with({}),
-                swapped = drive_with({"swap_cables@1", "cover@2 camera=0 duration_s=0.5"});
+  const MockBench good = drive_with({}),
+                  swapped = drive_with({"swap_cables@1", "cover@2 camera=0 duration_s=0.5"});
   for (std::size_t i = 0; i < 61; ++i) {
     const bool exchanged = i >= 20, covered = i >= 40 && i < 50;
     EXPECT_EQ(swapped.frames[0][i].mean, good.frames[exchanged ? 1 : 0][i].mean) << i;
@@ -200,7 +124,7 @@ TEST(MockRig, swappedCablesExchangeTheImagesAndNothingElse) {
 }
 
 TEST(MockRig, aBusIsInTheWayForItsTimeOnly) {
-  const Harvest good = drive_with({}), h = drive_with({"occluder@1 duration_s=1"});
+  const MockBench good = drive_with({}), h = drive_with({"occluder@1 duration_s=1"});
   for (std::size_t i = 0; i < 61; ++i)
     EXPECT_EQ(h.frames[0][i].mean != good.frames[0][i].mean, i >= 20 && i < 40) << i;
 }
@@ -244,17 +168,17 @@ TEST(MockRig, anIdealInsIsTheTruthToAMicrometre) {
 }
 
 TEST(MockRig, insFaultsAct) {
-  const Harvest gone = drive_with({"ins_gone@1 duration_s=1"});
-  EXPECT_EQ(gone.ins.lost, 120U);
+  const MockBench gone = drive_with({"ins_gone@1 duration_s=1"});
+  EXPECT_EQ(gone.rig->ins().statistics().lost, 120U);
   for (const InsReading& r : gone.readings)
     EXPECT_FALSE(r.sample.number >= 120 && r.sample.number < 240);
 
-  const Harvest dark = drive_with({"no_fix@1 duration_s=1"}, 3, true);
+  const MockBench dark = drive_with({"no_fix@1 duration_s=1"}, 3, true);
   for (const InsReading& r : dark.readings)
     EXPECT_EQ(r.sample.fix == FixStatus::none, r.sample.number >= 120 && r.sample.number < 240)
         << r.sample.number;
 
-  const Harvest leap = drive_with({"position_jump@1 east_m=100"}, 2, true);
+  const MockBench leap = drive_with({"position_jump@1 east_m=100"}, 2, true);
   for (std::size_t i = 1; i < leap.readings.size(); ++i) {
     const double east = (leap.readings[i].sample.position.longitude_deg -
                          leap.readings[i - 1].sample.position.longitude_deg) *

@@ -170,6 +170,25 @@ TEST(ClockBounds, exactToTheNanosecondOverTenYearsOfOffsetAndOfRunning) {
   }
 }
 
+// The process slept, and what its driver had queued comes at once: none is within the stall.
+TEST(ClockBounds, aBacklogIsNoClockThatWasSetBackAndStampsNeverGoBack) {
+  Line line(7);
+  line.drift = 80e-6;
+  ClockMapper clock(options_of(line, false));
+  HostStamp last{};
+  for (int i = 0; i < 5000; ++i) {
+    const auto at = [](int n) { return 10'000'000'000 + n * std::int64_t{8'333'333}; };
+    const bool queued = i >= 1000 && i < 1008;
+    const std::int64_t late = queued ? at(999) + 950'000'000 - at(i)
+                                     : std::min<std::int64_t>(line.late() / 13, 1'900'000);
+    const MappedStamp m = clock.map(line.read(at(i)), HostStamp(at(i) + line.floor_back + late));
+    ASSERT_LE(std::abs(m.host.ns() - at(i)), m.error.ns()) << i;
+    ASSERT_GT(m.host, last) << i;
+    last = m.host;
+  }
+  EXPECT_EQ(clock.resets(), 0U);
+}
+
 TEST(ClockBounds, hostileStampsAreCountedAndHarmless) {
   ClockMapper clock{ClockMapperOptions{}};
   Random random(4);

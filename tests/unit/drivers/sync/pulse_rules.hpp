@@ -9,6 +9,12 @@
 /// What must hold for every seed: a few in the ordinary tests, many in the slow ones.
 namespace vergence::testing {
 
+inline SyncOptions board() {
+  SyncOptions o;
+  o.mode = SyncMode::board;
+  return o;
+}
+
 /// Ten hours at 30 Hz: 0.1 % of the frames lost, 0.05 % of the triggers missed, five reconnects,
 /// three reboots.
 inline PulseRigOptions ten_hours(std::uint64_t seed) {
@@ -28,9 +34,7 @@ inline PulseRigOptions ten_hours(std::uint64_t seed) {
 inline void expect_ten_hours_right(std::uint64_t seed) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   const PulseRigOptions o = ten_hours(seed);
-  SyncOptions board;
-  board.mode = SyncMode::board;
-  PulseRig rig(o, board);
+  PulseRig rig(o, board());
   rig.run(36'000);
   const auto& t = rig.truth();
   const SyncCounters c = rig.counters();
@@ -97,8 +101,7 @@ inline void expect_never_wrong(std::uint64_t seed, double seconds) {
                                                 : (random.uniform() < 0.5 ? 1 : -2) / o.rate_hz});
     }
   }
-  SyncOptions sync;
-  sync.mode = SyncMode::board;
+  SyncOptions sync = board();
   for (SyncCameraOptions& c : sync.camera) c.jitter = Duration::seconds(o.stamp_noise_us * 2e-6);
   PulseRig rig(o, sync);
   rig.run(seconds);

@@ -35,17 +35,6 @@ TEST(Numbers, fixedPointAsOnTheWire) {
   EXPECT_EQ(read_i32(from_hex("FF FF FF F4")), -12);
 }
 
-TEST(Mtdata2, decodesTheMakersExample) {
-  const Mtdata2 m =
-      decoded(from_hex("FA FF 36 31 10 20 02 DF C5 10 60 04 00 45 9D A0 40 20 0C BE DC 9A FA 3F 54 "
-                       "9F 37 41 1C BB 70 80 20 0C BB AA 5C 80 3B 8C 55 "
-                       "01 BB 81 33 00 E0 20 04 00 00 00 81 45"));
-  EXPECT_EQ(m.packet_counter, 57285);
-  EXPECT_EQ(m.sample_time_fine, 4562336U);
-  EXPECT_EQ(m.status_word, 0x81U);
-  EXPECT_FALSE(m.quaternion || m.latitude_longitude_deg || m.gnss_pvt || m.utc);
-}
-
 TEST(Mtdata2, keepsPositionInSixteenDotThirtyTwoExactly) {
   const Mtdata2 m =
       decoded(from_hex("FA FF 36 53 10 20 02 FF FF 10 60 04 33 7F 97 9C 20 10 10 3F 35 04 F3 00 00 "

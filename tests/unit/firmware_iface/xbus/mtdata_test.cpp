@@ -67,16 +67,6 @@ void expect_same(const Utc& a, const Utc& b) {
   EXPECT_EQ(all(a), all(b));
 }
 
-void expect_fp1632_tail(const Mtdata& m) {
-  expect_attitude(m, 1e-7);
-  expect_place(m, 0x1p-33);
-  EXPECT_EQ(m.velocity, (Three{10.5, -0.125, 0.0625}));
-  EXPECT_EQ(m.status, 7);
-  EXPECT_EQ(m.sample_counter, 0x1234);
-  ASSERT_TRUE(m.utc);
-  expect_same(*m.utc, {250'000'000, 2012, 5, 14, 3, 4, 5, 7});
-}
-
 TEST(Mtdata, decodesTheReceiversFixWhichIsInIntegersWhateverTheFormat) {
   const Mtdata m =
       decoded(from_hex("FA FF 32 77 C5 E7 02 12 06 42 FA EF 9F 69 8A 5B 36 56 22 00 00 CC 1A 00 00 "
@@ -91,7 +81,13 @@ TEST(Mtdata, decodesTheReceiversFixWhichIsInIntegersWhateverTheFormat) {
   EXPECT_EQ(
       std::tuple(f.horizontal_accuracy_mm, f.vertical_accuracy_mm, f.speed_accuracy_cm_s, f.age),
       std::tuple(2500, 3800, 45, 3));
-  expect_fp1632_tail(m);
+  expect_attitude(m, 1e-7);
+  expect_place(m, 0x1p-33);
+  EXPECT_EQ(m.velocity, (Three{10.5, -0.125, 0.0625}));
+  EXPECT_EQ(m.status, 7);
+  EXPECT_EQ(m.sample_counter, 0x1234);
+  ASSERT_TRUE(m.utc);
+  expect_same(*m.utc, {250'000'000, 2012, 5, 14, 3, 4, 5, 7});
 }
 
 TEST(Mtdata, aLengthThatIsNotTheLayoutsIsRefused) {
