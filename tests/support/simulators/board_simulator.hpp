@@ -70,9 +70,7 @@ class BoardSimulator final : public DeviceModel {
   void power_cycle(HostStamp at) override;
   [[nodiscard]] bool ended() const override { return ended_; }
 
-  [[nodiscard]] const TriggerBoard& board() const noexcept { return board_; }
   [[nodiscard]] std::uint32_t boot_id() const noexcept { return board_.boot_id; }
-  [[nodiscard]] int boots() const noexcept { return boots_; }
   [[nodiscard]] std::uint64_t pulses_made() const noexcept { return made_; }
 
  private:

@@ -1,12 +1,7 @@
 #include "tests/support/simulators/simulated_line.hpp"
 
-#include <time.h>
-
 #include <algorithm>
-#include <array>
-#include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <deque>
 #include <mutex>
 #include <utility>
@@ -14,21 +9,6 @@
 #include "core/math/random.hpp"
 
 namespace vergence::test {
-
-std::optional<HostStamp> OutageSchedule::next() const noexcept {
-  if (at_ == outages_.size()) return std::nullopt;
-  return in_outage_ ? outages_[at_].to : outages_[at_].from;
-}
-
-const Outage& OutageSchedule::change() noexcept {
-  const Outage& outage = outages_[at_];
-  in_outage_ = !in_outage_;
-  if (in_outage_)
-    ++begun_;
-  else
-    ++at_;
-  return outage;
-}
 
 namespace {
 
@@ -90,16 +70,6 @@ void UsbConverter::discard() noexcept {
   transfer_packets_ = 0;
 }
 
-namespace {
-
-HostStamp monotonic() noexcept {
-  timespec t{};
-  (void)::clock_gettime(CLOCK_MONOTONIC, &t);
-  return HostStamp(static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec);
-}
-
-}  // namespace
-
 /// All bytes under way, and the clock. Every member function with the mutex held.
 class SimulatedPlace::World {
  public:
@@ -107,19 +77,21 @@ class SimulatedPlace::World {
       : device_(std::move(device)),
         options_(options),
         random_(options.seed, 62),
-        now_(options.real_time ? monotonic() : options.start),
-        outages_(options.outages),
+        now_(options.start),
         converter_(options.latency_timer, options.converter_clock_ppm, now_,
                    now_ + Duration::nanoseconds(random_.below(1'000'000))) {}
 
   std::mutex mutex;
-  std::condition_variable woken_up;
   bool woken = false;
 
   [[nodiscard]] const SimulatedLineOptions& options() const noexcept { return options_; }
-  [[nodiscard]] HostStamp now() const noexcept { return options_.real_time ? monotonic() : now_; }
-  [[nodiscard]] bool unplugged() const noexcept { return outages_.unplugged(now_); }
-  [[nodiscard]] std::size_t outages_begun() const noexcept { return outages_.begun(); }
+  [[nodiscard]] HostStamp now() const noexcept { return now_; }
+  [[nodiscard]] bool unplugged() const noexcept {
+    return outage_ < options_.outages.size() && now_ >= options_.outages[outage_].from;
+  }
+  [[nodiscard]] std::size_t outages_begun() const noexcept {
+    return outage_ + (in_outage_ ? 1 : 0);
+  }
   [[nodiscard]] bool anything_readable() const noexcept { return !ready_.empty(); }
   [[nodiscard]] bool ended() const {
     return device_->ended() && on_wire_.empty() && converter_.empty() && fifo_.empty() &&
@@ -128,8 +100,8 @@ class SimulatedPlace::World {
 
   /// Lets time pass until `until`, or until bytes can be read or the line is cut.
   void run(HostStamp until) {
-    const std::size_t outages = outages_.begun();
-    while (ready_.empty() && outages == outages_.begun() && step(until)) {
+    const std::size_t outages = outages_begun();
+    while (ready_.empty() && outages == outages_begun() && step(until)) {
     }
   }
   void run_through(HostStamp until) {
@@ -197,7 +169,10 @@ class SimulatedPlace::World {
       if (t < at || (t == at && what == What::nothing)) at = std::max(t, now_), what = w;
     };
     if (!arriving_.empty()) consider(arriving_.front().at, What::arrival);
-    if (const auto change = outages_.next()) consider(*change, What::outage);
+    if (outage_ < options_.outages.size()) {
+      const Outage& outage = options_.outages[outage_];
+      consider(in_outage_ ? outage.to : outage.from, What::outage);
+    }
     if (!to_device_.empty()) consider(to_device_.front().at, What::command);
     if (const auto next = device_->next()) consider(*next, What::produce);
     if (!on_wire_.empty()) consider(on_wire_.front().done, What::byte);
@@ -236,19 +211,17 @@ class SimulatedPlace::World {
   }
 
   void change_outage() {
-    const Outage& outage = outages_.change();
-    if (outages_.in_outage()) {
-      discard();
-    } else if (!outage.device_powered) {
-      on_wire_.clear();
-      device_->power_cycle(now_);
-    }
+    in_outage_ = !in_outage_;
+    if (in_outage_) return discard();
+    if (options_.outages[outage_++].device_powered) return;
+    on_wire_.clear();
+    device_->power_cycle(now_);
   }
 
   void command() {
     Chunk chunk = std::move(to_device_.front());
     to_device_.pop_front();
-    if (outages_.in_outage()) return;
+    if (in_outage_) return;
     if (device_->baud() != host_baud_) garble(&chunk.bytes);
     device_->receive(chunk.bytes, now_);
   }
@@ -268,7 +241,7 @@ class SimulatedPlace::World {
   void take_byte() {
     std::uint8_t value = on_wire_.front().value;
     on_wire_.pop_front();
-    if (outages_.in_outage() || !open_) return;
+    if (in_outage_ || !open_) return;
     if (options_.corrupt > 0 && random_.uniform() < options_.corrupt)
       value ^= static_cast<std::uint8_t>(1U << random_.below(8));
     if (options_.converter) {
@@ -309,7 +282,8 @@ class SimulatedPlace::World {
   HostStamp line_free_{}, host_line_free_{}, last_arrival_{};
   std::uint32_t host_baud_ = LineSettings{}.baud;
   bool open_ = false;
-  OutageSchedule outages_;
+  std::size_t outage_ = 0;  // of the options: the one that has begun or will be next
+  bool in_outage_ = false;
   std::deque<Chunk> to_device_, arriving_;
   std::deque<Byte> on_wire_;
   UsbConverter converter_;          // used with options_.converter,
@@ -333,26 +307,18 @@ class SimulatedLine final : public ByteLine {
   }
 
   LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
-    std::unique_lock lock(world_->mutex);
+    const std::lock_guard lock(world_->mutex);
     if (gone()) return {DeviceStatus::gone, 0, world_->now()};
     const HostStamp deadline = world_->now() + limit;
-    for (;;) {  // ends at the deadline: virtual time passes by run(), real time by itself
-      world_->run(world_->options().real_time ? std::min(world_->now(), deadline) : deadline);
-      if (std::exchange(world_->woken, false)) return {DeviceStatus::stopped, 0, {}};
-      const HostStamp now = world_->now();
-      if (gone()) return {DeviceStatus::gone, 0, now};
-      if (world_->anything_readable()) return {DeviceStatus::ok, world_->take(out), now};
-      if (world_->ended()) return {DeviceStatus::ended, 0, now};
-      if (now >= deadline) return {DeviceStatus::timeout, 0, {}};
-      constexpr Duration kLook =
-          Duration::milliseconds(1);  // a USB frame: nothing arrives more often
-      const Duration wait = std::min(kLook, deadline - now);
-      (void)world_->woken_up.wait_for(lock, std::chrono::nanoseconds(wait.ns()));
-    }
+    world_->run(deadline);
+    if (std::exchange(world_->woken, false)) return {DeviceStatus::stopped, 0, {}};
+    const HostStamp now = world_->now();
+    if (gone()) return {DeviceStatus::gone, 0, now};
+    if (world_->anything_readable()) return {DeviceStatus::ok, world_->take(out), now};
+    return {world_->ended() ? DeviceStatus::ended : DeviceStatus::timeout, 0, now};
   }
   DeviceStatus write(std::span<const std::uint8_t> bytes, Duration /*limit*/) noexcept override {
     const std::lock_guard lock(world_->mutex);
-    if (world_->options().real_time) world_->run_through(world_->now());
     if (gone()) return DeviceStatus::gone;
     world_->send(bytes);
     return DeviceStatus::ok;
@@ -374,7 +340,6 @@ class SimulatedLine final : public ByteLine {
   void wake() noexcept override {
     const std::lock_guard lock(world_->mutex);
     world_->woken = true;
-    world_->woken_up.notify_all();
   }
   HostStamp now() const noexcept override {
     const std::lock_guard lock(world_->mutex);
@@ -397,7 +362,6 @@ SimulatedPlace::~SimulatedPlace() = default;
 
 std::unique_ptr<ByteLine> SimulatedPlace::open(const LineSettings& settings, DeviceStatus* status) {
   const std::lock_guard lock(world_->mutex);
-  if (world_->options().real_time) world_->run_through(world_->now());
   if (world_->unplugged()) {
     *status = DeviceStatus::not_found;
     return nullptr;
@@ -413,7 +377,6 @@ Duration SimulatedPlace::latency_timer() const {
 
 bool SimulatedPlace::pass(Duration time) {
   const std::lock_guard lock(world_->mutex);
-  if (world_->options().real_time) return false;
   world_->run_through(world_->now() + time);
   return true;
 }

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/types/time.hpp"
@@ -18,33 +17,6 @@ namespace vergence::test {
 struct Outage {
   HostStamp from{}, to{};
   bool device_powered = true;  // false: the device is off, too
-};
-
-/// Outages one after the other: which has begun, and when the next begins or ends.
-///
-/// Threads  One caller. Errors: none.
-class OutageSchedule {
- public:
-  /// In order, none into the next.
-  explicit OutageSchedule(std::vector<Outage> outages) : outages_(std::move(outages)) {}
-
-  /// When one begins or ends next; none: it is over with them.
-  [[nodiscard]] std::optional<HostStamp> next() const noexcept;
-  /// What next() told happens: the outage that begins; or, with in_outage() false afterwards, the
-  /// one that ends. Precondition: next().
-  const Outage& change() noexcept;
-  [[nodiscard]] bool in_outage() const noexcept { return in_outage_; }
-  /// By the schedule, whether change() was called or not.
-  [[nodiscard]] bool unplugged(HostStamp now) const noexcept {
-    return at_ < outages_.size() && now >= outages_[at_].from;
-  }
-  [[nodiscard]] std::size_t begun() const noexcept { return begun_; }
-
- private:
-  std::vector<Outage> outages_;
-  std::size_t at_ = 0;  // the one that has begun or will be next
-  bool in_outage_ = false;
-  std::size_t begun_ = 0;
 };
 
 /// A serial to USB converter of FTDI's kind, from the bytes of its line to complete transfers of
@@ -105,7 +77,6 @@ struct SimulatedLineOptions {
   double corrupt = 0;             // of the bytes from the device: one bit flips
   std::vector<Outage> outages{};  // in order
   HostStamp start{};              // of virtual time
-  bool real_time = false;         // the clock is the host's: reads wait
   std::uint64_t seed = 1;
 };
 
@@ -116,7 +87,7 @@ struct SimulatedLineOptions {
 ///        there then goes as a short packet with the next frame. The host's transfer is complete
 ///        with a short packet or with eight full ones (496 bytes); only then do the bytes reach the
 ///        reading program. So a dense stream with a long timer comes in bursts of 496 bytes.
-/// Time   Virtual unless real_time: reading is what lets it pass. Deterministic by the seed.
+/// Time   Virtual: reading is what lets it pass. Deterministic by the seed.
 /// Threads  As ByteLine says; the place's own calls: one caller, while no line of it is in use.
 class SimulatedPlace final : public LinePlace {
  public:

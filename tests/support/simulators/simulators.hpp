@@ -1,5 +1,5 @@
 #pragma once
-/// Devices at byte level, behind lines in virtual or real time.
+/// Devices at byte level, behind lines in virtual time.
 #include "tests/support/simulators/board_simulator.hpp"
 #include "tests/support/simulators/device_model.hpp"
 #include "tests/support/simulators/simulated_line.hpp"

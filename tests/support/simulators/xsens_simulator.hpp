@@ -45,7 +45,6 @@ class XsensSimulator final : public DeviceModel {
   }
   [[nodiscard]] const XsensWrites& writes() const noexcept { return settings_.writes(); }
   [[nodiscard]] bool measuring() const noexcept { return mode_ == Mode::measuring; }
-  [[nodiscard]] double rate_hz() const noexcept { return settings_.rate_hz(); }
   /// As the host has set it.
   [[nodiscard]] const XsensSettings& settings() const noexcept { return settings_; }
   /// Samples taken so far, by their device time since power-on, newest last; at most kRemembered.

@@ -5,32 +5,15 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/idle_camera.hpp"
+
 namespace vergence {
 namespace {
 
 /// A camera that remembers which slots came back.
-class SlotCamera final : public CameraDevice {
- public:
-  const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration&, CameraConfiguration*) noexcept override {
-    return DeviceStatus::ok;
-  }
-  DeviceStatus start(Notifier*) noexcept override { return DeviceStatus::ok; }
-  DeviceStatus wait(Duration, Frame*) noexcept override { return DeviceStatus::timeout; }
-  ImageView view(FrameSlot slot) const noexcept override {
-    ImageView image;
-    image.width = 100 + static_cast<int>(slot);
-    return image;
-  }
+struct SlotCamera final : test::IdleCamera {
   void release(FrameSlot slot) noexcept override { released.push_back(static_cast<int>(slot)); }
-  void stop() noexcept override {}
-  DeviceTiming timing() const noexcept override { return {}; }
-  CameraStatistics statistics() const noexcept override { return {}; }
-
   std::vector<int> released;
-
- private:
-  DeviceInfo info_{};
 };
 
 struct Bench {
@@ -44,24 +27,6 @@ AcquiredFrame frame(FrameSlot slot) {
   f.set.present[0] = true;
   f.set.slots[0] = slot;
   return f;
-}
-
-TEST(AcquiredQueue, givesEverythingInOrderAndThenEnds) {
-  Bench b;
-  AcquiredQueue queue(b.cameras, true);
-  queue.push(frame(3));
-  queue.push(AcquiredReading{});
-  queue.push(DeviceEvent{DeviceEvent::Kind::board_gone, Stamp(5)});
-  queue.finish();
-  Acquired item;
-  ASSERT_TRUE(queue.next(&item));
-  EXPECT_EQ(std::get<AcquiredFrame>(item).rig.images[0].width, 103) << "a view of the slot";
-  ASSERT_TRUE(queue.next(&item));
-  EXPECT_TRUE(std::holds_alternative<AcquiredReading>(item));
-  ASSERT_TRUE(queue.next(&item));
-  EXPECT_EQ(std::get<DeviceEvent>(item).stamp, Stamp(5));
-  EXPECT_FALSE(queue.next(&item));
-  EXPECT_EQ(queue.high_water(), 3U);
 }
 
 TEST(AcquiredQueue, slotsOfARefusedFrameGoBackUnseen) {
@@ -107,20 +72,6 @@ TEST(AcquiredQueue, aFullOneDropsReadingsLiveAndNothingElse) {
   producer.join();
   EXPECT_EQ(readings, 300U - dropped);
   EXPECT_EQ(events, 1U);
-}
-
-TEST(AcquiredQueue, aProducerThatWaitsForRoomIsFreedByAStop) {
-  Bench b;
-  AcquiredQueue queue(b.cameras, true);
-  std::thread producer([&] {
-    for (int i = 0; i < 1000; ++i) queue.push(AcquiredReading{});
-    queue.finish();
-  });
-  queue.stop();
-  producer.join();
-  std::size_t left = 0;
-  for (Acquired item; queue.next(&item);) ++left;
-  EXPECT_LE(left, 1000U);
 }
 
 }  // namespace

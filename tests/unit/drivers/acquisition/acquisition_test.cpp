@@ -15,6 +15,7 @@
 
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/acquired.hpp"
+#include "tests/support/idle_camera.hpp"
 #include "tests/support/small_mock.hpp"
 #include "tests/support/watched_camera.hpp"
 
@@ -128,23 +129,8 @@ TEST(Acquisition, bringsEveryPulseAndReadingOnceInOrderAndWithinTheStampsOwnErro
   EXPECT_EQ(b.source->counters().pulses, 81U);
 }
 
-TEST(Acquisition, twoRunsOfADriveInVirtualTimeAreTheSameItemByItem) {
-  const std::vector<std::string> faults{
-      "camera_gone@2 camera=1 duration_s=1", "duplicate_frames@0 share=0.3 duration_s=0",
-      "late_frames@1 camera=0 share=0.2 delay_s=0.2 duration_s=2"};
-  const auto a = Bench(faults).drive(), b = Bench(faults).drive();
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) ASSERT_TRUE(same(a[i], b[i])) << i;
-}
-
 /// Starts, gives nothing and is gone, again and again; who tells it is only told of the first.
-class EmptyCamera final : public CameraDevice {
- public:
-  const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration&, CameraConfiguration*) noexcept override {
-    return DeviceStatus::ok;
-  }
-  DeviceTiming timing() const noexcept override { return {}; }
+struct EmptyCamera final : test::IdleCamera {
   DeviceStatus start(Notifier*) noexcept override {
     starts.fetch_add(1);
     return DeviceStatus::ok;
@@ -153,15 +139,8 @@ class EmptyCamera final : public CameraDevice {
     frame->arrival = HostStamp(starts.load());
     return DeviceStatus::gone;
   }
-  ImageView view(FrameSlot) const noexcept override { return {}; }
-  void release(FrameSlot) noexcept override {}
-  void stop() noexcept override {}
-  CameraStatistics statistics() const noexcept override { return {}; }
 
   std::atomic<int> starts{0};
-
- private:
-  DeviceInfo info_;
 };
 
 /// The same of a board.
@@ -221,14 +200,6 @@ TEST(Acquisition, aCameraThatGivesNothingThoughThereArePulsesIsStartedAgain) {
   EXPECT_EQ(count(items, DeviceEvent::Kind::camera_gone), 1);
   EXPECT_EQ(count(items, DeviceEvent::Kind::camera_back), 1);
   EXPECT_GE(b.pulses_of.back()[1], 0) << "it gives images again";
-}
-
-TEST(Acquisition, everySlotComesBack) {
-  Bench b({"duplicate_frames@0 share=0.5 duration_s=0"});
-  (void)b.drive();
-  EXPECT_GT(b.source->counters().sync.duplicate[0], 10U);
-  // Kept slots would have stalled the drive: 81 frames and their doubles go through 24 of them.
-  EXPECT_EQ(b.rig->camera(0).statistics().underruns, 0U);
 }
 
 // ---- with the board's pulses
@@ -297,6 +268,8 @@ TEST_P(AcquisitionByPulses, whateverIsLostNoPairIsWrongAndAllIsSaid) {
   EXPECT_LE(worst_acquisition(items), 1);
   EXPECT_EQ(count(items, GetParam().kind), GetParam().items);
   EXPECT_GT(b.pulses_of.size(), 90U) << "of 160: it came back";
+  // Kept slots would stall the drive: its frames and their doubles go through 24 of them.
+  EXPECT_EQ(b.rig->camera(0).statistics().underruns, 0U);
   ASSERT_EQ(items.size(), more.size()) << "another run";
   for (std::size_t i = 0; i < items.size(); ++i) {
     ASSERT_TRUE(same(items[i], more[i])) << i;

@@ -9,41 +9,28 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/idle_camera.hpp"
+
 namespace vergence {
 namespace {
 
 constexpr int kWidth = 8, kHeight = 2;  // of one image
 
 /// A camera that gives what the test puts into it.
-class ScriptedCamera final : public CameraDevice {
+class ScriptedCamera final : public test::IdleCamera {
  public:
   struct Script {
     std::deque<DeviceStatus> answers;  // of wait(), then `timeout`
     std::set<FrameSlot> held;
-    CameraConfiguration configured{};
-    int configures = 0, starts = 0, stops = 0, triggers = 0;
+    int starts = 0;
     DeviceStatus on_start = DeviceStatus::ok;
-    Notifier* ready = nullptr;
   };
   explicit ScriptedCamera(Script* script) : script_(script) {
     for (std::size_t i = 0; i < pixels_.size(); ++i) pixels_[i] = static_cast<std::uint8_t>(i);
   }
 
-  const DeviceInfo& info() const noexcept override { return info_; }
-  DeviceStatus configure(const CameraConfiguration& requested,
-                         CameraConfiguration* actual) noexcept override {
-    ++script_->configures;
-    if (requested.width > 4 * kWidth) return DeviceStatus::unsupported;
-    script_->configured = requested;
-    if (actual == nullptr) return DeviceStatus::ok;
-    *actual = requested;
-    actual->exposure = Duration::microseconds(4990);
-    return DeviceStatus::ok;
-  }
-  DeviceTiming timing() const noexcept override { return {}; }
-  DeviceStatus start(Notifier* ready) noexcept override {
+  DeviceStatus start(Notifier*) noexcept override {
     ++script_->starts;
-    script_->ready = ready;
     return script_->on_start;
   }
   DeviceStatus wait(Duration, Frame* frame) noexcept override {
@@ -63,18 +50,10 @@ class ScriptedCamera final : public CameraDevice {
   void release(FrameSlot slot) noexcept override {
     EXPECT_EQ(script_->held.erase(slot), 1U) << "a slot that is not held";
   }
-  void stop() noexcept override { ++script_->stops; }
-  DeviceStatus trigger_once() noexcept override {
-    ++script_->triggers;
-    return DeviceStatus::ok;
-  }
-  std::string last_error() const override { return "it offers 16 x 2"; }
-  std::string remark() const override { return "a remark"; }
   CameraStatistics statistics() const noexcept override { return {99, 98, 3, 2, 1}; }
 
  private:
   Script* script_;
-  DeviceInfo info_{"scripted", "7", "Pair", "here"};
   std::array<std::uint8_t, 2 * kWidth * kHeight> pixels_{};
   std::uint64_t next_ = 0;
 };

@@ -51,7 +51,6 @@ class ShadowCamera {
   [[nodiscard]] std::uint64_t gaps() const noexcept {
     return gaps_;
   }  // exposures missing between handed out frames, this start
-  [[nodiscard]] const CameraStatistics& at_start() const noexcept { return at_start_; }
 
  private:
   struct Held {

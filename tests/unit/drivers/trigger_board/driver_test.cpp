@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "drivers/serial/serial.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
 namespace vergence::trigger_board {
@@ -9,36 +10,20 @@ namespace {
 struct Machine {
   struct Port {
     SerialPortInfo info;
-    std::shared_ptr<test::DeviceModel> device;
-    DeviceStatus trouble = DeviceStatus::ok;
+    std::shared_ptr<test::DeviceModel> device;  // null: it does not open
   };
   std::vector<Port> ports;
 
-  class Refusing final : public LinePlace {
-   public:
-    explicit Refusing(DeviceStatus status) : status_(status) {}
-    std::unique_ptr<ByteLine> open(const LineSettings&, DeviceStatus* status) override {
-      *status = status_;
-      return nullptr;
-    }
-    std::string name() const override { return "/dev/ttyUSB9"; }
-
-   private:
-    DeviceStatus status_;
-  };
-
-  std::shared_ptr<test::BoardSimulator> add_board(const char* port, std::uint8_t last_of_serial) {
+  void add_board(const char* port, std::uint8_t last_of_serial) {
     test::BoardSimulatorOptions o;
     o.serial[11] = last_of_serial;
     o.baud = 115200;  // a board's own USB takes every rate; this one the first
-    auto board = std::make_shared<test::BoardSimulator>(test::PulseSource{}, o);
-    ports.push_back({{port, "", 0x0483, 0x5740, "", {}}, board});
-    return board;
+    ports.push_back({{port, "", 0x0483, 0x5740, "", {}},
+                     std::make_shared<test::BoardSimulator>(test::PulseSource{}, o)});
   }
-  void add(const char* port, std::uint16_t vendor, std::uint16_t product,
-           DeviceStatus trouble = DeviceStatus::ok) {
+  void add(const char* port, std::uint16_t vendor, std::uint16_t product) {
     ports.push_back(
-        {{port, "", vendor, product, "", {}}, std::make_shared<test::Talker>("", 115200), trouble});
+        {{port, "", vendor, product, "", {}}, std::make_shared<test::Talker>("", 115200)});
   }
   std::vector<std::string> asked;
   Driver driver() {
@@ -49,14 +34,11 @@ struct Machine {
                        },
                        [this](const std::string& name) -> std::unique_ptr<LinePlace> {
                          asked.push_back(name);
-                         for (const Port& p : ports) {
-                           if (p.info.port != name) continue;
-                           if (p.trouble != DeviceStatus::ok)
-                             return std::make_unique<Refusing>(p.trouble);
-                           return std::make_unique<test::SimulatedPlace>(p.device,
-                                                                         test::direct_line());
-                         }
-                         return std::make_unique<Refusing>(DeviceStatus::not_found);
+                         for (const Port& p : ports)
+                           if (p.info.port == name && p.device != nullptr)
+                             return std::make_unique<test::SimulatedPlace>(p.device,
+                                                                           test::direct_line());
+                         return std::make_unique<SerialPort>("/dev/ttyThatIsNotThere");
                        }});
   }
 };
@@ -69,7 +51,7 @@ TEST(Driver, listsTheBoardsAndAsksNoIns) {
   m.add("/dev/ttyUSB2", 0x0403, 0x6001);
   m.add_board("/dev/ttyACM0", 0xAA);
   m.add_board("/dev/ttyACM1", 0xBB);
-  m.add("/dev/ttyUSB9", 0x0403, 0x6001, DeviceStatus::busy);
+  m.ports.push_back({{"/dev/ttyUSB9", "", 0x0403, 0x6001, "", {}}, nullptr});
   Driver driver = m.driver();
   const auto found = driver.enumerate();
   ASSERT_EQ(found.size(), 2U);

@@ -1,55 +1,18 @@
 #include <gtest/gtest.h>
+#include <pthread.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 
 #include "core/memory/allocation_guard.hpp"
+#include "core/memory/thread_allocations.hpp"
 #include "drivers/serial/serial.hpp"
 #include "tests/support/device_terminal.hpp"
 #include "tests/unit/drivers/trigger_board/rig.hpp"
 
 namespace vergence::trigger_board {
 namespace {
-
-/// A line that seals whoever reads it, as long as it is told to.
-class SealingLine final : public ByteLine {
- public:
-  SealingLine(std::unique_ptr<ByteLine> line, const std::atomic<bool>& seal)
-      : line_(std::move(line)), seal_(seal) {}
-  LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
-    if (seal_ != AllocationGuard::thread_sealed())
-      seal_ ? AllocationGuard::seal_thread() : AllocationGuard::unseal_thread();
-    return line_->read(out, limit);
-  }
-  DeviceStatus write(std::span<const std::uint8_t> bytes, Duration limit) noexcept override {
-    return line_->write(bytes, limit);
-  }
-  DeviceStatus set_baud(std::uint32_t baud) noexcept override { return line_->set_baud(baud); }
-  std::uint32_t baud() const noexcept override { return line_->baud(); }
-  void discard_input() noexcept override { line_->discard_input(); }
-  void wake() noexcept override { line_->wake(); }
-  HostStamp now() const noexcept override { return line_->now(); }
-
- private:
-  std::unique_ptr<ByteLine> line_;
-  const std::atomic<bool>& seal_;
-};
-
-/// A port whose lines do so.
-class SealingPlace final : public LinePlace {
- public:
-  SealingPlace(const std::string& port, const std::atomic<bool>& seal)
-      : place_(port), seal_(seal) {}
-  std::unique_ptr<ByteLine> open(const LineSettings& settings, DeviceStatus* status) override {
-    auto line = place_.open(settings, status);
-    return line == nullptr ? nullptr : std::make_unique<SealingLine>(std::move(line), seal_);
-  }
-  std::string name() const override { return place_.name(); }
-
- private:
-  SerialPort place_;
-  const std::atomic<bool>& seal_;
-};
 
 /// A device in real time and its board, with a terminal between them, at 100 Hz.
 struct TerminalRig {
@@ -68,9 +31,8 @@ struct TerminalRig {
     o.native_usb = true;
     return o;
   }
-  std::atomic<bool> seal{false};
   test::DeviceOnTerminal board{simulator()};
-  Device device{std::make_unique<SealingPlace>(board.port(), seal), options()};
+  Device device{std::make_unique<SerialPort>(board.port()), options()};
 };
 
 TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
@@ -117,17 +79,23 @@ TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
   Pulse p;
   ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
   const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  ThreadAllocations::begin();
   {
     const SealedScope sealed;
-    rig.seal = true;
     (void)rig.device.pause(2);
     for (int i = 0; i < 50; ++i)
       ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
     (void)rig.device.statistics();
   }
+  ThreadAllocations::end();
   EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
-  rig.seal = false;
-  ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
+  // The simulator's thread, which has the name of the test's, allocates what it sends.
+  std::array<char, ThreadAllocations::kNameBytes> own{};
+  ASSERT_EQ(pthread_getname_np(pthread_self(), own.data(), own.size()), 0);
+  const ThreadAllocations::Counts counts = ThreadAllocations::counts();
+  EXPECT_EQ(counts.size, 1U);
+  for (std::size_t i = 0; i < counts.size; ++i)
+    EXPECT_STREQ(counts.rows[i].name.data(), own.data());
 }
 
 }  // namespace
