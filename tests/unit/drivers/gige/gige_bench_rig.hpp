@@ -46,12 +46,11 @@ struct GigeBench {
   void start() { ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error(); }
 
   /// What comes until `count` complete frames came, or a second nothing; all slots given back.
-  std::vector<Frame> take(std::size_t count) {
+  std::vector<Frame> take(std::size_t count, Duration limit = Duration::seconds(1)) {
     std::vector<Frame> frames;
-    for (std::size_t complete = 0; complete < count;) {
-      Frame frame;
-      if (camera->wait(Duration::seconds(1), &frame) != DeviceStatus::ok) break;
-      complete += frame.status == FrameStatus::complete ? 1 : 0;
+    const std::size_t before = numbers.size();
+    for (Frame frame;
+         numbers.size() - before < count && camera->wait(limit, &frame) == DeviceStatus::ok;) {
       if (frame.status == FrameStatus::complete) numbers.push_back(number(frame));
       camera->release(frame.slot);
       frames.push_back(frame);
@@ -61,13 +60,7 @@ struct GigeBench {
   /// No more exposures; then what was on its way.
   std::vector<Frame> drain() {
     simulator->silence(true);
-    std::vector<Frame> frames;
-    for (Frame frame; camera->wait(Duration::milliseconds(400), &frame) == DeviceStatus::ok;
-         frames.push_back(frame)) {
-      if (frame.status == FrameStatus::complete) numbers.push_back(number(frame));
-      camera->release(frame.slot);
-    }
-    return frames;
+    return take(SIZE_MAX, Duration::milliseconds(400));
   }
   /// What the image says it is.
   [[nodiscard]] std::uint64_t number(const Frame& frame) const {

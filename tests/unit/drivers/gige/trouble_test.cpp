@@ -22,6 +22,16 @@ bool goes(GigeBench* b, double limit_s) {
   return false;
 }
 
+/// Asks until it is not `gone`, or until the limit.
+DeviceStatus start_again(GigeBench* b, double limit_s) {
+  const auto begin = Clock::now();
+  DeviceStatus status = DeviceStatus::gone;
+  while ((status = b->camera->start(nullptr)) == DeviceStatus::gone &&
+         seconds_since(begin) < limit_s)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  return status;
+}
+
 TEST(GigeTrouble, camerasAreFoundByBroadcastAndOpenedBySerial) {
   GigeCameraOptions o;
   o.address = GigeCamera::address(200);
@@ -68,11 +78,7 @@ TEST(GigeTrouble, aCameraThatSendsNothingIsGoneWithASentenceAndComesBack) {
   EXPECT_NE(b.camera->last_error().find("sends no images"), std::string::npos)
       << b.camera->last_error();
   b.simulator->silence(false);
-  const auto begin = Clock::now();
-  DeviceStatus status = DeviceStatus::gone;
-  while ((status = b.camera->start(nullptr)) == DeviceStatus::gone && seconds_since(begin) < 10)
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  ASSERT_EQ(status, DeviceStatus::ok) << b.camera->last_error();
+  ASSERT_EQ(start_again(&b, 10), DeviceStatus::ok) << b.camera->last_error();
   const auto frames = b.take(3);
   ASSERT_EQ(frames.size(), 3U);
   EXPECT_EQ(frames[0].counter, 0U);
@@ -130,11 +136,7 @@ TEST(GigeTrouble, isFoundElsewhereThoughAnotherCameraHasItsAddress) {
   const GigeCamera stranger(other);
   b.simulator = std::make_unique<GigeCamera>(moved);
   ASSERT_TRUE(goes(&b, 12));
-  const auto begin = Clock::now();
-  DeviceStatus status = DeviceStatus::gone;
-  while ((status = b.camera->start(nullptr)) == DeviceStatus::gone && seconds_since(begin) < 30)
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  ASSERT_EQ(status, DeviceStatus::ok) << b.camera->last_error();
+  ASSERT_EQ(start_again(&b, 30), DeviceStatus::ok) << b.camera->last_error();
   EXPECT_EQ(b.take(3).size(), 3U);
   EXPECT_EQ(stranger.report().starts, 0U);
 }
