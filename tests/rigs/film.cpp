@@ -37,33 +37,38 @@ RigCalibration rig() {
   return rig;
 }
 
-std::string key_of(const FilmOptions& o) {
+constexpr int kPairs = 100;
+constexpr double kRateHz = 10, kSpeed = 6;  // m/s, on the straights
+constexpr double kStart = 2;                // s of the drive, which stands for its first three
+
+/// What the film is of, in a file that is written last.
+std::string key() {
   std::ostringstream key;
-  key << "film 1: " << o.pairs << " " << o.rate_hz << " " << o.speed << " " << o.start_s;
+  key << "film 1: " << kPairs << " " << kRateHz << " " << kSpeed << " " << kStart;
   return key.str();
 }
 
-bool there_already(const std::filesystem::path& folder, const FilmOptions& o) {
+bool there_already(const std::filesystem::path& folder) {
   std::ifstream file(folder / "film.txt");
-  std::string key;
-  return file && std::getline(file, key) && key == key_of(o);
+  std::string line;
+  return file && std::getline(file, line) && line == key();
 }
 
 }  // namespace
 
-void render_film(const std::filesystem::path& folder, const FilmOptions& o) {
-  if (there_already(folder, o)) return;
+void render_film(const std::filesystem::path& folder) {
+  if (there_already(folder)) return;
   std::filesystem::create_directories(folder);
   mock::DriveOptions way;
   way.kind = mock::DriveKind::brief;
-  way.speed = o.speed;
+  way.speed = kSpeed;
   const mock::RigTruth truth(std::make_shared<const mock::World>(mock::WorldOptions{}), way, rig(),
                              mock::default_T_body_left(), {}, {});
   std::ofstream poses(folder / "truth.txt");
   poses << std::setprecision(17);
-  const auto time = [&](int n) { return Duration::seconds(o.start_s + n / o.rate_hz); };
+  const auto time = [&](int n) { return Duration::seconds(kStart + n / kRateHz); };
   const Transform T_first_enu = truth.camera_in_enu(0, time(0)).inverse();
-  for (int n = 0; n < o.pairs; ++n) {
+  for (int n = 0; n < kPairs; ++n) {
     const Transform T = T_first_enu * truth.camera_in_enu(0, time(n));
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) poses << T.R(i, j) << " ";
@@ -73,7 +78,7 @@ void render_film(const std::filesystem::path& folder, const FilmOptions& o) {
   for (std::size_t k = 0; k < 2; ++k) {
     mock::Renderer renderer(truth.shared_world(), Camera(truth.mounted().intrinsics[k]));
     std::ofstream out(image_file(folder, k), std::ios::binary);
-    for (int n = 0; n < o.pairs; ++n) {
+    for (int n = 0; n < kPairs; ++n) {
       mock::Shot shot;
       shot.noise_seed = static_cast<std::uint32_t>(2 * n + 1) + static_cast<std::uint32_t>(k);
       renderer.render(truth.camera_in_enu(static_cast<int>(k), time(n)).inverse(), shot,
@@ -85,7 +90,7 @@ void render_film(const std::filesystem::path& folder, const FilmOptions& o) {
       throw std::runtime_error(image_file(folder, k).string() + ": cannot be written");
   }
   std::ofstream done(folder / "film.txt");
-  done << key_of(o) << "\n";
+  done << key() << "\n";
   if (!poses.flush() || !done.flush())
     throw std::runtime_error(folder.string() + ": cannot be written");
 }

@@ -9,25 +9,17 @@
 
 namespace vergence::test {
 
+inline constexpr int kFilmWidth = 640, kFilmHeight = 480;
+
+/// Renders into `folder`, unless these very images are there. Throws std::runtime_error.
+void render_film(const std::filesystem::path& folder);
+
 /// A rendered drive as files, made once on this machine and played into emulated cameras:
 /// cameraK.raw (8-bit images of one size, one after the other) and truth.txt (of every image
 /// T_first_left: rotation by rows and translation, metres).
 ///
 /// The rig is the one that `rig.nominal` of app/config/mock.yaml describes: two parallel cameras
 /// 0.75 m apart.
-struct FilmOptions {
-  int pairs = 100;
-  double rate_hz = 10;
-  double speed = 6;    // m/s, on the straights
-  double start_s = 2;  // of the drive, which stands for its first three seconds
-};
-
-inline constexpr int kFilmWidth = 640, kFilmHeight = 480;
-
-/// Renders into `folder`, unless these very images are there. Throws std::runtime_error.
-void render_film(const std::filesystem::path& folder, const FilmOptions& options);
-
-/// Reads a film back.
 class Film {
  public:
   explicit Film(const std::filesystem::path& folder);

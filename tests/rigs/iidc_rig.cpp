@@ -58,11 +58,7 @@ CameraConfiguration usual(CameraTrigger trigger) {
 
 bool Taker::take_one(std::size_t k, Duration limit) {
   Frame frame;
-  const DeviceStatus status = cameras_[k]->wait(limit, &frame);
-  if (status != DeviceStatus::ok) {
-    if (status != DeviceStatus::timeout) told_.push_back(status);
-    return false;
-  }
+  if (cameras_[k]->wait(limit, &frame) != DeviceStatus::ok) return false;
   Account& a = accounts_[k];
   const ImageView image = cameras_[k]->view(frame.slot);
   const ImageStamp stamp = read_stamp(image);
@@ -71,8 +67,6 @@ bool Taker::take_one(std::size_t k, Duration limit) {
         stamp.guid != std::strtoull(cameras_[k]->info().serial.c_str(), nullptr, 16) ||
         !shows_pattern(image, stamp.number))
       ++a.wrong;
-    if (a.complete + a.torn == 0) a.first = stamp.number;
-    a.last = stamp.number;
     ++a.complete;
     a.middles.push_back(stamp.middle_ns);
     a.starts.push_back(frame.exposure_start.ns());

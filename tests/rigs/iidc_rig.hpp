@@ -1,7 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <functional>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -30,13 +28,10 @@ struct ImageStamp {
 /// One camera's account of what it delivered.
 struct Account {
   std::uint64_t complete = 0, torn = 0;
-  std::uint64_t gaps = 0;             // in the counters, after the first
-  std::uint32_t first = 0, last = 0;  // numbers in the images
+  std::uint64_t gaps = 0;   // in the counters, after the first
   std::uint64_t wrong = 0;  // complete, and with pixels, number or GUID that are not its own
   std::vector<std::int64_t> middles;  // of the exposures, by the emulator
   std::vector<std::int64_t> starts;   // by the camera's stamp
-  /// Exposures from the first to the last delivered.
-  [[nodiscard]] std::uint64_t span() const { return last - first + 1; }
 };
 
 /// Takes frames from several cameras in turn, and holds each against what stands in it.
@@ -53,16 +48,12 @@ class Taker {
   void restarted(std::size_t camera) { counters_[camera] = -1; }
 
   [[nodiscard]] const Account& account(std::size_t camera) const { return accounts_[camera]; }
-  [[nodiscard]] const std::vector<DeviceStatus>& told() const {
-    return told_;
-  }  // by wait(), other than ok and timeout
 
  private:
   bool take_one(std::size_t camera, Duration limit);
   std::vector<CameraDevice*> cameras_;
   std::vector<Account> accounts_;
   std::vector<std::int64_t> counters_;
-  std::vector<DeviceStatus> told_;
 };
 
 /// Opens and configures; fails the test with the sentence when it cannot.

@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    vergence::test::render_film(argv[1], {});
+    vergence::test::render_film(argv[1]);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "render_film: %s\n", e.what());
     return 1;

@@ -150,13 +150,8 @@ void iidc_init(struct iidc_camera* c, unsigned index) {
   c->rate = 4;
   c->iso_speed = 2;
   c->powered = true;
-  c->trigger = 0;
-  c->shutter = 100;
-  c->gain = 50;
-  c->brightness = 10;
   c->frame_rate = 480;
   c->shutter_abs = 0.005f;
-  c->gain_abs = 0.0f;
   c->frame_rate_abs = 30.0f;
   c->f7_size = 640u << 16 | 480u;
   c->f7_packet = 1280;

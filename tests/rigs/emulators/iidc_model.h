@@ -22,11 +22,10 @@ struct iidc_camera {
   /* registers */
   uint32_t format, mode, rate;
   uint32_t channel, iso_speed;
-  bool powered, transmitting, one_shot;
-  uint32_t multi_shot; /* frames left */
-  uint32_t trigger;    /* TRIGGER_MODE register */
+  bool powered, transmitting;
+  uint32_t trigger; /* TRIGGER_MODE register */
   uint32_t trigger_delay;
-  uint32_t shutter, gain, brightness, frame_rate;
+  uint32_t shutter, gain, frame_rate;
   float shutter_abs, gain_abs, frame_rate_abs;
   uint32_t strobe[4];
   uint32_t f7_position, f7_size, f7_coding, f7_packet;
@@ -65,12 +64,10 @@ double iidc_rate(const struct iidc_camera* c);
 struct iidc_sensor {
   uint64_t tick;     /* last frame begun */
   uint64_t exposing; /* begin of the triggered exposure now going on, or 0 */
-  uint64_t missed_edges;
 };
 
 /* Call until it says false: is a frame ready (exposed to the end) at `ns`? Gives the begin of its
- * exposure. `edge`: time of an external trigger pulse, or 0. Consumes one-shots and software
- * triggers. */
+ * exposure. `edge`: time of an external trigger pulse, or 0. Consumes software triggers. */
 bool iidc_next_frame(struct iidc_camera* c, struct iidc_sensor* s, uint64_t ns, uint64_t edge,
                      uint64_t* begin);
 

@@ -8,18 +8,8 @@
 
 #include "tests/rigs/emulators/iidc_model_internal.h"
 
-static bool may_send(struct iidc_camera* c) {
-  if (!c->powered || (c->format == 7 && iidc_f7_errors(c))) return false;
-  if (c->transmitting) return true;
-  if (c->one_shot) {
-    c->one_shot = false;
-    return true;
-  }
-  if (c->multi_shot) {
-    c->multi_shot--;
-    return true;
-  }
-  return false;
+static bool may_send(const struct iidc_camera* c) {
+  return c->powered && c->transmitting && !(c->format == 7 && iidc_f7_errors(c));
 }
 
 static uint64_t exposure_time_ns(const struct iidc_camera* c) {
@@ -37,10 +27,7 @@ bool iidc_next_frame(struct iidc_camera* c, struct iidc_sensor* s, uint64_t ns, 
     else if (software)
       edge = 0;
     c->software_triggers = 0;
-    if (edge && s->exposing && edge != s->exposing && ns < s->exposing + shutter)
-      s->missed_edges++;
-    else if (edge && !s->exposing)
-      s->exposing = edge;
+    if (edge && !s->exposing) s->exposing = edge;
     if (s->exposing && ns >= s->exposing + shutter) {
       *begin = s->exposing;
       s->exposing = 0;

@@ -1,7 +1,7 @@
 /* sim_ftdi: an FT232R on the virtual USB host, so that the kernel's ftdi_sio makes /dev/ttyUSB* of
  * it.
  *
- *   sim_ftdi --wire PATH [--serial TEXT] [--product TEXT] [--seconds S] [--ready FILE]
+ *   sim_ftdi --wire PATH [--serial TEXT] [--ready FILE]
  *
  * PATH becomes a link to a pseudo-terminal: the far end of the serial line, for a simulated
  * instrument to open. Bytes from there reach the host at the line rate the host has set (and those
@@ -11,7 +11,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,18 +49,12 @@ static struct ftdi {
   double baud;
   unsigned long up, down, overrun;
 } ftdi;
-static volatile sig_atomic_t stop;
 
 static const uint8_t device_descriptor[18] = {18,   1,    0x00, 0x02, 0,    0, 0, 8, 0x03,
                                               0x04, 0x01, 0x60, 0x00, 0x06, 1, 2, 3, 1};
 static const uint8_t config_descriptor[32] = {9,  2, 32, 0,    1,    1,    0, 0xa0, 45, 9,    4,
                                               0,  0, 2,  0xff, 0xff, 0xff, 2, 7,    5,  0x81, 2,
                                               64, 0, 0,  7,    5,    0x02, 2, 64,   0,  0};
-
-static void on_signal(int n) {
-  (void)n;
-  stop = 1;
-}
 
 /* Divisor of 3 MHz with eighths coded in three bits; 0 and 1 mean 3 and 2 Mbaud. */
 static double baud_of(unsigned value, unsigned index) {
@@ -214,9 +207,7 @@ static void send_up(uint64_t ns) {
 }
 
 int main(int argc, char** argv) {
-  const char *wire = NULL, *serial = "VG000001", *product = "FT232R USB UART", *ready = NULL;
-  double seconds = 0;
-  uint64_t start = now_ns();
+  const char *wire = NULL, *serial = "VG000001", *ready = NULL;
   char line[64];
 
   for (int i = 1; i + 1 < argc; i += 2) {
@@ -224,10 +215,6 @@ int main(int argc, char** argv) {
       wire = argv[i + 1];
     else if (!strcmp(argv[i], "--serial"))
       serial = argv[i + 1];
-    else if (!strcmp(argv[i], "--product"))
-      product = argv[i + 1];
-    else if (!strcmp(argv[i], "--seconds"))
-      seconds = atof(argv[i + 1]);
     else if (!strcmp(argv[i], "--ready"))
       ready = argv[i + 1];
     else
@@ -247,18 +234,16 @@ int main(int argc, char** argv) {
   ftdi.baud = 9600;
   ftdi.usb = (struct usb_device){.device_descriptor = device_descriptor,
                                  .config_descriptor = config_descriptor,
-                                 .strings = {NULL, "FTDI", product, serial},
+                                 .strings = {NULL, "FTDI", "FT232R USB UART", serial},
                                  .speed = USB_FULL,
                                  .control = control,
                                  .out = from_host,
                                  .fd = -1};
-  signal(SIGTERM, on_signal);
-  signal(SIGINT, on_signal);
   if (usb_plug(&ftdi.usb)) return 1;
   if (ready) close(open(ready, O_CREAT | O_WRONLY, 0644));
 
   bool input = true;
-  while (!stop) {
+  for (;;) {
     bool under_way = ftdi.used || ftdi.to_wire.used || ftdi.from_wire.used;
     bool full = ftdi.from_wire.used == sizeof ftdi.from_wire.waiting;
     struct pollfd fds[3] = {{ftdi.usb.fd, POLLIN, 0},
@@ -276,7 +261,7 @@ int main(int argc, char** argv) {
         else if (strstr(line, "replug") && ftdi.usb.fd < 0)
           usb_plug(&ftdi.usb);
         else if (strstr(line, "quit"))
-          stop = 1;
+          break;
       }
     }
     uint64_t ns = now_ns();
@@ -286,7 +271,6 @@ int main(int argc, char** argv) {
       take_from_wire(ns);
       send_up(ns);
     }
-    if (seconds > 0 && (double)(ns - start) > seconds * 1e9) break;
   }
   usb_unplug(&ftdi.usb);
   unlink(wire);

@@ -58,15 +58,14 @@ static void complete(struct usb_device* d, uint32_t seqnum, int status, uint32_t
   send_all(d, head, data, bytes);
 }
 
-static int free_port(enum usb_speed speed) {
+static int free_port(void) {
   char hub[16], line[256];
   int port, status, found = -1;
   FILE* f = fopen(VHCI "status", "r");
 
   if (!f) return -1;
   while (found < 0 && fgets(line, sizeof line, f))
-    if (sscanf(line, "%15s %d %d", hub, &port, &status) == 3 && status == 4 &&
-        !strcmp(hub, speed == USB_SUPER ? "ss" : "hs"))
+    if (sscanf(line, "%15s %d %d", hub, &port, &status) == 3 && status == 4 && !strcmp(hub, "hs"))
       found = port;
   fclose(f);
   return found;
@@ -88,7 +87,7 @@ int usb_plug(struct usb_device* d) {
   if (socketpair(AF_UNIX, SOCK_STREAM, 0, pair)) return perror("usbip: socketpair"), -1;
   setsockopt(pair[0], SOL_SOCKET, SO_SNDBUFFORCE, &size, sizeof size);
   for (int attempt = 0;; attempt++) {
-    d->port = free_port(d->speed);
+    d->port = free_port();
     if (d->port >= 0) {
       snprintf(text, sizeof text, "%d %d %d %d", d->port, pair[1], 0x10000 + d->port + 2,
                (int)d->speed);
@@ -166,7 +165,6 @@ static int standard(struct usb_device* d, const struct usb_setup* s, uint8_t* da
       return 1;
     case 9:
       d->configuration = (uint8_t)s->value;
-      if (d->configured) d->configured(d->self, s->value);
       return 0;
     case 10:
       data[0] = 0;

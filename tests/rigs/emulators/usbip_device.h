@@ -10,7 +10,7 @@
 
 #define USB_MAX_WAITING 512
 
-enum usb_speed { USB_FULL = 2, USB_HIGH = 3, USB_SUPER = 5 };
+enum usb_speed { USB_FULL = 2, USB_HIGH = 3 };
 
 struct usb_setup {
   uint8_t type, request;
@@ -27,7 +27,6 @@ struct usb_device {
    * or -1 to stall. */
   int (*control)(void* self, const struct usb_setup* setup, uint8_t* data);
   void (*out)(void* self, unsigned endpoint, const uint8_t* data, size_t bytes);
-  void (*configured)(void* self, unsigned configuration);
 
   /* kept by usbip_device.c */
   int fd, port;
@@ -40,7 +39,7 @@ struct usb_device {
   size_t filled, room;
 };
 
-/* Plugs into the first free port of the right speed. 0, or -1 with a message on stderr. */
+/* Plugs into the first free port. 0, or -1 with a message on stderr. */
 int usb_plug(struct usb_device* d);
 void usb_unplug(struct usb_device* d);
 /* Handles what the host sent; false when the host (or usb_unplug) has ended the connection. */

@@ -3,19 +3,15 @@
 #include <vector>
 
 #include "tests/support/camera_options.hpp"
+#include "tests/unit/drivers/conformance/shadow_camera.hpp"
 #include "tests/unit/drivers/iidc/camera_under_test.hpp"
 
 namespace vergence::test {
 namespace {
 
-class CountingNotifier final : public Notifier {
- public:
-  void notify() noexcept override { ++told; }
-  int told = 0;
-};
+using IidcCamera = WithCamera;
 
-TEST(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
-  CameraUnderTest c;
+TEST_F(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
   c.configure();
   CountingNotifier notifier;
   ASSERT_EQ(c.camera->start(&notifier), DeviceStatus::ok);
@@ -39,7 +35,7 @@ TEST(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
     EXPECT_EQ(view.at(100, 9), (9 + n) & 0xFFU);
     c.camera->release(f.slot);
   }
-  EXPECT_EQ(notifier.told, 5);
+  EXPECT_EQ(notifier.told(), 5U);
   Frame f;
   EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::timeout);
   const CameraStatistics s = c.camera->statistics();
@@ -47,8 +43,7 @@ TEST(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
   EXPECT_EQ(s.lost + s.torn + s.underruns, 0U);
 }
 
-TEST(IidcCamera, StampsGoOnThroughTheWrapOfTheBusClock) {
-  CameraUnderTest c;
+TEST_F(IidcCamera, StampsGoOnThroughTheWrapOfTheBusClock) {
   c.start();
   DeviceStamp last{};
   for (int i = 0; i < 60; ++i) {  // 100 s … 160 s of the camera's clock
@@ -61,8 +56,7 @@ TEST(IidcCamera, StampsGoOnThroughTheWrapOfTheBusClock) {
   }
 }
 
-TEST(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
-  CameraUnderTest c;
+TEST_F(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
   c.start();
   c.bus->expose(1);
   c.bus->expose_tampered([](auto*, std::size_t* bytes) { *bytes -= 512; });
@@ -81,20 +75,20 @@ TEST(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
   EXPECT_EQ(s.lost, 2U);
 }
 
-TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
+TEST_F(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
   for (const std::size_t lost : {1U, 3U, 100U}) {
-    CameraUnderTest c(true);
-    c.start(CameraUnderTest::usual_with("packet_bytes", "1024"));
-    c.bus->expose(1);
+    CameraUnderTest own(true);
+    own.start(CameraUnderTest::usual_with("packet_bytes", "1024"));
+    own.bus->expose(1);
     // The receiver fills up with the beginning of the next frame and waits for the start of the one
     // after that.
-    const std::size_t packet = c.bus->shape().packet_bytes, frame = c.bus->shape().frame_bytes;
+    const std::size_t packet = own.bus->shape().packet_bytes, frame = own.bus->shape().frame_bytes;
     std::vector<std::uint8_t> first;
-    c.bus->expose_tampered([&](std::vector<std::uint8_t>* image, std::size_t* bytes) {
+    own.bus->expose_tampered([&](std::vector<std::uint8_t>* image, std::size_t* bytes) {
       first = *image;
       *bytes = 0;
     });
-    c.bus->expose_tampered([&](std::vector<std::uint8_t>* image, std::size_t*) {
+    own.bus->expose_tampered([&](std::vector<std::uint8_t>* image, std::size_t*) {
       const std::vector<std::uint8_t> second = *image;
       *image = first;
       const std::size_t keep = frame - lost * packet, hole = packet * 5;
@@ -103,33 +97,31 @@ TEST(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
       std::copy(second.begin(), second.begin() + static_cast<std::ptrdiff_t>(lost * packet),
                 image->begin() + static_cast<std::ptrdiff_t>(keep));
     });
-    c.bus->expose(1);
-    EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
-    const Frame torn = c.take_and_release();
+    own.bus->expose(1);
+    EXPECT_EQ(own.take_and_release().status, FrameStatus::complete);
+    const Frame torn = own.take_and_release();
     EXPECT_EQ(torn.status, FrameStatus::torn) << lost;
     EXPECT_EQ(torn.counter, 1U);
-    const Frame good = c.take_and_release();
+    const Frame good = own.take_and_release();
     EXPECT_EQ(good.status, FrameStatus::complete);
     EXPECT_EQ(good.counter, 3U);
-    EXPECT_EQ(c.camera->statistics().lost, 1U);
+    EXPECT_EQ(own.camera->statistics().lost, 1U);
   }
 }
 
-TEST(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
+TEST_F(IidcCamera, TheSameOptionSaysWhichInstantIsStamped) {
   std::vector<std::int64_t> starts;
   for (const char* at : {"start", "middle", "end"}) {
-    CameraUnderTest c;
-    c.start(CameraUnderTest::usual_with("stamp_at", at));
-    c.bus->expose(1);
-    starts.push_back(c.take_and_release().exposure_start.ns());
+    CameraUnderTest own;
+    own.start(CameraUnderTest::usual_with("stamp_at", at));
+    own.bus->expose(1);
+    starts.push_back(own.take_and_release().exposure_start.ns());
   }
   EXPECT_NEAR(static_cast<double>(starts[0] - starts[1]), 2.5e6, 2);
   EXPECT_NEAR(static_cast<double>(starts[0] - starts[2]), 5e6, 2);
 }
 
-TEST(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
   requested.pixel_format = "Mono16";
   test::give<iidc::Options>(&requested, "buffers", "5");
   c.start(requested);
@@ -144,9 +136,7 @@ TEST(IidcCamera, SixteenBitPixelsBecomeGreyInSlotsOfTheirOwn) {
   }
 }
 
-TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
   requested.trigger = CameraTrigger::software;
   c.configure(requested);
   EXPECT_EQ(c.camera->trigger_once(), DeviceStatus::stopped);
@@ -160,8 +150,20 @@ TEST(IidcCamera, TheSoftwareTriggerFiresOnceACall) {
   EXPECT_EQ(free.camera->trigger_once(), DeviceStatus::unsupported);
 }
 
-TEST(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
-  CameraUnderTest c;
+TEST_F(IidcCamera, AnExposureSetWhileStreamingReachesTheRegistersOrTheNearestThatThereIs) {
+  ExposureSetting actual;
+  c.configure();
+  EXPECT_EQ(c.camera->set_exposure({Duration::milliseconds(2), 6}, &actual), DeviceStatus::stopped);
+  ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  EXPECT_EQ(c.camera->set_exposure({Duration::milliseconds(2), 1e6}, &actual), DeviceStatus::ok);
+  EXPECT_EQ(actual, (ExposureSetting{Duration::milliseconds(2), 24}));
+  EXPECT_FLOAT_EQ(c.bus->model().shutter_abs, 0.002F);
+  EXPECT_FLOAT_EQ(c.bus->model().gain_abs, 24.0F);
+  EXPECT_EQ(c.camera->set_exposure({Duration::seconds(1), 0}, &actual),
+            DeviceStatus::bad_configuration);
+}
+
+TEST_F(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
   c.start(CameraUnderTest::usual_with("embedded", "no"));
   c.bus->expose(3, Duration::milliseconds(100), {1});
   EXPECT_EQ(c.take_and_release().counter, 0U);
@@ -170,8 +172,7 @@ TEST(IidcCamera, WithoutEmbeddedInformationFramesAreCountedAsTheyCome) {
   EXPECT_EQ(f.exposure_start.ns(), f.arrival.ns() - f.exposure.ns());
 }
 
-TEST(IidcCamera, ItsTemperatureIsReadInEitherUnitThatMakersUse) {
-  CameraUnderTest c;
+TEST_F(IidcCamera, ItsTemperatureIsReadInEitherUnitThatMakersUse) {
   EXPECT_FALSE(c.camera->temperature_c()) << "not streaming";
   c.start();
   EXPECT_FALSE(c.camera->temperature_c()) << "the model has no such register";
@@ -189,7 +190,7 @@ TEST(IidcCamera, ItsTemperatureIsReadInEitherUnitThatMakersUse) {
   EXPECT_FALSE(c.camera->temperature_c());
 }
 
-TEST(IidcCamera, TimingIsExposureAndTheWay) {
+TEST_F(IidcCamera, TimingIsExposureAndTheWay) {
   CameraUnderTest usb, bus(true);
   usb.configure();
   bus.configure();

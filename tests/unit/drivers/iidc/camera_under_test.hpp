@@ -61,4 +61,10 @@ struct CameraUnderTest {
   CameraConfiguration actual{};
 };
 
+/// A test of one USB camera, and of what it is asked for.
+struct WithCamera : ::testing::Test {
+  CameraUnderTest c;
+  CameraConfiguration requested = CameraUnderTest::usual();
+};
+
 }  // namespace vergence::test

@@ -13,9 +13,9 @@ void expect_says(const std::string& sentence, std::initializer_list<const char*>
     EXPECT_NE(sentence.find(part), std::string::npos) << '"' << part << "\" in: " << sentence;
 }
 
-TEST(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+using IidcConfigure = WithCamera;
+
+TEST_F(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
   requested.rate_hz = 30;
   c.configure(requested);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U << 29U);
@@ -27,9 +27,7 @@ TEST(IidcConfigure, AFixedModeIsTakenWhereSizeAndRateAreItsOwn) {
   EXPECT_EQ(c.bus->shape().frame_bytes, 640U * 480U);
 }
 
-TEST(IidcConfigure, AHigherFixedRateServesTriggers) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcConfigure, AHigherFixedRateServesTriggers) {
   requested.rate_hz = 20;
   requested.trigger = CameraTrigger::hardware;
   c.configure(requested);
@@ -42,9 +40,7 @@ TEST(IidcConfigure, AHigherFixedRateServesTriggers) {
   EXPECT_FALSE(FeatureValue::of(c.bus->command(reg::feature_value(Feature::frame_rate))).on);
 }
 
-TEST(IidcConfigure, AnyOtherRateOrRegionIsFormat7) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcConfigure, AnyOtherRateOrRegionIsFormat7) {
   requested.width = 320;
   requested.height = 240;
   requested.offset_x = 64;
@@ -60,38 +56,36 @@ TEST(IidcConfigure, AnyOtherRateOrRegionIsFormat7) {
   EXPECT_FALSE(TriggerMode::of(c.bus->command(reg::kTriggerMode)).on);
 }
 
-TEST(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
+TEST_F(IidcConfigure, APacketIsTheCamerasShareOfTheBus) {
   CameraUnderTest bus(true), usb;
   for (const int cameras : {1, 2, 3}) {
-    CameraConfiguration requested = CameraUnderTest::usual();
-    requested.sharing = cameras;
-    bus.configure(requested);
+    CameraConfiguration asked = CameraUnderTest::usual();
+    asked.sharing = cameras;
+    bus.configure(asked);
     const std::size_t packet = bus.bus->shape().packet_bytes,
                       share = kBandwidthUnits / static_cast<unsigned>(cameras);
     EXPECT_LE(bandwidth_units(packet, BusSpeed::s400), share);
     if (packet < 4096) {
       EXPECT_GT(bandwidth_units(packet + 4, BusSpeed::s400), share);
     }
-    usb.configure(requested);
+    usb.configure(asked);
     EXPECT_LE(static_cast<double>(usb.bus->shape().packet_bytes) * kCyclesPerSecond * cameras,
               33e6);
   }
-  CameraConfiguration requested = CameraUnderTest::usual_with("packet_bytes", "1024");
-  bus.configure(requested);
+  CameraConfiguration asked = CameraUnderTest::usual_with("packet_bytes", "1024");
+  bus.configure(asked);
   EXPECT_EQ(bus.bus->model().f7_packet, 1024U);
 }
 
-TEST(IidcConfigure, WherePacketsSetTheRateTheyAreTheSmallestThatReachIt) {
-  CameraUnderTest c(true);
-  c.bus->masked[kRegisterSpace + 0xF00000 + reg::feature_inquiry(Feature::frame_rate)] = 0;
-  c.configure();
-  EXPECT_EQ(c.bus->model().f7_packet, packet_for_rate(640 * 480, 10 * 0.99, 4, 4096));
-  EXPECT_NEAR(c.actual.rate_hz, 10, 0.1);
+TEST_F(IidcConfigure, WherePacketsSetTheRateTheyAreTheSmallestThatReachIt) {
+  CameraUnderTest own(true);
+  own.bus->masked[kRegisterSpace + 0xF00000 + reg::feature_inquiry(Feature::frame_rate)] = 0;
+  own.configure();
+  EXPECT_EQ(own.bus->model().f7_packet, packet_for_rate(640 * 480, 10 * 0.99, 4, 4096));
+  EXPECT_NEAR(own.actual.rate_hz, 10, 0.1);
 }
 
-TEST(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
   requested.width = 320;
   requested.height = 240;
   requested.offset_x = 960;
@@ -110,9 +104,7 @@ TEST(IidcConfigure, MovingALargeRegionNeverLeavesTheSensor) {
   }
 }
 
-TEST(IidcConfigure, ExposureAndGainAreAbsoluteAndReadBack) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcConfigure, ExposureAndGainAreAbsoluteAndReadBack) {
   requested.exposure = Duration::microseconds(1234);
   requested.gain_db = 6.5;
   c.configure(requested);
@@ -124,8 +116,7 @@ TEST(IidcConfigure, ExposureAndGainAreAbsoluteAndReadBack) {
   EXPECT_FALSE(v.automatic);
 }
 
-TEST(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
-  CameraUnderTest c;
+TEST_F(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
   c.configure();
   EXPECT_EQ(c.bus->model().frame_info, 0x41U);
   EXPECT_EQ(c.camera->plan().info.size(), 8U);
@@ -135,16 +126,13 @@ TEST(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
   expect_says(c.camera->remark(), {"embeds no counter"});
 }
 
-TEST(IidcConfigure, ACameraWithoutTheVendorsRegistersIsTakenAsItIs) {
-  CameraUnderTest c;
+TEST_F(IidcConfigure, ACameraWithoutTheVendorsRegistersIsTakenAsItIs) {
   c.bus->refused.insert(kRegisterSpace + 0xF00000 + reg::kFrameInfo);
   c.configure();
   EXPECT_EQ(c.camera->plan().info.size(), 0U);
 }
 
-TEST(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
   requested.trigger = CameraTrigger::hardware;
   requested.options = Options{.trigger_mode = 0,
                               .trigger_source = 1,
@@ -165,49 +153,48 @@ TEST(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
   EXPECT_EQ(t.mode, 0U);
 }
 
-TEST(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
+TEST_F(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
   CameraUnderTest legacy(true, false), beta(true, true);
   legacy.configure();
   EXPECT_EQ(legacy.bus->model().iso_speed, 2U);
   beta.configure();
   EXPECT_EQ(beta.bus->model().iso_speed, 3U);
-  CameraConfiguration requested = CameraUnderTest::usual_with("speed", "800");
+  CameraConfiguration asked = CameraUnderTest::usual_with("speed", "800");
   std::string said;
-  EXPECT_EQ(legacy.refuse(requested, &said), DeviceStatus::unsupported);
+  EXPECT_EQ(legacy.refuse(asked, &said), DeviceStatus::unsupported);
   expect_says(said, {"speed", "S400"});
-  test::give<iidc::Options>(&requested, "speed", "400");
-  beta.configure(requested);
+  test::give<iidc::Options>(&asked, "speed", "400");
+  beta.configure(asked);
   EXPECT_EQ(beta.bus->model().iso_speed, 2U);
 }
 
-TEST(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIsNoSmallerOne) {
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcConfigure, APacketThatLeavesNoRoomForTheOthersIsTakenOnlyWhereThereIsNoSmallerOne) {
   requested.width = 1280;
   requested.height = 960;
   requested.rate_hz = 30;
-  CameraUnderTest c(true, true);
-  c.configure(requested);
-  EXPECT_EQ(c.bus->shape().packet_bytes, 5120U) << "alone: the fixed mode";
+  CameraUnderTest own(true, true);
+  own.configure(requested);
+  EXPECT_EQ(own.bus->shape().packet_bytes, 5120U) << "alone: the fixed mode";
   requested.sharing = 2;
-  c.configure(requested);
-  EXPECT_EQ(c.bus->command(reg::kVideoFormat), 7U << 29U);
-  EXPECT_LE(2 * bandwidth_units(c.bus->shape().packet_bytes, BusSpeed::s800), kBandwidthUnits);
-  EXPECT_NEAR(c.actual.rate_hz, 30, 0.3);
+  own.configure(requested);
+  EXPECT_EQ(own.bus->command(reg::kVideoFormat), 7U << 29U);
+  EXPECT_LE(2 * bandwidth_units(own.bus->shape().packet_bytes, BusSpeed::s800), kBandwidthUnits);
+  EXPECT_NEAR(own.actual.rate_hz, 30, 0.3);
   test::give<iidc::Options>(&requested, "format7", "no");
-  c.configure(requested);
-  EXPECT_EQ(c.bus->shape().packet_bytes, 5120U);
+  own.configure(requested);
+  EXPECT_EQ(own.bus->shape().packet_bytes, 5120U);
 }
 
-TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
+TEST_F(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
   using C = CameraConfiguration;
   struct Refusal {
     void (*change)(C*);
     std::initializer_list<const char*> says;
     DeviceStatus status = DeviceStatus::unsupported;
   };
-  CameraUnderTest c(true);
-  c.configure();
-  c.bus->written.clear();
+  CameraUnderTest own(true);
+  own.configure();
+  own.bus->written.clear();
   for (const Refusal& r : {
            Refusal{[](C* w) { w->width = 641; },
                    {"641 x 480", "640 x 480 Mono8 at", "1280 x 960 in steps of 8 x 2"}},
@@ -231,18 +218,17 @@ TEST(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
                    {"150000 us"},
                    DeviceStatus::bad_configuration},
        }) {
-    CameraConfiguration requested = CameraUnderTest::usual();
-    r.change(&requested);
+    CameraConfiguration asked = CameraUnderTest::usual();
+    r.change(&asked);
     std::string said;
-    EXPECT_EQ(c.refuse(requested, &said), r.status) << said;
+    EXPECT_EQ(own.refuse(asked, &said), r.status) << said;
     expect_says(said, r.says);
   }
-  EXPECT_TRUE(c.bus->written.empty()) << "a refusal writes nothing";
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
+  EXPECT_TRUE(own.bus->written.empty()) << "a refusal writes nothing";
+  EXPECT_EQ(own.camera->start(nullptr), DeviceStatus::ok);
 }
 
-TEST(IidcConfigure, WithoutFormat7ARateBetweenTheFixedOnesBecomesTheNext) {
-  CameraUnderTest c;
+TEST_F(IidcConfigure, WithoutFormat7ARateBetweenTheFixedOnesBecomesTheNext) {
   c.configure(CameraUnderTest::usual_with("format7", "no"));
   EXPECT_EQ(c.actual.rate_hz, 15);
   EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U);

@@ -1,10 +1,8 @@
 #include "tests/unit/drivers/iidc/fake_bus.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 
-#include "drivers/clock.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 
 namespace vergence::test {
@@ -31,7 +29,6 @@ std::uint32_t FakeBus::command(std::uint32_t offset) {
 }
 
 DeviceStatus FakeBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
-  const std::lock_guard lock(mutex_);
   if (!plugged_) return DeviceStatus::gone;
   if (all_accesses != DeviceStatus::ok) return all_accesses;
   const bool known = iidc_read(&model_, address, value) == 0;
@@ -44,7 +41,6 @@ DeviceStatus FakeBus::read(std::uint64_t address, std::uint32_t* value) noexcept
 }
 
 DeviceStatus FakeBus::write(std::uint64_t address, std::uint32_t value) noexcept {
-  const std::lock_guard lock(mutex_);
   if (!plugged_) return DeviceStatus::gone;
   if (all_accesses != DeviceStatus::ok) return all_accesses;
   written.emplace_back(address, value);
@@ -63,15 +59,7 @@ DeviceStatus FakeBus::start(iidc::StreamSink* sink) noexcept {
   if (!plugged_) return DeviceStatus::gone;
   if (start_status != DeviceStatus::ok) return start_status;
   sink_ = sink;
-  stopping_ = false;
-  if (real_time_) thread_ = std::thread([this] { work(); });
   return DeviceStatus::ok;
-}
-
-void FakeBus::stop() noexcept {
-  stopping_ = true;
-  if (thread_.joinable()) thread_.join();
-  sink_ = nullptr;
 }
 
 DeviceStatus FakeBus::reopen() noexcept {
@@ -81,15 +69,13 @@ DeviceStatus FakeBus::reopen() noexcept {
 
 void FakeBus::unplug() {
   plugged_ = false;
-  if (!real_time_ && sink_ != nullptr) sink_->gone(now());
+  if (sink_ != nullptr) sink_->gone(now());
 }
 
 void FakeBus::replug() {
-  const std::lock_guard lock(mutex_);
   const bool beta = model_.beta;
   iidc_init(&model_, 0);
   if (beta) iidc_init_beta(&model_);
-  sensor_ = {};
   plugged_ = true;
 }
 
@@ -129,34 +115,6 @@ void FakeBus::expose_tampered(const Tamper& tamper, Duration period) {
   std::size_t bytes = shape_.frame_bytes;
   tamper(&image, &bytes);
   deliver(image, bytes, now() + Duration::milliseconds(5));
-}
-
-void FakeBus::work() {
-  while (!stopping_) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    if (!plugged_) {
-      sink_->gone(monotonic_now());
-      return;
-    }
-    std::vector<std::uint8_t> image;
-    const HostStamp host = monotonic_now();
-    {
-      const std::lock_guard lock(mutex_);
-      const auto ns = static_cast<std::uint64_t>(host.ns());
-      // A pulse every 20 ms for those that wait for one.
-      const std::uint64_t edge =
-          ns / 20'000'000 != (ns - 1'100'000) / 20'000'000 ? ns / 20'000'000 * 20'000'000 : 0;
-      std::uint64_t begin = 0;
-      if (!iidc_next_frame(&model_, &sensor_, ns, edge, &begin)) continue;
-      image = draw(static_cast<std::int64_t>(
-          begin + static_cast<std::uint64_t>(static_cast<double>(model_.shutter_abs) * 1e9)));
-    }
-    if (lose_ > 0) {
-      --lose_;
-      continue;
-    }
-    deliver(image, shape_.frame_bytes, host);
-  }
 }
 
 }  // namespace vergence::test

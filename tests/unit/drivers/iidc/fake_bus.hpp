@@ -1,12 +1,9 @@
 #pragma once
 #include <array>
-#include <atomic>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <set>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -22,16 +19,14 @@ namespace vergence::test {
 
 /// The register model behind a bus that is nothing but function calls.
 ///
-/// Exposures are made by expose() on the caller's thread, which then is the stream's; or, after
-/// run(), by a thread in real time. Its time is virtual: host and camera clock begin at kStart and
-/// 100 s, and expose() moves both.
+/// Exposures are made by expose() on the caller's thread, which then is the stream's. Its time is
+/// virtual: host and camera clock begin at kStart and 100 s, and expose() moves both.
 class FakeBus final : public iidc::CameraBus {
  public:
   static constexpr std::int64_t kStart = 5'000'000'000'000;  // ns, host
   static constexpr std::int64_t kCameraStart = 100'000'000'000;
 
   explicit FakeBus(bool isochronous = false, bool beta = false);
-  ~FakeBus() override { stop(); }
 
   // ---- the camera's side ----
   iidc_camera& model() { return model_; }
@@ -44,11 +39,8 @@ class FakeBus final : public iidc::CameraBus {
   /// it are said to have come.
   using Tamper = std::function<void(std::vector<std::uint8_t>* image, std::size_t* bytes)>;
   void expose_tampered(const Tamper& tamper, Duration period = Duration::milliseconds(100));
-  /// Real time from the next start() on, at the rate that the registers ask for.
-  void run() { real_time_ = true; }
   void unplug();
   void replug();
-  void lose(int exposures) { lose_ += exposures; }
 
   // ---- faults of the registers ----
   std::map<std::uint64_t, std::uint32_t>
@@ -66,7 +58,7 @@ class FakeBus final : public iidc::CameraBus {
   const iidc::BusTraits& traits() const noexcept override { return traits_; }
   DeviceStatus allocate(const iidc::StreamShape& shape) noexcept override;
   DeviceStatus start(iidc::StreamSink* sink) noexcept override;
-  void stop() noexcept override;
+  void stop() noexcept override { sink_ = nullptr; }
   DeviceStatus reopen() noexcept override;
   void give_back(FrameSlot slot) noexcept override { memory_.release(slot); }
   const std::uint8_t* bytes(FrameSlot slot) const noexcept override { return memory_.bytes(slot); }
@@ -81,22 +73,16 @@ class FakeBus final : public iidc::CameraBus {
  private:
   void deliver(const std::vector<std::uint8_t>& image, std::size_t bytes, HostStamp at);
   std::vector<std::uint8_t> draw(std::int64_t end_of_exposure);
-  void work();
 
   iidc_camera model_{};
-  iidc_sensor sensor_{};
-  std::mutex mutex_;  // of the model, in real time
   DeviceInfo info_{"iidc-fake", "0205a9000000c000", "register model", "this process"};
   iidc::BusTraits traits_{};
   iidc::StreamShape shape_{};
   iidc::SlotMemory memory_;
-  std::atomic<bool> plugged_{true}, stopping_{false};
-  bool real_time_ = false;
-  std::atomic<int> lose_{0};
+  bool plugged_ = true;
   std::int64_t elapsed_ = 0;
   int reopened_ = 0;
   iidc::StreamSink* sink_ = nullptr;
-  std::thread thread_;
 };
 
 }  // namespace vergence::test

@@ -10,8 +10,9 @@ using namespace iidc;
 constexpr std::uint64_t kCommand = kRegisterSpace + 0xF00000, kFormat7 = kRegisterSpace + 0xF08000;
 constexpr Duration kSlack = Duration::milliseconds(300);  // of a busy machine
 
-TEST(IidcFaults, ARegisterThatNeverBecomesReadyEndsInTime) {
-  CameraUnderTest c;
+using IidcFaults = WithCamera;
+
+TEST_F(IidcFaults, ARegisterThatNeverBecomesReadyEndsInTime) {
   c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kValueApply;
   const HostStamp begun = monotonic_now();
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::timeout);
@@ -23,9 +24,7 @@ TEST(IidcFaults, ARegisterThatNeverBecomesReadyEndsInTime) {
   c.start();
 }
 
-TEST(IidcFaults, ASoftwareTriggerThatStaysBusyEndsInTime) {
-  CameraUnderTest c;
-  CameraConfiguration requested = CameraUnderTest::usual();
+TEST_F(IidcFaults, ASoftwareTriggerThatStaysBusyEndsInTime) {
   requested.trigger = CameraTrigger::software;
   c.start(requested);
   c.bus->stuck[kCommand + reg::kSoftwareTrigger] = bit(31);
@@ -35,8 +34,7 @@ TEST(IidcFaults, ASoftwareTriggerThatStaysBusyEndsInTime) {
   EXPECT_FALSE(c.camera->last_error().empty());
 }
 
-TEST(IidcFaults, ARegionThatTheCameraRefusesIsToldAsSuch) {
-  CameraUnderTest c;
+TEST_F(IidcFaults, ARegionThatTheCameraRefusesIsToldAsSuch) {
   c.bus->stuck[kFormat7 + reg::format7::kValueSetting] = reg::format7::kErrorRegion;
   EXPECT_EQ(c.camera->configure(CameraUnderTest::usual(), nullptr), DeviceStatus::unsupported);
   EXPECT_NE(c.camera->last_error().find("refuses the region 640 x 480"), std::string::npos)
@@ -47,7 +45,7 @@ TEST(IidcFaults, ARegionThatTheCameraRefusesIsToldAsSuch) {
       << c.camera->last_error();
 }
 
-TEST(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
+TEST_F(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
   CameraUnderTest probe;
   probe.start();
   probe.camera->stop();
@@ -56,30 +54,29 @@ TEST(IidcFaults, EveryRegisterMayRefuseAndNothingHangsOrCrashes) {
   for (std::uint32_t offset = 0; offset < 0x900; offset += 4) used.insert(kCommand + offset);
   for (std::uint32_t offset = 0; offset < 0x80; offset += 4) used.insert(kFormat7 + offset);
   for (const std::uint64_t address : used) {
-    CameraUnderTest c;
-    c.bus->refused.insert(address);
-    const DeviceStatus status = c.camera->configure(CameraUnderTest::usual(), nullptr);
+    CameraUnderTest own;
+    own.bus->refused.insert(address);
+    const DeviceStatus status = own.camera->configure(CameraUnderTest::usual(), nullptr);
     EXPECT_TRUE(status == DeviceStatus::ok || status == DeviceStatus::unsupported)
         << std::hex << address << ' ' << to_string(status);
-    EXPECT_EQ(status == DeviceStatus::ok, c.camera->last_error().empty()) << std::hex << address;
+    EXPECT_EQ(status == DeviceStatus::ok, own.camera->last_error().empty()) << std::hex << address;
   }
 }
 
-TEST(IidcFaults, RegistersFullOfNonsenseGiveAStatus) {
+TEST_F(IidcFaults, RegistersFullOfNonsenseGiveAStatus) {
   for (const std::uint32_t pattern : {0xFFFF'FFFFU, 0x7F80'0001U, 0xAAAA'AAAAU, 0x8000'0000U})
     for (std::uint32_t first = 0x100; first < 0x900; first += 0x40) {
-      CameraUnderTest c;
+      CameraUnderTest own;
       for (std::uint32_t offset = first; offset < first + 0x40; offset += 4)
-        c.bus->stuck[kCommand + offset] = pattern;
-      (void)c.camera->configure(CameraUnderTest::usual(), nullptr);
-      (void)c.camera->start(nullptr);
-      c.bus->expose(2);
-      c.camera->stop();
+        own.bus->stuck[kCommand + offset] = pattern;
+      (void)own.camera->configure(CameraUnderTest::usual(), nullptr);
+      (void)own.camera->start(nullptr);
+      own.bus->expose(2);
+      own.camera->stop();
     }
 }
 
-TEST(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConfigured) {
-  CameraUnderTest c;
+TEST_F(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConfigured) {
   c.start();
   c.bus->expose(2);
   c.bus->unplug();
@@ -103,8 +100,7 @@ TEST(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConfig
   c.camera->release(held.slot);
 }
 
-TEST(IidcFaults, ACameraUnpluggedWhileStoppedIsGoneAtTheNextStart) {
-  CameraUnderTest c;
+TEST_F(IidcFaults, ACameraUnpluggedWhileStoppedIsGoneAtTheNextStart) {
   c.start();
   c.camera->stop();
   c.bus->unplug();
@@ -115,8 +111,7 @@ TEST(IidcFaults, ACameraUnpluggedWhileStoppedIsGoneAtTheNextStart) {
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
 }
 
-TEST(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
-  CameraUnderTest c;
+TEST_F(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
   c.configure();
   c.bus->all_accesses = DeviceStatus::timeout;
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
@@ -125,8 +120,7 @@ TEST(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
 }
 
-TEST(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
-  CameraUnderTest c;
+TEST_F(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
   c.start();
   c.bus->unplug();
   Frame f;
@@ -146,8 +140,7 @@ TEST(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
   EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
 }
 
-TEST(IidcFaults, ACameraThatFallsSilentWhileAnImageIsHeldGoesOnBesideIt) {
-  CameraUnderTest c;
+TEST_F(IidcFaults, ACameraThatFallsSilentWhileAnImageIsHeldGoesOnBesideIt) {
   c.start();
   c.bus->expose(2);
   (void)c.take_and_release();
@@ -168,12 +161,11 @@ TEST(IidcFaults, ACameraThatFallsSilentWhileAnImageIsHeldGoesOnBesideIt) {
   }
 }
 
-TEST(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
-  CameraUnderTest c;
+TEST_F(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
   c.start();
   c.bus->expose(1);
   (void)c.take_and_release();
-  for (int i = 0; i < IidcCamera::kStrays; ++i)
+  for (int i = 0; i < iidc::IidcCamera::kStrays; ++i)
     c.bus->expose_tampered([](std::vector<std::uint8_t>* image, std::size_t*) {
       std::rotate(image->begin(), image->begin() + 4096, image->end());
     });
@@ -184,8 +176,7 @@ TEST(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
   EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);
 }
 
-TEST(IidcFaults, ACounterThatBeginsAnewIsFollowedAfterTwoFrames) {
-  CameraUnderTest c;
+TEST_F(IidcFaults, ACounterThatBeginsAnewIsFollowedAfterTwoFrames) {
   c.start();
   c.bus->expose(5);
   for (int i = 0; i < 5; ++i) (void)c.take_and_release();
