@@ -24,7 +24,7 @@ std::string narrowed(const std::string& wide, bool least_first) {
   text.reserve(wide.size() / 2);
   for (std::size_t i = 2; i + 1 < wide.size(); i += 2) {
     const char low = wide[i + (least_first ? 0 : 1)], high = wide[i + (least_first ? 1 : 0)];
-    text.push_back(high == 0 && low >= 0 ? low : '?');
+    text.push_back(high == 0 && static_cast<signed char>(low) >= 0 ? low : '?');
   }
   return text;
 }
