@@ -270,6 +270,7 @@ TEST_P(AcquisitionByPulses, whateverIsLostNoPairIsWrongAndAllIsSaid) {
   EXPECT_GT(b.pulses_of.size(), 90U) << "of 160: it came back";
   // Kept slots would stall the drive: its frames and their doubles go through 24 of them.
   EXPECT_EQ(b.rig->camera(0).statistics().underruns, 0U);
+  EXPECT_EQ(b.source->counters().clock_resets, 0U) << "another boot's clock is told, not found";
   ASSERT_EQ(items.size(), more.size()) << "another run";
   for (std::size_t i = 0; i < items.size(); ++i) {
     ASSERT_TRUE(same(items[i], more[i])) << i;
