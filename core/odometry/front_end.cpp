@@ -12,6 +12,8 @@ namespace {
 constexpr double kImageMargin = 9.0;   // px: a window's half and one
 constexpr float kMinStructure = 3.0F;  // grey levels, standard deviation of the coarsest level: a
                                        // lens cap's noise stays below 2
+// Grey levels, 1 σ, of a pixel: rounding has 0.3, a sensor one or two.
+constexpr double kGreyNoise = 2;
 constexpr int kMaskMargin =
     features::kWindow / 2 + 1;  // px: no pixel that holds a feature is a masked one
 
@@ -150,7 +152,8 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
   return check;
 }
 
-bool FrontEnd::finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept {
+bool FrontEnd::finish(int k, const Vec2& raw, double by_noise, double parallax,
+                      Followed* f) const noexcept {
   Vec2 ideal;
   double magnification = 1.0;
   if (hides(k, raw) || !lens(k).undistort(raw, &ideal, &magnification)) return false;
@@ -158,7 +161,8 @@ bool FrontEnd::finish(int k, const Vec2& raw, double parallax, Followed* f) cons
   f->raw = raw.cast<float>();
   f->ideal = ideal.cast<float>();
   f->sigma = static_cast<float>(
-      std::hypot(options_.pixel_sigma, options_.parallax_sigma * parallax) * magnification);
+      std::hypot(options_.pixel_sigma, kGreyNoise * by_noise, options_.parallax_sigma * parallax) *
+      magnification);
   return true;
 }
 
@@ -185,7 +189,8 @@ FrontEnd::Followed FrontEnd::follow(const MapPoint& p, const Transform& T_left_w
     farther.max_shift *= 2;
     a = features::align(p.patch, pyramids_[i], predicted, A, farther);
   }
-  if (a.status == features::AlignStatus::ok) (void)finish(k, a.pixel, T_k_origin.t.norm() / z, &f);
+  if (a.status == features::AlignStatus::ok)
+    (void)finish(k, a.pixel, static_cast<double>(a.sigma), T_k_origin.t.norm() / z, &f);
   return f;
 }
 

@@ -148,9 +148,11 @@ class FrontEnd {
                                 const features::AlignOptions& how) const noexcept;
   void follow_into_all(Map& map, const Transform& T_left_world, const features::AlignOptions& how,
                        int stride) noexcept;
+  /// `by_noise`: AlignResult::sigma, px for one grey level.
   /// `parallax`: how far this camera stands from where the patch was cut, over the depth there:
   /// what its unknown slope can do.
-  [[nodiscard]] bool finish(int k, const Vec2& raw, double parallax, Followed* f) const noexcept;
+  [[nodiscard]] bool finish(int k, const Vec2& raw, double by_noise, double parallax,
+                            Followed* f) const noexcept;
   void match_stereo(const features::Corner& corner, bool exchanged, NewPoint* out) const noexcept;
   [[nodiscard]] features::CornerOptions corner_options(int k) const noexcept;
   /// Corners of camera k four times as dense as points are: so that most of the other image's have

@@ -60,7 +60,7 @@ int FrontEnd::relocalise(Map& map, int k) noexcept {
     }
     Followed f;
     if (best > kMaxDistance || best > kDistinct * second || points[which].now.by(k) ||
-        !finish(k, at, 0.0, &f))
+        !finish(k, at, 0.0, 0.0, &f))
       continue;
     f.sigma = kRoughSigma;
     store(f, k, &points[which]);
@@ -92,8 +92,8 @@ void FrontEnd::keep_free_match(const features::Patch& patch, const RoughMatch& r
   const features::AlignResult a = features::align(patch, pyramids_[static_cast<std::size_t>(k)],
                                                   rough.other, Mat2::Identity(), how);
   Followed left, other;
-  if (a.status != features::AlignStatus::ok || !finish(0, rough.left, 0.0, &left) ||
-      !finish(k, a.pixel, 0.0, &other))
+  if (a.status != features::AlignStatus::ok || !finish(0, rough.left, 0.0, 0.0, &left) ||
+      !finish(k, a.pixel, static_cast<double>(a.sigma), 0.0, &other))
     return;
   (void)free_matches_.push({left.ideal.cast<double>(), other.ideal.cast<double>(),
                             static_cast<double>(std::max(left.sigma, other.sigma))});

@@ -37,7 +37,7 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
   out->usable = false;
   const Vec2 at(corner.x, corner.y);
   if (!features::cut_patch(pyramids_[0], at, &out->patch)) return;
-  if (!finish(0, at, 0.0, &out->left)) return;
+  if (!finish(0, at, 0.0, 0.0, &out->left)) return;
   for (int k = 1; k < cameras_; ++k) {
     if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0 || !placed(k)) continue;
     const auto i = static_cast<std::size_t>(k);
@@ -80,7 +80,8 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
                          options_.pixel_sigma;  // px, three sigmas of a difference of two positions
     if (out->disparity < -noise) continue;
     out->rho = std::max(rho, 1.0 / (kFarBaselines * baseline));
-    if (!finish(k, a.pixel, out->rho * baseline, &out->stereo)) continue;
+    if (!finish(k, a.pixel, static_cast<double>(a.sigma), out->rho * baseline, &out->stereo))
+      continue;
     out->matched_camera = k;
     out->usable = true;
     return;

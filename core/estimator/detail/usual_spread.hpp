@@ -13,7 +13,8 @@ namespace vergence {
 ///
 /// Of the recorded drives, untouched, no motion is more than 1.6 times as uncertain as usual, of
 /// the rendered street 2.3 times (build/bench/covariance_bench); cameras that are out of step
-/// make it more than 4 times (FaultPairs.anImageLateFromALostOneOnIsNotOk).
+/// make it more than 4 times, and a tunnel 3 from its third frame on
+/// (FaultPairs.anImageLateFromALostOneOnIsNotOk).
 ///
 /// Threads  One. Memory: none of the heap.
 class UsualSpread {
@@ -24,17 +25,18 @@ class UsualSpread {
     constexpr double kMoves = 2;  // sigmas
     return step_m > kMoves * (kept_ >= kLeast ? median() : sigma_m);
   }
-  /// Whether a motion is more than 4 times as uncertain as usual; after one that was, more than
-  /// twice. Then it is one of the usual ones: what stays uncertain is told for half of those kept.
+  /// Whether a motion is more than 3 times as uncertain as usual; after one that was, more than
+  /// twice. One that is makes nothing usual: what stays so uncertain is told for as long.
   ///
   /// sigma_m: of the translation of a motion that judges(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
     times_ = kept_ >= kLeast ? sigma_m / median() : 0;
     unusual_ = times_ > (unusual_ ? kRelease : kTimes);
+    if (unusual_) return true;
     sigma_[next_] = sigma_m;
     next_ = (next_ + 1) % kKept;
     kept_ = std::min(kept_ + 1, kKept);
-    return unusual_;
+    return false;
   }
 
   /// What is usual, the last one was so many times as uncertain; 0: there were too few to tell.
@@ -42,7 +44,7 @@ class UsualSpread {
 
  private:
   static constexpr std::size_t kKept = 61, kLeast = 15;  // motions
-  static constexpr double kTimes = 4, kRelease = 2;
+  static constexpr double kTimes = 3, kRelease = 2;
 
   [[nodiscard]] double median() const noexcept {
     std::array<double, kKept> sorted = sigma_;

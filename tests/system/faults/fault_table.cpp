@@ -37,7 +37,7 @@ const std::vector<Kind>& kinds() {
       {"one lens covered", "cover", "camera=1", 3, {"image_dark"}},
       {"both lenses covered", "cover", "camera=-1", 3, {"image_dark"}},
       {"night", "night", "", 5, {"image_dark"}},
-      {"tunnel", "night", "factor=0.1", 5, {"few_inliers"}},
+      {"tunnel", "night", "factor=0.1", 5, {"weak_geometry"}},
       {"exposure stuck, too bright", "exposure", "factor=6", 5, {"few_inliers"}},
       {"one side dark", "exposure", "camera=1 factor=0.1", 5, {}},
       {"30 % of the frames lost", "lose_frames", "share=0.3", 5, {"no_image"}},
