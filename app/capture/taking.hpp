@@ -32,8 +32,8 @@ struct PictureRemark {
 [[nodiscard]] std::vector<PictureRemark> judge_pictures(std::span<const std::string> names,
                                                         std::span<const PictureFigures> figures);
 
-/// Whether two pictures are the same pixel for pixel: one camera twice. Flat ones (a lens cap) are
-/// not called that.
+/// Returns whether two pictures are the same pixel for pixel, as one camera's would be if it were
+/// opened twice. Flat ones (a lens cap) are not called that.
 [[nodiscard]] bool are_identical(const ImageView& a, const ImageView& b) noexcept;
 
 /// The configuration of a capture, for which of the devices only the cameras and what triggers them

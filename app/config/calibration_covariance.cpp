@@ -229,9 +229,9 @@ Finding check_sigmas(const Numbers& sigmas, const std::string& field) {
   return std::nullopt;
 }
 
-/// How far the lens moves the image's farthest corner, as a part of its distance from the principal
-/// point. The model is evaluated at the distorted radius, which needs no inversion: good to the
-/// factor that the limit leaves.
+/// Returns how far the lens moves the image's farthest corner, as a part of its distance from the
+/// principal point. The model is evaluated at the distorted radius, which needs no inversion: good
+/// to the factor that the limit leaves.
 double corner_distortion(const Intrinsics& k) {
   const double x = std::max(k.cx, k.width - 1 - k.cx) / k.fx,
                y = std::max(k.cy, k.height - 1 - k.cy) / k.fy;

@@ -24,7 +24,7 @@ const char* model_word(CameraModelKind model) {
   return model == CameraModelKind::pinhole_equidistant ? "pinhole-equidistant" : "pinhole-radtan";
 }
 
-/// Another release may reckon a rotation's last digit otherwise; nobody writes so many.
+/// The last digit of a rotation differs between releases, so it is not compared.
 bool as_configured(double a, double b) { return std::abs(a - b) <= 1e-9 + 1e-6 * std::abs(b); }
 
 template <class Numbers>

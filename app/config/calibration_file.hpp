@@ -13,7 +13,7 @@
 
 namespace vergence::app {
 
-/// What a configuration says of its rig, as far as a calibration stands on it. The state file
+/// The part of a configuration that a calibration depends on. The state file
 /// (calibration_state.hpp) keeps it: a calibration found under other words is of another rig.
 struct ConfiguredCamera {
   std::string serial_key{};  // cameras.N.serial; not in the file

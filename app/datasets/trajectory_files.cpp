@@ -241,7 +241,7 @@ bool is_euroc_truth(const fs::path& file, const Sample& sample) {
                      [](std::string_view name) { return plain(name) == "prsrx"; });
 }
 
-/// Of those that repeat a stamp the first stays.
+/// Keeps the first of the rows that repeat a stamp.
 void sort_by_stamp(Trajectory* poses) {
   const auto earlier = [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; };
   if (!std::is_sorted(poses->begin(), poses->end(), earlier))

@@ -33,7 +33,7 @@ struct CheckContext {
   const Configuration* drive = nullptr;  // null: only what is plugged in is checked
   std::filesystem::path out = ".";       // where sessions go
 
-  /// Of a drive that nobody plans: no cameras, no INS, no trigger.
+  /// Requirements where no configuration is given: no cameras, no INS, no trigger.
   [[nodiscard]] const Configuration& needs() const;
 };
 

@@ -8,8 +8,8 @@
 
 namespace vergence {
 
-/// What there can be to doubt about poses. Where several doubts stand, the first of them here names
-/// the reason.
+/// The reasons for which poses can be doubted. Where several doubts stand, the first of them here
+/// names the reason.
 enum class Doubt : std::uint8_t {
   pairing,       // this frame's images are contradicted to have been exposed together
   scene,         // the map was rebuilt

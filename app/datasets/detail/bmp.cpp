@@ -30,7 +30,7 @@ std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
   return (std::size_t{width} * bits + 31) / 32 * 4;
 }
 
-/// Of one pixel (blue, green, red).
+/// The grey value of one pixel (blue, green, red).
 std::uint8_t grey_of(const std::uint8_t* bgr) noexcept { return luminance(bgr[2], bgr[1], bgr[0]); }
 
 /// Grey levels of the palette's indices; without a palette the indices are grey levels.

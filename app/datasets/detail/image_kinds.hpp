@@ -13,7 +13,7 @@ namespace vergence::app::detail {
 
 using ImageBytes = std::span<const std::uint8_t>;
 
-/// How grey samples of 16 bits become 8; colours keep their upper 8 bits.
+/// Reduces grey samples of 16 bits to 8; colours keep their upper 8 bits.
 struct DeepSamples {
   int bits = 16;           // as narrowed()'s
   std::uint16_t peak = 0;  // set: the greatest sample; 0 where the file has other samples
