@@ -87,6 +87,9 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
   else
     note(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, sentence_of(cause), 0);
   seek(cause, frame.number, frame);
+  // Where the cameras were is where they no longer are: what is found from there, on a facade that
+  // repeats itself, is chance.
+  odometry.reset_extrinsics();
 }
 
 void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept {

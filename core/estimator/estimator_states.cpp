@@ -38,15 +38,16 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     note(EstimatorEvent::Kind::time_gap, frame.stamp,
          "no frame for longer than motion can be predicted", out.gap_s);
   in_gap = out.gap_s > 0 && !out.posed;
-  // Images of two instants match by no calibration: cameras out of step say nothing against it.
+  // Images of two instants match by no calibration: cameras that are or may be out of step say
+  // nothing against it.
   const bool unmatched = !out.posed && out.images_good && !doubts.stands(Doubt::out_of_step) &&
+                         !doubts.stands(Doubt::late_image) &&
                          out.reason == Reason::no_stereo_matches &&
                          odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kUnmatchedAfter) {
     unmatched_frames = 0;
     give_up_calibration(frame, kUnmatchedAfter);
-    odometry.reset_extrinsics();
   }
   if (out.uneven) {
     doubts.enter(Doubt::late_image, Reason::image_repeated, frame.number, kLagShownAfter);

@@ -86,6 +86,7 @@ void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
   for (int k = 1; k < cameras_; ++k) {
     Watched& w = camera(k);
     w.learning = true;
+    w.pairing.reset();
     const Transform& T = transform(rig_, k);
     set_monitor_reference(k, T,
                           reference_covariance(confirmed ? kConfirmed : kClaimed, T.t.norm()));
@@ -209,7 +210,8 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
     (void)collect_stereo(odometry.map(), k, kWitness);
     w.jumps.set_transform(w.T_camera_left_before);
     const calibration::DisparityJump jump = w.jumps.next(number, stereo_.span(), step);
-    if (jump.confirmed) onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
+    if (jump.confirmed && !w.pairing.questioned())
+      onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
     w.T_camera_left_before = transform(odometry.rig(), k);
   }
   return onset;
@@ -268,7 +270,8 @@ RigVerdict RigMonitor::update(const odometry::Odometry& odometry,
     if (!scene_pending_) v = monitor_verdict(k, odometry, outcome, frame, found, moving);
     // A lag moves the epipolar lines, and with every change of speed the disparities.
     const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
-    if (pairing.suspected() || (!verified && change)) {
+    if (pairing.suspected() || (pairing.questioned() && v.kind == Kind::collapse) ||
+        (!verified && change)) {
       v.kind = Kind::quiet;
       v.undecided = true;
     }
