@@ -2,10 +2,13 @@
 #include <unistd.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
+
+#include "core/types/time.hpp"
 
 namespace vergence::app {
 
@@ -76,13 +79,22 @@ struct LineSocketCounters {
 
 /// Where lines go: a Unix stream socket with a few readers, or datagrams to one address.
 ///
-/// Threads  One caller. Nothing waits: a reader without room loses whole lines, never a part of
-///          one, and is disconnected when it does not read for a while.
+/// Threads  One caller. Sending never waits: a reader without room loses whole lines, never a part
+///          of one, and is disconnected when it does not read for a while.
 /// Errors   The constructors throw InputError: what, where, what to do. Afterwards counters.
 class LineSocket {
  public:
+  /// A request's answer, line feed included. The request has none.
+  using Answer = std::function<std::string(std::string_view request)>;
+
   virtual ~LineSocket() = default;
   virtual void send(std::string_view line) noexcept = 0;
+  /// Lines that every reader is given now, and readers that connect later are given first. They are
+  /// never lost: a reader without room gets them as soon as it has.
+  virtual void greet(std::string lines) noexcept = 0;
+  /// Returns when `wake`, an eventfd, was written to, which is then reset, or after `timeout`, or
+  /// earlier. Readers are accepted and their requests answered meanwhile; datagrams bring none.
+  virtual void wait(int wake, Duration timeout, const Answer& answer) noexcept = 0;
   [[nodiscard]] virtual LineSocketCounters counters() const noexcept = 0;
 };
 
