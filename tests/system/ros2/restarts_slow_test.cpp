@@ -1,6 +1,7 @@
 // vergence-ros2 over restarts, with readers that do not read, and what it costs.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -149,6 +151,8 @@ TEST_F(Ros2Restarts, AReaderThatStandsStillCostsNeitherPosesNorMemory) {
 }
 
 TEST_F(Ros2Restarts, FiftyPosesASecondArriveWithinTwoMilliseconds) {
+  // As the service runs: before what else the machine does.
+  (void)::setpriority(PRIO_PROCESS, 0, -10);
   StreamSession session(socket_);
   session.calibrate(450);
   session.align();
@@ -224,7 +228,12 @@ class BytesType final : public fast::TopicDataType {
 TEST_F(Ros2Restarts, ACallOfRmwFastrtpsIsAnsweredAndTellsOfARefusal) {
   const auto bridge = start_bridge(socket_, domain_);  // vergence does not run
   auto* factory = fast::DomainParticipantFactory::get_instance();
-  auto* participant = factory->create_participant(domain_, fast::PARTICIPANT_QOS_DEFAULT);
+  fast::DomainParticipantQos here;
+  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList.emplace_back("127.0.0.1");
+  here.transport().use_builtin_transports = false;
+  here.transport().user_transports.push_back(std::move(udp));
+  auto* participant = factory->create_participant(domain_, here);
   ASSERT_NE(participant, nullptr);
   const auto topic = [&](const char* name, const char* type) {
     fast::TypeSupport(new BytesType(type)).register_type(participant);

@@ -42,27 +42,21 @@ class Kept final : public TopicWriter {
 class Reader {
  public:
   explicit Reader(const std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
+  template <class T>
+  T get() {
+    at_ += (sizeof(T) - (at_ - 4) % sizeof(T)) % sizeof(T);
+    T out{};
+    std::memcpy(&out, bytes_.data() + at_, sizeof out);
+    at_ += sizeof out;
+    return out;
+  }
   std::string text() {
-    const std::uint32_t size = count();
+    const auto size = get<std::uint32_t>();
     const std::string out(reinterpret_cast<const char*>(bytes_.data()) + at_, size - 1);
     at_ += size;
     return out;
   }
-  std::uint8_t byte() { return bytes_[at_++]; }
-  std::uint32_t count() {
-    align(4);
-    std::uint32_t out = 0;
-    std::memcpy(&out, bytes_.data() + at_, sizeof out);
-    at_ += 4;
-    return out;
-  }
-  double number() {
-    align(8);
-    double out = 0;
-    std::memcpy(&out, bytes_.data() + at_, sizeof out);
-    at_ += 8;
-    return out;
-  }
+  double number() { return get<double>(); }
   Vec3 vector() {
     const double x = number(), y = number(), z = number();
     return {x, y, z};
@@ -79,7 +73,6 @@ class Reader {
   }
 
  private:
-  void align(std::size_t size) { at_ += (size - (at_ - 4) % size) % size; }
   const std::vector<std::uint8_t>& bytes_;
   std::size_t at_ = 12;
 };
@@ -354,8 +347,8 @@ TEST(Bridge, PlacesOnTheEarthComeWithTheAlignment) {
   const auto& fix = kept.messages["/vergence/fix"].at(0);
   Reader place(fix);
   (void)place.text();
-  (void)place.byte();
-  (void)place.byte();
+  (void)place.get<std::int8_t>();
+  (void)place.get<std::uint16_t>();
   const double latitude = place.number();
   // 120 m north by a degree of 110.8 km there.
   EXPECT_NEAR(latitude, -27.5 + 120 / 110'800.0, 1e-6);
@@ -429,12 +422,12 @@ TEST_P(BridgeDiagnostics, LevelsFollowTheStatus) {
   const auto& message = kept.messages["/diagnostics"].at(0);
   Reader in(message);
   (void)in.text();
-  ASSERT_EQ(in.count(), 5U);
+  ASSERT_EQ(in.get<std::uint32_t>(), 5U);
   std::array<int, 4> levels{};
   for (int& level : levels) {
-    level = in.byte();
+    level = in.get<std::uint8_t>();
     for (int i = 0; i < 3; ++i) (void)in.text();
-    for (std::uint32_t n = 2 * in.count(); n > 0; --n) (void)in.text();
+    for (std::uint32_t n = 2 * in.get<std::uint32_t>(); n > 0; --n) (void)in.text();
   }
   EXPECT_EQ(levels, c.levels);
 }
