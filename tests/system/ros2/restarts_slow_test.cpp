@@ -1,7 +1,7 @@
 // vergence-ros2 over restarts, with readers that do not read, and what it costs.
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <atomic>
@@ -151,8 +151,10 @@ TEST_F(Ros2Restarts, AReaderThatStandsStillCostsNeitherPosesNorMemory) {
 }
 
 TEST_F(Ros2Restarts, FiftyPosesASecondArriveWithinTwoMilliseconds) {
-  // As the service runs: before what else the machine does.
-  (void)::setpriority(PRIO_PROCESS, 0, -10);
+  // Where the system lets it, before what else the machine does: the figure is that of the
+  // programs.
+  const sched_param priority{1};
+  (void)::sched_setscheduler(0, SCHED_FIFO, &priority);
   StreamSession session(socket_);
   session.calibrate(450);
   session.align();
@@ -191,6 +193,8 @@ TEST_F(Ros2Restarts, FiftyPosesASecondArriveWithinTwoMilliseconds) {
       static_cast<double>(resident_kb(bridge->pid())) / 1024);
   EXPECT_LE(ms[kPoses * 99 / 100], 2);
   EXPECT_LE(cpu, 3);
+  const sched_param normal{0};
+  (void)::sched_setscheduler(0, SCHED_OTHER, &normal);
 }
 
 namespace fast = eprosima::fastdds::dds;
