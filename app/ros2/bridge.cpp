@@ -312,12 +312,9 @@ DiagnosticMessage calibration_status(const json& line, const std::string& rating
   if (!verified) {
     d.level = Level::warn;
     d.message = calibrated ? "not verified" : "none yet; drive to calibrate";
-  } else if (rating == "recalibrate" || rating == "poor") {
-    d.level = Level::error;
-    d.message = "verified, but uncertain: " + rating;
-  } else if (rating != "good") {
-    d.level = Level::warn;
-    d.message = "verified; rating " + (rating.empty() ? "unknown" : rating);
+  } else if (!rating.empty()) {
+    d.message = "verified; rating: " + rating;
+    if (rating != "good") d.level = rating == "recalibrate" ? Level::error : Level::warn;
   }
   d.values = {{"verified", text(line.at("verified"))},
               {"rating", rating.empty() ? "unknown" : rating}};
