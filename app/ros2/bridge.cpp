@@ -368,6 +368,7 @@ void Bridge::on_status(const json& line) {
   const std::array diagnostics{odometry_status(line), calibration_status(line, rating_),
                                cameras_status(line), ins_status(line),
                                stream_status(dropped_, malformed_)};
+  ++statuses_;
   publish("/diagnostics", [&](CdrWriter* out) {
     write_diagnostics(out, Stamp(stamp.is_null() ? 0 : stamp.get<std::int64_t>()), diagnostics);
   });

@@ -63,7 +63,9 @@ class Bridge {
   void disconnected() noexcept { previous_.reset(); }
   /// Publishes diagnostics of level STALE. `message`: why there is no status.
   void publish_stale(Stamp now, const std::string& message);
+  /// Lines that were left out, and status lines, since the start.
   [[nodiscard]] std::uint64_t malformed() const noexcept { return malformed_; }
+  [[nodiscard]] std::uint64_t statuses() const noexcept { return statuses_; }
 
  private:
   using Covariance = Eigen::Matrix<double, 6, 6>;  // translation, rotation
@@ -98,7 +100,7 @@ class Bridge {
   std::optional<PosedChild> previous_{};
   std::optional<Alignment> alignment_{};
   std::string calibration_text_{}, rating_{};  // the newest line; its rating, empty: none
-  std::uint64_t malformed_ = 0, dropped_ = 0;
+  std::uint64_t malformed_ = 0, statuses_ = 0, dropped_ = 0;
   std::vector<std::uint8_t> buffer_;
 };
 

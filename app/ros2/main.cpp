@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <deque>
 #include <exception>
 #include <memory>
@@ -129,23 +130,24 @@ class Program {
 
   void connect(Clock::time_point now) {
     connect_at_ = now + 500ms;
-    if (client_.connect()) {
+    const int error = client_.connect();
+    if (error == 0) {
       fmt::print(stderr, "vergence-ros2: connected to {}\n", client_.path());
       said_waiting_ = false;
     } else if (!said_waiting_) {
       fmt::print(stderr,
-                 "vergence-ros2: {}: nothing listens there; waiting for vergence with "
+                 "vergence-ros2: {}: {}; waiting for vergence with "
                  "publish.lines: unix://{}\n",
-                 client_.path(), client_.path());
+                 client_.path(), std::strerror(error), client_.path());
       said_waiting_ = true;
     }
   }
 
   bool read() {
     return client_.read([this](std::string_view line) {
-      const std::uint64_t malformed = bridge_.malformed();
+      const std::uint64_t malformed = bridge_.malformed(), statuses = bridge_.statuses();
       if (const auto response = bridge_.add(line)) answer(*response);
-      if (line.find(R"("type":"status")") != std::string_view::npos) stale_at_ = Clock::now() + 3s;
+      if (bridge_.statuses() > statuses) stale_at_ = Clock::now() + 3s;
       if (malformed == 0 && bridge_.malformed() > 0)
         fmt::print(stderr,
                    "vergence-ros2: a malformed line was skipped; further ones are only counted in "

@@ -22,16 +22,16 @@ PoseStreamClient::PoseStreamClient(std::string_view address) {
                     address.substr(0, 120), sizeof(sockaddr_un::sun_path) - 1));
 }
 
-bool PoseStreamClient::connect() {
+int PoseStreamClient::connect() {
   close();
   FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   path_.copy(address.sun_path, sizeof address.sun_path - 1);
   if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    return false;
+    return errno;
   socket_ = std::move(socket);
-  return true;
+  return 0;
 }
 
 bool PoseStreamClient::read(const std::function<void(std::string_view)>& on_line) {

@@ -18,8 +18,8 @@ class PoseStreamClient {
   /// `address`: unix:///PATH. InputError: another form.
   explicit PoseStreamClient(std::string_view address);
 
-  /// True when there is a connection now.
-  bool connect();
+  /// Returns 0 when there is a connection now, else errno.
+  int connect();
   [[nodiscard]] bool connected() const noexcept { return static_cast<bool>(socket_); }
   /// Descriptor to poll; −1 without a connection.
   [[nodiscard]] int descriptor() const noexcept { return socket_.get(); }

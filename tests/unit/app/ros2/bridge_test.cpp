@@ -269,6 +269,22 @@ INSTANTIATE_TEST_SUITE_P(All, BridgeStatus,
                                          StatusCase{"degraded", "time_gap", 100},
                                          StatusCase{"lost", "no_pose", 0}));
 
+/// The bridge's list names reasons as the stream has them: a renamed one would be widened less.
+TEST(Bridge, EveryReasonOfTheListIsOne) {
+  std::map<double, int> reasons;  // by the variance that they make of 1
+  for (int i = 1; i <= static_cast<int>(Reason::unproven_pairing); ++i) {
+    Kept kept;
+    Bridge bridge({}, &kept);
+    Pose pose;
+    pose.status = "degraded";
+    pose.reason = to_string(static_cast<Reason>(i));
+    bridge.add(line_of(pose));
+    ++reasons[odometry(kept.messages["/vergence/odometry"].at(0)).pose_covariance(5, 5)];
+  }
+  EXPECT_EQ(reasons[100], 3);
+  EXPECT_EQ(reasons[9], 8);
+}
+
 TEST(Bridge, NoSpeedAcrossAGapALostPoseOrAnotherConnection) {
   Kept kept;
   Bridge bridge({}, &kept);
