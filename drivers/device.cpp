@@ -1,11 +1,10 @@
 #include "drivers/device.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "drivers/camera.hpp"
+#include "drivers/common/format_text.hpp"
 
 namespace vergence {
 
@@ -52,11 +51,7 @@ const char* to_string(CameraTrigger trigger) noexcept {
 }
 
 std::string find_invalid(const CameraConfiguration& requested) {
-  const auto number = [](double value) {
-    std::array<char, 32> text{};
-    (void)std::snprintf(text.data(), text.size(), "%.6g", value);
-    return std::string(text.data());
-  };
+  const auto number = [](double value) { return format_text("%.6g", value); };
   if (requested.width <= 0 || requested.height <= 0)
     return "a size of " + std::to_string(requested.width) + " x " +
            std::to_string(requested.height);
