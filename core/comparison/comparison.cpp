@@ -115,7 +115,6 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.ins_valid = c.ins == InsMatch::ok;
   if (c.ins_valid) {
     c.reference = on_earth(reference.T_enu_left);
-    c.ins_stamp_error = reference.stamp_error;
     c.ins_position_sigma = reference.sigmas.position;
     c.height_known = !reference.flat;
   } else {
@@ -142,7 +141,6 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.scale_disagrees = ratio_.disagrees();
 
   const Placement& placement = builder_.placement();
-  c.placement_revision = placement.revision;
   c.placed = posed && placement.revision > 0;
   if (c.placed) c.ours = on_earth(placement.T_enu_world * pose.T_world_left);
   c.compared = c.placed && c.ins_valid;

@@ -84,11 +84,10 @@ struct ComparedPose {
   bool ins_valid = false;
   bool placed = false;    // the pose is not lost and there is a placement
   bool compared = false;  // both: the errors mean something
-  std::uint32_t placement_revision = 0;
   EarthPose ours{};
   EarthPose reference{};          // the INS brought to the left camera and to the frame's stamp
-  Duration ins_stamp_error{};     // the larger of the two samples' around the frame
-  double ins_position_sigma = 0;  // m, horizontal, each axis: likewise
+  double ins_position_sigma = 0;  // m, horizontal, each axis: the larger of the two samples'
+                                  // around the frame
   bool height_known = false;      // the INS measured its height; else error_enu.z() is 0
   Vec3 error_enu = Vec3::Zero();  // m, ours − INS
   double error_yaw = 0;           // rad, in (−π, π], counter-clockwise from above positive

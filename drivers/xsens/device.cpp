@@ -34,14 +34,8 @@ DeviceStatus Device::open() {
 }
 
 DeviceStatus Device::connect() {
-  stop();
-  close_line();
-  look_up_virtual_time();
-  DeviceStatus status = open();
-  if (status != DeviceStatus::ok) {
-    last_error_ = place().name() + " cannot be opened: " + std::string(to_string(status));
-    return status;
-  }
+  DeviceStatus status = open_anew();
+  if (status != DeviceStatus::ok) return status;
   Setup setup(*line(), options_, stopping());
   status = setup.find();
   if (status == DeviceStatus::ok) status = setup.identify(&identity_);

@@ -128,7 +128,7 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     StereoRow& row = stereo_[rows_];
     const Vec2 left = ray(c.left, s.left), right = ray(c.right, s.right);
     Vec5 J;
-    if (c.epipolar.to_line(left, right, &row.r, &J) != EpipolarStatus::ok) continue;
+    if (!c.epipolar.to_line(left, right, &row.r, &J)) continue;
     row.r *= f;
     for (int i = 0; i < kFixed; ++i) row.J[static_cast<std::size_t>(i)] = f * J[i];
     const Vec2 normal = (E * left.homogeneous()).head<2>().normalized();
