@@ -11,17 +11,6 @@ constexpr double kMinSine2 = 1e-20;  // between two rays: parallel to what doubl
 
 }  // namespace
 
-Mat32 tangent_basis(const Vec3& unit) noexcept {
-  const Vec3 a = unit.cwiseAbs();
-  const Vec3 axis = a.x() <= a.y() && a.x() <= a.z() ? Vec3::UnitX()
-                    : a.y() <= a.z()                 ? Vec3::UnitY()
-                                                     : Vec3::UnitZ();
-  Mat32 B;
-  B.col(0) = unit.cross(axis).normalized();
-  B.col(1) = unit.cross(B.col(0));
-  return B;
-}
-
 Transform moved_on_sphere(const Transform& T, const Vec5& delta) noexcept {
   const double length = T.t.norm();
   const Vec3 unit = T.t / length;

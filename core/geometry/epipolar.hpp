@@ -3,12 +3,7 @@
 
 namespace vergence {
 
-using Mat32 = Eigen::Matrix<double, 3, 2>;
 using Mat5 = Eigen::Matrix<double, 5, 5>;
-
-/// Two unit vectors that span the plane perpendicular to a unit vector; the same for the same
-/// input.
-[[nodiscard]] Mat32 tangent_basis(const Vec3& unit) noexcept;
 
 /// The stereo transform moved by δ = (φ, α, β), rad: R ← Exp(φ) R, t ← |t| · normalised(t/|t| + B
 /// (α, β)), B the tangent basis of t/|t|. The length stays: two cameras do not see it.

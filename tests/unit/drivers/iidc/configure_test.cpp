@@ -124,12 +124,6 @@ TEST_F(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
   expect_says(c.camera->remark(), {"embeds no counter"});
 }
 
-TEST_F(IidcConfigure, ACameraWithoutTheVendorsRegistersIsTakenAsItIs) {
-  c.bus->refused.insert(kRegisterSpace + 0xF00000 + reg::kFrameInfo);
-  c.configure();
-  EXPECT_EQ(c.camera->plan().info.size(), 0U);
-}
-
 TEST_F(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
   requested.trigger = CameraTrigger::hardware;
   requested.options = Options{.trigger_mode = 0,
@@ -219,12 +213,6 @@ TEST_F(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
   }
   EXPECT_TRUE(own.bus->written.empty()) << "a refusal writes nothing";
   EXPECT_EQ(own.camera->start(nullptr), DeviceStatus::ok);
-}
-
-TEST_F(IidcConfigure, WithoutFormat7ARateBetweenTheFixedOnesBecomesTheNext) {
-  c.configure(CameraUnderTest::usual_with("format7", "no"));
-  EXPECT_EQ(c.actual.rate_hz, 15);
-  EXPECT_EQ(c.bus->command(reg::kVideoFormat), 0U);
 }
 
 }  // namespace

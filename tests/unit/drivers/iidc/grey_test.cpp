@@ -16,30 +16,6 @@ std::vector<std::uint8_t> convert(const GreyConversion& c, const std::vector<std
   return out;
 }
 
-TEST(Grey, AColouredWallBehindAnyMosaicIsOneGrey) {
-  constexpr int kWidth = 14, kHeight = 10;
-  constexpr unsigned kRed = 200, kGreen = 100, kBlue = 40;
-  for (const char* tile : {"RGGB", "GRBG", "GBRG", "BGGR"}) {
-    std::vector<std::uint8_t> raw(kWidth * kHeight);
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) {
-        const char filter = tile[y % 2 * 2 + x % 2];
-        raw[static_cast<std::size_t>(y * kWidth + x)] =
-            static_cast<std::uint8_t>(filter == 'R'   ? kRed
-                                      : filter == 'G' ? kGreen
-                                                      : kBlue);
-      }
-    const auto out = convert({ColorCoding::raw8, true, 16}, raw, kWidth, kHeight, 64);
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x)
-        ASSERT_EQ(out[static_cast<std::size_t>(y) * 64 + static_cast<std::size_t>(x)],
-                  (kRed + 2 * kGreen + kBlue) / 4)
-            << tile << ' ' << x << ' ' << y;
-      ASSERT_EQ(out[static_cast<std::size_t>(y) * 64 + kWidth], 0xEE) << "padding is left alone";
-    }
-  }
-}
-
 TEST(Grey, SixteenBitsGiveTheHighestOfTheEffectiveOnes) {
   const std::vector<std::uint8_t> be{0x12, 0x34, 0x0F, 0xFF, 0xFF, 0xFF, 0x00, 0x7F};
   EXPECT_EQ(convert({ColorCoding::mono16, false, 16}, be, 4, 1, 4),

@@ -130,24 +130,6 @@ TEST(HostileBoard, aClockThatIsSetBackIsFoundOutAndTheDriveGoesOn) {
   EXPECT_LE(rig.device->statistics().lost, 2U) << "until three pings have told, 30 ms";
 }
 
-TEST(HostileBoard, oneWhoseNumbersStandStillIsGoneAndNamed) {
-  BoardRig rig(board_for(Duration::seconds(30)), direct_line(), {}, [](HostStamp at, Bytes* bytes) {
-    TriggerFrame f = opened(*bytes);
-    TriggerEvent e;
-    if (at < at_s(5) || f.type != trigger_event || !trigger_get_event(f.payload, f.size, &e))
-      return;
-    e.pulse = 3;
-    trigger_put_event(&e, f.payload);
-    *bytes = closed(f);
-  });
-  rig.start();
-  Pulse p;
-  EXPECT_EQ(test::end_of(*rig.device, &p), DeviceStatus::gone);
-  EXPECT_NE(rig.device->last_error().find("backwards"), std::string::npos)
-      << rig.device->last_error();
-  EXPECT_GE(rig.device->statistics().malformed, 8U);
-}
-
 TEST(HostileBoard, ofOneThatDoesNotPingTheArrivalsTellTheTime) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line(), {}, [](HostStamp, Bytes* bytes) {
     if (opened(*bytes).type == trigger_pong) bytes->clear();
