@@ -204,7 +204,10 @@ void Odometry::settle_points(const PoseFit& fit) noexcept {
     else if (p.missed > kMissesAllowed)
       p.stage = PointStage::dormant;
   }
-  new_points_.add(tried, kept);
+  const bool few_fit = fit.inliers < kRigidShare * fit.given, few_kept = 2 * kept < tried;
+  const bool others = (few_fit || few_kept) && poses_.others_move(map_, fit.T_left_world);
+  others_move_ = few_fit && others;
+  new_points_.add(tried, others ? kept : tried);
   frames_untried_ = tried > 0 ? 0 : frames_untried_ + 1;
   if (cursor_before_trial_) map_.rewind(*cursor_before_trial_);
   cursor_before_trial_.reset();
