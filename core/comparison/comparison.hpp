@@ -45,9 +45,6 @@ struct ComparisonOptions {
   /// INS samples held; the oldest goes. 8192 are 68 s at 120 Hz, far more than any pose waits.
   /// Power of two.
   std::size_t ins_capacity = 8192;
-
-  /// Nothing wrong: nullptr; else a sentence.
-  [[nodiscard]] const char* validate() const noexcept;
 };
 
 /// From where the left camera sits in the body of the INS (forward, left, up; m) and how the rig's
@@ -135,7 +132,7 @@ class Comparison {
  public:
   static constexpr std::size_t kPending = 64;
 
-  /// Precondition: options.validate() == nullptr. Throws std::length_error when the arena is full.
+  /// Throws std::length_error when the arena is full.
   Comparison(const ComparisonOptions& options, Arena& arena);
   Comparison(const Comparison&) = delete;  // its parts refer to one another
   Comparison& operator=(const Comparison&) = delete;
