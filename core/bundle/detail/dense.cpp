@@ -1,5 +1,4 @@
 // The dense half of a step: Y Yᵀ and Cholesky. Built once per SIMD target (see kernels.hpp).
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -48,8 +47,8 @@ HWY_INLINE void subtract_sums(V x, V y, double* at) {
 
 /// Folds a vector of pairs (x, y, x, y, …) to one pair.
 template <class DPairs>
-HWY_INLINE hn::Vec<hn::FixedTag<double, 2>> fold_pairs([[maybe_unused]] DPairs d,
-                                                       hn::Vec<DPairs> v) {
+HWY_INLINE hn::Vec<hn::FixedTag<double, 2> > fold_pairs([[maybe_unused]] DPairs d,
+                                                        hn::Vec<DPairs> v) {
   if constexpr (sizeof(hn::Vec<DPairs>) > 2 * sizeof(double)) {
     const hn::Half<DPairs> half;
     return fold_pairs(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
@@ -214,6 +213,38 @@ PivotReport cholesky_one(double* HWY_RESTRICT A, std::size_t n, std::size_t colu
   return report;
 }
 
+void solve_factored_one(const double* HWY_RESTRICT L, std::size_t n, std::size_t ld,
+                        double* HWY_RESTRICT b) {
+  const D d;
+  const std::size_t N = hn::Lanes(d);
+  const std::size_t rows = (n + N - 1) / N * N;
+  for (std::size_t i = n; i < rows; ++i) b[i] = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double* column = L + k * ld;
+    const double value = b[k] / column[k];
+    const V f = hn::Set(d, value);
+    // The vector that holds row k also holds solved rows: they are saved around it.
+    const std::size_t start = k / N * N;
+    double head[kBatch];
+    for (std::size_t i = start; i < k; ++i) head[i - start] = b[i];
+    for (std::size_t i = start; i < rows; i += N)
+      hn::Store(hn::NegMulAdd(hn::Load(d, column + i), f, hn::Load(d, b + i)), d, b + i);
+    for (std::size_t i = start; i < k; ++i) b[i] = head[i - start];
+    b[k] = value;
+  }
+  for (std::size_t i = n; i < rows; ++i) b[i] = 0;
+  for (std::size_t k = n; k-- > 0;) {
+    const double* column = L + k * ld;
+    const std::size_t start = (k / N + 1) * N;
+    V sum = hn::Zero(d);
+    for (std::size_t i = start; i < rows; i += N)
+      sum = hn::MulAdd(hn::Load(d, column + i), hn::Load(d, b + i), sum);
+    double v = b[k] - hn::GetLane(hn::SumOfLanes(d, sum));
+    for (std::size_t i = k + 1; i < std::min(start, n); ++i) v -= column[i] * b[i];
+    b[k] = v / column[k];
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace vergence::detail
 HWY_AFTER_NAMESPACE();
@@ -223,6 +254,7 @@ namespace vergence::detail {
 
 HWY_EXPORT(subtract_points_one);
 HWY_EXPORT(cholesky_one);
+HWY_EXPORT(solve_factored_one);
 
 void subtract_points(const KernelJob& job, std::size_t first, std::size_t last, double* A,
                      std::size_t ld) noexcept {
@@ -233,12 +265,7 @@ PivotReport cholesky(double* A, std::size_t n, std::size_t columns, std::size_t 
   return HWY_DYNAMIC_DISPATCH(cholesky_one)(A, n, columns, ld, tolerance);
 }
 void solve_factored(const double* L, std::size_t n, std::size_t ld, double* b) noexcept {
-  const auto size = static_cast<Eigen::Index>(n);
-  const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> factor(
-      L, size, size, Eigen::OuterStride<>(static_cast<Eigen::Index>(ld)));
-  Eigen::Map<Eigen::VectorXd> x(b, size);
-  factor.triangularView<Eigen::Lower>().solveInPlace(x);
-  factor.triangularView<Eigen::Lower>().transpose().solveInPlace(x);
+  HWY_DYNAMIC_DISPATCH(solve_factored_one)(L, n, ld, b);
 }
 
 }  // namespace vergence::detail

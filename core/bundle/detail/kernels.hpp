@@ -36,7 +36,7 @@ struct PivotReport {
 PivotReport cholesky(double* A, std::size_t n, std::size_t columns, std::size_t ld,
                      double tolerance) noexcept;
 
-/// b ← (L Lᵀ)⁻¹ b.
+/// b ← (L Lᵀ)⁻¹ b; b has room for ld.
 void solve_factored(const double* L, std::size_t n, std::size_t ld, double* b) noexcept;
 
 }  // namespace vergence::detail
