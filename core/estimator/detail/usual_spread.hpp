@@ -20,13 +20,13 @@ namespace vergence {
 /// (FaultPairs.anImageLateFromALostOneOnIsNotOk).
 ///
 /// Threads  One. Memory: none of the heap.
-class UsualSpread {
+class CovarianceBaseline {
  public:
   /// Standing still, residuals are smaller than they are on the way: such motions are no measure,
   /// and need none. By the usual sigma: the more uncertain a motion, the more it has to be judged.
   [[nodiscard]] bool judges(double step_m, double sigma_m) const noexcept {
     constexpr double kMoves = 2;  // sigmas
-    return step_m > kMoves * (kept_ >= kLeast ? median() : sigma_m);
+    return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
   }
   /// Returns true from a motion more than 3 times as uncertain as usual on, until the last five are
   /// less than twice as uncertain, root mean square. A motion judged so makes nothing usual: what
@@ -35,7 +35,7 @@ class UsualSpread {
   /// sigma_m: of the translation of a motion that judges(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
     recent_[judged_++ % kRecent] = sigma_m * sigma_m;
-    times_ = kept_ >= kLeast ? sigma_m / median() : 0;
+    times_ = kept_ >= kMin ? sigma_m / median() : 0;
     const double squares = std::accumulate(recent_.begin(), recent_.end(), 0.0);
     unusual_ = unusual_ ? std::sqrt(squares / kRecent) > kRelease * median() : times_ > kTimes;
     if (unusual_) return true;
@@ -49,7 +49,7 @@ class UsualSpread {
   [[nodiscard]] double times_usual() const noexcept { return times_; }
 
  private:
-  static constexpr std::size_t kKept = 61, kLeast = 15, kRecent = 5;  // motions
+  static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 5;  // motions
   static constexpr double kTimes = 3, kRelease = 2;
 
   [[nodiscard]] double median() const noexcept {
