@@ -27,8 +27,8 @@ double widening_of(std::string_view reason) {
     if (reason == r) return 10;
   // Lengths that stand on a calibration which is not, or not yet, that of the rig.
   for (const std::string_view r :
-       {"unconfirmed", "unverified_calibration", "recalibrating", "uncalibrated", "single_camera",
-        "out_of_sync", "no_stereo_matches", "cameras_swapped"})
+       {"unverified_calibration", "recalibrating", "uncalibrated", "single_camera", "out_of_sync",
+        "no_stereo_matches", "cameras_swapped"})
     if (reason == r) return 3;
   return reason.empty() ? 1 : 2;
 }
