@@ -14,7 +14,6 @@ std::string_view to_string(PoseStatus s) noexcept {
 }
 
 std::string_view to_string(Reason r) noexcept {
-<<<<<<< ours
   return name_of(r, std::array{"",
                                "no_image",
                                "image_no_contrast",
@@ -29,7 +28,6 @@ std::string_view to_string(Reason r) noexcept {
                                "map_reset",
                                "weak_geometry",
                                "dynamic_scene",
-                               "unconfirmed",
                                "unverified_calibration",
                                "recalibrating",
                                "uncalibrated",
@@ -38,31 +36,6 @@ std::string_view to_string(Reason r) noexcept {
                                "needs_near_structure",
                                "needs_texture",
                                "pairing_ambiguous"});
-=======
-  static constexpr std::array<std::string_view, 22> names = {"",
-                                                             "no_image",
-                                                             "image_no_contrast",
-                                                             "image_repeated",
-                                                             "few_features",
-                                                             "no_stereo_matches",
-                                                             "cameras_swapped",
-                                                             "few_inliers",
-                                                             "single_camera",
-                                                             "no_pose",
-                                                             "time_gap",
-                                                             "map_reset",
-                                                             "weak_geometry",
-                                                             "dynamic_scene",
-                                                             "unverified_calibration",
-                                                             "recalibrating",
-                                                             "uncalibrated",
-                                                             "out_of_sync",
-                                                             "needs_motion",
-                                                             "needs_near_structure",
-                                                             "needs_texture",
-                                                             "pairing_ambiguous"};
-  return name(names, r);
->>>>>>> theirs
 }
 
 std::string_view to_string(Stage s) noexcept {
