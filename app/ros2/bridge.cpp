@@ -314,7 +314,7 @@ DiagnosticMessage calibration_status(const json& line, const std::string& rating
     d.message = calibrated ? "not verified" : "none yet; drive to calibrate";
   } else if (!rating.empty()) {
     d.message = "verified; rating: " + rating;
-    if (rating != "good") d.level = rating == "recalibrate" ? Level::error : Level::warn;
+    if (rating != "good") d.level = rating == "poor" ? Level::error : Level::warn;
   }
   d.values = {{"verified", text(line.at("verified"))},
               {"rating", rating.empty() ? "unknown" : rating}};
