@@ -358,6 +358,16 @@ Configuration parse_configuration(std::string_view yaml, const std::string& name
   return load(YamlFile::parse(yaml, name), set);
 }
 
+std::vector<std::pair<std::string, std::string>> changed_settings(const Configuration& c) {
+  const Configuration defaults;
+  std::vector<std::pair<std::string, std::string>> changed;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys)
+      if (std::string value = to_text(key.get(c)); value != to_text(key.get(defaults)))
+        changed.emplace_back(key.name, std::move(value));
+  return changed;
+}
+
 std::string canonical_text(const Configuration& configuration) {
   std::vector<std::string> lines;
   for (const Group& group : schema())

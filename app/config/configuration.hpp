@@ -213,6 +213,10 @@ struct Configuration {
 [[nodiscard]] Configuration parse_configuration(std::string_view yaml, const std::string& name,
                                                 const std::vector<std::string>& set);
 
+/// Keys that are not at their default, with their values, in the order of docs/configuration.md.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> changed_settings(
+    const Configuration& configuration);
+
 /// Every key and its value, one `key=value` a line, ordered by key, numbers in the shortest form
 /// that reads back the same.
 [[nodiscard]] std::string canonical_text(const Configuration& configuration);

@@ -113,9 +113,7 @@ class McapFile {
   [[nodiscard]] bool open() const noexcept { return fd_ >= 0; }
   /// The index has no room for another chunk.
   [[nodiscard]] bool full() const noexcept { return chunks_.size() == kMostChunks; }
-  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }          // bytes that are good
-  [[nodiscard]] std::uint64_t first_time() const noexcept { return first_; }  // ns; of the messages
-  [[nodiscard]] std::uint64_t last_time() const noexcept { return last_; }
+  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }  // bytes that are good
 
   /// What the system had taken and then could not bring to the disk.
   struct Unwritten {

@@ -70,7 +70,6 @@ class CsvRows {
   [[nodiscard]] std::optional<std::int64_t> integer(
       std::optional<std::size_t> column) const noexcept;
 
-  [[nodiscard]] bool has_head() const noexcept { return !names_.empty(); }
   [[nodiscard]] std::size_t torn_rows() const noexcept { return torn_; }
 
  private:

@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "app/config/calibration_file.hpp"
-#include "app/config/schema.hpp"
 #include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
 #include "app/runtime/errors.hpp"
@@ -69,17 +68,14 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file) {
   return out;
 }
 
-/// Keys that are not as they are when nobody says anything.
+/// As `--set` takes them.
 std::vector<std::string> settings_of(const Configuration& c) {
-  const Configuration defaults;
   std::vector<std::string> out;
-  for (const Group& group : schema())
-    for (const Key& key : group.keys)
-      if (std::string value = to_text(key.get(c)); value != to_text(key.get(defaults))) {
-        if (key.name.ends_with(".mask"))  // beside the configuration, wherever the replay runs
-          value = std::filesystem::absolute(c.folder / value).string();
-        out.push_back(key.name + "=" + value);
-      }
+  for (auto& [key, value] : changed_settings(c)) {
+    if (key.ends_with(".mask"))  // beside the configuration, wherever the replay runs
+      value = std::filesystem::absolute(c.folder / value).string();
+    out.push_back(key + "=" + value);
+  }
   return out;
 }
 

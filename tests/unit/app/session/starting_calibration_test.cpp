@@ -88,14 +88,6 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   ASSERT_EQ(other.remarks.size(), 1U);
   EXPECT_NE(other.remarks[0].find("\"4711\", the one that is there \"4712\""), std::string::npos)
       << other.remarks[0];
-
-  // Files of older releases have the address: no word of them, for ever.
-  CalibrationFile old = drive("4711").file;
-  old.serials[0] = "192.168.7.2";
-  write_calibration(folder / "old.yaml", old);
-  EXPECT_TRUE(starting_calibration(c, {.file = folder / "old.yaml"}, {"4711", ""}).remarks.empty());
-  write_calibration(folder / "calibration_state.yaml", old);
-  EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
 }
 
 TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
