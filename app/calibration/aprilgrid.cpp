@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <memory>
-#include <span>
 
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <optional>
 
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
-#include <string_view>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

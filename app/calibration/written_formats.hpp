@@ -2,7 +2,6 @@
 #include <array>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "app/foreign_calibration/foreign_calibration.hpp"
 

@@ -1,7 +1,6 @@
 #include "app/capture/taking.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <chrono>
 #include <cmath>
@@ -10,7 +9,6 @@
 #include <cstring>
 #include <mutex>
 #include <optional>
-#include <string>
 #include <thread>
 
 #include <fmt/format.h>

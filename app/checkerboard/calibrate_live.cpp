@@ -1,5 +1,4 @@
 
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <exception>

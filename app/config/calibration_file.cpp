@@ -4,15 +4,12 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 #include <limits>
 #include <span>
-#include <vector>
 
 #include <fmt/format.h>
 
 #include "app/config/calibration_covariance.hpp"
-#include "app/config/yaml_file.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 

@@ -7,7 +7,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "app/config/yaml_file.hpp"
 #include "core/types/calibration.hpp"

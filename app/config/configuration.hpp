@@ -142,7 +142,6 @@ struct MockSettings {
 /// `record:` what goes into drive.mcap of a session (docs/recording.md).
 struct RecordSettings {
   int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
-  double keep_s = 0;                               // 0: everything
   int roll_mb = 0;                                 // 0: one file
 
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }

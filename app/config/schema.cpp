@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <iterator>
 #include <limits>
-#include <string>
 #include <utility>
-#include <variant>
-#include <vector>
 
 #include <fmt/format.h>
 
-#include "app/config/configuration.hpp"
 #include "app/runtime/realtime.hpp"
 
 namespace vergence::app {
@@ -205,8 +199,6 @@ Group record() {
               "All images that the estimator was given, with their cameras: what `replay --format "
               "session` needs.")
       .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
-      .number("keep_s", &R::keep_s, 0, 3600, "s",
-              "0: everything; else only what was so long before an event and so long after it.")
       .integer("roll_mb", &R::roll_mb, 0, 10'000'000, "MB",
                "Size at which a file ends and the next one begins; 0: one file.")
       .done();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <iostream>
 #include <limits>
-#include <optional>
 #include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/datasets/trajectory_files.hpp"
 #include "app/evaluation/evaluation_report.hpp"
 #include "app/runtime/terminal_text.hpp"
 #include "app/session/ins_file.hpp"

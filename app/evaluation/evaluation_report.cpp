@@ -7,7 +7,6 @@
 #include <iterator>
 #include <optional>
 #include <system_error>
-#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -115,7 +115,6 @@ class Recording {
     RecordingFiles::Options files{};
     std::vector<std::size_t> queues;  // bytes of each
     Stamp start{};                    // of the preamble where nothing follows
-    Duration keep{};                  // 0: everything
     WhenFull when_full = WhenFull::drop;
   };
 
@@ -131,8 +130,6 @@ class Recording {
                                               std::size_t most, bool bulky = false) noexcept;
   /// The first `size` bytes of what begin() gave are the message. 0: there is none after all.
   void commit(std::size_t queue, std::size_t size) noexcept;
-  /// Something happened: what is around it is kept.
-  void mark_event(Stamp stamp) noexcept;
 
   /// Sentences about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors() { return files_.take_errors(); }
@@ -159,7 +156,7 @@ class Recording {
   /// RecordingCounters as they grow.
   struct Counts {
     std::atomic<std::uint64_t> messages{0}, bytes{0}, chunks{0};
-    std::atomic<std::uint64_t> dropped{0}, dropped_images{0}, lost{0}, passed_over{0};
+    std::atomic<std::uint64_t> dropped{0}, dropped_images{0}, lost{0};
   };
 
   void work() noexcept;
@@ -168,11 +165,9 @@ class Recording {
   [[nodiscard]] Batch gather() const noexcept;
   [[nodiscard]] bool due(const Batch& batch) noexcept;
   void release(const Batch& batch) noexcept;
-  void pass_over_old(bool hurried, bool all) noexcept;
   void make_room(bool hurried) noexcept;
-  static void drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counter) noexcept;
+  void drop_oldest(RecordRing* ring) noexcept;
   [[nodiscard]] bool store(const Batch& batch) noexcept;
-  [[nodiscard]] bool holding() const noexcept;
 
   const Options options_;
   std::vector<std::uint32_t> sequences_;  // by topic; of its producer
@@ -180,8 +175,6 @@ class Recording {
   RecordingFiles files_;
   std::int64_t waiting_since_ns_ = 0;  // monotonic; of the writer's thread
 
-  std::atomic<std::int64_t> keep_until_ns_;
-  std::atomic<std::uint64_t> newest_ns_{0};  // of what was posted
   Counts counts_;
   std::mutex mutex_;  // with stop_ and hurry_, for the writer that sleeps
   std::condition_variable wake_;

@@ -1,6 +1,5 @@
 #include "app/runtime/nearest.hpp"
 
-#include <algorithm>
 #include <array>
 
 namespace vergence::app {

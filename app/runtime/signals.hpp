@@ -1,8 +1,6 @@
 #pragma once
 #include <optional>
 
-#include <csignal>
-
 #include "app/runtime/errors.hpp"
 
 namespace vergence::app {

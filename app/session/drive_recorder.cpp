@@ -1,15 +1,11 @@
 #include "app/session/drive_recorder.hpp"
 
 #include <algorithm>
-#include <filesystem>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include <fmt/format.h>
 
 #include "app/config/calibration_file.hpp"
-#include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
@@ -46,9 +42,6 @@ std::vector<std::string> recorded_names(const CalibrationFile& file) {
 constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue without images
 constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
 constexpr std::size_t kPulseQueue = std::size_t{1} << 20;  // bytes
-// Bytes that are recorded of each, and some to spare: of a frame beside its images (1310), of a
-// reading of the INS (740), of a pulse (300).
-constexpr double kFrameRecords = 2048, kReadingRecords = 1024, kPulseRecords = 512;
 
 std::vector<RecordedTopic> topics(const CalibrationFile& file) {
   std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
@@ -113,50 +106,22 @@ double frame_bytes(const SourceFacts& facts) {
   return bytes;
 }
 
-/// What an event would keep of records that small.
-double kept_bytes(const Configuration& c, double record_bytes, double rate) {
-  return c.record.keep_s * rate * record_bytes;
-}
-
-/// Of the estimator's thread without images: of frames, and of the INS as it was compared.
-double small_bytes(const Configuration& c) {
-  return kSmall + kept_bytes(c, kFrameRecords, c.trigger.rate) +
-         kept_bytes(c, kReadingRecords, c.ins.rate);
-}
-
 constexpr double kLeastHeld = 16;  // frames that wait: a replay waits for room
 
-/// What an address of this machine reaches; a 32-bit one's program has 3 GB for all.
-constexpr double kMostQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
-
-/// Bytes of images a second, and how many seconds of them are held.
-double wanted_queue_bytes(const Configuration& c, const SourceFacts& facts) {
-  if (c.record.images == 0) return small_bytes(c);
-  const double held = facts.when_full == Recorder::WhenFull::wait
-                          ? kLeastHeld
-                          : (kDiskS + c.record.keep_s) * c.trigger.rate;
-  return small_bytes(c) + frame_bytes(facts) * std::max(held, kLeastHeld);
-}
-
+/// Of the queue of the estimator's thread, whose images are held for a disk that stalls.
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
-  const double bytes = wanted_queue_bytes(c, facts);
-  if (bytes > kMostQueue)
-    throw InputError(
-        fmt::format("record.keep_s: {:.0f} MB of images are to wait, more than this machine "
-                    "can address",
-                    bytes / 1e6));
-  return static_cast<std::size_t>(bytes);
+  if (c.record.images == 0) return kSmall;
+  const double held = facts.when_full == Recorder::WhenFull::wait ? 0 : kDiskS * c.trigger.rate;
+  return kSmall + static_cast<std::size_t>(frame_bytes(facts) * std::max(held, kLeastHeld));
 }
 
 Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
   Recording::Options o;
   o.files.topics = topics(facts.begin.file);
-  o.queues = {queue_bytes(c, facts),
-              kPulseQueue + static_cast<std::size_t>(kept_bytes(c, kPulseRecords, c.trigger.rate))};
+  o.queues = {queue_bytes(c, facts), kPulseQueue};
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
   o.files.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
-  o.keep = Duration::seconds(c.record.keep_s);
   o.when_full = facts.when_full == Recorder::WhenFull::wait ? Recording::WhenFull::wait
                                                             : Recording::WhenFull::drop;
   return o;
@@ -200,7 +165,6 @@ bool DriveRecorder::post(std::size_t topic, Stamp stamp, const Write& write, std
 }
 
 void DriveRecorder::on_frame(const RigFrame& frame) noexcept {
-  ++frames_seen_;
   frame_ = {};
   frame_.number = frame.number;
   frame_.stamp = frame.stamp;
@@ -240,16 +204,12 @@ void DriveRecorder::post_rig(Stamp stamp) noexcept {
   post(tf_static_topic, stamp, [&](CdrWriter* out) {
     write_rig_transforms(out, stamp, rig_, std::span(frame_names_).first(cameras));
     rig_in_file_ = files;
-    last_rig_ = stamp;
   });
 }
 
-/// Who opens one file of several has no other. Where only what is around events is kept, each
-/// second may be the first that is.
-bool DriveRecorder::rig_is_due(Stamp stamp) const noexcept {
-  if (!calibrated_) return false;
-  return rig_in_file_ != recording_.counters().files ||
-         (settings_.keep_s > 0 && stamp - last_rig_ >= Duration::seconds(1));
+/// Who opens one file of several has no other.
+bool DriveRecorder::rig_is_due() const noexcept {
+  return calibrated_ && rig_in_file_ != recording_.counters().files;
 }
 
 void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
@@ -257,7 +217,7 @@ void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
   frame_.solver_done = watch_.found_idle();
   post(frame_topic, sample.stamp, [&](CdrWriter* out) { write_frame(out, frame_); });
   if (settings_.poses == 0) return;
-  if (rig_is_due(sample.stamp)) post_rig(sample.stamp);
+  if (rig_is_due()) post_rig(sample.stamp);
   post(odometry_topic, sample.stamp, [&](CdrWriter* out) { write_odometry(out, sample); });
   if (sample.status != PoseStatus::lost)
     post(tf_topic, sample.stamp, [&](CdrWriter* out) { write_pose_transform(out, sample); });
@@ -276,7 +236,6 @@ void DriveRecorder::on_event(const EventRecord& event) noexcept {
   const std::string_view kind = event.kind, sentence = event.sentence.data();
   recalibrate_ = recalibrate_ || kind == "recalibration_requested" ||
                  (kind == "fault" && sentence.starts_with("recalibrate"));
-  if (frames_seen_ > 0) recording_.mark_event(event.stamp);  // before it is set-up
 }
 
 void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcept {

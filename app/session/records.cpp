@@ -4,16 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <iterator>
 #include <numbers>
-#include <string_view>
-#include <variant>
 
 #include <fmt/format.h>
 

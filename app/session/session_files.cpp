@@ -1,13 +1,9 @@
 #include "app/session/session_files.hpp"
 
-#include <cstring>
-#include <string>
 #include <system_error>
 
 #include <nlohmann/json.hpp>
 
-#include "app/config/calibration_file.hpp"
-#include "app/config/calibration_state.hpp"
 #include "app/runtime/background_thread.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
@@ -63,65 +59,6 @@ std::unique_ptr<PairRunner> make_runner(int threads) {
   return std::make_unique<SequentialRunner>();
 }
 
-void write_session_calibration(const std::filesystem::path& session,
-                               const CalibrationFile& calibration,
-                               std::vector<std::string>* faults) {
-  try {
-    write_calibration(session / "calibration.yaml", calibration);
-  } catch (const InputError& e) {
-    faults->emplace_back(e.what());
-  }
-}
-
-namespace {
-
-Kept keep_state(const std::filesystem::path& state, const CalibrationFile& file) {
-  try {
-    write_state(state, file);
-    return {false, "the calibration is kept for the next drive: " + state.string()};
-  } catch (const InputError& e) {
-    return {true, std::string(e.what()) + "; the next drive will not know this calibration"};
-  }
-}
-
-}  // namespace
-
-KeepCalibration calibration_keeper(const std::filesystem::path& session,
-                                   const CalibrationFile& words,
-                                   const std::optional<std::filesystem::path>& state) {
-  return [session, words, state](const RigCalibration& rig, bool found) -> Kept {
-    CalibrationFile file = words;
-    file.rig = rig;
-    if (found) file.source = "online";
-    std::vector<std::string> of_session;
-    if (found) write_session_calibration(session, file, &of_session);
-    Kept kept{!of_session.empty(), {}};
-    if (state) kept = keep_state(*state, file);
-    // The session's own is written again at its end.
-    for (const std::string& fault : of_session)
-      kept.sentence += (kept.sentence.empty() ? "" : "; ") + fault;
-    return kept;
-  };
-}
-
-namespace {
-
-/// Takes out the sentences of one file, which begin with its name.
-void forget_faults_of(const std::filesystem::path& file, std::vector<std::string>* faults) {
-  const std::string name = file.string() + ":";
-  std::erase_if(*faults, [&name](const std::string& fault) { return fault.starts_with(name); });
-}
-
-}  // namespace
-
-void begin_session(const std::filesystem::path& session, const StartingCalibration& begin,
-                   Stamp stamp, SessionOutput* output, std::vector<std::string>* faults) {
-  if (begin.trust == CalibrationTrust::none) return;
-  output->post(CalibrationRecord::begin(begin.file.rig, stamp, begin.cause, begin.source));
-  write_session_calibration(session, begin.file,
-                            faults);  // at once: a session that is killed has it, too
-}
-
 void describe_calibration(const Estimator& estimator, const StartingCalibration& begin,
                           const SessionTotals& totals, const EstimatorOptions& options,
                           SummaryInput* input) {
@@ -140,17 +77,6 @@ std::string verification_sentence(const SummaryInput& input) {
     return "the calibration is not verified: nothing watched it (calibration.online: off)";
   return "the drive has not confirmed its calibration; what would: turns, near structure at the "
          "roadside, tracks in the images' corners";
-}
-
-void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
-                 const SummaryInput& input, const SessionTotals& totals,
-                 std::vector<std::string>* faults) {
-  if (!input.calibrated) return;
-  CalibrationFile file = begin.file;
-  file.rig = input.calibration;
-  if (totals.accepted > 0) file.source = "online";
-  forget_faults_of(session / "calibration.yaml", faults);
-  write_session_calibration(session, file, faults);
 }
 
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,

@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>
 
-#include "app/config/calibration_file.hpp"
 #include "app/config/calibration_state.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/devices/rig_settings.hpp"

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include "app/calibration/board_detector.hpp"

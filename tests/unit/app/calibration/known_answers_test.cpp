@@ -2,7 +2,6 @@
 // (checkerboards/opencv/README.md of the shared data).
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <string>
 
 #include "app/calibration/board_calibration.hpp"

@@ -1,7 +1,6 @@
 // What each encoding of sensor_msgs/Image and CompressedImage becomes, in both containers.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <memory>
 

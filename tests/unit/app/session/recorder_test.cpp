@@ -120,21 +120,13 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
     if (!std::exchange(hung, true)) (void)all_posted.wait_for(std::chrono::seconds(10));
     return false;
   };
-  std::vector<int> kept;
-  options.keep = [&kept](const RigCalibration& rig, bool /*found*/) {
-    kept.push_back(rig.frames);
-    return Kept{false, "kept"};
-  };
   Recorder recorder(folder.path(), options);
   constexpr std::uint64_t kFrames = 1000;  // many times what may wait
   for (std::uint64_t i = 0; i < kFrames; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
-  recorder.on_calibration(CalibrationRecord{decision(true)});
   posted.set_value();
   const auto totals = recorder.close();
   EXPECT_GT(totals->dropped_records, 0U);
   EXPECT_GT(totals->read, 0U);
-  EXPECT_EQ(kept, std::vector<int>{60})
-      << "a calibration is no pose, of which the next one says the same";
   EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
   EXPECT_EQ(lines_of(folder / "poses.csv").size(), totals->read + 1);
   EXPECT_TRUE(totals->trajectory.empty());
@@ -159,14 +151,12 @@ TEST(Recorder, postingAllocatesNothing) {
   Recorder recorder(folder.path(), {.ins = true});
   EstimatorEvent event;
   event.why = "a state changed";
-  const CalibrationDecision made = decision(false);
   const auto before = AllocationGuard::allocations_after_seal();
   {
     const SealedScope sealed;
     for (std::uint64_t i = 0; i < 1000; ++i) {
       recorder.on_report(pose(i, PoseStatus::ok, 0));
       recorder.on_event(EventRecord::of(event));
-      recorder.on_calibration(CalibrationRecord{made});
       recorder.on_reading(InsRecord{});
     }
   }
