@@ -81,7 +81,6 @@ struct RecordingCounters {
   std::uint64_t dropped_images = 0;  // of these, the large ones
   std::uint64_t lost = 0;  // messages that waited for a disk until there was no room, or that it
                            // had taken and did not keep
-  std::uint64_t passed_over = 0;  // messages older than what is kept before an event
   std::size_t queue_bytes = 0, queue_high_water = 0;  // of all queues, the most that waited in each
 };
 
@@ -98,12 +97,10 @@ struct RecordingCounters {
 /// Files      Split by size and when the index is full: drive.mcap becomes drive_0.mcap, the next
 /// is
 ///            drive_1.mcap. Every file begins with all schemas, channels and the preamble.
-/// Events     With keep > 0 only what was posted up to so long before an event and so long after
-///            it is written; the rest is passed over.
-/// Threads    begin(), commit(): one thread a queue. mark_event(): any. take_errors(), counters():
-///            any, counters exact after close(). close(): the owner's, after the last commit().
-/// Memory     All at construction; the writer's thread is sealed.
-/// Full       drop: begin() refuses, counted; what is bulky leaves room for the rest. wait:
+/// Threads    begin(), commit(): one thread a queue. take_errors(), counters(): any, counters exact
+/// after close(). close(): the owner's, after the last commit(). Memory     All at construction;
+/// the writer's thread is sealed. Full       drop: begin() refuses, counted; what is bulky leaves
+/// room for the rest. wait:
 ///            begin() waits for room (virtual time, replay).
 /// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). When
 ///            a write fails the data wait in their queue while there is room and the same file is

@@ -1,4 +1,5 @@
 #pragma once
+#include <csignal>
 #include <optional>
 
 #include "app/runtime/errors.hpp"

@@ -14,15 +14,6 @@
 /// What every command that writes a session folder does alike.
 namespace vergence::app {
 
-/// Whether the folder of a session is there, empty. InputError: it exists and is not empty, or is
-/// no folder.
-bool check_session_folder(const std::filesystem::path& folder);
-/// Makes the folder of a session. False: it was there, empty. InputError: it exists and is not
-/// empty, is no folder, or cannot be made.
-bool make_session_folder(const std::filesystem::path& folder);
-/// Undoes make_session_folder(): removes what is in the folder, and with `made` the folder itself.
-void discard_session_folder(const std::filesystem::path& folder, bool made) noexcept;
-
 /// What an arena needs beside its contents: the first piece is aligned, too.
 [[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }
 

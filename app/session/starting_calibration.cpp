@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 
 #include "app/config/calibration_state.hpp"
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/foreign_calibration/foreign_calibration.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"

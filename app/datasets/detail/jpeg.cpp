@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csetjmp>
+#include <cstdio>  // jpeglib.h leans on it
 
 #include <jpeglib.h>
 

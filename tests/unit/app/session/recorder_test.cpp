@@ -10,9 +10,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/session/records.hpp"
-#include "app/session/session_files.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
