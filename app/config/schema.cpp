@@ -702,10 +702,6 @@ Group monitor() {
                "Shortest window of moving frames that is tested: for large knocks.")
       .integer("long_window", &M::long_window, 60, 1800, "frames",
                "Longest window of moving frames that is tested: for drift.")
-      .number("lag_frames", &M::lag_frames, 0.1, 1, "frames",
-              "Least lag of a camera behind the others that is called `out_of_step`.")
-      .number("lag_sigmas", &M::lag_sigmas, 3, 20, "sigmas",
-              "By how much that lag has to stand out from every fixed transform.")
       .integer("collapse_frames", &M::collapse_frames, 2, 60, "frames",
                "So many frames in a row without the matches across that there should be are a "
                "`collapse`.")

@@ -96,6 +96,8 @@ constexpr std::array kTable{
     Withdrawn{Kind::key, "odometry.match_zncc", "matches are accepted by consistency"},
     Withdrawn{Kind::key, "odometry.max_gap_s",
               "gaps are measured in the intervals of the sequence itself"},
+    Withdrawn{Kind::key, "monitor.lag_frames", "a lag is a whole frame, found by likelihood"},
+    Withdrawn{Kind::key, "monitor.lag_sigmas", "a lag is a whole frame, found by likelihood"},
     Withdrawn{Kind::record_topic, "raw",
               "device bytes are no longer recorded; images and ins hold all that a replay reads"},
     Withdrawn{Kind::key, "record.image_format", "images are recorded as they are"},

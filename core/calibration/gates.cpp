@@ -287,7 +287,7 @@ Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noe
     const auto c = static_cast<std::size_t>(k);
     const Transform &found = s.rig.T_camera_left[c], &nominal = q.nominal->T_camera_left[c];
     if (found.t.dot(nominal.t) < 0) return Gate::cameras_swapped;
-    if (s.out_of_step) return Gate::out_of_step;
+    if (s.lag_frames != 0) return Gate::out_of_step;
     if (q.may_have_changed && s.changed_at > 0) return Gate::rig_changed;
     if (angle_between(found.t, nominal.t) > o.max_direction_deg * kRadiansPerDegree)
       return Gate::implausible_direction;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -15,16 +13,10 @@ namespace {
 
 using Kind = MonitorVerdict::Kind;
 
-constexpr double kYawKnown = 0.1 * std::numbers::pi / 180;  // rad: less is `needs_motion`
-constexpr int kPoorFrames = 30;          // without enough matches that make `needs_texture`
 constexpr int kStandingFrames = 3;       // in a row over the threshold while standing
 constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are
                                          // less normal than the sum of many frames'
 constexpr double kAgrees = 0.5;          // of the threshold: below, a frame agrees
-// There is no lag: less than this of the smallest that is called one, with a sigma of less than
-// that of the last one found; a smaller one where the rig has changed meanwhile, too, and no quiet
-// windows speak for it.
-constexpr double kNoLag = 0.5, kLagSigma = 0.6, kLagSigmaOfAKnock = 0.25;
 
 void check(bool good, const char* name, const char* range) {
   if (!good)
@@ -40,8 +32,6 @@ void validate(const MonitorOptions& o) {
   check(o.min_matches >= 12 && o.min_matches <= 1000, "min_matches", "12 … 1000");
   check(o.short_window >= 1 && o.short_window <= 10, "short_window", "1 … 10");
   check(o.long_window >= 60 && o.long_window <= 1800, "long_window", "60 … 1800");
-  check(o.lag_frames >= 0.1 && o.lag_frames <= 1, "lag_frames", "0.1 … 1");
-  check(o.lag_sigmas >= 3 && o.lag_sigmas <= 20, "lag_sigmas", "3 … 20");
   check(o.collapse_frames >= 2 && o.collapse_frames <= 60, "collapse_frames", "2 … 60");
   check(o.collapse_share >= 0.01 && o.collapse_share <= 0.9, "collapse_share", "0.01 … 0.9");
   check(o.collapse_expected >= 10 && o.collapse_expected <= 1000, "collapse_expected", "10 … 1000");
@@ -59,21 +49,15 @@ struct Monitor::Parts {
   detail::MonitorResiduals looks{};
   detail::ChangeDetector windows{};
   detail::Decision latest{};
-  int agreed = 0, poor = 0, collapsed = 0, standing_over = 0;
+  int agreed = 0, collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
-  double lag_found = 0;         // the last one that was `out_of_step`, frames
-  bool measured_lag = false;    // by the frame looked at
-  bool would_show_lag = false;  // the frame looked at, of one frame
 
   void forget() noexcept {
     looks.reset();
     windows.reset(options, covariance);
     latest = detail::Decision{};
-    latest.lag_sigma = latest.yaw_sigma = std::numeric_limits<double>::infinity();
-    agreed = poor = collapsed = standing_over = 0;
-    measured_lag = would_show_lag = false;
+    agreed = collapsed = standing_over = 0;
   }
-  [[nodiscard]] bool in_step() const noexcept;
   void watch_collapse(const MonitorFrame& frame) noexcept;
   void watch_matches(const MonitorFrame& frame) noexcept;
   void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& look) noexcept;
@@ -136,7 +120,6 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   const detail::StereoResiduals stereo =
       collapsed > 0 ? detail::StereoResiduals{}
                     : looks.stereo(reference, frame, options.min_matches, frame.moving);
-  poor = stereo.usable ? 0 : poor + 1;
   if (!stereo.usable) return;
   if (!frame.moving) {
     watch_standing(frame, stereo);
@@ -145,18 +128,11 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   standing_over = 0;
   detail::FrameEvidence e;
   e.frame = frame.frame;
-  e.before = frame.before;
-  e.evidence.stereo = stereo.evidence;
+  e.evidence = stereo.evidence;
   e.spread_now = stereo.spread_now;
   e.spread_life = stereo.spread_life;
-  if (!frame.motion.empty()) {
-    const detail::MotionResiduals motion = looks.motion(reference, frame);
-    if (motion.usable) e.evidence.motion = motion.evidence, e.spread_motion = motion.spread;
-  }
   windows.push(e);
   latest = windows.decide();
-  measured_lag = true;
-  would_show_lag = windows.lag_statistic(e.evidence.stereo) > options.threshold;
   const bool measured = windows.frames() >= static_cast<std::uint64_t>(options.short_window);
   agreed = measured && latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold
                ? agreed + 1
@@ -181,24 +157,12 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
   latest.frames = standing_over;
 }
 
-/// The lag is estimated beside the rig's offset, so a knock meanwhile hides none. Of frames that
-/// measured it: while standing, or where hardly anything matches, `latest` is of
-/// frames before.
-bool Monitor::Parts::in_step() const noexcept {
-  return measured_lag && latest.kind != Kind::out_of_step && !latest.undecided &&
-         std::abs(latest.lag) < kNoLag * options.lag_frames &&
-         latest.lag_sigma < (latest.kind == Kind::quiet ? kLagSigma : kLagSigmaOfAKnock) *
-                                std::max(lag_found, options.lag_frames);
-}
-
 MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   Parts& p = *parts_;
   MonitorVerdict v;
   v.threshold = p.options.threshold;
   v.onset_frame = frame.frame;
-  v.lag_sigma = std::numeric_limits<double>::infinity();
-  if (!p.valid || !frame.T_now_previous.finite()) return v;
-  p.measured_lag = p.would_show_lag = false;
+  if (!p.valid) return v;
   p.watch_collapse(frame);
   p.watch_matches(frame);
   const detail::Decision& d = p.latest;
@@ -207,11 +171,6 @@ MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
   v.undecided = d.undecided;
   v.offset = p.d_offset_d_theta * d.theta;
   v.covariance = p.d_offset_d_theta * d.covariance * p.d_offset_d_theta.transpose();
-  v.lag_frames = d.lag;
-  v.lag_sigma = d.lag_sigma;
-  if (d.kind == Kind::out_of_step) p.lag_found = std::abs(d.lag);
-  v.in_step = p.in_step();
-  v.shows_no_lag = p.would_show_lag && d.kind == Kind::quiet && !d.undecided;
   v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
   v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
   if (p.collapsed >= p.options.collapse_frames) {
@@ -220,8 +179,6 @@ MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
     v.onset_frame = p.collapsed_from;
     v.frames_since_onset = p.collapsed;
   }
-  v.needs_motion = !(d.yaw_sigma < kYawKnown);
-  v.needs_texture = p.poor >= kPoorFrames;
   return v;
 }
 

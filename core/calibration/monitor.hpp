@@ -21,11 +21,8 @@ struct MonitorOptions {
   double claimed_bias_px = 0.3;  // and with one that is given, 0 … 5
   int min_matches =
       30;  // stereo matches under which a frame measures nothing (`needs_texture`), 12 … 1000
-  int short_window = 3;     // moving frames of the shortest window: large knocks, 1 … 10
-  int long_window = 300;    // moving frames of the longest window: drift, 60 … 1800
-  double lag_frames = 0.3;  // frames: smallest lag of a camera that is called one, 0.1 … 1
-  double lag_sigmas =
-      5.0;  // and how many sigmas it must stand out from every fixed transform, 3 … 20
+  int short_window = 3;   // moving frames of the shortest window: large knocks, 1 … 10
+  int long_window = 300;  // moving frames of the longest window: drift, 60 … 1800
   int collapse_frames =
       5;  // frames in a row without the expected matches that raise `collapse`, 2 … 60
   double collapse_share = 0.2;  // of the expected matches: fewer found is a collapse, 0.01 … 0.9
@@ -43,25 +40,11 @@ struct StereoObservation {
   std::uint32_t track = 0;  // the same number in every frame that sees the same point
 };
 
-/// A point that both cameras saw at an earlier frame (`before`) and see now. One `before` for all
-/// tracks of a frame. A track serves about once in its life: MotionTrackBuilder takes care of it.
-struct MotionTrack {
-  Vec2 left_before, right_before, left_now, right_now;
-  double sigma_px = 0;
-  std::uint32_t track = 0;
-};
-
 /// What the monitor is shown of one frame. Views: they live until look() returns.
 struct MonitorFrame {
-  Stamp stamp{};
   std::uint64_t frame = 0;  // strictly increasing
   bool moving = false;      // false: the images repeat themselves, so their errors do not average
   std::span<const StereoObservation> stereo;
-  std::span<const MotionTrack> motion;  // empty in most frames
-  Transform T_now_previous{};  // left camera, from the frame before to this one, from the odometry
-  std::uint64_t before = 0;    // number of that earlier frame
-  Transform T_now_before{};    // left camera, from `before` to now; read with `motion` only
-  Transform T_before_earlier{};  // T_now_previous as it was at `before`
   int expected_stereo =
       0;  // matches a good pair of images would give; 0 where either image is poor by itself
   int found_stereo = 0;  // matches there are
@@ -69,51 +52,36 @@ struct MonitorFrame {
 
 /// What the monitor says after one frame.
 struct MonitorVerdict {
-  enum class Kind : std::uint8_t {
+  enum class Kind : std::uint8_t {  // in order of weight
     quiet,
-    knock,        // the transform has changed at a moment
-    drift,        // it has been changing steadily
-    collapse,     // matches are expected and not there: too far off to be measured
-    out_of_step,  // camera k exposes `lag_frames` frames late (negative: early); no fixed transform
-                  // explains it
+    drift,     // the transform has been changing steadily
+    knock,     // it has changed at a moment
+    collapse,  // matches are expected and not there: too far off to be measured
   };
   Kind kind = Kind::quiet;
-  bool undecided = false;  // over the threshold, but not yet told what it is: at most a second
+  bool undecided = false;  // over the threshold in a frame that may be an exception
   double statistic = 0;    // largest of all windows
   double threshold = 0;    // what it is held against
   Vec6 offset = Vec6::Zero();  // true minus reference, (φ rad, τ m): R ← Exp(φ) R, t ← t + τ; since
                                // the onset, else of the longest window; first order
   Mat6 covariance = Mat6::Zero();  // of `offset`; rank 5, the length is not seen
-  double lag_frames =
-      0;  // best estimate over the longest window, frames; meaningless where lag_sigma is infinite
-  double lag_sigma = 0;       // frames; infinite: not seen
-  bool shows_no_lag = false;  // this frame moved so far that a lag of one frame that began since
-                              // then would be over the threshold in it, and nothing is
-  bool in_step = false;  // this frame's motion shows, with those since set_reference() or reset(),
-                         // that there is no lag, and would show the last one that was found
   std::uint64_t onset_frame =
-      0;  // knock, out_of_step: first frame of the changed rig; drift: where it began; else `frame`
+      0;  // knock: first frame of the changed rig; drift: where it began; else `frame`
   int frames_since_onset = 0;  // frames measured since then
-  bool needs_motion = false;   // yaw is not known to 0.1° for want of motion
-  bool needs_texture = false;  // too few stereo matches to measure by
 };
 
 /// Watches whether the transform of one further camera still is true (METHOD §4). One Monitor per
 /// further camera.
 ///
 /// Every frame the stereo matches give, through the distance to the epipolar line, a gradient g and
-/// an information A of θ = (φ, α, β, κ): the five of moved_on_sphere() and the lag κ of camera k.
-/// Points seen at two instants add what a pair cannot see (yaw): each pair of observations is a
-/// point with its covariance, and the two must be one rigid motion apart, which is eliminated; the
-/// part of the observations that speaks of the epipolar distance is not used again. Over a window
-/// of frames
+/// an information A of θ = (φ, α, β), the five of moved_on_sphere(). Over a window of n matches
 ///
 ///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²
-///     statistic = gᵀ (A + A C A)⁻¹ g,  κ held at 0
+///     statistic = gᵀ (A + A C A)⁻¹ g
 ///
 /// λ: spread of whole tracks over the white one, measured. b: MonitorOptions::bias_px, or what is
-/// measured; in residuals of motion it counts four times (two instants, along the baseline).
-/// C: covariance of the reference.
+/// measured. C: covariance of the reference. A turn about the axis that no epipolar line shows
+/// (yaw, for cameras side by side) is seen by DisparityJumpDetector and by solves.
 ///
 /// The same against what the two minutes before the window have shown, whose covariance is smaller
 /// than the reference's: small knocks. Windows of a few to several hundred moving frames; the
@@ -128,7 +96,7 @@ struct MonitorVerdict {
 ///
 /// Memory   All of it from the arena in the constructor. look() allocates nothing.
 /// Threads  One caller.
-/// Time     Under 0.3 ms for 300 stereo matches and 200 motion tracks.
+/// Time     Under 0.1 ms for 300 stereo matches.
 /// Errors   The constructor throws (std::invalid_argument with a sentence, std::length_error). What
 ///          is not a number is left out.
 class Monitor {

@@ -37,8 +37,11 @@ PairingEvidence::PairingEvidence(std::size_t capacity, Arena& arena)
       late_px_(arena.make<float>(capacity, "pairing: distances, camera late")),
       early_px_(arena.make<float>(capacity, "pairing: distances, left late")) {}
 
-void PairingEvidence::next(std::span<StereoObservation> points, const Transform& T_camera_left,
-                           const Pinhole& left, const Pinhole& camera) noexcept {
+void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> points,
+                           const Transform& T_camera_left, const Pinhole& left,
+                           const Pinhole& camera) noexcept {
+  if (frame != frame_ + 1) count_ = 0;
+  frame_ = frame;
   points = points.first(std::min(points.size(), before_.size()));
   std::sort(points.begin(), points.end(),
             [](const StereoObservation& a, const StereoObservation& b) noexcept {
@@ -67,24 +70,34 @@ void PairingEvidence::next(std::span<StereoObservation> points, const Transform&
   if (both < kFewestPoints) return;
   const double now = std::max(distance_px_, kNoise);
   if (usual_px_ == 0) usual_px_ = now;
-  const auto add = [&](double shifted_px, double* sum) noexcept {
-    const double shifted = std::max(shifted_px, kNoise) / usual_px_;
-    const double ratio = std::log(now / usual_px_) - 0.5 * (shifted * shifted - 1);
+  const auto add = [&](double usual, double other, double* sum) noexcept {
+    const double u = usual / usual_px_;
+    const double ratio = std::log(other / usual_px_) - 0.5 * (u * u - 1);
     *sum = std::clamp(*sum + kPointsOfAFrame * (std::clamp(ratio, -1.0, 1.0) - kReference), 0.0,
                       kDecided + kPointsOfAFrame);
   };
-  add(static_cast<double>(median(late_px_.first(both))), &late_);
-  add(static_cast<double>(median(early_px_.first(both))), &early_);
-  if (std::max(late_, early_) < 1) usual_px_ += kFollow * (now - usual_px_);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::span<float> px = (i == 0 ? late_px_ : early_px_).first(both);
+    const double other = std::max(static_cast<double>(median(px)), kNoise);
+    add(other, now, &shifted_[i]);
+    add(now, other, &in_step_[i]);
+  }
+  if (lag_frames() != 0) question();
+  if (in_step()) questioned_ = false;
+  if (std::max(shifted_[0], shifted_[1]) < 1) usual_px_ += kFollow * (now - usual_px_);
 }
 
 int PairingEvidence::lag_frames() const noexcept {
-  if (std::max(late_, early_) < kDecided) return 0;
-  return late_ > early_ ? 1 : -1;
+  if (std::max(shifted_[0], shifted_[1]) < kDecided) return 0;
+  return shifted_[0] > shifted_[1] ? 1 : -1;
+}
+
+bool PairingEvidence::in_step() const noexcept {
+  return std::min(in_step_[0], in_step_[1]) >= kDecided;
 }
 
 bool PairingEvidence::suspected() const noexcept {
-  return std::max(late_, early_) >= 0.5 * kPointsOfAFrame;
+  return std::max(shifted_[0], shifted_[1]) >= 0.5 * kPointsOfAFrame;
 }
 
 }  // namespace vergence::calibration

@@ -55,7 +55,7 @@ std::size_t RigSolver::memory_needed(const CalibrationOptions& options,
   const auto frames = static_cast<std::size_t>(options.max_frames);
   return TrackLog::memory_needed(frames, features) + BundleAdjuster::memory_needed(c) +
          (c.cameras - 1) * Monitor::memory_needed(monitor) +
-         MotionTrackBuilder::memory_needed(features) +
+         PairingEvidence::memory_needed(features) + DisparityJumpDetector::memory_needed(features) +
          c.poses * (sizeof(Transform) + sizeof(std::uint16_t) + sizeof(std::uint8_t)) +
          (c.poses + 1) * sizeof(int) + c.points * sizeof(Vec3) +
          c.observations * (sizeof(BundleObservation) + 2 * sizeof(float)) +
@@ -69,7 +69,8 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
       log_(static_cast<std::size_t>(options.max_frames), features, arena),
       adjuster_(capacities(options, cameras, features), arena),
       expected_scatter_px_(monitor.found_bias_px),
-      track_builder_(features, arena),
+      pairing_(features, arena),
+      jumps_(features, arena),
       most_frames_(static_cast<std::size_t>(options.max_frames)),
       count_(cameras) {
   for (int k = 1; k < cameras; ++k) monitors_[static_cast<std::size_t>(k)].emplace(monitor, arena);

@@ -3,9 +3,10 @@
 #include <optional>
 
 #include "core/bundle/bundle.hpp"
+#include "core/calibration/disparity_jump.hpp"
 #include "core/calibration/monitor.hpp"
-#include "core/calibration/motion_track_builder.hpp"
 #include "core/calibration/options.hpp"
+#include "core/calibration/pairing_evidence.hpp"
 #include "core/calibration/track_log.hpp"
 #include "core/memory/arena.hpp"
 
@@ -51,11 +52,9 @@ struct RigSolution {
   int tracks = 0;
   int observations = 0;
   int steps = 0;
-  int near = 0;              // tracks nearer than CalibrationOptions::near_baselines
-  double travelled_m = 0;    // along the frames used
-  double lag_frames = 0;     // of the first camera that is out of step, else of camera 1, by the
-                             // monitors over the frames used
-  bool out_of_step = false;  // and it is significant
+  int near = 0;                  // tracks nearer than CalibrationOptions::near_baselines
+  double travelled_m = 0;        // along the frames used
+  int lag_frames = 0;            // that the images of a camera are late, else 0
   std::uint64_t changed_at = 0;  // frame since which the tracks are of another transform than
                                  // before, the latest of all cameras; 0: they are of one
   double solve_ms = 0;           // wall time
@@ -122,8 +121,7 @@ class RigSolver {
   void watch_frames(RigSolution* s) noexcept;
   /// What the frames used say of one camera, held against the result.
   struct Watch {
-    double lag_frames = 0;
-    bool out_of_step = false;
+    int lag_frames = 0;
     std::uint64_t changed_at = 0;
   };
   [[nodiscard]] Watch watch_camera(int k, const RigCalibration& rig) noexcept;
@@ -133,7 +131,8 @@ class RigSolver {
   BundleAdjuster adjuster_;
   std::array<std::optional<Monitor>, kMaxCameras> monitors_;  // [k] of camera k ≥ 1
   double expected_scatter_px_;
-  MotionTrackBuilder track_builder_;
+  PairingEvidence pairing_;
+  DisparityJumpDetector jumps_;
   std::size_t most_frames_;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};

@@ -87,8 +87,7 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
 void RigSolver::watch_frames(RigSolution* s) noexcept {
   for (int k = 1; k < count_; ++k) {
     const Watch seen = watch_camera(k, s->rig);
-    if (k == 1 || (seen.out_of_step && !s->out_of_step)) s->lag_frames = seen.lag_frames;
-    s->out_of_step = s->out_of_step || seen.out_of_step;
+    if (s->lag_frames == 0) s->lag_frames = seen.lag_frames;
     // Since the latest change all cameras are where they are now.
     s->changed_at = std::max(s->changed_at, seen.changed_at);
   }
@@ -103,7 +102,8 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
   if (!monitor.set_reference(rig.T_camera_left[other], left, right, rig.covariance_wide[other]))
     return seen;
   monitor.expect_scatter(expected_scatter_px_);
-  track_builder_.reset();
+  pairing_.reset();
+  jumps_.set_reference(rig.T_camera_left[other], left, right);
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const LoggedFrame& f = log_.frame(logged_[i]);
     stereo_.clear();
@@ -118,11 +118,17 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
            Vec2(right.fx * r.x() / r.z() + right.cx, right.fy * r.y() / r.z() + right.cy),
            static_cast<double>(observation.sigma), observation.track});
     }
+    // Frames that did not move are not in the log.
+    MonitorFrame shown;
+    shown.frame = f.number;
+    shown.moving = true;
+    shown.stereo = stereo_.span();
+    const MonitorVerdict v = monitor.look(shown);
+    pairing_.next(f.number, stereo_.span(), rig.T_camera_left[other], left, right);
+    if (seen.lag_frames == 0) seen.lag_frames = pairing_.lag_frames();
     const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();
-    const MonitorVerdict v =
-        monitor.look(track_builder_.next(f.stamp, f.number, stereo_.span(), step));
-    seen.lag_frames = v.lag_frames;
-    if (v.kind == MonitorVerdict::Kind::out_of_step) seen.out_of_step = true;
+    const DisparityJump jump = jumps_.next(f.number, stereo_.span(), step);
+    if (jump.confirmed) seen.changed_at = jump.onset_frame;
     if (v.kind == MonitorVerdict::Kind::knock && v.statistic > kCertainChange * v.threshold)
       seen.changed_at = v.onset_frame;
   }

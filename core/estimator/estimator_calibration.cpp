@@ -9,11 +9,9 @@ namespace vergence {
 namespace {
 
 constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
-// Frames that show the cameras in step, before their being out of step is over.
-constexpr int kInStepAfter = 30;
 
 /// From which frame on the tracks tell of the rig as it is now.
-std::uint64_t first_frame_of_use(const calibration::MonitorVerdict& v, std::uint64_t now) noexcept {
+std::uint64_t first_frame_of_use(const RigVerdict& v, std::uint64_t now) noexcept {
   using K = calibration::MonitorVerdict::Kind;
   if (v.kind == K::collapse) return now;  // until now there were wrong matches only
   // A rig that creeps is another one by and by.
@@ -28,8 +26,6 @@ CalibrationCause cause_of(calibration::MonitorVerdict::Kind kind) noexcept {
       return CalibrationCause::drift;
     case K::collapse:
       return CalibrationCause::collapse;
-    case K::out_of_step:
-      return CalibrationCause::out_of_step;
     case K::knock:
     case K::quiet:
       break;
@@ -91,13 +87,17 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
   else
     note(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, sentence_of(cause), 0);
   seek(cause, frame.number, frame);
+  // Where the cameras were is where they no longer are: what is found from there, on a facade that
+  // repeats itself, is chance.
+  odometry.reset_extrinsics();
 }
 
 void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept {
   if (!doubts.stands(Doubt::out_of_step))
     note(EstimatorEvent::Kind::out_of_step, stamp, sentence_of(CalibrationCause::out_of_step),
          lag_frames);
-  doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, kInStepAfter);
+  doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, 1);
+  calibrator.monitor().question_pairing();
   // Frames out of step would speak for a lag in the monitor's windows long after its end; those
   // logged for a calibration are dropped with them.
   calibrator.forget_frames();
@@ -106,23 +106,22 @@ void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept
 /// What the monitors say of a frame posed with the calibration in use.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorVerdict::Kind;
-  const calibration::MonitorVerdict v = calibrator.monitor().update(
-      odometry, out, frame, calibrator.verified(), doubts.stands(Doubt::late_image));
+  const RigVerdict v = calibrator.monitor().update(odometry, out, frame, calibrator.verified());
   doubts.hold(Doubt::rig, v.undecided, Reason::recalibrating, frame.number);
-  shows_no_lag = v.shows_no_lag;
-  if (v.kind == K::out_of_step) {
+  if (v.lag_frames != 0) {
     note_out_of_step(frame.stamp, v.lag_frames);
     return;
   }
-  if (doubts.stands(Doubt::out_of_step)) {
-    // A rig out of step fits no calibration: what else the monitor says is of no use until that is
-    // over.
-    if (v.in_step && doubts.weaken(Doubt::out_of_step)) {
+  if (v.in_step) {
+    doubts.strike(Doubt::late_image);
+    if (doubts.weaken(Doubt::out_of_step)) {
       note(EstimatorEvent::Kind::in_step, frame.stamp, "the cameras are in step again", 0);
       calibrator.forget_frames();
     }
-    return;
   }
+  // A rig out of step fits no calibration: what else the monitor says is of no use until that is
+  // over.
+  if (doubts.stands(Doubt::out_of_step)) return;
   if (v.kind == K::collapse) {
     give_up_calibration(frame,
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
@@ -244,7 +243,8 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
       transition(Trigger::calibration_kept, stamp);
       break;
     case calibration::Gate::out_of_step:
-      doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, kInStepAfter);
+      doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, 1);
+      calibrator.monitor().question_pairing();
       [[fallthrough]];
     default:
       transition(Trigger::calibration_rejected, stamp);

@@ -10,8 +10,8 @@ namespace {
 constexpr int kLostAfter = 3;  // frames without a pose in a row before the state says so
 // Frames with good images that no scene can be made of with the calibration in use.
 constexpr int kUnmatchedAfter = 15;
-// Frames after an image that came twice that would show that camera an exposure behind from then
-// on, before it is believed not to be: the monitor needs nine.
+// Moving frames after an image that came twice, before that camera is believed not to be an
+// exposure behind, where nothing watches the rig.
 constexpr int kLagShownAfter = 12;
 // Frames marked after the map was rebuilt.
 constexpr int kRestartedFrames = 10;
@@ -38,23 +38,24 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     note(EstimatorEvent::Kind::time_gap, frame.stamp,
          "no frame for longer than motion can be predicted", out.gap_s);
   in_gap = out.gap_s > 0 && !out.posed;
-  // Images of two instants match by no calibration: cameras out of step say nothing against it.
+  // Images of two instants match by no calibration: cameras that are or may be out of step say
+  // nothing against it.
   const bool unmatched = !out.posed && out.images_good && !doubts.stands(Doubt::out_of_step) &&
+                         !doubts.stands(Doubt::late_image) &&
                          out.reason == Reason::no_stereo_matches &&
                          odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kUnmatchedAfter) {
     unmatched_frames = 0;
     give_up_calibration(frame, kUnmatchedAfter);
-    odometry.reset_extrinsics();
   }
   if (out.uneven) {
     doubts.enter(Doubt::late_image, Reason::image_repeated, frame.number, kLagShownAfter);
+    calibrator.monitor().question_pairing();
     // Frames from before and frames out of step would be one solve, and a rig that is neither's.
     if (calibrator.seeking()) seek_anew(std::nullopt, frame.number, frame);
   }
   moves = out.posed && !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_of(out));
-  shows_no_lag = moves && !options.online;  // where there is no monitor, as far as anything does
   if (!out.posed) {
     if (++without_pose == kLostAfter) {
       transition(Trigger::pose_lost, frame.stamp);
@@ -156,9 +157,8 @@ void Estimator::Parts::renew_doubts(const odometry::FrameOutcome& out, Pairing p
 void Estimator::Parts::weaken_doubts(const odometry::FrameOutcome& out, Stamp stamp) noexcept {
   for (const Doubt doubt : {Doubt::scene, Doubt::moving_scene, Doubt::window})
     (void)doubts.weaken(doubt);
-  // A rig that stands, or creeps, looks the same with a camera an exposure behind: such frames say
-  // nothing about it.
-  if (shows_no_lag && !out.uneven) (void)doubts.weaken(Doubt::late_image);
+  // A rig that stands looks the same with a camera an exposure behind.
+  if (moves && !out.uneven && !options.online) (void)doubts.weaken(Doubt::late_image);
   // The next pose stands on the calibration that was adopted.
   if (out.relinked && doubts.weaken(Doubt::calibration)) notify_confirmed(stamp);
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/estimator/detail/rig_verdict.hpp"
 #include "core/geometry/epipolar.hpp"
 
 namespace vergence {
@@ -32,7 +31,8 @@ constexpr double kFarFromLines = 0.5;
 // Times the distance in the frame before: matches of one that is spoilt lie so much farther off.
 // 2.5 rows of skew on `sand_rover` are 28 times (1.77 px of 0.06).
 constexpr double kSpoilt = 2;
-constexpr int kLearnFrames = 45;  // moving, in agreement
+constexpr int kLearnFrames = 45;      // moving, in agreement
+constexpr double kMovingSpeed = 0.5;  // m/s: slower, and neighbouring images are nearly the same
 
 Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
   Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
@@ -61,7 +61,6 @@ std::size_t RigMonitor::memory_needed(const calibration::MonitorOptions& options
                                       std::size_t capacity) noexcept {
   return static_cast<std::size_t>(cameras - 1) *
              (calibration::Monitor::memory_needed(options) +
-              calibration::MotionTrackBuilder::memory_needed(capacity) +
               calibration::DisparityJumpDetector::memory_needed(capacity) +
               calibration::PairingEvidence::memory_needed(capacity)) +
          capacity * sizeof(calibration::StereoObservation) + kCacheLine;
@@ -87,6 +86,7 @@ void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
   for (int k = 1; k < cameras_; ++k) {
     Watched& w = camera(k);
     w.learning = true;
+    w.pairing.reset();
     const Transform& T = transform(rig_, k);
     set_monitor_reference(k, T,
                           reference_covariance(confirmed ? kConfirmed : kClaimed, T.t.norm()));
@@ -102,7 +102,6 @@ void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
                                        const Mat6& covariance) noexcept {
   Watched& w = camera(k);
   (void)w.monitor.set_reference(T_camera_left, pinhole(rig_, 0), pinhole(rig_, k), covariance);
-  w.tracks.reset();
   w.grace = kGraceFrames;
 }
 
@@ -141,6 +140,10 @@ void RigMonitor::begin_unlinked(const RigCalibration& rig) noexcept {
   set_jump_reference(rig);
 }
 
+void RigMonitor::question_pairing() noexcept {
+  for (int k = 1; k < cameras_; ++k) camera(k).pairing.question();
+}
+
 void RigMonitor::reset() noexcept {
   for (int k = 1; k < cameras_; ++k) camera(k).monitor.reset();
 }
@@ -149,7 +152,6 @@ void RigMonitor::scene_lost() noexcept {
   T_left_world_before_.reset();
   for (int k = 1; k < cameras_; ++k) {
     camera(k).monitor.reset();
-    camera(k).tracks.reset();
     camera(k).jumps.reset();
     camera(k).pairing.reset();
   }
@@ -208,7 +210,8 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
     (void)collect_stereo(odometry.map(), k, kWitness);
     w.jumps.set_transform(w.T_camera_left_before);
     const calibration::DisparityJump jump = w.jumps.next(number, stereo_.span(), step);
-    if (jump.confirmed) onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
+    if (jump.confirmed && !w.pairing.questioned())
+      onset = std::min(onset.value_or(jump.onset_frame), jump.onset_frame);
     w.T_camera_left_before = transform(odometry.rig(), k);
   }
   return onset;
@@ -216,10 +219,12 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
 
 MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odometry,
                                            const odometry::FrameOutcome& outcome,
-                                           const RigFrame& frame, int found,
-                                           const Transform& step) noexcept {
+                                           const RigFrame& frame, int found, bool moving) noexcept {
   Watched& w = camera(k);
-  calibration::MonitorFrame f = w.tracks.next(frame.stamp, frame.number, stereo_.span(), step);
+  calibration::MonitorFrame f;
+  f.frame = frame.number;
+  f.moving = moving;
+  f.stereo = stereo_.span();
   f.expected_stereo = outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
   f.found_stereo = found;
   MonitorVerdict v = w.monitor.look(f);
@@ -235,45 +240,53 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
   return v;
 }
 
-MonitorVerdict RigMonitor::update(const odometry::Odometry& odometry,
-                                  const odometry::FrameOutcome& outcome, const RigFrame& frame,
-                                  bool verified, bool may_lag) noexcept {
-  RigVerdict verdict;
+RigVerdict RigMonitor::update(const odometry::Odometry& odometry,
+                              const odometry::FrameOutcome& outcome, const RigFrame& frame,
+                              bool verified) noexcept {
+  using Kind = MonitorVerdict::Kind;
+  RigVerdict rig;
+  rig.in_step = true;
+  const double seconds = T_left_world_before_ ? (frame.stamp - stamp_before_).to_seconds() : 0;
+  stamp_before_ = frame.stamp;
   const Transform step = step_to(outcome.T_left_world);
+  const bool moving = seconds > 0 && step.t.norm() > kMovingSpeed * seconds;
   for (int k = 1; k < cameras_; ++k) {
     const int found = collect_stereo(odometry.map(), k, kWitness);
-    calibration::DisparityJump jump;
-    // A pose that a spoilt image has drawn off moves the disparities of the frames on both sides.
     calibration::PairingEvidence& pairing = camera(k).pairing;
     const double before = pairing.distance_px();
-    pairing.next(stereo_.span(), transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k));
+    pairing.next(frame.number, stereo_.span(), transform(rig_, k), pinhole(rig_, 0),
+                 pinhole(rig_, k));
+    rig.in_step = rig.in_step && pairing.in_step();
+    if (pairing.lag_frames() != 0) rig.lag_frames = pairing.lag_frames();
+    // A pose that a spoilt image has drawn off moves the disparities of the frames on both sides.
     const bool spoilt =
         pairing.distance_px() > kFarFromLines && pairing.distance_px() > kSpoilt * before;
+    calibration::DisparityJump jump;
     if (both_show(outcome, k) && !spoilt)
       jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
     else
       camera(k).jumps.skip(step);
-    if (may_lag || pairing.suspected()) {
-      jump.suspected = jump.suspected || jump.confirmed;
-      jump.confirmed = false;
-    }
-    if (scene_pending_) {
-      verdict.add(jump);
-      continue;
-    }
-    MonitorVerdict v = monitor_verdict(k, odometry, outcome, frame, found, step);
-    const bool change =
-        v.kind == MonitorVerdict::Kind::knock || v.kind == MonitorVerdict::Kind::drift;
-    if (pairing.lag_frames() != 0) {
-      v.kind = MonitorVerdict::Kind::out_of_step;
-      v.lag_frames = pairing.lag_frames();
-    } else if (pairing.suspected() || (!verified && change)) {
-      v.kind = MonitorVerdict::Kind::quiet;
+    MonitorVerdict v;
+    if (!scene_pending_) v = monitor_verdict(k, odometry, outcome, frame, found, moving);
+    // A lag moves the epipolar lines, and with every change of speed the disparities.
+    const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
+    if (pairing.suspected() || (pairing.questioned() && v.kind == Kind::collapse) ||
+        (!verified && change)) {
+      v.kind = Kind::quiet;
       v.undecided = true;
     }
-    verdict.add(v, jump);
+    if (jump.confirmed && (pairing.suspected() || pairing.questioned())) {
+      v.undecided = true;
+    } else if (jump.confirmed && v.kind < Kind::knock) {
+      v.kind = Kind::knock;
+      v.onset_frame = jump.onset_frame;
+    }
+    rig.undecided = rig.undecided || v.undecided || jump.suspected;
+    if (v.kind <= rig.kind) continue;
+    rig.kind = v.kind;
+    rig.onset_frame = v.onset_frame;
   }
-  return verdict.of_all();
+  return rig;
 }
 
 }  // namespace vergence

@@ -4,11 +4,19 @@
 
 #include "core/calibration/disparity_jump.hpp"
 #include "core/calibration/monitor.hpp"
-#include "core/calibration/motion_track_builder.hpp"
 #include "core/calibration/pairing_evidence.hpp"
 #include "core/odometry/odometry.hpp"
 
 namespace vergence {
+
+/// What a frame says of the rig: the worst that any further camera's monitor says.
+struct RigVerdict {
+  calibration::MonitorVerdict::Kind kind = calibration::MonitorVerdict::Kind::quiet;
+  std::uint64_t onset_frame = 0;  // of `kind`
+  int lag_frames = 0;             // that a camera's images are late; negative: early
+  bool undecided = false;         // something of one camera is wrong, and it is not known what
+  bool in_step = false;           // motion shows that all cameras' images are of the same instant
+};
 
 /// Watches, frame by frame, whether the rig still is the one that its calibration describes
 /// (METHOD §4): for each further camera a monitor of the epipolar lines and a detector of jumps in
@@ -32,9 +40,9 @@ class RigMonitor {
   /// This calibration is the reference from now on. `confirmed` by the drive: less scatter is
   /// expected of it.
   void watch(const RigCalibration& rig, bool confirmed) noexcept;
-  /// The jump detectors compare with this calibration.
   /// How much stretches of the drive are expected to disagree, px rms over the image.
   void expect_scatter(double bias_px) noexcept;
+  /// The jump detectors compare with this calibration.
   void set_jump_reference(const RigCalibration& rig) noexcept;
   /// A calibration is adopted; until scene_rebuilt() only jumps count.
   void expect_rebuilt_scene() noexcept { scene_pending_ = true; }
@@ -46,21 +54,19 @@ class RigMonitor {
   /// The cameras are not linked from now on: a calibration is sought.
   void begin_unlinked(const RigCalibration& rig) noexcept;
 
-  /// The worst verdict of the further cameras on a posed frame; linked odometry only.
-  /// `verified`: the drive has confirmed the calibration watched. Of a claim a monitor cannot tell
-  /// its own errors, which differ from place to place, from a change of the rig: it leaves the rig
-  /// undecided.
-  /// `may_lag`: a camera may be an exposure behind. Disparities that jump are what a lag makes of a
-  /// change of speed, too, so they leave the rig undecided; the monitors tell the two apart.
-  [[nodiscard]] calibration::MonitorVerdict update(const odometry::Odometry& odometry,
-                                                   const odometry::FrameOutcome& outcome,
-                                                   const RigFrame& frame, bool verified,
-                                                   bool may_lag) noexcept;
+  /// A posed frame; linked odometry only. `verified`: the drive has confirmed the calibration
+  /// watched. Of a claim a monitor cannot distinguish its own errors, which differ from place to
+  /// place, from a change of the rig: it leaves the rig undecided.
+  [[nodiscard]] RigVerdict update(const odometry::Odometry& odometry,
+                                  const odometry::FrameOutcome& outcome, const RigFrame& frame,
+                                  bool verified) noexcept;
   /// The same while the cameras are not linked. A value: the rig has changed, from that frame on.
   [[nodiscard]] std::optional<std::uint64_t> update_unlinked(const odometry::Odometry& odometry,
                                                              const odometry::FrameOutcome& outcome,
                                                              std::uint64_t number) noexcept;
 
+  /// An image came twice: a camera may be a frame late from now on, until motion shows otherwise.
+  void question_pairing() noexcept;
   /// Forgets what the monitors have seen; references and jump detectors stay.
   void reset() noexcept;
   /// The scene was lost: the next frame is compared with none before it.
@@ -70,12 +76,8 @@ class RigMonitor {
   /// One further camera.
   struct Watched {
     Watched(const calibration::MonitorOptions& options, std::size_t capacity, Arena& arena)
-        : monitor(options, arena),
-          tracks(capacity, arena),
-          jumps(capacity, arena),
-          pairing(capacity, arena) {}
+        : monitor(options, arena), jumps(capacity, arena), pairing(capacity, arena) {}
     calibration::Monitor monitor;
-    calibration::MotionTrackBuilder tracks;
     calibration::DisparityJumpDetector jumps;
     calibration::PairingEvidence pairing;
     bool learning = false;           // the monitor's reference is a claim, its own not yet measured
@@ -91,7 +93,7 @@ class RigMonitor {
                                                             const odometry::Odometry& odometry,
                                                             const odometry::FrameOutcome& outcome,
                                                             const RigFrame& frame, int found,
-                                                            const Transform& step) noexcept;
+                                                            bool moving) noexcept;
   /// A claim does not say how exact it is; the monitor's own measurement does: what it sees in the
   /// first frames that agree with each other is what must not change.
   void learn_reference(int k, const calibration::MonitorVerdict& verdict) noexcept;
@@ -109,6 +111,7 @@ class RigMonitor {
   RigCalibration rig_{};    // the one watched
   bool confirmed_ = false;  // by the drive
   std::optional<Transform> T_left_world_before_;
+  Stamp stamp_before_{};  // of the frame before
   bool scene_pending_ = false;
 };
 

@@ -16,6 +16,7 @@ constexpr double kStereoShare =
     0.5;  // of the points found in two cameras, in which both must agree with the pose
 constexpr int kCameraHolds = 8;   // inliers for a camera to count as one that supports the pose
 constexpr int kCameraAlone = 12;  // inliers for a camera's own pose to be believed
+constexpr int kByChance = 4;      // matches to one that agrees: wrong ones agree by chance
 
 /// Zero where the observations hold no pose.
 Mat6 covariance_of(const RefinedPose& pose) noexcept {
@@ -188,12 +189,15 @@ PoseFit PoseEstimator::prefer_left(const Map& map, const Transform& start,
   return all;
 }
 
+bool PoseEstimator::holds_camera(const Solved& s) const noexcept {
+  return s.inliers >= kCameraAlone && kByChance * s.inliers >= static_cast<int>(owner_.size());
+}
+
 bool PoseEstimator::fit_camera(const Map& map, int k, const Transform& start, bool sample,
                                Transform* T_camera_world) noexcept {
   collect_camera(map, k);
   const Solved s = solve(start, sample);
-  // Wrong matches agree with each other by chance, so a share is asked for besides a count.
-  if (s.inliers < kCameraAlone || s.inliers < static_cast<int>(owner_.size()) / 4) return false;
+  if (!holds_camera(s)) return false;
   *T_camera_world = s.T;
   return true;
 }
@@ -209,7 +213,7 @@ PoseFit PoseEstimator::fit_unlinked(const Map& map, const Transform& start, bool
     const auto c = static_cast<std::size_t>(k);
     collect_camera(map, k);
     const Solved s = solve(T_camera_left[c] * (k == 0 ? start : fit.T_left_world), sample);
-    if (s.inliers < kCameraAlone) {
+    if (!holds_camera(s)) {
       // Without the left camera's pose there is none of the rig.
       if (k == 0) break;
       continue;

@@ -72,6 +72,8 @@ class PoseEstimator {
   void collect(const Map& map) noexcept;
   void collect_camera(const Map& map, int k) noexcept;
   [[nodiscard]] Solved solve(const Transform& start, bool sample) noexcept;
+  /// Of the camera's own pose, solved from all rows of the table.
+  [[nodiscard]] bool holds_camera(const Solved& s) const noexcept;
   [[nodiscard]] PoseRefineOptions how_to_refine(bool rough) const noexcept;
   void count(const Map& map, PoseFit* fit) const noexcept;
 

@@ -9,13 +9,9 @@ namespace vergence::calibration::detail {
 namespace {
 
 // What correlated tracks bring in over their life, until it is measured: times the spread of the
-// first frame, of the first look; and the frames (looks) that guess weighs.
-constexpr double kFirstLife = 6.5, kFirstMotion = 2.0, kGuessFrames = 30, kGuessLooks = 4;
-// Of the scatter's variance, in residuals of motion: two instants have it each, and along the
-// baseline, where no epipolar line measures it, real lenses leave more of it than across.
-constexpr double kMotionBias = 4;
-constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10,
-                 kForgetMotion = 1.0 / 40;  // a frame, a frame, a look
+// first frame; and the frames that guess weighs.
+constexpr double kFirstLife = 6.5, kGuessFrames = 30;
+constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10;  // a frame
 constexpr double kLeastInflation = 0.3,
                  kMostInflation =
                      200;  // below: sigmas claimed far too large; above: not a spread any more
@@ -34,16 +30,6 @@ constexpr double kRelease = 0.5;  // of the threshold: an alarm stands until the
 constexpr double kRampShare = 0.05;  // a ramp's best step explains 8/9 of it
 constexpr double kRampMargin = 10;   // gain by which a drift must beat a knock
 constexpr int kRampFrames = 150;     // and the least length of one
-constexpr double kLagMargin =
-    25;                         // gain by which a lag must beat every fixed or drifting transform
-constexpr double kLagMost = 2;  // frames: what pairs images farther apart is no camera's fault
-constexpr double kLagModel =
-    0.6;  // frames: error of a lag from few frames, where speed and rocking change within one
-constexpr double kLagExplains =
-    0.6;                       // share of the gain from which a lag alone is a rival of the knock
-constexpr int kLagFrames = 8;  // and the least frames it must have lasted
-constexpr int kLagPatience = 30;  // frames a verdict waits for the rivals to part
-
 }  // namespace
 
 void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance) noexcept {
@@ -60,8 +46,7 @@ void ChangeDetector::reset(const MonitorOptions& options, const Mat5& covariance
   }
   history_.clear();
   pending_.reset();
-  lambda_stereo_ = lambda_motion_ = now_fast_ = now_slow_ = life_slow_ = 0;
-  residuals_ = 0;
+  lambda_ = now_fast_ = now_slow_ = life_slow_ = 0;
   over_ = 0;
   newest_statistic_ = 0;
 }
@@ -72,9 +57,7 @@ void ChangeDetector::expect_scatter(double bias_px) noexcept {
 }
 
 void ChangeDetector::renew_floor() noexcept {
-  const double least = options_.bias_px * options_.bias_px / kFixed;
-  bias2_ = std::max(least, scatter_.variance());
-  motion_bias2_ = std::max(least, kMotionBias * scatter_.variance());
+  bias2_ = std::max(options_.bias_px * options_.bias_px / kTheta, scatter_.variance());
 }
 
 /// The block just closed against those before it.
@@ -83,8 +66,8 @@ void ChangeDetector::measure_scatter() noexcept {
   if (history_.closed() == 0 || newest_statistic_ > kRelease * options_.threshold) return;
   Evidence past;
   for (std::size_t i = 0; i < std::min(history_.blocks(), kScatterBlocks); ++i)
-    past.add(history_.block(i).evidence.stereo);
-  scatter_.add(history_.open().evidence.stereo, past, lambda_stereo_);
+    past.add(history_.block(i).evidence);
+  scatter_.add(history_.open().evidence, past, lambda_);
   renew_floor();
 }
 
@@ -104,26 +87,15 @@ void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
   }
   // Noise that has just grown (rain, dusk) counts at once, for the tracks it will go on to spoil.
   const double grown = now_slow_ > 0 ? std::max(1.0, now_fast_ / now_slow_) : 1.0;
-  lambda_stereo_ =
-      std::clamp(std::max(life_slow_, now_slow_) * grown, kLeastInflation, kMostInflation);
-  if (e.spread_motion < 0) return;
-  if (residuals_ == 0)
-    lambda_motion_ = kFirstMotion * e.spread_motion;
-  else
-    follow(&lambda_motion_, e.spread_motion,
-           std::max(kForgetMotion, 1.0 / (static_cast<double>(residuals_) + kGuessLooks)));
-  lambda_motion_ = std::clamp(lambda_motion_, kLeastInflation, kMostInflation);
-  ++residuals_;
+  lambda_ = std::clamp(std::max(life_slow_, now_slow_) * grown, kLeastInflation, kMostInflation);
 }
 
 bool ChangeDetector::stands_out(const FrameEvidence& e) const noexcept {
   if (history_.frames() == 0) return false;
   Vec5 mean;
   Mat5 covariance;
-  learn(TwoEvidences{}, &mean, &covariance);
-  Evidence alone;
-  alone.add(e.evidence.stereo, 1.0 / (lambda_stereo_ + bias2_ * e.evidence.stereo.n));
-  return statistic(alone, mean, covariance) > options_.threshold;
+  learn(Evidence{}, &mean, &covariance);
+  return statistic(effective(e.evidence), mean, covariance) > options_.threshold;
 }
 
 void ChangeDetector::push(const FrameEvidence& e) noexcept {
@@ -141,87 +113,71 @@ void ChangeDetector::push(const FrameEvidence& e) noexcept {
 
 void ChangeDetector::take(const FrameEvidence& e) noexcept {
   follow_spread(e);
-  if (!history_.push({e.frame, e.before, e.evidence})) return;
+  if (!history_.push({e.frame, e.evidence})) return;
   measure_scatter();
   history_.close_block();
 }
 
-Evidence ChangeDetector::effective(const TwoEvidences& sum) const noexcept {
+Evidence ChangeDetector::effective(const Evidence& sum) const noexcept {
   Evidence e;
-  e.add(sum.stereo, 1.0 / (lambda_stereo_ + bias2_ * sum.stereo.n));
-  if (sum.motion.n > 0) e.add(sum.motion, 1.0 / (lambda_motion_ + motion_bias2_ * sum.motion.n));
+  e.add(sum, 1.0 / (lambda_ + bias2_ * sum.n));
   return e;
 }
 
 double ChangeDetector::statistic(const Evidence& e, const Vec5& mean,
                                  const Mat5& covariance) noexcept {
-  const Mat5 A = fixed_block(e);
+  const Mat5 A = information(e);
   const Mat5 M = A + A * covariance * A;
   std::array<double, kTriangle> packed{};
-  for (int i = 0; i < kFixed; ++i)
+  for (int i = 0; i < kTheta; ++i)
     for (int j = 0; j <= i; ++j) packed[lower(i, j)] = M(i, j);
   Theta g = e.g;
   Eigen::Map<Vec5>(g.data()) -= A * mean;
-  return Solved(packed, g).fixed_gain();
+  return Solved(packed, g).gain();
 }
 
-void ChangeDetector::learn(const TwoEvidences& window, Vec5* mean,
-                           Mat5* covariance) const noexcept {
-  TwoEvidences past = history_.total();
+void ChangeDetector::learn(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept {
+  Evidence past = history_.total();
   past.add(window, -1.0);
   // Without the floor: window and past share most of the slow error, and the window's own floor
   // stands for what they do not share.
   Evidence e;
-  e.add(past.stereo, 1.0 / lambda_stereo_);
-  if (past.motion.n > 0) e.add(past.motion, 1.0 / lambda_motion_);
+  e.add(past, 1.0 / lambda_);
   // (C⁻¹ + A)⁻¹, written so that neither need have an inverse.
-  const Mat5 spread = Mat5::Identity() + covariance_ * fixed_block(e);
+  const Mat5 spread = Mat5::Identity() + covariance_ * information(e);
   *covariance = lu_solve(spread, covariance_);
   *mean = *covariance * Eigen::Map<const Vec5>(e.g.data());
 }
 
 void ChangeDetector::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept {
-  Mat5 A = fixed_block(e);
+  Mat5 A = information(e);
   A.diagonal().array() += 1.0 / (kPriorSigma * kPriorSigma);
   const Cholesky<5> factor(A);
   *covariance = factor.inverse();
   *theta = factor.solve(Vec5(Eigen::Map<const Vec5>(e.g.data())));
 }
 
-double ChangeDetector::single(const Evidence& stereo, double spread) const noexcept {
+double ChangeDetector::single(const Evidence& frame, double spread) const noexcept {
   Evidence e;
-  e.add(stereo, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * stereo.n));
+  e.add(frame, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * frame.n));
   return statistic(e, Vec5::Zero(), covariance_);
 }
 
-double ChangeDetector::lag_statistic(const Evidence& stereo) const noexcept {
-  Evidence e;
-  e.add(stereo, 1.0 / (lambda_stereo_ + bias2_ * stereo.n));
-  for (int i = 0; i < kFixed; ++i) e.g[static_cast<std::size_t>(i)] = e.A[lower(kLag, i)];
-  return statistic(e, Vec5::Zero(), covariance_);
-}
-
-void ChangeDetector::single_estimate(const Evidence& stereo, double spread, Vec5* theta,
+void ChangeDetector::single_estimate(const Evidence& frame, double spread, Vec5* theta,
                                      Mat5* covariance) const noexcept {
   Evidence e;
-  e.add(stereo, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * stereo.n));
+  e.add(frame, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * frame.n));
   estimate(e, theta, covariance);
 }
 
 Decision ChangeDetector::decide() noexcept {
   Decision d;
-  d.lag_sigma = d.yaw_sigma = std::numeric_limits<double>::infinity();
   const std::size_t count = history_.frames();
   if (count == 0) return d;
   d.onset = history_.recent(0).frame;
-  bool lagging = false;
   Evidence longest;
   std::size_t window = 0;  // of the largest statistic
-  const auto stands_out = [this](const Solved& s) {
-    return std::abs(s.lag()) > options_.lag_frames &&
-           std::abs(s.lag()) > options_.lag_sigmas * s.lag_sigma();
-  };
-  TwoEvidences sum;
+  Evidence sum;
   std::size_t summed = 0;
   for (std::size_t w = 0; w < window_count_ && detector_[w] <= count; ++w) {
     if (detector_[w] <= EvidenceHistory::kRecent) {
@@ -239,63 +195,39 @@ Decision ChangeDetector::decide() noexcept {
       most = std::max(most, statistic(longest, learnt, covariance));
     }
     if (most > d.statistic) d.statistic = most, window = detector_[w];
-    Evidence stereo;
-    stereo.add(sum.stereo, 1.0 / (lambda_stereo_ + bias2_ * sum.stereo.n));
-    const Solved solved(stereo.A, stereo.g);
-    d.lag = solved.lag();
-    d.lag_sigma = solved.lag_sigma();
-    lagging = lagging || stands_out(solved);
   }
   newest_statistic_ = d.statistic;
   estimate(longest, &d.theta, &d.covariance);
-  d.yaw_sigma = std::sqrt(d.covariance(kYaw, kYaw));
   const double limit = over_ > 0 ? kRelease * options_.threshold : options_.threshold;
   over_ = d.statistic > limit ? over_ + 1 : 0;
-  if (over_ > 0 || lagging) attribute(window, &d);
-  d.undecided = d.undecided || pending_.has_value();
+  if (over_ > 0) attribute(window, &d);
+  d.undecided = pending_.has_value();
   return d;
 }
 
 void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
-  struct Moments {
-    Evidence zeroth, first, second;  // Σ e, Σ age e, Σ age² e from now back
-    void add(const Evidence& e, double scale, double age) noexcept {
-      zeroth.add(e, scale), first.add(e, scale * age), second.add(e, scale * age * age);
-    }
-    [[nodiscard]] Evidence ramp(double length) const noexcept {  // weight 1 − age/length
-      Evidence r = zeroth;
-      for (std::size_t i = 0; i < r.g.size(); ++i) r.g[i] -= first.g[i] / length;
-      for (std::size_t i = 0; i < r.A.size(); ++i)
-        r.A[i] += (second.A[i] / length - 2 * first.A[i]) / length;
-      return r;
-    }
+  // Σ e, Σ age e, Σ age² e from now back, from which a ramp's sums follow.
+  Evidence zeroth, first, second;
+  const auto gain = [&](const Evidence& e) noexcept {
+    Theta g = e.g;
+    Eigen::Map<Vec5>(g.data()) -= information(e) * mean;
+    return Solved(e.A, g).gain() / lambda_;
   };
-  Moments all, stereo;
-  TwoEvidences raw;
   const auto take = [&](const Entry& entry, double age, int frames, bool ask) {
-    all.add(entry.evidence.stereo, 1.0 / lambda_stereo_, age);
-    stereo.add(entry.evidence.stereo, 1.0 / lambda_stereo_, age);
-    if (entry.evidence.motion.n > 0) all.add(entry.evidence.motion, 1.0 / lambda_motion_, age);
-    raw.add(entry.evidence);
+    zeroth.add(entry.evidence);
+    first.add(entry.evidence, age);
+    second.add(entry.evidence, age * age);
     if (!ask) return;
-    const auto solved = [&](const Evidence& e) {
-      Theta g = e.g;
-      for (int i = 0; i < kTheta; ++i)
-        for (int j = 0; j < kFixed; ++j)
-          g[static_cast<std::size_t>(i)] -= e.A[lower(std::max(i, j), std::min(i, j))] * mean[j];
-      return Solved(e.A, g);
+    const auto keep = [&](Onset* best, const Evidence& sum) {
+      if (const double g = gain(sum); g > best->gain) *best = Onset{g, entry.frame, frames, sum};
     };
-    const auto keep = [&](Onset* best, double gain, const Evidence& sum) {
-      if (gain > best->gain) *best = Onset{gain, entry.frame, frames, sum, raw};
-    };
-    const Solved fixed = solved(all.zeroth), lagged = solved(stereo.zeroth);
-    keep(&found->step, fixed.fixed_gain(), all.zeroth);
-    keep(&found->step_stereo, lagged.fixed_gain(), stereo.zeroth);
-    keep(&found->both_stereo, lagged.fixed_gain() + lagged.lag_gain(), stereo.zeroth);
+    keep(&found->step, zeroth);
     if (frames < kRampFrames) return;
-    const Evidence ramp = all.ramp(frames), ramp_stereo = stereo.ramp(frames);
-    keep(&found->ramp, solved(ramp).fixed_gain(), ramp);
-    keep(&found->ramp_stereo, solved(ramp_stereo).fixed_gain(), ramp_stereo);
+    Evidence ramp = zeroth;  // weight 1 − age/frames
+    for (std::size_t i = 0; i < ramp.g.size(); ++i) ramp.g[i] -= first.g[i] / frames;
+    for (std::size_t i = 0; i < ramp.A.size(); ++i)
+      ramp.A[i] += (second.A[i] / frames - 2 * first.A[i]) / frames;
+    keep(&found->ramp, ramp);
   };
   // Single frames up to a block's edge, then blocks.
   constexpr std::size_t kBlock = EvidenceHistory::kBlock;
@@ -311,73 +243,27 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
   }
 }
 
-bool ChangeDetector::find_lag(const Search& found, Decision* d) const noexcept {
-  const Onset& both = found.both_stereo;
-  Evidence e;
-  e.add(both.raw.stereo, 1.0 / (lambda_stereo_ + bias2_ * both.raw.stereo.n));
-  const Solved lag(e.A, e.g);
-  const double size = std::abs(lag.lag());
-  if (both.frames < kLagFrames || !(size > options_.lag_frames && size < kLagMost &&
-                                    size > options_.lag_sigmas * lag.lag_sigma()))
-    return false;
-  if (both.gain < std::max(found.step_stereo.gain, found.ramp_stereo.gain) + kLagMargin)
-    return false;
-  d->kind = MonitorVerdict::Kind::out_of_step;
-  d->lag = lag.lag();
-  d->lag_sigma = lag.lag_sigma();
-  d->onset = both.frame;
-  d->frames = both.frames;
-  estimate(e, &d->theta, &d->covariance);
-  return true;
-}
-
-bool ChangeDetector::lag_is_rival(const Search& found) const noexcept {
-  const Onset& step = found.step_stereo;
-  const double A = step.since.A[lower(kLag, kLag)], g = step.since.g[kLag];
-  if (!(A > 0) || g * g / A < kLagExplains * step.gain) return false;
-  const double alone = g / A;
-  if (std::abs(alone) < options_.lag_frames || std::abs(alone) > kLagMost) return false;
-  const Solved both(step.since.A, step.since.g);
-  return std::abs(both.lag() - alone) < std::max(options_.lag_sigmas * both.lag_sigma(), kLagModel);
-}
-
-TwoEvidences ChangeDetector::since(const Onset& onset) const noexcept {
-  // A look from before the onset to after it compares two rigs: it alarms, but it measures neither.
-  TwoEvidences sum = onset.raw;
-  const std::size_t frames = std::min<std::size_t>(
-      {static_cast<std::size_t>(onset.frames), EvidenceHistory::kRecent, history_.frames()});
-  for (std::size_t age = 0; age < frames; ++age) {
-    const Entry& e = history_.recent(age);
-    if (e.evidence.motion.n > 0 && e.before < onset.frame) sum.motion.add(e.evidence.motion, -1.0);
-  }
-  return sum;
-}
-
-void ChangeDetector::attribute(std::size_t window, Decision* d) noexcept {
+void ChangeDetector::attribute(std::size_t window, Decision* d) const noexcept {
   // What the rig was before, where that is known: a reference that is a little off is no onset.
   Vec5 mean = Vec5::Zero();
   const std::size_t recent_frames = std::clamp(window, kLearnWindow, kLearnLongest);
   if (history_.frames() >= 2 * recent_frames) {
-    TwoEvidences sum;
+    Evidence sum;
     Mat5 covariance;
     history_.sum_of(recent_frames, &sum);
     learn(sum, &mean, &covariance);
   }
   Search found;
   search(mean, &found);
-  if (find_lag(found, d)) return;
-  if (over_ == 0) return;  // the lag of a window alone, which a step inside that window can make
-  if (over_ <= kLagPatience && lag_is_rival(found)) {
-    d->undecided = true;
-    return;
-  }
   const bool ramp =
       found.ramp.gain > found.step.gain + std::max(kRampMargin, kRampShare * found.step.gain);
   d->kind = ramp ? MonitorVerdict::Kind::drift : MonitorVerdict::Kind::knock;
   const Onset& onset = ramp ? found.ramp : found.step;
   d->onset = onset.frame;
   d->frames = onset.frames;
-  estimate(ramp ? onset.since : effective(since(onset)), &d->theta, &d->covariance);
+  Evidence e;
+  e.add(onset.since, 1.0 / (lambda_ + (ramp ? 0.0 : bias2_ * onset.since.n)));
+  estimate(e, &d->theta, &d->covariance);
 }
 
 }  // namespace vergence::calibration::detail

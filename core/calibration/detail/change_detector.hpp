@@ -14,20 +14,17 @@ namespace vergence::calibration::detail {
 /// What one moving frame brings.
 struct FrameEvidence {
   std::uint64_t frame = 0;
-  std::uint64_t before = 0;  // the earlier frame of the motion look
-  TwoEvidences evidence;
+  Evidence evidence;
   double spread_now = 0, spread_life = 0;  // of the StereoResiduals
-  double spread_motion = -1;               // MotionResiduals::spread; negative: no look
 };
 
 /// What all windows together say. Angles rad, as θ.
 struct Decision {
   MonitorVerdict::Kind kind = MonitorVerdict::Kind::quiet;
   double statistic = 0;
-  bool undecided = false;  // over the threshold, but a lag would explain it as well so far
+  bool undecided = false;  // the newest frame stands out by itself, and waits for the next one
   Vec5 theta = Vec5::Zero();
   Mat5 covariance = Mat5::Zero();
-  double lag = 0, lag_sigma = 0, yaw_sigma = 0;  // over the longest window
   std::uint64_t onset = 0;
   int frames = 0;  // measured since the onset
 };
@@ -35,7 +32,7 @@ struct Decision {
 /// Evidence of the past moving frames in sliding windows, and the tests on it. It knows nothing of
 /// images or tracks.
 ///
-/// Memory  Fixed, in place (some 160 kB). Time: a few µs a frame; up to 0.1 ms while something is
+/// Memory  Fixed, in place (some 50 kB). Time: a few µs a frame; up to 0.1 ms while something is
 ///         over the threshold.
 class ChangeDetector {
  public:
@@ -49,17 +46,12 @@ class ChangeDetector {
   void push(const FrameEvidence& e) noexcept;
   [[nodiscard]] Decision decide() noexcept;
   /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
-  [[nodiscard]] double single(const Evidence& stereo, double spread) const noexcept;
-  /// What a lag of one frame would make of the statistic of a moving frame by itself. It grows with
-  /// the way between two frames, hardly with the number of frames: the reference is no better
-  /// known.
-  [[nodiscard]] double lag_statistic(const Evidence& stereo) const noexcept;
+  [[nodiscard]] double single(const Evidence& frame, double spread) const noexcept;
   /// A⁻¹ g and A⁻¹ of that frame, floors included.
-  void single_estimate(const Evidence& stereo, double spread, Vec5* theta,
+  void single_estimate(const Evidence& frame, double spread, Vec5* theta,
                        Mat5* covariance) const noexcept;
 
-  [[nodiscard]] double stereo_inflation() const noexcept { return lambda_stereo_; }
-  [[nodiscard]] double motion_inflation() const noexcept { return lambda_motion_; }
+  [[nodiscard]] double inflation() const noexcept { return lambda_; }
   [[nodiscard]] std::uint64_t frames() const noexcept { return history_.frames(); }
 
  private:
@@ -68,12 +60,10 @@ class ChangeDetector {
     double gain = 0;  // twice the log likelihood ratio against "nothing has changed"
     std::uint64_t frame = 0;
     int frames = 0;
-    Evidence since;  // inflated, without floor
-    TwoEvidences raw;
+    Evidence since;  // not inflated; of a ramp, weighted by it
   };
   struct Search {
-    Onset step, ramp;                             // five; five growing from zero
-    Onset step_stereo, both_stereo, ramp_stereo;  // the same without motion; five and the lag
+    Onset step, ramp;  // a change at a moment; one that grows from zero
   };
 
   void follow_spread(const FrameEvidence& e) noexcept;
@@ -81,31 +71,26 @@ class ChangeDetector {
   [[nodiscard]] bool stands_out(const FrameEvidence& e) const noexcept;
   void measure_scatter() noexcept;
   void renew_floor() noexcept;
-  [[nodiscard]] Evidence effective(const TwoEvidences& sum) const noexcept;
+  [[nodiscard]] Evidence effective(const Evidence& sum) const noexcept;
   [[nodiscard]] static double statistic(const Evidence& e, const Vec5& mean,
                                         const Mat5& covariance) noexcept;
-  void learn(const TwoEvidences& window, Vec5* mean, Mat5* covariance) const noexcept;
+  void learn(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept;
   void estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept;
   void search(const Vec5& mean, Search* found) const noexcept;
-  [[nodiscard]] bool find_lag(const Search& found, Decision* d) const noexcept;
-  [[nodiscard]] bool lag_is_rival(const Search& found) const noexcept;
-  [[nodiscard]] TwoEvidences since(const Onset& onset) const noexcept;
-  void attribute(std::size_t window, Decision* d) noexcept;
+  void attribute(std::size_t window, Decision* d) const noexcept;
 
   MonitorOptions options_{};
   Mat5 covariance_ = Mat5::Zero();
-  double bias2_ = 0;         // px², of a mode: the floor
-  double motion_bias2_ = 0;  // and that of residuals of motion
+  double bias2_ = 0;  // px², of a mode: the floor
   BlockScatter scatter_{};
   std::array<std::size_t, 6> detector_{};
   std::size_t window_count_ = 0;
   EvidenceHistory history_;
   std::optional<FrameEvidence> pending_;  // stands out, and waits for the next one
-  double lambda_stereo_ = 0, lambda_motion_ = 0;
+  double lambda_ = 0;
   double now_fast_ = 0, now_slow_ = 0, life_slow_ = 0;  // running means of the spreads
-  std::uint64_t residuals_ = 0;
-  double newest_statistic_ = 0;  // of the last decide()
-  int over_ = 0;                 // frames in a row over the threshold
+  double newest_statistic_ = 0;                         // of the last decide()
+  int over_ = 0;                                        // frames in a row over the threshold
 };
 
 }  // namespace vergence::calibration::detail

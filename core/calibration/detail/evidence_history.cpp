@@ -4,7 +4,7 @@ namespace vergence::calibration::detail {
 
 bool EvidenceHistory::push(const Entry& entry) noexcept {
   recent_[count_ % kRecent] = entry;
-  if (count_ % kBlock == 0) open_ = Entry{entry.frame, 0, {}};
+  if (count_ % kBlock == 0) open_ = Entry{entry.frame, {}};
   open_.evidence.add(entry.evidence);
   ++count_;
   return count_ % kBlock == 0;
@@ -18,7 +18,7 @@ void EvidenceHistory::close_block() noexcept {
   open_ = Entry{};
 }
 
-void EvidenceHistory::sum_of(std::size_t frames, TwoEvidences* sum) const noexcept {
+void EvidenceHistory::sum_of(std::size_t frames, Evidence* sum) const noexcept {
   *sum = open_.evidence;
   const std::size_t open = open_frames();
   const std::size_t count =
@@ -26,8 +26,8 @@ void EvidenceHistory::sum_of(std::size_t frames, TwoEvidences* sum) const noexce
   for (std::size_t i = 0; i < count; ++i) sum->add(block(i).evidence);
 }
 
-TwoEvidences EvidenceHistory::total() const noexcept {
-  TwoEvidences sum = total_;
+Evidence EvidenceHistory::total() const noexcept {
+  Evidence sum = total_;
   sum.add(open_.evidence);
   return sum;
 }

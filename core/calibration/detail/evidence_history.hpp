@@ -8,7 +8,7 @@
 namespace vergence::calibration::detail {
 
 /// The evidence of past moving frames: the newest one by one, older ones summed by blocks. A value;
-/// fixed, in place (some 160 kB). Full: the oldest block goes.
+/// fixed, in place (some 50 kB). Full: the oldest block goes.
 class EvidenceHistory {
  public:
   static constexpr std::size_t kRecent = 64;  // single frames: an onset among them is exact
@@ -17,14 +17,13 @@ class EvidenceHistory {
   static constexpr std::size_t kBlocks = 240;
   struct Entry {
     std::uint64_t frame = 0;
-    std::uint64_t before = 0;  // the earlier frame of its motion tracks
-    TwoEvidences evidence;
+    Evidence evidence;
   };
 
   void clear() noexcept {
     count_ = closed_ = 0;
     open_ = Entry{};
-    total_ = TwoEvidences{};
+    total_ = Evidence{};
   }
   /// True: the block being filled is full, to be looked at before close_block().
   [[nodiscard]] bool push(const Entry& entry) noexcept;
@@ -45,17 +44,17 @@ class EvidenceHistory {
     return blocks_[(closed_ - 1 - age) % kBlocks];
   }
   /// Of the newest frames, up to the edge of the block that holds the oldest of them.
-  void sum_of(std::size_t frames, TwoEvidences* sum) const noexcept;
+  void sum_of(std::size_t frames, Evidence* sum) const noexcept;
   /// Of all frames there are.
-  [[nodiscard]] TwoEvidences total() const noexcept;
+  [[nodiscard]] Evidence total() const noexcept;
 
  private:
   // Frames, full blocks; where indices have 32 bits, 30 Hz for four and a half years.
   std::size_t count_ = 0, closed_ = 0;
   std::array<Entry, kRecent> recent_{};
   std::array<Entry, kBlocks> blocks_{};
-  Entry open_{};          // the block being filled
-  TwoEvidences total_{};  // of the blocks kept
+  Entry open_{};      // the block being filled
+  Evidence total_{};  // of the blocks kept
 };
 
 }  // namespace vergence::calibration::detail

@@ -10,9 +10,8 @@
 
 namespace vergence::calibration::detail {
 
-/// θ of the monitor: φ (3, rad), α, β (rad: direction of t), κ (frames of lag). κ comes last, so
-/// that what is said of the first five is a prefix of what is said of all six.
-inline constexpr int kTheta = 6, kFixed = 5, kLag = 5, kYaw = 1;
+/// θ of the monitor: φ (3, rad), α, β (rad: direction of t).
+inline constexpr int kTheta = 5;
 inline constexpr int kTriangle = kTheta * (kTheta + 1) / 2;
 
 [[nodiscard]] constexpr std::size_t lower(int row, int column) noexcept {
@@ -37,27 +36,15 @@ struct Evidence {
   }
 };
 
-[[nodiscard]] inline Mat5 fixed_block(const Evidence& e) noexcept {
+[[nodiscard]] inline Mat5 information(const Evidence& e) noexcept {
   Mat5 A;
-  for (int i = 0; i < kFixed; ++i)
+  for (int i = 0; i < kTheta; ++i)
     for (int j = 0; j <= i; ++j) A(i, j) = A(j, i) = e.A[lower(i, j)];
   return A;
 }
 
-/// The two kinds apart: their errors are of different makings, so each has its own inflation.
-struct TwoEvidences {
-  Evidence stereo, motion;
-  void add(const TwoEvidences& e, double scale = 1.0) noexcept {
-    stereo.add(e.stereo, scale);
-    motion.add(e.motion, scale);
-  }
-};
-
 /// L Lᵀ = A and y = L⁻¹ g. Directions that nothing was seen of (pivot under 1e-9 of the diagonal)
 /// stay out: y = 0 there.
-///
-/// |y|² over the first five is gᵀA⁻¹g of a fixed transform, over all six with the lag; κ̂ = y₅/L₅₅,
-/// its sigma 1/L₅₅.
 struct Solved {
   std::array<double, kTriangle> L{};
   std::array<double, kTheta> y{};
@@ -82,15 +69,11 @@ struct Solved {
     }
   }
 
-  [[nodiscard]] double fixed_gain() const noexcept {
-    return y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3] + y[4] * y[4];
-  }
-  [[nodiscard]] double lag_gain() const noexcept { return y[kLag] * y[kLag]; }
-  [[nodiscard]] double lag() const noexcept {
-    return seen[kLag] ? y[kLag] / L[lower(kLag, kLag)] : 0.0;
-  }
-  [[nodiscard]] double lag_sigma() const noexcept {
-    return seen[kLag] ? 1.0 / L[lower(kLag, kLag)] : std::numeric_limits<double>::infinity();
+  /// gᵀA⁻¹g.
+  [[nodiscard]] double gain() const noexcept {
+    double sum = 0;
+    for (const double v : y) sum += v * v;
+    return sum;
   }
 };
 

@@ -29,17 +29,10 @@ struct StereoResiduals {
                            // variance of the sum
 };
 
-/// What the tracks through motion of one look say; nothing where there are too few.
-struct MotionResiduals {
-  bool usable = false;
-  Evidence evidence;
-  double spread = 0;  // as above; a track speaks once
-};
-
 /// Turns observations into evidence about θ, with redescending weights about the frame's own robust
 /// fit: a shifted rig is no outlier.
 ///
-/// Memory  Fixed, in place (some 300 kB): lives in an arena. Time: linear in the observations.
+/// Memory  Fixed, in place (some 250 kB): lives in an arena. Time: linear in the observations.
 class MonitorResiduals {
  public:
   void reset() noexcept;
@@ -47,8 +40,6 @@ class MonitorResiduals {
   /// tracks live for ever.
   [[nodiscard]] StereoResiduals stereo(const Reference& reference, const MonitorFrame& frame,
                                        int min_matches, bool follow) noexcept;
-  [[nodiscard]] MotionResiduals motion(const Reference& reference,
-                                       const MonitorFrame& frame) noexcept;
 
  private:
   struct StereoRow {
@@ -58,27 +49,17 @@ class MonitorResiduals {
     double weight;
     std::uint32_t track;
   };
-  struct MotionRow {
-    Eigen::Matrix<double, 3, kTheta> J_theta;  // whitened
-    Eigen::Matrix<double, 3, 6> J_pose;
-    Vec3 r;
-    double weight;
-    double inverse_sigma2;
-  };
   struct Memory {
     std::uint32_t track = 0;
     std::uint64_t frame = 0;  // of the last observation, plus one; 0: empty
-    std::array<double, kFixed> sum{};
+    std::array<double, kTheta> sum{};
   };
-  [[nodiscard]] static bool motion_row(const Reference& reference, const MonitorFrame& frame,
-                                       const MotionTrack& track, MotionRow* row) noexcept;
   void spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow,
                  StereoResiduals* look) noexcept;
 
   std::size_t rows_ = 0;
   std::array<StereoRow, kMaxObservations> stereo_{};
-  std::array<MotionRow, kMaxObservations / 2> motion_{};
-  std::array<double, kMaxObservations> sizes_{};  // scratch of the medians
+  std::array<double, kMaxObservations> sizes_{};  // scratch of the median
   std::array<Memory, 4096> memories_{};  // by track number; a newer track takes the place of one
                                          // that has the same last bits
 };

@@ -16,7 +16,7 @@ class BlockScatter {
  public:
   /// Before anything was measured: px rms over the image.
   void expect(double bias_px) noexcept {
-    expected2_ = bias_px * bias_px / kFixed;
+    expected2_ = bias_px * bias_px / kTheta;
     sum_ = 0;
     blocks_ = 0;
     used_ = true;

@@ -93,7 +93,6 @@ struct Estimator::Parts {
   bool any = false;
   double confirmed_percent = 0;     // depth error of the calibration that was confirmed
   bool focal_contradicted = false;  // and noted
-  bool shows_no_lag = false;        // this frame
   bool moves = false;               // this frame's pose, for all that is known of it
   int without_pose = 0;
   bool in_gap = false;       // and the last event has said so

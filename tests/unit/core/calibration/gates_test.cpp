@@ -139,7 +139,7 @@ TEST(Gates, aRotationFarFromTheConfiguredOneIsImplausibleUnlessFromScratch) {
 
 TEST(Gates, camerasOutOfStepHaveNoCalibration) {
   Case c;
-  c.solution.out_of_step = true;
+  c.solution.lag_frames = 1;
   EXPECT_EQ(c.ask(), Gate::out_of_step);
 }
 

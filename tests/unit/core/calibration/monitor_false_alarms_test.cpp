@@ -107,7 +107,7 @@ TEST(MonitorFalseAlarms, areFourAtMostInAHundredHours) {
         most = std::max(most, d.statistic);
         alarm = d.kind != MonitorVerdict::Kind::quiet;
       } else {
-        const double s = windows->single(f.evidence.evidence.stereo, f.spread_now) / 1.5;
+        const double s = windows->single(f.evidence.evidence, f.spread_now) / 1.5;
         worst_standing = std::max(worst_standing, s);
         standing_over = s > options.threshold ? standing_over + 1 : 0;
         alarm = standing_over == 3;

@@ -40,7 +40,6 @@ class ModeDrive {
     bias_ = kBiasKeeps * bias_ + std::sqrt(1 - kBiasKeeps * kBiasKeeps) * draw();
     Frame f = recorded;
     f.evidence.frame = number_++;
-    f.evidence.before = f.evidence.frame > 8 ? f.evidence.frame - 8 : 0;
     if (f.moving) {
       // Errors that stay with a track die with it: correlation 0.9 a frame has the same sum over a
       // life of twenty.
@@ -48,13 +47,8 @@ class ModeDrive {
       const double lasting = (spread_life_ - spread_now_) * (1 - kTrackKeeps) / (2 * kTrackKeeps);
       noise_ = std::sqrt(lasting) * track_ + std::sqrt(spread_now_ - lasting) * draw();
     }  // else the images repeat themselves, and so do their errors
-    auto& [stereo, motion] = f.evidence.evidence;
-    set_gradient(&stereo, noise_ + std::sqrt(stereo.n) * (bias_stereo_ * bias_), reference_error);
-    if (motion.n > 0)
-      set_gradient(
-          &motion,
-          std::sqrt(spread_motion_) * draw() + std::sqrt(motion.n) * (bias_motion_ * bias_),
-          reference_error);
+    calibration::detail::Evidence& e = f.evidence.evidence;
+    set_gradient(&e, noise_ + std::sqrt(e.n) * (bias_of_ * bias_), reference_error);
     return f;
   }
 
@@ -65,14 +59,14 @@ class ModeDrive {
   static constexpr double kTrackKeeps = 0.9;
   static constexpr double kBiasKeeps = 0.99667;  // 10 s at 30 Hz
 
-  [[nodiscard]] Vec6 draw() {
-    Vec6 y;
-    for (int i = 0; i < 6; ++i) y[i] = random_.normal();
+  [[nodiscard]] Vec5 draw() {
+    Vec5 y;
+    for (int i = 0; i < 5; ++i) y[i] = random_.normal();
     return kLarger * y;
   }
 
-  /// g = L y − A θ of the reference's error, the lag left out of the latter.
-  static void set_gradient(calibration::detail::Evidence* e, const Vec6& y,
+  /// g = L y − A θ of the reference's error.
+  static void set_gradient(calibration::detail::Evidence* e, const Vec5& y,
                            const Vec5& reference_error) {
     using namespace calibration::detail;
     const Solved factor(e->A, e->g);
@@ -80,7 +74,7 @@ class ModeDrive {
       double g = 0;
       for (int k = 0; k <= i; ++k)
         if (factor.seen[static_cast<std::size_t>(k)]) g += factor.L[lower(i, k)] * y[k];
-      for (int k = 0; k < kFixed; ++k)
+      for (int k = 0; k < kTheta; ++k)
         g -= e->A[lower(std::max(i, k), std::min(i, k))] * reference_error[k];
       e->g[static_cast<std::size_t>(i)] = g;
     }
@@ -103,31 +97,25 @@ class ModeDrive {
       const calibration::MonitorFrame& f = trial.frame();
       const StereoResiduals stereo = looks->stereo(reference, f, 30, f.moving);
       if (!stereo.usable) continue;
-      use(f, stereo,
-          f.motion.empty() || !f.moving ? MotionResiduals{} : looks->motion(reference, f));
+      use(f, stereo);
     }
   }
 
   void record(FeatureDriveOptions o) {
     o.drive_s = 60, o.stop_s = 15;
-    int moving = 0, looks = 0;
-    watch(o, 2250,
-          [&](const calibration::MonitorFrame& frame, const auto& stereo, const auto& motion) {
-            Frame f;
-            f.moving = frame.moving;
-            f.spread_now = stereo.spread_now;
-            f.evidence.evidence.stereo = stereo.evidence;
-            f.evidence.spread_now = stereo.spread_now;
-            f.evidence.spread_life = stereo.spread_life;
-            if (motion.usable)
-              f.evidence.evidence.motion = motion.evidence,
-              f.evidence.spread_motion = motion.spread;
-            frames_.push_back(f);
-            if (!frame.moving || frame.frame < 100) return;
-            ++moving, spread_now_ += stereo.spread_now, spread_life_ += stereo.spread_life;
-            if (motion.usable) ++looks, spread_motion_ += motion.spread;
-          });
-    spread_now_ /= moving, spread_life_ /= moving, spread_motion_ /= looks;
+    int moving = 0;
+    watch(o, 2250, [&](const calibration::MonitorFrame& frame, const auto& stereo) {
+      Frame f;
+      f.moving = frame.moving;
+      f.spread_now = stereo.spread_now;
+      f.evidence.evidence = stereo.evidence;
+      f.evidence.spread_now = stereo.spread_now;
+      f.evidence.spread_life = stereo.spread_life;
+      frames_.push_back(f);
+      if (!frame.moving || frame.frame < 100) return;
+      ++moving, spread_now_ += stereo.spread_now, spread_life_ += stereo.spread_life;
+    });
+    spread_now_ /= moving, spread_life_ /= moving;
   }
 
   void measure_bias(FeatureDriveOptions o) {
@@ -135,29 +123,25 @@ class ModeDrive {
     o.white_px = o.constant_px = o.walk_px = 1e-5;
     o.outliers = o.movers = 0;
     o.bias_s = 1;  // many draws of the field
-    Mat6 stereo_sum = Mat6::Zero(), motion_sum = Mat6::Zero();
-    int stereo_n = 0, motion_n = 0;
-    const auto add = [](const Evidence& e, Mat6* sum, int* n) {
+    Mat5 sum = Mat5::Zero();
+    int n = 0;
+    watch(o, 2500, [&](const auto&, const auto& stereo) {
+      const Evidence& e = stereo.evidence;
       const Solved solved(e.A, e.g);
-      const Vec6 y = Eigen::Map<const Vec6>(solved.y.data()) / std::sqrt(e.n);
-      *sum += y * y.transpose();
-      ++*n;
-    };
-    watch(o, 2500, [&](const auto&, const auto& stereo, const auto& motion) {
-      add(stereo.evidence, &stereo_sum, &stereo_n);
-      if (motion.usable) add(motion.evidence, &motion_sum, &motion_n);
+      const Vec5 y = Eigen::Map<const Vec5>(solved.y.data()) / std::sqrt(e.n);
+      sum += y * y.transpose();
+      ++n;
     });
-    bias_stereo_ = Eigen::LLT<Mat6>(stereo_sum / stereo_n).matrixL();
-    bias_motion_ = Eigen::LLT<Mat6>(motion_sum / motion_n).matrixL();
+    bias_of_ = Eigen::LLT<Mat5>(sum / n).matrixL();
   }
 
   Random random_;
   std::vector<Frame> frames_;
   std::size_t at_ = 0;
   std::uint64_t number_ = 0;
-  double spread_now_ = 0, spread_life_ = 0, spread_motion_ = 0;
-  Mat6 bias_stereo_ = Mat6::Zero(), bias_motion_ = Mat6::Zero();  // px a mode, whitened
-  Vec6 track_, bias_, noise_ = Vec6::Zero();
+  double spread_now_ = 0, spread_life_ = 0;
+  Mat5 bias_of_ = Mat5::Zero();  // px a mode, whitened
+  Vec5 track_, bias_, noise_ = Vec5::Zero();
 };
 
 }  // namespace vergence::test

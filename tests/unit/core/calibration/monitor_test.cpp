@@ -62,7 +62,6 @@ TEST_P(MonitorKnock, isNoticedInTimeAndItsOnsetFound) {
       ASSERT_GE(trial.frame().found_stereo, 190);
       const auto frames = trial.frames_until(row.limit);
       ASSERT_TRUE(frames.has_value()) << "statistic " << trial.verdict().statistic;
-      EXPECT_NE(trial.verdict().kind, Kind::out_of_step);
       latencies.push_back(*frames);
       for (int i = 0; i < 10; ++i) (void)trial.step();
       misplaced += !onset_fits(trial.verdict().onset_frame, *frames + 10) ? 1 : 0;
@@ -80,28 +79,30 @@ INSTANTIATE_TEST_SUITE_P(Table, MonitorKnock,
                          testing::Values(KnockRow{"pitch_0_2_deg", {0.2, 0, 0}, {0, 0, 0}, 10},
                                          KnockRow{"pitch_0_05_deg", {-0.05, 0, 0}, {0, 0, 0}, 30},
                                          KnockRow{"roll_0_1_deg", {0, 0, 0.1}, {0, 0, 0}, 30},
-                                         KnockRow{"yaw_0_3_deg", {0, 0.3, 0}, {0, 0, 0}, 30},
-                                         KnockRow{"yaw_minus_0_3_deg", {0, -0.3, 0}, {0, 0, 0}, 30},
                                          KnockRow{"t_y_4_mm", {0, 0, 0}, {0, 4, 0}, 30},
                                          KnockRow{"t_z_10_mm", {0, 0, 0}, {0, 0, 10}, 150},
                                          KnockRow{"pitch_2_deg", {2, 0, 0}, {0, 0, 0}, 10}),
                          [](const auto& row) { return std::string(row.param.name); });
 
 TEST(Monitor, estimatesASmallKnockWithinItsCovarianceAndALargeOneToFirstOrder) {
-  for (const Vec3& degrees : {Vec3(0.03, 0, 0), Vec3(0, 0.04, 0), Vec3(0.02, -0.04, 0.05),
-                              Vec3(0.1, 0, 0), Vec3(0, 0.3, 0), Vec3(0.05, -0.2, 0.1)}) {
+  for (const Vec3& degrees :
+       {Vec3(0.03, 0, 0), Vec3(0.02, 0, 0.05), Vec3(0.1, 0, 0), Vec3(0.05, 0, 0.1)}) {
     SCOPED_TRACE(degrees.transpose());
     FeatureDriveOptions o = street(8, 5, 300);
     o.changes = {{150, degrees / kRadian, Vec3::Zero(), 0}};
     MonitorTrial trial(o);
     for (int i = 0; i < 300; ++i) (void)trial.step();
     ASSERT_EQ(trial.verdict().kind, Kind::knock);
-    const Vec3 error = trial.verdict().offset.head<3>() - degrees / kRadian;
+    // A turn about the baseline and one about the optical axis; a yaw shows in no epipolar line.
+    const Vec3 off = trial.verdict().offset.head<3>() - degrees / kRadian;
+    const Vec2 error(off.x(), off.z());
     EXPECT_LT(error.norm() * kRadian, 0.003 + 0.1 * degrees.norm());
     if (degrees.norm() > 0.08) continue;
-    // χ² of three beyond 30: one in a million, with room for what is not Gaussian.
-    EXPECT_LT(error.dot(trial.verdict().covariance.topLeftCorner<3, 3>().inverse() * error), 30.0)
-        << error.transpose();
+    // χ² of two beyond 30: under one in a million, with room for what is not Gaussian.
+    Mat2 covariance;
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j) covariance(i, j) = trial.verdict().covariance(2 * i, 2 * j);
+    EXPECT_LT(error.dot(covariance.inverse() * error), 30.0) << error.transpose();
   }
 }
 
@@ -123,88 +124,6 @@ TEST(Monitor, callsASlowTurnADriftBeforeItReachesThreeHundredthsOfADegree) {
   }
 }
 
-TEST(Monitor, findsACameraOneFrameOutOfStepWithinASecond) {
-  for (const double speed : {3.0, 8.0, 15.0})
-    for (const double lag : {1.0, -1.0})
-      for (const std::uint64_t from : {0U, 150U}) {
-        SCOPED_TRACE(testing::Message()
-                     << lag << " frames at " << speed << " m/s from frame " << from);
-        FeatureDriveOptions o = street(speed, 3, 300);
-        o.lags = {{from, lag}};
-        MonitorTrial trial(o);
-        for (std::uint64_t i = 0; i < from; ++i) ASSERT_EQ(trial.step().kind, Kind::quiet);
-        const auto frames = trial.frames_until(30, Kind::out_of_step);
-        ASSERT_TRUE(frames.has_value())
-            << "lag " << trial.verdict().lag_frames << " ± " << trial.verdict().lag_sigma;
-        std::printf("lag %+.0f at %.0f m/s from frame %d: noticed after %d frames\n", lag, speed,
-                    static_cast<int>(from), *frames);
-        for (int i = 0; i < 60; ++i) (void)trial.step();
-        EXPECT_EQ(trial.verdict().kind, Kind::out_of_step);
-        EXPECT_NEAR(trial.verdict().lag_frames, lag, 0.2);
-      }
-}
-
-/// `turned_deg`: by which the camera is not put back as it was, while it lags.
-void expect_in_step_only_after_a_lag(double turned_deg) {
-  constexpr std::uint64_t kFrom = 150, kTurned = 200, kUntil = 240;
-  for (const double speed : {3.0, 8.0, 15.0})
-    for (const double lag : {1.0, -1.0}) {
-      SCOPED_TRACE(testing::Message() << lag << " frames at " << speed << " m/s");
-      FeatureDriveOptions o = street(speed, 3, 300);
-      o.lags = {{kFrom, lag}, {kUntil, 0.0}};
-      if (turned_deg > 0)
-        o.changes = {{kTurned, Vec3(turned_deg / 57.29578, 0, 0), Vec3::Zero(), 0}};
-      MonitorTrial trial(o);
-      for (std::uint64_t i = 0; i < kFrom; ++i) (void)trial.step();
-      ASSERT_TRUE(trial.frames_until(30, Kind::out_of_step).has_value());
-      // As the estimator does: what was out of step is forgotten each time that it is found.
-      trial.monitor().reset();
-      while (trial.frame().frame + 1 < kUntil) {
-        const MonitorVerdict& v = trial.step();
-        ASSERT_FALSE(v.in_step) << "frame " << trial.frame().frame << ", lag " << v.lag_frames
-                                << " ± " << v.lag_sigma;
-        if (v.kind == Kind::out_of_step) trial.monitor().reset();
-      }
-      int frames = 0;
-      while (frames < 60 && !trial.step().in_step) ++frames;
-      EXPECT_LT(frames, 60) << "lag " << trial.verdict().lag_frames << " ± "
-                            << trial.verdict().lag_sigma;
-    }
-}
-
-TEST(Monitor, saysInStepOnlyOnceALagHasEnded) { expect_in_step_only_after_a_lag(0); }
-
-TEST(Monitor, saysInStepOfACameraThatWasTurnedMeanwhile) { expect_in_step_only_after_a_lag(0.3); }
-
-TEST(Monitor, saysInStepOfAFrameThatMovesOnly) {
-  MonitorTrial trial(street(8, 3, 300));
-  for (int i = 0; i < 150; ++i) (void)trial.step();
-  ASSERT_TRUE(trial.verdict().in_step);
-  calibration::MonitorFrame standing = trial.frame();
-  standing.moving = false;
-  for (int i = 0; i < 40; ++i) {
-    ++standing.frame;
-    EXPECT_FALSE(trial.monitor().look(standing).in_step) << i;
-  }
-}
-
-TEST(Monitor, findsALagThatTheCalibrationHasSwallowed) {
-  FeatureDriveOptions o = street(8, 4, 300);
-  o.lags = {{0, 1.0}};
-  Transform T_wrong = o.T_right_left;
-  for (int round = 0; round < 4;
-       ++round) {  // the fixed transform that fits the first two seconds best
-    MonitorTrial fit(o, T_wrong, Mat6::Zero());
-    for (int i = 0; i < 75; ++i) (void)fit.step();
-    Vec6 step = fit.verdict().offset;
-    T_wrong = perturbed(T_wrong, step.head<3>(), step.tail<3>());
-    T_wrong.t *= o.T_right_left.t.norm() / T_wrong.t.norm();
-  }
-  EXPECT_GT(std::abs(T_wrong.t.z()), 0.15);  // v/30 = 0.27 m at 8 m/s
-  MonitorTrial trial(o, T_wrong, Mat6::Zero());
-  EXPECT_TRUE(trial.frames_until(30, Kind::out_of_step).has_value());
-}
-
 TEST(Monitor, isQuietWhenNothingHappensStandingIncluded) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     FeatureDriveOptions o = street(8, seed, 300);
@@ -222,23 +141,6 @@ TEST(Monitor, isQuietWhenNothingHappensStandingIncluded) {
     EXPECT_GT(standing, 900);
     EXPECT_GT(trial.monitor().frames_agreed(), 1000);
   }
-}
-
-TEST(Monitor, bearsTheErrorsOfAnOdometry) {
-  // A frame's motion off by 0.2 mrad and 5 mm: more than an odometry is.
-  FeatureDriveOptions o = street(8, 13, 300);
-  o.changes = {{kBefore, Vec3(0, 0.3, 0) / kRadian, Vec3::Zero(), 0}};
-  MonitorTrial trial(o);
-  Random random(4);
-  trial.disturb = [&random](Transform& T_now_previous) {
-    Vec3 phi, tau;
-    for (int i = 0; i < 3; ++i) phi[i] = 2e-4 * random.normal(), tau[i] = 5e-3 * random.normal();
-    T_now_previous = perturbed(T_now_previous, phi, tau);
-  };
-  for (int i = 0; i < kBefore; ++i)
-    ASSERT_EQ(trial.step().kind, Kind::quiet)
-        << "frame " << i << ", statistic " << trial.verdict().statistic;
-  EXPECT_TRUE(trial.frames_until(30, Kind::knock).has_value());
 }
 
 TEST(Monitor, noticesAKnockOfAStandingRig) {
@@ -277,7 +179,6 @@ TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
     const MonitorVerdict v = trial.monitor().look(night);
     ASSERT_EQ(v.kind, Kind::quiet);
   }
-  EXPECT_TRUE(trial.monitor().look(night).needs_texture);
   night.expected_stereo = 200;
   // A dark frame in between neither counts nor clears.
   calibration::MonitorFrame dark;
@@ -289,15 +190,12 @@ TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
   EXPECT_EQ(trial.monitor().look(night).kind, Kind::collapse);
 }
 
-TEST(Monitor, saysThatItNeedsMotion) {
-  FeatureDriveOptions standing = street(0, 9);
-  MonitorTrial still(standing);
+TEST(Monitor, countsMovingFramesThatAgree) {
+  MonitorTrial still(street(0, 9));
   for (int i = 0; i < 60; ++i) (void)still.step();
-  EXPECT_TRUE(still.verdict().needs_motion);
   EXPECT_EQ(still.monitor().frames_agreed(), 0);
   MonitorTrial moving(street(8, 9));
   for (int i = 0; i < 60; ++i) (void)moving.step();
-  EXPECT_FALSE(moving.verdict().needs_motion);
   EXPECT_EQ(moving.monitor().frames_agreed(),
             57);  // of 59 that move: the shortest window wants three
   moving.monitor().reset();

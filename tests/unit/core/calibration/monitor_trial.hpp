@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/calibration/monitor.hpp"
-#include "core/calibration/motion_track_builder.hpp"
 #include "core/geometry/epipolar.hpp"
 #include "tests/support/feature_drive.hpp"
 
@@ -25,14 +24,11 @@ class MonitorTrial {
       : MonitorTrial(drive, drive.T_right_left, Mat6::Zero(), options) {}
   MonitorTrial(const FeatureDriveOptions& drive, const Transform& T_right_left,
                const Mat6& covariance, const calibration::MonitorOptions& options = {})
-      : arena_(std::make_unique<Arena>(calibration::Monitor::memory_needed(options) +
-                                       calibration::MotionTrackBuilder::memory_needed(kTracks))),
+      : arena_(std::make_unique<Arena>(calibration::Monitor::memory_needed(options))),
         drive_(drive),
         monitor_(options, *arena_),
-        track_builder_(kTracks, *arena_),
         epipolar_(T_right_left) {
     (void)monitor_.set_reference(T_right_left, drive.left, drive.right, covariance);
-    observations_.reserve(kTracks);
   }
 
   /// The next frame.
@@ -53,11 +49,13 @@ class MonitorTrial {
       if (std::abs(off) * r.fy < gate_px)
         observations_.push_back({t.left, t.right, t.sigma_px, t.id});
     }
-    Transform T_now_previous = drive.T_now_previous();
-    if (disturb) disturb(T_now_previous);
-    frame_ = track_builder_.next(drive.stamp(), drive.frame(), observations_, T_now_previous);
+    frame_.found_stereo = static_cast<int>(observations_.size());
     frame_.expected_stereo = static_cast<int>(drive.tracks().size());
-    if (spoil) spoil(observations_), frame_.stereo = observations_;
+    if (spoil) spoil(observations_);
+    frame_.frame = drive.frame();
+    // A centimetre between two images at 30 Hz.
+    frame_.moving = drive.T_now_previous().t.norm() > 0.01;
+    frame_.stereo = observations_;
     verdict_ = monitor_.look(frame_);
     return verdict_;
   }
@@ -81,15 +79,12 @@ class MonitorTrial {
 
   double gate_px = 20;
   std::function<void(std::vector<calibration::StereoObservation>&)>
-      spoil;                                // what is done to a frame's matches
-  std::function<void(Transform&)> disturb;  // and to its motion
+      spoil;  // what is done to a frame's matches
 
  private:
-  static constexpr std::size_t kTracks = 1000;
   std::unique_ptr<Arena> arena_;
   FeatureDrive drive_;
   calibration::Monitor monitor_;
-  calibration::MotionTrackBuilder track_builder_;
   EpipolarGeometry epipolar_;
   std::vector<calibration::StereoObservation> observations_;
   calibration::MonitorFrame frame_;
@@ -104,7 +99,6 @@ struct TrialReference {
 };
 [[nodiscard]] inline TrialReference calibrated(FeatureDriveOptions drive) {
   drive.changes.clear();
-  drive.lags.clear();
   drive.drive_s = drive.stop_s = 0;
   drive.seed += 1000;
   calibration::MonitorOptions options;

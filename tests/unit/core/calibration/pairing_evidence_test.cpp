@@ -34,9 +34,16 @@ Vec2 pixel(const Vec3& X, Random* random) {
           kLens.fy * X.y() / X.z() + kLens.cy + 0.15 * random->normal()};
 }
 
-/// The lag that is seen at the end, and whether one was before the fault.
-std::pair<int, bool> drive(const Case& c) {
-  constexpr int kFrames = 40, kFault = 20;
+struct Seen {
+  bool before = false;  // a lag, before the fault
+  int lag = 0;          // in the last frame of the fault
+  bool in_step_during = false;
+  int in_step_after = 0;  // frames after the fault's end, until the cameras are seen in step
+};
+
+/// Twenty frames before the fault, twenty with it, and twenty after it.
+Seen drive(const Case& c) {
+  constexpr int kFrames = 60, kFault = 20, kEnd = 40;
   Arena arena(PairingEvidence::memory_needed(kPoints));
   PairingEvidence evidence(kPoints, arena);
   Random random(7);
@@ -45,9 +52,9 @@ std::pair<int, bool> drive(const Case& c) {
   for (std::size_t i = 0; i < kPoints; ++i)
     world.emplace_back(8 * random.uniform() - 4, 6 * random.uniform() - 3,
                        16 + 20 * random.uniform());
-  bool before = false;
+  Seen seen;
   for (int i = 0; i < kFrames; ++i) {
-    const bool fault = i >= kFault;
+    const bool fault = i >= kFault && i < kEnd;
     const Transform left = T_world_left(c, i - (fault ? c.left_late : 0)).inverse(),
                     right = T_world_left(c, i - (fault ? c.camera_late : 0)).inverse();
     const Transform knock{exp_so3({fault ? c.knock_rad : 0, 0, 0}), Vec3::Zero()};
@@ -56,10 +63,15 @@ std::pair<int, bool> drive(const Case& c) {
       points.push_back({pixel(left * world[k], &random),
                         pixel(knock * (T_right_left * (right * world[k])), &random), 0.15,
                         static_cast<std::uint32_t>(k)});
-    evidence.next(points, T_right_left, kLens, kLens);
-    before = before || (!fault && evidence.lag_frames() != 0);
+    if (i == kFault) evidence.question();
+    evidence.next(static_cast<std::uint64_t>(i + 1), points, T_right_left, kLens, kLens);
+    EXPECT_EQ(evidence.questioned() && evidence.in_step(), false) << c.name;
+    if (i < kFault) seen.before = seen.before || evidence.lag_frames() != 0;
+    if (fault) seen.in_step_during = seen.in_step_during || evidence.in_step();
+    if (i == kEnd - 1) seen.lag = evidence.lag_frames();
+    if (i >= kEnd && !evidence.in_step()) ++seen.in_step_after;
   }
-  return {evidence.lag_frames(), before};
+  return seen;
 }
 
 TEST(PairingEvidence, tellsALateImageFromAKnockAndFromStanding) {
@@ -69,9 +81,14 @@ TEST(PairingEvidence, tellsALateImageFromAKnockAndFromStanding) {
                                          {.name = "left late", .left_late = 1, .wanted = -1},
                                          {.name = "knocked", .knock_rad = 0.01},
                                          {.name = "knocked a little", .knock_rad = 0.002}}) {
-    const auto [lag, before] = drive(c);
-    EXPECT_EQ(lag, c.wanted) << c.name;
-    EXPECT_FALSE(before) << c.name;
+    const Seen seen = drive(c);
+    EXPECT_EQ(seen.lag, c.wanted) << c.name;
+    EXPECT_FALSE(seen.before) << c.name;
+    EXPECT_EQ(seen.in_step_during, c.wanted == 0 && c.step_m > 0 && c.knock_rad == 0) << c.name;
+    // Four frames of motion are the fewest that are as certain as a lag.
+    if (c.knock_rad == 0) {
+      EXPECT_LE(seen.in_step_after, c.step_m > 0 ? 8 : 20) << c.name;
+    }
   }
 }
 
@@ -88,7 +105,8 @@ TEST(PairingEvidence, ofARigThatStandsForLongNoiseMakesNoLag) {
                    0.5,
                    k};
     }
-    evidence.next(points, {Mat3::Identity(), {-0.5, 0, 0}}, kLens, kLens);
+    evidence.next(static_cast<std::uint64_t>(i + 1), points, {Mat3::Identity(), {-0.5, 0, 0}},
+                  kLens, kLens);
     ASSERT_EQ(evidence.lag_frames(), 0) << i;
     ASSERT_FALSE(evidence.suspected()) << i;
   }
@@ -101,7 +119,7 @@ TEST(PairingEvidence, measuresTheDistanceFromTheLines) {
   std::vector<StereoObservation> points;
   for (std::uint32_t k = 0; k < 40; ++k)
     points.push_back({Vec2(10.0 * k, 8.0 * k), Vec2(10.0 * k - 5, 8.0 * k + 2), 0.15, k});
-  evidence.next(points, T_right_left, kLens, kLens);
+  evidence.next(1, points, T_right_left, kLens, kLens);
   // Two pixels across, shared by the two images.
   EXPECT_NEAR(evidence.distance_px(), std::sqrt(2.0), 1e-6);
 }
