@@ -69,7 +69,7 @@ std::array<std::string, 2> format_ros(const CalibrationFile& calibration, Remark
     throw InputError(std::string("this rig cannot be rectified for camera_info: ") + error.err);
   }
   detail::remark_more_cameras(calibration, "a pair of camera_info", remarks);
-  detail::remark_lost(calibration, "camera_info", false, remarks);
+  detail::remark_lost(calibration, "camera_info", remarks);
   return {format_info(l, calibration.names[0], K[0], R_l, P_l),
           format_info(r, calibration.names[1], K[1], R_r, P_r)};
 }

@@ -21,29 +21,14 @@ std::string number_list(std::span<const double> values) {
 
 namespace detail {
 
-void remark_lost(const CalibrationFile& calibration, const char* format, bool names,
-                 Remarks* remarks) {
+void remark_lost(const CalibrationFile& calibration, const char* format, Remarks* remarks) {
   const RigCalibration& rig = calibration.rig;
-  std::vector<std::string> lost;
-  bool sigmas = false, serials = false;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
-    const auto given = [](const auto& values) {
-      return std::any_of(values.begin(), values.end(), [](double v) { return v != 0; });
-    };
-    sigmas = sigmas || given(rig.intrinsics[k].sigma) ||
-             given(rig.intrinsics[k].distortion_sigma) || given(rig.sigma_noise[k]) ||
-             given(rig.sigma_wide[k]) || !rig.covariance_wide[k].isZero(0);
-    serials = serials || !calibration.serials[k].empty();
-  }
-  if (sigmas || rig.baseline_sigma != 0) lost.emplace_back("sigmas");
-  if (!rig.covariance.empty()) lost.emplace_back("the covariance");
-  if (serials) lost.emplace_back("serials");
-  if (names) lost.emplace_back("names");
-  if (!calibration.rig_name.empty()) lost.emplace_back("the rig's name");
-  if (rig.found != Stamp() || rig.frames != 0) lost.emplace_back("when it was found and from what");
-  if (!lost.empty())
-    remarks->push_back(
-        fmt::format("{} has no place for {}; left out", format, fmt::join(lost, ", ")));
+  bool sigmas = rig.baseline_sigma != 0 || !rig.covariance.empty();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
+    sigmas = sigmas || rig.intrinsics[k].sigma[0] > 0 || rig.sigma_wide[k][0] > 0;
+  remarks->push_back(
+      fmt::format("{} has lenses and places alone; {}serials and origin are left out", format,
+                  sigmas ? "sigmas, " : ""));
 }
 
 void remark_more_cameras(const CalibrationFile& calibration, const char* format, Remarks* remarks) {
@@ -86,7 +71,7 @@ std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks) 
     std::replace(name.begin(), name.end(), '/', '_');
     text += "  rostopic: " + double_quoted("/" + name + "/image_raw") + "\n";
   }
-  detail::remark_lost(calibration, "a camchain", false, remarks);
+  detail::remark_lost(calibration, "a camchain", remarks);
   return text;
 }
 
@@ -113,7 +98,7 @@ std::array<std::string, 2> format_opencv(const CalibrationFile& calibration, Rem
   const Transform& T = rig.T_camera_left[1];
   const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = T.R;
   detail::remark_more_cameras(calibration, "an OpenCV stereo file", remarks);
-  detail::remark_lost(calibration, "an OpenCV stereo file", true, remarks);
+  detail::remark_lost(calibration, "an OpenCV stereo file", remarks);
   return {lenses, format_matrix("R", 3, 3, std::span(R.data(), 9)) +
                       format_matrix("T", 3, 1, std::span(T.t.data(), 3))};
 }

@@ -33,8 +33,7 @@ namespace vergence::app {
 
 namespace detail {
 /// Remarks what every one of these formats lacks; `serials`, `names`: the format lacks those, too.
-void remark_lost(const CalibrationFile& calibration, const char* format, bool names,
-                 Remarks* remarks);
+void remark_lost(const CalibrationFile& calibration, const char* format, Remarks* remarks);
 /// Remarks cameras beyond the pair that a format holds.
 void remark_more_cameras(const CalibrationFile& calibration, const char* format, Remarks* remarks);
 }  // namespace detail

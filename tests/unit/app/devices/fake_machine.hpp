@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "app/devices/doctor_checks.hpp"
+#include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::test {
@@ -63,10 +64,6 @@ struct FakeMachine {
   std::string group = "video";      // of all nodes
   std::optional<app::DiskRoom> room = app::DiskRoom{std::uint64_t{1} << 40};
 };
-
-inline bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 /// A serial port /dev/ttyUSB0 on an adapter with these USB ids.
 inline app::FoundPort port(std::uint16_t vendor, std::uint16_t product, const std::string& serial,
