@@ -80,6 +80,8 @@ bool Recorder::push(Queue<Value, N>* queue, const Value& value) noexcept {
   return true;
 }
 
+void Recorder::post(const Record& record) noexcept { (void)push(&records_, record); }
+
 void Recorder::on_reading(const InsRecord& reading) noexcept { (void)push(&readings_, reading); }
 
 void Recorder::work() {

@@ -64,12 +64,8 @@ class Recorder final : public SessionObserver {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  void on_report(const FrameReport& report) noexcept override {
-    (void)push(&records_, Record(report));
-  }
-  void on_event(const EventRecord& event) noexcept override {
-    (void)push(&records_, Record(event));
-  }
+  void on_report(const FrameReport& report) noexcept override { post(report); }
+  void on_event(const EventRecord& event) noexcept override { post(event); }
   /// Precondition: Options::ins.
   void on_reading(const InsRecord& reading) noexcept override;
   /// Bytes taken at the beginning: lines that may wait.
@@ -97,6 +93,7 @@ class Recorder final : public SessionObserver {
   bool push(Queue<Value, N>* queue, const Value& value) noexcept;
   void work();
   bool take();
+  void post(const Record& record) noexcept;
   void write(const FrameReport& report);
   void write(const EventRecord& event);
   void write(const InsRecord& reading);
