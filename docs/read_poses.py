@@ -26,6 +26,10 @@ def lines(address):
 def main():
     for line in lines(sys.argv[1]):
         pose = json.loads(line)
+        if pose["version"] != 2:
+            sys.exit("read_poses: the stream has version %s, this program reads version 2" % pose["version"])
+        if pose["type"] != "pose":  # calibration, alignment, status: docs/publish.md
+            continue
         place = ["%9.3f" % v for v in pose["pose"]["position_m"]] if pose["pose"] else ["no pose"]
         print(pose["frame"], pose["status"], pose["reason"] or "-", *place, flush=True)
 

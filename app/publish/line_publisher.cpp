@@ -1,15 +1,15 @@
 #include "app/publish/line_publisher.hpp"
 
 #include <pthread.h>
+#include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
-#include <iterator>
-#include <limits>
+#include <cerrno>
+#include <system_error>
 
-#include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "drivers/clock.hpp"
 
@@ -17,112 +17,65 @@ namespace vergence::app {
 
 namespace {
 
-/// JSON knows no infinity.
-void write_number(double value, int digits, std::string* line) {
-  if (std::isfinite(value))
-    fmt::format_to(std::back_inserter(*line), "{:.{}f}", value, digits);
-  else
-    *line += "null";
-}
-
-void write_covariance(const char* key, const Covariance6& covariance, std::string* line) {
-  fmt::format_to(std::back_inserter(*line), R"(,"{}":[{:.4g})", key, covariance[0]);
-  for (std::size_t i = 1; i < covariance.size(); ++i)
-    fmt::format_to(std::back_inserter(*line), ",{:.4g}", covariance[i]);
-  *line += ']';
-}
-
-bool finite(const Covariance6& covariance) {
-  return std::all_of(covariance.begin(), covariance.end(),
-                     [](float c) { return std::isfinite(c); });
-}
-
-void write_covariances(const PoseSample& pose, std::string* line) {
-  if (pose.status == PoseStatus::lost || !finite(pose.covariance) ||
-      !finite(pose.motion_covariance) || !std::isfinite(pose.length_sigma)) {
-    *line += R"(,"covariance":null,"motion_covariance":null,"length_sigma":null)";
-    return;
-  }
-  write_covariance("covariance", pose.covariance, line);
-  write_covariance("motion_covariance", pose.motion_covariance, line);
-  fmt::format_to(std::back_inserter(*line), R"(,"length_sigma":{:.5f})", pose.length_sigma);
-}
-
-}  // namespace
-
-EarthPose PublishedPlacement::of(const Transform& T_world_left) const {
-  const Transform T_enu_left = T_enu_world * T_world_left;
-  const Vec3 view = T_enu_left.R.col(2);
-  return {T_enu_left, LocalTangentPlane(origin).to_geodetic(T_enu_left.t),
-          std::atan2(view.y(), view.x())};
-}
-
-void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& earth,
-                     std::optional<double> age_ms, std::uint64_t dropped, std::string* line) {
-  line->clear();
-  auto out = std::back_inserter(*line);
-  fmt::format_to(out, R"({{"version":1,"frame":{},"stamp_ns":{},"state":"{}","status":"{}",)",
-                 pose.frame, pose.stamp.ns(), to_string(pose.state), to_string(pose.status));
-  fmt::format_to(out, R"("reason":"{}","pose":)", to_string(pose.reason));
-  if (pose.status == PoseStatus::lost || !pose.T_world_left.R.allFinite() ||
-      !pose.T_world_left.t.allFinite()) {
-    *line += "null";
-  } else {
-    const Vec3& t = pose.T_world_left.t;
-    const Eigen::Quaterniond q = quaternion(pose.T_world_left.R);
-    fmt::format_to(
-        out,
-        R"({{"position_m":[{:.6f},{:.6f},{:.6f}],"orientation_xyzw":[{:.9f},{:.9f},{:.9f},{:.9f}]}})",
-        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
-  }
-  write_covariances(pose, line);
-  *line += R"(,"earth":)";
-  if (pose.status == PoseStatus::lost || !earth) {
-    *line += "null";
-  } else {
-    fmt::format_to(out, R"({{"enu_m":[{:.4f},{:.4f},{:.4f}],"latitude_deg":{:.9f},)",
-                   earth->T_enu_left.t.x(), earth->T_enu_left.t.y(), earth->T_enu_left.t.z(),
-                   earth->position.latitude_deg);
-    fmt::format_to(out, R"("longitude_deg":{:.9f},"height_m":{:.4f},"heading_deg":{:.4f}}})",
-                   earth->position.longitude_deg, earth->position.height_m,
-                   compass_heading_deg(earth->yaw));
-  }
-  fmt::format_to(out, R"(,"inliers":{},"stereo_inliers":{},"reprojection_px":)", pose.inliers,
-                 pose.stereo_inliers);
-  write_number(pose.reprojection_px, 4, line);
-  *line += R"(,"estimate_ms":)";
-  write_number(static_cast<double>(pose.estimate_ms), 3, line);
-  *line += R"(,"age_ms":)";
-  write_number(age_ms.value_or(std::numeric_limits<double>::quiet_NaN()), 3, line);
-  fmt::format_to(out, ",\"dropped\":{}}}\n", dropped);
-}
-
-namespace {
-
 constexpr int kNiceness = -10;
+constexpr Duration kBetweenStatus = Duration::seconds(1);
 
 }  // namespace
 
-LinePublisher::LinePublisher(std::unique_ptr<LineSocket> socket)
-    : socket_(std::move(socket)), thread_([this] { work(); }) {}
+LinePublisher::LinePublisher(std::unique_ptr<LineSocket> socket, SessionRequests* requests,
+                             const calibration::CalibrationOptions& options)
+    : socket_(std::move(socket)),
+      requests_(requests),
+      options_(options),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  if (!wake_) throw std::system_error(errno, std::generic_category(), "eventfd");
+  thread_ = std::thread([this] { work(); });
+}
 
 LinePublisher::~LinePublisher() { stop(); }
 
 void LinePublisher::stop() noexcept {
   stop_.store(true, std::memory_order_release);
-  wake_.signal();
+  wake();
   if (thread_.joinable()) thread_.join();
 }
 
-void LinePublisher::on_pose(const PoseSample& sample) noexcept {
-  if (!poses_.push({sample, monotonic_now()})) dropped_.fetch_add(1, std::memory_order_relaxed);
-  wake_.signal();
+void LinePublisher::wake() noexcept { (void)::eventfd_write(wake_.get(), 1); }
+
+void LinePublisher::on_start(const SessionStart& start) noexcept {
+  start_ = start;
+  started_.store(true, std::memory_order_release);
 }
 
+void LinePublisher::on_pose(const PoseSample& sample) noexcept {
+  if (!frames_.push(builder_.add(sample, monotonic_now())))
+    dropped_.fetch_add(1, std::memory_order_relaxed);
+  wake();
+}
+
+// A session has fewer alignments and calibrations in a second than their rings hold; one that finds
+// no room is replaced by the next one.
 void LinePublisher::on_placement(const Placement& placement, const Geodetic& origin) noexcept {
-  // Eight that wait are more than a session has in its first minutes; the newest is then lost
-  // until the next one.
-  (void)placements_.push({placement.T_enu_world, origin});
+  (void)placements_.push({placement, origin});
+}
+
+void LinePublisher::on_calibration(const CalibrationRecord& calibration) noexcept {
+  if (!calibration.accepted) return;
+  if (calibration.decided) verified_.store(calibration.verified, std::memory_order_relaxed);
+  (void)calibrations_.push(calibration);
+  wake();
+}
+
+void LinePublisher::on_reading(const InsRecord& reading) noexcept {
+  fix_.store(reading.sample.fix, std::memory_order_relaxed);
+  sample_ns_.store(monotonic_now().ns(), std::memory_order_relaxed);
+}
+
+void LinePublisher::on_event(const EventRecord& event) noexcept {
+  const std::string_view kind = event.kind;
+  const bool confirmed = kind == "calibration_confirmed";
+  if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed")
+    verified_.store(confirmed, std::memory_order_relaxed);
 }
 
 void LinePublisher::work() noexcept {
@@ -131,31 +84,78 @@ void LinePublisher::work() noexcept {
   // lets us.
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   for (;;) {
-    const WakeEvent::Ticket seen = wake_.ticket();
     const bool last = stop_.load(std::memory_order_acquire);
-    for (Outgoing pose; poses_.pop(&pose);) send(pose);
+    const bool begun = started_.load(std::memory_order_acquire);
+    drain();
+    const HostStamp now = monotonic_now();
+    if (begun && now >= status_due_) send_status(now);
     if (last) return;
-    wake_.wait(seen);
+    socket_->wait(wake_.get(), begun ? status_due_ - now : kBetweenStatus,
+                  [this](std::string_view request) { return answer(request); });
   }
 }
 
-void LinePublisher::send(const Outgoing& outgoing) {
-  const PoseSample& pose = outgoing.pose;
-  for (PublishedPlacement placement; placements_.pop(&placement);) placement_ = placement;
+void LinePublisher::drain() {
+  bool changed = false;
+  for (CalibrationRecord record; calibrations_.pop(&record); changed = true)
+    calibration_line_ = calibration_line(record, start_.camera_names, options_);
+  for (PublishedPlacement placement; placements_.pop(&placement); changed = true) {
+    placement_ = placement;
+    alignment_line_ = alignment_line(placement);
+  }
+  if (changed) socket_->greet(calibration_line_ + alignment_line_);
+  for (LiveFrame frame; frames_.pop(&frame);) send(frame);
+}
+
+void LinePublisher::send(const LiveFrame& frame) {
+  const PoseSample& pose = frame.pose;
+  newest_ = frame;
   std::optional<EarthPose> on_earth;
   if (placement_ && pose.status != PoseStatus::lost) on_earth = placement_->of(pose.T_world_left);
-  const HostStamp now = monotonic_now();
+  const std::optional<ClockTie>& tie = start_.tie;
   std::optional<double> age_ms;
-  if (tie_) age_ms = (tie_->stamp_at(now) - pose.stamp).to_seconds() * 1e3;
+  if (tie) age_ms = (tie->stamp_at(monotonic_now()) - pose.stamp).to_seconds() * 1e3;
   write_pose_line(pose, on_earth, age_ms, dropped_.load(std::memory_order_relaxed), &line_);
   socket_->send(line_);
   ++lines_;
   const HostStamp sent = monotonic_now();
-  behind_pose_.add((sent - outgoing.out).to_seconds() * 1e3);
-  if (!tie_) return;
-  age_.add((tie_->stamp_at(sent) - pose.stamp).to_seconds() * 1e3);
+  behind_pose_.add((sent - frame.out).to_seconds() * 1e3);
+  if (!tie) return;
+  age_.add((tie->stamp_at(sent) - pose.stamp).to_seconds() * 1e3);
   constexpr std::uint64_t kBetween = 64;  // lines: a percentile walks through thousands of bins
   if (lines_ % kBetween == 1) age_p99_ms_.store(age_.percentile(0.99), std::memory_order_relaxed);
+}
+
+void LinePublisher::send_status(HostStamp now) {
+  status_due_ = now + kBetweenStatus;
+  StreamStatus status;
+  status.session = start_.name;
+  status.frame = newest_;
+  if (newest_) status.silent_s = (now - newest_->out).to_seconds();
+  status.calibrated = !calibration_line_.empty();
+  status.verified = verified_.load(std::memory_order_relaxed);
+  status.aligned = placement_.has_value();
+  status.dropped = dropped_.load(std::memory_order_relaxed);
+  if (const std::int64_t ns = sample_ns_.load(std::memory_order_relaxed); ns != 0)
+    status.ins = {fix_.load(std::memory_order_relaxed), (now - HostStamp(ns)).to_seconds()};
+  socket_->send(status_line(status));
+}
+
+std::string LinePublisher::answer(std::string_view request) {
+  const auto parsed = nlohmann::json::parse(request, nullptr, false);
+  const std::string name =
+      parsed.is_object() && parsed.contains("request") && parsed["request"].is_string()
+          ? parsed["request"].get<std::string>()
+          : "";
+  if (name != "recalibrate")
+    return response_line(name, false,
+                         R"(unknown request; the only one is {"request": "recalibrate"})");
+  if (!started_.load(std::memory_order_acquire) || !start_.can_recalibrate)
+    return response_line(name, false,
+                         "this session does not recalibrate on request; use a live session with "
+                         "calibration.online: on");
+  requests_->recalibrate.store(true, std::memory_order_relaxed);
+  return response_line(name, true, "recalibration starts at the next frame");
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> LinePublisher::counters() {
@@ -172,7 +172,7 @@ std::vector<std::pair<std::string, std::uint64_t>> LinePublisher::counters() {
       {"line_readers_turned_away", c.turned_away},
       {"line_behind_pose_p50_us", us(behind_pose_.percentile(0.5))},
       {"line_behind_pose_p99_us", us(behind_pose_.percentile(0.99))}};
-  if (tie_)
+  if (start_.tie)
     out.insert(out.end(), {{"line_age_p50_us", us(age_.percentile(0.5))},
                            {"line_age_p99_us", us(age_.percentile(0.99))}});
   return out;

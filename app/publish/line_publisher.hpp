@@ -9,46 +9,42 @@
 #include <vector>
 
 #include "app/publish/line_socket.hpp"
+#include "app/publish/live_frame.hpp"
+#include "app/publish/pose_stream.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
-#include "core/comparison/comparison.hpp"
+#include "core/calibration/options.hpp"
 #include "core/memory/ring.hpp"
 #include "core/types/pose_sample.hpp"
-#include "drivers/common/wake_event.hpp"
+#include "core/types/rig_frame.hpp"
 
 namespace vergence::app {
 
-/// Where the odometry's world lies on the earth.
-struct PublishedPlacement {
-  Transform T_enu_world{};
-  Geodetic origin{};  // of enu
-
-  [[nodiscard]] EarthPose of(const Transform& T_world_left) const;
-};
-
-/// One JSON object and a line feed (docs/publish.md is its schema). `age_ms`: from mid-exposure
-/// to now, where stamps are tied to this machine's clock. `dropped`: lines that were not made
-/// since the start. `line` is replaced; its memory is used again.
-void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& earth,
-                     std::optional<double> age_ms, std::uint64_t dropped, std::string* line);
-
-/// `publish.lines`: one JSON object a frame to robots and bridges (docs/publish.md).
+/// `publish.lines`: the pose stream to robots and bridges (docs/publish.md). A line per frame, the
+/// calibration and the alignment when a reader connects and when they change, a status per second.
 ///
-/// Threads  on_…(): the estimator's, which pushes into a ring and wakes; no lock, no system call
-///          but the wake. Formatting and sending: a thread of its own, made by the constructor.
+/// Threads  on_…(): the estimator's, which pushes into rings and wakes; no lock, no system call
+///          but the wake. Formatting, sending and requests: a thread of its own, made by the
+///          constructor.
 /// Memory   Fixed for the estimator's part. Ring full: that line is not made, and counted.
 /// Errors   The constructor throws std::system_error when no thread can be had.
 class LinePublisher final : public SessionObserver {
  public:
-  explicit LinePublisher(std::unique_ptr<LineSocket> socket);
+  /// `requests` outlives it. `options`: what a calibration is rated by.
+  LinePublisher(std::unique_ptr<LineSocket> socket, SessionRequests* requests,
+                const calibration::CalibrationOptions& options);
   /// Sends what waits, then ends the thread.
   ~LinePublisher() override;
   LinePublisher(const LinePublisher&) = delete;
   LinePublisher& operator=(const LinePublisher&) = delete;
 
-  void on_start(const SessionStart& start) noexcept override { tie_ = start.tie; }
+  void on_start(const SessionStart& start) noexcept override;
+  void on_frame(const RigFrame& frame) noexcept override { builder_.add(frame); }
   void on_pose(const PoseSample& sample) noexcept override;
   void on_placement(const Placement& placement, const Geodetic& origin) noexcept override;
+  void on_reading(const InsRecord& reading) noexcept override;
+  void on_event(const EventRecord& event) noexcept override;
+  void on_calibration(const CalibrationRecord& calibration) noexcept override;
   /// Sends what waits first: to be called when no more poses come.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
   /// From mid-exposure to the line, ms, 99th percentile so far; negative: not known. Any thread.
@@ -58,24 +54,38 @@ class LinePublisher final : public SessionObserver {
 
  private:
   void work() noexcept;
-  struct Outgoing {
-    PoseSample pose{};
-    HostStamp out{};  // when the estimator was done
-  };
-  void send(const Outgoing& outgoing);
+  void drain();
+  void send(const LiveFrame& frame);
+  void send_status(HostStamp now);
+  [[nodiscard]] std::string answer(std::string_view request);
+  void wake() noexcept;
   void stop() noexcept;
 
   std::unique_ptr<LineSocket> socket_;
-  std::optional<ClockTie> tie_{};  // before the first pose
-  Ring<Outgoing, 64> poses_;
-  Ring<PublishedPlacement, 8> placements_;
-  std::atomic<std::uint64_t> dropped_{0};
-  std::atomic<double> age_p99_ms_{-1};
-  WakeEvent wake_;
-  std::atomic<bool> stop_{false};
+  SessionRequests* requests_;
+  calibration::CalibrationOptions options_;
+  FileDescriptor wake_;   // an eventfd
+  SessionStart start_{};  // published by started_
+  std::atomic<bool> started_{false}, stop_{false};
 
-  // Of the thread.
+  // Of the estimator's thread.
+  LiveFrameBuilder builder_;
+  // From it to the publisher's.
+  Ring<LiveFrame, 64> frames_;
+  Ring<PublishedPlacement, 8> placements_;
+  Ring<CalibrationRecord, 4> calibrations_;
+  std::atomic<std::uint64_t> dropped_{0};
+  std::atomic<bool> verified_{false};
+  std::atomic<std::int64_t> sample_ns_{0};  // arrival of the newest INS sample; 0: none
+  std::atomic<FixStatus> fix_{FixStatus::none};
+
+  std::atomic<double> age_p99_ms_{-1};
+
+  // Of the publisher's thread.
   std::optional<PublishedPlacement> placement_{};
+  std::optional<LiveFrame> newest_{};
+  std::string calibration_line_{}, alignment_line_{};
+  HostStamp status_due_{};
   std::string line_;
   std::uint64_t lines_ = 0;
   TimeHistogram age_, behind_pose_;  // ms

@@ -1,6 +1,8 @@
 #include "app/publish/line_socket.hpp"
 
 #include <netdb.h>
+#include <poll.h>
+#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -11,6 +13,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <span>
 #include <string>
 
 #include <fmt/format.h>
@@ -88,6 +91,15 @@ constexpr std::size_t kReaders = 8;  // robots have a handful of programs that w
 constexpr Duration kPatience = Duration::seconds(5);  // for a reader that does not read
 constexpr int kPending = 4;                           // connections that wait between two frames
 
+/// Waits for events; the first one is of an eventfd, which is reset.
+void wait_for(std::span<pollfd> events, Duration timeout) noexcept {
+  const auto ms = std::max<std::int64_t>(timeout.ns() / 1'000'000 + 1, 0);
+  if (::poll(events.data(), events.size(), static_cast<int>(ms)) < 0)
+    for (pollfd& event : events) event.revents = 0;
+  eventfd_t ignored = 0;
+  if (events[0].revents != 0) (void)::eventfd_read(events[0].fd, &ignored);
+}
+
 /// Takes away a socket file that nobody listens to any more: of a program that was killed.
 void remove_stale(const sockaddr_un& address, std::string_view key) {
   struct stat status {};
@@ -131,17 +143,43 @@ class UnixLineSocket final : public LineSocket {
   }
 
   void send(std::string_view line) noexcept override {
-    accept_readers();
     const HostStamp now = monotonic_now();
     for (Reader& reader : readers_)
       if (reader.socket) send(line, now, &reader);
+  }
+  void greet(std::string lines) noexcept override {
+    greeting_ = std::move(lines);
+    const HostStamp now = monotonic_now();
+    for (Reader& reader : readers_) {
+      reader.greeted = false;
+      if (reader.socket) flush(now, &reader);
+    }
+  }
+  void wait(int wake, Duration timeout, const Answer& answer) noexcept override {
+    const HostStamp now = monotonic_now();
+    std::array<pollfd, 2 + kReaders> events{};
+    events[0] = {wake, POLLIN, 0};
+    events[1] = {now >= accept_again_ ? listener_.get() : -1, POLLIN, 0};
+    for (std::size_t i = 0; i < kReaders; ++i) {
+      const Reader& reader = readers_[i];
+      // One request after the other: the next one when the answer to the last one is out.
+      const bool hears = reader.asks && reader.rest.empty();
+      events[2 + i] = {reader.socket.get(), static_cast<short>(hears ? POLLIN : 0), 0};
+    }
+    wait_for(events, timeout);
+    for (std::size_t i = 0; i < kReaders; ++i)
+      if (events[2 + i].revents != 0) hear(events[2 + i].revents, answer, &readers_[i]);
+    if (events[1].revents != 0) accept_readers();
   }
   [[nodiscard]] LineSocketCounters counters() const noexcept override { return counters_; }
 
  private:
   struct Reader {
     FileDescriptor socket;
-    std::string rest;      // of a line that went out in part; the next one waits for it
+    std::string rest;      // of lines that went out in part; the next one waits for it
+    bool greeted = false;  // has, or has in `rest`, the newest greeting
+    bool asks = true;      // has not closed its side
+    std::string asked;     // the beginning of a request
     HostStamp progress{};  // when it last took something
   };
 
@@ -149,7 +187,12 @@ class UnixLineSocket final : public LineSocket {
     for (int i = 0; i < kPending; ++i) {
       FileDescriptor socket(
           ::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-      if (!socket) return;
+      const HostStamp now = monotonic_now();
+      if (!socket) {
+        // Without descriptors to spare the connection would wake this thread for ever.
+        if (errno != EAGAIN && errno != EINTR) accept_again_ = now + Duration::seconds(1);
+        return;
+      }
       Reader* free = nullptr;
       for (Reader& reader : readers_)
         if (!reader.socket) free = &reader;
@@ -158,9 +201,10 @@ class UnixLineSocket final : public LineSocket {
         continue;
       }
       ++counters_.readers;
+      *free = Reader{};
       free->socket = std::move(socket);
-      free->rest.clear();
-      free->progress = monotonic_now();
+      free->progress = now;
+      flush(now, free);
     }
   }
 
@@ -172,15 +216,26 @@ class UnixLineSocket final : public LineSocket {
     return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -1;
   }
 
-  void send(std::string_view line, HostStamp now, Reader* reader) noexcept {
-    if (!reader->rest.empty()) {
+  /// What waits for the reader, as far as it has room: the rest of a line, then a greeting.
+  void flush(HostStamp now, Reader* reader) noexcept {
+    while (!reader->rest.empty() || !reader->greeted) {
+      if (reader->rest.empty()) {
+        reader->rest = greeting_;
+        reader->greeted = true;
+        continue;
+      }
       const ssize_t n = write(*reader, reader->rest);
       if (n < 0) return reader->socket.reset();
-      if (n > 0) reader->progress = now;
+      if (n == 0) return;
+      reader->progress = now;
       reader->rest.erase(0, static_cast<std::size_t>(n));
     }
-    const bool room = reader->rest.empty();
-    const ssize_t n = room ? write(*reader, line) : 0;
+  }
+
+  void send(std::string_view line, HostStamp now, Reader* reader) noexcept {
+    flush(now, reader);
+    if (!reader->socket) return;
+    const ssize_t n = reader->rest.empty() ? write(*reader, line) : 0;
     if (n < 0) return reader->socket.reset();
     if (n > 0) {
       reader->progress = now;
@@ -194,8 +249,30 @@ class UnixLineSocket final : public LineSocket {
     reader->socket.reset();
   }
 
+  /// Reads what a reader has sent, and answers whole lines.
+  void hear(short events, const Answer& answer, Reader* reader) noexcept {
+    constexpr std::size_t kMostRequest = 512;  // bytes
+    std::array<char, kMostRequest> bytes;
+    const ssize_t n = reader->asks && reader->rest.empty()
+                          ? ::recv(reader->socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT)
+                          : 0;
+    if (n == 0) reader->asks = false;
+    if (n <= 0 && ((events & (POLLHUP | POLLERR)) != 0 || (n < 0 && errno != EAGAIN)))
+      return reader->socket.reset();
+    if (n <= 0) return;
+    reader->asked.append(bytes.data(), static_cast<std::size_t>(n));
+    for (std::size_t end; (end = reader->asked.find('\n')) != std::string::npos;) {
+      reader->rest += answer(std::string_view(reader->asked).substr(0, end));
+      reader->asked.erase(0, end + 1);
+    }
+    if (reader->asked.size() >= kMostRequest) return reader->socket.reset();
+    flush(monotonic_now(), reader);
+  }
+
   std::string path_;
   FileDescriptor listener_;
+  HostStamp accept_again_{};
+  std::string greeting_;
   bool bound_ = false;
   std::array<Reader, kReaders> readers_{};
   LineSocketCounters counters_{};
@@ -222,6 +299,15 @@ class UdpLineSocket final : public LineSocket {
                                    std::strerror(reason)));
   }
 
+  void greet(std::string lines) noexcept override {
+    for (std::size_t begin = 0, end; (end = lines.find('\n', begin)) != std::string::npos;
+         begin = end + 1)
+      send(std::string_view(lines).substr(begin, end + 1 - begin));
+  }
+  void wait(int wake, Duration timeout, const Answer& /*answer*/) noexcept override {
+    std::array<pollfd, 1> events{{{wake, POLLIN, 0}}};
+    wait_for(events, timeout);
+  }
   void send(std::string_view line) noexcept override {
     if (::send(socket_.get(), line.data(), line.size(), MSG_DONTWAIT | MSG_NOSIGNAL) ==
         static_cast<ssize_t>(line.size()))

@@ -1,11 +1,12 @@
 #pragma once
-#include <unistd.h>
-
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <utility>
+
+#include "app/runtime/file_descriptor.hpp"
+#include "core/types/time.hpp"
 
 namespace vergence::app {
 
@@ -37,34 +38,6 @@ struct LineAddress {
 /// `key`.
 [[nodiscard]] LineAddress parse_line_address(std::string_view text, std::string_view key);
 
-/// A file descriptor that is closed with its owner. Moves; −1: none.
-class FileDescriptor {
- public:
-  FileDescriptor() = default;
-  explicit FileDescriptor(int fd) noexcept : fd_(fd) {}
-  FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept {
-    if (this != &other) {
-      reset();
-      fd_ = std::exchange(other.fd_, -1);
-    }
-    return *this;
-  }
-  ~FileDescriptor() { reset(); }
-
-  void reset() noexcept {
-    if (fd_ >= 0) ::close(fd_);
-    fd_ = -1;
-  }
-  /// Somebody else closes it from now on.
-  void release() noexcept { fd_ = -1; }
-  [[nodiscard]] int get() const noexcept { return fd_; }
-  [[nodiscard]] explicit operator bool() const noexcept { return fd_ >= 0; }
-
- private:
-  int fd_ = -1;
-};
-
 /// What became of the lines at the socket.
 struct LineSocketCounters {
   std::uint64_t sent = 0;     // lines that a reader was given, each reader counted
@@ -76,13 +49,22 @@ struct LineSocketCounters {
 
 /// Where lines go: a Unix stream socket with a few readers, or datagrams to one address.
 ///
-/// Threads  One caller. Nothing waits: a reader without room loses whole lines, never a part of
-///          one, and is disconnected when it does not read for a while.
+/// Threads  One caller. Sending never waits: a reader without room loses whole lines, never a part
+///          of one, and is disconnected when it does not read for a while.
 /// Errors   The constructors throw InputError: what, where, what to do. Afterwards counters.
 class LineSocket {
  public:
+  /// A request's answer, line feed included. The request has none.
+  using Answer = std::function<std::string(std::string_view request)>;
+
   virtual ~LineSocket() = default;
   virtual void send(std::string_view line) noexcept = 0;
+  /// Lines that every reader is given now, and readers that connect later are given first. They are
+  /// never lost: a reader without room gets them as soon as it has.
+  virtual void greet(std::string lines) noexcept = 0;
+  /// Returns when `wake`, an eventfd, was written to, which is then reset, or after `timeout`, or
+  /// earlier. Readers are accepted and their requests answered meanwhile; datagrams bring none.
+  virtual void wait(int wake, Duration timeout, const Answer& answer) noexcept = 0;
   [[nodiscard]] virtual LineSocketCounters counters() const noexcept = 0;
 };
 

@@ -166,7 +166,7 @@ void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
 }
 
 void LivePage::on_placement(const Placement& placement, const Geodetic& origin) noexcept {
-  push(&placements_, {placement.T_enu_world, origin});
+  push(&placements_, {placement, origin});
 }
 
 void LivePage::on_report(const FrameReport& report) noexcept { push(&reports_, report); }

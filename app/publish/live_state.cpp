@@ -26,18 +26,6 @@ std::string text_of(const json& value) {
   return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-const char* to_words(Pairing pairing) {
-  switch (pairing) {
-    case Pairing::assumed:
-      return "assumed";
-    case Pairing::proven:
-      return "proven";
-    case Pairing::contradicted:
-      return "contradicted";
-  }
-  return "";
-}
-
 json event_json(const EventRecord& event, Stamp first) {
   return {{"s", rounded((event.stamp - first).to_seconds(), 1)},
           {"kind", event.kind},
@@ -197,7 +185,7 @@ json LiveState::calibration_json() const {
 namespace {
 
 json placement_json(const PublishedPlacement& placement) {
-  const Transform& T = placement.T_enu_world;
+  const Transform& T = placement.placement.T_enu_world;
   json rows = json::array();
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 4; ++j) rows.push_back(j < 3 ? T.R(i, j) : T.t(i));
@@ -248,31 +236,6 @@ std::string LiveState::update(HostStamp now, double line_age_ms) {
   if (std::exchange(calibration_new_, false)) out["calibration"] = calibration_json();
   if (std::exchange(placement_new_, false)) out["placement"] = placement_json(*placement_);
   return text_of(out);
-}
-
-void LiveFrameBuilder::add(const RigFrame& frame) noexcept {
-  if (any_ && frame.number > frame_.number + 1) now_.missing += frame.number - frame_.number - 1;
-  any_ = true;
-  frame_ = frame;
-}
-
-const LiveFrame& LiveFrameBuilder::add(const PoseSample& sample, HostStamp now) noexcept {
-  now_.pose = sample;
-  now_.out = now;
-  ++now_.read;
-  ++(sample.status == PoseStatus::ok         ? now_.ok
-     : sample.status == PoseStatus::degraded ? now_.degraded
-                                             : now_.lost);
-  if (sample.status != PoseStatus::lost) {
-    const Vec3& position = sample.T_world_left.t;
-    if (last_position_) now_.path_m += (position - *last_position_).norm();
-    last_position_ = position;
-  }
-  now_.stamp_error = frame_.stamp_error;
-  now_.spread = frame_.spread;
-  now_.pairing = frame_.pairing;
-  now_.age_ms = tie_ ? (tie_->stamp_at(now) - sample.stamp).to_seconds() * 1e3 : -1;
-  return now_;
 }
 
 namespace {

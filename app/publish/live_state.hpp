@@ -10,7 +10,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "app/publish/line_publisher.hpp"
+#include "app/publish/live_frame.hpp"
 #include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
@@ -46,19 +46,6 @@ class LiveTrail {
   std::vector<Place> places_{};
   float least_step_m_ = 0.5F;
   std::size_t shown_ = 0;  // places that a viewer has as they are
-};
-
-/// One frame for the live page, with what has been counted up to it: figures stay true when
-/// frames are left out.
-struct LiveFrame {
-  PoseSample pose{};
-  HostStamp out{};  // when the estimator was done
-  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
-  std::uint64_t missing = 0;  // numbers of frames that never came
-  double path_m = 0;
-  Duration stamp_error{}, spread{};
-  Pairing pairing = Pairing::assumed;
-  double age_ms = -1;  // from mid-exposure to the pose; negative: not known
 };
 
 /// What the live page shows, kept so that a viewer who comes late sees the whole drive.
@@ -105,25 +92,6 @@ class LiveState {
   bool calibration_new_ = false;
   std::optional<PublishedPlacement> placement_{};
   bool placement_new_ = false;
-};
-
-/// Counts a drive's frames and poses into the LiveFrame of each. One thread; no heap.
-class LiveFrameBuilder {
- public:
-  /// `tie`: without one ages are not known.
-  void begin(const std::optional<ClockTie>& tie) noexcept { tie_ = tie; }
-  /// The frame that the next pose is of; its images live as long as the caller's.
-  void add(const RigFrame& frame) noexcept;
-  /// Its pose, made at `now`.
-  [[nodiscard]] const LiveFrame& add(const PoseSample& sample, HostStamp now) noexcept;
-  [[nodiscard]] const RigFrame& frame() const noexcept { return frame_; }
-
- private:
-  std::optional<ClockTie> tie_{};
-  RigFrame frame_{};
-  bool any_ = false;
-  LiveFrame now_{};
-  std::optional<Vec3> last_position_;
 };
 
 }  // namespace vergence::app

@@ -58,7 +58,8 @@ Publishing::Publishing(const Configuration& configuration) {
   if (!settings.lines.empty()) {
     const LineAddress address = parse_line_address(settings.lines, "publish.lines");
     try {
-      lines_ = std::make_unique<LinePublisher>(open_line_socket(address, "publish.lines"));
+      lines_ = std::make_unique<LinePublisher>(open_line_socket(address, "publish.lines"),
+                                               &requests_, configuration.calibration);
     } catch (const InputError& e) {
       fmt::print(stderr, "vergence: {}; the drive goes on without lines\n", e.what());
     }

@@ -18,6 +18,12 @@ void put_quaternion(CdrWriter* out, const Mat3& R) noexcept {
   out->put(q.x()).put(q.y()).put(q.z()).put(q.w());
 }
 
+/// Of geometry_msgs/Pose and geometry_msgs/Transform.
+void put_pose(CdrWriter* out, const Transform& T) noexcept {
+  put_vector(out, T.t);
+  put_quaternion(out, T.R);
+}
+
 void put_matrix(CdrWriter* out, const Mat3& M) noexcept {
   for (int i = 0; i < 9; ++i) out->put(M(i / 3, i % 3));
 }
@@ -104,17 +110,23 @@ void write_camera_info(CdrWriter* out, Stamp stamp, std::string_view frame,
   out->boolean(false);
 }
 
-void write_nav_sat_fix(CdrWriter* out, const InsSample& s) noexcept {
-  out->header(s.stamp, "ins");
-  const bool fix = s.fix == FixStatus::fix_2d || s.fix == FixStatus::fix_3d;
+void write_nav_sat_fix(CdrWriter* out, Stamp stamp, std::string_view frame,
+                       const FixMessage& fix) noexcept {
+  out->header(stamp, frame);
   constexpr std::uint16_t kGps = 1;
-  out->put(static_cast<std::int8_t>(fix ? 0 : -1)).put(kGps);
-  out->put(s.position.latitude_deg).put(s.position.longitude_deg).put(s.position.height_m);
-  const double horizontal = s.position_sigma * s.position_sigma;
-  out->items(std::array{horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0,
-                        s.height_sigma * s.height_sigma});
-  constexpr std::uint8_t kUnknown = 0, kDiagonalKnown = 2;
-  out->put(s.position_sigma > 0 ? kDiagonalKnown : kUnknown);
+  out->put(static_cast<std::int8_t>(fix.fix ? 0 : -1)).put(kGps);
+  out->put(fix.position.latitude_deg).put(fix.position.longitude_deg).put(fix.position.height_m);
+  out->items(fix.covariance).put(static_cast<std::uint8_t>(fix.known));
+}
+
+void write_nav_sat_fix(CdrWriter* out, const InsSample& s) noexcept {
+  FixMessage fix;
+  fix.fix = s.fix == FixStatus::fix_2d || s.fix == FixStatus::fix_3d;
+  fix.position = s.position;
+  fix.covariance[0] = fix.covariance[4] = s.position_sigma * s.position_sigma;
+  fix.covariance[8] = s.height_sigma * s.height_sigma;
+  if (s.position_sigma > 0) fix.known = FixMessage::Known::diagonal;
+  write_nav_sat_fix(out, s.stamp, "ins", fix);
 }
 
 void write_imu(CdrWriter* out, const InsSample& s) noexcept {
@@ -141,38 +153,65 @@ void write_ins_reading(CdrWriter* out, const InsSample& s, const InsQuality& q) 
   put_crc(out);
 }
 
+void write_odometry(CdrWriter* out, Stamp stamp, std::string_view frame, std::string_view child,
+                    const OdometryMessage& odometry) noexcept {
+  out->header(stamp, frame).text(child);
+  put_pose(out, odometry.pose);
+  out->items(odometry.pose_covariance);
+  put_vector(out, odometry.linear);
+  put_vector(out, odometry.angular);
+  out->items(odometry.twist_covariance);
+}
+
 void write_odometry(CdrWriter* out, const PoseSample& sample) noexcept {
-  out->header(sample.stamp, "world").text("left");
-  const bool posed = sample.status != PoseStatus::lost;
-  const Transform T = posed ? sample.T_world_left : Transform{};
-  put_vector(out, T.t);
-  put_quaternion(out, T.R);
-  std::array<double, 36> covariance = full_matrix(sample.covariance);
-  if (!posed) covariance[0] = -1.0;
-  out->items(covariance);
-  put_vector(out, Vec3::Zero());
-  put_vector(out, Vec3::Zero());
-  covariance = {};
-  covariance[0] = -1.0;  // the speed is not measured
+  OdometryMessage odometry;
+  odometry.pose_covariance = full_matrix(sample.covariance);
+  if (sample.status != PoseStatus::lost)
+    odometry.pose = sample.T_world_left;
+  else
+    odometry.pose_covariance[0] = -1.0;
+  odometry.twist_covariance[0] = -1.0;  // the speed is not measured
+  write_odometry(out, sample.stamp, "world", "left", odometry);
+}
+
+void write_pose_with_covariance(CdrWriter* out, Stamp stamp, std::string_view frame,
+                                const Transform& pose,
+                                const std::array<double, 36>& covariance) noexcept {
+  out->header(stamp, frame);
+  put_pose(out, pose);
   out->items(covariance);
 }
 
+void write_transforms(CdrWriter* out, Stamp stamp,
+                      std::span<const NamedTransform> transforms) noexcept {
+  out->count(transforms.size());
+  for (const NamedTransform& t : transforms) {
+    out->header(stamp, t.parent).text(t.child);
+    put_pose(out, t.T_parent_child);
+  }
+}
+
 void write_pose_transform(CdrWriter* out, const PoseSample& sample) noexcept {
-  out->count(1).header(sample.stamp, "world").text("left");
-  put_vector(out, sample.T_world_left.t);
-  put_quaternion(out, sample.T_world_left.R);
+  write_transforms(out, sample.stamp,
+                   std::array{NamedTransform{"world", "left", sample.T_world_left}});
 }
 
 void write_rig_transforms(CdrWriter* out, Stamp stamp, const RigCalibration& rig,
                           std::span<const std::string_view> names) noexcept {
+  std::array<NamedTransform, kMaxCameras> transforms;
   const auto cameras = std::min(static_cast<std::size_t>(rig.cameras), names.size());
-  out->count(cameras > 0 ? cameras - 1 : 0);
-  for (std::size_t k = 1; k < cameras; ++k) {
-    // ROS writes where the child is in its parent.
-    const Transform T_left_camera = rig.T_camera_left[k].inverse();
-    out->header(stamp, names[0]).text(names[k]);
-    put_vector(out, T_left_camera.t);
-    put_quaternion(out, T_left_camera.R);
+  for (std::size_t k = 1; k < cameras; ++k)
+    transforms[k - 1] = {names[0], names[k], rig.T_camera_left[k].inverse()};
+  write_transforms(out, stamp, std::span(transforms).first(cameras > 0 ? cameras - 1 : 0));
+}
+
+void write_diagnostics(CdrWriter* out, Stamp stamp,
+                       std::span<const DiagnosticMessage> diagnostics) noexcept {
+  out->header(stamp, "").count(diagnostics.size());
+  for (const DiagnosticMessage& d : diagnostics) {
+    out->put(static_cast<std::uint8_t>(d.level)).text(d.name).text(d.message).text("vergence");
+    out->count(d.values.size());
+    for (const auto& [key, value] : d.values) out->text(key).text(value);
   }
 }
 
@@ -186,8 +225,7 @@ void write_frame(CdrWriter* out, const FrameRecord& f) noexcept {
   const PoseSample& s = f.sample;
   out->put(static_cast<std::uint8_t>(s.state)).put(static_cast<std::uint8_t>(s.status));
   out->put(static_cast<std::uint8_t>(s.reason));
-  put_vector(out, s.T_world_left.t);
-  put_quaternion(out, s.T_world_left.R);
+  put_pose(out, s.T_world_left);
   out->put(static_cast<std::int32_t>(s.inliers)).put(s.reprojection_px).put(s.estimate_ms);
   out->put(s.effort.points_percent).put(s.effort.window_keyframes).put(s.effort.window_steps);
   put_crc(out);
@@ -236,6 +274,10 @@ constexpr std::array kDefinitions{
                "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"},
     Definition{"tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
     Definition{"std_msgs/String", "string data\n"},
+    Definition{"geometry_msgs/PoseWithCovarianceStamped",
+               "std_msgs/Header header\ngeometry_msgs/PoseWithCovariance pose\n"},
+    Definition{"diagnostic_msgs/DiagnosticArray",
+               "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"},
     // What one call of the estimator was given and what came of it: all that a replay needs beside
     // the images. `crc` is the CRC-32 of the message's bytes before it, `image_crc` that of pixels.
     Definition{"vergence_msgs/Frame",
@@ -261,6 +303,10 @@ constexpr std::array kDefinitions{
                "int64[] exposure_start_ns\nint64[] exposure_end_ns\nbool mapped\n"
                "int64 edge_ns\nint64 edge_error_ns\n"},
     // What those are made of.
+    Definition{"diagnostic_msgs/DiagnosticStatus",
+               "byte level\nstring name\nstring message\nstring hardware_id\n"
+               "diagnostic_msgs/KeyValue[] values\n"},
+    Definition{"diagnostic_msgs/KeyValue", "string key\nstring value\n"},
     Definition{"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},
     Definition{"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
     Definition{"sensor_msgs/RegionOfInterest",
@@ -285,10 +331,18 @@ constexpr std::array kDefinitions{
 };
 
 constexpr std::array<std::string_view, kRosTypes> kNames{
-    "sensor_msgs/msg/Image",  "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/NavSatFix",
-    "sensor_msgs/msg/Imu",    "nav_msgs/msg/Odometry",      "tf2_msgs/msg/TFMessage",
-    "std_msgs/msg/String",    "vergence_msgs/msg/Frame",    "vergence_msgs/msg/InsReading",
-    "vergence_msgs/msg/Pulse"};
+    "sensor_msgs/msg/Image",
+    "sensor_msgs/msg/CameraInfo",
+    "sensor_msgs/msg/NavSatFix",
+    "sensor_msgs/msg/Imu",
+    "nav_msgs/msg/Odometry",
+    "tf2_msgs/msg/TFMessage",
+    "std_msgs/msg/String",
+    "vergence_msgs/msg/Frame",
+    "vergence_msgs/msg/InsReading",
+    "vergence_msgs/msg/Pulse",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "diagnostic_msgs/msg/DiagnosticArray"};
 
 const Definition* find(std::string_view name) {
   for (const Definition& d : kDefinitions)

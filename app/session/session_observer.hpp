@@ -27,13 +27,14 @@ struct ClockTie {
 
 /// What is known of a session before its first frame.
 struct SessionStart {
-  std::string name{};             // of the session folder
-  Stamp first{};                  // of the drive
-  std::uint64_t frames = 0;       // of the whole drive; 0: nobody knows
-  std::optional<ClockTie> tie{};  // none in a replay and in virtual time
-  std::size_t image_bytes = 0;    // of one frame of the largest camera
-  bool can_recalibrate = false;   // SessionRequests::recalibrate is listened to
-  bool recording = false;         // a drive.mcap is written
+  std::string name{};                       // of the session folder
+  std::vector<std::string> camera_names{};  // those of the calibration, each once
+  Stamp first{};                            // of the drive
+  std::uint64_t frames = 0;                 // of the whole drive; 0: nobody knows
+  std::optional<ClockTie> tie{};            // none in a replay and in virtual time
+  std::size_t image_bytes = 0;              // of one frame of the largest camera
+  bool can_recalibrate = false;             // SessionRequests::recalibrate is listened to
+  bool recording = false;                   // a drive.mcap is written
 };
 
 /// What a viewer may ask of a running session. Acts at the next frame.

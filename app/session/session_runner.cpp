@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "app/runtime/nearest.hpp"
 #include "app/runtime/service_manager.hpp"
 #include "app/session/calibration_writer.hpp"
 #include "app/session/drive_recorder.hpp"
@@ -220,7 +221,9 @@ SessionStart SessionRunner::session_start() const {
   start.first = facts_.first;
   start.frames = facts_.frames;
   start.tie = facts_.tie;
-  const RigCalibration& rig = facts_.begin.file.rig;
+  const CalibrationFile& file = facts_.begin.file;
+  const RigCalibration& rig = file.rig;
+  start.camera_names = distinct_names({file.names.begin(), file.names.begin() + rig.cameras});
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
     start.image_bytes =
         std::max(start.image_bytes, static_cast<std::size_t>(rig.intrinsics[k].width) *

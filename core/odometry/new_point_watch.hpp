@@ -2,14 +2,14 @@
 
 namespace vergence::odometry {
 
-/// Whether most of the points made lately do not fit the pose. Where the pose follows what moves in
-/// front of the scene they are lost as soon as they are made.
-/// Threads  One. Memory: none of the heap.
+/// Whether most of the points made lately do not fit the pose but another motion. Where the pose
+/// follows what moves in front of the scene they are lost as soon as they are made. Threads  One.
+/// Memory: none of the heap.
 class NewPointWatch {
  public:
-  /// New points that were looked for in a frame, and how many of them were found where they should
-  /// be. Few at a time are judged together: else one blurred frame's verdict stood until many came
-  /// at once.
+  /// New points that were looked for in a frame, and how many of them do not move by themselves.
+  /// Few at a time are judged together: else one blurred frame's verdict stood until many came at
+  /// once.
   void add(int tried, int kept) noexcept {
     tried_ += tried;
     kept_ += kept;

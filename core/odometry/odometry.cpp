@@ -131,8 +131,7 @@ double Odometry::new_points(int at_least, FrameOutcome* out) noexcept {
 void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept {
   out->status = PoseStatus::degraded;
   // New points are made by the calibration, and without one they say nothing.
-  out->moving =
-      fit.inliers < kRigidShare * fit.given || (link_ == Link::linked && new_points_.lost());
+  out->moving = others_move_ || (link_ == Link::linked && new_points_.lost());
   const Reason of_images = weakness(images, rig_.cameras);
   if (of_images != Reason::none)
     out->reason = of_images;

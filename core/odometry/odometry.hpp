@@ -174,6 +174,7 @@ class Odometry {
   MotionModel motion_;
   GapWatch gaps_;
   NewPointWatch new_points_;
+  bool others_move_ = false;  // in this frame
 
   int frames_lost_ = 0;        // in a row, with images that show something
   bool stereo_fails_ = false;  // hardly any of the points that the other cameras saw before are

@@ -49,20 +49,35 @@ PoseEstimator::PoseEstimator(const OdometryOptions& options, const RigCalibratio
       agrees_all_(arena.make<std::uint8_t>(kMaxPoints, "pose flags of all cameras")),
       random_(options.seed) {}
 
+bool PoseEstimator::collect_point(const Map& map, std::size_t i, std::uint8_t cameras) noexcept {
+  const MapPoint& p = map.points()[i];
+  if (!table_.push(p.p_world, p.now.sigma[static_cast<std::size_t>(std::countr_zero(cameras))]))
+    return false;
+  for (int k = 0; k < rig_.cameras; ++k)
+    if (((cameras >> static_cast<unsigned>(k)) & 1U) != 0)
+      table_.see(k, p.now.pixel[static_cast<std::size_t>(k)].cast<double>());
+  return owner_.push(static_cast<std::uint16_t>(i));
+}
+
 void PoseEstimator::collect(const Map& map) noexcept {
   table_.set_rig(rig_);
   table_.clear();
   owner_.clear();
-  const std::span<const MapPoint> points = map.points();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const MapPoint& p = points[i];
-    if (!p.holds_poses() || p.now.cameras == 0) continue;
-    const auto first = static_cast<std::size_t>(std::countr_zero(p.now.cameras));
-    if (!table_.push(p.p_world, p.now.sigma[first])) return;
-    for (int k = 0; k < rig_.cameras; ++k)
-      if (p.now.by(k)) table_.see(k, p.now.pixel[static_cast<std::size_t>(k)].cast<double>());
-    (void)owner_.push(static_cast<std::uint16_t>(i));
+  for (std::size_t i = 0; i < map.points().size(); ++i) {
+    const MapPoint& p = map.points()[i];
+    if (p.holds_poses() && p.now.cameras != 0 && !collect_point(map, i, p.now.cameras)) return;
   }
+}
+
+bool PoseEstimator::others_move(const Map& map, const Transform& T_left_world) noexcept {
+  table_.set_rig(rig_);
+  table_.clear();
+  owner_.clear();
+  for (std::size_t i = 0; i < map.points().size(); ++i) {
+    const MapPoint& p = map.points()[i];
+    if (p.in_images != 0 && p.now.cameras == 0 && !collect_point(map, i, p.in_images)) break;
+  }
+  return holds_camera(solve(T_left_world, true));
 }
 
 void PoseEstimator::collect_camera(const Map& map, int k) noexcept {

@@ -52,6 +52,10 @@ class PoseEstimator {
   [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
                                 Transform* T_camera_world) noexcept;
 
+  /// After settle_points(): whether what was found and does not fit the pose agrees on another
+  /// motion. Wrong matches, as of things that look alike, agree on none.
+  [[nodiscard]] bool others_move(const Map& map, const Transform& T_left_world) noexcept;
+
   /// From the next fit on: whether observations that are grossly off are left out of a fit by
   /// refinement alone (as they are to begin with) or count as much as Huber's loss lets them. What
   /// sampling began with is rough: there they always count.
@@ -70,6 +74,8 @@ class PoseEstimator {
     Mat6 covariance = Mat6::Zero();
   };
   void collect(const Map& map) noexcept;
+  /// One row of the table; false: it is full.
+  bool collect_point(const Map& map, std::size_t i, std::uint8_t cameras) noexcept;
   void collect_camera(const Map& map, int k) noexcept;
   [[nodiscard]] Solved solve(const Transform& start, bool sample) noexcept;
   /// Of the camera's own pose, solved from all rows of the table.

@@ -9,6 +9,10 @@ if(VERGENCE_CHECKERBOARD)
   # OPTIONAL: a build of the target vergence alone has none.
   install(TARGETS vergence-checkerboard RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/vergence COMPONENT checkerboard OPTIONAL)
 endif()
+if(VERGENCE_ROS2)
+  install(TARGETS vergence-ros2 RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ros2 OPTIONAL)
+  install(FILES ${packaging}/vergence-ros2.service DESTINATION lib/systemd/system COMPONENT ros2)
+endif()
 file(GLOB configurations CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/app/config/*.yaml)
 install(FILES ${configurations} DESTINATION ${CMAKE_INSTALL_DATADIR}/vergence/config COMPONENT program)
 

@@ -44,6 +44,7 @@ class ChildProgram {
   ChildProgram& operator=(const ChildProgram&) = delete;
 
   void signal(int number) const { (void)::kill(pid_, number); }
+  [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] int terminal() const { return terminal_; }
   void close_terminal() {
     if (terminal_ >= 0) (void)::close(terminal_);

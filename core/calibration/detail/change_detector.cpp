@@ -25,7 +25,6 @@ constexpr std::size_t kScatterBlocks =
 // Of the blocks older than so many only every fourth is asked whether it is the onset: a search
 // every frame of an alarm costs little then.
 constexpr std::size_t kFineBlocks = 24, kCoarse = 4;
-constexpr double kPriorSigma = 0.2;  // rad: of directions nothing was seen of
 constexpr double kRelease = 0.5;  // of the threshold: an alarm stands until the statistic is below
 constexpr double kRampShare = 0.05;  // a ramp's best step explains 8/9 of it
 constexpr double kRampMargin = 10;   // gain by which a drift must beat a knock
@@ -126,14 +125,7 @@ Evidence ChangeDetector::effective(const Evidence& sum) const noexcept {
 
 double ChangeDetector::statistic(const Evidence& e, const Vec5& mean,
                                  const Mat5& covariance) noexcept {
-  const Mat5 A = information(e);
-  const Mat5 M = A + A * covariance * A;
-  std::array<double, kTriangle> packed{};
-  for (int i = 0; i < kTheta; ++i)
-    for (int j = 0; j <= i; ++j) packed[lower(i, j)] = M(i, j);
-  Theta g = e.g;
-  Eigen::Map<Vec5>(g.data()) -= A * mean;
-  return Solved(packed, g).gain();
+  return gain(e.A + e.A * covariance * e.A, e.g - e.A * mean);
 }
 
 void ChangeDetector::learn(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept {
@@ -144,17 +136,15 @@ void ChangeDetector::learn(const Evidence& window, Vec5* mean, Mat5* covariance)
   Evidence e;
   e.add(past, 1.0 / lambda_);
   // (C⁻¹ + A)⁻¹, written so that neither need have an inverse.
-  const Mat5 spread = Mat5::Identity() + covariance_ * information(e);
+  const Mat5 spread = Mat5::Identity() + covariance_ * e.A;
   *covariance = lu_solve(spread, covariance_);
-  *mean = *covariance * Eigen::Map<const Vec5>(e.g.data());
+  *mean = *covariance * e.g;
 }
 
 void ChangeDetector::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept {
-  Mat5 A = information(e);
-  A.diagonal().array() += 1.0 / (kPriorSigma * kPriorSigma);
-  const Cholesky<5> factor(A);
+  const Cholesky<5> factor = with_prior(e.A);
   *covariance = factor.inverse();
-  *theta = factor.solve(Vec5(Eigen::Map<const Vec5>(e.g.data())));
+  *theta = factor.solve(e.g);
 }
 
 double ChangeDetector::single(const Evidence& frame, double spread) const noexcept {
@@ -208,25 +198,20 @@ Decision ChangeDetector::decide() noexcept {
 void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
   // Σ e, Σ age e, Σ age² e from now back, from which a ramp's sums follow.
   Evidence zeroth, first, second;
-  const auto gain = [&](const Evidence& e) noexcept {
-    Theta g = e.g;
-    Eigen::Map<Vec5>(g.data()) -= information(e) * mean;
-    return Solved(e.A, g).gain() / lambda_;
-  };
   const auto take = [&](const Entry& entry, double age, int frames, bool ask) {
     zeroth.add(entry.evidence);
     first.add(entry.evidence, age);
     second.add(entry.evidence, age * age);
     if (!ask) return;
     const auto keep = [&](Onset* best, const Evidence& sum) {
-      if (const double g = gain(sum); g > best->gain) *best = Onset{g, entry.frame, frames, sum};
+      if (const double g = gain(sum.A, sum.g - sum.A * mean) / lambda_; g > best->gain)
+        *best = Onset{g, entry.frame, frames, sum};
     };
     keep(&found->step, zeroth);
     if (frames < kRampFrames) return;
     Evidence ramp = zeroth;  // weight 1 − age/frames
-    for (std::size_t i = 0; i < ramp.g.size(); ++i) ramp.g[i] -= first.g[i] / frames;
-    for (std::size_t i = 0; i < ramp.A.size(); ++i)
-      ramp.A[i] += (second.A[i] / frames - 2 * first.A[i]) / frames;
+    ramp.g -= first.g / frames;
+    ramp.A += (second.A / frames - 2 * first.A) / frames;
     keep(&found->ramp, ramp);
   };
   // Single frames up to a block's edge, then blocks.

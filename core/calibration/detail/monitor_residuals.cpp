@@ -15,8 +15,6 @@ constexpr double kMinScale = 0.1;  // of the sigma the observations claim
 // An M-estimate's covariance has E ψ' where this code sums E w: (E w / E ψ')² for Gaussian errors
 // at kTukey.
 constexpr double kTukeySpread = 1.46;
-constexpr double kFitSigma =
-    0.1;  // rad: prior that keeps a frame's own fit from running off where it sees nothing
 constexpr std::uint64_t kTrackGap = 30;  // frames: a number seen after longer is another track
 
 Vec2 ray(const Pinhole& k, const Vec2& pixel) noexcept {
@@ -43,10 +41,9 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     if (!(s.sigma_px > 0) || !s.left.allFinite() || !s.right.allFinite()) continue;
     StereoRow& row = stereo_[rows_];
     const Vec2 left = ray(c.left, s.left), right = ray(c.right, s.right);
-    Vec5 J;
-    if (c.epipolar.to_line(left, right, &row.r, &J) != EpipolarStatus::ok) continue;
+    if (c.epipolar.to_line(left, right, &row.r, &row.J) != EpipolarStatus::ok) continue;
     row.r *= f;
-    for (int i = 0; i < kTheta; ++i) row.J[static_cast<std::size_t>(i)] = f * J[i];
+    row.J *= f;
     row.inverse_sigma2 =
         1.0 / (2.0 * s.sigma_px * s.sigma_px);  // two images' errors across the line
     row.track = s.track;
@@ -57,9 +54,7 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
 
   Vec5 fit = Vec5::Zero();
   for (int round = 0; round < kStereoRounds; ++round) {
-    const auto rest = [&](const StereoRow& row) {
-      return row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit);
-    };
+    const auto rest = [&](const StereoRow& row) { return row.r + row.J.dot(fit); };
     for (std::size_t i = 0; i < rows_; ++i)
       sizes_[i] = std::abs(rest(stereo_[i])) * std::sqrt(stereo_[i].inverse_sigma2);
     const double scale =
@@ -71,22 +66,11 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
       const double d = rest(row);
       row.weight = row.inverse_sigma2 * tukey(d * d * row.inverse_sigma2, kTukey * scale);
       if (row.weight == 0) continue;
-      std::size_t at = 0;
-      for (std::size_t a = 0; a < kTheta; ++a) {
-        const double wa = row.weight * row.J[a];
-        e.g[a] -= wa * row.r;
-        for (std::size_t b = 0; b <= a; ++b) e.A[at++] += wa * row.J[b];
-      }
+      e.g -= row.weight * row.r * row.J;
+      e.A.noalias() += row.weight * row.J * row.J.transpose();
       e.n += row.weight;
     }
-    std::array<double, kTriangle> A = e.A;
-    for (int i = 0; i < kTheta; ++i) A[lower(i, i)] += 1.0 / (kFitSigma * kFitSigma);
-    const Solved solved(A, e.g);
-    for (int i = kTheta - 1; i >= 0; --i) {  // back through Lᵀ
-      double s = solved.y[static_cast<std::size_t>(i)];
-      for (int k = i + 1; k < kTheta; ++k) s -= solved.L[lower(k, i)] * fit[k];
-      fit[i] = s / solved.L[lower(i, i)];
-    }
+    fit = with_prior(e.A).solve(e.g);
   }
   look.usable = std::count_if(stereo_.begin(), stereo_.begin() + static_cast<std::ptrdiff_t>(rows_),
                               [](const StereoRow& r) { return r.weight > 0; }) >= min_matches;
@@ -99,33 +83,19 @@ void MonitorResiduals::spread_of(const Evidence& evidence, const Vec5& fit, std:
   // With x the part of a track in the gradient's noise and A = L Lᵀ: trace A⁻¹ Σ x xᵀ = Σ |L⁻¹ x|²,
   // and the variance that the frame adds to a running sum is Σ (x xᵀ + x sᵀ + s xᵀ), s what the
   // track brought before.
-  const Solved factor(evidence.A, evidence.g);
-  std::array<double, kTheta> inverse;
-  for (int i = 0; i < kTheta; ++i)
-    inverse[static_cast<std::size_t>(i)] = 1.0 / factor.L[lower(i, i)];
-  const auto whitened = [&](std::array<double, kTheta>& v) {
-    for (int i = 0; i < kTheta; ++i) {
-      const auto ii = static_cast<std::size_t>(i);
-      double s = v[ii];
-      for (int k = 0; k < i; ++k) s -= factor.L[lower(i, k)] * v[static_cast<std::size_t>(k)];
-      v[ii] = s * inverse[ii];
-    }
-  };
+  const Mat5 whiten = with_prior(evidence.A).whitening();
   double now = 0, before = 0;
   for (std::size_t i = 0; i < rows_; ++i) {
     const StereoRow& row = stereo_[i];
-    const double size = row.weight * (row.r + Eigen::Map<const Vec5>(row.J.data()).dot(fit));
-    std::array<double, kTheta> x, white;
-    for (std::size_t a = 0; a < kTheta; ++a) white[a] = x[a] = size * row.J[a];
-    whitened(white);
-    for (const double a : white) now += a * a;
+    const Vec5 x = row.weight * (row.r + row.J.dot(fit)) * row.J;
+    const Vec5 white = whiten * x;
+    now += white.squaredNorm();
     if (!follow) continue;
     Memory& m = memories_[row.track % memories_.size()];
     if (m.frame == 0 || m.track != row.track || frame + 1 - m.frame > kTrackGap)
-      m = Memory{row.track, 0, {}};
-    std::array<double, kTheta> s = m.sum;
-    whitened(s);
-    for (std::size_t a = 0; a < kTheta; ++a) before += 2 * white[a] * s[a], m.sum[a] += x[a];
+      m = Memory{row.track, 0, Vec5::Zero()};
+    before += 2 * white.dot(whiten * m.sum);
+    m.sum += x;
     m.frame = frame + 1;
   }
   look->spread_now = kTukeySpread * now / kTheta;

@@ -43,16 +43,16 @@ class MonitorResiduals {
 
  private:
   struct StereoRow {
-    std::array<double, kTheta> J;  // px
-    double r;                      // px
-    double inverse_sigma2;         // of r, 1/px²
+    Vec5 J;                 // px
+    double r;               // px
+    double inverse_sigma2;  // of r, 1/px²
     double weight;
     std::uint32_t track;
   };
   struct Memory {
     std::uint32_t track = 0;
     std::uint64_t frame = 0;  // of the last observation, plus one; 0: empty
-    std::array<double, kTheta> sum{};
+    Vec5 sum = Vec5::Zero();
   };
   void spread_of(const Evidence& evidence, const Vec5& fit, std::uint64_t frame, bool follow,
                  StereoResiduals* look) noexcept;

@@ -13,13 +13,11 @@ constexpr double kMostBlocks = 60;      // that are remembered: half a minute at
 
 void BlockScatter::add(const Evidence& block, const Evidence& past, double lambda) noexcept {
   if (!(block.n > 0) || !(past.n > 0)) return;
-  const Mat5 A = information(block), P = information(past);
-  const Cholesky<5> of_block(A), of_past(P);
+  const Cholesky<5> of_block(block.A), of_past(past.A);
   if (!of_block.ok() || !of_past.ok()) return;
-  const Vec5 d = of_block.solve(Vec5(Eigen::Map<const Vec5>(block.g.data()))) -
-                 of_past.solve(Vec5(Eigen::Map<const Vec5>(past.g.data())));
-  const double by_noise = lambda * (kTheta + (A * of_past.inverse()).trace());
-  const double scatter = (d.dot(A * d) - by_noise) / (kTheta * block.n);
+  const Vec5 d = of_block.solve(block.g) - of_past.solve(past.g);
+  const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
+  const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
   const double most = kMostOfExpected * std::max(variance(), lambda / block.n);
   if (!(scatter < most)) return;  // also refuses NaN
   if (static_cast<double>(blocks_) >= kMostBlocks) {

@@ -38,6 +38,10 @@ WORLDS_OF_THEIR_OWN = ("firmware_iface/trigger/board/", "tests/rigs/kernel/")
 LIBRARIES = {
     "opencv2": ("app/checkerboard/", "tests/"),  # the checkerboard tool; the program needs none of it
     "opencv": ("app/checkerboard/", "tests/"),
+    "fastdds": ("app/ros2/", "tests/"),  # the ROS 2 bridge; the program links no DDS
+    "fastrtps": ("app/ros2/", "tests/"),
+    "dds": ("tests/",),  # Cyclone DDS, which reads what the bridge publishes
+    "openssl": ("tests/",),
     "png.h": ("app/datasets/", "app/recording/", "tests/"),
     "jpeglib.h": ("app/datasets/", "tests/"),
     "Eigen": ("app/", "core/", "drivers/", "tests/"),

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The unit is as closed as docs/deployment.md says (systemd's own measure: at most 3.0 of 10), and what it starts names a session folder
+# The units are as closed as docs/deployment.md says (systemd's own measure: at most 3.0 of 10), and what it starts names a session folder
 # that does not exist yet.
 #   service_test.sh PACKAGING
 set -euo pipefail
@@ -12,7 +12,9 @@ work="$(mktemp -d)"
 disk="$work/disk"
 trap 'umount "$disk" 2>/dev/null || true; rm -rf "$work"' EXIT
 
-systemd-analyze security --offline=true --threshold=30 --no-pager "$packaging/vergence.service" | tail -n 1
+for unit in vergence.service vergence-ros2.service; do
+  systemd-analyze security --offline=true --threshold=30 --no-pager "$packaging/$unit" | tail -n 1
+done
 
 # The starter with a program that prints its arguments, twice within a second: two folders.
 sed "s|/usr/bin/vergence|echo|" "$packaging/vergence-session" >"$work/start"

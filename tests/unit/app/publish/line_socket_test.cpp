@@ -1,5 +1,6 @@
 #include "app/publish/line_socket.hpp"
 
+#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -34,6 +35,12 @@ std::string all_of(const FileDescriptor& socket) {
   return text;
 }
 
+/// What the publisher does between two lines.
+void wait(LineSocket* socket, const LineSocket::Answer& answer = {}) {
+  const FileDescriptor wake(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  socket->wait(wake.get(), Duration::milliseconds(1), answer);
+}
+
 class UnixLines : public testing::Test {
  protected:
   test::TemporaryFolder folder_;
@@ -53,6 +60,7 @@ TEST_F(UnixLines, theGroupMayReadWhateverTheUmaskAndNobodyElse) {
 TEST_F(UnixLines, whoDoesNotReadLosesWholeLinesAndHoldsNobodyUp) {
   const auto socket = open_line_socket(address_, "k");
   const FileDescriptor idle = reader_of(path_), eager = reader_of(path_);
+  wait(socket.get());
   std::string eager_text;
   constexpr int kLines = 4000;
   const std::string body(500, 'x');
@@ -86,15 +94,72 @@ TEST_F(UnixLines, readersBeyondThePlacesAreTurnedAwayAndThoseWhoLeaveMakeRoom) {
   std::vector<FileDescriptor> readers;
   for (int i = 0; i < 12; ++i) {
     readers.push_back(reader_of(path_));
-    socket->send("line\n");
+    wait(socket.get());
   }
   EXPECT_EQ(socket->counters().readers, 8U);
   EXPECT_EQ(socket->counters().turned_away, 4U);
   readers.clear();
   socket->send("finds them gone\n");
   const FileDescriptor late = reader_of(path_);
+  wait(socket.get());
   socket->send("line\n");
   EXPECT_EQ(all_of(late), "line\n");
+}
+
+TEST_F(UnixLines, ReadersAreGreetedFirstAndAgainWhenTheGreetingChanges) {
+  const auto socket = open_line_socket(address_, "k");
+  const FileDescriptor early = reader_of(path_);
+  wait(socket.get());
+  socket->send("1\n");
+  socket->greet("a\n");
+  const FileDescriptor late = reader_of(path_);
+  wait(socket.get());
+  socket->send("2\n");
+  socket->greet("b\n");
+  EXPECT_EQ(all_of(early), "1\na\n2\nb\n");
+  EXPECT_EQ(all_of(late), "a\n2\nb\n");
+}
+
+TEST_F(UnixLines, AGreetingIsNotLostByAReaderWithoutRoom) {
+  const auto socket = open_line_socket(address_, "k");
+  const FileDescriptor reader = reader_of(path_);
+  wait(socket.get());
+  const std::string body(5000, 'x');
+  while (socket->counters().refused == 0) socket->send(body + "\n");
+  socket->greet("greeting\n");
+  (void)all_of(reader);
+  socket->send("");  // the rest of a line, and the greeting
+  socket->send("line\n");
+  EXPECT_TRUE(all_of(reader).ends_with("greeting\nline\n"));
+}
+
+TEST_F(UnixLines, RequestsAreAnsweredToWhoeverSentThem) {
+  const auto socket = open_line_socket(address_, "k");
+  const FileDescriptor asking = reader_of(path_), silent = reader_of(path_);
+  wait(socket.get());
+  const auto answer = [](std::string_view request) { return "<" + std::string(request) + ">\n"; };
+  const auto send = [&](const FileDescriptor& reader, std::string_view text) {
+    EXPECT_EQ(::send(reader.get(), text.data(), text.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(text.size()));
+    wait(socket.get(), answer);
+  };
+  send(asking, "hal");
+  EXPECT_EQ(all_of(asking), "");
+  send(asking, "f\ntwo\n\n");
+  EXPECT_EQ(all_of(asking), "<half>\n<two>\n<>\n");
+  // Who closes only its own side goes on reading.
+  (void)::shutdown(asking.get(), SHUT_WR);
+  wait(socket.get(), answer);
+  socket->send("line\n");
+  EXPECT_EQ(all_of(asking), "line\n");
+  // A request without an end costs the connection, not memory.
+  for (int i = 0; i < 3; ++i)
+    if (::send(silent.get(), std::string(300, 'x').data(), 300, MSG_NOSIGNAL) == 300)
+      wait(socket.get(), answer);
+  socket->send("line\n");
+  char byte = 0;
+  EXPECT_EQ(all_of(silent), "line\n") << "the one before";
+  EXPECT_LE(::recv(silent.get(), &byte, 1, MSG_DONTWAIT), 0);
 }
 
 TEST_F(UnixLines, aFileLeftBehindIsReplacedAnotherProgramsIsNot) {

@@ -1,6 +1,8 @@
 #include "app/publish/line_publisher.hpp"
 
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/eventfd.h>
 
 #include <atomic>
 #include <limits>
@@ -8,6 +10,8 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -52,7 +56,8 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   earth.position = {-27.4975, 153.0137, 60};
   earth.yaw = (90 - 358.25) * std::numbers::pi / 180;
   const auto j = line_of(sample(), earth, 21.5);
-  EXPECT_EQ(j["version"], 1);
+  EXPECT_EQ(j["version"], 2);
+  EXPECT_EQ(j["type"], "pose");
   EXPECT_EQ(j["frame"], 12);
   EXPECT_EQ(j["stamp_ns"], 1'577'836'800'500'000'001);
   EXPECT_EQ(j["state"], "stereo_odometry");
@@ -78,7 +83,7 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   EXPECT_EQ(j["estimate_ms"], 7.5);
   EXPECT_EQ(j["age_ms"], 21.5);
   EXPECT_EQ(j["dropped"], 7);
-  EXPECT_EQ(j.size(), 17U) << "a key that docs/publish.md does not have";
+  EXPECT_EQ(j.size(), 18U) << "a key that docs/publish.md does not have";
 }
 
 TEST(PoseLine, ofALostFrameHasNoPlace) {
@@ -102,16 +107,83 @@ TEST(PoseLine, staysJsonWithNumbersThatAreNone) {
   EXPECT_TRUE(j["reprojection_px"].is_null());
 }
 
-/// Keeps what it is sent; holds the publisher's thread while it is shut.
+TEST(PoseStream, CalibrationLineHoldsTheRig) {
+  CalibrationRecord record;
+  record.stamp = Stamp(5);
+  record.calibration.cameras = 2;
+  record.calibration.intrinsics[0] = {CameraModelKind::pinhole_equidistant,
+                                      640,
+                                      480,
+                                      450,
+                                      451,
+                                      322,
+                                      239,
+                                      {0.1, 0.2, 0.3, 0.4, 0},
+                                      {},
+                                      {}};
+  record.calibration.T_camera_left[1] = {exp_so3({0.01, -0.02, 0.03}), {-0.75, 0.01, -0.02}};
+  const std::vector<std::string> names{"left", "ri\"ght\xff"};
+  const auto j = nlohmann::json::parse(calibration_line(record, names, {}));
+  EXPECT_EQ(j["type"], "calibration");
+  EXPECT_TRUE(j["rating"].is_null()) << "no sigmas, no rating";
+  EXPECT_EQ(j["cameras"][0]["model"], "pinhole-equidistant");
+  EXPECT_EQ(j["cameras"][0]["intrinsics"], (std::vector<double>{450, 451, 322, 239}));
+  EXPECT_EQ(j["cameras"][0]["distortion"], (std::vector<double>{0.1, 0.2, 0.3, 0.4, 0}));
+  EXPECT_EQ(j["cameras"][1]["name"], "ri\"ght\xEF\xBF\xBD") << "JSON is UTF-8";
+  const auto T = j["cameras"][1]["T_camera_left"].get<std::vector<double>>();
+  ASSERT_EQ(T.size(), 12U);
+  EXPECT_EQ(T[3], -0.75);
+  EXPECT_EQ(T[1], record.calibration.T_camera_left[1].R(0, 1)) << "row by row";
+}
+
+TEST(PoseStream, StatusLineBeforeAndAfterTheFirstFrame) {
+  StreamStatus status;
+  status.session = "monday";
+  auto j = nlohmann::json::parse(status_line(status));
+  EXPECT_EQ(j["type"], "status");
+  for (const char* key : {"stamp_ns", "status", "frames", "ins"})
+    EXPECT_TRUE(j[key].is_null()) << key;
+  const auto keys = j.size();
+  status.frame.emplace();
+  status.frame->pose = sample();
+  status.frame->lost = 3;
+  status.frame->cameras = 2;
+  status.frame->images_present = 2;
+  status.ins = {FixStatus::fix_2d, 0.5};
+  status.aligned = true;
+  j = nlohmann::json::parse(status_line(status));
+  EXPECT_EQ(j.size(), keys);
+  EXPECT_EQ(j["status"], "degraded");
+  EXPECT_EQ(j["frames"]["lost"], 3);
+  EXPECT_EQ(j["cameras"], (std::vector<bool>{false, true}));
+  EXPECT_EQ(j["ins"]["fix"], "2d");
+  EXPECT_EQ(j["ins"]["aligned"], true);
+}
+
+/// Keeps the pose lines and the greeting; holds the publisher's thread while it is shut.
 class Kept final : public LineSocket {
  public:
   explicit Kept(std::vector<std::string>* lines, std::atomic<bool>* open)
       : lines_(lines), open_(open) {}
   void send(std::string_view line) noexcept override {
     open_->wait(false);
-    lines_->emplace_back(line);
+    if (line.find(R"("type":"pose")") != std::string_view::npos) lines_->emplace_back(line);
+  }
+  void greet(std::string lines) noexcept override { greeting = std::move(lines); }
+  void wait(int wake, Duration timeout, const Answer& answer) noexcept override {
+    pollfd event{wake, POLLIN, 0};
+    (void)::poll(&event, 1, static_cast<int>(timeout.ns() / 1'000'000) + 1);
+    eventfd_t ignored = 0;
+    if (event.revents != 0) (void)::eventfd_read(wake, &ignored);
+    if (request.empty() || event.revents == 0) return;
+    response = answer(std::exchange(request, ""));
+    answered = true;
   }
   [[nodiscard]] LineSocketCounters counters() const noexcept override { return {}; }
+
+  // Of the publisher's thread while there is one.
+  std::string greeting{}, request{}, response{};
+  std::atomic<bool> answered{false};
 
  private:
   std::vector<std::string>* lines_;
@@ -127,9 +199,10 @@ PoseSample sample(std::uint64_t frame) {
 }
 
 TEST(LinePublisher, aFullRingLosesTheNewestCountsThemAndNeverWaits) {
+  SessionRequests requests;
   std::vector<std::string> lines;
   std::atomic<bool> open{false};
-  LinePublisher publisher(std::make_unique<Kept>(&lines, &open));
+  LinePublisher publisher(std::make_unique<Kept>(&lines, &open), &requests, {});
   publisher.on_start({});
   constexpr std::uint64_t kPoses = 1000;
   for (std::uint64_t i = 0; i < kPoses; ++i) publisher.on_pose(sample(i));  // the socket is shut
@@ -151,9 +224,10 @@ TEST(LinePublisher, aFullRingLosesTheNewestCountsThemAndNeverWaits) {
 }
 
 TEST(LinePublisher, takesNoMemoryOnTheEstimatorsThreadAndBringsPosesToTheEarth) {
+  SessionRequests requests;
   std::vector<std::string> lines;
   std::atomic<bool> open{true};
-  LinePublisher publisher(std::make_unique<Kept>(&lines, &open));
+  LinePublisher publisher(std::make_unique<Kept>(&lines, &open), &requests, {});
   publisher.on_start({});
   Placement placement;
   placement.T_enu_world.t = {1, 2, 3};
@@ -168,6 +242,69 @@ TEST(LinePublisher, takesNoMemoryOnTheEstimatorsThreadAndBringsPosesToTheEarth) 
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(nlohmann::json::parse(lines[0])["earth"]["enu_m"], (std::vector<double>{1, 2, 3}));
 }
+
+TEST(LinePublisher, GreetsWithTheNewestCalibrationInUseAndTheAlignment) {
+  SessionRequests requests;
+  std::vector<std::string> lines;
+  std::atomic<bool> open{true};
+  auto kept = std::make_unique<Kept>(&lines, &open);
+  const Kept* socket = kept.get();
+  LinePublisher publisher(std::move(kept), &requests, {});
+  publisher.on_start({});
+  CalibrationRecord record;
+  for (const auto& [stamp, accepted] : {std::pair(1, true), {2, true}, {3, false}}) {
+    record.stamp = Stamp(stamp);
+    record.accepted = accepted;
+    publisher.on_calibration(record);
+  }
+  publisher.on_placement({}, {-27.4975, 153.0137, 60});
+  (void)publisher.counters();
+  const std::size_t end = socket->greeting.find('\n') + 1;
+  EXPECT_EQ(nlohmann::json::parse(socket->greeting.substr(0, end))["stamp_ns"], 2);
+  EXPECT_EQ(nlohmann::json::parse(socket->greeting.substr(end))["origin"]["height_m"], 60);
+}
+
+struct RequestCase {
+  const char* request;
+  bool can_recalibrate, accepted;
+};
+void PrintTo(const RequestCase& c, std::ostream* out) { *out << c.request; }
+
+class LineRequests : public testing::TestWithParam<RequestCase> {};
+
+TEST_P(LineRequests, ActOnlyWhereTheyAreUnderstoodAndTheSessionCan) {
+  const RequestCase& c = GetParam();
+  SessionRequests requests;
+  std::vector<std::string> lines;
+  std::atomic<bool> open{true};
+  auto kept = std::make_unique<Kept>(&lines, &open);
+  Kept* socket = kept.get();
+  SessionStart start;
+  start.can_recalibrate = c.can_recalibrate;
+  std::string response;
+  {
+    // The publisher's thread waits for what it is woken by, and then reads the request.
+    socket->request = c.request;
+    LinePublisher publisher(std::move(kept), &requests, {});
+    publisher.on_start(start);
+    publisher.on_pose(sample(0));
+    while (socket->answered.load() == false) std::this_thread::yield();
+    response = socket->response;
+  }
+  const auto j = nlohmann::json::parse(response);
+  EXPECT_EQ(j["type"], "response");
+  EXPECT_EQ(j["accepted"], c.accepted);
+  EXPECT_EQ(requests.recalibrate.load(), c.accepted);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, LineRequests,
+                         testing::Values(RequestCase{R"({"request": "recalibrate"})", true, true},
+                                         RequestCase{R"({"request": "recalibrate"})", false, false},
+                                         RequestCase{R"({"request": "reboot"})", true, false},
+                                         RequestCase{R"({"request": 7})", true, false},
+                                         RequestCase{R"(["recalibrate"])", true, false},
+                                         RequestCase{"{\xff", true, false},
+                                         RequestCase{" ", true, false}));
 
 }  // namespace
 }  // namespace vergence::app

@@ -69,15 +69,7 @@ class ModeDrive {
   static void set_gradient(calibration::detail::Evidence* e, const Vec5& y,
                            const Vec5& reference_error) {
     using namespace calibration::detail;
-    const Solved factor(e->A, e->g);
-    for (int i = 0; i < kTheta; ++i) {
-      double g = 0;
-      for (int k = 0; k <= i; ++k)
-        if (factor.seen[static_cast<std::size_t>(k)]) g += factor.L[lower(i, k)] * y[k];
-      for (int k = 0; k < kTheta; ++k)
-        g -= e->A[lower(std::max(i, k), std::min(i, k))] * reference_error[k];
-      e->g[static_cast<std::size_t>(i)] = g;
-    }
+    e->g = Eigen::LLT<Mat5>(e->A).matrixL() * y - e->A * reference_error;
   }
 
   template <class Use>
@@ -127,8 +119,7 @@ class ModeDrive {
     int n = 0;
     watch(o, 2500, [&](const auto&, const auto& stereo) {
       const Evidence& e = stereo.evidence;
-      const Solved solved(e.A, e.g);
-      const Vec5 y = Eigen::Map<const Vec5>(solved.y.data()) / std::sqrt(e.n);
+      const Vec5 y = with_prior(e.A).whitening() * e.g / std::sqrt(e.n);
       sum += y * y.transpose();
       ++n;
     });

@@ -35,10 +35,8 @@ class Blocks {
     const Vec5 g =
         L * (std::sqrt(kLambda) * noise + std::sqrt(kObservations / 5) * rms_px * offset);
     Evidence e;
-    for (int i = 0; i < 5; ++i) {
-      e.g[static_cast<std::size_t>(i)] = g[i];
-      for (int j = 0; j <= i; ++j) e.A[lower(i, j)] = A_(i, j);
-    }
+    e.g = g;
+    e.A = A_;
     e.n = kObservations;
     return e;
   }
@@ -120,7 +118,8 @@ TEST(BlockScatter, whatSeesNothingSaysNothing) {
   s.add(Evidence{}, b.past(), kLambda);
   s.add(b.draw(0.1), Evidence{}, kLambda);
   Evidence flat = b.draw(0.1);
-  for (int i = 0; i < 5; ++i) flat.A[lower(4, i)] = 0;
+  flat.A.row(4).setZero();
+  flat.A.col(4).setZero();
   s.add(flat, b.past(), kLambda);
   Evidence nan = b.draw(0.1);
   nan.g[2] = std::nan("");

@@ -1,0 +1,182 @@
+#include "app/publish/pose_stream.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "core/calibration/health.hpp"
+
+namespace vergence::app {
+
+namespace {
+
+/// JSON knows no infinity.
+void write_number(double value, int digits, std::string* line) {
+  if (std::isfinite(value))
+    fmt::format_to(std::back_inserter(*line), "{:.{}f}", value, digits);
+  else
+    *line += "null";
+}
+
+void write_covariance(const char* key, const Covariance6& covariance, std::string* line) {
+  fmt::format_to(std::back_inserter(*line), R"(,"{}":[{:.4g})", key, covariance[0]);
+  for (std::size_t i = 1; i < covariance.size(); ++i)
+    fmt::format_to(std::back_inserter(*line), ",{:.4g}", covariance[i]);
+  *line += ']';
+}
+
+bool finite(const Covariance6& covariance) {
+  return std::all_of(covariance.begin(), covariance.end(),
+                     [](float c) { return std::isfinite(c); });
+}
+
+void write_covariances(const PoseSample& pose, std::string* line) {
+  if (pose.status == PoseStatus::lost || !finite(pose.covariance) ||
+      !finite(pose.motion_covariance) || !std::isfinite(pose.length_sigma)) {
+    *line += R"(,"covariance":null,"motion_covariance":null,"length_sigma":null)";
+    return;
+  }
+  write_covariance("covariance", pose.covariance, line);
+  write_covariance("motion_covariance", pose.motion_covariance, line);
+  fmt::format_to(std::back_inserter(*line), R"(,"length_sigma":{:.5f})", pose.length_sigma);
+}
+
+}  // namespace
+
+void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& earth,
+                     std::optional<double> age_ms, std::uint64_t dropped, std::string* line) {
+  line->clear();
+  auto out = std::back_inserter(*line);
+  fmt::format_to(
+      out, R"({{"version":{},"type":"pose","frame":{},"stamp_ns":{},"state":"{}","status":"{}",)",
+      kPoseStreamVersion, pose.frame, pose.stamp.ns(), to_string(pose.state),
+      to_string(pose.status));
+  fmt::format_to(out, R"("reason":"{}","pose":)", to_string(pose.reason));
+  if (pose.status == PoseStatus::lost || !pose.T_world_left.R.allFinite() ||
+      !pose.T_world_left.t.allFinite()) {
+    *line += "null";
+  } else {
+    const Vec3& t = pose.T_world_left.t;
+    const Eigen::Quaterniond q = quaternion(pose.T_world_left.R);
+    fmt::format_to(
+        out,
+        R"({{"position_m":[{:.6f},{:.6f},{:.6f}],"orientation_xyzw":[{:.9f},{:.9f},{:.9f},{:.9f}]}})",
+        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  }
+  write_covariances(pose, line);
+  *line += R"(,"earth":)";
+  if (pose.status == PoseStatus::lost || !earth) {
+    *line += "null";
+  } else {
+    fmt::format_to(out, R"({{"enu_m":[{:.4f},{:.4f},{:.4f}],"latitude_deg":{:.9f},)",
+                   earth->T_enu_left.t.x(), earth->T_enu_left.t.y(), earth->T_enu_left.t.z(),
+                   earth->position.latitude_deg);
+    fmt::format_to(out, R"("longitude_deg":{:.9f},"height_m":{:.4f},"heading_deg":{:.4f}}})",
+                   earth->position.longitude_deg, earth->position.height_m,
+                   compass_heading_deg(earth->yaw));
+  }
+  fmt::format_to(out, R"(,"inliers":{},"stereo_inliers":{},"reprojection_px":)", pose.inliers,
+                 pose.stereo_inliers);
+  write_number(pose.reprojection_px, 4, line);
+  *line += R"(,"estimate_ms":)";
+  write_number(static_cast<double>(pose.estimate_ms), 3, line);
+  *line += R"(,"age_ms":)";
+  write_number(age_ms.value_or(std::numeric_limits<double>::quiet_NaN()), 3, line);
+  fmt::format_to(out, ",\"dropped\":{}}}\n", dropped);
+}
+
+namespace {
+
+using nlohmann::json;
+
+/// A line of its type with `fields`. Names may hold bytes that are no UTF-8.
+std::string line_of(const char* type, const json& fields) {
+  json line{{"version", kPoseStreamVersion}, {"type", type}};
+  line.update(fields);
+  return line.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+json rows(const Transform& T) {
+  json out = json::array();
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 4; ++j) out.push_back(j < 3 ? T.R(i, j) : T.t(i));
+  return out;
+}
+
+json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+const char* to_word(FixStatus fix) noexcept {
+  constexpr std::array kWords{"none", "dead_reckoning", "2d", "3d"};
+  return kWords[static_cast<std::size_t>(fix)];
+}
+
+}  // namespace
+
+std::string calibration_line(const CalibrationRecord& record, std::span<const std::string> names,
+                             const calibration::CalibrationOptions& options) {
+  const RigCalibration& rig = record.calibration;
+  json cameras = json::array();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
+    const Intrinsics& lens = rig.intrinsics[k];
+    const bool radtan = lens.kind == CameraModelKind::pinhole_radtan;
+    cameras.push_back({{"name", k < names.size() ? names[k] : fmt::format("camera{}", k)},
+                       {"size", {lens.width, lens.height}},
+                       {"model", radtan ? "pinhole-radtan" : "pinhole-equidistant"},
+                       {"intrinsics", {lens.fx, lens.fy, lens.cx, lens.cy}},
+                       {"distortion", lens.distortion},
+                       {"T_camera_left", rows(rig.T_camera_left[k])}});
+  }
+  constexpr double kDepth = 20;  // m: where health() evaluates the rig
+  const bool known = calibration::depth_error_percent(rig, kDepth) > 0;
+  return line_of("calibration",
+                 {{"stamp_ns", record.stamp.ns()},
+                  {"cause", record.cause_word()},
+                  {"rating", known ? json(to_string(calibration::health(rig, options))) : json()},
+                  {"cameras", cameras}});
+}
+
+std::string alignment_line(const PublishedPlacement& p) {
+  return line_of("alignment", {{"stamp_ns", p.placement.last.ns()},
+                               {"origin",
+                                {{"latitude_deg", p.origin.latitude_deg},
+                                 {"longitude_deg", p.origin.longitude_deg},
+                                 {"height_m", p.origin.height_m}}},
+                               {"T_enu_world", rows(p.placement.T_enu_world)},
+                               {"position_sigma_m", numbers(p.placement.position_sigma)},
+                               {"rotation_sigma_rad", numbers(p.placement.rotation_sigma)}});
+}
+
+std::string status_line(const StreamStatus& s) {
+  json fields{{"session", s.session},       {"stamp_ns", nullptr},    {"state", nullptr},
+              {"status", nullptr},          {"reason", nullptr},      {"silent_s", nullptr},
+              {"frames", nullptr},          {"pairing", nullptr},     {"cameras", json::array()},
+              {"calibrated", s.calibrated}, {"verified", s.verified}, {"ins", nullptr}};
+  if (s.frame) {
+    const LiveFrame& f = *s.frame;
+    fields["stamp_ns"] = f.pose.stamp.ns();
+    fields["state"] = to_string(f.pose.state);
+    fields["status"] = to_string(f.pose.status);
+    fields["reason"] = to_string(f.pose.reason);
+    fields["silent_s"] = s.silent_s;
+    fields["frames"] = {{"read", f.read}, {"ok", f.ok},           {"degraded", f.degraded},
+                        {"lost", f.lost}, {"missing", f.missing}, {"dropped", s.dropped}};
+    fields["pairing"] = to_words(f.pairing);
+    for (int k = 0; k < f.cameras; ++k)
+      fields["cameras"].push_back((f.images_present >> k & 1U) != 0);
+  }
+  if (s.ins)
+    fields["ins"] = {
+        {"fix", to_word(s.ins->fix)}, {"silent_s", s.ins->silent_s}, {"aligned", s.aligned}};
+  return line_of("status", fields);
+}
+
+std::string response_line(std::string_view request, bool accepted, std::string_view message) {
+  return line_of("response", {{"request", request}, {"accepted", accepted}, {"message", message}});
+}
+
+}  // namespace vergence::app

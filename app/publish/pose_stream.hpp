@@ -1,0 +1,53 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "app/publish/live_frame.hpp"
+#include "app/session/records.hpp"
+#include "core/calibration/options.hpp"
+#include "drivers/ins.hpp"
+
+/// Lines of the pose stream: JSON objects, each with a `type` and followed by a line feed.
+/// docs/publish.md is their schema.
+namespace vergence::app {
+
+inline constexpr int kPoseStreamVersion = 2;
+
+/// `type: pose`. `age_ms`: from mid-exposure to now, where stamps are tied to this machine's clock.
+/// `dropped`: frames without a line since the start. Replaces *line, whose memory is used again.
+void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& earth,
+                     std::optional<double> age_ms, std::uint64_t dropped, std::string* line);
+
+/// `type: calibration`, of one that is in use. `names`: of the cameras.
+[[nodiscard]] std::string calibration_line(const CalibrationRecord& calibration,
+                                           std::span<const std::string> names,
+                                           const calibration::CalibrationOptions& options);
+
+/// `type: alignment`.
+[[nodiscard]] std::string alignment_line(const PublishedPlacement& placement);
+
+/// Status of odometry and devices, once per second.
+struct StreamStatus {
+  struct Ins {
+    FixStatus fix = FixStatus::none;
+    double silent_s = 0;  // since the last sample
+  };
+
+  std::string session{};  // name of the session folder
+  std::optional<LiveFrame> frame{};
+  double silent_s = 0;  // since the last frame
+  bool calibrated = false, verified = false, aligned = false;
+  std::uint64_t dropped = 0;  // as in a pose line
+  std::optional<Ins> ins{};
+};
+/// `type: status`.
+[[nodiscard]] std::string status_line(const StreamStatus& status);
+
+/// `type: response`, to the reader that sent the request.
+[[nodiscard]] std::string response_line(std::string_view request, bool accepted,
+                                        std::string_view message);
+
+}  // namespace vergence::app

@@ -1,0 +1,223 @@
+// vergence-ros2: the pose stream of a running vergence as ROS 2 topics (docs/ros2.md).
+#include <poll.h>
+#include <sys/eventfd.h>
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <numbers>
+#include <string>
+
+#include <fmt/format.h>
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include "app/ros2/bridge.hpp"
+#include "app/ros2/dds_node.hpp"
+#include "app/ros2/pose_stream_client.hpp"
+#include "app/runtime/errors.hpp"
+#include "app/runtime/signals.hpp"
+#include "app/runtime/version.hpp"
+#include "core/comparison/comparison.hpp"
+
+namespace vergence::app::ros2 {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+struct Options {
+  std::string socket = "unix:///run/vergence/pose.sock";
+  std::uint32_t domain = 0;
+  BridgeOptions bridge{};
+  std::string child = "base";
+  std::array<double, 3> camera_xyz_m{}, camera_rpy_deg{};
+};
+
+void declare(CLI::App* app, Options* o) {
+  // Ports of a domain beyond 232 are above 65535.
+  constexpr std::uint32_t kMaxDomain = 232;
+  BridgeOptions& b = o->bridge;
+  app->set_version_flag("--version", "vergence-ros2 " + std::string(version()));
+  app->add_option("--socket", o->socket, "Address of the pose stream: unix:///PATH")
+      ->capture_default_str();
+  app->add_option("--domain", o->domain, "DDS domain")
+      ->envname("ROS_DOMAIN_ID")
+      ->check(CLI::Range(std::uint32_t{0}, kMaxDomain))
+      ->capture_default_str();
+  app->add_option("--namespace", b.name_space, "Namespace of the topics, like /robot1/vergence")
+      ->capture_default_str();
+  app->add_option("--odom-frame", b.odom_frame, "Parent frame of the odometry")
+      ->capture_default_str();
+  app->add_option("--base-frame", b.base_frame, "Frame of the vehicle")->capture_default_str();
+  app->add_option("--enu-frame", b.enu_frame, "Frame of pose_enu")->capture_default_str();
+  app->add_option("--child", o->child, "Child of the odometry: base, or camera (left, optical)")
+      ->check(CLI::IsMember({"base", "camera"}))
+      ->capture_default_str();
+  app->add_option("--camera-xyz-m", o->camera_xyz_m,
+                  "Position of the left camera in the base frame")
+      ->type_name("X Y Z");
+  app->add_option("--camera-rpy-deg", o->camera_rpy_deg,
+                  "Roll, pitch and yaw of the camera's forward, left, up axes in the base frame")
+      ->type_name("R P Y");
+  app->add_flag("!--no-tf", b.publish_tf, "Do not publish odom -> child on /tf");
+}
+
+void finish(Options* o) {
+  std::string& space = o->bridge.name_space;
+  if (!space.starts_with('/')) space.insert(0, "/");
+  while (space.ends_with('/')) space.pop_back();
+  for (const char c : space)
+    if (!(c == '/' || c == '_' || (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') ||
+          (c >= 'A' && c <= 'Z')))
+      throw InputError(fmt::format(
+          "--namespace: \"{}\" is not a ROS name; use letters, digits, _ and /", space));
+  o->bridge.camera_child = o->child == "camera";
+  const auto& x = o->camera_xyz_m;
+  const auto& r = o->camera_rpy_deg;
+  o->bridge.T_base_left =
+      mount_of({x[0], x[1], x[2]}, Vec3(r[0], r[1], r[2]) * (std::numbers::pi / 180));
+}
+
+/// The program's loop: the stream in, topics out, service calls across.
+///
+/// Threads  One; Fast DDS's write to an eventfd.
+class Program {
+ public:
+  explicit Program(const Options& options)
+      : client_(options.socket),
+        node_(options.domain),
+        bridge_(options.bridge, &node_),
+        wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    node_.serve_trigger(options.bridge.name_space + "/recalibrate", wake_.get());
+  }
+  ~Program() {
+    while (!calls_.empty()) answer({false, "vergence-ros2 is stopping"});
+  }
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  ExitCode run() {
+    const SignalGuard signals;
+    for (;;) {
+      if (const auto code = signals.stop_code()) return *code;
+      const Clock::time_point now = Clock::now();
+      if (!client_.connected() && now >= connect_at_) connect(now);
+      if (now >= stale_at_) {
+        stale_at_ = now + 1s;
+        bridge_.publish_stale(wall_clock(), client_.connected() ? "no status from vergence"
+                                                                : "vergence is not running");
+      }
+      // Long enough to cost nothing, short enough for a signal that comes just before poll().
+      constexpr int kTimeoutMs = 200;
+      std::array<pollfd, 2> events{{{client_.descriptor(), POLLIN, 0}, {wake_.get(), POLLIN, 0}}};
+      if (::poll(events.data(), events.size(), kTimeoutMs) <= 0) continue;
+      if (events[1].revents != 0) take_calls();
+      if (events[0].revents != 0 && !read()) lose();
+    }
+  }
+
+ private:
+  static Stamp wall_clock() {
+    return Stamp(
+        std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count());
+  }
+
+  void connect(Clock::time_point now) {
+    connect_at_ = now + 500ms;
+    const int error = client_.connect();
+    if (error == 0) {
+      fmt::print(stderr, "vergence-ros2: connected to {}\n", client_.path());
+      said_waiting_ = false;
+    } else if (!said_waiting_) {
+      fmt::print(stderr,
+                 "vergence-ros2: {}: {}; waiting for vergence with "
+                 "publish.lines: unix://{}\n",
+                 client_.path(), std::strerror(error), client_.path());
+      said_waiting_ = true;
+    }
+  }
+
+  bool read() {
+    return client_.read([this](std::string_view line) {
+      const std::uint64_t malformed = bridge_.malformed(), statuses = bridge_.statuses();
+      if (const auto response = bridge_.add(line)) answer(*response);
+      if (bridge_.statuses() > statuses) stale_at_ = Clock::now() + 3s;
+      if (malformed == 0 && bridge_.malformed() > 0)
+        fmt::print(stderr,
+                   "vergence-ros2: a malformed line was skipped; further ones are only counted in "
+                   "/diagnostics\n");
+    });
+  }
+
+  void lose() {
+    fmt::print(stderr, "vergence-ros2: the pose stream has ended; waiting for vergence\n");
+    said_waiting_ = true;
+    bridge_.disconnected();
+    while (!calls_.empty()) answer({false, "vergence has ended"});
+    stale_at_ = Clock::now();
+  }
+
+  void take_calls() {
+    eventfd_t ignored = 0;
+    (void)::eventfd_read(wake_.get(), &ignored);
+    while (auto call = node_.next_request()) {
+      calls_.push_back(std::move(call));
+      if (!client_.send("{\"request\": \"recalibrate\"}\n")) {
+        const auto refused = std::move(calls_.back());
+        calls_.pop_back();
+        node_.reply(*refused, false, "vergence is not running");
+      }
+    }
+  }
+
+  /// Responses come in the order of their requests.
+  void answer(const Bridge::Response& response) {
+    if (calls_.empty()) return;
+    node_.reply(*calls_.front(), response.accepted, response.message);
+    calls_.pop_front();
+  }
+
+  PoseStreamClient client_;
+  DdsNode node_;
+  Bridge bridge_;
+  FileDescriptor wake_;
+  std::deque<std::shared_ptr<const DdsNode::Request>> calls_;
+  Clock::time_point connect_at_{}, stale_at_ = Clock::now() + 3s;
+  bool said_waiting_ = false;
+};
+
+ExitCode run(int argc, char** argv) {
+  CLI::App app("Publish the pose stream of vergence as ROS 2 topics", "vergence-ros2");
+  Options options;
+  declare(&app, &options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version
+    app.exit(asked);
+    return ExitCode::done;
+  } catch (const CLI::ParseError& error) {
+    throw InputError(std::string(error.what()) + "; see vergence-ros2 --help");
+  }
+  finish(&options);
+  Program program(options);
+  return program.run();
+}
+
+}  // namespace
+}  // namespace vergence::app::ros2
+
+int main(int argc, char** argv) {
+  using vergence::app::ExitCode;
+  try {
+    return static_cast<int>(vergence::app::ros2::run(argc, argv));
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "vergence-ros2: {}\n", e.what());
+    return static_cast<int>(ExitCode::bad_input);
+  }
+}

@@ -1,0 +1,264 @@
+#pragma once
+#include <dds/dds.h>
+#include <messages.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/publish/line_publisher.hpp"
+#include "core/math/so3.hpp"
+#include "tests/support/child_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace vergence::test {
+
+using namespace std::chrono_literals;
+
+/// Messages that Cyclone DDS decodes.
+using RosOdometry = nav_msgs_msg_dds__Odometry_;
+using RosTf = tf2_msgs_msg_dds__TFMessage_;
+using RosCameraInfo = sensor_msgs_msg_dds__CameraInfo_;
+using RosFix = sensor_msgs_msg_dds__NavSatFix_;
+using RosPose = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;
+using RosDiagnostics = diagnostic_msgs_msg_dds__DiagnosticArray_;
+using TriggerRequest = std_srvs_srv_dds__Trigger_Request_;
+using TriggerResponse = std_srvs_srv_dds__Trigger_Response_;
+
+template <class Message>
+const dds_topic_descriptor_t& descriptor();
+template <>
+inline const dds_topic_descriptor_t& descriptor<RosOdometry>() {
+  return nav_msgs_msg_dds__Odometry__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<RosTf>() {
+  return tf2_msgs_msg_dds__TFMessage__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<RosCameraInfo>() {
+  return sensor_msgs_msg_dds__CameraInfo__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<RosFix>() {
+  return sensor_msgs_msg_dds__NavSatFix__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<RosPose>() {
+  return geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<RosDiagnostics>() {
+  return diagnostic_msgs_msg_dds__DiagnosticArray__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<TriggerRequest>() {
+  return std_srvs_srv_dds__Trigger_Request__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<TriggerResponse>() {
+  return std_srvs_srv_dds__Trigger_Response__desc;
+}
+
+/// A domain of this process's own, so that tests may run in parallel.
+inline std::uint32_t own_domain() { return 1 + static_cast<std::uint32_t>(::getpid()) % 200; }
+
+/// A participant of Cyclone DDS on this machine alone.
+class RosParticipant {
+ public:
+  explicit RosParticipant(std::uint32_t domain) {
+    ::setenv("CYCLONEDDS_URI",
+             "<CycloneDDS><Domain><General><Interfaces>"
+             "<NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces></General>"
+             "</Domain></CycloneDDS>",
+             1);
+    participant_ = dds_create_participant(domain, nullptr, nullptr);
+  }
+  ~RosParticipant() { (void)dds_delete(participant_); }
+  RosParticipant(const RosParticipant&) = delete;
+  RosParticipant& operator=(const RosParticipant&) = delete;
+
+  [[nodiscard]] dds_entity_t get() const { return participant_; }
+
+  struct QosDelete {
+    void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+  };
+  [[nodiscard]] static std::unique_ptr<dds_qos_t, QosDelete> reliable(bool latched) {
+    std::unique_ptr<dds_qos_t, QosDelete> qos(dds_create_qos());
+    dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+    dds_qset_durability(qos.get(),
+                        latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 10);
+    return qos;
+  }
+  template <class Message>
+  [[nodiscard]] dds_entity_t topic(const std::string& name) const {
+    return dds_create_topic(participant_, &descriptor<Message>(), name.c_str(), nullptr, nullptr);
+  }
+
+ private:
+  dds_entity_t participant_ = 0;
+};
+
+/// A subscription as ROS 2 has it by default: reliable, the last ten.
+template <class Message>
+class RosReader {
+ public:
+  RosReader(const RosParticipant& participant, const std::string& topic, bool latched = false)
+      : reader_(dds_create_reader(participant.get(), participant.topic<Message>("rt" + topic),
+                                  RosParticipant::reliable(latched).get(), nullptr)) {}
+  RosReader(const RosParticipant& participant, dds_entity_t topic)
+      : reader_(dds_create_reader(participant.get(), topic, RosParticipant::reliable(false).get(),
+                                  nullptr)) {}
+
+  /// The next message if there is one; valid until the next call.
+  [[nodiscard]] const Message* take() {
+    release();
+    dds_sample_info_t info;
+    if (dds_take(reader_, &sample_, &info, 1, 1) == 1 && info.valid_data)
+      return static_cast<const Message*>(sample_);
+    return nullptr;
+  }
+  /// Waits for it; null: none came in time.
+  [[nodiscard]] const Message* next(std::chrono::milliseconds limit = 10s) {
+    for (const auto end = std::chrono::steady_clock::now() + limit;
+         std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(500us))
+      if (const Message* message = take()) return message;
+    return nullptr;
+  }
+  /// USER_DATA of the writers that it is matched with.
+  [[nodiscard]] std::vector<std::string> user_data() const {
+    std::vector<std::string> out;
+    std::array<dds_instance_handle_t, 8> writers{};
+    const auto n = dds_get_matched_publications(reader_, writers.data(), writers.size());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(n, 0)); ++i) {
+      dds_builtintopic_endpoint_t* writer = dds_get_matched_publication_data(reader_, writers[i]);
+      void* bytes = nullptr;
+      std::size_t size = 0;
+      if (writer != nullptr && dds_qget_userdata(writer->qos, &bytes, &size) && bytes != nullptr)
+        out.emplace_back(static_cast<const char*>(bytes), size);
+      dds_free(bytes);
+      if (writer != nullptr) dds_builtintopic_free_endpoint(writer);
+    }
+    return out;
+  }
+  [[nodiscard]] dds_entity_t get() const { return reader_; }
+  ~RosReader() {
+    release();
+    (void)dds_delete(reader_);
+  }
+  RosReader(const RosReader&) = delete;
+  RosReader& operator=(const RosReader&) = delete;
+
+ private:
+  void release() {
+    if (sample_ != nullptr) (void)dds_return_loan(reader_, &sample_, 1);
+    sample_ = nullptr;
+  }
+  dds_entity_t reader_;
+  void* sample_ = nullptr;
+};
+
+/// The pose stream of a session: the product's publisher, fed by the test.
+class StreamSession {
+ public:
+  explicit StreamSession(const std::string& socket)
+      : publisher_(app::open_line_socket({app::LineAddress::Kind::unix_socket, socket, {}}, "test"),
+                   &requests, {}) {
+    app::SessionStart start;
+    start.name = "session";
+    start.camera_names = {"left", "right"};
+    start.can_recalibrate = true;
+    publisher_.on_start(start);
+  }
+
+  void calibrate(double fx) {
+    app::CalibrationRecord record;
+    record.accepted = record.verified = true;
+    record.stamp = Stamp(kFirst);
+    record.calibration.cameras = 2;
+    for (std::size_t k = 0; k < 2; ++k)
+      record.calibration.intrinsics[k] = {
+          CameraModelKind::pinhole_radtan, 640, 480, fx, fx + 1, 322, 239,
+          {-0.3, 0.1, 1e-4, -2e-4, 0.01},  {},  {}};
+    record.calibration.T_camera_left[1].t = {-0.75, 0, 0};
+    publisher_.on_calibration(record);
+  }
+  void align() {
+    Placement placement;
+    placement.T_enu_world.R << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+    placement.T_enu_world.t = {1, 2, 3};
+    placement.position_sigma = {0.5, 0.5, 1};
+    publisher_.on_placement(placement, {-27.4975, 153.0137, 60});
+  }
+  /// The pose of a camera that looks and drives straight ahead at 0.1 m per frame.
+  void pose() {
+    RigFrame frame;
+    frame.number = frames_;
+    frame.cameras = 2;
+    static std::uint8_t pixel = 0;
+    frame.images[0] = frame.images[1] = {&pixel, 1, 1, 1};
+    publisher_.on_frame(frame);
+    PoseSample sample;
+    sample.frame = frames_;
+    sample.stamp = Stamp(kFirst + static_cast<std::int64_t>(frames_) * kInterval);
+    sample.state = State::stereo_odometry;
+    sample.status = PoseStatus::ok;
+    sample.T_world_left.t.z() = 0.1 * static_cast<double>(frames_);
+    sample.covariance[0] = 0.25F;
+    ++frames_;
+    publisher_.on_pose(sample);
+  }
+  [[nodiscard]] std::map<std::string, std::uint64_t> counters() {
+    std::map<std::string, std::uint64_t> out;
+    for (const auto& [name, value] : publisher_.counters()) out[name] = value;
+    return out;
+  }
+
+  static constexpr std::int64_t kFirst = 1'577'836'800'000'000'001;  // ns
+  static constexpr std::int64_t kInterval = 50'000'000;              // ns
+  app::SessionRequests requests;
+
+ private:
+  app::LinePublisher publisher_;
+  std::uint64_t frames_ = 0;
+};
+
+/// The number of a frame by its stamp.
+inline std::int64_t frame_of(const std_msgs_msg_dds__Header_& header) {
+  const std::int64_t ns =
+      std::int64_t{header.stamp.sec} * 1'000'000'000 + std::int64_t{header.stamp.nanosec};
+  return (ns - StreamSession::kFirst) / StreamSession::kInterval;
+}
+
+/// vergence-ros2, on this machine alone.
+inline std::unique_ptr<ChildProgram> start_bridge(const std::string& socket, std::uint32_t domain,
+                                                  std::vector<std::string> more = {},
+                                                  const ChildProgram::Start& start = {}) {
+  ::setenv("ROS_LOCALHOST_ONLY", "1", 1);
+  std::vector<std::string> words{"--socket", "unix://" + socket, "--domain",
+                                 fmt::format("{}", domain)};
+  words.insert(words.end(), more.begin(), more.end());
+  return std::make_unique<ChildProgram>(words, start);
+}
+
+/// Feeds poses until `done`; false: it never was.
+inline bool feed_until(StreamSession* session, const std::function<bool()>& done,
+                       std::chrono::milliseconds limit = 15s) {
+  for (const auto end = std::chrono::steady_clock::now() + limit;
+       std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(10ms)) {
+    session->pose();
+    if (done()) return true;
+  }
+  return false;
+}
+
+}  // namespace vergence::test

@@ -1,0 +1,464 @@
+#include "app/ros2/bridge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <map>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include "app/runtime/errors.hpp"
+#include "core/comparison/comparison.hpp"
+#include "core/math/random.hpp"
+#include "core/math/so3.hpp"
+#include "tests/support/mutated.hpp"
+
+namespace vergence::app::ros2 {
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+/// Keeps the messages of every topic.
+class Kept final : public TopicWriter {
+ public:
+  void advertise(const std::string& topic, RosType /*type*/, bool keeps) override {
+    messages[topic];
+    if (keeps) latched.push_back(topic);
+  }
+  void publish(const std::string& topic, std::span<const std::uint8_t> cdr) override {
+    messages.at(topic).emplace_back(cdr.begin(), cdr.end());
+  }
+
+  std::map<std::string, std::vector<std::vector<std::uint8_t>>> messages;
+  std::vector<std::string> latched;
+};
+
+/// Texts and doubles of a message after its encapsulation and stamp.
+class Reader {
+ public:
+  explicit Reader(const std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
+  template <class T>
+  T get() {
+    at_ += (sizeof(T) - (at_ - 4) % sizeof(T)) % sizeof(T);
+    T out{};
+    std::memcpy(&out, bytes_.data() + at_, sizeof out);
+    at_ += sizeof out;
+    return out;
+  }
+  std::string text() {
+    const auto size = get<std::uint32_t>();
+    const std::string out(reinterpret_cast<const char*>(bytes_.data()) + at_, size - 1);
+    at_ += size;
+    return out;
+  }
+  double number() { return get<double>(); }
+  Vec3 vector() {
+    const double x = number(), y = number(), z = number();
+    return {x, y, z};
+  }
+  Transform pose() {
+    const Vec3 t = vector();
+    const double x = number(), y = number(), z = number(), w = number();
+    return {Eigen::Quaterniond(w, x, y, z).toRotationMatrix(), t};
+  }
+  Matrix6 covariance() {
+    Matrix6 m;
+    for (int i = 0; i < 36; ++i) m(i / 6, i % 6) = number();
+    return m;
+  }
+
+ private:
+  const std::vector<std::uint8_t>& bytes_;
+  std::size_t at_ = 12;
+};
+
+struct Odometry {
+  std::string frame, child;
+  Transform pose;
+  Matrix6 pose_covariance;
+  Vec3 linear, angular;
+  Matrix6 twist_covariance;
+};
+
+Odometry odometry(const std::vector<std::uint8_t>& message) {
+  Reader in(message);
+  Odometry o;
+  o.frame = in.text();
+  o.child = in.text();
+  o.pose = in.pose();
+  o.pose_covariance = in.covariance();
+  o.linear = in.vector();
+  o.angular = in.vector();
+  o.twist_covariance = in.covariance();
+  return o;
+}
+
+/// Upper triangle, row by row.
+std::string upper(const Matrix6& m) {
+  std::vector<double> numbers;
+  for (int i = 0; i < 6; ++i)
+    for (int k = i; k < 6; ++k) numbers.push_back(m(i, k));
+  return fmt::format("[{:.17g}]", fmt::join(numbers, ","));
+}
+
+struct Pose {
+  std::int64_t stamp_ns = 0;
+  Transform T_world_left{};
+  std::string status = "ok", reason{};
+  Matrix6 covariance = Matrix6::Identity(), motion = Matrix6::Identity();
+  double length_sigma = 0;
+};
+
+std::string line_of(const Pose& p) {
+  const Eigen::Quaterniond q = quaternion(p.T_world_left.R);
+  const Vec3& t = p.T_world_left.t;
+  const std::string pose =
+      p.status == "lost"
+          ? "null"
+          : fmt::format(
+                R"({{"position_m":[{:.17g},{:.17g},{:.17g}],"orientation_xyzw":[{:.17g},{:.17g},{:.17g},{:.17g}]}})",
+                t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  return fmt::format(
+      R"({{"version":2,"type":"pose","stamp_ns":{},"status":"{}","reason":"{}","pose":{},"covariance":{},)"
+      R"("motion_covariance":{},"length_sigma":{},"dropped":0}})",
+      p.stamp_ns, p.status, p.reason, pose, upper(p.covariance), upper(p.motion), p.length_sigma);
+}
+
+std::string calibration_line(const std::string& left, const std::string& right) {
+  const auto camera = [](const std::string& name, double x) {
+    return fmt::format(
+        R"({{"name":"{}","size":[640,480],"model":"pinhole-radtan","intrinsics":[450,451,322,239],)"
+        R"("distortion":[0,0,0,0,0],"T_camera_left":[1,0,0,{},0,1,0,0,0,0,1,0]}})",
+        name, x);
+  };
+  return fmt::format(
+      R"({{"version":2,"type":"calibration","stamp_ns":7,"rating":"good","cameras":[{},{}]}})",
+      camera(left, 0), camera(right, -0.75));
+}
+
+constexpr const char* kAlignment =
+    R"({"version":2,"type":"alignment","stamp_ns":7,"origin":{"latitude_deg":-27.5,"longitude_deg":153,"height_m":60},)"
+    R"("T_enu_world":[1,0,0,10,0,0,1,20,0,-1,0,30],"position_sigma_m":[1,2,3],"rotation_sigma_rad":[0.01,0.01,0.02]})";
+constexpr const char* kStatus =
+    R"({"version":2,"type":"status","session":"monday","stamp_ns":8,"state":"stereo_odometry","status":"ok",)"
+    R"("reason":"","silent_s":0.01,"frames":{"read":3},"pairing":"assumed","cameras":[true,true],)"
+    R"("calibrated":true,"verified":true,"ins":{"fix":"3d","silent_s":0.1,"aligned":true}})";
+
+BridgeOptions on_vehicle() {
+  BridgeOptions o;
+  o.T_base_left = mount_of({1.5, -0.2, 0.8}, {0.02, 0.1, -0.3});
+  return o;
+}
+
+constexpr std::int64_t kStep = 50'000'000;  // ns
+
+/// A vehicle that drives an arc at a constant speed, whose camera sits off its origin: the speed
+/// and the pose of the vehicle come out, not those of the camera.
+TEST(Bridge, OdometryIsThatOfTheVehicle) {
+  const BridgeOptions options = on_vehicle();
+  Kept kept;
+  Bridge bridge(options, &kept);
+  const Vec3 v(2, 0, 0), w(0, 0, 0.2);
+  Transform T_odom_base;
+  const Transform step{exp_so3(w * 0.05), left_jacobian_so3(w * 0.05) * v * 0.05};
+  for (int i = 0; i < 40; ++i, T_odom_base = T_odom_base * step)
+    bridge.add(line_of({1'000'000'000 + i * kStep,
+                        options.T_base_left.inverse() * T_odom_base * options.T_base_left}));
+  const auto& messages = kept.messages["/vergence/odometry"];
+  ASSERT_EQ(messages.size(), 40U);
+  T_odom_base = {};
+  for (std::size_t i = 0; i < messages.size(); ++i, T_odom_base = T_odom_base * step) {
+    const Odometry o = odometry(messages[i]);
+    EXPECT_EQ(o.frame, "odom");
+    EXPECT_EQ(o.child, "base_link");
+    EXPECT_LT((o.pose.t - T_odom_base.t).norm(), 1e-9);
+    EXPECT_LT((o.pose.R - T_odom_base.R).norm(), 1e-9);
+    if (i == 0) {
+      EXPECT_EQ(o.twist_covariance(0, 0), 1e6) << "of one pose there is no speed";
+      continue;
+    }
+    // The chord of 0.01 rad is shorter than its arc by the square of that over 24.
+    EXPECT_LT((o.linear - v).norm(), 2 * 5e-6);
+    EXPECT_LT((o.angular - w).norm(), 1e-9);
+  }
+  EXPECT_EQ(kept.messages["/tf"].size(), 40U);
+}
+
+/// Against differences of the pose itself.
+TEST(Bridge, CovariancesAreTurnedAndMovedToTheVehicle) {
+  const BridgeOptions options = on_vehicle();
+  Pose pose{0, {exp_so3({0.3, -0.8, 0.1}), {5, -1, 20}}};
+  Matrix6 root = Matrix6::Zero();
+  Random random(5);
+  for (int i = 0; i < 36; ++i) root(i / 6, i % 6) = random.uniform() - 0.5;
+  pose.covariance = root * root.transpose();
+  Kept kept;
+  Bridge bridge(options, &kept);
+  bridge.add(line_of(pose));
+  const auto child_of = [&](const Transform& T) {
+    return options.T_base_left * T * options.T_base_left.inverse();
+  };
+  const Transform child = child_of(pose.T_world_left);
+  Matrix6 J;
+  constexpr double kDelta = 1e-6;
+  for (int i = 0; i < 6; ++i) {
+    Vec3 tau = Vec3::Zero(), phi = Vec3::Zero();
+    (i < 3 ? tau : phi)(i % 3) = kDelta;
+    const Transform moved = child_of(perturbed(pose.T_world_left, phi, tau));
+    J.block<3, 1>(0, i) = (moved.t - child.t) / kDelta;
+    J.block<3, 1>(3, i) = log_so3(moved.R * child.R.transpose()) / kDelta;
+  }
+  const Matrix6 wanted = J * pose.covariance * J.transpose();
+  const Odometry o = odometry(kept.messages["/vergence/odometry"].at(0));
+  EXPECT_LT((o.pose_covariance - wanted).norm(), 1e-4 * wanted.norm());
+}
+
+TEST(Bridge, TwistCovarianceHasTheMotionsAndTheLengths) {
+  BridgeOptions options;  // the camera at the vehicle's origin
+  options.T_base_left = mount_of(Vec3::Zero(), Vec3::Zero());
+  Kept kept;
+  Bridge bridge(options, &kept);
+  Pose pose;
+  pose.motion = Vec3(1, 2, 3).replicate<2, 1>().asDiagonal();  // right, down, forward
+  pose.length_sigma = 0.1;
+  bridge.add(line_of(pose));
+  pose.stamp_ns = kStep;
+  pose.T_world_left.t.z() = 0.5;  // 10 m/s forward
+  bridge.add(line_of(pose));
+  const Odometry o = odometry(kept.messages["/vergence/odometry"].at(1));
+  const double per_s2 = 1 / (0.05 * 0.05);
+  const Matrix6 wanted = (Eigen::Vector<double, 6>() << 3 * per_s2 + 1, per_s2, 2 * per_s2,
+                          3 * per_s2, per_s2, 2 * per_s2)
+                             .finished()
+                             .asDiagonal();
+  EXPECT_LT((o.twist_covariance - wanted).norm(), 1e-9 * wanted.norm());
+}
+
+struct StatusCase {
+  const char *status, *reason;
+  double variance;  // 0: no message
+};
+void PrintTo(const StatusCase& c, std::ostream* out) { *out << c.status << " " << c.reason; }
+
+class BridgeStatus : public testing::TestWithParam<StatusCase> {};
+
+TEST_P(BridgeStatus, DegradedIsWidenedAndLostIsNotPublished) {
+  Kept kept;
+  Bridge bridge({}, &kept);
+  Pose pose;
+  pose.status = GetParam().status;
+  pose.reason = GetParam().reason;
+  bridge.add(line_of(pose));
+  const auto& messages = kept.messages["/vergence/odometry"];
+  EXPECT_EQ(kept.messages["/tf"].size(), messages.size());
+  ASSERT_EQ(messages.size(), GetParam().variance > 0 ? 1U : 0U);
+  if (!messages.empty()) {
+    EXPECT_DOUBLE_EQ(odometry(messages[0]).pose_covariance(5, 5), GetParam().variance);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, BridgeStatus,
+                         testing::Values(StatusCase{"ok", "", 1},
+                                         StatusCase{"degraded", "weak_geometry", 4},
+                                         StatusCase{"degraded", "uncalibrated", 9},
+                                         StatusCase{"degraded", "time_gap", 100},
+                                         StatusCase{"lost", "no_pose", 0}));
+
+/// The bridge's list names reasons as the stream has them: a renamed one would be widened less.
+TEST(Bridge, EveryReasonOfTheListIsOne) {
+  std::map<double, int> reasons;  // by the variance that they make of 1
+  for (int i = 1; i <= static_cast<int>(Reason::unproven_pairing); ++i) {
+    Kept kept;
+    Bridge bridge({}, &kept);
+    Pose pose;
+    pose.status = "degraded";
+    pose.reason = to_string(static_cast<Reason>(i));
+    bridge.add(line_of(pose));
+    ++reasons[odometry(kept.messages["/vergence/odometry"].at(0)).pose_covariance(5, 5)];
+  }
+  EXPECT_EQ(reasons[100], 3);
+  EXPECT_EQ(reasons[9], 8);
+}
+
+TEST(Bridge, NoSpeedAcrossAGapALostPoseOrAnotherConnection) {
+  Kept kept;
+  Bridge bridge({}, &kept);
+  Pose pose;
+  const auto measured = [&](std::int64_t after_ns) {
+    pose.stamp_ns += after_ns;
+    bridge.add(line_of(pose));
+    return odometry(kept.messages["/vergence/odometry"].back()).twist_covariance(0, 0) < 1e6;
+  };
+  EXPECT_FALSE(measured(0));
+  EXPECT_TRUE(measured(kStep));
+  EXPECT_FALSE(measured(0)) << "the same stamp again";
+  EXPECT_FALSE(measured(2'000'000'000));
+  EXPECT_TRUE(measured(kStep));
+  Pose lost;
+  lost.status = "lost";
+  bridge.add(line_of(lost));
+  EXPECT_FALSE(measured(kStep));
+  bridge.disconnected();
+  EXPECT_FALSE(measured(kStep));
+}
+
+TEST(Bridge, TheCamerasOpticalFrameIsTheChildWhereAsked) {
+  BridgeOptions options;
+  options.camera_child = true;
+  Kept kept;
+  Bridge bridge(options, &kept);
+  bridge.add(calibration_line("front left", "right"));
+  Pose pose;
+  pose.T_world_left.t = {1, 2, 3};  // right, down, forward
+  bridge.add(line_of(pose));
+  const Odometry o = odometry(kept.messages["/vergence/odometry"].at(0));
+  EXPECT_EQ(o.child, "front_left_optical_frame");
+  EXPECT_LT((o.pose.t - Vec3(3, -1, -2)).norm(), 1e-12) << "forward, left, up of odom";
+  EXPECT_LT((o.pose.R.col(2) - Vec3::UnitX()).norm(), 1e-12) << "z is the camera's view";
+}
+
+TEST(Bridge, ACalibrationIsLatchedOnceUnderNamesOfRos) {
+  BridgeOptions options = on_vehicle();
+  Kept kept;
+  Bridge bridge(options, &kept);
+  bridge.add(calibration_line("1-st", "1 st"));
+  bridge.add(calibration_line("1-st", "1 st"));  // the greeting again
+  for (const char* topic :
+       {"/tf_static", "/vergence/_1_st/camera_info", "/vergence/_1_st_1/camera_info"}) {
+    EXPECT_EQ(kept.messages[topic].size(), 1U) << topic;
+    EXPECT_EQ(std::count(kept.latched.begin(), kept.latched.end(), topic), 1) << topic;
+  }
+  Reader in(kept.messages["/vergence/_1_st_1/camera_info"].at(0));
+  EXPECT_EQ(in.text(), "_1_st_1_optical_frame");
+  bridge.add(calibration_line("left", "right"));
+  EXPECT_EQ(kept.messages["/tf_static"].size(), 2U) << "another one";
+}
+
+TEST(Bridge, PlacesOnTheEarthComeWithTheAlignment) {
+  Kept kept;
+  BridgeOptions options;
+  options.T_base_left = mount_of(Vec3::Zero(), Vec3::Zero());
+  Bridge bridge(options, &kept);
+  Pose pose;
+  pose.T_world_left.t = {0, 0, 100};  // enu: y is the world's z
+  pose.covariance.setZero();
+  bridge.add(line_of(pose));
+  EXPECT_TRUE(kept.messages["/vergence/fix"].empty());
+  bridge.add(kAlignment);
+  bridge.add(line_of(pose));
+  Reader in(kept.messages["/vergence/pose_enu"].at(0));
+  EXPECT_EQ(in.text(), "enu");
+  EXPECT_LT((in.pose().t - Vec3(10, 120, 30)).norm(), 1e-9);
+  const Matrix6 P = in.covariance();
+  // Variances of the position, and of the heading and the tilt 100 m away.
+  EXPECT_NEAR(P(0, 0), 1 + 4, 1e-9);
+  EXPECT_NEAR(P(1, 1), 4, 1e-9);
+  EXPECT_NEAR(P(2, 2), 9 + 1, 1e-9);
+  EXPECT_NEAR(P(5, 5), 4e-4, 1e-12);
+  const auto& fix = kept.messages["/vergence/fix"].at(0);
+  Reader place(fix);
+  (void)place.text();
+  (void)place.get<std::int8_t>();
+  (void)place.get<std::uint16_t>();
+  const double latitude = place.number();
+  // 120 m north by a degree of 110.8 km there.
+  EXPECT_NEAR(latitude, -27.5 + 120 / 110'800.0, 1e-6);
+}
+
+TEST(Bridge, ResponsesAreHandedOver) {
+  Kept kept;
+  Bridge bridge({}, &kept);
+  const auto response = bridge.add(
+      R"({"version":2,"type":"response","request":"recalibrate","accepted":true,"message":"m"})");
+  ASSERT_TRUE(response);
+  EXPECT_TRUE(response->accepted);
+  EXPECT_EQ(response->message, "m");
+  EXPECT_FALSE(bridge.add(kStatus));
+}
+
+TEST(Bridge, AnotherVersionIsRefusedAndBothAreNamed) {
+  Kept kept;
+  Bridge bridge({}, &kept);
+  try {
+    bridge.add(R"({"version":41,"type":"pose"})");
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("41"), std::string::npos);
+    EXPECT_NE(std::string(e.what()).find(fmt::format("{}", Bridge::kVersion)), std::string::npos);
+  }
+}
+
+TEST(Bridge, MalformedLinesAreCountedAndNothingElse) {
+  Kept kept;
+  Bridge bridge({}, &kept);
+  Random random(1);
+  std::uint64_t refused = 0;
+  const std::vector<std::string> lines{line_of({}), calibration_line("left", "right"), kAlignment,
+                                       kStatus};
+  for (int i = 0; i < 4000; ++i) {
+    const std::string& line = lines[static_cast<std::size_t>(i) % lines.size()];
+    const auto bytes = test::mutated({line.begin(), line.end()}, &random);
+    try {
+      bridge.add({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    } catch (const InputError&) {
+      ++refused;  // another version
+    }
+  }
+  EXPECT_GT(bridge.malformed(), 2000U);
+  EXPECT_LT(refused, 500U);
+  const std::size_t before = kept.messages["/vergence/odometry"].size();
+  bridge.add(line_of({}));
+  EXPECT_EQ(kept.messages["/vergence/odometry"].size(), before + 1);
+}
+
+struct DiagnosticCase {
+  const char *find, *replace;
+  std::array<int, 4> levels;  // odometry, calibration, cameras, INS
+};
+void PrintTo(const DiagnosticCase& c, std::ostream* out) { *out << c.replace; }
+
+class BridgeDiagnostics : public testing::TestWithParam<DiagnosticCase> {};
+
+TEST_P(BridgeDiagnostics, LevelsFollowTheStatus) {
+  const DiagnosticCase& c = GetParam();
+  Kept kept;
+  Bridge bridge({}, &kept);
+  bridge.add(calibration_line("left", "right"));
+  std::string line = kStatus;
+  const std::size_t at = line.find(c.find);
+  ASSERT_NE(at, std::string::npos);
+  line.replace(at, std::string(c.find).size(), c.replace);
+  bridge.add(line);
+  EXPECT_EQ(bridge.malformed(), 0U);
+  const auto& message = kept.messages["/diagnostics"].at(0);
+  Reader in(message);
+  (void)in.text();
+  ASSERT_EQ(in.get<std::uint32_t>(), 5U);
+  std::array<int, 4> levels{};
+  for (int& level : levels) {
+    level = in.get<std::uint8_t>();
+    for (int i = 0; i < 3; ++i) (void)in.text();
+    for (std::uint32_t n = 2 * in.get<std::uint32_t>(); n > 0; --n) (void)in.text();
+  }
+  EXPECT_EQ(levels, c.levels);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, BridgeDiagnostics,
+    testing::Values(DiagnosticCase{"ok", "ok", {0, 0, 0, 0}},
+                    DiagnosticCase{R"("status":"ok")", R"("status":"degraded")", {1, 0, 0, 0}},
+                    DiagnosticCase{R"("status":"ok")", R"("status":"lost")", {2, 0, 0, 0}},
+                    DiagnosticCase{R"("silent_s":0.01)", R"("silent_s":1.5)", {3, 0, 0, 0}},
+                    DiagnosticCase{R"("verified":true)", R"("verified":false)", {0, 1, 0, 0}},
+                    DiagnosticCase{"[true,true]", "[true,false]", {0, 0, 2, 0}},
+                    DiagnosticCase{"assumed", "contradicted", {0, 0, 1, 0}},
+                    DiagnosticCase{R"("fix":"3d")", R"("fix":"none")", {0, 0, 0, 1}},
+                    DiagnosticCase{R"("silent_s":0.1)", R"("silent_s":9.5)", {0, 0, 0, 2}}));
+
+}  // namespace
+}  // namespace vergence::app::ros2
