@@ -95,9 +95,12 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   change.to = State::stereo_odometry;
   change.why = "trusted calibration";
   recorder.on_event(EventRecord::of(change));
+  change.kind = EstimatorEvent::Kind::time_gap;
+  change.value = 2.5;
+  recorder.on_event(EventRecord::of(change));
   (void)recorder.close();
   const auto lines = lines_of(folder / "events.jsonl");
-  ASSERT_EQ(lines.size(), 2U);
+  ASSERT_EQ(lines.size(), 3U);
   const auto torn = nlohmann::json::parse(lines[0]), state = nlohmann::json::parse(lines[1]);
   EXPECT_EQ(torn["stamp_ns"], kStamp);
   EXPECT_EQ(torn["kind"], "image_torn");
@@ -108,6 +111,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   EXPECT_EQ(state["kind"], "state");
   EXPECT_EQ(state["sentence"], "initialising to stereo_odometry: trusted calibration");
   EXPECT_EQ(state["fields"]["to"], "stereo_odometry");
+  EXPECT_EQ(nlohmann::json::parse(lines[2])["fields"], nlohmann::json({{"gap_s", 2.5}}));
 }
 
 TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
