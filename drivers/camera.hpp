@@ -1,7 +1,6 @@
 #pragma once
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -145,9 +144,6 @@ class CameraDevice {
                                                   ExposureSetting* /*actual*/) noexcept {
     return DeviceStatus::unsupported;
   }
-  /// Of sensor or housing, °C, where the device tells. Talks to the device as set_exposure() does;
-  /// any thread but that of wait().
-  [[nodiscard]] virtual std::optional<double> temperature_c() noexcept { return std::nullopt; }
   /// One sentence about the last call that was not `ok`: what was refused, what the camera offers,
   /// what to do. Empty: the status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }

@@ -2,61 +2,26 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
+#include "core/types/names.hpp"
 #include "drivers/camera.hpp"
+#include "drivers/common/format_text.hpp"
 
 namespace vergence {
 
 std::string_view to_string(DeviceStatus status) noexcept {
-  switch (status) {
-    case DeviceStatus::ok:
-      return "ok";
-    case DeviceStatus::timeout:
-      return "timeout";
-    case DeviceStatus::stopped:
-      return "stopped";
-    case DeviceStatus::ended:
-      return "ended";
-    case DeviceStatus::gone:
-      return "gone";
-    case DeviceStatus::not_found:
-      return "not found";
-    case DeviceStatus::no_permission:
-      return "no permission";
-    case DeviceStatus::busy:
-      return "busy";
-    case DeviceStatus::unsupported:
-      return "unsupported";
-    case DeviceStatus::bad_configuration:
-      return "bad configuration";
-    case DeviceStatus::no_bandwidth:
-      return "no bandwidth";
-    case DeviceStatus::failed:
-      return "failed";
-  }
-  return "";
+  return name_of(
+      status, std::array{"ok", "timeout", "stopped", "ended", "gone", "not found", "no permission",
+                         "busy", "unsupported", "bad configuration", "no bandwidth", "failed"});
 }
 
 const char* to_string(CameraTrigger trigger) noexcept {
-  switch (trigger) {
-    case CameraTrigger::hardware:
-      return "hardware";
-    case CameraTrigger::software:
-      return "software";
-    case CameraTrigger::free:
-      return "free";
-  }
-  return "";
+  return name_of(trigger, std::array{"hardware", "software", "free"});
 }
 
 std::string find_invalid(const CameraConfiguration& requested) {
-  const auto number = [](double value) {
-    std::array<char, 32> text{};
-    (void)std::snprintf(text.data(), text.size(), "%.6g", value);
-    return std::string(text.data());
-  };
+  const auto number = [](double value) { return format_text("%.6g", value); };
   if (requested.width <= 0 || requested.height <= 0)
     return "a size of " + std::to_string(requested.width) + " x " +
            std::to_string(requested.height);

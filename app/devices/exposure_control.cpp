@@ -52,7 +52,6 @@ class ExposureControl::Watched final : public CameraDevice {
                             ExposureSetting* actual) noexcept override {
     return camera_->set_exposure(requested, actual);
   }
-  std::optional<double> temperature_c() noexcept override { return camera_->temperature_c(); }
   std::string last_error() const override { return camera_->last_error(); }
   std::string remark() const override { return camera_->remark(); }
   CameraStatistics statistics() const noexcept override { return camera_->statistics(); }

@@ -131,7 +131,6 @@ ComparisonOptions comparison_options(const Configuration& c) {
   }
   o.jump_m = c.comparison.jump_m;
   o.scale_tolerance = c.comparison.scale_tolerance;
-  if (const char* sentence = o.validate()) throw InputError(std::string("comparison: ") + sentence);
   return o;
 }
 
@@ -151,7 +150,7 @@ exposure::ExposureOptions exposure_options(const Configuration& c) {
   o.most = microseconds(c.exposure.max_us);
   o.most_gain_db = c.exposure.max_gain_db;
   o.settle_frames = c.exposure.settle_frames;
-  if (const char* sentence = o.validate()) throw InputError(std::string("exposure: ") + sentence);
+  if (o.most < o.least) throw InputError("exposure.max_us: below exposure.min_us; make it larger");
   if (c.exposure.max_us * 1e-6 * c.trigger.rate > 1)
     throw InputError(fmt::format(
         "exposure.max_us is {}, longer than the {:.0f} µs between two pulses (trigger.rate {})",

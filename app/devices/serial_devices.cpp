@@ -68,7 +68,7 @@ xsens::Options xsens_options(const InsRequest& request) {
 }
 
 std::unique_ptr<InsDriver> make_xsens(const InsRequest& request) {
-  return std::make_unique<xsens::Driver>(xsens_options(request));
+  return xsens::make_driver(xsens_options(request));
 }
 
 template <gnss::Protocol kProtocol>
@@ -78,7 +78,7 @@ gnss::Options gnss_options(const InsRequest& request) {
 
 template <gnss::Protocol kProtocol>
 std::unique_ptr<InsDriver> make_gnss(const InsRequest& request) {
-  return std::make_unique<gnss::Driver>(gnss_options<kProtocol>(request));
+  return gnss::make_driver(gnss_options<kProtocol>(request));
 }
 
 const InsDriverRow& row_of(const InsRequest& request) {

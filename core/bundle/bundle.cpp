@@ -100,10 +100,10 @@ class Solve {
   void run() noexcept {
     damping_ = options_.initial_damping;
     if (!system_.linearise(best(), damping_)) {
-      find_behind();
+      result_.termination = BundleTermination::invalid_input;  // a point behind its camera
       return;
     }
-    cost_ = result_.initial_cost = system_.cost();
+    cost_ = system_.cost();
     squared_px_ = system_.squared_px();
     iterate();
     if (rank_suspicious_ && result_.termination != BundleTermination::rank_deficient &&
@@ -244,22 +244,6 @@ class Solve {
     for (std::size_t i = 0; i < problem_.T_left_world.size(); ++i)
       if (w_.poses[i].block == w_.free_poses - 1) result_.pose = static_cast<std::uint16_t>(i);
     result_.has_pose_covariance = true;
-  }
-
-  /// The start is no start: names the first observation that has no projection.
-  void find_behind() noexcept {
-    result_.termination = BundleTermination::invalid_input;
-    result_.defect = BundleDefect::not_finite;
-    for (std::size_t i = 0; i < problem_.observations.size(); ++i) {
-      const BundleObservation& o = problem_.observations[i];
-      Vec2 pixel;
-      const Vec3 p =
-          best().T_camera_left[o.camera] * (best().poses[o.pose] * problem_.points[o.point]);
-      if (best().cameras[o.camera].project(p, &pixel, nullptr) == ProjectStatus::ok) continue;
-      result_.defect = BundleDefect::behind;
-      result_.defect_index = static_cast<std::uint32_t>(i);
-      return;
-    }
   }
 
   void write_back() noexcept {

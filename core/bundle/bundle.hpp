@@ -126,8 +126,8 @@ struct BundleOptions {
   bool pose_covariance = false;  // fill BundleResult::pose_covariance, of the free pose with the
                                  // highest index; costs as much as a step
 
-  /// Empty when every field is in its range, else one sentence naming the field.
-  [[nodiscard]] const char* validate() const noexcept;
+  /// Every field is in its range.
+  [[nodiscard]] bool valid() const noexcept;
 };
 
 enum class BundleTermination : std::uint8_t {
@@ -136,31 +136,12 @@ enum class BundleTermination : std::uint8_t {
   small_cost_change,  // converged
   max_steps,          // stopped on the way; the result is the best so far
   diverged,           // no damping up to the largest lowers the cost; the result is the best so far
-  invalid_input,      // see BundleResult::defect; nothing was changed
+  invalid_input,      // options out of range, sizes, indices, order or numbers that cannot be, a
+                      // point behind its camera at the start; nothing was changed
   rank_deficient,     // the observations do not determine the parameters; unchanged if found before
                       // the first step, else the best so far
   capacity,           // more of something than the adjuster was built for; nothing was changed
 };
-
-/// Why a problem was refused (`invalid_input`, `rank_deficient` before the first step); the
-/// offender is in BundleResult::defect_index.
-enum class BundleDefect : std::uint8_t {
-  none,
-  options,           // BundleOptions::validate() has the sentence
-  sizes,             // spans whose lengths do not go together, no camera, no pose, no constant pose
-  index,             // an observation (index given) or a prior points outside its array
-  order,             // observation not in the required order, or twice
-  not_finite,        // observation, sigma not > 0
-  state_not_finite,  // a start value: point, pose, camera (in that order of search); rotation far
-                     // from orthonormal
-  behind,     // observation of a point that is behind its camera, or outside its lens model, at the
-              // start
-  seen_once,  // free point with one observation
-  pose_without_observations,  // free pose that nothing determines
-};
-
-[[nodiscard]] const char* to_string(BundleTermination) noexcept;
-[[nodiscard]] const char* to_string(BundleDefect) noexcept;
 
 /// Covariances are of the left perturbation (rotation rad, then translation m), R ← Exp(φ) R, t ← t
 /// + τ, as in RigCalibration; with an exact length the 6×6 has rank 5.
@@ -171,12 +152,9 @@ struct BundleResult {
   }
 
   BundleTermination termination = BundleTermination::invalid_input;
-  BundleDefect defect = BundleDefect::none;
-  std::uint32_t defect_index = 0;
-  int steps = 0;            // tried
-  int accepted = 0;         // of these
-  double initial_cost = 0;  // ½ Σ ρ(|ε|²/σ²) + priors
-  double final_cost = 0;
+  int steps = 0;          // tried
+  int accepted = 0;       // of these
+  double final_cost = 0;  // ½ Σ ρ(|ε|²/σ²) + priors
   double rms_px =
       0;  // root mean of |ε|² over observations, px, both coordinates together, unweighted
   double damping = 0;  // λ at the end

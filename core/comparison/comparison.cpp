@@ -1,7 +1,6 @@
 #include "core/comparison/comparison.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cassert>
 #include <cmath>
 #include <utility>
@@ -9,30 +8,7 @@
 namespace vergence {
 namespace {
 
-bool positive(double v) noexcept { return std::isfinite(v) && v > 0; }
-
 double wrapped(double angle) noexcept { return std::remainder(angle, 2.0 * std::numbers::pi); }
-
-}  // namespace
-
-const char* ComparisonOptions::validate() const noexcept {
-  if (!T_ins_left.finite()) return "the lever arm or the boresight is not a number";
-  if (!positive(placement_m)) return "placement_m must be more than 0 m";
-  if (!positive(correlation_s)) return "correlation_s must be more than 0 s";
-  if (!positive(position_sigma_m) || !positive(height_sigma_m) || !positive(tilt_sigma_rad))
-    return "every sigma must be more than 0";
-  if (!(heading_sigma_rad >= 0)) return "heading_sigma must be 0 or more";
-  if (max_gap <= Duration{} || max_wait <= Duration{})
-    return "max_gap and max_wait must be more than 0 s";
-  if (!positive(jump_m)) return "jump_m must be more than 0 m";
-  if (!positive(scale_stretch_m) || !positive(scale_tolerance))
-    return "scale_stretch_m and scale_tolerance must be more than 0";
-  if (!std::has_single_bit(ins_capacity) || ins_capacity < 16)
-    return "ins_capacity must be a power of two, 16 or more";
-  return nullptr;
-}
-
-namespace {
 
 /// Forward-left-up from right-down-forward.
 Mat3 body_from_camera() noexcept {
@@ -61,9 +37,7 @@ const char* to_string(InsMatch m) noexcept {
 }
 
 Comparison::Comparison(const ComparisonOptions& options, Arena& arena)
-    : options_(options), ins_(options_, counters_, arena), builder_(options_, arena) {
-  assert(options.validate() == nullptr);
-}
+    : options_(options), ins_(options_, counters_, arena), builder_(options_, arena) {}
 
 std::size_t Comparison::bytes_needed(const ComparisonOptions& options) noexcept {
   return InsHistory::bytes_needed(options) + PlacementBuilder::bytes_needed();
@@ -115,7 +89,6 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.ins_valid = c.ins == InsMatch::ok;
   if (c.ins_valid) {
     c.reference = on_earth(reference.T_enu_left);
-    c.ins_stamp_error = reference.stamp_error;
     c.ins_position_sigma = reference.sigmas.position;
     c.height_known = !reference.flat;
   } else {
@@ -142,7 +115,6 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.scale_disagrees = ratio_.disagrees();
 
   const Placement& placement = builder_.placement();
-  c.placement_revision = placement.revision;
   c.placed = posed && placement.revision > 0;
   if (c.placed) c.ours = on_earth(placement.T_enu_world * pose.T_world_left);
   c.compared = c.placed && c.ins_valid;

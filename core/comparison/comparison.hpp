@@ -45,9 +45,6 @@ struct ComparisonOptions {
   /// INS samples held; the oldest goes. 8192 are 68 s at 120 Hz, far more than any pose waits.
   /// Power of two.
   std::size_t ins_capacity = 8192;
-
-  /// Nothing wrong: nullptr; else a sentence.
-  [[nodiscard]] const char* validate() const noexcept;
 };
 
 /// From where the left camera sits in the body of the INS (forward, left, up; m) and how the rig's
@@ -84,11 +81,10 @@ struct ComparedPose {
   bool ins_valid = false;
   bool placed = false;    // the pose is not lost and there is a placement
   bool compared = false;  // both: the errors mean something
-  std::uint32_t placement_revision = 0;
   EarthPose ours{};
   EarthPose reference{};          // the INS brought to the left camera and to the frame's stamp
-  Duration ins_stamp_error{};     // the larger of the two samples' around the frame
-  double ins_position_sigma = 0;  // m, horizontal, each axis: likewise
+  double ins_position_sigma = 0;  // m, horizontal, each axis: the larger of the two samples'
+                                  // around the frame
   bool height_known = false;      // the INS measured its height; else error_enu.z() is 0
   Vec3 error_enu = Vec3::Zero();  // m, ours − INS
   double error_yaw = 0;           // rad, in (−π, π], counter-clockwise from above positive
@@ -136,7 +132,7 @@ class Comparison {
  public:
   static constexpr std::size_t kPending = 64;
 
-  /// Precondition: options.validate() == nullptr. Throws std::length_error when the arena is full.
+  /// Throws std::length_error when the arena is full.
   Comparison(const ComparisonOptions& options, Arena& arena);
   Comparison(const Comparison&) = delete;  // its parts refer to one another
   Comparison& operator=(const Comparison&) = delete;

@@ -135,7 +135,6 @@ void InsHistory::add(const InsSample& sample) noexcept {
   if (!accept_stamp(sample.stamp)) return;
   Reading r;
   r.stamp = sample.stamp;
-  r.stamp_error = sample.stamp_error;
   locate(sample, &r);
   if (r.valid) r.jumped = leapt(r);
   if (end_ - begin_ == readings_.size()) ++begin_;
@@ -177,7 +176,6 @@ InsMatch InsHistory::reference_at(Stamp stamp, Reference* out) const noexcept {
       interpolate({a.R_enu_ins, a.p_enu_ins}, {b.R_enu_ins, b.p_enu_ins}, s);
   out->T_enu_left = T_enu_ins * options_.T_ins_left;
   out->flat = a.flat || b.flat;
-  out->stamp_error = std::max(a.stamp_error, b.stamp_error);
   out->sigmas.position = std::max(a.sigmas.position, b.sigmas.position);
   out->sigmas.height = std::max(a.sigmas.height, b.sigmas.height);
   out->sigmas.tilt = std::max(a.sigmas.tilt, b.sigmas.tilt);

@@ -26,9 +26,8 @@ class InsHistory {
   /// Between two samples.
   struct Reference {
     Transform T_enu_left{};
-    Sigmas sigmas{};         // the larger of both
-    Duration stamp_error{};  // the larger of both
-    bool flat = false;       // one of them has no height: its height is the last measured one
+    Sigmas sigmas{};    // the larger of both
+    bool flat = false;  // one of them has no height: its height is the last measured one
   };
 
   /// Counts refused samples and jumps in `counters`, which outlive this, as `options` do.
@@ -52,7 +51,6 @@ class InsHistory {
  private:
   struct Reading {  // an InsSample in enu
     Stamp stamp{};
-    Duration stamp_error{};
     bool valid = false;
     bool jumped = false;  // against the last fix before
     bool flat = false;    // a fix in two dimensions

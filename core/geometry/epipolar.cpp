@@ -11,17 +11,6 @@ constexpr double kMinSine2 = 1e-20;  // between two rays: parallel to what doubl
 
 }  // namespace
 
-Mat32 tangent_basis(const Vec3& unit) noexcept {
-  const Vec3 a = unit.cwiseAbs();
-  const Vec3 axis = a.x() <= a.y() && a.x() <= a.z() ? Vec3::UnitX()
-                    : a.y() <= a.z()                 ? Vec3::UnitY()
-                                                     : Vec3::UnitZ();
-  Mat32 B;
-  B.col(0) = unit.cross(axis).normalized();
-  B.col(1) = unit.cross(B.col(0));
-  return B;
-}
-
 Transform moved_on_sphere(const Transform& T, const Vec5& delta) noexcept {
   const double length = T.t.norm();
   const Vec3 unit = T.t / length;
@@ -45,9 +34,9 @@ EpipolarGeometry::EpipolarGeometry(const Transform& T) noexcept
 }
 
 template <bool kBothImages>
-EpipolarStatus EpipolarGeometry::distance(const Vec2& left, const Vec2& right, double* value,
-                                          Vec5* J) const noexcept {
-  if (!valid_) return EpipolarStatus::no_baseline;
+bool EpipolarGeometry::distance(const Vec2& left, const Vec2& right, double* value,
+                                Vec5* J) const noexcept {
+  if (!valid_) return false;
   const Vec3 x1 = left.homogeneous(), x2 = right.homogeneous();
   const Vec3 turned = R_ * x1;
   const Vec3 l = t_.cross(turned);
@@ -56,10 +45,10 @@ EpipolarStatus EpipolarGeometry::distance(const Vec2& left, const Vec2& right, d
   const double n = x2.dot(l);
   double s = l.head<2>().squaredNorm();
   if constexpr (kBothImages) s += k.head<2>().squaredNorm();
-  if (!(s > kMinGradient2)) return EpipolarStatus::at_epipole;
+  if (!(s > kMinGradient2)) return false;
   const double i = 1.0 / std::sqrt(s);
   *value = n * i;
-  if (J == nullptr) return EpipolarStatus::ok;
+  if (J == nullptr) return true;
   // l = t × (R x): ∂/∂φ = −[t]× [R x]×, ∂/∂(α, β) = −[R x]× B.   k = Rᵀ (x' × t): ∂/∂φ = Rᵀ [w]×,
   // ∂/∂(α, β) = Rᵀ [x']× B.
   Eigen::Matrix<double, 3, 5> dl;
@@ -74,16 +63,16 @@ EpipolarStatus EpipolarGeometry::distance(const Vec2& left, const Vec2& right, d
     ds += dk.topRows<2>().transpose() * k.head<2>();
   }
   *J = i * (dl.transpose() * x2) - (n * i * i * i) * ds;
-  return EpipolarStatus::ok;
+  return true;
 }
 
-EpipolarStatus EpipolarGeometry::sampson(const Vec2& left, const Vec2& right, double* value,
-                                         Vec5* J) const noexcept {
+bool EpipolarGeometry::sampson(const Vec2& left, const Vec2& right, double* value,
+                               Vec5* J) const noexcept {
   return distance<true>(left, right, value, J);
 }
 
-EpipolarStatus EpipolarGeometry::to_line(const Vec2& left, const Vec2& right, double* value,
-                                         Vec5* J) const noexcept {
+bool EpipolarGeometry::to_line(const Vec2& left, const Vec2& right, double* value,
+                               Vec5* J) const noexcept {
   return distance<false>(left, right, value, J);
 }
 

@@ -1,22 +1,9 @@
 #pragma once
-#include <cstdint>
-
 #include "core/math/se3.hpp"
 
 namespace vergence {
 
-using Mat32 = Eigen::Matrix<double, 3, 2>;
 using Mat5 = Eigen::Matrix<double, 5, 5>;
-
-enum class EpipolarStatus : std::uint8_t {
-  ok,
-  at_epipole,   // the epipolar line has no direction there: nothing is measured
-  no_baseline,  // |t| = 0 or not a number
-};
-
-/// Two unit vectors that span the plane perpendicular to a unit vector; the same for the same
-/// input.
-[[nodiscard]] Mat32 tangent_basis(const Vec3& unit) noexcept;
 
 /// The stereo transform moved by δ = (φ, α, β), rad: R ← Exp(φ) R, t ← |t| · normalised(t/|t| + B
 /// (α, β)), B the tangent basis of t/|t|. The length stays: two cameras do not see it.
@@ -42,17 +29,18 @@ class EpipolarGeometry {
  public:
   explicit EpipolarGeometry(const Transform& T_right_left) noexcept;
 
-  /// Not `ok`: *value and *J untouched. J may be null.
-  [[nodiscard]] EpipolarStatus sampson(const Vec2& left, const Vec2& right, double* value,
-                                       Vec5* J) const noexcept;
-  [[nodiscard]] EpipolarStatus to_line(const Vec2& left, const Vec2& right, double* value,
-                                       Vec5* J) const noexcept;
+  /// False: nothing is measured, as at the epipole, where the line has no direction, or without a
+  /// baseline; *value and *J untouched. J may be null.
+  [[nodiscard]] bool sampson(const Vec2& left, const Vec2& right, double* value,
+                             Vec5* J) const noexcept;
+  [[nodiscard]] bool to_line(const Vec2& left, const Vec2& right, double* value,
+                             Vec5* J) const noexcept;
   [[nodiscard]] const Mat3& E() const noexcept { return E_; }
 
  private:
   template <bool kBothImages>
-  [[nodiscard]] EpipolarStatus distance(const Vec2& left, const Vec2& right, double* value,
-                                        Vec5* J) const noexcept;
+  [[nodiscard]] bool distance(const Vec2& left, const Vec2& right, double* value,
+                              Vec5* J) const noexcept;
 
   Mat3 R_, E_;
   Vec3 t_;   // unit

@@ -255,19 +255,15 @@ void cubics_at(const Mat3& E, Vec10* f) noexcept {
 FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
                                     const std::array<Vec2, 5>& right) noexcept {
   FivePointSolutions out;
-  const auto refuse = [&out](FivePointStatus why) noexcept {
-    out.status = why;
-    return out;
-  };
   for (std::size_t i = 0; i < 5; ++i)
-    if (!left[i].allFinite() || !right[i].allFinite()) return refuse(FivePointStatus::not_finite);
+    if (!left[i].allFinite() || !right[i].allFinite()) return out;
   Basis basis;
-  if (!null_space(left, right, &basis)) return refuse(FivePointStatus::degenerate);
+  if (!null_space(left, right, &basis)) return out;
   const Mat10x20 M = constraints(basis);
   const Eigen::Matrix<double, 10, 10> head = M.leftCols<10>(), tail = M.rightCols<10>();
   const Eigen::PartialPivLU<Eigen::Matrix<double, 10, 10>> lu(head);
   const Eigen::Matrix<double, 10, 10> reduced = lu.solve(tail);
-  if (!reduced.allFinite()) return refuse(FivePointStatus::degenerate);
+  if (!reduced.allFinite()) return out;
   const auto row = [&reduced](int i) noexcept { return Vec10(reduced.row(i).transpose()); };
   // Rows 4 … 9 of the reduced system lead with x²z x² y²z y² xyz xy: pairs that differ by a factor
   // z.
@@ -276,7 +272,7 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
   std::array<double, 11> det = determinant(B);
   double largest = 0;
   for (const double c : det) largest = std::max(largest, std::abs(c));
-  if (!(largest > 0) || !std::isfinite(largest)) return refuse(FivePointStatus::degenerate);
+  if (!(largest > 0) || !std::isfinite(largest)) return out;
   for (double& c : det) c /= largest;
 
   // |z| ≤ 1, and beyond it the reversed polynomial in 1/z.
@@ -299,7 +295,6 @@ FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
       if (!seen) out.E[static_cast<std::size_t>(out.count++)] = E;
     }
   }
-  out.status = out.count > 0 ? FivePointStatus::ok : FivePointStatus::no_solution;
   return out;
 }
 

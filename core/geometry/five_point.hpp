@@ -1,23 +1,14 @@
 #pragma once
 #include <array>
-#include <cstdint>
 #include <span>
 
 #include "core/math/se3.hpp"
 
 namespace vergence {
 
-enum class FivePointStatus : std::uint8_t {
-  ok,
-  not_finite,
-  degenerate,   // the five matches do not make five equations: coincident for instance
-  no_solution,  // all roots are complex
-};
-
-/// Essential matrices, Frobenius norm √2: rayᵀ_right E ray_left = 0. `count` is 0 unless `status`
-/// is ok.
+/// Essential matrices, Frobenius norm √2: rayᵀ_right E ray_left = 0. None where the matches are not
+/// finite or do not make five equations, as coincident ones, or all roots are complex.
 struct FivePointSolutions {
-  FivePointStatus status = FivePointStatus::no_solution;
   int count = 0;  // 0 … 10
   std::array<Mat3, 10> E{};
 };
@@ -29,7 +20,7 @@ struct FivePointSolutions {
 /// determinant has degree ten (D. Nistér, "An Efficient Solution to the Five-Point Relative Pose
 /// Problem", PAMI 26, 2004). Its real roots are isolated between critical points, and (x, y, z)
 /// polished by Gauss–Newton on the ten cubics, which takes away what the elimination has rounded.
-/// Threads pure. Memory none. Errors by status; nothing that comes out is NaN.
+/// Threads pure. Memory none. Errors none; nothing that comes out is NaN.
 [[nodiscard]] FivePointSolutions solve_five_point(const std::array<Vec2, 5>& left,
                                                   const std::array<Vec2, 5>& right) noexcept;
 

@@ -177,12 +177,7 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
                             const Transform* prior, Random& random) noexcept {
   MlesacPose out;
   points_ = 0;
-  const auto refuse = [&out](MlesacStatus why) noexcept {
-    out.status = why;
-    return out;
-  };
-  if (!valid(options) || !o.consistent()) return refuse(MlesacStatus::invalid_input);
-  if (o.size() > flags_.size()) return refuse(MlesacStatus::capacity);
+  if (!valid(options) || !o.consistent() || o.size() > flags_.size()) return out;
   const double cap = options.outlier_cost;
   gather(o, cap);
   problem_.gather(o);
@@ -192,18 +187,17 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
   for (const CameraSet& s : sets_) drawable += s.count >= 3 ? static_cast<int>(s.count) : 0;
   if (observations_ == 0 || (drawable == 0 && !has_prior)) {
     std::fill_n(flags_.begin(), points_, std::uint8_t{0});
-    return refuse(MlesacStatus::too_few);
+    return out;
   }
 
   double best = std::numeric_limits<double>::infinity();
   int polished = 0;
   int needed = drawable > 0 ? options.max_hypotheses : 0;
   const auto consider = [&](const Transform& T) noexcept {
-    ++out.hypotheses;
     const double cost = score(o, T, best);
-    if (!(cost < best)) return false;
+    if (!(cost < best)) return;
     best = cost;
-    out.status = MlesacStatus::ok;
+    out.found = true;
     out.T_left_world = T;
     Transform better = T;
     if (polished < kMaxPolished && polish(cap, &better)) {
@@ -220,9 +214,8 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
                  ? std::max(std::min(options.min_hypotheses, options.max_hypotheses),
                             samples_needed(share, 3, options.confidence, options.max_hypotheses))
                  : 0;
-    return true;
   };
-  if (has_prior) out.prior_best = consider(*prior);
+  if (has_prior) consider(*prior);
 
   while (out.samples < needed) {
     ++out.samples;
@@ -247,10 +240,9 @@ MlesacPose RigMlesac::solve(const RigObservations& o, const MlesacOptions& optio
     const ThreePointSolutions found = solve_three_point(rays, points);
     const Transform T_left_camera = o.T_camera_left[k].inverse();
     for (int j = 0; j < found.count; ++j)
-      if (consider(T_left_camera * found.T_camera_world[static_cast<std::size_t>(j)]))
-        out.prior_best = false;
+      consider(T_left_camera * found.T_camera_world[static_cast<std::size_t>(j)]);
   }
-  if (out.status != MlesacStatus::ok) {
+  if (!out.found) {
     std::fill_n(flags_.begin(), points_, std::uint8_t{0});
     return out;
   }

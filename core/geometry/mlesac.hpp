@@ -20,24 +20,17 @@ struct MlesacOptions {
   double outlier_cost = kChi2OfPixel;
 };
 
-enum class MlesacStatus : std::uint8_t {
-  ok,             // there is a pose; whether its inliers suffice is the caller's to say
-  invalid_input,  // lengths disagree, intrinsics or transforms are not finite, options out of range
-  capacity,       // more points than the workspace holds
-  too_few,        // no camera has three usable observations, and there is no prior
-  no_hypothesis,  // no sample gave a pose, and there is no prior
-};
-
 struct MlesacPose {
-  MlesacStatus status = MlesacStatus::no_hypothesis;
+  /// There is a pose; whether its inliers suffice is the caller's to say. Not found where the input
+  /// or the options cannot be, there are more points than the workspace holds, or without a prior
+  /// no camera has three usable observations or no sample gave a pose.
+  bool found = false;
   Transform T_left_world{};
   int inliers = 0;              // points all of whose `seen` observations are usable, within T²
   int inlier_observations = 0;  // of `observations`
   int observations = 0;         // usable, of all cameras
   double score = 0;             // C below, lower is better
   int samples = 0;              // three-point samples drawn
-  int hypotheses = 0;           // poses scored, the prior among them
-  bool prior_best = false;      // no sample was better than the prior
 };
 
 /// Pose of a rig in the world from points seen by any of its cameras, outliers among them.
@@ -61,7 +54,7 @@ struct MlesacPose {
 /// Memory     All at construction.
 /// Precision  Scores in float about the points' mean (0.01 px for points within 100 times their
 ///            distance), flags in double.
-/// Errors     By status; not `ok`: the pose is the identity and means nothing.
+/// Errors     Not found: the pose is the identity and means nothing.
 /// Same input, options and random state: same result, on every instruction set.
 class RigMlesac {
  public:

@@ -79,7 +79,7 @@ bool PoseRefiner::drop_gross(const RefinedPose& pose, const PoseRefineOptions& o
 bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) noexcept {
   pose->scale = residual_scale(pose->T_left_world, options.min_scale);
   detail::PoseProblem::Sums now = problem_.sums(pose->T_left_world, pose->scale, options.huber);
-  pose->status = PoseRefineStatus::max_steps;
+  pose->converged = false;
   double damping = 0;
   int failures = 0, steps = 0;
   bool rescaled = false;
@@ -103,7 +103,7 @@ bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) n
     // Rounding of the sum is forgiven: at the optimum steps neither help nor hurt.
     if (!(then.cost <= now.cost * (1.0 + 1e-12)) || !next.finite()) {
       if (small(delta, options.small_update)) {
-        pose->status = PoseRefineStatus::small_update;
+        pose->converged = true;
         break;
       }
       if (++failures > kMaxFailures) break;
@@ -117,7 +117,7 @@ bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) n
     if (damping < 1e-9) damping = 0;
     failures = 0;
     if (converged) {
-      pose->status = PoseRefineStatus::small_update;
+      pose->converged = true;
       break;
     }
   }
@@ -159,14 +159,9 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
   RefinedPose out;
   out.T_left_world = start;
   points_ = 0;
-  const auto refuse = [&out](PoseRefineStatus why) noexcept {
-    out.status = why;
-    return out;
-  };
   if (!valid(options) || !o.consistent() || !start.finite() ||
-      (!use.empty() && use.size() != o.size()))
-    return refuse(PoseRefineStatus::invalid_input);
-  if (o.size() > flags_.size()) return refuse(PoseRefineStatus::capacity);
+      (!use.empty() && use.size() != o.size()) || o.size() > flags_.size())
+    return out;
   points_ = o.size();
   std::fill_n(flags_.begin(), points_, std::uint8_t{0});
   problem_.gather(o);
@@ -176,9 +171,9 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
       const bool counts = use.empty() || ((use[problem_.point(k, i)] >> k) & 1U) != 0;
       if (!counts) problem_.use(k, i, false);
     }
-  if (counted() < kLeastObservations) return refuse(PoseRefineStatus::too_few);
+  if (counted() < kLeastObservations) return out;
 
-  if (!descend(options, &out)) return refuse(PoseRefineStatus::rank_deficient);
+  if (!descend(options, &out)) return out;
   if (drop_gross(out, options)) {
     // Where what is left does not hold the pose, it is that of all.
     const RefinedPose of_all = out;
@@ -188,14 +183,12 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
 
   Vec6 d;
   for (int i = 0; i < 6; ++i) {
-    if (!(out.information(i, i) > 0.0) || !std::isfinite(out.information(i, i)))
-      return refuse(PoseRefineStatus::rank_deficient);
+    if (!(out.information(i, i) > 0.0) || !std::isfinite(out.information(i, i))) return out;
     d[i] = 1.0 / std::sqrt(out.information(i, i));
   }
   const Mat6 unit = d.asDiagonal() * out.information * d.asDiagonal();
   const Vec6 scaled = semidefinite_eigenvalues(unit);
-  if (!(scaled[5] > scaled[0] / kMaxCondition)) return refuse(PoseRefineStatus::rank_deficient);
-  out.condition = scaled[0] / scaled[5];
+  if (!(scaled[5] > scaled[0] / kMaxCondition)) return out;
   const Mat6 covariance = d.asDiagonal() * Cholesky<6>(unit).inverse() * d.asDiagonal();
   const auto worst = [&covariance](int at) noexcept {
     const Mat3 block = covariance.block<3, 3>(at, at);
@@ -203,6 +196,7 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
   };
   out.rotation_sigma = worst(0);
   out.translation_sigma = worst(3);
+  out.usable = true;
   return out;
 }
 

@@ -19,33 +19,23 @@ struct PoseRefineOptions {
   double small_update = 1e-7;  // rad and m: converged below it
 };
 
-enum class PoseRefineStatus : std::uint8_t {
-  small_update,    // converged
-  max_steps,       // still moving; the pose is the best so far
-  invalid_input,   // lengths, intrinsics, transforms or the start are not what they must be
-  capacity,        // more points than the workspace holds
-  too_few,         // fewer than three usable observations
-  rank_deficient,  // the observations do not hold six degrees of freedom
-};
-
 struct RefinedPose {
-  PoseRefineStatus status = PoseRefineStatus::too_few;
+  /// There is a pose. Not so where the input, the start or the options cannot be, there are more
+  /// points than the workspace holds, fewer than three usable observations, or these do not hold
+  /// six degrees of freedom.
+  bool usable = false;
+  bool converged = false;           // else it was still moving: the pose is the best so far
   Transform T_left_world{};         // the start where nothing could be refined
   Mat6 information = Mat6::Zero();  // Σ w JᵀJ/(σ scale)² at the end, undamped; δ = (φ rad, τ m),
                                     // X_left ← Exp(φ) X_left + τ
   double rotation_sigma = 0;     // rad, in the direction known worst, the translation unknown
   double translation_sigma = 0;  // m, likewise: camera position; large → weak_geometry
-  double condition = 0;  // largest over least eigenvalue of the information scaled to a unit
-                         // diagonal; units drop out
-  double scale = 1;      // robust residual scale in given sigmas, ≥ min_scale
-  double rms_px = 0;     // of the inliers' residuals, per coordinate
-  int inliers = 0;       // points with every usable observation under the χ² threshold
+  double scale = 1;              // robust residual scale in given sigmas, ≥ min_scale
+  double rms_px = 0;             // of the inliers' residuals, per coordinate
+  int inliers = 0;               // points with every usable observation under the χ² threshold
   int inlier_observations = 0;
   int observations = 0;
   int steps = 0;
-  [[nodiscard]] bool usable() const noexcept {
-    return status == PoseRefineStatus::small_update || status == PoseRefineStatus::max_steps;
-  }
 };
 
 /// Pose of a rig over all cameras' observations with points held: Levenberg–Marquardt on
@@ -64,7 +54,7 @@ struct RefinedPose {
 ///
 /// Ownership  Workspace in the arena. flags() stay valid until the next refine().
 /// Threads    One caller per object. Memory: all at construction.
-/// Errors     By status; nothing that comes out is NaN. Same input, same result, on every
+/// Errors     Not usable; nothing that comes out is NaN. Same input, same result, on every
 ///            instruction set.
 class PoseRefiner {
  public:

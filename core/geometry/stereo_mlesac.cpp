@@ -130,7 +130,7 @@ Mat5 StereoMlesac::information(double cap, const Transform& T, Vec5* gradient) c
   for (std::size_t i = 0; i < count_; ++i) {
     double r = 0;
     Vec5 J;
-    if (geometry.sampson(left_[i], right_[i], &r, &J) != EpipolarStatus::ok) continue;
+    if (!geometry.sampson(left_[i], right_[i], &r, &J)) continue;
     r *= inverse_sigma_[i];
     // A wrong match that the line lets pass has a large disparity and with it a long lever on t:
     // half of them stand behind.
@@ -163,7 +163,7 @@ int StereoMlesac::flag(double cap, const Transform& T) noexcept {
   int inliers = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     double r = 0;
-    if (geometry.sampson(left_[i], right_[i], &r, nullptr) != EpipolarStatus::ok) continue;
+    if (!geometry.sampson(left_[i], right_[i], &r, nullptr)) continue;
     r *= inverse_sigma_[i];
     if (!(r * r < cap)) continue;
     if (!in_front(T, left_[i], right_[i], inverse_sigma_[i], cap)) continue;
@@ -179,16 +179,11 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
                                                        Random& random) noexcept {
   StereoEstimate out;
   matches_ = 0;
-  const auto refuse = [&out](StereoMlesacStatus why) noexcept {
-    out.status = why;
-    return out;
-  };
-  if (!valid(matches, baseline, options)) return refuse(StereoMlesacStatus::invalid_input);
-  if (matches.size() > flags_.size()) return refuse(StereoMlesacStatus::capacity);
+  if (!valid(matches, baseline, options) || matches.size() > flags_.size()) return out;
   const double cap = options.outlier_cost;
   gather(matches, cap);
   std::fill_n(flags_.begin(), matches_, std::uint8_t{0});
-  if (count_ < 5) return refuse(StereoMlesacStatus::too_few);
+  if (count_ < 5) return out;
 
   double best = std::numeric_limits<double>::infinity();
   int needed = options.max_hypotheses, polished = 0;
@@ -200,7 +195,6 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
     for (std::size_t j = 0; j < 5; ++j) left[j] = left_[picks[j]], right[j] = right_[picks[j]];
     const FivePointSolutions found = solve_five_point(left, right);
     for (int j = 0; j < found.count; ++j) {
-      ++out.hypotheses;
       const Mat3& E = found.E[static_cast<std::size_t>(j)];
       const double cost = score(E, best);
       Transform T;
@@ -215,7 +209,7 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
         if (polished_cost < best && transform_of(E_better, cap, baseline, &better))
           best = polished_cost, T = better;
       }
-      out.status = StereoMlesacStatus::ok;
+      out.found = true;
       out.T_right_left = T;
       out.inliers = flag(cap, T);
       needed =
@@ -224,7 +218,7 @@ StereoEstimate StereoMlesac::estimate_stereo_transform(const StereoMatches& matc
                                   options.confidence, options.max_hypotheses));
     }
   }
-  if (out.status != StereoMlesacStatus::ok) return out;
+  if (!out.found) return out;
   out.score = best;
   Vec5 unused;
   out.information = information(cap, out.T_right_left, &unused);

@@ -24,16 +24,8 @@ struct StereoMlesacOptions {
       6.63;  // T², squared sigmas: χ² of the one number that a match measures, at 99 %
 };
 
-enum class StereoMlesacStatus : std::uint8_t {
-  ok,
-  invalid_input,
-  capacity,
-  too_few,
-  no_hypothesis
-};
-
 struct StereoEstimate {
-  StereoMlesacStatus status = StereoMlesacStatus::no_hypothesis;
+  bool found = false;               // as MlesacPose::found; from five matches on
   Transform T_right_left{};         // |t| = baseline
   Mat5 information = Mat5::Zero();  // of δ of moved_on_sphere(), Σ JᵀJ/σ² over the inliers
   double rotation_sigma = 0;   // rad, worst direction; infinite where the matches do not hold it
@@ -41,7 +33,6 @@ struct StereoEstimate {
   int inliers = 0;             // within T² and in front of both cameras
   double score = 0;            // C, lower is better
   int samples = 0;
-  int hypotheses = 0;
 };
 
 /// Stereo transform from matches with outliers: MLESAC in its truncated form (see mlesac.hpp) over

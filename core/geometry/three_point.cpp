@@ -163,14 +163,9 @@ int meet(const Quadric& first, const Quadric& second, double gamma,
 ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
                                       const std::array<Vec3, 3>& points) noexcept {
   ThreePointSolutions out;
-  const auto refuse = [&out](ThreePointStatus why) noexcept {
-    out.status = why;
-    return out;
-  };
   for (std::size_t i = 0; i < 3; ++i) {
-    if (!rays[i].allFinite() || !points[i].allFinite()) return refuse(ThreePointStatus::not_finite);
-    if (!(std::abs(rays[i].squaredNorm() - 1.0) < kUnitTolerance))
-      return refuse(ThreePointStatus::degenerate_rays);
+    if (!rays[i].allFinite() || !points[i].allFinite()) return out;
+    if (!(std::abs(rays[i].squaredNorm() - 1.0) < kUnitTolerance)) return out;
   }
   const Vec3 p01 = points[1] - points[0], p02 = points[2] - points[0], p12 = points[2] - points[1];
   Sides s{rays[0].dot(rays[1]),
@@ -184,16 +179,16 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
           p12.squaredNorm()};
   if (std::min({rays[0].cross(rays[1]).squaredNorm(), rays[0].cross(rays[2]).squaredNorm(),
                 rays[1].cross(rays[2]).squaredNorm()}) < kMinRaySine2)
-    return refuse(ThreePointStatus::degenerate_rays);
+    return out;
   const double sum = s.a01 + s.a02 + s.a12;
-  if (!std::isfinite(sum)) return refuse(ThreePointStatus::not_finite);
+  if (!std::isfinite(sum)) return out;
   const double longest = std::max({s.a01, s.a02, s.a12}),
                shortest = std::min({s.a01, s.a02, s.a12});
   // |p01 × p02|² = (twice the area)²; with the two longer sides about equal it is longest ×
   // shortest × sin² of a corner.
   if (!(p01.cross(p02).squaredNorm() > kMinTriangleSine2 * longest * shortest) ||
       !(shortest > 1e-24 * longest))
-    return refuse(ThreePointStatus::degenerate_points);
+    return out;
   const double scale = 1.0 / sum;
   s.a01 *= scale, s.a02 *= scale, s.a12 *= scale;
 
@@ -245,7 +240,6 @@ ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
     found[static_cast<std::size_t>(out.count)] = l;
     out.T_camera_world[static_cast<std::size_t>(out.count++)] = T;
   }
-  out.status = out.count > 0 ? ThreePointStatus::ok : ThreePointStatus::no_solution;
   return out;
 }
 

@@ -7,17 +7,9 @@
 
 namespace vergence {
 
-enum class ThreePointStatus : std::uint8_t {
-  ok,                 // at least one pose
-  not_finite,         // a NaN or an infinity among the input
-  degenerate_points,  // the world points lie on a line or coincide: the pose turns freely about it
-  degenerate_rays,    // two rays coincide, or a ray is not a unit vector
-  no_solution,        // no triangle of that size fits the rays in front of the camera
-};
-
-/// Poses that map the three points onto the three rays. `count` is 0 unless `status` is ok.
+/// Poses that map the three points onto the three rays; none where the input is not finite, the
+/// points lie on a line, rays coincide or are no unit vectors, or no triangle of that size fits.
 struct ThreePointSolutions {
-  ThreePointStatus status = ThreePointStatus::no_solution;
   int count = 0;                              // 0 … 4
   std::array<Transform, 4> T_camera_world{};  // the first `count` are meant, in no order
 };
@@ -33,7 +25,7 @@ struct ThreePointSolutions {
 ///
 /// Input   rays: unit vectors in the camera's frame; points: world, m. Any scale of the scene;
 ///         checked, never assumed.
-/// Threads Pure. Memory none. Time about 1 µs. Errors by status; nothing that comes out is NaN.
+/// Threads Pure. Memory none. Time about 1 µs. Errors none; nothing that comes out is NaN.
 [[nodiscard]] ThreePointSolutions solve_three_point(const std::array<Vec3, 3>& rays,
                                                     const std::array<Vec3, 3>& points) noexcept;
 

@@ -41,6 +41,15 @@ Mat3 left_jacobian_so3(const Vec3& phi) noexcept {
          (theta - std::sin(theta)) / (theta2 * theta) * K * K;
 }
 
+Mat32 tangent_basis(const Vec3& unit) noexcept {
+  int least = 0;
+  (void)unit.cwiseAbs().minCoeff(&least);
+  Mat32 B;
+  B.col(0) = unit.cross(Vec3::Unit(least)).normalized();
+  B.col(1) = unit.cross(B.col(0));
+  return B;
+}
+
 Mat3 normalised(const Mat3& R) noexcept {
   return Eigen::Quaterniond(R).normalized().toRotationMatrix();
 }

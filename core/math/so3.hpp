@@ -26,6 +26,10 @@ namespace vergence {
 /// Left Jacobian: Exp(φ + δ) ≈ Exp(Jl(φ) δ) Exp(φ).
 [[nodiscard]] Mat3 left_jacobian_so3(const Vec3& phi) noexcept;
 
+/// Two unit vectors that span the plane perpendicular to a unit vector; the same for the same
+/// input.
+[[nodiscard]] Mat32 tangent_basis(const Vec3& unit) noexcept;
+
 /// The rotation nearest to a matrix that has drifted from orthonormality by products.
 [[nodiscard]] Mat3 normalised(const Mat3& R) noexcept;
 

@@ -13,6 +13,7 @@ using Mat3 = Eigen::Matrix3d;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Mat23 = Eigen::Matrix<double, 2, 3>;
 using Mat26 = Eigen::Matrix<double, 2, 6>;
+using Mat32 = Eigen::Matrix<double, 3, 2>;
 using Mat34 = Eigen::Matrix<double, 3, 4>;
 
 }  // namespace vergence

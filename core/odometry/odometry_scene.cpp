@@ -32,8 +32,7 @@ bool Odometry::initialise_rig(FrameOutcome* out) noexcept {
   clock.mark(Stage::match);
   out->reason =
       n < static_cast<std::size_t>(kStartMatches) ? Reason::needs_texture : Reason::uncalibrated;
-  if (e.status != StereoMlesacStatus::ok || e.inliers < kStartMatches ||
-      e.inliers < kRigidShare * static_cast<double>(n))
+  if (!e.found || e.inliers < kStartMatches || e.inliers < kRigidShare * static_cast<double>(n))
     return false;
   // A direction of t that the scene does not hold (all of it far away) is no start: depth would be
   // arbitrary.

@@ -114,13 +114,13 @@ PoseEstimator::Solved PoseEstimator::solve(const Transform& start, bool sample) 
     MlesacOptions how;
     how.max_hypotheses = options_.mlesac_hypotheses;
     const MlesacPose m = mlesac_.solve(table_.view(), how, &start, random_);
-    if (m.status != MlesacStatus::ok) return s;
+    if (!m.found) return s;
     s.T = m.T_left_world;
   }
   const RefinedPose r = refiner_.refine(table_.view(), s.T,
                                         sample ? mlesac_.flags() : std::span<const std::uint8_t>{},
                                         how_to_refine(sample));
-  if (!r.usable()) return s;
+  if (!r.usable) return s;
   s.found = true;
   s.T = r.T_left_world;
   s.rms_px = r.rms_px;
@@ -186,7 +186,7 @@ PoseFit PoseEstimator::fit_left(const Map& map, const Transform& start) noexcept
   const RefinedPose r =
       refiner_.refine(table_.view(), T, std::span<const std::uint8_t>(left).first(table_.size()),
                       how_to_refine(false));
-  if (!r.usable()) return fit;
+  if (!r.usable) return fit;
   fit.T_left_world = r.T_left_world;
   fit.rms_px = r.rms_px;
   fit.covariance = covariance_of(r);

@@ -1,14 +1,12 @@
 #include "core/types/calibration_decision.hpp"
 
-#include <array>
+#include "core/types/names.hpp"
 
 namespace vergence {
 
 std::string_view to_string(CalibrationCause c) noexcept {
-  static constexpr std::array<std::string_view, 8> names = {
-      "from_scratch", "knock",     "drift",      "collapse",
-      "out_of_step",  "requested", "refinement", "contradicted"};
-  return names[static_cast<std::size_t>(c)];
+  return name_of(c, std::array{"from_scratch", "knock", "drift", "collapse", "out_of_step",
+                               "requested", "refinement", "contradicted"});
 }
 
 }  // namespace vergence

@@ -157,6 +157,13 @@ FrameQueue::State FrameQueue::state() const noexcept {
   return state_;
 }
 
+DeviceStatus FrameQueue::standing() const noexcept {
+  const State now = state();
+  return now == State::streaming ? DeviceStatus::ok
+         : now == State::stopped ? DeviceStatus::stopped
+                                 : DeviceStatus::gone;
+}
+
 std::size_t FrameQueue::held() const noexcept {
   const std::lock_guard lock(mutex_);
   return static_cast<std::size_t>(std::popcount(held_slots_));

@@ -73,6 +73,8 @@ class FrameQueue {
   [[nodiscard]] State state() const noexcept;
   /// Streaming, gone or back: not stopped.
   [[nodiscard]] bool started() const noexcept { return state() != State::stopped; }
+  /// Whether the device can be asked now. → ok (it streams), stopped, gone
+  [[nodiscard]] DeviceStatus standing() const noexcept;
   /// Slots that the consumer has.
   [[nodiscard]] std::size_t held() const noexcept;
   /// Slots that are offered or that the consumer has.

@@ -1,7 +1,8 @@
 #pragma once
-#include <mutex>
 #include <string>
 #include <utility>
+
+#include "drivers/common/published.hpp"
 
 namespace vergence {
 
@@ -11,12 +12,8 @@ namespace vergence {
 /// Threads  Any. Memory: that of the sentence. Errors: none but std::bad_alloc of get().
 ///
 ///     return last_error_.refuse(DeviceStatus::busy, "the camera streams; stop it first");
-class LastError {
+class LastError : public Published<std::string> {
  public:
-  void set(std::string sentence) noexcept {
-    const std::lock_guard lock(mutex_);
-    sentence_ = std::move(sentence);
-  }
   /// The status as it is, with its reason kept.
   template <class Status>
   [[nodiscard]] Status refuse(Status status, std::string sentence) noexcept {
@@ -24,14 +21,6 @@ class LastError {
     return status;
   }
   void clear() noexcept { set({}); }
-  [[nodiscard]] std::string get() const {
-    const std::lock_guard lock(mutex_);
-    return sentence_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::string sentence_;
 };
 
 }  // namespace vergence

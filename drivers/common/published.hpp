@@ -1,6 +1,7 @@
 #pragma once
 #include <mutex>
 #include <type_traits>
+#include <utility>
 
 namespace vergence {
 
@@ -17,9 +18,9 @@ class Published {
     if (lock.owns_lock()) value_ = value;
   }
   /// Waits for a reader's copy.
-  void set(const Value& value) noexcept(kCopies) {
+  void set(Value value) noexcept {
     const std::lock_guard lock(mutex_);
-    value_ = value;
+    value_ = std::move(value);
   }
   [[nodiscard]] Value get() const noexcept(kCopies) {
     const std::lock_guard lock(mutex_);

@@ -47,6 +47,19 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
     info_.place = this->place().name();
   }
 
+  /// Opens the line as the device wants it.
+  [[nodiscard]] virtual DeviceStatus open() = 0;
+  /// Stopped, and opened again. Not ok: last_error_ says why. Owner's thread.
+  [[nodiscard]] DeviceStatus open_anew() {
+    stop();
+    this->close_line();
+    this->look_up_virtual_time();
+    const DeviceStatus status = open();
+    if (status != DeviceStatus::ok)
+      last_error_ = info_.place + " cannot be opened: " + std::string(to_string(status));
+    return status;
+  }
+
   /// As a decoder has counted since the device was opened. The device's thread, or the owner's
   /// while there is none.
   void count(std::uint64_t lost, std::uint64_t malformed, std::uint64_t restarts) noexcept {

@@ -111,7 +111,6 @@ class Whole final : public Notifier {
   DeviceStatus set_exposure(const ExposureSetting& requested, ExposureSetting* actual) noexcept {
     return camera_->set_exposure(requested, actual);
   }
-  std::optional<double> temperature_c() noexcept { return camera_->temperature_c(); }
   DeviceStatus trigger_once() noexcept { return camera_->trigger_once(); }
 
   [[nodiscard]] CameraStatistics statistics(std::size_t half) const noexcept {
@@ -222,7 +221,6 @@ class Half final : public CameraDevice {
                             ExposureSetting* actual) noexcept override {
     return whole_->set_exposure(requested, actual);
   }
-  std::optional<double> temperature_c() noexcept override { return whole_->temperature_c(); }
   std::string last_error() const override { return last_error_; }
   std::string remark() const override {
     return half_ == 0 ? whole_->camera().remark() : std::string();

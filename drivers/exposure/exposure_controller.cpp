@@ -16,19 +16,6 @@ double stops_of(const ExposureOptions& o, const ExposureSetting& s) noexcept {
 
 }  // namespace
 
-const char* ExposureOptions::validate() const noexcept {
-  if (least <= Duration{}) return "the shortest exposure must be positive";
-  if (most < least) return "the longest exposure is shorter than the shortest";
-  if (!(target >= 20 && target <= 200)) return "the target is a mean grey level of 20 to 200";
-  if (!(may_saturate >= 0 && may_saturate <= 0.5)) return "at most half of the pixels may saturate";
-  if (!(dead_band >= 0.05 && dead_band <= 1)) return "the dead band is 0.05 to 1 stops";
-  if (!(up_stops > 0 && up_stops <= 4 && down_stops > 0 && down_stops <= 4))
-    return "a change is at most 4 stops";
-  if (!(most_gain_db >= 0)) return "the gain is not negative";
-  if (settle_frames < 1) return "an image after a change is the least to judge by";
-  return nullptr;
-}
-
 ExposureSetting within(const ExposureOptions& o, const ExposureSetting& requested) noexcept {
   return {std::clamp(requested.exposure, o.least, o.most),
           std::clamp(requested.gain_db, 0.0, o.most_gain_db)};

@@ -17,8 +17,6 @@ struct ExposureOptions {
          down_stops = 2;  // a change at most; down is faster: saturated pixels tell nothing
   int settle_frames =
       5;  // from a change until an image is judged again: beyond every camera's latency
-  /// Null: they go together; else a sentence.
-  [[nodiscard]] const char* validate() const noexcept;
 };
 
 /// Exposure and gain of a rig, from the brightness of its reference camera.
@@ -34,7 +32,7 @@ struct ExposureOptions {
 /// Threads  One caller. Memory: none. Errors: none.
 class ExposureController {
  public:
-  /// Precondition: options are valid. `start`: what the cameras have, brought inside the bounds.
+  /// Precondition: 0 < least ≤ most. `start`: what the cameras have, brought inside the bounds.
   ExposureController(const ExposureOptions& options, const ExposureSetting& start) noexcept;
 
   /// One image of the reference camera. → what all cameras are to have from now on; nothing: as it

@@ -284,10 +284,7 @@ bool Decoder::next_ubx(Fix* fix) noexcept {
         continue;
       }
       ++fixes_;
-      if (!pvt.utc_ns) {
-        ++counters_.untimed;
-        continue;
-      }
+      if (!pvt.utc_ns) continue;
       *fix = {};
       fix->measured = DeviceStamp(*pvt.utc_ns);
       fix->arrival = arrival_;
@@ -344,7 +341,6 @@ bool Decoder::map(const Fix& fix, InsReading* reading) noexcept {
       mapper_.restart();
       ++number_;
     } else if (step <= Duration{}) {
-      ++counters_.backward;
       return false;
     } else {
       count(step);
@@ -357,10 +353,8 @@ bool Decoder::map(const Fix& fix, InsReading* reading) noexcept {
   const Duration on_wire =
       Duration::nanoseconds(std::llround(byte_ns_ * static_cast<double>(fix.bytes)));
   const MappedStamp mapped = host_stamp(fix, fix.arrival - on_wire);
-  if (counters_.readings > 0 && mapped.host <= last_host_) {
-    ++counters_.unsettled;
-    return false;
-  }
+  // The map still improves after a start: time would turn back.
+  if (counters_.readings > 0 && mapped.host <= last_host_) return false;
   last_host_ = mapped.host;
   ++counters_.readings;
   InsReading r = fix.reading;

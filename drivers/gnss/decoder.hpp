@@ -71,9 +71,6 @@ struct DecoderCounters {
   std::uint64_t readings = 0;
   std::uint64_t lost = 0;       // epochs missing between two, by the receiver's interval
   std::uint64_t malformed = 0;  // sentences and frames that made no sense
-  std::uint64_t backward = 0;   // fixes not newer than the one before
-  std::uint64_t untimed = 0;    // fixes without a time: not handed out
-  std::uint64_t unsettled = 0;  // of the first: mapping improved, and time would have turned back
   std::uint64_t restarts = 0;   // the receiver's clock was set
 };
 
@@ -82,7 +79,7 @@ struct DecoderCounters {
 /// Time     A fix's UTC is the device's clock, mapped to the host's by a ClockMapper: the bytes of
 ///          an epoch's first message arrive Options::processing and their time on the wire after
 ///          the fix, or later. By what `processing` is wrong all stamps are, beyond their bound.
-/// Order    Of measurement; a fix that is not newer than the last is counted and dropped.
+/// Order    Of measurement; a fix that is not newer than the last, or without a time, is dropped.
 /// Threads  One caller. Memory: in place, no heap.
 /// Errors   Counted; nothing stops the stream.
 class Decoder {

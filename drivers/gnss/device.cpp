@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
-#include <filesystem>
-#include <system_error>
 #include <utility>
+
+#include "drivers/serial/serial_port.hpp"
 
 namespace vergence::gnss {
 namespace {
@@ -20,13 +20,6 @@ constexpr double kOtherRate = 0.2;  // relative; beyond, the receiver's rate is 
 
 const char* name_of(Protocol protocol) noexcept {
   return protocol == Protocol::nmea ? "nmea" : "ubx";
-}
-
-/// A receiver with USB of its own: bytes take no time on a line.
-bool has_native_usb(const std::string& port) {
-  std::error_code error;
-  const std::string real = std::filesystem::canonical(port, error).string();
-  return (error ? port : real).find("ttyACM") != std::string::npos;
 }
 
 }  // namespace
@@ -47,15 +40,9 @@ DeviceStatus Device::open() {
 }
 
 DeviceStatus Device::connect() {
-  stop();
-  close_line();
-  look_up_virtual_time();
-  DeviceStatus status = open();
-  if (status != DeviceStatus::ok) {
-    last_error_ = place().name() + " cannot be opened: " + std::string(to_string(status));
-    return status;
-  }
-  has_native_usb_ = has_native_usb(place().name());
+  DeviceStatus status = open_anew();
+  if (status != DeviceStatus::ok) return status;
+  has_native_usb_ = is_native_usb(place().name());
   status = find();
   if (status == DeviceStatus::ok) status = measure_rate();
   if (status != DeviceStatus::ok) close_line();

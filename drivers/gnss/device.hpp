@@ -33,7 +33,7 @@ class Device final : public SerialInsDevice<256> {  // 12 s at 20 Hz
   [[nodiscard]] DeviceTiming timing() const noexcept override;
 
  private:
-  [[nodiscard]] DeviceStatus open();
+  [[nodiscard]] DeviceStatus open() override;
   [[nodiscard]] DeviceStatus search();
   [[nodiscard]] DeviceStatus find();
   [[nodiscard]] DeviceStatus listen(std::uint32_t baud);

@@ -3,25 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
 
 #include "core/types/bayer.hpp"
+#include "drivers/common/format_text.hpp"
 
 namespace vergence::iidc {
-namespace {
-
-/// printf into a string of at most 255 characters: sentences with numbers, off the real-time path.
-template <class... A>
-std::string text(const char* format, A... values) {
-  std::array<char, 256> out{};
-  (void)std::snprintf(out.data(), out.size(), format, values...);
-  return out.data();
-}
-
-}  // namespace
-
 bool GreyConversion::possible() const noexcept {
   switch (coding) {
     case ColorCoding::mono8:
@@ -30,10 +18,7 @@ bool GreyConversion::possible() const noexcept {
     case ColorCoding::mono16:
     case ColorCoding::raw16:
       return !mosaic && effective_bits >= 8 && effective_bits <= 16;
-    case ColorCoding::yuv411:
     case ColorCoding::yuv422:
-    case ColorCoding::yuv444:
-    case ColorCoding::rgb8:
       return !mosaic;
     default:
       return false;
@@ -61,18 +46,6 @@ void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width
       case ColorCoding::yuv422:  // U Y V Y
         for (int x = 0; x < width; ++x) to[x] = row[2 * x + 1];
         break;
-      case ColorCoding::yuv411:  // U Y Y V Y Y
-        for (int x = 0; x < width; ++x)
-          to[x] = row[x / 4 * 6 + (x % 4 < 2 ? 1 + x % 4 : 2 + x % 4)];
-        break;
-      case ColorCoding::yuv444:  // U Y V
-        for (int x = 0; x < width; ++x) to[x] = row[3 * x + 1];
-        break;
-      case ColorCoding::rgb8:
-        for (int x = 0; x < width; ++x)
-          to[x] = static_cast<std::uint8_t>(
-              (static_cast<unsigned>(row[3 * x]) + 2U * row[3 * x + 1] + row[3 * x + 2] + 2) / 4);
-        break;
       default:
         return;
     }
@@ -86,9 +59,8 @@ constexpr double kRateSlack =
 constexpr unsigned kFormat7Modes = 8;
 
 /// From the cheapest to the dearest on the bus.
-constexpr std::array kCodings{ColorCoding::mono8,  ColorCoding::raw8,  ColorCoding::yuv411,
-                              ColorCoding::mono16, ColorCoding::raw16, ColorCoding::yuv422,
-                              ColorCoding::yuv444, ColorCoding::rgb8};
+constexpr std::array kCodings{ColorCoding::mono8, ColorCoding::raw8, ColorCoding::mono16,
+                              ColorCoding::raw16, ColorCoding::yuv422};
 
 class Planner {
  public:
@@ -131,7 +103,7 @@ class Planner {
     if (requested_.width > kMost || requested_.height > kMost || requested_.offset_x > kMost ||
         requested_.offset_y > kMost) {
       last_error_ =
-          text("%d x %d is more than any camera has", requested_.width, requested_.height);
+          format_text("%d x %d is more than any camera has", requested_.width, requested_.height);
       return DeviceStatus::unsupported;
     }
     return DeviceStatus::ok;
@@ -143,8 +115,8 @@ class Planner {
         bus_.isochronous && !beta ? std::min(bus_.fastest, BusSpeed::s400) : bus_.fastest;
     if (plan_.options.speed && bus_.isochronous) {
       if (*plan_.options.speed > most) {
-        last_error_ = text("option speed: the camera and its bus reach %s",
-                           std::string(to_string(most)).c_str());
+        last_error_ = format_text("option speed: the camera and its bus reach %s",
+                                  std::string(to_string(most)).c_str());
         return false;
       }
       most = *plan_.options.speed;
@@ -165,14 +137,14 @@ class Planner {
     if (!t.present || !t.has_source(source) || (!t.has_mode(0) && !t.has_mode(14))) {
       last_error_ = requested_.trigger == CameraTrigger::software
                         ? "this camera has no software trigger"
-                        : text("this camera has no trigger input %u", source);
+                        : format_text("this camera has no trigger input %u", source);
       last_error_ += offered_triggers(t);
       return false;
     }
     plan_.trigger_mode = plan_.options.trigger_mode.value_or(t.has_mode(14) ? 14 : 0);
     if (!t.has_mode(plan_.trigger_mode)) {
-      last_error_ =
-          text("this camera has no trigger mode %u", plan_.trigger_mode) + offered_triggers(t);
+      last_error_ = format_text("this camera has no trigger mode %u", plan_.trigger_mode) +
+                    offered_triggers(t);
       return false;
     }
     if (!plan_.options.trigger_rising && !t.polarity) {
@@ -206,8 +178,8 @@ class Planner {
     }
     if (s < shutter.least * (1 - kFloat) || s > shutter.most * (1 + kFloat)) {
       last_error_ =
-          text("an exposure of %.6g us is not possible; this camera offers %.6g to %.6g us",
-               s * 1e6, shutter.least * 1e6, shutter.most * 1e6);
+          format_text("an exposure of %.6g us is not possible; this camera offers %.6g to %.6g us",
+                      s * 1e6, shutter.least * 1e6, shutter.most * 1e6);
       return false;
     }
     const AbsoluteRange gain = r_.absolute_range(Feature::gain);
@@ -215,10 +187,11 @@ class Planner {
     if (gain.present
             ? requested_.gain_db < gain.least - slack || requested_.gain_db > gain.most + slack
             : requested_.gain_db != 0) {
-      last_error_ = gain.present
-                        ? text("a gain of %g dB is not possible; this camera offers %g to %g dB",
-                               requested_.gain_db, gain.least, gain.most)
-                        : "this camera does not take its gain in dB; gain_db must be 0";
+      last_error_ =
+          gain.present
+              ? format_text("a gain of %g dB is not possible; this camera offers %g to %g dB",
+                            requested_.gain_db, gain.least, gain.most)
+              : "this camera does not take its gain in dB; gain_db must be 0";
       return false;
     }
     plan_.exposure = requested_.exposure;
@@ -234,8 +207,9 @@ class Planner {
     if (csr != 0 &&
         (r_.get_at(csr + reg::strobe::inquiry(*plan_.options.strobe_pin)) & bit(31)) != 0)
       return true;
-    last_error_ = csr == 0 ? "this camera has no strobe outputs"
-                           : text("this camera has no strobe output %u", *plan_.options.strobe_pin);
+    last_error_ =
+        csr == 0 ? "this camera has no strobe outputs"
+                 : format_text("this camera has no strobe output %u", *plan_.options.strobe_pin);
     return false;
   }
 
@@ -258,9 +232,9 @@ class Planner {
     }
     for (const ColorCoding c : candidates)
       if (may_fixed && fixed(c, false)) return true;
-    last_error_ = text("%d x %d", requested_.width, requested_.height) +
+    last_error_ = format_text("%d x %d", requested_.width, requested_.height) +
                   (requested_.pixel_format.empty() ? "" : " " + requested_.pixel_format) +
-                  text(" at %g Hz is not possible", requested_.rate_hz) +
+                  format_text(" at %g Hz is not possible", requested_.rate_hz) +
                   (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " + offers();
     return false;
   }
@@ -326,8 +300,8 @@ class Planner {
       if (requested_.trigger == CameraTrigger::free && frame_rate_.present &&
           (requested_.rate_hz < frame_rate_.least * (1 - kRateSlack) ||
            requested_.rate_hz > frame_rate_.most * (1 + kRateSlack))) {
-        say_why_not(
-            text("its frame rate goes from %g to %g Hz", frame_rate_.least, frame_rate_.most));
+        say_why_not(format_text("its frame rate goes from %g to %g Hz", frame_rate_.least,
+                                frame_rate_.most));
         continue;
       }
       plan_.format = 7;
@@ -357,8 +331,9 @@ class Planner {
     if (packet == 0 || packet > most || packet % unit != 0 ||
         packet_rate(bytes, packet) < requested_.rate_hz * (1 - kRateSlack)) {
       const std::size_t best = asked != 0 && asked <= most ? asked : most / unit * unit;
-      say_why_not(text("packets of %zu bytes (largest %zu, in steps of %zu) carry %.4g Hz of it",
-                       best, most, unit, packet_rate(bytes, best)));
+      say_why_not(
+          format_text("packets of %zu bytes (largest %zu, in steps of %zu) carry %.4g Hz of it",
+                      best, most, unit, packet_rate(bytes, best)));
       return false;
     }
     // Larger ones bring the image sooner, where it is not the packets that set a free camera's
@@ -380,7 +355,7 @@ class Planner {
   bool possible_as_grey() {
     const bool raw = plan_.coding == ColorCoding::raw8 || plan_.coding == ColorCoding::raw16;
     plan_.grey.coding = plan_.coding;
-    plan_.grey.mosaic = raw && bayer_tile(r_.get_optional(reg::kBayerTile)) != BayerTile::none;
+    plan_.grey.mosaic = raw && is_bayer_tile(r_.get_optional(reg::kBayerTile));
     if (plan_.grey.possible() &&
         (!plan_.grey.mosaic || (requested_.width > 1 && requested_.height > 1)))
       return true;
@@ -398,11 +373,11 @@ class Planner {
     std::string out;
     for (const FixedMode& m : fixed_modes()) {
       if (!r_.has_mode(m.format, m.mode)) continue;
-      out += (out.empty() ? "" : ", ") + text("%d x %d ", m.width, m.height) +
+      out += (out.empty() ? "" : ", ") + format_text("%d x %d ", m.width, m.height) +
              std::string(to_string(m.coding)) + " at";
       const std::uint32_t rates = r_.get(reg::rate_inquiry(m.format, m.mode));
       for (unsigned code = 0; code < kRates; ++code)
-        if ((rates & bit(31 - code)) != 0) out += text(" %g", rate_of(code));
+        if ((rates & bit(31 - code)) != 0) out += format_text(" %g", rate_of(code));
       out += " Hz";
     }
     for (unsigned mode = 0; mode < kFormat7Modes; ++mode) {
@@ -410,8 +385,9 @@ class Planner {
       if (csr == 0) continue;
       const Size most = Size::of(r_.get_at(csr + reg::format7::kMaxSize)),
                  unit = Size::of(r_.get_at(csr + reg::format7::kUnitSize));
-      out += (out.empty() ? "" : ", ") + text("any region of %d x %d in steps of %d x %d",
-                                              most.width, most.height, unit.width, unit.height);
+      out +=
+          (out.empty() ? "" : ", ") + format_text("any region of %d x %d in steps of %d x %d",
+                                                  most.width, most.height, unit.width, unit.height);
       const std::uint32_t codings = r_.get_at(csr + reg::format7::kCodingInquiry);
       for (unsigned c = 0; c < kColorCodings; ++c)
         if ((codings & bit(31 - c)) != 0)
@@ -450,22 +426,22 @@ bool write_format7(CameraRegisters& r, const CameraPlan& plan, std::string* erro
   r.set_at(plan.csr + kSize, plan.size.quadlet());
   r.set_at(plan.csr + kPosition, plan.position.quadlet());
   if (!r.apply_format7(plan.csr, kErrorRegion)) {
-    *error = text("the camera refuses the region %d x %d at (%d, %d)", plan.size.width,
-                  plan.size.height, plan.position.width, plan.position.height);
+    *error = format_text("the camera refuses the region %d x %d at (%d, %d)", plan.size.width,
+                         plan.size.height, plan.position.width, plan.position.height);
     return false;
   }
   const Size limits = Size::of(r.get_at(plan.csr + kPacketLimits));  // they may depend on the size
   const std::size_t packet = plan.shape.packet_bytes;
   if (limits.height != 0 &&
       (packet > limits.height || (limits.width != 0 && packet % limits.width != 0))) {
-    *error =
-        text("the camera takes packets of at most %d bytes in steps of %d at this size, not %zu",
-             limits.height, limits.width, packet);
+    *error = format_text(
+        "the camera takes packets of at most %d bytes in steps of %d at this size, not %zu",
+        limits.height, limits.width, packet);
     return false;
   }
   r.set_at(plan.csr + kPacketBytes, static_cast<std::uint32_t>(packet) << 16U);
   if (!r.apply_format7(plan.csr, kErrorPacket)) {
-    *error = text("the camera refuses packets of %zu bytes", packet);
+    *error = format_text("the camera refuses packets of %zu bytes", packet);
     return false;
   }
   return true;

@@ -25,12 +25,11 @@ struct GreyConversion {
 
 /// Converts width × height pixels, rows of `stride` bytes in `out`.
 ///
-/// Method  Mosaic: bayer_to_grey(). 16 bits: the eight highest of the effective ones. YUV: the
-///         luma. RGB: 1:2:1.
+/// Method  Mosaic: bayer_to_grey(). 16 bits: the eight highest of the effective ones. YUV 4:2:2:
+///         the luma.
 /// Time    One pass. Memory: none beside the images.
 /// Precondition  conversion.possible() and not none(); a mosaic has at least two rows and columns;
-///               `in` holds frame_bytes(width, height,
-/// coding).
+///               `in` holds frame_bytes(width, height, coding).
 void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width, int height,
              std::uint8_t* out, std::size_t stride) noexcept;
 

@@ -5,10 +5,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <span>
 
 #include "drivers/clock.hpp"
+#include "drivers/common/format_text.hpp"
 
 namespace vergence::iidc {
 namespace {
@@ -52,19 +52,6 @@ std::uint32_t CameraRegisters::get_optional(std::uint32_t offset) noexcept {
   if (status == DeviceStatus::ok) return value;
   if (status != DeviceStatus::unsupported) fail(status, base_ + offset, false);
   return 0;
-}
-
-/// IIDC 1.31 leaves the unit to the maker: tenths of a Kelvin (Point Grey), or of a degree Celsius
-/// (Allied Vision, Stingray manual 4.4, from −55 to 150 °C). Which it is, the value says, but for
-/// those below freezing, which could be either.
-std::optional<double> CameraRegisters::temperature_c() noexcept {
-  constexpr std::uint32_t kColdest = 2230, kHottest = 3540;  // 0.1 K
-  constexpr std::uint32_t kMostCelsius = 1500;               // 0.1 °C
-  const FeatureValue v = FeatureValue::of(get_optional(reg::feature_value(Feature::temperature)));
-  if (!v.present) return std::nullopt;
-  if (v.value <= kMostCelsius) return 0.1 * v.value;
-  if (v.value < kColdest || v.value > kHottest) return std::nullopt;
-  return 0.1 * v.value - 273.15;
 }
 
 std::uint64_t CameraRegisters::table(std::uint32_t offset) noexcept {
@@ -144,15 +131,13 @@ DeviceStatus CameraRegisters::take_status() noexcept {
 
 std::string CameraRegisters::last_error() const {
   if (last_failure_ == DeviceStatus::ok) return {};
-  std::array<char, 160> text{};
   const char* what = last_failure_ == DeviceStatus::timeout       ? "did not become ready in time"
                      : last_failure_ == DeviceStatus::unsupported ? "was refused by the camera"
                      : last_failure_ == DeviceStatus::gone ? "was not answered: the camera is gone"
                                                            : "could not be reached";
-  (void)std::snprintf(text.data(), text.size(), "register 0x%llx %s%s",
-                      static_cast<unsigned long long>(failed_at_ - kRegisterSpace), what,
-                      failed_writing_ ? " (writing)" : "");
-  return text.data();
+  return format_text("register 0x%llx %s%s",
+                     static_cast<unsigned long long>(failed_at_ - kRegisterSpace), what,
+                     failed_writing_ ? " (writing)" : "");
 }
 
 DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* message) {

@@ -1,6 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <optional>
 #include <string>
 
 #include "drivers/iidc/bus.hpp"
@@ -48,9 +47,6 @@ class CameraRegisters {
   [[nodiscard]] double set_absolute(Feature f, double value) noexcept;
   /// Not automatic, and off where it can be.
   void switch_off(Feature f) noexcept;
-
-  /// °C; nothing where the camera has no such register.
-  [[nodiscard]] std::optional<double> temperature_c() noexcept;
 
   void transmit(bool on) noexcept { set(reg::kTransmit, on ? bit(31) : 0); }
   /// Fires when the camera is ready for it.

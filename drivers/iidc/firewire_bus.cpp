@@ -23,6 +23,13 @@ namespace {
 constexpr Duration kSlow = Duration::milliseconds(
     90);  // a register access that takes longer met the kernel's split time-out
 
+constexpr const char* kNoStack = "this kernel has no FireWire stack: modprobe firewire-ohci";
+
+DeviceInfo info_of(const FirewireNode& node) {
+  return {"iidc-1394", guid_text(node.rom.guid),
+          node.rom.model[0] != 0 ? node.rom.model.data() : "IIDC camera", node.device};
+}
+
 /// libdc1394 writes to stderr unless told otherwise; what matters is said by status and sentence.
 void silence_library() {
   static std::once_flag once;
@@ -47,7 +54,7 @@ DeviceStatus FirewireBus::open_node(std::string_view requested) {
   silence_library();
   last_error_.clear();
   DeviceStatus status = DeviceStatus::not_found;
-  if (!has_firewire()) last_error_ = "this kernel has no FireWire stack: modprobe firewire-ohci";
+  if (!has_firewire()) last_error_ = kNoStack;
   for (const FirewireNode& node : list_firewire_cameras()) {
     if (!names_camera(requested, node.rom.guid)) continue;
     lock_ = ::open(node.device.c_str(), O_RDWR | O_CLOEXEC);
@@ -80,8 +87,7 @@ DeviceStatus FirewireBus::open_node(std::string_view requested) {
       continue;
     }
     node_ = node;
-    info_ = {"iidc-1394", guid_text(node.rom.guid),
-             node.rom.model[0] != 0 ? node.rom.model.data() : "IIDC camera", node.device};
+    info_ = info_of(node);
     last_error_.clear();
     return DeviceStatus::ok;
   }
@@ -190,11 +196,9 @@ namespace {
 class FirewireDriver final : public CameraDriver {
  public:
   std::vector<DeviceInfo> enumerate() override {
-    last_error_ = has_firewire() ? "" : "this kernel has no FireWire stack: modprobe firewire-ohci";
+    last_error_ = has_firewire() ? "" : kNoStack;
     std::vector<DeviceInfo> out;
-    for (const FirewireNode& n : list_firewire_cameras())
-      out.push_back({"iidc-1394", guid_text(n.rom.guid),
-                     n.rom.model[0] != 0 ? n.rom.model.data() : "IIDC camera", n.device});
+    for (const FirewireNode& n : list_firewire_cameras()) out.push_back(info_of(n));
     return out;
   }
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {

@@ -1,15 +1,13 @@
 #include "drivers/iidc/identity.hpp"
 
-#include <array>
 #include <charconv>
-#include <cstdio>
+
+#include "drivers/common/format_text.hpp"
 
 namespace vergence::iidc {
 
 std::string guid_text(std::uint64_t guid) {
-  std::array<char, 24> text{};
-  (void)std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(guid));
-  return text.data();
+  return format_text("%016llx", static_cast<unsigned long long>(guid));
 }
 
 bool names_camera(std::string_view requested, std::uint64_t guid,

@@ -224,14 +224,6 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
   return DeviceStatus::ok;
 }
 
-std::optional<double> IidcCamera::temperature_c() noexcept {
-  const std::lock_guard lock(asking_);
-  if (standing() != DeviceStatus::ok) return std::nullopt;
-  const std::optional<double> t = registers_.temperature_c();
-  (void)registers_.take_status();  // of a camera that has just gone
-  return t;
-}
-
 std::string IidcCamera::remark() const {
   if (!configured_ || plan_.info.has(FrameInfoItem::counter)) return {};
   return "it embeds no counter and no stamp: lost images are noticed by their times only";

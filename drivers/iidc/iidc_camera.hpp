@@ -51,7 +51,6 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   [[nodiscard]] DeviceStatus trigger_once() noexcept override;
   [[nodiscard]] DeviceStatus set_exposure(const ExposureSetting& requested,
                                           ExposureSetting* actual) noexcept override;
-  [[nodiscard]] std::optional<double> temperature_c() noexcept override;
   [[nodiscard]] std::string last_error() const override { return last_error_; }
   [[nodiscard]] std::string remark() const override;
   [[nodiscard]] CameraStatistics statistics() const noexcept override {
@@ -77,7 +76,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
   std::unique_ptr<CameraBus> bus_;
   std::shared_ptr<SharedClock> clock_;
   std::mutex asking_;  // of registers_, plan_ and the bus's start and stop: the owner's, and
-                       // trigger_once(), set_exposure(), temperature_c()
+                       // trigger_once(), set_exposure()
   CameraRegisters registers_;
   CameraPlan plan_{};
   bool configured_ = false;

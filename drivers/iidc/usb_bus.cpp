@@ -5,12 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <exception>
+#include <functional>
 #include <new>
 #include <utility>
 
 #include "drivers/clock.hpp"
+#include "drivers/common/format_text.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 #include "drivers/iidc/identity.hpp"
 #include "drivers/iidc/iidc.hpp"
@@ -45,71 +46,14 @@ const Product* product_of(const libusb_device_descriptor& d) noexcept {
 }
 
 std::string place_of(libusb_device* device) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "usb %03d/%03d", libusb_get_bus_number(device),
-                      libusb_get_device_address(device));
-  return text.data();
+  return format_text("usb %03d/%03d", libusb_get_bus_number(device),
+                     libusb_get_device_address(device));
 }
 
 std::string node_of(libusb_device* device) {
-  std::array<char, 48> text{};
-  (void)std::snprintf(text.data(), text.size(), "/dev/bus/usb/%03d/%03d",
-                      libusb_get_bus_number(device), libusb_get_device_address(device));
-  return text.data();
+  return format_text("/dev/bus/usb/%03d/%03d", libusb_get_bus_number(device),
+                     libusb_get_device_address(device));
 }
-
-/// Registers of a device that is opened, but not yet anybody's camera.
-class HandlePort final : public RegisterPort {
- public:
-  explicit HandlePort(libusb_device_handle* handle) : handle_(handle) {}
-  DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override {
-    return read_usb_quadlet(handle_, address, value);
-  }
-  DeviceStatus write(std::uint64_t, std::uint32_t) noexcept override {
-    return DeviceStatus::unsupported;
-  }
-
- private:
-  libusb_device_handle* handle_;
-};
-
-/// Opens a device and asks who it is.
-FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, const Product& product,
-                   std::string* message) {
-  FoundUsbCamera found;
-  found.device = device;
-  UsbCandidate& who = found.who;
-  who.info = {"iidc-usb", "", product.name, place_of(device)};
-  const int error = libusb_open(device, &found.handle);
-  if (error != LIBUSB_SUCCESS) {
-    who.access = usb_status(error);
-    if (who.access == DeviceStatus::no_permission)
-      *message = "no permission to open " + node_of(device) +
-                 ": install the udev rules (vergence devices --write-udev) and plug it in again";
-    return found;
-  }
-  std::array<unsigned char, 64> text{};
-  if (d.iSerialNumber != 0) {
-    const int n = libusb_get_string_descriptor_ascii(found.handle, d.iSerialNumber, text.data(),
-                                                     static_cast<int>(text.size()));
-    if (n > 0) who.transport_serial.assign(text.begin(), text.begin() + n);
-  }
-  HandlePort port(found.handle);
-  std::string why;
-  who.access = read_rom(&port, &found.rom, &why);
-  if (who.access != DeviceStatus::ok) {
-    *message = std::string(product.name) + " at " + place_of(device) + ": " + why;
-    libusb_close(found.handle);
-    found.handle = nullptr;
-    return found;
-  }
-  who.guid = found.rom.guid;
-  who.info.serial = guid_text(who.guid);
-  if (found.rom.model[0] != 0) who.info.model = found.rom.model.data();
-  return found;
-}
-
-}  // namespace
 
 DeviceStatus usb_status(int libusb_error) noexcept {
   switch (libusb_error) {
@@ -156,6 +100,78 @@ DeviceStatus write_usb_quadlet(libusb_device_handle* handle, std::uint64_t addre
   return sent == static_cast<int>(b.size()) ? DeviceStatus::ok : DeviceStatus::failed;
 }
 
+/// Registers of a device that is opened, but not yet anybody's camera.
+class HandlePort final : public RegisterPort {
+ public:
+  explicit HandlePort(libusb_device_handle* handle) : handle_(handle) {}
+  DeviceStatus read(std::uint64_t address, std::uint32_t* value) noexcept override {
+    return read_usb_quadlet(handle_, address, value);
+  }
+  DeviceStatus write(std::uint64_t, std::uint32_t) noexcept override {
+    return DeviceStatus::unsupported;
+  }
+
+ private:
+  libusb_device_handle* handle_;
+};
+
+/// One attached device that may be an IIDC camera.
+struct UsbCandidate {
+  DeviceInfo info{};             // serial: the GUID; empty when it could not be opened
+  std::string transport_serial;  // the USB string
+  std::uint64_t guid = 0;
+  DeviceStatus access = DeviceStatus::ok;  // why it could not be asked
+};
+
+/// One that is looked at; `handle` is null where `who.access` is not ok.
+struct FoundUsbCamera {
+  UsbCandidate who;
+  ConfigRom rom;
+  libusb_device* device = nullptr;
+  libusb_device_handle* handle = nullptr;
+};
+
+constexpr const char* kNoUsb = "the system's USB devices cannot be listed";
+
+/// Opens a device and asks who it is.
+FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, const Product& product,
+                   std::string* message) {
+  FoundUsbCamera found;
+  found.device = device;
+  UsbCandidate& who = found.who;
+  who.info = {"iidc-usb", "", product.name, place_of(device)};
+  const int error = libusb_open(device, &found.handle);
+  if (error != LIBUSB_SUCCESS) {
+    who.access = usb_status(error);
+    if (who.access == DeviceStatus::no_permission)
+      *message = "no permission to open " + node_of(device) +
+                 ": install the udev rules (vergence devices --write-udev) and plug it in again";
+    return found;
+  }
+  std::array<unsigned char, 64> text{};
+  if (d.iSerialNumber != 0) {
+    const int n = libusb_get_string_descriptor_ascii(found.handle, d.iSerialNumber, text.data(),
+                                                     static_cast<int>(text.size()));
+    if (n > 0) who.transport_serial.assign(text.begin(), text.begin() + n);
+  }
+  HandlePort port(found.handle);
+  std::string why;
+  who.access = read_rom(&port, &found.rom, &why);
+  if (who.access != DeviceStatus::ok) {
+    *message = std::string(product.name) + " at " + place_of(device) + ": " + why;
+    libusb_close(found.handle);
+    found.handle = nullptr;
+    return found;
+  }
+  who.guid = found.rom.guid;
+  who.info.serial = guid_text(who.guid);
+  if (found.rom.model[0] != 0) who.info.model = found.rom.model.data();
+  return found;
+}
+
+/// Opens each in turn and calls back; true ends it. Whoever does not take the handle (sets it to
+/// null) has it closed.
+/// False: the system's devices cannot be listed.
 bool for_each_usb_camera(libusb_context* context, std::string* message,
                          const std::function<bool(FoundUsbCamera*)>& look) {
   libusb_device** list = nullptr;
@@ -178,6 +194,7 @@ bool for_each_usb_camera(libusb_context* context, std::string* message,
   return true;
 }
 
+/// Every device with a known id, each asked for its GUID; in that order.
 std::vector<UsbCandidate> find_usb_cameras(std::string* message) {
   std::vector<UsbCandidate> all;
   libusb_context* context = nullptr;
@@ -197,8 +214,6 @@ std::vector<UsbCandidate> find_usb_cameras(std::string* message) {
   });
   return all;
 }
-
-namespace {
 
 constexpr int kMostErrors = 8;  // transfers in a row that failed: the device is given up
 constexpr std::size_t kSuperSpeedBlock = 1024;  // transfers of USB 3 are whole packets of this size

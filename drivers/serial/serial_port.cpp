@@ -136,6 +136,10 @@ std::optional<int> read_latency_timer_ms(const std::string& port) {
   return ms;
 }
 
+bool is_native_usb(const std::string& port) {
+  return resolved(port).filename().string().starts_with("ttyACM");
+}
+
 namespace {
 
 /// `asked`, or nothing where another device has its name now.

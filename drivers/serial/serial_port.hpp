@@ -27,6 +27,10 @@ struct SerialPortInfo {
 /// such chip.
 [[nodiscard]] std::optional<int> read_latency_timer_ms(const std::string& port);
 
+/// The port is the device's own USB: its baud rate is a word without meaning, and bytes take no
+/// time on a line.
+[[nodiscard]] bool is_native_usb(const std::string& port);
+
 /// Where the device that was at port `asked` (or a link to it) is now, by its converter's serial
 /// number: at `asked`, if that bears the number; else at the only one of `ports` that does. Where
 /// none or several do, `asked`, or nothing if that bears another number: a port of another device

@@ -1,46 +1,19 @@
 #include "drivers/sync/sync_types.hpp"
 
+#include <array>
 #include <cstddef>
+
+#include "core/types/names.hpp"
 
 namespace vergence {
 const char* to_string(SyncMode mode) noexcept {
-  switch (mode) {
-    case SyncMode::counter:
-      return "counter";
-    case SyncMode::software:
-      return "software";
-    case SyncMode::board:
-      return "board";
-    case SyncMode::ins_syncout:
-      return "ins_syncout";
-    case SyncMode::master_strobe:
-      return "master_strobe";
-    case SyncMode::bus:
-      return "bus";
-    case SyncMode::ptp:
-      return "ptp";
-    case SyncMode::one_picture:
-      return "one_picture";
-  }
-  return "";
+  return name_of(mode, std::array{"counter", "software", "board", "ins_syncout", "master_strobe",
+                                  "bus", "ptp", "one_picture"});
 }
 
 const char* to_string(SyncProof proof) noexcept {
-  switch (proof) {
-    case SyncProof::counted:
-      return "counted";
-    case SyncProof::unproven:
-      return "unproven";
-    case SyncProof::by_time:
-      return "by_time";
-    case SyncProof::numbered:
-      return "numbered";
-    case SyncProof::master:
-      return "master";
-    case SyncProof::common_clock:
-      return "common_clock";
-  }
-  return "";
+  return name_of(
+      proof, std::array{"counted", "unproven", "by_time", "numbered", "master", "common_clock"});
 }
 
 const char* SyncOptions::validate() const noexcept {

@@ -7,7 +7,7 @@
 namespace vergence::trigger_board {
 
 void BoardLine::attach(ByteLine* line) noexcept {
-  before_ = counters();
+  refused_before_ = refused();
   decoder_ = {};
   line_ = line;
   used_ = size_ = 0;
@@ -39,15 +39,6 @@ DeviceStatus BoardLine::send(std::uint8_t type, std::span<const std::uint8_t> pa
       trigger_write_frame(type, sequence_, payload.data(), payload.size(), frame.data() + 1);
   sequence_ = static_cast<std::uint8_t>((sequence_ + 1U) % trigger_unasked);
   return line_->write(std::span(frame).first(size + 1), kWrite);
-}
-
-LineCounters BoardLine::counters() const noexcept {
-  LineCounters c = before_;
-  c.frames += decoder_.frames;
-  c.bad_coding += decoder_.bad_coding;
-  c.bad_length += decoder_.bad_length;
-  c.bad_crc += decoder_.bad_crc;
-  return c;
 }
 
 DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, Times* times) noexcept {

@@ -12,13 +12,6 @@
 
 namespace vergence::trigger_board {
 
-/// What was received that is no frame.
-struct LineCounters {
-  std::uint64_t frames = 0;
-  std::uint64_t bad_coding = 0, bad_length = 0, bad_crc = 0;
-  [[nodiscard]] std::uint64_t refused() const noexcept { return bad_coding + bad_length + bad_crc; }
-};
-
 /// Frames of the trigger protocol on a line. They come one after the other, whoever asks for them:
 /// an answer that was waited for and an event that came in the same read are both had.
 ///
@@ -51,7 +44,10 @@ class BoardLine {
   /// → ok, timeout, stopped (woken), ended, gone, failed
   [[nodiscard]] DeviceStatus next(HostStamp deadline, TriggerFrame* frame, Times* times) noexcept;
 
-  [[nodiscard]] LineCounters counters() const noexcept;
+  /// What was received that is no frame.
+  [[nodiscard]] std::uint64_t refused() const noexcept {
+    return refused_before_ + decoder_.bad_coding + decoder_.bad_length + decoder_.bad_crc;
+  }
   /// What the first bytes look like when no frame has come since attach() or forget(). Empty:
   /// nothing was received, or frames were.
   [[nodiscard]] std::string received_instead() const;
@@ -65,7 +61,7 @@ class BoardLine {
   ByteLine* line_ = nullptr;
   std::uint8_t sequence_ = 0;
   TriggerDecoder decoder_{};
-  LineCounters before_{};                    // of the decoders before this one
+  std::uint64_t refused_before_ = 0;         // by the decoders before this one
   std::array<std::uint8_t, 1024> buffer_{};  // of one read
   std::size_t used_ = 0, size_ = 0;
   HostStamp arrival_{};

@@ -22,19 +22,6 @@ enum class PongWord : std::uint8_t {
   backward,  // earlier than the one before
 };
 
-/// How well the board's time is known, and from what. Durations of the newest kRemembered pings.
-struct TimeQuality {
-  std::uint64_t asked = 0, answered = 0;
-  std::uint64_t unanswered = 0;  // for as long as kOpen questions took
-  std::uint64_t refused = 0;     // answers that made no sense
-  std::uint64_t resets = 0;      // times that the board's clock was found to have been set
-  Duration rtt_least{}, rtt_median{}, rtt_most{};  // without the wire's and the board's own time
-  Duration error{};                                // bound of a stamp now
-  double drift_ppm = 0;                            // of the host's clock against the board's
-  bool pps_locked = false;
-  Duration pps_age = Duration::nanoseconds(-1);  // negative: never seen
-};
-
 /// The board's clock on the host's, from pings.
 ///
 /// Method   Every PING and its PONG give four stamps: t1 when it was handed to the line, t2 and t3
@@ -52,7 +39,6 @@ class BoardClock {
  public:
   static constexpr std::size_t kOpen =
       64;  // questions that may be under way: more than half a second of them
-  static constexpr std::size_t kRemembered = 1024;
   static constexpr int kBackward = 3;
   static constexpr Duration kUnseen = Duration::milliseconds(1);  // a USB frame
   static constexpr Duration kTurn = Duration::seconds(6);
@@ -87,9 +73,9 @@ class BoardClock {
   [[nodiscard]] MappedStamp map(DeviceStamp stamp, HostStamp arrival) noexcept;
 
   /// Times that answers showed a clock that was set back.
-  [[nodiscard]] std::uint64_t resets_by_set_back() const noexcept { return totals_.resets; }
-  /// All but the PPS. Takes a median: not for every event.
-  [[nodiscard]] TimeQuality quality() const noexcept;
+  [[nodiscard]] std::uint64_t resets() const noexcept { return resets_; }
+  /// Answers that made no sense.
+  [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:
   struct Question {
@@ -97,6 +83,7 @@ class BoardClock {
     HostStamp sent{};
     bool open = false;
   };
+  [[nodiscard]] PongWord refuse(PongWord why) noexcept;
   void forget() noexcept;
   void take_turns(HostStamp now) noexcept;
   [[nodiscard]] MappedStamp with_room(MappedStamp m) const noexcept;
@@ -114,20 +101,7 @@ class BoardClock {
   std::uint64_t newest_tick_ = 0;
   int backward_ = 0;
   std::uint64_t answers_ = 0;
-  std::array<std::int64_t, kRemembered> rtt_ns_{};
-  std::size_t rtts_ = 0, rtt_at_ = 0;
-  std::uint64_t resets_before_ = 0;  // of mappers before this one
-  TimeQuality totals_{};             // the counters of it
-};
-
-/// What a board says by itself, counters since open.
-struct ReceiverCounters {
-  std::uint64_t frames_unknown =
-      0;                     // right frames of a type or size that this protocol does not have
-  std::uint64_t errors = 0;  // ERROR messages that no one waited for
-  std::uint64_t reboots = 0;
-  std::uint64_t pps_edges = 0, ins_edges = 0;
-  TriggerStatus board{};  // its newest STATUS; all zero before the first
+  std::uint64_t resets_ = 0, refused_ = 0;
 };
 
 /// Sorts the frames that a board sends: events become numbered pulses with the host's time, PONGs
@@ -178,9 +152,9 @@ class BoardReceiver final : public FrameSink {
 
   [[nodiscard]] BoardClock& clock() noexcept { return clock_; }
   [[nodiscard]] PulseAccount& account() noexcept { return account_; }
-  [[nodiscard]] const ReceiverCounters& counters() const noexcept { return counters_; }
-  /// Takes a median: not for every frame.
-  [[nodiscard]] TimeQuality time_quality() const noexcept;
+  /// Right frames of a type or size that this protocol does not have.
+  [[nodiscard]] std::uint64_t unknown_frames() const noexcept { return unknown_frames_; }
+  [[nodiscard]] std::uint64_t reboots() const noexcept { return reboots_; }
 
  private:
   void take_event(const TriggerEvent& event, HostStamp arrival) noexcept;
@@ -193,7 +167,7 @@ class BoardReceiver final : public FrameSink {
   const std::function<void(const Pulse&)> hand_out_;
   PulseAccount account_;
   BoardClock clock_;
-  ReceiverCounters counters_{};
+  std::uint64_t unknown_frames_ = 0, reboots_ = 0;
   std::uint32_t mark_ = 0;  // of the configuration, in STATUS
   Finding finding_ = Finding::none;
   bool known_boot_ = false;  // account_.boot() is one

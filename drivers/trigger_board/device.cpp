@@ -1,11 +1,10 @@
 #include "drivers/trigger_board/device.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <exception>
 #include <utility>
 
+#include "drivers/common/format_text.hpp"
 #include "drivers/trigger_board/setup.hpp"
 
 namespace vergence::trigger_board {
@@ -30,11 +29,7 @@ DeviceTiming timing_of(const TriggerConfig& config, Duration byte_time,
 
 std::string hex_of(const std::uint8_t (&bytes)[12]) {
   std::string text;
-  for (const std::uint8_t b : bytes) {
-    std::array<char, 3> two{};
-    (void)std::snprintf(two.data(), two.size(), "%02x", static_cast<unsigned>(b));
-    text += two.data();
-  }
+  for (const std::uint8_t b : bytes) text += format_text("%02x", static_cast<unsigned>(b));
   return text;
 }
 
@@ -165,13 +160,7 @@ DeviceStatus Device::pause(std::uint32_t pulses) noexcept {
 }
 
 TriggerStatistics Device::statistics() const noexcept {
-  const BoardStatistics b = board_statistics();
-  TriggerStatistics s;
-  s.pulses = b.pulses.pulses;
-  s.lost = b.pulses.lost;
-  s.reboots = b.reboots;
-  s.malformed = b.pulses.refused() + b.pulses.exposures_refused + b.line.refused() +
-                b.frames_unknown + b.time.refused;
+  TriggerStatistics s = statistics_.get();
   s.overruns = overruns();
   s.starts = starts();
   return s;

@@ -14,20 +14,6 @@
 
 namespace vergence::trigger_board {
 
-/// What a board's session went through, since open.
-struct SessionCounters {
-  std::uint64_t writes_refused = 0;  // questions that the line did not take
-  std::uint64_t gone = 0;            // the line was lost
-  std::uint64_t restarts = 0;        // it had stopped by itself, and was started again
-};
-
-/// All that a board's driver counts and measures, for reports. Counters since open.
-struct BoardStatistics : ReceiverCounters, SessionCounters {
-  LineCounters line{};  // frames, and what was none
-  PulseCounters pulses{};
-  TimeQuality time{};
-};
-
 /// A trigger board on a serial line.
 ///
 /// As TriggerDevice says. connect() and configure() talk to the board and may take a second, at
@@ -66,8 +52,6 @@ class Device final : public TriggerDevice,
 
   /// Who the board said it is. Precondition: connected.
   [[nodiscard]] const TriggerInfo& identity() const noexcept { return identity_; }
-  /// Any thread; at most a tenth of a second old.
-  [[nodiscard]] BoardStatistics board_statistics() const noexcept { return statistics_.get(); }
 
  private:
   [[nodiscard]] DeviceStatus open();
@@ -105,12 +89,10 @@ class Device final : public TriggerDevice,
   // From here on: of the thread while it runs, else the owner's.
   BoardLine frames_;
   BoardReceiver receiver_;
-  SessionCounters counters_{};
   Random dither_{1, 63};
   bool running_ = false;  // it was started and makes pulses, as far as we know
-  HostStamp published_at_{};
 
-  Published<BoardStatistics> statistics_;
+  Published<TriggerStatistics> statistics_;  // of the thread, without what SerialDevice counts
 };
 
 }  // namespace vergence::trigger_board

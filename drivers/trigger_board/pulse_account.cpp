@@ -49,26 +49,25 @@ void PulseAccount::end(std::uint32_t next, std::uint32_t to_come) noexcept {
   const std::int64_t missing = steps_from(next_, next);
   if (missing <= 0) return;
   const std::uint64_t left_out = std::min(asked_, static_cast<std::uint64_t>(missing));
-  counters_.left_out += left_out;
   const std::uint64_t rest = static_cast<std::uint64_t>(missing) - left_out;
   counters_.lost += rest - std::min<std::uint64_t>(rest, to_come);
   next_ += static_cast<std::uint64_t>(missing);
   asked_ = 0;
 }
 
-bool PulseAccount::refuse(std::uint64_t* counter) noexcept {
-  ++*counter;
+bool PulseAccount::refuse() noexcept {
+  ++counters_.refused;
   ++in_row_;
   return false;
 }
 
 bool PulseAccount::take(const TriggerEvent& event, Pulse* pulse) noexcept {
   const std::int64_t missing = steps_from(next_, event.pulse);
-  if (missing < 0) return refuse(&counters_.repeated);
-  if (event.tick > kMostTicks || (any_ && event.tick <= tick_)) return refuse(&counters_.backward);
+  if (missing < 0) return refuse();
+  if (event.tick > kMostTicks || (any_ && event.tick <= tick_)) return refuse();
   // Before the first, the ticks since the board's start bound the count.
   if (static_cast<std::uint64_t>(missing) > (event.tick - tick_) / shortest_us_ + 1)
-    return refuse(&counters_.too_many);
+    return refuse();
 
   const auto gap = static_cast<std::uint64_t>(missing);
   const bool flagged = (event.flags & 1U) != 0;
@@ -77,11 +76,9 @@ bool PulseAccount::take(const TriggerEvent& event, Pulse* pulse) noexcept {
   const bool over = asked_ > 0 && gap > 0 && (flagged || gap > asked_);
   const std::uint64_t left_out = over ? std::min(asked_, gap) : 0;
   if (over) asked_ = 0;
-  counters_.left_out += left_out;
-  const bool late = (event.flags & 2U) != 0;
-  (late ? counters_.skipped : counters_.lost) += gap - left_out;
+  const bool skipped = (event.flags & 2U) != 0;  // the board was too late for them
+  if (!skipped) counters_.lost += gap - left_out;
   ++counters_.pulses;
-  if (late) ++counters_.late;
   in_row_ = 0;
 
   Pulse p;

@@ -8,22 +8,19 @@ namespace vergence::trigger_board {
 
 /// Counters since open.
 struct PulseCounters {
-  std::uint64_t pulses = 0;    // taken
-  std::uint64_t lost = 0;      // numbers that no event came for, and no pause
-  std::uint64_t left_out = 0;  // by pauses
-  std::uint64_t skipped = 0;   // by the board, as it says: it was too late for them
-  std::uint64_t repeated = 0;  // events with a number that was not after the last one
-  std::uint64_t backward = 0;  // … with a later number and an earlier tick
-  std::uint64_t too_many = 0;  // … with more pulses between them than the rate makes
+  std::uint64_t pulses = 0;   // taken
+  std::uint64_t lost = 0;     // numbers that no event came for, without a pause, and that the board
+                              // does not say it skipped
+  std::uint64_t refused = 0;  // events that cannot follow the one before
   std::uint64_t exposures_refused = 0;
-  std::uint64_t late = 0;  // pulses that the board says its timer made late
-  [[nodiscard]] std::uint64_t refused() const noexcept { return repeated + backward + too_many; }
 };
 
 /// Events to pulses: numbers unwrapped, what is missing sorted by cause, invalid events refused.
 ///
 /// Threads  One caller. Memory: none. Time: `edge` is the board's ticks in nanoseconds.
-/// Errors   An event that cannot follow the one before is refused and counted by name.
+/// Errors   An event that cannot follow the one before is refused and counted: its number is not
+///          after the last one, its tick is earlier, or more pulses lie between than the rate
+///          makes.
 class PulseAccount {
  public:
   /// A start of the board, `next` being the number of its next pulse.
@@ -48,7 +45,7 @@ class PulseAccount {
   [[nodiscard]] int refused_in_row() const noexcept { return in_row_; }
 
  private:
-  [[nodiscard]] bool refuse(std::uint64_t* counter) noexcept;
+  [[nodiscard]] bool refuse() noexcept;
 
   std::uint32_t boot_ = 0;
   std::uint64_t next_ = 0;  // number expected

@@ -10,7 +10,6 @@
 namespace vergence::trigger_board {
 namespace {
 
-constexpr Duration kPublish = Duration::milliseconds(100);  // statistics are as old as this at most
 constexpr Duration kFirstPong =
     Duration::milliseconds(50);  // the first pings wait for their answers
 
@@ -19,10 +18,9 @@ const std::atomic<bool> kNever{false};
 
 }  // namespace
 
-void Device::interrupted(DeviceStatus status) noexcept {
+void Device::interrupted(DeviceStatus /*status*/) noexcept {
   receiver_.hold();
   publish(false);
-  if (status != DeviceStatus::ok && status != DeviceStatus::ended) ++counters_.gone;
 }
 
 void Device::finished() noexcept {
@@ -120,16 +118,12 @@ DeviceStatus Device::read_on() noexcept {
       next_ping = now + Duration::nanoseconds(
                             std::llround(part * static_cast<double>(options_.ping_interval.ns())));
     }
-    if (now - published_at_ >= kPublish || now < published_at_) {
-      published_at_ = now;
-      publish(false);
-    }
+    publish(false);
     const DeviceStatus status = read_one(next_ping);
     if (status != DeviceStatus::ok && status != DeviceStatus::timeout &&
         status != DeviceStatus::stopped)
       return status;
   }
-  if (receiver_.finding() == BoardReceiver::Finding::halted) ++counters_.restarts;
   if (receiver_.finding() != BoardReceiver::Finding::invalid) return DeviceStatus::ok;
   running_ = false;
   try {
@@ -182,7 +176,7 @@ void Device::ping(HostStamp now) noexcept {
   std::array<std::uint8_t, trigger_ping_payload_size> payload{};
   const TriggerPing message{receiver_.clock().ask(now)};
   trigger_put_ping(&message, payload.data());
-  if (frames_.send(trigger_ping, payload, nullptr) != DeviceStatus::ok) ++counters_.writes_refused;
+  (void)frames_.send(trigger_ping, payload, nullptr);  // without an answer the next one is asked
 }
 
 void Device::send_pause(HostStamp now) noexcept {
@@ -194,20 +188,18 @@ void Device::send_pause(HostStamp now) noexcept {
   std::uint8_t sequence = 0;
   const DeviceStatus status = frames_.send(trigger_pause, payload, &sequence);
   pause_.sent(sequence, now);
-  if (status == DeviceStatus::ok)
-    receiver_.account().expect_pause(pulses);
-  else
-    ++counters_.writes_refused;
+  if (status == DeviceStatus::ok) receiver_.account().expect_pause(pulses);
 }
 
 void Device::publish(bool last) noexcept {
-  BoardStatistics s;
-  static_cast<ReceiverCounters&>(s) = receiver_.counters();
-  static_cast<SessionCounters&>(s) = counters_;
-  s.line = frames_.counters();
-  s.pulses = receiver_.account().counters();
-  s.time = receiver_.time_quality();
-  // Whoever reads it holds the lock for a copy's time; the next tenth of a second will do as well.
+  const PulseCounters& pulses = receiver_.account().counters();
+  TriggerStatistics s;
+  s.pulses = pulses.pulses;
+  s.lost = pulses.lost;
+  s.reboots = receiver_.reboots();
+  s.malformed = pulses.refused + pulses.exposures_refused + frames_.refused() +
+                receiver_.unknown_frames() + receiver_.clock().refused();
+  // Whoever reads it holds the lock for a copy's time; the next round will do as well.
   if (last)
     statistics_.set(s);
   else

@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
+
+#include "drivers/common/format_text.hpp"
 
 namespace vergence::trigger_board {
 
 namespace {
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  std::array<char, 320> buffer{};
-  (void)std::snprintf(buffer.data(), buffer.size(), format, args...);
-  return buffer.data();
-}
 
 constexpr double kFastest = 2000;  // Hz: two events a millisecond are more than a line carries
 constexpr std::int64_t kWidest = 1'000'000;  // µs, of a pulse: the board's own limit
@@ -47,34 +41,35 @@ DeviceStatus wire_configuration(const TriggerConfiguration& requested, const Opt
   };
 
   if (!(requested.rate_hz >= 0.001 && requested.rate_hz <= kFastest))
-    return bad(
-        text("a trigger.rate of %g Hz is none; choose 0.001 to %g", requested.rate_hz, kFastest));
+    return bad(format_text("a trigger.rate of %g Hz is none; choose 0.001 to %g", requested.rate_hz,
+                           kFastest));
   const auto millihertz = static_cast<std::uint32_t>(std::llround(requested.rate_hz * 1000));
   const std::int64_t period_us = 1'000'000'000 / millihertz, width_us = requested.width.ns() / 1000,
                      vary_us = requested.vary.ns() / 1000;
   if (width_us < 1) return bad("a pulse needs a width: set trigger.width_us to 1 or more");
   if (width_us > kWidest)
-    return bad(text("a pulse of %lld µs is longer than a second; lower trigger.width_us",
-                    static_cast<long long>(width_us)));
+    return bad(format_text("a pulse of %lld µs is longer than a second; lower trigger.width_us",
+                           static_cast<long long>(width_us)));
   if (vary_us < 0 || vary_us >= period_us)
-    return bad(
-        text("trigger.vary_us is %lld and the period %lld µs; it must lie between 0 and that",
-             static_cast<long long>(vary_us), static_cast<long long>(period_us)));
+    return bad(format_text(
+        "trigger.vary_us is %lld and the period %lld µs; it must lie between 0 and that",
+        static_cast<long long>(vary_us), static_cast<long long>(period_us)));
   if (width_us >= period_us - vary_us)
-    return bad(text(
+    return bad(format_text(
         "a pulse of %lld µs does not fit into %lld µs from pulse to pulse; lower trigger.width_us",
         static_cast<long long>(width_us), static_cast<long long>(period_us - vary_us)));
   if (requested.lines == 0)
     return bad("no line is to be pulsed; name the cameras' lines in trigger.lines");
   if (beyond(requested.lines, board.lines) || beyond(requested.active_low, board.lines))
-    return cannot(text("the trigger board has %u lines, numbered from 0; trigger.lines names more",
-                       static_cast<unsigned>(board.lines)));
+    return cannot(
+        format_text("the trigger board has %u lines, numbered from 0; trigger.lines names more",
+                    static_cast<unsigned>(board.lines)));
   if (beyond(requested.feedback, board.feedback_inputs) ||
       beyond(requested.feedback_active_low, board.feedback_inputs))
     return cannot(
-        text("the trigger board has %u inputs for exposure feedback, numbered from 0; "
-             "trigger.feedback names more",
-             static_cast<unsigned>(board.feedback_inputs)));
+        format_text("the trigger board has %u inputs for exposure feedback, numbered from 0; "
+                    "trigger.feedback names more",
+                    static_cast<unsigned>(board.feedback_inputs)));
   if (options.pps != Edge::none && board.has_pps == 0)
     return cannot("the trigger board has no input for PPS; set trigger.pps to none");
   if (options.ins != Edge::none && board.has_ins == 0)
@@ -109,7 +104,7 @@ TriggerConfiguration configuration_of(const TriggerConfig& config) noexcept {
 std::string remark_about(const TriggerConfiguration& requested, const TriggerConfig& config) {
   const double rate = static_cast<double>(config.rate_millihertz) / 1000;
   if (std::abs(rate - requested.rate_hz) < 1e-6 * requested.rate_hz) return {};
-  return text("it pulses at %.3f Hz: rates are whole thousandths", rate);
+  return format_text("it pulses at %.3f Hz: rates are whole thousandths", rate);
 }
 
 namespace {
@@ -151,7 +146,7 @@ std::string words_of_error(std::uint8_t code) {
       return "it does not have all of these lines and inputs; change trigger.lines, "
              "trigger.feedback, trigger.pps or trigger.ins";
     case trigger_error_version:
-      return text(
+      return format_text(
           "it does not speak version %d of the trigger protocol, as this program does; flash this "
           "release's firmware",
           static_cast<int>(trigger_protocol_version));
@@ -165,8 +160,8 @@ std::string words_of_error(std::uint8_t code) {
     case trigger_error_not_configured:
       return "it has lost its configuration";
     default:
-      return text("it gives error %u, which is none of this protocol version",
-                  static_cast<unsigned>(code));
+      return format_text("it gives error %u, which is none of this protocol version",
+                         static_cast<unsigned>(code));
   }
 }
 
@@ -225,7 +220,8 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
     case Answer::stopped:
       return DeviceStatus::stopped;
     case Answer::refused:
-      last_error_ = text("the trigger board refuses %s: ", words_of(type)) + words_of_error(error_);
+      last_error_ =
+          format_text("the trigger board refuses %s: ", words_of(type)) + words_of_error(error_);
       return error_ == trigger_error_not_stopped || error_ == trigger_error_not_configured
                  ? DeviceStatus::failed
                  : DeviceStatus::unsupported;
@@ -233,8 +229,8 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
     case Answer::gone:
       break;
   }
-  last_error_ = text("the trigger board did not answer when asked %s; check its cable and supply",
-                     words_of(type));
+  last_error_ = format_text(
+      "the trigger board did not answer when asked %s; check its cable and supply", words_of(type));
   return DeviceStatus::gone;
 }
 
@@ -247,7 +243,7 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
   const unsigned theirs = frame_.size > 0 ? frame_.payload[0] : 0U;
   if (theirs != trigger_protocol_version) return other_version(theirs);
   if (trigger_get_info(frame_.payload, frame_.size, info)) return DeviceStatus::ok;
-  last_error_ = text(
+  last_error_ = format_text(
       "the trigger board answered %u bytes, which are no INFO; flash this release's "
       "firmware",
       static_cast<unsigned>(frame_.size));
@@ -255,7 +251,7 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
 }
 
 DeviceStatus Setup::other_version(unsigned theirs) {
-  last_error_ = text(
+  last_error_ = format_text(
       "the trigger board speaks version %u of the protocol and this program version %d; flash this "
       "release's firmware",
       theirs, static_cast<int>(trigger_protocol_version));
@@ -270,7 +266,7 @@ DeviceStatus Setup::find(std::uint32_t baud, TriggerInfo* info) {
       const std::uint32_t rate = baud != 0 ? baud : candidate;
       if (line_.baud() != rate) {
         if (const DeviceStatus s = line_.set_baud(rate); s != DeviceStatus::ok) {
-          last_error_ = text("the port cannot be set to %u baud", rate);
+          last_error_ = format_text("the port cannot be set to %u baud", rate);
           return s;
         }
         frames_.attach(&line_);
@@ -302,9 +298,9 @@ DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> 
     *status = s;
     return DeviceStatus::ok;
   }
-  last_error_ =
-      text("the trigger board answers when asked %s, and does not do it; switch it off and on",
-           words_of(type));
+  last_error_ = format_text(
+      "the trigger board answers when asked %s, and does not do it; switch it off and on",
+      words_of(type));
   return DeviceStatus::failed;
 }
 

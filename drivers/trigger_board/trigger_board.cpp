@@ -1,6 +1,5 @@
 #include "drivers/trigger_board/trigger_board.hpp"
 
-#include <filesystem>
 #include <utility>
 
 namespace vergence::trigger_board {
@@ -14,13 +13,6 @@ bool of_xsens(const SerialPortInfo& port) noexcept {
 }
 
 }  // namespace
-
-// Its baud rate is a word without meaning.
-bool is_native_usb(const std::string& port) {
-  std::error_code none;
-  const std::filesystem::path real = std::filesystem::canonical(port, none);
-  return (none ? std::filesystem::path(port) : real).filename().string().rfind("ttyACM", 0) == 0;
-}
 
 Driver::Driver(const Options& options)
     : Driver(options, {list_serial_ports, [](const std::string& port) {

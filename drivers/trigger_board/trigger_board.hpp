@@ -52,7 +52,4 @@ class Driver final : public TriggerDriver {
   std::string last_error_;
 };
 
-/// The port is the board's own USB: bytes take no time on a line.
-[[nodiscard]] bool is_native_usb(const std::string& port);
-
 }  // namespace vergence::trigger_board

@@ -144,19 +144,6 @@ bool FrameExchange::drain() noexcept {
   return node_died_;
 }
 
-// ---- any thread
-
-DeviceStatus FrameExchange::standing() const noexcept {
-  switch (queue_.state()) {
-    case FrameQueue::State::stopped:
-      return DeviceStatus::stopped;
-    case FrameQueue::State::streaming:
-      return DeviceStatus::ok;
-    default:
-      return DeviceStatus::gone;
-  }
-}
-
 // ---- the releaser
 
 bool FrameExchange::release(FrameSlot slot) noexcept {

@@ -4,22 +4,18 @@
 #include <linux/videodev2.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <vector>
 
+#include "drivers/common/format_text.hpp"
+
 namespace vergence::v4l2 {
 
-std::string number_text(double value) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%.6g", value);
-  return text.data();
-}
-
 namespace {
+
+std::string number_text(double value) { return format_text("%.6g", value); }
 
 constexpr double kRateTolerance =
     0.02;  // between what was asked and what the camera chose, before it is worth a remark

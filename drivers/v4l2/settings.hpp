@@ -9,9 +9,6 @@
 
 namespace vergence::v4l2 {
 
-/// A figure in a sentence, to six digits.
-[[nodiscard]] std::string number_text(double value);
-
 /// What a camera has been brought to.
 struct Settings {
   CameraConfiguration actual{};

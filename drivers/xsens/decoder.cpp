@@ -361,14 +361,11 @@ bool Decoder::next(InsReading* reading) noexcept {
 }
 
 void Decoder::take_other(const Message& m) noexcept {
-  ++counters_.other;
   if (m.is(MessageId::wake_up)) said_.woke = true;
   if (answers(m, MessageId::go_to_config)) said_.stopped = true;
   if (answers(m, MessageId::go_to_measurement)) said_.going_on = said_.resumed = true;
-  if (!m.is(MessageId::error)) return;
-  ++counters_.errors;
-  counters_.last_error = m.payload.empty() ? std::uint8_t{0} : m.payload[0];
-  if (counters_.last_error == kErrorPowerDip) said_.woke = true;
+  if (m.is(MessageId::error) && !m.payload.empty() && m.payload[0] == kErrorPowerDip)
+    said_.woke = true;
 }
 
 void Decoder::count_messages(std::uint16_t counter) noexcept {
@@ -382,39 +379,26 @@ void Decoder::count_messages(std::uint16_t counter) noexcept {
 }
 
 bool Decoder::step(ClockStep step) noexcept {
-  switch (step) {
-    case ClockStep::first:
-    case ClockStep::forward:
-      return true;
-    case ClockStep::backward:
-      ++counters_.backward;
-      return false;
-    case ClockStep::restart:
-      ++counters_.restarts;
-      timing_.restart();
-      counted_ = false;
-      return true;
+  if (step == ClockStep::restart) {
+    ++counters_.restarts;
+    timing_.restart();
+    counted_ = false;
   }
-  return false;
+  return step != ClockStep::backward;
 }
 
 bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t end,
                            InsReading* reading) noexcept {
   Mtdata2 d;
-  if (decode_mtdata2(m.payload, &d) != PacketStatus::ok) {
+  if (!decode_mtdata2(m.payload, &d)) {
     ++counters_.malformed;
     return false;
   }
   if (d.packet_counter) count_messages(*d.packet_counter);
-  if (d.gnss_pvt) {
-    ++counters_.fixes;
-    receiver_ = receiver_of(*d.gnss_pvt, arrival_);
-  }
+  if (d.gnss_pvt) receiver_ = receiver_of(*d.gnss_pvt, arrival_);
   // A receiver's message has no sample of its own.
   if (!d.sample_time_fine || !(d.quaternion || d.latitude_longitude_deg)) {
-    const bool receivers = d.gnss_pvt || d.satellites;
-    counters_.malformed += receivers || d.sample_time_fine ? 0U : 1U;
-    counters_.incomplete += !receivers && d.sample_time_fine ? 1U : 0U;
+    counters_.malformed += d.gnss_pvt || d.satellites || d.sample_time_fine ? 0U : 1U;
     return false;
   }
   if (!step(sample_time_.next(*d.sample_time_fine,
@@ -425,10 +409,7 @@ bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t 
   if (!finish(sample_time_.stamp(), begin, end, &r)) return false;
   const bool lacks_place =
       r.sample.fix == FixStatus::none && (r.quality.status & kStatusGnssFix) != 0;
-  if (lacks_place && arrival_ - last_place_ < kWithoutPlace) {
-    ++counters_.incomplete;
-    return false;
-  }
+  if (lacks_place && arrival_ - last_place_ < kWithoutPlace) return false;
   if (!lacks_place) last_place_ = arrival_;
   return hand_out(r, reading);
 }
@@ -436,10 +417,8 @@ bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t 
 bool Decoder::take_mtdata(const Message& m, std::uint64_t begin, std::uint64_t end,
                           InsReading* reading) noexcept {
   Mtdata d;
-  const MtdataStatus status = decode_mtdata(m.payload, set_.layout, &d);
-  if (status != MtdataStatus::ok || !d.sample_counter) {
+  if (!decode_mtdata(m.payload, set_.layout, &d) || !d.sample_counter) {
     ++counters_.malformed;
-    if (status == MtdataStatus::length_wrong) ++counters_.layout_wrong;
     return false;
   }
   const double elapsed = last_sample_ != HostStamp{} ? (arrival_ - last_sample_).to_seconds() : 0;
@@ -452,10 +431,8 @@ bool Decoder::take_mtdata(const Message& m, std::uint64_t begin, std::uint64_t e
         static_cast<std::uint64_t>(std::max<std::int64_t>(0, sample_counter_.count() - before - 1));
   if (d.fix) {
     // The block is repeated in every sample; its age drops when a new one has come.
-    if (d.fix->age <= last_fix_age_ || !receiver_.known) {
-      if (d.fix->age < last_fix_age_ || !receiver_.known) ++counters_.fixes;
+    if (d.fix->age <= last_fix_age_ || !receiver_.known)
       receiver_ = receiver_of(*d.fix, d.status.value_or(0), arrival_);
-    }
     last_fix_age_ = d.fix->age;
   }
   InsReading r;
@@ -467,10 +444,7 @@ bool Decoder::take_mtdata(const Message& m, std::uint64_t begin, std::uint64_t e
 /// Just after a start the map still improves: a reading that falls before one that went out already
 /// would turn time back.
 bool Decoder::hand_out(const InsReading& r, InsReading* reading) noexcept {
-  if (counters_.readings > 0 && r.host <= last_host_) {
-    ++counters_.unsettled;
-    return false;
-  }
+  if (counters_.readings > 0 && r.host <= last_host_) return false;
   last_host_ = r.host;
   ++counters_.readings;
   *reading = r;
@@ -483,10 +457,7 @@ bool Decoder::finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t en
                      InsReading* r) noexcept {
   timing_.message(begin, end, measured);
   last_sample_ = arrival_;
-  if (!timing_.known()) {
-    ++counters_.unsettled;
-    return false;
-  }
+  if (!timing_.known()) return false;
   if (any_) {
     const double periods = static_cast<double>((measured - last_).ns()) * 1e-9 * set_.rate_hz();
     number_ += static_cast<std::uint64_t>(std::max(1LL, std::llround(periods)));

@@ -151,21 +151,10 @@ void fill(const xbus::Mtdata& data, const Receiver& receiver, HostStamp now,
 /// Counters of a stream; all only grow.
 struct DecoderCounters {
   std::uint64_t readings = 0;
-  std::uint64_t fixes = 0;  // receiver's messages
   std::uint64_t lost =
       0;  // messages (MTi-G-700/710) or samples (MTi-G) missing in the device's count
-  std::uint64_t malformed = 0;   // whole frames that made no sense
-  std::uint64_t backward = 0;    // samples not newer than the one before
-  std::uint64_t incomplete = 0;  // samples without attitude and position, or without a position
-                                 // though there is a fix: not handed out
-  std::uint64_t unsettled =
-      0;  // of the first after a start: the clocks were not tied yet, or turned back
-  std::uint64_t other = 0;     // messages of other kinds
-  std::uint64_t errors = 0;    // of these, errors that the device told
-  std::uint64_t restarts = 0;  // the device restarted, or its clock was set
-  std::uint64_t layout_wrong =
-      0;  // of the malformed: MTData of another length than the settings say
-  std::uint8_t last_error = 0;
+  std::uint64_t malformed = 0;  // whole frames that made no sense
+  std::uint64_t restarts = 0;   // the device restarted, or its clock was set
 };
 
 /// Bytes of a measuring device into readings with times.
@@ -177,7 +166,7 @@ struct DecoderCounters {
 /// Time     A reading's time is that of its sample by the device's clock, mapped to the host's by
 ///          ArrivalTiming. The receiver's messages are older than the inertial ones before them and
 ///          not in step: they say how good the fix is, and are no readings.
-/// Order    Of measurement; a sample that is not newer than the last is counted and dropped.
+/// Order    Of measurement; a sample that is not newer than the last is dropped.
 /// Threads  One caller. Memory: in place, no heap.
 /// Errors   Counted; nothing stops the stream.
 class Decoder {

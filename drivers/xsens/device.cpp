@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <exception>
 #include <utility>
+
+#include "drivers/common/format_text.hpp"
 
 namespace vergence::xsens {
 namespace {
@@ -33,14 +34,8 @@ DeviceStatus Device::open() {
 }
 
 DeviceStatus Device::connect() {
-  stop();
-  close_line();
-  look_up_virtual_time();
-  DeviceStatus status = open();
-  if (status != DeviceStatus::ok) {
-    last_error_ = place().name() + " cannot be opened: " + std::string(to_string(status));
-    return status;
-  }
+  DeviceStatus status = open_anew();
+  if (status != DeviceStatus::ok) return status;
   Setup setup(*line(), options_, stopping());
   status = setup.find();
   if (status == DeviceStatus::ok) status = setup.identify(&identity_);
@@ -50,9 +45,7 @@ DeviceStatus Device::connect() {
     return status;
   }
   baud_ = line()->baud();
-  std::array<char, 16> id{};
-  (void)std::snprintf(id.data(), id.size(), "%08X", identity_.device_id);
-  info_.serial = id.data();
+  info_.serial = format_text("%08X", identity_.device_id);
   info_.model = static_cast<const char*>(identity_.product);
   return DeviceStatus::ok;
 }
@@ -92,19 +85,13 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
 
 std::string Device::remark_about(double rate_hz) const {
   const auto differs = [](double a, double b) { return std::abs(a - b) > 1e-6 * b; };
-  std::array<char, 200> text{};
   std::string all;
-  if (differs(set_.rate_hz(), rate_hz)) {
-    (void)std::snprintf(text.data(), text.size(),
-                        "it measures at %.4g Hz: of its rates the nearest to %.4g", set_.rate_hz(),
-                        rate_hz);
-    all = text.data();
-  }
-  if (set_.sync_out_hz > 0 && differs(set_.sync_out_hz, options_.sync_out_hz)) {
-    (void)std::snprintf(text.data(), text.size(), "its SyncOut makes %.4g Hz: the nearest to %.4g",
-                        set_.sync_out_hz, options_.sync_out_hz);
-    all += (all.empty() ? "" : "; ") + std::string(text.data());
-  }
+  if (differs(set_.rate_hz(), rate_hz))
+    all = format_text("it measures at %.4g Hz: of its rates the nearest to %.4g", set_.rate_hz(),
+                      rate_hz);
+  if (set_.sync_out_hz > 0 && differs(set_.sync_out_hz, options_.sync_out_hz))
+    all += (all.empty() ? "" : "; ") + format_text("its SyncOut makes %.4g Hz: the nearest to %.4g",
+                                                   set_.sync_out_hz, options_.sync_out_hz);
   return all;
 }
 

@@ -38,7 +38,7 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
   [[nodiscard]] const StreamSettings& stream() const noexcept { return set_; }
 
  private:
-  [[nodiscard]] DeviceStatus open();
+  [[nodiscard]] DeviceStatus open() override;
   [[nodiscard]] std::string remark_about(double rate_hz) const;
   [[nodiscard]] DeviceStatus begin() noexcept override;
   [[nodiscard]] DeviceStatus read_on() noexcept override;

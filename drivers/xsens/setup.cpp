@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <string_view>
 #include <utility>
+
+#include "drivers/common/format_text.hpp"
 
 namespace vergence::xsens {
 
@@ -15,14 +16,6 @@ namespace {
 constexpr Duration kAskAgain = Duration::milliseconds(150);
 constexpr Duration kListen = Duration::milliseconds(50);
 constexpr Duration kWrite = Duration::milliseconds(100);
-
-/// printf into a sentence of at most 319 bytes; what is longer is cut.
-template <class... Args>
-std::string format_text(const char* format, Args... args) {
-  std::array<char, 320> buffer{};
-  (void)std::snprintf(buffer.data(), buffer.size(), format, args...);
-  return buffer.data();
-}
 
 }  // namespace
 

@@ -1,21 +1,12 @@
 #include "drivers/xsens/xsens.hpp"
 
-#include "drivers/common/serial_ports.hpp"
-#include "drivers/serial/serial_port.hpp"
+#include "drivers/common/serial_ins_driver.hpp"
 #include "drivers/xsens/device.hpp"
 
 namespace vergence::xsens {
 
-std::vector<DeviceInfo> Driver::enumerate() { return usb_serial_ports("xsens"); }
-
-std::unique_ptr<InsDevice> Driver::open(std::string_view port, DeviceStatus* status) {
-  const std::string name = only_usb_serial_port(port, status, &last_error_);
-  if (name.empty()) return nullptr;
-  auto device = std::make_unique<Device>(std::make_unique<SerialPort>(name), options_);
-  *status = device->connect();
-  if (*status == DeviceStatus::ok) return device;
-  last_error_ = device->last_error();
-  return nullptr;
+std::unique_ptr<InsDriver> make_driver(const Options& options) {
+  return std::make_unique<SerialInsDriver<Device, Options>>("xsens", options);
 }
 
 }  // namespace vergence::xsens

@@ -10,12 +10,8 @@ constexpr std::uint32_t kName1394 = 0x3133'3934;
 constexpr std::uint32_t kSpecifierIidc = 0x00A02D, kSpecifierPointGrey = 0x00B09D;
 
 enum Key : std::uint8_t {
-  key_vendor = 0x03,
   key_specifier = 0x12,
-  key_version = 0x13,
-  key_sub_version = 0x38,
   key_command_base = 0x40,
-  key_vendor_leaf = 0x81,
   key_model_leaf = 0x82,
   key_unit_directory = 0xD1,
   key_unit_dependent = 0xD4,
@@ -75,43 +71,7 @@ void read_text(std::span<const std::uint32_t> rom, const std::optional<Entry>& l
   }
 }
 
-bool checksum_wrong(std::span<const std::uint32_t> rom, std::size_t header) noexcept {
-  const std::size_t n = rom[header] >> 16U;
-  return rom_checksum(rom.subspan(header + 1, n)) != (rom[header] & 0xFFFFU);
-}
-
-IidcVersion version_of(std::uint32_t unit_version,
-                       const std::optional<Entry>& sub_version) noexcept {
-  if (unit_version <= 0x100) return IidcVersion::v1_04;
-  if (unit_version == 0x101) return IidcVersion::v1_20;
-  switch (sub_version ? sub_version->value >> 4U & 0xFU : 0) {
-    case 1:
-    case 3:  // 0x30: how some write 1.31
-      return IidcVersion::v1_31;
-    case 2:
-      return IidcVersion::v1_32;
-    default:
-      return IidcVersion::v1_30;
-  }
-}
-
 }  // namespace
-
-std::string_view to_string(IidcVersion v) noexcept {
-  switch (v) {
-    case IidcVersion::v1_04:
-      return "1.04";
-    case IidcVersion::v1_20:
-      return "1.20";
-    case IidcVersion::v1_30:
-      return "1.30";
-    case IidcVersion::v1_31:
-      return "1.31";
-    case IidcVersion::v1_32:
-      return "1.32";
-  }
-  return "unknown";
-}
 
 std::string_view to_string(RomStatus s) noexcept {
   switch (s) {
@@ -131,18 +91,6 @@ std::string_view to_string(RomStatus s) noexcept {
   return "unknown";
 }
 
-std::uint16_t rom_checksum(std::span<const std::uint32_t> block) noexcept {
-  std::uint32_t crc = 0;
-  for (const std::uint32_t quadlet : block) {
-    for (unsigned shift = 32; shift != 0;) {
-      shift -= 4;
-      const std::uint32_t sum = (crc >> 12U ^ quadlet >> shift) & 0xFU;
-      crc = (crc << 4U ^ sum << 12U ^ sum << 5U ^ sum) & 0xFFFFU;
-    }
-  }
-  return static_cast<std::uint16_t>(crc);
-}
-
 RomStatus parse_config_rom(std::span<const std::uint32_t> quadlets, ConfigRom* rom) noexcept {
   const auto all = quadlets.first(std::min(quadlets.size(), kMaxRomQuadlets));
   constexpr std::size_t kBusBlock = 5;  // header, name, capabilities, two of GUID
@@ -155,8 +103,6 @@ RomStatus parse_config_rom(std::span<const std::uint32_t> quadlets, ConfigRom* r
 
   ConfigRom out;
   out.guid = static_cast<std::uint64_t>(all[3]) << 32U | all[4];
-  out.checksum_wrong = checksum_wrong(all, root_at);
-  if (const auto vendor = root->find(key_vendor)) out.vendor_id = vendor->value;
 
   std::optional<Entry> dependent;
   bool camera = false;
@@ -170,8 +116,6 @@ RomStatus parse_config_rom(std::span<const std::uint32_t> quadlets, ConfigRom* r
         (specifier->value != kSpecifierIidc && specifier->value != kSpecifierPointGrey))
       continue;
     camera = true;
-    out.specifier = specifier->value;
-    const auto version = unit->find(key_version);
     dependent = unit->find(key_unit_dependent);
     if (!dependent) continue;
     const auto details = Directory::at(all, target(*dependent));
@@ -179,8 +123,6 @@ RomStatus parse_config_rom(std::span<const std::uint32_t> quadlets, ConfigRom* r
     const auto base = details->find(key_command_base);
     if (!base) return RomStatus::no_command_base;
     out.command_base = kRegisterSpace + 4 * static_cast<std::uint64_t>(base->value);
-    out.version = version_of(version ? version->value : 0x102, details->find(key_sub_version));
-    read_text(all, details->find(key_vendor_leaf), &out.vendor);
     read_text(all, details->find(key_model_leaf), &out.model);
   }
   if (!camera) return RomStatus::no_camera;

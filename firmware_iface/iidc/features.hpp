@@ -1,34 +1,20 @@
 #pragma once
 #include <cstdint>
-#include <string_view>
 
 #include "firmware_iface/iidc/registers.hpp"
 
 /// Features: shutter, gain and the like, the trigger and the strobe outputs.
 namespace vergence::iidc {
 
-enum class Feature : std::uint8_t {  // the number is the place in every table of features
-  brightness = 0,
+/// Those that the driver sets; the number is the place in every table of features.
+enum class Feature : std::uint8_t {
   auto_exposure = 1,
-  sharpness = 2,
-  white_balance = 3,
-  hue = 4,
-  saturation = 5,
   gamma = 6,
-  shutter = 7,  // absolute: s
-  gain = 8,     // absolute: dB
-  iris = 9,
-  focus = 10,
-  temperature = 11,
-  trigger = 12,
+  shutter = 7,         // absolute: s
+  gain = 8,            // absolute: dB
   trigger_delay = 13,  // absolute: s
-  white_shading = 14,
-  frame_rate = 15,  // absolute: Hz
-  zoom = 32,
-  pan = 33,
-  tilt = 34,
+  frame_rate = 15,     // absolute: Hz
 };
-[[nodiscard]] std::string_view to_string(Feature) noexcept;
 
 namespace reg {
 [[nodiscard]] constexpr std::uint32_t feature_inquiry(Feature f) noexcept {
@@ -43,13 +29,9 @@ namespace reg {
 }  // namespace reg
 
 struct FeatureInquiry {
-  bool present = false, absolute = false, one_push = false, readable = false, on_off = false,
-       automatic = false, manual = false;
-  std::uint32_t least = 0, most = 0;
+  bool present = false, absolute = false, on_off = false, automatic = false;
   [[nodiscard]] static constexpr FeatureInquiry of(std::uint32_t q) noexcept {
-    return {(q & bit(31)) != 0, (q & bit(30)) != 0, (q & bit(28)) != 0,
-            (q & bit(27)) != 0, (q & bit(26)) != 0, (q & bit(25)) != 0,
-            (q & bit(24)) != 0, field(q, 23, 12),   field(q, 11, 0)};
+    return {(q & bit(31)) != 0, (q & bit(30)) != 0, (q & bit(26)) != 0, (q & bit(25)) != 0};
   }
 };
 
@@ -74,12 +56,11 @@ inline constexpr unsigned kTriggerSourceSoftware = 7;
 
 /// reg::kTriggerInquiry.
 struct TriggerInquiry {
-  bool present = false, polarity = false, level_readable = false, software = false;
+  bool present = false, polarity = false, software = false;
   std::uint8_t sources = 0;  // bit n: input n, 0 … 3
   std::uint16_t modes = 0;   // bit n: mode n; 0 … 5, 14, 15 exist
   [[nodiscard]] static constexpr TriggerInquiry of(std::uint32_t q) noexcept {
-    TriggerInquiry t{
-        (q & bit(31)) != 0, (q & bit(25)) != 0, (q & bit(24)) != 0, (q & bit(16)) != 0, 0, 0};
+    TriggerInquiry t{(q & bit(31)) != 0, (q & bit(25)) != 0, (q & bit(16)) != 0, 0, 0};
     for (unsigned n = 0; n < 4; ++n)
       if ((q & bit(23 - n)) != 0) t.sources = static_cast<std::uint8_t>(t.sources | 1U << n);
     for (unsigned n = 0; n < 6; ++n)
@@ -100,17 +81,12 @@ struct TriggerInquiry {
 /// reg::kTriggerMode.
 struct TriggerMode {
   bool on = false;
-  bool rising = true;      // active high
-  unsigned source = 0;     // 0 … 3: inputs, kTriggerSourceSoftware
-  unsigned mode = 0;       // 0: one frame an edge; 14: the same, exposing during readout
-  unsigned parameter = 0;  // 12 bits
-  [[nodiscard]] static constexpr TriggerMode of(std::uint32_t q) noexcept {
-    return {(q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 23, 21), field(q, 19, 16),
-            field(q, 11, 0)};
-  }
+  bool rising = true;   // active high
+  unsigned source = 0;  // 0 … 3: inputs, kTriggerSourceSoftware
+  unsigned mode = 0;    // 0: one frame an edge; 14: the same, exposing during readout
   [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
     return bit(31) | (on ? bit(25) : 0) | (rising ? bit(24) : 0) | (source & 7U) << 21U |
-           (mode & 15U) << 16U | (parameter & 0xFFFU);
+           (mode & 15U) << 16U;
   }
 };
 
@@ -120,9 +96,6 @@ struct StrobeControl {
   bool high = true;            // active level
   std::uint32_t delay = 0;     // 12 bits, from the start of the exposure
   std::uint32_t duration = 0;  // 12 bits; 0: as long as the exposure
-  [[nodiscard]] static constexpr StrobeControl of(std::uint32_t q) noexcept {
-    return {(q & bit(25)) != 0, (q & bit(24)) != 0, field(q, 23, 12), field(q, 11, 0)};
-  }
   [[nodiscard]] constexpr std::uint32_t quadlet() const noexcept {
     return bit(31) | (on ? bit(25) : 0) | (high ? bit(24) : 0) | (delay & 0xFFFU) << 12U |
            (duration & 0xFFFU);

@@ -1,5 +1,6 @@
 #include "firmware_iface/iidc/formats.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -51,14 +52,6 @@ std::size_t frame_bytes(unsigned width, unsigned height, ColorCoding coding) noe
   return static_cast<std::size_t>(width) * height * bits_per_pixel(coding) / 8;
 }
 
-std::optional<unsigned> rate_code_for(double rate_hz) noexcept {
-  constexpr double kSame = 1 - 1e-4;
-  if (!(rate_hz > 0)) return std::nullopt;
-  for (unsigned code = 0; code < kRates; ++code)
-    if (rate_of(code) >= rate_hz * kSame) return code;
-  return std::nullopt;
-}
-
 std::size_t fixed_packet_bytes(const FixedMode& mode, unsigned rate_code) noexcept {
   if (rate_code >= kRates) return 0;
   // Packets of a frame at 240 Hz, times 2 a code below.
@@ -84,19 +77,9 @@ std::size_t packet_for_rate(std::size_t image_bytes, double rate_hz, std::size_t
   return packet <= most ? packet : 0;
 }
 
-BayerTile bayer_tile(std::uint32_t quadlet) noexcept {
-  switch (quadlet) {
-    case 0x52474742:
-      return BayerTile::rggb;
-    case 0x47524247:
-      return BayerTile::grbg;
-    case 0x47425247:
-      return BayerTile::gbrg;
-    case 0x42474752:
-      return BayerTile::bggr;
-    default:
-      return BayerTile::none;
-  }
+bool is_bayer_tile(std::uint32_t quadlet) noexcept {
+  constexpr std::array<std::uint32_t, 4> kTiles{0x52474742, 0x47524247, 0x47425247, 0x42474752};
+  return std::find(kTiles.begin(), kTiles.end(), quadlet) != kTiles.end();
 }
 
 }  // namespace vergence::iidc

@@ -40,8 +40,6 @@ inline constexpr unsigned kRates = 8;
 [[nodiscard]] constexpr double rate_of(unsigned code) noexcept {
   return 1.875 * static_cast<double>(1U << code);
 }
-/// The smallest code with rate_of(code) ≥ rate (to a ten-thousandth); none above 240 Hz.
-[[nodiscard]] std::optional<unsigned> rate_code_for(double rate_hz) noexcept;
 
 /// Bytes of one packet of a fixed mode; 0: not a whole number of quadlets, such a rate does not
 /// exist. A frame of 30 Hz is 240 packets, of 768 lines 256: whole parts of lines travel together.
@@ -59,9 +57,8 @@ inline constexpr double kCyclesPerSecond = 8000;  // each carries one packet of 
 [[nodiscard]] std::size_t packet_for_rate(std::size_t image_bytes, double rate_hz, std::size_t unit,
                                           std::size_t most) noexcept;
 
-/// A mosaic of colour filters, by the letters of its first two rows.
-enum class BayerTile : std::uint8_t { none, rggb, grbg, gbrg, bggr };
-/// From Point Grey's register: four letters, YYYY or 0 is mono.
-[[nodiscard]] BayerTile bayer_tile(std::uint32_t quadlet) noexcept;
+/// Point Grey's register of the colour filters holds a mosaic's first two rows in four letters;
+/// `YYYY` or 0 is mono.
+[[nodiscard]] bool is_bayer_tile(std::uint32_t quadlet) noexcept;
 
 }  // namespace vergence::iidc

@@ -13,11 +13,9 @@ namespace vergence::iidc {
 
 namespace reg {
 
-inline constexpr std::uint32_t kInitialize = 0x000;     // b31: back to factory settings
 inline constexpr std::uint32_t kFormatInquiry = 0x100;  // b31 − f: format f
 inline constexpr std::uint32_t kBasicFunctions = 0x400;
 inline constexpr std::uint32_t kOptionalFunctions = 0x40C;  // b28: strobe
-inline constexpr std::uint32_t kAdvancedBase = 0x480;       // quadlet offset
 inline constexpr std::uint32_t kStrobeBase = 0x48C;         // quadlet offset
 inline constexpr std::uint32_t kTriggerInquiry = 0x530;
 inline constexpr std::uint32_t kFrameRate = 0x600;    // b31–29
@@ -31,7 +29,6 @@ inline constexpr std::uint32_t kTriggerMode = 0x830;
 // Point Grey
 inline constexpr std::uint32_t kBayerTile = 0x1040;  // four letters, "YYYY": mono
 inline constexpr std::uint32_t kFrameInfo = 0x12F8;
-inline constexpr std::uint32_t kSerialNumber = 0x1F20;
 
 [[nodiscard]] constexpr std::uint32_t mode_inquiry(unsigned format) noexcept {
   return 0x180 + 4 * format;
@@ -52,7 +49,6 @@ inline constexpr std::uint32_t kPosition = 0x08;
 inline constexpr std::uint32_t kSize = 0x0C;
 inline constexpr std::uint32_t kCoding = 0x10;         // b31–24
 inline constexpr std::uint32_t kCodingInquiry = 0x14;  // b31 − c: coding c
-inline constexpr std::uint32_t kTotalBytesHigh = 0x38;
 inline constexpr std::uint32_t kTotalBytesLow = 0x3C;
 inline constexpr std::uint32_t kPacketLimits = 0x40;  // unit b31–16, largest b15–0
 inline constexpr std::uint32_t kPacketBytes = 0x44;   // set b31–16, recommended b15–0
@@ -78,13 +74,10 @@ inline constexpr std::uint32_t kLeast = 0, kMost = 4, kValue = 8;  // IEEE 754 s
 /// reg::kBasicFunctions.
 struct BasicFunctions {
   bool advanced = false;
-  bool optional_functions = false;
   bool beta = false;  // 1394b: S800
   bool power_switch = false;
-  bool one_shot = false;
   [[nodiscard]] static constexpr BasicFunctions of(std::uint32_t q) noexcept {
-    return {(q & bit(31)) != 0, (q & bit(28)) != 0, (q & bit(23)) != 0, (q & bit(15)) != 0,
-            (q & bit(12)) != 0};
+    return {(q & bit(31)) != 0, (q & bit(23)) != 0, (q & bit(15)) != 0};
   }
 };
 

@@ -159,19 +159,17 @@ std::optional<std::size_t> MtdataLayout::payload_size() const noexcept {
   return sizes.total;
 }
 
-MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout,
-                           Mtdata* out) noexcept {
+bool decode_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout,
+                   Mtdata* out) noexcept {
   const std::optional<std::size_t> size = layout.payload_size();
-  if (!size) return MtdataStatus::layout_unknown;
-  if (*size != payload.size()) return MtdataStatus::length_wrong;
+  if (size != payload.size()) return false;
   Mtdata decoded;
   decoded.frame = layout.frame();
   decoded.format = layout.format();
   Reader reader{payload, layout.format()};
   walk(layout, decoded, reader);
-  if (!reader.finite) return MtdataStatus::not_finite;
-  *out = decoded;
-  return MtdataStatus::ok;
+  if (reader.finite) *out = decoded;
+  return reader.finite;
 }
 
 std::size_t encode_mtdata(const Mtdata& data, const MtdataLayout& layout,

@@ -81,16 +81,9 @@ struct Mtdata {
   std::optional<Utc> utc;
 };
 
-enum class MtdataStatus : std::uint8_t {
-  ok,
-  layout_unknown,  // no payload of this mode and these settings can be told
-  length_wrong,    // not of this layout: ask the device for its configuration again
-  not_finite,      // a number that is none
-};
-
-/// Decodes a payload. Not ok: *out untouched.
-[[nodiscard]] MtdataStatus decode_mtdata(std::span<const std::uint8_t> payload,
-                                         const MtdataLayout& layout, Mtdata* out) noexcept;
+/// Decodes a payload. False: it is not of this layout, or a number is none; *out untouched.
+[[nodiscard]] bool decode_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout,
+                                 Mtdata* out) noexcept;
 
 /// Writes the layout's fields, absent ones and those that Mtdata has not as zeros. Returns the
 /// bytes written; 0: the layout is unknown, or there is no room.

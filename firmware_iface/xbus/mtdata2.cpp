@@ -90,11 +90,6 @@ void take(const Packet& packet, Mtdata2* out) noexcept {
       return store_u32(data, &out->sample_time_fine);
     case PacketId::quaternion:
       return store_in_frame(packet, numbers<4>(packet), &out->quaternion, &out->orientation_frame);
-    case PacketId::rotation_matrix:
-      return store_in_frame(packet, numbers<9>(packet), &out->rotation_matrix,
-                            &out->orientation_frame);
-    case PacketId::euler:
-      return store_in_frame(packet, numbers<3>(packet), &out->euler_deg, &out->orientation_frame);
     case PacketId::altitude_ellipsoid:
       if (const auto metres = numbers<1>(packet)) out->altitude_ellipsoid_m = (*metres)[0];
       return;
@@ -122,13 +117,11 @@ void take(const Packet& packet, Mtdata2* out) noexcept {
 
 }  // namespace
 
-PacketStatus PacketReader::next(Packet* packet) noexcept {
-  if (rest_.empty()) return PacketStatus::end;
-  if (rest_.size() < kPacketHeader || rest_.size() < kPacketHeader + rest_[2])
-    return PacketStatus::torn;
+bool PacketReader::next(Packet* packet) noexcept {
+  if (rest_.size() < kPacketHeader || rest_.size() < kPacketHeader + rest_[2]) return false;
   *packet = {read_u16(rest_), rest_.subspan(kPacketHeader, rest_[2])};
   rest_ = rest_.subspan(kPacketHeader + rest_[2]);
-  return PacketStatus::ok;
+  return true;
 }
 
 std::optional<std::size_t> packet_size(std::uint16_t id) noexcept {
@@ -230,18 +223,12 @@ void PacketWriter::put_pvt(const GnssPvt& p) noexcept {
   put(wire_id(PacketId::gnss_pvt), b);
 }
 
-PacketStatus decode_mtdata2(Bytes payload, Mtdata2* out) noexcept {
+bool decode_mtdata2(Bytes payload, Mtdata2* out) noexcept {
   Mtdata2 decoded;
   PacketReader reader(payload);
-  Packet packet;
-  for (;;) {  // ends: every packet takes at least three bytes of the payload
-    const PacketStatus status = reader.next(&packet);
-    if (status == PacketStatus::torn) return PacketStatus::torn;
-    if (status == PacketStatus::end) break;
-    take(packet, &decoded);
-  }
-  *out = decoded;
-  return PacketStatus::ok;
+  for (Packet packet; reader.next(&packet);) take(packet, &decoded);
+  if (!reader.torn()) *out = decoded;
+  return !reader.torn();
 }
 
 }  // namespace vergence::xbus

@@ -71,18 +71,14 @@ struct Packet {
   std::span<const std::uint8_t> data{};
 };
 
-enum class PacketStatus : std::uint8_t {
-  ok,
-  end,   // the payload is used up exactly
-  torn,  // the rest is no whole packet: the message is false, whatever its checksum says
-};
-
 /// Walks over a payload. Ends: each packet is at least three bytes.
 class PacketReader {
  public:
   explicit PacketReader(std::span<const std::uint8_t> payload) noexcept : rest_(payload) {}
-  /// The next packet. Not ok: *packet untouched.
-  [[nodiscard]] PacketStatus next(Packet* packet) noexcept;
+  /// The next packet. False: the payload is used up, or torn(); *packet untouched.
+  [[nodiscard]] bool next(Packet* packet) noexcept;
+  /// The rest is no whole packet: the message is false, whatever its checksum says.
+  [[nodiscard]] bool torn() const noexcept { return !rest_.empty(); }
 
  private:
   std::span<const std::uint8_t> rest_;
@@ -108,9 +104,7 @@ struct Mtdata2 {
   std::optional<Utc> utc;
   std::optional<std::uint8_t> status_byte;
   std::optional<std::uint32_t> status_word;
-  std::optional<std::array<double, 4>> quaternion;       // w x y z, sensor → local frame
-  std::optional<std::array<double, 9>> rotation_matrix;  // row by row, sensor → local frame
-  std::optional<Three> euler_deg;                        // roll, pitch, yaw
+  std::optional<std::array<double, 4>> quaternion;  // w x y z, sensor → local frame
   LocalFrame orientation_frame = LocalFrame::enu;
   std::optional<std::array<double, 2>> latitude_longitude_deg;
   std::optional<double> altitude_ellipsoid_m;
@@ -142,16 +136,15 @@ class PacketWriter {
   bool full_ = false;
 };
 
-/// Decodes a message's payload. `torn`: *out untouched. Never `end`. A packet's length outranks its
+/// Decodes a message's payload. False: it is torn, *out untouched. A packet's length outranks its
 /// id's format bits: firmware has been seen to announce a double and send four bytes.
 ///
 ///     Message message;  // of a FrameStream
 ///     Mtdata2 data;
 ///     while (stream.next(&message))
-///       if (message.is(MessageId::mtdata2) &&
-///           decode_mtdata2(message.payload, &data) == PacketStatus::ok && data.quaternion)
+///       if (message.is(MessageId::mtdata2) && decode_mtdata2(message.payload, &data) &&
+///           data.quaternion)
 ///         use(*data.quaternion);
-[[nodiscard]] PacketStatus decode_mtdata2(std::span<const std::uint8_t> payload,
-                                          Mtdata2* out) noexcept;
+[[nodiscard]] bool decode_mtdata2(std::span<const std::uint8_t> payload, Mtdata2* out) noexcept;
 
 }  // namespace vergence::xbus

@@ -104,7 +104,7 @@ inline constexpr std::uint32_t width = 0x10000, height = 0x10004, offset_x = 0x1
                                locked = 0x1005C, ptp_enable = 0x10060, ptp_status = 0x10064,
                                gain_raw = 0x10068, sensor_width = 0x1006C, sensor_height = 0x10070,
                                line_selector = 0x10074, line_mode = 0x10078, line_source = 0x1007C,
-                               chunk_mode = 0x10080, temperature = 0x1008C;
+                               chunk_mode = 0x10080;
 }  // namespace gige_register
 
 /// The GenICam description of such a camera.

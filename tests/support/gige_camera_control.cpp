@@ -76,7 +76,6 @@ void GigeCamera::Impl::reset() {
   put(acquisition_mode, 2);
   put(frame_rate, std::bit_cast<std::uint32_t>(10.0F));
   put(exposure_time, std::bit_cast<std::uint32_t>(5000.0F));
-  put(temperature, std::bit_cast<std::uint32_t>(41.5F));
   put(trigger_selector, 1);
   put(exposure_mode, 1);
   put(exposure_auto, 2);  // as many cameras come: on

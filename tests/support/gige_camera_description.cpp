@@ -117,7 +117,6 @@ std::string gige_description(const GigeCameraOptions& o) {
     d.integer("GainRaw", gain_raw, "<Min>0</Min><Max>240</Max>");
   else
     d.number("Gain", gain, 0, 24, "dB");
-  if (!o.old_names) d.number("DeviceTemperature", temperature, -40, 120, "C");
   d.choice("GainAuto", gain_auto, {{"Off", 0}, {"Continuous", 2}});
   d.choice("TriggerSelector", trigger_selector, {{"FrameStart", 1}});
   d.choice("TriggerMode", trigger_mode, {{"Off", 0}, {"On", 1}});

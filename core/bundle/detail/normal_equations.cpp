@@ -228,7 +228,7 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
       if (moving) {  // rows of N before the basis: τ in its three places, φ after them
         double* N = rows + job.shared.extrinsic[k] * 3 * kBatch;
         const int phi = job.shared.exact[k] ? 2 : 3;
-        const double* basis = job.cameras[k].basis;
+        const double* basis = job.cameras[k].basis.data();
 #pragma GCC unroll 3
         for (int c = 0; c < 3; ++c) {
           if (job.shared.exact[k]) {

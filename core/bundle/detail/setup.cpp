@@ -11,11 +11,8 @@ namespace {
 constexpr double kOrthonormal =
     1e-6;  // largest entry of RᵀR − I of a rotation that only rounding has touched
 
-bool refuse(BundleResult* result, BundleTermination termination, BundleDefect defect,
-            std::size_t index = 0) noexcept {
+bool refuse(BundleResult* result, BundleTermination termination) noexcept {
   result->termination = termination;
-  result->defect = defect;
-  result->defect_index = static_cast<std::uint32_t>(index);
   return false;
 }
 
@@ -41,33 +38,31 @@ bool check_sizes(const BundleWorkspace& w, const BundleProblem& p, const BundleO
       !as_many(p.squared_residuals.size(), p.observations.size()) ||
       (mono ? !as_many(p.T_camera_left.size(), p.cameras.size())
             : p.T_camera_left.size() != p.cameras.size()))
-    return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
+    return refuse(r, BundleTermination::invalid_input);
   if (p.cameras.size() > w.capacity.cameras || p.T_left_world.size() > w.capacity.poses ||
       p.points.size() > w.capacity.points || p.observations.size() > w.capacity.observations ||
       (o.configuration == BundleConfiguration::stereo_calibration && !w.capacity.shared))
-    return refuse(r, BundleTermination::capacity, BundleDefect::none);
+    return refuse(r, BundleTermination::capacity);
   return true;
 }
 
-bool check_state(const BundleProblem& p, const BundleOptions& o, BundleResult* r) noexcept {
-  const auto bad = [&](std::size_t i) {
-    return refuse(r, BundleTermination::invalid_input, BundleDefect::state_not_finite, i);
-  };
-  for (std::size_t i = 0; i < p.points.size(); ++i)
-    if (!p.points[i].allFinite()) return bad(i);
-  for (std::size_t i = 0; i < p.T_left_world.size(); ++i)
-    if (!rigid(p.T_left_world[i])) return bad(i);
+/// The start: numbers, and rotations that are some.
+bool check_state(const BundleProblem& p, const BundleOptions& o) noexcept {
+  for (const Vec3& point : p.points)
+    if (!point.allFinite()) return false;
+  for (const Transform& T : p.T_left_world)
+    if (!rigid(T)) return false;
   const bool mono = o.configuration == BundleConfiguration::parallel_monocular;
   for (std::size_t k = 0; k < p.cameras.size(); ++k) {
-    if (!usable(p.cameras[k].intrinsics())) return bad(k);
+    if (!usable(p.cameras[k].intrinsics())) return false;
     if (mono) continue;
-    if (!rigid(p.T_camera_left[k])) return bad(k);
+    if (!rigid(p.T_camera_left[k])) return false;
     if (k == 0 && !(p.T_camera_left[0].R.isIdentity(kOrthonormal) &&
                     p.T_camera_left[0].t.norm() < kOrthonormal))
-      return bad(k);
+      return false;
     if (k > 0 && o.configuration == BundleConfiguration::stereo_calibration &&
         o.length[k].kind != BundleLength::free && !(p.T_camera_left[k].t.norm() > kOrthonormal))
-      return bad(k);  // a length without a direction
+      return false;  // a length without a direction
   }
   return true;
 }
@@ -83,15 +78,14 @@ bool check_observations(BundleWorkspace& w, const BundleProblem& p, BundleResult
   for (std::size_t i = 0; i < p.observations.size(); ++i) {
     const BundleObservation& o = p.observations[i];
     if (o.point >= points || o.pose >= poses || o.camera >= cameras)
-      return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
+      return refuse(r, BundleTermination::invalid_input);
     const std::uint64_t key = (static_cast<std::uint64_t>(o.point) << 24U) |
                               (static_cast<std::uint64_t>(o.pose) << 8U) | o.camera;
-    if (i > 0 && key <= last)
-      return refuse(r, BundleTermination::invalid_input, BundleDefect::order, i);
+    if (i > 0 && key <= last) return refuse(r, BundleTermination::invalid_input);
     last = key;
     if (!std::isfinite(o.x) || !std::isfinite(o.y) || !std::isfinite(o.inverse_sigma) ||
         !(o.inverse_sigma > 0))
-      return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
+      return refuse(r, BundleTermination::invalid_input);
     while (next_point <= o.point) w.first_observation[next_point++] = static_cast<std::uint32_t>(i);
     ++pose_observations[o.pose];
   }
@@ -110,27 +104,24 @@ bool check_poses(BundleWorkspace& w, const BundleProblem& p, const BundleOptions
     anchored = anchored || constant;
     w.poses[i].block = constant ? -1 : w.free_poses++;
   }
-  if (!anchored) return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
+  if (!anchored) return refuse(r, BundleTermination::invalid_input);
   for (std::size_t i = 0; i < p.pose_priors.size(); ++i) {
     const BundlePosePrior& prior = p.pose_priors[i];
-    if (prior.pose >= p.T_left_world.size())
-      return refuse(r, BundleTermination::invalid_input, BundleDefect::index, i);
+    if (prior.pose >= p.T_left_world.size()) return refuse(r, BundleTermination::invalid_input);
     if (!rigid(prior.T_left_world) || !prior.information.allFinite())
-      return refuse(r, BundleTermination::invalid_input, BundleDefect::not_finite, i);
+      return refuse(r, BundleTermination::invalid_input);
   }
   for (std::size_t i = 0; i < p.T_left_world.size(); ++i) {
     if (w.poses[i].block < 0 || w.pose_observations[i] > 0) continue;
     const bool held = std::any_of(p.pose_priors.begin(), p.pose_priors.end(),
                                   [&](const BundlePosePrior& q) { return q.pose == i; });
-    if (!held)
-      return refuse(r, BundleTermination::rank_deficient, BundleDefect::pose_without_observations,
-                    i);
+    if (!held) return refuse(r, BundleTermination::rank_deficient);
   }
   if (static_cast<std::size_t>(w.free_poses) * kBlock +
               static_cast<std::size_t>(shared_layout(p, o, false).blocks) * kBlock ==
           0 &&
       p.points.empty())
-    return refuse(r, BundleTermination::invalid_input, BundleDefect::sizes);
+    return refuse(r, BundleTermination::invalid_input);
   return true;
 }
 
@@ -142,8 +133,7 @@ bool order_points(BundleWorkspace& w, const BundleProblem& p, BundleResult* r) n
     const std::uint32_t begin = w.first_observation[i], end = w.first_observation[i + 1];
     if (begin == end) continue;
     const bool free = p.point_constant.empty() || p.point_constant[i] == 0;
-    if (free && end - begin < 2)
-      return refuse(r, BundleTermination::rank_deficient, BundleDefect::seen_once, i);
+    if (free && end - begin < 2) return refuse(r, BundleTermination::rank_deficient);
     w.free_points += free ? 1U : 0U;
     const std::uint64_t first = p.observations[begin].pose, last = p.observations[end - 1].pose;
     w.order[w.point_count++] = (first << 48U) | (last << 32U) | i;
@@ -283,16 +273,16 @@ SharedLayout shared_layout(const BundleProblem& p, const BundleOptions& o, bool 
 
 bool set_up(BundleWorkspace& w, const BundleProblem& p, const BundleOptions& o,
             BundleResult* r) noexcept {
-  if (o.validate()[0] != '\0')
-    return refuse(r, BundleTermination::invalid_input, BundleDefect::options);
-  if (!check_sizes(w, p, o, r) || !check_state(p, o, r) || !check_observations(w, p, r) ||
-      !check_poses(w, p, o, r) || !order_points(w, p, r))
+  if (!o.valid()) return refuse(r, BundleTermination::invalid_input);
+  if (!check_sizes(w, p, o, r)) return false;
+  if (!check_state(p, o)) return refuse(r, BundleTermination::invalid_input);
+  if (!check_observations(w, p, r) || !check_poses(w, p, o, r) || !order_points(w, p, r))
     return false;
   w.batch_count = (w.point_count + kBatch - 1) / kBatch;
   w.block_count = w.slot_count = 0;
   std::uint32_t group = 0, in_group = 0;
   for (std::size_t b = 0; b < w.batch_count; ++b) {
-    if (!lay_out_batch(w, p, b)) return refuse(r, BundleTermination::capacity, BundleDefect::none);
+    if (!lay_out_batch(w, p, b)) return refuse(r, BundleTermination::capacity);
     if (b > 0 && (in_group == kGroupLimit || !same_poses(w, w.batches[b - 1], w.batches[b]))) {
       ++group;
       in_group = 0;

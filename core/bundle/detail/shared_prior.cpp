@@ -56,7 +56,7 @@ SharedPrior::SharedPrior(const BundleSharedPrior& prior, const SharedLayout& lay
     const int number = static_cast<int>(k);
     const Transform& T = prior.rig->T_camera_left[k];
     if (!(T.t.norm() > 0)) return;
-    if (layout.exact[k]) tangent_basis((T.R.transpose() * T.t).normalized(), mean_[k].basis);
+    if (layout.exact[k]) mean_[k].basis = tangent_basis((T.R.transpose() * T.t).normalized());
     const Mat6 basis = extrinsic_basis(layout, mean_[k], number);
     for (int i = 0; i < (layout.exact[k] ? 5 : 6); ++i) {
       rows[n] = extrinsic_combination(basis, T.R, number, i);

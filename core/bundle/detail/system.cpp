@@ -18,25 +18,11 @@ void row_major(const Mat3& R, double out[9]) noexcept {
 
 }  // namespace
 
-void tangent_basis(const Vec3& u, double basis[6]) noexcept {
-  int least = 0;
-  (void)u.cwiseAbs().minCoeff(&least);
-  const Vec3 a = u.cross(Vec3::Unit(least)).normalized();
-  const Vec3 b = u.cross(a);
-  for (int r = 0; r < 3; ++r) {
-    basis[2 * r] = a[r];
-    basis[2 * r + 1] = b[r];
-  }
-}
-
 Row6 extrinsic_basis(const SharedLayout& shared, const KernelCamera& camera, int k) noexcept {
   Row6 J = Row6::Zero();
   if (!shared.exact[k]) return Row6::Identity();
-  for (int r = 0; r < 3; ++r) {
-    J(r, 0) = camera.basis[2 * r];
-    J(r, 1) = camera.basis[2 * r + 1];
-    J(3 + r, 2 + r) = 1;
-  }
+  J.topLeftCorner<3, 2>() = camera.basis;
+  J.block<3, 3>(3, 2).setIdentity();
   return J;  // the sixth column stays empty
 }
 
@@ -98,7 +84,7 @@ void System::prepare(const BundleState& state) noexcept {
     c.cx = intrinsics.cx;
     c.cy = intrinsics.cy;
     c.identity = T.R == Mat3::Identity() && T.t == Vec3::Zero();
-    if (job_.shared.exact[k]) tangent_basis((T.R.transpose() * T.t).normalized(), c.basis);
+    if (job_.shared.exact[k]) c.basis = tangent_basis((T.R.transpose() * T.t).normalized());
   }
   job_.points = state.points.data();
   job_.cost = job_.squared_px = job_.weighted = job_.decrement = 0;

@@ -60,10 +60,7 @@ class System {
   double cost_ = 0, update_ = 0, norm_ = 0;
 };
 
-/// Two unit vectors across u, in the base camera's axes: τ = basis β keeps |t_k| to first order.
-void tangent_basis(const Vec3& u, double basis[6]) noexcept;
-
-/// J (6 × size, row-major): how (τ, φ) of camera k follows from its rows of θ_S.
+/// J (6 × size): how (τ, φ) of camera k follows from its rows of θ_S.
 [[nodiscard]] Eigen::Matrix<double, 6, 6> extrinsic_basis(const SharedLayout& shared,
                                                           const KernelCamera& camera,
                                                           int k) noexcept;

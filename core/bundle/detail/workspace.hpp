@@ -53,7 +53,7 @@ struct KernelPose {
 struct KernelCamera {
   double R[9], t[3];  // row-major, T_camera_left
   double fx, fy, cx, cy;
-  double basis[6];  // 3×2, row-major: where τ may go with the exact length
+  Eigen::Matrix<double, 3, 2, Eigen::RowMajor> basis;  // where τ may go with the exact length
   bool identity;
 };
 

@@ -41,7 +41,7 @@ StereoResiduals MonitorResiduals::stereo(const Reference& c, const MonitorFrame&
     if (!(s.sigma_px > 0) || !s.left.allFinite() || !s.right.allFinite()) continue;
     StereoRow& row = stereo_[rows_];
     const Vec2 left = ray(c.left, s.left), right = ray(c.right, s.right);
-    if (c.epipolar.to_line(left, right, &row.r, &row.J) != EpipolarStatus::ok) continue;
+    if (!c.epipolar.to_line(left, right, &row.r, &row.J)) continue;
     row.r *= f;
     row.J *= f;
     row.inverse_sigma2 =

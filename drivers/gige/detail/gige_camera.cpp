@@ -195,29 +195,19 @@ void GigeCamera::stop() noexcept {
   close_stream(session_ != nullptr && !session_->lost());
 }
 
-DeviceStatus GigeCamera::standing() const noexcept {
-  switch (queue_.state()) {
-    case FrameQueue::State::stopped:
-      return DeviceStatus::stopped;
-    case FrameQueue::State::streaming:
-      return DeviceStatus::ok;
-    default:
-      return DeviceStatus::gone;
-  }
-}
-
 DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
   try {
-    if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
+    if (const DeviceStatus s = queue_.standing(); s != DeviceStatus::ok) return s;
     if (requested.exposure <= Duration{} ||
         requested.exposure.to_seconds() * requested_.rate_hz > 1)
       return last_error_.refuse(
           DeviceStatus::bad_configuration,
           "the exposure must be positive, and shorter than the time between two images");
     const std::lock_guard lock(device_);
-    if (session_ == nullptr || standing() != DeviceStatus::ok)
-      return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
+    if (session_ == nullptr || queue_.standing() != DeviceStatus::ok)
+      return queue_.standing() == DeviceStatus::stopped ? DeviceStatus::stopped
+                                                        : DeviceStatus::gone;
     ExposureSetting taken;
     if (const DeviceStatus s = session_->change_exposure(requested, &taken); s != DeviceStatus::ok)
       return last_error_.refuse(s, session_->last_error());
@@ -232,26 +222,15 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
   }
 }
 
-std::optional<double> GigeCamera::temperature_c() noexcept {
-  if (standing() != DeviceStatus::ok)
-    return std::nullopt;  // who opens it anew holds it for seconds
-  try {
-    const std::lock_guard lock(device_);
-    if (session_ == nullptr || standing() != DeviceStatus::ok) return std::nullopt;
-    return session_->temperature_c();
-  } catch (const std::exception&) {
-    return std::nullopt;
-  }
-}
-
 DeviceStatus GigeCamera::trigger_once() noexcept {
   if (!configured_ || requested_.trigger != CameraTrigger::software)
     return DeviceStatus::unsupported;
   try {
-    if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
+    if (const DeviceStatus s = queue_.standing(); s != DeviceStatus::ok) return s;
     const std::lock_guard lock(device_);
-    if (session_ == nullptr || standing() != DeviceStatus::ok)
-      return standing() == DeviceStatus::stopped ? DeviceStatus::stopped : DeviceStatus::gone;
+    if (session_ == nullptr || queue_.standing() != DeviceStatus::ok)
+      return queue_.standing() == DeviceStatus::stopped ? DeviceStatus::stopped
+                                                        : DeviceStatus::gone;
     const DeviceStatus s = session_->trigger();
     return s == DeviceStatus::ok ? s : last_error_.refuse(s, session_->last_error());
   } catch (const std::exception&) {

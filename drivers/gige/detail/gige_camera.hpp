@@ -77,14 +77,11 @@ class GigeCamera final : public CameraDevice {
   DeviceStatus trigger_once() noexcept override;
   DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override;
-  [[nodiscard]] std::optional<double> temperature_c() noexcept override;
   std::string last_error() const override { return last_error_.get(); }
   std::string remark() const override;
   CameraStatistics statistics() const noexcept override { return queue_.statistics(); }
 
  private:
-  /// Whether the camera can be asked now. → ok, stopped, gone
-  [[nodiscard]] DeviceStatus standing() const noexcept;
   [[nodiscard]] std::unique_ptr<Session> open_ours(const std::string& address,
                                                    std::string* why) const;
   [[nodiscard]] DeviceStatus reach();

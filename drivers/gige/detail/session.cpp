@@ -4,12 +4,13 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <mutex>
 #include <shared_mutex>
 #include <string_view>
 #include <thread>
 #include <utility>
+
+#include "drivers/common/format_text.hpp"
 
 namespace vergence::gige {
 
@@ -30,14 +31,9 @@ constexpr std::array kNames{
     Names{Purpose::ptp_status, {"PtpStatus", "GevIEEE1588Status", nullptr, nullptr}},
     Names{Purpose::ptp_latch, {"PtpDataSetLatch", "GevIEEE1588DataSetLatch", nullptr, nullptr}},
     Names{Purpose::chunk_mode, {"ChunkModeActive", "ChunkMode", nullptr, nullptr}},
-    Names{Purpose::temperature, {"DeviceTemperature", "DeviceTemperatureAbs"}},
 };
 
-std::string shown(double v) {
-  std::array<char, 32> text{};
-  (void)std::snprintf(text.data(), text.size(), "%.6g", v);
-  return text.data();
-}
+std::string shown(double v) { return format_text("%.6g", v); }
 
 std::string listed(const std::vector<std::string>& words) {
   std::string all;
@@ -293,11 +289,6 @@ DeviceStatus Session::refuse(DeviceStatus status, std::string sentence) {
     return DeviceStatus::gone;
   }
   return status;
-}
-
-std::optional<double> Session::temperature_c() const {
-  const char* name = features_.find(Purpose::temperature);
-  return name != nullptr ? features_.number(name) : std::nullopt;
 }
 
 bool Session::in_control() {

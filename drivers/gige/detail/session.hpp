@@ -24,8 +24,7 @@ enum class Purpose : std::uint8_t {
   ptp_enable,
   ptp_status,
   ptp_latch,
-  chunk_mode,   // whether frames have chunk data at all
-  temperature,  // °C
+  chunk_mode,  // whether frames have chunk data at all
 };
 
 /// The GenICam features of an open camera, with sentences for what it does not have.
@@ -124,9 +123,6 @@ class Session {
   /// unsupported, gone
   [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& requested,
                                              ExposureSetting* actual);
-
-  /// °C; nothing where it does not tell.
-  [[nodiscard]] std::optional<double> temperature_c() const;
 
   /// Asks the camera: it answers, and we are in control.
   [[nodiscard]] bool in_control();

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cstdint>
 #include <mutex>
-#include <shared_mutex>
 
 #include "drivers/clock.hpp"
 
@@ -44,9 +43,7 @@ void DeliveryQueue::finish(HostStamp at) {
 std::optional<FrameSlot> DeliveryQueue::take_spare(int k) {
   const std::lock_guard lock(mutex_);
   Sender& sender = senders_[static_cast<std::size_t>(k)];
-  if (sender.spare.empty() ||
-      sender.spare_generation != cameras_[static_cast<std::size_t>(k)]->generation())
-    return std::nullopt;
+  if (sender.spare.empty()) return std::nullopt;
   const FrameSlot slot = sender.spare.back();
   sender.spare.pop_back();
   return slot;
@@ -141,8 +138,6 @@ void DeliveryQueue::deliver_frame(const Parcel& parcel, HostStamp arrival) {
     return;
   }
   senders_[k].on_the_way.fetch_sub(1);
-  const std::shared_lock memory(cameras_[k]->memory);
-  if (parcel.generation != cameras_[k]->generation()) return;  // its memory is no more
   // What was on the way as the camera was unplugged is lost with it: a stream has nothing but
   // `back` behind a `gone`.
   if (parcel.unplugged != senders_[k].known_gone) {
@@ -159,10 +154,7 @@ void DeliveryQueue::deliver_frame(const Parcel& parcel, HostStamp arrival) {
 
 void DeliveryQueue::keep_spare(const Parcel& parcel) {
   const std::lock_guard lock(mutex_);
-  Sender& sender = senders_[static_cast<std::size_t>(parcel.device)];
-  if (sender.spare_generation != parcel.generation) sender.spare.clear();
-  sender.spare_generation = parcel.generation;
-  sender.spare.push_back(parcel.frame.value.slot);
+  senders_[static_cast<std::size_t>(parcel.device)].spare.push_back(parcel.frame.value.slot);
 }
 
 }  // namespace vergence::mock

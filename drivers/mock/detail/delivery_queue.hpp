@@ -23,8 +23,7 @@ struct Parcel {
   Delivery<Frame> frame{};
   Delivery<InsReading> reading{};
   Delivery<BoardReport> report{};
-  std::uint32_t generation = 0;  // of the camera's memory that the frame is in
-  std::uint32_t unplugged = 0;   // times the camera had been when this was posted
+  std::uint32_t unplugged = 0;  // times the camera had been when this was posted
   [[nodiscard]] bool operator<(const Parcel& o) const noexcept {  // the queue's top is the earliest
     return std::pair(arrival, order) > std::pair(o.arrival, o.order);
   }
@@ -70,8 +69,7 @@ class DeliveryQueue {
     std::atomic<int> on_the_way{0};
     std::uint32_t unplugged = 0;   // by what was posted; under mutex_
     std::uint32_t known_gone = 0;  // by what was delivered
-    std::vector<FrameSlot> spare;  // of that generation; under mutex_
-    std::uint32_t spare_generation = 0;
+    std::vector<FrameSlot> spare;  // of frames that nobody was there for; under mutex_
   };
 
   void hand_out_in_time();

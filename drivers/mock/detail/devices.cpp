@@ -24,23 +24,26 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& requested,
     return DeviceStatus::unsupported;
   if (stream.streaming() || out_.load() > 0 || (rig_->pulsing.load() && !rig_->options.real_time))
     return DeviceStatus::busy;
-  const std::unique_lock mine(memory);
   try {
-    arena_ = std::make_unique<Arena>(
-        FramePool::memory_needed(lens.width, lens.height, MockRig::kSlots) + kCacheLine);
-    pool_ = std::make_unique<FramePool>(lens.width, lens.height, MockRig::kSlots, *arena_);
-    renderer_ = std::make_unique<Renderer>(rig_->truth->shared_world(), vergence::Camera(lens),
-                                           rig_->options.pattern);
-    if (rig_->options.pattern == Pattern::gbrg && !rig_->options.raw)
-      mosaic_.resize(FramePool::stride(lens.width) * static_cast<std::size_t>(lens.height));
+    if (pool_ == nullptr) take_memory(lens);
   } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
   configuration_ = requested;
   exposures_.reset({requested.exposure, requested.gain_db});
-  generation_.fetch_add(1, std::memory_order_release);
   if (actual != nullptr) *actual = requested;
   return DeviceStatus::ok;
+}
+
+/// Every configuration has the lens's size: the memory of the first one stays.
+void MockCamera::take_memory(const Intrinsics& lens) {
+  renderer_ = std::make_unique<Renderer>(rig_->truth->shared_world(), vergence::Camera(lens),
+                                         rig_->options.pattern);
+  if (rig_->options.pattern == Pattern::gbrg && !rig_->options.raw)
+    mosaic_.resize(FramePool::stride(lens.width) * static_cast<std::size_t>(lens.height));
+  arena_ = std::make_unique<Arena>(
+      FramePool::memory_needed(lens.width, lens.height, MockRig::kSlots) + kCacheLine);
+  pool_ = std::make_unique<FramePool>(lens.width, lens.height, MockRig::kSlots, *arena_);
 }
 
 DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,

@@ -7,7 +7,6 @@
 #include <limits>
 #include <memory>
 #include <mutex>
-#include <shared_mutex>
 #include <vector>
 
 #include "core/memory/arena.hpp"
@@ -93,8 +92,6 @@ class MockCamera final : public CameraDevice {
   const DeviceInfo& info() const noexcept override { return info_; }
   DeviceStatus configure(const CameraConfiguration& requested,
                          CameraConfiguration* actual) noexcept override;
-  /// One of them warms up more than the other.
-  std::optional<double> temperature_c() noexcept override { return 38.5 + 0.5 * k_; }
   DeviceStatus set_exposure(const ExposureSetting& requested,
                             ExposureSetting* actual) noexcept override;
   DeviceTiming timing() const noexcept override {
@@ -110,13 +107,6 @@ class MockCamera final : public CameraDevice {
   // The scheduler's side.
   Stream<Frame, 64> stream;
   std::atomic<std::uint64_t> underruns{0}, lost{0};
-  /// Held (shared) while pictures are planned, rendered and sent: configure() waits for it in real
-  /// time.
-  std::shared_mutex memory;
-  /// Of the memory: frames of an older one are nobody's.
-  [[nodiscard]] std::uint32_t generation() const noexcept {
-    return generation_.load(std::memory_order_acquire);
-  }
   /// From the edge of a pulse to the start of its exposure.
   [[nodiscard]] Duration trigger_delay() const noexcept {
     return rig_->options.trigger_delay[static_cast<std::size_t>(k_)];
@@ -130,7 +120,6 @@ class MockCamera final : public CameraDevice {
   void label(FrameSlot slot, std::uint64_t pulse) noexcept {
     pulse_of_[slot].store(pulse, std::memory_order_release);
   }
-  [[nodiscard]] const CameraConfiguration& configuration() const noexcept { return configuration_; }
   [[nodiscard]] const DeviceOscillator& clock() const noexcept { return clock_; }
   /// Image memory, bytes.
   [[nodiscard]] std::size_t bytes() const noexcept { return arena_ ? arena_->capacity() : 0; }
@@ -140,6 +129,8 @@ class MockCamera final : public CameraDevice {
             const Shot& shot, std::uint8_t* out);
 
  private:
+  void take_memory(const Intrinsics& lens);
+
   RigContext* rig_;
   int k_;
   DeviceInfo info_;
@@ -150,7 +141,6 @@ class MockCamera final : public CameraDevice {
   std::unique_ptr<Renderer> renderer_;
   std::vector<std::uint8_t> mosaic_;  // empty: the renderer's picture is what is handed out
   std::atomic<std::uint64_t> delivered_{0}, starts_{0};
-  std::atomic<std::uint32_t> generation_{0};
   std::atomic<int> out_{0};  // slots the consumer holds
   std::array<std::atomic<std::uint64_t>, MockRig::kSlots> pulse_of_{};
   ExposurePlan exposures_;

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <shared_mutex>
 #include <thread>
 #include <vector>
 
@@ -294,9 +293,6 @@ constexpr Duration kNominalExposure = Duration::milliseconds(8);
 void Scheduler::make_frames(std::uint64_t pulse) {
   std::array<Shooting, kMaxCameras> shootings;
   std::size_t count = 0;
-  std::array<std::shared_lock<std::shared_mutex>, kMaxCameras> memories;
-  for (std::size_t k = 0; k < cameras_.size(); ++k)
-    memories[k] = std::shared_lock(cameras_[k]->memory);
   for (int k = 0; k < static_cast<int>(cameras_.size()); ++k) {
     if (!present(pulse, k)) continue;
     if (const auto shooting = plan(pulse, k)) shootings[count++] = *shooting;
@@ -373,7 +369,6 @@ void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
   const HostStamp begins = host_of(pulse) + camera.trigger_delay();
   Parcel p;
   p.device = shooting.camera;
-  p.generation = camera.generation();
   p.arrival = jittered(begins + open + kTransfer, k, pulse) + shooting.exposure.delay;
   p.frame.value = {shooting.slot,
                    pulse - sender.counter_base,

@@ -51,9 +51,9 @@ class InsRig : public ::testing::Test {
     xsens::Options o;
     o.baud = baud;
     DeviceStatus status = DeviceStatus::ok;
-    xsens::Driver driver(o);
-    auto device = driver.open("", &status);  // the only converter there is
-    EXPECT_EQ(status, DeviceStatus::ok) << driver.last_error();
+    const auto driver = xsens::make_driver(o);
+    auto device = driver->open("", &status);  // the only converter there is
+    EXPECT_EQ(status, DeviceStatus::ok) << driver->last_error();
     return device;
   }
   static void set_latency_timer(int ms) {

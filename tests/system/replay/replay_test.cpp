@@ -44,17 +44,6 @@ TEST_F(ReplayedFolder, aDriveTooShortToConfirmItsCalibrationSaysSo) {
   EXPECT_TRUE(test::says(read_file(session() / "report.html"), "not verified"));
 }
 
-TEST_F(ReplayedFolder, theSameBytesWithOneThreadAndTwo) {
-  ASSERT_EQ(replay("--threads 1").code, 0);
-  const fs::path other = work_ / "other";
-  ASSERT_EQ(run_vergence("replay '" + data().string() +
-                         "' --format folder --quiet --threads 2 --out '" + other.string() + "'")
-                .code,
-            0);
-  EXPECT_EQ(read_file(session() / "trajectory.tum"), read_file(other / "trajectory.tum"));
-  EXPECT_EQ(read_file(session() / "events.jsonl"), read_file(other / "events.jsonl"));
-}
-
 TEST_F(ReplayedFolder, fromScratchIntrinsicsAndALengthAreEnough) {
   std::string text = read_file(data() / "calibration.yaml");
   const auto at = text.find("    T_camera_left: [");

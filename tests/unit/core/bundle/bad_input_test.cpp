@@ -10,142 +10,146 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-class BadBundle : public ::testing::Test {
- protected:
-  BadBundle() : own(capacities_for(small())), rig(make()) {}
-  static SimulationOptions small() {
-    SimulationOptions s;
-    s.points = 30;
-    s.poses = 4;
-    return s;
-  }
-  static SimulatedRig make() {
-    Random random(31);
-    return simulate_rig(small(), random);
-  }
-  /// Refused with this reason, and nothing of the caller's is changed.
-  void expect(BundleTermination termination, BundleDefect defect, const BundleProblem& p,
-              const BundleOptions& o = calibration_options()) {
+SimulationOptions small() {
+  SimulationOptions s;
+  s.points = 30;
+  s.poses = 4;
+  return s;
+}
+
+SimulatedRig make() {
+  Random random(31);
+  return simulate_rig(small(), random);
+}
+
+/// Something that is wrong with a problem, which is refused for it.
+struct Defect {
+  const char* name;
+  void (*spoil)(SimulatedRig*, BundleProblem*, BundleOptions*);
+  BundleTermination termination = BundleTermination::invalid_input;
+};
+
+TEST(BadBundle, isRefusedAndNothingOfTheCallersIsChanged) {
+  constexpr BundleTermination kUndetermined = BundleTermination::rank_deficient;
+  static const std::vector<std::uint8_t> none_constant(4, 0);
+  for (const Defect& d : {
+           Defect{"a point behind its camera",
+                  [](auto*rig, auto*, auto*) {
+                    rig->points[7] = rig->true_poses[0].inverse() * Vec3(0, 0, -5);
+                  }},
+           {"a point seen once",
+            [](auto*rig, auto*p, auto*) {
+              std::erase_if(rig->observations, [](const BundleObservation& o) {
+                return o.point == 5 && !(o.pose == 2 && o.camera == 1);
+              });
+              p->observations = rig->observations;
+            },
+            kUndetermined},
+           {"a pose without observations",
+            [](auto*rig, auto*p, auto*) {
+              std::erase_if(rig->observations,
+                            [](const BundleObservation& o) { return o.pose == 3; });
+              p->observations = rig->observations;
+            },
+            kUndetermined},
+           {"a pixel that is no number",
+            [](auto*rig, auto*, auto*) { rig->observations[11].x = kNaN; }},
+           {"a sigma without end",
+            [](auto*rig, auto*, auto*) { rig->observations[3].inverse_sigma = 0; }},
+           {"a point that is no number", [](auto*rig, auto*, auto*) { rig->points[2].x() = kNaN; }},
+           {"a rotation that is none",
+            [](auto*rig, auto*, auto*) { rig->T_left_world[2].R *= 1.1; }},
+           {"a length without a direction",
+            [](auto*rig, auto*, auto*) { rig->T_camera_left[1].t.setZero(); }},
+           {"a pixel whose square is not finite",
+            [](auto*rig, auto*, auto*) { rig->observations[3].x = 1e200; }},
+           {"a point that there is not",
+            [](auto*rig, auto*, auto*) { rig->observations[9].point = 1000; }},
+           {"a pose that there is not",
+            [](auto*rig, auto*, auto*) { rig->observations[9].pose = 4; }},
+           {"observations out of order",
+            [](auto*rig, auto*, auto*) { std::swap(rig->observations[9], rig->observations[10]); }},
+           {"an observation twice",
+            [](auto*rig, auto*, auto*) { rig->observations[10] = rig->observations[9]; }},
+           {"a transform too few",
+            [](auto*, auto*p, auto*) { p->T_camera_left = p->T_camera_left.first(1); }},
+           {"no pose that holds the others",
+            [](auto*, auto*p, auto*) { p->pose_constant = none_constant; }},
+           {"nothing", [](auto*, auto*p, auto*) { *p = BundleProblem{}; }},
+           {"fewer cells than none", [](auto*, auto*, auto*o) { o->cells = -1; }},
+           {"more cells than there can be", [](auto*, auto*, auto*o) { o->cells = 9; }},
+           {"no shared errors", [](auto*, auto*, auto*o) { o->shared_errors = 0; }},
+           {"shared errors that are no number",
+            [](auto*, auto*, auto*o) { o->shared_errors = kNaN; }},
+           {"steps without end", [](auto*, auto*, auto*o) { o->max_steps = 1001; }},
+           {"a damping of nothing", [](auto*, auto*, auto*o) { o->initial_damping = 0; }},
+           {"a measured length without a sigma",
+            [](auto*, auto*, auto*o) {
+              o->length[1].kind = BundleLength::measured;
+              o->length[1].metres = 1;
+              o->length[1].sigma = 0;
+            }},
+           {"a tenth parameter of a lens",
+            [](auto*, auto*, auto*o) { o->intrinsics[1].free = 1U << kIntrinsicsSize; }},
+       }) {
+    SCOPED_TRACE(d.name);
+    SimulatedRig rig = make();
+    BundleProblem p = rig.problem();
+    BundleOptions o = calibration_options();
+    d.spoil(&rig, &p, &o);
+    OwnAdjuster own(capacities_for(small()));
     const std::vector<Vec3> points(p.points.begin(), p.points.end());
     const BundleResult r = own.adjuster.solve(p, o);
-    EXPECT_EQ(r.termination, termination) << to_string(r.termination);
-    EXPECT_EQ(r.defect, defect) << to_string(r.defect);
+    EXPECT_EQ(r.termination, d.termination);
     EXPECT_FALSE(r.usable());
     for (std::size_t i = 0; i < points.size(); ++i)
       EXPECT_TRUE(points[i] == p.points[i] || points[i].hasNaN());
-    index = r.defect_index;
   }
-  OwnAdjuster own;
-  SimulatedRig rig;
-  std::uint32_t index = 0;
-};
-
-TEST_F(BadBundle, pointBehindItsCameraIsNamed) {
-  rig.points[7] = rig.true_poses[0].inverse() * Vec3(0, 0, -5);
-  expect(BundleTermination::invalid_input, BundleDefect::behind, rig.problem());
-  EXPECT_EQ(rig.observations[index].point, 7U);
 }
 
-TEST_F(BadBundle, pointSeenOnceIsNamed) {
-  std::erase_if(rig.observations, [](const BundleObservation& o) {
-    return o.point == 5 && !(o.pose == 2 && o.camera == 1);
-  });
-  expect(BundleTermination::rank_deficient, BundleDefect::seen_once, rig.problem());
-  EXPECT_EQ(index, 5U);
-}
-
-TEST_F(BadBundle, pointSeenNeverIsLeftAlone) {
+TEST(BadBundle, pointSeenNeverIsLeftAlone) {
+  SimulatedRig rig = make();
+  OwnAdjuster own(capacities_for(small()));
   std::erase_if(rig.observations, [](const BundleObservation& o) { return o.point == 5; });
   const Vec3 before = rig.points[5];
   EXPECT_TRUE(own.adjuster.solve(rig.problem(), calibration_options()).converged());
   EXPECT_EQ(rig.points[5], before);
 }
 
-TEST_F(BadBundle, poseWithoutObservationsIsNamed) {
-  std::erase_if(rig.observations, [](const BundleObservation& o) { return o.pose == 3; });
-  expect(BundleTermination::rank_deficient, BundleDefect::pose_without_observations, rig.problem());
-  EXPECT_EQ(index, 3U);
-}
-
-TEST_F(BadBundle, numbersThatAreNoneAreNamed) {
-  rig.observations[11].x = kNaN;
-  expect(BundleTermination::invalid_input, BundleDefect::not_finite, rig.problem());
-  EXPECT_EQ(index, 11U);
-  rig = make();
-  rig.observations[3].inverse_sigma = 0;
-  expect(BundleTermination::invalid_input, BundleDefect::not_finite, rig.problem());
-  rig = make();
-  rig.points[2].x() = kNaN;
-  expect(BundleTermination::invalid_input, BundleDefect::state_not_finite, rig.problem());
-  rig = make();
-  rig.T_left_world[2].R *= 1.1;
-  expect(BundleTermination::invalid_input, BundleDefect::state_not_finite, rig.problem());
-  rig = make();
-  rig.T_camera_left[1].t.setZero();  // a length without a direction
-  expect(BundleTermination::invalid_input, BundleDefect::state_not_finite, rig.problem());
-  rig = make();
-  rig.observations[3].x = 1e200;  // finite, but not its square
-  expect(BundleTermination::invalid_input, BundleDefect::not_finite, rig.problem());
-}
-
-TEST_F(BadBundle, indicesAndOrderAreChecked) {
-  rig.observations[9].point = 1000;
-  expect(BundleTermination::invalid_input, BundleDefect::index, rig.problem());
-  rig = make();
-  rig.observations[9].pose = 4;
-  expect(BundleTermination::invalid_input, BundleDefect::index, rig.problem());
-  rig = make();
-  std::swap(rig.observations[9], rig.observations[10]);
-  expect(BundleTermination::invalid_input, BundleDefect::order, rig.problem());
-  rig = make();
-  rig.observations[10] = rig.observations[9];
-  expect(BundleTermination::invalid_input, BundleDefect::order, rig.problem());
-}
-
-TEST_F(BadBundle, sizesThatDoNotGoTogetherAreRefused) {
-  BundleProblem p = rig.problem();
-  p.T_camera_left = p.T_camera_left.first(1);
-  expect(BundleTermination::invalid_input, BundleDefect::sizes, p);
-  p = rig.problem();
-  const std::vector<std::uint8_t> none_constant(rig.T_left_world.size(), 0);
-  p.pose_constant = none_constant;
-  expect(BundleTermination::invalid_input, BundleDefect::sizes, p);
-  expect(BundleTermination::invalid_input, BundleDefect::sizes, BundleProblem{});
-}
-
-TEST_F(BadBundle, moreThanTheCapacityIsRefused) {
-  for (const int what : {0, 1, 2, 3, 4}) {
+TEST(BadBundle, moreThanTheCapacityIsRefused) {
+  SimulatedRig rig = make();
+  for (const int what : {0, 1, 2, 3, 4, 5}) {
     BundleCapacities c = capacities_for(small());
     if (what == 0) c.points = 29;
     if (what == 1) c.poses = 3;
     if (what == 2) c.observations = 239;
     if (what == 3) c.cameras = 1;
     if (what == 4) c.blocks = 15;
+    if (what == 5) c.shared = false;
     OwnAdjuster tight(c);
     EXPECT_EQ(tight.adjuster.solve(rig.problem(), calibration_options()).termination,
               BundleTermination::capacity)
         << what;
+    if (what == 5) {
+      EXPECT_TRUE(tight.adjuster.solve(rig.problem(), {}).usable()) << "odometry alone";
+    }
   }
-  BundleCapacities c = capacities_for(small());
-  c.shared = false;
-  OwnAdjuster odometry_only(c);
-  EXPECT_EQ(odometry_only.adjuster.solve(rig.problem(), calibration_options()).termination,
-            BundleTermination::capacity);
-  EXPECT_TRUE(odometry_only.adjuster.solve(rig.problem(), {}).usable());
 }
 
-TEST_F(BadBundle, aPoseSeenByTwoPointsIsRankDeficient) {
+TEST(BadBundle, aPoseSeenByTwoPointsIsRankDeficient) {
+  SimulatedRig rig = make();
+  OwnAdjuster own(capacities_for(small()));
   std::erase_if(rig.observations, [](const BundleObservation& o) {
     return o.pose == 3 && (o.point > 1 || o.camera == 1);
   });
   rig.T_camera_left = rig.true_cameras;
   const BundleResult r = own.adjuster.solve(rig.problem(), {});
-  EXPECT_EQ(r.termination, BundleTermination::rank_deficient) << to_string(r.termination);
+  EXPECT_EQ(r.termination, BundleTermination::rank_deficient);
   EXPECT_TRUE(rig.T_left_world[3].finite());
 }
 
 /// Problems that nobody would pose: whatever comes out has a name and is finite.
-TEST(BundleFuzz, hostileProblemsEndWithANameAndNeverWithNaN) {
+TEST(BundleFuzz, hostileProblemsEndAndNeverWithNaN) {
   SimulationOptions s;
   s.points = 20;
   s.poses = 5;
@@ -212,13 +216,9 @@ TEST(BundleFuzz, hostileProblemsEndWithANameAndNeverWithNaN) {
     EXPECT_GE(r.steps, 0);
     EXPECT_LE(r.steps, o.max_steps);
     if (r.termination == BundleTermination::invalid_input ||
-        r.termination == BundleTermination::capacity) {
-      EXPECT_TRUE(r.termination == BundleTermination::capacity || r.defect != BundleDefect::none)
-          << seed;
+        r.termination == BundleTermination::capacity)
       continue;
-    }
     EXPECT_TRUE(std::isfinite(r.final_cost) && std::isfinite(r.rms_px)) << seed;
-    EXPECT_LE(r.final_cost, r.initial_cost) << seed;
     for (const Vec3& point : p.points) EXPECT_TRUE(point.allFinite()) << seed;
     for (const Transform& T : p.T_left_world) EXPECT_TRUE(T.finite()) << seed;
     for (const Transform& T : p.T_camera_left) EXPECT_TRUE(T.finite()) << seed;

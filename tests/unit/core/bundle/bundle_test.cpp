@@ -24,7 +24,7 @@ TEST(Bundle,
   for (int run = 0; run < 100; ++run) {
     SimulatedRig rig = simulate_rig(s, random);
     const BundleResult r = own.adjuster.solve(rig.problem(), calibration_options());
-    ASSERT_TRUE(r.converged()) << run << ": " << to_string(r.termination);
+    ASSERT_TRUE(r.converged()) << run;
     EXPECT_LT(r.rms_px, kExactPixel) << run;
     EXPECT_LT(rotation_error(rig, 1), kExactRadian) << run;
     EXPECT_LT(translation_error(rig, 1), kExactMetre) << run;
@@ -41,7 +41,7 @@ TEST(Bundle, stereoOdometryLeavesTheRigAloneAndFindsThePoses) {
     SimulatedRig rig = simulate_rig(s, random);
     rig.T_camera_left = rig.true_cameras;
     const BundleResult r = own.adjuster.solve(rig.problem(), {});
-    ASSERT_TRUE(r.converged()) << to_string(r.termination);
+    ASSERT_TRUE(r.converged());
     EXPECT_LT(r.rms_px, kExactPixel);
     EXPECT_LT(pose_error(rig), kExactMetre);
     EXPECT_EQ(rig.T_camera_left[1].t, rig.true_cameras[1].t);
@@ -62,7 +62,7 @@ TEST(Bundle, parallelMonocularFindsEveryImageUpToScale) {
     std::vector<std::uint8_t> constant;
     const BundleResult r =
         own.adjuster.solve(rig.monocular_problem(&images, &observations, &constant), options);
-    ASSERT_TRUE(r.converged()) << to_string(r.termination);
+    ASSERT_TRUE(r.converged());
     EXPECT_LT(r.rms_px, kExactPixel);
     const Transform& newest_left = images[images.size() - 2];
     const Transform T_right_left = images.back() * newest_left.inverse();
@@ -85,7 +85,7 @@ TEST(Bundle, everyExtraCameraOfTwoThreeAndFourIsFound) {
     for (std::size_t k = 2; k < kMaxCameras; ++k)
       o.length[k].kind = BundleLength::free;  // one known length is the scale of all
     const BundleResult r = own.adjuster.solve(rig.problem(), o);
-    ASSERT_TRUE(r.converged()) << cameras << " cameras: " << to_string(r.termination);
+    ASSERT_TRUE(r.converged()) << cameras << " cameras";
     for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {
       EXPECT_LT(rotation_error(rig, k), kExactRadian);
       EXPECT_LT(translation_error(rig, k), kExactMetre);
@@ -125,7 +125,7 @@ TEST(Bundle, intrinsicsWithPriorsAreFoundThroughDistortion) {
   o.update_tolerance = 1e-12;
   OwnAdjuster own(capacities_for(s));
   const BundleResult r = own.adjuster.solve(rig.problem(), o);
-  ASSERT_TRUE(r.converged()) << to_string(r.termination);
+  ASSERT_TRUE(r.converged());
   EXPECT_NEAR(rig.cameras[1].intrinsics().fx, truth.fx, 1e-7);
   EXPECT_NEAR(rig.cameras[1].intrinsics().fy, truth.fy, 1e-7);
   EXPECT_NEAR(rig.cameras[1].intrinsics().distortion[0], truth.distortion[0], 1e-9);
@@ -145,7 +145,7 @@ TEST(Bundle, robustLossesShrugOffWrongObservations) {
     BundleOptions o = calibration_options();
     o.loss = loss;
     const BundleResult r = own.adjuster.solve(rig.problem(), o);
-    EXPECT_TRUE(r.usable()) << to_string(r.termination);
+    EXPECT_TRUE(r.usable());
     return rotation_error(rig, 1);
   };
   const double none = error_with(BundleLoss::none);
@@ -208,7 +208,7 @@ TEST(Bundle, withEveryPoseConstantThePointsAloneAreFound) {
   p.pose_constant = constant;
   OwnAdjuster own(capacities_for(s));
   const BundleResult r = own.adjuster.solve(p, {});
-  ASSERT_TRUE(r.converged()) << to_string(r.termination);
+  ASSERT_TRUE(r.converged());
   for (std::size_t i = 0; i < rig.points.size(); ++i)
     EXPECT_LT((rig.points[i] - rig.true_points[i]).norm(), kExactMetre);
 }
@@ -230,7 +230,7 @@ TEST(Bundle, aPosePriorHoldsAPoseThatNothingElseHolds) {
   p.pose_priors = {&prior, 1};
   OwnAdjuster own(capacities_for(s));
   const BundleResult r = own.adjuster.solve(p, {});
-  ASSERT_TRUE(r.converged()) << to_string(r.termination);
+  ASSERT_TRUE(r.converged());
   EXPECT_LT(pose_error(rig), 1e-8);
   EXPECT_LT(rotation_angle(rig.T_left_world[0].R * rig.true_poses[0].R.transpose()), 1e-9);
 }

@@ -113,18 +113,5 @@ TEST(BundleCells, aFieldOverTheImageIsSeenByThemAndNotByTracks) {
   EXPECT_GT(mean, 2.0);
 }
 
-TEST(BundleCells, numbersOfCellsThatCannotBeAreRefused) {
-  for (const int cells : {-1, 9}) {
-    BundleOptions o = calibration_options();
-    o.cells = cells;
-    EXPECT_NE(std::string(o.validate()).find("cells"), std::string::npos) << cells;
-  }
-  for (const double bad : {0.0, -1.0, std::nan("")}) {
-    BundleOptions o = calibration_options();
-    o.shared_errors = bad;
-    EXPECT_NE(std::string(o.validate()).find("shared_errors"), std::string::npos) << bad;
-  }
-}
-
 }  // namespace
 }  // namespace vergence

@@ -200,7 +200,7 @@ TEST_P(DenseReference, oneStepIsTheDenseStep) {
   o.initial_damping = 1e-11;
   OwnAdjuster own(capacities_for(s));
   const BundleResult r = own.adjuster.solve(rig.problem(), o);
-  ASSERT_EQ(r.accepted, 1) << to_string(r.termination) << " " << to_string(r.defect);
+  ASSERT_EQ(r.accepted, 1);
   // Central differences with h = 1e-6 of residuals near 1000 px carry 1e-7; weak directions (depth,
   // focal length) amplify it.
   for (std::size_t i = 0; i < rig.points.size(); ++i)

@@ -45,7 +45,7 @@ class MonitorTrial {
       double off = 0;
       const Vec2 left((t.left.x() - l.cx) / l.fx, (t.left.y() - l.cy) / l.fy),
           right((t.right.x() - r.cx) / r.fx, (t.right.y() - r.cy) / r.fy);
-      if (epipolar_.to_line(left, right, &off, nullptr) != EpipolarStatus::ok) continue;
+      if (!epipolar_.to_line(left, right, &off, nullptr)) continue;
       if (std::abs(off) * r.fy < gate_px)
         observations_.push_back({t.left, t.right, t.sigma_px, t.id});
     }

@@ -23,8 +23,8 @@ TEST(Epipolar, trueMatchesHaveNoResidual) {
     const Vec3 p = test::visible_point(random, 4, 40);
     const EpipolarGeometry geometry(T);
     double sampson = 1, line = 1;
-    ASSERT_EQ(geometry.sampson(ray_of(p), ray_of(T * p), &sampson, nullptr), EpipolarStatus::ok);
-    ASSERT_EQ(geometry.to_line(ray_of(p), ray_of(T * p), &line, nullptr), EpipolarStatus::ok);
+    ASSERT_TRUE(geometry.sampson(ray_of(p), ray_of(T * p), &sampson, nullptr));
+    ASSERT_TRUE(geometry.to_line(ray_of(p), ray_of(T * p), &line, nullptr));
     EXPECT_NEAR(sampson, 0, 1e-13);
     EXPECT_NEAR(line, 0, 1e-13);
     double left = 0, right = 0;
@@ -44,23 +44,21 @@ TEST(Epipolar, derivativesMatchCentralDifferences) {
     const Vec2 right(left.x() + random.uniform(-0.2, 0.1), left.y() + random.uniform(-0.05, 0.05));
     double value = 0;
     Vec5 J;
-    ASSERT_EQ(EpipolarGeometry(T).sampson(left, right, &value, &J), EpipolarStatus::ok);
+    ASSERT_TRUE(EpipolarGeometry(T).sampson(left, right, &value, &J));
     EXPECT_TRUE(test::jacobian_matches(
         J.transpose(),
         [&](const Vec5& d) {
           double v = 0;
-          EXPECT_EQ(EpipolarGeometry(moved_on_sphere(T, d)).sampson(left, right, &v, nullptr),
-                    EpipolarStatus::ok);
+          EXPECT_TRUE(EpipolarGeometry(moved_on_sphere(T, d)).sampson(left, right, &v, nullptr));
           return Value(v);
         },
         1e-7));
-    ASSERT_EQ(EpipolarGeometry(T).to_line(left, right, &value, &J), EpipolarStatus::ok);
+    ASSERT_TRUE(EpipolarGeometry(T).to_line(left, right, &value, &J));
     EXPECT_TRUE(test::jacobian_matches(
         J.transpose(),
         [&](const Vec5& d) {
           double v = 0;
-          EXPECT_EQ(EpipolarGeometry(moved_on_sphere(T, d)).to_line(left, right, &v, nullptr),
-                    EpipolarStatus::ok);
+          EXPECT_TRUE(EpipolarGeometry(moved_on_sphere(T, d)).to_line(left, right, &v, nullptr));
           return Value(v);
         },
         1e-7));
@@ -82,13 +80,12 @@ TEST(Epipolar, movingKeepsTheLengthAndTheBasisIsOrthonormal) {
   }
 }
 
-TEST(Epipolar, namesWhereNothingIsMeasured) {
+TEST(Epipolar, saysWhereNothingIsMeasured) {
   double value = 7;
-  EXPECT_EQ(EpipolarGeometry(Transform{}).sampson({0, 0}, {0, 0}, &value, nullptr),
-            EpipolarStatus::no_baseline);
+  EXPECT_FALSE(EpipolarGeometry(Transform{}).sampson({0, 0}, {0, 0}, &value, nullptr));
   const EpipolarGeometry forward(Transform{Mat3::Identity(), {0, 0, -1}});
-  EXPECT_EQ(forward.sampson({0, 0}, {0, 0}, &value, nullptr), EpipolarStatus::at_epipole);
-  EXPECT_EQ(forward.to_line({0, 0}, {0.1, 0}, &value, nullptr), EpipolarStatus::at_epipole);
+  EXPECT_FALSE(forward.sampson({0, 0}, {0, 0}, &value, nullptr));
+  EXPECT_FALSE(forward.to_line({0, 0}, {0.1, 0}, &value, nullptr));
   EXPECT_EQ(value, 7);
   double l = 3, r = 3;
   EXPECT_FALSE(match_depths(Transform{Mat3::Identity(), {1, 0, 0}}, {0.1, 0}, {0.1, 0}, &l, &r));

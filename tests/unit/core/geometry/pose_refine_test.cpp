@@ -104,7 +104,7 @@ TEST_F(PoseRefinerTest, grossPointsNearByDoNotMoveThePose) {
     }
     const RefinedPose found = refiner_.refine(table_.view(), Transform{}, {}, {});
     const RefinedPose without = refiner_.refine(table_.view(), Transform{}, right, {});
-    ASSERT_TRUE(found.usable() && without.usable()) << seed;
+    ASSERT_TRUE(found.usable && without.usable) << seed;
     const Vec6 apart = step_between(found.T_left_world, without.T_left_world);
     EXPECT_LT(apart.dot(without.information * apart), 1e-4) << seed;
     EXPECT_NEAR(found.scale, without.scale, 0.01);  // as it is after two steps from two starts
@@ -129,14 +129,13 @@ TEST_F(PoseRefinerTest, informationPredictsTheSpreadOfThePose) {
     Random random(1000 + static_cast<std::uint64_t>(k));
     const RigScene scene = make_scene(random, 2, 150, 0.0, 0.3, 0.4, 0.4, &table_);
     const RefinedPose found = refiner_.refine(table_.view(), scene.T_left_world, {}, {});
-    ASSERT_EQ(found.status, PoseRefineStatus::small_update);
+    ASSERT_TRUE(found.usable && found.converged);
     const Vec6 d = step_between(found.T_left_world, scene.T_left_world);
     nees += d.dot(found.information * d) / kDraws;
     rms += found.rms_px / kDraws;
     const Mat6 covariance = found.information.inverse();
     EXPECT_LE(std::sqrt(covariance(0, 0)), found.rotation_sigma * (1 + 1e-9));
     EXPECT_LE(std::sqrt(covariance(5, 5)), found.translation_sigma * (1 + 1e-9));
-    EXPECT_GE(found.condition, 1.0);
   }
   EXPECT_NEAR(nees, 6.0, 1.2);
   EXPECT_NEAR(rms, 0.4, 0.02);  // the 1 % beyond the χ² threshold are not in it
@@ -153,7 +152,7 @@ TEST_F(PoseRefinerTest, saysThatFarPointsDoNotHoldThePosition) {
     table_.see(0, Vec2(520 * p.x() / p.z() + 318, 525 * p.y() / p.z() + 243));
   }
   const RefinedPose loose = refiner_.refine(table_.view(), Transform{}, {}, {});
-  ASSERT_TRUE(loose.usable());
+  ASSERT_TRUE(loose.usable);
   EXPECT_LT(held.translation_sigma, 0.05);
   EXPECT_GT(loose.translation_sigma, 1.0);
   EXPECT_LT(loose.rotation_sigma, 0.01);
@@ -170,44 +169,38 @@ TEST_F(PoseRefinerTest, usesOnlyWhatItIsTold) {
   for (std::size_t i = 0; i < 100; ++i) EXPECT_EQ(refiner_.flags()[i] == 3, scene.good[i]) << i;
 }
 
-TEST_F(PoseRefinerTest, namesWhatIsWrong) {
+TEST_F(PoseRefinerTest, hasNoPoseForWhatCannotBe) {
   Random random(26);
   const RigScene scene = make_scene(random, 1, 2, 0.0, 0.0, 0.0, 0.3, &table_);
-  EXPECT_EQ(refiner_.refine(table_.view(), scene.T_left_world, {}, {}).status,
-            PoseRefineStatus::too_few);
+  EXPECT_FALSE(refiner_.refine(table_.view(), scene.T_left_world, {}, {}).usable);
   (void)make_scene(random, 2, 50, 0.0, 0.0, 0.0, 0.3, &table_);
   Transform bad;
   bad.t.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(refiner_.refine(table_.view(), bad, {}, {}).status, PoseRefineStatus::invalid_input);
+  EXPECT_FALSE(refiner_.refine(table_.view(), bad, {}, {}).usable);
   const std::vector<std::uint8_t> use(3, 1);
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, use, {}).status,
-            PoseRefineStatus::invalid_input);
+  EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, use, {}).usable);
   PoseRefineOptions options;
   options.huber = 0;
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, options).status,
-            PoseRefineStatus::invalid_input);
+  EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, {}, options).usable);
   options = {};
   options.gross_chi2 = 0;
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, options).status,
-            PoseRefineStatus::invalid_input);
+  EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, {}, options).usable);
   Arena small_arena(PoseRefiner::memory_needed(20));
   PoseRefiner small(20, small_arena);
-  EXPECT_EQ(small.refine(table_.view(), Transform{}, {}, {}).status, PoseRefineStatus::capacity);
+  EXPECT_FALSE(small.refine(table_.view(), Transform{}, {}, {}).usable);
 
   table_.clear();  // all points on one line: the turn about it is free
   for (int i = 0; i < 50; ++i) {
     ASSERT_TRUE(table_.push(Vec3(0.1 * i, 0, 10), 0.3));
     table_.see(0, Vec2(318 + 5.2 * i, 243));
   }
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, {}).status,
-            PoseRefineStatus::rank_deficient);
+  EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, {}, {}).usable);
   table_.clear();  // and all behind the camera
   for (int i = 0; i < 50; ++i) {
     ASSERT_TRUE(table_.push(test::visible_point(random, -9, -2), 0.3));
     table_.see(0, Vec2(318, 243));
   }
-  EXPECT_EQ(refiner_.refine(table_.view(), Transform{}, {}, {}).status,
-            PoseRefineStatus::rank_deficient);
+  EXPECT_FALSE(refiner_.refine(table_.view(), Transform{}, {}, {}).usable);
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ TEST(ThreePoint, solvesSymmetricAndFarScenes) {
                   Vec3(-0.5 * size, -std::sqrt(0.75) * size, 0)};
       for (std::size_t i = 0; i < 3; ++i) p.rays[i] = (p.T_camera_world * p.points[i]).normalized();
       const ThreePointSolutions s = solve_three_point(p.rays, p.points);
-      ASSERT_EQ(s.status, ThreePointStatus::ok) << depth << " " << size;
+      ASSERT_GT(s.count, 0) << depth << " " << size;
       // Depth is depth/size times as uncertain as the rays, and the tilt enters by its square.
       EXPECT_LT(nearest(s, p.T_camera_world), 1e-6 * std::max(1.0, depth / size))
           << depth << " " << size;
@@ -99,31 +99,31 @@ TEST(ThreePoint, solvesSymmetricAndFarScenes) {
   EXPECT_LT(nearest(solve_three_point(p.rays, p.points), Transform{}), 1e-9);
 }
 
-TEST(ThreePoint, refusesDegenerateInputByName) {
+TEST(ThreePoint, hasNoPoseForDegenerateInput) {
   Random random(14);
   const Problem good = random_problem(random);
   Problem p = good;
   p.points[2] = 0.3 * p.points[0] + 0.7 * p.points[1];
-  EXPECT_EQ(solve_three_point(p.rays, p.points).status, ThreePointStatus::degenerate_points);
+  EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p.points[2] = p.points[0];
-  EXPECT_EQ(solve_three_point(p.rays, p.points).status, ThreePointStatus::degenerate_points);
+  EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p.points[1] = p.points[0];
-  EXPECT_EQ(solve_three_point(p.rays, p.points).status, ThreePointStatus::degenerate_points);
+  EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p = good;
   p.rays[1] = p.rays[0];
-  EXPECT_EQ(solve_three_point(p.rays, p.points).status, ThreePointStatus::degenerate_rays);
+  EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p = good;
   p.rays[1] *= 1.01;
-  EXPECT_EQ(solve_three_point(p.rays, p.points).status, ThreePointStatus::degenerate_rays);
+  EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p = good;
   p.rays[0].x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(solve_three_point(p.rays, p.points).status, ThreePointStatus::not_finite);
+  EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p = good;
   p.points[2].z() = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(solve_three_point(p.rays, p.points).status, ThreePointStatus::not_finite);
+  EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p = good;
   for (Vec3& x : p.points) x *= 1e200;  // squares overflow
-  EXPECT_EQ(solve_three_point(p.rays, p.points).status, ThreePointStatus::not_finite);
+  EXPECT_EQ(solve_three_point(p.rays, p.points).count, 0);
   p = good;  // a narrow bundle of rays can only reach a large triangle from inside it
   p.rays = {Vec3(0, 0, 1), Vec3(1e-3, 0, 1).normalized(), Vec3(0, 1e-3, 1).normalized()};
   p.points = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0.5, 1e-9, 0)};
@@ -141,7 +141,6 @@ TEST(ThreePoint, nothingIsNotANumberWhateverTheInput) {
     if (random.below(2) == 0) p.points[1] = p.points[0] + 1e-9 * Vec3::Ones();
     if (random.below(2) == 0) p.rays[2] = (p.rays[0] + 1e-8 * p.rays[1]).normalized();
     const ThreePointSolutions s = solve_three_point(p.rays, p.points);
-    EXPECT_EQ(s.count > 0, s.status == ThreePointStatus::ok);
     for (int i = 0; i < s.count; ++i)
       EXPECT_TRUE(s.T_camera_world[static_cast<std::size_t>(i)].finite());
   }

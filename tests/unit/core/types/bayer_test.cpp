@@ -70,23 +70,5 @@ TEST(Bayer, anEvenColourIsEvenGreyWhateverThePattern) {
   }
 }
 
-TEST(Bayer, aColouredSlopeKeepsItsPlace) {
-  // Linear brightness under a colour filter whose mean gain is 1: inside, grey is the slope itself
-  // at every phase.
-  constexpr int kWidth = 40, kHeight = 30;
-  constexpr std::array<double, 4> kGbrg{1.0, 0.7, 1.3, 1.0};
-  std::vector<std::uint8_t> raw, out(kWidth * kHeight);
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x)
-      raw.push_back(static_cast<std::uint8_t>(
-          kGbrg[static_cast<std::size_t>(2 * (y % 2) + x % 2)] * (40 + 2 * x + y) + 0.5));
-  bayer_to_grey(raw.data(), kWidth, kWidth, kHeight, out.data(), kWidth);
-  // Rounded to half a level before and after; the colour's share changes over a pixel by (0.3 · 2 ·
-  // 2 px) / 4 at most.
-  for (int y = 1; y + 1 < kHeight; ++y)
-    for (int x = 1; x + 1 < kWidth; ++x)
-      EXPECT_NEAR(out[static_cast<std::size_t>(y * kWidth + x)], 40 + 2 * x + y, 1.0 + 0.3);
-}
-
 }  // namespace
 }  // namespace vergence

@@ -67,20 +67,20 @@ test::DeviceOnTerminal on_terminal(Model::Epoch epoch) {
 
 TEST(GnssDevice, theOtherProtocolIsNamed) {
   const auto receiver = on_terminal(nmea_epoch);
-  Driver driver({Protocol::ubx, 38400, {}});
+  const auto driver = make_driver({Protocol::ubx, 38400, {}});
   DeviceStatus status = DeviceStatus::ok;
-  EXPECT_EQ(driver.open(receiver.port(), &status), nullptr);
+  EXPECT_EQ(driver->open(receiver.port(), &status), nullptr);
   EXPECT_EQ(status, DeviceStatus::not_found);
-  EXPECT_NE(driver.last_error().find("set ins.driver to nmea"), std::string::npos)
-      << driver.last_error();
+  EXPECT_NE(driver->last_error().find("set ins.driver to nmea"), std::string::npos)
+      << driver->last_error();
 }
 
 TEST(GnssDevice, anotherRateIsRefusedWithTheReceiversOwn) {
   const auto receiver = on_terminal(ubx_epoch);
-  Driver driver({Protocol::ubx, 9600, {}});
+  const auto driver = make_driver({Protocol::ubx, 9600, {}});
   DeviceStatus status = DeviceStatus::failed;
-  const auto device = driver.open(receiver.port(), &status);
-  ASSERT_EQ(status, DeviceStatus::ok) << driver.last_error();
+  const auto device = driver->open(receiver.port(), &status);
+  ASSERT_EQ(status, DeviceStatus::ok) << driver->last_error();
   EXPECT_EQ(device->configure(120, nullptr), DeviceStatus::unsupported);
   EXPECT_NE(device->last_error().find("set ins.rate to 10"), std::string::npos)
       << device->last_error();

@@ -100,17 +100,6 @@ TEST_F(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConf
   c.camera->release(held.slot);
 }
 
-TEST_F(IidcFaults, ACameraUnpluggedWhileStoppedIsGoneAtTheNextStart) {
-  c.start();
-  c.camera->stop();
-  c.bus->unplug();
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
-  Frame f;
-  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::stopped);
-  c.bus->replug();
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
-}
-
 TEST_F(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
   c.configure();
   c.bus->all_accesses = DeviceStatus::timeout;

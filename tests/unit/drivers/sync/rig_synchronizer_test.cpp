@@ -49,19 +49,6 @@ std::vector<SyncedSet> offer(RigSynchronizer* sync, const SyncFrame& f,
   return drain(sync);
 }
 
-TEST(RigSynchronizer, aSetGoesOutWithItsLastImageAndCarriesCameraZerosStamp) {
-  RigSynchronizer sync(options());
-  EXPECT_TRUE(offer(&sync, frame(1, 0, 0, 7)).empty());
-  const auto sets = offer(&sync, frame(0, 0, 0, 3));
-  ASSERT_EQ(sets.size(), 1U);
-  EXPECT_TRUE(sets[0].complete);
-  EXPECT_EQ(sets[0].slots[0], 3);
-  EXPECT_EQ(sets[0].slots[1], 7);
-  EXPECT_EQ(sets[0].stamp, middle_of(0));
-  EXPECT_EQ(sets[0].error, Duration::microseconds(100));
-  EXPECT_EQ(sets[0].spread, Duration::microseconds(30));
-}
-
 TEST(RigSynchronizer, aLostImageIsKnownWhenTheNextOneOfThatCameraComes) {
   RigSynchronizer sync(options());
   EXPECT_TRUE(offer(&sync, frame(0, 0, 0)).empty());

@@ -36,7 +36,6 @@ TEST_F(Accounted, aPauseWhoseFirstReportIsLostIsStillAPause) {
   ASSERT_TRUE(take(1));
   ASSERT_TRUE(take(7));
   EXPECT_TRUE(pulse.resumed);
-  EXPECT_EQ(account.counters().left_out, 4U);
   EXPECT_EQ(account.counters().lost, 1U);
 }
 
@@ -46,14 +45,11 @@ TEST_F(Accounted, losesBeforeAPauseAreNotTakenForIt) {
   EXPECT_FALSE(pulse.resumed);
   EXPECT_EQ(account.counters().lost, 2U);
   ASSERT_TRUE(take(8, 1));
-  EXPECT_EQ(account.counters().left_out, 4U);
   EXPECT_EQ(account.counters().lost, 2U);
 }
 
 TEST_F(Accounted, whatTheBoardLeftOutByItselfIsNotLost) {
   ASSERT_TRUE(take(4, 2));
-  EXPECT_EQ(account.counters().skipped, 3U);
-  EXPECT_EQ(account.counters().late, 1U);
   EXPECT_EQ(account.counters().lost, 0U);
 }
 
@@ -67,17 +63,14 @@ TEST_F(Accounted, theEndTellsOfReportsThatNeverCame) {
   EXPECT_EQ(account.counters().lost, 3U);
 }
 
-TEST_F(Accounted, repeatedOldAndBackwardEventsAreRefusedByName) {
+TEST_F(Accounted, repeatedOldAndBackwardEventsAreRefused) {
   ASSERT_TRUE(take(1));
   EXPECT_FALSE(take(1));
   EXPECT_FALSE(take(0));
-  EXPECT_EQ(account.counters().repeated, 2U);
   EXPECT_FALSE(account.take(event(2, kPeriod), &pulse));
   EXPECT_FALSE(account.take(event(2, 2 * kPeriod), &pulse)) << "at the tick of the one before";
   EXPECT_FALSE(account.take(event(2, kMostTicks + 1), &pulse));
-  EXPECT_EQ(account.counters().backward, 3U);
   EXPECT_FALSE(account.take(event(100'000, 3 * kPeriod), &pulse));
-  EXPECT_EQ(account.counters().too_many, 1U);
   EXPECT_EQ(account.refused_in_row(), 6);
   EXPECT_EQ(pulse.number, 1U) << "untouched";
   EXPECT_TRUE(take(2));

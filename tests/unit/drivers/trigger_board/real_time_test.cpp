@@ -43,7 +43,6 @@ TEST(RealTime, ownerConsumerAndOnlookersDoNotMeet) {
     std::thread onlooker([&] {
       while (!done) {
         (void)rig.device.statistics();
-        (void)rig.device.board_statistics();
         (void)rig.device.timing();
         (void)rig.device.pause(1);
         std::this_thread::sleep_for(std::chrono::milliseconds(30));

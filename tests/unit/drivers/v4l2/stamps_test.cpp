@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
+#include <vector>
+
 namespace vergence::v4l2 {
 namespace {
 
@@ -33,43 +35,25 @@ TEST(V4l2Stamps, exposureStartIsReckonedBackFromWhatTheStampIsOf) {
 }
 
 TEST(V4l2Sequence, countsFromZeroAndTellsGaps) {
-  SequenceCounter counter(Duration{});
-  EXPECT_EQ(counter.next(17, {}).counter, 0U);
-  EXPECT_EQ(counter.next(18, {}).counter, 1U);
-  const auto step = counter.next(22, {});
-  EXPECT_EQ(step.counter, 5U);
-  EXPECT_EQ(step.missing, 3U);
-  EXPECT_EQ(counter.next(23, {}).missing, 0U);
-}
-
-TEST(V4l2Sequence, goesOnAcrossTheWrapOf32Bits) {
-  SequenceCounter counter(Duration{});
-  EXPECT_EQ(counter.next(0xFFFFFFFE, {}).counter, 0U);
-  EXPECT_EQ(counter.next(0xFFFFFFFF, {}).counter, 1U);
-  const auto step = counter.next(1, {});
-  EXPECT_EQ(step.counter, 3U);
-  EXPECT_EQ(step.missing, 1U) << "number 0";
-}
-
-TEST(V4l2Sequence, aNumberThatGoesBackCountsOne) {
-  SequenceCounter counter(Duration{});
-  (void)counter.next(100, {});
-  const auto step = counter.next(3, {});
-  EXPECT_EQ(step.counter, 1U);
-  EXPECT_EQ(step.missing, 0U);
-  EXPECT_EQ(counter.next(4, {}).counter, 2U);
-}
-
-TEST(V4l2Sequence, unnumberedBuffersAreCountedByTime) {
-  const Duration period = Duration::milliseconds(40);
-  SequenceCounter counter(period);
-  DeviceStamp t{1'000'000'000};
-  EXPECT_EQ(counter.next(0, t).counter, 0U);
-  EXPECT_EQ(counter.next(0, t + Duration::milliseconds(43)).counter, 1U) << "jitter";
-  const auto step = counter.next(0, t + Duration::milliseconds(157));
-  EXPECT_EQ(step.counter, 4U);
-  EXPECT_EQ(step.missing, 2U);
-  EXPECT_EQ(counter.next(0, t + Duration::milliseconds(158)).counter, 5U) << "two at once are two";
+  struct Row {
+    std::uint32_t sequence;
+    int ms;  // of the stamp, where the buffers have no numbers
+    std::uint64_t counter, missing;
+  };
+  const auto expect = [](Duration period, const std::vector<Row>& rows) {
+    SequenceCounter counter(period);
+    for (const Row& row : rows) {
+      const auto step =
+          counter.next(row.sequence, DeviceStamp(1'000'000'000) + Duration::milliseconds(row.ms));
+      EXPECT_EQ(step.counter, row.counter) << row.sequence << " at " << row.ms;
+      EXPECT_EQ(step.missing, row.missing) << row.sequence << " at " << row.ms;
+    }
+  };
+  expect({}, {{17, 0, 0, 0}, {18, 0, 1, 0}, {22, 0, 5, 3}, {23, 0, 6, 0}});
+  expect({}, {{0xFFFFFFFE, 0, 0, 0}, {0xFFFFFFFF, 0, 1, 0}, {1, 0, 3, 1}});  // through the wrap
+  expect({}, {{100, 0, 0, 0}, {3, 0, 1, 0}, {4, 0, 2, 0}});                  // it goes back
+  // Without numbers: by time, with jitter; two at once are two.
+  expect(Duration::milliseconds(40), {{0, 0, 0, 0}, {0, 43, 1, 0}, {0, 157, 4, 2}, {0, 158, 5, 0}});
 }
 
 TEST(V4l2Raster, keepsTheFirstFrameOfEveryIntervalOfTheClock) {

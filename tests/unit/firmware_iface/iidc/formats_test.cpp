@@ -43,17 +43,6 @@ TEST(Formats, APacketOfAFixedModeIsWholeQuadletsAndFillsTheFrame) {
     }
 }
 
-TEST(Formats, RatesAreFoundUpwards) {
-  EXPECT_EQ(rate_code_for(30), 4U);
-  EXPECT_EQ(rate_code_for(20), 4U);
-  EXPECT_EQ(rate_code_for(30.0000001), 4U);
-  EXPECT_EQ(rate_code_for(1), 0U);
-  EXPECT_EQ(rate_code_for(240), 7U);
-  EXPECT_FALSE(rate_code_for(241));
-  EXPECT_FALSE(rate_code_for(0));
-  EXPECT_FALSE(rate_code_for(-1));
-}
-
 TEST(Formats, Format7PacketsForARateAreTheSmallestThatReachIt) {
   // 307200 bytes: 1024 a packet is 300 packets and one idle cycle.
   EXPECT_NEAR(packet_rate(307200, 1024), 8000.0 / 301, 1e-12);

@@ -19,7 +19,7 @@ Mtdata2 decoded(const std::vector<std::uint8_t>& bytes) {
   EXPECT_EQ(frame.status, FrameStatus::ok);
   EXPECT_TRUE(frame.message.is(MessageId::mtdata2));
   Mtdata2 out;
-  EXPECT_EQ(decode_mtdata2(frame.message.payload, &out), PacketStatus::ok);
+  EXPECT_TRUE(decode_mtdata2(frame.message.payload, &out));
   return out;
 }
 
@@ -94,17 +94,14 @@ TEST(Mtdata2, tornPayloadsAreRefusedWhole) {
   for (std::size_t n = 0; n <= payload.size(); ++n) {
     const bool whole = n == 0 || n == 5 || n == payload.size();
     Mtdata2 at = out;
-    EXPECT_EQ(decode_mtdata2(std::span(payload).first(n), &at),
-              whole ? PacketStatus::ok : PacketStatus::torn)
-        << n;
+    EXPECT_EQ(decode_mtdata2(std::span(payload).first(n), &at), whole) << n;
     EXPECT_EQ(at.packet_counter == 77, !whole) << n;
   }
 }
 
 TEST(Mtdata2, unknownPacketsAreSkipped) {
   Mtdata2 out;
-  ASSERT_EQ(decode_mtdata2(from_hex("88 30 03 01 02 03 10 20 02 00 07 FF FF 00"), &out),
-            PacketStatus::ok);
+  ASSERT_TRUE(decode_mtdata2(from_hex("88 30 03 01 02 03 10 20 02 00 07 FF FF 00"), &out));
   EXPECT_EQ(out.packet_counter, 7);
 }
 
@@ -127,43 +124,29 @@ TEST(Mtdata2, knownPacketsOfImpossibleSizeOrValueAreRefused) {
         Case{"70 20 02 00 00", "a satellite list without its header"},
         Case{"E0 10 02 00 00", "a status byte of two"}}) {
     Mtdata2 out;
-    ASSERT_EQ(decode_mtdata2(from_hex(bytes), &out), PacketStatus::ok) << what;
+    ASSERT_TRUE(decode_mtdata2(from_hex(bytes), &out)) << what;
     EXPECT_FALSE(out.packet_counter || out.sample_time_fine || out.quaternion ||
                  out.altitude_ellipsoid_m || out.gnss_pvt || out.satellites || out.status_byte)
         << what;
   }
 }
 
-TEST(Mtdata2, everyFormOfAnAttitudeHasItsOwnPacket) {
+TEST(Mtdata2, aStatusByteIsOne) {
   Mtdata2 out;
-  std::array<std::uint8_t, 128> buffer{};
-  PacketWriter packets(buffer);
-  packets.put_numbers(wire_id(PacketId::euler, NumberFormat::fp16_32, LocalFrame::nwu),
-                      Three{1.5, -2.25, -170.125});
-  packets.put_numbers(wire_id(PacketId::rotation_matrix, NumberFormat::float32, LocalFrame::nwu),
-                      std::array<double, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1});
-  packets.put(wire_id(PacketId::status_byte), from_hex("07"));
-  ASSERT_EQ(decode_mtdata2(packets.payload(), &out), PacketStatus::ok);
-  EXPECT_EQ(out.euler_deg, (Three{1.5, -2.25, -170.125}));
-  EXPECT_EQ(out.rotation_matrix, (std::array<double, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1}));
-  EXPECT_EQ(out.orientation_frame, LocalFrame::nwu);
+  ASSERT_TRUE(decode_mtdata2(from_hex("E0 10 01 07"), &out));
   EXPECT_EQ(out.status_byte, 0x07);
-  EXPECT_EQ(wire_id(PacketId::euler), 0x2030);
-  EXPECT_EQ(wire_id(PacketId::rotation_matrix), 0x2020);
-  EXPECT_EQ(wire_id(PacketId::status_byte), 0xE010);
 }
 
 TEST(Mtdata2, aListOfSatellitesIsAReceiversMessage) {
   Mtdata2 out;
-  ASSERT_EQ(
-      decode_mtdata2(from_hex("70 20 10 02 F5 C9 2A 02 00 00 00 00 05 2B 07 06 0A 1F 0F"), &out),
-      PacketStatus::ok);
+  ASSERT_TRUE(
+      decode_mtdata2(from_hex("70 20 10 02 F5 C9 2A 02 00 00 00 00 05 2B 07 06 0A 1F 0F"), &out));
   EXPECT_TRUE(out.satellites);
 }
 
 TEST(Mtdata2, thePacketsLengthOutranksItsFormatBits) {
   Mtdata2 out;
-  ASSERT_EQ(decode_mtdata2(from_hex("50 23 04 42 13 40 00"), &out), PacketStatus::ok);
+  ASSERT_TRUE(decode_mtdata2(from_hex("50 23 04 42 13 40 00"), &out));
   EXPECT_EQ(out.altitude_ellipsoid_m, 36.8125);
 }
 

@@ -1,0 +1,17 @@
+#pragma once
+#include <array>
+#include <cstdio>
+#include <string>
+
+namespace vergence {
+
+/// printf into a string of at most 319 bytes; what is longer is cut. For sentences with numbers,
+/// off the real-time path.
+template <class... Args>
+[[nodiscard]] std::string format_text(const char* format, Args... args) {
+  std::array<char, 320> text{};
+  (void)std::snprintf(text.data(), text.size(), format, args...);
+  return text.data();
+}
+
+}  // namespace vergence
