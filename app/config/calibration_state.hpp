@@ -28,13 +28,13 @@ inline constexpr double kOtherLength = 0.02;
 struct CalibrationState {
   std::optional<CalibrationFile> calibration{};  // fits the rig that is there
   std::string
-      sentence{};  // why a file that is there is not used; empty: none is there, or it is used
+      message{};  // why a file that is there is not used; empty: none is there, or it is used
 };
 
 /// Reads the file if there is one. It is used for the rig it was found on: as many cameras of the
 /// same sizes, the same serials in the same order, and a configuration that says what it said then
 /// (configured_rig()) and whose baseline the one found differs from by less than kOtherLength.
-/// Errors  None: a sentence.
+/// Errors  None: a message.
 [[nodiscard]] CalibrationState read_state(const std::filesystem::path& file,
                                           const CalibrationFile& expected);
 

@@ -27,11 +27,9 @@ constexpr double kBlack = 6, kDim = 30;  // mean, grey levels
 constexpr double kFlat = 1.5;            // contrast, grey levels: less is noise
 constexpr double kBlurred = 0.2;         // of the sharpest camera's sharpness
 
-PictureRemark remark(bool unusable, std::string sentence) {
-  return {unusable, std::move(sentence)};
-}
+ImageIssue remark(bool unusable, std::string message) { return {unusable, std::move(message)}; }
 
-std::optional<std::string> why_unusable(const PictureFigures& f, const std::string& who) {
+std::optional<std::string> why_unusable(const ImageStatistics& f, const std::string& who) {
   if (f.mean < kBlack) return who + " is black: a cap on the lens, no light, or no exposure";
   if (f.saturated > kMuch)
     return fmt::format(
@@ -44,8 +42,8 @@ std::optional<std::string> why_unusable(const PictureFigures& f, const std::stri
 
 }  // namespace
 
-PictureFigures figures_of(const ImageView& image) noexcept {
-  PictureFigures f;
+ImageStatistics figures_of(const ImageView& image) noexcept {
+  ImageStatistics f;
   double sum = 0, squares = 0, gradients = 0;
   std::int64_t bright = 0, dark = 0;
   for (int y = 0; y < image.height; ++y) {
@@ -71,15 +69,15 @@ PictureFigures figures_of(const ImageView& image) noexcept {
   return f;
 }
 
-std::vector<PictureRemark> judge_pictures(std::span<const std::string> names,
-                                          std::span<const PictureFigures> figures) {
-  std::vector<PictureRemark> remarks;
+std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
+                                        std::span<const ImageStatistics> figures) {
+  std::vector<ImageIssue> remarks;
   double sharpest = 0;
   std::size_t sharpest_at = 0;
   for (std::size_t k = 0; k < figures.size(); ++k)
     if (figures[k].sharpness > sharpest) sharpest = figures[k].sharpness, sharpest_at = k;
   for (std::size_t k = 0; k < figures.size(); ++k) {
-    const PictureFigures& f = figures[k];
+    const ImageStatistics& f = figures[k];
     const std::string& who = names[k];
     if (const auto reason = why_unusable(f, who)) {
       remarks.push_back(remark(true, *reason));
@@ -177,18 +175,19 @@ class Watchdog {
   std::thread thread_;
 };
 
-void note(const DeviceEvent& event, Taking* taking) {
+void note(const DeviceEvent& event, CaptureResult* taking) {
   const auto k = static_cast<std::size_t>(event.camera);
-  if (event.kind == DeviceEvent::Kind::camera_gone) taking->gone[k] = true;
-  if (event.kind == DeviceEvent::Kind::camera_back) taking->gone[k] = false;
+  if (event.kind == DeviceEvent::Kind::camera_disconnected) taking->gone[k] = true;
+  if (event.kind == DeviceEvent::Kind::camera_reconnected) taking->gone[k] = false;
 }
 
 }  // namespace
 
-Taking take_sets(DriveDevices& devices, const TakingOptions& options, const SignalGuard& signals,
-                 const std::function<void(const TakenSet&)>& use) {
+CaptureResult take_sets(DriveDevices& devices, const TakingOptions& options,
+                        const SignalGuard& signals,
+                        const std::function<void(const CapturedSet&)>& use) {
   const std::size_t n = devices.cameras().size();
-  Taking taking;
+  CaptureResult taking;
   taking.delivered.assign(n, 0);
   taking.gone.assign(n, false);
   Acquisition::Options o = devices.acquisition_options();
@@ -223,9 +222,9 @@ Taking take_sets(DriveDevices& devices, const TakingOptions& options, const Sign
   for (Acquired item; source.next(&item);)
     if (const auto* frame = std::get_if<AcquiredFrame>(&item)) source.release(*frame);
   source.join();
-  taking.end = taking.sets == options.count ? Taking::End::done
-               : signals.stop_requested()   ? Taking::End::interrupted
-                                            : Taking::End::timeout;
+  taking.end = taking.sets == options.count ? CaptureResult::End::done
+               : signals.stop_requested()   ? CaptureResult::End::interrupted
+                                            : CaptureResult::End::timeout;
   return taking;
 }
 

@@ -11,7 +11,7 @@
 
 namespace vergence::app {
 
-struct PictureFigures {
+struct ImageStatistics {
   double mean = 0;       // grey levels
   double contrast = 0;   // standard deviation, grey levels
   double saturated = 0;  // share of pixels at 254 and above
@@ -20,17 +20,17 @@ struct PictureFigures {
                          // with blur, rises with noise
 };
 /// Precondition: not empty. Images of one row or column have no sharpness.
-[[nodiscard]] PictureFigures figures_of(const ImageView& image) noexcept;
+[[nodiscard]] ImageStatistics figures_of(const ImageView& image) noexcept;
 
 /// One thing that strikes the eye.
-struct PictureRemark {
+struct ImageIssue {
   bool unusable = false;  // these pictures are no good; else they could be better
-  std::string sentence;
+  std::string message;
 };
 
 /// Exposure of each picture, and sharpness of each against the sharpest.
-[[nodiscard]] std::vector<PictureRemark> judge_pictures(std::span<const std::string> names,
-                                                        std::span<const PictureFigures> figures);
+[[nodiscard]] std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
+                                                      std::span<const ImageStatistics> figures);
 
 /// Returns whether two pictures are the same pixel for pixel, as one camera's would be if it were
 /// opened twice. Flat ones (a lens cap) are not called that.
@@ -41,13 +41,13 @@ struct PictureRemark {
 /// SyncOut makes the pulses.
 [[nodiscard]] Configuration capture_configuration(const Configuration& configuration);
 
-/// Names of the cameras for files and sentences: those of the configuration (letters, digits, `_`
+/// Names of the cameras for files and messages: those of the configuration (letters, digits, `_`
 /// and `-`, everything else becomes `_`), `camera0` … where there is none, each once.
 [[nodiscard]] std::vector<std::string> camera_names(const Configuration& configuration,
                                                     int cameras);
 
 /// One synchronised set, while its images are there.
-struct TakenSet {
+struct CapturedSet {
   int index = 0;  // 0, 1, …
   Stamp stamp{};
   Duration stamp_error{}, spread{};
@@ -56,7 +56,7 @@ struct TakenSet {
 };
 
 /// What came of waiting for them.
-struct Taking {
+struct CaptureResult {
   enum class End : std::uint8_t { done, timeout, interrupted } end = End::timeout;
   int sets = 0;                          // complete ones that were handed on
   std::vector<std::uint64_t> delivered;  // images by camera, also those of incomplete sets
@@ -76,8 +76,8 @@ struct TakingOptions {
 /// Threads  `use` on the caller's. Time: `limit` a set, and what starting and stopping take.
 ///          Errors: InputError as start_acquisition(), and
 /// what `use` throws.
-[[nodiscard]] Taking take_sets(DriveDevices& devices, const TakingOptions& options,
-                               const SignalGuard& signals,
-                               const std::function<void(const TakenSet&)>& use);
+[[nodiscard]] CaptureResult take_sets(DriveDevices& devices, const TakingOptions& options,
+                                      const SignalGuard& signals,
+                                      const std::function<void(const CapturedSet&)>& use);
 
 }  // namespace vergence::app

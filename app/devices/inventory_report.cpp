@@ -198,13 +198,13 @@ std::string paste_text(const Inventory& inventory, const Terminal& t) {
                       : t.in(Terminal::Ink::bold, "For the configuration") + "\n" + text + "\n";
 }
 
-/// One line a driver, its sentence beside it.
+/// One line a driver, its message beside it.
 std::string notes_text(const Inventory& inventory, const Terminal& t) {
   std::string text;
   constexpr std::size_t kName = 14;
-  const auto note = [&](const std::string& name, const std::string& sentence) {
+  const auto note = [&](const std::string& name, const std::string& message) {
     std::string head = "  " + padded(name, kName - 2);
-    for (const std::string& line : wrapped(sentence, t.width - kName)) {
+    for (const std::string& line : wrapped(message, t.width - kName)) {
       text += head + line + "\n";
       head = std::string(kName, ' ');
     }
@@ -296,8 +296,8 @@ std::string doctor_json(const std::vector<Finding>& findings) {
   for (const Finding& f : findings)
     rows.push_back({{"check", f.check},
                     {"state", to_string(f.state)},
-                    {"sentence", f.message},
-                    {"mend", f.mend}});
+                    {"message", f.message},
+                    {"fix", f.mend}});
   const Json all{{"problems", count(findings, FindingState::problem)},
                  {"advice", count(findings, FindingState::advice)},
                  {"ok", count(findings, FindingState::ok)},

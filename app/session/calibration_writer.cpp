@@ -18,7 +18,7 @@ constexpr std::size_t kPending = std::size_t{1} << 18;  // bytes: some 300 lines
 
 CalibrationWriter::CalibrationWriter(Options options)
     : options_(std::move(options)), lines_(options_.session / "calibrations.csv", kPending) {
-  totals_.attempts.reserve(kMostAttempts);
+  totals_.attempts.reserve(kMaxAttempts);
   lines_.append(std::string(kCalibrationsHeader) + "\n");
   thread_ = std::thread([this] { work(); });
 }
@@ -37,7 +37,7 @@ void CalibrationWriter::post(const Item& item) noexcept {
 }
 
 void CalibrationWriter::on_event(const EventRecord& event) noexcept {
-  if (std::string_view(event.kind) == "calibration_confirmed") post(event.stamp);
+  if (std::string_view(event.kind) == "calibration_verified") post(event.stamp);
 }
 
 void CalibrationWriter::on_calibration(const CalibrationRecord& calibration) noexcept {
@@ -52,7 +52,7 @@ void CalibrationWriter::stop() noexcept {
 }
 
 void CalibrationWriter::work() {
-  (void)pthread_setname_np(pthread_self(), "vergence-keep");
+  (void)pthread_setname_np(pthread_self(), "vergence-state");
   (void)lines_.flush();
   for (Item item;;) {
     const WakeEvent::Ticket seen = filled_.ticket();
@@ -92,29 +92,29 @@ void CalibrationWriter::write(Stamp confirmed) {
 
 void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found) {
   // The next drive's first: the session's disk may stand still.
-  std::string sentence;
+  std::string message;
   bool failed = false;
   if (options_.state) try {
       CalibrationFile file = options_.words;
       file.rig = rig;
       if (found) file.source = "online";
       write_state(*options_.state, file);
-      sentence = "the calibration is kept for the next drive: " + options_.state->string();
+      message = "the calibration is kept for the next drive: " + options_.state->string();
     } catch (const InputError& e) {
       failed = true;
-      sentence = std::string(e.what()) + "; the next drive will not know this calibration";
+      message = std::string(e.what()) + "; the next drive will not know this calibration";
     }
   if (found) write_session_file(rig);
   if (found && !fault_.empty()) {
     failed = failed || !options_.state;
-    sentence += (sentence.empty() ? "" : "; ") + fault_;
+    message += (message.empty() ? "" : "; ") + fault_;
   }
-  if (sentence.empty()) return;
+  if (message.empty()) return;
   Outcome outcome;
   outcome.failed = failed;
   outcome.event.stamp = stamp;
-  outcome.event.kind = failed ? "calibration_not_kept" : "calibration_kept";
-  outcome.event.set_sentence(sentence);
+  outcome.event.kind = failed ? "calibration_save_failed" : "calibration_saved";
+  outcome.event.set_message(message);
   (void)outcomes_.push(outcome);
 }
 

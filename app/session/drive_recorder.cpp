@@ -106,13 +106,13 @@ double frame_bytes(const SourceFacts& facts) {
   return bytes;
 }
 
-constexpr double kLeastHeld = 16;  // frames that wait: a replay waits for room
+constexpr double kMinHeld = 16;  // frames that wait: a replay waits for room
 
 /// Of the queue of the estimator's thread, whose images are held for a disk that stalls.
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
   if (c.record.images == 0) return kSmall;
   const double held = facts.when_full == Recorder::WhenFull::wait ? 0 : kDiskS * c.trigger.rate;
-  return kSmall + static_cast<std::size_t>(frame_bytes(facts) * std::max(held, kLeastHeld));
+  return kSmall + static_cast<std::size_t>(frame_bytes(facts) * std::max(held, kMinHeld));
 }
 
 Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
@@ -121,7 +121,7 @@ Recording::Options recording_options(const Configuration& c, const SourceFacts& 
   o.queues = {queue_bytes(c, facts), kPulseQueue};
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
-  o.files.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
+  o.files.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
   o.when_full = facts.when_full == Recorder::WhenFull::wait ? Recording::WhenFull::wait
                                                             : Recording::WhenFull::drop;
   return o;
@@ -131,7 +131,7 @@ Recording::Options recording_options(const Configuration& c, const SourceFacts& 
 
 DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
                              const Configuration& configuration, const SourceFacts& facts,
-                             const SolverWatch& watch)
+                             const ReplayableSolverRunner& watch)
     : settings_(configuration.record),
       watch_(watch),
       frames_(recorded_names(facts.begin.file)),
@@ -233,9 +233,9 @@ void DriveRecorder::on_reading(const InsRecord& reading) noexcept {
 }
 
 void DriveRecorder::on_event(const EventRecord& event) noexcept {
-  const std::string_view kind = event.kind, sentence = event.sentence.data();
+  const std::string_view kind = event.kind, message = event.message.data();
   recalibrate_ = recalibrate_ || kind == "recalibration_requested" ||
-                 (kind == "fault" && sentence.starts_with("recalibrate"));
+                 (kind == "fault" && message.starts_with("recalibrate"));
 }
 
 void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcept {

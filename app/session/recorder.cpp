@@ -41,7 +41,7 @@ struct Recorder::Files {
 
 namespace {
 
-constexpr std::size_t kLongestLine = 2048;  // bytes: an event's sentence may be of \u.... alone
+constexpr std::size_t kLongestLine = 2048;  // bytes: an event's message may be of \u.... alone
 
 }  // namespace
 
@@ -162,9 +162,9 @@ void Recorder::flush() {
   for (LineFile* file : files_->all)
     if (!file->flush() && failed == nullptr) failed = file;
   if (failed != nullptr)
-    note_disk(failed, failed->fault());
+    record_disk(failed, failed->fault());
   else if (!pretended_)
-    note_disk(nullptr, 0);
+    record_disk(nullptr, 0);
 }
 
 void Recorder::pretend(Stamp stamp) {
@@ -175,19 +175,19 @@ void Recorder::pretend(Stamp stamp) {
   for (LineFile* file : files_->all) file->pretend_full(full);
   retry_due_ = {};
   if (full)
-    note_disk(&files_->poses, ENOSPC);
+    record_disk(&files_->poses, ENOSPC);
   else
     flush();
 }
 
 /// An error and an event when writing begins to fail, an event when all was written again.
 /// `failed`: a file that could not be written; null: all were.
-void Recorder::note_disk(const LineFile* failed, int fault) {
+void Recorder::record_disk(const LineFile* failed, int fault) {
   if ((failed != nullptr) == disk_full_) return;
   disk_full_ = failed != nullptr;
   EventRecord event;
   event.stamp = newest_;
-  event.kind = disk_full_ ? "disk_full" : "disk_room";
+  event.kind = disk_full_ ? "disk_full" : "disk_recovered";
   std::array<char, 256> text{};
   const auto out = text.begin();
   if (disk_full_) {
@@ -203,7 +203,7 @@ void Recorder::note_disk(const LineFile* failed, int fault) {
     (void)fmt::format_to_n(out, text.size() - 1, "the disk takes lines again; {} were lost",
                            lost_lines());
   }
-  event.set_sentence(text.data());
+  event.set_message(text.data());
   write(event);
 }
 
@@ -215,17 +215,17 @@ std::uint64_t Recorder::lost_lines() const {
 
 template <class... Arguments>
 void Recorder::report_error(const char* format, const Arguments&... arguments) noexcept {
-  ErrorSentence sentence{};
-  (void)fmt::format_to_n(sentence.begin(), sentence.size() - 1, fmt::runtime(format), arguments...);
-  (void)error_sentences_.push(sentence);
+  ErrorMessage message{};
+  (void)fmt::format_to_n(message.begin(), message.size() - 1, fmt::runtime(format), arguments...);
+  (void)error_messages_.push(message);
 }
 
 std::vector<std::string> Recorder::take_errors() {
-  std::vector<std::string> sentences;
-  for (ErrorSentence c; error_sentences_.pop(&c);) sentences.emplace_back(c.data());
-  sentences.insert(sentences.end(), errors_.begin(), errors_.end());
+  std::vector<std::string> messages;
+  for (ErrorMessage c; error_messages_.pop(&c);) messages.emplace_back(c.data());
+  messages.insert(messages.end(), errors_.begin(), errors_.end());
   errors_.clear();
-  return sentences;
+  return messages;
 }
 
 /// The trajectories, from the session's own files: nothing that grows with the drive waits in

@@ -43,8 +43,8 @@ class LineFile;
 ///          Readings have a ring of their own: they never push out a pose.
 /// Errors   The constructor throws InputError. When the disk takes no more: an error and an event
 ///          `disk_full`; lines wait as LineFile says, and are written again every kRetry to the
-///          files that were opened at the start. An event `disk_room` when all was taken, with the
-///          number of lines lost. A file that lacks lines is a fault of the totals.
+///          files that were opened at the start. An event `disk_recovered` when all was taken, with
+///          the number of lines lost. A file that lacks lines is a fault of the totals.
 class Recorder final : public SessionObserver {
  public:
   enum class WhenFull : std::uint8_t { wait, drop };
@@ -70,7 +70,7 @@ class Recorder final : public SessionObserver {
   void on_reading(const InsRecord& reading) noexcept override;
   /// Bytes taken at the beginning: lines that may wait.
   [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
-  /// Sentences about the disk since the last call.
+  /// Messages about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors();
   /// Writes what is waiting, closes the files. Once.
   [[nodiscard]] std::unique_ptr<SessionTotals> close();
@@ -99,10 +99,10 @@ class Recorder final : public SessionObserver {
   void write(const InsRecord& reading);
   void flush();
   void pretend(Stamp stamp);
-  void note_disk(const LineFile* failed, int fault);
+  void record_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
   void stop_and_join() noexcept;
-  using ErrorSentence = std::array<char, 512>;  // ends with 0, cut at the array's end
+  using ErrorMessage = std::array<char, 512>;  // ends with 0, cut at the array's end
   template <class... Arguments>
   void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
@@ -121,8 +121,8 @@ class Recorder final : public SessionObserver {
   Queue<InsRecord, kReadings> readings_;
   WakeEvent filled_, freed_;
   std::atomic<bool> stop_{false};
-  Ring<ErrorSentence, 16> error_sentences_;  // full: the newest are lost
-  std::vector<std::string> errors_;          // of close()
+  Ring<ErrorMessage, 16> error_messages_;  // full: the newest are lost
+  std::vector<std::string> errors_;        // of close()
   std::thread thread_;
 };
 

@@ -82,20 +82,20 @@ struct EventWords {
 /// In the order of EstimatorEvent::Kind.
 constexpr std::array kEventWords{
     EventWords{"state", "", nullptr},
-    EventWords{"scene_restarted", "", "gap_s"},
+    EventWords{"map_reset", "", "gap_s"},
     EventWords{"time_gap", "", "gap_s"},
     EventWords{"relocalised", "", nullptr},
-    EventWords{"dropped", "", "count"},
+    EventWords{"points_dropped", "", "count"},
     EventWords{"rig_changed", "", "frames_since_onset"},
-    EventWords{"out_of_step", "", "lag_frames"},
-    EventWords{"in_step", "", nullptr},
-    EventWords{"calibration_confirmed", "", "depth_sigma_percent"},
+    EventWords{"out_of_sync", "", "lag_frames"},
+    EventWords{"cameras_in_sync", "", nullptr},
+    EventWords{"calibration_verified", "", "depth_sigma_percent"},
     EventWords{"calibration_contradicted", "", "depth_percent"},
     EventWords{"focal_length_contradicted", "", "measured_px"},
     EventWords{"calibration_accepted", "a new calibration is in use", "frames"},
     EventWords{"calibration_rejected", "a calibration was rejected", "frames"},
     EventWords{"calibration_taken_up", "", "fitting_percent"},
-    EventWords{"calibration_waits", "the calibration waits", nullptr},
+    EventWords{"calibration_pending", "the calibration waits", nullptr},
     EventWords{"calibration_resumed", "the last calibration is in use again", nullptr}};
 static_assert(kEventWords.size() ==
               static_cast<std::size_t>(EstimatorEvent::Kind::calibration_resumed) + 1);
@@ -131,7 +131,7 @@ std::array<double, 4> FrameReport::error() const noexcept {
   return {error_enu.x(), error_enu.y(), error_enu.z(), -error_yaw * (180.0 / std::numbers::pi)};
 }
 
-void EventRecord::set_sentence(std::string_view text) noexcept { copy_text(text, &sentence); }
+void EventRecord::set_message(std::string_view text) noexcept { copy_text(text, &message); }
 
 EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
   EventRecord r;
@@ -144,7 +144,7 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     const auto from = to_string(event.from), to = to_string(event.to);
     (void)std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()),
                         from.data(), static_cast<int>(to.size()), to.data(), event.why);
-    r.set_sentence(text.data());
+    r.set_message(text.data());
     // The words are string literals: views of them end with 0.
     r.fields[0] = {"from", from.data()};
     r.fields[1] = {"to", to.data()};
@@ -161,7 +161,7 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     else
       (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
                           *begin != 0 && *why != 0 ? ": " : "", why);
-    r.set_sentence(text.data());
+    r.set_message(text.data());
     if (words.field != nullptr) r.fields[0] = {words.field, event.value};
   }
   return r;
@@ -182,7 +182,7 @@ CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stam
 namespace {
 
 /// east … heading_deg, a comma before each; empty where there is nothing.
-void append_earth(std::string* line, bool valid, const EarthPose& e) {
+void append_enu(std::string* line, bool valid, const EnuPose& e) {
   if (!valid) {
     *line += ",,,,,,,";
     return;
@@ -215,8 +215,8 @@ void format_frame(const FrameReport& r, std::string* line) {
     append_transform(line, p.T_world_left, ',');
   else
     *line += ",,,,,,,";
-  append_earth(line, r.placed, r.ours);
-  append_earth(line, r.ins_valid, r.reference);
+  append_enu(line, r.placed, r.ours);
+  append_enu(line, r.ins_valid, r.reference);
   for (const double v : r.error())
     if (r.compared)
       fmt::format_to(out, ",{:.4f}", v);
@@ -259,7 +259,7 @@ void append_distortion(std::string* line, const Intrinsics& lens) {
   append_sigmas(line, sigma);
 }
 
-/// A comma, and a word or sentence as one field.
+/// A comma, and a word or message as one field.
 void append_field(std::string* line, std::string_view text) {
   *line += ',';
   for (const char c : text) *line += c == ',' || c == '\n' || c == '"' ? ';' : c;
@@ -274,7 +274,7 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   const auto out = std::back_inserter(*line);
   fmt::format_to(out, "{},{}", c.stamp.ns(),
                  c.accepted ? "accepted"
-                 : c.learnt ? "kept"
+                 : c.learnt ? "unchanged"
                             : "rejected");
   append_field(line, c.cause_word());
   append_field(line, c.why());
@@ -290,15 +290,15 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()})
     fmt::format_to(out, ",{:.9f}", v);
   append_sigmas(line, rig.sigma_noise[k]);
-  append_sigmas(line, rig.sigma_wide[k]);
+  append_sigmas(line, rig.sigma_total[k]);
   const Intrinsics& lens = rig.intrinsics[k];
   fmt::format_to(out, ",{:.5f},{:.5f},{:.5f},{:.5f}", lens.fx, lens.fy, lens.cx, lens.cy);
   append_sigmas(line, lens.sigma);
   append_distortion(line, lens);
   append_distortion(line, rig.intrinsics[0]);
-  if (c.decided && c.judged_depth_m > 0)
-    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.judged_depth_m, c.depth_sigma_percent,
-                   c.depth_difference_percent, c.verified, c.lenses);
+  if (c.decided && c.reference_depth_m > 0)
+    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.reference_depth_m,
+                   c.depth_sigma_percent, c.depth_error_percent, c.verified, c.lenses);
   else
     *line += ",,,,,";
   *line += '\n';
@@ -348,8 +348,8 @@ void format_event(const EventRecord& event, std::string* line) {
   line->clear();
   fmt::format_to(std::back_inserter(*line), "{{\"stamp_ns\":{},\"kind\":", event.stamp.ns());
   append_text(line, event.kind);
-  *line += ",\"sentence\":";
-  append_text(line, event.sentence.data());
+  *line += ",\"message\":";
+  append_text(line, event.message.data());
   *line += ",\"fields\":{";
   bool any = false;
   for (const EventField& f : event.fields) {

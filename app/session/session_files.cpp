@@ -27,7 +27,7 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
   input->options = options.calibration;
 }
 
-std::string verification_sentence(const SummaryInput& input) {
+std::string verification_message(const SummaryInput& input) {
   if (input.verified || !input.calibrated) return "";
   if (!input.online)
     return "the calibration is not verified: nothing watched it (calibration.online: off)";
@@ -58,7 +58,7 @@ SessionReport write_session_report(const std::filesystem::path& session) {
   return report;
 }
 
-void say_verdict(const SessionReport& report, bool quiet, Progress* progress) {
+void print_verdict(const SessionReport& report, bool quiet, Progress* progress) {
   if (!quiet) {
     for (const std::string& line : closing_lines(report.outcome, report.failure))
       progress->say(line);

@@ -27,9 +27,9 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
 
 /// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is
 /// none.
-[[nodiscard]] std::string verification_sentence(const SummaryInput& input);
+[[nodiscard]] std::string verification_message(const SummaryInput& input);
 
-/// summary.json of the session; what goes wrong becomes a sentence of *faults.
+/// summary.json of the session; what goes wrong becomes a message of *faults.
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
                            const SummaryInput& input, std::vector<std::string>* faults);
 
@@ -41,6 +41,6 @@ struct SessionReport {
 [[nodiscard]] SessionReport write_session_report(const std::filesystem::path& session);
 
 /// The last words of a session: closing_lines(); quiet, only what must not be missed.
-void say_verdict(const SessionReport& report, bool quiet, Progress* progress);
+void print_verdict(const SessionReport& report, bool quiet, Progress* progress);
 
 }  // namespace vergence::app

@@ -2,13 +2,13 @@
 
 namespace vergence::app {
 
-void WorkDropped::add(const FrameEffort& effort) noexcept {
+void BudgetStatistics::add(const FrameWorkload& effort) noexcept {
   if (effort.whole()) return;
   ++frames;
   const bool window = effort.window_keyframes > 0 && effort.window_steps > 0;
   points += effort.points_percent < 100 ? 1 : 0;
-  keyframes += window && effort.window_keyframes != FrameEffort::kAll ? 1 : 0;
-  steps += window && effort.window_steps != FrameEffort::kAll ? 1 : 0;
+  keyframes += window && effort.window_keyframes != FrameWorkload::kAll ? 1 : 0;
+  steps += window && effort.window_steps != FrameWorkload::kAll ? 1 : 0;
   windows += window ? 0 : 1;
 }
 
@@ -39,13 +39,13 @@ void TotalsBuilder::add(const FrameReport& report) {
 
 /// An event comes before the pose of its frame, or after the last one.
 void TotalsBuilder::match_confirmed() {
-  if (totals_.confirmed == newest_ && !totals_.confirmed_frame && totals_.read > 0)
-    totals_.confirmed_frame = newest_frame_;
+  if (totals_.confirmed == newest_ && !totals_.verified_frame && totals_.read > 0)
+    totals_.verified_frame = newest_frame_;
 }
 
 void TotalsBuilder::add(const EventRecord& e) {
   const std::string_view kind = e.kind;
-  if (kind == "calibration_confirmed" && !totals_.confirmed) {
+  if (kind == "calibration_verified" && !totals_.confirmed) {
     totals_.confirmed = e.stamp;
     match_confirmed();
   } else if (kind == "calibration_contradicted" && !totals_.contradicted) {
@@ -58,7 +58,7 @@ bool CalibrationTotals::add(const CalibrationRecord& c) {
   if (c.focal.measured_px > 0) focal = c.focal;
   if (c.learnt && !c.accepted) return false;  // the drive goes on: nothing was attempted
   ++(c.accepted ? accepted : rejected);
-  if (attempts.size() == kMostAttempts) attempts.erase(attempts.begin());
+  if (attempts.size() == kMaxAttempts) attempts.erase(attempts.begin());
   const CalibrationAttempt attempt{c.stamp,          c.cause_word(),       c.reason,  c.accepted,
                                    c.latency_frames, c.calibration.frames, c.solve_ms};
   attempts.push_back(attempt);

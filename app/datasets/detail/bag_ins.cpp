@@ -9,7 +9,7 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr Duration kMostGap = Duration::milliseconds(100);  // between two orientations
+constexpr Duration kMaxGap = Duration::milliseconds(100);  // between two orientations
 
 template <typename Topics>
 std::vector<std::string> usable(const Topics& topics) {
@@ -70,7 +70,7 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, R
   } else {
     if (*next == 0) return false;
     const RosAttitude& before = attitudes[*next - 1];
-    if (after.stamp - before.stamp > kMostGap) return false;
+    if (after.stamp - before.stamp > kMaxGap) return false;
     const double share =
         (stamp - before.stamp).to_seconds() / (after.stamp - before.stamp).to_seconds();
     set_attitude(quaternion_of(before).slerp(share, quaternion_of(after)), &r->sample);
@@ -80,7 +80,7 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, R
   return true;
 }
 
-void say_without_fix(const std::string& name, RecordedIns* ins) {
+void print_without_fix(const std::string& name, RecordedIns* ins) {
   const auto without =
       std::count_if(ins->readings.begin(), ins->readings.end(), [](const RecordedReading& r) {
         return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
@@ -101,12 +101,12 @@ RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
     if (!attitude_at(attitudes, &next, &r)) ++without;
   }
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));
-  say_without_fix(name, &ins);
+  print_without_fix(name, &ins);
   if (without > 0)
     ins.remarks.push_back(
         fmt::format("{}: {} fixes have no orientation of {} within {} ms around them: nothing is "
                     "compared there",
-                    name, without, imu, kMostGap.ns() / 1'000'000));
+                    name, without, imu, kMaxGap.ns() / 1'000'000));
   return ins;
 }
 

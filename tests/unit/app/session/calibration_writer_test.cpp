@@ -76,7 +76,7 @@ CalibrationRecord found(bool accepted) {
 
 EventRecord confirmed() {
   EventRecord event;
-  event.kind = "calibration_confirmed";
+  event.kind = "calibration_verified";
   return event;
 }
 
@@ -102,7 +102,7 @@ TEST(CalibrationWriter, theNextDriveGetsWhatWasFoundOrConfirmed) {
     CalibrationWriter::Outcome outcome;
     EXPECT_EQ(writer.next(&outcome), frames > 0);
     if (frames > 0) {
-      EXPECT_STREQ(outcome.event.kind, "calibration_kept");
+      EXPECT_STREQ(outcome.event.kind, "calibration_saved");
     }
     EXPECT_FALSE(writer.next(&outcome)) << "what was replaced or kept is not kept again";
   }
@@ -143,7 +143,7 @@ TEST(CalibrationWriter, whetherItIsKeptIsWhetherTheNextDriveHasIt) {
     ASSERT_TRUE(writer.next(&outcome));
     EXPECT_EQ(outcome.failed, failed);
     EXPECT_EQ(
-        std::string(outcome.event.sentence.data()).find("calibration.yaml") != std::string::npos,
+        std::string(outcome.event.message.data()).find("calibration.yaml") != std::string::npos,
         session_fails);
   }
 }
@@ -154,12 +154,12 @@ TEST(CalibrationWriter, postingAllocatesNothing) {
   const test::TemporaryFolder folder;
   CalibrationWriter writer({.session = folder.path(), .wait_when_full = true});
   const CalibrationRecord record = found(false);
-  const auto before = AllocationGuard::allocations_after_seal();
+  const auto before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     for (int i = 0; i < 100; ++i) writer.on_calibration(record);
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   EXPECT_TRUE(close(&writer).empty());
   EXPECT_EQ(writer.totals().rejected, 100U);
 }

@@ -73,7 +73,7 @@ class RecordedPoses {
 
   test::TemporaryFolder folder_;
   IdleSolver solver_;
-  SolverWatch watch_{solver_};
+  ReplayableSolverRunner watch_{solver_};
   SourceFacts facts_ = calibrated_pair();
   Configuration configuration_;
   DriveRecorder recorder_;
@@ -81,7 +81,7 @@ class RecordedPoses {
 };
 
 TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
-  RecordedPoses drive({"record=[poses]", "record.roll_mb=1"});
+  RecordedPoses drive({"record=[poses]", "record.split_mb=1"});
   for (int i = 0; i < 100 && drive.rigs("drive_1.mcap") == 0; ++i) {
     drive.drive(100);
     std::this_thread::sleep_for(100ms);
