@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/version.hpp"
+
 namespace vergence::app {
 
 namespace {
@@ -263,7 +265,10 @@ std::string devices_json(const Inventory& inventory, const std::string& rules) {
          {"description", p.info.description},
          {"latency_timer_ms", p.info.latency_timer_ms ? Json(*p.info.latency_timer_ms) : Json()},
          {"configuration", p.configuration}});
-  Json all{{"cameras", cameras}, {"serial_ports", ports}, {"drivers", drivers}};
+  Json all{{"schema_version", kSchemaVersion},
+           {"cameras", cameras},
+           {"serial_ports", ports},
+           {"drivers", drivers}};
   if (!rules.empty()) all["udev_rules"] = rules;
   return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -297,8 +302,9 @@ std::string doctor_json(const std::vector<Finding>& findings) {
     rows.push_back({{"check", f.check},
                     {"state", to_string(f.state)},
                     {"message", f.message},
-                    {"fix", f.mend}});
-  const Json all{{"problems", count(findings, FindingState::problem)},
+                    {"fix", f.fix}});
+  const Json all{{"schema_version", kSchemaVersion},
+                 {"problems", count(findings, FindingState::problem)},
                  {"advice", count(findings, FindingState::advice)},
                  {"ok", count(findings, FindingState::ok)},
                  {"findings", rows}};

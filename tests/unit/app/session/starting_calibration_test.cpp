@@ -44,7 +44,7 @@ TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfigurat
   const Configuration c = configuration(folder);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
   const StartingCalibration state = starting_calibration(c, {}, kSerials);
-  EXPECT_EQ(state.trust, CalibrationTrust::unconfirmed);
+  EXPECT_EQ(state.trust, CalibrationTrust::state_file);
   EXPECT_EQ(state.file.rig.T_camera_left[1].t.y(), 0.011);
   EXPECT_STREQ(state.cause, "state_file");
 
@@ -79,7 +79,7 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
 
   const auto drive = [&](const char* own) { return starting_calibration(c, {}, {own, ""}); };
   write_state(folder / "calibration_state.yaml", drive("4711").file);
-  EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
+  EXPECT_EQ(drive("4711").trust, CalibrationTrust::state_file);
   const StartingCalibration other = drive("4712");
   EXPECT_EQ(other.trust, CalibrationTrust::given);
   ASSERT_EQ(other.remarks.size(), 1U);
@@ -95,7 +95,7 @@ TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   c.cameras[1].T_camera_left = {};
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::none);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
-  EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::unconfirmed);
+  EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::state_file);
 }
 
 }  // namespace
