@@ -282,10 +282,10 @@ std::string doctor_text(const std::vector<Finding>& findings, bool given, const 
       text += head + line + "\n";
       head = margin;
     }
-    for (const std::string& command : f.mend)
+    for (const std::string& command : f.fix)
       text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) +
               "\n";  // never broken: it is copied
-    if (!f.mend.empty()) text += "\n";
+    if (!f.fix.empty()) text += "\n";
   }
   if (!text.ends_with("\n\n")) text += "\n";
   text +=
