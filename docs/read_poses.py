@@ -9,7 +9,7 @@ import sys
 
 
 def lines(address):
-    """Lines as they come, from `publish.lines` of the configuration."""
+    """Lines as they come, from `publish.pose_stream` of the configuration."""
     kind, _, place = address.partition("://")
     if kind == "unix":
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stream:

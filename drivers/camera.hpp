@@ -50,7 +50,7 @@ struct ExposureSetting {
 
 enum class FrameStatus : std::uint8_t {
   complete,
-  torn,  // parts of the image never came; their pixels mean nothing
+  incomplete,  // parts of the image never came; their pixels mean nothing
 };
 
 /// One exposure, handed out by wait().
@@ -144,10 +144,10 @@ class CameraDevice {
                                                   ExposureSetting* /*actual*/) noexcept {
     return DeviceStatus::unsupported;
   }
-  /// One sentence about the last call that was not `ok`: what was refused, what the camera offers,
+  /// One message about the last call that was not `ok`: what was refused, what the camera offers,
   /// what to do. Empty: the status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
-  /// One sentence about what works, but not as well as it should (a buffer the system made
+  /// One message about what works, but not as well as it should (a buffer the system made
   /// smaller): what, and what to do. Empty: nothing. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual CameraStatistics statistics() const noexcept = 0;
@@ -165,7 +165,7 @@ class CameraDriver {
   /// unsupported (it is no such camera), failed
   [[nodiscard]] virtual std::unique_ptr<CameraDevice> open(std::string_view serial,
                                                            DeviceStatus* status) = 0;
-  /// One sentence about the last open() that gave nothing, or enumerate() that found nothing.
+  /// One message about the last open() that gave nothing, or enumerate() that found nothing.
   /// Empty: the status says it all.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
 };

@@ -18,7 +18,7 @@ enum class DeviceStatus : std::uint8_t {
   timeout,            // nothing came within the limit
   stopped,            // not streaming: stop() was called, or start() never
   ended,              // the source is finite and at its end (mock drive); no more will come
-  gone,               // unplugged, powered off, no answer; start() may bring it back
+  disconnected,       // unplugged, powered off, no answer; start() may bring it back
   not_found,          // no device with that serial
   no_permission,      // the system does not let us
   busy,               // somebody else has it
@@ -29,7 +29,7 @@ enum class DeviceStatus : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(DeviceStatus) noexcept;
 
-/// Who a device is: for lists and sentences.
+/// Who a device is: for lists and messages.
 struct DeviceInfo {
   std::string driver;  // mock, gige, …
   std::string serial;
@@ -40,7 +40,7 @@ struct DeviceInfo {
 /// What a driver knows about the way from the measurement to the host, for the configuration in
 /// force.
 struct DeviceTiming {
-  Duration least_delay{};  // from the stamped instant to the arrival, at best
+  Duration min_delay{};  // from the stamped instant to the arrival, at best
   Duration delay_spread = Duration::milliseconds(2);  // by how much a delay usually exceeds it
   Duration resolution = Duration::microseconds(1);    // of the device's stamps
 };

@@ -84,10 +84,10 @@ class InsDevice {
   [[nodiscard]] virtual DeviceStatus pause(Duration /*gap*/) noexcept {
     return DeviceStatus::unsupported;
   }
-  /// One sentence about the last call that was not `ok`: what was refused, what to do. Empty: the
+  /// One message about the last call that was not `ok`: what was refused, what to do. Empty: the
   /// status says it all. Owner's thread; may allocate.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
-  /// One sentence about what works, but not as asked. Empty: nothing. As last_error().
+  /// One message about what works, but not as asked. Empty: nothing. As last_error().
   [[nodiscard]] virtual std::string remark() const { return {}; }
   [[nodiscard]] virtual InsStatistics statistics() const noexcept = 0;
 };
@@ -99,7 +99,7 @@ class InsDriver {
   [[nodiscard]] virtual std::vector<DeviceInfo> enumerate() = 0;
   [[nodiscard]] virtual std::unique_ptr<InsDevice> open(std::string_view serial,
                                                         DeviceStatus* status) = 0;
-  /// One sentence about the last open() that gave nothing. Empty: the status says it all.
+  /// One message about the last open() that gave nothing. Empty: the status says it all.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 

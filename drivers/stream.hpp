@@ -58,7 +58,7 @@ class Stream {
     if (ended_) return DeviceStatus::ended;
     if (gone_) {
       Delivery<T> d;
-      if (!ring_.pop(&d)) return DeviceStatus::gone;
+      if (!ring_.pop(&d)) return DeviceStatus::disconnected;
       if (d.what == Delivery<T>::What::end) {
         ended_ = true;
         return DeviceStatus::ended;
@@ -86,7 +86,7 @@ class Stream {
 
   [[nodiscard]] DeviceStatus take(Duration limit, Delivery<T>* d) noexcept {
     if (!streaming()) return DeviceStatus::stopped;
-    if (gone_) return DeviceStatus::gone;
+    if (gone_) return DeviceStatus::disconnected;
     if (ended_) return DeviceStatus::ended;
     if (!ring_.pop(d)) {
       if (limit <= Duration{}) return DeviceStatus::timeout;
@@ -99,7 +99,7 @@ class Stream {
     notify_taken();
     gone_ = d->what == Delivery<T>::What::gone;
     ended_ = d->what == Delivery<T>::What::end;
-    return gone_ ? DeviceStatus::gone : ended_ ? DeviceStatus::ended : DeviceStatus::ok;
+    return gone_ ? DeviceStatus::disconnected : ended_ ? DeviceStatus::ended : DeviceStatus::ok;
   }
 
  private:

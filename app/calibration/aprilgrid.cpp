@@ -20,7 +20,7 @@ constexpr int kWrongBits = 1;  // of 36; codes differ in 11
 constexpr std::size_t kFewestTags = 4;
 constexpr double kWindowOfGap = 0.4;  // half window: a wider one meets the next tag's edge
 constexpr int kNarrowestWindow = 2, kWidestWindow = 8;  // px, half windows
-constexpr double kMostRefined = 4;                      // px: grown twice, corners lie 2.8 px in
+constexpr double kMaxRefined = 4;                       // px: grown twice, corners lie 2.8 px in
 constexpr double kFlatToSide = 0.2;  // mean residual of a flat board: more is another layout
 
 struct Tag {
@@ -148,7 +148,7 @@ BoardCorners refined(const cv::Mat& image, const BoardPattern& board, const Layo
       // The library's pixels have their corner at integers.
       rough.push_back({layout.index(board, tag.id, k),
                        Vec2(tag.corners[k].x, tag.corners[k].y) - Vec2(0.5, 0.5)});
-  return refine_corners(image, rough, window, kMostRefined);
+  return refine_corners(image, rough, window, kMaxRefined);
 }
 
 }  // namespace

@@ -297,11 +297,11 @@ void BoardCalibrator::set_sigmas(const std::vector<std::size_t>& used, const Sol
     for (std::size_t k = 0; k < cameras_; ++k) {
       const auto place = lenses + static_cast<Eigen::Index>(6 * k);
       const Mat6 of_place = covariance.block<6, 6>(place, place);
-      auto& sigmas = hold ? rig->sigma_noise[k] : rig->sigma_wide[k];
+      auto& sigmas = hold ? rig->sigma_noise[k] : rig->sigma_total[k];
       for (int i = 0; i < 6; ++i) sigmas[static_cast<std::size_t>(i)] = std::sqrt(of_place(i, i));
       if (hold) continue;
       // Fewer groups than numbers leave directions without any variance.
-      rig->covariance_wide[k] = groups > 6 ? of_place : Mat6(of_place.diagonal().asDiagonal());
+      rig->covariance_total[k] = groups > 6 ? of_place : Mat6(of_place.diagonal().asDiagonal());
       for (std::size_t i = 0; i < 9; ++i) {
         const auto at = static_cast<Eigen::Index>(9 * k + i);
         (i < 4 ? rig->intrinsics[k].sigma[i] : rig->intrinsics[k].distortion_sigma[i - 4]) =
@@ -312,7 +312,7 @@ void BoardCalibrator::set_sigmas(const std::vector<std::size_t>& used, const Sol
   if (cameras_ == 1) return;
   const Vec3 along = rig->T_camera_left[1].t.normalized();
   rig->baseline_sigma =
-      std::sqrt(along.dot(rig->covariance_wide[1].bottomRightCorner<3, 3>() * along));
+      std::sqrt(along.dot(rig->covariance_total[1].bottomRightCorner<3, 3>() * along));
 }
 
 BoardCalibration BoardCalibrator::run() const {
@@ -360,7 +360,7 @@ BoardCalibration BoardCalibrator::run() const {
     if (cameras_ == 1) return result;
     rig.baseline = rig.T_camera_left[1].t.norm();
     if (const auto bad = find_implausible(&rig))
-      result.error = "the views do not determine the lenses: " + bad->sentence;
+      result.error = "the views do not determine the lenses: " + bad->message;
   } catch (const cv::Exception& e) {
     result.error = "the views do not determine lenses and places (" + e.err +
                    "): more of them, tilted, are needed";

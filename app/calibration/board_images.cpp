@@ -180,11 +180,11 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
     const auto with = std::count_if(view.corners.begin(), view.corners.end(),
                                     [](const auto& c) { return !c.empty(); });
     const bool usable = !view.corners[0].empty() && with >= (cameras > 1 ? 2 : 1);
-    for (const std::string& sentence : without)
-      images.remarks.push_back(sentence + (usable ? ""
-                                           : cameras > 1
-                                               ? "; the views of the other cameras are skipped, too"
-                                               : "; skipped"));
+    for (const std::string& message : without)
+      images.remarks.push_back(message + (usable ? ""
+                                          : cameras > 1
+                                              ? "; the views of the other cameras are skipped, too"
+                                              : "; skipped"));
     if (usable) images.views.push_back(std::move(view));
     if (on_view) on_view(v + 1, images.views.size());
   }

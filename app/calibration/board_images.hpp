@@ -28,7 +28,7 @@ namespace vergence::app {
 struct BoardImages {
   std::vector<BoardView> views{};      // of several cameras: those that camera 0 and another have
   std::vector<ImageSize> sizes{};      // one a camera
-  std::vector<std::string> remarks{};  // a sentence for every view that is skipped
+  std::vector<std::string> remarks{};  // a message for every view that is skipped
 };
 
 /// Finds the board in all of them. `on_view` (may be empty) is called after every view: how many

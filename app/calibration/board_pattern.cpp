@@ -13,8 +13,8 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kFewest = 3, kMost = 100;                         // inner corners a side
-constexpr int kMostTagsAlong = 24, kFamily = 587;               // codes of 36h11
+constexpr int kFewest = 3, kMax = 100;                          // inner corners a side
+constexpr int kMaxTagsAlong = 24, kFamily = 587;                // codes of 36h11
 constexpr double kSmallestSquare = 0.001, kLargest = 10.0;      // m
 constexpr double kNarrowest = 0.05, kWidest = 2;                // gap over the side of a tag
 constexpr double kSmallestMarker = 0.3, kLargestMarker = 0.95;  // of the side of a square
@@ -85,15 +85,15 @@ std::string BoardPattern::words() const {
 BoardPattern parse_checkerboard(const std::string& inner_corners, double square) {
   BoardPattern board;
   if (!parse_product(inner_corners, &board) || std::min(board.columns, board.rows) < kFewest ||
-      std::max(board.columns, board.rows) > kMost)
+      std::max(board.columns, board.rows) > kMax)
     throw InputError(fmt::format(
-        "--board is \"{}\"; it takes the inner corners along and down, {} to {}, like 9x6",
-        inner_corners.substr(0, 60), kFewest, kMost));
+        "--checkerboard is \"{}\"; it takes the inner corners along and down, {} to {}, like 9x6",
+        inner_corners.substr(0, 60), kFewest, kMax));
   if (board.columns == board.rows)
-    throw InputError(
-        fmt::format("--board {}: a board with as many corners along as down looks the same after a "
-                    "quarter turn; take another",
-                    inner_corners));
+    throw InputError(fmt::format(
+        "--checkerboard {}: a board with as many corners along as down looks the same after a "
+        "quarter turn; take another",
+        inner_corners));
   check_side(square);
   board.square = square;
   return board;
@@ -103,10 +103,10 @@ BoardPattern parse_aprilgrid(const std::string& tags, double side, double spacin
   BoardPattern board;
   board.kind = BoardKind::aprilgrid;
   if (!parse_product(tags, &board) || std::min(board.columns, board.rows) < 1 ||
-      std::max(board.columns, board.rows) > kMostTagsAlong || board.columns * board.rows > kFamily)
+      std::max(board.columns, board.rows) > kMaxTagsAlong || board.columns * board.rows > kFamily)
     throw InputError(
         fmt::format("--aprilgrid is \"{}\"; it takes the tags along and up, 1 to {}, like 6x6",
-                    tags.substr(0, 60), kMostTagsAlong));
+                    tags.substr(0, 60), kMaxTagsAlong));
   check_side(side);
   if (!(spacing >= kNarrowest && spacing <= kWidest))
     throw InputError(fmt::format(
@@ -123,10 +123,10 @@ BoardPattern parse_charuco(const std::string& squares, double square, double mar
   BoardPattern board;
   board.kind = BoardKind::charuco;
   if (!parse_product(squares, &board) || std::min(board.columns, board.rows) < kFewest ||
-      std::max(board.columns, board.rows) > kMost)
+      std::max(board.columns, board.rows) > kMax)
     throw InputError(
         fmt::format("--charuco is \"{}\"; it takes the squares along and down, {} to {}, like 11x8",
-                    squares.substr(0, 60), kFewest, kMost));
+                    squares.substr(0, 60), kFewest, kMax));
   check_side(square);
   if (!(marker >= kSmallestMarker * square && marker <= kLargestMarker * square))
     throw InputError(

@@ -76,7 +76,7 @@ std::string place_table(const BoardReport& r, std::size_t k) {
   text += fmt::format("{:<16}{:>12}{:>12}{:>14}\n", "", "", "1 σ", "lenses held");
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
-    const double sigma = unit * rig.sigma_wide[k][i];
+    const double sigma = unit * rig.sigma_total[k][i];
     const int digits = std::max(digits_for(sigma), i < 3 ? 4 : 3);
     const auto at = static_cast<Eigen::Index>(i % 3);
     // ° is one column and two bytes: fmt counts columns.
@@ -87,7 +87,7 @@ std::string place_table(const BoardReport& r, std::size_t k) {
   return text;
 }
 
-std::string baseline_sentence(const BoardReport& r) {
+std::string baseline_message(const BoardReport& r) {
   const RigCalibration& rig = r.file.rig;
   std::string text = fmt::format("baseline {:.3f} ± {:.3f} mm", 1e3 * rig.T_camera_left[1].t.norm(),
                                  1e3 * rig.baseline_sigma);
@@ -136,7 +136,7 @@ std::string format_report(const BoardReport& r) {
   text += lens_table(r) + "± 1 σ\n\n";
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
     text += place_table(r, k) + "\n";
-  if (rig.cameras > 1) text += baseline_sentence(r) + "\n";
+  if (rig.cameras > 1) text += baseline_message(r) + "\n";
   text += r.coverage.grid() + "corners a cell: · none, - up to 9, + up to 39, # more\n";
   const auto needs = r.coverage.needs();
   text += needs.empty() ? "Nothing is missing: every part of the images, tilts and distances.\n"
@@ -177,7 +177,7 @@ nlohmann::ordered_json json_report(const BoardReport& r) {
       std::array<double, 6> sigma{}, held{};
       for (std::size_t i = 0; i < 6; ++i) {
         const double unit = i < 3 ? kDegreesPerRadian : 1e3;
-        sigma[i] = unit * rig.sigma_wide[k][i], held[i] = unit * rig.sigma_noise[k][i];
+        sigma[i] = unit * rig.sigma_total[k][i], held[i] = unit * rig.sigma_noise[k][i];
       }
       camera["place"] = {{"rotation_deg", {turn.x(), turn.y(), turn.z()}},
                          {"t_mm", {1e3 * T.t.x(), 1e3 * T.t.y(), 1e3 * T.t.z()}},

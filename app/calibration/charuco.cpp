@@ -23,8 +23,7 @@ constexpr std::size_t kFewestMarkers = 4;
 constexpr double kFlatToSide = 0.2;   // mean residual of a flat board: more is another layout
 constexpr double kWindowOfGap = 0.8;  // half window: a wider one meets the marker's corner
 constexpr int kNarrowestWindow = 2, kWidestWindow = 8;  // px, half windows
-constexpr double kMostMoved =
-    0.25;  // of a square: what two markers extrapolate is nearer than that
+constexpr double kMaxMoved = 0.25;  // of a square: what two markers extrapolate is nearer than that
 
 struct Marker {
   int id = 0;
@@ -162,7 +161,7 @@ BoardCorners find_charuco(const ImageView& image, const BoardPattern& board) {
   const int window = std::clamp(static_cast<int>(kWindowOfGap * (square - side) / 2),
                                 kNarrowestWindow, kWidestWindow);
   return refine_corners(pixels, extrapolated(markers, layouts[best], board.square), window,
-                        kMostMoved * square);
+                        kMaxMoved * square);
 }
 
 }  // namespace vergence::app

@@ -128,7 +128,7 @@ Remarks convert_calibration(const ConversionRequest& request) {
   const CalibrationFormat format = request.format ? *request.format : format_of_name(request.out);
   const CalibrationFile calibration = read_any_calibration(request.in, request.size, &remarks);
   write_any_calibration(request.out, format, calibration, &remarks);
-  remarks.push_back(baseline_sentence(calibration.rig));
+  remarks.push_back(baseline_message(calibration.rig));
   if (std::string doubt = baseline_doubt(calibration.rig); !doubt.empty())
     remarks.push_back(std::move(doubt));
   return remarks;

@@ -27,7 +27,7 @@ double homography_misfit(const std::vector<cv::Point2d>& on_board,
 }
 
 BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough, int half_window,
-                            double most_moved) {
+                            double max_moved) {
   cv::Mat soft;
   cv::GaussianBlur(image, soft, {}, kBlur);
   const double margin = half_window + 2;
@@ -46,7 +46,7 @@ BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough, int
       {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
   BoardCorners refined;
   for (std::size_t i = 0; i < fine.size(); ++i)
-    if (const Vec2 at(fine[i].x, fine[i].y); (at - corners[i].pixel).norm() <= most_moved)
+    if (const Vec2 at(fine[i].x, fine[i].y); (at - corners[i].pixel).norm() <= max_moved)
       refined.push_back({corners[i].index, at});
   std::sort(refined.begin(), refined.end(),
             [](const BoardCorner& a, const BoardCorner& b) { return a.index < b.index; });

@@ -16,9 +16,9 @@ namespace vergence::app {
 
 /// To the saddle points near `rough` (centres of pixels at integers), by OpenCV's cornerSubPix in
 /// windows of 2 `half_window` + 1 px. Corners too near to the image's edge, and those that would go
-/// farther than `most_moved` px, are left out; in order of index.
+/// farther than `max_moved` px, are left out; in order of index.
 [[nodiscard]] BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough,
-                                          int half_window, double most_moved);
+                                          int half_window, double max_moved);
 
 /// The same pixels; nothing writes them.
 [[nodiscard]] cv::Mat matrix_of(const ImageView& image);

@@ -44,18 +44,18 @@ bool ViewCollector::elsewhere(const BoardView& seen) const {
   });
 }
 
-OfferVerdict ViewCollector::offer(const BoardView& seen) {
+OfferResult ViewCollector::offer(const BoardView& seen) {
   const auto others = std::count_if(seen.corners.begin() + 1, seen.corners.end(),
                                     [](const auto& c) { return !c.empty(); });
   const bool held = still(seen);
   last_ = seen;
-  if (seen.corners[0].empty() || others == 0) return OfferVerdict::not_seen;
-  if (!held) return OfferVerdict::moving;
+  if (seen.corners[0].empty() || others == 0) return OfferResult::not_seen;
+  if (!held) return OfferResult::moving;
   if (!coverage_.brings_something(seen) && !(coverage_.views() < kEnoughViews && elsewhere(seen)))
-    return OfferVerdict::nothing_new;
+    return OfferResult::nothing_new;
   coverage_.add(seen);
   views_.push_back(seen);
-  return OfferVerdict::taken;
+  return OfferResult::taken;
 }
 
 }  // namespace vergence::app

@@ -6,7 +6,7 @@
 
 namespace vergence::app {
 
-enum class OfferVerdict : std::uint8_t {
+enum class OfferResult : std::uint8_t {
   taken,
   not_seen,     // camera 0, or every other camera, does not have the whole board
   moving,       // the board is not where it was a moment ago, or was not seen then: exposures that
@@ -22,7 +22,7 @@ class ViewCollector {
   explicit ViewCollector(Coverage coverage, double image_width_px);
 
   /// Corners of one set of images; sets come one after the other.
-  [[nodiscard]] OfferVerdict offer(const BoardView& seen);
+  [[nodiscard]] OfferResult offer(const BoardView& seen);
   [[nodiscard]] const std::vector<BoardView>& views() const noexcept { return views_; }
   [[nodiscard]] const Coverage& coverage() const noexcept { return coverage_; }
   /// Nothing is missing any more.

@@ -32,7 +32,7 @@ void remark_lost(const CalibrationFile& calibration, const char* format, bool na
     };
     sigmas = sigmas || given(rig.intrinsics[k].sigma) ||
              given(rig.intrinsics[k].distortion_sigma) || given(rig.sigma_noise[k]) ||
-             given(rig.sigma_wide[k]) || !rig.covariance_wide[k].isZero(0);
+             given(rig.sigma_total[k]) || !rig.covariance_total[k].isZero(0);
     serials = serials || !calibration.serials[k].empty();
   }
   if (sigmas || rig.baseline_sigma != 0) lost.emplace_back("sigmas");

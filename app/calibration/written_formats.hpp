@@ -13,7 +13,7 @@
 ///          All formats here share pixels, metres, axes (x right, y down, z forward) and the two
 ///          distortion models.
 /// Errors   InputError: the format has no place for what images would need.
-/// Remarks  One sentence each for what is not carried over.
+/// Remarks  One message each for what is not carried over.
 namespace vergence::app {
 
 /// Kalibr's camchain: cam0, cam1 … with T_cn_cnm1, X_cn = T_cn_cnm1 X_cn-1.

@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/capture/taking.hpp"
+#include "app/capture/capture_result.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/rig_settings.hpp"
@@ -28,7 +28,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kPercent = 100, kMilli = 1e3;
 
-void say(const std::string& sentence) { std::cerr << "vergence: " << harmless(sentence) << '\n'; }
+void say(const std::string& message) { std::cerr << "vergence: " << harmless(message) << '\n'; }
 
 /// To so many decimals.
 double rounded(double v, int decimals) {
@@ -48,18 +48,18 @@ class Snap {
   ExitCode run();
 
  private:
-  [[nodiscard]] Taking attempt();
-  void note(const std::string& sentence) {
-    notes_.push_back(sentence);
-    say(sentence);
+  [[nodiscard]] CaptureResult attempt();
+  void note(const std::string& message) {
+    notes_.push_back(message);
+    say(message);
   }
-  void keep(const TakenSet& set);
-  [[nodiscard]] std::vector<PictureRemark> look_at(
-      const TakenSet& set, const std::vector<PictureFigures>& figures) const;
+  void keep(const CapturedSet& set);
+  [[nodiscard]] std::vector<ImageIssue> look_at(const CapturedSet& set,
+                                                const std::vector<ImageStatistics>& figures) const;
   [[nodiscard]] std::string file_name(std::size_t camera, int set) const;
-  void print(const TakenSet& set, const std::vector<PictureFigures>& figures) const;
+  void print(const CapturedSet& set, const std::vector<ImageStatistics>& figures) const;
   void write_report() const;
-  [[nodiscard]] ExitCode verdict(const Taking& taking) const;
+  [[nodiscard]] ExitCode verdict(const CaptureResult& taking) const;
 
   const SignalGuard signals_;
   const SnapRequest& request_;
@@ -72,7 +72,7 @@ class Snap {
   bool unusable_ = false;
 };
 
-Taking Snap::attempt() {
+CaptureResult Snap::attempt() {
   const Configuration& c = configuration_;
   // A mock: in virtual time, as long as the sets need and a second more.
   const std::optional<double> duration =
@@ -84,11 +84,11 @@ Taking Snap::attempt() {
   o.count = request_.count;
   o.limit = Duration::seconds(request_.wait_s);
   o.skip = is_mock(c) || c.cameras[0].trigger == CameraTrigger::hardware ? 0 : 2;
-  return take_sets(*devices_, o, signals_, [this](const TakenSet& set) { keep(set); });
+  return take_sets(*devices_, o, signals_, [this](const CapturedSet& set) { keep(set); });
 }
 
 ExitCode Snap::run() {
-  const Taking taking = attempt();
+  const CaptureResult taking = attempt();
   if (!sets_.empty()) write_report();
   return verdict(taking);
 }
@@ -98,9 +98,9 @@ std::string Snap::file_name(std::size_t camera, int set) const {
                              : fmt::format("{}_{:04}.png", names_[camera], set);
 }
 
-std::vector<PictureRemark> Snap::look_at(const TakenSet& set,
-                                         const std::vector<PictureFigures>& figures) const {
-  std::vector<PictureRemark> remarks = judge_pictures(names_, figures);
+std::vector<ImageIssue> Snap::look_at(const CapturedSet& set,
+                                      const std::vector<ImageStatistics>& figures) const {
+  std::vector<ImageIssue> remarks = evaluate_images(names_, figures);
   for (std::size_t k = 1; k < set.images.size(); ++k)
     for (std::size_t i = 0; i < k; ++i)
       if (are_identical(set.images[i], set.images[k]))
@@ -111,13 +111,13 @@ std::vector<PictureRemark> Snap::look_at(const TakenSet& set,
   return remarks;
 }
 
-void Snap::keep(const TakenSet& set) {
-  std::vector<PictureFigures> figures;
+void Snap::keep(const CapturedSet& set) {
+  std::vector<ImageStatistics> figures;
   Json images = Json::array();
   for (std::size_t k = 0; k < set.images.size(); ++k) {
     const std::string file = file_name(k, set.index);
     write_png(request_.out / file, set.images[k]);
-    const PictureFigures f = figures_of(set.images[k]);
+    const ImageStatistics f = figures_of(set.images[k]);
     figures.push_back(f);
     const DeviceInfo& who = devices_->cameras()[k]->info();
     const CameraSettings& s = configuration_.cameras[k];
@@ -139,14 +139,14 @@ void Snap::keep(const TakenSet& set) {
   }
   Json findings = Json::array();
   print(set, figures);
-  for (const PictureRemark& r : look_at(set, figures)) {
+  for (const ImageIssue& r : look_at(set, figures)) {
     unusable_ = unusable_ || r.unusable;
-    findings.push_back({{"unusable", r.unusable}, {"sentence", r.sentence}});
-    say(r.sentence);
+    findings.push_back({{"unusable", r.unusable}, {"message", r.message}});
+    say(r.message);
   }
-  if (set.proof == SyncProof::unproven)
+  if (set.proof == SyncProof::ambiguous)
     say("the cameras' stamps do not agree: that these pictures were exposed together is not "
-        "proven");
+        "verified");
   sets_.push_back({{"stamp_ns", set.stamp.ns()},
                    {"stamp_error_ms", rounded(set.stamp_error.to_seconds() * kMilli, 4)},
                    {"spread_ms", rounded(set.spread.to_seconds() * kMilli, 4)},
@@ -155,7 +155,7 @@ void Snap::keep(const TakenSet& set) {
                    {"findings", findings}});
 }
 
-void Snap::print(const TakenSet& set, const std::vector<PictureFigures>& figures) const {
+void Snap::print(const CapturedSet& set, const std::vector<ImageStatistics>& figures) const {
   std::size_t width = 6;
   for (const std::string& name : names_) width = std::max(width, name.size());
   const std::string title = request_.count == 1 ? "camera" : fmt::format("set {}", set.index);
@@ -165,7 +165,7 @@ void Snap::print(const TakenSet& set, const std::vector<PictureFigures>& figures
         "black %", "sharpness",
         fmt::format("exposed within {:.3f} ms", set.spread.to_seconds() * kMilli));
   for (std::size_t k = 0; k < figures.size(); ++k) {
-    const PictureFigures& f = figures[k];
+    const ImageStatistics& f = figures[k];
     std::cout << fmt::format("{:<{}}  {:>6.1f} {:>8.1f} {:>8.2f} {:>8.2f} {:>9.1f}  {}\n",
                              names_[k], width, f.mean, f.contrast, kPercent * f.saturated,
                              kPercent * f.dark, f.sharpness,
@@ -186,10 +186,11 @@ void Snap::write_report() const {
   if (!out) throw InputError(file.string() + ": cannot be written; is the disk full?");
 }
 
-ExitCode Snap::verdict(const Taking& taking) const {
-  if (taking.end == Taking::End::interrupted)
+ExitCode Snap::verdict(const CaptureResult& taking) const {
+  if (taking.end == CaptureResult::End::interrupted)
     return signals_.stop_code().value_or(ExitCode::interrupted);
-  if (taking.end == Taking::End::done) return unusable_ ? ExitCode::not_usable : ExitCode::done;
+  if (taking.end == CaptureResult::End::done)
+    return unusable_ ? ExitCode::not_usable : ExitCode::done;
   bool silent = false;
   for (std::size_t k = 0; k < taking.delivered.size(); ++k) {
     if (taking.delivered[k] > 0) continue;
@@ -205,7 +206,7 @@ ExitCode Snap::verdict(const Taking& taking) const {
     say(fmt::format(
         "images came from every camera, but {}: {} of {} sets were taken; cameras that are not "
         "triggered together need "
-        "sync.mode: software and a sync.tolerance_ms of half their period",
+        "sync.mode: approximate_time and a sync.tolerance_ms of half their period",
         sets_.empty() ? "never two that belong together" : "too few that belong together",
         taking.sets, request_.count));
   return ExitCode::device_failed;
@@ -213,7 +214,7 @@ ExitCode Snap::verdict(const Taking& taking) const {
 
 }  // namespace
 
-ExitCode take_pictures(const SnapRequest& request) {
+ExitCode capture_images(const SnapRequest& request) {
   Snap snap(request);
   (void)make_session_folder(request.out);
   return snap.run();

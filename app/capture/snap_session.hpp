@@ -22,6 +22,6 @@ struct SnapRequest {
 /// → done, not_usable (pictures are there and no good), device_failed (a camera sent nothing),
 ///   interrupted, terminated
 /// Errors  InputError: configuration, folder; DeviceError: devices that are not there.
-[[nodiscard]] ExitCode take_pictures(const SnapRequest& request);
+[[nodiscard]] ExitCode capture_images(const SnapRequest& request);
 
 }  // namespace vergence::app

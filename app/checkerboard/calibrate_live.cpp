@@ -10,7 +10,7 @@
 
 #include "app/calibration/board_detector.hpp"
 #include "app/calibration/view_collector.hpp"
-#include "app/capture/taking.hpp"
+#include "app/capture/capture_result.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
 #include "app/datasets/image_writer.hpp"
 #include "app/devices/drive_devices.hpp"
@@ -25,15 +25,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const char* phrase(OfferVerdict verdict) {
+const char* phrase(OfferResult verdict) {
   switch (verdict) {
-    case OfferVerdict::taken:
+    case OfferResult::taken:
       return "taken";
-    case OfferVerdict::not_seen:
+    case OfferResult::not_seen:
       return "board not seen by both";
-    case OfferVerdict::moving:
+    case OfferResult::moving:
       return "hold it still";
-    case OfferVerdict::nothing_new:
+    case OfferResult::nothing_new:
       return "seen that";
   }
   return "";
@@ -104,10 +104,10 @@ class Collection {
   }
 
   void note(const DeviceEvent& event) {
-    const bool gone = event.kind == DeviceEvent::Kind::camera_gone;
-    if (!gone && event.kind != DeviceEvent::Kind::camera_back) return;
+    const bool gone = event.kind == DeviceEvent::Kind::camera_disconnected;
+    if (!gone && event.kind != DeviceEvent::Kind::camera_reconnected) return;
     const std::lock_guard lock(mutex_);
-    sentences_.push_back(
+    messages_.push_back(
         fmt::format("camera {} is {}", event.camera, gone ? "gone; waiting for it" : "back"));
   }
 
@@ -120,8 +120,8 @@ class Collection {
           find_board(frame.images[at], request_.board, BoardSearch::quick, seen.corners[0]);
     }
     const std::size_t number = collector_.views().size();
-    const OfferVerdict verdict = collector_.offer(seen);
-    if (verdict == OfferVerdict::taken && request_.keep_views) keep(frame, number);
+    const OfferResult verdict = collector_.offer(seen);
+    if (verdict == OfferResult::taken && request_.keep_views) keep(frame, number);
     const auto needs = collector_.coverage().needs();
     complete_ = needs.empty();
     const std::lock_guard lock(mutex_);
@@ -144,14 +144,14 @@ class Collection {
       } catch (const InputError&) {  // said below
       }
       const std::lock_guard lock(mutex_);
-      sentences_.push_back(file.string() + ": cannot be written; the view is used all the same");
+      messages_.push_back(file.string() + ": cannot be written; the view is used all the same");
     }
   }
 
   /// Under the lock.
   void show_progress(Progress* progress) {
-    for (const std::string& sentence : sentences_) progress->say("vergence: " + sentence);
-    sentences_.clear();
+    for (const std::string& message : messages_) progress->say("vergence: " + message);
+    messages_.clear();
     ProgressState state;
     state.state = "calibrate";
     state.frame = sets_;
@@ -171,7 +171,7 @@ class Collection {
   bool done_ = false;
   std::uint64_t sets_ = 0;
   std::string words_ = "waiting for images";
-  std::vector<std::string> sentences_;
+  std::vector<std::string> messages_;
 };
 
 CalibratedRig rig_of(const Configuration& c, const DriveDevices& devices) {
@@ -196,7 +196,7 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   const Configuration c = capture_configuration(configuration);
   DriveDevices devices(c, {}, false, std::nullopt);
   Progress progress = Progress::on_stderr(request.quiet);
-  for (const std::string& sentence : devices.remarks()) progress.say("vergence: " + sentence);
+  for (const std::string& message : devices.remarks()) progress.say("vergence: " + message);
   const CalibratedRig rig = rig_of(c, devices);
   Acquisition::Options options = devices.acquisition_options();
   options.tie_host = monotonic_now();

@@ -43,7 +43,7 @@ void remark(const CalibrationFile& file, Progress* progress) {
     if (const double differ = std::abs(lens.fx / lens.fy - 1); differ > kSquarePixels)
       progress->say(fmt::format(
           "vergence: {}: fx and fy differ by {:.1f} %, pixels of cameras are square: look whether "
-          "--board has its corners the "
+          "--checkerboard has its corners the "
           "right way round "
           "(9x6 or 6x9), whether images were stretched, and show the board tilted both ways",
           file.names[k], 100 * differ));
@@ -79,10 +79,10 @@ std::size_t distinct_views(const BoardCalibration& found) {
   return distinct.size();
 }
 
-/// Why the views say too little of the lenses: half a sentence; empty: they do not.
+/// Why the views say too little of the lenses: half a message; empty: they do not.
 std::string undetermined(const BoardCalibration& found) {
   constexpr std::size_t kFewest = 4;
-  constexpr double kMostSigma = 0.02;  // of the focal length
+  constexpr double kMaxSigma = 0.02;  // of the focal length
   if (const std::size_t distinct = distinct_views(found); distinct < kFewest)
     return fmt::format(
         "only {} of {} views show the board differently; {} are the least, better 15: move and "
@@ -91,13 +91,13 @@ std::string undetermined(const BoardCalibration& found) {
         distinct, found.views.size(), kFewest);
   for (std::size_t k = 0; k < static_cast<std::size_t>(found.rig.cameras); ++k) {
     const Intrinsics& lens = found.rig.intrinsics[k];
-    if (lens.sigma[0] > kMostSigma * lens.fx)
+    if (lens.sigma[0] > kMaxSigma * lens.fx)
       return fmt::format(
           "the views do not determine the lens of camera {}: the focal length {:.0f} px has a "
           "sigma "
           "of {:.0f} px ({:.1f} %, {:.0f} % are the most): tilt the board more, and show it nearer "
           "and farther",
-          k, lens.fx, lens.sigma[0], 100 * lens.sigma[0] / lens.fx, 100 * kMostSigma);
+          k, lens.fx, lens.sigma[0], 100 * lens.sigma[0] / lens.fx, 100 * kMaxSigma);
   }
   return "";
 }
@@ -169,7 +169,7 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
   std::cout << (request.json ? json_report(report).dump(1) + "\n" : format_report(report));
   remark(file, progress);
   if (file.rig.cameras > 1) {
-    progress->say("vergence: " + baseline_sentence(file.rig));
+    progress->say("vergence: " + baseline_message(file.rig));
     if (const std::string doubt = baseline_doubt(file.rig); !doubt.empty())
       progress->say("vergence: " + doubt);
   }
@@ -202,13 +202,13 @@ ExitCode calibrate_images(const CalibrateRequest& request,
         progress.update(state);
       });
   progress.finish();
-  for (const std::string& sentence : remarks) progress.say("vergence: " + sentence);
-  if (images.views.empty())  // a sentence a view would only hide the one that helps
+  for (const std::string& message : remarks) progress.say("vergence: " + message);
+  if (images.views.empty())  // a message a view would only hide the one that helps
     throw InputError(
         fmt::format("no view has the board of {}{}; {} ({})", request.board.words(),
                     patterns.size() > 1 ? " in two cameras" : "", how_to_count(request.board.kind),
                     images.remarks.empty() ? "there are no images" : images.remarks.front()));
-  for (const std::string& sentence : images.remarks) progress.say("vergence: " + sentence);
+  for (const std::string& message : images.remarks) progress.say("vergence: " + message);
   CalibratedRig rig;
   rig.sizes = images.sizes;
   return conclude_calibration(request, rig, images.views, &progress);

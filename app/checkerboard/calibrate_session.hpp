@@ -39,7 +39,7 @@ struct CalibratedRig {
   std::vector<ImageSize> sizes{};
 };
 
-/// Calibrates, prints the report on standard output and writes the file; sentences go through
+/// Calibrates, prints the report on standard output and writes the file; messages go through
 /// *progress. → done, not_usable
 [[nodiscard]] ExitCode conclude_calibration(const CalibrateRequest& request,
                                             const CalibratedRig& rig,

@@ -23,7 +23,8 @@ BoardPattern board_of(const CalibrateOptions& a) {
       (a.board.empty() ? 0 : 1) + (a.aprilgrid.empty() ? 0 : 1) + (a.charuco.empty() ? 0 : 1);
   if (boards == 0)
     throw InputError(
-        "--board is missing: the board's inner corners along and down, like 9x6; or --aprilgrid: "
+        "--checkerboard is missing: the board's inner corners along and down, like 9x6; or "
+        "--aprilgrid: "
         "its tags along and up, like 6x6; or --charuco: its squares along and down, like 11x8");
   if (boards > 1)
     throw InputError("--board, --aprilgrid and --charuco are different boards; give one");
@@ -71,8 +72,8 @@ ExitCode convert(const CalibrateOptions& a) {
           file.string() +
           ": is there already, and nothing is overwritten; add --force, or name another file");
   if (!a.size.empty()) r.size = parse_size(a.size);
-  for (const std::string& sentence : convert_calibration(r))
-    std::cerr << "vergence: " << sentence << '\n';
+  for (const std::string& message : convert_calibration(r))
+    std::cerr << "vergence: " << message << '\n';
   std::vector<std::string> written;
   for (const std::filesystem::path& file : files_written(r.out, format))
     written.push_back(file.string());

@@ -72,14 +72,15 @@ CLI::App* CalibrateOptions::declare(CLI::App& root) {
                    "--drive: lenses and length to begin with, instead of the data set's own")
       ->type_name("FILE");
   declare_image_topics(*command, &left_topic, &right_topic);
-  command->add_option("--board", board, "Inner corners along and down")->type_name("9x6");
+  command->add_option("--checkerboard", board, "Inner corners along and down")->type_name("9x6");
   command
-      ->add_option("--aprilgrid", aprilgrid,
-                   "Instead of --board: tags along and up, family 36h11, as Kalibr prints them")
+      ->add_option(
+          "--aprilgrid", aprilgrid,
+          "Instead of --checkerboard: tags along and up, family 36h11, as Kalibr prints them")
       ->type_name("6x6");
   command
       ->add_option("--charuco", charuco,
-                   "Instead of --board: squares along and down of a ChArUco board")
+                   "Instead of --checkerboard: squares along and down of a ChArUco board")
       ->type_name("11x8");
   command->add_option("--square", square, "Side of a square, or of a tag, m")->type_name("M");
   command->add_option("--marker", marker, "--charuco: side of a marker, m")->type_name("M");

@@ -17,8 +17,8 @@ void CommonOptions::declare(CLI::App& command) {
 }
 
 void declare_session_options(CLI::App& command, bool* memory, bool* page) {
-  command.add_flag("--memory", *memory, "Print what memory is held, by whom");
-  command.add_flag("--page", *page,
+  command.add_flag("--print-memory", *memory, "Print what memory is held, by whom");
+  command.add_flag("--live-page", *page,
                    "Show the session on a page in a browser: publish.http, 127.0.0.1:8080 unless "
                    "the configuration says otherwise");
 }

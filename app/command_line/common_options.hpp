@@ -27,7 +27,7 @@ struct CommonOptions {
                                             const std::vector<std::string>& before = {}) const;
 };
 
-/// Adds `--memory` and `--page`, the options of commands that write a session.
+/// Adds `--print-memory` and `--live-page`, the options of commands that write a session.
 void declare_session_options(CLI::App& command, bool* memory, bool* page);
 
 /// `--left-topic`, `--right-topic` of the commands that read a bag's images.

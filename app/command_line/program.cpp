@@ -21,10 +21,10 @@
 namespace vergence::app {
 namespace {
 
-/// One sentence on one line of stderr. Words of the user's may stand in it: nothing in them may
+/// One message on one line of stderr. Words of the user's may stand in it: nothing in them may
 /// steer a terminal.
-void print_error(const std::string& sentence) {
-  std::cerr << "vergence: " << harmless(sentence) << '\n';
+void print_error(const std::string& message) {
+  std::cerr << "vergence: " << harmless(message) << '\n';
 }
 
 std::vector<std::string> command_words(CLI::App& root) {
@@ -46,7 +46,7 @@ std::string help_hint(const CLI::App& command) {
   return "'vergence" + word + " --help' shows what is";
 }
 
-/// CLI11's errors about a command line, as one sentence.
+/// CLI11's errors about a command line, as one message.
 std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
   const auto given = root.get_subcommands();
   CLI::App& command = given.empty() ? root : *given.front();
@@ -113,11 +113,11 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
   return exit_code;
 }
 
-/// A thread's stack is as large as the limit says, and there is no sentence after an overflow.
+/// A thread's stack is as large as the limit says, and there is no message after an overflow.
 void check_stack() {
-  constexpr rlim_t kLeast = rlim_t{1} << 20;  // bytes; what is used is below half of it
+  constexpr rlim_t kMin = rlim_t{1} << 20;  // bytes; what is used is below half of it
   struct rlimit stack {};
-  if (::getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kLeast) return;
+  if (::getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kMin) return;
   throw InputError("the stack is limited to " + std::to_string(stack.rlim_cur >> 10U) +
                    " kB, and 1024 are needed: raise the limit (ulimit -s)");
 }

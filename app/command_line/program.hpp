@@ -13,7 +13,7 @@ using ProgramWords = std::span<const char* const>;
 /// Declares the commands of a program on `root`, as add_…() of app/commands/commands.hpp do.
 using AddCommands = void (*)(CLI::App& root, const ProgramWords& words, ExitCode* exit_code);
 
-/// A whole program: parses, runs one command, turns every exception into one sentence on stderr and
+/// A whole program: parses, runs one command, turns every exception into one message on stderr and
 /// an exit code.
 [[nodiscard]] ExitCode run_program(int argc, const char* const* argv,
                                    AddCommands add_commands) noexcept;

@@ -16,7 +16,7 @@ namespace {
 /// The words as given; checked when the command runs.
 struct EvaluateArguments {
   std::string estimate, reference;
-  bool json = false, estimate_mount = false;
+  bool json = false, estimate_ins_extrinsics = false;
   std::optional<std::string> lengths;  // m
   std::optional<int> step;
   std::string associate = "interpolate";
@@ -27,11 +27,11 @@ struct EvaluateArguments {
 };
 
 std::vector<double> parse_lengths(const std::string& text) {
-  constexpr std::size_t kMost = 1000;
-  std::vector<std::string_view> fields(kMost);
+  constexpr std::size_t kMax = 1000;
+  std::vector<std::string_view> fields(kMax);
   const std::size_t count = split(text, ',', fields);
-  if (count > kMost)
-    throw InputError("--lengths has more than " + std::to_string(kMost) + " lengths");
+  if (count > kMax)
+    throw InputError("--lengths has more than " + std::to_string(kMax) + " lengths");
   std::vector<double> lengths(count);
   for (std::size_t i = 0; i < count; ++i)
     if (!parse_number(fields[i], &lengths[i]) || !(lengths[i] > 0))
@@ -98,7 +98,7 @@ EvaluationRequest evaluate_request(const EvaluateArguments& a) {
   r.options = options_of(a);
   r.usual_lengths = !a.lengths;
   r.json = a.json;
-  r.estimate_mount = a.estimate_mount;
+  r.estimate_ins_extrinsics = a.estimate_ins_extrinsics;
   r.units = parse_pair<TimeUnit>("--time-unit", a.unit, "s, ms, us or ns", parse_time_unit);
   r.quaternions =
       parse_pair<QuaternionOrder>("--quaternion", a.quaternion, "xyzw or wxyz", parse_order);
@@ -150,7 +150,7 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
           "Order of the quaternion in ESTIMATE[,REFERENCE]: xyzw, wxyz [by the headings, or "
           "xyzw]")
       ->type_name("ORDER");
-  command->add_flag("--estimate-mount", a->estimate_mount,
+  command->add_flag("--estimate-ins-extrinsics", a->estimate_ins_extrinsics,
                     "Find how the two bodies sit to one another; compare at the estimate's. "
                     "Without REFERENCE: the session's own INS");
   command->callback([a, exit_code] { *exit_code = run_evaluation(evaluate_request(*a)); });

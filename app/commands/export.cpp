@@ -55,7 +55,7 @@ ExitCode run_export(const ExportArguments& a) {
     progress.update(state);
   });
   progress.finish();
-  for (const std::string& sentence : result.remarks) progress.say("vergence: " + sentence);
+  for (const std::string& message : result.remarks) progress.say("vergence: " + message);
   if (result.left_out > 0)
     progress.say(
         fmt::format("vergence: {} frames without both images were left out", result.left_out));

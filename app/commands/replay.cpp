@@ -25,7 +25,7 @@ struct ReplayArguments {
   bool from_scratch = false, calibrate_first = false, memory = false, page = false;
 };
 
-std::optional<KnownNumbers> known_numbers(const ReplayArguments& a) {
+std::optional<AssumedIntrinsics> known_numbers(const ReplayArguments& a) {
   if (!a.focal) return std::nullopt;
   if (a.calibration)
     throw InputError(
@@ -36,7 +36,7 @@ std::optional<KnownNumbers> known_numbers(const ReplayArguments& a) {
         "tell");
   if (!(*a.focal >= 10 && *a.focal <= 1e5))
     throw InputError("--focal is the focal length in pixels, 10 to 100000");
-  KnownNumbers known;
+  AssumedIntrinsics known;
   known.focal = *a.focal;
   known.baseline = *a.baseline;
   known.model = a.model == "equidistant" ? CameraModelKind::pinhole_equidistant

@@ -10,7 +10,7 @@ namespace {
 
 void make_report(const std::string& session) {
   const ReportOutcome outcome = write_report(session);
-  for (const std::string& sentence : outcome.missing) std::cerr << "vergence: " << sentence << '\n';
+  for (const std::string& message : outcome.missing) std::cerr << "vergence: " << message << '\n';
   std::cerr << outcome.headline << '\n';
   std::cout << outcome.page.string() << '\n';
 }

@@ -55,7 +55,7 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
       "Exit code: 0 done, 1 the pictures are no good (black, white, twice the same), 2 "
       "bad arguments,\n"
       "3 a camera is not there or sent nothing.");
-  command->callback([a, exit_code] { *exit_code = take_pictures(snap_request(*a)); });
+  command->callback([a, exit_code] { *exit_code = capture_images(snap_request(*a)); });
 }
 
 }  // namespace vergence::app

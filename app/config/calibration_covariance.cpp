@@ -210,10 +210,10 @@ constexpr double kNearRotation =
 constexpr double kShortestBaseline = 0.005, kLongestBaseline = 20;  // m: outside, the unit is wrong
 constexpr double kBaselineTolerance = 0.02;  // relative, beside four sigmas of the measured length
 
-using Finding = std::optional<Implausible>;
+using Finding = std::optional<ValidationError>;
 
-Finding finding(const std::string& field, const std::string& sentence) {
-  return Implausible{field, field + " " + sentence};
+Finding finding(const std::string& field, const std::string& message) {
+  return ValidationError{field, field + " " + message};
 }
 
 template <class Numbers>
@@ -355,7 +355,7 @@ Finding check_found(const RigCalibration& rig) {
 
 }  // namespace
 
-std::string baseline_sentence(const RigCalibration& rig) {
+std::string baseline_message(const RigCalibration& rig) {
   return fmt::format("the baseline is {:.4g} m", rig.T_camera_left[1].t.norm());
 }
 
@@ -369,7 +369,7 @@ std::string baseline_doubt(const RigCalibration& rig) {
       length < kUsuallyShortest ? "another" : "centimetres, millimetres or squares of a board");
 }
 
-std::optional<Implausible> find_implausible(RigCalibration* rig) {
+std::optional<ValidationError> find_implausible(RigCalibration* rig) {
   if (rig->cameras < 2 || rig->cameras > kMaxCameras)
     return finding("cameras",
                    fmt::format("lists {}; a rig has 2 to {}", rig->cameras, kMaxCameras));
@@ -380,8 +380,8 @@ std::optional<Implausible> find_implausible(RigCalibration* rig) {
     if (k == 0) continue;
     if (auto bad = check_transform(&rig->T_camera_left[i], camera + "T_camera_left")) return bad;
     if (auto bad = check_sigmas(rig->sigma_noise[i], camera + "sigma_noise")) return bad;
-    if (auto bad = check_sigmas(rig->sigma_wide[i], camera + "sigma_wide")) return bad;
-    if (auto bad = check_covariance(rig->covariance_wide[i], camera + "covariance_wide"))
+    if (auto bad = check_sigmas(rig->sigma_total[i], camera + "sigma_total")) return bad;
+    if (auto bad = check_covariance(rig->covariance_total[i], camera + "covariance_total"))
       return bad;
   }
   if (const auto flaw = find_flaw(rig->covariance)) return finding("covariance", *flaw);

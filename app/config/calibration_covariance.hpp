@@ -17,7 +17,7 @@ namespace vergence::app {
 /// Names, lens models and the number of cameras are read already. Errors  InputError.
 void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationFile* calibration);
 
-/// Half a sentence about why this cannot be a covariance: a number that is not finite, a negative
+/// Half a message about why this cannot be a covariance: a number that is not finite, a negative
 /// variance, or not positive semidefinite beyond what nine digits leave.
 [[nodiscard]] std::optional<std::string> find_flaw(const RigCovariance& covariance);
 

@@ -141,7 +141,7 @@ constexpr const char* kRadtan = "pinhole-radtan";
 constexpr const char* kEquidistant = "pinhole-equidistant";
 constexpr std::size_t kTriangle = 21;  // numbers in the upper triangle of a 6×6 matrix
 
-/// One group of the file: its node, its name in sentences, its fields by name.
+/// One group of the file: its node, its name in messages, its fields by name.
 class Section {
  public:
   Section(const YamlFile& file, const YAML::Node& node, std::string name,
@@ -192,7 +192,7 @@ class Section {
   std::string name_;
 };
 
-std::size_t most_coefficients(const Intrinsics& k) {
+std::size_t max_coefficients(const Intrinsics& k) {
   return k.kind == CameraModelKind::pinhole_radtan ? 5 : 4;
 }
 
@@ -217,12 +217,12 @@ Intrinsics read_intrinsics(const YamlFile& file, const Section& camera) {
   const auto f = camera.numbers("intrinsics", 4, 4);
   k.fx = f[0], k.fy = f[1], k.cx = f[2], k.cy = f[3];
   if (camera.gives("distortion")) {
-    const auto d = camera.numbers("distortion", 4, most_coefficients(k));
+    const auto d = camera.numbers("distortion", 4, max_coefficients(k));
     std::copy(d.begin(), d.end(), k.distortion.begin());
   }
   camera.optional_numbers("intrinsics_sigma", &k.sigma);
   if (camera.has("distortion_sigma")) {
-    const auto sigma = camera.numbers("distortion_sigma", 4, most_coefficients(k));
+    const auto sigma = camera.numbers("distortion_sigma", 4, max_coefficients(k));
     std::copy(sigma.begin(), sigma.end(), k.distortion_sigma.begin());
   }
   return k;
@@ -238,8 +238,8 @@ Transform read_transform(const Section& camera) {
 
 Mat6 read_wide_covariance(const Section& camera) {
   Mat6 covariance = Mat6::Zero();
-  if (!camera.has("covariance_wide")) return covariance;
-  const auto n = camera.numbers("covariance_wide", kTriangle, kTriangle);
+  if (!camera.has("covariance_total")) return covariance;
+  const auto n = camera.numbers("covariance_total", kTriangle, kTriangle);
   auto next = n.begin();
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j) covariance(i, j) = covariance(j, i) = *next++;
@@ -250,7 +250,7 @@ Mat6 read_wide_covariance(const Section& camera) {
 void refuse_other_transforms(const YamlFile& file, const YAML::Node& node,
                              const std::string& camera) {
   struct Other {
-    const char *key, *sentence;
+    const char *key, *message;
   };
   constexpr std::array kOthers{
       Other{"T_left_camera",
@@ -270,7 +270,7 @@ void refuse_other_transforms(const YamlFile& file, const YAML::Node& node,
   if (!node.IsMap()) return;
   for (const Other& other : kOthers)
     if (const YAML::Node given = node[other.key])
-      file.fail(given, camera + "." + other.key + " " + other.sentence);
+      file.fail(given, camera + "." + other.key + " " + other.message);
 }
 
 void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
@@ -284,7 +284,7 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
                                  "intrinsics_sigma",
                                  "distortion_sigma"};
   if (k > 0)
-    known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_wide", "covariance_wide"});
+    known.insert(known.end(), {"T_camera_left", "sigma_noise", "sigma_total", "covariance_total"});
   refuse_other_transforms(file, node, fmt::format("cameras.{}", k));
   const Section camera(file, node, fmt::format("cameras.{}", k), known);
   RigCalibration& rig = calibration->rig;
@@ -298,8 +298,8 @@ void read_camera(const YamlFile& file, const YAML::Node& node, std::size_t k,
                         "enough there");
   rig.T_camera_left[k] = read_transform(camera);
   camera.optional_numbers("sigma_noise", &rig.sigma_noise[k]);
-  camera.optional_numbers("sigma_wide", &rig.sigma_wide[k]);
-  rig.covariance_wide[k] = read_wide_covariance(camera);
+  camera.optional_numbers("sigma_total", &rig.sigma_total[k]);
+  rig.covariance_total[k] = read_wide_covariance(camera);
 }
 
 void read_found(const YamlFile& file, const YAML::Node& node, CalibrationFile* calibration) {
@@ -368,7 +368,7 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
               "with --baseline M");
   apply_use(use, &rig);
   if (const auto bad = find_implausible(&rig))
-    file.fail(locate(file.root(), bad->field), bad->sentence);
+    file.fail(locate(file.root(), bad->field), bad->message);
   return calibration;
 }
 
@@ -424,12 +424,12 @@ std::string format_extrinsics(const RigCalibration& rig, std::size_t k) {
       "    T_camera_left: " + list(numbers) + "  # X_camera = R X_left + t, rows of [R t], m\n";
   if (any(rig.sigma_noise[k]))
     text += "    sigma_noise: " + list(rig.sigma_noise[k]) + "  # rad, m\n";
-  if (any(rig.sigma_wide[k])) text += "    sigma_wide: " + list(rig.sigma_wide[k]) + "\n";
-  if (!rig.covariance_wide[k].isZero(0)) {
+  if (any(rig.sigma_total[k])) text += "    sigma_total: " + list(rig.sigma_total[k]) + "\n";
+  if (!rig.covariance_total[k].isZero(0)) {
     std::vector<double> triangle;
     for (int i = 0; i < 6; ++i)
-      for (int j = i; j < 6; ++j) triangle.push_back(rig.covariance_wide[k](i, j));
-    text += "    covariance_wide: " + list(triangle) + "\n";
+      for (int j = i; j < 6; ++j) triangle.push_back(rig.covariance_total[k](i, j));
+    text += "    covariance_total: " + list(triangle) + "\n";
   }
   return text;
 }
@@ -457,9 +457,9 @@ void apply_use(const CalibrationUse& use, RigCalibration* rig) {
     for (std::size_t k = 1; k < static_cast<std::size_t>(rig->cameras); ++k) {
       rig->T_camera_left[k].t *= factor;
       for (std::size_t i = 3; i < 6; ++i)
-        rig->sigma_noise[k][i] *= factor, rig->sigma_wide[k][i] *= factor;
-      rig->covariance_wide[k].rightCols<3>() *= factor;
-      rig->covariance_wide[k].bottomRows<3>() *= factor;
+        rig->sigma_noise[k][i] *= factor, rig->sigma_total[k][i] *= factor;
+      rig->covariance_total[k].rightCols<3>() *= factor;
+      rig->covariance_total[k].bottomRows<3>() *= factor;
     }
     scale_lengths(factor, &rig->covariance);
     rig->baseline = use.baseline;
@@ -467,8 +467,8 @@ void apply_use(const CalibrationUse& use, RigCalibration* rig) {
   if (!use.length_only) return;
   make_parallel(rig);
   for (auto& sigmas : rig->sigma_noise) sigmas.fill(0);
-  for (auto& sigmas : rig->sigma_wide) sigmas.fill(0);
-  for (Mat6& covariance : rig->covariance_wide) covariance.setZero();
+  for (auto& sigmas : rig->sigma_total) sigmas.fill(0);
+  for (Mat6& covariance : rig->covariance_total) covariance.setZero();
   clear_places(&rig->covariance);
   rig->found = Stamp();
   rig->frames = 0;

@@ -37,7 +37,7 @@ struct ConfiguredRig {
 /// Errors  InputError with file:line.
 [[nodiscard]] ConfiguredRig read_configured(const YamlFile& file, const YAML::Node& node);
 
-/// The first thing that the configuration says otherwise now, as the end of a sentence; empty:
+/// The first thing that the configuration says otherwise now, as the end of a message; empty:
 /// nothing.
 [[nodiscard]] std::string find_change(const ConfiguredRig& then, const ConfiguredRig& now);
 
@@ -59,10 +59,10 @@ struct CalibrationUse {
 };
 
 /// What is wrong with a calibration: the field as it stands in calibration.yaml
-/// (`cameras.1.T_camera_left`) and half a sentence that begins with it.
-struct Implausible {
+/// (`cameras.1.T_camera_left`) and half a message that begins with it.
+struct ValidationError {
   std::string field;
-  std::string sentence;
+  std::string message;
 };
 
 /// Looks whether a rig can be real: sizes, focal lengths, principal points, distortion, rotations,
@@ -70,12 +70,12 @@ struct Implausible {
 /// is well.
 ///
 /// For calibrations from other files (data sets): `if (auto bad = find_implausible(rig)) throw
-/// InputError(file + ": " + bad->sentence);` A rotation off by 1e-6 to 1e-3 (largest entry of RᵀR −
+/// InputError(file + ": " + bad->message);` A rotation off by 1e-6 to 1e-3 (largest entry of RᵀR −
 /// I) is replaced by the nearest one; beyond, it is reported.
-[[nodiscard]] std::optional<Implausible> find_implausible(RigCalibration* rig);
+[[nodiscard]] std::optional<ValidationError> find_implausible(RigCalibration* rig);
 
 /// "the baseline is 0.1101 m", for people who know their rig.
-[[nodiscard]] std::string baseline_sentence(const RigCalibration& rig);
+[[nodiscard]] std::string baseline_message(const RigCalibration& rig);
 /// Asks for the unit of a length above 2 m or below 2 cm, which few rigs have; empty: it is usual.
 [[nodiscard]] std::string baseline_doubt(const RigCalibration& rig);
 

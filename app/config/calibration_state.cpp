@@ -97,18 +97,18 @@ CalibrationState read_state(const std::filesystem::path& file, const Calibration
   std::error_code error;
   if (!std::filesystem::exists(file, error)) {
     if (error)
-      state.sentence = file.string() + ": cannot be looked at (" + error.message() +
-                       "); the drive begins without it";
+      state.message = file.string() + ": cannot be looked at (" + error.message() +
+                      "); the drive begins without it";
     return state;
   }
   try {
     CalibrationFile found = read_calibration(file);
     if (const std::string why = mismatch(found, expected); !why.empty())
-      state.sentence = file.string() + ": is not used: " + why;
+      state.message = file.string() + ": is not used: " + why;
     else
       state.calibration = std::move(found);
   } catch (const InputError& e) {
-    state.sentence = std::string(e.what()) + "; the drive begins without it";
+    state.message = std::string(e.what()) + "; the drive begins without it";
   }
   return state;
 }

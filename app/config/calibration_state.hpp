@@ -23,7 +23,7 @@ inline constexpr double kOtherLength = 0.02;
 struct CalibrationState {
   std::optional<CalibrationFile> calibration{};  // fits the rig that is there
   std::string
-      sentence{};  // why a file that is there is not used; empty: none is there, or it is used
+      message{};  // why a file that is there is not used; empty: none is there, or it is used
 };
 
 /// Reads the file if there is one. It is used for the rig it was found on: as many cameras of the
@@ -32,7 +32,7 @@ struct CalibrationState {
 /// than kOtherLength. A file without what the configuration said, of an older release: the same
 /// lens models, the same measured length of the baseline (to a thousandth), and a camera may bear
 /// the configuration's `serial`.
-/// Errors  None: a sentence.
+/// Errors  None: a message.
 [[nodiscard]] CalibrationState read_state(const std::filesystem::path& file,
                                           const CalibrationFile& expected);
 

@@ -22,7 +22,7 @@ namespace vergence::app {
 namespace {
 
 // A configuration is a tree of a few dozen leaves; aliases could unfold a small file into billions.
-constexpr std::size_t kMostEntries = 10'000;
+constexpr std::size_t kMaxEntries = 10'000;
 constexpr int kDeepest = 8;
 
 /// One value somebody gave: a leaf of the YAML tree, list items by number.
@@ -30,7 +30,7 @@ struct Entry {
   std::string name;    // cameras.0.serial
   std::string value;   // the scalar's text
   bool scalar = true;  // false: an empty group or list
-  std::string origin;  // for the sentence: file:line, or the --set argument
+  std::string origin;  // for the message: file:line, or the --set argument
 };
 
 /// Unfolds YAML trees into entries.
@@ -45,7 +45,7 @@ class Flattener {
     const std::string here = origin.empty() ? file.at(node) : origin;
     if (depth > kDeepest)
       throw InputError(here + ": \"" + name.substr(0, 60) + "\" is nested too deeply; no key is");
-    if (entries_->size() >= kMostEntries)
+    if (entries_->size() >= kMaxEntries)
       throw InputError(here + ": more values than any configuration has; is it the right file?");
     if (node.IsMap() && node.size() > 0) {
       for (const auto& item : node) {
@@ -142,7 +142,7 @@ std::string suggestion(const std::string& name) {
                    (why.empty() ? suggestion(entry.name) : why));
 }
 
-/// The rest of a sentence "it must be …".
+/// The rest of a message "it must be …".
 std::string allowed(const Key& key) {
   const std::string range = range_text(key);
   return range.rfind("from ", 0) == 0 ? range + " on" : "in " + range;
@@ -331,8 +331,8 @@ Configuration from_entries(const std::vector<Entry>& given, const std::string& n
   for (const Entry& entry : entries)
     if (std::string option; !camera_of_options(entry, &option)) apply(entry, &configuration);
   apply_camera_options(entries, &configuration);
-  if (const std::string sentence = find_contradiction(configuration); !sentence.empty())
-    throw InputError(name + ": " + sentence);
+  if (const std::string message = find_contradiction(configuration); !message.empty())
+    throw InputError(name + ": " + message);
   return configuration;
 }
 
@@ -378,7 +378,7 @@ std::string configuration_hash(const Configuration& configuration) {
 
 namespace {
 
-constexpr std::size_t kShown = 60;  // bytes of a text from outside in a sentence
+constexpr std::size_t kShown = 60;  // bytes of a text from outside in a message
 
 std::string no_such_option(const std::string& name, const CameraSettings& camera) {
   std::vector<std::string> names;

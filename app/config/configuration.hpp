@@ -32,12 +32,12 @@ struct RigSettings {
 };
 
 /// Which part of a camera's picture an entry of `cameras:` is.
-enum class PictureHalf : std::uint8_t { whole, left, right };
+enum class ImageHalf : std::uint8_t { whole, left, right };
 
 /// One entry of `cameras:`. Without a driver there is no such camera.
 struct CameraSettings {
   std::string name{}, driver{}, serial{};
-  PictureHalf half = PictureHalf::whole;
+  ImageHalf half = ImageHalf::whole;
   int width = 640, height = 480;   // px, of this entry's image
   int offset_x = 0, offset_y = 0;  // px, of the region on the sensor
   std::string pixel_format{};
@@ -80,7 +80,7 @@ struct TriggerSettings {
   std::string port{};  // empty: the only board there is
   int baud = 0;        // 0: found by asking
   double rate = 20;    // Hz
-  double width_us = 200, vary_us = 0;
+  double width_us = 200, dither_us = 0;
   int lines = 0;  // masks, bit k for line k; 0: one line for each camera
   int active_low = 0, feedback = 0, feedback_active_low = 0;
   trigger_board::Edge pps = trigger_board::Edge::none;  // of the GNSS receiver's pulse
@@ -88,13 +88,13 @@ struct TriggerSettings {
 };
 
 struct SyncSettings {
-  SyncMode mode = SyncMode::counter;
-  double hold_ms = 100;
+  SyncMode mode = SyncMode::frame_counter;
+  double timeout_ms = 100;
   double tolerance_ms = 2;
 };
 
 struct ComparisonSettings {
-  double placement_m = 100;
+  double alignment_distance_m = 100;
   double correlation_s = 10;
   double heading_sigma_deg = 0;
   double max_gap_ms = 100;
@@ -142,17 +142,17 @@ struct MockSettings {
 /// `record:` what goes into drive.mcap of a session (docs/recording.md).
 struct RecordSettings {
   int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
-  double keep_s = 0;                               // 0: everything
-  int roll_mb = 0;                                 // 0: one file
+  double event_window_s = 0;                       // 0: everything
+  int split_mb = 0;                                // 0: one file
 
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
 };
 
 /// `publish:` what others see of a running session (docs/publish.md). Empty: nothing.
 struct PublishSettings {
-  std::string lines{};       // unix:///PATH, udp://HOST:PORT
-  std::string http{};        // HOST:PORT of the live page
-  std::string token_file{};  // its first line; empty: a new token each session
+  std::string pose_stream{};  // unix:///PATH, udp://HOST:PORT
+  std::string http{};         // HOST:PORT of the live page
+  std::string token_file{};   // its first line; empty: a new token each session
   int viewers = 4;
 };
 
@@ -170,7 +170,7 @@ struct RealtimeSettings {
   double frame_budget_ms = 0;  // of a live drive; 0: its frame interval
 };
 
-inline constexpr std::size_t kMostFaults = 16;
+inline constexpr std::size_t kMaxFaults = 16;
 
 /// Everything a user may change, with its defaults. Each member is bound to a row of the schema
 /// (app/config/schema.hpp), which is where its unit, range and meaning stand.
@@ -188,7 +188,7 @@ struct Configuration {
   PublishSettings publish{};
   SessionsSettings sessions{};
   RealtimeSettings realtime{};
-  std::array<std::string, kMostFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
+  std::array<std::string, kMaxFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
   int preset = 0;  // odometry.preset: 1: small, what other keys are that nobody gave
   OdometryOptions odometry{};
   calibration::CalibrationOptions calibration{};
@@ -221,7 +221,7 @@ struct Configuration {
 /// however they were written.
 [[nodiscard]] std::string configuration_hash(const Configuration& configuration);
 
-/// One option. Empty: done, or the driver has no options; else half a sentence about what is wrong.
+/// One option. Empty: done, or the driver has no options; else half a message about what is wrong.
 [[nodiscard]] std::string set_camera_option(const std::string& name, const std::string& value,
                                             CameraSettings* camera);
 

@@ -205,9 +205,9 @@ Group record() {
               "All images that the estimator was given, with their cameras: what `replay --format "
               "session` needs.")
       .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
-      .number("keep_s", &R::keep_s, 0, 3600, "s",
+      .number("event_window_s", &R::event_window_s, 0, 3600, "s",
               "0: everything; else only what was so long before an event and so long after it.")
-      .integer("roll_mb", &R::roll_mb, 0, 10'000'000, "MB",
+      .integer("split_mb", &R::split_mb, 0, 10'000'000, "MB",
                "Size at which a file ends and the next one begins; 0: one file.")
       .done();
 }
@@ -217,7 +217,7 @@ Group publish() {
   return Rows<P>(
              "publish", "What others see of a running session, live or replayed (docs/publish.md).",
              [](auto& c) -> auto& { return c.publish; })
-      .text("lines", &P::lines, 200,
+      .text("pose_stream", &P::pose_stream, 200,
             "One JSON object a frame goes there: `unix:///PATH` (a stream socket that readers "
             "connect to) or `udp://HOST:PORT`; empty: nowhere.")
       .text("http", &P::http, 200,
@@ -272,9 +272,9 @@ std::vector<std::pair<std::string, trigger_board::Edge>> edges() {
 
 std::vector<std::pair<std::string, SyncMode>> sync_modes() {
   std::vector<std::pair<std::string, SyncMode>> modes;
-  for (const SyncMode mode :
-       {SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe, SyncMode::bus,
-        SyncMode::ptp, SyncMode::one_picture, SyncMode::counter, SyncMode::software})
+  for (const SyncMode mode : {SyncMode::board, SyncMode::ins_syncout, SyncMode::master_strobe,
+                              SyncMode::ieee1394_cycle_time, SyncMode::ptp, SyncMode::side_by_side,
+                              SyncMode::frame_counter, SyncMode::approximate_time})
     modes.emplace_back(to_string(mode), mode);
   return modes;
 }
@@ -314,11 +314,11 @@ Group cameras() {
             .text("name", &C::name, 32, "How it is called in messages and in calibration.yaml.")
             .text("serial", &C::serial, 64,
                   "Which one, where there are several; empty: the next one. GigE: or its address.")
-            .choice<PictureHalf>(
-                "half", &C::half,
-                {{"whole", PictureHalf::whole},
-                 {"left", PictureHalf::left},
-                 {"right", PictureHalf::right}},
+            .choice<ImageHalf>(
+                "image_half", &C::half,
+                {{"whole", ImageHalf::whole},
+                 {"left", ImageHalf::left},
+                 {"right", ImageHalf::right}},
                 "Of a camera that gives both images side by side in one picture: which one this "
                 "is. Two entries with one `serial` then are one camera of twice the `size.0`.")
             .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
@@ -351,7 +351,7 @@ Group cameras() {
             .number("stamp_jitter_us", &C::stamp_jitter_us, 0, 5000, "µs",
                     "By how much its stamps may be off the pulses; 0: what this driver's stamps "
                     "have (20, of a camera that only the host "
-                    "stamps 1000). With more than half of `trigger.vary_us` only a pause proves "
+                    "stamps 1000). With more than half of `trigger.dither_us` only a pause proves "
                     "the pairing.")
             .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
             .text("mask", &C::mask, 400,
@@ -439,7 +439,7 @@ Group trigger() {
       .number("rate", &T::rate, 1, 200, "Hz", "Pulses, and so images of every camera, a second.")
       .number("width_us", &T::width_us, 1, 100000, "µs",
               "Length of a pulse; what the cameras' inputs need.")
-      .number("vary_us", &T::vary_us, 0, 20000, "µs",
+      .number("dither_us", &T::dither_us, 0, 20000, "µs",
               "Every interval is longer or shorter by this, in an order that does not repeat: the "
               "cameras' own stamps then prove at any time "
               "which frame is of which pulse. 0: even intervals, a pause proves it.")
@@ -472,15 +472,16 @@ Group sync() {
           "trigger board's pulses; `ins_syncout`, by "
           "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE "
           "1394 cycle timer; `ptp`, stamps of one PTP "
-          "clock; `one_picture`, both images come in one (`cameras.N.half`). Not proven: "
+          "clock; `side_by_side`, both images come in one (`cameras.N.image_half`). Not verified: "
           "`counter`, exposure n of every camera belongs together; "
           "`software`, what was exposed within "
           "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
-      .number("hold_ms", &S::hold_ms, 1, 10000, "ms",
+      .number("timeout_ms", &S::timeout_ms, 1, 10000, "ms",
               "How long the images of a pulse wait for one that is late.")
-      .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
-              "With `software`, `bus`, `ptp` and `one_picture`: the farthest that exposures of one "
-              "set are apart.")
+      .number(
+          "tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
+          "With `software`, `bus`, `ptp` and `side_by_side`: the farthest that exposures of one "
+          "set are apart.")
       .done();
 }
 
@@ -523,7 +524,7 @@ Group comparison() {
   return Rows<C>(
              "comparison", "The comparison with the INS.",
              [](auto& c) -> auto& { return c.comparison; })
-      .number("placement_m", &C::placement_m, 1, 100000, "m",
+      .number("alignment_distance_m", &C::alignment_distance_m, 1, 100000, "m",
               "Distance driven with a valid fix after which the path is placed on the earth.")
       .number("correlation_s", &C::correlation_s, 0.1, 3600, "s",
               "For so long the INS's position errors resemble one another.")
@@ -555,7 +556,7 @@ Group odometry() {
                "Points tracked in each image: more of them cost time and hold the pose better "
                "where texture is poor. They are spread "
                "over a grid of cells of the size that this number asks for.")
-      .choice("first_pair", &O::first_pair, {"corners", "surf"},
+      .choice("init_features", &O::init_features, {"corners", "surf"},
               "What is matched across the first images of a rig that is calibrated from scratch: "
               "the corners that are tracked anyway, or "
               "SURF-64; docs/front_ends.md compares them.")
@@ -575,7 +576,7 @@ Group odometry() {
               "Residuals beyond this count less and less (Huber's weight).")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
                "Keyframes that are adjusted together with their points.")
-      .number("rig_turn_sigma", &O::rig_turn_sigma, 0, 0.05, "rad",
+      .number("extrinsic_rotation_sigma_rad", &O::extrinsic_rotation_sigma_rad, 0, 0.05, "rad",
               "What the turn between two cameras that shifts all disparities alike may be off by, "
               "where their calibration does not say less: "
               "it is estimated with every window. 0: the calibration is held as exact.")
@@ -660,20 +661,21 @@ Group calibration_options() {
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
               "The same of the rotation; the first calibration of a drive from scratch is asked "
               "for its direction only.")
-      .number("needs_motion_m", &C::needs_motion_m, 0.01, 1000, "m",
+      .number("min_path_m", &C::min_path_m, 0.01, 1000, "m",
               "Way within the frames gathered (or three baselines) below which the reason is "
               "`needs_motion`.")
-      .integer("needs_near_points", &C::needs_near_points, 0, 1000, "points",
+      .integer("min_near_points", &C::min_near_points, 0, 1000, "points",
                "Near points among those gathered below which the reason is `needs_near_structure`.")
       .number("near_baselines", &C::near_baselines, 5, 500, "baselines",
               "Nearer than this a point is near.")
-      .number("drift_mrad", &C::drift_mrad, 0, 100, "mrad/√h",
+      .number("extrinsic_random_walk_mrad_per_sqrt_h", &C::extrinsic_random_walk_mrad_per_sqrt_h, 0,
+              100, "mrad/√h",
               "How far a rig that nobody touches wanders in an hour, as a random walk: what is "
               "known of it grows old by this.")
-      .number("tolerated_depth_percent", &C::tolerated_depth_percent, 0.1, 50, "%",
+      .number("max_depth_error_percent", &C::max_depth_error_percent, 0.1, 50, "%",
               "Depth error up to which the drive has confirmed a calibration; until then poses are "
               "`degraded: unverified_calibration`.")
-      .number("tolerated_depth_m", &C::tolerated_depth_m, 0.5, 500, "m",
+      .number("reference_depth_m", &C::reference_depth_m, 0.5, 500, "m",
               "The depth at which that is asked; on a short baseline nearer, where a single match "
               "is no better than that.")
       .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
@@ -699,10 +701,10 @@ Group monitor() {
       .number("bias_px", &M::bias_px, 0, 1, "px",
               "Slow error that imperfect intrinsics leave in the matches across and that is no "
               "knock, at least.")
-      .number("found_bias_px", &M::found_bias_px, 0, 2, "px",
+      .number("verified_bias_px", &M::verified_bias_px, 0, 2, "px",
               "The same with a calibration that was found from images and is confirmed, expected "
               "until the monitor has measured it.")
-      .number("claimed_bias_px", &M::claimed_bias_px, 0, 5, "px",
+      .number("unverified_bias_px", &M::unverified_bias_px, 0, 5, "px",
               "The same with a calibration that is given.")
       .integer("min_matches", &M::min_matches, 12, 1000, "matches",
                "A frame with fewer matches across measures nothing.")
@@ -802,7 +804,7 @@ Group faults() {
   group.list = "faults.";
   group.meaning =
       "What goes wrong in the mock, a list; docs/mock.md has the kinds and their parameters.";
-  for (std::size_t i = 0; i < kMostFaults; ++i)
+  for (std::size_t i = 0; i < kMaxFaults; ++i)
     group.keys.push_back(
         {"faults." + std::to_string(i), KeyType::text, "", 0, 200,
          "`KIND@SECONDS NAME=NUMBER …`, or the same as a group: `{at: 42, kind: knock, camera: 1, "
@@ -918,7 +920,7 @@ vergence replay DATA --format folder --out session --set odometry.features=400 -
 `--threads N` and `--seed N` are short for `--set threads=N` and `--set odometry.seed=N`.
 
 A key that does not exist is an error that names the nearest one that does; so is a value of the wrong type or outside its range,
-a key that is given twice, and two keys that contradict each other. The sentence names the file and the line; the program exits with 2.
+a key that is given twice, and two keys that contradict each other. The message names the file and the line; the program exits with 2.
 
 Units stand in the column `unit`; pixels are those of the image as it was taken. `summary.json` of a session holds `configuration_hash`, equal for
 equal values of all keys however they were written.

@@ -21,7 +21,7 @@ struct Key {
   KeyType type = KeyType::integer;
   std::string unit;            // empty: none
   double least = 0, most = 0;  // both allowed; of a text: its length in bytes
-  std::string meaning;         // one sentence for a person who has never seen the key
+  std::string meaning;         // one message for a person who has never seen the key
   std::function<void(Configuration&, const KeyValue&)> set;
   std::function<KeyValue(const Configuration&)> get;
   std::vector<std::string> words{};  // of a text that is one of a few; empty: any
@@ -42,7 +42,7 @@ struct Group {
 [[nodiscard]] const std::vector<Group>& schema();
 
 /// What no single row can say (two keys that contradict each other, one that would be read by
-/// nobody): the sentence, empty when all is well.
+/// nobody): the message, empty when all is well.
 [[nodiscard]] std::string find_contradiction(const Configuration& configuration);
 
 /// The shortest text that reads back as the same value.

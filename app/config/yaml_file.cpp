@@ -41,7 +41,7 @@ std::string contents(const std::filesystem::path& path) {
   return text;
 }
 
-/// A scalar as it may stand in a sentence.
+/// A scalar as it may stand in a message.
 std::string shown(const std::string& scalar) {
   constexpr std::size_t kShown = 60;  // bytes: enough to recognise it
   return scalar.size() <= kShown ? scalar : fmt::format("{}…", scalar.substr(0, kShown));
@@ -120,8 +120,8 @@ std::string YamlFile::at(const YAML::Node& node) const {
   return mark.is_null() ? name_ : name_ + ":" + std::to_string(mark.line + 1);
 }
 
-void YamlFile::fail(const YAML::Node& node, const std::string& sentence) const {
-  throw InputError(at(node) + ": " + sentence);
+void YamlFile::fail(const YAML::Node& node, const std::string& message) const {
+  throw InputError(at(node) + ": " + message);
 }
 
 void YamlFile::check_keys(const YAML::Node& map, const std::string& what,
@@ -143,7 +143,7 @@ void YamlFile::check_keys(const YAML::Node& map, const std::string& what,
 double YamlFile::number(const YAML::Node& node, const std::string& field) const {
   double value = 0;
   if (!node.IsScalar() || !parse_whole(node.Scalar(), &value)) {
-    // What YAML calls .nan and .inf is a number to the writer, so the sentence says what is wrong
+    // What YAML calls .nan and .inf is a number to the writer, so the message says what is wrong
     // with it.
     double special = 0;
     if (node.IsScalar() && YAML::convert<double>::decode(node, special) && !std::isfinite(special))

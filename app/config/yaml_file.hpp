@@ -9,7 +9,7 @@
 
 namespace vergence::app {
 
-/// One YAML document from outside, and the sentences about it.
+/// One YAML document from outside, and the messages about it.
 ///
 /// Errors  InputError with file:line: not readable, larger than kLargestYaml, not YAML, more than
 ///         one document.
@@ -24,15 +24,15 @@ class YamlFile {
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   /// `file:line` of a node, lines from 1; the file alone where the node has no place.
   [[nodiscard]] std::string at(const YAML::Node& node) const;
-  /// Throws InputError: `file:line: sentence`.
-  [[noreturn]] void fail(const YAML::Node& node, const std::string& sentence) const;
+  /// Throws InputError: `file:line: message`.
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& message) const;
 
   /// Refuses what is no map, a key that is given twice and a key that is not known, naming the
   /// nearest known one. `what` says whose keys they are: `camera 1`.
   void check_keys(const YAML::Node& map, const std::string& what,
                   const std::vector<std::string>& known) const;
 
-  // The value of a node; `field` names it in the sentence when it is no such thing.
+  // The value of a node; `field` names it in the message when it is no such thing.
   [[nodiscard]] double number(const YAML::Node& node, const std::string& field) const;  // finite
   [[nodiscard]] std::int64_t integer(const YAML::Node& node, const std::string& field,
                                      std::int64_t least, std::int64_t most) const;

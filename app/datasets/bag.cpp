@@ -178,7 +178,7 @@ std::vector<std::array<std::size_t, 2>> pair_images(
   constexpr double kHalf = 0.5;  // of the interval
   const std::array stamps{stamps_of(images[0]), stamps_of(images[1])};
   const Duration interval = usual_interval(stamps[0]);
-  const Duration most = Duration::seconds(kMostApart * interval.to_seconds());
+  const Duration most = Duration::seconds(kMaxApart * interval.to_seconds());
   const auto near =
       pair_nearest(stamps[0], stamps[1], Duration::seconds(kHalf * interval.to_seconds()));
   const PairOffset offset = pair_offset(stamps[0], stamps[1], near);
@@ -197,7 +197,7 @@ std::vector<std::array<std::size_t, 2>> pair_images(
            fmt::format("has no pair: header.stamp of {} begins at {} ns, of {} at {} ns, and no "
                        "two are within {:.0f} % of the interval of each other",
                        topics[0], stamps[0].front().ns(), topics[1], stamps[1].front().ns(),
-                       100 * kMostApart));
+                       100 * kMaxApart));
   const PairOffset kept = pair_offset(stamps[0], stamps[1], pairs);
   sequence->assumptions.push_back(fmt::format(
       "images are paired by the nearest {}, right ones are later by {}",
@@ -321,7 +321,7 @@ StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag, bool
   if (alone > 0)
     sequence.remarks.push_back(
         fmt::format("{} images have no partner within {:.0f} % of the interval and were left out",
-                    alone, 100 * kMostApart));
+                    alone, 100 * kMaxApart));
   sequence.left_out += alone;
   const std::vector<Stamp> stamps = stamps_of(images[0]);
   const auto store = std::make_shared<const BagImages>(bag.format, std::move(bag.files), chosen,

@@ -21,8 +21,8 @@ const char* kind_of(ImageFileStatus status) noexcept {
   switch (status) {
     case ImageFileStatus::missing:
       return "image_missing";
-    case ImageFileStatus::torn:
-      return "image_torn";
+    case ImageFileStatus::truncated:
+      return "image_truncated";
     case ImageFileStatus::wrong_size:
       return "image_size";
     default:
@@ -30,10 +30,10 @@ const char* kind_of(ImageFileStatus status) noexcept {
   }
 }
 
-void note(DecodedPair* pair, const char* kind, const std::string& sentence) {
+void note(DecodedPair* pair, const char* kind, const std::string& message) {
   pair->kind = kind;
-  const std::size_t n = std::min(sentence.size(), pair->note.size() - 1);
-  std::copy_n(sentence.begin(), n, pair->note.begin());
+  const std::size_t n = std::min(message.size(), pair->note.size() - 1);
+  std::copy_n(message.begin(), n, pair->note.begin());
   pair->note[n] = 0;
 }
 
@@ -108,13 +108,13 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   pair.frame = index;
   pair.stamp = listed.stamp;
   if (any_ && listed.stamp <= newest_) {
-    note(&pair, "time_backwards",
+    note(&pair, "stamp_not_increasing",
          fmt::format("frame {} skipped: its time {} is not later than {}, the latest before it",
                      index, format_seconds(listed.stamp.ns()), format_seconds(newest_.ns())));
     return pair;
   }
   if (!listed.in_order) {
-    note(&pair, "time_ahead",
+    note(&pair, "stamp_outlier",
          fmt::format("frame {} skipped: its time {} is later than those of the frames after it",
                      index, format_seconds(listed.stamp.ns())));
     return pair;

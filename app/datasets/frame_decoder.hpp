@@ -22,8 +22,8 @@ struct DecodedPair {
   bool decoded = false;              // else skipped: no slots, and `kind` and `note` say why
   std::array<FrameSlot, 2> slots{};  // left, right
   float decode_ms = 0;               // reading both files and decoding them
-  const char* kind = "";             // of the event: image_missing, image_torn, …, time_backwards
-  std::array<char, 256> note{};      // sentence, ends with 0
+  const char* kind = "";  // of the event: image_missing, image_truncated, …, stamp_not_increasing
+  std::array<char, 256> note{};  // message, ends with 0
 };
 
 /// Reads and decodes the images of a sequence ahead of whoever consumes them, the two of a pair

@@ -94,7 +94,7 @@ const char* to_phrase(ImageFileStatus status) noexcept {
              "(ulimit -n)";
     case ImageFileStatus::not_an_image:
       return "is no PNG, JPEG, BMP or PGM image";
-    case ImageFileStatus::torn:
+    case ImageFileStatus::truncated:
       return "is torn: it ends before the image is complete, or its check sums fail";
     case ImageFileStatus::undecodable:
       return "cannot be decoded: PNG of every kind, JPEG of 8-bit grey or three colours, "
@@ -125,7 +125,7 @@ ImageFileStatus read_image_size(Bytes head, ImageSize* size) noexcept {
   if (const auto* kind = kind_of(head)) return kind->size(head, size);
   // A file of nothing, or of the first bytes of a signature, is a torn write; another content is
   // another kind of file.
-  return detail::may_become_png(head) ? ImageFileStatus::torn : ImageFileStatus::not_an_image;
+  return detail::may_become_png(head) ? ImageFileStatus::truncated : ImageFileStatus::not_an_image;
 }
 
 ImageFileStatus check_image(Bytes bytes, ImageSize* size) noexcept {

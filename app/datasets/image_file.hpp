@@ -16,12 +16,12 @@ enum class ImageFileStatus : std::uint8_t {
   unreadable,      // the system refuses to read it
   too_many_files,  // the program has as many files open as it may
   not_an_image,    // no PNG, JPEG or BMP, or one that claims more pixels than any camera has
-  torn,            // begins as an image and ends before it is complete, or its check sums fail
+  truncated,       // begins as an image and ends before it is complete, or its check sums fail
   undecodable,     // complete, and yet the decoder refuses it
   wrong_size,      // another width or height than asked for
 };
 
-/// The rest of a sentence that begins with the file's name: "is missing", "ends before the image is
+/// The rest of a message that begins with the file's name: "is missing", "ends before the image is
 /// complete".
 [[nodiscard]] const char* to_phrase(ImageFileStatus status) noexcept;
 

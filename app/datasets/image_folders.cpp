@@ -266,14 +266,14 @@ struct Stamped {
   std::vector<std::string> names{};
 };
 
-/// Pairs of the nearest stamps, within kMostApart of the interval, in the order of the left ones;
+/// Pairs of the nearest stamps, within kMaxApart of the interval, in the order of the left ones;
 /// images without a partner stand where their stamp belongs. Nothing: there is no pair.
 std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 2>& cameras,
                                                       StereoSequence* sequence) {
   const auto &left = cameras[0].stamps, &right = cameras[1].stamps;
   const Duration interval = usual_interval(left);
   const auto together =
-      pair_nearest(left, right, Duration::seconds(kMostApart * interval.to_seconds()));
+      pair_nearest(left, right, Duration::seconds(kMaxApart * interval.to_seconds()));
   if (together.empty()) return std::nullopt;
   const PairOffset offset = pair_offset(left, right, together);
   if (offset.farthest > Duration{})

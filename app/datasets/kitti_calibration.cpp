@@ -19,7 +19,7 @@ namespace {
 /// The lines of such a file by their keys.
 class Text {
  public:
-  /// `without`: what a sentence about a missing file goes on with.
+  /// `without`: what a message about a missing file goes on with.
   Text(const std::filesystem::path& file, const char* without) : file_(file) {
     std::error_code ignored;
     if (!std::filesystem::exists(file, ignored))
@@ -174,7 +174,7 @@ KittiRawRig read_kitti_raw_rig(const KittiRawFolders& folders, const std::array<
   if (are_rectified)
     out.rig.T_camera_left[1].R = Mat3::Identity();  // without the rounding of a product
   out.rig.baseline = out.rig.T_camera_left[1].t.norm();
-  if (const auto bad = find_implausible(&out.rig)) refuse(file, 0, bad->sentence);
+  if (const auto bad = find_implausible(&out.rig)) refuse(file, 0, bad->message);
   return out;
 }
 

@@ -170,14 +170,14 @@ bool is_drive(const fs::path& folder) {
 /// The folder itself, or what lies one or two folders below.
 std::vector<fs::path> drives_in(const fs::path& folder) {
   if (is_drive(folder)) return {folder};
-  constexpr std::size_t kMostFolders = 1000;  // that are looked into
+  constexpr std::size_t kMaxFolders = 1000;  // that are looked into
   std::vector<fs::path> found;
   std::size_t looked = 0;
   std::error_code error;
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
        it.increment(error)) {
     std::error_code ignored;
-    if (!it->is_directory(ignored) || ++looked > kMostFolders) continue;
+    if (!it->is_directory(ignored) || ++looked > kMaxFolders) continue;
     const bool drive = is_drive(it->path());
     if (drive) found.push_back(it->path());
     if (drive || it.depth() > 0) it.disable_recursion_pending();
@@ -196,14 +196,14 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
     refuse(folder, 0,
            "holds no KITTI raw drive: a folder with image_00, image_01 and oxts is expected");
   if (found.size() > 1) {
-    constexpr std::size_t kMostNamed = 8;
+    constexpr std::size_t kMaxNamed = 8;
     std::sort(found.begin(), found.end());
     std::string names;
-    for (std::size_t i = 0; i < std::min(kMostNamed, found.size()); ++i)
+    for (std::size_t i = 0; i < std::min(kMaxNamed, found.size()); ++i)
       names += (i > 0 ? ", " : "") + found[i].filename().string();
     refuse(folder, 0,
            fmt::format("holds {} drives ({}{}): name one of them", found.size(), names,
-                       found.size() > kMostNamed ? ", …" : ""));
+                       found.size() > kMaxNamed ? ", …" : ""));
   }
   std::error_code ignored;
   // `.` and a name that ends in a slash have a folder above, too.

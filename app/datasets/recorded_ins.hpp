@@ -24,7 +24,7 @@ struct RecordedIns {
   std::optional<Transform> T_ins_left{};  // p_ins = T_ins_left · p_left as published with the data
                                           // set; nothing: it is not
   std::string mount_source{};             // the files that say so
-  std::vector<std::string> remarks{};     // what was left out or taken on trust: a sentence each
+  std::vector<std::string> remarks{};     // what was left out or taken on trust: a message each
 };
 
 /// The INS of the drive that open_sequence() opens with the same arguments, where it has files of
@@ -32,12 +32,12 @@ struct RecordedIns {
 /// with the drive.
 /// `mount_wanted`: the published mount is read, where the data set publishes one; else somebody
 /// knows better.
-/// Memory  Some 250 bytes a reading, at most kMostReadings.  InputError  As the data set's reader
+/// Memory  Some 250 bytes a reading, at most kMaxReadings.  InputError  As the data set's reader
 /// says: files that are not there or no such files, no reading that is whole.
 [[nodiscard]] RecordedIns read_recorded_ins(SequenceFormat format,
                                             const std::filesystem::path& folder,
                                             const std::array<int, 2>& cameras, bool mount_wanted);
 
-inline constexpr std::size_t kMostReadings = 2'000'000;  // five hours at 100 Hz
+inline constexpr std::size_t kMaxReadings = 2'000'000;  // five hours at 100 Hz
 
 }  // namespace vergence::app

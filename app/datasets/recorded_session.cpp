@@ -22,10 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 using detail::RosReader;
 
-constexpr std::size_t kMostSmall = 65536;                       // bytes of a message that is none
-                                                                // of images
-constexpr std::size_t kMostDescription = std::size_t{4} << 20;  // bytes
-constexpr std::size_t kMostFrames = 4'000'000;                  // 37 hours at 30 Hz
+constexpr std::size_t kMaxSmall = 65536;                       // bytes of a message that is none
+                                                               // of images
+constexpr std::size_t kMaxDescription = std::size_t{4} << 20;  // bytes
+constexpr std::size_t kMaxFrames = 4'000'000;                  // 37 hours at 30 Hz
 
 /// The check sum that ends a message is that of what stands before it.
 bool check(std::span<const std::uint8_t> bytes, RosReader* in) {
@@ -55,7 +55,7 @@ std::optional<FrameRecord> read_frame(std::span<const std::uint8_t> bytes) {
   (void)in.get<std::int32_t>();
   (void)in.get<double>();
   (void)in.get<float>();
-  FrameEffort& effort = f.sample.effort;
+  FrameWorkload& effort = f.sample.effort;
   effort.points_percent = in.get<std::uint8_t>();
   effort.window_keyframes = in.get<std::uint8_t>();
   effort.window_steps = in.get<std::uint8_t>();
@@ -135,7 +135,7 @@ struct RecordedSession::Reader {
 
   void take_description(const detail::BagMessage& m) {
     if (described) return;
-    const auto bytes = detail::first_bytes(m, kMostDescription);
+    const auto bytes = detail::first_bytes(m, kMaxDescription);
     RosReader in(bytes, detail::MessageEncoding::cdr);
     const std::string json = in.text();
     if (!in.ok()) refuse(folder, 0, "has a recording whose description is damaged");
@@ -181,13 +181,13 @@ struct RecordedSession::Reader {
   }
 
   void take_frame(const detail::BagMessage& m) {
-    const auto record = read_frame(detail::first_bytes(m, kMostSmall));
+    const auto record = read_frame(detail::first_bytes(m, kMaxSmall));
     if (!record) {
       ++broken;
       return;
     }
-    if (session->frames_.size() == kMostFrames)
-      refuse(folder, 0, fmt::format("has a recording of more than {} frames", kMostFrames));
+    if (session->frames_.size() == kMaxFrames)
+      refuse(folder, 0, fmt::format("has a recording of more than {} frames", kMaxFrames));
     RecordedFrame frame{*record, {}, session->readings_.size()};
     for (std::size_t k = 0; k < static_cast<std::size_t>(record->cameras); ++k) {
       if ((record->images_present >> k & 1U) == 0) continue;
@@ -198,13 +198,13 @@ struct RecordedSession::Reader {
   }
 
   void take_reading(const detail::BagMessage& m) {
-    const auto reading = read_reading(detail::first_bytes(m, kMostSmall));
+    const auto reading = read_reading(detail::first_bytes(m, kMaxSmall));
     if (!reading) {
       ++broken;
       return;
     }
-    if (session->readings_.size() == kMostReadings)
-      refuse(folder, 0, fmt::format("has a recording of more than {} readings", kMostReadings));
+    if (session->readings_.size() == kMaxReadings)
+      refuse(folder, 0, fmt::format("has a recording of more than {} readings", kMaxReadings));
     session->readings_.push_back(*reading);
   }
 };

@@ -56,7 +56,7 @@ class RecordedSession {
   [[nodiscard]] bool read(const RecordedFrame& frame, std::size_t camera, std::uint8_t* out,
                           std::size_t stride) const noexcept;
   /// Gives back what frames() and readings() take, and they are empty; all else stays.
-  void forget_frames() noexcept {
+  void clear_frames() noexcept {
     frames_ = std::vector<RecordedFrame>();
     readings_ = std::vector<RecordedReading>();
   }

@@ -86,7 +86,7 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
   const std::size_t end =
       first + std::min(count, sequence.pairs.size() - std::min(first, sequence.pairs.size()));
   std::size_t good = 0, bad = 0;
-  std::string sentence;
+  std::string message;
   for (std::size_t i = first; i < end; ++i)
     for (std::size_t k = 0; k < 2; ++k) {
       const std::string& name = sequence.pairs[i].file[k];
@@ -96,15 +96,15 @@ void check_image_sizes(const StereoSequence& sequence, std::size_t first, std::s
       const Intrinsics& camera = sequence.calibration.intrinsics[k];
       const ImageSize requested{(sequence.side_by_side ? 2 : 1) * camera.width, camera.height};
       ++(size == requested ? good : bad);
-      if (size == requested || !sentence.empty()) continue;
-      sentence = (sequence.root / name).string() + ": is " + text(size) +
-                 " pixels, but the calibration of this camera (" + sequence.calibration_source +
-                 ") is for " + text(requested) +
-                 (sequence.side_by_side ? " (twice its width, side by side)" : "") +
-                 "; use the calibration that belongs to these images";
+      if (size == requested || !message.empty()) continue;
+      message = (sequence.root / name).string() + ": is " + text(size) +
+                " pixels, but the calibration of this camera (" + sequence.calibration_source +
+                ") is for " + text(requested) +
+                (sequence.side_by_side ? " (twice its width, side by side)" : "") +
+                "; use the calibration that belongs to these images";
     }
   // Single images of another size cost their frames.
-  if (bad > good) throw InputError(sentence);
+  if (bad > good) throw InputError(message);
 }
 
 void find_deep_bits(StereoSequence* sequence) {

@@ -217,7 +217,7 @@ bool has_pair(const RecordedFrame& frame) {
 }
 
 /// The first frame of which both images were recorded.
-const RecordedFrame& first_pair(const RecordedSession& session) {
+const RecordedFrame& init_features(const RecordedSession& session) {
   const auto& frames = session.frames();
   const auto first = std::find_if(frames.begin(), frames.end(), has_pair);
   if (first == frames.end())
@@ -256,7 +256,7 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
                             const std::function<void(std::size_t)>& progress) {
   ExportResult result;
   result.remarks = session.remarks();
-  const RecordedFrame& first = first_pair(session);
+  const RecordedFrame& first = init_features(session);
   check_sizes(first, request.calibration);
   if (first.given.cameras > 2)
     result.remarks.push_back(fmt::format(

@@ -25,7 +25,7 @@ struct ExportRequest {
 struct ExportResult {
   std::size_t frames = 0;
   std::size_t left_out = 0;            // without a left or right image that reads back
-  std::vector<std::string> remarks{};  // sentences
+  std::vector<std::string> remarks{};  // messages
 };
 
 /// Left and right images as PNG, stamps, calibration and truth:

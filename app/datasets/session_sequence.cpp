@@ -39,7 +39,8 @@ class SessionImages final : public ImageStore {
     if (frame == nullptr) return ImageFileStatus::missing;
     if (size != ImageSize{frame->images[camera].width, frame->images[camera].height})
       return ImageFileStatus::wrong_size;
-    return session_.read(*frame, camera, out, stride) ? ImageFileStatus::ok : ImageFileStatus::torn;
+    return session_.read(*frame, camera, out, stride) ? ImageFileStatus::ok
+                                                      : ImageFileStatus::truncated;
   }
 
  private:

@@ -123,11 +123,11 @@ Mat3 matrix_of(const Axes& axes) {
       .cast<double>();
 }
 
-constexpr double kFast = 5.0;             // m/s: above it the course is where the vehicle points
-constexpr double kApart = 1.0;            // s between the positions whose difference is the motion
-constexpr std::size_t kEnough = 100;      // samples: below, nothing is decided
-constexpr double kTells = 0.3;            // correlation from which the slope decides about pitch
-constexpr std::size_t kMostBroken = 100;  // one line in so many
+constexpr double kFast = 5.0;            // m/s: above it the course is where the vehicle points
+constexpr double kApart = 1.0;           // s between the positions whose difference is the motion
+constexpr std::size_t kEnough = 100;     // samples: below, nothing is decided
+constexpr double kTells = 0.3;           // correlation from which the slope decides about pitch
+constexpr std::size_t kMaxBroken = 100;  // one line in so many
 
 /// One line as it stands.
 struct Line {
@@ -171,7 +171,7 @@ std::vector<Line> read_lines(const std::filesystem::path& log, std::vector<std::
       first_broken = lines.number();
     }
   }
-  if (out.empty() || broken > 1 + out.size() / kMostBroken)
+  if (out.empty() || broken > 1 + out.size() / kMaxBroken)
     refuse(log, first_broken,
            fmt::format("and {} more lines are not twelve numbers; this is not the log of the INS",
                        broken > 0 ? broken - 1 : 0));

@@ -46,12 +46,12 @@ std::optional<int> take_offset(std::string_view* text) noexcept {
 
 /// Seconds before the point and whole nanoseconds behind it.
 std::optional<Stamp> read_parts(std::string_view text) noexcept {
-  constexpr std::int64_t kMostSeconds = 9'000'000'000;  // what 64 bits of nanoseconds hold
+  constexpr std::int64_t kMaxSeconds = 9'000'000'000;  // what 64 bits of nanoseconds hold
   const std::size_t point = text.find('.');
   const auto s = parse_integer(text.substr(0, point));
   const auto ns = point == std::string_view::npos ? std::optional<std::int64_t>(0)
                                                   : parse_integer(text.substr(point + 1));
-  if (!s || !ns || *s < 0 || *s > kMostSeconds || *ns < 0 || *ns >= kSecond) return std::nullopt;
+  if (!s || !ns || *s < 0 || *s > kMaxSeconds || *ns < 0 || *ns >= kSecond) return std::nullopt;
   return Stamp(*s * kSecond + *ns);
 }
 

@@ -93,7 +93,7 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
   check_times(sequence);
   mark_out_of_order(&sequence.pairs);
   apply_use(use, &sequence.calibration);
-  if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->sentence);
+  if (const auto bad = find_implausible(&sequence.calibration)) refuse(source, 0, bad->message);
   if (sequence.calibration.cameras != 2)
     refuse(source, 0,
            "describes " + std::to_string(sequence.calibration.cameras) +
@@ -108,8 +108,8 @@ StereoSequence checked(StereoSequence sequence, const std::filesystem::path& sou
   check_image_sizes(sequence, 0, std::min<std::size_t>(1, sequence.pairs.size()));
   find_deep_bits(&sequence);
   // Names and words of files stand in them.
-  for (auto* sentences : {&sequence.remarks, &sequence.assumptions})
-    for (std::string& sentence : *sentences) sentence = harmless(sentence);
+  for (auto* messages : {&sequence.remarks, &sequence.assumptions})
+    for (std::string& message : *messages) message = harmless(message);
   return sequence;
 }
 

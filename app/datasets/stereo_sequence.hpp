@@ -54,9 +54,9 @@ struct StereoSequence {
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
   std::string calibration_source;  // the file's name, for calibrations.csv
-  std::filesystem::path times;     // the file that the stamps are from, for sentences about them
+  std::filesystem::path times;     // the file that the stamps are from, for messages about them
   std::size_t left_out = 0;  // frames that are none of `pairs`: no stamp, no partner, out of order
-  std::vector<std::string> remarks{};  // what was left out or is doubtful: a sentence each
+  std::vector<std::string> remarks{};  // what was left out or is doubtful: a message each
   std::vector<std::string>
       assumptions{};          // facts the files leave out, and the values assumed: one phrase each
   bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
@@ -157,7 +157,7 @@ struct BagTopics {
 
 /// InputError where the stamps cannot be those of a drive: one is further than 146 years from 1970
 /// (so that differences stay within 64 bits), most do not go forward, or the median step between
-/// pairs is below 1 ms or above 10 s. The sentence asks for the unit that would make them one.
+/// pairs is below 1 ms or above 10 s. The message asks for the unit that would make them one.
 void check_times(const StereoSequence& sequence);
 
 /// Looks at the head of every image of pairs [first, first + count): InputError names the first

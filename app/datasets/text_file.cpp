@@ -19,11 +19,11 @@ constexpr std::string_view kBlanks = " \t\r\v\f";
 
 /// What some editors and shells write: two bytes a character, least first or last. Others than
 /// those of ASCII become question marks; no number, key or name that is read here has them.
-std::string narrowed(const std::string& wide, bool least_first) {
+std::string narrowed(const std::string& wide, bool min_first) {
   std::string text;
   text.reserve(wide.size() / 2);
   for (std::size_t i = 2; i + 1 < wide.size(); i += 2) {
-    const char low = wide[i + (least_first ? 0 : 1)], high = wide[i + (least_first ? 1 : 0)];
+    const char low = wide[i + (min_first ? 0 : 1)], high = wide[i + (min_first ? 1 : 0)];
     text.push_back(high == 0 && static_cast<signed char>(low) >= 0 ? low : '?');
   }
   return text;
@@ -32,11 +32,11 @@ std::string narrowed(const std::string& wide, bool least_first) {
 }  // namespace
 
 void refuse(const std::filesystem::path& file, std::size_t line, std::string_view what) {
-  std::string sentence = file.string();
-  if (line > 0) sentence += ":" + std::to_string(line);
-  sentence += ": ";
-  sentence += what;
-  throw InputError(sentence);
+  std::string message = file.string();
+  if (line > 0) message += ":" + std::to_string(line);
+  message += ": ";
+  message += what;
+  throw InputError(message);
 }
 
 std::string read_text(const std::filesystem::path& file, std::size_t limit) {
@@ -66,8 +66,8 @@ std::string read_text(const std::filesystem::path& file, std::size_t limit) {
           "is longer than " + std::to_string(limit) + " bytes: this is not the file that is meant");
   }
   if (in.bad()) refuse(file, 0, "reading it failed half way");
-  const bool least_first = text.starts_with("\xFF\xFE");
-  return least_first || text.starts_with("\xFE\xFF") ? narrowed(text, least_first) : text;
+  const bool min_first = text.starts_with("\xFF\xFE");
+  return min_first || text.starts_with("\xFE\xFF") ? narrowed(text, min_first) : text;
 }
 
 Lines::Lines(std::string_view text) noexcept : rest_(text) {

@@ -35,7 +35,7 @@ bool begins_row(std::string_view field) noexcept {
 }  // namespace
 
 TextTable::TextTable(std::string_view text) : rest_(text) {
-  constexpr std::size_t kMostHeadings = 50;  // lines
+  constexpr std::size_t kMaxHeadings = 50;  // lines
   if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
   std::string_view headings;
   for (std::size_t others = 0;;) {
@@ -57,7 +57,7 @@ TextTable::TextTable(std::string_view text) : rest_(text) {
       break;
     }
     headings = line;
-    if (++others > kMostHeadings) rest_ = {};  // this is no table
+    if (++others > kMaxHeadings) rest_ = {};  // this is no table
   }
   const char of_rows = separator_;
   if (headings.find(',') != std::string_view::npos) separator_ = ',';

@@ -23,7 +23,7 @@ constexpr double kQuaternionLength = 0.02;
 // Of R Rᵀ − I: three decimals of a matrix keep within it.
 constexpr double kNearRotation = 5e-3;
 constexpr std::int64_t kRowStep = 100'000'000;  // ns: from row to row where a file has no times
-constexpr std::int64_t kMostPoses = 100'000'000;
+constexpr std::int64_t kMaxPoses = 100'000'000;
 constexpr double kRounded = 1e-4;  // beyond, the numbers have lost digits, and it is said
 
 bool present(const fs::path& p) {
@@ -168,7 +168,7 @@ std::optional<Columns> columns_of_row(const std::vector<std::string_view>& field
     c.first = first;
     // A small whole number before a matrix is that of its frame.
     const auto number = parse_integer(fields[0]);
-    c.counted = first == 1 && number && *number >= 0 && *number < kMostPoses;
+    c.counted = first == 1 && number && *number >= 0 && *number < kMaxPoses;
     if (c.counted)
       c.time = TimeColumns{};
     else if (first > 0)
@@ -300,7 +300,7 @@ class Reader {
   }
 
   void find_order() {
-    out_.order_told = columns_.order || options_.quaternion || columns_.layout != Layout::pose;
+    out_.order_reported = columns_.order || options_.quaternion || columns_.layout != Layout::pose;
     out_.order = columns_.order.value_or(QuaternionOrder::xyzw);
     if (!columns_.order && columns_.layout == Layout::pose) {
       // EuRoC and those who write as it does (VINS): w first, commas, whole nanoseconds.
@@ -361,7 +361,7 @@ class Reader {
     if (is_no_value(field)) return false;
     if (columns_.counted) {
       const auto number = parse_integer(field);
-      if (!number || *number < 0 || *number > kMostPoses)
+      if (!number || *number < 0 || *number > kMaxPoses)
         refuse(file_, line, fmt::format("`{}` is not the number of a pose", field.substr(0, 40)));
       most_ = std::max(most_, static_cast<std::size_t>(*number));
       *stamp = Stamp(*number * kRowStep);
@@ -537,7 +537,7 @@ TrajectoryFile read_file(const fs::path& path, const TrajectoryOptions& options)
   else
     out.remarks.emplace_back(
         "this is the truth of the body and not of the left camera: put cam0/sensor.yaml of the "
-        "data set beside it, or use --estimate-mount");
+        "data set beside it, or use --estimate-ins-extrinsics");
   return out;
 }
 

@@ -40,7 +40,7 @@ struct TrajectoryFile {
   std::size_t rows = 0;                // of the file, also those that are skipped
   bool numbered = false;  // the file counts its frames: some may be missing, `rows` counts them too
   bool timed = true;      // false: the file holds no times; rows are 0.1 s apart, from 0
-  bool order_told = false;  // headings, a matrix or the user say how rotations are written
+  bool order_reported = false;  // headings, a matrix or the user say how rotations are written
   QuaternionOrder order = QuaternionOrder::xyzw;  // as read
 };
 

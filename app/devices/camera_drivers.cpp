@@ -36,7 +36,7 @@ std::string list_of(const std::vector<DeviceInfo>& found) {
   return text;
 }
 
-/// The sentence for an open() that gave nothing.
+/// The message for an open() that gave nothing.
 std::string refusal(const CameraRequest& request, const std::string& serial,
                     const CameraDriverRow& row, CameraDriver& driver, DeviceStatus status) {
   const std::string who = fmt::format("{}: the {} camera {}", request.key, row.name,
@@ -59,20 +59,21 @@ std::string refusal(const CameraRequest& request, const std::string& serial,
 }
 
 bool are_one_camera(const CameraRequest& a, const CameraRequest& b) {
-  return a.half != PictureHalf::whole && b.half != PictureHalf::whole && a.half != b.half &&
+  return a.half != ImageHalf::whole && b.half != ImageHalf::whole && a.half != b.half &&
          a.driver == b.driver && a.serial == b.serial;
 }
 
 /// A half needs its other one, asked for in the same way.
 void check_half(const CameraRequest& request, const std::vector<CameraRequest>& requests) {
-  if (request.half == PictureHalf::whole) return;
+  if (request.half == ImageHalf::whole) return;
   const auto other = std::find_if(requests.begin(), requests.end(), [&](const CameraRequest& r) {
     return are_one_camera(r, request);
   });
-  const bool left = request.half == PictureHalf::left;
+  const bool left = request.half == ImageHalf::left;
   if (other == requests.end())
     throw InputError(fmt::format(
-        "{}.half is {}, and no other entry is the {} half of the same picture: give one the same "
+        "{}.image_half is {}, and no other entry is the {} half of the same picture: give one the "
+        "same "
         "driver and serial, and half: {}",
         request.key, left ? "left" : "right", left ? "right" : "left", left ? "right" : "left"));
   const CameraConfiguration& a = request.configuration;
@@ -92,7 +93,7 @@ class Openings {
   explicit Openings(const std::vector<CameraRequest>& requests) {
     for (const CameraRequest& r : requests) {
       check_half(r, requests);
-      if (r.half == PictureHalf::right) continue;  // its left half stands for the camera
+      if (r.half == ImageHalf::right) continue;  // its left half stands for the camera
       ++sharing_[r.driver];
       if (!r.serial.empty()) taken_.emplace_back(r.driver, r.serial);
     }
@@ -104,7 +105,7 @@ class Openings {
 
   OpenedCamera open(const CameraRequest& request) {
     OpenedCamera opened;
-    opened.device = request.half == PictureHalf::whole ? open_device(request) : open_half(request);
+    opened.device = request.half == ImageHalf::whole ? open_device(request) : open_half(request);
     CameraConfiguration requested = request.configuration;
     requested.sharing = sharing_[request.driver];
     const DeviceStatus status = opened.device->configure(requested, &opened.actual);
@@ -124,7 +125,7 @@ class Openings {
     for (OpenHalf& h : halves_)
       if (are_one_camera(*h.of, request) && h.device != nullptr) return std::move(h.device);
     auto [left, right] = split_side_by_side(open_device(request));
-    const bool is_left = request.half == PictureHalf::left;
+    const bool is_left = request.half == ImageHalf::left;
     halves_.push_back({&request, is_left ? std::move(right) : std::move(left)});
     return is_left ? std::move(left) : std::move(right);
   }

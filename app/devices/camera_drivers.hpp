@@ -23,9 +23,9 @@ struct CameraDriverRow {
 
 /// One camera as the configuration wants it.
 struct CameraRequest {
-  std::string key;  // `cameras.0`, for sentences
+  std::string key;  // `cameras.0`, for messages
   std::string driver, serial;
-  PictureHalf half = PictureHalf::whole;
+  ImageHalf half = ImageHalf::whole;
   CameraConfiguration configuration;  // `sharing` is filled in: the requests with the same driver
 };
 
@@ -38,13 +38,13 @@ struct OpenedCamera {
 /// Opens and configures them in order. An empty serial takes the next camera that no other request
 /// names. A left half and a right one with the same driver and serial are one camera.
 ///
-/// Errors  As refuse_device(), one sentence: the key, what was found or what the camera offers,
+/// Errors  As refuse_device(), one message: the key, what was found or what the camera offers,
 ///         what to do. Nothing stays open then.
-/// `remarks`: sentences about what works, but not as well as it should.
+/// `remarks`: messages about what works, but not as well as it should.
 [[nodiscard]] std::vector<OpenedCamera> open_cameras(const std::vector<CameraRequest>& requests,
                                                      std::vector<std::string>* remarks);
 
-/// A camera for a sentence: `cameras.0 (gige 15021234)`.
+/// A camera for a message: `cameras.0 (gige 15021234)`.
 [[nodiscard]] std::string camera_title(const std::string& key, const DeviceInfo& info);
 
 }  // namespace vergence::app

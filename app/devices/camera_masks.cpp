@@ -37,16 +37,16 @@ bool is_pgm(Bytes b) noexcept {
 /// Width, height and white after "P5", apart by white space, in which `#` begins a remark. False:
 /// not that.
 bool read_pgm_head(Bytes b, PgmHead* head) noexcept {
-  constexpr int kMost = 1 << 15;
+  constexpr int kMax = 1 << 15;
   std::size_t at = 2;
   for (int* number : {&head->width, &head->height, &head->white}) {
     for (; at < b.size() && (std::isspace(b[at]) != 0 || b[at] == '#'); ++at)
       if (b[at] == '#')
         while (at + 1 < b.size() && b[at] != '\n') ++at;
     const std::size_t first = at;
-    for (; at < b.size() && std::isdigit(b[at]) != 0 && *number <= kMost; ++at)
+    for (; at < b.size() && std::isdigit(b[at]) != 0 && *number <= kMax; ++at)
       *number = 10 * *number + (b[at] - '0');
-    if (at == first || *number < 1 || *number > kMost) return false;
+    if (at == first || *number < 1 || *number > kMax) return false;
   }
   head->pixels = at + 1;
   return at < b.size() && std::isspace(b[at]) != 0;
@@ -59,7 +59,7 @@ ImageFileStatus read_pgm(Bytes b, ImageSize requested, ImageSize* size,
   *size = {head.width, head.height};
   if (*size != requested) return ImageFileStatus::wrong_size;
   const auto n = static_cast<std::size_t>(head.width) * static_cast<std::size_t>(head.height);
-  if (b.size() - head.pixels < n) return ImageFileStatus::torn;
+  if (b.size() - head.pixels < n) return ImageFileStatus::truncated;
   std::copy_n(b.begin() + static_cast<std::ptrdiff_t>(head.pixels), n, out);
   return ImageFileStatus::ok;
 }

@@ -116,7 +116,7 @@ void check_board(const Configuration& c) {
   if (c.trigger.driver == "none")
     refuse(c,
            "trigger.driver is none, so nothing reports the pulses; set trigger.driver to board, or "
-           "sync.mode to counter (not proven)");
+           "sync.mode to frame_counter (not verified)");
 }
 
 void check_ins_syncout(const Configuration& c, int cameras) {
@@ -178,10 +178,11 @@ void check_ptp(const Configuration& c, int cameras) {
 
 void check_one_picture(const Configuration& c, int cameras) {
   for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
-    if (s.half == PictureHalf::whole)
-      refuse(c, fmt::format("cameras.{}.half is whole, so it has a picture of its own; with both "
-                            "images in one picture it is left or right",
-                            k));
+    if (s.half == ImageHalf::whole)
+      refuse(c, fmt::format(
+                    "cameras.{}.image_half is whole, so it has a picture of its own; with both "
+                    "images in one picture it is left or right",
+                    k));
   });
 }
 
@@ -193,39 +194,40 @@ void check_mode(const Configuration& c, int cameras) {
       return check_ins_syncout(c, cameras);
     case SyncMode::master_strobe:
       return check_master(c, cameras);
-    case SyncMode::bus:
+    case SyncMode::ieee1394_cycle_time:
       return check_bus(c, cameras);
     case SyncMode::ptp:
       return check_ptp(c, cameras);
-    case SyncMode::one_picture:
+    case SyncMode::side_by_side:
       return check_one_picture(c, cameras);
-    case SyncMode::counter:
+    case SyncMode::frame_counter:
       if (c.cameras[0].trigger == CameraTrigger::free)
         throw InputError(
             "cameras[].trigger is free: nothing makes the cameras expose together, so their "
             "counters cannot pair the images; "
-            "trigger them, or set sync.mode to software (both in one picture: one_picture)");
+            "trigger them, or set sync.mode to approximate_time (both in one picture: "
+            "side_by_side)");
       return;
-    case SyncMode::software:
+    case SyncMode::approximate_time:
       return;
   }
 }
 
 /// A pulse that comes while a camera still exposes is ignored without a word.
 void check_exposures(const Configuration& c, int cameras) {
-  const double shortest_us = 1e6 / c.trigger.rate - c.trigger.vary_us;
+  const double shortest_us = 1e6 / c.trigger.rate - c.trigger.dither_us;
   for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
     const double busy_us = s.trigger_delay_us + s.exposure_us;
     if (busy_us > shortest_us)
-      throw InputError(
-          fmt::format("cameras.{}.exposure_us is {}{}, longer than the {:.0f} µs between two "
-                      "pulses (trigger.rate {}{}): the camera would miss pulses",
-                      k, s.exposure_us,
-                      s.trigger_delay_us > 0
-                          ? fmt::format(" after {} µs of trigger_delay_us", s.trigger_delay_us)
-                          : "",
-                      shortest_us, c.trigger.rate,
-                      c.trigger.vary_us > 0 ? fmt::format(", vary_us {}", c.trigger.vary_us) : ""));
+      throw InputError(fmt::format(
+          "cameras.{}.exposure_us is {}{}, longer than the {:.0f} µs between two "
+          "pulses (trigger.rate {}{}): the camera would miss pulses",
+          k, s.exposure_us,
+          s.trigger_delay_us > 0
+              ? fmt::format(" after {} µs of trigger_delay_us", s.trigger_delay_us)
+              : "",
+          shortest_us, c.trigger.rate,
+          c.trigger.dither_us > 0 ? fmt::format(", dither_us {}", c.trigger.dither_us) : ""));
   });
 }
 
@@ -252,7 +254,7 @@ SyncOptions sync_options(const Configuration& c, int cameras) {
   SyncOptions o;
   o.cameras = cameras;
   o.interval = Duration::seconds(1 / c.trigger.rate);
-  o.hold = Duration::seconds(c.sync.hold_ms * 1e-3);
+  o.hold = Duration::seconds(c.sync.timeout_ms * 1e-3);
   o.tolerance = Duration::seconds(c.sync.tolerance_ms * 1e-3);
   o.mode = c.sync.mode;
   for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
@@ -260,8 +262,8 @@ SyncOptions sync_options(const Configuration& c, int cameras) {
     camera.delay = microseconds(s.trigger_delay_us);
     camera.jitter = jitter_of(s);
   });
-  if (const char* sentence = o.validate())
-    throw InputError(fmt::format("sync ({}): {}", to_string(c.sync.mode), sentence));
+  if (const char* message = o.validate())
+    throw InputError(fmt::format("sync ({}): {}", to_string(c.sync.mode), message));
   return o;
 }
 
@@ -270,16 +272,17 @@ void fit_to_devices(const Configuration& c, const std::vector<DeviceTiming>& cam
   for (std::size_t k = 0; k < cameras.size(); ++k)
     options->camera[k].resolution = cameras[k].resolution;
   options->align_start = c.cameras[0].trigger == CameraTrigger::hardware &&
-                         options->mode == SyncMode::counter &&
+                         options->mode == SyncMode::frame_counter &&
                          !trigger;  // the pulses do not wait for us
 }
 
 void check_sync_out(const Configuration& c, const DeviceInfo& ins) {
   if (!marks_sync_out(ins))
-    refuse(c, fmt::format("{} tells which pulses it made by no clock that goes on over a gap, so "
-                          "nothing could prove the pairs; set sync.mode to counter (not proven), "
-                          "or to board with a trigger board",
-                          ins_title(ins)));
+    refuse(c, fmt::format(
+                  "{} tells which pulses it made by no clock that goes on over a gap, so "
+                  "nothing could prove the pairs; set sync.mode to frame_counter (not verified), "
+                  "or to board with a trigger board",
+                  ins_title(ins)));
   constexpr double kBase = 400;  // Hz, over n
   const double nearest = kBase / std::max(1.0, std::round(kBase / c.trigger.rate));
   if (std::abs(nearest - c.trigger.rate) <= 1e-3 * c.trigger.rate) return;
@@ -294,7 +297,7 @@ TriggerConfiguration trigger_configuration(const Configuration& c, int cameras) 
   TriggerConfiguration t;
   t.rate_hz = c.trigger.rate;
   t.width = microseconds(c.trigger.width_us);
-  t.vary = microseconds(c.trigger.vary_us);
+  t.vary = microseconds(c.trigger.dither_us);
   t.lines = c.trigger.lines == 0 ? all : static_cast<std::uint8_t>(c.trigger.lines);
   t.active_low = static_cast<std::uint8_t>(c.trigger.active_low);
   t.feedback = static_cast<std::uint8_t>(c.trigger.feedback);
@@ -305,36 +308,36 @@ TriggerConfiguration trigger_configuration(const Configuration& c, int cameras) 
                     "line for each of the {}",
                     c.trigger.lines, cameras));
   const double period_us = 1e6 / c.trigger.rate;
-  if (c.trigger.vary_us * 2 > period_us)
-    throw InputError(
-        fmt::format("trigger.vary_us is {}, more than half of the {:.0f} µs between two pulses; a "
-                    "twentieth is plenty",
-                    c.trigger.vary_us, period_us));
-  if (c.trigger.width_us + c.trigger.vary_us >= period_us)
+  if (c.trigger.dither_us * 2 > period_us)
+    throw InputError(fmt::format(
+        "trigger.dither_us is {}, more than half of the {:.0f} µs between two pulses; a "
+        "twentieth is plenty",
+        c.trigger.dither_us, period_us));
+  if (c.trigger.width_us + c.trigger.dither_us >= period_us)
     throw InputError(fmt::format(
         "trigger.width_us is {}: a pulse would last until the next one, {:.0f} µs later",
-        c.trigger.width_us, period_us - c.trigger.vary_us));
+        c.trigger.width_us, period_us - c.trigger.dither_us));
   return t;
 }
 
-const char* proof_sentence(SyncMode mode) noexcept {
+const char* proof_message(SyncMode mode) noexcept {
   switch (mode) {
     case SyncMode::board:
-      return "pairs are proven by the board's numbered pulses";
+      return "pairs are verified by the board's numbered pulses";
     case SyncMode::ins_syncout:
-      return "pairs are proven by the numbered pulses of the INS's SyncOut";
+      return "pairs are verified by the numbered pulses of the INS's SyncOut";
     case SyncMode::master_strobe:
-      return "pairs are proven by the exposures of camera 0, which triggers the others";
-    case SyncMode::bus:
-      return "pairs are proven by stamps of the bus's one clock";
+      return "pairs are verified by the exposures of camera 0, which triggers the others";
+    case SyncMode::ieee1394_cycle_time:
+      return "pairs are verified by stamps of the bus's one clock";
     case SyncMode::ptp:
-      return "pairs are proven by stamps of one PTP clock";
-    case SyncMode::one_picture:
-      return "pairs are proven: both images come in one picture";
-    case SyncMode::counter:
+      return "pairs are verified by stamps of one PTP clock";
+    case SyncMode::side_by_side:
+      return "pairs are verified: both images come in one picture";
+    case SyncMode::frame_counter:
       return "nothing proves that paired images were exposed together: sync.mode is counter, they "
              "are counted and their stamps compared";
-    case SyncMode::software:
+    case SyncMode::approximate_time:
       return "nothing proves that paired images were exposed together: sync.mode is software, "
              "their stamps are near each other";
   }

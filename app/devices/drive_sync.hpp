@@ -75,6 +75,6 @@ void check_sync_out(const Configuration& configuration, const DeviceInfo& ins);
                                                          int cameras);
 
 /// What proves the pairing, or that nothing does: for events and reports.
-[[nodiscard]] const char* proof_sentence(SyncMode mode) noexcept;
+[[nodiscard]] const char* proof_message(SyncMode mode) noexcept;
 
 }  // namespace vergence::app

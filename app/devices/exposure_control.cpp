@@ -150,7 +150,7 @@ void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
     if (status != DeviceStatus::ok) {
       refused_.fetch_add(1, std::memory_order_relaxed);
       // One that is away comes back with what it had: its frames tell, and it is asked again.
-      if (status == DeviceStatus::gone) taken_[k] = requested;
+      if (status == DeviceStatus::disconnected) taken_[k] = requested;
       continue;
     }
     taken_[k] = actual;

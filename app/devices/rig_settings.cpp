@@ -96,7 +96,7 @@ RigCalibration mounted_rig(const Configuration& c) {
   }
   rig.baseline = rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&rig))
-    throw InputError("rig.nominal and cameras: " + bad->sentence);
+    throw InputError("rig.nominal and cameras: " + bad->message);
   return rig;
 }
 
@@ -106,7 +106,7 @@ RigCalibration nominal_rig(const Configuration& c) {
   add_intrinsics_error(c.mock.intrinsics_error, &rig);
   add_calibration_error(c.mock.calibration_error, &rig);
   if (const auto bad = find_implausible(&rig))
-    throw InputError("mock.calibration_error and intrinsics_error: " + bad->sentence);
+    throw InputError("mock.calibration_error and intrinsics_error: " + bad->message);
   return rig;
 }
 
@@ -120,7 +120,7 @@ ComparisonOptions comparison_options(const Configuration& c) {
   ComparisonOptions o;
   o.T_ins_left =
       mount_of(vec3(c.ins.lever_arm_m), vec3(c.ins.boresight_deg) * (std::numbers::pi / 180));
-  o.placement_m = c.comparison.placement_m;
+  o.alignment_distance_m = c.comparison.alignment_distance_m;
   o.correlation_s = c.comparison.correlation_s;
   o.heading_sigma_rad = c.comparison.heading_sigma_deg * (std::numbers::pi / 180);
   o.max_gap = Duration::seconds(c.comparison.max_gap_ms * 1e-3);
@@ -148,7 +148,7 @@ exposure::ExposureOptions exposure_options(const Configuration& c) {
   o.may_saturate = 0.01 * c.exposure.saturated_percent;
   o.least = microseconds(c.exposure.min_us);
   o.most = microseconds(c.exposure.max_us);
-  o.most_gain_db = c.exposure.max_gain_db;
+  o.max_gain_db = c.exposure.max_gain_db;
   o.settle_frames = c.exposure.settle_frames;
   if (o.most < o.least) throw InputError("exposure.max_us: below exposure.min_us; make it larger");
   if (c.exposure.max_us * 1e-6 * c.trigger.rate > 1)

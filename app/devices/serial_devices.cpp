@@ -30,24 +30,24 @@ std::string serial_open_error(const std::string& who, DeviceStatus status,
   }
 }
 
-void refuse_device(DeviceStatus status, const std::string& sentence) {
+void refuse_device(DeviceStatus status, const std::string& message) {
   switch (status) {
     case DeviceStatus::unsupported:
     case DeviceStatus::bad_configuration:
     case DeviceStatus::no_bandwidth:
-      throw InputError(sentence);
+      throw InputError(message);
     case DeviceStatus::ok:
     case DeviceStatus::timeout:
     case DeviceStatus::stopped:
     case DeviceStatus::ended:
-    case DeviceStatus::gone:
+    case DeviceStatus::disconnected:
     case DeviceStatus::not_found:
     case DeviceStatus::no_permission:
     case DeviceStatus::busy:
     case DeviceStatus::failed:
       break;
   }
-  throw DeviceError(sentence);
+  throw DeviceError(message);
 }
 
 void require_configured(const std::string& title, DeviceStatus status, const std::string& error) {

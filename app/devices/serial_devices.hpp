@@ -6,22 +6,22 @@
 #include "app/config/configuration.hpp"
 #include "drivers/device.hpp"
 #include "drivers/ins.hpp"
-#include "drivers/serial/byte_line.hpp"
+#include "drivers/serial/serial_link.hpp"
 #include "drivers/trigger_board/device.hpp"
 #include "drivers/xsens/options.hpp"
 
 namespace vergence::app {
 
 /// Why a device on a serial port cannot be opened. `who`: `ins: the xsens INS on /dev/ttyUSB0`;
-/// `error`: the driver's sentence, may be empty.
+/// `error`: the driver's message, may be empty.
 [[nodiscard]] std::string serial_open_error(const std::string& who, DeviceStatus status,
                                             const std::string& error);
 
 /// Throws: InputError where the request is at fault (a device cannot do it, it makes no sense, one
 /// of several is not named), DeviceError where the device is: the same may succeed later.
-[[noreturn]] void refuse_device(DeviceStatus status, const std::string& sentence);
+[[noreturn]] void refuse_device(DeviceStatus status, const std::string& message);
 
-/// refuse_device() unless `ok`: the device's title, and its sentence or the status.
+/// refuse_device() unless `ok`: the device's title, and its message or the status.
 void require_configured(const std::string& title, DeviceStatus status, const std::string& error);
 
 /// An INS as the configuration wants it.
@@ -54,20 +54,20 @@ struct InsDriverRow {
 
 /// Opens and configures it; null for `none`.
 ///
-/// Errors  As refuse_device(), one sentence: the key, what was found, what to do. Nothing
+/// Errors  As refuse_device(), one message: the key, what was found, what to do. Nothing
 ///         stays open then.
-/// `remarks`: sentences about what works, but not as asked.
+/// `remarks`: messages about what works, but not as asked.
 [[nodiscard]] std::unique_ptr<InsDevice> open_ins(const InsRequest& request,
                                                   std::vector<std::string>* remarks);
 
-/// An INS for a sentence: `ins (xsens 07701234, MTI-G-710 on /dev/ttyUSB0)`.
+/// An INS for a message: `ins (xsens 07701234, MTI-G-710 on /dev/ttyUSB0)`.
 [[nodiscard]] std::string ins_title(const DeviceInfo& info);
 
 /// Opens the trigger board and configures it; from then on it makes no pulse until it is started.
 ///
-/// Errors  As refuse_device(), one sentence: the key, what was found, what to do. Nothing
+/// Errors  As refuse_device(), one message: the key, what was found, what to do. Nothing
 ///         stays open then.
-/// `remarks`: sentences about what works, but not as asked.
+/// `remarks`: messages about what works, but not as asked.
 [[nodiscard]] std::unique_ptr<trigger_board::Device> open_trigger_board(
     const TriggerSettings& settings, const TriggerConfiguration& pulses,
     std::vector<std::string>* remarks);
@@ -75,7 +75,7 @@ struct InsDriverRow {
 /// What the driver needs to know of a board of this configuration.
 [[nodiscard]] trigger_board::Options trigger_board_options(const TriggerSettings& settings);
 
-/// A board for a sentence: `trigger (board 3000…, on /dev/ttyACM0)`.
+/// A board for a message: `trigger (board 3000…, on /dev/ttyACM0)`.
 [[nodiscard]] std::string board_title(const DeviceInfo& info);
 
 }  // namespace vergence::app

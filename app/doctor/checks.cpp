@@ -145,11 +145,11 @@ void check_nodes(const CheckContext& p, const NodesToOpen& o, std::vector<Findin
           "they are not open to group {} (mode 0660); install the udev rules, or end a serial "
           "console that holds the port (sudo systemctl mask --now serial-getty@NAME)",
           o.group);
-      f.mend = kInstallRules;
+      f.fix = kInstallRules;
     } else {
       f.message += fmt::format("{} is not in group {}; add, then log out and in again",
                                p.machine.user, o.group);
-      f.mend = {fmt::format("sudo usermod -aG {} {}", o.group, p.machine.user)};
+      f.fix = {fmt::format("sudo usermod -aG {} {}", o.group, p.machine.user)};
     }
   }
   findings->push_back(std::move(f));
@@ -232,7 +232,7 @@ void check_latency(const CheckContext& p, std::vector<Finding>* findings) {
       f.state = FindingState::advice;
       f.message +=
           fmt::format("; the INS's stamps are best with {} ms (docs/ins.md)", kAdvisedLatency);
-      f.mend = {
+      f.fix = {
           fmt::format("echo {} | sudo tee /sys/bus/usb-serial/devices/{}/latency_timer",
                       kAdvisedLatency, std::filesystem::path(port->info.port).filename().string()),
           kInstallRules.front()};
@@ -341,10 +341,9 @@ void check_receive_buffer(const CheckContext& p, std::vector<Finding>* findings)
     f.state = lost ? FindingState::problem : FindingState::advice;
     if (lost) f.message += ": images will be lost";
     // The last file by name counts, and the package's own is 10-vergence.conf.
-    f.mend = {
-        fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
-        fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/90-vergence-rmem.conf",
-                    advised)};
+    f.fix = {fmt::format("sudo sysctl -w net.core.rmem_max={}", advised),
+             fmt::format("echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/90-vergence-rmem.conf",
+                         advised)};
   }
   findings->push_back(std::move(f));
 }
@@ -381,8 +380,8 @@ void check_mtu(const std::string& name, int mtu, std::vector<Finding>* findings)
         ": with {} (interface, and every switch on the way) a camera takes a quarter of the "
         "processor's time",
         kJumbo);
-    f.mend = {fmt::format("sudo ip link set dev {} mtu {}", name, kJumbo),
-              fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", name, kJumbo)};
+    f.fix = {fmt::format("sudo ip link set dev {} mtu {}", name, kJumbo),
+             fmt::format("sudo nmcli con mod {} 802-3-ethernet.mtu {}", name, kJumbo)};
   }
   findings->push_back(std::move(f));
 }
@@ -435,8 +434,8 @@ void check_limits(const CheckContext& p, std::vector<Finding>* findings) {
               {}};
     if (!enough) {
       f.state = l.refused;
-      f.mend = {fmt::format("echo '{} - {}' | sudo tee -a /etc/security/limits.d/60-vergence.conf",
-                            p.machine.user, l.item)};
+      f.fix = {fmt::format("echo '{} - {}' | sudo tee -a /etc/security/limits.d/60-vergence.conf",
+                           p.machine.user, l.item)};
     }
     findings->push_back(std::move(f));
   }
@@ -449,8 +448,8 @@ void check_clock(const CheckContext& p, std::vector<Finding>* findings) {
     f.message =
         "the clock is not in step: the dates of sessions may be wrong, their intervals are not";
     // Without a clock with a battery a start begins with an old date; timesyncd remembers the last.
-    f.mend = {p.machine.exists("/dev/rtc0") ? "sudo apt-get install chrony"
-                                            : "sudo apt-get install systemd-timesyncd"};
+    f.fix = {p.machine.exists("/dev/rtc0") ? "sudo apt-get install chrony"
+                                           : "sudo apt-get install systemd-timesyncd"};
   }
   findings->push_back(std::move(f));
 }
@@ -467,7 +466,7 @@ void check_disk(const CheckContext& p, std::vector<Finding>* findings) {
   if (room->read_only) {
     f.state = FindingState::problem;
     f.message = fmt::format("the file system of {} is read-only: no session can be written", where);
-    f.mend = {fmt::format("findmnt -T '{}'", p.out.string())};
+    f.fix = {fmt::format("findmnt -T '{}'", p.out.string())};
   } else if (!room->may_write && p.drive != nullptr) {
     f.state = FindingState::problem;
     f.message = fmt::format("{} may not write at {}: name a folder of your own by --out",
@@ -475,7 +474,7 @@ void check_disk(const CheckContext& p, std::vector<Finding>* findings) {
   } else if (room->bytes < kComfortable) {
     f.state = room->bytes < kMin ? FindingState::problem : FindingState::advice;
     f.message += "; an hour's drive writes some 100 MB, recordings of images far more";
-    f.mend = {"df -h"};
+    f.fix = {"df -h"};
   }
   findings->push_back(std::move(f));
 }

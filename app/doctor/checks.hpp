@@ -21,7 +21,7 @@ struct Finding {
   std::string check;  // name, as in docs/doctor.md
   FindingState state = FindingState::ok;
   std::string message;
-  std::vector<std::string> mend;  // commands as they are typed, the lasting one last
+  std::vector<std::string> fix;  // commands as they are typed, the lasting one last
 };
 
 /// Returns true if a driver talks to a device: it is neither empty nor `none` nor `mock`.

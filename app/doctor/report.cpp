@@ -199,13 +199,13 @@ std::string paste_text(const Inventory& inventory, const Terminal& t) {
                       : t.in(Terminal::Ink::bold, "For the configuration") + "\n" + text + "\n";
 }
 
-/// One line a driver, its sentence beside it.
+/// One line a driver, its message beside it.
 std::string notes_text(const Inventory& inventory, const Terminal& t) {
   std::string text;
   constexpr std::size_t kName = 14;
-  const auto note = [&](const std::string& name, const std::string& sentence) {
+  const auto note = [&](const std::string& name, const std::string& message) {
     std::string head = "  " + padded(name, kName - 2);
-    for (const std::string& line : wrapped(sentence, t.width - kName)) {
+    for (const std::string& line : wrapped(message, t.width - kName)) {
       text += head + line + "\n";
       head = std::string(kName, ' ');
     }
@@ -278,10 +278,10 @@ std::string doctor_text(const std::vector<Finding>& findings, bool given, const 
       text += head + line + "\n";
       head = margin;
     }
-    for (const std::string& command : f.mend)
+    for (const std::string& command : f.fix)
       text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) +
               "\n";  // never broken: it is copied
-    if (!f.mend.empty()) text += "\n";
+    if (!f.fix.empty()) text += "\n";
   }
   if (!text.ends_with("\n\n")) text += "\n";
   text +=
@@ -297,8 +297,8 @@ std::string doctor_json(const std::vector<Finding>& findings) {
   for (const Finding& f : findings)
     rows.push_back({{"check", f.check},
                     {"state", to_string(f.state)},
-                    {"sentence", f.message},
-                    {"mend", f.mend}});
+                    {"message", f.message},
+                    {"fix", f.fix}});
   const Json all{{"problems", count(findings, FindingState::problem)},
                  {"advice", count(findings, FindingState::advice)},
                  {"ok", count(findings, FindingState::ok)},

@@ -39,14 +39,15 @@ struct Reference {
 };
 
 Reference reference_of(const EvaluationRequest& a) {
-  if (a.reference.empty() && !a.estimate_mount)
+  if (a.reference.empty() && !a.estimate_ins_extrinsics)
     throw InputError(
-        "REFERENCE is missing; name a trajectory, or with --estimate-mount a session folder that "
+        "REFERENCE is missing; name a trajectory, or with --estimate-ins-extrinsics a session "
+        "folder that "
         "has an ins.csv");
   // A session folder stands for its poses, but where a mount is asked for: that is the INS's.
   const std::filesystem::path path = a.reference.empty() ? a.estimate : a.reference;
   std::error_code ignored;
-  const bool poses = !a.estimate_mount && std::filesystem::is_directory(path, ignored);
+  const bool poses = !a.estimate_ins_extrinsics && std::filesystem::is_directory(path, ignored);
   const std::filesystem::path ins = poses ? std::filesystem::path{} : find_ins_file(path);
   if (!ins.empty()) return {ins, true};
   if (a.reference.empty())
@@ -60,7 +61,7 @@ struct Files {
   TrajectoryFile estimate{}, reference{};
 };
 
-void say(const std::string& sentence) { std::cerr << "vergence: " << harmless(sentence) << '\n'; }
+void say(const std::string& message) { std::cerr << "vergence: " << harmless(message) << '\n'; }
 
 /// Rows of a file without times belong to the rows of the other one, with its times if it has some.
 void pair_rows(const EvaluationRequest& a, const Reference& from, Files* files) {
@@ -149,7 +150,7 @@ Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readi
     throw InputError(readings.string() + ": has no reading with an attitude and a satellites' fix");
   Brought out;
   out.poses = poses_of(moments);
-  if (a.estimate_mount)
+  if (a.estimate_ins_extrinsics)
     out.found = find_ins_mount(estimate, moments);
   else if (a.options.axes == BodyAxes::camera)  // else both are forward, left, up
     out.told = ins_mount_of(a.estimate, readings);
@@ -163,16 +164,17 @@ Brought bring_reference(const EvaluationRequest& a, const Reference& from, Files
     out = bring_ins(a, from.path, estimate);
   } else {
     out.poses = files->reference.poses;
-    if (a.estimate_mount) out.found = find_mount(estimate, out.poses);
+    if (a.estimate_ins_extrinsics) out.found = find_mount(estimate, out.poses);
   }
-  if (a.estimate_mount && out.found.status == MountStatus::ok)
+  if (a.estimate_ins_extrinsics && out.found.status == MountStatus::ok)
     out.poses = brought_over(out.poses, out.found.mount.T_ref_est);
   if (out.told) out.poses = brought_over(out.poses, out.told->T_ins_left);
   return out;
 }
 
 /// Without a mount nothing can be compared.
-ExitCode tell_no_mount(const EvaluationRequest& a, const Reference& from, const FoundMount& found) {
+ExitCode report_no_mount(const EvaluationRequest& a, const Reference& from,
+                         const FoundMount& found) {
   if (a.json) {
     nlohmann::ordered_json out;
     out["mount"] = mount_json(found);
@@ -234,12 +236,12 @@ std::string rotation_remark(const EvaluationRequest& a, const Files& files,
     return helps(in_other_order(estimate, files.estimate.order), reference);
   };
   const auto of_reference = [&] {
-    return !files.reference.poses.empty() && !a.estimate_mount &&
+    return !files.reference.poses.empty() && !a.estimate_ins_extrinsics &&
            helps(estimate, in_other_order(files.reference.poses, files.reference.order));
   };
   // Where both would help, the order that is unusual is the doubtful one.
   const bool reference_first = files.reference.order == QuaternionOrder::wxyz &&
-                               !files.reference.order_told &&
+                               !files.reference.order_reported &&
                                files.estimate.order == QuaternionOrder::xyzw;
   if (reference_first && of_reference()) return order(a.reference, ",", files.reference);
   if (of_estimate()) return order(a.estimate, "", files.estimate);
@@ -247,7 +249,7 @@ std::string rotation_remark(const EvaluationRequest& a, const Files& files,
   if (const auto turn = constant_turn(estimate, reference, options, e))
     return fmt::format(
         "{}: the two bodies have different axes, turned by {:.0f} deg all the way (a camera and an "
-        "IMU or a vehicle?); --estimate-mount finds the turn",
+        "IMU or a vehicle?); --estimate-ins-extrinsics finds the turn",
         what, *turn * kDegreesPerRadian);
   Trajectory inverse = estimate;
   for (StampedPose& pose : inverse) pose.T_world_body.R.transposeInPlace();
@@ -264,12 +266,12 @@ void print(const EvaluationRequest& a, const EvaluationOptions& options, const B
            const TrajectoryEvaluation& evaluation) {
   if (a.json) {
     nlohmann::ordered_json out = evaluation_json(evaluation, options);
-    if (a.estimate_mount) out["mount"] = mount_json(reference.found);
+    if (a.estimate_ins_extrinsics) out["mount"] = mount_json(reference.found);
     if (reference.told) out["ins_mount"] = ins_mount_json(*reference.told);
     std::cout << out.dump(1) << '\n';
     return;
   }
-  if (a.estimate_mount) std::cout << mount_text(reference.found);
+  if (a.estimate_ins_extrinsics) std::cout << mount_text(reference.found);
   if (reference.told) std::cout << ins_mount_text(*reference.told) << '\n';
   std::cout << evaluation_text(evaluation, options);
 }
@@ -282,8 +284,8 @@ ExitCode run_evaluation(const EvaluationRequest& a) {
   Files files = read_files(a, from);
   const Trajectory& estimate = files.estimate.poses;
   const Brought reference = bring_reference(a, from, &files);
-  if (a.estimate_mount && reference.found.status != MountStatus::ok)
-    return tell_no_mount(a, from, reference.found);
+  if (a.estimate_ins_extrinsics && reference.found.status != MountStatus::ok)
+    return report_no_mount(a, from, reference.found);
   TrajectoryEvaluation evaluation = evaluate(estimate, reference.poses, options);
   if (a.usual_lengths) keep_longest(&evaluation, &options);
   print(a, options, reference, evaluation);

@@ -16,7 +16,7 @@ struct EvaluationRequest {
   EvaluationOptions options{};
   bool usual_lengths = true;  // of options.segments the longest that the path is long enough for
   bool json = false;
-  bool estimate_mount = false;
+  bool estimate_ins_extrinsics = false;
   // What the user says of the estimate's file and of the reference's.
   std::array<std::optional<TimeUnit>, 2> units{};
   std::array<std::optional<QuaternionOrder>, 2> quaternions{};

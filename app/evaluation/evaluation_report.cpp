@@ -231,7 +231,7 @@ std::optional<InsMount> mount_in(const std::filesystem::path& summary) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(summary, ignored)) return std::nullopt;
   const Json all = Json::parse(read_text(summary, kLargest), nullptr, false);
-  const Json mount = all.is_object() ? all.value("/earth/mount"_json_pointer, Json()) : Json();
+  const Json mount = all.is_object() ? all.value("/enu/mount"_json_pointer, Json()) : Json();
   if (!mount.is_object()) return std::nullopt;
   const auto arm = vector_of(mount, "lever_arm_m"), turn = vector_of(mount, "boresight_deg");
   if (!arm || !turn) return std::nullopt;
@@ -264,7 +264,7 @@ Json ins_mount_json(const InsMount& mount) {
 std::string ins_mount_text(const InsMount& mount) {
   if (mount.axes_only)
     return "nobody says how the camera sits on the INS: it is taken to look along the INS's x, at "
-           "its place; --estimate-mount finds more\n";
+           "its place; --estimate-ins-extrinsics finds more\n";
   return fmt::format("the INS is brought to the left camera by {}\n", mount.source);
 }
 
@@ -340,7 +340,7 @@ FoundMount find_ins_mount(const Trajectory& estimate, std::span<const MountRefer
   FoundMount found;
   found.of_ins = true;
   found.nominal = mount_of(Vec3::Zero(), Vec3::Zero()).R;
-  found.status = estimate_mount(estimate, moments, found.nominal, {}, &found.mount);
+  found.status = estimate_ins_extrinsics(estimate, moments, found.nominal, {}, &found.mount);
   return found;
 }
 
@@ -363,7 +363,7 @@ FoundMount find_mount(const Trajectory& estimate, const Trajectory& reference) {
        {Mat3(Mat3::Identity()), R_flu_camera, Mat3(R_flu_camera.transpose())}) {
     FoundMount found;
     found.nominal = nominal;
-    found.status = estimate_mount(estimate, readings, nominal, {}, &found.mount);
+    found.status = estimate_ins_extrinsics(estimate, readings, nominal, {}, &found.mount);
     if (found.status != MountStatus::ok) {
       if (best.status != MountStatus::ok) best.status = found.status;
       continue;

@@ -24,7 +24,7 @@ namespace vergence::app {
 [[nodiscard]] std::string evaluation_text(const TrajectoryEvaluation& evaluation,
                                           const EvaluationOptions& options);
 
-/// Why there are no figures, as a whole sentence. `interval`: the usual one between the reference's
+/// Why there are no figures, as a whole message. `interval`: the usual one between the reference's
 /// poses. Precondition: the status is not ok.
 [[nodiscard]] std::string evaluation_problem(const TrajectoryEvaluation& evaluation,
                                              const EvaluationOptions& options, Duration interval);

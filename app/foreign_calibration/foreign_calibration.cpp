@@ -31,15 +31,15 @@ double number_of(const Fact& fact) { return fact.file->number(fact.node, fact.ke
 
 /// All numbers of a value: one, a list, a list of lists, or `{rows, cols, data}`.
 std::vector<double> numbers_of(const Fact& fact) {
-  constexpr std::size_t kMost = 64;
+  constexpr std::size_t kMax = 64;
   const YAML::Node data = fact.node.IsMap() ? fact.node["data"] : fact.node;
   if (data.IsScalar()) return {fact.file->number(data, fact.key)};
   std::vector<double> values;
   for (const auto& item : data) {
-    const auto row = item.IsSequence() ? fact.file->numbers(item, fact.key, 0, kMost)
+    const auto row = item.IsSequence() ? fact.file->numbers(item, fact.key, 0, kMax)
                                        : std::vector{fact.file->number(item, fact.key)};
     values.insert(values.end(), row.begin(), row.end());
-    if (values.size() > kMost) fail(fact, " has too many numbers");
+    if (values.size() > kMax) fail(fact, " has too many numbers");
   }
   if (fact.node.IsMap())
     if (const YAML::Node rows = fact.node["rows"], columns = fact.node["cols"]; rows && columns)
@@ -476,7 +476,7 @@ void finish(const std::string& name, const CalibrationUse& use, CalibrationFile*
   calibration->source = "given";
   calibration->rig.baseline = calibration->rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&calibration->rig))
-    throw InputError(fmt::format("{}: in the words of calibration.yaml, {}", name, bad->sentence));
+    throw InputError(fmt::format("{}: in the words of calibration.yaml, {}", name, bad->message));
   apply_use(use, &calibration->rig);
 }
 

@@ -22,7 +22,7 @@ enum class CalibrationFormat : std::uint8_t { vergence, kalibr, ros, opencv };
 
 /// One file of a calibration.
 struct CalibrationText {
-  std::string name;  // for sentences; files that it names lie beside it
+  std::string name;  // for messages; files that it names lie beside it
   std::string text;
 };
 

@@ -127,10 +127,10 @@ std::vector<YamlFile> settings_trees(std::string text, const std::string& name) 
   if (text.starts_with("---")) text.replace(0, 3, 3, ' ');
   std::vector<YamlFile> trees;
   std::string document;  // after as many ends of lines as stand before it
-  constexpr std::size_t kMostDocuments = 16;
+  constexpr std::size_t kMaxDocuments = 16;
   rest = text;
   for (std::size_t documents = 1;; ++documents) {
-    if (documents > kMostDocuments)
+    if (documents > kMaxDocuments)
       refuse(name, 0, "has more documents (---) than a calibration has");
     const std::size_t end = std::min(rest.find("\n---"), rest.size());
     document.append(rest.substr(0, end));

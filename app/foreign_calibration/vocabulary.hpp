@@ -36,7 +36,7 @@ struct Fact {
 [[nodiscard]] std::vector<Fact> facts_of(const YamlFile& file);
 
 /// The program that a file is of, by a key that only its files have, and what it needs to be read:
-/// half a sentence. Empty: none that is known. *never is set where a program's files are never
+/// half a message. Empty: none that is known. *never is set where a program's files are never
 /// read.
 [[nodiscard]] std::string program_of(const YamlFile& file, bool* never);
 

@@ -215,7 +215,7 @@ struct HttpServer::Callbacks {
 
 HttpServer::HttpServer(const HostPort& address, HttpPolicy policy, std::string_view page,
                        std::size_t viewers, Action action)
-    : policy_(std::move(policy)), page_(page), most_viewers_(viewers), action_(std::move(action)) {
+    : policy_(std::move(policy)), page_(page), max_viewers_(viewers), action_(std::move(action)) {
   FileDescriptor listener = listen_at(address);
   daemon_.reset(::MHD_start_daemon(
       MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr, &Callbacks::request, this,
@@ -242,12 +242,12 @@ void HttpServer::step(milliseconds timeout) {
 
 bool HttpServer::answer(MHD_Connection* c, const HttpRequest& request) {
   HttpDecision decision = decide(request, policy_);
-  if (decision.route == HttpRoute::events && viewers_.size() >= most_viewers_)
+  if (decision.route == HttpRoute::events && viewers_.size() >= max_viewers_)
     decision = {HttpRoute::refuse, 503, "as many as publish.viewers allows are looking already"};
   switch (decision.route) {
     case HttpRoute::refuse:
       return send(c, decision.status, "text/plain; charset=utf-8",
-                  std::string(decision.sentence) + "\n");
+                  std::string(decision.message) + "\n");
     case HttpRoute::page:
       return send(c, decision.status, "text/html; charset=utf-8", page_);
     case HttpRoute::events:
@@ -272,7 +272,7 @@ void HttpServer::wake(Viewer* viewer) noexcept {
 }
 
 bool HttpServer::send_event(Viewer* viewer, std::string_view name, std::string_view json) {
-  if (viewer->pending() || json.size() > kMostEventBytes) return false;
+  if (viewer->pending() || json.size() > kMaxEventBytes) return false;
   viewer->out = fmt::format("event: {}\ndata: {}\n\n", name, json);
   viewer->sent = 0;
   wake(viewer);
@@ -286,7 +286,7 @@ void HttpServer::broadcast(std::string_view name, std::string_view json, Skipped
       v.greeted = send_event(&v, name, json);
     else if (!v.pending())
       (void)send_event(&v, name, json);
-    else if (v.sent == 0 && v.out.size() + json.size() <= kMostEventBytes)
+    else if (v.sent == 0 && v.out.size() + json.size() <= kMaxEventBytes)
       v.out += fmt::format("event: {}\ndata: {}\n\n", name, json);  // behind what is just made
   }
 }

@@ -36,7 +36,7 @@ enum class HttpRoute : std::uint8_t { refuse, page, events, recalibrate, mark, s
 struct HttpDecision {
   HttpRoute route = HttpRoute::refuse;
   unsigned status = 200;
-  const char* sentence = "";  // of a refusal
+  const char* message = "";  // of a refusal
 };
 
 /// The page itself holds nothing of the session and is for everyone; events want the token where
@@ -65,7 +65,7 @@ class HttpServer {
   static constexpr unsigned kConnections = 64;
   static constexpr std::size_t kAsking = 24;  // connections without a request; the oldest goes
   static constexpr std::size_t kRequestBytes = std::size_t{8} << 10U;  // browsers send some 600
-  static constexpr std::size_t kMostEventBytes = std::size_t{4} << 20U;
+  static constexpr std::size_t kMaxEventBytes = std::size_t{4} << 20U;
 
   using Action = std::function<void(HttpRoute)>;
 
@@ -113,7 +113,7 @@ class HttpServer {
 
   const HttpPolicy policy_;
   const std::string_view page_;
-  const std::size_t most_viewers_;
+  const std::size_t max_viewers_;
   const Action action_;
   std::list<Viewer> viewers_;
   std::list<MHD_Connection*> asking_;  // that have sent no request yet, the oldest first

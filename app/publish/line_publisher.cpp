@@ -55,8 +55,9 @@ void LinePublisher::on_pose(const PoseSample& sample) noexcept {
 
 // A session has fewer alignments and calibrations in a second than their rings hold; one that finds
 // no room is replaced by the next one.
-void LinePublisher::on_placement(const Placement& placement, const Geodetic& origin) noexcept {
-  (void)placements_.push({placement, origin});
+void LinePublisher::on_enu_alignment(const EnuAlignment& alignment,
+                                     const Geodetic& origin) noexcept {
+  (void)alignments_.push({alignment, origin});
 }
 
 void LinePublisher::on_calibration(const CalibrationRecord& calibration) noexcept {
@@ -73,7 +74,7 @@ void LinePublisher::on_reading(const InsRecord& reading) noexcept {
 
 void LinePublisher::on_event(const EventRecord& event) noexcept {
   const std::string_view kind = event.kind;
-  const bool confirmed = kind == "calibration_confirmed";
+  const bool confirmed = kind == "calibration_verified";
   if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed")
     verified_.store(confirmed, std::memory_order_relaxed);
 }
@@ -99,9 +100,9 @@ void LinePublisher::drain() {
   bool changed = false;
   for (CalibrationRecord record; calibrations_.pop(&record); changed = true)
     calibration_line_ = calibration_line(record, start_.camera_names, options_);
-  for (PublishedPlacement placement; placements_.pop(&placement); changed = true) {
-    placement_ = placement;
-    alignment_line_ = alignment_line(placement);
+  for (PublishedEnuAlignment alignment; alignments_.pop(&alignment); changed = true) {
+    alignment_ = alignment;
+    alignment_line_ = alignment_line(alignment);
   }
   if (changed) socket_->greet(calibration_line_ + alignment_line_);
   for (LiveFrame frame; frames_.pop(&frame);) send(frame);
@@ -110,12 +111,12 @@ void LinePublisher::drain() {
 void LinePublisher::send(const LiveFrame& frame) {
   const PoseSample& pose = frame.pose;
   newest_ = frame;
-  std::optional<EarthPose> on_earth;
-  if (placement_ && pose.status != PoseStatus::lost) on_earth = placement_->of(pose.T_world_left);
+  std::optional<EnuPose> in_enu;
+  if (alignment_ && pose.status != PoseStatus::lost) in_enu = alignment_->of(pose.T_world_left);
   const std::optional<ClockTie>& tie = start_.tie;
   std::optional<double> age_ms;
   if (tie) age_ms = (tie->stamp_at(monotonic_now()) - pose.stamp).to_seconds() * 1e3;
-  write_pose_line(pose, on_earth, age_ms, dropped_.load(std::memory_order_relaxed), &line_);
+  write_pose_line(pose, in_enu, age_ms, dropped_.load(std::memory_order_relaxed), &line_);
   socket_->send(line_);
   ++lines_;
   const HostStamp sent = monotonic_now();
@@ -134,7 +135,7 @@ void LinePublisher::send_status(HostStamp now) {
   if (newest_) status.silent_s = (now - newest_->out).to_seconds();
   status.calibrated = !calibration_line_.empty();
   status.verified = verified_.load(std::memory_order_relaxed);
-  status.aligned = placement_.has_value();
+  status.aligned = alignment_.has_value();
   status.dropped = dropped_.load(std::memory_order_relaxed);
   if (const std::int64_t ns = sample_ns_.load(std::memory_order_relaxed); ns != 0)
     status.ins = {fix_.load(std::memory_order_relaxed), (now - HostStamp(ns)).to_seconds()};

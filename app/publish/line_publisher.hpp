@@ -20,8 +20,9 @@
 
 namespace vergence::app {
 
-/// `publish.lines`: the pose stream to robots and bridges (docs/publish.md). A line per frame, the
-/// calibration and the alignment when a reader connects and when they change, a status per second.
+/// `publish.pose_stream`: the pose stream to robots and bridges (docs/publish.md). A line per
+/// frame, the calibration and the alignment when a reader connects and when they change, a status
+/// per second.
 ///
 /// Threads  on_…(): the estimator's, which pushes into rings and wakes; no lock, no system call
 ///          but the wake. Formatting, sending and requests: a thread of its own, made by the
@@ -41,7 +42,7 @@ class LinePublisher final : public SessionObserver {
   void on_start(const SessionStart& start) noexcept override;
   void on_frame(const RigFrame& frame) noexcept override { builder_.add(frame); }
   void on_pose(const PoseSample& sample) noexcept override;
-  void on_placement(const Placement& placement, const Geodetic& origin) noexcept override;
+  void on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept override;
   void on_reading(const InsRecord& reading) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
@@ -72,7 +73,7 @@ class LinePublisher final : public SessionObserver {
   LiveFrameBuilder builder_;
   // From it to the publisher's.
   Ring<LiveFrame, 64> frames_;
-  Ring<PublishedPlacement, 8> placements_;
+  Ring<PublishedEnuAlignment, 8> alignments_;
   Ring<CalibrationRecord, 4> calibrations_;
   std::atomic<std::uint64_t> dropped_{0};
   std::atomic<bool> verified_{false};
@@ -82,7 +83,7 @@ class LinePublisher final : public SessionObserver {
   std::atomic<double> age_p99_ms_{-1};
 
   // Of the publisher's thread.
-  std::optional<PublishedPlacement> placement_{};
+  std::optional<PublishedEnuAlignment> alignment_{};
   std::optional<LiveFrame> newest_{};
   std::string calibration_line_{}, alignment_line_{};
   HostStamp status_due_{};

@@ -251,8 +251,8 @@ class UnixLineSocket final : public LineSocket {
 
   /// Reads what a reader has sent, and answers whole lines.
   void hear(short events, const Answer& answer, Reader* reader) noexcept {
-    constexpr std::size_t kMostRequest = 512;  // bytes
-    std::array<char, kMostRequest> bytes;
+    constexpr std::size_t kMaxRequest = 512;  // bytes
+    std::array<char, kMaxRequest> bytes;
     const ssize_t n = reader->asks && reader->rest.empty()
                           ? ::recv(reader->socket.get(), bytes.data(), bytes.size(), MSG_DONTWAIT)
                           : 0;
@@ -265,7 +265,7 @@ class UnixLineSocket final : public LineSocket {
       reader->rest += answer(std::string_view(reader->asked).substr(0, end));
       reader->asked.erase(0, end + 1);
     }
-    if (reader->asked.size() >= kMostRequest) return reader->socket.reset();
+    if (reader->asked.size() >= kMaxRequest) return reader->socket.reset();
     flush(monotonic_now(), reader);
   }
 

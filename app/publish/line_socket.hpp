@@ -30,11 +30,11 @@ struct LineAddress {
   HostPort udp{};
 };
 
-/// `127.0.0.1:8080`, `[::1]:8080`, `0.0.0.0:8080`, `name:8080`. InputError: a sentence that begins
+/// `127.0.0.1:8080`, `[::1]:8080`, `0.0.0.0:8080`, `name:8080`. InputError: a message that begins
 /// with `key`.
 [[nodiscard]] HostPort parse_host_port(std::string_view text, std::string_view key);
 
-/// `unix:///run/vergence/pose.sock`, `udp://HOST:PORT`. InputError: a sentence that begins with
+/// `unix:///run/vergence/pose.sock`, `udp://HOST:PORT`. InputError: a message that begins with
 /// `key`.
 [[nodiscard]] LineAddress parse_line_address(std::string_view text, std::string_view key);
 
@@ -68,7 +68,7 @@ class LineSocket {
   [[nodiscard]] virtual LineSocketCounters counters() const noexcept = 0;
 };
 
-/// `key` begins the sentence of an InputError.
+/// `key` begins the message of an InputError.
 [[nodiscard]] std::unique_ptr<LineSocket> open_line_socket(const LineAddress& address,
                                                            std::string_view key);
 

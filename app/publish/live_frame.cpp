@@ -4,8 +4,8 @@
 
 namespace vergence::app {
 
-EarthPose PublishedPlacement::of(const Transform& T_world_left) const {
-  const Transform T_enu_left = placement.T_enu_world * T_world_left;
+EnuPose PublishedEnuAlignment::of(const Transform& T_world_left) const {
+  const Transform T_enu_left = alignment.T_enu_world * T_world_left;
   const Vec3 view = T_enu_left.R.col(2);
   return {T_enu_left, LocalTangentPlane(origin).to_geodetic(T_enu_left.t),
           std::atan2(view.y(), view.x())};
@@ -15,8 +15,8 @@ const char* to_words(Pairing pairing) noexcept {
   switch (pairing) {
     case Pairing::assumed:
       return "assumed";
-    case Pairing::proven:
-      return "proven";
+    case Pairing::verified:
+      return "verified";
     case Pairing::contradicted:
       return "contradicted";
   }

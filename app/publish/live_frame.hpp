@@ -4,7 +4,7 @@
 
 #include "app/session/session_observer.hpp"
 #include "core/comparison/comparison.hpp"
-#include "core/comparison/placement.hpp"
+#include "core/comparison/enu_alignment.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
 #include "drivers/clock.hpp"
@@ -12,11 +12,11 @@
 namespace vergence::app {
 
 /// Where the odometry's world lies on the earth.
-struct PublishedPlacement {
-  Placement placement{};
+struct PublishedEnuAlignment {
+  EnuAlignment alignment{};
   Geodetic origin{};  // of enu
 
-  [[nodiscard]] EarthPose of(const Transform& T_world_left) const;
+  [[nodiscard]] EnuPose of(const Transform& T_world_left) const;
 };
 
 /// One frame for viewers and readers, with what has been counted up to it: figures stay true when
@@ -34,7 +34,7 @@ struct LiveFrame {
   double age_ms = -1;               // from mid-exposure to the pose; negative: not known
 };
 
-/// `assumed`, `proven`, `contradicted`.
+/// `assumed`, `verified`, `contradicted`.
 [[nodiscard]] const char* to_words(Pairing pairing) noexcept;
 
 /// Counts a drive's frames and poses into the LiveFrame of each. One thread; no heap.

@@ -165,8 +165,8 @@ void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
   images_.take_points(builder_.frame(), tracks);
 }
 
-void LivePage::on_placement(const Placement& placement, const Geodetic& origin) noexcept {
-  push(&placements_, {placement, origin});
+void LivePage::on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
+  push(&alignments_, {alignment, origin});
 }
 
 void LivePage::on_report(const FrameReport& report) noexcept { push(&reports_, report); }
@@ -208,7 +208,7 @@ void LivePage::drain() {
   // Before the rings: what is in them by then is all of the drive.
   const bool ended = ended_.load(std::memory_order_acquire);
   for (CalibrationRecord record; calibrations_.pop(&record);) state_.add(record);
-  for (PublishedPlacement placement; placements_.pop(&placement);) state_.add(placement);
+  for (PublishedEnuAlignment alignment; alignments_.pop(&alignment);) state_.add(alignment);
   for (LiveFrame frame; frames_.pop(&frame);) state_.add(frame);
   for (FrameReport report; reports_.pop(&report);) state_.add(report);
   for (EventRecord event; events_.pop(&event);) state_.add(event);

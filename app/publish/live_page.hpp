@@ -106,7 +106,7 @@ class LivePage final : public SessionObserver {
   void on_frame(const RigFrame& frame) noexcept override;
   void on_pose(const PoseSample& sample) noexcept override;
   void on_tracks(const calibration::TrackLog& tracks) noexcept override;
-  void on_placement(const Placement& placement, const Geodetic& origin) noexcept override;
+  void on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept override;
   void on_report(const FrameReport& report) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
@@ -136,7 +136,7 @@ class LivePage final : public SessionObserver {
   Ring<FrameReport, 256> reports_;
   Ring<EventRecord, 64> events_;
   Ring<CalibrationRecord, 8> calibrations_;
-  Ring<PublishedPlacement, 8> placements_;
+  Ring<PublishedEnuAlignment, 8> alignments_;
   /// For summary.json.
   struct Counts {
     std::atomic<std::uint64_t> updates{0}, dropped{0};

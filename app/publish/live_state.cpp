@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/report/verdict.hpp"
+#include "app/report/assessment.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
 
@@ -29,14 +29,14 @@ std::string text_of(const json& value) {
 json event_json(const EventRecord& event, Stamp first) {
   return {{"s", rounded((event.stamp - first).to_seconds(), 1)},
           {"kind", event.kind},
-          {"sentence", event.sentence.data()}};
+          {"message", event.message.data()}};
 }
 
 json camera_json(const RigCalibration& rig, std::size_t k) {
   const Transform& T = rig.T_camera_left[k];
   const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;
   json figures = json::array();
-  const auto& sigma = rig.sigma_wide[k];
+  const auto& sigma = rig.sigma_total[k];
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
     const auto axis = static_cast<Eigen::Index>(i % 3);
@@ -47,7 +47,7 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
 }
 
 constexpr double kSilenceSeconds = 1;  // without a frame: nobody reads an old status as today's …
-constexpr double kMostIntervals = 3;   // … unless frames are that rare
+constexpr double kMaxIntervals = 3;    // … unless frames are that rare
 constexpr double kSmoothing = 8;       // frames
 
 }  // namespace
@@ -85,7 +85,7 @@ void LiveState::add(const EventRecord& event) {
   if (events_.size() == kEvents) events_.pop_front();
   events_.push_back(event);
   const std::string_view kind = event.kind;
-  const bool confirmed = kind == "calibration_confirmed";
+  const bool confirmed = kind == "calibration_verified";
   if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed") {
     confirmed_ = confirmed;
     calibration_new_ = true;
@@ -104,9 +104,9 @@ void LiveState::add(const CalibrationRecord& calibration) {
   in_use_ = calibration;
 }
 
-void LiveState::add(const PublishedPlacement& placement) {
-  placement_ = placement;
-  placement_new_ = true;
+void LiveState::add(const PublishedEnuAlignment& alignment) {
+  alignment_ = alignment;
+  alignment_new_ = true;
 }
 
 json LiveState::frame_json(HostStamp now) const {
@@ -117,7 +117,7 @@ json LiveState::frame_json(HostStamp now) const {
   json out{{"frame", p.frame},
            {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
            {"since_s", rounded(silence, 1)},  // when it came
-           {"silent", silence > std::max(kSilenceSeconds, kMostIntervals * interval_s_)},
+           {"silent", silence > std::max(kSilenceSeconds, kMaxIntervals * interval_s_)},
            {"state", to_string(p.state)},
            {"status", to_string(p.status)},
            {"reason", reason},
@@ -147,11 +147,11 @@ json LiveState::frame_json(HostStamp now) const {
                   {"heading_deg", rounded(e[3], 2)}};
   }
   if (report_ && report_->placed) {
-    const EarthPose& ours = report_->ours;
-    out["earth"] = {{"latitude_deg", rounded(ours.position.latitude_deg, 7)},
-                    {"longitude_deg", rounded(ours.position.longitude_deg, 7)},
-                    {"height_m", rounded(ours.position.height_m, 2)},
-                    {"heading_deg", rounded(compass_heading_deg(ours.yaw), 1)}};
+    const EnuPose& ours = report_->ours;
+    out["enu"] = {{"latitude_deg", rounded(ours.position.latitude_deg, 7)},
+                  {"longitude_deg", rounded(ours.position.longitude_deg, 7)},
+                  {"height_m", rounded(ours.position.height_m, 2)},
+                  {"heading_deg", rounded(compass_heading_deg(ours.yaw), 1)}};
   }
   return out;
 }
@@ -168,14 +168,14 @@ json LiveState::calibration_json() const {
     out["frames"] = in_use_->calibration.frames;
     const CalibrationRecord& known = measured_ ? *measured_ : *in_use_;
     out["depth"] = known.depth_sigma_percent > 0
-                       ? json({{"at_m", rounded(known.judged_depth_m, 1)},
+                       ? json({{"at_m", rounded(known.reference_depth_m, 1)},
                                {"sigma_percent", rounded(known.depth_sigma_percent, 2)}})
                        : json(nullptr);
   }
   for (const CalibrationRecord& c : calibrations_)
     out["history"].push_back({{"s", rounded((c.stamp - start_.first).to_seconds(), 1)},
                               {"what", c.accepted ? "in use"
-                                       : c.learnt ? "kept"
+                                       : c.learnt ? "unchanged"
                                                   : "rejected"},
                               {"cause", c.cause_word()},
                               {"reason", c.why()}});
@@ -184,8 +184,8 @@ json LiveState::calibration_json() const {
 
 namespace {
 
-json placement_json(const PublishedPlacement& placement) {
-  const Transform& T = placement.placement.T_enu_world;
+json enu_alignment_json(const PublishedEnuAlignment& alignment) {
+  const Transform& T = alignment.alignment.T_enu_world;
   json rows = json::array();
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 4; ++j) rows.push_back(j < 3 ? T.R(i, j) : T.t(i));
@@ -213,7 +213,7 @@ std::string LiveState::hello(HostStamp now) const {
   json& events = out["events"] = json::array();
   for (const EventRecord& event : events_) events.push_back(event_json(event, start_.first));
   out["calibration"] = calibration_json();
-  if (placement_) out["placement"] = placement_json(*placement_);
+  if (alignment_) out["enu_alignment"] = enu_alignment_json(*alignment_);
   if (newest_) out["now"] = frame_json(now);
   return text_of(out);
 }
@@ -234,13 +234,13 @@ std::string LiveState::update(HostStamp now, double line_age_ms) {
     events.push_back(event_json(events_[i], start_.first));
   events_shown_ = events_seen_;
   if (std::exchange(calibration_new_, false)) out["calibration"] = calibration_json();
-  if (std::exchange(placement_new_, false)) out["placement"] = placement_json(*placement_);
+  if (std::exchange(alignment_new_, false)) out["enu_alignment"] = enu_alignment_json(*alignment_);
   return text_of(out);
 }
 
 namespace {
 
-constexpr float kMostStep = 16;  // m: a map of longer ones shows no way any more
+constexpr float kMaxStep = 16;  // m: a map of longer ones shows no way any more
 
 float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
@@ -249,8 +249,8 @@ float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
 }  // namespace
 
 void LiveTrail::add(const Place& place) {
-  if (places_.size() == kMost) thin();
-  if (places_.empty() || distance(place.world, places_.back().world) >= least_step_m_)
+  if (places_.size() == kMax) thin();
+  if (places_.empty() || distance(place.world, places_.back().world) >= min_step_m_)
     return places_.push_back(place);
   // A rig that stands for weeks uses up no places, whatever its status does.
   Place& last = places_.back();
@@ -261,16 +261,16 @@ void LiveTrail::add(const Place& place) {
 
 void LiveTrail::thin() {
   shown_ = 0;
-  if (least_step_m_ >= kMostStep) {
-    places_.erase(places_.begin(), places_.begin() + kMost / 2);
+  if (min_step_m_ >= kMaxStep) {
+    places_.erase(places_.begin(), places_.begin() + kMax / 2);
     return;
   }
-  least_step_m_ *= 2;
+  min_step_m_ *= 2;
   for (std::size_t i = 0; i < places_.size(); i += 2) {
     places_[i].status = std::max(places_[i].status, places_[i + 1].status);
     places_[i / 2] = places_[i];
   }
-  places_.resize(kMost / 2);
+  places_.resize(kMax / 2);
 }
 
 }  // namespace vergence::app

@@ -24,10 +24,10 @@ namespace vergence::app {
 /// worst status of all that was driven up to the next one.
 ///
 /// Threads  One.
-/// Full     After kMost places every other one goes, so 64 km are shown; then the oldest do.
+/// Full     After kMax places every other one goes, so 64 km are shown; then the oldest do.
 class LiveTrail {
  public:
-  static constexpr std::size_t kMost = 4000;
+  static constexpr std::size_t kMax = 4000;
 
   struct Place {
     std::array<float, 3> world{};               // m, of the left camera
@@ -44,7 +44,7 @@ class LiveTrail {
   void thin();
 
   std::vector<Place> places_{};
-  float least_step_m_ = 0.5F;
+  float min_step_m_ = 0.5F;
   std::size_t shown_ = 0;  // places that a viewer has as they are
 };
 
@@ -61,7 +61,7 @@ class LiveState {
   void add(const FrameReport& report);
   void add(const EventRecord& event);
   void add(const CalibrationRecord& calibration);
-  void add(const PublishedPlacement& placement);
+  void add(const PublishedEnuAlignment& alignment);
   void end() noexcept { ended_ = true; }
 
   /// All there is to know, for a viewer who has just come. `now` tells whether frames still come.
@@ -90,8 +90,8 @@ class LiveState {
   std::optional<CalibrationRecord> measured_{};  // by the drive, beside the one in use
   bool confirmed_ = false;
   bool calibration_new_ = false;
-  std::optional<PublishedPlacement> placement_{};
-  bool placement_new_ = false;
+  std::optional<PublishedEnuAlignment> alignment_{};
+  bool alignment_new_ = false;
 };
 
 }  // namespace vergence::app

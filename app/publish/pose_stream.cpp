@@ -48,7 +48,7 @@ void write_covariances(const PoseSample& pose, std::string* line) {
 
 }  // namespace
 
-void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& earth,
+void write_pose_line(const PoseSample& pose, const std::optional<EnuPose>& earth,
                      std::optional<double> age_ms, std::uint64_t dropped, std::string* line) {
   line->clear();
   auto out = std::back_inserter(*line);
@@ -69,7 +69,7 @@ void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& ear
         t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   }
   write_covariances(pose, line);
-  *line += R"(,"earth":)";
+  *line += R"(,"enu":)";
   if (pose.status == PoseStatus::lost || !earth) {
     *line += "null";
   } else {
@@ -140,15 +140,15 @@ std::string calibration_line(const CalibrationRecord& record, std::span<const st
                   {"cameras", cameras}});
 }
 
-std::string alignment_line(const PublishedPlacement& p) {
-  return line_of("alignment", {{"stamp_ns", p.placement.last.ns()},
+std::string alignment_line(const PublishedEnuAlignment& p) {
+  return line_of("alignment", {{"stamp_ns", p.alignment.last.ns()},
                                {"origin",
                                 {{"latitude_deg", p.origin.latitude_deg},
                                  {"longitude_deg", p.origin.longitude_deg},
                                  {"height_m", p.origin.height_m}}},
-                               {"T_enu_world", rows(p.placement.T_enu_world)},
-                               {"position_sigma_m", numbers(p.placement.position_sigma)},
-                               {"rotation_sigma_rad", numbers(p.placement.rotation_sigma)}});
+                               {"T_enu_world", rows(p.alignment.T_enu_world)},
+                               {"position_sigma_m", numbers(p.alignment.position_sigma)},
+                               {"rotation_sigma_rad", numbers(p.alignment.rotation_sigma)}});
 }
 
 std::string status_line(const StreamStatus& s) {

@@ -18,7 +18,7 @@ inline constexpr int kPoseStreamVersion = 2;
 
 /// `type: pose`. `age_ms`: from mid-exposure to now, where stamps are tied to this machine's clock.
 /// `dropped`: frames without a line since the start. Replaces *line, whose memory is used again.
-void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& earth,
+void write_pose_line(const PoseSample& pose, const std::optional<EnuPose>& earth,
                      std::optional<double> age_ms, std::uint64_t dropped, std::string* line);
 
 /// `type: calibration`, of one that is in use. `names`: of the cameras.
@@ -27,7 +27,7 @@ void write_pose_line(const PoseSample& pose, const std::optional<EarthPose>& ear
                                            const calibration::CalibrationOptions& options);
 
 /// `type: alignment`.
-[[nodiscard]] std::string alignment_line(const PublishedPlacement& placement);
+[[nodiscard]] std::string alignment_line(const PublishedEnuAlignment& alignment);
 
 /// Status of odometry and devices, once per second.
 struct StreamStatus {

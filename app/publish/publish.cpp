@@ -17,7 +17,7 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kLeastToken = 16, kMostToken = 128;
+constexpr std::size_t kMinToken = 16, kMaxToken = 128;
 
 /// 128 bits of the kernel's, in hexadecimal digits.
 std::string new_token() {
@@ -31,7 +31,7 @@ std::string new_token() {
 
 std::string read_token(const std::filesystem::path& file) {
   std::ifstream in(file);
-  std::string line(kMostToken + 2, '\0');
+  std::string line(kMaxToken + 2, '\0');
   if (!in)
     throw InputError(
         fmt::format("publish.token_file: {} cannot be read; write a line of letters "
@@ -43,11 +43,11 @@ std::string read_token(const std::filesystem::path& file) {
     return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' ||
            c == '_';
   });
-  if (line.size() < kLeastToken || line.size() > kMostToken || !plain)
+  if (line.size() < kMinToken || line.size() > kMaxToken || !plain)
     throw InputError(
         fmt::format("publish.token_file: the first line of {} is no token: {} to {} "
                     "letters, digits, - and _",
-                    file.string(), kLeastToken, kMostToken));
+                    file.string(), kMinToken, kMaxToken));
   return line;
 }
 
@@ -55,10 +55,10 @@ std::string read_token(const std::filesystem::path& file) {
 
 Publishing::Publishing(const Configuration& configuration) {
   const PublishSettings& settings = configuration.publish;
-  if (!settings.lines.empty()) {
-    const LineAddress address = parse_line_address(settings.lines, "publish.lines");
+  if (!settings.pose_stream.empty()) {
+    const LineAddress address = parse_line_address(settings.pose_stream, "publish.pose_stream");
     try {
-      lines_ = std::make_unique<LinePublisher>(open_line_socket(address, "publish.lines"),
+      lines_ = std::make_unique<LinePublisher>(open_line_socket(address, "publish.pose_stream"),
                                                &requests_, configuration.calibration);
     } catch (const InputError& e) {
       fmt::print(stderr, "vergence: {}; the drive goes on without lines\n", e.what());

@@ -14,7 +14,7 @@ namespace vergence::app {
 /// Ownership  Outlives the session that its observers are given to.
 /// Threads    One each for lines and page, begun here. Memory: theirs, taken here.
 /// Errors     Addresses that are none: InputError. What this machine refuses (a port in use, a
-///            folder that is not there): a sentence on stderr, and the session goes without.
+///            folder that is not there): a message on stderr, and the session goes without.
 class Publishing {
  public:
   explicit Publishing(const Configuration& configuration);
@@ -31,7 +31,7 @@ class Publishing {
   std::string link_{};  // to the page, for a person to open
 };
 
-/// `--page`: the live page on this machine, where the configuration names no address.
+/// `--live-page`: the live page on this machine, where the configuration names no address.
 void page_by_default(Configuration* configuration);
 
 }  // namespace vergence::app

@@ -132,8 +132,8 @@ class McapFile::Appender {
 
   template <class Content>
   void record(Opcode opcode, const Content& content) noexcept {
-    constexpr std::size_t kMostRecord = kScratch / 2;  // schemas are the longest
-    if (out_.size() > kScratch - kMostRecord) flush();
+    constexpr std::size_t kMaxRecord = kScratch / 2;  // schemas are the longest
+    if (out_.size() > kScratch - kMaxRecord) flush();
     put_record(&out_, opcode, content);
   }
   void bytes(const void* data, std::size_t size) noexcept { out_.bytes(data, size); }
@@ -167,9 +167,9 @@ class McapFile::Appender {
 
 McapFile::McapFile(Disk& disk, std::span<const McapTopic> topics, std::string library)
     : disk_(disk), topics_(topics), library_(std::move(library)), scratch_(kScratch) {
-  assert(topics.size() <= kMostChannels);
-  entries_.reserve(kMostMessages);
-  chunks_.reserve(kMostChunks);
+  assert(topics.size() <= kMaxChannels);
+  entries_.reserve(kMaxMessages);
+  chunks_.reserve(kMaxChunks);
 }
 
 McapFile::~McapFile() { abandon(); }
@@ -253,7 +253,7 @@ void McapFile::index_messages(std::span<const std::span<const std::uint8_t>> par
   chunk->start = std::numeric_limits<std::uint64_t>::max();
   for (std::span<const std::uint8_t> part : parts) {
     *crc = libdeflate_crc32(*crc, part.data(), part.size());
-    while (!part.empty() && entries_.size() < kMostMessages) {
+    while (!part.empty() && entries_.size() < kMaxMessages) {
       const auto head = McapMessageHead::read(part.first<McapMessageHead::kSize>());
       entries_.push_back({head.channel, head.log_time, chunk->records});
       chunk->start = std::min(chunk->start, head.log_time);
@@ -265,7 +265,7 @@ void McapFile::index_messages(std::span<const std::span<const std::uint8_t>> par
 }
 
 int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) noexcept {
-  assert(open() && !full() && parts.size() <= kMostParts);
+  assert(open() && !full() && parts.size() <= kMaxParts);
   ChunkIndex chunk;
   std::uint32_t crc = 0;
   index_messages(parts, &chunk, &crc);
@@ -301,7 +301,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
   }
   chunk.index_length = static_cast<std::uint32_t>(index.size());
 
-  std::array<iovec, kMostParts + 2> pieces{};
+  std::array<iovec, kMaxParts + 2> pieces{};
   int count = 0;
   pieces[static_cast<std::size_t>(count++)] = {head.data(), head.size()};
   for (const auto& part : parts)  // written from, never to
@@ -322,7 +322,7 @@ int McapFile::write_chunk(std::span<const std::span<const std::uint8_t>> parts) 
 void McapFile::write_back(const ChunkIndex& chunk) noexcept {
   disk_.start_writeback(fd_, chunk.offset, end_ - chunk.offset);
   if (chunk.offset > writeback_) {
-    note_unwritten(disk_.finish_writeback(fd_, writeback_, chunk.offset - writeback_));
+    record_unwritten(disk_.finish_writeback(fd_, writeback_, chunk.offset - writeback_));
     writeback_ = chunk.offset;
     waiting_ = 0;
   }
@@ -330,7 +330,7 @@ void McapFile::write_back(const ChunkIndex& chunk) noexcept {
 }
 
 /// Which pages a failure was about nobody says: all that waited may be missing.
-void McapFile::note_unwritten(int error) noexcept {
+void McapFile::record_unwritten(int error) noexcept {
   if (error == 0) return;
   if (unwritten_.error == 0) unwritten_.error = error;
   unwritten_.messages += std::exchange(waiting_, 0);
@@ -416,7 +416,7 @@ int McapFile::finish() noexcept {
   out.flush();
   int error = out.error();
   const int synchronised = disk_.synchronise(fd_);
-  note_unwritten(synchronised);
+  record_unwritten(synchronised);
   if (error == 0) error = synchronised;
   abandon();
   return error;

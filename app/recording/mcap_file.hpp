@@ -84,16 +84,16 @@ struct McapMessageHead {
 /// A chunk is one write, at an offset that only moves when all of it was taken; what a failed write
 /// left behind is cut off and written over. So the file is always good up to the last chunk, also
 /// without its end.
-/// Threads  One. Memory  Some 180 bytes for each of kMostChunks, at construction; none after.
+/// Threads  One. Memory  Some 180 bytes for each of kMaxChunks, at construction; none after.
 /// Errors   Negative errno values.
 class McapFile {
  public:
-  static constexpr std::size_t kMostChunks = 65536;  // in a file: 109 minutes of 100 ms
-  static constexpr std::size_t kMostChannels = 32;
-  static constexpr std::size_t kMostMessages = 4096;  // in a chunk
-  static constexpr std::size_t kMostParts = 8;
+  static constexpr std::size_t kMaxChunks = 65536;  // in a file: 109 minutes of 100 ms
+  static constexpr std::size_t kMaxChannels = 32;
+  static constexpr std::size_t kMaxMessages = 4096;  // in a chunk
+  static constexpr std::size_t kMaxParts = 8;
 
-  /// Precondition: at most kMostChannels. Topics and disk outlive it.
+  /// Precondition: at most kMaxChannels. Topics and disk outlive it.
   McapFile(Disk& disk, std::span<const McapTopic> topics, std::string library);
   ~McapFile();
   McapFile(const McapFile&) = delete;
@@ -101,7 +101,7 @@ class McapFile {
 
   /// A new file with its head. Precondition: none is open. → 0
   [[nodiscard]] int create(const char* path) noexcept;
-  /// Message records, of at most kMostMessages, in pieces that are whole records. Precondition:
+  /// Message records, of at most kMaxMessages, in pieces that are whole records. Precondition:
   /// open, not full(). → 0, and then all of it is with the system
   [[nodiscard]] int write_chunk(std::span<const std::span<const std::uint8_t>> parts) noexcept;
   /// Index and summary; the file is closed whatever comes of them. → 0, and then the disk has all
@@ -112,7 +112,7 @@ class McapFile {
 
   [[nodiscard]] bool open() const noexcept { return fd_ >= 0; }
   /// The index has no room for another chunk.
-  [[nodiscard]] bool full() const noexcept { return chunks_.size() == kMostChunks; }
+  [[nodiscard]] bool full() const noexcept { return chunks_.size() == kMaxChunks; }
   [[nodiscard]] std::uint64_t size() const noexcept { return end_; }          // bytes that are good
   [[nodiscard]] std::uint64_t first_time() const noexcept { return first_; }  // ns; of the messages
   [[nodiscard]] std::uint64_t last_time() const noexcept { return last_; }
@@ -135,14 +135,14 @@ class McapFile {
     std::uint64_t start = 0, end = 0;  // ns
     std::uint64_t offset = 0, length = 0, records = 0;
     std::uint32_t index_length = 0;
-    std::array<std::uint32_t, kMostChannels> index{};  // of each channel's MessageIndex, from the
-                                                       // chunk's end; kNone
+    std::array<std::uint32_t, kMaxChannels> index{};  // of each channel's MessageIndex, from the
+                                                      // chunk's end; kNone
   };
   class Appender;
 
   [[nodiscard]] int append(iovec* pieces, int count) noexcept;
   void write_back(const ChunkIndex& chunk) noexcept;
-  void note_unwritten(int error) noexcept;
+  void record_unwritten(int error) noexcept;
   void index_messages(std::span<const std::span<const std::uint8_t>> parts, ChunkIndex* chunk,
                       std::uint32_t* crc) noexcept;
   void write_schemas(Appender* out) const noexcept;
@@ -160,7 +160,7 @@ class McapFile {
   Unwritten unwritten_{};
   std::vector<Entry> entries_;  // of the chunk at hand
   std::vector<ChunkIndex> chunks_;
-  std::array<std::uint64_t, kMostChannels> counts_{};  // messages of each channel
+  std::array<std::uint64_t, kMaxChannels> counts_{};  // messages of each channel
   std::vector<std::uint8_t> scratch_;
 };
 

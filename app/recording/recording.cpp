@@ -82,11 +82,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kLook = 20ms;                      // between two looks at the queues
-constexpr std::int64_t kMostWaitNs = 40'000'000;  // of a message for its chunk: with a look and
-                                                  // the write it is less than 100 ms
-constexpr std::size_t kMostChunkBytes = std::size_t{32} << 20;  // half of what readers take
-constexpr std::size_t kSpare = std::size_t{1} << 20;            // of a queue, for what is not bulky
+constexpr auto kLook = 20ms;                     // between two looks at the queues
+constexpr std::int64_t kMaxWaitNs = 40'000'000;  // of a message for its chunk: with a look and
+                                                 // the write it is less than 100 ms
+constexpr std::size_t kMaxChunkBytes = std::size_t{32} << 20;  // half of what readers take
+constexpr std::size_t kSpare = std::size_t{1} << 20;           // of a queue, for what is not bulky
 constexpr int kNice = 5;  // poses come first; what is recorded waits in memory
 
 /// How full a queue may be that is not written: a producer that does not wait finds room for an
@@ -106,7 +106,7 @@ Recording::Recording(const std::filesystem::path& folder, const Options& options
       sequences_(options.files.topics.size()),
       files_(folder, options.files),
       keep_until_ns_(std::numeric_limits<std::int64_t>::min()) {
-  assert(options_.queues.size() <= McapFile::kMostParts);
+  assert(options_.queues.size() <= McapFile::kMaxParts);
   for (const std::size_t bytes : options_.queues) queues_.push_back(std::make_unique<Queue>(bytes));
   thread_ = std::thread([this] { work(); });
 }
@@ -123,7 +123,7 @@ std::span<std::uint8_t> Recording::begin(std::size_t queue, std::size_t topic, S
   q.head.log_time = static_cast<std::uint64_t>(std::max<std::int64_t>(stamp.ns(), 0));
   const std::size_t size = McapMessageHead::kSize + most;
   const std::size_t spare = bulky ? std::min(kSpare, q.ring.capacity() / 8) : 0;
-  const bool fits = size <= q.ring.capacity() / 2 && size <= kMostChunkBytes;
+  const bool fits = size <= q.ring.capacity() / 2 && size <= kMaxChunkBytes;
   for (;;) {
     const WakeEvent::Ticket seen = freed_.ticket();
     q.open = fits ? q.ring.begin(size, spare) : std::span<std::uint8_t>{};
@@ -220,8 +220,8 @@ Recording::Batch Recording::gather() const noexcept {
     while (at < waiting.size()) {
       const McapMessageHead head = head_of(waiting.subspan(at));
       const std::size_t size = head.record_size();
-      batch.filled = batch.messages == McapFile::kMostMessages ||
-                     (batch.bytes > 0 && batch.bytes + size > kMostChunkBytes);
+      batch.filled = batch.messages == McapFile::kMaxMessages ||
+                     (batch.bytes > 0 && batch.bytes + size > kMaxChunkBytes);
       if (batch.filled) break;
       if (batch.messages == 0) batch.first = head.log_time;
       at += size;
@@ -236,7 +236,7 @@ Recording::Batch Recording::gather() const noexcept {
 bool Recording::due(const Batch& batch) noexcept {
   const std::int64_t now = monotonic_now().ns();
   if (waiting_since_ns_ == 0) waiting_since_ns_ = now;
-  return batch.filled || now - waiting_since_ns_ >= kMostWaitNs;
+  return batch.filled || now - waiting_since_ns_ >= kMaxWaitNs;
 }
 
 void Recording::release(const Batch& batch) noexcept {

@@ -107,7 +107,7 @@ struct RecordingCounters {
 ///            begin() waits for room (virtual time, replay).
 /// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). When
 ///            a write fails the data wait in their queue while there is room and the same file is
-///            tried again every RecordingFiles::kRetry; sentences by take_errors().
+///            tried again every RecordingFiles::kRetry; messages by take_errors().
 class Recording {
  public:
   enum class WhenFull : std::uint8_t { drop, wait };
@@ -150,7 +150,7 @@ class Recording {
   };
   /// What waits, as far as a chunk takes it.
   struct Batch {
-    std::array<std::span<const std::uint8_t>, McapFile::kMostParts> parts{};
+    std::array<std::span<const std::uint8_t>, McapFile::kMaxParts> parts{};
     std::size_t messages = 0, bytes = 0;
     std::uint64_t first = 0;  // time of the first one, ns
     bool filled = false;      // there is more than a chunk takes

@@ -69,7 +69,7 @@ std::uint64_t RecordingFiles::append(Parts parts, std::uint64_t first,
   const std::uint64_t before = file_.size();
   int error = preamble_due_ ? write_preamble(first) : 0;
   if (error == 0) error = file_.write_chunk(parts);
-  note_unwritten();
+  record_unwritten();
   if (error != 0) {
     fail(-error);
     return 0;
@@ -86,12 +86,12 @@ void RecordingFiles::finish(std::uint64_t time) noexcept {
 
 void RecordingFiles::end_file() noexcept {
   const int error = file_.finish();
-  note_unwritten();
+  record_unwritten();
   if (error != 0) (void)notices_.push({Notice::Kind::unfinished, -error, 0, number_});
 }
 
 /// It is not tried again: the system has forgotten what it could not write.
-void RecordingFiles::note_unwritten() noexcept {
+void RecordingFiles::record_unwritten() noexcept {
   const McapFile::Unwritten missing = file_.take_unwritten();
   if (missing.messages == 0) return;
   unwritten_.fetch_add(missing.messages, std::memory_order_relaxed);
@@ -157,11 +157,11 @@ const char* RecordingFiles::path(std::vector<char>* out) const noexcept {
 std::vector<std::string> RecordingFiles::take_errors() {
   const std::lock_guard lock(errors_mutex_);
   std::vector<std::string> out;
-  for (Notice n; notices_.pop(&n);) out.push_back(sentence(n));
+  for (Notice n; notices_.pop(&n);) out.push_back(message(n));
   return out;
 }
 
-std::string RecordingFiles::sentence(const Notice& n) const {
+std::string RecordingFiles::message(const Notice& n) const {
   const std::string what = std::strerror(n.error);
   switch (n.kind) {
     case Notice::Kind::good_again:

@@ -83,10 +83,10 @@ class RecordingFiles {
   [[nodiscard]] int write_preamble(std::uint64_t time) noexcept;
   void fail(int error) noexcept;
   void end_file() noexcept;
-  void note_unwritten() noexcept;
+  void record_unwritten() noexcept;
   void begin_next_number() noexcept;
   [[nodiscard]] const char* path(std::vector<char>* out) const noexcept;
-  [[nodiscard]] std::string sentence(const Notice& notice) const;
+  [[nodiscard]] std::string message(const Notice& notice) const;
 
   const std::string folder_;
   const std::uint64_t roll_bytes_;

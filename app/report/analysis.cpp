@@ -15,7 +15,7 @@
 namespace vergence::app::report {
 namespace {
 
-constexpr double kPlacement =
+constexpr double kAlignment =
     100.0;  // m: the stretch that lays the trajectory on its reference, as with the INS
 constexpr double kPercent = 100.0;
 constexpr double kWideGap = 4.0;  // frame intervals: nothing is drawn across more
@@ -48,9 +48,9 @@ void measure_distance(const Session& s, Analysis* a) {
 }
 
 /// The first time that the drive confirmed the calibration in use.
-const Event* first_confirmation(const Session& s) {
+const Event* first_verification(const Session& s) {
   const auto found = std::find_if(s.events.begin(), s.events.end(),
-                                  [](const Event& e) { return e.kind == "calibration_confirmed"; });
+                                  [](const Event& e) { return e.kind == "calibration_verified"; });
   return found == s.events.end() ? nullptr : &*found;
 }
 
@@ -58,9 +58,9 @@ const Event* first_confirmation(const Session& s) {
 /// the drive.
 void count_waiting(const Session& s, Analysis* a) {
   a->waited_by_reason.assign(s.reasons.size(), 0);
-  const Event* confirmed = first_confirmation(s);
+  const Event* confirmed = first_verification(s);
   if (confirmed != nullptr && !s.frames.empty())
-    a->confirmed_s = std::clamp(
+    a->verified_s = std::clamp(
         seconds_between(s.frames.front().stamp, std::max(s.frames.front().stamp, confirmed->stamp)),
         0.0, a->duration_s);
   for (const Frame& f : s.frames) {
@@ -135,11 +135,11 @@ struct Laid {
   bool by_rotations = false;
 };
 
-/// Lays the first kPlacement metres of the estimate on the reference.
+/// Lays the first kAlignment metres of the estimate on the reference.
 Laid lay_on(const MatchedTrajectories& m) {
   Laid laid;
   std::size_t n = 1;
-  for (; n < m.reference.size() && laid.stretch < kPlacement; ++n)
+  for (; n < m.reference.size() && laid.stretch < kAlignment; ++n)
     laid.stretch += (m.reference[n].T_world_body.t - m.reference[n - 1].T_world_body.t).norm();
   const auto estimate = std::span(m.estimate).first(n), reference = std::span(m.reference).first(n);
   const Alignment fit = align(estimate, reference, AlignmentScale::one);
@@ -195,7 +195,7 @@ void take_reference(const Session& s, Analysis* a) {
   const MatchedTrajectories m =
       ours.empty() ? MatchedTrajectories{} : associate(ours, s.reference, EvaluationOptions{});
   if (m.estimate.empty()) {
-    a->source_sentence =
+    a->source_message =
         "reference.tum has no pose at the times of ours: there is nothing to compare, so no errors "
         "are shown.";
     return;
@@ -203,7 +203,7 @@ void take_reference(const Session& s, Analysis* a) {
   const Laid laid = lay_on(m);
   const bool up_is_z = world_up(m.reference, BodyAxes::camera).z() > 0.5;
   a->source = ErrorSource::reference;
-  a->source_sentence = fmt::format(
+  a->source_message = fmt::format(
       "Errors against the reference trajectory. Ours was laid on it once, rigidly and without "
       "scale, over the first {:.0f} m ({}); what "
       "grows after that is drift.",
@@ -215,10 +215,10 @@ void take_reference(const Session& s, Analysis* a) {
 }
 
 /// Where the way broke off the drive is placed on the earth anew: its positions step there.
-void find_placements(const Session& s, Analysis* a) {
+void find_alignments(const Session& s, Analysis* a) {
   std::vector<Stamp> stamps;
   for (const Event& e : s.events)
-    if (e.kind == "placement") stamps.push_back(e.stamp);
+    if (e.kind == "enu_alignment") stamps.push_back(e.stamp);
   std::sort(stamps.begin(), stamps.end());
   a->placed_anew.assign(s.frames.size(), 0);
   std::size_t next = 0;
@@ -234,19 +234,19 @@ void find_placements(const Session& s, Analysis* a) {
   }
 }
 
-std::string placement_words(const Analysis& a) {
-  constexpr std::size_t kTold = 5;
+std::string alignment_text(const Analysis& a) {
+  constexpr std::size_t kReported = 5;
   if (a.placed_s.size() < 2) return ", which was fitted at the start and then frozen";
   std::string words = fmt::format(", which was placed {} times, at ", a.placed_s.size());
-  for (std::size_t i = 0; i < std::min(kTold, a.placed_s.size()); ++i)
+  for (std::size_t i = 0; i < std::min(kReported, a.placed_s.size()); ++i)
     words += (i > 0 ? ", " : "") + duration_text(a.placed_s[i], 0.1);
-  return words + (a.placed_s.size() > kTold ? ", …" : "") +
+  return words + (a.placed_s.size() > kReported ? ", …" : "") +
          ", where the way had broken off: errors and positions step there";
 }
 
 void take_ins(const Session& s, Analysis* a) {
   a->map_is_enu = true;
-  find_placements(s, a);
+  find_alignments(s, a);
   bool compared = false;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const Frame& f = s.frames[i];
@@ -259,13 +259,13 @@ void take_ins(const Session& s, Analysis* a) {
     a->heading_deg[i] = f.error_heading_deg;
   }
   if (!compared) {
-    a->source_sentence =
+    a->source_message =
         "There was an INS, but never a frame that could be compared with it: no errors are shown.";
     return;
   }
   a->source = ErrorSource::ins;
-  a->source_sentence = "Errors against the INS after the placement on the earth" +
-                       placement_words(*a) + "; they hold the INS's own errors, too.";
+  a->source_message = "Errors against the INS after the alignment on the earth" +
+                      alignment_text(*a) + "; they hold the INS's own errors, too.";
 }
 
 void take_world(const Session& s, Analysis* a) {
@@ -287,15 +287,15 @@ void compare(const Session& s, Analysis* a) {
   if (placed) return take_ins(s, a);
   if (ins) {
     a->ins_unplaced = true;
-    a->source_sentence =
+    a->source_message =
         "There was an INS, but the drive could not be placed on the earth with it: no errors are "
         "shown.";
     return take_world(s, a);
   }
   if (!s.reference.empty()) take_reference(s, a);
   if (a->source != ErrorSource::none) return;
-  if (a->source_sentence.empty())
-    a->source_sentence =
+  if (a->source_message.empty())
+    a->source_message =
         "There was no reference: how far the trajectory drifted is not known, so no errors are "
         "shown.";
   take_world(s, a);
@@ -325,15 +325,15 @@ void take_metrics(const Session& s, Analysis* a) {
   if (const auto e = metric("end_error_percent")) a->end_error = *e / kPercent;
   const auto far = metric("segment_error_percent"), near = metric("segment_error_short_percent");
   if (far || near) a->drift = far.value_or(near.value_or(0)) / kPercent;
-  a->drift_sentence = far    ? "mean of all segments of 100 to 800 m"
-                      : near ? "mean of all segments of 10 to 50 m"
-                             : "";
+  a->drift_message = far    ? "mean of all segments of 100 to 800 m"
+                     : near ? "mean of all segments of 10 to 50 m"
+                            : "";
 }
 
 /// Positions of both at the frames that have both, the INS's in enu.
 MatchedTrajectories positions_with_ins(const Session& s) {
-  constexpr std::size_t kMostPairs = 20'000;
-  const std::size_t stride = 1 + s.frames.size() / kMostPairs;
+  constexpr std::size_t kMaxPairs = 20'000;
+  const std::size_t stride = 1 + s.frames.size() / kMaxPairs;
   MatchedTrajectories m;
   for (std::size_t i = 0; i < s.frames.size(); i += stride) {
     const Frame& f = s.frames[i];
@@ -379,7 +379,7 @@ void drift_by_positions(const Session& s, Analysis* a) {
     const auto difference = mean_difference(m, R, driven, length);
     if (!difference) continue;
     a->drift = *difference / length;
-    a->drift_sentence = fmt::format(
+    a->drift_message = fmt::format(
         "horizontal, over segments of {:.0f} m; the INS's own errors are in it", length);
     return;
   }

@@ -12,7 +12,7 @@ namespace vergence::app::report {
 /// What the errors of the page are differences to.
 enum class ErrorSource : std::uint8_t {
   none,       // there is no reference: no errors
-  ins,        // errors of poses.csv, after the placement on the earth
+  ins,        // errors of poses.csv, after the alignment on the earth
   reference,  // reference.tum, the start of the trajectory laid on it
 };
 
@@ -27,7 +27,7 @@ struct Analysis {
 
   ErrorSource source = ErrorSource::none;
   std::string
-      source_sentence;  // what was compared with what, and how the two were laid on each other
+      source_message;  // what was compared with what, and how the two were laid on each other
   bool ins_unplaced = false;  // there was an INS, and no frame was placed on the earth with it
   std::vector<double> horizontal_m, vertical_m, heading_deg;
   struct Spread {
@@ -36,7 +36,7 @@ struct Analysis {
   Spread horizontal, vertical, heading;
 
   std::vector<double> placed_s;           // when the drive was placed on the earth, each time
-  std::vector<std::uint8_t> placed_anew;  // this frame is the first one on a further placement
+  std::vector<std::uint8_t> placed_anew;  // this frame is the first one on a further alignment
   bool map_is_enu = false;                // east to the right, north up
   std::vector<double> ours_x, ours_y, theirs_x, theirs_y;  // m
 
@@ -48,12 +48,12 @@ struct Analysis {
   std::size_t waited = 0;
   std::vector<std::size_t> waited_by_reason;
   std::optional<double>
-      confirmed_s;  // when the drive first confirmed the calibration in use, since the first frame
+      verified_s;  // when the drive first confirmed the calibration in use, since the first frame
   std::optional<double> ok_share;  // of the frames read and skipped; nothing: status is not known
   double path_m = 0;
 
   std::optional<double> drift;  // ratio: mean translation error of segments over their length
-  std::string drift_sentence;   // which segments
+  std::string drift_message;    // which segments
   std::optional<double> segment_error;  // KITTI's, as in summary.json, where `drift` is another
   std::optional<double> scale, ate_m, rotation_deg_per_m, end_error;
 };

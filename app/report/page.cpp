@@ -21,7 +21,7 @@ namespace vergence::app::report {
 
 namespace {
 
-constexpr std::size_t kMostRows = 40;  // of a group whose keys come from a file
+constexpr std::size_t kMaxRows = 40;  // of a group whose keys come from a file
 
 /// Rows "name value" under heads; names of ours are plain text, all else is escaped by who adds it.
 class Figures {
@@ -70,7 +70,7 @@ void frames_group(const Session& s, const Analysis& a, Figures* f) {
 
 void error_group(const Analysis& a, Figures* f) {
   f->group(a.source == ErrorSource::ins ? "Against the INS" : "Against the reference");
-  f->row("drift, " + a.drift_sentence, times(a.drift, 100), "{:.2f} %");
+  f->row("drift, " + a.drift_message, times(a.drift, 100), "{:.2f} %");
   f->row("KITTI segment error, with the INS's attitude", times(a.segment_error, 100), "{:.2f} %");
   f->row("horizontal error, rms", metres(a.horizontal.rms));
   f->row("horizontal error, largest", metres(a.horizontal.max));
@@ -87,17 +87,17 @@ void error_group(const Analysis& a, Figures* f) {
 void verification_rows(const Session& s, const Analysis& a, Figures* f) {
   if (const auto verified = flag_at(s.summary, "calibration.verified"))
     f->row("verified by the drive", *verified ? "yes" : "not verified");
-  if (a.confirmed_s) f->row("first verified after", duration_text(*a.confirmed_s, 0.1));
+  if (a.verified_s) f->row("first verified after", duration_text(*a.verified_s, 0.1));
   f->row("contradicted: depths were off by",
          number_at(s.summary, "calibration.contradicted.depth_percent"), "{:.1f} %");
   const auto newest =
       std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
                    [](const CalibrationRow& c) { return std::isfinite(c.depth_sigma_percent); });
   if (newest == s.calibrations.rend()) return;
-  const std::string at = fmt::format(" at {:.0f} m, newest measurement", newest->judged_depth_m);
+  const std::string at = fmt::format(" at {:.0f} m, newest measurement", newest->reference_depth_m);
   f->row("depth sigma" + at, newest->depth_sigma_percent, "{:.2f} %");
-  if (newest->depth_difference_percent > 0)
-    f->row("what was in use differs" + at, newest->depth_difference_percent, "{:.2f} %");
+  if (newest->depth_error_percent > 0)
+    f->row("what was in use differs" + at, newest->depth_error_percent, "{:.2f} %");
 }
 
 void calibration_group(const Session& s, const Analysis& a, Figures* f) {
@@ -114,7 +114,7 @@ void calibration_group(const Session& s, const Analysis& a, Figures* f) {
              fmt::format("{:.4f}°, {:.4f}°, {:.4f}°", phi.x() + 0.0, phi.y() + 0.0, phi.z() + 0.0));
     }
   }
-  if (const std::string word = text_at(s.summary, "calibration.word"); !word.empty())
+  if (const std::string word = text_at(s.summary, "calibration.rating"); !word.empty())
     f->row("health", word);
   verification_rows(s, a, f);
 }
@@ -132,10 +132,10 @@ std::string number_text(const nlohmann::json& value, int digits) {
 
 /// `1.2, -0.3, 4`; empty for anything but a short row of numbers.
 std::string numbers_text(const nlohmann::json& value) {
-  constexpr std::size_t kMostNumbers = 8;
+  constexpr std::size_t kMaxNumbers = 8;
   if (value.is_number()) return number_text(value, 5);
   std::string text;
-  if (!value.is_array() || value.size() > kMostNumbers) return text;
+  if (!value.is_array() || value.size() > kMaxNumbers) return text;
   for (const auto& item : value) {
     if (!item.is_number()) return "";
     text += (text.empty() ? "" : ", ") + number_text(item, 3);
@@ -144,7 +144,7 @@ std::string numbers_text(const nlohmann::json& value) {
 }
 
 /// Numbers below an object, its keys as names; for blocks whose keys are not fixed. Beyond
-/// kMostRows they are only counted.
+/// kMaxRows they are only counted.
 // NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
 void flatten(const nlohmann::json& json, const std::string& prefix, int depth, std::size_t* rows,
              Figures* f) {
@@ -155,7 +155,7 @@ void flatten(const nlohmann::json& json, const std::string& prefix, int depth, s
     std::replace(name.begin(), name.end(), '_', ' ');
     if (const std::string text = numbers_text(value); text.empty())
       flatten(value, name + " ", depth + 1, rows, f);
-    else if (++*rows <= kMostRows)
+    else if (++*rows <= kMaxRows)
       f->row(name, text);
   }
 }
@@ -165,8 +165,8 @@ void block_group(const Session& s, const char* key, const char* head, Figures* f
   f->group(head);
   std::size_t rows = 0;
   flatten(s.summary[key], "", 0, &rows, f);
-  if (rows > kMostRows)
-    f->row(fmt::format("… {} more in summary.json", grouped(rows - kMostRows)), "");
+  if (rows > kMaxRows)
+    f->row(fmt::format("… {} more in summary.json", grouped(rows - kMaxRows)), "");
 }
 
 std::string event_time(const Session& s, Stamp stamp) {
@@ -186,7 +186,7 @@ std::vector<EventRun> condensed(const std::vector<Event>& events) {
   std::vector<EventRun> runs;
   for (const Event& e : events) {
     if (!runs.empty() && runs.back().first->kind == e.kind &&
-        runs.back().first->sentence == e.sentence) {
+        runs.back().first->message == e.message) {
       ++runs.back().count;
       runs.back().last = e.stamp;
     } else {
@@ -201,7 +201,7 @@ std::string event_row(const Session& s, const EventRun& run) {
   if (run.count > 1) when += " … " + event_time(s, run.last);
   const std::string many = run.count > 1 ? " (" + grouped(run.count) + " times)" : "";
   return fmt::format("<tr><td class=\"t\">{}</td><td class=\"k\">{}</td><td>{}{}</td></tr>\n", when,
-                     escape(run.first->kind, 60), escape(run.first->sentence), many);
+                     escape(run.first->kind, 60), escape(run.first->message), many);
 }
 
 }  // namespace
@@ -232,8 +232,7 @@ std::string figures_table(const Session& session, const Analysis& analysis) {
   block_group(session, "comparison", "Comparison with the INS", &f);
   block_group(session, "time", "Clocks and pairing", &f);
   block_group(session, "memory", "Memory", &f);
-  f.row("allocations after the seal", number_at(session.summary, "allocations_after_seal"),
-        "{:.0f}");
+  f.row("allocations after the seal", number_at(session.summary, "runtime_allocations"), "{:.0f}");
   block_group(session, "drops", "Drops", &f);
   return std::move(f).finish();
 }
@@ -242,7 +241,7 @@ namespace {
 
 /// One row of words about a calibration; empty when nothing is known of it.
 std::string health_row(const nlohmann::json& summary, const char* name, const std::string& path) {
-  const std::string word = text_at(summary, path + "word");
+  const std::string word = text_at(summary, path + "rating");
   if (word.empty()) return "";
   std::string row =
       fmt::format("<tr><th scope=\"row\">{}</th><td class=\"k\">{}</td>", name, escape(word, 60));
@@ -264,19 +263,18 @@ std::string held_out_text(const CalibrationRow& c) {
 /// `± 0.26 % at 20 m, was off 1.4 %` as parts that no line breaks; empty where nothing was
 /// measured.
 std::string depth_text(const CalibrationRow& c) {
-  if (!(c.judged_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
-  const bool off = c.depth_difference_percent > 0;
+  if (!(c.reference_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
+  const bool off = c.depth_error_percent > 0;
   std::string text = fmt::format("<span class=\"w\">± {:.2f} % at {:.0f} m{}</span>",
-                                 c.depth_sigma_percent, c.judged_depth_m, off ? "," : "");
-  if (off)
-    text += fmt::format(" <span class=\"w\">was off {:.2f} %</span>", c.depth_difference_percent);
+                                 c.depth_sigma_percent, c.reference_depth_m, off ? "," : "");
+  if (off) text += fmt::format(" <span class=\"w\">was off {:.2f} %</span>", c.depth_error_percent);
   return text;
 }
 
 }  // namespace
 
 std::string health_table(const Session& session) {
-  const std::string rows = health_row(session.summary, "at the start", "calibration.before.") +
+  const std::string rows = health_row(session.summary, "at the start", "calibration.initial.") +
                            health_row(session.summary, "at the end", "calibration.");
   if (rows.empty()) return "";
   return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>calibration</th><th "
@@ -291,7 +289,7 @@ std::string health_table(const Session& session) {
 }
 
 std::string calibrations_table(const Session& session) {
-  constexpr std::size_t kMost = 60;
+  constexpr std::size_t kMax = 60;
   std::string out =
       "<table "
       "class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>after</th><th>held-out "
@@ -300,10 +298,10 @@ std::string calibrations_table(const Session& session) {
   for (const CalibrationRow& c : session.calibrations)
     if (c.camera == 1) rows.push_back(&c);
   const std::size_t n = rows.size();
-  if (n > kMost)
+  if (n > kMax)
     out += fmt::format("<tr><td colspan=\"7\">{} earlier ones are in calibrations.csv</td></tr>",
-                       grouped(n - kMost));
-  for (std::size_t i = n > kMost ? n - kMost : 0; i < n; ++i) {
+                       grouped(n - kMax));
+  for (std::size_t i = n > kMax ? n - kMax : 0; i < n; ++i) {
     const CalibrationRow& c = *rows[i];
     std::string cause = c.cause;
     std::replace(cause.begin(), cause.end(), '_', ' ');
@@ -354,13 +352,12 @@ std::string section(std::string_view css, std::string_view head, const std::stri
   return fmt::format("<section class=\"{}\"><h2>{}</h2>{}</section>\n", css, head, body);
 }
 
-std::string list(const std::vector<std::string>& sentences) {
-  constexpr std::size_t kMost = 30;
+std::string list(const std::vector<std::string>& messages) {
+  constexpr std::size_t kMax = 30;
   std::string out = "<ul>";
-  for (std::size_t i = 0; i < std::min(sentences.size(), kMost); ++i)
-    out += "<li>" + escape(sentences[i], 500) + "</li>\n";
-  if (sentences.size() > kMost)
-    out += fmt::format("<li>… and {} more</li>", sentences.size() - kMost);
+  for (std::size_t i = 0; i < std::min(messages.size(), kMax); ++i)
+    out += "<li>" + escape(messages[i], 500) + "</li>\n";
+  if (messages.size() > kMax) out += fmt::format("<li>… and {} more</li>", messages.size() - kMax);
   return out + "</ul>";
 }
 
@@ -394,7 +391,7 @@ std::string drift_card(const Analysis& a) {
   const char* name = a.source == ErrorSource::ins         ? "Drift against the INS"
                      : a.source == ErrorSource::reference ? "Drift against the reference"
                                                           : "Drift";
-  if (a.drift) return number_card(fmt::format("{:.2f} %", *a.drift * 100), name, a.drift_sentence);
+  if (a.drift) return number_card(fmt::format("{:.2f} %", *a.drift * 100), name, a.drift_message);
   if (a.source == ErrorSource::none) return number_card("not known", name, "no reference");
   return number_card("not known", name, "the drive is too short");
 }
@@ -424,15 +421,15 @@ std::string ok_card(const Session& s, const Analysis& a) {
                                  grouped(a.degraded), waited, grouped(a.lost), skipped));
 }
 
-std::string verdict_section(const Session& s, const Analysis& a, const Verdict& v) {
+std::string assessment_section(const Session& s, const Analysis& a, const Assessment& v) {
   constexpr std::array<const char*, 3> kTones{"tone-good", "tone-care", "tone-bad"};
   constexpr std::array<const char*, 3> kMarks{"✔", "!", "✖"};
   const auto i = static_cast<std::size_t>(v.grade);
   return fmt::format(
-      "<section class=\"verdict {}\"><p class=\"word\">{} {}</p><p>{}</p><div "
+      "<section class=\"assessment {}\"><p class=\"word\">{} {}</p><p>{}</p><div "
       "class=\"numbers\">{}{}{}</div></section>\n",
-      kTones[i], kMarks[i], to_words(v.grade), escape(v.sentence, 600), drift_card(a),
-      error_card(a), ok_card(s, a));
+      kTones[i], kMarks[i], to_words(v.grade), escape(v.message, 600), drift_card(a), error_card(a),
+      ok_card(s, a));
 }
 
 std::string map_section(const Session& s, const Analysis& a) {
@@ -474,7 +471,7 @@ void error_plots(const Session& s, const Analysis& a, std::string* out) {
 
 std::string errors_head(const Analysis& a) {
   return section("wide", "Errors",
-                 "<p>" + escape(a.source_sentence, 500) + "</p>" +
+                 "<p>" + escape(a.source_message, 500) + "</p>" +
                      (a.lost > 0 && a.source != ErrorSource::none
                           ? "<p class=\"soft\">Red stripes: frames without a pose. Curves stop "
                             "there and are not carried across.</p>"
@@ -542,16 +539,18 @@ std::string footer(const Session& s) {
 
 }  // namespace
 
-std::string page_html(const Session& session, const Analysis& analysis, const Verdict& verdict) {
+std::string page_html(const Session& session, const Analysis& analysis,
+                      const Assessment& assessment) {
   const std::string title = escape(title_line(session, analysis), 400);
   std::string out =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"/>"
       "<link rel=\"icon\" href=\"data:,\"/><title>" +
       title + "</title><style>" + style_sheet() + "</style></head><body><main>\n";
-  out += "<h1>" + title + "</h1>\n" + verdict_section(session, analysis, verdict) +
+  out += "<h1>" + title + "</h1>\n" + assessment_section(session, analysis, assessment) +
          "<div class=\"grid\">\n";
-  if (!verdict.advice.empty()) out += section("wide", "What to do next", list(verdict.advice));
+  if (!assessment.advice.empty())
+    out += section("wide", "What to do next", list(assessment.advice));
   if (const std::vector<std::string> missing = session.not_had(); !missing.empty())
     out += section("wide", "What is missing in this session", list(missing));
   out += map_section(session, analysis);

@@ -2,8 +2,8 @@
 #include <string>
 
 #include "app/report/analysis.hpp"
+#include "app/report/assessment.hpp"
 #include "app/report/session.hpp"
-#include "app/report/verdict.hpp"
 
 namespace vergence::app::report {
 
@@ -19,7 +19,7 @@ namespace vergence::app::report {
 /// sought, how long it took, how held-out frames fit, what was known of the depth.
 [[nodiscard]] std::string calibrations_table(const Session& session);
 
-/// Events in their order, successive ones of one kind and sentence as one row with a count; of very
+/// Events in their order, successive ones of one kind and message as one row with a count; of very
 /// many the first and the last.
 [[nodiscard]] std::string events_table(const Session& session);
 
@@ -32,6 +32,6 @@ namespace vergence::app::report {
 /// The whole of report.html: one document, well-formed as XML, too; no script, nothing loaded from
 /// anywhere.
 [[nodiscard]] std::string page_html(const Session& session, const Analysis& analysis,
-                                    const Verdict& verdict);
+                                    const Assessment& assessment);
 
 }  // namespace vergence::app::report

@@ -90,8 +90,8 @@ void PlotBox::fit_y(double low, double high, bool from_zero) {
 }
 
 void PlotBox::draw_time_axis(Svg* svg) const {
-  constexpr int kMost = 6;
-  const auto ticks = time_ticks(x0, x1, kMost);
+  constexpr int kMax = 6;
+  const auto ticks = time_ticks(x0, x1, kMax);
   const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 1;
   for (const double t : ticks) {
     const double at = x(t);
@@ -335,7 +335,7 @@ void draw_marks(const CalibrationCurve& curve, const PlotBox& box, Svg* svg) {
   for (const Mark& m : curve.rejected) svg->circle("hollow", box.x(m.at), box.y(m.value), 3.2);
 }
 
-void draw_confirmation(double at_s, const PlotBox& box, Svg* svg) {
+void draw_verification(double at_s, const PlotBox& box, Svg* svg) {
   const double x = box.x(at_s);
   svg->line("confirmed", x, box.top, x, box.bottom);
   const bool near_the_end = x > box.right - 60;
@@ -355,7 +355,7 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
   Svg svg(kPlotWidth, kPlotHeight, "A number of the calibration over time with two sigmas");
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
-  if (analysis.confirmed_s) draw_confirmation(*analysis.confirmed_s, box, &svg);
+  if (analysis.verified_s) draw_verification(*analysis.verified_s, box, &svg);
   draw_held(curve, box, &svg);
   draw_marks(curve, box, &svg);
   return std::move(svg).finish();
@@ -365,10 +365,10 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
 
 namespace {
 
-constexpr double kMargin = 16, kFoot = 38, kLeast = 190,
-                 kMost = 420;  // of the paper; kFoot: room for the scale bar
+constexpr double kMargin = 16, kFoot = 38, kMin = 190,
+                 kMax = 420;   // of the paper; kFoot: room for the scale bar
 constexpr double kThin = 0.4;  // of the paper: finer than the line is wide
-constexpr std::size_t kMostPoints = 20'000;
+constexpr std::size_t kMaxPoints = 20'000;
 
 struct Bounds {
   double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
@@ -382,7 +382,7 @@ struct Bounds {
 
 /// From metres to the paper, one scale for both axes; up is up.
 struct MapScale {
-  double per_metre = 1, x_middle = 0, y_middle = 0, height = kLeast;
+  double per_metre = 1, x_middle = 0, y_middle = 0, height = kMin;
   [[nodiscard]] double x(double v) const { return kPlotWidth / 2 + (v - x_middle) * per_metre; }
   [[nodiscard]] double y(double v) const {
     return kMargin + (height - kMargin - kFoot) / 2 - (v - y_middle) * per_metre;
@@ -394,8 +394,8 @@ MapScale scale_for(const Bounds& b) {
       1;  // m: a vehicle that stands still is a dot, not its noise enlarged
   const double width = std::max(b.x1 - b.x0, kSmallest), depth = std::max(b.y1 - b.y0, kSmallest);
   MapScale s;
-  s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMost - kMargin - kFoot) / depth);
-  s.height = std::clamp(depth * s.per_metre + kMargin + kFoot, kLeast, kMost);
+  s.per_metre = std::min((kPlotWidth - 2 * kMargin) / width, (kMax - kMargin - kFoot) / depth);
+  s.height = std::clamp(depth * s.per_metre + kMargin + kFoot, kMin, kMax);
   s.x_middle = (b.x0 + b.x1) / 2, s.y_middle = (b.y0 + b.y1) / 2;
   return s;
 }
@@ -410,7 +410,7 @@ std::vector<double> placed(const std::vector<double>& values, const MapScale& s,
 void draw_path(const char* css, const std::vector<double>& x, const std::vector<double>& y,
                const std::vector<std::uint8_t>& breaks, const MapScale& s, Svg* svg) {
   const std::vector<double> on_x = placed(x, s, false), on_y = placed(y, s, true);
-  svg->lines(css, thin(on_x, on_y, breaks, kThin, kMostPoints));
+  svg->lines(css, thin(on_x, on_y, breaks, kThin, kMaxPoints));
 }
 
 /// Our way also breaks off where the drive was placed on the earth anew: that step was not driven.

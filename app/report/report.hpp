@@ -9,13 +9,13 @@ namespace vergence::app {
 /// What became of a page.
 struct ReportOutcome {
   std::filesystem::path page;  // SESSION/report.html
-  std::string headline;        // "Good", "Usable with care", "Do not use", and why, in one sentence
+  std::string headline;        // "Good", "Usable with care", "Do not use", and why, in one message
   bool usable = true;          // false: no pose can be relied on
   std::string main_reason{};   // then: why, with counts, and what to do
   std::string grade{};         // the headline's beginning
-  std::vector<std::string> reasons{};  // half sentences, the worst first
-  std::vector<std::string> advice{};   // what to do next, whole sentences
-  std::vector<std::string> missing{};  // sentences: files or lines that were not there, not whole
+  std::vector<std::string> reasons{};  // half messages, the worst first
+  std::vector<std::string> advice{};   // what to do next, whole messages
+  std::vector<std::string> missing{};  // messages: files or lines that were not there, not whole
                                        // or not read
 };
 

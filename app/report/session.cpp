@@ -71,8 +71,8 @@ bool FileLines::next(std::string_view* line) {
 CsvRows::CsvRows(NextLine next_line) : next_line_(std::move(next_line)) {
   std::string_view head;
   if (!next_line_(&head)) return;
-  std::vector<std::string_view> names(kMostColumns);
-  names.resize(std::min(split(head, ',', names), kMostColumns));
+  std::vector<std::string_view> names(kMaxColumns);
+  names.resize(std::min(split(head, ',', names), kMaxColumns));
   names_.assign(names.begin(), names.end());
   fields_.resize(names_.size());
 }
@@ -127,7 +127,7 @@ const nlohmann::json* find_path(const nlohmann::json& json, std::string_view pat
   return at;
 }
 
-/// What `read` gives, or a sentence in `missing`.
+/// What `read` gives, or a message in `missing`.
 template <class Read>
 auto part_of(const fs::path& file, const char* consequence, Session* session, const Read& read)
     -> std::optional<decltype(read())> {
@@ -177,7 +177,7 @@ void report_damage(const char* file, const FileLines& lines, std::size_t rows,
                     disordered, disordered == 1 ? "" : "s"));
 }
 
-constexpr std::size_t kMostReasons = 64;
+constexpr std::size_t kMaxReasons = 64;
 constexpr double kFarthest = 1e7;  // m: beyond, a coordinate is damage and would flatten every plot
 
 /// Index of a word among an enum's words, the first `count` of them.
@@ -192,7 +192,7 @@ std::uint16_t reason_index(std::string_view word, Session* session) {
   const auto found = std::find(session->reasons.begin(), session->reasons.end(), word);
   if (found != session->reasons.end())
     return static_cast<std::uint16_t>(found - session->reasons.begin());
-  if (session->reasons.size() >= kMostReasons) return 0;
+  if (session->reasons.size() >= kMaxReasons) return 0;
   session->reasons.emplace_back(word.substr(0, kLongestText));
   return static_cast<std::uint16_t>(session->reasons.size() - 1);
 }
@@ -366,8 +366,8 @@ void read_calibrations(const fs::path& folder, Session* session) {
   CsvRows rows([&lines](std::string_view* line) { return lines->next(line); });
   std::size_t unreadable = 0;
   while (rows.next()) {
-    if (session->calibrations.size() == kMostCalibrations) {
-      leave_out("calibrations.csv", kMostCalibrations, session);
+    if (session->calibrations.size() == kMaxCalibrations) {
+      leave_out("calibrations.csv", kMaxCalibrations, session);
       break;
     }
     CalibrationRow c;
@@ -381,7 +381,7 @@ void read_calibrations(const fs::path& folder, Session* session) {
     c.stamp = Stamp(*stamp);
     c.camera = static_cast<int>(*camera);
     c.accepted = rows.text(rows.column("outcome")) == "accepted";
-    c.kept = rows.text(rows.column("outcome")) == "kept";
+    c.kept = rows.text(rows.column("outcome")) == "unchanged";
     c.cause = rows.text(rows.column("cause")).substr(0, kLongestText);
     c.reason = rows.text(rows.column("reason")).substr(0, kLongestText);
     c.frames = rows.integer(rows.column("frames")).value_or(0);
@@ -389,11 +389,10 @@ void read_calibrations(const fs::path& folder, Session* session) {
     c.decided = std::isfinite(c.latency_frames);
     c.held_out_before_px = rows.number(rows.column("held_out_before_px")).value_or(kNone);
     c.held_out_after_px = rows.number(rows.column("held_out_after_px")).value_or(kNone);
-    c.judged_depth_m = rows.number(rows.column("judged_depth_m")).value_or(kNone);
+    c.reference_depth_m = rows.number(rows.column("reference_depth_m")).value_or(kNone);
     c.depth_sigma_percent = rows.number(rows.column("depth_sigma_percent")).value_or(kNone);
-    c.depth_difference_percent =
-        rows.number(rows.column("depth_difference_percent")).value_or(kNone);
-    c.has_sigma = read_six(rows, "wide_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
+    c.depth_error_percent = rows.number(rows.column("depth_error_percent")).value_or(kNone);
+    c.has_sigma = read_six(rows, "sigma_total_", &c.sigma) || read_six(rows, "sigma_", &c.sigma);
     session->calibrations.push_back(std::move(c));
   }
   report_damage("calibrations.csv", *lines, rows.torn_rows() + unreadable, 0, session);
@@ -407,7 +406,7 @@ std::optional<Event> parse_event(std::string_view line) {
   if (const auto stamp = json.find("stamp_ns"); stamp != json.end() && stamp->is_number_integer())
     e.stamp = Stamp(stamp->get<std::int64_t>());
   e.kind = text_at(json, "kind");
-  e.sentence = text_at(json, "sentence");
+  e.message = text_at(json, "message");
   return e;
 }
 
@@ -417,7 +416,7 @@ void read_events(const fs::path& folder, Session* session) {
   if (!lines) return;
   std::size_t damaged = 0;
   for (std::string_view line; lines->next(&line);) {
-    if (session->events.size() == kMostEvents) {
+    if (session->events.size() == kMaxEvents) {
       ++session->events_dropped;
     } else if (auto event = parse_event(line)) {
       session->events.push_back(std::move(*event));
@@ -496,7 +495,7 @@ bool is_live(const Session& session) {
          session.summary["time"].is_object();
 }
 
-Session read_session(const fs::path& folder, std::size_t most_frames) {
+Session read_session(const fs::path& folder, std::size_t max_frames) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
     throw InputError(
@@ -510,13 +509,13 @@ Session read_session(const fs::path& folder, std::size_t most_frames) {
   Session session;
   session.name = fs::weakly_canonical(folder, error).filename().string();
   read_summary(folder, &session);
-  if (!read_poses(folder, most_frames, &session) || session.frames.empty())
-    frames_from_trajectory(folder, most_frames, &session);
+  if (!read_poses(folder, max_frames, &session) || session.frames.empty())
+    frames_from_trajectory(folder, max_frames, &session);
   // Where there was nothing to compare with there is no such file.
   if (fs::exists(folder / "reference.tum", error) || number_at(session.summary, "metrics.ate_m"))
     session.reference = read_trajectory_part(folder, "reference.tum",
                                              "there is nothing to compare the trajectory with",
-                                             most_frames, &session);
+                                             max_frames, &session);
   read_calibrations(folder, &session);
   read_calibration_file(folder, &session);
   read_events(folder, &session);

@@ -74,7 +74,7 @@ class CsvRows {
   [[nodiscard]] std::size_t torn_rows() const noexcept { return torn_; }
 
  private:
-  static constexpr std::size_t kMostColumns = 256;
+  static constexpr std::size_t kMaxColumns = 256;
   NextLine next_line_;
   std::vector<std::string> names_;
   std::vector<std::string_view> fields_;
@@ -120,12 +120,12 @@ struct CalibrationRow {
   bool has_sigma = false;
   // What the drive had measured of the depth by then: at which distance, its sigma, and how far off
   // what was in use is by it.
-  double judged_depth_m = kNone, depth_sigma_percent = kNone, depth_difference_percent = kNone;
+  double reference_depth_m = kNone, depth_sigma_percent = kNone, depth_error_percent = kNone;
 };
 
 struct Event {
   Stamp stamp{};
-  std::string kind{}, sentence{};
+  std::string kind{}, message{};
 };
 
 /// Stamps of `frames` and of `reference` ascend strictly; rows that break this are left out and
@@ -137,31 +137,31 @@ struct Session {
   std::vector<StampedPose> reference{};  // reference.tum
   std::vector<CalibrationRow> calibrations{};
   std::vector<Event> events{};
-  std::size_t events_dropped = 0;  // beyond kMostEvents
+  std::size_t events_dropped = 0;  // beyond kMaxEvents
   nlohmann::json summary{};        // null when it is missing or no JSON
   std::optional<CalibrationFile> calibration{};
-  std::vector<std::string> missing{};   // sentences
+  std::vector<std::string> missing{};   // messages
   std::vector<std::string> left_out{};  // the same of files that are longer than is read
 
   /// All that the report does not have: what was left out first.
   [[nodiscard]] std::vector<std::string> not_had() const {
-    std::vector<std::string> sentences = left_out;
-    sentences.insert(sentences.end(), missing.begin(), missing.end());
-    return sentences;
+    std::vector<std::string> messages = left_out;
+    messages.insert(messages.end(), missing.begin(), missing.end());
+    return messages;
   }
 };
 
-inline constexpr std::size_t kMostFrames =
+inline constexpr std::size_t kMaxFrames =
     4'000'000;  // 37 hours at 30 Hz; further ones are left out and told
-inline constexpr std::size_t kMostEvents = 200'000;
-inline constexpr std::size_t kMostCalibrations = 20'000;
+inline constexpr std::size_t kMaxEvents = 200'000;
+inline constexpr std::size_t kMaxCalibrations = 20'000;
 inline constexpr std::size_t kLongestText =
-    300;  // characters kept of a word or sentence from outside
+    300;  // characters kept of a word or message from outside
 
 /// Reads what is there, line by line: no file is held in memory. Errors  InputError: `folder` is no
 /// folder, or none of a session's files is in it.
 [[nodiscard]] Session read_session(const std::filesystem::path& folder,
-                                   std::size_t most_frames = kMostFrames);
+                                   std::size_t max_frames = kMaxFrames);
 
 /// It was recorded from devices; else it is a replay, or nobody knows.
 [[nodiscard]] bool is_live(const Session& session);

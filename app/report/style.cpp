@@ -15,9 +15,9 @@ p{margin:0 0 8px}
 .grid{display:grid;grid-template-columns:1fr;gap:12px;margin-top:12px}
 section{background:var(--panel);border-radius:8px;padding:12px;min-width:0}
 .wide{grid-column:1/-1}
-.verdict{border-left:10px solid var(--tone);margin-top:8px}
-.verdict .word{font-size:1.75rem;font-weight:700;color:var(--tone);line-height:1.2;margin:0 0 2px}
-.verdict p{font-size:1.02rem}
+.assessment{border-left:10px solid var(--tone);margin-top:8px}
+.assessment .word{font-size:1.75rem;font-weight:700;color:var(--tone);line-height:1.2;margin:0 0 2px}
+.assessment p{font-size:1.02rem}
 .tone-good{--tone:var(--good)}.tone-care{--tone:var(--care)}.tone-bad{--tone:var(--bad)}
 .numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:10px;margin-top:10px}
 .number b{display:block;font-size:1.5rem;line-height:1.25;font-variant-numeric:tabular-nums}
@@ -86,7 +86,7 @@ tr.group th{color:var(--ink);font-weight:600;padding-top:9px}
 body{font-size:10pt;background:#fff}main{max-width:none;padding:0}
 .grid{grid-template-columns:1fr 1fr;gap:6px}.tall{grid-row:span 2}.two{columns:2}
 section{border:1px solid var(--frame);padding:8px;break-inside:avoid;border-radius:4px}
-.verdict{border-left:10px solid var(--tone)}
+.assessment{border-left:10px solid var(--tone)}
 section.long{break-inside:auto}
 .band,.hole,.track,.key,rect,circle{print-color-adjust:exact;-webkit-print-color-adjust:exact}
 }

@@ -223,8 +223,8 @@ std::string time_label(double seconds, double step) {
 }
 
 std::string duration_text(double seconds, double step) {
-  constexpr double kHour = 3600, kDay = 86400, kMost = 1e7;  // s
-  if (seconds > kMost) return fmt::format("{:.0f} days", seconds / kDay);
+  constexpr double kHour = 3600, kDay = 86400, kMax = 1e7;  // s
+  if (seconds > kMax) return fmt::format("{:.0f} days", seconds / kDay);
   const char* unit = seconds < 60 ? " s" : std::round(seconds) < kHour ? " min" : " h";
   return time_label(seconds, step) + unit;
 }

@@ -23,12 +23,12 @@ constexpr double kLongestStep = 1;        // s between two poses that a speed is
 /// Factor on the standard deviations of a degraded pose (docs/ros2.md).
 double widening_of(std::string_view reason) {
   // Motion that was carried on, not measured.
-  for (const std::string_view r : {"time_gap", "scene_restarted", "no_image"})
+  for (const std::string_view r : {"time_gap", "map_reset", "no_image"})
     if (reason == r) return 10;
   // Lengths that stand on a calibration which is not, or not yet, that of the rig.
   for (const std::string_view r :
-       {"unconfirmed", "unverified_calibration", "recalibrating", "uncalibrated", "one_camera",
-        "out_of_step", "no_stereo_matches", "cameras_swapped"})
+       {"unconfirmed", "unverified_calibration", "recalibrating", "uncalibrated", "single_camera",
+        "out_of_sync", "no_stereo_matches", "cameras_swapped"})
     if (reason == r) return 3;
   return reason.empty() ? 1 : 2;
 }

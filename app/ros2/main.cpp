@@ -137,7 +137,7 @@ class Program {
     } else if (!said_waiting_) {
       fmt::print(stderr,
                  "vergence-ros2: {}: {}; waiting for vergence with "
-                 "publish.lines: unix://{}\n",
+                 "publish.pose_stream: unix://{}\n",
                  client_.path(), std::strerror(error), client_.path());
       said_waiting_ = true;
     }

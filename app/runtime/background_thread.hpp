@@ -63,9 +63,9 @@ class ThreadRunner final : public PairRunner {
 /// did in the drive.
 ///
 /// Threads  As BackgroundRunner; begin_frame(), found_idle(): the same one. Memory: none.
-class SolverWatch final : public BackgroundRunner {
+class ReplayableSolverRunner final : public BackgroundRunner {
  public:
-  explicit SolverWatch(BackgroundRunner& solver) noexcept : solver_(solver) {}
+  explicit ReplayableSolverRunner(BackgroundRunner& solver) noexcept : solver_(solver) {}
 
   /// Before Estimator::process(). `idle_then`: of a replay, what was found at this frame of the
   /// drive: busy() says the same, waiting where the solver is slower now.

@@ -15,20 +15,20 @@ enum class ExitCode : int {
   terminated = 143
 };
 
-/// Arguments, configuration or input that cannot be used. The text is the whole sentence for the
+/// Arguments, configuration or input that cannot be used. The text is the whole message for the
 /// user: which file (with its line) or key, what is wrong, what to do. Caught in main(), exit code
 /// 2.
 class InputError : public std::runtime_error {
  public:
-  explicit InputError(const std::string& sentence) : std::runtime_error(sentence) {}
+  explicit InputError(const std::string& message) : std::runtime_error(message) {}
 };
 
 /// A device that the configuration names is not there, does not answer, or is somebody else's. The
-/// text is the whole sentence for the user. Caught in main(), exit code 3: what is asked for is in
+/// text is the whole message for the user. Caught in main(), exit code 3: what is asked for is in
 /// order and may be asked again when the device has its power.
 class DeviceError : public std::runtime_error {
  public:
-  explicit DeviceError(const std::string& sentence) : std::runtime_error(sentence) {}
+  explicit DeviceError(const std::string& message) : std::runtime_error(message) {}
 };
 
 }  // namespace vergence::app

@@ -35,7 +35,7 @@ namespace vergence::app {
 [[nodiscard]] std::optional<std::string> nearest(std::string_view word,
                                                  const std::vector<std::string>& known);
 
-/// `; did you mean "X"?` for a sentence, or "" when nothing is near.
+/// `; did you mean "X"?` for a message, or "" when nothing is near.
 [[nodiscard]] std::string did_you_mean(std::string_view word,
                                        const std::vector<std::string>& known);
 

@@ -85,9 +85,9 @@ void Progress::update(const ProgressState& state) {
   if (now - drawn_time_ >= (mode_ == Mode::terminal ? kBetweenRedraws : kBetweenLines)) draw(now);
 }
 
-void Progress::say(std::string_view sentence) {
+void Progress::say(std::string_view message) {
   const bool drawn = columns_ > 0;
-  put_line(sentence);
+  put_line(message);
   if (drawn) draw(clock_());
 }
 

@@ -47,8 +47,8 @@ class Progress {
   /// Called as often as wanted; draws when it is time. The clock of the rate starts with the first
   /// call.
   void update(const ProgressState& state);
-  /// A sentence for the user between the redraws, on a line of its own; also with `quiet`.
-  void say(std::string_view sentence);
+  /// A message for the user between the redraws, on a line of its own; also with `quiet`.
+  void say(std::string_view message);
   /// Draws the last state and ends the line. Later updates start a new one.
   void finish();
 

@@ -108,8 +108,8 @@ std::vector<std::string> RealtimeThreads::lock_memory() {
 }
 
 std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>& threads) {
-  std::vector<std::string> sentences;
-  if (request_.priority <= 0 && !request_.affinity && !request_.solver_affinity) return sentences;
+  std::vector<std::string> messages;
+  if (request_.priority <= 0 && !request_.affinity && !request_.solver_affinity) return messages;
   // One that has ended is forgotten: capture threads come and go for months, and a number is given
   // again.
   std::erase_if(done_, [&](const auto& done) {
@@ -122,21 +122,21 @@ std::vector<std::string> RealtimeThreads::apply(const std::vector<ProcessThread>
     const auto [at, is_new] = done_.try_emplace(thread.id, role);
     if (!is_new && at->second == role) continue;
     at->second = role;  // the number of a thread that has ended is given again
-    apply(thread, &sentences);
+    apply(thread, &messages);
   }
-  return sentences;
+  return messages;
 }
 
-void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string>* sentences) {
+void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string>* messages) {
   const ThreadRole role = thread_role(thread.name);
   const bool solver = role == ThreadRole::solver;
   if (const auto& cpus = solver ? request_.solver_affinity : request_.affinity; cpus)
-    set_affinity(thread.id, *cpus, solver, sentences);
+    set_affinity(thread.id, *cpus, solver, messages);
   const int priority = role_priority(role, request_.priority);
   if (priority == 0) return;
   const int error = system_.set_fifo(thread.id, priority);
   if (error == 0 || error == ESRCH || std::exchange(priority_refused_, true)) return;
-  sentences->push_back(fmt::format(
+  messages->push_back(fmt::format(
       "realtime.priority: {} gets no priority {} ({}), the drive goes on without: allow it with "
       "`sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v vergence)`, in a service with "
       "LimitRTPRIO={}",
@@ -144,11 +144,11 @@ void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string
 }
 
 void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
-                                   std::vector<std::string>* sentences) {
+                                   std::vector<std::string>* messages) {
   const int error = system_.set_affinity(thread, cpus);
   bool& refused = solver ? solver_affinity_refused_ : affinity_refused_;
   if (error == 0 || error == ESRCH || std::exchange(refused, true)) return;
-  sentences->push_back(
+  messages->push_back(
       fmt::format("realtime.{}: there is none of these processors for us ({}), the drive goes on "
                   "on all of them: `taskset -pc $$` lists those that there are",
                   solver ? "solver_affinity" : "affinity", reason(error)));

@@ -68,7 +68,7 @@ class RealtimeSystem {
 /// recognised by its name, so drivers and publishers need not know of it.
 ///
 /// Threads  One, which is none of the drive's.
-/// Errors   A refusal by the system is a sentence, once for each key, with what allows it; the
+/// Errors   A refusal by the system is a message, once for each key, with what allows it; the
 ///          drive goes on.
 class RealtimeThreads {
  public:
@@ -81,9 +81,9 @@ class RealtimeThreads {
   [[nodiscard]] std::vector<std::string> apply(const std::vector<ProcessThread>& threads);
 
  private:
-  void apply(const ProcessThread& thread, std::vector<std::string>* sentences);
+  void apply(const ProcessThread& thread, std::vector<std::string>* messages);
   void set_affinity(pid_t thread, const cpu_set_t& cpus, bool solver,
-                    std::vector<std::string>* sentences);
+                    std::vector<std::string>* messages);
 
   RealtimeRequest request_;
   RealtimeSystem& system_;

@@ -9,12 +9,12 @@ std::atomic<int> caught{0};  // the first signal's number; all a handler may tou
 std::atomic<bool> calibration_asked{false};
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-extern "C" void note_signal(int number) {
+extern "C" void record_signal(int number) {
   int none = 0;
   caught.compare_exchange_strong(none, number);
 }
 
-extern "C" void note_calibration_request(int /*number*/) { calibration_asked.store(true); }
+extern "C" void record_calibration_request(int /*number*/) { calibration_asked.store(true); }
 
 /// Restart: a signal must not turn a write of the session into an error. `once`: the second one
 /// acts as it would by default.
@@ -32,12 +32,12 @@ void install(int number, void (*handler)(int), bool once, struct sigaction* form
 SignalGuard::SignalGuard() {
   caught.store(0);
   calibration_asked.store(false);
-  install(SIGINT, note_signal, true, &former_interrupt_);
-  install(SIGTERM, note_signal, true, &former_terminate_);
-  install(SIGHUP, note_signal, true, &former_hangup_);
+  install(SIGINT, record_signal, true, &former_interrupt_);
+  install(SIGTERM, record_signal, true, &former_terminate_);
+  install(SIGHUP, record_signal, true, &former_hangup_);
   if (former_hangup_.sa_handler == SIG_IGN)  // nohup: the drive is to outlive its terminal
     install(SIGHUP, SIG_IGN, false, nullptr);
-  install(SIGUSR1, note_calibration_request, false, &former_user_);
+  install(SIGUSR1, record_calibration_request, false, &former_user_);
   // A reader of our output that goes, a file at its limit: the write that fails says so.
   install(SIGPIPE, SIG_IGN, false, &former_pipe_);
   install(SIGXFSZ, SIG_IGN, false, &former_file_size_);

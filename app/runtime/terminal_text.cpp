@@ -45,12 +45,12 @@ std::vector<std::string> wrapped(std::string_view text, std::size_t width) {
 }
 
 Terminal Terminal::of_stdout() {
-  constexpr std::size_t kLeast = 60, kMost = 140;
+  constexpr std::size_t kMin = 60, kMax = 140;
   Terminal t;
   if (::isatty(STDOUT_FILENO) == 0) return t;
   winsize size{};
   if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0)
-    t.width = std::clamp<std::size_t>(size.ws_col, kLeast, kMost);
+    t.width = std::clamp<std::size_t>(size.ws_col, kMin, kMax);
   const char* kind = std::getenv("TERM");
   t.colours =
       kind != nullptr && std::string_view(kind) != "dumb" && std::getenv("NO_COLOR") == nullptr;

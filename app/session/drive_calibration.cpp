@@ -18,7 +18,7 @@
 #include "app/session/starting_calibration.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/health.hpp"
-#include "core/calibration/stretches.hpp"
+#include "core/calibration/segment_solver.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"
 
@@ -28,7 +28,7 @@ namespace {
 constexpr std::size_t kMiddleDepth = 2;  // of Agreement::kDepthM: 20 m
 constexpr const char* kInterrupted = "it was interrupted";
 constexpr int kMoreFeatures = 2,
-              kMostFeatures = 1000;     // of a drive's own: nobody waits for a pose here
+              kMaxFeatures = 1000;      // of a drive's own: nobody waits for a pose here
 constexpr int kObservations = 240'000;  // of a solve that nobody waits for
 constexpr std::size_t kAloneFrames =
     40;  // of a stretch by itself, at most about: short drives, too, are to have two
@@ -92,11 +92,11 @@ std::optional<RigCalibration> drive_once(const DrivePass& pass, const StartingCa
 }
 
 DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibration& given) {
-  using calibration::Stretches;
+  using calibration::SegmentSolver;
   DriveCalibration result;
   Configuration c = drive.configuration;
   c.odometry.features =
-      std::max(c.odometry.features, std::min(kMoreFeatures * c.odometry.features, kMostFeatures));
+      std::max(c.odometry.features, std::min(kMoreFeatures * c.odometry.features, kMaxFeatures));
   c.calibration.max_observations = std::max(c.calibration.max_observations, kObservations);
   c.online = 1;
   const DrivePass pass{drive.sequence, c, drive.start, drive.count, drive.stopped, drive.progress};
@@ -122,15 +122,15 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   found.trust = CalibrationTrust::given;
 
   const auto features = static_cast<std::size_t>(c.odometry.features);
-  Arena arena(arena_size(
-      2 * Stretches::memory_needed(c.calibration, c.monitor, given.file.rig.cameras, features)));
-  Stretches joined(
-      Stretches::Kind::joined, blank.file.rig, *first,
+  Arena arena(arena_size(2 * SegmentSolver::memory_needed(c.calibration, c.monitor,
+                                                          given.file.rig.cameras, features)));
+  SegmentSolver joined(
+      SegmentSolver::Kind::joined, blank.file.rig, *first,
       stretch_length(result.frames, static_cast<std::size_t>(c.calibration.max_frames)),
       c.calibration, c.monitor, features, arena);
-  Stretches alone(Stretches::Kind::alone, blank.file.rig, *first,
-                  stretch_length(result.frames, kAloneFrames), c.calibration, c.monitor, features,
-                  arena);
+  SegmentSolver alone(SegmentSolver::Kind::alone, blank.file.rig, *first,
+                      stretch_length(result.frames, kAloneFrames), c.calibration, c.monitor,
+                      features, arena);
   std::optional<calibration::RigSolution> last;
   const auto keep = [&](const std::optional<calibration::RigSolution>& s) {
     if (!s) return;
@@ -163,13 +163,13 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   result.why.clear();
   for (int k = 1; k < result.rig->cameras; ++k) {
     const double depth =
-        calibration::judged_depth_m(*result.rig, k, c.calibration, c.odometry.pixel_sigma);
+        calibration::reference_depth_m(*result.rig, k, c.calibration, c.odometry.pixel_sigma);
     const double sigma = calibration::depth_error_percent(*result.rig, k, depth);
     if (sigma <= result.depth_sigma_percent) continue;
     result.depth_m = depth;
     result.depth_sigma_percent = sigma;
   }
-  result.verified = result.depth_sigma_percent <= c.calibration.tolerated_depth_percent;
+  result.verified = result.depth_sigma_percent <= c.calibration.max_depth_error_percent;
   return result;
 }
 
@@ -211,7 +211,7 @@ std::string describe(const DriveCalibration& found) {
     if (k == 0) continue;
     const Vec3 turn = log_so3(rig.T_camera_left[k].R) * (180 / std::numbers::pi);
     const Vec3& t = rig.T_camera_left[k].t;
-    const auto& sigma = rig.sigma_wide[k];
+    const auto& sigma = rig.sigma_total[k];
     fmt::format_to(out,
                    "          rotation {:.4f} ± {:.4f}, {:.4f} ± {:.4f}, {:.4f} ± {:.4f} deg\n",
                    turn.x(), sigma[0] * 180 / std::numbers::pi, turn.y(),
@@ -248,12 +248,12 @@ ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
           ? open_sequence(r.format, r.data, given_calibration(*r.calibration, use, &remarks), use,
                           cameras, r.topics)
           : open_sequence(r.format, r.data, std::nullopt, use, cameras, r.topics);
-  for (const std::string& sentence : remarks) std::cerr << "vergence: " << sentence << '\n';
+  for (const std::string& message : remarks) std::cerr << "vergence: " << message << '\n';
   check_image_sizes(sequence, 0, sequence.pairs.size());
   const StartingCalibration given = replayed_calibration(c, sequence, true);
   const SignalGuard signals;
   Progress progress = Progress::on_stderr(r.quiet);
-  for (const std::string& sentence : sequence.remarks) progress.say("vergence: " + sentence);
+  for (const std::string& message : sequence.remarks) progress.say("vergence: " + message);
   if (!sequence.assumptions.empty())
     progress.say(fmt::format("vergence: assumed: {}", fmt::join(sequence.assumptions, "; ")));
   const DriveCalibration found = calibrate_with_progress(

@@ -119,7 +119,7 @@ double frame_bytes(const SourceFacts& facts) {
 
 /// What an event would keep of records that small.
 double kept_bytes(const Configuration& c, double record_bytes, double rate) {
-  return c.record.keep_s * rate * record_bytes;
+  return c.record.event_window_s * rate * record_bytes;
 }
 
 /// Of the estimator's thread without images: of frames, and of the INS as it was compared.
@@ -128,27 +128,27 @@ double small_bytes(const Configuration& c) {
          kept_bytes(c, kReadingRecords, c.ins.rate);
 }
 
-constexpr double kLeastHeld = 16;  // frames that wait: a replay waits for room
+constexpr double kMinHeld = 16;  // frames that wait: a replay waits for room
 
 /// What an address of this machine reaches; a 32-bit one's program has 3 GB for all.
-constexpr double kMostQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
+constexpr double kMaxQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
 
 /// Bytes of images a second, and how many seconds of them are held.
 double wanted_queue_bytes(const Configuration& c, const SourceFacts& facts) {
   if (c.record.images == 0) return small_bytes(c);
   const double held = facts.when_full == Recorder::WhenFull::wait
-                          ? kLeastHeld
-                          : (kDiskS + c.record.keep_s) * c.trigger.rate;
-  return small_bytes(c) + frame_bytes(facts) * std::max(held, kLeastHeld);
+                          ? kMinHeld
+                          : (kDiskS + c.record.event_window_s) * c.trigger.rate;
+  return small_bytes(c) + frame_bytes(facts) * std::max(held, kMinHeld);
 }
 
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
   const double bytes = wanted_queue_bytes(c, facts);
-  if (bytes > kMostQueue)
-    throw InputError(
-        fmt::format("record.keep_s: {:.0f} MB of images are to wait, more than this machine "
-                    "can address",
-                    bytes / 1e6));
+  if (bytes > kMaxQueue)
+    throw InputError(fmt::format(
+        "record.event_window_s: {:.0f} MB of images are to wait, more than this machine "
+        "can address",
+        bytes / 1e6));
   return static_cast<std::size_t>(bytes);
 }
 
@@ -159,8 +159,8 @@ Recording::Options recording_options(const Configuration& c, const SourceFacts& 
               kPulseQueue + static_cast<std::size_t>(kept_bytes(c, kPulseRecords, c.trigger.rate))};
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
-  o.files.roll_bytes = static_cast<std::uint64_t>(c.record.roll_mb) * 1'000'000;
-  o.keep = Duration::seconds(c.record.keep_s);
+  o.files.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
+  o.keep = Duration::seconds(c.record.event_window_s);
   o.when_full = facts.when_full == Recorder::WhenFull::wait ? Recording::WhenFull::wait
                                                             : Recording::WhenFull::drop;
   return o;
@@ -170,7 +170,7 @@ Recording::Options recording_options(const Configuration& c, const SourceFacts& 
 
 DriveRecorder::DriveRecorder(const std::filesystem::path& folder,
                              const Configuration& configuration, const SourceFacts& facts,
-                             const SolverWatch& watch)
+                             const ReplayableSolverRunner& watch)
     : settings_(configuration.record),
       watch_(watch),
       frames_(recorded_names(facts.begin.file)),
@@ -253,7 +253,7 @@ void DriveRecorder::post_rig(Stamp stamp) noexcept {
 bool DriveRecorder::rig_is_due(Stamp stamp) const noexcept {
   if (!calibrated_) return false;
   return rig_in_file_ != recording_.counters().files ||
-         (settings_.keep_s > 0 && stamp - last_rig_ >= Duration::seconds(1));
+         (settings_.event_window_s > 0 && stamp - last_rig_ >= Duration::seconds(1));
 }
 
 void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
@@ -277,9 +277,9 @@ void DriveRecorder::on_reading(const InsRecord& reading) noexcept {
 }
 
 void DriveRecorder::on_event(const EventRecord& event) noexcept {
-  const std::string_view kind = event.kind, sentence = event.sentence.data();
+  const std::string_view kind = event.kind, message = event.message.data();
   recalibrate_ = recalibrate_ || kind == "recalibration_requested" ||
-                 (kind == "fault" && sentence.starts_with("recalibrate"));
+                 (kind == "fault" && message.starts_with("recalibrate"));
   if (frames_seen_ > 0) recording_.mark_event(event.stamp);  // before it is set-up
 }
 

@@ -27,12 +27,12 @@ enum Queue : std::size_t { estimator_queue, acquisition_queue };
 /// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
 ///            PulseObserver, a queue each. The rest: the owner's.
 /// Memory     The recording's queues, at construction.
-/// Errors     The constructor throws InputError: no room, no file. Afterwards sentences.
+/// Errors     The constructor throws InputError: no room, no file. Afterwards messages.
 class DriveRecorder final : public SessionObserver, public PulseObserver {
  public:
   /// `folder`: of the session, exists. Precondition: configuration.record.any().
   DriveRecorder(const std::filesystem::path& folder, const Configuration& configuration,
-                const SourceFacts& facts, const SolverWatch& watch);
+                const SourceFacts& facts, const ReplayableSolverRunner& watch);
 
   void on_frame(const RigFrame& frame) noexcept override;
   void on_pose(const PoseSample& sample) noexcept override;
@@ -42,9 +42,9 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
 
   void on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept override;
 
-  /// Sentences about the disk, since the last call.
+  /// Messages about the disk, since the last call.
   [[nodiscard]] std::vector<std::string> take_errors() { return recording_.take_errors(); }
-  /// Ends the files. What a disk failure cost becomes a sentence of *faults.
+  /// Ends the files. What a disk failure cost becomes a message of *faults.
   void close(std::vector<std::string>* faults);
   /// Nothing more is recorded. The estimator's thread.
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
@@ -60,7 +60,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   [[nodiscard]] bool rig_is_due(Stamp stamp) const noexcept;
 
   const RecordSettings& settings_;
-  const SolverWatch& watch_;
+  const ReplayableSolverRunner& watch_;
   std::vector<std::string> frames_;  // of reference, of the cameras
   std::array<std::string_view, kMaxCameras> frame_names_{};
   const std::string folder_;

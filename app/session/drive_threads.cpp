@@ -21,8 +21,8 @@ RealtimeRequest request_of(const RealtimeSettings& settings) {
   return request;
 }
 
-void say(const std::vector<std::string>& sentences, Progress* progress) {
-  for (const std::string& sentence : sentences) progress->say("vergence: " + sentence);
+void say(const std::vector<std::string>& messages, Progress* progress) {
+  for (const std::string& message : messages) progress->say("vergence: " + message);
 }
 
 }  // namespace
@@ -45,7 +45,7 @@ void DriveThreads::look(Progress* progress) {
   say(realtime_.apply(threads_), progress);
 }
 
-ThreadAllocationFigures DriveThreads::figures() const {
+ThreadAllocationCounts DriveThreads::figures() const {
   const ThreadAllocations::Counts counts = ThreadAllocations::counts();
   std::map<std::string, std::uint64_t> ours, libraries;
   for (const std::string& name : ours_) ours[name] = 0;
@@ -54,13 +54,13 @@ ThreadAllocationFigures DriveThreads::figures() const {
     (ProcessThread{0, name}.ours() ? ours : libraries)[name] += counts.rows[i].count;
   }
   if (counts.others > 0) libraries["others"] = counts.others;
-  ThreadAllocationFigures out;
+  ThreadAllocationCounts out;
   out.ours.assign(ours.begin(), ours.end());
   out.libraries.assign(libraries.begin(), libraries.end());
   return out;
 }
 
-std::string allocations_sentence(const ThreadAllocationFigures& figures) {
+std::string allocations_message(const ThreadAllocationCounts& figures) {
   std::string list;
   for (const auto* names : {&figures.ours, &figures.libraries})
     for (const auto& [name, count] : *names)

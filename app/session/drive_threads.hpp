@@ -24,7 +24,7 @@ class DriveThreads {
   /// Called every 50 ms while frames come.
   void look(Progress* progress);
   /// ThreadAllocations' counts, beside the names that look() has seen.
-  [[nodiscard]] ThreadAllocationFigures figures() const;
+  [[nodiscard]] ThreadAllocationCounts figures() const;
 
  private:
   RealtimeSystem system_;
@@ -36,6 +36,6 @@ class DriveThreads {
 
 /// `heap allocations while frames came: vergence-sync 3`, with the threads that are not 0; empty:
 /// there are none.
-[[nodiscard]] std::string allocations_sentence(const ThreadAllocationFigures& figures);
+[[nodiscard]] std::string allocations_message(const ThreadAllocationCounts& figures);
 
 }  // namespace vergence::app

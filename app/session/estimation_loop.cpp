@@ -44,7 +44,7 @@ void print_memory_table(const std::vector<MemoryRow>& memory) {
     print_parts(row);
     sum += row.bytes;
   }
-  print_row("sum_bytes", sum);
+  print_row("total_bytes", sum);
   (void)std::fflush(stdout);
 }
 
@@ -112,13 +112,13 @@ void EstimationLoop::run() noexcept {
 
 void EstimationLoop::handle(const SourceEvent& event) noexcept {
   if (event.recalibrate) estimator_->request_recalibration();
-  if (event.skipped) log_.note_skipped();
+  if (event.skipped) log_.record_skipped();
   if (event.listed) log_.log(event.record, event.to_user);
 }
 
-void EstimationLoop::request_recalibration(Stamp stamp, const char* sentence) noexcept {
+void EstimationLoop::request_recalibration(Stamp stamp, const char* message) noexcept {
   estimator_->request_recalibration();
-  log_.log(stamp, "recalibration_requested", sentence, true);
+  log_.log(stamp, "recalibration_requested", message, true);
 }
 
 /// What viewers of the session have asked for.

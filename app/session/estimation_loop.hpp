@@ -27,7 +27,7 @@ struct MemoryRow {
   std::span<const ArenaRow> parts{};
 };
 
-/// The table of --memory on stdout, before the drive.
+/// The table of --print-memory on stdout, before the drive.
 void print_memory_table(const std::vector<MemoryRow>& memory);
 
 /// What the estimator's thread does: takes what the source delivers, poses it, compares it with
@@ -67,7 +67,9 @@ class EstimationLoop {
   [[nodiscard]] const EstimatorOptions& options() const noexcept { return options_; }
   /// Null: there is no INS.
   [[nodiscard]] const InsComparison* comparison() const noexcept { return comparison_.get(); }
-  [[nodiscard]] const SolverWatch& solver_watch() const noexcept { return watched_solver_; }
+  [[nodiscard]] const ReplayableSolverRunner& solver_watch() const noexcept {
+    return watched_solver_;
+  }
   [[nodiscard]] const Arena& estimator_arena() const noexcept { return estimator_arena_; }
   [[nodiscard]] const Arena& comparison_arena() const noexcept { return comparison_arena_; }
 
@@ -81,7 +83,7 @@ class EstimationLoop {
   void handle(const InsRecord& reading) noexcept { comparison_->add(reading); }
   void handle(const SourceEvent& event) noexcept;
   void compare(const PoseSample& sample, float decode_ms) noexcept;
-  void request_recalibration(Stamp stamp, const char* sentence) noexcept;
+  void request_recalibration(Stamp stamp, const char* message) noexcept;
   void take_requests(Stamp stamp) noexcept;
 
   FrameSource& source_;
@@ -93,7 +95,7 @@ class EstimationLoop {
   Arena estimator_arena_, comparison_arena_;
   std::unique_ptr<PairRunner> runner_;
   BackgroundThread solver_;
-  SolverWatch watched_solver_{solver_};
+  ReplayableSolverRunner watched_solver_{solver_};
   std::unique_ptr<Estimator> estimator_;
   DriveRecorder* recording_ = nullptr;
   SessionOutput output_;

@@ -14,10 +14,10 @@ constexpr int kWholeAgain = 100;  // frames, after which dropped work is news
 /// What a user wants to hear of at once.
 bool is_for_user(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
-  return kind == Kind::rig_changed || kind == Kind::out_of_step || kind == Kind::in_step ||
-         kind == Kind::calibration_confirmed || kind == Kind::calibration_contradicted ||
+  return kind == Kind::rig_changed || kind == Kind::out_of_sync || kind == Kind::cameras_in_sync ||
+         kind == Kind::calibration_verified || kind == Kind::calibration_contradicted ||
          kind == Kind::focal_length_contradicted || kind == Kind::calibration_accepted ||
-         kind == Kind::calibration_rejected || kind == Kind::calibration_waits ||
+         kind == Kind::calibration_rejected || kind == Kind::calibration_pending ||
          kind == Kind::calibration_resumed;
 }
 
@@ -58,7 +58,7 @@ void EventLog::note(const Estimator& estimator) noexcept {
 }
 
 /// Frames in a row without all of their work are one event.
-void EventLog::note_effort(const PoseSample& sample) noexcept {
+void EventLog::record_effort(const PoseSample& sample) noexcept {
   if (sample.effort.whole()) {
     whole_frames_ = std::min(whole_frames_ + 1, kWholeAgain);
     return;
@@ -67,7 +67,7 @@ void EventLog::note_effort(const PoseSample& sample) noexcept {
   EventRecord event;
   event.stamp = sample.stamp;
   event.kind = "work_dropped";
-  event.set_sentence("frames take longer than there is time: less is done beside the pose");
+  event.set_message("frames take longer than there is time: less is done beside the pose");
   event.fields[0] = {"points_percent", std::int64_t{sample.effort.points_percent}};
   event.fields[1] = {"window_keyframes", std::int64_t{sample.effort.window_keyframes}};
   event.fields[2] = {"window_steps", std::int64_t{sample.effort.window_steps}};
@@ -75,7 +75,7 @@ void EventLog::note_effort(const PoseSample& sample) noexcept {
 }
 
 void EventLog::note(const PoseSample& sample) noexcept {
-  note_effort(sample);
+  record_effort(sample);
   ++now_.done;
   now_.state = sample.state;
   now_.reason = sample.reason;
@@ -86,20 +86,19 @@ void EventLog::note(const PoseSample& sample) noexcept {
     last_position_ = sample.T_world_left.t;
     posed_ = true;
   }
-  (void)glimpses_.push(now_);
+  (void)progress_snapshots_.push(now_);
 }
 
-void EventLog::note_skipped() noexcept {
+void EventLog::record_skipped() noexcept {
   ++now_.done;
-  (void)glimpses_.push(now_);
+  (void)progress_snapshots_.push(now_);
 }
 
-void EventLog::log(Stamp stamp, const char* kind, std::string_view sentence,
-                   bool to_user) noexcept {
+void EventLog::log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept {
   EventRecord event;
   event.stamp = stamp;
   event.kind = kind;
-  event.set_sentence(sentence);
+  event.set_message(message);
   log(event, to_user);
 }
 
@@ -111,10 +110,10 @@ void EventLog::log(const EventRecord& event, bool to_user) noexcept {
 void EventLog::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
     progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
-                              notice.sentence.data()));
+                              notice.message.data()));
   ProgressSnapshot newest;
   bool any = false;
-  while (glimpses_.pop(&newest)) any = true;
+  while (progress_snapshots_.pop(&newest)) any = true;
   if (!any) return;
   const std::string state_text = state_words(newest.state, newest.reason);
   ProgressState state;

@@ -11,12 +11,12 @@
 namespace vergence::app {
 
 /// What becomes of each frame beside its line in poses.csv: events and calibrations for the
-/// recorder, the state of things for the progress line, sentences for the user.
+/// recorder, the state of things for the progress line, messages for the user.
 ///
 /// Threads  note…(), log(): the estimator's, sealed. show(): the caller's. After the estimator's
 ///          thread has joined all is anyone's.
 /// Memory   Fixed. Full: of the states for the
-///          line the newest are lost, the next one tells the same and more; of the sentences too,
+///          line the newest are lost, the next one tells the same and more; of the messages too,
 ///          and events.jsonl has them.
 class EventLog {
  public:
@@ -28,10 +28,10 @@ class EventLog {
   /// The sample of a process() call.
   void note(const PoseSample& sample) noexcept;
   /// A frame that was not read.
-  void note_skipped() noexcept;
-  void note_distance_from_ins(double metres) noexcept { now_.from_ins_m = metres; }
+  void record_skipped() noexcept;
+  void record_distance_from_ins(double metres) noexcept { now_.from_ins_m = metres; }
   /// An event of the session's own. `kind` points to a constant. `to_user`: on stderr, too.
-  void log(Stamp stamp, const char* kind, std::string_view sentence, bool to_user) noexcept;
+  void log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept;
   void log(const EventRecord& event, bool to_user) noexcept;
 
   /// Points and observations over the estimator's capacity.
@@ -51,7 +51,7 @@ class EventLog {
     double from_ins_m = -1;  // negative: not compared
   };
 
-  void note_effort(const PoseSample& sample) noexcept;
+  void record_effort(const PoseSample& sample) noexcept;
 
   SessionOutput* output_ = nullptr;
   Stamp first_{};
@@ -60,7 +60,7 @@ class EventLog {
   Vec3 last_position_ = Vec3::Zero();
   bool posed_ = false;
   int whole_frames_ = std::numeric_limits<int>::max() / 2;  // since one had no time for its work
-  Ring<ProgressSnapshot, 64> glimpses_;
+  Ring<ProgressSnapshot, 64> progress_snapshots_;
   Ring<EventRecord, 32> notices_;
 };
 

@@ -26,8 +26,9 @@ namespace vergence::app {
 struct SourceFrame {
   RigFrame rig{};
   float decode_ms = 0;  // reading and decoding its images; 0 where they came as pixels
-  std::optional<bool> solver_idle{};  // of a recorded drive: what the calibration solver answered
-                                      // at this frame, and is to answer again (SolverWatch)
+  std::optional<bool>
+      solver_idle{};  // of a recorded drive: what the calibration solver answered
+                      // at this frame, and is to answer again (ReplayableSolverRunner)
 };
 
 /// Something to be noted, at its place among the frames.
@@ -41,9 +42,9 @@ struct SourceEvent {
 
 using SourceItem = std::variant<SourceFrame, InsRecord, SourceEvent>;
 
-/// A sentence of the set-up.
+/// A message of the set-up.
 struct SourceRemark {
-  std::string sentence{};
+  std::string message{};
   const char* kind = nullptr;  // of its event; null: it is only said
   bool say = true;             // on stderr, too
 };

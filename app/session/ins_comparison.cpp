@@ -18,8 +18,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json placement_json(const PlacementRecord& record) {
-  const Placement& p = record.placement;
+Json enu_alignment_json(const EnuAlignmentRecord& record) {
+  const EnuAlignment& p = record.alignment;
   Json rows = Json::array();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) rows.push_back(p.T_enu_world.R(row, column));
@@ -32,30 +32,30 @@ Json placement_json(const PlacementRecord& record) {
           {"heading_sigma_deg", p.rotation_sigma.z() * kDegreesPerRadian}};
 }
 
-Json errors_json(const EarthErrors& e) {
+Json errors_json(const EnuErrors& e) {
   if (e.poses == 0) return nullptr;
-  return {
-      {"poses", e.poses},
-      {"horizontal_rms_m", e.horizontal_rms_m},
-      {"horizontal_max_m", e.horizontal_most_m},
-      {"horizontal_end_m", e.horizontal_end_m},
-      {"horizontal_end_percent", e.way_m > 0 ? Json(100 * e.horizontal_end_m / e.way_m) : Json()},
-      {"up_rms_m", e.up_rms_m},
-      {"up_end_m", e.up_end_m},
-      {"heading_rms_deg", e.heading_rms_deg},
-      {"heading_max_deg", e.heading_most_deg},
-      {"heading_end_deg", e.heading_end_deg}};
+  return {{"poses", e.poses},
+          {"horizontal_rms_m", e.horizontal_rms_m},
+          {"horizontal_max_m", e.horizontal_max_m},
+          {"horizontal_end_m", e.horizontal_end_m},
+          {"horizontal_end_percent",
+           e.ins_path_m > 0 ? Json(100 * e.horizontal_end_m / e.ins_path_m) : Json()},
+          {"up_rms_m", e.up_rms_m},
+          {"up_end_m", e.up_end_m},
+          {"heading_rms_deg", e.heading_rms_deg},
+          {"heading_max_deg", e.heading_max_deg},
+          {"heading_end_deg", e.heading_end_deg}};
 }
 
 }  // namespace
 
-Json earth_json(const EarthFigures& figures) {
+Json enu_json(const EnuMetrics& figures) {
   if (!figures.origin) return nullptr;
   const Vec3 turn = boresight_of(figures.T_ins_left.R) * kDegreesPerRadian;
   const Vec3& arm = figures.T_ins_left.t;
-  Json placements = Json::array();
-  for (const PlacementRecord& record : figures.placements)
-    placements.push_back(placement_json(record));
+  Json alignments = Json::array();
+  for (const EnuAlignmentRecord& record : figures.alignments)
+    alignments.push_back(enu_alignment_json(record));
   return {{"origin",
            {{"latitude_deg", figures.origin->latitude_deg},
             {"longitude_deg", figures.origin->longitude_deg},
@@ -64,13 +64,13 @@ Json earth_json(const EarthFigures& figures) {
            {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
             {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
             {"source", figures.mount_source}}},
-          {"placements", placements},
-          {"way_m", figures.errors.way_m},
+          {"alignments", alignments},
+          {"ins_path_m", figures.errors.ins_path_m},
           {"errors", errors_json(figures.errors)}};
 }
 
 void InsEvents::note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept {
-  note_attitude(sample);
+  record_attitude(sample);
   if (contradicted && !std::exchange(contradiction_noted_, true))
     event_log_.log(
         sample.stamp, "ins_attitude",
@@ -86,20 +86,20 @@ void InsEvents::note(const InsSample& sample, std::uint64_t jumps, bool contradi
 }
 
 void InsEvents::note(const ComparedPose& pose, std::uint64_t matches) noexcept {
-  if (source_ != InsSource::none) note_match(pose, matches);
-  note_scale(pose);
+  if (source_ != InsSource::none) record_match(pose, matches);
+  record_scale(pose);
 }
 
-void InsEvents::note(const Placement& p, Stamp stamp) noexcept {
+void InsEvents::note(const EnuAlignment& p, Stamp stamp) noexcept {
   std::array<char, 160> text{};
   (void)std::snprintf(text.data(), text.size(),
                       "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m",
                       p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual);
-  event_log_.log(stamp, "placement", text.data(), false);
+  event_log_.log(stamp, "enu_alignment", text.data(), false);
 }
 
 /// Once a drive: a receiver never has one, an INS has it after it has aligned.
-void InsEvents::note_attitude(const InsSample& sample) noexcept {
+void InsEvents::record_attitude(const InsSample& sample) noexcept {
   if (sample.attitude_valid || sample.heading_source == HeadingSource::none ||
       std::exchange(attitude_noted_, true))
     return;
@@ -112,7 +112,7 @@ void InsEvents::note_attitude(const InsSample& sample) noexcept {
                  false);
 }
 
-void InsEvents::note_match(const ComparedPose& pose, std::uint64_t matches) noexcept {
+void InsEvents::record_match(const ComparedPose& pose, std::uint64_t matches) noexcept {
   constexpr std::uint64_t kSettled = 3;  // poses: one missed reading is no event
   match_run_ = pose.ins == last_match_ ? match_run_ + 1 : 1;
   last_match_ = pose.ins;
@@ -121,12 +121,12 @@ void InsEvents::note_match(const ComparedPose& pose, std::uint64_t matches) noex
   switch (pose.ins) {
     case InsMatch::ok:
       if (matches > kSettled)
-        event_log_.log(pose.pose.stamp, "ins_ok",
+        event_log_.log(pose.pose.stamp, "ins_recovered",
                        "the INS has a position again; the comparison goes on", false);
       break;
     case InsMatch::none:
       event_log_.log(
-          pose.pose.stamp, "ins_silent",
+          pose.pose.stamp, "ins_timeout",
           recorded
               ? "the recording has no reading of the INS here: these poses are not compared"
               : "the INS is silent: the drive goes on without it; check its cable and its rate",
@@ -147,7 +147,7 @@ void InsEvents::note_match(const ComparedPose& pose, std::uint64_t matches) noex
   }
 }
 
-void InsEvents::note_scale(const ComparedPose& pose) noexcept {
+void InsEvents::record_scale(const ComparedPose& pose) noexcept {
   if (pose.scale_disagrees == scale_disagrees_) return;
   scale_disagrees_ = pose.scale_disagrees;
   std::array<char, 200> text{};
@@ -171,7 +171,7 @@ InsComparison::InsComparison(const ComparisonOptions& options, InsSource source,
       comparison_(options, arena),
       event_log_(event_log),
       events_(source, options.scale_stretch_m, event_log) {
-  placements_.reserve(kMostPlacements);
+  alignments_.reserve(kMaxPlacements);
 }
 
 void InsComparison::add(const InsRecord& reading) noexcept {
@@ -194,8 +194,8 @@ void InsComparison::drain() noexcept {
     if (pose.ins_valid) ++matches_;
     measure_way(pose);
     measure_errors(pose);
-    event_log_.note_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
-    take_placement(pose.pose.stamp);
+    event_log_.record_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
+    take_enu_alignment(pose.pose.stamp);
     if (pose.ins_valid && pose.scale_disagrees) ++scale_disagreements_;
     events_.note(pose, matches_);
   }
@@ -204,7 +204,7 @@ void InsComparison::drain() noexcept {
 void InsComparison::finish() noexcept {
   comparison_.finish();
   drain();
-  take_placement(newest_stamp_);
+  take_enu_alignment(newest_stamp_);
 }
 
 /// The way is summed across the ground, straight across holes, in steps of four sigmas of a
@@ -213,24 +213,24 @@ void InsComparison::finish() noexcept {
 /// of a step, which is 0.2 %. A bend of radius R is cut by L²/24R²: at 30 m, by 0.3 % in steps of
 /// 8.5 m.
 void InsComparison::measure_way(const ComparedPose& pose) noexcept {
-  constexpr double kSigmas = 4, kLeast = 0.5, kMost = 20;  // m: longer ones cut corners
+  constexpr double kSigmas = 4, kMin = 0.5, kMax = 20;  // m: longer ones cut corners
   if (!pose.ins_valid) return;
   const Vec2 place = pose.reference.T_enu_left.t.head<2>();
   if (!std::exchange(on_way_, true)) last_place_ = place;
   beyond_ = (place - last_place_).norm();
-  if (beyond_ < std::clamp(kSigmas * pose.ins_position_sigma, kLeast, kMost)) return;
-  errors_.way_m += std::exchange(beyond_, 0);
+  if (beyond_ < std::clamp(kSigmas * pose.ins_position_sigma, kMin, kMax)) return;
+  errors_.ins_path_m += std::exchange(beyond_, 0);
   last_place_ = place;
 }
 
 void InsComparison::measure_errors(const ComparedPose& pose) noexcept {
   if (!pose.compared) return;
-  EarthErrors& e = errors_;
+  EnuErrors& e = errors_;
   const double across = pose.error_enu.head<2>().norm(), up = pose.error_enu.z();
   const double turn = -pose.error_yaw * (180.0 / std::numbers::pi);  // a compass counts clockwise
   ++e.poses;
   e.horizontal_rms_m += across * across;
-  e.horizontal_most_m = std::max(e.horizontal_most_m, across);
+  e.horizontal_max_m = std::max(e.horizontal_max_m, across);
   e.horizontal_end_m = across;
   if (pose.height_known) {
     ++heights_;
@@ -238,17 +238,17 @@ void InsComparison::measure_errors(const ComparedPose& pose) noexcept {
     e.up_end_m = up;
   }
   e.heading_rms_deg += turn * turn;
-  e.heading_most_deg = std::max(e.heading_most_deg, std::abs(turn));
+  e.heading_max_deg = std::max(e.heading_max_deg, std::abs(turn));
   e.heading_end_deg = turn;
 }
 
-EarthFigures InsComparison::earth(const std::string& mount_source) const {
-  EarthFigures figures;
+EnuMetrics InsComparison::earth(const std::string& mount_source) const {
+  EnuMetrics figures;
   if (comparison_.has_origin()) figures.origin = comparison_.plane().origin();
-  figures.placements.assign(placements_.begin(), placements_.end());
+  figures.alignments.assign(alignments_.begin(), alignments_.end());
   figures.errors = errors_;
   // The last step is still under way; alone it may be nothing but a standstill's noise.
-  if (errors_.way_m > 0) figures.errors.way_m += beyond_;
+  if (errors_.ins_path_m > 0) figures.errors.ins_path_m += beyond_;
   const double n = std::max(1.0, static_cast<double>(errors_.poses));
   for (double* squares : {&figures.errors.horizontal_rms_m, &figures.errors.heading_rms_deg})
     *squares = std::sqrt(*squares / n);
@@ -270,20 +270,20 @@ std::vector<std::pair<std::string, std::uint64_t>> InsComparison::counters() con
           {"compared", k.compared},
           {"without_ins", k.without_ins},
           {"pushed_out", k.pushed_out},
-          {"placements", comparison_.placement().revision},
+          {"alignments", comparison_.alignment().revision},
           {"scale_disagrees", scale_disagreements_}};
 }
 
-void InsComparison::take_placement(Stamp stamp) noexcept {
-  const Placement& p = comparison_.placement();
-  if (p.revision == placement_revision_) return;
-  placement_revision_ = p.revision;
-  if (placements_.size() < kMostPlacements) {
-    placements_.push_back({stamp, p});
-    if (placements_.size() == kMostPlacements)
-      event_log_.log(stamp, "placements_full",
+void InsComparison::take_enu_alignment(Stamp stamp) noexcept {
+  const EnuAlignment& p = comparison_.alignment();
+  if (p.revision == alignment_revision_) return;
+  alignment_revision_ = p.revision;
+  if (alignments_.size() < kMaxPlacements) {
+    alignments_.push_back({stamp, p});
+    if (alignments_.size() == kMaxPlacements)
+      event_log_.log(stamp, "enu_alignment_limit",
                      "the drive was placed on the earth anew so often that summary.json has no "
-                     "further placement; poses.csv has every one",
+                     "further alignment; poses.csv has every one",
                      true);
   }
   output_->post(p, comparison_.plane().origin());

@@ -12,38 +12,39 @@
 #include "app/session/event_log.hpp"
 #include "app/session/session_observer.hpp"
 #include "core/comparison/comparison.hpp"
-#include "core/comparison/placement.hpp"
+#include "core/comparison/enu_alignment.hpp"
 #include "core/math/se3.hpp"
 #include "core/types/ins_sample.hpp"
 
 namespace vergence::app {
 
-/// A placement and from when on it holds.
-struct PlacementRecord {
+/// A alignment and from when on it holds.
+struct EnuAlignmentRecord {
   Stamp stamp{};
-  Placement placement{};
+  EnuAlignment alignment{};
 };
 
-/// Errors against the INS after the placement, over the poses that were compared.
-struct EarthErrors {
+/// Errors against the INS after the alignment, over the poses that were compared.
+struct EnuErrors {
   std::uint64_t poses = 0;
-  double way_m = 0;  // of the INS across the ground from its first fix on, straight across holes
-  double horizontal_rms_m = 0, horizontal_most_m = 0, horizontal_end_m = 0;
-  double up_rms_m = 0, up_end_m = 0;                                      // ours − INS
-  double heading_rms_deg = 0, heading_most_deg = 0, heading_end_deg = 0;  // the end clockwise
+  double ins_path_m =
+      0;  // of the INS across the ground from its first fix on, straight across holes
+  double horizontal_rms_m = 0, horizontal_max_m = 0, horizontal_end_m = 0;
+  double up_rms_m = 0, up_end_m = 0;                                     // ours − INS
+  double heading_rms_deg = 0, heading_max_deg = 0, heading_end_deg = 0;  // the end clockwise
 };
 
 /// Where a drive lies on the earth, and how far from the INS it is there.
-struct EarthFigures {
+struct EnuMetrics {
   std::optional<Geodetic> origin{};  // of enu; nothing: the INS never had a fix
-  std::vector<PlacementRecord> placements{};
-  EarthErrors errors{};
+  std::vector<EnuAlignmentRecord> alignments{};
+  EnuErrors errors{};
   Transform T_ins_left{};      // the mount that the comparison took
   std::string mount_source{};  // where it is from
 };
 
 /// Null without an origin.
-[[nodiscard]] nlohmann::ordered_json earth_json(const EarthFigures& figures);
+[[nodiscard]] nlohmann::ordered_json enu_json(const EnuMetrics& figures);
 
 enum class InsSource : std::uint8_t { none, device, recording };
 
@@ -60,12 +61,12 @@ class InsEvents {
   void note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept;
   /// A pose that has met its readings, the `matches`-th that found any.
   void note(const ComparedPose& pose, std::uint64_t matches) noexcept;
-  void note(const Placement& placement, Stamp stamp) noexcept;
+  void note(const EnuAlignment& alignment, Stamp stamp) noexcept;
 
  private:
-  void note_attitude(const InsSample& sample) noexcept;
-  void note_match(const ComparedPose& pose, std::uint64_t matches) noexcept;
-  void note_scale(const ComparedPose& pose) noexcept;
+  void record_attitude(const InsSample& sample) noexcept;
+  void record_match(const ComparedPose& pose, std::uint64_t matches) noexcept;
+  void record_scale(const ComparedPose& pose) noexcept;
 
   const InsSource source_;
   const double scale_stretch_m_;
@@ -85,7 +86,7 @@ class InsEvents {
 class InsComparison {
  public:
   /// That are kept for the files at the end; later ones are in poses.csv alone, and count.
-  static constexpr std::size_t kMostPlacements = 4096;
+  static constexpr std::size_t kMaxPlacements = 4096;
 
   /// Without a source poses go through and nothing is said. `event_log` outlives it.
   InsComparison(const ComparisonOptions& options, InsSource source, Arena& arena,
@@ -106,12 +107,12 @@ class InsComparison {
   [[nodiscard]] std::uint64_t matches() const noexcept { return matches_; }
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
   /// `mount_source`: where the mount of the options is from.
-  [[nodiscard]] EarthFigures earth(const std::string& mount_source) const;
+  [[nodiscard]] EnuMetrics earth(const std::string& mount_source) const;
 
  private:
   void measure_way(const ComparedPose& pose) noexcept;
   void measure_errors(const ComparedPose& pose) noexcept;
-  void take_placement(Stamp stamp) noexcept;
+  void take_enu_alignment(Stamp stamp) noexcept;
   const Transform T_ins_left_;
   Comparison comparison_;
   EventLog& event_log_;
@@ -120,13 +121,13 @@ class InsComparison {
   std::array<float, Comparison::kPending> decode_ms_{};  // of the poses that wait, by their count
   std::uint64_t added_ = 0, drained_ = 0;
   std::uint64_t matches_ = 0, scale_disagreements_ = 0;
-  std::uint32_t placement_revision_ = 0;
-  std::vector<PlacementRecord> placements_;  // its memory is taken at construction
-  EarthErrors errors_{};                     // means and roots are squares' sums until earth()
-  std::uint64_t heights_ = 0;                // poses whose error upwards is in errors_
-  bool on_way_ = false;                      // last_place_ means something
-  Vec2 last_place_ = Vec2::Zero();           // where the newest whole step of the way ended
-  double beyond_ = 0;                        // m from there to the newest place
+  std::uint32_t alignment_revision_ = 0;
+  std::vector<EnuAlignmentRecord> alignments_;  // its memory is taken at construction
+  EnuErrors errors_{};                          // means and roots are squares' sums until earth()
+  std::uint64_t heights_ = 0;                   // poses whose error upwards is in errors_
+  bool on_way_ = false;                         // last_place_ means something
+  Vec2 last_place_ = Vec2::Zero();              // where the newest whole step of the way ended
+  double beyond_ = 0;                           // m from there to the newest place
   Stamp newest_stamp_{};
 };
 

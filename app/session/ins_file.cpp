@@ -79,9 +79,7 @@ class Columns {
   [[noreturn]] void refuse(std::string_view field, const char* what) const {
     app::refuse(file_, line_, "`" + std::string(field.substr(0, 40)) + "` is not " + what);
   }
-  [[noreturn]] void refuse(const std::string& sentence) const {
-    app::refuse(file_, line_, sentence);
-  }
+  [[noreturn]] void refuse(const std::string& message) const { app::refuse(file_, line_, message); }
 
  private:
   const fs::path& file_;
@@ -91,12 +89,12 @@ class Columns {
 };
 
 InsRecord parse(Columns columns) {
-  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  constexpr std::int64_t kMax = std::numeric_limits<std::int64_t>::max();
   InsRecord r;
   InsSample& s = r.sample;
-  s.stamp = Stamp(columns.integer("a stamp in whole nanoseconds", 0, kMost));
-  s.stamp_error = Duration::nanoseconds(columns.integer("a bound in whole nanoseconds", 0, kMost));
-  s.number = static_cast<std::uint64_t>(columns.integer("a reading's number", 0, kMost));
+  s.stamp = Stamp(columns.integer("a stamp in whole nanoseconds", 0, kMax));
+  s.stamp_error = Duration::nanoseconds(columns.integer("a bound in whole nanoseconds", 0, kMax));
+  s.number = static_cast<std::uint64_t>(columns.integer("a reading's number", 0, kMax));
   s.fix = columns.fix();
   std::array<double, 3> place{};
   if (columns.numbers("a coordinate", &place)) {
@@ -121,7 +119,7 @@ InsRecord parse(Columns columns) {
   r.quality.satellites =
       static_cast<std::uint8_t>(columns.integer_or_nothing("a number of satellites", 0, 255));
   r.quality.filter_valid = columns.integer("0 or 1", 0, 1) != 0;
-  r.quality.utc_ns = columns.integer_or_nothing("a time in whole nanoseconds", 0, kMost);
+  r.quality.utc_ns = columns.integer_or_nothing("a time in whole nanoseconds", 0, kMax);
   r.quality.utc_valid = r.quality.utc_ns != 0;
   return r;
 }

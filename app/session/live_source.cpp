@@ -31,12 +31,12 @@ std::vector<std::string> serials_of(const std::vector<CameraDevice*>& cameras) {
   return serials;
 }
 
-SourceEvent event_of(Stamp stamp, const TimingMonitor::Sentence& sentence) noexcept {
+SourceEvent event_of(Stamp stamp, const TimingMonitor::Message& message) noexcept {
   SourceEvent event;
   event.record.stamp = stamp;
-  event.record.kind = sentence.kind;
-  event.record.set_sentence(sentence.text.data());
-  event.to_user = sentence.to_user;
+  event.record.kind = message.kind;
+  event.record.set_message(message.text.data());
+  event.to_user = message.to_user;
   return event;
 }
 
@@ -91,15 +91,15 @@ void LiveSource::make_facts() {
         return is_full(f) && f.active(stamp - start_);
       });
     };
-  for (const std::string& sentence : facts_.begin.remarks)
-    facts_.remarks.push_back({sentence, "calibration"});
-  for (const std::string& sentence : devices_.remarks())
-    facts_.remarks.push_back({sentence, "device"});
+  for (const std::string& message : facts_.begin.remarks)
+    facts_.remarks.push_back({message, "calibration"});
+  for (const std::string& message : devices_.remarks())
+    facts_.remarks.push_back({message, "device"});
   const SyncMode mode = devices_.sync().mode;
-  facts_.remarks.push_back({proof_sentence(mode), "pairing", false});
-  if (mode == SyncMode::software)
+  facts_.remarks.push_back({proof_message(mode), "pairing", false});
+  if (mode == SyncMode::approximate_time)
     facts_.remarks.push_back(
-        {std::string(proof_sentence(mode)) + "; poses in motion suffer from it"});
+        {std::string(proof_message(mode)) + "; poses in motion suffer from it"});
   facts_.knows_truth = devices_.mock() != nullptr;
   facts_.image_bytes = devices_.image_bytes();
   facts_.ring_bytes = sizeof(Acquisition);
@@ -129,20 +129,20 @@ bool LiveSource::next(SourceItem* item) noexcept {
       return true;
     }
     if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
-      const TimingMonitor::Sentence sentence = time_.of_reading(*reading);
+      const TimingMonitor::Message message = time_.of_reading(*reading);
       const Stamp stamp = reading->sample.stamp;
       in_hand_ = DeviceEvent{};
-      if (sentence.kind != nullptr) {
-        *item = event_of(stamp, sentence);
+      if (message.kind != nullptr) {
+        *item = event_of(stamp, message);
         return true;
       }
     }
     if (!acquisition_->next(&in_hand_)) return false;
     if (const auto* frame = std::get_if<AcquiredFrame>(&in_hand_)) {
       waiting_ = true;
-      const TimingMonitor::Sentence sentence = time_.of_set(frame->set);
-      if (sentence.kind == nullptr) continue;
-      *item = event_of(frame->rig.stamp, sentence);
+      const TimingMonitor::Message message = time_.of_set(frame->set);
+      if (message.kind == nullptr) continue;
+      *item = event_of(frame->rig.stamp, message);
       return true;
     }
     if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
@@ -169,7 +169,7 @@ bool LiveSource::next_event(SourceItem* item) noexcept {
     SourceEvent event;
     event.record.stamp = start_ + faults[i].at;
     event.record.kind = "fault";
-    event.record.set_sentence(text.data());
+    event.record.set_message(text.data());
     event.recalibrate = faults[i].kind == mock::FaultKind::recalibrate;
     *item = event;
     return true;
@@ -179,7 +179,7 @@ bool LiveSource::next_event(SourceItem* item) noexcept {
 
 void LiveSource::done(const PoseSample& sample) noexcept {
   const auto* frame = std::get_if<AcquiredFrame>(&in_hand_);
-  time_.note_pose(*frame, sample.estimate_ms, request_.fast ? HostStamp{} : monotonic_now());
+  time_.record_pose(*frame, sample.estimate_ms, request_.fast ? HostStamp{} : monotonic_now());
   acquisition_->release(*frame);
 }
 
@@ -235,10 +235,10 @@ std::vector<std::pair<std::string, std::uint64_t>> LiveSource::counters() const 
       {"sets_complete", c.sync.complete},
       {"sets_incomplete", c.sync.incomplete},
       {"pulses_missed", c.sync.missed},
-      {"sets_overtaken", c.dropped_sets},
+      {"sets_superseded", c.dropped_sets},
       {"readings_dropped", c.dropped_readings},
-      {"frames_torn", c.torn},
-      {"sets_unproven", c.sync.unproven},
+      {"frames_incomplete", c.torn},
+      {"sets_ambiguous", c.sync.ambiguous},
       {"clock_resets", c.clock_resets},
       {"worst_stamp_error_ns", static_cast<std::uint64_t>(c.worst_stamp_error_ns)}};
   if (exposure_) {
@@ -267,9 +267,9 @@ std::vector<std::pair<std::string, std::uint64_t>> LiveSource::counters() const 
   return out;
 }
 
-TruthFigures LiveSource::truth_figures(const SessionTotals& totals,
+TruthMetrics LiveSource::truth_figures(const SessionTotals& totals,
                                        const Estimator& estimator) const {
-  TruthFigures figures;
+  TruthMetrics figures;
   if (totals.trajectory.empty() || devices_.mock() == nullptr) return figures;
   figures.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
   if (estimator.calibrated())

@@ -61,7 +61,7 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool next_event(SourceItem* item) noexcept;
   [[nodiscard]] bool next_fault(SourceItem* item) noexcept;
   void write_truth(std::vector<std::string>* faults) const;
-  [[nodiscard]] TruthFigures truth_figures(const SessionTotals& totals,
+  [[nodiscard]] TruthMetrics truth_figures(const SessionTotals& totals,
                                            const Estimator& estimator) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
 
@@ -87,7 +87,7 @@ class LiveSource final : public FrameSource {
 ///
 /// Errors   InputError, DeviceError before the session folder is made, for all that can be known by
 /// then.
-///          Afterwards sentences on stderr.
+///          Afterwards messages on stderr.
 /// → as run_session(); device_failed: a camera was gone at the end
 [[nodiscard]] ExitCode run_drive(const RunRequest& request);
 

@@ -20,7 +20,7 @@ constexpr Duration kAround =
 constexpr double kPublishedHeading =
     0.3 * std::numbers::pi /
     180;  // a mount from a calibration of three sensors, a lens whose centre is 5 px off
-constexpr double kMostOfInterval =
+constexpr double kMaxOfInterval =
     1.5;  // one reading late by half an interval is no hole, one that is missing is
 
 bool says_mount(const InsSettings& ins) {
@@ -91,7 +91,7 @@ std::size_t drop_contradicted(const ComparisonOptions& options,
   return dropped;
 }
 
-std::string mount_sentence(const Transform& T_ins_left, const std::string& source) {
+std::string mount_message(const Transform& T_ins_left, const std::string& source) {
   const Vec3 turn = boresight_of(T_ins_left.R) * (180 / std::numbers::pi);
   const Vec3& arm = T_ins_left.t;
   return fmt::format(
@@ -121,7 +121,7 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
     return out;
   }
   const Duration usual = usual_interval(out.readings);
-  const Duration rarely = Duration::seconds(kMostOfInterval * usual.to_seconds());
+  const Duration rarely = Duration::seconds(kMaxOfInterval * usual.to_seconds());
   out.options.max_gap = std::max(out.options.max_gap, rarely);
   out.options.max_wait = std::max(out.options.max_wait, rarely);
   out.mount_source = says_mount(c.ins) ? "the configuration"
@@ -137,7 +137,7 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
                     "the course over "
                     "ground for 50 m or more; heading is the course",
                     dropped));
-  out.remarks.push_back(mount_sentence(out.options.T_ins_left, out.mount_source));
+  out.remarks.push_back(mount_message(out.options.T_ins_left, out.mount_source));
   return out;
 }
 
@@ -148,36 +148,36 @@ int height_of(const StereoSequence& s) { return s.calibration.intrinsics[0].heig
 
 /// Frames that cannot be read and are listed: 140 kB of events. A data set whose images are
 /// elsewhere has a million.
-constexpr std::uint64_t kMostListed = 1000;
+constexpr std::uint64_t kMaxListed = 1000;
 
 SourceEvent event_of(const DecodedPair& pair, std::uint64_t unread) noexcept {
   SourceEvent event;
   event.skipped = true;
-  event.listed = unread <= kMostListed + 1;
+  event.listed = unread <= kMaxListed + 1;
   event.record.stamp = pair.stamp;
   event.record.kind = pair.kind;
-  event.record.set_sentence(
-      unread <= kMostListed
+  event.record.set_message(
+      unread <= kMaxListed
           ? pair.note.data()
           : "1000 frames could not be read; further ones are counted (summary.json: skipped)");
   event.record.fields[0] = {"frame", static_cast<std::int64_t>(pair.frame)};
   return event;
 }
 
-void report_earth_errors(const EarthFigures& earth, double placement_m, Progress* progress) {
-  const EarthErrors& e = earth.errors;
+void report_enu_errors(const EnuMetrics& earth, double alignment_distance_m, Progress* progress) {
+  const EnuErrors& e = earth.errors;
   if (e.poses > 0)
-    progress->say(
-        fmt::format("beside the INS after the placement: {:.2f} m at the end, {:.2f} % of {:.1f} "
-                    "m; at most {:.2f} m; heading off by "
-                    "{:.2f} deg rms, {:.2f} deg at the end",
-                    e.horizontal_end_m, e.way_m > 0 ? 100 * e.horizontal_end_m / e.way_m : 0,
-                    e.way_m, e.horizontal_most_m, e.heading_rms_deg, e.heading_end_deg));
+    progress->say(fmt::format(
+        "beside the INS after the alignment: {:.2f} m at the end, {:.2f} % of {:.1f} "
+        "m; at most {:.2f} m; heading off by "
+        "{:.2f} deg rms, {:.2f} deg at the end",
+        e.horizontal_end_m, e.ins_path_m > 0 ? 100 * e.horizontal_end_m / e.ins_path_m : 0,
+        e.ins_path_m, e.horizontal_max_m, e.heading_rms_deg, e.heading_end_deg));
   else
     progress->say(
-        fmt::format("nothing is compared after the placement: it takes {:g} m with a fix "
-                    "(comparison.placement_m)",
-                    placement_m));
+        fmt::format("nothing is compared after the alignment: it takes {:g} m with a fix "
+                    "(comparison.alignment_distance_m)",
+                    alignment_distance_m));
 }
 
 }  // namespace
@@ -201,8 +201,8 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
     facts_.ins = SourceIns{ins_.options, InsSource::recording, ins_.mount_source,
                            ins_.readings.capacity() * sizeof(RecordedReading)};
   for (const std::vector<std::string>* remarks : {&sequence_.remarks, &ins_.remarks})
-    for (const std::string& sentence : *remarks)
-      facts_.remarks.push_back({sentence, "data", !request.session.quiet});
+    for (const std::string& message : *remarks)
+      facts_.remarks.push_back({message, "data", !request.session.quiet});
   facts_.assumptions = sequence_.assumptions;
   if (!facts_.assumptions.empty())
     facts_.remarks.push_back({fmt::format("assumed: {}", fmt::join(facts_.assumptions, "; ")),
@@ -210,7 +210,7 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
   // Otherwise the length is the user's own, and where the right camera sits is to be found.
   if (!request.from_scratch && !request.known) {
     const RigCalibration& rig = facts_.begin.file.rig;
-    facts_.remarks.push_back({baseline_sentence(rig) + " (" + facts_.begin.source + ")", nullptr,
+    facts_.remarks.push_back({baseline_message(rig) + " (" + facts_.begin.source + ")", nullptr,
                               !request.session.quiet});
     if (std::string doubt = baseline_doubt(rig); !doubt.empty())
       facts_.remarks.push_back({std::move(doubt), "calibration", !request.session.quiet});
@@ -292,7 +292,8 @@ void RecordedSource::print_figures(const SessionTotals& /*totals*/, const Summar
                     (request_.session.out / "trajectory.tum").string()));
   }
   if (facts_.ins)
-    report_earth_errors(*input.earth, request_.configuration.comparison.placement_m, progress);
+    report_enu_errors(*input.earth, request_.configuration.comparison.alignment_distance_m,
+                      progress);
 }
 
 }  // namespace vergence::app

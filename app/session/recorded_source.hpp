@@ -22,7 +22,7 @@ struct ReplayedIns {
       readings{};  // around the frames that are replayed; empty: there is no INS
   ComparisonOptions options{};
   std::string mount_source{};
-  std::vector<std::string> remarks{};  // sentences
+  std::vector<std::string> remarks{};  // messages
 };
 
 /// Of the frames [request.start, …) of the sequence. A mount that the configuration says

@@ -21,36 +21,36 @@
 
 namespace vergence::app {
 
-CalibrationKeeper::CalibrationKeeper(KeepCalibration keep, WakeEvent* wake)
+CalibrationStateWriter::CalibrationStateWriter(KeepCalibration keep, WakeEvent* wake)
     : keep_(std::move(keep)), wake_(wake), thread_([this] { work(); }) {}
 
-bool CalibrationKeeper::confirmed(Stamp stamp) noexcept {
+bool CalibrationStateWriter::confirmed(Stamp stamp) noexcept {
   if (!unconfirmed_) return true;
   const Waiting begun_with{stamp, *unconfirmed_, false};
   unconfirmed_.reset();
   return post(begun_with);
 }
 
-bool CalibrationKeeper::found(Stamp stamp, const RigCalibration& rig) noexcept {
+bool CalibrationStateWriter::found(Stamp stamp, const RigCalibration& rig) noexcept {
   unconfirmed_.reset();
   return post({stamp, rig, true});
 }
 
-bool CalibrationKeeper::post(const Waiting& waiting) noexcept {
+bool CalibrationStateWriter::post(const Waiting& waiting) noexcept {
   if (!waiting_.push(waiting)) return false;
   filled_.signal();
   return true;
 }
 
-void CalibrationKeeper::stop() noexcept {
+void CalibrationStateWriter::stop() noexcept {
   if (!thread_.joinable()) return;
   stop_.store(true, std::memory_order_release);
   filled_.signal();
   thread_.join();
 }
 
-void CalibrationKeeper::work() {
-  (void)pthread_setname_np(pthread_self(), "vergence-keep");
+void CalibrationStateWriter::work() {
+  (void)pthread_setname_np(pthread_self(), "vergence-state");
   for (Waiting waiting;;) {
     const WakeEvent::Ticket seen = filled_.ticket();
     const bool stopping = stop_.load(std::memory_order_acquire);  // before the ring
@@ -63,14 +63,14 @@ void CalibrationKeeper::work() {
   }
 }
 
-void CalibrationKeeper::keep(const Waiting& waiting) {
+void CalibrationStateWriter::keep(const Waiting& waiting) {
   const Kept kept = keep_(waiting.rig, waiting.found);
-  if (kept.sentence.empty()) return;
+  if (kept.message.empty()) return;
   Outcome outcome;
   outcome.failed = kept.failed;
   outcome.event.stamp = waiting.stamp;
-  outcome.event.kind = kept.failed ? "calibration_not_kept" : "calibration_kept";
-  outcome.event.set_sentence(kept.sentence);
+  outcome.event.kind = kept.failed ? "calibration_save_failed" : "calibration_saved";
+  outcome.event.set_message(kept.message);
   (void)outcomes_.push(outcome);
   wake_->signal();
 }
@@ -100,7 +100,7 @@ struct Recorder::Files {
 
 namespace {
 
-constexpr std::string_view kConfirmed = "calibration_confirmed";  // an event's kind
+constexpr std::string_view kVerified = "calibration_verified";  // an event's kind
 constexpr std::size_t kLongestLine = 2048;  // bytes: calibrations.csv has the longest, some 800
 
 }  // namespace
@@ -108,7 +108,7 @@ constexpr std::size_t kLongestLine = 2048;  // bytes: calibrations.csv has the l
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options), files_(std::make_unique<Files>(folder, options)), newest_(options.first) {
   line_.reserve(kLongestLine);
-  if (options.keep) keeper_ = std::make_unique<CalibrationKeeper>(options.keep, &filled_);
+  if (options.keep) keeper_ = std::make_unique<CalibrationStateWriter>(options.keep, &filled_);
   memory_ = totals_.memory();
   for (LineFile* file : files_->all) {
     memory_ += file->pending();
@@ -225,7 +225,7 @@ void Recorder::write(const EventRecord& e) {
   totals_.add(e);
   format_event(e, &line_);
   files_->events.append(line_);
-  if (keeper_ != nullptr && std::string_view(e.kind) == kConfirmed)
+  if (keeper_ != nullptr && std::string_view(e.kind) == kVerified)
     report_kept(keeper_->confirmed(e.stamp));
 }
 
@@ -260,10 +260,10 @@ void Recorder::write(const FrameReport& r) {
 
 /// What became of a calibration. False: there is nothing new.
 bool Recorder::take_outcome() {
-  CalibrationKeeper::Outcome outcome;
+  CalibrationStateWriter::Outcome outcome;
   if (keeper_ == nullptr || !keeper_->next(&outcome)) return false;
   write(outcome.event);
-  if (outcome.failed) report_error("{}", outcome.event.sentence.data());
+  if (outcome.failed) report_error("{}", outcome.event.message.data());
   return true;
 }
 
@@ -277,9 +277,9 @@ void Recorder::flush() {
   for (LineFile* file : files_->all)
     if (!file->flush() && failed == nullptr) failed = file;
   if (failed != nullptr)
-    note_disk(failed, failed->fault());
+    record_disk(failed, failed->fault());
   else if (!pretended_)
-    note_disk(nullptr, 0);
+    record_disk(nullptr, 0);
 }
 
 void Recorder::pretend(Stamp stamp) {
@@ -290,19 +290,19 @@ void Recorder::pretend(Stamp stamp) {
   for (LineFile* file : files_->all) file->pretend_full(full);
   retry_due_ = {};
   if (full)
-    note_disk(&files_->poses, ENOSPC);
+    record_disk(&files_->poses, ENOSPC);
   else
     flush();
 }
 
 /// An error and an event when writing begins to fail, an event when all was written again.
 /// `failed`: a file that could not be written; null: all were.
-void Recorder::note_disk(const LineFile* failed, int fault) {
+void Recorder::record_disk(const LineFile* failed, int fault) {
   if ((failed != nullptr) == disk_full_) return;
   disk_full_ = failed != nullptr;
   EventRecord event;
   event.stamp = newest_;
-  event.kind = disk_full_ ? "disk_full" : "disk_room";
+  event.kind = disk_full_ ? "disk_full" : "disk_recovered";
   std::array<char, 256> text{};
   const auto out = text.begin();
   if (disk_full_) {
@@ -318,7 +318,7 @@ void Recorder::note_disk(const LineFile* failed, int fault) {
     (void)fmt::format_to_n(out, text.size() - 1, "the disk takes lines again; {} were lost",
                            lost_lines());
   }
-  event.set_sentence(text.data());
+  event.set_message(text.data());
   write(event);
 }
 
@@ -330,17 +330,17 @@ std::uint64_t Recorder::lost_lines() const {
 
 template <class... Arguments>
 void Recorder::report_error(const char* format, const Arguments&... arguments) noexcept {
-  ErrorSentence sentence{};
-  (void)fmt::format_to_n(sentence.begin(), sentence.size() - 1, fmt::runtime(format), arguments...);
-  (void)error_sentences_.push(sentence);
+  ErrorMessage message{};
+  (void)fmt::format_to_n(message.begin(), message.size() - 1, fmt::runtime(format), arguments...);
+  (void)error_messages_.push(message);
 }
 
 std::vector<std::string> Recorder::take_errors() {
-  std::vector<std::string> sentences;
-  for (ErrorSentence c; error_sentences_.pop(&c);) sentences.emplace_back(c.data());
-  sentences.insert(sentences.end(), errors_.begin(), errors_.end());
+  std::vector<std::string> messages;
+  for (ErrorMessage c; error_messages_.pop(&c);) messages.emplace_back(c.data());
+  messages.insert(messages.end(), errors_.begin(), errors_.end());
   errors_.clear();
-  return sentences;
+  return messages;
 }
 
 /// The trajectories, from the session's own files: nothing that grows with the drive waits in

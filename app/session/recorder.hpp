@@ -26,34 +26,34 @@ namespace vergence::app {
 /// session as well when it failed.
 struct Kept {
   bool failed = false;
-  std::string sentence{};  // empty: nothing to tell
+  std::string message{};  // empty: nothing to tell
 };
 
 /// Keeps a calibration. `found`: by the drive; else it is the one that the drive began with and has
 /// confirmed.
 using KeepCalibration = std::function<Kept(const RigCalibration& rig, bool found)>;
 
-/// Keeps calibrations for the next drive, on a thread of its own (`vergence-keep`): making YAML
+/// Keeps calibrations for the next drive, on a thread of its own (`vergence-state`): making YAML
 /// takes heap memory, and its files wait for the disk, which the recorder's thread does not.
 ///
 /// Threads  One, the recorder's; stop() after the last to be kept.
 /// Memory   Fixed for the recorder's thread; what `keep` takes is its thread's.
-/// Full     While kMostWaiting wait for the disk a further one is refused.
-class CalibrationKeeper {
+/// Full     While kMaxWaiting wait for the disk a further one is refused.
+class CalibrationStateWriter {
  public:
-  static constexpr std::size_t kMostWaiting = 4;  // they come seconds apart
+  static constexpr std::size_t kMaxWaiting = 4;  // they come seconds apart
 
   /// What became of a calibration.
   struct Outcome {
-    EventRecord event{};  // `calibration_kept` or `calibration_not_kept`
+    EventRecord event{};  // `calibration_saved` or `calibration_save_failed`
     bool failed = false;
   };
 
   /// `keep` is called on the keeper's thread; *wake is signalled when next() has something.
-  CalibrationKeeper(KeepCalibration keep, WakeEvent* wake);
-  ~CalibrationKeeper() { stop(); }
-  CalibrationKeeper(const CalibrationKeeper&) = delete;
-  CalibrationKeeper& operator=(const CalibrationKeeper&) = delete;
+  CalibrationStateWriter(KeepCalibration keep, WakeEvent* wake);
+  ~CalibrationStateWriter() { stop(); }
+  CalibrationStateWriter(const CalibrationStateWriter&) = delete;
+  CalibrationStateWriter& operator=(const CalibrationStateWriter&) = delete;
 
   /// What the drive begins with. It is kept when it is confirmed before another one is found.
   void begin_with(const RigCalibration& rig) noexcept { unconfirmed_ = rig; }
@@ -81,9 +81,8 @@ class CalibrationKeeper {
   WakeEvent* wake_;
   std::optional<RigCalibration>
       unconfirmed_{};  // the poster's; empty: kept, or not in use any more
-  Ring<Waiting, kMostWaiting> waiting_;
-  Ring<Outcome, 2 * kMostWaiting>
-      outcomes_;  // full: the recorder hangs, its events are lost anyway
+  Ring<Waiting, kMaxWaiting> waiting_;
+  Ring<Outcome, 2 * kMaxWaiting> outcomes_;  // full: the recorder hangs, its events are lost anyway
   WakeEvent filled_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
@@ -92,19 +91,20 @@ class CalibrationKeeper {
 class LineFile;
 
 /// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
-/// noise alone, `wide_` with uncertain intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 … k4 of
-/// an equidistant lens. Latency in frames since the alarm, the request or the start; held-out
+/// noise alone, `sigma_total_` with uncertain intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 …
+/// k4 of an equidistant lens. Latency in frames since the alarm, the request or the start; held-out
 /// errors are medians before and after. `kept`: what the drive measured is no better than what is
 /// in use. The last five are those of CalibrationDecision.
 inline constexpr const char* kCalibrationsHeader =
     "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_out_"
     "before_px,held_out_after_px,scale_sigma,"
-    "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,wide_"
-    "ry,wide_rz,wide_tx,wide_ty,wide_tz,"
+    "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,sigma_total_rx,"
+    "sigma_total_"
+    "ry,sigma_total_rz,sigma_total_tx,sigma_total_ty,sigma_total_tz,"
     "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,sigma_"
     "d3,"
     "left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_left_d2,sigma_left_d3,"
-    "judged_depth_m,depth_sigma_percent,depth_difference_percent,verified,lenses";
+    "reference_depth_m,depth_sigma_percent,depth_error_percent,verified,lenses";
 
 /// Writes trajectory.tum, reference.tum (gone at the end if there was no reference), poses.csv,
 /// calibrations.csv, events.jsonl and, with an INS, ins.csv of a session as it goes on, on a thread
@@ -127,8 +127,8 @@ inline constexpr const char* kCalibrationsHeader =
 ///          which poses would push out while the disk stands still; they are written in their turn.
 /// Errors   The constructor throws InputError. When the disk takes no more: an error and an event
 ///          `disk_full`; lines wait as LineFile says, and are written again every kRetry to the
-///          files that were opened at the start. An event `disk_room` when all was taken, with the
-///          number of lines lost. A file that lacks lines is a fault of the totals.
+///          files that were opened at the start. An event `disk_recovered` when all was taken, with
+///          the number of lines lost. A file that lacks lines is a fault of the totals.
 class Recorder final : public SessionObserver {
  public:
   enum class WhenFull : std::uint8_t { wait, drop };
@@ -159,7 +159,7 @@ class Recorder final : public SessionObserver {
   void on_reading(const InsRecord& reading) noexcept override;
   /// Bytes taken at the beginning: lines that may wait, attempts to calibrate.
   [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
-  /// Sentences about the disk since the last call.
+  /// Messages about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors();
   /// Writes what is waiting, closes the files. Once.
   [[nodiscard]] std::unique_ptr<SessionTotals> close();
@@ -204,10 +204,10 @@ class Recorder final : public SessionObserver {
   void report_kept(bool kept) noexcept;
   void flush();
   void pretend(Stamp stamp);
-  void note_disk(const LineFile* failed, int fault);
+  void record_disk(const LineFile* failed, int fault);
   [[nodiscard]] std::uint64_t lost_lines() const;
   void stop_and_join() noexcept;
-  using ErrorSentence = std::array<char, 512>;  // ends with 0, cut at the array's end
+  using ErrorMessage = std::array<char, 512>;  // ends with 0, cut at the array's end
   template <class... Arguments>
   void report_error(const char* format, const Arguments&... arguments) noexcept;
   void read_back();
@@ -228,9 +228,9 @@ class Recorder final : public SessionObserver {
   Turn turn_;
   WakeEvent filled_, freed_;
   std::atomic<bool> stop_{false};
-  Ring<ErrorSentence, 16> error_sentences_;    // full: the newest are lost
-  std::vector<std::string> errors_;            // of close()
-  std::unique_ptr<CalibrationKeeper> keeper_;  // null: nothing is kept
+  Ring<ErrorMessage, 16> error_messages_;           // full: the newest are lost
+  std::vector<std::string> errors_;                 // of close()
+  std::unique_ptr<CalibrationStateWriter> keeper_;  // null: nothing is kept
   std::thread thread_;
 };
 

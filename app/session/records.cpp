@@ -82,22 +82,22 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
   switch (kind) {
     case EstimatorEvent::Kind::state:
       return "state";
-    case EstimatorEvent::Kind::scene_restarted:
-      return "scene_restarted";
+    case EstimatorEvent::Kind::map_reset:
+      return "map_reset";
     case EstimatorEvent::Kind::time_gap:
       return "time_gap";
     case EstimatorEvent::Kind::relocalised:
       return "relocalised";
     case EstimatorEvent::Kind::dropped:
-      return "dropped";
+      return "points_dropped";
     case EstimatorEvent::Kind::rig_changed:
       return "rig_changed";
-    case EstimatorEvent::Kind::out_of_step:
-      return "out_of_step";
-    case EstimatorEvent::Kind::in_step:
-      return "in_step";
-    case EstimatorEvent::Kind::calibration_confirmed:
-      return "calibration_confirmed";
+    case EstimatorEvent::Kind::out_of_sync:
+      return "out_of_sync";
+    case EstimatorEvent::Kind::cameras_in_sync:
+      return "cameras_in_sync";
+    case EstimatorEvent::Kind::calibration_verified:
+      return "calibration_verified";
     case EstimatorEvent::Kind::calibration_contradicted:
       return "calibration_contradicted";
     case EstimatorEvent::Kind::focal_length_contradicted:
@@ -108,8 +108,8 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
       return "calibration_rejected";
     case EstimatorEvent::Kind::calibration_taken_up:
       return "calibration_taken_up";
-    case EstimatorEvent::Kind::calibration_waits:
-      return "calibration_waits";
+    case EstimatorEvent::Kind::calibration_pending:
+      return "calibration_pending";
     case EstimatorEvent::Kind::calibration_resumed:
       return "calibration_resumed";
   }
@@ -123,7 +123,7 @@ const char* opening(EstimatorEvent::Kind kind) noexcept {
       return "a new calibration is in use";
     case EstimatorEvent::Kind::calibration_rejected:
       return "a calibration was rejected";
-    case EstimatorEvent::Kind::calibration_waits:
+    case EstimatorEvent::Kind::calibration_pending:
       return "the calibration waits";
     case EstimatorEvent::Kind::calibration_resumed:
       return "the last calibration is in use again";
@@ -163,7 +163,7 @@ std::array<double, 4> FrameReport::error() const noexcept {
   return {error_enu.x(), error_enu.y(), error_enu.z(), -error_yaw * (180.0 / std::numbers::pi)};
 }
 
-void EventRecord::set_sentence(std::string_view text) noexcept { copy_text(text, &sentence); }
+void EventRecord::set_message(std::string_view text) noexcept { copy_text(text, &message); }
 
 EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
   EventRecord r;
@@ -175,7 +175,7 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     const auto from = to_string(event.from), to = to_string(event.to);
     (void)std::snprintf(text.data(), text.size(), "%.*s to %.*s: %s", static_cast<int>(from.size()),
                         from.data(), static_cast<int>(to.size()), to.data(), event.why);
-    r.set_sentence(text.data());
+    r.set_message(text.data());
     // The words are string literals: views of them end with 0.
     r.fields[0] = {"from", from.data()};
     r.fields[1] = {"to", to.data()};
@@ -192,7 +192,7 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     else
       (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
                           *begin != 0 && *why != 0 ? ": " : "", why);
-    r.set_sentence(text.data());
+    r.set_message(text.data());
     r.fields[0] = {"value", event.value};
   }
   return r;
@@ -213,7 +213,7 @@ CalibrationRecord CalibrationRecord::begin(const RigCalibration& rig, Stamp stam
 namespace {
 
 /// east … heading_deg, a comma before each; empty where there is nothing.
-void append_earth(std::string* line, bool valid, const EarthPose& e) {
+void append_enu(std::string* line, bool valid, const EnuPose& e) {
   if (!valid) {
     *line += ",,,,,,,";
     return;
@@ -246,8 +246,8 @@ void format_frame(const FrameReport& r, std::string* line) {
     append_transform(line, p.T_world_left, ',');
   else
     *line += ",,,,,,,";
-  append_earth(line, r.placed, r.ours);
-  append_earth(line, r.ins_valid, r.reference);
+  append_enu(line, r.placed, r.ours);
+  append_enu(line, r.ins_valid, r.reference);
   for (const double v : r.error())
     if (r.compared)
       fmt::format_to(out, ",{:.4f}", v);
@@ -290,7 +290,7 @@ void append_distortion(std::string* line, const Intrinsics& lens) {
   append_sigmas(line, sigma);
 }
 
-/// A comma, and a word or sentence as one field.
+/// A comma, and a word or message as one field.
 void append_field(std::string* line, std::string_view text) {
   *line += ',';
   for (const char c : text) *line += c == ',' || c == '\n' || c == '"' ? ';' : c;
@@ -305,7 +305,7 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   const auto out = std::back_inserter(*line);
   fmt::format_to(out, "{},{}", c.stamp.ns(),
                  c.accepted ? "accepted"
-                 : c.learnt ? "kept"
+                 : c.learnt ? "unchanged"
                             : "rejected");
   append_field(line, c.cause_word());
   append_field(line, c.why());
@@ -321,15 +321,15 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   for (const double v : {phi.x(), phi.y(), phi.z(), T.t.x(), T.t.y(), T.t.z()})
     fmt::format_to(out, ",{:.9f}", v);
   append_sigmas(line, rig.sigma_noise[k]);
-  append_sigmas(line, rig.sigma_wide[k]);
+  append_sigmas(line, rig.sigma_total[k]);
   const Intrinsics& lens = rig.intrinsics[k];
   fmt::format_to(out, ",{:.5f},{:.5f},{:.5f},{:.5f}", lens.fx, lens.fy, lens.cx, lens.cy);
   append_sigmas(line, lens.sigma);
   append_distortion(line, lens);
   append_distortion(line, rig.intrinsics[0]);
-  if (c.decided && c.judged_depth_m > 0)
-    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.judged_depth_m, c.depth_sigma_percent,
-                   c.depth_difference_percent, c.verified, c.lenses);
+  if (c.decided && c.reference_depth_m > 0)
+    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.reference_depth_m,
+                   c.depth_sigma_percent, c.depth_error_percent, c.verified, c.lenses);
   else
     *line += ",,,,,";
   *line += '\n';
@@ -379,8 +379,8 @@ void format_event(const EventRecord& event, std::string* line) {
   line->clear();
   fmt::format_to(std::back_inserter(*line), "{{\"stamp_ns\":{},\"kind\":", event.stamp.ns());
   append_text(line, event.kind);
-  *line += ",\"sentence\":";
-  append_text(line, event.sentence.data());
+  *line += ",\"message\":";
+  append_text(line, event.message.data());
   *line += ",\"fields\":{";
   bool any = false;
   for (const EventField& f : event.fields) {

@@ -84,7 +84,7 @@ struct FrameReport : ComparedPose {
   [[nodiscard]] std::array<double, 4> error() const noexcept;
 };
 
-/// A number or a constant word beside an event's sentence. `name` null: not used.
+/// A number or a constant word beside an event's message. `name` null: not used.
 struct EventField {
   const char* name = nullptr;
   std::variant<std::int64_t, double, const char*> value{std::int64_t{0}};
@@ -94,11 +94,11 @@ struct EventField {
 struct EventRecord {
   Stamp stamp{};
   const char* kind = "";
-  std::array<char, 256> sentence{};  // ends with 0
+  std::array<char, 256> message{};  // ends with 0
   std::array<EventField, 4> fields{};
 
   /// Cut at the array's end, at a whole UTF-8 character.
-  void set_sentence(std::string_view text) noexcept;
+  void set_message(std::string_view text) noexcept;
   [[nodiscard]] static EventRecord of(const EstimatorEvent& event) noexcept;
 };
 
@@ -139,7 +139,7 @@ void format_tum(Stamp stamp, const Transform& T, std::string* line);
 /// Memory  None where the capacity of *line is enough.
 void format_calibration(const CalibrationRecord& calibration, int k, std::string* line);
 
-/// A line of events.jsonl, end of line included: `stamp_ns`, `kind`, `sentence`, `fields`. Bytes
+/// A line of events.jsonl, end of line included: `stamp_ns`, `kind`, `message`, `fields`. Bytes
 /// that are no UTF-8, which file names may hold, become U+FFFD: the line stays JSON.
 ///
 /// Memory  None where the capacity of *line is enough.

@@ -56,7 +56,7 @@ StereoSequence open_drive(const ReplayRequest& request) {
     sequence =
         open_sequence(request.format, request.data, std::nullopt, use, cameras, request.topics);
   if (!request.session.quiet)
-    for (const std::string& sentence : remarks) fmt::print(stderr, "vergence: {}\n", sentence);
+    for (const std::string& message : remarks) fmt::print(stderr, "vergence: {}\n", message);
   return sequence;
 }
 
@@ -113,8 +113,8 @@ std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
                                    *request.calibration, begin.file.rig.cameras,
                                    request.data.string(), recorded));
     begin.source = std::filesystem::path(*request.calibration).filename().string();
-    for (const std::string& sentence : begin.remarks)
-      if (!request.session.quiet) fmt::print(stderr, "vergence: {}\n", sentence);
+    for (const std::string& message : begin.remarks)
+      if (!request.session.quiet) fmt::print(stderr, "vergence: {}\n", message);
   } else {
     apply_use(use, &begin.file.rig);
   }

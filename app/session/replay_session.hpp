@@ -20,7 +20,7 @@ struct ReplayRequest {
   SequenceFormat format = SequenceFormat::kitti;
   BagTopics topics{};                      // of a bag
   std::optional<std::string> calibration;  // a file of any program, instead of the data set's own
-  std::optional<KnownNumbers> known;       // instead of any calibration
+  std::optional<AssumedIntrinsics> known;  // instead of any calibration
   std::optional<double> baseline;          // m: instead of the calibration's length
   bool from_scratch = false;               // of the calibration only intrinsics and length are read
   bool calibrate_first = false;            // from the whole drive, then drive with what was found
@@ -37,7 +37,7 @@ struct ReplayRequest {
 /// and the figures against the data set's truth (run_session()).
 ///
 /// Errors   InputError before the session folder is made, for all that can be known by then.
-///          Afterwards sentences on stderr.
+///          Afterwards messages on stderr.
 /// → as run_session()
 [[nodiscard]] ExitCode run_replay(const ReplayRequest& request);
 

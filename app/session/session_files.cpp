@@ -99,15 +99,15 @@ KeepCalibration calibration_keeper(const std::filesystem::path& session,
     if (state) kept = keep_state(*state, file);
     // The session's own is written again at its end.
     for (const std::string& fault : of_session)
-      kept.sentence += (kept.sentence.empty() ? "" : "; ") + fault;
+      kept.message += (kept.message.empty() ? "" : "; ") + fault;
     return kept;
   };
 }
 
 namespace {
 
-/// Takes out the sentences of one file, which begin with its name.
-void forget_faults_of(const std::filesystem::path& file, std::vector<std::string>* faults) {
+/// Takes out the messages of one file, which begin with its name.
+void clear_faults_of(const std::filesystem::path& file, std::vector<std::string>* faults) {
   const std::string name = file.string() + ":";
   std::erase_if(*faults, [&name](const std::string& fault) { return fault.starts_with(name); });
 }
@@ -134,7 +134,7 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
   input->options = options.calibration;
 }
 
-std::string verification_sentence(const SummaryInput& input) {
+std::string verification_message(const SummaryInput& input) {
   if (input.verified || !input.calibrated) return "";
   if (!input.online)
     return "the calibration is not verified: nothing watched it (calibration.online: off)";
@@ -149,7 +149,7 @@ void end_session(const std::filesystem::path& session, const StartingCalibration
   CalibrationFile file = begin.file;
   file.rig = input.calibration;
   if (totals.accepted > 0) file.source = "online";
-  forget_faults_of(session / "calibration.yaml", faults);
+  clear_faults_of(session / "calibration.yaml", faults);
   write_session_calibration(session, file, faults);
 }
 
@@ -176,7 +176,7 @@ SessionReport write_session_report(const std::filesystem::path& session) {
   return report;
 }
 
-void say_verdict(const SessionReport& report, bool quiet, Progress* progress) {
+void print_verdict(const SessionReport& report, bool quiet, Progress* progress) {
   if (!quiet) {
     for (const std::string& line : closing_lines(report.outcome, report.failure))
       progress->say(line);

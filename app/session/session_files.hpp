@@ -35,7 +35,7 @@ void discard_session_folder(const std::filesystem::path& folder, bool made) noex
 /// One worker beside the estimator with two threads or more.
 [[nodiscard]] std::unique_ptr<PairRunner> make_runner(int threads);
 
-/// calibration.yaml of the session; what goes wrong becomes a sentence of *faults.
+/// calibration.yaml of the session; what goes wrong becomes a message of *faults.
 void write_session_calibration(const std::filesystem::path& session,
                                const CalibrationFile& calibration,
                                std::vector<std::string>* faults);
@@ -61,15 +61,15 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
 
 /// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is
 /// none.
-[[nodiscard]] std::string verification_sentence(const SummaryInput& input);
+[[nodiscard]] std::string verification_message(const SummaryInput& input);
 
-/// calibration.yaml as it is in use at the end, if there is one. A sentence of *faults that
+/// calibration.yaml as it is in use at the end, if there is one. A message of *faults that
 /// calibration.yaml could not be written at the start gives way to what becomes of it now.
 void end_session(const std::filesystem::path& session, const StartingCalibration& begin,
                  const SummaryInput& input, const SessionTotals& totals,
                  std::vector<std::string>* faults);
 
-/// summary.json of the session; what goes wrong becomes a sentence of *faults.
+/// summary.json of the session; what goes wrong becomes a message of *faults.
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
                            const SummaryInput& input, std::vector<std::string>* faults);
 
@@ -81,6 +81,6 @@ struct SessionReport {
 [[nodiscard]] SessionReport write_session_report(const std::filesystem::path& session);
 
 /// The last words of a session: closing_lines(); quiet, only what must not be missed.
-void say_verdict(const SessionReport& report, bool quiet, Progress* progress);
+void print_verdict(const SessionReport& report, bool quiet, Progress* progress);
 
 }  // namespace vergence::app

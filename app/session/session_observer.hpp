@@ -10,7 +10,7 @@
 #include "app/session/ins_file.hpp"
 #include "app/session/records.hpp"
 #include "core/calibration/track_log.hpp"
-#include "core/comparison/placement.hpp"
+#include "core/comparison/enu_alignment.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/pose_sample.hpp"
 #include "core/types/rig_frame.hpp"
@@ -77,7 +77,8 @@ class SessionObserver {
   virtual void on_tracks(const calibration::TrackLog& /*tracks*/) noexcept {}
   /// The odometry's world was placed on the earth; `origin` is that of enu. Acts from the next
   /// pose on.
-  virtual void on_placement(const Placement& /*placement*/, const Geodetic& /*origin*/) noexcept {}
+  virtual void on_enu_alignment(const EnuAlignment& /*alignment*/,
+                                const Geodetic& /*origin*/) noexcept {}
   /// All there is to say of a frame: the pose placed on the earth, the INS beside it. Without an
   /// INS at once; with one after the readings around the frame have come.
   virtual void on_report(const FrameReport& /*report*/) noexcept {}
@@ -106,8 +107,8 @@ class SessionOutput {
   void post(const calibration::TrackLog& tracks) noexcept {
     tell(&SessionObserver::on_tracks, tracks);
   }
-  void post(const Placement& placement, const Geodetic& origin) noexcept {
-    tell(&SessionObserver::on_placement, placement, origin);
+  void post(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
+    tell(&SessionObserver::on_enu_alignment, alignment, origin);
   }
   void post(const FrameReport& report) noexcept { tell(&SessionObserver::on_report, report); }
   void post(const EventRecord& event) noexcept { tell(&SessionObserver::on_event, event); }

@@ -51,24 +51,24 @@ std::vector<EndedSession> sessions_beside(const fs::path& session) {
 
 }  // namespace
 
-std::vector<std::string> keep_session_quota(const fs::path& session, std::uint64_t most_bytes) {
+std::vector<std::string> keep_session_quota(const fs::path& session, std::uint64_t max_bytes) {
   const std::vector<EndedSession> sessions = sessions_beside(session);
   std::uint64_t bytes = 0;
   for (const EndedSession& s : sessions) bytes += s.bytes;
-  std::vector<std::string> sentences;
+  std::vector<std::string> messages;
   for (const EndedSession& s : sessions) {
-    if (bytes <= most_bytes) break;
+    if (bytes <= max_bytes) break;
     bytes -= s.bytes;
     std::error_code error;
     fs::remove_all(s.folder, error);
-    sentences.push_back(
+    messages.push_back(
         error ? fmt::format("{}: is over sessions.quota_mb and cannot be removed ({}); check its "
                             "permissions",
                             s.folder.string(), error.message())
               : fmt::format("{}: removed ({} MB), the oldest session over sessions.quota_mb",
                             s.folder.string(), (s.bytes + 999'999) / 1'000'000));
   }
-  return sentences;
+  return messages;
 }
 
 }  // namespace vergence::app

@@ -40,14 +40,14 @@ class SessionRunner {
   void open_files(std::vector<std::string>* faults);
   [[nodiscard]] bool trajectory_is_asked_for() const;
   [[nodiscard]] SessionStart session_start() const;
-  void say_remarks(Progress* progress);
+  void print_remarks(Progress* progress);
   void estimate() noexcept;
   void watch(Progress* progress);
   void start_source(std::vector<std::string>* faults);
   [[nodiscard]] std::thread start_estimating();
   void leave_no_folder();
   void halt_source() noexcept;
-  void say_recording_errors(Progress* progress);
+  void print_recording_errors(Progress* progress);
   [[nodiscard]] SummaryInput summary_input(const SessionTotals& totals,
                                            std::uint64_t allocations) const;
   void write_files(const SessionTotals& totals, const SummaryInput& input,
@@ -73,7 +73,7 @@ class SessionRunner {
   std::condition_variable changed_;
   bool done_ = false;
   bool folder_made_ = false;          // it was not there before
-  std::vector<std::string> removed_;  // sessions over the quota: a sentence each
+  std::vector<std::string> removed_;  // sessions over the quota: a message each
   bool halted_ = false;               // the caller's thread alone
   DriveThreads threads_;              // of the caller's thread
 };
@@ -108,7 +108,7 @@ void SessionRunner::watch(Progress* progress) {
     if (loop_.drained()) halt_source();
     threads_.look(progress);
     loop_.event_log().show(progress, facts_.frames);
-    say_recording_errors(progress);
+    print_recording_errors(progress);
     lock.lock();
   }
   lock.unlock();
@@ -158,12 +158,11 @@ void SessionRunner::leave_no_folder() {
   discard_session_folder(request_.out, folder_made_);
 }
 
-void SessionRunner::say_recording_errors(Progress* progress) {
-  for (const std::string& sentence : recorder_->take_errors())
-    progress->say("vergence: " + sentence);
+void SessionRunner::print_recording_errors(Progress* progress) {
+  for (const std::string& message : recorder_->take_errors()) progress->say("vergence: " + message);
   if (!recording_) return;
-  for (const std::string& sentence : recording_->take_errors())
-    progress->say("vergence: " + sentence);
+  for (const std::string& message : recording_->take_errors())
+    progress->say("vergence: " + message);
 }
 
 void SessionRunner::open(std::vector<std::string>* faults) {
@@ -225,15 +224,15 @@ SessionStart SessionRunner::session_start() const {
   return start;
 }
 
-void SessionRunner::say_remarks(Progress* progress) {
-  for (const std::string& sentence : removed_) {
-    progress->say("vergence: " + sentence);
-    loop_.event_log().log(facts_.first, "session_removed", sentence, false);
+void SessionRunner::print_remarks(Progress* progress) {
+  for (const std::string& message : removed_) {
+    progress->say("vergence: " + message);
+    loop_.event_log().log(facts_.first, "session_removed", message, false);
   }
   for (const SourceRemark& remark : facts_.remarks) {
-    if (remark.say) progress->say("vergence: " + remark.sentence);
+    if (remark.say) progress->say("vergence: " + remark.message);
     if (remark.kind != nullptr)
-      loop_.event_log().log(facts_.first, remark.kind, remark.sentence, false);
+      loop_.event_log().log(facts_.first, remark.kind, remark.message, false);
   }
 }
 
@@ -259,7 +258,7 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
     input.earth = comparison->earth(facts_.ins->mount_source);
   }
   describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(), &input);
-  input.allocations_after_seal = allocations;
+  input.runtime_allocations = allocations;
   input.frame_budget = loop_.options().frame_budget;
   input.allocations = threads_.figures();
   for (const MemoryRow& row : memory()) input.memory.emplace_back(row.name, row.bytes);
@@ -276,9 +275,8 @@ void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput&
   end_session(request_.out, facts_.begin, input, totals, faults);
   write_session_summary(request_.out, totals, input, faults);
   faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
-  for (const std::string& sentence : recorder_->take_errors())
-    progress->say("vergence: " + sentence);
-  for (const std::string& sentence : *faults) progress->say("vergence: " + sentence);
+  for (const std::string& message : recorder_->take_errors()) progress->say("vergence: " + message);
+  for (const std::string& message : *faults) progress->say("vergence: " + message);
 }
 
 void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInput& input,
@@ -289,10 +287,10 @@ void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInpu
       request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded, totals.lost,
       input.skipped, facts_.word_of_skipped, totals.path_m, totals.estimate.mean(),
       totals.estimate.percentile(0.99)));
-  if (const std::string sentence = verification_sentence(input); !sentence.empty())
-    progress->say(sentence);
-  if (const std::string sentence = allocations_sentence(input.allocations); !sentence.empty())
-    progress->say(sentence);
+  if (const std::string message = verification_message(input); !message.empty())
+    progress->say(message);
+  if (const std::string message = allocations_message(input.allocations); !message.empty())
+    progress->say(message);
   source_.print_figures(totals, input, progress);
 }
 
@@ -320,8 +318,8 @@ ExitCode SessionRunner::run() {
   open(&faults);
   if (request_.print_memory) print_memory_table(memory());
   Progress progress = Progress::on_stderr(request_.quiet);
-  const auto allocations_before = AllocationGuard::allocations_after_seal();
-  say_remarks(&progress);
+  const auto allocations_before = AllocationGuard::runtime_allocations();
+  print_remarks(&progress);
   (void)::malloc_trim(0);  // what setting up took and gave back goes to the system
   threads_.lock_memory(&progress);
   start_source(&faults);
@@ -333,10 +331,10 @@ ExitCode SessionRunner::run() {
   source_.finish(&progress, &faults);
 
   if (recording_) recording_->close(&faults);
-  say_recording_errors(&progress);
+  print_recording_errors(&progress);
   const auto totals = recorder_->close();
   const SummaryInput input =
-      summary_input(*totals, AllocationGuard::allocations_after_seal() - allocations_before);
+      summary_input(*totals, AllocationGuard::runtime_allocations() - allocations_before);
   write_files(*totals, input, &faults, &progress);
   if (!request_.quiet) print_figures(*totals, input, &progress);
   // The report reads the files: of a day's drive two are not held at once.
@@ -345,7 +343,7 @@ ExitCode SessionRunner::run() {
   const SessionReport report = write_session_report(request_.out);
   ExitCode code = verdict(*totals, faults, &progress);
   if (code == ExitCode::done && !report.outcome.usable) code = ExitCode::not_usable;
-  say_verdict(report, request_.quiet, &progress);
+  print_verdict(report, request_.quiet, &progress);
   return signals_.stop_code().value_or(code);
 }
 

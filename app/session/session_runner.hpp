@@ -32,7 +32,7 @@ struct SessionOptions {
 ///          worker, the calibration solver (sealed, too), the recorder; the caller's thread draws
 ///          the progress line and watches for signals.
 /// Errors   InputError before the session folder is made, for all that can be known by then, and
-///          where the source does not start. Afterwards sentences on stderr. A disk that is full,
+///          where the source does not start. Afterwards messages on stderr. A disk that is full,
 ///          read-only or silent holds up no live drive: the folder is made when it takes one.
 /// → done, not_usable (never a pose, an INS that never had a position), device_failed (the source's
 ///   verdict), not_written (a file is missing or not whole), interrupted, terminated
@@ -40,7 +40,7 @@ struct SessionOptions {
                                    const SessionOptions& options, const SignalGuard& signals);
 
 /// What `make` returns; options and rig that do not go together, which core refuses by
-/// std::invalid_argument and std::length_error, as an InputError with the same sentence.
+/// std::invalid_argument and std::length_error, as an InputError with the same message.
 template <class Make>
 auto in_words(const Make& make) {
   try {

@@ -46,8 +46,8 @@ SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSessi
   if (d.ins && !session.readings().empty())
     facts.ins = SourceIns{comparison_options(request.configuration), InsSource::recording,
                           d.mount_source, session.readings().capacity() * sizeof(RecordedReading)};
-  for (const std::string& sentence : session.remarks())
-    facts.remarks.push_back({sentence, "data", !request.session.quiet});
+  for (const std::string& message : session.remarks())
+    facts.remarks.push_back({message, "data", !request.session.quiet});
   if (as_then && !session.complete())
     facts.remarks.push_back({"the recording is not whole: the poses are not those of the drive",
                              "data", !request.session.quiet});
@@ -70,7 +70,7 @@ SourceEvent recalibration_as_then(Stamp stamp) noexcept {
   SourceEvent event;
   event.record.stamp = stamp;
   event.record.kind = "recalibration_requested";
-  event.record.set_sentence("a new calibration was asked for, as in the drive");
+  event.record.set_message("a new calibration was asked for, as in the drive");
   event.recalibrate = true;
   return event;
 }
@@ -170,7 +170,7 @@ void SessionSource::finish(Progress* progress, std::vector<std::string>* /*fault
         "vergence: {} images of the drive are damaged or not in the recording; frames went without "
         "them",
         images_missing_));
-  session_.forget_frames();  // the report is not to be written on top of them
+  session_.clear_frames();  // the report is not to be written on top of them
 }
 
 void SessionSource::describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,

@@ -4,17 +4,17 @@
 
 namespace vergence::app {
 
-void WorkDropped::add(const FrameEffort& effort) noexcept {
+void BudgetStatistics::add(const FrameWorkload& effort) noexcept {
   if (effort.whole()) return;
   ++frames;
   const bool window = effort.window_keyframes > 0 && effort.window_steps > 0;
   points += effort.points_percent < 100 ? 1 : 0;
-  keyframes += window && effort.window_keyframes != FrameEffort::kAll ? 1 : 0;
-  steps += window && effort.window_steps != FrameEffort::kAll ? 1 : 0;
+  keyframes += window && effort.window_keyframes != FrameWorkload::kAll ? 1 : 0;
+  steps += window && effort.window_steps != FrameWorkload::kAll ? 1 : 0;
   windows += window ? 0 : 1;
 }
 
-TotalsBuilder::TotalsBuilder() { totals_.attempts.reserve(kMostAttempts); }
+TotalsBuilder::TotalsBuilder() { totals_.attempts.reserve(kMaxAttempts); }
 
 std::size_t TotalsBuilder::memory() const noexcept {
   return totals_.attempts.capacity() * sizeof(CalibrationAttempt);
@@ -47,13 +47,13 @@ void TotalsBuilder::add(const FrameReport& report) {
 
 /// An event comes before the pose of its frame, or after the last one.
 void TotalsBuilder::match_confirmed() {
-  if (totals_.confirmed == newest_ && !totals_.confirmed_frame && totals_.read > 0)
-    totals_.confirmed_frame = newest_frame_;
+  if (totals_.confirmed == newest_ && !totals_.verified_frame && totals_.read > 0)
+    totals_.verified_frame = newest_frame_;
 }
 
 void TotalsBuilder::add(const EventRecord& e) {
   const std::string_view kind = e.kind;
-  if (kind == "calibration_confirmed" && !totals_.confirmed) {
+  if (kind == "calibration_verified" && !totals_.confirmed) {
     totals_.confirmed = e.stamp;
     match_confirmed();
   } else if (kind == "calibration_contradicted" && !totals_.contradicted) {
@@ -66,7 +66,7 @@ bool TotalsBuilder::add(const CalibrationRecord& c) {
   if (c.focal.measured_px > 0) totals_.focal = c.focal;
   if (c.learnt && !c.accepted) return false;  // the drive goes on: nothing was attempted
   ++(c.accepted ? totals_.accepted : totals_.rejected);
-  if (totals_.attempts.size() == kMostAttempts) totals_.attempts.erase(totals_.attempts.begin());
+  if (totals_.attempts.size() == kMaxAttempts) totals_.attempts.erase(totals_.attempts.begin());
   const CalibrationAttempt attempt{c.stamp,          c.cause_word(),       c.reason,  c.accepted,
                                    c.latency_frames, c.calibration.frames, c.solve_ms};
   totals_.attempts.push_back(attempt);

@@ -23,7 +23,7 @@ class TimeHistogram {
     ++count_;
     sum_ += ms;
     max_ = std::max(max_, ms);
-    const double place = std::log(std::max(ms, kLeast) / kLeast) / kLogStep;
+    const double place = std::log(std::max(ms, kMin) / kMin) / kLogStep;
     ++bins_[std::min(static_cast<std::size_t>(place), kBins - 1)];
   }
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
@@ -42,14 +42,14 @@ class TimeHistogram {
     for (std::size_t i = 0; i < kBins; ++i) {
       seen += bins_[i];
       if (seen >= requested)
-        return std::min(max_, kLeast * std::exp((static_cast<double>(i) + 0.5) * kLogStep));
+        return std::min(max_, kMin * std::exp((static_cast<double>(i) + 0.5) * kLogStep));
     }
     return max_;
   }
 
  private:
   static constexpr std::size_t kBins = 4000;
-  static constexpr double kLeast = 1e-3;                    // ms
+  static constexpr double kMin = 1e-3;                      // ms
   static constexpr double kLogStep = 0.004987541511038968;  // ln(1.005)
   std::array<std::uint32_t, kBins> bins_{};
   std::uint64_t count_ = 0;
@@ -78,10 +78,10 @@ struct Contradiction {
 };
 
 /// Frames whose time was over before their work was done (docs/realtime.md), and what was left out.
-struct WorkDropped {
+struct BudgetStatistics {
   std::uint64_t frames = 0, points = 0, keyframes = 0, steps = 0, windows = 0;
 
-  void add(const FrameEffort& effort) noexcept;
+  void add(const FrameWorkload& effort) noexcept;
 };
 
 /// What a session has come to: for summary.json.
@@ -90,11 +90,11 @@ struct SessionTotals {
   TimeHistogram estimate, decode;                          // ms
   TimeHistogram calibrating;  // ms, of the frames in other states than stereo_odometry and lost
   std::array<TimeHistogram, kStages> stages;
-  std::vector<CalibrationAttempt> attempts;  // the newest kMostAttempts
+  std::vector<CalibrationAttempt> attempts;  // the newest kMaxAttempts
   std::uint64_t accepted = 0, rejected = 0;  // of all of them
   FromScratch from_scratch{};
   std::optional<Stamp> confirmed{};  // when the drive first confirmed the calibration in use
-  std::optional<std::uint64_t> confirmed_frame{};  // the frame of that stamp
+  std::optional<std::uint64_t> verified_frame{};  // the frame of that stamp
   std::optional<Contradiction>
       contradicted{};                   // the first time that it showed another one than was in use
   FocalMeasurement focal{};             // the newest
@@ -104,15 +104,15 @@ struct SessionTotals {
   std::uint64_t dropped_records = 0;    // the ring was full (live only)
   std::uint64_t dropped_readings = 0;   // theirs was
   std::uint64_t lost_lines = 0;         // the disk took no more
-  WorkDropped work_dropped{};
+  BudgetStatistics work_dropped{};
   std::size_t ring_high_water = 0;
-  std::vector<std::string> faults;  // a sentence for each file that is not whole
+  std::vector<std::string> faults;  // a message for each file that is not whole
 };
 
-inline constexpr std::size_t kMostAttempts = 1000;  // in summary.json; calibrations.csv has all
+inline constexpr std::size_t kMaxAttempts = 1000;  // in summary.json; calibrations.csv has all
 
 /// Adds up what the records of a session come to. One thread; takes no memory but at construction:
-/// room for kMostAttempts.
+/// room for kMaxAttempts.
 class TotalsBuilder {
  public:
   TotalsBuilder();

@@ -44,7 +44,7 @@ GivenCalibration given_calibration(const std::string& in, const CalibrationUse& 
           }};
 }
 
-GivenCalibration given_calibration(const KnownNumbers& known) {
+GivenCalibration given_calibration(const AssumedIntrinsics& known) {
   return {"--focal", [known](const StereoSequence& sequence) {
             const ImageSize size = first_image_size(sequence, 0);
             CalibrationFile file;
@@ -181,7 +181,7 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
     start.source = source.file->filename().string();
   } else if (!source.from_scratch && start.state) {
     CalibrationState state = read_state(*start.state, configured);
-    if (!state.sentence.empty()) start.remarks.push_back(std::move(state.sentence));
+    if (!state.message.empty()) start.remarks.push_back(std::move(state.message));
     if (state.calibration) {
       start.file = std::move(*state.calibration);
       name_cameras(c, serials, &start.file);

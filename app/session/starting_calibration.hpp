@@ -16,7 +16,7 @@ namespace vergence::app {
 
 /// What is known of a rig without a calibration: both cameras alike, principal points in the middle
 /// of the images.
-struct KnownNumbers {
+struct AssumedIntrinsics {
   double focal = 0;     // px
   double baseline = 0;  // m
   CameraModelKind model = CameraModelKind::pinhole_radtan;
@@ -26,7 +26,7 @@ struct KnownNumbers {
 /// calibration.yaml, a Kalibr camchain, ROS camera_info (left.yaml,right.yaml or a folder with
 /// them) or OpenCV stereo YAML, told by
 /// content, with what is wanted of it applied. `size`: of the images, where a file has none. What a
-/// format did not carry over is a sentence of *remarks.
+/// format did not carry over is a message of *remarks.
 /// Errors     InputError
 [[nodiscard]] CalibrationFile read_given_calibration(const std::string& in,
                                                      const CalibrationUse& use,
@@ -36,7 +36,7 @@ struct KnownNumbers {
 /// For open_sequence().
 [[nodiscard]] GivenCalibration given_calibration(const std::string& in, const CalibrationUse& use,
                                                  std::vector<std::string>* remarks);
-[[nodiscard]] GivenCalibration given_calibration(const KnownNumbers& known);
+[[nodiscard]] GivenCalibration given_calibration(const AssumedIntrinsics& known);
 
 /// What the command line says about it.
 struct CalibrationSource {
@@ -53,7 +53,7 @@ struct StartingCalibration {
   CalibrationTrust trust = CalibrationTrust::given;
   const char* cause = "given";                   // of calibrations.csv
   std::string source{};                          // a few words: what it is from
-  std::vector<std::string> remarks{};            // sentences for the user
+  std::vector<std::string> remarks{};            // messages for the user
   std::optional<std::filesystem::path> state{};  // where an accepted one is kept; nothing: nowhere
 };
 

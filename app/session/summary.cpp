@@ -78,7 +78,7 @@ bool given(const std::array<double, 6>& sigmas) {
 /// Whether every further camera comes with what its uncertainty is; else nothing can be predicted.
 bool has_sigmas(const RigCalibration& rig) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
-    if (!given(rig.sigma_wide[k]) && !(rig.covariance_wide[k].diagonal().maxCoeff() > 0))
+    if (!given(rig.sigma_total[k]) && !(rig.covariance_total[k].diagonal().maxCoeff() > 0))
       return false;
   return rig.cameras > 1;
 }
@@ -94,7 +94,7 @@ Json health_json(const RigCalibration& rig, const calibration::CalibrationOption
         percent > 0 ? Json(percent) : Json();  // 0: so near that no point is seen by both
   }
   return {
-      {"word", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()},
+      {"rating", known ? Json(std::string(to_string(calibration::health(rig, options)))) : Json()},
       {"depth_error_percent", depth}};
 }
 
@@ -105,8 +105,8 @@ Json limited_by(const RigCalibration& rig) {
   if (!has_sigmas(rig) || !given(rig.sigma_noise[1])) return nullptr;
   constexpr double kDepth = 20;  // m: where the word is found
   RigCalibration noise = rig;
-  noise.sigma_wide = rig.sigma_noise;  // without their correlations: no less than it is
-  for (Mat6& covariance : noise.covariance_wide) covariance.setZero();
+  noise.sigma_total = rig.sigma_noise;  // without their correlations: no less than it is
+  for (Mat6& covariance : noise.covariance_total) covariance.setZero();
   noise.covariance = {};
   const double wide = calibration::depth_error_percent(rig, 1, kDepth),
                by_noise = calibration::depth_error_percent(noise, 1, kDepth);
@@ -143,7 +143,7 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
                {"baseline_m", rig.T_camera_left[1].t.norm()},
                {"T_right_left", input.calibrated ? matrix_json(rig.T_camera_left[1]) : Json()},
                {"sigma_noise", sigmas_json(rig.sigma_noise[1])},
-               {"sigma_wide", sigmas_json(rig.sigma_wide[1])},
+               {"sigma_total", sigmas_json(rig.sigma_total[1])},
                {"scale_sigma", rig.scale_sigma > 0 ? Json(rig.scale_sigma) : Json()},
                {"frames", rig.frames}};
   const Json health = health_json(rig, input.options);
@@ -151,19 +151,19 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
   json["limited_by"] = limited_by(rig);
   json["online"] = input.online;
   json["verified"] = input.verified;
-  json["verified_frame"] = totals.confirmed_frame ? Json(*totals.confirmed_frame) : Json();
+  json["verified_frame"] = totals.verified_frame ? Json(*totals.verified_frame) : Json();
   json["verified_stamp_ns"] = totals.confirmed ? Json(totals.confirmed->ns()) : Json();
   json["contradicted"] = totals.contradicted
                              ? Json{{"stamp_ns", totals.contradicted->stamp.ns()},
                                     {"depth_percent", totals.contradicted->depth_percent}}
                              : Json();
   json["focal_length"] = totals.focal.measured_px > 0
-                             ? Json{{"given_px", totals.focal.given_px},
+                             ? Json{{"configured_px", totals.focal.configured_px},
                                     {"measured_px", totals.focal.measured_px},
                                     {"sigma_px", totals.focal.sigma_px},
                                     {"contradicted", totals.focal.contradicted}}
                              : Json();
-  json["before"] = input.before ? health_json(*input.before, input.options) : Json();
+  json["initial"] = input.before ? health_json(*input.before, input.options) : Json();
   json["from_scratch"] = from_scratch_json(totals);
   json["accepted"] = totals.accepted;
   json["rejected"] = totals.rejected;
@@ -180,7 +180,7 @@ Json recalibrations_json(const SessionTotals& totals) {
                     {"stamp_ns", a.stamp.ns()},
                     {"latency_frames", a.latency_frames},
                     {"accepted", a.accepted},
-                    {"why", a.accepted ? Json() : Json(a.reason)},
+                    {"rejection_reason", a.accepted ? Json() : Json(a.reason)},
                     {"frames", a.frames},
                     {"solve_ms", ms(a.solve_ms)}});
   }
@@ -204,7 +204,7 @@ Json in_sigmas(const std::array<double, 6>& error, const std::array<double, 6>& 
   return json;
 }
 
-Json truth_json(const std::optional<TruthFigures>& truth, const SummaryInput& input) {
+Json truth_json(const std::optional<TruthMetrics>& truth, const SummaryInput& input) {
   if (!truth) return nullptr;
   const RigCalibration& rig = input.calibration;
   Json json = metrics_json(truth->evaluation);
@@ -215,7 +215,7 @@ Json truth_json(const std::optional<TruthFigures>& truth, const SummaryInput& in
     return json;
   }
   json["calibration_error"] = truth->calibration_error[0];
-  json["calibration_error_sigmas"] = in_sigmas(truth->calibration_error[0], rig.sigma_wide[1]);
+  json["calibration_error_sigmas"] = in_sigmas(truth->calibration_error[0], rig.sigma_total[1]);
   Json cameras = Json::array();
   for (std::size_t k = 1; k <= truth->calibration_error.size(); ++k) {
     const auto& e = truth->calibration_error[k - 1];
@@ -223,7 +223,7 @@ Json truth_json(const std::optional<TruthFigures>& truth, const SummaryInput& in
                        {"rotation_rad", {e[0], e[1], e[2]}},
                        {"translation_m", {e[3], e[4], e[5]}},
                        {"sigmas_noise", in_sigmas(e, rig.sigma_noise[k])},
-                       {"sigmas_wide", in_sigmas(e, rig.sigma_wide[k])}});
+                       {"sigmas_total", in_sigmas(e, rig.sigma_total[k])}});
   }
   json["calibration"] = cameras;
   return json;
@@ -261,18 +261,18 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   json["metrics"] = metrics_json(input.evaluation);
   json["calibration"] = calibration_json(totals, input);
   json["recalibrations"] = recalibrations_json(totals);
-  json["allocations_after_seal"] = input.allocations_after_seal;
+  json["runtime_allocations"] = input.runtime_allocations;
   Json memory = Json::object();
   std::size_t sum = 0;
   for (const auto& [what, bytes] : input.memory) {
     memory[what] = bytes;
     sum += bytes;
   }
-  memory["sum_bytes"] = sum;
+  memory["total_bytes"] = sum;
   memory["allocations_by_thread"] = counters_json(input.allocations.ours);
   memory["allocations_by_library_thread"] = counters_json(input.allocations.libraries);
   json["memory"] = memory;
-  const WorkDropped& work = totals.work_dropped;
+  const BudgetStatistics& work = totals.work_dropped;
   json["work_dropped"] = {{"budget_ms", ms(input.frame_budget.to_seconds() * 1e3)},
                           {"frames", work.frames},
                           {"points", work.points},
@@ -285,7 +285,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
       {"lines", totals.lost_lines},        {"recorder_high_water", totals.ring_high_water}};
   json["devices"] = counters_json(input.devices);
   json["comparison"] = counters_json(input.comparison);
-  json["earth"] = input.earth ? earth_json(*input.earth) : Json();
+  json["enu"] = input.earth ? enu_json(*input.earth) : Json();
   json["time"] = input.time;
   json["truth"] = truth_json(input.truth, input);
   json["version"] = std::string(version());

@@ -18,7 +18,7 @@
 namespace vergence::app {
 
 /// What a mock drive knows beside: our trajectory and calibration against the truth.
-struct TruthFigures {
+struct TruthMetrics {
   std::optional<TrajectoryEvaluation> evaluation;
   /// Of camera 1 and so on, of the calibration in use at the end: rotation vector, rad;
   /// translation, m; ours against the true one.
@@ -27,7 +27,7 @@ struct TruthFigures {
 
 /// Heap allocations by the name of the thread that made them, from the first frame that is
 /// delivered until the last (docs/realtime.md).
-struct ThreadAllocationFigures {
+struct ThreadAllocationCounts {
   std::vector<std::pair<std::string, std::uint64_t>> ours{};       // 0 where a thread made none
   std::vector<std::pair<std::string, std::uint64_t>> libraries{};  // of threads that libraries have
 };
@@ -45,17 +45,17 @@ struct SummaryInput {
   bool verified = false;  // the drive itself has confirmed the calibration in use at the end
   std::optional<RigCalibration> before{};     // the drive began with it; none: from scratch
   calibration::CalibrationOptions options{};  // what its words mean
-  std::uint64_t allocations_after_seal = 0;
+  std::uint64_t runtime_allocations = 0;
   Duration frame_budget{};  // zero: none
-  ThreadAllocationFigures allocations{};
+  ThreadAllocationCounts allocations{};
   std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them
   std::string configuration_hash;
   std::vector<std::pair<std::string, std::uint64_t>>
       devices{};  // counters of the devices and of the pairing; none in a replay
   std::vector<std::pair<std::string, std::uint64_t>>
-      comparison{};                     // counters of the comparison with an INS
-  std::optional<EarthFigures> earth{};  // with an INS
-  std::optional<TruthFigures> truth{};
+      comparison{};                   // counters of the comparison with an INS
+  std::optional<EnuMetrics> earth{};  // with an INS
+  std::optional<TruthMetrics> truth{};
   std::vector<std::string> assumptions{};  // about the recording that was read
   nlohmann::ordered_json time{};           // how time was over a live drive; null in a replay
 };

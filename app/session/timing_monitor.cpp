@@ -18,9 +18,9 @@ constexpr double kMicroseconds = 1e6;
 double us(Duration d) { return d.to_seconds() * kMicroseconds; }
 
 template <class... Arguments>
-TimingMonitor::Sentence sentence(const char* kind, bool to_user, const char* format,
-                                 Arguments... arguments) noexcept {
-  TimingMonitor::Sentence s;
+TimingMonitor::Message message(const char* kind, bool to_user, const char* format,
+                               Arguments... arguments) noexcept {
+  TimingMonitor::Message s;
   s.kind = kind;
   s.to_user = to_user;
   (void)std::snprintf(s.text.data(), s.text.size(), format, arguments...);
@@ -66,46 +66,46 @@ Json latency_json(const TimeHistogram& latency, bool is_virtual) {
 
 }  // namespace
 
-TimingMonitor::Sentence TimingMonitor::of_device(const DeviceEvent& event) const noexcept {
+TimingMonitor::Message TimingMonitor::of_device(const DeviceEvent& event) const noexcept {
   using Kind = DeviceEvent::Kind;
   switch (event.kind) {
-    case Kind::camera_gone:
-      return sentence("camera_gone", true, "camera %d is gone; the drive goes on without it",
-                      event.camera);
-    case Kind::camera_back:
-      return sentence("camera_back", true, "camera %d is back", event.camera);
-    case Kind::board_gone:
-      return sentence("board_gone", true,
-                      "the trigger board is gone: check its cable; it is looked for every second");
-    case Kind::board_back:
-      return sentence("board_back", true, "the trigger board is back");
-    case Kind::board_rebooted:
-      return sentence("board_rebooted", true,
-                      "the trigger board has restarted: its pulses count from 0, the pairing is "
-                      "proven again");
-    case Kind::acquiring:
-      return sentence(
-          "acquiring", false,
+    case Kind::camera_disconnected:
+      return message("camera_disconnected", true, "camera %d is gone; the drive goes on without it",
+                     event.camera);
+    case Kind::camera_reconnected:
+      return message("camera_reconnected", true, "camera %d is back", event.camera);
+    case Kind::trigger_board_disconnected:
+      return message("trigger_board_disconnected", true,
+                     "the trigger board is gone: check its cable; it is looked for every second");
+    case Kind::trigger_board_reconnected:
+      return message("trigger_board_reconnected", true, "the trigger board is back");
+    case Kind::trigger_board_restarted:
+      return message("trigger_board_restarted", true,
+                     "the trigger board has restarted: its pulses count from 0, the pairing is "
+                     "verified again");
+    case Kind::pairing_pending:
+      return message(
+          "pairing_pending", false,
           "nothing proves yet which pulses the images of camera %d are of; they are not used",
           event.camera);
-    case Kind::proven:
-      return sentence("pairing_proven", false, "the pairing of camera %d is proven after %.2f s",
-                      event.camera, event.seconds);
+    case Kind::pairing_verified:
+      return message("pairing_verified", false, "the pairing of camera %d is verified after %.2f s",
+                     event.camera, event.seconds);
   }
   return {};
 }
 
-TimingMonitor::Sentence TimingMonitor::of_set(const SyncedSet& set) noexcept {
-  const bool was = unproven_;
-  unproven_ = set.proof == SyncProof::unproven;
-  if (was || !unproven_) return {};
-  return sentence(
-      "pairing_unproven", true,
+TimingMonitor::Message TimingMonitor::of_set(const SyncedSet& set) noexcept {
+  const bool was = ambiguous_;
+  ambiguous_ = set.proof == SyncProof::ambiguous;
+  if (was || !ambiguous_) return {};
+  return message(
+      "pairing_ambiguous", true,
       "images do not belong together for sure: pulses, counters and stamps contradict each other%s",
-      proves_pairing(mode_) ? "; one of them alone is used" : "");
+      verifies_pairing(mode_) ? "; one of them alone is used" : "");
 }
 
-TimingMonitor::Sentence TimingMonitor::of_reading(const AcquiredReading& reading) noexcept {
+TimingMonitor::Message TimingMonitor::of_reading(const AcquiredReading& reading) noexcept {
   constexpr int kMany = 3;  // satellites: one more or less is not worth a word
   const InsQuality& q = reading.quality;
   const int count = q.satellites;
@@ -122,13 +122,13 @@ TimingMonitor::Sentence TimingMonitor::of_reading(const AcquiredReading& reading
   const bool given =
       q.status != 0 ||
       q.filter_valid;  // a device that says nothing of its filter has no status either
-  return sentence("ins_status", false, "the INS has %s%s%s", word_of(fix_), satellites.data(),
-                  !given           ? ""
-                  : q.filter_valid ? ", its filter is valid"
-                                   : ", its filter is not valid");
+  return message("ins_status", false, "the INS has %s%s%s", word_of(fix_), satellites.data(),
+                 !given           ? ""
+                 : q.filter_valid ? ", its filter is valid"
+                                  : ", its filter is not valid");
 }
 
-TimingMonitor::Sentence TimingMonitor::of_utc(const AcquiredReading& reading) noexcept {
+TimingMonitor::Message TimingMonitor::of_utc(const AcquiredReading& reading) noexcept {
   constexpr double kStep = 0.1;  // s: a clock that was set
   if (!reading.quality.utc_valid || reading.quality.utc_ns == 0) return {};
   const double ahead =
@@ -136,14 +136,14 @@ TimingMonitor::Sentence TimingMonitor::of_utc(const AcquiredReading& reading) no
   if (utc_reported_ && std::abs(ahead - reported_ahead_s_) < kStep) return {};
   utc_reported_ = true;
   reported_ahead_s_ = ahead;
-  return sentence("utc", false,
-                  "the session's stamps are %.4f s %s the INS's UTC: they follow the host's clock "
-                  "of the day as it was at the start",
-                  std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
+  return message("utc_offset", false,
+                 "the session's stamps are %.4f s %s the INS's UTC: they follow the host's clock "
+                 "of the day as it was at the start",
+                 std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
 }
 
-void TimingMonitor::note_pose(const AcquiredFrame& frame, float estimate_ms,
-                              HostStamp now) noexcept {
+void TimingMonitor::record_pose(const AcquiredFrame& frame, float estimate_ms,
+                                HostStamp now) noexcept {
   const SyncedSet& set = frame.set;
   const double ms =
       virtual_ ? (set.arrival - set.stamp).to_seconds() * 1e3 + static_cast<double>(estimate_ms)
@@ -155,22 +155,22 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
                                            const DriveDevices& devices) const {
   Json clocks = Json::array(), board = Json::object(), ins = Json::object(),
        cameras = Json::array();
-  bool all_proven = proves_pairing(mode_);
+  bool all_verified = verifies_pairing(mode_);
   for (std::size_t k = 0; k < devices.cameras().size(); ++k) {
     clocks.push_back(clock_json(fmt::format("camera {}", k), c.cameras[k]));
     const CameraStatistics s = devices.cameras()[k]->statistics();
-    all_proven = all_proven && c.proven[k];
-    cameras.push_back({{"proven", proves_pairing(mode_) && c.proven[k]},
+    all_verified = all_verified && c.verified[k];
+    cameras.push_back({{"verified", verifies_pairing(mode_) && c.verified[k]},
                        {"acquisitions", c.sync.acquisitions[k]},
                        {"losses",
                         {{"missed_trigger", c.sync.missed_trigger[k]},
                          {"lost", c.sync.lost[k]},
-                         {"acquiring", c.sync.acquiring[k]},
+                         {"pairing_pending", c.sync.acquiring[k]},
                          {"contradictions", c.sync.contradictions[k]},
                          {"late", c.sync.late[k]},
                          {"duplicate", c.sync.duplicate[k]},
                          {"absent", c.sync.absent[k]},
-                         {"torn", s.torn},
+                         {"incomplete", s.torn},
                          {"underruns", s.underruns}}}});
   }
   if (c.board.stamps() > 0) clocks.push_back(clock_json("board", c.board));
@@ -189,22 +189,22 @@ nlohmann::ordered_json TimingMonitor::json(const AcquisitionCounters& c,
              {"overruns", s.overruns}, {"reboots", c.reboots}, {"starts", s.starts}};
   }
   const Json pairing = {{"mode", to_string(mode_)},
-                        {"sentence", proof_sentence(mode_)},
-                        {"can_be_proven", proves_pairing(mode_)},
-                        {"proven", all_proven},
+                        {"message", proof_message(mode_)},
+                        {"verifiable", verifies_pairing(mode_)},
+                        {"verified", all_verified},
                         {"worst_acquisition_s", rounded(c.sync.worst_acquisition.to_seconds())},
                         {"pauses", c.pauses},
                         {"pauses_refused", c.pauses_refused},
                         {"sets",
                          {{"complete", c.sync.complete},
                           {"incomplete", c.sync.incomplete},
-                          {"unproven", c.sync.unproven},
+                          {"ambiguous", c.sync.ambiguous},
                           {"unreported", c.sync.unreported},
                           {"pulses", c.pulses},
                           {"pulses_missed", c.sync.missed},
                           {"pushed_out", c.sync.pushed_out},
                           {"overtaken", c.dropped_sets},
-                          {"torn", c.torn}}},
+                          {"incomplete", c.torn}}},
                         {"cameras", cameras}};
   return {{"clocks", clocks},
           {"clock_resets", c.clock_resets},

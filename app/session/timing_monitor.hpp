@@ -11,13 +11,13 @@
 namespace vergence::app {
 
 /// What a drive tells of time: clocks, pairing, latencies, its stamps against the INS's UTC. Events
-/// as sentences, figures for summary.json.
+/// as messages, figures for summary.json.
 ///
 /// Threads  note…(): the estimator's, sealed. json(): any, after that has joined. Memory: fixed;
-///          sentences are in place.
+///          messages are in place.
 class TimingMonitor {
  public:
-  struct Sentence {
+  struct Message {
     const char* kind = nullptr;  // null: nothing to tell
     std::array<char, 200> text{};
     bool to_user = false;
@@ -26,27 +26,27 @@ class TimingMonitor {
   explicit TimingMonitor(SyncMode mode, bool virtual_time) : mode_(mode), virtual_(virtual_time) {}
 
   /// What an event of a device says.
-  [[nodiscard]] Sentence of_device(const DeviceEvent& event) const noexcept;
-  /// A set that was handed out: tells when a run of unproven ones begins.
-  [[nodiscard]] Sentence of_set(const SyncedSet& set) noexcept;
+  [[nodiscard]] Message of_device(const DeviceEvent& event) const noexcept;
+  /// A set that was handed out: tells when a run of ambiguous ones begins.
+  [[nodiscard]] Message of_set(const SyncedSet& set) noexcept;
   /// A reading: tells when what the receiver and the filter say has changed, and of the
   /// session's stamps against UTC.
-  [[nodiscard]] Sentence of_reading(const AcquiredReading& reading) noexcept;
+  [[nodiscard]] Message of_reading(const AcquiredReading& reading) noexcept;
 
   /// A pose of these images has gone out. `estimate_ms`: what it took; `now`: by the host's clock,
   /// meaningless in virtual time.
-  void note_pose(const AcquiredFrame& frame, float estimate_ms, HostStamp now) noexcept;
+  void record_pose(const AcquiredFrame& frame, float estimate_ms, HostStamp now) noexcept;
 
   /// The block `time` of summary.json.
   [[nodiscard]] nlohmann::ordered_json json(const AcquisitionCounters& counters,
                                             const DriveDevices& devices) const;
 
  private:
-  [[nodiscard]] Sentence of_utc(const AcquiredReading& reading) noexcept;
+  [[nodiscard]] Message of_utc(const AcquiredReading& reading) noexcept;
 
   SyncMode mode_;
   bool virtual_;
-  bool unproven_ = false;  // the last set
+  bool ambiguous_ = false;  // the last set
   TimeHistogram latency_;
   InsQuality quality_{};  // as told last
   FixStatus fix_ = FixStatus::none;

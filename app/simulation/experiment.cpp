@@ -50,11 +50,11 @@ struct Level {
 };
 
 std::vector<double> parse_noise(const std::string& text) {
-  constexpr std::size_t kMost = 100;
+  constexpr std::size_t kMax = 100;
   constexpr double kLargest = 100;  // px
-  std::vector<std::string_view> fields(kMost);
+  std::vector<std::string_view> fields(kMax);
   const std::size_t count = split(text, ',', fields);
-  if (count > kMost) throw InputError("--noise has more than " + std::to_string(kMost) + " levels");
+  if (count > kMax) throw InputError("--noise has more than " + std::to_string(kMax) + " levels");
   std::vector<double> levels(count);
   for (std::size_t i = 0; i < count; ++i)
     if (!parse_number(fields[i], &levels[i]) || !(levels[i] >= 0) || levels[i] > kLargest)

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kWidth = 1024, kHeight = 768;  // px
 constexpr double kHalfField = M_PI / 6;      // rad: 60° across
-constexpr int kMostTries = 1000;             // views drawn before the options count as impossible
+constexpr int kMaxTries = 1000;              // views drawn before the options count as impossible
 
 Camera pinhole() {
   Intrinsics k;
@@ -78,7 +78,7 @@ bool sees_all(const SimulatedRig& rig, const Transform& T_left_world) {
 }
 
 Transform draw_pose(const SimulatedRig& rig, const SimulationOptions& o, Random& random) {
-  for (int attempt = 0; attempt < kMostTries; ++attempt) {
+  for (int attempt = 0; attempt < kMaxTries; ++attempt) {
     const Vec3 outward = direction(random);
     const Mat3 R = looking_along(-outward, random.uniform(0, 2 * M_PI));
     if (o.generator == SimulationGenerator::ring) {

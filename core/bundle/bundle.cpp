@@ -16,9 +16,9 @@ using detail::BundleState;
 using detail::BundleWorkspace;
 using detail::System;
 
-constexpr double kLeastDamping = 1e-12;      // below it the damping is lost in rounding
-constexpr double kLeastGaugeDamping = 1e-9;  // where the scale is free the damping alone holds it
-constexpr double kLargestDamping = 1e10;     // steps are then shorter than any tolerance
+constexpr double kMinDamping = 1e-12;      // below it the damping is lost in rounding
+constexpr double kMinGaugeDamping = 1e-9;  // where the scale is free the damping alone holds it
+constexpr double kLargestDamping = 1e10;   // steps are then shorter than any tolerance
 constexpr double kPivotTolerance =
     1e-14;  // relative pivot of the damped system below which it counts as singular
 constexpr double kRankTolerance = 1e-11;  // of the undamped one
@@ -94,7 +94,7 @@ class Solve {
         BundleResult& result) noexcept
       : w_(w), problem_(problem), options_(options), result_(result), system_(w, problem, options) {
     if (options.configuration == BundleConfiguration::parallel_monocular)
-      least_damping_ = kLeastGaugeDamping;
+      min_damping_ = kMinGaugeDamping;
   }
 
   void run() noexcept {
@@ -141,7 +141,7 @@ class Solve {
                          tolerance * (std::sqrt(system_.norm_squared()) + tolerance);
       const bool expected_last = 0.5 * decrement <= options_.cost_tolerance * cost_ || small ||
                                  result_.steps == options_.max_steps;
-      const double next_damping = std::max(damping_ * 0.1, least_damping_);
+      const double next_damping = std::max(damping_ * 0.1, min_damping_);
       const bool valid = std::isfinite(system_.update_squared()) &&
                          (expected_last ? system_.evaluate(other(), false)
                                         : system_.linearise(other(), next_damping));
@@ -193,15 +193,15 @@ class Solve {
   }
 
   /// Least ratio of a direction that something should see.
-  double least_seen(const detail::PivotReport& pivots) const noexcept {
-    return free_directions() == 0 ? pivots.least_ratio : pivots.second_ratio;
+  double min_seen(const detail::PivotReport& pivots) const noexcept {
+    return free_directions() == 0 ? pivots.min_ratio : pivots.second_ratio;
   }
 
   /// A direction that only the damping holds: its pivot falls with λ, that of a seen one stays. One
   /// factorisation cannot tell them apart.
   void watch_rank() noexcept {
     constexpr double kFell = 0.3;  // of the ratio, when λ fell to a tenth
-    const double ratio = least_seen(pivots_);
+    const double ratio = min_seen(pivots_);
     if (watched_damping_ > 0 && damping_ < 0.5 * watched_damping_)
       rank_suspicious_ = ratio < kFell * watched_ratio_;
     rank_suspicious_ = rank_suspicious_ || ratio < kRankTolerance;
@@ -216,7 +216,7 @@ class Solve {
     constexpr double kLeft = 0.01;  // of the last ratio under damping
     const auto pivots =
         detail::cholesky(w_.A.data(), system_.rows(), system_.rows(), system_.ld(), kRankTolerance);
-    return pivots.small > free_directions() || least_seen(pivots) < kLeft * watched_ratio_;
+    return pivots.small > free_directions() || min_seen(pivots) < kLeft * watched_ratio_;
   }
 
   /// The newest free pose's block of the inverse of the whole system, θ_S and all: in the factor
@@ -282,7 +282,7 @@ class Solve {
   int best_ = 0;
   bool rank_suspicious_ = false;
   double watched_damping_ = 0, watched_ratio_ = 1;
-  double damping_ = 0, least_damping_ = kLeastDamping, cost_ = 0, squared_px_ = 0;
+  double damping_ = 0, min_damping_ = kMinDamping, cost_ = 0, squared_px_ = 0;
 };
 
 }  // namespace
@@ -295,9 +295,9 @@ std::size_t BundleAdjuster::memory_needed(const BundleCapacities& capacities) no
 }
 
 BundleAdjuster::BundleAdjuster(const BundleCapacities& c, Arena& arena) : workspace_(nullptr) {
-  constexpr std::size_t kMostPoses = 65535, kMostObservations = 1U << 28U;  // what the indices hold
-  if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMostPoses ||
-      c.points > kMostObservations || c.observations > kMostObservations)
+  constexpr std::size_t kMaxPoses = 65535, kMaxObservations = 1U << 28U;  // what the indices hold
+  if (c.cameras == 0 || c.cameras > kMaxCameras || c.poses == 0 || c.poses > kMaxPoses ||
+      c.points > kMaxObservations || c.observations > kMaxObservations)
     throw std::invalid_argument(
         "bundle adjustment: capacities out of range (cameras 1 … 4, poses 1 … 65535)");
   workspace_ = arena.make<BundleWorkspace>(1, "bundle: workspace").data();

@@ -147,7 +147,7 @@ enum class BundleTermination : std::uint8_t {
 /// + τ, as in RigCalibration; with an exact length the 6×6 has rank 5.
 struct BundleResult {
   BundleResult() noexcept {  // Eigen leaves a matrix as it finds the memory
-    for (auto* all : {&covariance_white, &covariance_noise, &covariance_wide})
+    for (auto* all : {&covariance_white, &covariance_noise, &covariance_total})
       for (Mat6& m : *all) m.setZero();
   }
 
@@ -165,11 +165,11 @@ struct BundleResult {
   std::array<Mat6, kMaxCameras>
       covariance_noise{};  // cluster-robust (`cells`), times shared_errors; priors as they are
   std::array<Mat6, kMaxCameras>
-      covariance_wide{};  // covariance_noise + what the held intrinsics may be off by
+      covariance_total{};  // covariance_noise + what the held intrinsics may be off by
   std::array<std::array<double, kIntrinsicsSize>, kMaxCameras>
       intrinsics_sigma{};  // of the free ones, from covariance_noise
   RigCovariance
-      covariance{};      // covariance_wide of all of θ_S together, with what is held but uncertain
+      covariance{};  // covariance_total of all of θ_S together, with what is held but uncertain
   double inflation = 1;  // mean over θ_S of the variance by clusters over the one that the solve
                          // itself believes (H⁻¹)
 

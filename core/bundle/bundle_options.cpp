@@ -26,16 +26,16 @@ bool valid(const BundleIntrinsics& i) noexcept {
 }  // namespace
 
 bool BundleOptions::valid() const noexcept {
-  constexpr int kMostSteps = 1000;
-  constexpr double kMostDamping = 1e6;
+  constexpr int kMaxSteps = 1000;
+  constexpr double kMaxDamping = 1e6;
   const auto each_valid = [](const auto& all) {
     return std::all_of(all.begin(), all.end(),
                        [](const auto& one) { return vergence::valid(one); });
   };
-  return positive(loss_threshold) && max_steps >= 1 && max_steps <= kMostSteps &&
+  return positive(loss_threshold) && max_steps >= 1 && max_steps <= kMaxSteps &&
          cost_tolerance >= 0 && update_tolerance >= 0 && gradient_tolerance >= 0 &&
-         initial_damping > 0 && initial_damping <= kMostDamping && each_valid(length) &&
-         each_valid(intrinsics) && cells >= 0 && cells <= detail::kMostCells &&
+         initial_damping > 0 && initial_damping <= kMaxDamping && each_valid(length) &&
+         each_valid(intrinsics) && cells >= 0 && cells <= detail::kMaxCells &&
          positive(shared_errors) && positive(shared_prior.weight);
 }
 

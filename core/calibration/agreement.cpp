@@ -37,7 +37,7 @@ Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noe
   for (std::size_t i = 0; i < Agreement::kDepths; ++i) {
     double normalised = 0, squared = 0;
     int seen = 0;
-    detail::for_places(a, k, Agreement::kDepthM[i], [&](const detail::SeenByBoth& p) noexcept {
+    detail::for_places(a, k, Agreement::kDepthM[i], [&](const detail::CovisiblePoint& p) noexcept {
       double relative = 0;
       if (!reader.difference(p, &relative)) return;
       const detail::DepthGradient g = detail::depth_gradient(p, a.T_camera_left[c], k, true);

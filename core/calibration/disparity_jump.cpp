@@ -10,17 +10,17 @@ namespace {
 
 constexpr std::size_t kFewestTracks = 25;
 constexpr int kReweightings = 6;
-constexpr double kLeastScale = 0.05;  // px: corners are found no better
+constexpr double kMinScale = 0.05;    // px: corners are found no better
 constexpr double kDepthStep = 1e-3;   // of the depth, for the numeric derivatives
-constexpr double kLeastJump = 0.6;    // px: twice what 95 % of untouched frames stay under
+constexpr double kMinJump = 0.6;      // px: twice what 95 % of untouched frames stay under
 constexpr double kJumpSigmas = 8.0;   // of the frame's own tracks
 constexpr double kJumpScatter = 5.0;  // times the root mean square of this drive's shifts
 constexpr int kFirstFrames = 5;       // measured, before the scatter is known
 constexpr int kScatterFrames = 20;    // that the mean square is reckoned over, about
 constexpr double kGoesBack = 0.5;  // of the shift: more taken back by the next frame is no change
 constexpr int kUnmeasured = 2;     // frames without enough tracks after it: it was a change
-constexpr int kMostSkipped = 3;    // frames, over which the same points are compared
-constexpr double kLeastParallax = 1e-4;  // rad: further points say the same at any depth
+constexpr int kMaxSkipped = 3;     // frames, over which the same points are compared
+constexpr double kMinParallax = 1e-4;  // rad: further points say the same at any depth
 
 Vec3 ray(const Pinhole& k, const Vec2& pixel) noexcept {
   return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy, 1.0};
@@ -35,7 +35,7 @@ double depth_of(const Vec3& left, const Vec3& other, const Transform& T_other_le
   // other ∥ z R left + t, so other × (R left) z = − other × t.
   const Vec3 a = other.cross(T_other_left.R * left), b = -other.cross(T_other_left.t);
   const double aa = a.squaredNorm();
-  if (aa < kLeastParallax * kLeastParallax * other.squaredNorm() * left.squaredNorm()) return -1.0;
+  if (aa < kMinParallax * kMinParallax * other.squaredNorm() * left.squaredNorm()) return -1.0;
   return a.dot(b) / aa;
 }
 
@@ -72,7 +72,7 @@ void DisparityJumpDetector::rebase(const Transform& T_camera_left, const Pinhole
 
 void DisparityJumpDetector::skip(const Transform& T_now_previous) noexcept {
   T_now_before_ = T_now_previous * T_now_before_;
-  if (++skipped_ > kMostSkipped) count_ = 0;
+  if (++skipped_ > kMaxSkipped) count_ = 0;
 }
 
 std::size_t DisparityJumpDetector::take(std::span<const StereoObservation> stereo,
@@ -122,9 +122,9 @@ DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
   };
   s = median_of([](const Row& r) noexcept { return r.e; });
   for (int k = 0; k < kReweightings; ++k) {
-    scale = std::max(kLeastScale, median_of([&](const Row& r) noexcept {
-                                    return std::abs(r.e - s - along * r.along);
-                                  }) / kMedianOfNormal);
+    scale = std::max(kMinScale, median_of([&](const Row& r) noexcept {
+                                  return std::abs(r.e - s - along * r.along);
+                                }) / kMedianOfNormal);
     double w = 0, wa = 0, waa = 0, we = 0, wae = 0;
     for (const Row& r : rows) {
       const double u = (r.e - s - along * r.along) / (kTukey * scale);
@@ -162,7 +162,7 @@ void DisparityJumpDetector::judge(std::uint64_t frame, DisparityJump* jump) noex
   }
   if (!jump->measured) return;
   const double limit =
-      std::max({kLeastJump, kJumpSigmas * jump->sigma_px, kJumpScatter * std::sqrt(mean_square_)});
+      std::max({kMinJump, kJumpSigmas * jump->sigma_px, kJumpScatter * std::sqrt(mean_square_)});
   if (measured_ >= kFirstFrames && std::abs(jump->px) > limit) {
     jump->suspected = true;
     pending_ = Pending{true, frame, jump->px, 0};

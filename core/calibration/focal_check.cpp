@@ -16,10 +16,10 @@ constexpr double kCertain = 3.0;  // sigmas
 FocalMeasurement check_focal_length(const RigSolution& found,
                                     const RigCalibration& given) noexcept {
   FocalMeasurement m;
-  m.given_px = given.intrinsics[0].fx;
+  m.configured_px = given.intrinsics[0].fx;
   const Intrinsics& lens = found.rig.intrinsics[0];
-  if (!(m.given_px > 0)) return m;
-  const double off = std::abs(lens.fx / m.given_px - 1);
+  if (!(m.configured_px > 0)) return m;
+  const double off = std::abs(lens.fx / m.configured_px - 1);
   if (found.status == RigSolveStatus::not_converged && off > kFocalDoubt) {
     // Still on its way, and already far: the right one is farther.
     m.measured_px = lens.fx;

@@ -20,7 +20,7 @@ constexpr int kFewestHeldOut = 3;           // frames that say anything
 constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
 // And how many times that of the frames that were; under so many pixels they may differ: on
 // recorded drives both are 0.08 to 0.25 px.
-constexpr double kTimesUsed = 3.0, kLeastMisfit = 0.4;
+constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
 // rad, of the turn between two cameras that no epipolar line shows: what a calibration that does
 // not state its sigmas is off by when it is the rig's, and when it is not. Chosen: on the seven
 // recorded drives the first lets every published calibration be confirmed (robustness_bench
@@ -32,7 +32,7 @@ constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
 // Sigma of a measurement over the claim's, under which it may take the claim's place: it has nine
 // times the information, so what is adopted rests on the drive.
 constexpr double kOfClaim = 1.0 / 3;
-constexpr double kNeedsBaselines = 3.0;  // travelled, besides needs_motion_m
+constexpr double kNeedsBaselines = 3.0;  // travelled, besides min_path_m
 
 /// Median distance to the epipolar lines of one frame's matches of the left camera and camera k,
 /// px; negative: hardly a match.
@@ -107,7 +107,7 @@ bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalib
   const HeldOut used = fit_of_used(log, newest, solved, k);
   const double worst = used.frames < kFewestHeldOut
                            ? kWorstFit
-                           : std::clamp(kTimesUsed * used.median_px, kLeastMisfit, kWorstFit);
+                           : std::clamp(kTimesUsed * used.median_px, kMinMisfit, kWorstFit);
   return fit.median_px > worst;
 }
 
@@ -180,7 +180,8 @@ double claimed_percent(const RigCalibration& claimed, int k, double depth,
   const double own = depth_error_percent(claimed, k, depth);
   const double by_turn = 100 * depth / claimed.T_camera_left[static_cast<std::size_t>(k)].t.norm();
   // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
-  return own > 0 ? std::hypot(own, 1e-3 * o.drift_mrad * by_turn) : kMakersTurn * by_turn;
+  return own > 0 ? std::hypot(own, 1e-3 * o.extrinsic_random_walk_mrad_per_sqrt_h * by_turn)
+                 : kMakersTurn * by_turn;
 }
 
 }  // namespace
@@ -195,9 +196,9 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
   bool sharper = true;  // of every camera the depth is held better than by the claim
   double worst = 0;
   for (int k = 1; k < measured.cameras; ++k) {
-    const double depth = judged_depth_m(measured, k, o, pixel_sigma);
+    const double depth = reference_depth_m(measured, k, o, pixel_sigma);
     const double s = depth_error_percent(measured, k, depth),
-                 difference = depth_difference_percent(measured, claimed, k, depth);
+                 difference = depth_error_percent(measured, claimed, k, depth);
     const double by_turn =
         100 * depth / measured.T_camera_left[static_cast<std::size_t>(k)].t.norm();
     const double m = claimed_percent(claimed, k, depth, o);
@@ -206,8 +207,8 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     const double weight = source == ClaimSource::this_drive ? 1.0 : m * m / (m * m + s * s);
     const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
     a.confirmed =
-        a.confirmed && s > 0 && odds - before > certain && off <= o.tolerated_depth_percent;
-    const bool contradicted = difference > o.tolerated_depth_percent && odds - before < -certain;
+        a.confirmed && s > 0 && odds - before > certain && off <= o.max_depth_error_percent;
+    const bool contradicted = difference > o.max_depth_error_percent && odds - before < -certain;
     const double least = source == ClaimSource::this_drive ? m : kOfClaim * m;
     sharper = sharper && s < least;
     a.nearer = a.nearer || (s < least && difference > kChance * s);
@@ -248,7 +249,7 @@ const char* reason(Gate gate) noexcept {
       return "the direction between the cameras is far from the configured one";
     case Gate::implausible_rotation:
       return "the rotation between the cameras is far from the configured one";
-    case Gate::out_of_step:
+    case Gate::out_of_sync:
       return "the cameras' images are not of the same instant";
     case Gate::does_not_fit:
       return "frames that were not used contradict it";
@@ -286,7 +287,7 @@ Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noe
     const auto c = static_cast<std::size_t>(k);
     const Transform &found = s.rig.T_camera_left[c], &nominal = q.nominal->T_camera_left[c];
     if (found.t.dot(nominal.t) < 0) return Gate::cameras_swapped;
-    if (s.lag_frames != 0) return Gate::out_of_step;
+    if (s.lag_frames != 0) return Gate::out_of_sync;
     if (q.may_have_changed && s.changed_at > 0) return Gate::rig_changed;
     if (angle_between(found.t, nominal.t) > o.max_direction_deg * kRadiansPerDegree)
       return Gate::implausible_direction;
@@ -295,9 +296,9 @@ Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noe
       return Gate::implausible_rotation;
   }
   // With the lenses free, the depth's own sigma says whether the path was long enough.
-  const double least = q.lenses ? 0.0 : o.needs_motion_m;
+  const double least = q.lenses ? 0.0 : o.min_path_m;
   if (s.travelled_m < std::max(least, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
-  if (s.near < o.needs_near_points) return Gate::needs_near_structure;
+  if (s.near < o.min_near_points) return Gate::needs_near_structure;
   return Gate::open;
 }
 
@@ -309,7 +310,7 @@ Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noe
   if (common != Gate::open) return common;
   if (q.lenses) {
     for (int k = 1; k < s.rig.cameras; ++k)
-      if (depth_error_percent(s.rig, k, judged_depth_m(s.rig, k, o, q.pixel_sigma)) >
+      if (depth_error_percent(s.rig, k, reference_depth_m(s.rig, k, o, q.pixel_sigma)) >
           o.usable_depth_percent)
         return Gate::depth_unknown;
   } else if (sigma_excess(s.rig, o) > (q.window_full ? kFullWindow : 1.0)) {

@@ -42,7 +42,7 @@ inline constexpr double kRareChance = 3.0;  // of a question that every solve as
 ///
 ///     log_odds = log N(d; 0, m² + s²) − log N(d; 0, M² + s²).
 struct Assessment {
-  double depth_m = 0;             // where it is judged: judged_depth_m()
+  double depth_m = 0;             // where it is judged: reference_depth_m()
   double sigma_percent = 0;       // of the measured calibration's depth there, 1 sigma
   double difference_percent = 0;  // of the claimed one from the measured, root mean over the image
   double log_odds = 0;            // that the rig is the one of the claim
@@ -74,13 +74,13 @@ enum class Gate : std::uint8_t {
   cameras_swapped,
   implausible_direction,
   implausible_rotation,
-  out_of_step,
+  out_of_sync,
   does_not_fit,   // frames not in the solve contradict it
   no_better,      // than the calibration in use: that one is kept
   rig_changed,    // among the very frames it was solved from
   depth_unknown,  // with the lenses free the tracks do not hold the depth yet
 };
-/// The sentence for events and calibrations.csv; empty for `open`.
+/// The message for events and calibrations.csv; empty for `open`.
 [[nodiscard]] const char* reason(Gate gate) noexcept;
 
 /// Whether a solution that came to this gate is at least one of the rig that the images are of now.
@@ -90,7 +90,7 @@ enum class Gate : std::uint8_t {
     case Gate::cameras_swapped:
     case Gate::implausible_direction:
     case Gate::implausible_rotation:
-    case Gate::out_of_step:
+    case Gate::out_of_sync:
     case Gate::does_not_fit:
     case Gate::rig_changed:
       return false;
@@ -113,7 +113,7 @@ struct AcceptanceInput {
       nullptr;  // with the frames since the snapshot; null: there are none to hold it against
   bool lenses = false;        // they were free: depth is judged by their joint covariance, not the
                               // transform's single sigmas
-  double pixel_sigma = 0.15;  // px, of a tracked corner: judged_depth_m()
+  double pixel_sigma = 0.15;  // px, of a tracked corner: reference_depth_m()
   bool may_have_changed = true;  // a change of the rig among the frames used closes the gate; once,
                                  // or a wrong one would for ever
   bool must_be_better = true;    // than `in_use`, on frames that were not used

@@ -12,9 +12,8 @@ constexpr double kWordDepth = 20;  // m
 
 }  // namespace
 
-std::string_view to_string(HealthWord word) noexcept {
-  static constexpr std::array<std::string_view, 3> names = {"good", "can be improved",
-                                                            "recalibrate"};
+std::string_view to_string(CalibrationRating word) noexcept {
+  static constexpr std::array<std::string_view, 3> names = {"good", "fair", "poor"};
   return names[static_cast<std::size_t>(word)];
 }
 
@@ -23,19 +22,19 @@ double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noe
   const bool joint = !rig.covariance.empty();
   double sum = 0;
   int seen = 0;
-  detail::for_places(rig, k, depth_m, [&](const detail::SeenByBoth& p) noexcept {
+  detail::for_places(rig, k, depth_m, [&](const detail::CovisiblePoint& p) noexcept {
     sum += detail::variance_of(rig, k, detail::depth_gradient(p, T, k, joint), joint);
     ++seen;
   });
   return seen == 0 ? 0.0 : 100.0 * std::sqrt(std::max(0.0, sum / seen));
 }
 
-double depth_difference_percent(const RigCalibration& measured, const RigCalibration& claimed,
-                                int k, double depth_m) noexcept {
+double depth_error_percent(const RigCalibration& measured, const RigCalibration& claimed, int k,
+                           double depth_m) noexcept {
   const detail::DepthReader reader(claimed, k);
   double sum = 0;
   int seen = 0;
-  detail::for_places(measured, k, depth_m, [&](const detail::SeenByBoth& p) noexcept {
+  detail::for_places(measured, k, depth_m, [&](const detail::CovisiblePoint& p) noexcept {
     double relative = 0;
     if (!reader.difference(p, &relative)) return;
     sum += relative * relative;
@@ -44,13 +43,13 @@ double depth_difference_percent(const RigCalibration& measured, const RigCalibra
   return seen == 0 ? 0.0 : 100.0 * std::sqrt(sum / seen);
 }
 
-double judged_depth_m(const RigCalibration& rig, int k, const CalibrationOptions& options,
-                      double pixel_sigma) noexcept {
+double reference_depth_m(const RigCalibration& rig, int k, const CalibrationOptions& options,
+                         double pixel_sigma) noexcept {
   const auto c = static_cast<std::size_t>(k);
   constexpr double kOfTolerance = 0.5;  // the share of it that a single match's noise takes
   const double tolerated_px =
-      std::sqrt(2.0) * pixel_sigma / (kOfTolerance * 0.01 * options.tolerated_depth_percent);
-  return std::min(options.tolerated_depth_m,
+      std::sqrt(2.0) * pixel_sigma / (kOfTolerance * 0.01 * options.max_depth_error_percent);
+  return std::min(options.reference_depth_m,
                   rig.intrinsics[0].fx * rig.T_camera_left[c].t.norm() / tolerated_px);
 }
 
@@ -64,11 +63,11 @@ double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept {
   return best;
 }
 
-HealthWord health(const RigCalibration& rig, const CalibrationOptions& options) noexcept {
+CalibrationRating health(const RigCalibration& rig, const CalibrationOptions& options) noexcept {
   const double error = depth_error_percent(rig, kWordDepth);
-  if (error <= options.good_depth_percent) return HealthWord::good;
-  return error <= options.usable_depth_percent ? HealthWord::can_be_improved
-                                               : HealthWord::recalibrate;
+  if (error <= options.good_depth_percent) return CalibrationRating::good;
+  return error <= options.usable_depth_percent ? CalibrationRating::can_be_improved
+                                               : CalibrationRating::recalibrate;
 }
 
 }  // namespace vergence::calibration

@@ -11,7 +11,7 @@
 namespace vergence::calibration {
 namespace {
 
-using Kind = MonitorVerdict::Kind;
+using Kind = MonitorResult::Kind;
 
 constexpr int kStandingFrames = 3;       // in a row over the threshold while standing
 constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are
@@ -27,8 +27,8 @@ void check(bool good, const char* name, const char* range) {
 void validate(const MonitorOptions& o) {
   check(o.threshold >= 20 && o.threshold <= 500, "threshold", "20 … 500");
   check(o.bias_px >= 0 && o.bias_px <= 1, "bias_px", "0 … 1");
-  check(o.found_bias_px >= 0 && o.found_bias_px <= 2, "found_bias_px", "0 … 2");
-  check(o.claimed_bias_px >= 0 && o.claimed_bias_px <= 5, "claimed_bias_px", "0 … 5");
+  check(o.verified_bias_px >= 0 && o.verified_bias_px <= 2, "verified_bias_px", "0 … 2");
+  check(o.unverified_bias_px >= 0 && o.unverified_bias_px <= 5, "unverified_bias_px", "0 … 5");
   check(o.min_matches >= 12 && o.min_matches <= 1000, "min_matches", "12 … 1000");
   check(o.short_window >= 1 && o.short_window <= 10, "short_window", "1 … 10");
   check(o.long_window >= 60 && o.long_window <= 1800, "long_window", "60 … 1800");
@@ -157,9 +157,9 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
   latest.frames = standing_over;
 }
 
-MonitorVerdict Monitor::look(const MonitorFrame& frame) noexcept {
+MonitorResult Monitor::look(const MonitorFrame& frame) noexcept {
   Parts& p = *parts_;
-  MonitorVerdict v;
+  MonitorResult v;
   v.threshold = p.options.threshold;
   v.onset_frame = frame.frame;
   if (!p.valid) return v;

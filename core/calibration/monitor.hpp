@@ -17,8 +17,8 @@ struct MonitorOptions {
                           // overlooked at least, 0 … 1
   // The same with a calibration that was found from images and is confirmed, expected until it is
   // measured, 0 … 2.
-  double found_bias_px = 0.12;
-  double claimed_bias_px = 0.3;  // and with one that is given, 0 … 5
+  double verified_bias_px = 0.12;
+  double unverified_bias_px = 0.3;  // and with one that is given, 0 … 5
   int min_matches =
       30;  // stereo matches under which a frame measures nothing (`needs_texture`), 12 … 1000
   int short_window = 3;   // moving frames of the shortest window: large knocks, 1 … 10
@@ -51,7 +51,7 @@ struct MonitorFrame {
 };
 
 /// What the monitor says after one frame.
-struct MonitorVerdict {
+struct MonitorResult {
   enum class Kind : std::uint8_t {  // in order of weight
     quiet,
     drift,     // the transform has been changing steadily
@@ -92,12 +92,12 @@ struct MonitorVerdict {
 ///     Monitor monitor(options, arena);
 ///     if (!monitor.set_reference(T_right_left, left, right, covariance)) return;
 ///     const auto verdict = monitor.look(frame);  // each posed frame
-///     if (verdict.kind != MonitorVerdict::Kind::quiet) recalibrate(verdict.onset_frame);
+///     if (verdict.kind != MonitorResult::Kind::quiet) recalibrate(verdict.onset_frame);
 ///
 /// Memory   All of it from the arena in the constructor. look() allocates nothing.
 /// Threads  One caller.
 /// Time     Under 0.1 ms for 300 stereo matches.
-/// Errors   The constructor throws (std::invalid_argument with a sentence, std::length_error). What
+/// Errors   The constructor throws (std::invalid_argument with a message, std::length_error). What
 ///          is not a number is left out.
 class Monitor {
  public:
@@ -116,7 +116,7 @@ class Monitor {
   /// measured does; monitor.bias_px is the least, and all there is without this call.
   void expect_scatter(double bias_px) noexcept;
 
-  [[nodiscard]] MonitorVerdict look(const MonitorFrame& frame) noexcept;
+  [[nodiscard]] MonitorResult look(const MonitorFrame& frame) noexcept;
 
   /// Forgets what was seen (the scene was lost); the reference stays.
   void reset() noexcept;

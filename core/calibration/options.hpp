@@ -31,16 +31,17 @@ struct CalibrationOptions {
   double max_direction_deg = 10;    // gate: direction of t from the nominal one, 0.1 … 180
   double max_rotation_deg = 10;     // gate: rotation from the nominal one, 0.1 … 180; the first
                                     // calibration of a drive from scratch is not asked for it
-  double needs_motion_m =
+  double min_path_m =
       1;  // travelled in the window, and three baselines, else `needs_motion`, 0.01 … 1000
-  int needs_near_points =
+  int min_near_points =
       30;  // points nearer than near_baselines, else `needs_near_structure`, 0 … 1000
   double near_baselines = 40;  // 5 … 500
-  double drift_mrad = 0.3;  // random walk of a rig that nobody touches, in an hour: what is known
-                            // of it grows old, 0 … 100
-  double tolerated_depth_percent = 2;  // depth error up to which a calibration counts as confirmed,
-                                       // at tolerated_depth_m, 0.1 … 50
-  double tolerated_depth_m =
+  double extrinsic_random_walk_mrad_per_sqrt_h =
+      0.3;  // random walk of a rig that nobody touches, in an hour: what is known
+            // of it grows old, 0 … 100
+  double max_depth_error_percent = 2;  // depth error up to which a calibration counts as confirmed,
+                                       // at reference_depth_m, 0.1 … 50
+  double reference_depth_m =
       20;  // or nearer, where a single match is no better than that: short baselines, 0.5 … 500
   double good_depth_percent =
       2;  // health word: predicted depth error at 20 m up to which it is `good`, 0.01 … 100

@@ -83,7 +83,7 @@ void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> poi
     add(now, other, &in_step_[i]);
   }
   if (lag_frames() != 0) question();
-  if (in_step()) questioned_ = false;
+  if (cameras_in_sync()) questioned_ = false;
   if (std::max(shifted_[0], shifted_[1]) < 1) usual_px_ += kFollow * (now - usual_px_);
 }
 
@@ -92,7 +92,7 @@ int PairingEvidence::lag_frames() const noexcept {
   return shifted_[0] > shifted_[1] ? 1 : -1;
 }
 
-bool PairingEvidence::in_step() const noexcept {
+bool PairingEvidence::cameras_in_sync() const noexcept {
   return std::min(in_step_[0], in_step_[1]) >= kDecided;
 }
 

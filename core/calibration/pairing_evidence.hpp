@@ -45,7 +45,7 @@ class PairingEvidence {
   /// From question() until motion shows that the cameras are in step.
   [[nodiscard]] bool questioned() const noexcept { return questioned_; }
   /// Since the last lag or question(), motion shows that the cameras are in step.
-  [[nodiscard]] bool in_step() const noexcept;
+  [[nodiscard]] bool cameras_in_sync() const noexcept;
   /// The scene was lost.
   void reset() noexcept {
     count_ = 0;

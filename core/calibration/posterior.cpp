@@ -18,7 +18,8 @@ void widen(RigCovariance* C, int row, double sigma) noexcept {
 }  // namespace
 
 void let_drift(double hours, const CalibrationOptions& options, RigCalibration* rig) noexcept {
-  const double angle = 1e-3 * options.drift_mrad * std::sqrt(std::max(0.0, hours));
+  const double angle =
+      1e-3 * options.extrinsic_random_walk_mrad_per_sqrt_h * std::sqrt(std::max(0.0, hours));
   for (int k = 0; k < rig->cameras; ++k) {
     const auto c = static_cast<std::size_t>(k);
     if (k > 0) {
@@ -35,7 +36,7 @@ void let_drift(double hours, const CalibrationOptions& options, RigCalibration* 
   }
 }
 
-void forget_transforms(RigCalibration* rig) noexcept {
+void clear_transforms(RigCalibration* rig) noexcept {
   for (int k = 1; k < rig->cameras; ++k) {
     const double length = rig->T_camera_left[static_cast<std::size_t>(k)].t.norm();
     for (int i = 0; i < 6; ++i) {

@@ -10,6 +10,6 @@ void let_drift(double hours, const CalibrationOptions& options, RigCalibration* 
 
 /// The cameras may sit elsewhere than they did, the lenses are the same: of the transforms nothing
 /// is known any more. Threads pure.
-void forget_transforms(RigCalibration* rig) noexcept;
+void clear_transforms(RigCalibration* rig) noexcept;
 
 }  // namespace vergence::calibration

@@ -12,13 +12,13 @@ namespace {
 constexpr std::size_t kFramesATrack = 3;  // at least, on average: sizes the points
 constexpr std::size_t kLanesABlock = 2;   // of the eight, at least, on average: sizes the blocks;
                                           // recorded drives fill 4.9 to 7.0
-constexpr int kLeastTracks = 60;
-constexpr int kLeastCandidateMatches =
+constexpr int kMinTracks = 60;
+constexpr int kMinCandidateMatches =
     40;  // across, of the frame whose own transform begins the solve
 constexpr double kHuber = 2.0, kCauchy = 2.5;  // residual scales
 constexpr double kFirstCut = 6.0,
                  kLastCut = 4.0;  // residual scales beyond which a observation is left out
-constexpr int kMostSteps = 60, kMostFocalSteps = 200;  // of the last adjustment
+constexpr int kMaxSteps = 60, kMaxFocalSteps = 200;  // of the last adjustment
 constexpr double kMedianOfTwo = 1.1774;  // median length of a vector of two standard normal numbers
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) noexcept {
@@ -68,10 +68,10 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
     : options_(options),
       log_(static_cast<std::size_t>(options.max_frames), features, arena),
       adjuster_(capacities(options, cameras, features), arena),
-      expected_scatter_px_(monitor.found_bias_px),
+      expected_scatter_px_(monitor.verified_bias_px),
       pairing_(features, arena),
       jumps_(features, arena),
-      most_frames_(static_cast<std::size_t>(options.max_frames)),
+      max_frames_(static_cast<std::size_t>(options.max_frames)),
       count_(cameras) {
   for (int k = 1; k < cameras; ++k) monitors_[static_cast<std::size_t>(k)].emplace(monitor, arena);
   const BundleCapacities c = capacities(options, cameras, features);
@@ -84,8 +84,8 @@ RigSolver::RigSolver(const CalibrationOptions& options, const MonitorOptions& mo
       arena.make_unset<BundleObservation>(c.observations, "calibration observations"));
   residuals_ = arena.make<float>(c.observations, "calibration residuals");
   sorted_ = arena.make<float>(c.observations, "calibration residuals");
-  references_ = BoundedVector<Reference>(
-      arena.make<Reference>(most_frames_ * features, "calibration tracks"));
+  references_ =
+      BoundedVector<Reference>(arena.make<Reference>(max_frames_ * features, "calibration tracks"));
   stereo_ = BoundedVector<StereoObservation>(
       arena.make<StereoObservation>(features, "calibration matches"));
 }
@@ -94,7 +94,7 @@ bool RigSolver::choose_candidate(const RigCalibration& rig) noexcept {
   const LoggedFrame* best = nullptr;
   for (std::size_t i = 0; i < log_.size(); ++i) {
     const LoggedFrame& f = log_.frame(i);
-    if (!f.unlinked || f.stereo < kLeastCandidateMatches || !all_placed(f, count_)) continue;
+    if (!f.unlinked || f.stereo < kMinCandidateMatches || !all_placed(f, count_)) continue;
     if (best == nullptr || f.reprojection_px < best->reprojection_px) best = &f;
   }
   if (best == nullptr) return false;
@@ -170,8 +170,7 @@ void RigSolver::drop_outliers(double limit) noexcept {
 
 /// Huber, then Cauchy twice, each time without what lies beyond some scales of the residuals;
 /// covariances with the last.
-BundleResult RigSolver::adjust_robustly(BundleOptions how, int most_steps,
-                                        RigSolution* s) noexcept {
+BundleResult RigSolver::adjust_robustly(BundleOptions how, int max_steps, RigSolution* s) noexcept {
   how.loss = BundleLoss::huber;
   how.loss_threshold = kHuber;
   how.max_steps = 12;
@@ -185,7 +184,7 @@ BundleResult RigSolver::adjust_robustly(BundleOptions how, int most_steps,
     how.loss = BundleLoss::cauchy;
     how.loss_threshold = kCauchy * scale;
     const bool last = cut == kLastCut;
-    how.max_steps = last ? most_steps : 8;
+    how.max_steps = last ? max_steps : 8;
     how.cost_tolerance = last ? 3e-6 : 1e-4;
     how.covariance = how.pose_covariance = last;
     r = adjust(how);
@@ -210,13 +209,12 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   s.frames = static_cast<int>(poses_.size());
   s.newest = log_.frame(log_.size() - 1).number;
   make_points();
-  if (points_.size() < static_cast<std::size_t>(kLeastTracks)) return s;
+  if (points_.size() < static_cast<std::size_t>(kMinTracks)) return s;
   hold_pieces();
   s.status = RigSolveStatus::not_converged;
   // To a focal length that is a quarter off it is a hundred steps and more.
-  const int most_steps =
-      request.freedom == RigFreedom::focal_lengths ? kMostFocalSteps : kMostSteps;
-  const BundleResult r = adjust_robustly(options_of(request), most_steps, &s);
+  const int max_steps = request.freedom == RigFreedom::focal_lengths ? kMaxFocalSteps : kMaxSteps;
+  const BundleResult r = adjust_robustly(options_of(request), max_steps, &s);
   if (!r.converged()) {
     if (r.usable()) s.rig.intrinsics[0] = cameras_[0].intrinsics();  // how far it came
     return s;

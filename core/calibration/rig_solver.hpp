@@ -108,7 +108,7 @@ class RigSolver {
   void hold_pieces() noexcept;
   [[nodiscard]] bool add_point(std::span<const Reference> track) noexcept;
   [[nodiscard]] BundleOptions options_of(const RigSolveRequest& request) const noexcept;
-  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, int most_steps,
+  [[nodiscard]] BundleResult adjust_robustly(BundleOptions how, int max_steps,
                                              RigSolution* s) noexcept;
   [[nodiscard]] BundleResult adjust(const BundleOptions& how) noexcept;
   [[nodiscard]] double residual_scale() noexcept;
@@ -133,7 +133,7 @@ class RigSolver {
   double expected_scatter_px_;
   PairingEvidence pairing_;
   DisparityJumpDetector jumps_;
-  std::size_t most_frames_;
+  std::size_t max_frames_;
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
   int count_ = 0;  // cameras

@@ -10,9 +10,9 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr std::size_t kMostViews = 12;  // of a track that its point is triangulated from
+constexpr std::size_t kMaxViews = 12;   // of a track that its point is triangulated from
 constexpr double kWildResidual = 40.0;  // px at the start: not the same point
-constexpr int kLeastTies = 10;          // points that tie a frame to those before it
+constexpr int kMinTies = 10;            // points that tie a frame to those before it
 // Tracks share errors that a cluster a track does not see: clusters are cells of the image and
 // blocks of frames. What is left, variance of the transforms found on recorded and rendered drives
 // over the one by clusters (docs/calibration.md).
@@ -44,9 +44,9 @@ bool RigSolver::add_point(std::span<const Reference> track) noexcept {
     pairs += (observation(r).cameras & 1U) != 0 && (observation(r).cameras & ~1U) != 0 ? 1 : 0;
   if (pairs < 2 || points_.full()) return true;  // four images see it, or it is none (METHOD §3)
 
-  std::array<RayView, kMostViews * kMaxCameras> views;
+  std::array<RayView, kMaxViews * kMaxCameras> views;
   std::size_t n = 0;
-  const std::size_t step = (track.size() + kMostViews - 1) / kMostViews;
+  const std::size_t step = (track.size() + kMaxViews - 1) / kMaxViews;
   for (std::size_t i = 0; i < track.size(); i += step) {
     const LoggedObservation& s = observation(track[i]);
     for (int k = 0; k < count_; ++k) {
@@ -124,7 +124,7 @@ void RigSolver::hold_pieces() noexcept {
   int ties = 0;
   for (std::size_t i = 0; i < held_.size(); ++i) {
     ties += ties_[i];
-    held_[i] = ties < kLeastTies ? 1 : 0;
+    held_[i] = ties < kMinTies ? 1 : 0;
   }
 }
 

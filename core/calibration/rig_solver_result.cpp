@@ -63,12 +63,12 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
     rig.intrinsics[c] = with_sigmas(lens, r.intrinsics_sigma[c]);
     if (k == 0) continue;
     rig.T_camera_left[c] = {normalised(T_camera_left_[c].R), T_camera_left_[c].t};
-    rig.covariance_wide[c] = r.covariance_wide[c];
+    rig.covariance_total[c] = r.covariance_total[c];
     for (int i = 0; i < 6; ++i) {
       rig.sigma_noise[c][static_cast<std::size_t>(i)] =
           std::sqrt(std::max(0.0, r.covariance_noise[c](i, i)));
-      rig.sigma_wide[c][static_cast<std::size_t>(i)] =
-          std::sqrt(std::max(0.0, r.covariance_wide[c](i, i)));
+      rig.sigma_total[c][static_cast<std::size_t>(i)] =
+          std::sqrt(std::max(0.0, r.covariance_total[c](i, i)));
     }
   }
   rig.covariance = r.covariance;
@@ -99,7 +99,7 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
   const Intrinsics &a = cameras_[0].intrinsics(), &b = cameras_[other].intrinsics();
   const Pinhole left{a.fx, a.fy, a.cx, a.cy}, right{b.fx, b.fy, b.cx, b.cy};
   Monitor& monitor = *monitors_[other];
-  if (!monitor.set_reference(rig.T_camera_left[other], left, right, rig.covariance_wide[other]))
+  if (!monitor.set_reference(rig.T_camera_left[other], left, right, rig.covariance_total[other]))
     return seen;
   monitor.expect_scatter(expected_scatter_px_);
   pairing_.reset();
@@ -123,13 +123,13 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
     shown.frame = f.number;
     shown.moving = true;
     shown.stereo = stereo_.span();
-    const MonitorVerdict v = monitor.look(shown);
+    const MonitorResult v = monitor.look(shown);
     pairing_.next(f.number, stereo_.span(), rig.T_camera_left[other], left, right);
     if (seen.lag_frames == 0) seen.lag_frames = pairing_.lag_frames();
     const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();
     const DisparityJump jump = jumps_.next(f.number, stereo_.span(), step);
     if (jump.confirmed) seen.changed_at = jump.onset_frame;
-    if (v.kind == MonitorVerdict::Kind::knock && v.statistic > kCertainChange * v.threshold)
+    if (v.kind == MonitorResult::Kind::knock && v.statistic > kCertainChange * v.threshold)
       seen.changed_at = v.onset_frame;
   }
   return seen;

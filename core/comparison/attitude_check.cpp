@@ -10,16 +10,16 @@ void AttitudeCheck::add(const Vec2& place, double sigma, double yaw) noexcept {
   // A step four sigmas long has a course good to some 15 degrees; longer steps cut bends.
   constexpr double kSigmas = 4, kShortest = 2, kLongest = 10;  // m
   // Twice the course error of the shortest step.
-  constexpr double kMostOff = 30 * std::numbers::pi / 180;
+  constexpr double kMaxOff = 30 * std::numbers::pi / 180;
   if (!anchor_) anchor_ = place;
   const Vec2 step = place - *anchor_;
   // A position jump or an outage counts as one long step.
-  constexpr double kMostOfStep = 20;  // m
-  const double length = std::min(step.norm(), kMostOfStep);
+  constexpr double kMaxOfStep = 20;  // m
+  const double length = std::min(step.norm(), kMaxOfStep);
   if (length < std::clamp(kSigmas * sigma, kShortest, kLongest)) return;
   anchor_ = place;
   course_ = std::atan2(step.y(), step.x());
-  const bool off = std::abs(std::remainder(*course_ - yaw, 2 * std::numbers::pi)) > kMostOff;
+  const bool off = std::abs(std::remainder(*course_ - yaw, 2 * std::numbers::pi)) > kMaxOff;
   against_ = off ? against_ + length : 0;
   with_ = off ? 0 : with_ + length;
   (off ? all_against_ : all_with_) += length;

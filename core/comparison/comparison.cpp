@@ -40,7 +40,7 @@ Comparison::Comparison(const ComparisonOptions& options, Arena& arena)
     : options_(options), ins_(options_, counters_, arena), builder_(options_, arena) {}
 
 std::size_t Comparison::bytes_needed(const ComparisonOptions& options) noexcept {
-  return InsHistory::bytes_needed(options) + PlacementBuilder::bytes_needed();
+  return InsHistory::bytes_needed(options) + EnuAlignmentBuilder::bytes_needed();
 }
 
 void Comparison::add(const PoseSample& pose) noexcept {
@@ -56,7 +56,7 @@ bool Comparison::ready(const PoseSample& pose) const noexcept {
          options_.max_wait;
 }
 
-EarthPose Comparison::on_earth(const Transform& T_enu_left) const {
+EnuPose Comparison::in_enu(const Transform& T_enu_left) const {
   const Vec3 view = T_enu_left.R.col(2);
   return {T_enu_left, ins_.plane().to_geodetic(T_enu_left.t), std::atan2(view.y(), view.x())};
 }
@@ -88,7 +88,7 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.ins = ins_.reference_at(pose.stamp, &reference);
   c.ins_valid = c.ins == InsMatch::ok;
   if (c.ins_valid) {
-    c.reference = on_earth(reference.T_enu_left);
+    c.reference = in_enu(reference.T_enu_left);
     c.ins_position_sigma = reference.sigmas.position;
     c.height_known = !reference.flat;
   } else {
@@ -102,7 +102,7 @@ bool Comparison::next(ComparedPose* out) noexcept {
   }
 
   const bool posed = pose.status != PoseStatus::lost && pose.T_world_left.finite();
-  const bool restarted = pose.reason == Reason::scene_restarted;
+  const bool restarted = pose.reason == Reason::map_reset;
   if (restarted && !restarted_) builder_.restart();
   restarted_ = restarted;
   if (posed && c.ins_valid) {
@@ -114,9 +114,9 @@ bool Comparison::next(ComparedPose* out) noexcept {
   c.path_ratio = ratio_.value();
   c.scale_disagrees = ratio_.disagrees();
 
-  const Placement& placement = builder_.placement();
-  c.placed = posed && placement.revision > 0;
-  if (c.placed) c.ours = on_earth(placement.T_enu_world * pose.T_world_left);
+  const EnuAlignment& alignment = builder_.alignment();
+  c.placed = posed && alignment.revision > 0;
+  if (c.placed) c.ours = in_enu(alignment.T_enu_world * pose.T_world_left);
   c.compared = c.placed && c.ins_valid;
   if (c.compared) {
     c.error_enu = c.ours.T_enu_left.t - c.reference.T_enu_left.t;

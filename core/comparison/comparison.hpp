@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <span>
 
+#include "core/comparison/enu_alignment_builder.hpp"
 #include "core/comparison/geodesy.hpp"
 #include "core/comparison/ins_history.hpp"
 #include "core/comparison/path_ratio.hpp"
-#include "core/comparison/placement_builder.hpp"
 #include "core/math/se3.hpp"
 #include "core/memory/arena.hpp"
 #include "core/types/ins_sample.hpp"
@@ -19,15 +19,15 @@ struct ComparisonOptions {
   /// p_ins = T_ins_left * p_left; made by mount_of() from the configuration's lever arm and
   /// boresight.
   Transform T_ins_left{};
-  /// m driven with a valid fix, after which the placement is fitted and frozen. > 0
-  double placement_m = 100.0;
-  /// s: for so long the INS's position errors resemble one another; sets the placement's sigma. > 0
+  /// m driven with a valid fix, after which the alignment is fitted and frozen. > 0
+  double alignment_distance_m = 100.0;
+  /// s: for so long the INS's position errors resemble one another; sets the alignment's sigma. > 0
   double correlation_s = 10.0;
   /// Used where a sample gives no sigma of its own. > 0
   double position_sigma_m = 2.5;
   double height_sigma_m = 5.0;
   double tilt_sigma_rad = 0.0087;  // half a degree
-  /// Of the INS's heading with all that lies between it and the camera's axes, for the placement;
+  /// Of the INS's heading with all that lies between it and the camera's axes, for the alignment;
   /// 0: the heading is the positions' alone, as it must be where nobody knows the mount to a
   /// degree.
   double heading_sigma_rad = 0;
@@ -67,7 +67,7 @@ enum class InsMatch : std::uint8_t {
 [[nodiscard]] const char* to_string(InsMatch) noexcept;
 
 /// A place and a direction of the left camera on the earth.
-struct EarthPose {
+struct EnuPose {
   Transform T_enu_left{};
   Geodetic position{};
   double yaw = 0;  // rad, of the camera's view in the horizontal plane, counter-clockwise from east
@@ -79,10 +79,10 @@ struct ComparedPose {
   PoseSample pose{};
   InsMatch ins = InsMatch::none;
   bool ins_valid = false;
-  bool placed = false;    // the pose is not lost and there is a placement
+  bool placed = false;    // the pose is not lost and there is a alignment
   bool compared = false;  // both: the errors mean something
-  EarthPose ours{};
-  EarthPose reference{};          // the INS brought to the left camera and to the frame's stamp
+  EnuPose ours{};
+  EnuPose reference{};            // the INS brought to the left camera and to the frame's stamp
   double ins_position_sigma = 0;  // m, horizontal, each axis: the larger of the two samples'
                                   // around the frame
   bool height_known = false;      // the INS measured its height; else error_enu.z() is 0
@@ -108,7 +108,7 @@ struct ComparisonCounters {
   std::uint64_t pushed_out = 0;  // poses that went out before their time because the queue was full
 };
 
-/// Our poses against a geodetic INS, frame by frame: interpolation, placement on the earth, errors,
+/// Our poses against a geodetic INS, frame by frame: interpolation, alignment on the earth, errors,
 /// scale (DESIGN §6).
 ///
 ///     Arena arena(Comparison::bytes_needed(options));
@@ -122,9 +122,9 @@ struct ComparisonCounters {
 ///            values out.
 /// Threads    One thread calls everything. Rings bring samples and poses to it.
 /// Memory     ins_capacity samples (the oldest goes), kPending poses (the oldest goes out at once,
-///            counted), a fixed number of placement pairs. An hour or a year makes no difference.
-/// Time       Constant a call, but for the call that fits the placement (linear in
-/// PlacementBuilder::kPairs,
+///            counted), a fixed number of alignment pairs. An hour or a year makes no difference.
+/// Time       Constant a call, but for the call that fits the alignment (linear in
+/// EnuAlignmentBuilder::kPairs,
 ///            well under a millisecond).
 /// Frames     `enu` has its origin at the first valid fix. `world` is the odometry's.
 /// Errors     Nothing throws after construction. What is missing is said in each ComparedPose.
@@ -148,28 +148,28 @@ class Comparison {
   /// was. Call until false.
   [[nodiscard]] bool next(ComparedPose* out) noexcept;
   /// No more samples will come: everything pending goes out by next(), and a drive too short for
-  /// the placement is placed with what there is once the last has gone.
+  /// the alignment is placed with what there is once the last has gone.
   void finish() noexcept { finishing_ = true; }
 
   /// revision 0: none yet.
-  [[nodiscard]] const Placement& placement() const noexcept { return builder_.placement(); }
+  [[nodiscard]] const EnuAlignment& alignment() const noexcept { return builder_.alignment(); }
   /// Why the last attempt gave none, while the drive is too short or its way does not hold a
   /// heading.
-  [[nodiscard]] PlacementStatus placement_status() const noexcept { return builder_.status(); }
+  [[nodiscard]] EnuAlignmentStatus alignment_status() const noexcept { return builder_.status(); }
   [[nodiscard]] bool has_origin() const noexcept { return ins_.has_origin(); }
   [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return ins_.plane(); }
   [[nodiscard]] const ComparisonCounters& counters() const noexcept { return counters_; }
 
  private:
   [[nodiscard]] bool ready(const PoseSample& pose) const noexcept;
-  [[nodiscard]] EarthPose on_earth(const Transform& T_enu_left) const;
-  /// The pose is where the INS says: scale and placement take it in.
+  [[nodiscard]] EnuPose in_enu(const Transform& T_enu_left) const;
+  /// The pose is where the INS says: scale and alignment take it in.
   void take(const ComparedPose& c, const InsHistory::Reference& reference) noexcept;
 
   const ComparisonOptions options_;
   ComparisonCounters counters_{};
   InsHistory ins_;
-  PlacementBuilder builder_;
+  EnuAlignmentBuilder builder_;
   PathRatio ratio_;
   std::array<PoseSample, kPending> pending_{};
   std::uint64_t pending_begin_ = 0, pending_end_ = 0;

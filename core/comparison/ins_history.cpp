@@ -13,7 +13,7 @@ constexpr double kFastest = 60.0;  // m/s: no vehicle that carries this rig
 // An INS whose clock has gone back and stays there: its refused stamps go on for so long, whatever
 // its rate.
 constexpr Duration kBackForGood = Duration::seconds(1);
-constexpr int kLeastBack = 3;  // samples: two stamps are a mistake as soon as a clock
+constexpr int kMinBack = 3;  // samples: two stamps are a mistake as soon as a clock
 constexpr double kQuaternionLength = 0.1;
 constexpr double kHorizontal = 0.5;      // of a unit vector: less says little of a heading
 constexpr double kUnknownHeight = 1000;  // m: sigma of a height that is not measured
@@ -62,7 +62,7 @@ bool InsHistory::back_for_good(Stamp stamp) noexcept {
   if (refused_.count == 0 || stamp <= refused_.last) refused_ = {0, stamp, stamp};
   ++refused_.count;
   refused_.last = stamp;
-  return refused_.count >= kLeastBack && refused_.last - refused_.first >= kBackForGood;
+  return refused_.count >= kMinBack && refused_.last - refused_.first >= kBackForGood;
 }
 
 void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {

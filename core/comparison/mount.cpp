@@ -201,8 +201,8 @@ bool Fit::start(const Mat3& nominal) {
          way_ref * way_est.transpose();  // a radian weighs as 20 m
     way += way_est.norm();
   }
-  constexpr double kLeastWay = 10;  // m
-  if (way < kLeastWay) return false;
+  constexpr double kMinWay = 10;  // m
+  if (way < kMinWay) return false;
   const auto rotation_of = [](const Mat3& M) {
     const Svd3 s = svd(M);
     const Vec3 d(1, 1, (s.U * s.V.transpose()).determinant());
@@ -236,17 +236,17 @@ void Fit::learn_noise(const std::vector<Errors>& all) {
         n += 1;
       }
     }
-    constexpr double kMost =
+    constexpr double kMax =
         0.998;  // a random walk as good as: beyond it the mean is lost to rounding
     double memory = now > 0 ? lagged / now : 0;
     // A short series seems to forget faster than it does (Kendall 1954), and fitted parameters have
     // taken their share.
     memory = std::clamp(memory + (1 + 3 * memory) / std::max(8.0, static_cast<double>(all.size())),
-                        0.0, kMost);
+                        0.0, kMax);
     constexpr int kVelocity = 4;
     if (c != kVelocity)
       memory = std::max(
-          memory, std::exp(-options_.step.to_seconds() / options_.least_correlation.to_seconds()));
+          memory, std::exp(-options_.step.to_seconds() / options_.min_correlation.to_seconds()));
     double white = 0;
     for (std::size_t i = 1; i < all.size(); ++i) {
       if (!moments_[i].follows) continue;
@@ -254,10 +254,10 @@ void Fit::learn_noise(const std::vector<Errors>& all) {
         if (kChannel[static_cast<std::size_t>(k)] == c)
           white += std::pow(all[i][k] - memory * all[i - 1][k], 2) / n;
     }
-    constexpr std::array<double, kChannels> kLeast{
+    constexpr std::array<double, kChannels> kMin{
         1e-5, 1e-5, 1e-4, 1e-4, 1e-4};  // rad, m, m/s: an ideal reference has some noise, too
     noise_[static_cast<std::size_t>(c)] = {
-        memory, std::max(std::sqrt(white), kLeast[static_cast<std::size_t>(c)])};
+        memory, std::max(std::sqrt(white), kMin[static_cast<std::size_t>(c)])};
   }
 }
 
@@ -367,8 +367,8 @@ bool Fit::settle() {
     if (!step(&d)) return false;
     state_ = moved(state_, d);
     state_.offset = std::clamp(state_.offset, -kLargest, kLargest);
-    constexpr int kLeastRounds = 6;  // for the correlations
-    if (round >= kLeastRounds && d.dot(information_ * d) < kSettled * kSettled)
+    constexpr int kMinRounds = 6;  // for the correlations
+    if (round >= kMinRounds && d.dot(information_ * d) < kSettled * kSettled)
       return std::abs(state_.offset) < kLargest;
   }
   return false;
@@ -389,9 +389,9 @@ MountStatus Fit::run(const Mat3& nominal, Mount* mount) {
 
 }  // namespace
 
-MountStatus estimate_mount(std::span<const StampedPose> estimate,
-                           std::span<const MountReference> reference, const Mat3& nominal,
-                           const MountOptions& options, Mount* mount) {
+MountStatus estimate_ins_extrinsics(std::span<const StampedPose> estimate,
+                                    std::span<const MountReference> reference, const Mat3& nominal,
+                                    const MountOptions& options, Mount* mount) {
   if (estimate.size() < kMountMoments || reference.size() < 2) return MountStatus::too_few;
   const Duration interval = interval_of(reference);
   MountOptions spaced = options;

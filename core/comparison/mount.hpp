@@ -38,7 +38,7 @@ struct MountOptions {
   // Between the moments that are compared, as nearly as the reference's readings give it.
   Duration step = Duration::milliseconds(500);
   Duration max_gap = Duration::milliseconds(200);  // of the estimate, that is bridged
-  Duration least_correlation = Duration::seconds(
+  Duration min_correlation = Duration::seconds(
       60);  // of attitude and place: a drive is too short to tell how slowly they wander
   // A parameter whose sigma is above this is `not_observable`.
   double rotation_sigma = 0.035;  // rad, two degrees: as much as the drawing knows
@@ -77,10 +77,10 @@ struct Mount {
 /// `nominal`: how the bodies are turned by the drawing; rotations are told against it, and it
 /// stands where the drive tells none. Stamps ascend (precondition). Memory: the heap; not for the
 /// real-time path. Time: linear in the moments, kMountRounds rounds. Not `ok`: *mount untouched.
-[[nodiscard]] MountStatus estimate_mount(std::span<const StampedPose> estimate,
-                                         std::span<const MountReference> reference,
-                                         const Mat3& nominal, const MountOptions& options,
-                                         Mount* mount);
+[[nodiscard]] MountStatus estimate_ins_extrinsics(std::span<const StampedPose> estimate,
+                                                  std::span<const MountReference> reference,
+                                                  const Mat3& nominal, const MountOptions& options,
+                                                  Mount* mount);
 
 /// Of whitening at most; drives with an INS's errors take 7 to 16.
 inline constexpr int kMountRounds = 24;

@@ -233,9 +233,9 @@ TrajectoryEvaluation evaluate(std::span<const StampedPose> estimate,
   out.before = m.before;
   out.after = m.after;
   out.gap = m.gap;
-  constexpr std::size_t kLeast = 3;  // positions that can hold a rotation
+  constexpr std::size_t kMin = 3;  // positions that can hold a rotation
   out.status = out.matched == 0                             ? EvaluationStatus::no_match
-               : out.matched < kLeast                       ? EvaluationStatus::too_few
+               : out.matched < kMin                         ? EvaluationStatus::too_few
                : !(moves(m.estimate) && moves(m.reference)) ? EvaluationStatus::no_motion
                                                             : EvaluationStatus::ok;
   if (out.status != EvaluationStatus::ok) return out;

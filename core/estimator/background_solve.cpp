@@ -7,7 +7,7 @@ namespace vergence {
 namespace {
 
 // Frames after a snapshot, for the gates to have frames that were not in it.
-constexpr int kLeastHeldOut = 6;
+constexpr int kMinHeldOut = 6;
 
 }  // namespace
 
@@ -37,7 +37,7 @@ void BackgroundSolve::start(const calibration::TrackLog& log, const Start& start
   running_ = true;
   discarded_ = false;
   frames_since_start_ = 0;
-  next_turn_ = std::min(kLeastHeldOut, options_.calibration.adopt_after);
+  next_turn_ = std::min(kMinHeldOut, options_.calibration.adopt_after);
   runner_.start(TaskRef(task_));
 }
 
@@ -77,7 +77,7 @@ bool BackgroundSolve::last_turn() const noexcept {
 }
 
 void BackgroundSolve::postpone() noexcept {
-  next_turn_ = std::min(next_turn_ + kLeastHeldOut, options_.calibration.adopt_after);
+  next_turn_ = std::min(next_turn_ + kMinHeldOut, options_.calibration.adopt_after);
 }
 
 void BackgroundSolve::finish() noexcept {

@@ -11,16 +11,16 @@ namespace vergence {
 /// The reasons for which poses can be doubted. Where several doubts stand, the first of them here
 /// names the reason.
 enum class Doubt : std::uint8_t {
-  pairing,       // this frame's images are contradicted to have been exposed together
-  scene,         // the map was rebuilt
-  frame,         // this frame's images, matches or geometry: FrameOutcome::reason
-  out_of_step,   // a camera's images are of another instant
-  late_image,    // a camera may be an exposure behind
-  rig,           // something is wrong with the rig, or it is being recalibrated
-  calibration,   // the drive has not confirmed the calibration that poses stand on
-  moving_scene,  // points of this frame or the last ones do not move as one rigid scene
-  window,        // the window still holds frames that were doubted
-  motion,        // this motion is less certain than the drive's others
+  pairing,        // this frame's images are contradicted to have been exposed together
+  scene,          // the map was rebuilt
+  frame,          // this frame's images, matches or geometry: FrameOutcome::reason
+  out_of_sync,    // a camera's images are of another instant
+  late_image,     // a camera may be an exposure behind
+  rig,            // something is wrong with the rig, or it is being recalibrated
+  calibration,    // the drive has not confirmed the calibration that poses stand on
+  dynamic_scene,  // points of this frame or the last ones do not move as one rigid scene
+  window,         // the window still holds frames that were doubted
+  motion,         // this motion is less certain than the drive's others
 };
 inline constexpr std::size_t kDoubts = static_cast<std::size_t>(Doubt::motion) + 1;
 
@@ -28,7 +28,7 @@ inline constexpr std::size_t kDoubts = static_cast<std::size_t>(Doubt::motion) +
 /// evidence against it end it (METHOD §7.4). A pose is `ok` while the ledger is empty; else it is
 /// `degraded` for the strongest reason.
 ///
-///     ledger.enter(Doubt::scene, Reason::scene_restarted, frame.number, 10);
+///     ledger.enter(Doubt::scene, Reason::map_reset, frame.number, 10);
 ///     if (const DoubtLedger::Entry* why = ledger.strongest(true)) use(why->reason);
 ///     ledger.weaken(Doubt::scene);  // a frame that speaks against it
 ///

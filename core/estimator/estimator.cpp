@@ -106,22 +106,22 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     if (out.posed) {
       const bool linked = p.odometry.linked() == odometry::Link::linked;
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
-      if (!linked && (p.calibrator.seeking() || p.calibrator.monitor().scene_pending()))
-        p.watch_sought(out, frame);
+      if (!linked && (p.calibrator.seeking() || p.calibrator.monitor().map_reset_pending()))
+        p.watch_estimate(out, frame);
       // Of cameras out of step there is no calibration, also where no lag shows for a while.
-      if (!p.doubts.stands(Doubt::out_of_step) || p.state != State::stereo_odometry)
+      if (!p.doubts.stands(Doubt::out_of_sync) || p.state != State::stereo_odometry)
         p.calibrator.frames().take(p.odometry, out, frame);
     }
   }
   p.odometry.rebuild(&out);
   if (p.options.online) {
     if (out.relinked) {
-      p.calibrator.scene_rebuilt(p.odometry);
+      p.calibrator.map_rebuilt(p.odometry);
       if (out.relink_due)
         p.note(EstimatorEvent::Kind::calibration_taken_up, frame.stamp,
                "the scene is seen through the calibration adopted", 100 * out.points_kept);
     }
-    if (out.renewed) p.calibrator.monitor().scene_renewed(p.odometry.map());
+    if (out.renewed) p.calibrator.monitor().map_renewed(p.odometry.map());
     p.calibrate(frame);
   }
   sample.state = p.state;

@@ -51,15 +51,15 @@ struct EstimatorEvent {
   Stamp stamp{};
   enum class Kind : std::uint8_t {
     state,
-    scene_restarted,
+    map_reset,
     time_gap,
     relocalised,
     dropped,
     rig_changed,  // the monitor raised, or the user asked; value: frames since the onset
-    out_of_step,  // the cameras' images are not of the same instant; value: the lag in frames, 0
+    out_of_sync,  // the cameras' images are not of the same instant; value: the lag in frames, 0
                   // where it is not known
-    in_step,      // cameras that were out of step are so no more
-    calibration_confirmed,      // the drive has confirmed the calibration in use; value: its depth
+    cameras_in_sync,            // cameras that were out of step are so no more
+    calibration_verified,       // the drive has confirmed the calibration in use; value: its depth
                                 // error, %
     calibration_contradicted,   // the drive has shown that it is not the rig's; value: how far off
                                 // its depths are, %
@@ -69,7 +69,7 @@ struct EstimatorEvent {
     calibration_rejected,       // why: the reason; value: frames
     calibration_taken_up,  // the scene is seen through the calibration that was accepted; value:
                            // share of its points that fit it, %
-    calibration_waits,     // why: what is missing to calibrate
+    calibration_pending,   // why: what is missing to calibrate
     calibration_resumed,   // the one before the last, or from before an alarm, is in use again:
                            // the scene was lost, and the images fit this one
   } kind = Kind::state;
@@ -98,7 +98,7 @@ struct EstimatorEvent {
 ///            Adoption::after_fixed_frames. request_recalibration(): any thread.
 /// Memory     All of it from the arena in the constructor. process() allocates nothing, nor does
 ///            the solver's task.
-/// Errors     The constructor throws (std::invalid_argument with a sentence, std::length_error).
+/// Errors     The constructor throws (std::invalid_argument with a message, std::length_error).
 ///            process() never does.
 class Estimator {
  public:

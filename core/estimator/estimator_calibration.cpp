@@ -11,16 +11,16 @@ namespace {
 constexpr std::uint64_t kDriftFrames = 60;  // of a creeping rig that are taken for one
 
 /// From which frame on the tracks tell of the rig as it is now.
-std::uint64_t first_frame_of_use(const RigVerdict& v, std::uint64_t now) noexcept {
-  using K = calibration::MonitorVerdict::Kind;
+std::uint64_t first_frame_of_use(const RigAssessment& v, std::uint64_t now) noexcept {
+  using K = calibration::MonitorResult::Kind;
   if (v.kind == K::collapse) return now;  // until now there were wrong matches only
   // A rig that creeps is another one by and by.
   if (v.kind == K::drift) return std::max(v.onset_frame, now - std::min(now, kDriftFrames));
   return v.onset_frame;
 }
 
-CalibrationCause cause_of(calibration::MonitorVerdict::Kind kind) noexcept {
-  using K = calibration::MonitorVerdict::Kind;
+CalibrationCause cause_of(calibration::MonitorResult::Kind kind) noexcept {
+  using K = calibration::MonitorResult::Kind;
   switch (kind) {
     case K::drift:
       return CalibrationCause::drift;
@@ -44,7 +44,7 @@ const char* sentence_of(CalibrationCause cause) noexcept {
     case CalibrationCause::collapse:
       return "left and right hardly match any more: a camera was knocked far off or is out of "
              "focus";
-    case CalibrationCause::out_of_step:
+    case CalibrationCause::out_of_sync:
       return "the cameras' images are not of the same instant";
     case CalibrationCause::requested:
       return "a new calibration is asked for";
@@ -92,36 +92,36 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
   odometry.reset_extrinsics();
 }
 
-void Estimator::Parts::note_out_of_step(Stamp stamp, double lag_frames) noexcept {
-  if (!doubts.stands(Doubt::out_of_step))
-    note(EstimatorEvent::Kind::out_of_step, stamp, sentence_of(CalibrationCause::out_of_step),
+void Estimator::Parts::record_out_of_sync(Stamp stamp, double lag_frames) noexcept {
+  if (!doubts.stands(Doubt::out_of_sync))
+    note(EstimatorEvent::Kind::out_of_sync, stamp, sentence_of(CalibrationCause::out_of_sync),
          lag_frames);
-  doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, 1);
+  doubts.enter(Doubt::out_of_sync, Reason::out_of_sync, last_number, 1);
   calibrator.monitor().question_pairing();
   // Frames out of step would speak for a lag in the monitor's windows long after its end; those
   // logged for a calibration are dropped with them.
-  calibrator.forget_frames();
+  calibrator.clear_frames();
 }
 
 /// What the monitors say of a frame posed with the calibration in use.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
-  using K = calibration::MonitorVerdict::Kind;
-  const RigVerdict v = calibrator.monitor().update(odometry, out, frame, calibrator.verified());
+  using K = calibration::MonitorResult::Kind;
+  const RigAssessment v = calibrator.monitor().update(odometry, out, frame, calibrator.verified());
   doubts.hold(Doubt::rig, v.undecided, Reason::recalibrating, frame.number);
   if (v.lag_frames != 0) {
-    note_out_of_step(frame.stamp, v.lag_frames);
+    record_out_of_sync(frame.stamp, v.lag_frames);
     return;
   }
-  if (v.in_step) {
+  if (v.cameras_in_sync) {
     doubts.strike(Doubt::late_image);
-    if (doubts.weaken(Doubt::out_of_step)) {
-      note(EstimatorEvent::Kind::in_step, frame.stamp, "the cameras are in step again", 0);
-      calibrator.forget_frames();
+    if (doubts.weaken(Doubt::out_of_sync)) {
+      note(EstimatorEvent::Kind::cameras_in_sync, frame.stamp, "the cameras are in step again", 0);
+      calibrator.clear_frames();
     }
   }
   // A rig out of step fits no calibration: what else the monitor says is of no use until that is
   // over.
-  if (doubts.stands(Doubt::out_of_step)) return;
+  if (doubts.stands(Doubt::out_of_sync)) return;
   if (v.kind == K::collapse) {
     give_up_calibration(frame,
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
@@ -132,21 +132,22 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
 
 /// A rig that changes while it is sought: frames before and after are never one solve, and those
 /// after do not confirm those before.
-void Estimator::Parts::watch_sought(const odometry::FrameOutcome& out,
-                                    const RigFrame& frame) noexcept {
+void Estimator::Parts::watch_estimate(const odometry::FrameOutcome& out,
+                                      const RigFrame& frame) noexcept {
   const auto onset = calibrator.monitor().update_unlinked(odometry, out, frame.number);
   if (!onset) return;
   if (!calibrator.seeking()) return doubt(CalibrationCause::knock, *onset, frame);
   note(EstimatorEvent::Kind::rig_changed, frame.stamp,
        "a camera was knocked while the calibration was sought",
        static_cast<double>(frame.number - *onset));
-  seek_anew(calibrator.calibrated() ? CalibrationCause::knock : CalibrationCause::from_scratch,
-            *onset, frame);
+  restart_estimation(
+      calibrator.calibrated() ? CalibrationCause::knock : CalibrationCause::from_scratch, *onset,
+      frame);
 }
 
 /// What the search has so far is of another rig. No cause: that of the search.
-void Estimator::Parts::seek_anew(std::optional<CalibrationCause> cause, std::uint64_t onset,
-                                 const RigFrame& frame) noexcept {
+void Estimator::Parts::restart_estimation(std::optional<CalibrationCause> cause,
+                                          std::uint64_t onset, const RigFrame& frame) noexcept {
   calibrator.seek(cause, onset, frame.number);
   if (state == State::calibrating) transition(Trigger::calibration_rejected, frame.stamp);
 }
@@ -166,33 +167,32 @@ void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
 
 /// How far lengths may be off now: a calibration that is adopted by its own sigma, one that stays
 /// also by what the drive measured beside it.
-void Estimator::Parts::note_length_sigma(const CalibrationDecision& decision) noexcept {
+void Estimator::Parts::record_length_sigma(const CalibrationDecision& decision) noexcept {
   if (!(decision.depth_sigma_percent > 0)) return;
   if (decision.accepted)
     length_sigma_percent = decision.depth_sigma_percent;
   else if (odometry.linked() == odometry::Link::linked && calibrator.verified())
-    length_sigma_percent =
-        std::hypot(decision.depth_sigma_percent, decision.depth_difference_percent);
+    length_sigma_percent = std::hypot(decision.depth_sigma_percent, decision.depth_error_percent);
 }
 
 /// A calibration is adopted. Poses stand on it once the scene is seen through it; until then what
 /// is known against the one before it counts.
 void Estimator::Parts::adopt(const CalibrationDecision& decision) noexcept {
   doubts.strike(Doubt::rig);
-  confirmed_percent = decision.depth_sigma_percent;
+  verified_percent = decision.depth_sigma_percent;
   doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number,
                decision.verified ? 1 : DoubtLedger::kUntilStruck);
   odometry.link(decision.calibration);
 }
 
 /// What the drive has measured of the rig while it went on.
-void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept {
-  if (calibrator.last_gate() == calibration::Gate::out_of_step) return note_out_of_step(stamp, 0);
+void Estimator::Parts::take_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept {
+  if (calibrator.last_gate() == calibration::Gate::out_of_sync) return record_out_of_sync(stamp, 0);
   const bool was_doubted = doubts.stands(Doubt::calibration),
              contradicted = decision.cause == CalibrationCause::contradicted;
   if (contradicted && was_doubted)
     note(EstimatorEvent::Kind::calibration_contradicted, stamp,
-         "the calibration in use is not that of the rig", decision.depth_difference_percent);
+         "the calibration in use is not that of the rig", decision.depth_error_percent);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
          decision.calibration.frames);
@@ -202,16 +202,16 @@ void Estimator::Parts::take_learnt(const CalibrationDecision& decision, Stamp st
   if (decision.verified && !contradicted) {
     // The poses until now are confirmed, too: they stand on what is refined, at most.
     doubts.strike(Doubt::calibration);
-    confirmed_percent = decision.depth_sigma_percent;
-    if (was_doubted) notify_confirmed(stamp);
+    verified_percent = decision.depth_sigma_percent;
+    if (was_doubted) notify_verified(stamp);
   } else if (!calibrator.verified() && !doubts.stands(Doubt::calibration)) {
     doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number);
   }
 }
 
-void Estimator::Parts::notify_confirmed(Stamp stamp) noexcept {
-  note(EstimatorEvent::Kind::calibration_confirmed, stamp,
-       "the drive confirms the calibration in use", confirmed_percent);
+void Estimator::Parts::notify_verified(Stamp stamp) noexcept {
+  note(EstimatorEvent::Kind::calibration_verified, stamp,
+       "the drive confirms the calibration in use", verified_percent);
 }
 
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
@@ -221,10 +221,10 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
          "the focal length given is not that of these images", decision.focal.measured_px);
   focal_contradicted = decision.focal.contradicted;
   if (decision.learnt) {
-    take_learnt(decision, stamp);
-    return note_length_sigma(decision);
+    take_refinement(decision, stamp);
+    return record_length_sigma(decision);
   }
-  note_length_sigma(decision);
+  record_length_sigma(decision);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
          decision.calibration.frames);
@@ -240,10 +240,10 @@ void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) no
       calibrator.keep();
       doubts.strike(Doubt::rig);
       odometry.link(calibrator.in_use());
-      transition(Trigger::calibration_kept, stamp);
+      transition(Trigger::calibration_saved, stamp);
       break;
-    case calibration::Gate::out_of_step:
-      doubts.enter(Doubt::out_of_step, Reason::out_of_step, last_number, 1);
+    case calibration::Gate::out_of_sync:
+      doubts.enter(Doubt::out_of_sync, Reason::out_of_sync, last_number, 1);
       calibrator.monitor().question_pairing();
       [[fallthrough]];
     default:
@@ -256,10 +256,10 @@ void Estimator::Parts::notify_missing(Stamp stamp) noexcept {
   if (missing == notified_missing) return;
   notified_missing = missing;
   if (missing == Reason::needs_motion)
-    note(EstimatorEvent::Kind::calibration_waits, stamp,
+    note(EstimatorEvent::Kind::calibration_pending, stamp,
          "the rig has to move before it can be calibrated", 0);
   else if (missing == Reason::needs_near_structure)
-    note(EstimatorEvent::Kind::calibration_waits, stamp,
+    note(EstimatorEvent::Kind::calibration_pending, stamp,
          "nearer things have to be seen before the rig can be calibrated", 0);
 }
 

@@ -40,7 +40,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   in_gap = out.gap_s > 0 && !out.posed;
   // Images of two instants match by no calibration: cameras that are or may be out of step say
   // nothing against it.
-  const bool unmatched = !out.posed && out.images_good && !doubts.stands(Doubt::out_of_step) &&
+  const bool unmatched = !out.posed && out.images_good && !doubts.stands(Doubt::out_of_sync) &&
                          !doubts.stands(Doubt::late_image) &&
                          out.reason == Reason::no_stereo_matches &&
                          odometry.linked() == odometry::Link::linked;
@@ -53,7 +53,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     doubts.enter(Doubt::late_image, Reason::image_repeated, frame.number, kLagShownAfter);
     calibrator.monitor().question_pairing();
     // Frames from before and frames out of step would be one solve, and a rig that is neither's.
-    if (calibrator.seeking()) seek_anew(std::nullopt, frame.number, frame);
+    if (calibrator.seeking()) restart_estimation(std::nullopt, frame.number, frame);
   }
   moves = out.posed && !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_of(out));
   if (!out.posed) {
@@ -81,7 +81,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     calibrator.seek(CalibrationCause::from_scratch, 0, frame.number);
   }
   if (out.restarted) {
-    note(EstimatorEvent::Kind::scene_restarted, frame.stamp,
+    note(EstimatorEvent::Kind::map_reset, frame.stamp,
          "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
     lose_track_of_rig(frame.number);
   }
@@ -93,7 +93,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
 /// Frames were missed in which nobody watched the rig: the drive has to confirm the calibration
 /// again.
 void Estimator::Parts::lose_track_of_rig(std::uint64_t number) noexcept {
-  calibrator.scene_lost();
+  calibrator.map_lost();
   if (options.online && !doubts.stands(Doubt::calibration))
     doubts.enter(Doubt::calibration, Reason::unverified_calibration, number);
 }
@@ -122,7 +122,7 @@ void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* 
 void Estimator::Parts::doubt_motion(const odometry::FrameOutcome& out, const Mat6& motion,
                                     double step_m) noexcept {
   doubts.strike(Doubt::motion);
-  if (doubts.any_up_to(Doubt::rig) || doubts.stands(Doubt::moving_scene)) return;
+  if (doubts.any_up_to(Doubt::rig) || doubts.stands(Doubt::dynamic_scene)) return;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
   const WindowCorrection correction{out.corrected.t.norm(), step_m, sigma_m};
   const bool unusual = usual.judges(step_m, sigma_m) && usual.unusual(sigma_m);
@@ -132,15 +132,15 @@ void Estimator::Parts::doubt_motion(const odometry::FrameOutcome& out, const Mat
 
 /// What a posed frame gives to doubt.
 void Estimator::Parts::renew_doubts(const odometry::FrameOutcome& out, Pairing pairing) noexcept {
-  doubts.hold(Doubt::pairing, pairing == Pairing::contradicted, Reason::unproven_pairing,
+  doubts.hold(Doubt::pairing, pairing == Pairing::contradicted, Reason::pairing_ambiguous,
               last_number);
   if (out.restarted)
-    doubts.enter(Doubt::scene, Reason::scene_restarted, last_number, kRestartedFrames + 1);
+    doubts.enter(Doubt::scene, Reason::map_reset, last_number, kRestartedFrames + 1);
   doubts.hold(Doubt::frame, out.status != PoseStatus::ok,
               out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason, last_number);
   if (state == State::recalibrating) doubts.enter(Doubt::rig, Reason::recalibrating, last_number);
   if (out.moving && !doubts.any_up_to(Doubt::rig))
-    doubts.enter(Doubt::moving_scene, Reason::moving_scene, last_number, kMovingFrames);
+    doubts.enter(Doubt::dynamic_scene, Reason::dynamic_scene, last_number, kMovingFrames);
   // What was wrong for some frames stays in the window's keyframes and points when it is over: the
   // window takes it back over the next frames, and their motions are off by it. So as many frames
   // as were doubted are doubted again, of a window at most.
@@ -155,19 +155,19 @@ void Estimator::Parts::renew_doubts(const odometry::FrameOutcome& out, Pairing p
 
 /// What a posed frame says against the doubts that stood for it.
 void Estimator::Parts::weaken_doubts(const odometry::FrameOutcome& out, Stamp stamp) noexcept {
-  for (const Doubt doubt : {Doubt::scene, Doubt::moving_scene, Doubt::window})
+  for (const Doubt doubt : {Doubt::scene, Doubt::dynamic_scene, Doubt::window})
     (void)doubts.weaken(doubt);
   // A rig that stands looks the same with a camera an exposure behind.
   if (moves && !out.uneven && !options.online) (void)doubts.weaken(Doubt::late_image);
   // The next pose stands on the calibration that was adopted.
-  if (out.relinked && doubts.weaken(Doubt::calibration)) notify_confirmed(stamp);
+  if (out.relinked && doubts.weaken(Doubt::calibration)) notify_verified(stamp);
 }
 
 /// What a pose of cameras that are not linked says of its calibration: the most particular that is
 /// known.
 Reason Estimator::Parts::why_uncalibrated() const noexcept {
   if (calibrator.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
-  if (doubts.stands(Doubt::out_of_step)) return Reason::out_of_step;
+  if (doubts.stands(Doubt::out_of_sync)) return Reason::out_of_sync;
   if (calibrator.missing() != Reason::none) return calibrator.missing();
   return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated
                                                                            : Reason::recalibrating;

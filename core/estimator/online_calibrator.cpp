@@ -13,10 +13,10 @@ namespace {
 using calibration::Gate;
 using calibration::RigSolution;
 
-constexpr int kMostDoublings = 4;  // of the frames between two solves
-constexpr double kGrow = 1.3;      // at least, of the frames between two solves
+constexpr int kMaxDoublings = 4;  // of the frames between two solves
+constexpr double kGrow = 1.3;     // at least, of the frames between two solves
 
-std::size_t most_tracks(const EstimatorOptions& o) noexcept {
+std::size_t max_tracks(const EstimatorOptions& o) noexcept {
   return static_cast<std::size_t>(o.odometry.features);
 }
 
@@ -27,17 +27,17 @@ double misfit_px(const CalibrationDecision& d) noexcept {
 }
 
 /// Another rig is adopted: what was learnt of the one before is no prior of it, but for the lenses.
-void forget_rig(std::optional<RigCalibration>* learnt) noexcept {
-  if (*learnt) calibration::forget_transforms(&**learnt);
+void clear_rig(std::optional<RigCalibration>* learnt) noexcept {
+  if (*learnt) calibration::clear_transforms(&**learnt);
 }
 
 }  // namespace
 
 std::size_t OnlineCalibrator::memory_needed(const EstimatorOptions& o,
                                             const RigCalibration& rig) noexcept {
-  return CalibrationFrames::memory_needed(o.calibration, most_tracks(o)) +
-         BackgroundSolve::memory_needed(o, rig.cameras, most_tracks(o)) +
-         RigMonitor::memory_needed(o.monitor, rig.cameras, most_tracks(o)) + kCacheLine;
+  return CalibrationFrames::memory_needed(o.calibration, max_tracks(o)) +
+         BackgroundSolve::memory_needed(o, rig.cameras, max_tracks(o)) +
+         RigMonitor::memory_needed(o.monitor, rig.cameras, max_tracks(o)) + kCacheLine;
 }
 
 OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCalibration& rig,
@@ -48,9 +48,9 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
       nominal_(nominal),
       state_(options.trust == CalibrationTrust::none ? CalibrationState::none
                                                      : CalibrationState::unverified),
-      frames_(options.calibration, most_tracks(options), arena),
-      solve_(options, rig, most_tracks(options), arena, solver),
-      monitor_(options.monitor, rig.cameras, most_tracks(options), arena) {
+      frames_(options.calibration, max_tracks(options), arena),
+      solve_(options, rig, max_tracks(options), arena, solver),
+      monitor_(options.monitor, rig.cameras, max_tracks(options), arena) {
   if (!calibrated()) return;
   monitor_.watch(rig_, false);
   monitor_.set_jump_reference(rig_);
@@ -64,7 +64,7 @@ void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
   rig_ = found.calibration;
   source_ = calibration::ClaimSource::this_drive;
   found_with_lenses_ = found.lenses;
-  forget_rig(&learnt_);
+  clear_rig(&learnt_);
   monitor_.expect_rebuilt_scene();
   frames_.begin_segment();
 }
@@ -72,7 +72,7 @@ void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
 void OnlineCalibrator::keep() noexcept {
   state_ = after(state_, CalibrationTrigger::kept);
   // What was learnt before the rig was doubted is no witness of it as it is.
-  if (search_.cause != CalibrationCause::requested) forget_rig(&learnt_);
+  if (search_.cause != CalibrationCause::requested) clear_rig(&learnt_);
   monitor_.expect_rebuilt_scene();
   frames_.begin_segment();
 }
@@ -90,20 +90,20 @@ void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
   monitor_.expect_rebuilt_scene();
 }
 
-void OnlineCalibrator::scene_rebuilt(const odometry::Odometry& odometry) noexcept {
-  monitor_.scene_rebuilt(odometry.map(), rig_, verified() && found());
+void OnlineCalibrator::map_rebuilt(const odometry::Odometry& odometry) noexcept {
+  monitor_.map_rebuilt(odometry.map(), rig_, verified() && found());
 }
 
-void OnlineCalibrator::forget_frames() noexcept {
+void OnlineCalibrator::clear_frames() noexcept {
   solve_.discard();
   frames_.clear();
   monitor_.reset();
 }
 
-void OnlineCalibrator::scene_lost() noexcept {
-  forget_rig(&learnt_);
-  forget_frames();
-  monitor_.scene_lost();
+void OnlineCalibrator::map_lost() noexcept {
+  clear_rig(&learnt_);
+  clear_frames();
+  monitor_.map_lost();
 }
 
 void OnlineCalibrator::seek(std::optional<CalibrationCause> cause, std::uint64_t onset,
@@ -138,7 +138,7 @@ void OnlineCalibrator::start_solve() noexcept {
     const calibration::TrackLog& log = frames_.log();
     const double hours = (log.frame(log.size() - 1).stamp - prior.found).to_seconds() / 3600.0;
     if (seeking())
-      calibration::forget_transforms(&prior);
+      calibration::clear_transforms(&prior);
     else
       calibration::let_drift(hours, options_.calibration, &prior);
   }
@@ -198,14 +198,14 @@ std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uin
   const SolutionReview now = review(last);
   // Frames of two rigs, or out of step, tell no focal length.
   const Gate gate = now.gate(now.measured(), false);
-  if (gate != Gate::rig_changed && gate != Gate::out_of_step)
+  if (gate != Gate::rig_changed && gate != Gate::out_of_sync)
     solve_.focal_check().take(frames_.solved_frames() >= frames_.most());
-  return solve_.sought() ? judge_sought(now, stamp, number)
-                         : judge_learnt(now, stamp, number, last);
+  return solve_.sought() ? evaluate_estimate(now, stamp, number)
+                         : evaluate_refinement(now, stamp, number, last);
 }
 
-CalibrationDecision OnlineCalibrator::judge_sought(const SolutionReview& review, Stamp stamp,
-                                                   std::uint64_t number) noexcept {
+CalibrationDecision OnlineCalibrator::evaluate_estimate(const SolutionReview& review, Stamp stamp,
+                                                        std::uint64_t number) noexcept {
   const RigSolution& found = review.sought();
   gate_ = review.gate(found);
   CalibrationDecision d = review.decision(found, stamp);
@@ -236,7 +236,7 @@ void OnlineCalibrator::plan_search(const RigSolution& found) noexcept {
     // The same frames would say the same again; and what is rejected again and again is asked about
     // less and less often.
     frames_.drop_before(found.newest + 1);
-    frames_.want_new(frames_.least() << std::min(search_.rejections, kMostDoublings));
+    frames_.want_new(frames_.least() << std::min(search_.rejections, kMaxDoublings));
     ++search_.rejections;
   }
 }
@@ -248,11 +248,12 @@ void OnlineCalibrator::learnt_of_it(CalibrationTrigger what, double misfit_px) n
   monitor_.watch(rig_, verified() && found());
   // A claim that is confirmed keeps its lens, and what that leaves differs from place to place.
   if (verified() && !found())
-    monitor_.expect_scatter(std::max(options_.monitor.found_bias_px, misfit_px));
+    monitor_.expect_scatter(std::max(options_.monitor.verified_bias_px, misfit_px));
 }
 
-CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review, Stamp stamp,
-                                                   std::uint64_t number, bool last) noexcept {
+CalibrationDecision OnlineCalibrator::evaluate_refinement(const SolutionReview& review, Stamp stamp,
+                                                          std::uint64_t number,
+                                                          bool last) noexcept {
   const RigSolution& found = review.measured();
   gate_ = review.gate(found, false);
   CalibrationDecision d = review.decision(found, stamp);
@@ -262,9 +263,9 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
   d.learnt = true;
   if (found.status == calibration::RigSolveStatus::ok) {
     const calibration::Assessment a = review.assess(found, rig_, source_);
-    d.judged_depth_m = a.depth_m;
+    d.reference_depth_m = a.depth_m;
     d.depth_sigma_percent = a.sigma_percent;
-    d.depth_difference_percent = a.difference_percent;
+    d.depth_error_percent = a.difference_percent;
     if (a.contradicted) d.cause = CalibrationCause::contradicted;
     // Without a frame that was not used, more frames of the same kind are better and another kind
     // is not.
@@ -274,7 +275,7 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
                             : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
     // One that the drive has confirmed is not given for one that it has not.
-    const bool certain = a.sigma_percent <= options_.calibration.tolerated_depth_percent;
+    const bool certain = a.sigma_percent <= options_.calibration.max_depth_error_percent;
     if (gate_ == Gate::open && verified() && !certain && !a.contradicted) gate_ = Gate::no_better;
     // Frames that contradict what was measured before them confirm nothing.
     d.verified = gate_ == Gate::open
@@ -288,7 +289,7 @@ CalibrationDecision OnlineCalibrator::judge_learnt(const SolutionReview& review,
   }
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
-  if (d.accepted && d.cause == CalibrationCause::contradicted) forget_rig(&learnt_);
+  if (d.accepted && d.cause == CalibrationCause::contradicted) clear_rig(&learnt_);
   plan_learning(found);
   return d;
 }

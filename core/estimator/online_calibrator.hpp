@@ -69,13 +69,13 @@ class OnlineCalibrator {
   [[nodiscard]] Reason missing() const noexcept;
 
   /// Another calibration is in use, whose scene has just been made; it is watched from here on.
-  void scene_rebuilt(const odometry::Odometry& odometry) noexcept;
+  void map_rebuilt(const odometry::Odometry& odometry) noexcept;
   /// Frames until now say nothing about the rig from here on: monitors and log begin again, the
   /// calibration in use stays.
-  void forget_frames() noexcept;
+  void clear_frames() noexcept;
   /// The scene was lost: what is logged does not go on, and what was learnt of the rig is no
   /// witness that nobody knocked it meanwhile.
-  void scene_lost() noexcept;
+  void map_lost() noexcept;
   /// The calibration in use is the one of this decision, which was sought.
   void use(const CalibrationDecision& found) noexcept;
   /// The same of one that was learnt: the frames stay.
@@ -107,10 +107,10 @@ class OnlineCalibrator {
   /// `last`: no more frames come that could make it better.
   [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number,
                                                          bool last) noexcept;
-  [[nodiscard]] CalibrationDecision judge_sought(const SolutionReview& review, Stamp stamp,
-                                                 std::uint64_t number) noexcept;
-  [[nodiscard]] CalibrationDecision judge_learnt(const SolutionReview& review, Stamp stamp,
-                                                 std::uint64_t number, bool last) noexcept;
+  [[nodiscard]] CalibrationDecision evaluate_estimate(const SolutionReview& review, Stamp stamp,
+                                                      std::uint64_t number) noexcept;
+  [[nodiscard]] CalibrationDecision evaluate_refinement(const SolutionReview& review, Stamp stamp,
+                                                        std::uint64_t number, bool last) noexcept;
   /// What the gate says of the frames to solve from next.
   void plan_search(const calibration::RigSolution& found) noexcept;
   void plan_learning(const calibration::RigSolution& found) noexcept;

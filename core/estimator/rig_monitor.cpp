@@ -8,7 +8,7 @@
 namespace vergence {
 namespace {
 
-using calibration::MonitorVerdict;
+using calibration::MonitorResult;
 using odometry::MapPoint;
 
 constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
@@ -18,7 +18,7 @@ constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need no
 constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
 // And of one that the drive has confirmed, until the monitor has measured its own: what the lens
 // model leaves in one stretch.
-constexpr std::array kConfirmed = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
+constexpr std::array kVerified = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
 constexpr double kLearnedCovariance =
     1.5;                     // times the monitor's own: the scene it was measured in was one
 constexpr int kWitness = 2;  // frames: a point just made was searched for in the band of the
@@ -82,14 +82,13 @@ void RigMonitor::expect_scatter(double bias_px) noexcept {
 void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
   rig_ = rig;
   confirmed_ = confirmed;
-  expect_scatter(confirmed ? options_.found_bias_px : options_.claimed_bias_px);
+  expect_scatter(confirmed ? options_.verified_bias_px : options_.unverified_bias_px);
   for (int k = 1; k < cameras_; ++k) {
     Watched& w = camera(k);
     w.learning = true;
     w.pairing.reset();
     const Transform& T = transform(rig_, k);
-    set_monitor_reference(k, T,
-                          reference_covariance(confirmed ? kConfirmed : kClaimed, T.t.norm()));
+    set_monitor_reference(k, T, reference_covariance(confirmed ? kVerified : kClaimed, T.t.norm()));
   }
 }
 
@@ -105,9 +104,9 @@ void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
   w.grace = kGraceFrames;
 }
 
-void RigMonitor::learn_reference(int k, const MonitorVerdict& verdict) noexcept {
+void RigMonitor::learn_reference(int k, const MonitorResult& verdict) noexcept {
   Watched& w = camera(k);
-  if (!w.learning || verdict.kind != MonitorVerdict::Kind::quiet ||
+  if (!w.learning || verdict.kind != MonitorResult::Kind::quiet ||
       w.monitor.frames_agreed() < kLearnFrames)
     return;
   w.learning = false;
@@ -118,15 +117,15 @@ void RigMonitor::learn_reference(int k, const MonitorVerdict& verdict) noexcept 
   set_monitor_reference(k, measured, kLearnedCovariance * verdict.covariance);
 }
 
-void RigMonitor::scene_rebuilt(const odometry::Map& map, const RigCalibration& rig,
-                               bool confirmed) noexcept {
-  scene_pending_ = false;
+void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
+                             bool confirmed) noexcept {
+  map_reset_pending_ = false;
   watch(rig, confirmed);
-  scene_renewed(map);
+  map_renewed(map);
 }
 
 /// Points made in this frame are where the next begins: no frame is between two that are compared.
-void RigMonitor::scene_renewed(const odometry::Map& map) noexcept {
+void RigMonitor::map_renewed(const odometry::Map& map) noexcept {
   for (int k = 1; k < cameras_; ++k) {
     (void)collect_stereo(map, k, 1);
     camera(k).jumps.rebase(transform(rig_, k), pinhole(rig_, 0), pinhole(rig_, k), stereo_.span());
@@ -135,7 +134,7 @@ void RigMonitor::scene_renewed(const odometry::Map& map) noexcept {
 
 void RigMonitor::begin_unlinked(const RigCalibration& rig) noexcept {
   T_left_world_before_.reset();
-  scene_pending_ = false;
+  map_reset_pending_ = false;
   for (int k = 1; k < cameras_; ++k) camera(k).T_camera_left_before = transform(rig, k);
   set_jump_reference(rig);
 }
@@ -148,7 +147,7 @@ void RigMonitor::reset() noexcept {
   for (int k = 1; k < cameras_; ++k) camera(k).monitor.reset();
 }
 
-void RigMonitor::scene_lost() noexcept {
+void RigMonitor::map_lost() noexcept {
   T_left_world_before_.reset();
   for (int k = 1; k < cameras_; ++k) {
     camera(k).monitor.reset();
@@ -179,12 +178,12 @@ Transform RigMonitor::step_to(const Transform& T_left_world) noexcept {
   return step;
 }
 
-int RigMonitor::collect_stereo(const odometry::Map& map, int k, int least_found) noexcept {
+int RigMonitor::collect_stereo(const odometry::Map& map, int k, int min_found) noexcept {
   const auto c = static_cast<std::size_t>(k);
   stereo_.clear();
   int found = 0;
   for (const MapPoint& p : map.points()) {
-    if (!p.followed() || p.found < least_found || !p.now.by(0)) continue;
+    if (!p.followed() || p.found < min_found || !p.now.by(0)) continue;
     if (((p.in_images >> static_cast<unsigned>(k)) & 1U) == 0) continue;
     if (p.stage == odometry::PointStage::active) ++found;
     (void)stereo_.push({p.now.pixel[0].cast<double>(), p.now.pixel[c].cast<double>(),
@@ -217,9 +216,9 @@ std::optional<std::uint64_t> RigMonitor::update_unlinked(const odometry::Odometr
   return onset;
 }
 
-MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odometry,
-                                           const odometry::FrameOutcome& outcome,
-                                           const RigFrame& frame, int found, bool moving) noexcept {
+MonitorResult RigMonitor::monitor_verdict(int k, const odometry::Odometry& odometry,
+                                          const odometry::FrameOutcome& outcome,
+                                          const RigFrame& frame, int found, bool moving) noexcept {
   Watched& w = camera(k);
   calibration::MonitorFrame f;
   f.frame = frame.number;
@@ -227,25 +226,25 @@ MonitorVerdict RigMonitor::monitor_verdict(int k, const odometry::Odometry& odom
   f.stereo = stereo_.span();
   f.expected_stereo = outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
   f.found_stereo = found;
-  MonitorVerdict v = w.monitor.look(f);
+  MonitorResult v = w.monitor.look(f);
   if (w.grace > 0) {
     --w.grace;
     // A claim that is off is no knock; nothing based on it is `ok`.
-    const bool doubted = confirmed_ && (v.undecided || v.kind != MonitorVerdict::Kind::quiet ||
+    const bool doubted = confirmed_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
                                         w.pairing.distance_px() > kFarFromLines);
-    v = MonitorVerdict{};
+    v = MonitorResult{};
     v.undecided = doubted;
   }
   learn_reference(k, v);
   return v;
 }
 
-RigVerdict RigMonitor::update(const odometry::Odometry& odometry,
-                              const odometry::FrameOutcome& outcome, const RigFrame& frame,
-                              bool verified) noexcept {
-  using Kind = MonitorVerdict::Kind;
-  RigVerdict rig;
-  rig.in_step = true;
+RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
+                                 const odometry::FrameOutcome& outcome, const RigFrame& frame,
+                                 bool verified) noexcept {
+  using Kind = MonitorResult::Kind;
+  RigAssessment rig;
+  rig.cameras_in_sync = true;
   const double seconds = T_left_world_before_ ? (frame.stamp - stamp_before_).to_seconds() : 0;
   stamp_before_ = frame.stamp;
   const Transform step = step_to(outcome.T_left_world);
@@ -256,7 +255,7 @@ RigVerdict RigMonitor::update(const odometry::Odometry& odometry,
     const double before = pairing.distance_px();
     pairing.next(frame.number, stereo_.span(), transform(rig_, k), pinhole(rig_, 0),
                  pinhole(rig_, k));
-    rig.in_step = rig.in_step && pairing.in_step();
+    rig.cameras_in_sync = rig.cameras_in_sync && pairing.cameras_in_sync();
     if (pairing.lag_frames() != 0) rig.lag_frames = pairing.lag_frames();
     // A pose that a spoilt image has drawn off moves the disparities of the frames on both sides.
     const bool spoilt =
@@ -266,8 +265,8 @@ RigVerdict RigMonitor::update(const odometry::Odometry& odometry,
       jump = camera(k).jumps.next(frame.number, stereo_.span(), step);
     else
       camera(k).jumps.skip(step);
-    MonitorVerdict v;
-    if (!scene_pending_) v = monitor_verdict(k, odometry, outcome, frame, found, moving);
+    MonitorResult v;
+    if (!map_reset_pending_) v = monitor_verdict(k, odometry, outcome, frame, found, moving);
     // A lag moves the epipolar lines, and with every change of speed the disparities.
     const bool change = v.kind == Kind::knock || v.kind == Kind::drift;
     if (pairing.suspected() || (pairing.questioned() && v.kind == Kind::collapse) ||

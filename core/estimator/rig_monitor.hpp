@@ -10,12 +10,12 @@
 namespace vergence {
 
 /// What a frame says of the rig: the worst that any further camera's monitor says.
-struct RigVerdict {
-  calibration::MonitorVerdict::Kind kind = calibration::MonitorVerdict::Kind::quiet;
+struct RigAssessment {
+  calibration::MonitorResult::Kind kind = calibration::MonitorResult::Kind::quiet;
   std::uint64_t onset_frame = 0;  // of `kind`
   int lag_frames = 0;             // that a camera's images are late; negative: early
   bool undecided = false;         // something of one camera is wrong, and it is not known what
-  bool in_step = false;           // motion shows that all cameras' images are of the same instant
+  bool cameras_in_sync = false;   // motion shows that all cameras' images are of the same instant
 };
 
 /// Watches, frame by frame, whether the rig still is the one that its calibration describes
@@ -44,22 +44,22 @@ class RigMonitor {
   void expect_scatter(double bias_px) noexcept;
   /// The jump detectors compare with this calibration.
   void set_jump_reference(const RigCalibration& rig) noexcept;
-  /// A calibration is adopted; until scene_rebuilt() only jumps count.
-  void expect_rebuilt_scene() noexcept { scene_pending_ = true; }
-  [[nodiscard]] bool scene_pending() const noexcept { return scene_pending_; }
+  /// A calibration is adopted; until map_rebuilt() only jumps count.
+  void expect_rebuilt_scene() noexcept { map_reset_pending_ = true; }
+  [[nodiscard]] bool map_reset_pending() const noexcept { return map_reset_pending_; }
   /// The scene of the calibration adopted has just been made; it is watched from here on.
-  void scene_rebuilt(const odometry::Map& map, const RigCalibration& rig, bool confirmed) noexcept;
+  void map_rebuilt(const odometry::Map& map, const RigCalibration& rig, bool confirmed) noexcept;
   /// A scene of the same calibration has just been made: its points are compared from here on.
-  void scene_renewed(const odometry::Map& map) noexcept;
+  void map_renewed(const odometry::Map& map) noexcept;
   /// The cameras are not linked from now on: a calibration is sought.
   void begin_unlinked(const RigCalibration& rig) noexcept;
 
   /// A posed frame; linked odometry only. `verified`: the drive has confirmed the calibration
   /// watched. Of a claim a monitor cannot distinguish its own errors, which differ from place to
   /// place, from a change of the rig: it leaves the rig undecided.
-  [[nodiscard]] RigVerdict update(const odometry::Odometry& odometry,
-                                  const odometry::FrameOutcome& outcome, const RigFrame& frame,
-                                  bool verified) noexcept;
+  [[nodiscard]] RigAssessment update(const odometry::Odometry& odometry,
+                                     const odometry::FrameOutcome& outcome, const RigFrame& frame,
+                                     bool verified) noexcept;
   /// The same while the cameras are not linked. A value: the rig has changed, from that frame on.
   [[nodiscard]] std::optional<std::uint64_t> update_unlinked(const odometry::Odometry& odometry,
                                                              const odometry::FrameOutcome& outcome,
@@ -70,7 +70,7 @@ class RigMonitor {
   /// Forgets what the monitors have seen; references and jump detectors stay.
   void reset() noexcept;
   /// The scene was lost: the next frame is compared with none before it.
-  void scene_lost() noexcept;
+  void map_lost() noexcept;
 
  private:
   /// One further camera.
@@ -89,18 +89,18 @@ class RigMonitor {
   void set_monitor_reference(int k, const Transform& T_camera_left,
                              const Mat6& covariance) noexcept;
   /// The verdict of camera k's monitor; a jump is left to the caller.
-  [[nodiscard]] calibration::MonitorVerdict monitor_verdict(int k,
-                                                            const odometry::Odometry& odometry,
-                                                            const odometry::FrameOutcome& outcome,
-                                                            const RigFrame& frame, int found,
-                                                            bool moving) noexcept;
+  [[nodiscard]] calibration::MonitorResult monitor_verdict(int k,
+                                                           const odometry::Odometry& odometry,
+                                                           const odometry::FrameOutcome& outcome,
+                                                           const RigFrame& frame, int found,
+                                                           bool moving) noexcept;
   /// A claim does not say how exact it is; the monitor's own measurement does: what it sees in the
   /// first frames that agree with each other is what must not change.
-  void learn_reference(int k, const calibration::MonitorVerdict& verdict) noexcept;
+  void learn_reference(int k, const calibration::MonitorResult& verdict) noexcept;
   /// Motion of the left camera since the frame watched before.
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Camera k's matches into `stereo_`; how many of them hold poses.
-  int collect_stereo(const odometry::Map& map, int k, int least_found) noexcept;
+  int collect_stereo(const odometry::Map& map, int k, int min_found) noexcept;
   [[nodiscard]] int expected_stereo(const odometry::Odometry& odometry, int k,
                                     const Transform& T_left_world) const noexcept;
 
@@ -112,7 +112,7 @@ class RigMonitor {
   bool confirmed_ = false;  // by the drive
   std::optional<Transform> T_left_world_before_;
   Stamp stamp_before_{};  // of the frame before
-  bool scene_pending_ = false;
+  bool map_reset_pending_ = false;
 };
 
 }  // namespace vergence

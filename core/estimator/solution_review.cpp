@@ -59,12 +59,12 @@ void SolutionReview::assess_next(const RigCalibration& next,
   const RigSolution& found = measured();
   if (found.status != RigSolveStatus::ok) return;
   const calibration::Assessment then = assess(found, next, calibration::ClaimSource::this_drive);
-  decision->judged_depth_m = then.depth_m;
+  decision->reference_depth_m = then.depth_m;
   decision->depth_sigma_percent = then.sigma_percent;
   // All distances are off by what the focal length is off by.
   decision->verified = then.confirmed && !decision->focal.contradicted;
   if (context_.in_use != nullptr)
-    decision->depth_difference_percent =
+    decision->depth_error_percent =
         assess(found, *context_.in_use, context_.source).difference_percent;
 }
 

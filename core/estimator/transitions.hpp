@@ -12,7 +12,7 @@ enum class Trigger : std::uint8_t {
   frames_enough,         // the tracks since then are thought to hold a calibration
   calibration_accepted,  // through the gates
   calibration_rejected,  // not through
-  calibration_kept,      // a new one is no better than the one in use
+  calibration_saved,     // a new one is no better than the one in use
   rig_changed,           // the monitor raised
   requested,             // the user wants a new calibration
   pose_lost,
@@ -51,7 +51,7 @@ inline constexpr std::array kTransitions = {
     Transition{State::stereo_odometry, Trigger::pose_lost, State::lost, "no pose for three frames"},
     Transition{State::recalibrating, Trigger::calibration_accepted, State::stereo_odometry,
                "the new calibration is accepted"},
-    Transition{State::recalibrating, Trigger::calibration_kept, State::stereo_odometry,
+    Transition{State::recalibrating, Trigger::calibration_saved, State::stereo_odometry,
                "the calibration in use fits as well as a new one"},
     Transition{State::recalibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
     Transition{State::lost, Trigger::pose_found, State::stereo_odometry, "a pose again"},

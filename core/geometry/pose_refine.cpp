@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kWho = "pose refinement";
 constexpr double kRayleighMedian = 1.1774100225154747;  // √(2 ln 2)
-constexpr int kLeastObservations = 3;
+constexpr int kMinObservations = 3;
 constexpr int kRescaleAfter = 2;        // steps: by then the pose is within a sigma or two
 constexpr double kFirstDamping = 1e-4;  // relative to the diagonal, once a plain step has failed
 constexpr int kMaxFailures = 6;         // damping grows tenfold a time: beyond, rounding decides
@@ -73,7 +73,7 @@ bool PoseRefiner::drop_gross(const RefinedPose& pose, const PoseRefineOptions& o
       dropped = true;
     }
   }
-  return dropped && counted() >= kLeastObservations;
+  return dropped && counted() >= kMinObservations;
 }
 
 bool PoseRefiner::descend(const PoseRefineOptions& options, RefinedPose* pose) noexcept {
@@ -171,7 +171,7 @@ RefinedPose PoseRefiner::refine(const RigObservations& o, const Transform& start
       const bool counts = use.empty() || ((use[problem_.point(k, i)] >> k) & 1U) != 0;
       if (!counts) problem_.use(k, i, false);
     }
-  if (counted() < kLeastObservations) return out;
+  if (counted() < kMinObservations) return out;
 
   if (!descend(options, &out)) return out;
   if (drop_gross(out, options)) {

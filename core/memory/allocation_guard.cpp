@@ -18,14 +18,14 @@ bool AllocationGuard::available() noexcept { return hooked.load(std::memory_orde
 void AllocationGuard::seal_thread() noexcept { sealed = true; }
 void AllocationGuard::unseal_thread() noexcept { sealed = false; }
 bool AllocationGuard::thread_sealed() noexcept { return sealed; }
-std::uint64_t AllocationGuard::allocations_after_seal() noexcept {
+std::uint64_t AllocationGuard::runtime_allocations() noexcept {
   return count.load(std::memory_order_relaxed);
 }
 void AllocationGuard::abort_on_allocation(bool on) noexcept {
   abort_on.store(on, std::memory_order_relaxed);
 }
 
-void AllocationGuard::note_allocation() noexcept {
+void AllocationGuard::record_allocation() noexcept {
   if (!sealed) return;
   count.fetch_add(1, std::memory_order_relaxed);
   if (abort_on.load(std::memory_order_relaxed)) {

@@ -17,13 +17,13 @@ class AllocationGuard {
   static void unseal_thread() noexcept;
   [[nodiscard]] static bool thread_sealed() noexcept;
   /// Allocations on sealed threads since the program's start.
-  [[nodiscard]] static std::uint64_t allocations_after_seal() noexcept;
+  [[nodiscard]] static std::uint64_t runtime_allocations() noexcept;
   /// From now on an allocation on a sealed thread aborts (tests: the debugger then stands at the
   /// culprit).
   static void abort_on_allocation(bool on) noexcept;
 
   /// For the hooks only: an allocation has happened on this thread.
-  static void note_allocation() noexcept;
+  static void record_allocation() noexcept;
   static void set_available() noexcept;
 };
 

@@ -9,8 +9,8 @@
 namespace {
 
 void note() noexcept {
-  vergence::AllocationGuard::note_allocation();
-  vergence::ThreadAllocations::note_allocation();
+  vergence::AllocationGuard::record_allocation();
+  vergence::ThreadAllocations::record_allocation();
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ struct Counter {
 
 constexpr int kNoRow = -1;
 
-std::array<Counter, ThreadAllocations::kMostNames> table;
+std::array<Counter, ThreadAllocations::kMaxNames> table;
 std::atomic<std::size_t> used{0};
 std::atomic<std::uint64_t> others{0};
 std::atomic<bool> counting{false};
@@ -94,7 +94,7 @@ ThreadAllocations::Counts ThreadAllocations::counts() noexcept {
   return out;
 }
 
-void ThreadAllocations::note_allocation() noexcept {
+void ThreadAllocations::record_allocation() noexcept {
   if (counting.load(std::memory_order_acquire)) count();
 }
 

@@ -16,7 +16,7 @@ namespace vergence {
 /// Debugger A breakpoint on `vergence::ThreadAllocations::count` stops at every counted allocation.
 class ThreadAllocations {
  public:
-  static constexpr std::size_t kMostNames = 32;
+  static constexpr std::size_t kMaxNames = 32;
   static constexpr std::size_t kNameBytes = 16;  // of the kernel, the final zero included
 
   struct Row {
@@ -24,7 +24,7 @@ class ThreadAllocations {
     std::uint64_t count = 0;
   };
   struct Counts {
-    std::array<Row, kMostNames> rows{};  // `size` of them, in order of their first allocation
+    std::array<Row, kMaxNames> rows{};  // `size` of them, in order of their first allocation
     std::size_t size = 0;
     std::uint64_t others = 0;  // of threads that had no place in the table
   };
@@ -36,7 +36,7 @@ class ThreadAllocations {
   [[nodiscard]] static Counts counts() noexcept;
 
   /// For the hooks only: an allocation has happened on this thread.
-  static void note_allocation() noexcept;
+  static void record_allocation() noexcept;
 
  private:
   static void count() noexcept;

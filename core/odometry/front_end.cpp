@@ -67,7 +67,7 @@ std::size_t FrontEnd::memory_needed(const OdometryOptions& options, const RigCal
     bytes += features::Pyramid::memory_needed(c.width, c.height, options.pyramid_levels) +
              kMaxPoints * sizeof(Followed) + 2 * kCacheLine;
   }
-  if (options.first_pair != 0)
+  if (options.init_features != 0)
     bytes += BlobMatcher::memory_needed(largest_width(rig), largest_height(rig));
   const auto n = static_cast<std::size_t>(options.features);
   return bytes + n * (sizeof(features::Corner) + sizeof(NewPoint) + sizeof(FreeMatch)) +
@@ -97,7 +97,8 @@ FrontEnd::FrontEnd(const OdometryOptions& options, const RigCalibration& rig, Ar
   distances_ = BoundedVector<float>(arena.make<float>(kMaxPoints, "distances to epipolar lines"));
   described_ = arena.make<features::Descriptor>(kMaxPoints, "descriptors");
   free_matches_ = BoundedVector<FreeMatch>(arena.make<FreeMatch>(n, "free matches"));
-  if (options.first_pair != 0) blobs_ = BlobMatcher(largest_width(rig), largest_height(rig), arena);
+  if (options.init_features != 0)
+    blobs_ = BlobMatcher(largest_width(rig), largest_height(rig), arena);
   rebuild_lenses();
 }
 

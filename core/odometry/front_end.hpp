@@ -12,7 +12,7 @@
 #include "core/odometry/map.hpp"
 #include "core/odometry/options.hpp"
 #include "core/odometry/undistorted_camera.hpp"
-#include "core/types/frame_effort.hpp"
+#include "core/types/frame_workload.hpp"
 #include "core/types/parallel.hpp"
 #include "core/types/rig_frame.hpp"
 
@@ -89,7 +89,7 @@ class FrontEnd {
   /// other cameras stay. Some milliseconds: for frames that tracking has lost.
   [[nodiscard]] int relocalise(Map& map, int k) noexcept;
 
-  /// Corners of `left`, or blobs (OdometryOptions::first_pair), found in camera k with nothing
+  /// Corners of `left`, or blobs (OdometryOptions::init_features), found in camera k with nothing
   /// known of the rig but that it does not turn the image by more than some 20°: mutually best
   /// descriptors, then aligned. Wrong ones are among them. Some ten milliseconds, with blobs three
   /// times that. Valid until the next call.
@@ -97,7 +97,7 @@ class FrontEnd {
 
   /// New corners of `left` where the map has no points, matched across; null: as if there were no
   /// map. As many as there is room for, by the effort, and `at_least` so many whatever that is.
-  [[nodiscard]] StereoCount match_new(const Map* map, const FrameEffort& effort = {},
+  [[nodiscard]] StereoCount match_new(const Map* map, const FrameWorkload& effort = {},
                                       int at_least = 0) noexcept;
   /// What the distances of this frame's points from the epipolar lines between the first two
   /// cameras say.
@@ -163,7 +163,7 @@ class FrontEnd {
   void keep_free_match(const features::Patch& patch, const RoughMatch& rough, int k) noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
   /// What the distances of the matches with a larger disparity say.
-  [[nodiscard]] EpipolarEvidence weigh(double least_disparity) noexcept;
+  [[nodiscard]] EpipolarEvidence weigh(double min_disparity) noexcept;
   /// Where camera k sits is known, if only roughly: before, its transform is the identity.
   [[nodiscard]] bool placed(int k) const noexcept {
     return k == 0 || rig_.T_camera_left[static_cast<std::size_t>(k)].t.squaredNorm() > 0;

@@ -72,7 +72,7 @@ int FrontEnd::relocalise(Map& map, int k) noexcept {
 std::span<const FreeMatch> FrontEnd::match_free(int k) noexcept {
   free_matches_.clear();
   if ((structured_ & 1U) == 0 || ((structured_ >> static_cast<unsigned>(k)) & 1U) == 0) return {};
-  if (options_.first_pair == 0) {
+  if (options_.init_features == 0) {
     match_corners_freely(k);
   } else {
     features::Patch patch;

@@ -98,7 +98,8 @@ void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchang
   runner_.run(TaskRef(first), TaskRef(second));
 }
 
-StereoCount FrontEnd::match_new(const Map* map, const FrameEffort& effort, int at_least) noexcept {
+StereoCount FrontEnd::match_new(const Map* map, const FrameWorkload& effort,
+                                int at_least) noexcept {
   StereoCount count;
   corners_.clear();
   // Without a left image the pyramid still looks at the last one, whose memory its camera may have
@@ -127,10 +128,10 @@ StereoCount FrontEnd::match_new(const Map* map, const FrameEffort& effort, int a
   return count;
 }
 
-EpipolarEvidence FrontEnd::weigh(double least_disparity) noexcept {
+EpipolarEvidence FrontEnd::weigh(double min_disparity) noexcept {
   distances_.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i)
-    if (fresh_[i].usable && fresh_[i].disparity > least_disparity)
+    if (fresh_[i].usable && fresh_[i].disparity > min_disparity)
       (void)distances_.push(fresh_[i].distance);
   return weigh_epipolar_distances(distances_.span(), band_px_,
                                   std::numbers::sqrt2 * options_.pixel_sigma);

@@ -138,7 +138,7 @@ void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome*
   else if (out->gap_s > 0 || gaps_.renewal_due())
     out->reason = Reason::time_gap;
   else if (std::popcount(fit.cameras) < 2)
-    out->reason = Reason::one_camera;
+    out->reason = Reason::single_camera;
   else if (stereo_fails_ || !fit.confirmed_stereo())
     out->reason = Reason::no_stereo_matches;
   else if (fit.inliers < options_.ok_inliers)
@@ -201,7 +201,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
     motion_.update(fit.T_left_world, frame.stamp);
   out.T_left_world = motion_.T_left_world();
   judge(fit, images, &out);
-  const FrameEffort effort =
+  const FrameWorkload effort =
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);
   // Far things alone carry a scene on and begin none.

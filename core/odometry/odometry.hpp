@@ -3,10 +3,10 @@
 #include <optional>
 
 #include "core/odometry/front_end.hpp"
-#include "core/odometry/gap_watch.hpp"
+#include "core/odometry/gap_detector.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/motion_model.hpp"
-#include "core/odometry/new_point_watch.hpp"
+#include "core/odometry/new_point_monitor.hpp"
 #include "core/odometry/pose_estimator.hpp"
 #include "core/odometry/rig_initialiser.hpp"
 #include "core/odometry/window.hpp"
@@ -26,7 +26,7 @@ struct FrameOutcome {
   int stereo_inliers = 0;
   double reprojection_px = 0;
   bool keyframe = false;
-  FrameEffort effort{};      // what was done of the work beside the pose
+  FrameWorkload effort{};    // what was done of the work beside the pose
   double unseen_s = 0;       // since the last pose that images have shown; 0: this one
   Transform expected{};      // the motion since then that is expected: the pose is predicted by it,
                              // or, of a left image that came twice, is without it
@@ -172,8 +172,8 @@ class Odometry {
   PoseEstimator poses_;
   RigInitialiser initialiser_;
   MotionModel motion_;
-  GapWatch gaps_;
-  NewPointWatch new_points_;
+  GapDetector gaps_;
+  NewPointMonitor new_points_;
   bool others_move_ = false;  // in this frame
 
   int frames_lost_ = 0;        // in a row, with images that show something

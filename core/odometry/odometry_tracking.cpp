@@ -20,9 +20,9 @@ constexpr int kSample =
 // Of the sample, below which the prediction was wrong. Three points hold a pose; that five more of
 // thirty, found within 32 px, agree with it to half a pixel is chance once in 10¹⁰ hypotheses.
 constexpr int kSampleInliers = 8;
-constexpr double kSampleShare = 0.3;       // and of those found, which must agree
-constexpr double kLeastSampleShare = 0.2;  // where no start does better: a calibration that does
-                                           // not fit leaves a quarter of the far points
+constexpr double kSampleShare = 0.3;     // and of those found, which must agree
+constexpr double kMinSampleShare = 0.2;  // where no start does better: a calibration that does
+                                         // not fit leaves a quarter of the far points
 constexpr double kSampleResidual =
     3.0;  // px: worse than that is no agreement, however many take part in it
 constexpr int kRelocaliseInliers = 15;    // that agree on one pose: by chance of rough matches 8 do
@@ -69,13 +69,13 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     clock.mark(Stage::track);
     fit = this->fit(*a.start, true);
     clock.mark(Stage::pose);
-    if (sample_agrees(fit, kLeastSampleShare) && fit.inliers > best.inliers) best = fit;
+    if (sample_agrees(fit, kMinSampleShare) && fit.inliers > best.inliers) best = fit;
     if (sample_agrees(fit, kSampleShare)) break;
   }
   fit = best;
   bool doubtful = frames_lost_ > 0 || out->gap_s > 0;
   std::bitset<kMaxPoints> revived;
-  if (!sample_agrees(fit, kLeastSampleShare)) {
+  if (!sample_agrees(fit, kMinSampleShare)) {
     fit = relocalise(out, &revived);
     if (!fit.found) return fit;
     doubtful = true;

@@ -29,7 +29,7 @@ BundleCapacities WindowAdjuster::capacities(const OdometryOptions& options,
   c.poses = static_cast<std::size_t>(options.window_keyframes * rig.cameras);
   c.points = kMaxWindowPoints;
   c.observations = kMaxWindowPoints * kObservationsAPoint;
-  c.shared = options.rig_turn_sigma > 0;
+  c.shared = options.extrinsic_rotation_sigma_rad > 0;
   return c;
 }
 
@@ -61,7 +61,7 @@ void WindowAdjuster::take_up_rig() noexcept {
 }
 
 void WindowAdjuster::doubt_rig() noexcept {
-  doubted_ = options_.rig_turn_sigma > 0;
+  doubted_ = options_.extrinsic_rotation_sigma_rad > 0;
   if (!doubted_) return;
   claimed_ = rig_;
   claimed_.covariance = {};
@@ -76,8 +76,8 @@ void WindowAdjuster::doubt_rig() noexcept {
     // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
     const double known =
         0.01 * calibration::depth_error_percent(rig_, k, kJudgedDepth) * t.norm() / kJudgedDepth;
-    const double sigma =
-        known > 0 ? std::min(known, options_.rig_turn_sigma) : options_.rig_turn_sigma;
+    const double sigma = known > 0 ? std::min(known, options_.extrinsic_rotation_sigma_rad)
+                                   : options_.extrinsic_rotation_sigma_rad;
     const Mat3 turn = sigma * sigma * axis.normalized() * axis.normalized().transpose() +
                       kHeldSigma * kHeldSigma * Mat3::Identity();
     for (int i = 0; i < 3; ++i) {
@@ -89,7 +89,7 @@ void WindowAdjuster::doubt_rig() noexcept {
   }
 }
 
-void WindowAdjuster::gather(Map& map, bool linked, const FrameEffort& effort) noexcept {
+void WindowAdjuster::gather(Map& map, bool linked, const FrameWorkload& effort) noexcept {
   poses_.clear();
   constant_.clear();
   points_.clear();
@@ -163,7 +163,7 @@ int WindowAdjuster::drop_outliers(Map& map) noexcept {
 }
 
 WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
-                                    const FrameEffort& effort) noexcept {
+                                    const FrameWorkload& effort) noexcept {
   WindowOutcome outcome;
   outcome.points = static_cast<int>(points_.size());
   outcome.observations = static_cast<int>(observations_.size());
@@ -197,7 +197,7 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
   return outcome;
 }
 
-WindowOutcome WindowAdjuster::adjust(Map& map, const FrameEffort& effort) noexcept {
+WindowOutcome WindowAdjuster::adjust(Map& map, const FrameWorkload& effort) noexcept {
   gather(map, true, effort);
   WindowOutcome outcome = solve(BundleConfiguration::stereo_odometry, effort);
   if (!outcome.usable) return outcome;
@@ -208,7 +208,7 @@ WindowOutcome WindowAdjuster::adjust(Map& map, const FrameEffort& effort) noexce
   return outcome;
 }
 
-WindowOutcome WindowAdjuster::adjust_unlinked(Map& map, const FrameEffort& effort) noexcept {
+WindowOutcome WindowAdjuster::adjust_unlinked(Map& map, const FrameWorkload& effort) noexcept {
   gather(map, false, effort);
   WindowOutcome outcome = solve(BundleConfiguration::parallel_monocular, effort);
   if (!outcome.usable) return outcome;

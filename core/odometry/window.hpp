@@ -2,7 +2,7 @@
 #include "core/bundle/bundle.hpp"
 #include "core/odometry/map.hpp"
 #include "core/odometry/options.hpp"
-#include "core/types/frame_effort.hpp"
+#include "core/types/frame_workload.hpp"
 
 namespace vergence::odometry {
 
@@ -37,11 +37,11 @@ class WindowAdjuster {
   /// Writes poses and points back if the result is usable, and drops observations beyond the robust
   /// limit. T_camera_left() is what it found.
   /// Not more than `effort` allows: the newest keyframes, so many steps.
-  WindowOutcome adjust(Map& map, const FrameEffort& effort = {}) noexcept;
+  WindowOutcome adjust(Map& map, const FrameWorkload& effort = {}) noexcept;
   /// The same with the cameras not linked: every image has a pose of its own, in
   /// Keyframe::T_camera_left (METHOD §2, parallel monocular). Both images of the oldest keyframe
   /// are constant; the caller renews the scale.
-  WindowOutcome adjust_unlinked(Map& map, const FrameEffort& effort = {}) noexcept;
+  WindowOutcome adjust_unlinked(Map& map, const FrameWorkload& effort = {}) noexcept;
   /// The owner's rig is another calibration than before.
   void take_up_rig() noexcept;
   /// The rig as the last adjustment found it; as many as cameras.
@@ -54,9 +54,9 @@ class WindowAdjuster {
                                                    const RigCalibration& rig) noexcept;
   /// What the calibration knows of itself, as a prior of the cameras' turns.
   void doubt_rig() noexcept;
-  void gather(Map& map, bool linked, const FrameEffort& effort) noexcept;
+  void gather(Map& map, bool linked, const FrameWorkload& effort) noexcept;
   [[nodiscard]] WindowOutcome solve(BundleConfiguration configuration,
-                                    const FrameEffort& effort) noexcept;
+                                    const FrameWorkload& effort) noexcept;
   [[nodiscard]] int drop_outliers(Map& map) noexcept;
 
   const OdometryOptions& options_;

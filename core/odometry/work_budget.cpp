@@ -6,10 +6,10 @@
 namespace vergence::odometry {
 namespace {
 
-constexpr double kUsable = 0.9;      // of the budget: what comes after the odometry needs some
-constexpr double kForgets = 0.8;     // a keyframe, of what a piece of work once took
-constexpr double kLeastPoints = 25;  // percent: under that the scene is lost sooner or later
-constexpr int kLeastKeyframes = 4;
+constexpr double kUsable = 0.9;    // of the budget: what comes after the odometry needs some
+constexpr double kForgets = 0.8;   // a keyframe, of what a piece of work once took
+constexpr double kMinPoints = 25;  // percent: under that the scene is lost sooner or later
+constexpr int kMinKeyframes = 4;
 
 void take(double ms, double* dearest) noexcept { *dearest = std::max(ms, kForgets * *dearest); }
 
@@ -20,21 +20,21 @@ void WorkBudget::begin(Duration budget) noexcept {
   if (limited()) start_ = Clock::now();
 }
 
-FrameEffort WorkBudget::plan(int keyframes, int steps) const noexcept {
-  FrameEffort effort;
+FrameWorkload WorkBudget::plan(int keyframes, int steps) const noexcept {
+  FrameWorkload effort;
   if (!limited()) return effort;
   double left =
       budget_ms_ - std::chrono::duration<double, std::milli>(Clock::now() - start_).count();
   const double keyframe_ms = steps * window_step_ms_;
   const double window_ms = keyframes * keyframe_ms;
   if (points_ms_ + window_ms <= left) return effort;
-  const double percent = points_ms_ > 0 ? 100.0 * (left - window_ms) / points_ms_ : kLeastPoints;
+  const double percent = points_ms_ > 0 ? 100.0 * (left - window_ms) / points_ms_ : kMinPoints;
   effort.points_percent =
-      static_cast<std::uint8_t>(std::clamp(std::floor(percent), kLeastPoints, 100.0));
+      static_cast<std::uint8_t>(std::clamp(std::floor(percent), kMinPoints, 100.0));
   left -= 0.01 * effort.points_percent * points_ms_;
   if (window_ms <= left) return effort;
   const int fits = left > 0 ? static_cast<int>(left / keyframe_ms) : 0;
-  const int newest = std::clamp(fits, std::min(kLeastKeyframes, keyframes), keyframes);
+  const int newest = std::clamp(fits, std::min(kMinKeyframes, keyframes), keyframes);
   if (newest < keyframes) effort.window_keyframes = static_cast<std::uint8_t>(newest);
   if (fits >= newest) return effort;
   const int few = left > 0 ? static_cast<int>(left / (newest * window_step_ms_)) : 0;
@@ -45,7 +45,7 @@ FrameEffort WorkBudget::plan(int keyframes, int steps) const noexcept {
   return effort;
 }
 
-void WorkBudget::points_took(double ms, const FrameEffort& effort) noexcept {
+void WorkBudget::points_took(double ms, const FrameWorkload& effort) noexcept {
   take(100.0 * ms / effort.points_percent, &points_ms_);
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <chrono>
 
-#include "core/types/frame_effort.hpp"
+#include "core/types/frame_workload.hpp"
 #include "core/types/time.hpp"
 
 namespace vergence::odometry {
@@ -19,11 +19,11 @@ class WorkBudget {
   /// A frame begins; `budget` zero: it has all the time it needs.
   void begin(Duration budget) noexcept;
   /// What there is time for, of a window of so many keyframes and steps a keyframe.
-  [[nodiscard]] FrameEffort plan(int keyframes, int steps) const noexcept;
+  [[nodiscard]] FrameWorkload plan(int keyframes, int steps) const noexcept;
   [[nodiscard]] bool limited() const noexcept { return budget_ms_ > 0; }
 
   /// What new points and a window have taken.
-  void points_took(double ms, const FrameEffort& effort) noexcept;
+  void points_took(double ms, const FrameWorkload& effort) noexcept;
   void window_took(double ms, int keyframes, int steps) noexcept;
 
  private:

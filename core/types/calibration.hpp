@@ -80,10 +80,10 @@ struct RigCalibration {
   std::array<std::array<double, 6>, kMaxCameras>
       sigma_noise{};  // rx ry rz (rad) tx ty tz (m); 0: not given
   std::array<std::array<double, 6>, kMaxCameras>
-      sigma_wide{};  // the same with uncertain intrinsics
+      sigma_total{};  // the same with uncertain intrinsics
   // zero: not given (Eigen leaves a Mat6 without initialiser undefined)
-  std::array<Mat6, kMaxCameras> covariance_wide{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(),
-                                                Mat6::Zero()};
+  std::array<Mat6, kMaxCameras> covariance_total{Mat6::Zero(), Mat6::Zero(), Mat6::Zero(),
+                                                 Mat6::Zero()};
   RigCovariance covariance{};  // of all parameters together, wide: what a depth is off by follows
                                // from it; empty: not given
   double baseline = 0;         // m, |t| of camera 1 as measured once

@@ -12,7 +12,7 @@ enum class CalibrationCause : std::uint8_t {
   knock,         // the monitor saw the rig change
   drift,         // the monitor saw it creep
   collapse,      // left and right found hardly any match any more
-  out_of_step,   // a camera's images seem to be of another instant
+  out_of_sync,   // a camera's images seem to be of another instant
   requested,     // the user asked
   refinement,    // the drive goes on: what it has shown since is added to what is known
   contradicted,  // the calibration that the drive began with, or went on with, is not that of the
@@ -22,10 +22,10 @@ enum class CalibrationCause : std::uint8_t {
 
 /// What a drive itself measures of the focal length, held against the one that it was given.
 struct FocalMeasurement {
-  double given_px = 0;     // fx of the left camera
-  double measured_px = 0;  // 0: it has not been measured
-  double sigma_px = 0;     // 1 sigma, with what lenses leave; 0: the measurement is not at its end,
-                           // and already far from the one given
+  double configured_px = 0;  // fx of the left camera
+  double measured_px = 0;    // 0: it has not been measured
+  double sigma_px = 0;  // 1 sigma, with what lenses leave; 0: the measurement is not at its end,
+                        // and already far from the one given
   bool contradicted = false;  // the one given is certainly not that of the images
 };
 
@@ -37,7 +37,7 @@ struct CalibrationDecision {
   bool learnt = false;  // measured while the drive went on: not accepted is no rejection, what is
                         // in use fits as well
   const char* reason =
-      "";  // why it was rejected, a constant sentence without commas; empty when accepted
+      "";  // why it was rejected, a constant message without commas; empty when accepted
   RigCalibration calibration{};   // the one found, also when rejected
   int latency_frames = 0;         // from the alarm (or the start, or the request) to here
   std::uint64_t onset_frame = 0;  // when the rig is thought to have changed; 0: does not apply
@@ -45,10 +45,10 @@ struct CalibrationDecision {
                                   // solve, median, of the camera that fits worst: with the one
                                   // before
   double held_out_after_px = 0;   // and with this one
-  double judged_depth_m =
+  double reference_depth_m =
       0;  // METHOD §6.4: the depth that the next three are of; 0: nothing was measured
   double depth_sigma_percent = 0;  // predicted depth error of the calibration found, 1 sigma
-  double depth_difference_percent =
+  double depth_error_percent =
       0;                     // how far off the one before was, by the one found; 0: there was none
   bool verified = false;     // the calibration now in use holds to the tolerated depth error
   bool lenses = false;       // lenses were part of what was found

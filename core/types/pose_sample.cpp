@@ -16,27 +16,27 @@ std::string_view to_string(PoseStatus s) noexcept {
 std::string_view to_string(Reason r) noexcept {
   return name_of(r, std::array{"",
                                "no_image",
-                               "image_dark",
+                               "image_no_contrast",
                                "image_repeated",
                                "few_features",
                                "no_stereo_matches",
                                "cameras_swapped",
                                "few_inliers",
-                               "one_camera",
+                               "single_camera",
                                "no_pose",
                                "time_gap",
-                               "scene_restarted",
+                               "map_reset",
                                "weak_geometry",
-                               "moving_scene",
+                               "dynamic_scene",
                                "unconfirmed",
                                "unverified_calibration",
                                "recalibrating",
                                "uncalibrated",
-                               "out_of_step",
+                               "out_of_sync",
                                "needs_motion",
                                "needs_near_structure",
                                "needs_texture",
-                               "unproven_pairing"});
+                               "pairing_ambiguous"});
 }
 
 std::string_view to_string(Stage s) noexcept {

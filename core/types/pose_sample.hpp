@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "core/math/se3.hpp"
-#include "core/types/frame_effort.hpp"
+#include "core/types/frame_workload.hpp"
 #include "core/types/time.hpp"
 
 namespace vergence {
@@ -30,7 +30,7 @@ enum class PoseStatus : std::uint8_t {
 enum class Reason : std::uint8_t {
   none,
   no_image,           // a camera delivered nothing for this frame
-  image_dark,         // an image carries no structure: covered, black, saturated
+  image_no_contrast,  // an image carries no structure: covered, black, saturated
   image_repeated,     // a camera delivered the image of the frame before once more, now or earlier
                       // while others went on: it may be an exposure behind until a dozen frames of
                       // a rig that drives have shown it is not
@@ -38,25 +38,25 @@ enum class Reason : std::uint8_t {
   no_stereo_matches,  // left and right do not fit this calibration
   cameras_swapped,    // points would lie behind the rig: left and right exchanged
   few_inliers,        // the pose rests on few points
-  one_camera,         // only one camera supports the pose; its scale is remembered, not measured
+  single_camera,      // only one camera supports the pose; its scale is remembered, not measured
   no_pose,            // tracking failed
   time_gap,           // no frame for longer than motion can be predicted, up to ten frames ago
-  scene_restarted,    // the map was rebuilt; the motion across the gap was extrapolated
+  map_reset,          // the map was rebuilt; the motion across the gap was extrapolated
   weak_geometry,      // the points do not hold the pose well, or several times worse than usual,
                       // or the window moved the pose far
-  moving_scene,       // more outliers than a rigid scene has
+  dynamic_scene,      // more outliers than a rigid scene has
   unconfirmed,        // calibration from a state file that the drive has not confirmed yet
   unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands
                            // on
   recalibrating,           // the rig no longer fits its calibration, up to ten frames ago
   uncalibrated,  // no calibration yet: each camera's pose is found for itself, the scale is the
                  // last pair's
-  out_of_step,   // a camera's images are of another instant than the others'
+  out_of_sync,   // a camera's images are of another instant than the others'
   needs_motion,  // the calibration has to be found and cannot be without driving
   needs_near_structure,  // the same, without points near the rig
   needs_texture,         // the same, without anything to stereo match
-  unproven_pairing,  // what proves that its images were exposed together has contradicted: one of
-                     // them alone was used
+  pairing_ambiguous,  // what proves that its images were exposed together has contradicted: one of
+                      // them alone was used
 };
 
 [[nodiscard]] std::string_view to_string(State) noexcept;
@@ -89,7 +89,7 @@ struct PoseSample {
   int stereo_inliers = 0;  // of these, seen by a second camera in this frame
   double reprojection_px = 0;  // rms of the inliers' residuals, per coordinate
   bool keyframe = false;
-  FrameEffort effort{};                   // what was done of the work beside the pose
+  FrameWorkload effort{};                 // what was done of the work beside the pose
   std::array<float, kStages> stage_ms{};  // wall time; the parallel stages as the slower side took
   float estimate_ms = 0;                  // wall time from the images in hand to this sample
 };

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "core/types/calibration.hpp"
-#include "core/types/frame_effort.hpp"
+#include "core/types/frame_workload.hpp"
 #include "core/types/image.hpp"
 #include "core/types/time.hpp"
 
@@ -13,7 +13,7 @@ namespace vergence {
 /// How sure it is that the images of a rig frame were exposed together.
 enum class Pairing : std::uint8_t {
   assumed,       // nothing proves it: a recording, or images paired by count or by arrival
-  proven,        // pulse numbers or stamps of one clock leave no other
+  verified,      // pulse numbers or stamps of one clock leave no other
   contradicted,  // what should prove it contradicts itself: each image is one, nothing more is sure
 };
 
@@ -30,7 +30,7 @@ struct RigFrame {
   Duration spread{};
   Pairing pairing = Pairing::assumed;
   int cameras = 0;
-  std::optional<FrameEffort> effort{};  // of a recorded drive: no more and no less is done again
+  std::optional<FrameWorkload> effort{};  // of a recorded drive: no more and no less is done again
   std::array<ImageView, kMaxCameras> images{};
 };
 

@@ -27,17 +27,17 @@ struct AcquiredReading {
 /// Something that happened to a device.
 struct DeviceEvent {
   enum class Kind : std::uint8_t {
-    camera_gone,
-    camera_back,
-    board_gone,
-    board_back,
-    board_rebooted,
-    acquiring,  // nothing proves any more which pulses the camera's frames belong to
-    proven,     // now something does
-  } kind = Kind::camera_gone;
+    camera_disconnected,
+    camera_reconnected,
+    trigger_board_disconnected,
+    trigger_board_reconnected,
+    trigger_board_restarted,
+    pairing_pending,   // nothing proves any more which pulses the camera's frames belong to
+    pairing_verified,  // now something does
+  } kind = Kind::camera_disconnected;
   Stamp stamp{};
-  int camera = 0;      // camera_…, acquiring, proven
-  double seconds = 0;  // proven: since the first frame that was not
+  int camera = 0;      // camera_…, pairing_…
+  double seconds = 0;  // verified: since the first frame that was not
 };
 
 /// Receives the trigger board's pulses as they arrive, to record them.
@@ -61,8 +61,8 @@ using Acquired = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent>;
 
 /// What the synchroniser's proof of a set comes to for an estimator.
 [[nodiscard]] constexpr Pairing pairing_of(SyncMode mode, SyncProof proof) noexcept {
-  if (!proves_pairing(mode)) return Pairing::assumed;
-  return proof == SyncProof::unproven ? Pairing::contradicted : Pairing::proven;
+  if (!verifies_pairing(mode)) return Pairing::assumed;
+  return proof == SyncProof::ambiguous ? Pairing::contradicted : Pairing::verified;
 }
 
 }  // namespace vergence

@@ -57,7 +57,7 @@ bool AcquiredQueue::next(Acquired* out) noexcept {
     }
     auto* frame = std::get_if<AcquiredFrame>(&item);
     const int behind = waiting_.fetch_sub(1, std::memory_order_acq_rel) - 1;
-    if (!wait_when_full_ && behind >= kMostWaiting) {
+    if (!wait_when_full_ && behind >= kMaxWaiting) {
       release(frame->set);
       skipped_sets_.fetch_add(1, std::memory_order_relaxed);
       continue;

@@ -60,7 +60,7 @@ class AcquiredQueue {
   static constexpr std::size_t kItems = 256;
   // Live: sets that may wait for the estimator before the oldest is skipped; when an image was lost
   // so many come at once.
-  static constexpr int kMostWaiting = static_cast<int>(OpenSets::kOpen);
+  static constexpr int kMaxWaiting = static_cast<int>(OpenSets::kOpen);
 
   const std::vector<CameraDevice*>& cameras_;
   bool wait_when_full_;
@@ -72,17 +72,17 @@ class AcquiredQueue {
   std::atomic<std::size_t> high_water_{0};
 };
 
-/// Whether it is proven which pulses the cameras' frames belong to: tells when that changes.
+/// Whether it is verified which pulses the cameras' frames belong to: tells when that changes.
 ///
-/// A camera begins as proven, so that where nothing can be proven nothing is told; and as one of
-/// which no frame has come, so that a camera that is not yet there is not told of either.
+/// A camera begins as verified, so that where nothing can be verified nothing is told; and as one
+/// of which no frame has come, so that a camera that is not yet there is not told of either.
 ///
 /// Threads  One. Memory: in place. Time: constant a call. Errors: none.
-class PairingWatch {
+class PairingTracker {
  public:
   struct Change {
-    bool proven = false;
-    double seconds = 0;  // proven: since the change before it
+    bool verified = false;
+    double seconds = 0;  // verified: since the change before it
   };
 
   /// A frame of that camera has come.
@@ -90,19 +90,19 @@ class PairingWatch {
   /// It was started again.
   void restarted(std::size_t camera) noexcept { cameras_[camera] = {}; }
   /// What the synchroniser says of it now. None: as before, or no frame has come yet.
-  [[nodiscard]] std::optional<Change> look(std::size_t camera, bool proven,
+  [[nodiscard]] std::optional<Change> look(std::size_t camera, bool verified,
                                            HostStamp now) noexcept {
     Camera& own = cameras_[camera];
-    if (proven == own.proven || !own.any) return std::nullopt;
-    const double seconds = proven ? (now - own.since).to_seconds() : 0;
-    own = {true, proven, now};
-    return Change{proven, seconds};
+    if (verified == own.verified || !own.any) return std::nullopt;
+    const double seconds = verified ? (now - own.since).to_seconds() : 0;
+    own = {true, verified, now};
+    return Change{verified, seconds};
   }
 
  private:
   struct Camera {
     bool any = false;
-    bool proven = true;
+    bool verified = true;
     HostStamp since{};  // of the last change
   };
 

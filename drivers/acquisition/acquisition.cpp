@@ -14,7 +14,7 @@ namespace {
 
 ClockMapperOptions clock_options(const DeviceTiming& t) noexcept {
   ClockMapperOptions o;
-  o.least_delay = t.least_delay;
+  o.min_delay = t.min_delay;
   o.delay_spread = t.delay_spread;
   o.resolution = t.resolution;
   return o;
@@ -76,7 +76,7 @@ void Acquisition::join() noexcept {
   if (trigger_ != nullptr) trigger_->stop();
   counters_.sync = sync_.counters();
   for (std::size_t k = 0; k < cameras_.size(); ++k)
-    counters_.proven[k] = sync_.proven(static_cast<int>(k));
+    counters_.verified[k] = sync_.verified(static_cast<int>(k));
   counters_.dropped_sets = queue_.skipped_sets();
   counters_.dropped_readings = queue_.dropped_readings();
   counters_.ring_high_water = queue_.high_water();
@@ -167,7 +167,7 @@ void Acquisition::take_frame(std::size_t k) {
   const int camera = static_cast<int>(k);
   head.pulses_without = 0;
   if (head.event) {
-    note_gone(camera, head.value.arrival);
+    record_disconnect(camera, head.value.arrival);
     return;
   }
   if (head.back) {
@@ -176,7 +176,7 @@ void Acquisition::take_frame(std::size_t k) {
     counters_.cameras[k].restart();
     pairing_.restarted(k);
     sync_.restarted(camera);
-    push_event(DeviceEvent::Kind::camera_back, head.value.arrival, camera);
+    push_event(DeviceEvent::Kind::camera_reconnected, head.value.arrival, camera);
   }
   const Frame& frame = head.value;
   SyncFrame in;
@@ -192,9 +192,9 @@ void Acquisition::take_frame(std::size_t k) {
   const bool torn = frame.status != FrameStatus::complete;
   counters_.torn += torn ? 1 : 0;
   if (torn) sync_.lost(in.camera, in.counter);
-  const bool taken = !torn && sync_.offer(in) == SyncVerdict::taken;
+  const bool taken = !torn && sync_.offer(in) == SyncResult::taken;
   pairing_.frame(k);
-  note_proofs(frame.arrival);
+  record_proofs(frame.arrival);
   if (options_.sync.mode == SyncMode::master_strobe && k == 0) pause_pulses();
   if (taken) return;
   AcquiredQueue::Refused refused;
@@ -203,12 +203,12 @@ void Acquisition::take_frame(std::size_t k) {
   queue_.push(refused);
 }
 
-void Acquisition::note_gone(int camera, HostStamp when) {
+void Acquisition::record_disconnect(int camera, HostStamp when) {
   auto& head = heads_[static_cast<std::size_t>(camera)];
   head.gone = true;
   sync_.absent(camera);
   // One that started and gave nothing has not been back: it is not gone once more.
-  if (!head.back) push_event(DeviceEvent::Kind::camera_gone, when, camera);
+  if (!head.back) push_event(DeviceEvent::Kind::camera_disconnected, when, camera);
 }
 
 void Acquisition::take_reading() {
@@ -257,12 +257,12 @@ void Acquisition::take_board() {
   if (head.event) {
     head.gone = true;
     // As a camera: one that started and gave nothing is not gone once more.
-    if (!head.back) push_event(DeviceEvent::Kind::board_gone, head.value.arrival);
+    if (!head.back) push_event(DeviceEvent::Kind::trigger_board_disconnected, head.value.arrival);
     return;
   }
   if (head.back) {
     head.back = false;
-    push_event(DeviceEvent::Kind::board_back, head.value.arrival);
+    push_event(DeviceEvent::Kind::trigger_board_reconnected, head.value.arrival);
   }
   take_pulse(head.value);
   if (options_.sync.mode == SyncMode::board) pause_pulses();
@@ -276,14 +276,14 @@ void Acquisition::take_pulse(const Pulse& reported) {
   const Pulse& pulse = report.pulse;
   if (report.rebooted && !sync_out_) {
     ++counters_.reboots;
-    push_event(DeviceEvent::Kind::board_rebooted, pulse.arrival);
+    push_event(DeviceEvent::Kind::trigger_board_restarted, pulse.arrival);
   }
   ++counters_.pulses;
   if (report.rebooted && !reported.mapped) counters_.board.restart();
   if (!sync_out_) counters_.board.note(pulse.edge, {pulse.host, pulse.host_error});
   if (!wants_pulses(options_.sync.mode)) return;
   sync_.pulse(pulse);
-  note_proofs(pulse.arrival);
+  record_proofs(pulse.arrival);
   give_up_mute_cameras(pulse.arrival);
 }
 
@@ -295,7 +295,7 @@ void Acquisition::give_up_mute_cameras(HostStamp now) {
     if (options_.sync.interval * ++head.pulses_without <= kLongest) continue;
     head.pulses_without = 0;
     cameras_[k]->stop();
-    note_gone(static_cast<int>(k), now);
+    record_disconnect(static_cast<int>(k), now);
   }
 }
 
@@ -329,13 +329,14 @@ void Acquisition::pause_pulses() {
   }
 }
 
-void Acquisition::note_proofs(HostStamp now) {
+void Acquisition::record_proofs(HostStamp now) {
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     if (heads_[k].gone) continue;
-    const auto change = pairing_.look(k, sync_.proven(static_cast<int>(k)), now);
+    const auto change = pairing_.look(k, sync_.verified(static_cast<int>(k)), now);
     if (!change) continue;
-    push_event(change->proven ? DeviceEvent::Kind::proven : DeviceEvent::Kind::acquiring, now,
-               static_cast<int>(k), change->seconds);
+    push_event(
+        change->verified ? DeviceEvent::Kind::pairing_verified : DeviceEvent::Kind::pairing_pending,
+        now, static_cast<int>(k), change->seconds);
   }
 }
 

@@ -35,7 +35,7 @@ struct AcquisitionCounters {
   std::uint64_t pauses_refused = 0;                // the board cannot
   std::array<ClockRecord, kMaxCameras> cameras{};  // their clocks
   ClockRecord ins{}, board{};
-  std::array<bool, kMaxCameras> proven{};  // at the end
+  std::array<bool, kMaxCameras> verified{};  // at the end
   std::size_t ring_high_water = 0;
   std::int64_t worst_stamp_error_ns = 0;  // of the images' stamps, after the first second
 };
@@ -44,7 +44,7 @@ struct AcquisitionCounters {
 struct StartFailure {
   DeviceInfo device{};
   DeviceStatus status = DeviceStatus::ok;
-  std::string message{};  // the driver's sentence; empty: the status says it all
+  std::string message{};  // the driver's message; empty: the status says it all
 };
 
 /// Cameras, INS and board into one stream of rig frames, INS samples and device events, stamped on
@@ -137,9 +137,9 @@ class Acquisition final : private Notifier {
   /// Cameras that have given nothing for ten seconds of pulses hang, whatever their drivers know:
   /// they are stopped, and asked to come back like any that is gone.
   void give_up_mute_cameras(HostStamp now);
-  void note_gone(int camera, HostStamp when);
-  /// Tells of cameras whose pairing was proven, or is not any more.
-  void note_proofs(HostStamp now);
+  void record_disconnect(int camera, HostStamp when);
+  /// Tells of cameras whose pairing was verified, or is not any more.
+  void record_proofs(HostStamp now);
   void hand_out_sets();
   void push_event(DeviceEvent::Kind kind, HostStamp when, int camera = 0, double seconds = 0);
   [[nodiscard]] Stamp stamp_of(HostStamp host) const noexcept;
@@ -156,7 +156,7 @@ class Acquisition final : private Notifier {
   PulseMapper pulse_mapper_;
   DeviceHead<TriggerDevice, Pulse> board_head_;
   std::optional<SyncOutPulses> sync_out_;
-  PairingWatch pairing_;
+  PairingTracker pairing_;
 
   AcquiredQueue queue_;
   WakeEvent wake_;

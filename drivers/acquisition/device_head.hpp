@@ -34,7 +34,7 @@ struct DeviceHead {
     if (device == nullptr) ended = true;
     if (held || ended || (gone && !start_again(ready, ask_always))) return;
     const DeviceStatus status = device->wait(Duration{}, &value);
-    event = status == DeviceStatus::gone;
+    event = status == DeviceStatus::disconnected;
     held = status == DeviceStatus::ok || event;
     ended = status == DeviceStatus::ended || status == DeviceStatus::stopped;
   }

@@ -5,7 +5,7 @@
 
 namespace vergence {
 
-/// printf into a string of at most 319 bytes; what is longer is cut. For sentences with numbers,
+/// printf into a string of at most 319 bytes; what is longer is cut. For messages with numbers,
 /// off the real-time path.
 template <class... Args>
 [[nodiscard]] std::string format_text(const char* format, Args... args) {

@@ -17,9 +17,9 @@ constexpr std::uint64_t bit(FrameSlot slot) noexcept { return std::uint64_t{1} <
 }  // namespace
 
 Duration longest_silence(CameraTrigger trigger, double rate_hz) noexcept {
-  constexpr Duration kLeast = Duration::seconds(2);
+  constexpr Duration kMin = Duration::seconds(2);
   if (trigger != CameraTrigger::free || !(rate_hz > 0)) return {};
-  return std::max(kLeast, Duration::seconds(10 / rate_hz));
+  return std::max(kMin, Duration::seconds(10 / rate_hz));
 }
 
 void FrameQueue::begin(Notifier* ready, Duration silence) noexcept {
@@ -41,7 +41,7 @@ void FrameQueue::end() noexcept {
 void FrameQueue::fail(HostStamp when) noexcept {
   const std::lock_guard lock(mutex_);
   state_ = State::gone;
-  gone_at_ = when;
+  disconnected_at_ = when;
 }
 
 void FrameQueue::fail() noexcept {
@@ -91,7 +91,7 @@ void FrameQueue::lose(HostStamp when) noexcept {
   const std::lock_guard lock(mutex_);
   if (state_ != State::streaming) return;
   state_ = State::gone;
-  gone_at_ = when;
+  disconnected_at_ = when;
   changed_.notify_all();
   if (notifier_ != nullptr) notifier_->notify();
 }
@@ -138,11 +138,11 @@ DeviceStatus FrameQueue::wait_locked(std::unique_lock<std::mutex>* lock, Duratio
   }
   if (const HostStamp now = monotonic_now(); state_ == State::streaming && silent(now)) {
     state_ = State::gone;
-    gone_at_ = now;
+    disconnected_at_ = now;
   }
   if (state_ == State::streaming) return DeviceStatus::timeout;
-  frame->arrival = gone_at_;
-  return DeviceStatus::gone;
+  frame->arrival = disconnected_at_;
+  return DeviceStatus::disconnected;
 }
 
 bool FrameQueue::release(FrameSlot slot) noexcept {
@@ -161,7 +161,7 @@ DeviceStatus FrameQueue::standing() const noexcept {
   const State now = state();
   return now == State::streaming ? DeviceStatus::ok
          : now == State::stopped ? DeviceStatus::stopped
-                                 : DeviceStatus::gone;
+                                 : DeviceStatus::disconnected;
 }
 
 std::size_t FrameQueue::held() const noexcept {

@@ -95,7 +95,7 @@ class FrameQueue {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   State state_ = State::stopped;
-  HostStamp gone_at_{};
+  HostStamp disconnected_at_{};
   Duration silence_{};           // zero: no limit
   bool heard_any_ = false;       // an image since begin()
   HostStamp heard_{}, asked_{};  // the newest image; the end of the newest wait()

@@ -3,7 +3,7 @@
 
 namespace vergence {
 
-/// Thrown where a device or its driver refuses one of several steps; the sentence is kept
+/// Thrown where a device or its driver refuses one of several steps; the message is kept
 /// elsewhere. Off the real-time path.
 struct Refused {
   DeviceStatus status = DeviceStatus::failed;

@@ -10,7 +10,7 @@
 #include <thread>
 #include <utility>
 
-#include "drivers/serial/byte_line.hpp"
+#include "drivers/serial/serial_link.hpp"
 #include "drivers/stream.hpp"
 
 namespace vergence {
@@ -38,7 +38,7 @@ class SerialDevice {
   using Item = Delivery<Value>;
   static constexpr Duration kReopenInterval = Duration::milliseconds(500);
 
-  SerialDevice(std::unique_ptr<LinePlace> place, const char* thread_name)
+  SerialDevice(std::unique_ptr<SerialLinkFactory> place, const char* thread_name)
       : place_(std::move(place)), thread_name_(thread_name) {}
   virtual ~SerialDevice() = default;
 
@@ -57,9 +57,9 @@ class SerialDevice {
 
   // ---- owner's thread
 
-  [[nodiscard]] LinePlace& place() const noexcept { return *place_; }
+  [[nodiscard]] SerialLinkFactory& place() const noexcept { return *place_; }
   /// Null: not open. Owner's thread while there is no other, else the device's.
-  [[nodiscard]] ByteLine* line() const noexcept { return line_.get(); }
+  [[nodiscard]] SerialLink* line() const noexcept { return line_.get(); }
   [[nodiscard]] DeviceStatus open_line(const LineSettings& settings) {
     DeviceStatus status = DeviceStatus::ok;
     auto line = place_->open(settings, &status);
@@ -68,7 +68,7 @@ class SerialDevice {
     return status;
   }
   void close_line() noexcept {
-    std::unique_ptr<ByteLine> line;
+    std::unique_ptr<SerialLink> line;
     const std::lock_guard lock(line_mutex_);
     line = std::move(line_);
   }
@@ -85,7 +85,7 @@ class SerialDevice {
     if (status != DeviceStatus::ok) return status;
     try {
       stopping_.store(false, std::memory_order_release);
-      reported_gone_ = false;
+      reported_disconnect_ = false;
       away_.store(false, std::memory_order_relaxed);
       thread_ = std::thread([this] { work(); });
     } catch (const std::exception&) {
@@ -130,7 +130,7 @@ class SerialDevice {
   [[nodiscard]] DeviceStatus take(Duration limit, Value* value) noexcept {
     Item item;
     const DeviceStatus status = out_.take(limit, &item);
-    if (status == DeviceStatus::gone) value->arrival = item.arrival;
+    if (status == DeviceStatus::disconnected) value->arrival = item.arrival;
     if (status == DeviceStatus::ok) *value = item.value;
     return status;
   }
@@ -145,14 +145,14 @@ class SerialDevice {
   /// itself before that.
   void report_streaming(HostStamp now) noexcept {
     away_.store(false, std::memory_order_release);
-    if (std::exchange(reported_gone_, false)) push({Item::What::back, now, {}}, true);
+    if (std::exchange(reported_disconnect_, false)) push({Item::What::back, now, {}}, true);
   }
 
  private:
   void work() noexcept {
     (void)pthread_setname_np(pthread_self(), thread_name_);
     while (!stop_requested()) {
-      DeviceStatus status = line_ != nullptr ? begin() : DeviceStatus::gone;
+      DeviceStatus status = line_ != nullptr ? begin() : DeviceStatus::disconnected;
       HostStamp when = line_ != nullptr ? line_->now() : HostStamp{};
       const bool refused = line_ != nullptr && status != DeviceStatus::ok;
       if (status == DeviceStatus::ok) {
@@ -168,7 +168,7 @@ class SerialDevice {
         break;
       }
       away_.store(true, std::memory_order_release);
-      if (!std::exchange(reported_gone_, true)) push({Item::What::gone, when, {}}, true);
+      if (!std::exchange(reported_disconnect_, true)) push({Item::What::gone, when, {}}, true);
       close_line();
       // It opens well and answers at once: without a pause it would be asked as fast as it answers.
       if (refused) rest(kReopenInterval);
@@ -208,14 +208,14 @@ class SerialDevice {
     }
   }
 
-  std::unique_ptr<LinePlace> place_;
+  std::unique_ptr<SerialLinkFactory> place_;
   const char* const thread_name_;
   bool virtual_time_ = false;
   std::mutex line_mutex_;  // of the pointer: stop_thread() wakes a line that may be replaced
-  std::unique_ptr<ByteLine> line_;
+  std::unique_ptr<SerialLink> line_;
   Stream<Value, kRing> out_;
   std::atomic<bool> stopping_{false}, away_{false};
-  bool reported_gone_ = false;
+  bool reported_disconnect_ = false;
   std::mutex pause_mutex_;
   std::condition_variable stopped_;
   std::thread thread_;

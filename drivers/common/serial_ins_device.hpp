@@ -42,7 +42,7 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
   }
 
  protected:
-  explicit SerialInsDevice(std::unique_ptr<LinePlace> place)
+  explicit SerialInsDevice(std::unique_ptr<SerialLinkFactory> place)
       : SerialDevice<InsReading, kRing>(std::move(place), "vergence-ins") {
     info_.place = this->place().name();
   }

@@ -49,7 +49,7 @@ class Whole final : public Notifier {
   DeviceStatus start(std::size_t half, Notifier* ready, std::string* error) noexcept {
     const std::lock_guard lock(mutex_);
     if (!sizes_[half]) return DeviceStatus::bad_configuration;
-    if (gone_ && !noticed_[1 - half]) return DeviceStatus::gone;
+    if (gone_ && !noticed_[1 - half]) return DeviceStatus::disconnected;
     ready_[half].store(ready, std::memory_order_release);
     const DeviceStatus status = camera_->start(this);
     if (status != DeviceStatus::ok) {
@@ -73,13 +73,13 @@ class Whole final : public Notifier {
       const auto left = Duration::nanoseconds((end - std::chrono::steady_clock::now()).count());
       Frame next;
       const DeviceStatus status = camera_->wait(std::max(left, Duration{}), &next);
-      if (status != DeviceStatus::ok && status != DeviceStatus::gone) return status;
+      if (status != DeviceStatus::ok && status != DeviceStatus::disconnected) return status;
       const std::lock_guard lock(mutex_);
       if (status == DeviceStatus::ok) {
         queue(next);
       } else {
         gone_ = true;
-        gone_at_ = next.arrival;
+        disconnected_at_ = next.arrival;
       }
     }
   }
@@ -148,7 +148,7 @@ class Whole final : public Notifier {
     w.first = (w.first + 1) % w.frames.size();
     --w.count;
     ++w.delivered;
-    if (frame->status == FrameStatus::torn) ++w.torn;
+    if (frame->status == FrameStatus::incomplete) ++w.torn;
     return true;
   }
 
@@ -164,8 +164,8 @@ class Whole final : public Notifier {
 
   DeviceStatus notice(std::size_t half, Frame* frame) noexcept {
     noticed_[half] = true;
-    frame->arrival = gone_at_;
-    return DeviceStatus::gone;
+    frame->arrival = disconnected_at_;
+    return DeviceStatus::disconnected;
   }
 
   void release_locked(FrameSlot slot) noexcept {
@@ -185,7 +185,7 @@ class Whole final : public Notifier {
   std::array<std::uint8_t, FramePool::kMaxSlots> users_{};  // halves that have a slot, by slot
   std::size_t held_ = 0;                                    // slots
   bool gone_ = false;
-  HostStamp gone_at_{};
+  HostStamp disconnected_at_{};
   std::array<bool, 2> noticed_{};  // that it is gone
 };
 

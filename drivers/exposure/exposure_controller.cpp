@@ -18,7 +18,7 @@ double stops_of(const ExposureOptions& o, const ExposureSetting& s) noexcept {
 
 ExposureSetting within(const ExposureOptions& o, const ExposureSetting& requested) noexcept {
   return {std::clamp(requested.exposure, o.least, o.most),
-          std::clamp(requested.gain_db, 0.0, o.most_gain_db)};
+          std::clamp(requested.gain_db, 0.0, o.max_gain_db)};
 }
 
 ExposureController::ExposureController(const ExposureOptions& options,
@@ -32,9 +32,9 @@ double ExposureController::requested_stops(const Brightness& image) const noexce
   const double to_target = std::log2(options_.target / std::max(image.mean, kDarkest));
   if (image.bright < kSaturated)
     return std::min(to_target, std::log2(kSaturated / std::max(image.bright, kDarkest)));
-  constexpr double kMostOfIt = 0.5;
+  constexpr double kMaxOfIt = 0.5;
   return std::min(to_target,
-                  image.saturated > kMostOfIt ? -options_.down_stops : -0.5 * options_.down_stops);
+                  image.saturated > kMaxOfIt ? -options_.down_stops : -0.5 * options_.down_stops);
 }
 
 ExposureSetting ExposureController::split(double stops) const noexcept {

@@ -12,7 +12,7 @@ struct ExposureOptions {
   double dead_band = 0.2;  // stops (factors of two) to each side within which nothing is changed
   Duration least = Duration::microseconds(20);   // shortest exposure
   Duration most = Duration::microseconds(8000);  // longest: what motion blur allows
-  double most_gain_db = 18;                      // used once the exposure is at its longest
+  double max_gain_db = 18;                       // used once the exposure is at its longest
   double up_stops = 1,
          down_stops = 2;  // a change at most; down is faster: saturated pixels tell nothing
   int settle_frames =

@@ -167,11 +167,11 @@ namespace {
 
 constexpr Duration kClockSet = Duration::seconds(10);  // backwards: the receiver's time was set
 constexpr Duration kShortest = Duration::milliseconds(10);  // no receiver sends faster
-constexpr double kMostLost = 1000;  // at once; beyond: the line was away, or the time was set
+constexpr double kMaxLost = 1000;  // at once; beyond: the line was away, or the time was set
 
 ClockMapperOptions mapping(const Options& o) noexcept {
   ClockMapperOptions m;
-  m.least_delay = o.processing;
+  m.min_delay = o.processing;
   m.delay_spread = Duration::milliseconds(20);  // a solution takes longer with more satellites
   m.jump = Duration::milliseconds(200);
   m.resolution = Duration::milliseconds(1);
@@ -315,7 +315,7 @@ void Decoder::count(Duration step) noexcept {
   if (step >= kShortest) period_.note(step);
   const Duration period = period_.interval();
   const double periods = period == Duration{} ? 1 : step.to_seconds() / period.to_seconds();
-  const auto steps = static_cast<std::uint64_t>(std::llround(std::clamp(periods, 1.0, kMostLost)));
+  const auto steps = static_cast<std::uint64_t>(std::llround(std::clamp(periods, 1.0, kMaxLost)));
   number_ += steps;
   counters_.lost += steps - 1;
 }

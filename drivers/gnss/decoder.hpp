@@ -84,12 +84,12 @@ struct DecoderCounters {
 /// Errors   Counted; nothing stops the stream.
 class Decoder {
  public:
-  static constexpr std::size_t kMostBytes = 1024;
+  static constexpr std::size_t kMaxBytes = 1024;
 
   explicit Decoder(const Options& options) noexcept;
   /// The line was opened, at this rate; 0: bytes take no time (USB). Counters go on.
   void begin(std::uint32_t baud) noexcept;
-  /// What a read brought. Precondition: next() has said false since the last; at most kMostBytes.
+  /// What a read brought. Precondition: next() has said false since the last; at most kMaxBytes.
   void accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept;
   /// The next reading. False: none, *reading untouched.
   [[nodiscard]] bool next(InsReading* reading) noexcept;
@@ -129,7 +129,7 @@ class Decoder {
   Options options_;
   ClockMapper mapper_;
   double byte_ns_ = 0;
-  std::array<std::uint8_t, kMostBytes> bytes_{};
+  std::array<std::uint8_t, kMaxBytes> bytes_{};
   std::size_t at_ = 0, size_ = 0;  // of bytes_: not read yet, of the newest read
   HostStamp arrival_{};
   bool quiet_ = false;

@@ -24,7 +24,7 @@ const char* name_of(Protocol protocol) noexcept {
 
 }  // namespace
 
-Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
+Device::Device(std::unique_ptr<SerialLinkFactory> place, const Options& options)
     : SerialInsDevice(std::move(place)), options_(options), decoder_(options) {
   info_.driver = name_of(options.protocol);
   info_.model =
@@ -151,7 +151,7 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
 
 DeviceTiming Device::timing() const noexcept {
   DeviceTiming t;
-  t.least_delay = options_.processing;
+  t.min_delay = options_.processing;
   t.delay_spread = place().latency_timer() + Duration::milliseconds(60);
   t.resolution = Duration::milliseconds(1);
   return t;
@@ -176,12 +176,12 @@ DeviceStatus Device::read_on() noexcept {
       return status;
     if (decoder_.fixes() != fixes) last_received = line()->now();
     fixes = decoder_.fixes();
-    if (line()->now() - last_received > kSilent) return DeviceStatus::gone;
+    if (line()->now() - last_received > kSilent) return DeviceStatus::disconnected;
   }
 }
 
 DeviceStatus Device::read_once(Duration limit, bool discard) noexcept {
-  std::array<std::uint8_t, Decoder::kMostBytes> bytes{};
+  std::array<std::uint8_t, Decoder::kMaxBytes> bytes{};
   const LineRead r = line()->read(bytes, limit);
   if (r.status == DeviceStatus::ok)
     decoder_.accept(std::span(bytes).first(r.size), r.arrival);

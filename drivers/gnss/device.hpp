@@ -21,7 +21,7 @@ class Device final : public SerialInsDevice<256> {  // 12 s at 20 Hz
  public:
   static constexpr Duration kSilent = Duration::seconds(3);
 
-  Device(std::unique_ptr<LinePlace> place, const Options& options);
+  Device(std::unique_ptr<SerialLinkFactory> place, const Options& options);
   ~Device() override;
 
   /// Opens the line and listens. → ok, not_found (silent, or another protocol), no_permission,

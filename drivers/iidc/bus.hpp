@@ -95,7 +95,7 @@ class CameraBus : public RegisterPort {
   virtual void give_back(FrameSlot slot) noexcept = 0;
   [[nodiscard]] virtual const std::uint8_t* bytes(FrameSlot slot) const noexcept = 0;
 
-  /// One sentence about the last call that was not ok; empty: the status says it all.
+  /// One message about the last call that was not ok; empty: the status says it all.
   [[nodiscard]] virtual std::string last_error() const { return {}; }
 };
 

@@ -99,18 +99,18 @@ class Planner {
     last_error_ = r_.last_error();
     throw Refused{failed};
   }
-  [[noreturn]] void refuse(std::string sentence, DeviceStatus status = DeviceStatus::unsupported) {
+  [[noreturn]] void refuse(std::string message, DeviceStatus status = DeviceStatus::unsupported) {
     check_registers();
-    last_error_ = std::move(sentence);
+    last_error_ = std::move(message);
     throw Refused{status};
   }
 
   void check_numbers() {
-    constexpr int kMost = 65535;
+    constexpr int kMax = 65535;
     if (const std::string invalid = find_invalid(requested_); !invalid.empty())
       refuse(invalid + " is no configuration", DeviceStatus::bad_configuration);
-    if (requested_.width > kMost || requested_.height > kMost || requested_.offset_x > kMost ||
-        requested_.offset_y > kMost)
+    if (requested_.width > kMax || requested_.height > kMax || requested_.offset_x > kMax ||
+        requested_.offset_y > kMax)
       refuse(
           format_text("%d x %d is more than any camera has", requested_.width, requested_.height));
   }
@@ -286,8 +286,8 @@ class Planner {
       if (requested_.trigger == CameraTrigger::free && frame_rate_.present &&
           (requested_.rate_hz < frame_rate_.least * (1 - kRateSlack) ||
            requested_.rate_hz > frame_rate_.most * (1 + kRateSlack))) {
-        say_why_not(format_text("its frame rate goes from %g to %g Hz", frame_rate_.least,
-                                frame_rate_.most));
+        explain_refusal(format_text("its frame rate goes from %g to %g Hz", frame_rate_.least,
+                                    frame_rate_.most));
         continue;
       }
       plan_.format = 7;
@@ -317,7 +317,7 @@ class Planner {
     if (packet == 0 || packet > most || packet % unit != 0 ||
         packet_rate(bytes, packet) < requested_.rate_hz * (1 - kRateSlack)) {
       const std::size_t best = asked != 0 && asked <= most ? asked : most / unit * unit;
-      say_why_not(
+      explain_refusal(
           format_text("packets of %zu bytes (largest %zu, in steps of %zu) carry %.4g Hz of it",
                       best, most, unit, packet_rate(bytes, best)));
       return false;
@@ -345,13 +345,13 @@ class Planner {
     if (plan_.grey.possible() &&
         (!plan_.grey.mosaic || (requested_.width > 1 && requested_.height > 1)))
       return true;
-    say_why_not(std::string(to_string(plan_.coding)) +
-                " of this camera is not turned to grey here");
+    explain_refusal(std::string(to_string(plan_.coding)) +
+                    " of this camera is not turned to grey here");
     return false;
   }
 
   /// Of the first way that was tried: the cheapest.
-  void say_why_not(const std::string& why) {
+  void explain_refusal(const std::string& why) {
     if (why_not_.empty()) why_not_ = why;
   }
 

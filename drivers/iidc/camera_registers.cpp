@@ -81,8 +81,8 @@ AbsoluteRange CameraRegisters::absolute_range(Feature f) noexcept {
   const std::uint64_t csr = table(reg::feature_absolute_base(f));
   if (csr == 0) return {};
   AbsoluteRange range;
-  range.least = static_cast<double>(std::bit_cast<float>(get_at(csr + reg::absolute::kLeast)));
-  range.most = static_cast<double>(std::bit_cast<float>(get_at(csr + reg::absolute::kMost)));
+  range.least = static_cast<double>(std::bit_cast<float>(get_at(csr + reg::absolute::kMin)));
+  range.most = static_cast<double>(std::bit_cast<float>(get_at(csr + reg::absolute::kMax)));
   range.present =
       std::isfinite(range.least) && std::isfinite(range.most) && range.least <= range.most;
   return range;
@@ -133,8 +133,9 @@ std::string CameraRegisters::last_error() const {
   if (last_failure_ == DeviceStatus::ok) return {};
   const char* what = last_failure_ == DeviceStatus::timeout       ? "did not become ready in time"
                      : last_failure_ == DeviceStatus::unsupported ? "was refused by the camera"
-                     : last_failure_ == DeviceStatus::gone ? "was not answered: the camera is gone"
-                                                           : "could not be reached";
+                     : last_failure_ == DeviceStatus::disconnected
+                         ? "was not answered: the camera is gone"
+                         : "could not be reached";
   return format_text("register 0x%llx %s%s",
                      static_cast<unsigned long long>(failed_at_ - kRegisterSpace), what,
                      failed_writing_ ? " (writing)" : "");
@@ -156,7 +157,7 @@ DeviceStatus read_rom(RegisterPort* port, ConfigRom* rom, std::string* message) 
   const RomStatus parsed = parse_config_rom(std::span(quadlets).first(n), rom);
   if (parsed == RomStatus::ok) return DeviceStatus::ok;
   *message = to_string(parsed);
-  return status == DeviceStatus::gone ? status : DeviceStatus::failed;
+  return status == DeviceStatus::disconnected ? status : DeviceStatus::failed;
 }
 
 }  // namespace vergence::iidc

@@ -30,7 +30,7 @@ DeviceInfo info_of(const FirewireNode& node) {
           node.rom.model[0] != 0 ? node.rom.model.data() : "IIDC camera", node.device};
 }
 
-/// libdc1394 writes to stderr unless told otherwise; what matters is said by status and sentence.
+/// libdc1394 writes to stderr unless told otherwise; what matters is said by status and message.
 void silence_library() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -105,7 +105,7 @@ void FirewireBus::close_node() noexcept {
 
 FirewireBus::~FirewireBus() {
   stop();
-  ring_.forget_kept();  // the consumer is gone by contract
+  ring_.discard_kept();  // the consumer is gone by contract
   end_ring();
   close_node();
   if (wake_ >= 0) (void)::close(wake_);
@@ -127,7 +127,7 @@ DeviceStatus FirewireBus::reopen() noexcept {
     ring_.drop_orphans();
     if (!ring_.has_room()) {
       last_error_ = "images of before it was unplugged are still in use";
-      return DeviceStatus::gone;
+      return DeviceStatus::disconnected;
     }
     close_node();
     const std::string mine = info_.serial;
@@ -136,13 +136,13 @@ DeviceStatus FirewireBus::reopen() noexcept {
       if (last_error_.empty()) last_error_ = "the camera is not on the bus";
       return status == DeviceStatus::no_permission || status == DeviceStatus::busy
                  ? status
-                 : DeviceStatus::gone;
+                 : DeviceStatus::disconnected;
     }
     ring_.use_free_range();
     lost_.store(false, std::memory_order_release);
     return status;
   } catch (const std::exception&) {
-    return DeviceStatus::gone;
+    return DeviceStatus::disconnected;
   }
 }
 
@@ -150,12 +150,12 @@ DeviceStatus FirewireBus::reopen() noexcept {
 
 /// libdc1394 says only that it failed.
 DeviceStatus FirewireBus::failure(HostStamp begun) const noexcept {
-  if (::access(node_.device.c_str(), F_OK) != 0) return DeviceStatus::gone;
+  if (::access(node_.device.c_str(), F_OK) != 0) return DeviceStatus::disconnected;
   return monotonic_now() - begun > kSlow ? DeviceStatus::timeout : DeviceStatus::unsupported;
 }
 
 DeviceStatus FirewireBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
-  if (camera_ == nullptr) return DeviceStatus::gone;
+  if (camera_ == nullptr) return DeviceStatus::disconnected;
   const HostStamp begun = monotonic_now();
   return dc1394_get_registers(camera_, address - kRegisterSpace, value, 1) == DC1394_SUCCESS
              ? DeviceStatus::ok
@@ -163,7 +163,7 @@ DeviceStatus FirewireBus::read(std::uint64_t address, std::uint32_t* value) noex
 }
 
 DeviceStatus FirewireBus::write(std::uint64_t address, std::uint32_t value) noexcept {
-  if (camera_ == nullptr) return DeviceStatus::gone;
+  if (camera_ == nullptr) return DeviceStatus::disconnected;
   const HostStamp begun = monotonic_now();
   return dc1394_set_registers(camera_, address - kRegisterSpace, &value, 1) == DC1394_SUCCESS
              ? DeviceStatus::ok

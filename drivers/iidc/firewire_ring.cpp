@@ -15,7 +15,7 @@ namespace vergence::iidc {
 
 FirewireRing::~FirewireRing() {
   end();
-  forget_kept();
+  discard_kept();
   drop_orphans();
 }
 
@@ -33,7 +33,7 @@ DeviceStatus FirewireRing::set_up(dc1394camera_t* camera, const std::string& dev
   }
   if (result != DC1394_SUCCESS) {
     *error = std::string("libdc1394 cannot set up the capture: ") + dc1394_error_get_string(result);
-    return ::access(device.c_str(), F_OK) != 0 ? DeviceStatus::gone : DeviceStatus::failed;
+    return ::access(device.c_str(), F_OK) != 0 ? DeviceStatus::disconnected : DeviceStatus::failed;
   }
   captured_ = true;
   if (!find_map(device)) {

@@ -26,7 +26,7 @@ namespace vergence::iidc {
 /// Threads    set_up, resume, end, …: the owner, while nobody takes. take, refuse,
 ///            enqueue_returned: the stream's thread. give_back, bytes: any.
 /// Memory     The kernel's and the library's, at set_up(). Time: no call waits for a frame.
-/// Errors     Nothing throws but set_up(), where a sentence finds no memory.
+/// Errors     Nothing throws but set_up(), where a message finds no memory.
 class FirewireRing {
  public:
   static constexpr std::size_t kReserve = 3;
@@ -70,7 +70,7 @@ class FirewireRing {
   /// The next ring takes the range that is free. Precondition: !captured(), has_room().
   void use_free_range() noexcept;
   /// Nobody looks at images any more.
-  void forget_kept() noexcept { kept_.clear(); }
+  void discard_kept() noexcept { kept_.clear(); }
 
   // The stream's thread. Precondition: captured().
   /// Readable when a buffer is filled.

@@ -29,7 +29,7 @@ std::int64_t realtime_us() noexcept {
 
 DeviceStatus FirewireBus::start(StreamSink* sink) noexcept {
   stop();
-  if (camera_ == nullptr) return DeviceStatus::gone;
+  if (camera_ == nullptr) return DeviceStatus::disconnected;
   try {
     if (wake_ < 0) wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (!ring_.any_kept()) end_ring();

@@ -95,7 +95,7 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
   f.taken = true;
   f.stray = false;
   f.status = arrival.broken || arrival.bytes < shape_.image_bytes || holds_next_frame(arrival, e)
-                 ? FrameStatus::torn
+                 ? FrameStatus::incomplete
                  : FrameStatus::complete;
   if (info_.has(FrameInfoItem::time)) {
     f.exposure_start = DeviceStamp(clock_->unwrap(e.wrapped_ns, arrival.at)) - to_start();
@@ -111,7 +111,7 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
 ReadFrame FrameReader::count_only(const Arrival& arrival) noexcept {
   ReadFrame f;
   f.taken = true;
-  f.status = arrival.broken || arrival.bytes < shape_.image_bytes ? FrameStatus::torn
+  f.status = arrival.broken || arrival.bytes < shape_.image_bytes ? FrameStatus::incomplete
                                                                   : FrameStatus::complete;
   const HostStamp stamp = arrival.has_bus_stamp ? arrival.bus_stamp : arrival.at;
   if (any_ && arrival.has_bus_stamp && free_running_ && rate_hz_ > 0) {

@@ -26,7 +26,7 @@ DeviceStatus IidcCamera::configure(const CameraConfiguration& requested,
                                    CameraConfiguration* actual) noexcept {
   try {
     return configure_or_throw(requested, actual);
-  } catch (const std::exception&) {  // no memory for the slots, or for a sentence
+  } catch (const std::exception&) {  // no memory for the slots, or for a message
     return DeviceStatus::failed;
   }
 }
@@ -76,12 +76,12 @@ Duration IidcCamera::transfer_time() const noexcept {
 DeviceTiming IidcCamera::timing() const noexcept {
   DeviceTiming t;
   const BusTraits& bus = bus_->traits();
-  t.least_delay = plan_.exposure + transfer_time();
+  t.min_delay = plan_.exposure + transfer_time();
   const bool stamped = plan_.info.has(FrameInfoItem::time);
   t.resolution = stamped ? Duration::nanoseconds(kCycleNs / kTicksPerCycle + 1)
                          : Duration::nanoseconds(kCycleNs);
   if (!stamped && !bus.isochronous) {  // the stamp is the arrival
-    t.least_delay = plan_.exposure;
+    t.min_delay = plan_.exposure;
     t.resolution = Duration::milliseconds(1);
   }
   return t;
@@ -118,17 +118,18 @@ DeviceStatus IidcCamera::begin(Notifier* ready) {
   std::string why;
   if (lost_.load(std::memory_order_acquire)) {
     const DeviceStatus back = bus_->reopen();
-    if (back != DeviceStatus::ok) return refused(DeviceStatus::gone, bus_->last_error());
+    if (back != DeviceStatus::ok) return refused(DeviceStatus::disconnected, bus_->last_error());
     lost_.store(false, std::memory_order_release);
   }
   CameraPlan plan = plan_;
   DeviceStatus status = apply_plan(&registers_, bus_->traits(), &plan, &why);
-  if (status == DeviceStatus::gone)
+  if (status == DeviceStatus::disconnected)
     lost_.store(true, std::memory_order_release);  // unplugged while stopped
   if (status == DeviceStatus::timeout || status == DeviceStatus::failed ||
       status == DeviceStatus::unsupported) {
     lost_.store(true, std::memory_order_release);
-    status = DeviceStatus::gone;  // it does not answer as it did; asked again, it is opened again
+    status = DeviceStatus::disconnected;  // it does not answer as it did; asked again, it is opened
+                                          // again
   }
   if (status == DeviceStatus::ok && !(plan.shape == plan_.shape)) {
     why = "the camera's frames are not those it was configured for; configure it again";
@@ -153,12 +154,12 @@ DeviceStatus IidcCamera::begin(Notifier* ready) {
     status = registers_.take_status();
     if (status != DeviceStatus::ok) why = registers_.last_error();
     if (status == DeviceStatus::timeout || status == DeviceStatus::unsupported)
-      status = DeviceStatus::gone;
+      status = DeviceStatus::disconnected;
   } else {
     why = bus_->last_error();
   }
   if (status != DeviceStatus::ok) {
-    if (status == DeviceStatus::gone) lost_.store(true, std::memory_order_release);
+    if (status == DeviceStatus::disconnected) lost_.store(true, std::memory_order_release);
     return refused(status, std::move(why));
   }
   queue_.count_start();
@@ -173,7 +174,7 @@ void IidcCamera::stop() noexcept {
   const std::lock_guard lock(asking_);  // libdc1394 takes no question while a capture ends
   if (!lost_.load(std::memory_order_acquire)) {
     registers_.transmit(false);
-    if (registers_.take_status() == DeviceStatus::gone)
+    if (registers_.take_status() == DeviceStatus::disconnected)
       lost_.store(true, std::memory_order_release);
   }
   bus_->stop();
@@ -181,7 +182,7 @@ void IidcCamera::stop() noexcept {
 
 DeviceStatus IidcCamera::standing() const noexcept {
   if (!queue_.started()) return DeviceStatus::stopped;
-  return lost_.load(std::memory_order_acquire) ? DeviceStatus::gone : DeviceStatus::ok;
+  return lost_.load(std::memory_order_acquire) ? DeviceStatus::disconnected : DeviceStatus::ok;
 }
 
 DeviceStatus IidcCamera::trigger_once() noexcept {
@@ -216,7 +217,7 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
     taken.gain_db = registers_.set_absolute(Feature::gain, nearest(r, requested.gain_db));
   const DeviceStatus status = registers_.take_status();
   if (status != DeviceStatus::ok)
-    return status == DeviceStatus::gone ? status : DeviceStatus::failed;
+    return status == DeviceStatus::disconnected ? status : DeviceStatus::failed;
   plan_.exposure = taken.exposure;  // also after a stop or a replug
   plan_.gain_db = taken.gain_db;
   (void)exposures_.change(taken, monotonic_now());
@@ -274,7 +275,8 @@ void IidcCamera::gone(HostStamp at) noexcept {
 
 DeviceStatus IidcCamera::wait(Duration limit, Frame* frame) noexcept {
   const DeviceStatus status = queue_.wait(limit, frame);
-  if (status == DeviceStatus::gone) lost_.store(true, std::memory_order_release);  // silent, then
+  if (status == DeviceStatus::disconnected)
+    lost_.store(true, std::memory_order_release);  // silent, then
   return status;
 }
 

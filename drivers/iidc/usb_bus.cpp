@@ -63,7 +63,7 @@ DeviceStatus usb_status(int libusb_error) noexcept {
       return DeviceStatus::timeout;
     case LIBUSB_ERROR_NO_DEVICE:
     case LIBUSB_ERROR_NOT_FOUND:
-      return DeviceStatus::gone;
+      return DeviceStatus::disconnected;
     case LIBUSB_ERROR_ACCESS:
       return DeviceStatus::no_permission;
     case LIBUSB_ERROR_BUSY:
@@ -215,7 +215,7 @@ std::vector<UsbCandidate> find_usb_cameras(std::string* message) {
   return all;
 }
 
-constexpr int kMostErrors = 8;  // transfers in a row that failed: the device is given up
+constexpr int kMaxErrors = 8;  // transfers in a row that failed: the device is given up
 constexpr std::size_t kSuperSpeedBlock = 1024;  // transfers of USB 3 are whole packets of this size
 
 }  // namespace
@@ -336,23 +336,25 @@ DeviceStatus UsbBus::reopen() noexcept {
       info_.serial = mine;
       return status == DeviceStatus::no_permission || status == DeviceStatus::busy
                  ? status
-                 : DeviceStatus::gone;
+                 : DeviceStatus::disconnected;
     }
     lost_.store(false, std::memory_order_release);
     return status;
   } catch (const std::exception&) {
-    return DeviceStatus::gone;
+    return DeviceStatus::disconnected;
   }
 }
 
 // ---- registers
 
 DeviceStatus UsbBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
-  return handle_ == nullptr ? DeviceStatus::gone : read_usb_quadlet(handle_, address, value);
+  return handle_ == nullptr ? DeviceStatus::disconnected
+                            : read_usb_quadlet(handle_, address, value);
 }
 
 DeviceStatus UsbBus::write(std::uint64_t address, std::uint32_t value) noexcept {
-  return handle_ == nullptr ? DeviceStatus::gone : write_usb_quadlet(handle_, address, value);
+  return handle_ == nullptr ? DeviceStatus::disconnected
+                            : write_usb_quadlet(handle_, address, value);
 }
 
 // ---- streaming
@@ -393,9 +395,9 @@ int UsbBus::submit(Flight* flight) noexcept {
 }
 
 DeviceStatus UsbBus::start(StreamSink* sink) noexcept {
-  if (handle_ == nullptr) return DeviceStatus::gone;
+  if (handle_ == nullptr) return DeviceStatus::disconnected;
   stop();
-  if (abandoned()) return DeviceStatus::gone;
+  if (abandoned()) return DeviceStatus::disconnected;
   flying_.store(0, std::memory_order_release);  // one given up that came back was subtracted twice
   sink_ = sink;
   errors_ = 0;
@@ -422,7 +424,7 @@ DeviceStatus UsbBus::start(StreamSink* sink) noexcept {
     }
   }
   stop();
-  if (error == LIBUSB_ERROR_NO_DEVICE) return DeviceStatus::gone;
+  if (error == LIBUSB_ERROR_NO_DEVICE) return DeviceStatus::disconnected;
   last_error_ =
       error == LIBUSB_ERROR_OTHER
           ? "no thread for its stream"
@@ -452,7 +454,7 @@ void UsbBus::completed(Flight* flight) noexcept {
         again = false;
         break;
       default:  // error, stall, or cancelled by nobody we know
-        again = ++errors_ < kMostErrors;
+        again = ++errors_ < kMaxErrors;
         break;
     }
     again = again && submit(flight) == LIBUSB_SUCCESS;

@@ -81,7 +81,7 @@ struct FaultRow {
 [[nodiscard]] std::string_view to_string(FaultKind) noexcept;
 
 /// A fault from its kind, time in seconds and parameters. Throws std::invalid_argument: half a
-/// sentence about what is wrong.
+/// message about what is wrong.
 [[nodiscard]] Fault make_fault(const std::string& kind, double at_s,
                                const std::vector<std::pair<std::string, double>>& parameters);
 

@@ -28,7 +28,7 @@ struct OptionRow {
   std::string name;      // `feature.NAME`: any name after the dot
   std::string values;    // the unit, what it takes: `µs, 0 to 10000`, `on, off`
   std::string fallback;  // what holds where nobody gives it; may be words; empty: nothing
-  std::string meaning;   // one sentence
+  std::string meaning;   // one message
 };
 
 /// The options of one kind of camera, a row for each member of the struct `Options`, in the order

@@ -53,7 +53,7 @@ namespace {
 
 OptionTable<Options> make_table() {
   using O = Options;
-  constexpr double kMostStrobeUs = 3998;  // 12 bits of 1/1024 ms
+  constexpr double kMaxStrobeUs = 3998;  // 12 bits of 1/1024 ms
   OptionTable<O> t;
   t.number("trigger_source", &O::trigger_source, {0, 3}, "", nullptr,
            "Input of the hardware trigger.");
@@ -65,9 +65,9 @@ OptionTable<Options> make_table() {
   t.number("strobe_pin", &O::strobe_pin, {0, 3}, "", "none", "Output that shows the exposure.");
   t.choice<bool, bool>("strobe_level", &O::strobe_high, {{"high", true}, {"low", false}}, nullptr,
                        "Level of that output during the exposure.");
-  t.number("strobe_delay_us", &O::strobe_delay, {0, kMostStrobeUs}, "µs", nullptr,
+  t.number("strobe_delay_us", &O::strobe_delay, {0, kMaxStrobeUs}, "µs", nullptr,
            "From the exposure's start to the strobe's.");
-  t.number("strobe_duration_us", &O::strobe_duration, {0, kMostStrobeUs}, "µs", nullptr,
+  t.number("strobe_duration_us", &O::strobe_duration, {0, kMaxStrobeUs}, "µs", nullptr,
            "Length of the strobe; 0: as long as the exposure.");
   t.on_off("format7", &O::format7, "where needed",
            "on: only regions (Format 7), off: only fixed modes.");

@@ -17,7 +17,7 @@ namespace vergence {
 ///     CameraConfiguration c;
 ///     c.options = gige::Options{.packet_size = 9000};
 ///
-/// Threads  Values. Memory: ordinary. Errors: statuses; the sentence is made where the text came
+/// Threads  Values. Memory: ordinary. Errors: statuses; the message is made where the text came
 ///          from.
 using CameraOptions = std::variant<std::monostate, gige::Options, iidc::Options, v4l2::Options>;
 

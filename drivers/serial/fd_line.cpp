@@ -53,7 +53,7 @@ LineRead FdLine::read(std::span<std::uint8_t> out, Duration limit) noexcept {
           got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
       // A wake-up for nothing to read is a hang-up: the converter is unplugged.
       if (!nothing_yet || (fds[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0)
-        return {DeviceStatus::gone, 0, arrival};
+        return {DeviceStatus::disconnected, 0, arrival};
     }
     if (monotonic_now() >= deadline) return {DeviceStatus::timeout, 0, {}};
   }
@@ -68,12 +68,13 @@ DeviceStatus FdLine::write(std::span<const std::uint8_t> bytes, Duration limit) 
       continue;
     }
     if (put < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)
-      return DeviceStatus::gone;
+      return DeviceStatus::disconnected;
     pollfd p{tty_.get(), POLLOUT, 0};
     const timespec left = left_until(deadline);
     const int n = ::ppoll(&p, 1, &left, nullptr);
     if (n < 0 && errno != EINTR) return DeviceStatus::failed;
-    if (n > 0 && (p.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return DeviceStatus::gone;
+    if (n > 0 && (p.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0)
+      return DeviceStatus::disconnected;
     if (monotonic_now() >= deadline) return DeviceStatus::timeout;
   }
   return DeviceStatus::ok;

@@ -9,7 +9,7 @@ namespace vergence {
 
 DeviceStatus set_raw_tty(int fd, const LineSettings& settings) noexcept {
   termios2 t{};
-  if (::ioctl(fd, TCGETS2, &t) != 0) return DeviceStatus::gone;
+  if (::ioctl(fd, TCGETS2, &t) != 0) return DeviceStatus::disconnected;
   t.c_iflag = 0;
   t.c_oflag = 0;
   t.c_lflag = 0;
@@ -19,7 +19,7 @@ DeviceStatus set_raw_tty(int fd, const LineSettings& settings) noexcept {
   t.c_cc[VTIME] = 0;
   if (::ioctl(fd, TCSETS2, &t) != 0) return DeviceStatus::unsupported;
   termios2 set{};
-  if (::ioctl(fd, TCGETS2, &set) != 0) return DeviceStatus::gone;
+  if (::ioctl(fd, TCGETS2, &set) != 0) return DeviceStatus::disconnected;
   // A converter rounds to what its divisor can do: 3 % is what a byte of ten bits stands.
   const double error = static_cast<double>(set.c_ospeed) / static_cast<double>(settings.baud) - 1;
   return error < 0.03 && error > -0.03 ? DeviceStatus::ok : DeviceStatus::unsupported;

@@ -193,7 +193,7 @@ std::string SerialPort::find() const {
   return converter_.known() ? converter_.find(list_serial_ports(), port_) : port_;
 }
 
-std::unique_ptr<ByteLine> SerialPort::open(const LineSettings& settings, DeviceStatus* status) {
+std::unique_ptr<SerialLink> SerialPort::open(const LineSettings& settings, DeviceStatus* status) {
   if (settings.baud == 0 || settings.stop_bits < 1 || settings.stop_bits > 2) {
     *status = DeviceStatus::unsupported;
     return nullptr;

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "drivers/serial/byte_line.hpp"
+#include "drivers/serial/serial_link.hpp"
 
 namespace vergence {
 
@@ -69,13 +69,13 @@ class ConverterNumber {
 /// from its first opening, if no other port bears it: a device that comes back as ttyUSB1 is found.
 /// The port is held exclusively; a second opening is `busy`.
 ///
-/// Threads  One caller. Memory: ordinary; the lines as ByteLine says.
-class SerialPort final : public LinePlace {
+/// Threads  One caller. Memory: ordinary; the lines as SerialLink says.
+class SerialPort final : public SerialLinkFactory {
  public:
   explicit SerialPort(std::string port) : port_(std::move(port)) {}
 
-  [[nodiscard]] std::unique_ptr<ByteLine> open(const LineSettings& settings,
-                                               DeviceStatus* status) override;
+  [[nodiscard]] std::unique_ptr<SerialLink> open(const LineSettings& settings,
+                                                 DeviceStatus* status) override;
   [[nodiscard]] std::string name() const override { return port_; }
   [[nodiscard]] Duration latency_timer() const override;
 

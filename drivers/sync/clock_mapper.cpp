@@ -92,7 +92,7 @@ MappedStamp ClockMapper::at(DeviceStamp device) const noexcept {
 // ---- one way ----
 
 MappedStamp ClockMapper::begin_one_way(DeviceStamp device, HostStamp arrival) noexcept {
-  begin(device, arrival - options_.least_delay);
+  begin(device, arrival - options_.min_delay);
   (void)take(&upper_, {0, 0}, 1);
   pairs_ = 1;
   return at(device);
@@ -101,9 +101,9 @@ MappedStamp ClockMapper::begin_one_way(DeviceStamp device, HostStamp arrival) no
 MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
   if (two_way_)
     return absurd(device, origin_)
-               ? MappedStamp{arrival - options_.least_delay, options_.delay_spread + options_.stall}
+               ? MappedStamp{arrival - options_.min_delay, options_.delay_spread + options_.stall}
                : at(device);
-  const HostStamp host = arrival - options_.least_delay;
+  const HostStamp host = arrival - options_.min_delay;
   if (!known()) return begin_one_way(device, arrival);
   if (far_off(device, host)) {
     ++resets_;

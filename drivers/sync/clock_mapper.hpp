@@ -8,7 +8,7 @@
 namespace vergence {
 
 struct ClockMapperOptions {
-  Duration least_delay{};  // from measurement to arrival at best, as the transport states it
+  Duration min_delay{};  // from measurement to arrival at best, as the transport states it
   Duration delay_spread = Duration::milliseconds(
       2);  // by how much a delay exceeds it on average: the error bound while little is known
   Duration resolution = Duration::microseconds(1);  // of the device's stamps
@@ -29,7 +29,7 @@ struct MappedStamp {
 /// Ties a device's clock to the host's: offset and drift, from pairs of device stamp and arrival,
 /// or from questions and answers.
 ///
-///     ClockMapper clock({.least_delay = Duration::microseconds(300)});
+///     ClockMapper clock({.min_delay = Duration::microseconds(300)});
 ///     const MappedStamp mapped = clock.map(frame.exposure_start, frame.arrival);
 ///     use(mapped.host, mapped.error);
 ///
@@ -37,7 +37,7 @@ struct MappedStamp {
 ///            device) is the clock. Every kBin of device time keeps its least-delayed pair, kBins
 ///            of them are held; the line is the edge of their lower convex hull under the mean, its
 ///            slope held within the drift bound. What the least delay of the way truly is nobody
-///            can see one way: by what the stated one (`least_delay`) is wrong, all stamps are,
+///            can see one way: by what the stated one (`min_delay`) is wrong, all stamps are,
 ///            beyond the bound.
 /// Two ways   A question puts the line above a point, its answer below one. Of the slopes the one
 ///            is taken that leaves the most room between those bounds, and the line in the middle

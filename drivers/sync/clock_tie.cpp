@@ -17,9 +17,9 @@ DeviceStamp ClockTie::edge_of(DeviceStamp stamp) const noexcept {
 }
 
 Duration ClockTie::gate(DeviceStamp stamp) const noexcept {
-  constexpr Duration kLeast = Duration::microseconds(50);
+  constexpr Duration kMin = Duration::microseconds(50);
   constexpr double kWander = 30e-6;  // of the rate, where nothing was seen for a while
-  const Duration near = std::min(noise_ * 4 + kLeast, interval_ / 5);
+  const Duration near = std::min(noise_ * 4 + kMin, interval_ / 5);
   const Duration since = stamp - stamp_;
   return near + scaled(magnitude(since), kWander);
 }
@@ -40,7 +40,7 @@ void ClockTie::add(DeviceStamp stamp, DeviceStamp edge) noexcept {
   stamp_ = stamp;
   edge_ = expected + scaled(off, g);
   rate_ = std::clamp(rate_ + h * static_cast<double>(off.ns()) / static_cast<double>(since.ns()),
-                     -kMostDrift, kMostDrift);
+                     -kMaxDrift, kMaxDrift);
 }
 
 }  // namespace vergence

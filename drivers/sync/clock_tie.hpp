@@ -4,7 +4,7 @@
 namespace vergence {
 
 /// The greatest difference between two crystals of 200 ppm.
-inline constexpr double kMostDrift = 400e-6;
+inline constexpr double kMaxDrift = 400e-6;
 
 /// A camera's clock tied to the clock of the pulses' source: a line over matched pairs of stamp and
 /// edge.

@@ -51,7 +51,7 @@ bool CounterNumbering::judge(bool agree) noexcept {
     unproven_run_ = 0;
     return false;
   }
-  if (!align_start_ || ++unproven_run_ < kUnproven) return false;
+  if (!align_start_ || ++unproven_run_ < kAmbiguous) return false;
   unproven_run_ = 0;
   for (std::size_t k = 1; k < cameras_.size(); ++k)
     cameras_[k].align = true;  // to camera 0, whose numbers go on

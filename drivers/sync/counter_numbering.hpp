@@ -15,13 +15,13 @@ namespace vergence {
 /// Constant  0 until it is told to be found by time: then the camera's next frame gets the number
 ///           whose time is nearest, reckoned from the newest number that a time is known of, and
 ///           the others follow. So after a restart, after a counter that leaps over an hour of
-///           pulses, and, with `align_start`, at the start and after kUnproven sets in a row whose
+///           pulses, and, with `align_start`, at the start and after kAmbiguous sets in a row whose
 ///           stamps did not agree.
 /// Threads   One caller. Memory: in place. Time: constant a call.
 /// Errors    None.
 class CounterNumbering {
  public:
-  static constexpr int kUnproven = 10;  // in a row: the pulses were not found rightly
+  static constexpr int kAmbiguous = 10;  // in a row: the pulses were not found rightly
 
   /// `interval`: between two pulses, > 0.
   CounterNumbering(Duration interval, bool align_start) noexcept;

@@ -51,9 +51,9 @@ std::optional<PulseAcquisition::Trial> PulseAcquisition::attempt(const PulseTrai
     strict = f == Fit::strict;
     found = place;
   }
-  const bool proven = fits == 1 && strict && !(open_ended && beyond + kNear >= found) &&
-                      believable(train, found, end);
-  return Trial{proven, found, end};
+  const bool verified = fits == 1 && strict && !(open_ended && beyond + kNear >= found) &&
+                        believable(train, found, end);
+  return Trial{verified, found, end};
 }
 
 /// The frame came no later than frames do, every pulse that it might be of instead was tried, and a
@@ -82,7 +82,7 @@ PulseAcquisition::Fit PulseAcquisition::fit(const PulseTrain& train, std::size_t
   bool strict = true;
   for (std::size_t i = end - 1; i-- > begin;) {
     const Duration since = frames_[i + 1].stamp - frames_[i].stamp;
-    const Duration noise = noise_ * 2 + scaled(since, kMostDrift);
+    const Duration noise = noise_ * 2 + scaled(since, kMaxDrift);
     const DeviceStamp target = edge - since;
     while (at > 0 && train[at].edge > target + noise * 2) --at;
     const PulseTrain::Entry& pulse = train[at];
@@ -91,7 +91,7 @@ PulseAcquisition::Fit PulseAcquisition::fit(const PulseTrain& train, std::size_t
         static_cast<std::uint64_t>(advance(frames_[i].counter, frames_[i + 1].counter));
     if (off <= noise * 2) {
       const Duration span = last.stamp - frames_[i].stamp;
-      const Duration along = noise_ * 2 + scaled(span, kMostDrift);
+      const Duration along = noise_ * 2 + scaled(span, kMaxDrift);
       const Duration apart = magnitude((train[place].edge - pulse.edge) - span);
       if (apart > along * 2) return Fit::none;
       strict = strict && off <= noise && apart <= along;
@@ -120,14 +120,14 @@ PulseAcquisition::Fit PulseAcquisition::fit(const PulseTrain& train, std::size_t
   return strict && odd == 0 ? Fit::strict : Fit::loose;
 }
 
-bool MissedTriggerDoubt::add(std::uint64_t missed) noexcept {
+bool MissedTriggerTest::add(std::uint64_t missed) noexcept {
   pulses_ += missed;
   rivals_ = {};
-  return pulses_ <= kMost;
+  return pulses_ <= kMax;
 }
 
-bool MissedTriggerDoubt::compare(const PulseTrain& train, std::uint64_t number,
-                                 Duration limit) noexcept {
+bool MissedTriggerTest::compare(const PulseTrain& train, std::uint64_t number,
+                                Duration limit) noexcept {
   const PulseTrain::Entry* pulse = train.find(number);
   bool all = true;
   for (std::size_t s = 1; s <= pulses_; ++s) {
@@ -147,14 +147,14 @@ bool MissedTriggerDoubt::compare(const PulseTrain& train, std::uint64_t number,
 }
 
 void PulseMatcher::restart() noexcept {
-  proven_ = false;
+  verified_ = false;
   acquisition_.clear();
   recents_ = pendings_ = 0;
   failures_ = 0;
   doubt_.clear();
 }
 
-std::uint64_t PulseMatcher::least_number(std::uint64_t counter) const noexcept {
+std::uint64_t PulseMatcher::min_number(std::uint64_t counter) const noexcept {
   const std::int64_t steps = advance(last_.counter, counter);
   return steps > 0 ? last_.number + static_cast<std::uint64_t>(steps) : last_.number;
 }
@@ -162,7 +162,7 @@ std::uint64_t PulseMatcher::least_number(std::uint64_t counter) const noexcept {
 PulseMatcher::Match PulseMatcher::frame(const PulseTrain& train, std::uint64_t counter,
                                         DeviceStamp stamp, HostStamp arrival) noexcept {
   const StampedFrame frame{counter, stamp, arrival, 0};
-  if (proven_) return match(train, frame);
+  if (verified_) return match(train, frame);
   acquisition_.add(frame);
   acquire(train, arrival);
   return {};
@@ -170,7 +170,7 @@ PulseMatcher::Match PulseMatcher::frame(const PulseTrain& train, std::uint64_t c
 
 std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train,
                                                   HostStamp arrival) noexcept {
-  if (!proven_) {
+  if (!verified_) {
     acquire(train, arrival);
     return std::nullopt;
   }
@@ -206,7 +206,7 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train,
 void PulseMatcher::acquire(const PulseTrain& train, HostStamp now) noexcept {
   const auto trial = acquisition_.attempt(train);
   if (!trial) return;
-  if (trial->proven)
+  if (trial->verified)
     adopt(train, *trial, now);
   else
     ++failures_;
@@ -214,7 +214,7 @@ void PulseMatcher::acquire(const PulseTrain& train, HostStamp now) noexcept {
 
 void PulseMatcher::adopt(const PulseTrain& train, const PulseAcquisition::Trial& trial,
                          HostStamp now) noexcept {
-  proven_ = true;
+  verified_ = true;
   failures_ = 0;
   ++acquisitions_;
   worst_acquisition_ = std::max(worst_acquisition_, now - acquisition_.began());
@@ -238,7 +238,7 @@ void PulseMatcher::adopt(const PulseTrain& train, const PulseAcquisition::Trial&
     frame.number = pulse.number;
     tie_.add(frame.stamp, pulse.edge);
     const Duration delay = frame.arrival - pulse.host;
-    least_delay_ = i == 0 ? delay : std::min(least_delay_, delay);
+    min_delay_ = i == 0 ? delay : std::min(min_delay_, delay);
     last_ = frame;
     last_skipped_ = pulse.skipped;
     recent_[recents_++ % kRecent] = frame;
@@ -248,10 +248,10 @@ void PulseMatcher::adopt(const PulseTrain& train, const PulseAcquisition::Trial&
   const std::size_t waiting = frames.size() - trial.end;
   std::copy_n(frames.begin() + static_cast<std::ptrdiff_t>(trial.end), waiting, later.begin());
   acquisition_.clear();
-  for (std::size_t i = 0; i < waiting && proven_; ++i) (void)match(train, later[i]);
+  for (std::size_t i = 0; i < waiting && verified_; ++i) (void)match(train, later[i]);
 }
 
-// ---- proven ----
+// ---- verified ----
 
 PulseMatcher::Match PulseMatcher::contradict(const StampedFrame& frame) noexcept {
   restart();
@@ -304,9 +304,9 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
   // here before its pulse.
   const MappedStamp host = train.host_of(m.edge);
   const Duration delay = frame.arrival - host.host;
-  if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < least_delay_))
+  if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < min_delay_))
     return contradict(frame);
-  least_delay_ = std::min(least_delay_, delay);
+  min_delay_ = std::min(min_delay_, delay);
   if (m.missed > 0 && !doubt_.add(m.missed)) return contradict(frame);
   m.outcome = Outcome::matched;
   m.number = place->number;

@@ -39,7 +39,7 @@ struct StampedFrame {
 /// Errors     None: an acquisition that proves nothing goes on.
 ///
 ///     acquisition.add(frame);
-///     if (const auto trial = acquisition.attempt(train); trial && trial->proven) use(*trial);
+///     if (const auto trial = acquisition.attempt(train); trial && trial->verified) use(*trial);
 class PulseAcquisition {
  public:
   static constexpr std::size_t kRun =
@@ -50,7 +50,7 @@ class PulseAcquisition {
   static constexpr std::size_t kNear = 8;   // places beside the found one that must be excluded
 
   struct Trial {
-    bool proven = false;
+    bool verified = false;
     std::size_t place = 0;  // on the train, of the run's last frame
     std::size_t end = 0;    // the run ends before this one of frames()
   };
@@ -99,14 +99,14 @@ class PulseAcquisition {
 ///          pulse s earlier, a constant time off. That is refuted once this time has changed by
 ///          more than the limit given. Intervals that differ settle it soon, even ones not before a
 ///          pause.
-/// Threads  One caller. Memory: fixed. Time: at most kMost steps a call.
-class MissedTriggerDoubt {
+/// Threads  One caller. Memory: fixed. Time: at most kMax steps a call.
+class MissedTriggerTest {
  public:
-  static constexpr std::size_t kMost = 8;  // pulses missed since the doubt began
+  static constexpr std::size_t kMax = 8;  // pulses missed since the doubt began
 
   void clear() noexcept { pulses_ = 0; }
   [[nodiscard]] bool any() const noexcept { return pulses_ > 0; }
-  /// So many more triggers seem to have been missed. False: more than kMost.
+  /// So many more triggers seem to have been missed. False: more than kMax.
   [[nodiscard]] bool add(std::uint64_t missed) noexcept;
   /// A frame of this reported pulse fits it. True: the triggers were missed, the doubt is over.
   [[nodiscard]] bool compare(const PulseTrain& train, std::uint64_t number,
@@ -120,7 +120,7 @@ class MissedTriggerDoubt {
   };
 
   std::uint64_t pulses_ = 0;  // by which the frames may be off; 0: none
-  std::array<Rival, kMost> rivals_{};
+  std::array<Rival, kMax> rivals_{};
 };
 
 /// Ties one camera's frames to numbered pulses: first by proof, then by stamp and counter together.
@@ -175,9 +175,9 @@ class PulseMatcher {
   /// Forgets everything: the camera or the train began again.
   void restart() noexcept;
 
-  [[nodiscard]] bool proven() const noexcept { return proven_; }
-  /// The least number that the exposure of this counter can have. Precondition: proven().
-  [[nodiscard]] std::uint64_t least_number(std::uint64_t counter) const noexcept;
+  [[nodiscard]] bool verified() const noexcept { return verified_; }
+  /// The least number that the exposure of this counter can have. Precondition: verified().
+  [[nodiscard]] std::uint64_t min_number(std::uint64_t counter) const noexcept;
   /// Frames since the last missed trigger may be of earlier pulses than they were matched with.
   [[nodiscard]] bool doubtful() const noexcept { return doubt_.any(); }
   /// Trials of the current acquisition that proved nothing, or frames that did not end the current
@@ -199,12 +199,12 @@ class PulseMatcher {
   [[nodiscard]] Match contradict(const StampedFrame& frame) noexcept;
 
   Duration interval_;
-  bool proven_ = false;
+  bool verified_ = false;
   int failures_ = 0;
   PulseAcquisition acquisition_;
   // Proven.
   ClockTie tie_;
-  MissedTriggerDoubt doubt_;
+  MissedTriggerTest doubt_;
   std::array<StampedFrame, kRecent> recent_{};
   std::size_t recents_ = 0;
   std::array<StampedFrame, kPending>
@@ -212,7 +212,7 @@ class PulseMatcher {
   std::size_t pendings_ = 0;
   StampedFrame last_{};
   std::uint64_t last_skipped_ = 0;
-  Duration least_delay_{};  // from edge to arrival
+  Duration min_delay_{};  // from edge to arrival
   std::uint64_t acquisitions_ = 0;
   Duration worst_acquisition_{};
 };

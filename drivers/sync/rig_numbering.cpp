@@ -55,14 +55,14 @@ void RigSynchronizer::take_pulse(const Pulse& pulse) noexcept {
   ++pulses_;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     PulseMatcher& matcher = matchers_[k];
-    const bool proven = matcher.proven();
+    const bool verified = matcher.verified();
     if (const auto number = matcher.report(train_, now_)) {
       ++counters_.contradictions[k];
       sets_.contradict_doubtful(k);
       OpenSet* open = sets_.find(*number);
       if (open != nullptr && open->set.present[k]) open->contradicted = true;
     }
-    if (!proven && matcher.proven()) acquired(k);
+    if (!verified && matcher.verified()) acquired(k);
   }
 }
 
@@ -72,7 +72,7 @@ std::uint32_t RigSynchronizer::wants_pause() noexcept {
       3 * PulseMatcher::kRun;  // pulses, until a pause has been seen or has not helped
   if (!proves_numbers(options_.mode) || (asked_ && pulses_ < asked_at_ + kPatience)) return 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
-    const bool settled = proven(static_cast<int>(k)) && !matchers_[k].doubtful();
+    const bool settled = verified(static_cast<int>(k)) && !matchers_[k].doubtful();
     if (!sources_[k].here || settled || matchers_[k].failures() < kInVain) continue;
     asked_ = true;
     asked_at_ = pulses_;
@@ -81,10 +81,10 @@ std::uint32_t RigSynchronizer::wants_pause() noexcept {
   return 0;
 }
 
-bool RigSynchronizer::proven(int camera) const noexcept {
+bool RigSynchronizer::verified(int camera) const noexcept {
   const bool is_master = options_.mode == SyncMode::master_strobe && camera == 0;
   return !proves_numbers(options_.mode) || is_master ||
-         matchers_[static_cast<std::size_t>(camera)].proven();
+         matchers_[static_cast<std::size_t>(camera)].verified();
 }
 
 RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame,
@@ -108,7 +108,7 @@ RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame,
     case PulseMatcher::Outcome::acquiring:
       ++counters_.acquiring[k];
       steady_from_ = std::max(steady_from_, sets_.first_free());
-      if (matchers_[k].proven()) acquired(k);
+      if (matchers_[k].verified()) acquired(k);
       return Step::acquiring;
   }
   counters_.missed_trigger[k] += m.missed;

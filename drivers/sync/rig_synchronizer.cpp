@@ -10,7 +10,7 @@ namespace vergence {
 
 RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept
     : options_(options),
-      by_counter_(options.interval, options.align_start && options.mode == SyncMode::counter),
+      by_counter_(options.interval, options.align_start && options.mode == SyncMode::frame_counter),
       by_time_(options),
       train_(options.interval),
       master_(options.interval) {
@@ -20,23 +20,23 @@ RigSynchronizer::RigSynchronizer(const SyncOptions& options) noexcept
     matchers_[k] = PulseMatcher(noise_of(k), options.interval, options.camera[k].latest, pause);
 }
 
-SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
+SyncResult RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   assert(frame.camera >= 0 && frame.camera < options_.cameras && !sets_.crowded());
   const auto k = static_cast<std::size_t>(frame.camera);
   now_ = std::max(now_, frame.arrival);
   SetImage image{frame.middle, 0, {}, {}, frame.exposure};
   std::uint64_t number = 0;
   const Step step = number_of(frame, &number, &image);
-  if (step == Step::acquiring) return SyncVerdict::acquiring;
+  if (step == Step::acquiring) return SyncResult::acquiring;
   if (step == Step::late) {
     ++counters_.late[k];
-    return SyncVerdict::late;
+    return SyncResult::late;
   }
   if (sets_.is_out(number)) return verdict_on_late(k, number, step, image);
   OpenSet* open = sets_.find(number);
   if (step == Step::again || (open != nullptr && open->set.present[k])) {
     ++counters_.duplicate[k];
-    return SyncVerdict::duplicate;
+    return SyncResult::duplicate;
   }
   if (open == nullptr) open = &sets_.open(number, frame.arrival);
   open->set.present[k] = true;
@@ -49,25 +49,25 @@ SyncVerdict RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   source.newest = source.any ? std::max(source.newest, number) : number;
   source.any = true;
   by_counter_.note(number, frame.middle.host, k == 0 || !sources_[0].here);
-  return SyncVerdict::taken;
+  return SyncResult::taken;
 }
 
-/// A frame whose set has gone out: with its image, without it, or before it was proven at all.
-SyncVerdict RigSynchronizer::verdict_on_late(std::size_t camera, std::uint64_t number, Step step,
-                                             const SetImage& image) noexcept {
+/// A frame whose set has gone out: with its image, without it, or before it was verified at all.
+SyncResult RigSynchronizer::verdict_on_late(std::size_t camera, std::uint64_t number, Step step,
+                                            const SetImage& image) noexcept {
   if (number < sources_[camera].from) {
     ++counters_.acquiring[camera];
-    return SyncVerdict::acquiring;
+    return SyncResult::acquiring;
   }
   const bool of_it = !pairs_by_time(options_.mode) ||
                      std::abs(image.time - sets_.last_time()) <= options_.tolerance.ns();
   const bool given = step == Step::again || (of_it && sets_.went_out_with(number, camera));
   ++(given ? counters_.duplicate : counters_.late)[camera];
-  return given ? SyncVerdict::duplicate : SyncVerdict::late;
+  return given ? SyncResult::duplicate : SyncResult::late;
 }
 
 bool RigSynchronizer::waited_for(std::size_t camera) const noexcept {
-  return sources_[camera].here && proven(static_cast<int>(camera));
+  return sources_[camera].here && verified(static_cast<int>(camera));
 }
 
 bool RigSynchronizer::ready(const OpenSet& open) const noexcept {
@@ -165,13 +165,13 @@ void RigSynchronizer::emit(OpenSet* open, SyncedSet* set) noexcept {
 /// What can be said of a set's togetherness, and whether the pulses have to be found again.
 void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
   switch (options_.mode) {
-    case SyncMode::software:
+    case SyncMode::approximate_time:
       set->proof = SyncProof::by_time;
       return;
-    case SyncMode::one_picture:
+    case SyncMode::side_by_side:
       set->proof = SyncProof::common_clock;
       return;
-    case SyncMode::bus:
+    case SyncMode::ieee1394_cycle_time:
     case SyncMode::ptp:
       // A clock that is common no more (no master, two of them) pairs one exposure with the next
       // once it has drifted apart by an interval; the host's stamps know better.
@@ -188,7 +188,7 @@ void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
           options_.mode == SyncMode::master_strobe ? SyncProof::master : SyncProof::numbered;
       if (open->contradicted) doubt(set);
       return;
-    case SyncMode::counter:
+    case SyncMode::frame_counter:
       break;
   }
   if (std::count(set->present.begin(), set->present.end(), true) < 2) return;
@@ -209,8 +209,8 @@ bool RigSynchronizer::a_clock_is_apart() const noexcept {
 }
 
 void RigSynchronizer::doubt(SyncedSet* set) noexcept {
-  set->proof = SyncProof::unproven;
-  ++counters_.unproven;
+  set->proof = SyncProof::ambiguous;
+  ++counters_.ambiguous;
 }
 
 SyncCounters RigSynchronizer::counters() const noexcept {
@@ -226,12 +226,12 @@ void RigSynchronizer::lost(int camera, std::uint64_t counter) noexcept {
   const auto k = static_cast<std::size_t>(camera);
   Source& source = sources_[k];
   std::uint64_t next = 0;  // the first that is still waited for
-  if (options_.mode == SyncMode::counter) {
+  if (options_.mode == SyncMode::frame_counter) {
     const auto number = by_counter_.number_of_lost(k, counter);
     if (!number) return;
     next = *number + 1;
-  } else if (proves_numbers(options_.mode) && matchers_[k].proven()) {
-    next = matchers_[k].least_number(counter) + 1;
+  } else if (proves_numbers(options_.mode) && matchers_[k].verified()) {
+    next = matchers_[k].min_number(counter) + 1;
   } else {
     return;
   }
@@ -248,7 +248,7 @@ void RigSynchronizer::restarted(int camera) noexcept {
   Source& source = sources_[k];
   source.here = true;
   source.any = false;
-  if (options_.mode == SyncMode::counter) by_counter_.align(k);
+  if (options_.mode == SyncMode::frame_counter) by_counter_.align(k);
   sets_.contradict_doubtful(k);
   matchers_[k].restart();
   if (k == 0) master_.restart();

@@ -23,7 +23,7 @@ namespace vergence {
 /// once. Determined by what is offered and in which order; no clock is read.
 ///
 ///     RigSynchronizer synchronizer({.cameras = 2, .interval = Duration::milliseconds(50)});
-///     if (synchronizer.offer(frame) != SyncVerdict::taken) camera.release(frame.slot);
+///     if (synchronizer.offer(frame) != SyncResult::taken) camera.release(frame.slot);
 ///     for (SyncedSet set; synchronizer.next(&set);)
 ///       if (set.complete) use(set.slots, set.stamp);  // its slots are ours again
 ///
@@ -34,12 +34,12 @@ namespace vergence {
 ///            than counts are missed triggers, counts without images are lost frames, anything else
 ///            is a contradiction and it acquires again. After a missed trigger sets wait up to
 ///            `hold` for the intervals to show that it was none of the clock's, else they are
-///            `unproven`. A pulse that runs back in number or has another `boot` makes all acquire
+///            `ambiguous`. A pulse that runs back in number or has another `boot` makes all acquire
 ///            again. A frame that comes before its pulse's report is given the pulse's number all
-///            the same; the report then confirms it, or the set is `unproven`.
+///            the same; the report then confirms it, or the set is `ambiguous`.
 /// One clock  Of a set paired by stamps of one bus or PTP clock the host's stamps must agree within
-///            half an interval, else it is `unproven`; so is every set while a camera that is there
-///            has a clock far from the others'.
+///            half an interval, else it is `ambiguous`; so is every set while a camera that is
+///            there has a clock far from the others'.
 /// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot
 ///            be told here.
 /// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the
@@ -49,7 +49,7 @@ namespace vergence {
 class RigSynchronizer {
  public:
   static constexpr std::size_t kOpen = OpenSets::kOpen;
-  static constexpr int kUnproven = CounterNumbering::kUnproven;
+  static constexpr int kAmbiguous = CounterNumbering::kAmbiguous;
   static constexpr std::uint32_t kPause =
       4;  // pulses left out: more than what a camera misses by itself
 
@@ -57,7 +57,7 @@ class RigSynchronizer {
   explicit RigSynchronizer(const SyncOptions& options) noexcept;
 
   /// Precondition: next() was called until false since the last offer().
-  [[nodiscard]] SyncVerdict offer(const SyncFrame& frame) noexcept;
+  [[nodiscard]] SyncResult offer(const SyncFrame& frame) noexcept;
   /// The next set that is ready. Call until false.
   [[nodiscard]] bool next(SyncedSet* set) noexcept;
 
@@ -70,8 +70,8 @@ class RigSynchronizer {
   /// board: TriggerDevice::pause() with just that number, another could hide a report that was
   /// lost. ins_syncout, master_strobe: stop the source and start it again.
   [[nodiscard]] std::uint32_t wants_pause() noexcept;
-  /// Nothing is left to be proven of that camera's frames: always, where nothing can be.
-  [[nodiscard]] bool proven(int camera) const noexcept;
+  /// Nothing is left to be verified of that camera's frames: always, where nothing can be.
+  [[nodiscard]] bool verified(int camera) const noexcept;
 
   /// That exposure of a camera gave no image that could be used: nobody waits for it. Else as
   /// offer(); not where stamps pair.
@@ -103,8 +103,8 @@ class RigSynchronizer {
                                      SetImage* image) noexcept;
   [[nodiscard]] Step number_by_master(const SyncFrame& frame, std::uint64_t* number,
                                       SetImage* image) noexcept;
-  [[nodiscard]] SyncVerdict verdict_on_late(std::size_t camera, std::uint64_t number, Step step,
-                                            const SetImage& image) noexcept;
+  [[nodiscard]] SyncResult verdict_on_late(std::size_t camera, std::uint64_t number, Step step,
+                                           const SetImage& image) noexcept;
   void take_pulse(const Pulse& pulse) noexcept;
   void acquired(std::size_t camera) noexcept;
   void begin_again() noexcept;

@@ -8,12 +8,12 @@
 namespace vergence {
 const char* to_string(SyncMode mode) noexcept {
   return name_of(mode, std::array{"counter", "software", "board", "ins_syncout", "master_strobe",
-                                  "bus", "ptp", "one_picture"});
+                                  "bus", "ptp", "side_by_side"});
 }
 
 const char* to_string(SyncProof proof) noexcept {
   return name_of(
-      proof, std::array{"counted", "unproven", "by_time", "numbered", "master", "common_clock"});
+      proof, std::array{"counted", "ambiguous", "by_time", "numbered", "master", "common_clock"});
 }
 
 const char* SyncOptions::validate() const noexcept {

@@ -11,19 +11,19 @@ namespace vergence {
 
 /// By what images are paired, and what proves that they belong together.
 enum class SyncMode : std::uint8_t {
-  counter,   // exposure n of every camera belongs to pulse n; nothing proves it
-  software,  // what was exposed within `tolerance` by the host's clock belongs together: nothing
-             // makes the cameras expose at once
+  frame_counter,     // exposure n of every camera belongs to pulse n; nothing proves it
+  approximate_time,  // what was exposed within `tolerance` by the host's clock belongs together:
+                     // nothing makes the cameras expose at once
   board,  // a trigger board's pulses, by number; intervals that vary, or a pause, prove which frame
           // is of which
-  ins_syncout,    // the same with the INS's SyncOut for pulses; a gap proves
-  master_strobe,  // camera 0 triggers the others: its frames are the pulses; a gap of its own
-                  // proves
-  bus,  // the stamps are of one IEEE 1394 cycle timer, which wraps after 128 s: within `tolerance`
-        // in it
-  ptp,  // the stamps are of one PTP clock: within `tolerance` in it
-  one_picture,  // both images come in one picture of one camera (side_by_side_camera.hpp), with one
-                // stamp
+  ins_syncout,          // the same with the INS's SyncOut for pulses; a gap proves
+  master_strobe,        // camera 0 triggers the others: its frames are the pulses; a gap of its own
+                        // proves
+  ieee1394_cycle_time,  // the stamps are of one IEEE 1394 cycle timer, which wraps after 128 s:
+                        // within `tolerance` in it
+  ptp,           // the stamps are of one PTP clock: within `tolerance` in it
+  side_by_side,  // both images come in one picture of one camera (side_by_side_camera.hpp), with
+                 // one stamp
 };
 [[nodiscard]] const char* to_string(SyncMode) noexcept;
 /// Frames are tied to pulses that are offered by RigSynchronizer::pulse().
@@ -35,13 +35,13 @@ enum class SyncMode : std::uint8_t {
   return wants_pulses(m) || m == SyncMode::master_strobe;
 }
 /// Something proves that the images of a set were exposed together.
-[[nodiscard]] constexpr bool proves_pairing(SyncMode m) noexcept {
-  return m != SyncMode::counter && m != SyncMode::software;
+[[nodiscard]] constexpr bool verifies_pairing(SyncMode m) noexcept {
+  return m != SyncMode::frame_counter && m != SyncMode::approximate_time;
 }
 /// Frames are paired by their stamps.
 [[nodiscard]] constexpr bool pairs_by_time(SyncMode m) noexcept {
-  return m == SyncMode::software || m == SyncMode::bus || m == SyncMode::ptp ||
-         m == SyncMode::one_picture;
+  return m == SyncMode::approximate_time || m == SyncMode::ieee1394_cycle_time ||
+         m == SyncMode::ptp || m == SyncMode::side_by_side;
 }
 
 /// Of one camera, for the modes with pulses.
@@ -63,14 +63,14 @@ struct SyncOptions {
   Duration interval{};  // between two pulses, > 0; the mean, where they vary
   Duration hold = Duration::milliseconds(
       100);  // a set waits so long, by the arrivals of others, for images and the pulse's report
-  SyncMode mode = SyncMode::counter;
+  SyncMode mode = SyncMode::frame_counter;
   Duration tolerance = Duration::milliseconds(
       2);  // modes that pair by time: between the middles of a set's exposures
   /// counter: the pulses may have begun before the cameras, so each camera's first exposure is
-  /// given its pulse by its stamp; and again after kUnproven unproven sets in a row.
+  /// given its pulse by its stamp; and again after kAmbiguous ambiguous sets in a row.
   bool align_start = false;
   std::array<SyncCameraOptions, kMaxCameras> camera{};  // board, ins_syncout, master_strobe
-  /// Nothing wrong: nullptr; else a sentence.
+  /// Nothing wrong: nullptr; else a message.
   [[nodiscard]] const char* validate() const noexcept;
 };
 
@@ -90,7 +90,7 @@ struct SyncFrame {
 enum class SyncProof : std::uint8_t {
   counted,       // paired by counter, and the stamps agree within half an interval (also: one image
                  // only)
-  unproven,      // paired by counter or a common clock, and the host's stamps do not agree, or a
+  ambiguous,     // paired by counter or a common clock, and the host's stamps do not agree, or a
                  // camera's clock is not the others'; or a pulse's report contradicts: do not
                  // estimate from it
   by_time,       // paired by the host's stamps
@@ -122,7 +122,7 @@ struct SyncedSet {
   SyncProof proof = SyncProof::counted;
 };
 
-enum class SyncVerdict : std::uint8_t {
+enum class SyncResult : std::uint8_t {
   taken,      // the slot comes out with its set
   duplicate,  // that camera has given this pulse already; the slot stays the caller's
   late,       // its set has gone out without it, or by its stamp it is of none; the slot stays the
@@ -141,14 +141,14 @@ struct SyncCounters {
   std::array<std::uint64_t, kMaxCameras> late{};
   std::uint64_t pushed_out =
       0;  // of the incomplete: before their time, because more pulses were open than kOpen
-  std::uint64_t unproven = 0;   // sets whose stamps do not agree
+  std::uint64_t ambiguous = 0;  // sets whose stamps do not agree
   std::uint64_t realigned = 0;  // times that all cameras' pulses were found by their stamps again
   // With numbered pulses:
   std::array<std::uint64_t, kMaxCameras>
       missed_trigger{};  // pulses that this camera did not expose
   std::array<std::uint64_t, kMaxCameras>
       acquiring{};  // frames given back while nothing proved their pulse
-  std::array<std::uint64_t, kMaxCameras> acquisitions{};  // times that its pulses were proven
+  std::array<std::uint64_t, kMaxCameras> acquisitions{};  // times that its pulses were verified
   std::array<std::uint64_t, kMaxCameras>
       contradictions{};  // times that counter, stamp and pulses did not agree: it acquires again
   std::uint64_t reboots = 0;     // times that the pulses began again: all acquire again

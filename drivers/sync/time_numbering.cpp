@@ -57,9 +57,9 @@ class Counted {
 }  // namespace
 
 std::int64_t TimeNumbering::time_of(const SyncFrame& frame, const OpenSets& sets) const noexcept {
-  if (mode_ == SyncMode::software) return frame.middle.host.ns();
+  if (mode_ == SyncMode::approximate_time) return frame.middle.host.ns();
   const std::int64_t own = (frame.exposure_start + frame.exposure / 2).ns();
-  if (mode_ != SyncMode::bus || !(sets.any_out() || !sets.empty())) return own;
+  if (mode_ != SyncMode::ieee1394_cycle_time || !(sets.any_out() || !sets.empty())) return own;
   std::int64_t reference = sets.last_time();
   for (const OpenSet& o : sets.slots())
     if (o.used) reference = o.images[o.base()].time;

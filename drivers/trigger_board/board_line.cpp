@@ -6,7 +6,7 @@
 
 namespace vergence::trigger_board {
 
-void BoardLine::attach(ByteLine* line) noexcept {
+void BoardLine::attach(SerialLink* line) noexcept {
   refused_before_ = refused();
   decoder_ = {};
   line_ = line;
@@ -16,13 +16,13 @@ void BoardLine::attach(ByteLine* line) noexcept {
   forget();
 }
 
-void BoardLine::note_byte(std::uint8_t byte) noexcept {
+void BoardLine::record_byte(std::uint8_t byte) noexcept {
   // The 00 belongs to the frame that it ends; one that stands alone to none.
   if (byte != 0 || into_frame_ > 0) ++into_frame_;
 }
 
 /// Up to here the frame had been sent when this read was on its way.
-void BoardLine::note_end_of_read() noexcept {
+void BoardLine::record_end_of_read() noexcept {
   if (into_frame_ == 0) return;
   const HostStamp bound = arrival_ - byte_time_ * into_frame_;
   departure_ = bounded_ ? std::min(departure_, bound) : bound;
@@ -46,9 +46,9 @@ DeviceStatus BoardLine::next(HostStamp deadline, TriggerFrame* frame, Times* tim
     while (used_ < size_) {
       const std::uint8_t byte = buffer_[used_++];
       const bool ready = trigger_decode(&decoder_, byte, frame) == trigger_frame_ready;
-      note_byte(byte);
+      record_byte(byte);
       if (used_ == size_ || ready)
-        note_end_of_read();  // its end bounds a whole frame, wherever in the read it is
+        record_end_of_read();  // its end bounds a whole frame, wherever in the read it is
       const HostStamp departure = departure_;
       if (byte == 0) {
         into_frame_ = 0;
@@ -103,7 +103,7 @@ std::uint32_t PauseRequest::due(HostStamp now) noexcept {
     open_ = {open_.pulses + added, 0, 0, {}};
   else if (open_.pulses == 0 || now < open_.again)
     return 0;
-  if (open_.sent == kMostSent) open_ = {};
+  if (open_.sent == kMaxSent) open_ = {};
   return open_.pulses;
 }
 

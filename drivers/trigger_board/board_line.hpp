@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/types/time.hpp"
-#include "drivers/serial/byte_line.hpp"
+#include "drivers/serial/serial_link.hpp"
 #include "firmware_iface/trigger/trigger.h"
 
 namespace vergence::trigger_board {
@@ -32,7 +32,7 @@ class BoardLine {
 
   /// From another line, or the same anew: what was read before is forgotten, the counters go on.
   /// The line outlives its use.
-  void attach(ByteLine* line) noexcept;
+  void attach(SerialLink* line) noexcept;
   /// A byte's time on the wire, 0 where it has none.
   void set_byte_time(Duration time) noexcept { byte_time_ = time; }
   [[nodiscard]] HostStamp now() const noexcept { return line_->now(); }
@@ -55,10 +55,10 @@ class BoardLine {
 
  private:
   void remember() noexcept;
-  void note_byte(std::uint8_t byte) noexcept;
-  void note_end_of_read() noexcept;
+  void record_byte(std::uint8_t byte) noexcept;
+  void record_end_of_read() noexcept;
 
-  ByteLine* line_ = nullptr;
+  SerialLink* line_ = nullptr;
   std::uint8_t sequence_ = 0;
   TriggerDecoder decoder_{};
   std::uint64_t refused_before_ = 0;         // by the decoders before this one
@@ -76,7 +76,7 @@ class BoardLine {
 
 /// Pulses that the board shall leave out: from the owner's request to the board's answer.
 ///
-/// A message without an answer is sent again, kMostSent times in all. One whose answer alone was
+/// A message without an answer is sent again, kMaxSent times in all. One whose answer alone was
 /// lost makes another pause: a gap more, which the pulses' numbers show.
 /// Threads  add(): any. The others: the board's thread, or the owner while there is none.
 /// Memory   None.
@@ -86,7 +86,7 @@ class BoardLine {
 class PauseRequest {
  public:
   static constexpr Duration kAnswerLimit = Duration::milliseconds(300);
-  static constexpr int kMostSent = 3;
+  static constexpr int kMaxSent = 3;
 
   /// So many more pulses.
   void add(std::uint32_t pulses) noexcept {

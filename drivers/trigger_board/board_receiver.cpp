@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "drivers/trigger_board/pulse_account.hpp"
+#include "drivers/trigger_board/pulse_counter.hpp"
 
 namespace vergence::trigger_board {
 
@@ -66,30 +66,30 @@ std::uint32_t BoardClock::ask(HostStamp t1) noexcept {
   return token;
 }
 
-PongWord BoardClock::refuse(PongWord why) noexcept {
+PongStatus BoardClock::refuse(PongStatus why) noexcept {
   ++refused_;
   return why;
 }
 
-PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
+PongStatus BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
   Question& q = questions_[pong.token % kOpen];
-  if (!q.open || q.token != pong.token) return refuse(PongWord::unasked);
+  if (!q.open || q.token != pong.token) return refuse(PongStatus::unasked);
   q.open = false;
   const HostStamp sent = q.sent + wire_ * kPingBytes;
-  if (pong.sent < pong.received || pong.sent > kMostTicks) return refuse(PongWord::invalid);
+  if (pong.sent < pong.received || pong.sent > kMaxTicks) return refuse(PongStatus::invalid);
   const Duration inside =
       Duration::microseconds(static_cast<std::int64_t>(pong.sent - pong.received));
   const Duration rtt = (t4 - sent) - inside;
   // A tick at either end, and the board's clock may be slow.
   const Duration tolerance = Duration::microseconds(2) + inside / 1000;
-  if (rtt < -tolerance) return refuse(PongWord::invalid);
+  if (rtt < -tolerance) return refuse(PongStatus::invalid);
   if (pong.received < newest_tick_) {
     if (++backward_ >= kBackward) {
       ++resets_;
       for (ClockMapper& m : mappers_) m.restart();
       forget();
     }
-    return refuse(PongWord::backward);
+    return refuse(PongStatus::backward);
   }
   backward_ = 0;
   newest_tick_ = pong.received;  // not `sent`: the next question may have come while this answer
@@ -100,7 +100,7 @@ PongWord BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
            std::max(t4, sent + inside));
   known_ = true;
   ++answers_;
-  return PongWord::taken;
+  return PongStatus::taken;
 }
 
 MappedStamp BoardClock::map(DeviceStamp stamp, HostStamp arrival) noexcept {
@@ -117,12 +117,12 @@ void BoardReceiver::begin_boot(std::uint32_t boot, std::uint32_t next, const Tri
     account_.begin(boot, next);
     clock_.restart(delay_spread, config.pps_edge != trigger_edge_none);
     pause_.restart();  // what was requested of the other start is past
-  } else if (account_.refused_in_row() >= kMostRefused) {
+  } else if (account_.refused_in_row() >= kMaxRefused) {
     account_.begin(boot, next);  // what it held against the board was wrong itself
   } else {
     account_.end(next, 0);
   }
-  account_.set_intervals(config.rate_millihertz, config.vary_us);
+  account_.set_intervals(config.rate_millihertz, config.dither_us);
 }
 
 void BoardReceiver::stream(HostStamp now) noexcept {
@@ -134,7 +134,7 @@ void BoardReceiver::end(const TriggerStatus& status, std::uint32_t to_come) noex
   if (status.boot_id == account_.boot()) account_.end(status.pulses, to_come);
 }
 
-void BoardReceiver::forget_halt() noexcept {
+void BoardReceiver::clear_halt() noexcept {
   if (finding_ == Finding::halted) finding_ = Finding::none;
 }
 
@@ -177,7 +177,7 @@ void BoardReceiver::take_event(const TriggerEvent& event, HostStamp arrival) noe
   if (!streaming_ || !same_boot(event.boot_id)) return;
   Pulse pulse;
   if (!account_.take(event, &pulse)) {
-    if (account_.refused_in_row() >= kMostRefused) finding_ = Finding::invalid;
+    if (account_.refused_in_row() >= kMaxRefused) finding_ = Finding::invalid;
     return;
   }
   const MappedStamp mapped = clock_.map(pulse.edge, arrival);
@@ -192,7 +192,7 @@ void BoardReceiver::take_pong(const TriggerPong& pong, HostStamp departure) noex
   if (!same_boot(pong.boot_id)) return;
   const std::uint64_t resets = clock_.resets();
   (void)clock_.answer(pong, departure);
-  if (clock_.resets() != resets) account_.forget_time();
+  if (clock_.resets() != resets) account_.clear_time();
 }
 
 void BoardReceiver::take_status(const TriggerStatus& status) noexcept {
@@ -204,7 +204,7 @@ void BoardReceiver::take_status(const TriggerStatus& status) noexcept {
 void BoardReceiver::take_error(const TriggerError& error) noexcept {
   if (error.refused != trigger_pause) return;
   pause_.refused();
-  account_.forget_pause();
+  account_.clear_pause();
 }
 
 }  // namespace vergence::trigger_board

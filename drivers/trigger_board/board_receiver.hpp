@@ -8,14 +8,14 @@
 #include "drivers/sync/clock_mapper.hpp"
 #include "drivers/trigger.hpp"
 #include "drivers/trigger_board/board_line.hpp"
-#include "drivers/trigger_board/pulse_account.hpp"
+#include "drivers/trigger_board/pulse_counter.hpp"
 #include "drivers/trigger_board/setup.hpp"
 #include "firmware_iface/trigger/trigger.h"
 
 namespace vergence::trigger_board {
 
 /// What came of a PONG.
-enum class PongWord : std::uint8_t {
+enum class PongStatus : std::uint8_t {
   taken,
   unasked,   // no such question is open
   invalid,   // it cannot be: sent before received, or longer in the board than under way
@@ -33,7 +33,8 @@ enum class PongWord : std::uint8_t {
 ///          old, and until the rate is there the bound has room for what it moves in that time
 ///          (kMoving).
 /// Threads  One caller. Memory: fixed.
-/// Errors   PongWord. kBackward answers in a row from an earlier time than before are a clock that
+/// Errors   PongStatus. kBackward answers in a row from an earlier time than before are a clock
+/// that
 ///          was set: the fit begins again.
 class BoardClock {
  public:
@@ -61,7 +62,7 @@ class BoardClock {
   /// A PING is being sent now: its token.
   [[nodiscard]] std::uint32_t ask(HostStamp t1) noexcept;
   /// `t4`: BoardLine's departure.
-  [[nodiscard]] PongWord answer(const TriggerPong& pong, HostStamp t4) noexcept;
+  [[nodiscard]] PongStatus answer(const TriggerPong& pong, HostStamp t4) noexcept;
 
   /// A ping has been answered since restart().
   [[nodiscard]] bool known() const noexcept { return known_; }
@@ -83,7 +84,7 @@ class BoardClock {
     HostStamp sent{};
     bool open = false;
   };
-  [[nodiscard]] PongWord refuse(PongWord why) noexcept;
+  [[nodiscard]] PongStatus refuse(PongStatus why) noexcept;
   void forget() noexcept;
   void take_turns(HostStamp now) noexcept;
   [[nodiscard]] MappedStamp with_room(MappedStamp m) const noexcept;
@@ -113,13 +114,13 @@ class BoardClock {
 /// Errors   finding(): why the board must be set up anew.
 class BoardReceiver final : public FrameSink {
  public:
-  static constexpr int kMostRefused = 8;  // events in a row that cannot be
+  static constexpr int kMaxRefused = 8;  // events in a row that cannot be
   /// Why reading ends and the board is set up anew.
   enum class Finding : std::uint8_t {
     none,
     reboot,   // another boot_id: it began again
     halted,   // it makes no pulses, or has another configuration
-    invalid,  // numbers or ticks that cannot be, kMostRefused in a row
+    invalid,  // numbers or ticks that cannot be, kMaxRefused in a row
   };
 
   /// Pulses go to `hand_out`, requests of `pause` are answered; both outlive the receiver.
@@ -146,12 +147,12 @@ class BoardReceiver final : public FrameSink {
   [[nodiscard]] Finding finding() const noexcept { return finding_; }
   void clear_finding() noexcept { finding_ = Finding::none; }
   /// What it said of a halt while it was being started is past.
-  void forget_halt() noexcept;
+  void clear_halt() noexcept;
   /// Of the newest frame, or of stream().
   [[nodiscard]] HostStamp last_frame() const noexcept { return last_frame_; }
 
   [[nodiscard]] BoardClock& clock() noexcept { return clock_; }
-  [[nodiscard]] PulseAccount& account() noexcept { return account_; }
+  [[nodiscard]] PulseCounter& account() noexcept { return account_; }
   /// Right frames of a type or size that this protocol does not have.
   [[nodiscard]] std::uint64_t unknown_frames() const noexcept { return unknown_frames_; }
   [[nodiscard]] std::uint64_t reboots() const noexcept { return reboots_; }
@@ -165,7 +166,7 @@ class BoardReceiver final : public FrameSink {
 
   PauseRequest& pause_;
   const std::function<void(const Pulse&)> hand_out_;
-  PulseAccount account_;
+  PulseCounter account_;
   BoardClock clock_;
   std::uint64_t unknown_frames_ = 0, reboots_ = 0;
   std::uint32_t mark_ = 0;  // of the configuration, in STATUS

@@ -17,7 +17,7 @@ DeviceTiming timing_of(const TriggerConfig& config, Duration byte_time,
                        Duration latency_timer) noexcept {
   constexpr std::int64_t kReportBytes = trigger_event_payload_size + trigger_overhead + 2;
   DeviceTiming t;
-  t.least_delay = byte_time * kReportBytes;
+  t.min_delay = byte_time * kReportBytes;
   // A report waits for the end of the exposures, at the latest for the next pulse.
   const Duration period =
       Duration::nanoseconds(1'000'000'000'000 / std::max<std::int64_t>(1, config.rate_millihertz));
@@ -35,7 +35,7 @@ std::string hex_of(const std::uint8_t (&bytes)[12]) {
 
 }  // namespace
 
-Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
+Device::Device(std::unique_ptr<SerialLinkFactory> place, const Options& options)
     : SerialDevice(std::move(place), "vergence-board"),
       options_(options),
       receiver_(pause_, [this](const Pulse& pulse) { hand_out(pulse, pulse.arrival); }) {
@@ -107,15 +107,16 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
     if (line() == nullptr) {
       if (const DeviceStatus s = connect(); s != DeviceStatus::ok) return s;
     }
-    std::string sentence;
+    std::string message;
     TriggerConfig config;
     const DeviceStatus possible =
-        wire_configuration(requested, options_, identity_, &config, &sentence);
-    if (possible != DeviceStatus::ok) return last_error_.refuse(possible, std::move(sentence));
+        wire_configuration(requested, options_, identity_, &config, &message);
+    if (possible != DeviceStatus::ok) return last_error_.refuse(possible, std::move(message));
     config_ = config;
     mark_ = mark_of(config);
     DeviceStatus status = set_up();
-    if (status == DeviceStatus::gone) {  // it was unplugged since: once more, from the port on
+    if (status ==
+        DeviceStatus::disconnected) {  // it was unplugged since: once more, from the port on
       status = connect();
       if (status == DeviceStatus::ok) status = set_up();
     }
@@ -136,7 +137,7 @@ DeviceStatus Device::set_up() {
   DeviceStatus done = setup.halt(&status);
   if (done == DeviceStatus::ok) done = setup.configure(config_, &status);
   if (done != DeviceStatus::ok) {
-    if (done == DeviceStatus::gone) close_line();
+    if (done == DeviceStatus::disconnected) close_line();
     return last_error_.refuse(done, place().name() + ": " + setup.last_error());
   }
   return DeviceStatus::ok;
@@ -154,7 +155,7 @@ DeviceStatus Device::wait(Duration limit, Pulse* pulse) noexcept { return take(l
 
 DeviceStatus Device::pause(std::uint32_t pulses) noexcept {
   if (!streaming()) return DeviceStatus::stopped;
-  if (away()) return DeviceStatus::gone;
+  if (away()) return DeviceStatus::disconnected;
   pause_.add(pulses);  // the thread looks at least every ping_interval
   return DeviceStatus::ok;
 }

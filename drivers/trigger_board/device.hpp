@@ -31,7 +31,7 @@ class Device final : public TriggerDevice,
   static constexpr Duration kSilent = Duration::seconds(1);
   static constexpr int kFirstPings = 8;
 
-  Device(std::unique_ptr<LinePlace> place, const Options& options);
+  Device(std::unique_ptr<SerialLinkFactory> place, const Options& options);
   ~Device() override;
 
   /// Opens the line and asks who is there. → ok, not_found (another make, or nobody),

@@ -39,9 +39,9 @@ DeviceStatus Device::begin() noexcept {
     return status == DeviceStatus::ok || status == DeviceStatus::stopped ||
                    status == DeviceStatus::ended
                ? status
-               : DeviceStatus::gone;
+               : DeviceStatus::disconnected;
   } catch (const std::exception&) {
-    return DeviceStatus::gone;
+    return DeviceStatus::disconnected;
   }
 }
 
@@ -61,7 +61,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
     go_streaming(line()->now());
     status = setup->start(&board);
     if (status == DeviceStatus::ok && board.configuration == mark_) {
-      receiver_.forget_halt();
+      receiver_.clear_halt();
       return status;
     }
     receiver_.hold();
@@ -76,7 +76,7 @@ DeviceStatus Device::begin_on(Setup* setup) {
   running_ = true;
   go_streaming(line()->now());
   status = setup->start(&board);
-  if (status == DeviceStatus::ok) receiver_.forget_halt();
+  if (status == DeviceStatus::ok) receiver_.clear_halt();
   return status;
 }
 
@@ -111,7 +111,7 @@ DeviceStatus Device::read_on() noexcept {
     if (stop_requested()) return DeviceStatus::stopped;
     const HostStamp now = line()->now();
     send_pause(now);
-    if (now - receiver_.last_frame() > kSilent) return DeviceStatus::gone;
+    if (now - receiver_.last_frame() > kSilent) return DeviceStatus::disconnected;
     if (now >= next_ping) {
       ping(now);
       const double part = 1 + 0.2 * dither_.uniform(-1, 1);
@@ -162,7 +162,7 @@ void Device::halt_board() noexcept {
       receiver_.end(status, open_reports());
     else
       last_error_.set(place().name() + ": " + setup.last_error());
-    if (done == DeviceStatus::gone) close_line();
+    if (done == DeviceStatus::disconnected) close_line();
   } catch (const std::exception&) {
     close_line();
   }

@@ -28,9 +28,9 @@ bool beyond(std::uint8_t mask, std::uint8_t lines) noexcept {
 
 DeviceStatus wire_configuration(const TriggerConfiguration& requested, const Options& options,
                                 const TriggerInfo& board, TriggerConfig* config,
-                                std::string* sentence) {
-  const auto refuse = [sentence](DeviceStatus status, std::string why) {
-    *sentence = std::move(why);
+                                std::string* message) {
+  const auto refuse = [message](DeviceStatus status, std::string why) {
+    *message = std::move(why);
     return status;
   };
   const auto bad = [&refuse](std::string why) {
@@ -45,19 +45,19 @@ DeviceStatus wire_configuration(const TriggerConfiguration& requested, const Opt
                            kFastest));
   const auto millihertz = static_cast<std::uint32_t>(std::llround(requested.rate_hz * 1000));
   const std::int64_t period_us = 1'000'000'000 / millihertz, width_us = requested.width.ns() / 1000,
-                     vary_us = requested.vary.ns() / 1000;
+                     dither_us = requested.vary.ns() / 1000;
   if (width_us < 1) return bad("a pulse needs a width: set trigger.width_us to 1 or more");
   if (width_us > kWidest)
     return bad(format_text("a pulse of %lld µs is longer than a second; lower trigger.width_us",
                            static_cast<long long>(width_us)));
-  if (vary_us < 0 || vary_us >= period_us)
+  if (dither_us < 0 || dither_us >= period_us)
     return bad(format_text(
-        "trigger.vary_us is %lld and the period %lld µs; it must lie between 0 and that",
-        static_cast<long long>(vary_us), static_cast<long long>(period_us)));
-  if (width_us >= period_us - vary_us)
+        "trigger.dither_us is %lld and the period %lld µs; it must lie between 0 and that",
+        static_cast<long long>(dither_us), static_cast<long long>(period_us)));
+  if (width_us >= period_us - dither_us)
     return bad(format_text(
         "a pulse of %lld µs does not fit into %lld µs from pulse to pulse; lower trigger.width_us",
-        static_cast<long long>(width_us), static_cast<long long>(period_us - vary_us)));
+        static_cast<long long>(width_us), static_cast<long long>(period_us - dither_us)));
   if (requested.lines == 0)
     return bad("no line is to be pulsed; name the cameras' lines in trigger.lines");
   if (beyond(requested.lines, board.lines) || beyond(requested.active_low, board.lines))
@@ -78,7 +78,7 @@ DeviceStatus wire_configuration(const TriggerConfiguration& requested, const Opt
   TriggerConfig c{};
   c.rate_millihertz = millihertz;
   c.pulse_us = static_cast<std::uint32_t>(width_us);
-  c.vary_us = static_cast<std::uint32_t>(vary_us);
+  c.dither_us = static_cast<std::uint32_t>(dither_us);
   c.lines = requested.lines;
   c.active_low = requested.active_low;
   c.feedback_inputs = requested.feedback;
@@ -93,7 +93,7 @@ TriggerConfiguration configuration_of(const TriggerConfig& config) noexcept {
   TriggerConfiguration c;
   c.rate_hz = static_cast<double>(config.rate_millihertz) / 1000;
   c.width = Duration::microseconds(config.pulse_us);
-  c.vary = Duration::microseconds(config.vary_us);
+  c.vary = Duration::microseconds(config.dither_us);
   c.lines = config.lines;
   c.active_low = config.active_low;
   c.feedback = config.feedback_inputs;
@@ -141,7 +141,7 @@ std::string words_of_error(std::uint8_t code) {
       return "its timer cannot make this rate; choose another trigger.rate";
     case trigger_error_pulse:
       return "the pulse is not shorter than its period, or has no width; change trigger.width_us "
-             "or trigger.vary_us";
+             "or trigger.dither_us";
     case trigger_error_line:
       return "it does not have all of these lines and inputs; change trigger.lines, "
              "trigger.feedback, trigger.pps or trigger.ins";
@@ -205,7 +205,7 @@ Setup::Answer Setup::ask(std::uint8_t type, std::span<const std::uint8_t> payloa
   std::uint8_t first = 0, last = 0;
   for (bool again = false;; again = true) {  // each turn listens for kAskAgain of the limit
     const DeviceStatus sent = frames_.send(type, payload, &last);
-    if (sent == DeviceStatus::gone || sent == DeviceStatus::failed) return Answer::gone;
+    if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed) return Answer::gone;
     if (!again) first = last;
     const Answer answer =
         listen(type, first, last, requested, std::min(end, frames_.now() + kAskAgain));
@@ -231,7 +231,7 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
   }
   last_error_ = format_text(
       "the trigger board did not answer when asked %s; check its cable and supply", words_of(type));
-  return DeviceStatus::gone;
+  return DeviceStatus::disconnected;
 }
 
 DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {

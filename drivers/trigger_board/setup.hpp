@@ -13,11 +13,11 @@ namespace vergence::trigger_board {
 
 // What is asked of a board, as it goes over the wire.
 
-/// → ok; bad_configuration, unsupported: *sentence says what is wrong and what to do, *config is as
+/// → ok; bad_configuration, unsupported: *message says what is wrong and what to do, *config is as
 ///   it was.
 [[nodiscard]] DeviceStatus wire_configuration(const TriggerConfiguration& requested,
                                               const Options& options, const TriggerInfo& board,
-                                              TriggerConfig* config, std::string* sentence);
+                                              TriggerConfig* config, std::string* message);
 [[nodiscard]] TriggerConfiguration configuration_of(const TriggerConfig& config) noexcept;
 /// What the board will do otherwise than asked. Empty: nothing.
 [[nodiscard]] std::string remark_about(const TriggerConfiguration& requested,
@@ -32,7 +32,7 @@ class FrameSink {
 
 /// Questions to a board, each with its answer: who it is, halt, configuration, start.
 ///
-/// Threads  One caller. Memory: none, but for the sentence of a refusal. Time: no call outlasts a
+/// Threads  One caller. Memory: none, but for the message of a refusal. Time: no call outlasts a
 ///          second, find() two a baud rate.
 /// Errors   Statuses: gone (silent, or the line is), stopped (`stop` is set), unsupported (another
 ///          protocol version, or refused by the board), failed. last_error() says what and what to
@@ -40,7 +40,7 @@ class FrameSink {
 class Setup {
  public:
   /// `others` may be null.
-  Setup(ByteLine& line, BoardLine& frames, const std::atomic<bool>& stop,
+  Setup(SerialLink& line, BoardLine& frames, const std::atomic<bool>& stop,
         FrameSink* others) noexcept
       : line_(line), frames_(frames), stop_(stop), others_(others) {}
 
@@ -66,7 +66,7 @@ class Setup {
   [[nodiscard]] DeviceStatus other_version(unsigned theirs);
   [[nodiscard]] DeviceStatus verdict(Answer answer, std::uint8_t type);
 
-  ByteLine& line_;
+  SerialLink& line_;
   BoardLine& frames_;
   const std::atomic<bool>& stop_;
   FrameSink* others_;

@@ -53,7 +53,7 @@ std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* 
     std::unique_ptr<Device> board = open_port(port, status);
     if (board == nullptr) {
       // A board that cannot be used is worth more words than a port without one.
-      if (*status != DeviceStatus::not_found && *status != DeviceStatus::gone)
+      if (*status != DeviceStatus::not_found && *status != DeviceStatus::disconnected)
         worst_status = *status, others = last_error_;
       continue;
     }

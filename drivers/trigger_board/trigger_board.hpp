@@ -23,7 +23,7 @@ class Driver final : public TriggerDriver {
   /// Ports of the machine; tests bring their own.
   struct Ports {
     std::function<std::vector<SerialPortInfo>()> list;
-    std::function<std::unique_ptr<LinePlace>(const std::string& port)> at;
+    std::function<std::unique_ptr<SerialLinkFactory>(const std::string& port)> at;
   };
 
   explicit Driver(const Options& options = {});

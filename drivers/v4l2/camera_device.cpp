@@ -111,7 +111,7 @@ bool CaptureThread::take_filled() noexcept {
     case EAGAIN:
       return ++poll_errors_ < kPollErrors;
     case ENODEV:
-      exchange_.note_dead_node();
+      exchange_.record_dead_node();
       return false;
     default:  // EIO: the driver's queue is in error until streaming restarts
       return ++poll_errors_ < kPollErrors;
@@ -130,13 +130,13 @@ void CaptureThread::handle(Filled filled) noexcept {
   const StampKind kind = stamp_kind(filled.flags, filled.stamp_ns);
   frame.exposure_start =
       exposure_start(kind, filled.stamp_ns, frame.arrival, frame.exposure, s.readout);
-  const std::size_t needed = least_frame_bytes(s.format, s.actual.width, s.actual.height, s.stride);
+  const std::size_t needed = min_frame_bytes(s.format, s.actual.width, s.actual.height, s.stride);
   const bool inside =
       filled.offset <= exchange_.slots().buffer(filled.index).size() -
                            needed;  // buffers hold what is needed: configure() has looked
   const bool whole = inside && filled.bytes >= needed;
   if (!inside) filled.offset = 0;
-  if ((filled.flags & V4L2_BUF_FLAG_ERROR) != 0 || !whole) frame.status = FrameStatus::torn;
+  if ((filled.flags & V4L2_BUF_FLAG_ERROR) != 0 || !whole) frame.status = FrameStatus::incomplete;
 
   SequenceCounter::Step step = counter_->next(filled.sequence, frame.exposure_start);
   if (raster_ && !raster_->keep(frame.exposure_start, &step)) {
@@ -181,8 +181,8 @@ V4l2Camera::V4l2Camera(UniqueFd fd, Node node)
 
 V4l2Camera::~V4l2Camera() { stop(); }
 
-DeviceStatus V4l2Camera::refuse(DeviceStatus status, std::string sentence) noexcept {
-  last_error_ = std::move(sentence);
+DeviceStatus V4l2Camera::refuse(DeviceStatus status, std::string message) noexcept {
+  last_error_ = std::move(message);
   return status;
 }
 
@@ -249,7 +249,7 @@ DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool kee
   std::vector<Mapping> mappings;
   if (const int error = queue.request(static_cast<std::uint32_t>(options.buffers), &mappings);
       error != 0) {
-    if (error == ENODEV) return refuse(DeviceStatus::gone, {});
+    if (error == ENODEV) return refuse(DeviceStatus::disconnected, {});
     if (error == EBUSY)
       return refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
     return refuse(DeviceStatus::failed,
@@ -288,7 +288,7 @@ DeviceStatus V4l2Camera::open_again() {
   if (found == DeviceStatus::no_permission)
     return refuse(found, node_.path + ": no permission; add the user to the group video");
   if (found != DeviceStatus::ok)
-    return refuse(DeviceStatus::gone,
+    return refuse(DeviceStatus::disconnected,
                   "there is no camera " + node_.found_by + " any more: check its cable");
   node_ = std::move(node);
   info_.place = node_.path;
@@ -315,7 +315,7 @@ DeviceStatus V4l2Camera::start(Notifier* ready) noexcept {
       // Whatever keeps a camera that is back from its configuration may pass; it is asked again.
       if (bring_to(*requested_, true) != DeviceStatus::ok) {
         lost_node_ = true;
-        return DeviceStatus::gone;
+        return DeviceStatus::disconnected;
       }
     }
     if (const DeviceStatus status = start_streaming(); status != DeviceStatus::ok) return status;
@@ -342,7 +342,7 @@ DeviceStatus V4l2Camera::start_streaming() {
       break;
   }
   (void)queue_->stop();
-  if (error == ENODEV) return DeviceStatus::gone;
+  if (error == ENODEV) return DeviceStatus::disconnected;
   if (error == ENOSPC)
     return refuse(DeviceStatus::no_bandwidth,
                   "its bus has no room for another stream: a lower rate, a smaller size, or a port "

@@ -95,7 +95,7 @@ class V4l2Camera final : public CameraDevice {
   DeviceStatus bring_to(const CameraConfiguration& requested, bool keep_slots);
   DeviceStatus open_again();
   DeviceStatus start_streaming();
-  DeviceStatus refuse(DeviceStatus status, std::string sentence) noexcept;
+  DeviceStatus refuse(DeviceStatus status, std::string message) noexcept;
   void end_thread() noexcept;
   void close_node() noexcept;
 

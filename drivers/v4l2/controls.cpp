@@ -11,8 +11,8 @@
 namespace vergence::v4l2 {
 namespace {
 
-constexpr int kMostControls = 512;  // more than any sensor has: a driver that never ends its list
-constexpr std::int64_t kMostItems = 64;
+constexpr int kMaxControls = 512;  // more than any sensor has: a driver that never ends its list
+constexpr std::int64_t kMaxItems = 64;
 
 bool is_number_like(std::uint32_t type) noexcept {
   return type == V4L2_CTRL_TYPE_INTEGER || type == V4L2_CTRL_TYPE_BOOLEAN ||
@@ -28,8 +28,7 @@ std::string text(const Char (&field)[N]) {
 }
 
 void read_menu(Control* control) {
-  for (std::int64_t i = control->least; i <= control->most && i < control->least + kMostItems;
-       ++i) {
+  for (std::int64_t i = control->least; i <= control->most && i < control->least + kMaxItems; ++i) {
     v4l2_querymenu item{};
     item.id = control->id;
     item.index = static_cast<__u32>(i);
@@ -57,7 +56,7 @@ std::string key_of(std::string_view name) {
 
 void Controls::add(int fd) {
   v4l2_query_ext_ctrl query{};
-  for (int i = 0; i < kMostControls; ++i) {
+  for (int i = 0; i < kMaxControls; ++i) {
     query.id |= V4L2_CTRL_FLAG_NEXT_CTRL;
     if (v4l2::control(fd, VIDIOC_QUERY_EXT_CTRL, &query) != 0) return;
     if ((query.flags & V4L2_CTRL_FLAG_DISABLED) != 0) continue;

@@ -32,7 +32,7 @@ class Controls {
   /// The control to switch an external trigger on with: the first whose key has the word "trigger"
   /// in it and that is a switch, a menu or a number. Null: none.
   [[nodiscard]] const Control* trigger() const noexcept;
-  /// Keys of all that can be written, for a sentence; at most `most`.
+  /// Keys of all that can be written, for a message; at most `most`.
   [[nodiscard]] std::string keys(std::size_t most = 24) const;
 
  private:

@@ -78,7 +78,7 @@ const PixelFormat* choose_format(std::span<const std::uint32_t> offered,
   return nullptr;
 }
 
-std::size_t least_row_bytes(const PixelFormat& format, int width) noexcept {
+std::size_t min_row_bytes(const PixelFormat& format, int width) noexcept {
   const auto w = static_cast<std::size_t>(width);
   switch (format.layout) {
     case Layout::luma_plane:
@@ -94,14 +94,14 @@ std::size_t least_row_bytes(const PixelFormat& format, int width) noexcept {
   return 2 * w;
 }
 
-std::size_t least_frame_bytes(const PixelFormat& format, int width, int height,
-                              std::size_t stride) noexcept {
-  return stride * static_cast<std::size_t>(height - 1) + least_row_bytes(format, width);
+std::size_t min_frame_bytes(const PixelFormat& format, int width, int height,
+                            std::size_t stride) noexcept {
+  return stride * static_cast<std::size_t>(height - 1) + min_row_bytes(format, width);
 }
 
 void to_grey(const PixelFormat& format, const std::uint8_t* from, std::size_t from_stride,
              int width, int height, std::uint8_t* to, std::size_t to_stride) noexcept {
-  assert(from_stride >= least_row_bytes(format, width) &&
+  assert(from_stride >= min_row_bytes(format, width) &&
          to_stride >= static_cast<std::size_t>(width));
   if (format.layout == Layout::mosaic) {
     bayer_to_grey(from, static_cast<std::ptrdiff_t>(from_stride), width, height, to,

@@ -34,14 +34,14 @@ struct PixelFormat {
                                                std::string_view requested) noexcept;
 
 /// Bytes a row of `width` pixels takes at least.
-[[nodiscard]] std::size_t least_row_bytes(const PixelFormat& format, int width) noexcept;
+[[nodiscard]] std::size_t min_row_bytes(const PixelFormat& format, int width) noexcept;
 /// Bytes that must have come for every row to be there: the last row needs no padding.
-[[nodiscard]] std::size_t least_frame_bytes(const PixelFormat& format, int width, int height,
-                                            std::size_t stride) noexcept;
+[[nodiscard]] std::size_t min_frame_bytes(const PixelFormat& format, int width, int height,
+                                          std::size_t stride) noexcept;
 
 /// Brightness, 8 bits, into rows of `to_stride` bytes. `shift` as in PixelFormat.
 ///
-/// Method  Mosaics: bayer_to_grey(). Memory: reads least_frame_bytes() of `from`, writes `width`
+/// Method  Mosaics: bayer_to_grey(). Memory: reads min_frame_bytes() of `from`, writes `width`
 ///         bytes of every row. Preconditions: strides
 /// hold a row; 0 ≤ shift ≤ 8; a mosaic has at least two rows and columns.
 void to_grey(const PixelFormat& format, const std::uint8_t* from, std::size_t from_stride,

@@ -44,8 +44,8 @@ void Slots::install(std::vector<Mapping> mappings) {
   }
   std::size_t at = 0;
   for (std::size_t i = 0; i < mappings.size(); ++i) {
-    while (at < kMost && entries_[at].used) ++at;
-    if (at == kMost) return;
+    while (at < kMax && entries_[at].used) ++at;
+    if (at == kMax) return;
     entries_[at].memory = std::move(mappings[i]);
     entries_[at].used = entries_[at].current = true;
     entries_[at].buffer = static_cast<std::uint32_t>(i);
@@ -188,7 +188,7 @@ void FrameExchange::offer(const Frame& frame) noexcept {
   (void)slots_.release(frame.slot);  // its buffer: start() finds it by itself
 }
 
-void FrameExchange::note_dead_node() noexcept {
+void FrameExchange::record_dead_node() noexcept {
   const std::lock_guard lock(mutex_);
   node_died_ = true;
 }

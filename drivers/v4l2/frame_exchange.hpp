@@ -25,7 +25,7 @@ namespace vergence::v4l2 {
 /// Threads  One at a time; view() of a held slot at any time.
 class Slots {
  public:
-  static constexpr std::size_t kMost = FramePool::kMaxSlots;
+  static constexpr std::size_t kMax = FramePool::kMaxSlots;
   static constexpr std::size_t kPool =
       16;  // as many as buffers by default: the synchroniser's, the estimator's, the next
 
@@ -71,7 +71,7 @@ class Slots {
   };
   int width_ = 0, height_ = 0;
   std::size_t stride_ = 0;
-  std::array<Entry, kMost> entries_{};       // in place
+  std::array<Entry, kMax> entries_{};        // in place
   std::vector<std::uint16_t> buffer_slots_;  // entry of each buffer; kNone: there was no room
   std::vector<Mapping> raw_;                 // not in place
   std::unique_ptr<Arena> arena_;
@@ -93,7 +93,7 @@ class FrameExchange {
  public:
   /// Buffers for the kernel.
   struct Buffers {
-    std::array<std::uint32_t, Slots::kMost> index{};
+    std::array<std::uint32_t, Slots::kMax> index{};
     std::size_t count = 0;
     [[nodiscard]] std::span<const std::uint32_t> list() const noexcept {
       return std::span(index).first(count);
@@ -148,7 +148,7 @@ class FrameExchange {
   [[nodiscard]] std::optional<FrameSlot> hold_pooled() noexcept;
   /// Of a slot that is held; free again where it was stopped meanwhile.
   void offer(const Frame& frame) noexcept;
-  void note_dead_node() noexcept;
+  void record_dead_node() noexcept;
   /// From streaming: the camera is gone. Nothing happens where it was stopped.
   void lose(HostStamp when) noexcept { queue_.lose(when); }
 

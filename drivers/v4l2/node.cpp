@@ -80,14 +80,14 @@ DeviceStatus open_node(const std::string& path, UniqueFd* out, Node* node) {
         return DeviceStatus::not_found;
       case ENODEV:
       case ENXIO:
-        return DeviceStatus::gone;
+        return DeviceStatus::disconnected;
       default:
         return DeviceStatus::failed;
     }
   }
   v4l2_capability cap{};
   if (const int error = control(fd.get(), VIDIOC_QUERYCAP, &cap); error != 0)
-    return error == ENODEV ? DeviceStatus::gone : DeviceStatus::unsupported;
+    return error == ENODEV ? DeviceStatus::disconnected : DeviceStatus::unsupported;
   const std::uint32_t has =
       (cap.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? cap.device_caps : cap.capabilities;
   const bool planes = (has & V4L2_CAP_VIDEO_CAPTURE_MPLANE) != 0;

@@ -20,7 +20,7 @@ std::string number_text(double value) { return format_text("%.6g", value); }
 
 constexpr double kRateTolerance =
     0.02;  // between what was asked and what the camera chose, before it is worth a remark
-constexpr std::uint32_t kMostListed = 24;  // sizes and formats named in a sentence
+constexpr std::uint32_t kMaxListed = 24;  // sizes and formats named in a message
 
 std::string size_text(std::uint32_t width, std::uint32_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
@@ -29,7 +29,7 @@ std::string size_text(std::uint32_t width, std::uint32_t height) {
 DeviceStatus status_of(int error) noexcept {
   switch (error) {
     case ENODEV:
-      return DeviceStatus::gone;
+      return DeviceStatus::disconnected;
     case EBUSY:
       return DeviceStatus::busy;
     default:
@@ -67,8 +67,8 @@ class Applier {
   }
 
  private:
-  [[noreturn]] void refuse(DeviceStatus status, std::string sentence) {
-    *last_error_ = std::move(sentence);
+  [[noreturn]] void refuse(DeviceStatus status, std::string message) {
+    *last_error_ = std::move(message);
     throw Refused{status};
   }
   [[noreturn]] void system(int error, const std::string& what) {
@@ -76,8 +76,8 @@ class Applier {
       refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
     refuse(status_of(error), what + " failed: " + std::strerror(error));
   }
-  void remark(const std::string& sentence) {
-    out_.remark += (out_.remark.empty() ? "" : "; ") + sentence;
+  void remark(const std::string& message) {
+    out_.remark += (out_.remark.empty() ? "" : "; ") + message;
   }
 
   void set(const Control& control, std::int64_t value) {
@@ -142,7 +142,7 @@ class Applier {
     std::string list;
     v4l2_frmsizeenum e{};
     e.pixel_format = fourcc;
-    for (e.index = 0; e.index < kMostListed && control(fd_, VIDIOC_ENUM_FRAMESIZES, &e) == 0;
+    for (e.index = 0; e.index < kMaxListed && control(fd_, VIDIOC_ENUM_FRAMESIZES, &e) == 0;
          ++e.index) {
       if (e.type != V4L2_FRMSIZE_TYPE_DISCRETE)
         return size_text(e.stepwise.min_width, e.stepwise.min_height) + " to " +
@@ -207,9 +207,9 @@ class Applier {
     if (chosen->layout == Layout::mosaic && (requested_.width < 2 || requested_.height < 2))
       refuse(DeviceStatus::unsupported, "a mosaic of colours needs at least two rows and columns");
     if (options_.shift >= 0 && chosen->layout == Layout::words) out_.format.shift = options_.shift;
-    out_.stride = std::max(out_.stride, least_row_bytes(out_.format, requested_.width));
+    out_.stride = std::max(out_.stride, min_row_bytes(out_.format, requested_.width));
     if (out_.image_size <
-        least_frame_bytes(out_.format, requested_.width, requested_.height, out_.stride))
+        min_frame_bytes(out_.format, requested_.width, requested_.height, out_.stride))
       refuse(DeviceStatus::unsupported,
              "the driver's buffers of " + std::to_string(out_.image_size) + " bytes do not hold " +
                  size_text(width, height) + " in " + name_of(chosen->fourcc));
@@ -364,7 +364,7 @@ DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
                              const ExposureSetting& requested, ExposureSetting* actual) noexcept {
   const auto status_of = [](int error) {
     return error == 0        ? DeviceStatus::ok
-           : error == ENODEV ? DeviceStatus::gone
+           : error == ENODEV ? DeviceStatus::disconnected
                              : DeviceStatus::failed;
   };
   const Control* exposure =

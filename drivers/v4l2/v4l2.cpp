@@ -33,7 +33,7 @@ class Driver final : public CameraDriver {
         last_error_ =
             name + " is no node that captures and streams; vergence devices lists those that do";
         break;
-      case DeviceStatus::gone:
+      case DeviceStatus::disconnected:
         *status = DeviceStatus::not_found;
         [[fallthrough]];
       default:

@@ -22,7 +22,7 @@ namespace vergence::v4l2 {
 ///            arrival serves, and timing() is wide.
 /// Options    drivers/options/v4l2_options.hpp, docs/cameras/v4l2.md.
 /// Errors     configure(): also `busy`, another program streams from it. start(): also `failed`,
-///            the sentence has the kernel's reason.
+///            the message has the kernel's reason.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_driver();
 
 }  // namespace vergence::v4l2

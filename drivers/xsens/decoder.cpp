@@ -231,8 +231,8 @@ std::optional<std::array<double, 4>> enu_attitude(const std::array<double, 4>& w
                                                   LocalFrame frame) noexcept {
   const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
   const double n = q.norm();
-  constexpr double kLeast = 0.9, kMost = 1.1;  // what 12.20 rounds is far inside
-  if (!(n > kLeast && n < kMost)) return std::nullopt;
+  constexpr double kMin = 0.9, kMax = 1.1;  // what 12.20 rounds is far inside
+  if (!(n > kMin && n < kMax)) return std::nullopt;
   const Eigen::Quaterniond enu = enu_from(frame) * Eigen::Quaterniond(q.coeffs() / n);
   return std::array{enu.x(), enu.y(), enu.z(), enu.w()};
 }
@@ -334,7 +334,7 @@ void Decoder::accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noe
   arrival_ = arrival;
   received_ += bytes.size();
   timing_.read(received_, arrival);
-  (void)stream_.accept(bytes);  // kMostBytes fit beside any frame that waits
+  (void)stream_.accept(bytes);  // kMaxBytes fit beside any frame that waits
 }
 
 bool Decoder::woke() noexcept { return std::exchange(said_.woke, false); }

@@ -175,9 +175,9 @@ class Decoder {
   /// Of a device that was set like this, on a line of this rate. Forgets everything but the
   /// counters and the numbers.
   void begin(const StreamSettings& stream, std::uint32_t baud, Duration processing) noexcept;
-  /// What a read brought. Precondition: next() has said false since the last; at most kMostBytes.
+  /// What a read brought. Precondition: next() has said false since the last; at most kMaxBytes.
   void accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept;
-  static constexpr std::size_t kMostBytes = 4096;
+  static constexpr std::size_t kMaxBytes = 4096;
   /// The next reading. False: none, *reading untouched.
   [[nodiscard]] bool next(InsReading* reading) noexcept;
   /// Nothing came for longer than a frame takes: what looked like the beginning of one was none.

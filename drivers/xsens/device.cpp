@@ -15,7 +15,7 @@ constexpr Duration kRead = Duration::milliseconds(200);
 
 }  // namespace
 
-Device::Device(std::unique_ptr<LinePlace> place, const Options& options)
+Device::Device(std::unique_ptr<SerialLinkFactory> place, const Options& options)
     : SerialInsDevice(std::move(place)), options_(options) {
   info_.driver = "xsens";
 }
@@ -100,8 +100,8 @@ DeviceTiming Device::timing() const noexcept {
   const std::size_t bytes = set_.generation == xbus::Generation::legacy
                                 ? xbus::frame_size(set_.layout.payload_size().value_or(0))
                                 : 100;
-  t.least_delay = options_.processing +
-                  Duration::nanoseconds(xbus::wire_time_ns(bytes, baud_ == 0 ? 115200 : baud_));
+  t.min_delay = options_.processing +
+                Duration::nanoseconds(xbus::wire_time_ns(bytes, baud_ == 0 ? 115200 : baud_));
   t.delay_spread =
       place().latency_timer() + Duration::milliseconds(60);  // a burst of 496 bytes at 115200 baud
   t.resolution = Duration::microseconds(100);
@@ -130,12 +130,12 @@ DeviceStatus Device::read_on() noexcept {
     if (stop_requested()) return DeviceStatus::stopped;
     DeviceStatus status = read_once(kRead);
     if (const std::int64_t gap = gap_ns_.exchange(0, std::memory_order_relaxed);
-        gap > 0 && status != DeviceStatus::gone)
+        gap > 0 && status != DeviceStatus::disconnected)
       status = make_gap(Duration::nanoseconds(gap));
     if (status != DeviceStatus::ok && status != DeviceStatus::timeout) return status;
     // Opened again it is set again: a restart may have cost it its settings.
-    if (decoder_.woke()) return DeviceStatus::gone;
-    if (line()->now() - last_sample_ > silent_after()) return DeviceStatus::gone;
+    if (decoder_.woke()) return DeviceStatus::disconnected;
+    if (line()->now() - last_sample_ > silent_after()) return DeviceStatus::disconnected;
   }
 }
 
@@ -146,7 +146,7 @@ Duration Device::silent_after() const noexcept {
 
 /// Hands out what a read brings. → ok, timeout (also where it was woken), ended, gone, failed
 DeviceStatus Device::read_once(Duration limit) noexcept {
-  std::array<std::uint8_t, Decoder::kMostBytes> bytes{};
+  std::array<std::uint8_t, Decoder::kMaxBytes> bytes{};
   const LineRead r = line()->read(bytes, limit);
   if (r.status == DeviceStatus::timeout) decoder_.quiet();
   if (r.status == DeviceStatus::stopped) return DeviceStatus::timeout;
@@ -197,7 +197,7 @@ DeviceStatus Device::tell(xbus::MessageId request) noexcept {
       if (decoder_.answered(request)) return DeviceStatus::ok;
     }
   }
-  return DeviceStatus::gone;  // opened again it is set anew
+  return DeviceStatus::disconnected;  // opened again it is set anew
 }
 
 /// Cameras that its SyncOut triggers expose no more after a stop.

@@ -22,7 +22,7 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
  public:
   static constexpr Duration kSilent = Duration::seconds(2);
 
-  Device(std::unique_ptr<LinePlace> place, const Options& options);
+  Device(std::unique_ptr<SerialLinkFactory> place, const Options& options);
   ~Device() override;
 
   /// Opens the line, finds the device and asks who it is; leaves it in its configuration state. →

@@ -29,7 +29,7 @@ void RequestReply::ask(xbus::MessageId id, std::span<const std::uint8_t> payload
   reply->answer = Answer::silent;
   do {  // ends: each turn listens for kAskAgain of the limit
     const DeviceStatus sent = line_.write(std::span(frame).first(w.size), kWrite);
-    if (sent == DeviceStatus::gone || sent == DeviceStatus::failed) {
+    if (sent == DeviceStatus::disconnected || sent == DeviceStatus::failed) {
       reply->answer = Answer::gone;
       return;
     }
@@ -55,7 +55,7 @@ Answer RequestReply::listen(std::uint8_t requested, HostStamp until, Reply* repl
     const HostStamp now = line_.now();
     if (now >= until) return Answer::silent;
     const LineRead r = line_.read(bytes, std::min(kListen, until - now));
-    if (r.status == DeviceStatus::gone || r.status == DeviceStatus::failed ||
+    if (r.status == DeviceStatus::disconnected || r.status == DeviceStatus::failed ||
         r.status == DeviceStatus::ended)
       return Answer::gone;
     if (r.status != DeviceStatus::ok) continue;
@@ -110,7 +110,7 @@ DeviceStatus status_of(Answer answer) noexcept {
       return DeviceStatus::failed;
     case Answer::silent:
     case Answer::gone:
-      return DeviceStatus::gone;
+      return DeviceStatus::disconnected;
     case Answer::stopped:
       return DeviceStatus::stopped;
   }
@@ -140,7 +140,7 @@ DeviceStatus Setup::find() {
       continue;
     const DeviceStatus status = probe(bauds[i], kProbe);
     if (status == DeviceStatus::ok || status == DeviceStatus::stopped) return status;
-    if (status == DeviceStatus::gone) {
+    if (status == DeviceStatus::disconnected) {
       last_error_ = "the line went dead while the device was looked for; check its cable";
       return status;
     }
@@ -159,8 +159,8 @@ DeviceStatus Setup::find() {
   return DeviceStatus::not_found;
 }
 
-void Setup::refuse(DeviceStatus status, std::string sentence) {
-  last_error_ = std::move(sentence);
+void Setup::refuse(DeviceStatus status, std::string message) {
+  last_error_ = std::move(message);
   throw Refused{status};
 }
 
@@ -408,7 +408,7 @@ void Setup::set_mark4(double rate_hz, StreamSettings* stream) {
   write(MessageId::output_configuration, {}, "the question for its outputs");
   OutputConfiguration has;
   if (!read_output_configuration(reply_.bytes(), &has) || !(has == requested)) {
-    std::array<std::uint8_t, 4 * kMostOutputs> bytes{};
+    std::array<std::uint8_t, 4 * kMaxOutputs> bytes{};
     const std::size_t n = write_output_configuration(requested, bytes);
     write(MessageId::output_configuration, std::span(bytes).first(n), "the outputs asked for");
     if (!read_output_configuration(reply_.bytes(), &has)) has = {};
@@ -457,7 +457,7 @@ void Setup::set_mark4_lines(StreamSettings* stream) {
     stream->sync_out_hz = actual;
   }
   if (requested == has) return;
-  std::array<std::uint8_t, kSyncEntrySize * kMostSyncEntries> bytes{};
+  std::array<std::uint8_t, kSyncEntrySize * kMaxSyncEntries> bytes{};
   write(MessageId::sync_settings, std::span(bytes).first(write_sync_settings(requested, bytes)),
         "its synchronisation settings");
 }

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "drivers/serial/byte_line.hpp"
+#include "drivers/serial/serial_link.hpp"
 #include "drivers/xsens/options.hpp"
 #include "firmware_iface/xbus/xbus.hpp"
 
@@ -38,7 +38,8 @@ struct Reply {
 class RequestReply {
  public:
   /// `stop`: while true, every question is `stopped`.
-  RequestReply(ByteLine& line, const std::atomic<bool>& stop) noexcept : line_(line), stop_(stop) {}
+  RequestReply(SerialLink& line, const std::atomic<bool>& stop) noexcept
+      : line_(line), stop_(stop) {}
 
   static constexpr Duration kAnswerTime = Duration::milliseconds(500);
 
@@ -47,7 +48,7 @@ class RequestReply {
            Duration limit = kAnswerTime);
   void ask(xbus::MessageId id, Reply* reply) { ask(id, {}, reply); }
 
-  /// What the bytes that were received look like, when they are no Xbus: for a sentence. Empty:
+  /// What the bytes that were received look like, when they are no Xbus: for a message. Empty:
   /// nothing was received.
   [[nodiscard]] std::string received_instead() const;
   [[nodiscard]] std::uint64_t messages_received() const noexcept { return messages_; }
@@ -58,7 +59,7 @@ class RequestReply {
   [[nodiscard]] Answer listen(std::uint8_t requested, HostStamp until, Reply* reply);
   void remember(std::span<const std::uint8_t> bytes) noexcept;
 
-  ByteLine& line_;
+  SerialLink& line_;
   const std::atomic<bool>& stop_;
   xbus::FrameStream stream_;
   std::uint64_t messages_ = 0;
@@ -74,7 +75,7 @@ class RequestReply {
 /// Errors   Status and last_error(); a device that was found stays in its configuration state.
 class Setup {
  public:
-  Setup(ByteLine& line, const Options& options, const std::atomic<bool>& stop)
+  Setup(SerialLink& line, const Options& options, const std::atomic<bool>& stop)
       : line_(line), options_(options), dialogue_(line, stop) {}
 
   /// Tries the rate asked for, then the usual ones. → ok, not_found, gone, stopped
@@ -101,14 +102,14 @@ class Setup {
   void set_mark4_lines(StreamSettings* stream);
   void write(xbus::MessageId id, std::span<const std::uint8_t> payload, const char* what);
   void check_load(const xbus::LineBudget& budget, double rate_hz);
-  [[noreturn]] void refuse(DeviceStatus status, std::string sentence);
+  [[noreturn]] void refuse(DeviceStatus status, std::string message);
   /// Of the newest question; `refused`: where the device said no.
   [[noreturn]] void fail(const char* what, DeviceStatus refused = DeviceStatus::failed);
   [[nodiscard]] std::uint32_t baud_to_be() const noexcept {
     return options_.baud != 0 ? options_.baud : line_.baud();
   }
 
-  ByteLine& line_;
+  SerialLink& line_;
   Options options_;
   RequestReply dialogue_;
   Reply reply_;

@@ -66,7 +66,7 @@ namespace strobe {
 
 /// Of a feature with absolute values, from its base.
 namespace absolute {
-inline constexpr std::uint32_t kLeast = 0, kMost = 4, kValue = 8;  // IEEE 754 single
+inline constexpr std::uint32_t kMin = 0, kMax = 4, kValue = 8;  // IEEE 754 single
 }  // namespace absolute
 
 }  // namespace reg

@@ -8,13 +8,13 @@ namespace {
 
 constexpr double kKnot = 1852.0 / 3600.0;  // m/s
 constexpr std::size_t kAddress = 5;        // talker and type
-constexpr std::size_t kMostDigits = 20;
+constexpr std::size_t kMaxDigits = 20;
 
 bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
 
 /// Digits, one point, a sign before: no exponent, no words.
 std::optional<double> number(std::string_view text) noexcept {
-  if (text.empty() || text.size() > kMostDigits) return std::nullopt;
+  if (text.empty() || text.size() > kMaxDigits) return std::nullopt;
   bool digit = false;
   for (std::size_t i = 0, points = 0; i < text.size(); ++i) {
     if (text[i] == '.' ? ++points > 1 : !is_digit(text[i]) && (text[i] != '-' || i > 0))
@@ -88,13 +88,13 @@ std::optional<double> angle(std::string_view text, std::string_view side, char p
 }
 
 struct Fields {
-  std::array<std::string_view, kMostFields> at{};  // missing ones are empty
+  std::array<std::string_view, kMaxFields> at{};  // missing ones are empty
 };
 
 bool split(std::string_view body, Fields* fields) noexcept {
   std::size_t n = 0;
   for (;;) {
-    if (n == kMostFields) return false;
+    if (n == kMaxFields) return false;
     const std::size_t comma = body.find(',');
     fields->at[n++] = body.substr(0, comma);
     if (comma == std::string_view::npos) return true;

@@ -13,8 +13,8 @@ namespace vergence::nmea {
 
 /// Characters between `$` and the line's end. The standard has 79; receivers with more decimals
 /// send more.
-inline constexpr std::size_t kMostCharacters = 120;
-inline constexpr std::size_t kMostFields = 24;
+inline constexpr std::size_t kMaxCharacters = 120;
+inline constexpr std::size_t kMaxFields = 24;
 
 enum class Type : std::uint8_t { other, gga, rmc, vtg, gst, hdt };
 
@@ -65,7 +65,7 @@ class SentenceStream {
   [[nodiscard]] std::size_t size() const noexcept { return last_size_; }
 
  private:
-  std::array<char, kMostCharacters> line_{};
+  std::array<char, kMaxCharacters> line_{};
   std::size_t count_ = 0, last_size_ = 0;
   bool inside_ = false;
   StreamCounters counters_{};

@@ -80,13 +80,13 @@ typedef struct {
   uint8_t serial[12];       /* of the board's processor */
 } TriggerInfo;
 
-/* CONFIG, 18 bytes: 0 rate_millihertz, 4 pulse_us, 8 vary_us, 12 lines, 13 active_low, 14
+/* CONFIG, 18 bytes: 0 rate_millihertz, 4 pulse_us, 8 dither_us, 12 lines, 13 active_low, 14
  * feedback_inputs, 15 feedback_active_low, 16 pps_edge, 17 ins_edge. Bit k of a mask is line or
  * input k. */
 typedef struct {
   uint32_t rate_millihertz;
   uint32_t pulse_us;
-  uint32_t vary_us; /* 0: even intervals; else every interval is longer or shorter by this:
+  uint32_t dither_us; /* 0: even intervals; else every interval is longer or shorter by this:
                        trigger_interval_is_longer() */
   uint8_t lines;
   uint8_t active_low;
@@ -166,7 +166,7 @@ typedef struct {
   uint8_t code; /* TriggerErrorCode */
 } TriggerError;
 
-/* With vary_us: whether the interval that begins at this pulse is longer. The same bits on both
+/* With dither_us: whether the interval that begins at this pulse is longer. The same bits on both
  * sides, and no run of 24 intervals among the first 100 000 fits itself shifted by up to eight, so
  * that a camera's own intervals prove which frame belongs to which pulse. */
 static inline bool trigger_interval_is_longer(uint32_t pulse) {

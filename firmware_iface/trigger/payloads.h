@@ -76,7 +76,7 @@ static inline bool trigger_get_info(const uint8_t* p, size_t size, TriggerInfo* 
 static inline void trigger_put_config(const TriggerConfig* m, uint8_t* p) {
   p = trigger_put_bytes(p, m->rate_millihertz, 4);
   p = trigger_put_bytes(p, m->pulse_us, 4);
-  p = trigger_put_bytes(p, m->vary_us, 4);
+  p = trigger_put_bytes(p, m->dither_us, 4);
   p = trigger_put_bytes(p, m->lines, 1);
   p = trigger_put_bytes(p, m->active_low, 1);
   p = trigger_put_bytes(p, m->feedback_inputs, 1);
@@ -89,7 +89,7 @@ static inline bool trigger_get_config(const uint8_t* p, size_t size, TriggerConf
   if (size != trigger_config_payload_size) return false;
   m->rate_millihertz = trigger_get_u32(p);
   m->pulse_us = trigger_get_u32(p + 4);
-  m->vary_us = trigger_get_u32(p + 8);
+  m->dither_us = trigger_get_u32(p + 8);
   m->lines = p[12];
   m->active_low = p[13];
   m->feedback_inputs = p[14];

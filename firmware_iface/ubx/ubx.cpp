@@ -51,7 +51,7 @@ std::optional<std::int64_t> utc(Bytes p) noexcept {
 }  // namespace
 
 bool decode_pvt(Bytes p, Pvt* pvt) noexcept {
-  if (p.size() < kLeastPvt || p.size() > kMostPayload) return false;
+  if (p.size() < kMinPvt || p.size() > kMaxPayload) return false;
   Pvt v;
   if (p[20] > static_cast<std::uint8_t>(FixType::time_only)) return false;
   v.utc_ns = utc(p);
@@ -83,7 +83,7 @@ bool decode_pvt(Bytes p, Pvt* pvt) noexcept {
 std::size_t write_frame(std::uint8_t message_class, std::uint8_t id, Bytes payload,
                         std::span<std::uint8_t> out) noexcept {
   const std::size_t size = payload.size() + kOverhead;
-  if (payload.size() > kMostPayload || out.size() < size) return 0;
+  if (payload.size() > kMaxPayload || out.size() < size) return 0;
   const auto n = static_cast<std::uint16_t>(payload.size());
   const std::array<std::uint8_t, 6> head{kSync1,
                                          kSync2,
@@ -128,7 +128,7 @@ bool FrameStream::next(Frame* frame) noexcept {
     if (rest[1] != kSync2) continue;
     if (rest.size() < 6) return false;
     const std::size_t length = read_u16(rest, 4);
-    if (length > kMostPayload) {
+    if (length > kMaxPayload) {
       ++counters_.length_refused;
       continue;
     }

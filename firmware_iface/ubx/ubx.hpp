@@ -11,9 +11,9 @@
 namespace vergence::ubx {
 
 inline constexpr std::uint8_t kSync1 = 0xB5, kSync2 = 0x62;
-inline constexpr std::size_t kOverhead = 8;        // sync, class, id, length, two of checksum
-inline constexpr std::size_t kMostPayload = 2048;  // longer ones are refused: no length to wait for
-inline constexpr std::size_t kLeastPvt = 84;       // u-blox 7; 92 from u-blox 8 on
+inline constexpr std::size_t kOverhead = 8;       // sync, class, id, length, two of checksum
+inline constexpr std::size_t kMaxPayload = 2048;  // longer ones are refused: no length to wait for
+inline constexpr std::size_t kMinPvt = 84;        // u-blox 7; 92 from u-blox 8 on
 
 struct Frame {
   std::uint8_t message_class = 0, id = 0;
@@ -71,7 +71,7 @@ class FrameStream {
 
  private:
   void skip() noexcept;
-  std::array<std::uint8_t, 2 * (kMostPayload + kOverhead)> bytes_{};
+  std::array<std::uint8_t, 2 * (kMaxPayload + kOverhead)> bytes_{};
   std::size_t begin_ = 0, end_ = 0;
   StreamCounters counters_{};
 };

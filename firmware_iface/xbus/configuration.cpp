@@ -56,8 +56,8 @@ std::optional<std::uint32_t> baud_of_code(std::uint8_t code) noexcept {
 }
 
 std::optional<std::uint16_t> period_of_rate(double rate_hz) noexcept {
-  constexpr double kLeast = 10, kMost = 512;  // Hz
-  if (!(rate_hz >= kLeast && rate_hz <= kMost)) return std::nullopt;
+  constexpr double kMin = 10, kMax = 512;  // Hz
+  if (!(rate_hz >= kMin && rate_hz <= kMax)) return std::nullopt;
   const double period = std::round(kPeriodClock / rate_hz);
   if (std::abs(kPeriodClock / period - rate_hz) > 1e-6 * rate_hz) return std::nullopt;
   if (std::any_of(kRatesExcluded.begin(), kRatesExcluded.end(),
@@ -113,7 +113,7 @@ bool OutputConfiguration::operator==(const OutputConfiguration& o) const noexcep
 bool read_output_configuration(std::span<const std::uint8_t> payload,
                                OutputConfiguration* out) noexcept {
   constexpr std::size_t kEntry = 4;
-  if (payload.size() % kEntry != 0 || payload.size() / kEntry > kMostOutputs) return false;
+  if (payload.size() % kEntry != 0 || payload.size() / kEntry > kMaxOutputs) return false;
   OutputConfiguration read;
   for (; !payload.empty(); payload = payload.subspan(kEntry))
     (void)read.add({read_u16(payload), read_u16(payload.subspan(2))});
@@ -161,7 +161,7 @@ bool SyncSettings::operator==(const SyncSettings& o) const noexcept {
 }
 
 bool read_sync_settings(std::span<const std::uint8_t> payload, SyncSettings* out) noexcept {
-  if (payload.size() % kSyncEntrySize != 0 || payload.size() / kSyncEntrySize > kMostSyncEntries)
+  if (payload.size() % kSyncEntrySize != 0 || payload.size() / kSyncEntrySize > kMaxSyncEntries)
     return false;
   SyncSettings read;
   for (; !payload.empty(); payload = payload.subspan(kSyncEntrySize))

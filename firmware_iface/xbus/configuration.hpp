@@ -74,11 +74,11 @@ struct OutputEntry {
   constexpr bool operator==(const OutputEntry&) const noexcept = default;
 };
 inline constexpr std::uint16_t kEveryMessage = 0xFFFF;
-inline constexpr std::size_t kMostOutputs = 32;
+inline constexpr std::size_t kMaxOutputs = 32;
 
 /// A list as it stands in a message, in place.
 struct OutputConfiguration {
-  std::array<OutputEntry, kMostOutputs> entries{};
+  std::array<OutputEntry, kMaxOutputs> entries{};
   std::size_t count = 0;
 
   [[nodiscard]] std::span<const OutputEntry> items() const noexcept {
@@ -133,10 +133,10 @@ inline constexpr std::uint8_t kSyncLineOut = 4;
 inline constexpr std::uint8_t kSyncPositive = 1;
 inline constexpr double kSyncOutBase = 400;  // Hz: SyncOut counts this, whatever the data rate
 inline constexpr std::size_t kSyncEntrySize = 12;
-inline constexpr std::size_t kMostSyncEntries = 16;
+inline constexpr std::size_t kMaxSyncEntries = 16;
 
 struct SyncSettings {
-  std::array<SyncEntry, kMostSyncEntries> entries{};
+  std::array<SyncEntry, kMaxSyncEntries> entries{};
   std::size_t count = 0;
 
   [[nodiscard]] std::span<const SyncEntry> items() const noexcept {

@@ -180,11 +180,11 @@ void PacketWriter::put(std::uint16_t id, Bytes data) noexcept {
 }
 
 void PacketWriter::put_numbers(std::uint16_t id, std::span<const double> values) noexcept {
-  constexpr std::size_t kMost = 9;
-  std::array<std::uint8_t, kMost * sizeof(double)> bytes{};
+  constexpr std::size_t kMax = 9;
+  std::array<std::uint8_t, kMax * sizeof(double)> bytes{};
   const auto format = static_cast<NumberFormat>(id & 3U);
   const std::size_t size = size_of(format);
-  if (values.size() > kMost) {
+  if (values.size() > kMax) {
     full_ = true;
     return;
   }

@@ -29,7 +29,7 @@
 #include "app/session/drive_calibration.hpp"
 #include "core/calibration/agreement.hpp"
 #include "core/calibration/health.hpp"
-#include "core/calibration/stretches.hpp"
+#include "core/calibration/segment_solver.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/recorded_sequence.hpp"
@@ -42,7 +42,7 @@ namespace {
 using app::StartingCalibration;
 using app::StereoSequence;
 using calibration::RigSolution;
-using calibration::Stretches;
+using calibration::SegmentSolver;
 using test::drive_recorded;
 using test::DriveOutcome;
 using test::RecordedSequence;
@@ -57,8 +57,8 @@ void print(const std::string& drive_name, const std::string& what, const DriveOu
              r.since_verified > 0 ? 100.0 * r.ok_since_verified / r.since_verified : 0.0);
   if (r.contradicted_at >= 0)
     fmt::print("  contradicted at {} by {:.1f} %", r.contradicted_at, r.contradicted_percent);
-  if (r.told_at >= 0 || r.mended_at >= 0)
-    fmt::print("  told at {} mended at {}", r.told_at, r.mended_at);
+  if (r.reported_at >= 0 || r.mended_at >= 0)
+    fmt::print("  told at {} mended at {}", r.reported_at, r.mended_at);
   fmt::print("\n");
   std::fflush(stdout);
 }
@@ -75,7 +75,7 @@ void print_focal_lengths(const RecordedSequence& d, const app::Configuration& c)
           "{:+.1f} % (sigma {:.1f} %)\n",
           d.name, factor, scratch ? "from scratch" : "given", r.ok, r.frames,
           r.focal.contradicted ? "contradicted" : "believed",
-          100 * (factor * r.focal.measured_px / r.focal.given_px - 1),
+          100 * (factor * r.focal.measured_px / r.focal.configured_px - 1),
           100 * r.focal.sigma_px / r.focal.measured_px);
       std::fflush(stdout);
     }
@@ -129,7 +129,7 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
         "{:12s} knock at {} by ({:g}, {:g}, {:g}) deg: told after {}, mended after {}, {} ok "
         "before that, {} false before it; seg {:.3f} % ATE {:.4f} m\n",
         d.name, at, turn.x(), turn.y(), turn.z(),
-        r.told_at < 0 ? -1 : r.told_at - static_cast<int>(at),
+        r.reported_at < 0 ? -1 : r.reported_at - static_cast<int>(at),
         r.mended_at < 0 ? -1 : r.mended_at - static_cast<int>(at), r.ok_before_mended, r.knocks,
         r.segments_percent, r.ate_m);
     std::fflush(stdout);
@@ -186,12 +186,12 @@ void rendered_stretches(const app::Configuration& c) {
   options.monitor = c.monitor;
   const auto features = static_cast<std::size_t>(c.odometry.features);
   Arena arena(Estimator::memory_needed(options, o.rig) +
-              calibration::Stretches::memory_needed(c.calibration, c.monitor, 2, features));
+              calibration::SegmentSolver::memory_needed(c.calibration, c.monitor, 2, features));
   app::ThreadRunner two;
   ImmediateRunner solver;
   Estimator estimator(options, o.rig, o.rig, arena, two, solver);
-  calibration::Stretches alone(calibration::Stretches::Kind::alone, o.rig, o.rig, kStretch,
-                               c.calibration, c.monitor, features, arena);
+  calibration::SegmentSolver alone(calibration::SegmentSolver::Kind::alone, o.rig, o.rig, kStretch,
+                                   c.calibration, c.monitor, features, arena);
   std::vector<calibration::RigSolution> stretches;
   for (std::uint64_t i = 0; i < kFrames; ++i) {
     (void)estimator.process(rendered.frame(i));
@@ -208,12 +208,12 @@ std::array<std::vector<RigSolution>, kStretches.size()> solve_stretches(
     const RecordedSequence& d, app::Configuration c, const StartingCalibration& given) {
   c.calibration.min_frames = std::min<int>(c.calibration.min_frames, kStretches.front());
   const auto features = static_cast<std::size_t>(c.odometry.features);
-  Arena arena(kStretches.size() *
-              Stretches::memory_needed(c.calibration, c.monitor, given.file.rig.cameras, features));
-  std::deque<Stretches> stretches;
+  Arena arena(kStretches.size() * SegmentSolver::memory_needed(c.calibration, c.monitor,
+                                                               given.file.rig.cameras, features));
+  std::deque<SegmentSolver> stretches;
   for (const std::size_t n : kStretches)
-    stretches.emplace_back(Stretches::Kind::alone, given.file.rig, given.file.rig, n, c.calibration,
-                           c.monitor, features, arena);
+    stretches.emplace_back(SegmentSolver::Kind::alone, given.file.rig, given.file.rig, n,
+                           c.calibration, c.monitor, features, arena);
   std::array<std::vector<RigSolution>, kStretches.size()> solved;
   const app::DrivePass pass{d.sequence, c, 0, d.sequence.pairs.size(), {}, {}};
   (void)app::drive_once(pass, given, [&](const Estimator& e, const PoseSample& /*sample*/) {
@@ -235,8 +235,8 @@ void print_solves(const RecordedSequence& d, const app::Configuration& c) {
     double squares = 0, largest = 0, sigma = 0, percent = 0;
     for (const RigSolution& s : solved[i]) {
       const double depth =
-          calibration::judged_depth_m(s.rig, 1, c.calibration, c.odometry.pixel_sigma);
-      const double off = calibration::depth_difference_percent(*whole.rig, s.rig, 1, depth),
+          calibration::reference_depth_m(s.rig, 1, c.calibration, c.odometry.pixel_sigma);
+      const double off = calibration::depth_error_percent(*whole.rig, s.rig, 1, depth),
                    own = calibration::depth_error_percent(s.rig, 1, depth), z = off / own;
       squares += z * z;
       largest = std::max(largest, z);

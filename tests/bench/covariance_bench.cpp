@@ -26,7 +26,7 @@
 #include "core/estimator/detail/window_correction.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/odometry/drift_covariance.hpp"
-#include "tests/support/honesty.hpp"
+#include "tests/support/integrity.hpp"
 #include "tests/support/recorded_sequence.hpp"
 #include "tests/support/rendered_drive.hpp"
 
@@ -152,7 +152,7 @@ struct Judged {
 };
 
 Judged judged(std::span<const Posed> poses) {
-  UsualSpread usual;
+  CovarianceBaseline usual;
   Judged most;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const Transform motion =

@@ -50,7 +50,7 @@ def shares(process, seconds, names):
 def publishing_drive(below, seconds):
     """A mock drive with lines and a page, and a reader of its lines."""
     below.mkdir()
-    drive = d.Drive(below / "drive", seconds, "--set", f"publish.lines=unix://{below}/pose.sock", "--set", f"publish.http=127.0.0.1:{d.free_port()}")
+    drive = d.Drive(below / "drive", seconds, "--set", f"publish.pose_stream=unix://{below}/pose.sock", "--set", f"publish.http=127.0.0.1:{d.free_port()}")
     url = drive.wait_for(r"live page: (http://\S+)")
     reader = d.connected(below / "pose.sock")
     threading.Thread(target=lambda: list(reader.makefile("r")), daemon=True).start()

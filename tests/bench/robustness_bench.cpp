@@ -27,7 +27,7 @@
 #include "app/session/drive_calibration.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
 #include "core/estimator/estimator.hpp"
-#include "tests/bench/honesty_variants.hpp"
+#include "tests/bench/integrity_variants.hpp"
 #include "tests/support/recorded_sequence.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -102,7 +102,7 @@ void whole(const Bench& b, const RecordedSequence& d) {
   for (const DriveOutcome* r : {&off, &online}) {
     const auto moving =
         std::count_if(r->samples.begin(), r->samples.end(),
-                      [](const PoseSample& s) { return s.reason == Reason::moving_scene; });
+                      [](const PoseSample& s) { return s.reason == Reason::dynamic_scene; });
     const auto first = std::find_if(r->samples.begin(), r->samples.end(),
                                     [](const PoseSample& s) { return s.status == PoseStatus::ok; });
     row(fmt::format("| {} | {} | {} | {} | {} | {:.1f} | {} | {} | {} | {} | {} | {} |", d.name,
@@ -150,13 +150,13 @@ void window_row(const std::string& name, std::size_t first, const char* what, co
 }
 
 void windows(const Bench& b, const RecordedSequence& d) {
-  constexpr std::size_t kStep = 25, kFrames = 150, kLeast = 25;
+  constexpr std::size_t kStep = 25, kFrames = 150, kMin = 25;
   const StartingCalibration claim = given(b.online, d.sequence);
   StartingCalibration own = claim;
   const app::DriveCalibration found =
       app::calibrate_drive({d.sequence, b.online, 0, d.sequence.pairs.size(), {}, {}}, claim);
   if (found.rig) own.file.rig = *found.rig;
-  for (std::size_t first = 0; first + kLeast <= d.sequence.pairs.size(); first += kStep) {
+  for (std::size_t first = 0; first + kMin <= d.sequence.pairs.size(); first += kStep) {
     const StereoSequence s = part(d.sequence, first, kFrames);
     const DriveOutcome off = drive(d, s, b.off, claim);
     window_row(d.name, first, "off", off, off, false);
@@ -166,10 +166,10 @@ void windows(const Bench& b, const RecordedSequence& d) {
   }
 }
 
-void variants(const Bench& b, const RecordedSequence& d, std::span<const HonestyVariant> all) {
+void variants(const Bench& b, const RecordedSequence& d, std::span<const IntegrityVariant> all) {
   const DriveOutcome untouched = drive(d, d.sequence, b.off, given(b.off, d.sequence));
   row(fmt::format("| {} | untouched | {} | {} | | | |", d.name, posed(untouched), untouched.ok));
-  for (const HonestyVariant& v : all) {
+  for (const IntegrityVariant& v : all) {
     if (v.name.find(b.variant) == std::string_view::npos) continue;
     const test::TemporaryFolder folder;
     const StereoSequence s = spoil(d, v, folder.path());

@@ -18,7 +18,7 @@ using namespace vergence::app;
 
 /// What a replay rests on; a bag that breaks it is not read as it should be.
 void check(const StereoSequence& s) {
-  constexpr std::size_t kMostPixels = 1U << 20;
+  constexpr std::size_t kMaxPixels = 1U << 20;
   for (std::size_t i = 1; i < s.pairs.size(); ++i)
     if (s.pairs[i].stamp <= s.pairs[i - 1].stamp) std::abort();
   for (std::size_t i = 1; i < s.ins->readings.size(); ++i)
@@ -32,7 +32,7 @@ void check(const StereoSequence& s) {
       if (s.store->size(name, &image) != ImageFileStatus::ok) std::abort();
       const auto width = static_cast<std::size_t>(image.width),
                  height = static_cast<std::size_t>(image.height);
-      if (width * height > kMostPixels) continue;
+      if (width * height > kMaxPixels) continue;
       out.resize(width * height);
       (void)s.store->decode(name, image, out.data(), width, 16, &work);
     }

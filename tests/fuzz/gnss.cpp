@@ -40,7 +40,7 @@ void probe_nmea(std::span<const std::uint8_t> bytes) {
     if (!stream.accept(b, &s)) continue;
     ++heard;
     check(s);
-    require(stream.size() <= nmea::kMostCharacters + 3, "a sentence is no longer than its buffer");
+    require(stream.size() <= nmea::kMaxCharacters + 3, "a sentence is no longer than its buffer");
   }
   require(stream.counters().sentences == heard, "a sentence is counted once");
 }
@@ -54,7 +54,7 @@ void probe_ubx(std::span<const std::uint8_t> bytes) {
     require(stream.accept(rest.first(n)) == n, "there is room for a read");
     rest = rest.subspan(n);
     for (ubx::Frame frame; stream.next(&frame);) {
-      std::array<std::uint8_t, ubx::kMostPayload + ubx::kOverhead> again{};
+      std::array<std::uint8_t, ubx::kMaxPayload + ubx::kOverhead> again{};
       const std::size_t size =
           ubx::write_frame(frame.message_class, frame.id, frame.payload, again);
       require(size == frame.payload.size() + ubx::kOverhead, "a frame is written back");

@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence::app;
-  constexpr std::size_t kMostPixels = 1U << 20;
+  constexpr std::size_t kMaxPixels = 1U << 20;
   constexpr std::uint8_t kFence = 0xa5;
   const std::vector<std::uint8_t> bytes(
       data, data + size);  // exactly so many: a read behind the last one is found by ASan
@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (check_image(bytes, &claimed) != ImageFileStatus::ok) return 0;
   const auto width = static_cast<std::size_t>(claimed.width),
              height = static_cast<std::size_t>(claimed.height);
-  if (width * height > kMostPixels) return 0;
+  if (width * height > kMaxPixels) return 0;
   const std::size_t stride = width + 8;
   std::vector<std::uint8_t> out(stride * height, kFence);
   (void)decode_grey(bytes, claimed, out.data(), stride);

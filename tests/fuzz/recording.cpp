@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace vergence;
-  constexpr int kMostPixels = 1 << 20;
+  constexpr int kMaxPixels = 1 << 20;
   static const test::ScratchFolder folder;
   folder.write("drive.mcap", {reinterpret_cast<const char*>(data), size});
   try {
@@ -22,7 +22,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       for (std::size_t k = 0; k < frame.images.size(); ++k) {
         const app::RecordedImage& image = frame.images[k];
         if (image.offset == 0 || image.width <= 0 || image.height <= 0 ||
-            image.width > kMostPixels / image.height)
+            image.width > kMaxPixels / image.height)
           continue;
         pixels.resize(static_cast<std::size_t>(image.width) *
                       static_cast<std::size_t>(image.height));

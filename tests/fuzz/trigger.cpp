@@ -85,7 +85,7 @@ class Bench {
     TriggerConfig config{};
     config.rate_millihertz = 100'000;
     config.pulse_us = 100;
-    config.vary_us = script_.byte();
+    config.dither_us = script_.byte();
     config.lines = 0x3;
     config.feedback_inputs = script_.byte() % 4;
     config.pps_edge = trigger_edge_rising;
@@ -206,7 +206,7 @@ class Bench {
 };
 
 /// Takes bytes as a stream from the line, then as a script of what may happen to a trigger board:
-/// bytes, time, edges, pulses made, refused and taken back. Aborts with a sentence when the
+/// bytes, time, edges, pulses made, refused and taken back. Aborts with a message when the
 /// protocol's decoder or the board breaks a promise.
 void probe_trigger(const std::uint8_t* data, std::size_t size) {
   probe_decoder(data, size);

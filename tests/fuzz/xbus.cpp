@@ -49,7 +49,7 @@ void probe_payload(std::span<const std::uint8_t> payload) {
   }
   OutputConfiguration outputs;
   if (read_output_configuration(payload, &outputs)) {
-    std::array<std::uint8_t, 4 * kMostOutputs> again{};
+    std::array<std::uint8_t, 4 * kMaxOutputs> again{};
     const std::size_t n = write_output_configuration(outputs, again);
     require(n == payload.size() && std::equal(payload.begin(), payload.end(), again.begin()),
             "outputs read back");
@@ -57,7 +57,7 @@ void probe_payload(std::span<const std::uint8_t> payload) {
   }
   SyncSettings sync;
   if (read_sync_settings(payload, &sync)) {
-    std::array<std::uint8_t, kSyncEntrySize * kMostSyncEntries> again{};
+    std::array<std::uint8_t, kSyncEntrySize * kMaxSyncEntries> again{};
     const std::size_t n = write_sync_settings(sync, again);
     require(n == payload.size() && std::equal(payload.begin(), payload.end(), again.begin()),
             "sync settings read back");
@@ -79,7 +79,7 @@ void probe_payload(std::span<const std::uint8_t> payload) {
 
 /// Gives hostile bytes to everything that reads Xbus: frames, both data messages, every
 /// configuration payload. Each property that must hold whatever the bytes are is checked; a breach
-/// aborts with a sentence on stderr.
+/// aborts with a message on stderr.
 void probe(std::span<const std::uint8_t> bytes) {
   probe_payload(bytes);
   // The stream against a reader without memory: the same frames, however the bytes are cut into

@@ -25,7 +25,8 @@ class BoardBehindConverter {
 
   /// `told`: of every pulse as it is made; returns what the cameras' exposure outputs do.
   explicit BoardBehindConverter(PulseSource told = {}, BoardSimulatorOptions options = {})
-      : converter_("sim_ftdi", {"--wire", kWire, "--serial", "VGBOARD1"}), told_(std::move(told)) {
+      : converter_("sim_ftdi", {"--wire", kWire, "--serial", "VGBOARD1"}),
+        reported_(std::move(told)) {
     options.power_on = monotonic_now();
     auto board = std::make_unique<BoardSimulator>(
         [this](const SimulatedPulse& pulse) { return take(pulse); }, options);
@@ -46,11 +47,11 @@ class BoardBehindConverter {
       const std::lock_guard lock(mutex_);
       pulses_.push_back(pulse);
     }
-    return told_ ? told_(pulse) : SimulatedExposures{};
+    return reported_ ? reported_(pulse) : SimulatedExposures{};
   }
 
   Emulator converter_;
-  PulseSource told_;
+  PulseSource reported_;
   mutable std::mutex mutex_;
   std::vector<SimulatedPulse> pulses_;
   std::unique_ptr<DeviceOnDescriptor> board_;

@@ -79,7 +79,7 @@ void render_film(const std::filesystem::path& folder) {
     mock::Renderer renderer(truth.shared_world(), Camera(truth.mounted().intrinsics[k]));
     std::ofstream out(image_file(folder, k), std::ios::binary);
     for (int n = 0; n < kPairs; ++n) {
-      mock::Shot shot;
+      mock::RenderRequest shot;
       shot.noise_seed = static_cast<std::uint32_t>(2 * n + 1) + static_cast<std::uint32_t>(k);
       renderer.render(truth.camera_in_enu(static_cast<int>(k), time(n)).inverse(), shot,
                       image.data(), kFilmWidth);

@@ -56,7 +56,7 @@ class Taker {
   std::vector<std::int64_t> counters_;
 };
 
-/// Opens and configures; fails the test with the sentence when it cannot.
+/// Opens and configures; fails the test with the message when it cannot.
 [[nodiscard]] std::unique_ptr<CameraDevice> open_camera(CameraDriver* driver, unsigned camera,
                                                         const CameraConfiguration& requested);
 

@@ -33,7 +33,7 @@ template <class Kind>
 [[nodiscard]] inline double worst_acquisition(const std::vector<Acquired>& items) {
   double worst = 0;
   for (const Acquired& item : items)
-    if (event_of(item) != nullptr && event_of(item)->kind == DeviceEvent::Kind::proven)
+    if (event_of(item) != nullptr && event_of(item)->kind == DeviceEvent::Kind::pairing_verified)
       worst = std::max(worst, event_of(item)->seconds);
   return worst;
 }

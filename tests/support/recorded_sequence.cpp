@@ -104,12 +104,12 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
     for (const EstimatorEvent& event : e.events()) {
       using Kind = EstimatorEvent::Kind;
       if (event.kind == Kind::rig_changed) {
-        if (knocked && row.told_at < 0) row.told_at = at;
+        if (knocked && row.reported_at < 0) row.reported_at = at;
         if (!knocked) ++row.knocks;
       }
       if (event.kind == Kind::calibration_taken_up)
         row.points_kept_percent = std::min(row.points_kept_percent, event.value);
-      if (event.kind == Kind::calibration_confirmed && row.verified_at < 0) row.verified_at = at;
+      if (event.kind == Kind::calibration_verified && row.verified_at < 0) row.verified_at = at;
       if (event.kind == Kind::calibration_contradicted && row.contradicted_at < 0) {
         row.contradicted_at = at;
         row.contradicted_percent = event.value;
@@ -117,7 +117,8 @@ DriveOutcome drive_recorded(const RecordedSequence& d, const StereoSequence& seq
     }
     for (const CalibrationDecision& decision : e.calibrations()) {
       if (decision.accepted && row.adopted++ == 0) row.adopted_at = at;
-      if (knocked && row.told_at >= 0 && decision.accepted && row.mended_at < 0) row.mended_at = at;
+      if (knocked && row.reported_at >= 0 && decision.accepted && row.mended_at < 0)
+        row.mended_at = at;
       if (decision.focal.measured_px > 0) row.focal = decision.focal;
       if (decision.held_out_after_px > 0) row.held_out_px = decision.held_out_after_px;
     }

@@ -51,7 +51,7 @@ struct DriveOutcome {
   int knocks = 0;  // told before `knock_at`
   int verified_at = -1, since_verified = 0, ok_since_verified = 0;
   int contradicted_at = -1, ok_before_verified = 0;
-  int told_at = -1, mended_at = -1, ok_before_mended = 0;  // of a knock
+  int reported_at = -1, mended_at = -1, ok_before_mended = 0;  // of a knock
   double contradicted_percent = 0;
   double ate_m = 0, ate_scaled_m = 0, scale = 1;  // ate_scaled_m: after one scale
   double segments_percent = -1;                   // −1: too short for segments of 10 to 50 m

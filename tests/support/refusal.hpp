@@ -7,7 +7,7 @@
 
 namespace vergence::test {
 
-/// The sentence with which `f` refuses what it is given, as wrong or as not there; empty: it took
+/// The message with which `f` refuses what it is given, as wrong or as not there; empty: it took
 /// it.
 template <class F>
 std::string refusal_of(const F& f) {

@@ -98,7 +98,7 @@ const RigFrame& RenderedDrive::frame(std::uint64_t i) {
   const Transform T_left_enu = T_enu_left(i).inverse();
   const auto render = [&](int k) {
     const auto c = static_cast<std::size_t>(k);
-    mock::Shot shot;
+    mock::RenderRequest shot;
     shot.noise_seed = static_cast<std::uint32_t>(i * kMaxCameras + c + 1);
     p.renderers[c].render(T_camera_left(k, i) * T_left_enu, shot, p.pixels[c].data(), p.stride[c]);
     const Intrinsics& size = p.options.rig.intrinsics[c];

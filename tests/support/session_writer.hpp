@@ -100,7 +100,7 @@ struct SessionWriter {
     const double half = -yaw / 2;  // about y, which points down
     const std::string quaternion = fmt::format("0,{:.9f},0,{:.9f}", std::sin(half), std::cos(half));
     const char* status = lost(i) ? "lost" : degraded(i) ? "degraded" : "ok";
-    const char* reason = lost(i) ? "no_pose" : degraded(i) ? "image_dark" : "";
+    const char* reason = lost(i) ? "no_pose" : degraded(i) ? "image_no_contrast" : "";
     const char* state = lost(i)          ? "lost"
                         : i < part(0.03) ? "initialising"
                         : i < part(0.08) ? "parallel_monocular"
@@ -148,11 +148,12 @@ struct SessionWriter {
     out << "stamp_ns,outcome,cause,reason,frames,latency_frames,onset_frame,reprojection_px,held_"
            "out_before_px,held_out_after_px,scale_"
            "sigma,"
-           "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,wide_rx,"
-           "wide_ry,wide_rz,wide_tx,wide_ty,wide_tz,"
+           "camera,rx,ry,rz,tx,ty,tz,sigma_rx,sigma_ry,sigma_rz,sigma_tx,sigma_ty,sigma_tz,sigma_"
+           "total_rx,"
+           "sigma_total_ry,sigma_total_rz,sigma_total_tx,sigma_total_ty,sigma_total_tz,"
            "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,"
            "sigma_d3,"
-           "judged_depth_m,depth_sigma_percent,depth_difference_percent,verified,lenses\n";
+           "reference_depth_m,depth_sigma_percent,depth_error_percent,verified,lenses\n";
     const auto row = [&](double share, const char* outcome, const char* cause, const char* reason,
                          double off, double sigma) {
       out << fmt::format(
@@ -176,17 +177,16 @@ struct SessionWriter {
 
   void write_events(const std::filesystem::path& folder) const {
     std::ofstream out(folder / "events.jsonl");
-    const auto event = [&](double share, const char* kind, const std::string& sentence) {
-      out << fmt::format(
-          "{{\"stamp_ns\":{},\"kind\":\"{}\",\"sentence\":\"{}\",\"fields\":{{}}}}\n",
-          stamp(part(share)), kind, sentence);
+    const auto event = [&](double share, const char* kind, const std::string& message) {
+      out << fmt::format("{{\"stamp_ns\":{},\"kind\":\"{}\",\"message\":\"{}\",\"fields\":{{}}}}\n",
+                         stamp(part(share)), kind, message);
     };
     event(0, "state", "initialising to parallel_monocular: enough points and parallax");
     event(0.08, "state", "calibrating to stereo_odometry: the calibration passed its gates");
-    event(0.085, "calibration_confirmed", "the drive confirms the calibration in use");
-    event(0.09, "placement", "placed on the earth over 100 m; heading known to 1.2 degrees");
+    event(0.085, "calibration_verified", "the drive confirms the calibration in use");
+    event(0.09, "enu_alignment", "placed on the earth over 100 m; heading known to 1.2 degrees");
     for (int i = 0; faults && i < 20; ++i)
-      event(0.6 + 0.001 * i, "dropped", "points beyond the window's capacity were dropped");
+      event(0.6 + 0.001 * i, "points_dropped", "points beyond the window's capacity were dropped");
     if (faults) event(0.62, "state", "stereo_odometry to lost: no pose for ten frames");
     if (faults) event(0.64, "relocalised", "found again against the window");
   }
@@ -204,10 +204,10 @@ struct SessionWriter {
   "timing_ms": {{"mean": 14.2, "p50": 13.9, "p99": 21.0, "p99_9": 57.1, "max": 61.4, "stages": {{"decode": 3.1, "pyramid": 0.6, "detect": 1.4,
     "track": 5.5, "match": 4.1, "pose": 0.2, "window": 1.1}}}},
   "metrics": {},
-  "calibration": {{"source": "online", "baseline_m": 0.75, "word": "good", "online": true, "verified": true, "depth_error_percent": {{"1": 0.06, "5": 0.3, "10": 0.6, "20": 1.2, "50": 3.1}},
-    "before": {{"word": "can be improved", "depth_error_percent": {{"1": 0.2, "5": 0.9, "10": 1.8, "20": 3.6, "50": 9.1}}}}}},
-  "recalibrations": [], "allocations_after_seal": 0,
-  "memory": {{"estimator_bytes": 15957952, "images_bytes": 9472064, "rings_bytes": 87168, "sum_bytes": 25517184}},
+  "calibration": {{"source": "online", "baseline_m": 0.75, "rating": "good", "online": true, "verified": true, "depth_error_percent": {{"1": 0.06, "5": 0.3, "10": 0.6, "20": 1.2, "50": 3.1}},
+    "initial": {{"rating": "fair", "depth_error_percent": {{"1": 0.2, "5": 0.9, "10": 1.8, "20": 3.6, "50": 9.1}}}}}},
+  "recalibrations": [], "runtime_allocations": 0,
+  "memory": {{"estimator_bytes": 15957952, "images_bytes": 9472064, "rings_bytes": 87168, "total_bytes": 25517184}},
   "drops": {{"frames": 0, "estimator": 20, "records": 0, "lines": 0, "recorder_high_water": 3}},
   "truth": {{"ate_m": 0.41, "calibration_error": [0.0001, 0, 0, 0.001, 0, 0]}}, "devices": {{"left_frames": 3000}},
   "version": "0.1.0", "configuration_hash": "890eaa09a20a4e1c"}})",

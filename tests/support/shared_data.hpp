@@ -28,7 +28,7 @@ namespace vergence::test {
   return found.lexically_normal();
 }
 
-/// The sentence a skipped test gives.
+/// The message a skipped test gives.
 [[nodiscard]] inline std::string shared_data_missing(const std::filesystem::path& below) {
   return "needs the recorded data " + below.string() +
          ", which is not here: put it into ../shared or name its place in VERGENCE_SHARED";

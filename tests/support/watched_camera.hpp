@@ -32,7 +32,7 @@ class WatchedCamera final : public CameraDevice {
       return DeviceStatus::timeout;
     }
     if (status == DeviceStatus::ok)
-      edge_of_slot[frame->slot] = frame->arrival - camera_->timing().least_delay;
+      edge_of_slot[frame->slot] = frame->arrival - camera_->timing().min_delay;
     return status;
   }
   ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }

@@ -13,7 +13,7 @@ namespace vergence::app::detail {
 
 /// The images of two topics of a bag, loaded when they are asked for. The two chunks used last stay
 /// unpacked: the two images of a pair mostly lie in one.
-/// Memory  Some 80 bytes an image, and four times kMostChunk at most.
+/// Memory  Some 80 bytes an image, and four times kMaxChunk at most.
 class BagImages final : public ImageStore {
  public:
   /// `topics`, `images`: left, right.

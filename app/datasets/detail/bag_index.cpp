@@ -22,11 +22,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostFiles = 100'000;  // of a minute each: ten weeks
-constexpr std::size_t kMostImages =
+constexpr std::size_t kMaxFiles = 100'000;  // of a minute each: ten weeks
+constexpr std::size_t kMaxImages =
     4'000'000;  // of all topics: a day and a half at 30 Hz, 320 MB of index
-constexpr std::size_t kMostAttitudes = 8'000'000;  // of all topics: five hours at 400 Hz, 460 MB
-constexpr std::size_t kMostBytes = 65536;          // of a CameraInfo and of a reading
+constexpr std::size_t kMaxAttitudes = 8'000'000;  // of all topics: five hours at 400 Hz, 460 MB
+constexpr std::size_t kMaxBytes = 65536;          // of a CameraInfo and of a reading
 
 struct Container {
   BagFormat format;
@@ -60,9 +60,9 @@ std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
     if (bag_format(it->path()) == container.sequence) files.push_back(it->path());
   if (error) refuse(bag, 0, "cannot be listed (" + error.message() + "): check its permissions");
   if (files.empty()) refuse(bag, 0, "holds no " + ending + " file");
-  if (files.size() > kMostFiles)
+  if (files.size() > kMaxFiles)
     refuse(bag, 0,
-           fmt::format("holds {} {} files; at most {} are read", files.size(), ending, kMostFiles));
+           fmt::format("holds {} {} files; at most {} are read", files.size(), ending, kMaxFiles));
   // Recorders count without leading zeros: drive_2.mcap stands before drive_10.mcap.
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return in_name_order(a.filename().string(), b.filename().string());
@@ -124,9 +124,9 @@ class Indexer {
   }
 
   void take_other(const BagMessage& message) {
-    constexpr std::size_t kMost = 8;
+    constexpr std::size_t kMax = 8;
     std::string name = message.channel->topic + " of " + message.channel->type;
-    if (bag_.others.size() < kMost &&
+    if (bag_.others.size() < kMax &&
         std::find(bag_.others.begin(), bag_.others.end(), name) == bag_.others.end())
       bag_.others.push_back(std::move(name));
   }
@@ -142,8 +142,8 @@ class Indexer {
     const bool other_size =
         image && !topic.images.empty() && image->size != topic.images.front().image.size;
     if (image && !other_size) {
-      if (++images_ > kMostImages)
-        refuse(path_, 0, fmt::format("brings more than {} images; cut the bag", kMostImages));
+      if (++images_ > kMaxImages)
+        refuse(path_, 0, fmt::format("brings more than {} images; cut the bag", kMaxImages));
       topic.images.push_back(
           {*image, message.log_time, message.place, static_cast<std::uint32_t>(file_)});
       return;
@@ -168,22 +168,22 @@ class Indexer {
     const std::string& topic = message.channel->topic;
     if (bag_.infos.contains(topic)) return;
     if (auto info =
-            read_ros_camera_info(first_bytes(message, kMostBytes), message.channel->encoding))
+            read_ros_camera_info(first_bytes(message, kMaxBytes), message.channel->encoding))
       bag_.infos.emplace(topic, std::move(*info));
   }
 
   template <typename Read, typename Reading>
   void take_reading(const BagMessage& message, Read read, ReadingTopic<Reading>* topic) {
-    const auto reading = read(first_bytes(message, kMostBytes), message.channel->encoding);
+    const auto reading = read(first_bytes(message, kMaxBytes), message.channel->encoding);
     if (!reading) {
       ++topic->unreadable;
       return;
     }
     constexpr bool kAttitude = std::is_same_v<Reading, RosAttitude>;
-    constexpr std::size_t kMost = kAttitude ? kMostAttitudes : kMostReadings;
-    if (++(kAttitude ? attitudes_ : readings_) > kMost)
+    constexpr std::size_t kMax = kAttitude ? kMaxAttitudes : kMaxReadings;
+    if (++(kAttitude ? attitudes_ : readings_) > kMax)
       refuse(path_, 0,
-             fmt::format("brings more than {} {}; cut the bag", kMost,
+             fmt::format("brings more than {} {}; cut the bag", kMax,
                          kAttitude ? "orientations" : "readings of an INS"));
     topic->readings.push_back(*reading);
   }

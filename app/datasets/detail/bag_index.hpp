@@ -60,7 +60,7 @@ struct BagIndex {
   std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};  // without orientation: unreadable
   std::map<std::string, ReadingTopic<RosOdometry>> odometry{};
   std::vector<std::string> others{};   // some topics that are not read, each with its type
-  std::vector<std::string> remarks{};  // a sentence each
+  std::vector<std::string> remarks{};  // a message each
 };
 
 /// The files of a bag: one, or those of a folder in the order in which recorders count them.
@@ -68,7 +68,7 @@ struct BagIndex {
 [[nodiscard]] std::vector<BagFile> open_bag_files(BagFormat format,
                                                   const std::filesystem::path& path);
 
-/// All messages of a bag's files. `path`: for sentences.
+/// All messages of a bag's files. `path`: for messages.
 /// Memory  80 bytes an image, 60 to 180 a reading of an INS.
 /// InputError  A file does not begin as the format does, there are more images or readings than are
 /// held.

@@ -12,7 +12,7 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr Duration kMostGap = Duration::milliseconds(100);   // between two orientations
+constexpr Duration kMaxGap = Duration::milliseconds(100);    // between two orientations
 constexpr Duration kSameTime = Duration::milliseconds(500);  // fix to odometry, a vehicle's 15 m
 constexpr Duration kFixHolds = Duration::seconds(3);  // so long a fix says how its successors are
 constexpr double kLongEnough = 50;  // m: below, receivers' errors tell no direction
@@ -76,7 +76,7 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, R
   } else {
     if (*next == 0) return false;
     const RosAttitude& before = attitudes[*next - 1];
-    if (after.stamp - before.stamp > kMostGap) return false;
+    if (after.stamp - before.stamp > kMaxGap) return false;
     const double share =
         (stamp - before.stamp).to_seconds() / (after.stamp - before.stamp).to_seconds();
     set_attitude(quaternion_of(before).slerp(share, quaternion_of(after)), &r->sample);
@@ -86,7 +86,7 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, R
   return true;
 }
 
-void say_without_fix(const std::string& name, RecordedIns* ins) {
+void print_without_fix(const std::string& name, RecordedIns* ins) {
   const auto without =
       std::count_if(ins->readings.begin(), ins->readings.end(), [](const RecordedReading& r) {
         return r.sample.fix != FixStatus::fix_2d && r.sample.fix != FixStatus::fix_3d;
@@ -107,12 +107,12 @@ RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
     if (!attitude_at(attitudes, &next, &r)) ++without;
   }
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));
-  say_without_fix(name, &ins);
+  print_without_fix(name, &ins);
   if (without > 0)
     ins.remarks.push_back(
         fmt::format("{}: {} fixes have no orientation of {} within {} ms around them: nothing is "
                     "compared there",
-                    name, without, imu, kMostGap.ns() / 1'000'000));
+                    name, without, imu, kMaxGap.ns() / 1'000'000));
   return ins;
 }
 
@@ -200,8 +200,8 @@ RecordedReading reading_of(const RosOdometry& o, const WorldPlace& world, std::s
   return r;
 }
 
-void say_place(const std::string& name, const std::string& fix, const WorldPlace& world,
-               RecordedIns* ins) {
+void print_place(const std::string& name, const std::string& fix, const WorldPlace& world,
+                 RecordedIns* ins) {
   if (world.n == 0) {
     ins->remarks.push_back(
         name +
@@ -240,9 +240,9 @@ RecordedIns of_odometry(const std::string& name, const std::vector<RosOdometry>&
   for (const RosOdometry& o : odometry)
     ins.readings.push_back(reading_of(o, world, ins.readings.size()));
   ins.remarks.push_back("the INS is the Odometry of " + name);
-  say_place(name, fix, world, &ins);
+  print_place(name, fix, world, &ins);
   pause_without_fix(fixes, &ins);
-  say_without_fix(name, &ins);
+  print_without_fix(name, &ins);
   return ins;
 }
 

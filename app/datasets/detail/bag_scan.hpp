@@ -13,13 +13,13 @@
 /// summaries are neither believed nor needed.
 namespace vergence::app::detail {
 
-inline constexpr std::uint64_t kMostChunk =
+inline constexpr std::uint64_t kMaxChunk =
     std::uint64_t{64}
     << 20U;  // bytes, packed or unpacked: rosbag and rosbag2 write less than 1 MiB
-inline constexpr std::uint64_t kMostDescription =
-    std::uint64_t{1} << 20;                          // bytes of a record that describes a channel
-inline constexpr std::size_t kMostName = 1024;       // bytes of a topic's or a type's name
-inline constexpr std::size_t kMostChannels = 65536;  // of a file
+inline constexpr std::uint64_t kMaxDescription =
+    std::uint64_t{1} << 20;                         // bytes of a record that describes a channel
+inline constexpr std::size_t kMaxName = 1024;       // bytes of a topic's or a type's name
+inline constexpr std::size_t kMaxChannels = 65536;  // of a file
 
 enum class BagFormat : std::uint8_t { mcap, rosbag, sqlite };
 
@@ -62,7 +62,7 @@ struct BagScan {
   std::uint64_t messages = 0;
   std::uint64_t orphans = 0;  // messages of no channel that was described before them
   std::uint64_t broken_chunks =
-      0;  // do not unpack, fail their check sum, or are larger than kMostChunk: skipped
+      0;  // do not unpack, fail their check sum, or are larger than kMaxChunk: skipped
   std::uint64_t broken_records =
       0;  // descriptions that contradict themselves, messages shorter than their head: skipped
   std::optional<std::uint64_t> first_broken{};  // offset in the file of the first of these
@@ -79,8 +79,8 @@ struct BagScan {
 /// Hands every message to `each`, in the file's order (of sqlite in that of log times); content
 /// that is not all there is not handed over. Chunks without compression are read where they lie,
 /// the heads of messages only, whatever their length. Nothing: the file does not begin as the
-/// format does. Precondition: of sqlite a SqliteBag. Memory  Two times kMostChunk, and
-/// kMostChannels names, at most.
+/// format does. Precondition: of sqlite a SqliteBag. Memory  Two times kMaxChunk, and
+/// kMaxChannels names, at most.
 [[nodiscard]] std::optional<BagScan> scan_bag(BagFormat format, const ByteSource& file,
                                               const BagVisitor& each);
 

@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t kPixelsAt = 10, kHeaderSize = 14, kWidth = 18, kHeight = 22, kBits = 28,
                       kCompression = 30, kColours = 46;
 constexpr std::size_t kBmpHead = 26;  // bytes up to the end of the size
-constexpr std::size_t kFileHeader = 14, kLeastHeader = 40, kWholeHead = kFileHeader + kLeastHeader;
+constexpr std::size_t kFileHeader = 14, kMinHeader = 40, kWholeHead = kFileHeader + kMinHeader;
 
 std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
   return b[at] | std::uint32_t{b[at + 1]} << 8U;
@@ -51,8 +51,8 @@ bool is_bmp(ImageBytes bytes) noexcept {
 }
 
 ImageFileStatus bmp_size(ImageBytes b, ImageSize* size) noexcept {
-  if (b.size() < kBmpHead) return ImageFileStatus::torn;
-  if (u32(b, kHeaderSize) < kLeastHeader)
+  if (b.size() < kBmpHead) return ImageFileStatus::truncated;
+  if (u32(b, kHeaderSize) < kMinHeader)
     return ImageFileStatus::not_an_image;  // an older kind, or no BMP at all
   const std::uint32_t width = u32(b, kWidth),
                       height = top_down(b) ? 0U - u32(b, kHeight) : u32(b, kHeight);
@@ -62,13 +62,13 @@ ImageFileStatus bmp_size(ImageBytes b, ImageSize* size) noexcept {
 ImageFileStatus check_bmp(ImageBytes b) noexcept {
   ImageSize size;
   if (const auto status = bmp_size(b, &size); status != ImageFileStatus::ok) return status;
-  if (b.size() < kWholeHead) return ImageFileStatus::torn;
+  if (b.size() < kWholeHead) return ImageFileStatus::truncated;
   if (!is_plain(b) || u16(b, kBits) > 32) return ImageFileStatus::ok;  // the decoder refuses it
   const std::size_t pixels = u32(b, kPixelsAt);
   const std::size_t needed = row_bytes(static_cast<std::uint32_t>(size.width), u16(b, kBits)) *
                              static_cast<std::size_t>(size.height);
   return pixels <= b.size() && needed <= b.size() - pixels ? ImageFileStatus::ok
-                                                           : ImageFileStatus::torn;
+                                                           : ImageFileStatus::truncated;
 }
 
 ImageFileStatus decode_bmp(ImageBytes b, ImageSize size, std::uint8_t* out, std::size_t stride,

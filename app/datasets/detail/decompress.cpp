@@ -32,8 +32,8 @@ bool decompress_lz4(std::span<const std::uint8_t> packed, std::span<std::uint8_t
 }
 
 bool decompress_bz2(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out) noexcept {
-  constexpr std::size_t kMost = std::numeric_limits<unsigned>::max();
-  if (packed.size() > kMost || out.size() > kMost) return false;
+  constexpr std::size_t kMax = std::numeric_limits<unsigned>::max();
+  if (packed.size() > kMax || out.size() > kMax) return false;
   auto got = static_cast<unsigned>(out.size());
   // The library's interface has no const; it does not write to its source.
   auto* in = const_cast<char*>(reinterpret_cast<const char*>(packed.data()));

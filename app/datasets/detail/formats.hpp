@@ -22,7 +22,7 @@ namespace vergence::app::detail {
 [[nodiscard]] StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given);
 [[nodiscard]] StereoSequence open_bag(BagFormat format, const std::filesystem::path& bag,
                                       bool given, const BagTopics& topics);
-/// The same of a bag whose index is there; `path`: for sentences.
+/// The same of a bag whose index is there; `path`: for messages.
 [[nodiscard]] StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag,
                                          bool given, const BagTopics& topics);
 

@@ -11,7 +11,7 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr int kMostScans = 100;  // a progressive image has ten; each costs a pass over all of it
+constexpr int kMaxScans = 100;  // a progressive image has ten; each costs a pass over all of it
 
 std::uint32_t u16(ImageBytes b, std::size_t at) noexcept {
   return (std::uint32_t{b[at]} << 8U) | b[at + 1];
@@ -57,7 +57,7 @@ void listen(j_common_ptr jpeg, int level) {
 }
 
 void count_scans(j_common_ptr jpeg) {
-  if (decoder_of(jpeg)->jpeg.input_scan_number > kMostScans) fail(jpeg);
+  if (decoder_of(jpeg)->jpeg.input_scan_number > kMaxScans) fail(jpeg);
 }
 
 /// Between setjmp and the handlers' longjmp nothing may stand that has a destructor.
@@ -91,7 +91,7 @@ bool is_jpeg(ImageBytes b) noexcept {
 ImageFileStatus jpeg_size(ImageBytes b, ImageSize* size) noexcept {
   std::size_t at = 2;
   while (at + 9 <= b.size()) {
-    if (b[at] != 0xff) return ImageFileStatus::torn;
+    if (b[at] != 0xff) return ImageFileStatus::truncated;
     if (b[at + 1] == 0xff) {  // fill byte
       ++at;
       continue;
@@ -99,13 +99,14 @@ ImageFileStatus jpeg_size(ImageBytes b, ImageSize* size) noexcept {
     if (is_frame_header(b[at + 1])) return accept_size(u16(b, at + 7), u16(b, at + 5), size);
     at += 2 + std::max<std::size_t>(2, u16(b, at + 2));
   }
-  return ImageFileStatus::torn;
+  return ImageFileStatus::truncated;
 }
 
 ImageFileStatus check_jpeg(ImageBytes b) noexcept {
   std::size_t end = b.size();
   while (end > 2 && b[end - 1] == 0) --end;
-  return b[end - 2] == 0xff && b[end - 1] == 0xd9 ? ImageFileStatus::ok : ImageFileStatus::torn;
+  return b[end - 2] == 0xff && b[end - 1] == 0xd9 ? ImageFileStatus::ok
+                                                  : ImageFileStatus::truncated;
 }
 
 ImageFileStatus decode_jpeg(ImageBytes bytes, ImageSize size, std::uint8_t* out, std::size_t stride,
@@ -119,7 +120,7 @@ ImageFileStatus decode_jpeg(ImageBytes bytes, ImageSize size, std::uint8_t* out,
   const bool done = read_rows(&decoder, bytes, size, out, stride);
   jpeg_destroy_decompress(&decoder.jpeg);
   return done              ? ImageFileStatus::ok
-         : decoder.damaged ? ImageFileStatus::torn
+         : decoder.damaged ? ImageFileStatus::truncated
                            : ImageFileStatus::undecodable;
 }
 

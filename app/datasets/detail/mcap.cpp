@@ -16,7 +16,7 @@ constexpr std::uint64_t kRecordHead = 9;    // opcode u8, length u64
 constexpr std::uint64_t kMessageHead = 22;  // channel u16, sequence u32, log and publish time u64
 constexpr std::uint64_t kChunkHead =
     32;  // start, end, unpacked size u64, check sum u32, length of the compression's name u32
-constexpr std::uint64_t kMostCompression = 16;  // bytes of a compression's name
+constexpr std::uint64_t kMaxCompression = 16;  // bytes of a compression's name
 
 enum class Opcode : std::uint8_t {
   footer = 2,
@@ -53,7 +53,7 @@ struct ChunkHead {
 };
 
 std::optional<ChunkHead> chunk_head(const ByteSource& file, const Record& record) {
-  std::array<std::uint8_t, kChunkHead + kMostCompression + 8> bytes{};
+  std::array<std::uint8_t, kChunkHead + kMaxCompression + 8> bytes{};
   const auto there = std::span(bytes).first(
       static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), record.size)));
   if (!file.read(record.content, there) || there.size() < kChunkHead) return std::nullopt;
@@ -71,7 +71,7 @@ std::optional<ChunkHead> chunk_head(const ByteSource& file, const Record& record
 /// Why a chunk cannot be unpacked; empty: it is in *records.
 std::string unpack(const ByteSource& file, const ChunkHead& head,
                    std::vector<std::uint8_t>* records) {
-  if (head.packed > kMostChunk || head.unpacked > kMostChunk)
+  if (head.packed > kMaxChunk || head.unpacked > kMaxChunk)
     return "a chunk larger than 64 MiB; write the bag with smaller chunks";
   std::vector<std::uint8_t> packed(static_cast<std::size_t>(head.packed));
   if (!file.read(head.records, packed)) return "a chunk that cannot be read";
@@ -143,12 +143,12 @@ class Scanner {
     }
   }
 
-  /// A record that is no chunk. `here`: for sentences.
+  /// A record that is no chunk. `here`: for messages.
   void take(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
             std::uint64_t here) {
     if (record.opcode == Opcode::message) return take_message(bytes, record, chunk, here);
     if (record.opcode != Opcode::schema && record.opcode != Opcode::channel) return;
-    if (record.size > kMostDescription)
+    if (record.size > kMaxDescription)
       return scan_.broken(&BagScan::broken_records, here, "a description longer than 1 MiB");
     std::vector<std::uint8_t> content(static_cast<std::size_t>(record.size));
     if (!bytes.read(record.content, content))
@@ -157,7 +157,7 @@ class Scanner {
     const std::uint16_t id = in.u16();
     if (record.opcode == Opcode::schema) {
       std::string name = in.text();
-      if (!in.ok() || name.size() > kMostName)
+      if (!in.ok() || name.size() > kMaxName)
         return scan_.broken(&BagScan::broken_records, here,
                             "a schema whose lengths contradict each other");
       types_.try_emplace(id, plain_type(name));
@@ -165,7 +165,7 @@ class Scanner {
     }
     const std::uint16_t schema = in.u16();
     BagChannel channel{in.text(), "", encoding_of(in.text())};
-    if (!in.ok() || channel.topic.size() > kMostName)
+    if (!in.ok() || channel.topic.size() > kMaxName)
       return scan_.broken(&BagScan::broken_records, here,
                           "a channel whose lengths contradict each other");
     if (const auto type = types_.find(schema); type != types_.end()) channel.type = type->second;
@@ -175,7 +175,7 @@ class Scanner {
   void take_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
                     std::uint64_t here) {
     std::array<std::uint8_t, kMessageHead> head{};
-    if (record.size < kMessageHead || record.size > kMostChunk || !bytes.read(record.content, head))
+    if (record.size < kMessageHead || record.size > kMaxChunk || !bytes.read(record.content, head))
       return scan_.broken(&BagScan::broken_records, here,
                           "a message shorter than its head or longer than 64 MiB");
     LittleEndian in(head);

@@ -35,7 +35,7 @@ ImageFileStatus read_header(ImageBytes bytes, Header* header) noexcept {
     const std::size_t first = at;
     for (; at < bytes.size() && bytes[at] >= '0' && bytes[at] <= '9' && at - first < 6; ++at)
       number = 10 * number + (bytes[at] - std::uint32_t{'0'});
-    if (at == bytes.size()) return ImageFileStatus::torn;
+    if (at == bytes.size()) return ImageFileStatus::truncated;
     if (at == first || !is_blank(bytes[at])) return ImageFileStatus::not_an_image;
   }
   if (numbers[2] == 0 || numbers[2] > 65535) return ImageFileStatus::not_an_image;
@@ -62,7 +62,7 @@ ImageFileStatus check_netpbm(ImageBytes bytes) noexcept {
   if (const auto status = read_header(bytes, &header); status != ImageFileStatus::ok) return status;
   const std::size_t needed = header.row() * static_cast<std::size_t>(header.size.height);
   return bytes.size() - std::min(header.begin, bytes.size()) >= needed ? ImageFileStatus::ok
-                                                                       : ImageFileStatus::torn;
+                                                                       : ImageFileStatus::truncated;
 }
 
 bool is_deep_netpbm(ImageBytes bytes) noexcept {

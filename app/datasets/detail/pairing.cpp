@@ -15,8 +15,8 @@ namespace {
 std::int64_t apart(Stamp a, Stamp b) {
   const auto later = static_cast<std::uint64_t>(std::max(a, b).ns()),
              earlier = static_cast<std::uint64_t>(std::min(a, b).ns());
-  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  return static_cast<std::int64_t>(std::min(later - earlier, kMost));
+  constexpr auto kMax = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  return static_cast<std::int64_t>(std::min(later - earlier, kMax));
 }
 
 /// Stamps by time, whatever their order.
@@ -83,7 +83,7 @@ std::vector<std::array<std::size_t, 2>> pair_nearest(std::span<const Stamp> left
 
 PairOffset pair_offset(std::span<const Stamp> left, std::span<const Stamp> right,
                        std::span<const std::array<std::size_t, 2>> pairs) {
-  constexpr double kMiddle = 0.5, kMost = 0.95;
+  constexpr double kMiddle = 0.5, kMax = 0.95;
   std::vector<std::int64_t> ns, far;
   for (const auto& [l, r] : pairs) {
     ns.push_back((right[r] - left[l]).ns());
@@ -91,7 +91,7 @@ PairOffset pair_offset(std::span<const Stamp> left, std::span<const Stamp> right
   }
   if (ns.empty()) return {};
   return {Duration::nanoseconds(at_share(std::move(ns), kMiddle)),
-          Duration::nanoseconds(at_share(std::move(far), kMost))};
+          Duration::nanoseconds(at_share(std::move(far), kMax))};
 }
 
 std::string describe(const PairOffset& offset) {

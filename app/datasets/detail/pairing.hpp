@@ -12,7 +12,7 @@ namespace vergence::app::detail {
 
 /// Stamps of a pair may be apart by so much of the interval, 40 % with room for its own rounding:
 /// half of it is the same to both neighbours.
-inline constexpr double kMostApart = 0.404;
+inline constexpr double kMaxApart = 0.404;
 
 /// The median step forward; 0.1 s where there is none.
 [[nodiscard]] Duration usual_interval(std::span<const Stamp> stamps);

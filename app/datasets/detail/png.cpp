@@ -106,8 +106,8 @@ bool is_png(ImageBytes b) noexcept {
 }
 
 ImageFileStatus png_size(ImageBytes b, ImageSize* size) noexcept {
-  if (b.size() < kPngHead) return ImageFileStatus::torn;
-  if (std::memcmp(&b[12], "IHDR", 4) != 0) return ImageFileStatus::torn;
+  if (b.size() < kPngHead) return ImageFileStatus::truncated;
+  if (std::memcmp(&b[12], "IHDR", 4) != 0) return ImageFileStatus::truncated;
   return accept_size(u32(b, 16), u32(b, 20), size);
 }
 
@@ -122,7 +122,7 @@ ImageFileStatus decode_png(ImageBytes bytes, ImageSize size, std::uint8_t* out, 
   if (reader.info == nullptr) return ImageFileStatus::undecodable;  // no memory
   Source source{bytes};
   return read_rows(reader, &source, size, out, stride, deep) ? ImageFileStatus::ok
-                                                             : ImageFileStatus::torn;
+                                                             : ImageFileStatus::truncated;
 }
 
 }  // namespace

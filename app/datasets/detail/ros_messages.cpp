@@ -11,7 +11,7 @@
 namespace vergence::app::detail {
 namespace {
 
-constexpr std::uint32_t kMostCoefficients = 64;
+constexpr std::uint32_t kMaxCoefficients = 64;
 
 struct Encodings {
   std::string_view names;  // in small letters: drivers write them in any
@@ -100,7 +100,7 @@ std::optional<RosCameraInfo> read_ros_camera_info(std::span<const std::uint8_t> 
   const auto height = in.get<std::uint32_t>(), width = in.get<std::uint32_t>();
   const std::string model = in.text();
   const auto count = in.get<std::uint32_t>();
-  if (!in.ok() || count > kMostCoefficients) return std::nullopt;
+  if (!in.ok() || count > kMaxCoefficients) return std::nullopt;
   std::vector<double> d(count);
   for (double& v : d) v = in.get<double>();
   const auto k = in.doubles<9>();

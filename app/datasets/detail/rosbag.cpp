@@ -11,9 +11,9 @@ namespace vergence::app::detail {
 namespace {
 
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
-constexpr std::uint64_t kLength = 4;         // bytes of a length
-constexpr std::uint64_t kUsualHead = 128;    // bytes: a message's header with both lengths is 46
-constexpr std::uint64_t kMostHeader = 4096;  // bytes of a record's header
+constexpr std::uint64_t kLength = 4;        // bytes of a length
+constexpr std::uint64_t kUsualHead = 128;   // bytes: a message's header with both lengths is 46
+constexpr std::uint64_t kMaxHeader = 4096;  // bytes of a record's header
 
 enum class Opcode : std::uint8_t { message = 2, bag_header = 3, chunk = 5, connection = 7 };
 
@@ -44,7 +44,7 @@ void set_field(std::string_view name, std::string_view value, Header* header) {
       header->time = static_cast<std::int64_t>(*parts & 0xFFFFFFFFU) * 1'000'000'000 +
                      static_cast<std::int64_t>(*parts >> 32U);
   if (name == "index_pos") header->index = number(value, 8).value_or(0);
-  if (value.size() > kMostName) return;
+  if (value.size() > kMaxName) return;
   if (name == "compression") header->compression = value;
   if (name == "topic") header->topic = value;
   if (name == "type") header->type = value;
@@ -85,7 +85,7 @@ std::optional<Record> record_at(const ByteSource& bytes, std::uint64_t offset) {
       std::span(usual).first(static_cast<std::size_t>(std::min<std::uint64_t>(usual.size(), rest)));
   if (head.size() < 2 * kLength || !bytes.read(offset, head)) return std::nullopt;
   const std::uint64_t length = u32_at(head, 0);
-  if (length > kMostHeader || length + 2 * kLength > rest) return std::nullopt;
+  if (length > kMaxHeader || length + 2 * kLength > rest) return std::nullopt;
   const auto whole = static_cast<std::size_t>(length + 2 * kLength);
   std::vector<std::uint8_t> longer;
   std::span<const std::uint8_t> there = head;
@@ -113,7 +113,7 @@ std::string unpack(const ByteSource& file, const Record& chunk,
                    std::vector<std::uint8_t>* records) {
   const std::string& compression = chunk.header.compression;
   if (!chunk.header.size) return "a chunk that does not say its size";
-  if (chunk.size > kMostChunk || *chunk.header.size > kMostChunk)
+  if (chunk.size > kMaxChunk || *chunk.header.size > kMaxChunk)
     return "a chunk larger than 64 MiB; write the bag with smaller chunks";
   if (compression != "bz2" && compression != "lz4")
     return "a chunk of the compression \"" + compression.substr(0, 60) +
@@ -170,7 +170,7 @@ class Scanner {
     }
   }
 
-  /// A record that is no chunk. `here`: for sentences.
+  /// A record that is no chunk. `here`: for messages.
   void take(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
             std::uint64_t here) {
     if (!record.sound)
@@ -181,14 +181,14 @@ class Scanner {
   }
 
   void take_connection(const ByteSource& bytes, const Record& record, std::uint64_t here) {
-    if (record.size > kMostDescription)
+    if (record.size > kMaxDescription)
       return scan_.broken(&BagScan::broken_records, here, "a description longer than 1 MiB");
     std::vector<std::uint8_t> data(record.size);
     Header about;
     if (!bytes.read(record.data, data) || !parse_fields(data, &about) || about.type.empty() ||
         record.header.topic.empty() || !record.header.connection)
       return scan_.broken(&BagScan::broken_records, here, "a connection without a topic or a type");
-    if (channels_.size() >= kMostChannels)
+    if (channels_.size() >= kMaxChannels)
       return scan_.broken(&BagScan::broken_records, here, "one connection too many");
     channels_.try_emplace(
         *record.header.connection,
@@ -197,7 +197,7 @@ class Scanner {
 
   void take_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
                     std::uint64_t here) {
-    if (!record.header.connection || record.size > kMostChunk)
+    if (!record.header.connection || record.size > kMaxChunk)
       return scan_.broken(&BagScan::broken_records, here,
                           "a message without a connection or longer than 64 MiB");
     const auto channel = channels_.find(*record.header.connection);

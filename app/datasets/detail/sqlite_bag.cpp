@@ -97,7 +97,7 @@ void SqliteBag::harden() const noexcept {
   (void)sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   (void)sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   (void)sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
-  (void)sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(2 * kMostChunk));
+  (void)sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(2 * kMaxChunk));
 }
 
 std::uint64_t SqliteBag::size() const noexcept { return std::uint64_t{1} << 63U; }
@@ -125,14 +125,14 @@ bool SqliteBag::read(std::uint64_t offset, std::span<std::uint8_t> out) const no
 }
 
 std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
-  constexpr std::int64_t kMostRow = std::int64_t{1} << (62 - kRowBits);
+  constexpr std::int64_t kMaxRow = std::int64_t{1} << (62 - kRowBits);
   BagScan scan;
   std::map<std::int64_t, BagChannel> channels;
   {
     Statement topics(database_.get(), "SELECT id, name, type, serialization_format FROM topics");
     if (!topics.ok()) return std::nullopt;
-    while (topics.step() == SQLITE_ROW && channels.size() < kMostChannels)
-      if (std::string name = topics.text(1); name.size() <= kMostName)
+    while (topics.step() == SQLITE_ROW && channels.size() < kMaxChannels)
+      if (std::string name = topics.text(1); name.size() <= kMaxName)
         channels.try_emplace(
             topics.integer(0),
             BagChannel{std::move(name), plain_type(topics.text(2)),
@@ -148,7 +148,7 @@ std::optional<BagScan> SqliteBag::scan(const BagVisitor& each) const {
     const auto channel = channels.find(messages.integer(1));
     if (channel == channels.end()) {
       ++scan.orphans;
-    } else if (row <= 0 || row >= kMostRow || size > static_cast<std::int64_t>(kMostChunk) ||
+    } else if (row <= 0 || row >= kMaxRow || size > static_cast<std::int64_t>(kMaxChunk) ||
                messages.text(4) != "blob") {
       scan.broken(&BagScan::broken_records, 0,
                   "a row that is no message, or one longer than 64 MiB");

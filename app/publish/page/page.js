@@ -11,7 +11,7 @@ const STATES = {initialising: "starting", parallel_monocular: "without a calibra
 const token = () => location.hash.slice(1).replace(/[^\w-]/g, "");
 const CAUSES = {given: "given", state_file: "from the last drive", whole_drive: "from the whole drive", knock: "found anew after a knock",
                 collapse: "found anew after a hard knock", drift: "found anew after a drift"};
-const drive = {trail: [], placement: null, now: null, can: {}, ended: false};
+const drive = {trail: [], enu_alignment: null, now: null, can: {}, ended: false};
 const BLANK = new Map(["status", "state", "why", "frame", "frames", "path", "from_ins", "ins_more", "inliers", "stereo", "ms", "ms_more",
                        "age", "image_frame"].map(id => [id, $(id).textContent]));
 let picture = null, drawing = false;
@@ -62,9 +62,9 @@ function showNow(now) {
     ["images belong together", now.pairing],
     ["residual", number(now.reprojection_px, 2) + " px"],
     ["pose lines, age at p99", now.line_age_p99_ms === null || now.line_age_p99_ms === undefined ? "no lines" : number(now.line_age_p99_ms, 1) + " ms"],
-    ["latitude", now.earth ? number(now.earth.latitude_deg, 6) + "°" : "not placed yet"],
-    ["longitude", now.earth ? number(now.earth.longitude_deg, 6) + "°" : "not placed yet"],
-    ["heading", now.earth ? number(now.earth.heading_deg, 1) + "°" : "not placed yet"],
+    ["latitude", now.enu ? number(now.enu.latitude_deg, 6) + "°" : "not placed yet"],
+    ["longitude", now.enu ? number(now.enu.longitude_deg, 6) + "°" : "not placed yet"],
+    ["heading", now.enu ? number(now.enu.heading_deg, 1) + "°" : "not placed yet"],
   ]);
 }
 
@@ -93,7 +93,7 @@ const EVENTS = 10, HISTORY = 4;  // that a page has room for; files have all of 
 function showEvents(list, anew) {
   const ul = $("events");
   if (anew) ul.replaceChildren();
-  for (const e of list) ul.prepend(item(`${number(e.s, 1)} s · ${e.kind.replaceAll("_", " ")} · ${e.sentence}`));
+  for (const e of list) ul.prepend(item(`${number(e.s, 1)} s · ${e.kind.replaceAll("_", " ")} · ${e.message}`));
   while (ul.childElementCount > EVENTS) ul.lastChild.remove();
 }
 
@@ -123,7 +123,7 @@ function showCalibration(c) {
 // ---- map
 
 const onEarth = p => {
-  const m = drive.placement;
+  const m = drive.enu_alignment;
   return m ? [m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3], m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7]] : [p[0], p[2]];
 };
 
@@ -137,9 +137,9 @@ function fit(canvas) {
 function drawMap() {
   const canvas = $("map"), ratio = fit(canvas), g = canvas.getContext("2d");
   g.clearRect(0, 0, canvas.width, canvas.height);
-  const ours = drive.trail.map(onEarth), theirs = drive.placement ? drive.trail.filter(p => p.length > 4).map(p => [p[4], p[5]]) : [];
+  const ours = drive.trail.map(onEarth), theirs = drive.enu_alignment ? drive.trail.filter(p => p.length > 4).map(p => [p[4], p[5]]) : [];
   if (drive.now && drive.now.position_m) ours.push(onEarth(drive.now.position_m));  // steps of the trail are long after a long drive
-  show("map_words", drive.placement ? "north is up" : "left camera's start looks up; the INS comes once the drive is placed on the earth");
+  show("map_words", drive.enu_alignment ? "north is up" : "left camera's start looks up; the INS comes once the drive is placed on the earth");
   if (!ours.length) return;
   let [l, b, r, t] = [Infinity, Infinity, -Infinity, -Infinity];
   for (const [x, y] of ours.concat(theirs)) { l = Math.min(l, x); r = Math.max(r, x); b = Math.min(b, y); t = Math.max(t, y); }
@@ -208,14 +208,14 @@ function redraw() {
 window.addEventListener("resize", redraw);
 matchMedia("(prefers-color-scheme:dark)").addEventListener("change", redraw);
 
-function forgetPicture() {
+function clearImage() {
   if (picture) for (const i of picture.images) if (i.bitmap) i.bitmap.close();
   picture = null;
 }
 
 async function showImages(message) {
   const bitmaps = await Promise.all(message.images.map(i => decode(i.jpeg)));
-  forgetPicture();
+  clearImage();
   picture = {frame: message.frame, images: message.images.map((i, k) => ({width: i.width, height: i.height, bitmap: bitmaps[k]})),
              points: message.points.map(p => ({left: [p[0] / 10, p[1] / 10], right: p.length > 2 ? [p[2] / 10, p[3] / 10] : null}))};
   show("image_frame", "frame " + message.frame + " · " + picture.points.length + " points");
@@ -237,14 +237,14 @@ function blank() {
   for (const [id, words] of BLANK) show(id, words);
   $("times").replaceChildren();
   for (const id of ["left", "right"]) $(id).getContext("2d").clearRect(0, 0, $(id).width, $(id).height);
-  forgetPicture();
+  clearImage();
   drive.now = null;
 }
 
 function begin(message) {
   greeted = true;
   if (!message.now || message.session !== drive.session) blank();
-  Object.assign(drive, {session: message.session, frames: message.frames, trail: [], placement: null});
+  Object.assign(drive, {session: message.session, frames: message.frames, trail: [], enu_alignment: null});
   document.title = "vergence · " + message.session;
   for (const button of document.querySelectorAll("button")) button.disabled = !token()
     || (button.dataset.action === "recalibrate" && !message.can_recalibrate) || (button.dataset.action === "stop-recording" && !message.recording);
@@ -254,7 +254,7 @@ function begin(message) {
 }
 
 function take(message) {
-  if (message.placement) drive.placement = message.placement;
+  if (message.enu_alignment) drive.enu_alignment = message.enu_alignment;
   if (message.calibration) showCalibration(message.calibration);
   drive.trail.splice(message.trail_from || 0, Infinity, ...message.trail);
   drive.ended = message.ended;
@@ -309,8 +309,8 @@ async function look() {
     link("connected, waiting for the session to begin", false, true);
     return read(answer.body);
   }
-  const sentence = (await answer.text()).trim();
-  link(`refused (${answer.status}): ${sentence}${answer.status === 403 ? "; open the link that the program shows when it starts" : ""}`, true, true);
+  const message = (await answer.text()).trim();
+  link(`refused (${answer.status}): ${message}${answer.status === 403 ? "; open the link that the program shows when it starts" : ""}`, true, true);
   return REFUSED_MS;
 }
 

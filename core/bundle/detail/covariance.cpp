@@ -210,7 +210,7 @@ void shared_covariance(BundleWorkspace& w, const BundleProblem& problem,
     const Transform& T = state.T_camera_left[k];
     result->covariance_white[k] = published(white, layout, camera, T, number);
     result->covariance_noise[k] = published(noise, layout, camera, T, number);
-    result->covariance_wide[k] = published(wide, layout, camera, T, number);
+    result->covariance_total[k] = published(wide, layout, camera, T, number);
   }
   PublishedRow rows[kMaxShared];
   for (std::size_t k = 1; k < problem.cameras.size(); ++k) {

@@ -174,9 +174,9 @@ PivotReport cholesky_one(double* HWY_RESTRICT A, std::size_t n, std::size_t colu
       double pivot = A[(p + c) * ld + p + c];
       for (std::size_t k = 0; k < c; ++k) pivot -= L[c][k] * L[c][k];
       const double ratio = diagonal[c] > 0 ? pivot / diagonal[c] : 0;
-      if (ratio < report.least_ratio) {
-        report.second_ratio = report.least_ratio;
-        report.least_ratio = ratio;
+      if (ratio < report.min_ratio) {
+        report.second_ratio = report.min_ratio;
+        report.min_ratio = ratio;
       } else {
         report.second_ratio = std::min(report.second_ratio, ratio);
       }

@@ -27,7 +27,7 @@ void evaluate(KernelJob& job, std::size_t first, std::size_t last) noexcept;
 struct PivotReport {
   int small =
       0;  // pivots not above `tolerance` times their diagonal: their parameter is left where it is
-  double least_ratio = 1;   // least pivot over its diagonal
+  double min_ratio = 1;     // least pivot over its diagonal
   double second_ratio = 1;  // the least but one
 };
 

@@ -118,7 +118,7 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
     X[r] = load(job.points + (index * 3 + static_cast<std::size_t>(r)) * kBatch + lane);
   for (V& p : P) p = zero;
   for (V& g : e) g = zero;
-  V least_depth = set(kFar), cost = zero, squared = zero, weighted = zero, behind = zero;
+  V min_depth = set(kFar), cost = zero, squared = zero, weighted = zero, behind = zero;
   std::size_t jet_index = 0;
   const bool robust = job.loss != BundleLoss::none;
 
@@ -157,7 +157,7 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
           cost = hn::Add(cost, s);
         }
         squared = hn::Add(squared, hn::IfThenElseZero(hn::Gt(r.weight, zero), r2));
-        least_depth = hn::Min(least_depth, r.depth);
+        min_depth = hn::Min(min_depth, r.depth);
         const V wx = hn::Mul(w, r.x), wy = hn::Mul(w, r.y);
         if (!kJets && camera.identity) {  // F = [a 0 −a xn; 0 b −b yn]
           const V a = hn::Mul(set(camera.fx), r.iz), b = hn::Mul(set(camera.fy), r.iz);
@@ -295,7 +295,7 @@ HWY_INLINE void linearise_lanes(KernelJob& job, std::size_t index, std::size_t l
   const V z[3] = {hn::Mul(m00, e[0]), hn::MulAdd(m10, e[0], hn::Mul(m11, e[1])),
                   hn::MulAdd(m20, e[0], hn::MulAdd(m21, e[1], hn::Mul(m22, e[2])))};
   double* factor = job.factors + index * kFactorRows * kBatch + lane;
-  const V stored[10] = {m00, m10, m11, m20, m21, m22, z[0], z[1], z[2], least_depth};
+  const V stored[10] = {m00, m10, m11, m20, m21, m22, z[0], z[1], z[2], min_depth};
 #pragma GCC unroll 10
   for (int i = 0; i < 10; ++i) store(stored[i], factor + i * kBatch);
 

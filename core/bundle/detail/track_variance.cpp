@@ -13,7 +13,7 @@ using Shared = SharedMatrix;
 using Index = Eigen::Index;
 
 constexpr std::size_t kBlockFrames = 8;  // at least, of a cluster in time
-constexpr double kMostFewClusters = 4;   // times the variance, for there being few of them
+constexpr double kMaxFewClusters = 4;    // times the variance, for there being few of them
 
 /// The gradients of one lane's observations, straight from the camera model, and the robust weight
 /// of each.
@@ -150,14 +150,13 @@ class Clusters {
       ++n;
       meat.noalias() += sums_[c].lazyProduct(sums_[c].transpose());
     }
-    return meat *
-           std::min(kMostFewClusters, n / std::max(1.0, static_cast<double>(n - parameters)));
+    return meat * std::min(kMaxFewClusters, n / std::max(1.0, static_cast<double>(n - parameters)));
   }
 
  private:
   int size_;
-  std::array<SharedVector, static_cast<std::size_t>(kMostCells* kMostCells)> sums_;
-  std::array<bool, static_cast<std::size_t>(kMostCells* kMostCells)> any_{};
+  std::array<SharedVector, static_cast<std::size_t>(kMaxCells* kMaxCells)> sums_;
+  std::array<bool, static_cast<std::size_t>(kMaxCells* kMaxCells)> any_{};
 };
 
 /// The same with larger clusters, of two kinds, since tracks share errors in both ways: a cell of
@@ -174,7 +173,7 @@ Shared variance_by_cells(const BundleWorkspace& w, const BundleProblem& problem,
   };
   const std::size_t poses = problem.T_left_world.size();
   const std::size_t blocks =
-      std::clamp<std::size_t>(poses / kBlockFrames, 1, static_cast<std::size_t>(kMostCells));
+      std::clamp<std::size_t>(poses / kBlockFrames, 1, static_cast<std::size_t>(kMaxCells));
   for (std::size_t i = 0; i < w.point_count; ++i) {
     const auto point = static_cast<std::uint32_t>(w.order[i]);
     const std::uint32_t begin = w.first_observation[point], end = w.first_observation[point + 1];

@@ -20,7 +20,7 @@ inline constexpr int kGroupLimit =
     16;  // batches multiplied together: one block of each, 18 kB, stays in the first-level cache
 inline constexpr int kMaxShared = kBlock * (kMaxCameras - 1) + kIntrinsicsSize * kMaxCameras;
 inline constexpr int kMaxSharedBlocks = (kMaxShared + kBlock - 1) / kBlock;
-inline constexpr int kMostCells = 8;  // a side of the image, of a covariance by cells
+inline constexpr int kMaxCells = 8;  // a side of the image, of a covariance by cells
 inline constexpr int kJetDepth = 8;
 inline constexpr int kJetIntrinsics = 9;
 inline constexpr int kJetRows =

@@ -12,8 +12,8 @@ namespace {
 // first frame; and the frames that guess weighs.
 constexpr double kFirstLife = 6.5, kGuessFrames = 30;
 constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10;  // a frame
-constexpr double kLeastInflation = 0.3,
-                 kMostInflation =
+constexpr double kMinInflation = 0.3,
+                 kMaxInflation =
                      200;  // below: sigmas claimed far too large; above: not a spread any more
 constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may count for at most,
                                       // else one frame blinds the monitor
@@ -86,7 +86,7 @@ void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
   }
   // Noise that has just grown (rain, dusk) counts at once, for the tracks it will go on to spoil.
   const double grown = now_slow_ > 0 ? std::max(1.0, now_fast_ / now_slow_) : 1.0;
-  lambda_ = std::clamp(std::max(life_slow_, now_slow_) * grown, kLeastInflation, kMostInflation);
+  lambda_ = std::clamp(std::max(life_slow_, now_slow_) * grown, kMinInflation, kMaxInflation);
 }
 
 bool ChangeDetector::stands_out(const FrameEvidence& e) const noexcept {
@@ -149,14 +149,14 @@ void ChangeDetector::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) 
 
 double ChangeDetector::single(const Evidence& frame, double spread) const noexcept {
   Evidence e;
-  e.add(frame, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * frame.n));
+  e.add(frame, 1.0 / (std::max(spread, kMinInflation) + bias2_ * frame.n));
   return statistic(e, Vec5::Zero(), covariance_);
 }
 
 void ChangeDetector::single_estimate(const Evidence& frame, double spread, Vec5* theta,
                                      Mat5* covariance) const noexcept {
   Evidence e;
-  e.add(frame, 1.0 / (std::max(spread, kLeastInflation) + bias2_ * frame.n));
+  e.add(frame, 1.0 / (std::max(spread, kMinInflation) + bias2_ * frame.n));
   estimate(e, theta, covariance);
 }
 
@@ -242,7 +242,7 @@ void ChangeDetector::attribute(std::size_t window, Decision* d) const noexcept {
   search(mean, &found);
   const bool ramp =
       found.ramp.gain > found.step.gain + std::max(kRampMargin, kRampShare * found.step.gain);
-  d->kind = ramp ? MonitorVerdict::Kind::drift : MonitorVerdict::Kind::knock;
+  d->kind = ramp ? MonitorResult::Kind::drift : MonitorResult::Kind::knock;
   const Onset& onset = ramp ? found.ramp : found.step;
   d->onset = onset.frame;
   d->frames = onset.frames;

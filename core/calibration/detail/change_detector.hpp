@@ -20,7 +20,7 @@ struct FrameEvidence {
 
 /// What all windows together say. Angles rad, as θ.
 struct Decision {
-  MonitorVerdict::Kind kind = MonitorVerdict::Kind::quiet;
+  MonitorResult::Kind kind = MonitorResult::Kind::quiet;
   double statistic = 0;
   bool undecided = false;  // the newest frame stands out by itself, and waits for the next one
   Vec5 theta = Vec5::Zero();

@@ -13,7 +13,8 @@ constexpr int kDepthSteps = 4;  // of Newton: from a few percent off to rounding
 
 }  // namespace
 
-DepthGradient depth_gradient(const SeenByBoth& p, const Transform& T, int k, bool lenses) noexcept {
+DepthGradient depth_gradient(const CovisiblePoint& p, const Transform& T, int k,
+                             bool lenses) noexcept {
   // The right pixel moves by by_depth per metre, by G (−[R X]×, I) per error of the transform, by
   // ∂x/∂intrinsics per error of the right lens, and along with the ray per error of the left one:
   // the depth that a match then gives is the one that takes up the part along the epipolar line.
@@ -46,12 +47,12 @@ double variance_of(const RigCalibration& rig, int k, const DepthGradient& g, boo
         sum += g.by[i] * g.by[j] * rig.covariance(g.row[i], g.row[j]);
     return sum;
   }
-  const bool full = rig.covariance_wide[c].squaredNorm() > 0;
+  const bool full = rig.covariance_total[c].squaredNorm() > 0;
   for (std::size_t i = 0; i < 6; ++i)
     for (std::size_t j = 0; j < 6; ++j) {
-      const double of_sigma = i == j ? rig.sigma_wide[c][i] * rig.sigma_wide[c][i] : 0.0;
+      const double of_sigma = i == j ? rig.sigma_total[c][i] * rig.sigma_total[c][i] : 0.0;
       sum += g.by[i] * g.by[j] *
-             (full ? rig.covariance_wide[c](static_cast<int>(i), static_cast<int>(j)) : of_sigma);
+             (full ? rig.covariance_total[c](static_cast<int>(i), static_cast<int>(j)) : of_sigma);
     }
   return sum;
 }
@@ -61,7 +62,7 @@ DepthReader::DepthReader(const RigCalibration& rig, int k) noexcept
       right_(rig.intrinsics[static_cast<std::size_t>(k)]),
       T_(rig.T_camera_left[static_cast<std::size_t>(k)]) {}
 
-bool DepthReader::difference(const SeenByBoth& p, double* relative) const noexcept {
+bool DepthReader::difference(const CovisiblePoint& p, double* relative) const noexcept {
   Vec3 ray;
   if (!left_.unproject(p.pixel, &ray)) return false;
   // Where along its own ray is the point that projects nearest to the match? In units of the depth,

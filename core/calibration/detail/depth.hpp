@@ -9,7 +9,7 @@ namespace vergence::calibration::detail {
 inline constexpr int kDepthGrid = 7;  // places a side of the image
 
 /// A place of the left image, a depth, and what camera k of a rig makes of the point there.
-struct SeenByBoth {
+struct CovisiblePoint {
   const Camera* left = nullptr;
   const Camera* right = nullptr;
   double depth_m = 0;
@@ -29,7 +29,7 @@ void for_places(const RigCalibration& rig, int k, double depth_m, Each each) noe
   const Camera left(rig.intrinsics[0]), right(rig.intrinsics[c]);
   for (int row = 0; row < kDepthGrid; ++row) {
     for (int column = 0; column < kDepthGrid; ++column) {
-      SeenByBoth p;
+      CovisiblePoint p;
       p.left = &left;
       p.right = &right;
       p.depth_m = depth_m;
@@ -59,10 +59,11 @@ struct DepthGradient {
 };
 
 /// `lenses`: theirs too, else the transform's alone.
-[[nodiscard]] DepthGradient depth_gradient(const SeenByBoth& place, const Transform& T_camera_left,
-                                           int k, bool lenses) noexcept;
+[[nodiscard]] DepthGradient depth_gradient(const CovisiblePoint& place,
+                                           const Transform& T_camera_left, int k,
+                                           bool lenses) noexcept;
 
-/// Variance of the relative depth; without `joint` that of the transform alone, by covariance_wide
+/// Variance of the relative depth; without `joint` that of the transform alone, by covariance_total
 /// or the wide sigmas.
 [[nodiscard]] double variance_of(const RigCalibration& rig, int k, const DepthGradient& g,
                                  bool joint) noexcept;
@@ -73,7 +74,7 @@ class DepthReader {
   DepthReader(const RigCalibration& rig, int k) noexcept;
   /// How much larger the inverse depth is that this rig gives to the place's two pixels, relative.
   /// False: outside its lenses' models.
-  [[nodiscard]] bool difference(const SeenByBoth& place, double* relative) const noexcept;
+  [[nodiscard]] bool difference(const CovisiblePoint& place, double* relative) const noexcept;
 
  private:
   Camera left_, right_;

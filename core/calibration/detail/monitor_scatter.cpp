@@ -5,9 +5,9 @@
 namespace vergence::calibration::detail {
 namespace {
 
-constexpr double kMostOfExpected = 20;  // a block that lies farther off than so many times what is
-                                        // expected is a change, no scatter
-constexpr double kMostBlocks = 60;      // that are remembered: half a minute at 30 Hz
+constexpr double kMaxOfExpected = 20;  // a block that lies farther off than so many times what is
+                                       // expected is a change, no scatter
+constexpr double kMaxBlocks = 60;      // that are remembered: half a minute at 30 Hz
 
 }  // namespace
 
@@ -18,10 +18,10 @@ void BlockScatter::add(const Evidence& block, const Evidence& past, double lambd
   const Vec5 d = of_block.solve(block.g) - of_past.solve(past.g);
   const double by_noise = lambda * (kTheta + (block.A * of_past.inverse()).trace());
   const double scatter = (d.dot(block.A * d) - by_noise) / (kTheta * block.n);
-  const double most = kMostOfExpected * std::max(variance(), lambda / block.n);
+  const double most = kMaxOfExpected * std::max(variance(), lambda / block.n);
   if (!(scatter < most)) return;  // also refuses NaN
-  if (static_cast<double>(blocks_) >= kMostBlocks) {
-    sum_ *= (kMostBlocks - 1) / kMostBlocks;
+  if (static_cast<double>(blocks_) >= kMaxBlocks) {
+    sum_ *= (kMaxBlocks - 1) / kMaxBlocks;
     --blocks_;
   }
   sum_ += scatter;

@@ -26,7 +26,7 @@ struct Estimator::Parts {
         calibrator(options, r, nominal, arena, solver),
         length_sigma_percent(o.trust == CalibrationTrust::none
                                  ? kUnlinkedLengthPercent
-                                 : o.calibration.tolerated_depth_percent) {
+                                 : o.calibration.max_depth_error_percent) {
     if (!options.online) return;
     doubts.enter(Doubt::calibration,
                  o.trust == CalibrationTrust::unconfirmed ? Reason::unconfirmed
@@ -59,20 +59,20 @@ struct Estimator::Parts {
   void lose_track_of_rig(std::uint64_t number) noexcept;
   [[nodiscard]] Mat6 motion_of(const odometry::FrameOutcome& out) const noexcept;
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
-  void note_length_sigma(const CalibrationDecision& decision) noexcept;
+  void record_length_sigma(const CalibrationDecision& decision) noexcept;
   void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
-  void seek_anew(std::optional<CalibrationCause> cause, std::uint64_t onset,
-                 const RigFrame& frame) noexcept;
+  void restart_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
+                          const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
-  void note_out_of_step(Stamp stamp, double lag_frames) noexcept;
+  void record_out_of_sync(Stamp stamp, double lag_frames) noexcept;
   void watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
-  void watch_sought(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
+  void watch_estimate(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void adopt(const CalibrationDecision& decision) noexcept;
   void seek(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
-  void take_learnt(const CalibrationDecision& decision, Stamp stamp) noexcept;
-  void notify_confirmed(Stamp stamp) noexcept;
+  void take_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void notify_verified(Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void notify_missing(Stamp stamp) noexcept;
   void renew_doubts(const odometry::FrameOutcome& out, Pairing pairing) noexcept;
@@ -84,14 +84,14 @@ struct Estimator::Parts {
   odometry::Odometry odometry;
   OnlineCalibrator calibrator;
   odometry::DriftCovariance drift{};
-  UsualSpread usual{};
+  CovarianceBaseline usual{};
   DoubtLedger doubts{};
   double length_sigma_percent;  // of all lengths, by what is known of the calibration in use
   State state = State::initialising;
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
-  double confirmed_percent = 0;     // depth error of the calibration that was confirmed
+  double verified_percent = 0;      // depth error of the calibration that was confirmed
   bool focal_contradicted = false;  // and noted
   bool moves = false;               // this frame's pose, for all that is known of it
   int without_pose = 0;

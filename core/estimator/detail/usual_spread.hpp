@@ -17,20 +17,20 @@ namespace vergence {
 /// (FaultPairs.anImageLateFromALostOneOnIsNotOk).
 ///
 /// Threads  One. Memory: none of the heap.
-class UsualSpread {
+class CovarianceBaseline {
  public:
   /// Standing still, residuals are smaller than they are on the way: such motions are no measure,
   /// and need none. By the usual sigma: the more uncertain a motion, the more it has to be judged.
   [[nodiscard]] bool judges(double step_m, double sigma_m) const noexcept {
     constexpr double kMoves = 2;  // sigmas
-    return step_m > kMoves * (kept_ >= kLeast ? median() : sigma_m);
+    return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
   }
   /// Whether a motion is more than 3 times as uncertain as usual; after one that was, more than
   /// twice. One that is makes nothing usual: what stays so uncertain is told for as long.
   ///
   /// sigma_m: of the translation of a motion that judges(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
-    times_ = kept_ >= kLeast ? sigma_m / median() : 0;
+    times_ = kept_ >= kMin ? sigma_m / median() : 0;
     unusual_ = times_ > (unusual_ ? kRelease : kTimes);
     if (unusual_) return true;
     sigma_[next_] = sigma_m;
@@ -43,7 +43,7 @@ class UsualSpread {
   [[nodiscard]] double times_usual() const noexcept { return times_; }
 
  private:
-  static constexpr std::size_t kKept = 61, kLeast = 15;  // motions
+  static constexpr std::size_t kKept = 61, kMin = 15;  // motions
   static constexpr double kTimes = 3, kRelease = 2;
 
   [[nodiscard]] double median() const noexcept {

@@ -21,18 +21,18 @@ struct Gradient {
   float x = 0, y = 0;
 };
 
-constexpr float kMostPixels =
+constexpr float kMaxPixels =
     1e6F;  // of a coordinate or side: whole numbers of 32 bits hold it with room to spare
 
 /// Half of a wavelet's side, px.
 int half_side(float s) noexcept {
-  return s > 1.F ? static_cast<int>(std::lround(std::min(s, kMostPixels))) : 1;
+  return s > 1.F ? static_cast<int>(std::lround(std::min(s, kMaxPixels))) : 1;
 }
 
 /// Haar wavelets of side 2 h about the corner of pixels nearest to (x, y). Nothing where they leave
 /// the picture: half a wavelet would see the picture's edge.
 Gradient haar(const IntegralImage& image, float x, float y, int h) noexcept {
-  if (!(std::abs(x) < kMostPixels && std::abs(y) < kMostPixels)) return {};
+  if (!(std::abs(x) < kMaxPixels && std::abs(y) < kMaxPixels)) return {};
   // Pixel centres lie at whole numbers, the corners between them at halves.
   const int cx = static_cast<int>(std::lround(x + 0.5F)),
             cy = static_cast<int>(std::lround(y + 0.5F));

@@ -15,7 +15,7 @@ inline Reason weakness(const ImageCheck& images, int cameras) noexcept {
   const auto all = static_cast<std::uint8_t>((1U << static_cast<unsigned>(cameras)) - 1U);
   if (images.given != all) return Reason::no_image;
   if (images.repeated) return Reason::image_repeated;
-  return images.structured != all ? Reason::image_dark : Reason::none;
+  return images.structured != all ? Reason::image_no_contrast : Reason::none;
 }
 
 /// Times of a frame's stages.

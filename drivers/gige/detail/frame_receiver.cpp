@@ -99,7 +99,7 @@ bool FrameReceiver::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame)
   frame->arrival = arrival;
   const bool stamp_at_end = applied_->options.stamp_at_end;
   const ExposureSetting& had = exposures_.at(arrival - applied_->plan.transfer - last_exposure_);
-  frame->status = whole && right_size(buffer) ? FrameStatus::complete : FrameStatus::torn;
+  frame->status = whole && right_size(buffer) ? FrameStatus::complete : FrameStatus::incomplete;
   frame->exposure = had.exposure;
   frame->gain_db = had.gain_db;
   last_exposure_ = frame->exposure;

@@ -95,7 +95,7 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
 
 DeviceTiming GigeCamera::timing() const noexcept {
   DeviceTiming t;
-  t.least_delay =
+  t.min_delay =
       applied_.plan.transfer + (options_.stamp_at_end ? Duration{} : applied_.actual.exposure);
   if (applied_.tick_frequency > 0)
     t.resolution = std::max(Duration::nanoseconds(1),
@@ -119,7 +119,7 @@ DeviceStatus GigeCamera::reach() {
   session_.reset();
   std::string why;
   session_ = open_ours(address_, &why);
-  if (session_ == nullptr) return last_error_.refuse(DeviceStatus::gone, why);
+  if (session_ == nullptr) return last_error_.refuse(DeviceStatus::disconnected, why);
   stale_ = true;
   return DeviceStatus::ok;
 }
@@ -131,7 +131,7 @@ DeviceStatus GigeCamera::apply_again() {
   if (const DeviceStatus s = session_->apply(requested_, options_, &again); s != DeviceStatus::ok)
     return last_error_.refuse(s, session_->last_error());
   if (again.payload != applied_.payload || again.format != applied_.format)
-    return last_error_.refuse(DeviceStatus::gone,
+    return last_error_.refuse(DeviceStatus::disconnected,
                               "the camera came back with frames of another size");
   applied_ = std::move(again);
   in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
@@ -144,7 +144,8 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
     if (!configured_) return DeviceStatus::bad_configuration;
     const FrameQueue::State state = queue_.state();
     if (state == FrameQueue::State::streaming) return DeviceStatus::ok;
-    if (state == FrameQueue::State::gone) return DeviceStatus::gone;  // the supervisor is at it
+    if (state == FrameQueue::State::gone)
+      return DeviceStatus::disconnected;  // the supervisor is at it
     const std::lock_guard lock(device_);
     DeviceStatus status = state == FrameQueue::State::stopped ? reach() : DeviceStatus::ok;
     if (status == DeviceStatus::ok && stale_) status = apply_again();
@@ -158,7 +159,7 @@ DeviceStatus GigeCamera::start(Notifier* ready) noexcept {
     if (state == FrameQueue::State::back) {  // not yet, after all
       session_.reset();
       queue_.fail(monotonic_now());
-      return DeviceStatus::gone;
+      return DeviceStatus::disconnected;
     }
     queue_.end();
     return status == DeviceStatus::unsupported ? DeviceStatus::bad_configuration : status;
@@ -207,7 +208,7 @@ DeviceStatus GigeCamera::set_exposure(const ExposureSetting& requested,
     const std::lock_guard lock(device_);
     if (session_ == nullptr || queue_.standing() != DeviceStatus::ok)
       return queue_.standing() == DeviceStatus::stopped ? DeviceStatus::stopped
-                                                        : DeviceStatus::gone;
+                                                        : DeviceStatus::disconnected;
     ExposureSetting taken;
     if (const DeviceStatus s = session_->change_exposure(requested, &taken); s != DeviceStatus::ok)
       return last_error_.refuse(s, session_->last_error());
@@ -230,7 +231,7 @@ DeviceStatus GigeCamera::trigger_once() noexcept {
     const std::lock_guard lock(device_);
     if (session_ == nullptr || queue_.standing() != DeviceStatus::ok)
       return queue_.standing() == DeviceStatus::stopped ? DeviceStatus::stopped
-                                                        : DeviceStatus::gone;
+                                                        : DeviceStatus::disconnected;
     const DeviceStatus s = session_->trigger();
     return s == DeviceStatus::ok ? s : last_error_.refuse(s, session_->last_error());
   } catch (const std::exception&) {
@@ -241,7 +242,7 @@ DeviceStatus GigeCamera::trigger_once() noexcept {
 namespace {
 
 constexpr Duration kTick = Duration::milliseconds(100);
-constexpr Duration kLeastSilence =
+constexpr Duration kMinSilence =
     Duration::seconds(1);  // of a free running camera before it is taken for gone
 constexpr Duration kAskEvery =
     Duration::seconds(1);  // a triggered one may rest; it is asked whether it is there
@@ -283,7 +284,7 @@ void GigeCamera::supervise(Watch* watch) {
       case FrameQueue::State::stopped:
         break;
     }
-  } catch (const std::exception&) {  // no memory for a sentence: the next round tries again
+  } catch (const std::exception&) {  // no memory for a message: the next round tries again
   }
 }
 
@@ -301,7 +302,7 @@ GigeCamera::Fault GigeCamera::check(HostStamp at, HostStamp* asked) {
   if (session_->lost()) return kSilent;
   const Duration silence = at - receiver_.last_buffer();
   const Duration period = Duration::seconds(1 / requested_.rate_hz);
-  if (requested_.trigger == CameraTrigger::free && silence > std::max(kLeastSilence, period * 10)) {
+  if (requested_.trigger == CameraTrigger::free && silence > std::max(kMinSilence, period * 10)) {
     if (!session_->in_control()) return kSilent;
     return {"the camera answers, but sends no images; check the firewall, and the MTU on the way"};
   }

@@ -19,7 +19,7 @@ struct Free {
 template <class T>
 using Memory = std::unique_ptr<T, Free>;
 
-/// A GError on its way into a sentence: `f(…, error.out())`, then `if (error)`.
+/// A GError on its way into a message: `f(…, error.out())`, then `if (error)`.
 class Error {
  public:
   Error() noexcept = default;

@@ -23,7 +23,7 @@ namespace {
 constexpr int kWireOverhead = 38;  // bytes: Ethernet's header 14, check sum 4, preamble 8, gap 12
 constexpr int kHeaders = 20 + 8 + 8;  // IP, UDP, GVSP
 constexpr int kExtendedHeaders = 20 + 8 + 20;
-constexpr int kMostBySwitches = 9000;  // bytes; beyond it few switches go
+constexpr int kMaxBySwitches = 9000;  // bytes; beyond it few switches go
 
 double packets_of(const LinkLoad& load, int packet_size) noexcept {
   const int data = std::max(1, packet_size - (load.extended_ids ? kExtendedHeaders : kHeaders));
@@ -62,7 +62,7 @@ Interface interface_of(const std::string& address) {
 
 int choose_packet_size(int wished, int mtu, std::int64_t least, std::int64_t most,
                        std::int64_t step) noexcept {
-  std::int64_t size = wished > 0 ? wished : std::min(mtu, kMostBySwitches);
+  std::int64_t size = wished > 0 ? wished : std::min(mtu, kMaxBySwitches);
   size = std::min<std::int64_t>({size, most, mtu});
   step = std::max<std::int64_t>(step, 1);
   size = least + (size - least) / step * step;
@@ -86,7 +86,7 @@ LinkPlan plan_link(const LinkLoad& load, int packet_size, std::int64_t speed,
 double highest_rate(const LinkLoad& load, int packet_size, std::int64_t speed) noexcept {
   const double transfer =
       plan_link(load, packet_size, speed, Duration::nanoseconds(-1)).transfer.to_seconds();
-  return transfer > 0 ? kMostOfPeriod / transfer : 1e9;
+  return transfer > 0 ? kMaxOfPeriod / transfer : 1e9;
 }
 
 int find_udp_socket(std::uint16_t port) {
@@ -124,12 +124,12 @@ std::int64_t set_receive_buffer(int socket, std::int64_t bytes) {
 }
 
 LinkBudget link_budget(const LinkDemand& d) noexcept {
-  constexpr int kLeastPacket = 576, kMostPacket = 65'000, kStep = 4;  // bytes: what cameras have
+  constexpr int kMinPacket = 576, kMaxPacket = 65'000, kStep = 4;  // bytes: what cameras have
   const LinkLoad load{d.image_bytes, d.rate_hz, d.cameras, false};
   LinkBudget budget;
-  budget.packet_size = choose_packet_size(d.packet_size, d.mtu, kLeastPacket, kMostPacket, kStep);
+  budget.packet_size = choose_packet_size(d.packet_size, d.mtu, kMinPacket, kMaxPacket, kStep);
   budget.used =
-      plan_link(load, budget.packet_size, d.speed, Duration::nanoseconds(-1)).share / kMostOfPeriod;
+      plan_link(load, budget.packet_size, d.speed, Duration::nanoseconds(-1)).share / kMaxOfPeriod;
   budget.highest_hz = highest_rate(load, budget.packet_size, d.speed);
   return budget;
 }

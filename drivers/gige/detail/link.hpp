@@ -26,10 +26,10 @@ struct LinkPlan {
   int packet_size = 1500;  // bytes, GevSCPSPacketSize: with the IP, UDP and GVSP headers
   Duration delay{};        // between two packets of one camera
   Duration transfer{};     // of a frame
-  double share = 0;  // of the time between two frames that the transfer takes; above kMostOfPeriod
+  double share = 0;  // of the time between two frames that the transfer takes; above kMaxOfPeriod
                      // it does not fit
 };
-inline constexpr double kMostOfPeriod = 0.9;  // the rest is for resent packets and control
+inline constexpr double kMaxOfPeriod = 0.9;  // the rest is for resent packets and control
 
 /// The largest packet that interface, camera and request allow, a multiple of the camera's step.
 /// `wished` 0: at most 9000, what switches carry.

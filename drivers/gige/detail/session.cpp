@@ -191,8 +191,8 @@ namespace {
 
 constexpr std::uint64_t kCapabilities = 0x934, kControlPrivilege = 0xA00;
 constexpr std::uint32_t kCanResend = 4;
-constexpr std::int64_t kLeastSocketBuffer = 4 << 20;  // bytes
-constexpr std::int64_t kBufferedFrames = 8;           // that the socket holds while nobody reads
+constexpr std::int64_t kMinSocketBuffer = 4 << 20;  // bytes
+constexpr std::int64_t kBufferedFrames = 8;         // that the socket holds while nobody reads
 
 std::string text_of(const char* text) { return text == nullptr ? "" : text; }
 
@@ -281,12 +281,12 @@ Session::~Session() {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
-DeviceStatus Session::refuse(DeviceStatus status, std::string sentence) {
-  last_error_ = std::move(sentence);
-  // A camera that has gone refuses everything; the sentence about the last feature would mislead.
+DeviceStatus Session::refuse(DeviceStatus status, std::string message) {
+  last_error_ = std::move(message);
+  // A camera that has gone refuses everything; the message about the last feature would mislead.
   if (lost() || !in_control()) {
     last_error_ = "the camera does not answer any more";
-    return DeviceStatus::gone;
+    return DeviceStatus::disconnected;
   }
   return status;
 }
@@ -312,7 +312,7 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
     stream_.reset();
     if (error.is(ARV_DEVICE_ERROR_NOT_CONTROLLER)) {
       last_error_ = "another program controls the camera";
-      return DeviceStatus::gone;
+      return DeviceStatus::disconnected;
     }
     return refuse(DeviceStatus::failed, "the stream cannot be made: " + error.text());
   }
@@ -349,7 +349,7 @@ void Session::enlarge_socket_buffer(const Applied& a) {
   const std::int64_t requested =
       a.options.socket_buffer_kb > 0
           ? std::int64_t{a.options.socket_buffer_kb} * 1024
-          : std::max(kLeastSocketBuffer, kBufferedFrames * static_cast<std::int64_t>(a.payload));
+          : std::max(kMinSocketBuffer, kBufferedFrames * static_cast<std::int64_t>(a.payload));
   const int socket = find_udp_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())));
   const std::int64_t got = socket < 0 ? 0 : set_receive_buffer(socket, requested);
   const std::int64_t least = 2 * static_cast<std::int64_t>(a.payload);
@@ -370,7 +370,7 @@ DeviceStatus Session::start_acquisition() {
   if (features_.has("TLParamsLocked"))
     arv_device_set_integer_feature_value(device_.get(), "TLParamsLocked", 1, error.out());
   arv_device_execute_command(device_.get(), "AcquisitionStart", error.out());
-  return error ? refuse(DeviceStatus::gone, "the camera does not begin: " + error.text())
+  return error ? refuse(DeviceStatus::disconnected, "the camera does not begin: " + error.text())
                : DeviceStatus::ok;
 }
 
@@ -389,7 +389,8 @@ void Session::close_stream(bool reachable) noexcept {
 DeviceStatus Session::trigger() {
   Error error;
   arv_device_execute_command(device_.get(), "TriggerSoftware", error.out());
-  return error ? refuse(DeviceStatus::gone, "the software trigger was refused: " + error.text())
+  return error ? refuse(DeviceStatus::disconnected,
+                        "the software trigger was refused: " + error.text())
                : DeviceStatus::ok;
 }
 
@@ -561,7 +562,7 @@ DeviceStatus Session::change_exposure(const ExposureSetting& requested, Exposure
   double us = 0;
   *actual = requested;
   if (!set_nearest(exposure, requested.exposure.to_seconds() * 1e6, "us", &us))
-    return refuse(in_control() ? DeviceStatus::unsupported : DeviceStatus::gone,
+    return refuse(in_control() ? DeviceStatus::unsupported : DeviceStatus::disconnected,
                   features_.last_error());
   actual->exposure = Duration::seconds(us * 1e-6);
   const char* gain = features_.find(Purpose::gain);
@@ -571,7 +572,7 @@ DeviceStatus Session::change_exposure(const ExposureSetting& requested, Exposure
     return DeviceStatus::ok;
   }
   if (!set_nearest(gain, requested.gain_db, "dB", &actual->gain_db))
-    return refuse(in_control() ? DeviceStatus::unsupported : DeviceStatus::gone,
+    return refuse(in_control() ? DeviceStatus::unsupported : DeviceStatus::disconnected,
                   features_.last_error());
   return DeviceStatus::ok;
 }
@@ -646,7 +647,7 @@ DeviceStatus Session::set_packets(const CameraConfiguration& requested, const Op
   const int cameras = o.link_cameras > 0 ? o.link_cameras : requested.sharing;
   const LinkLoad load{static_cast<std::int64_t>(a->payload), requested.rate_hz, cameras, false};
   a->plan = plan_link(load, size, speed, o.packet_delay);
-  if (a->plan.share > kMostOfPeriod)
+  if (a->plan.share > kMaxOfPeriod)
     return refuse(DeviceStatus::unsupported,
                   std::to_string(cameras) + " cameras of " + std::to_string(requested.width) +
                       " x " + std::to_string(requested.height) + " " + a->format->name + " at " +

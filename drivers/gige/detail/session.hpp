@@ -27,10 +27,10 @@ enum class Purpose : std::uint8_t {
   chunk_mode,  // whether frames have chunk data at all
 };
 
-/// The GenICam features of an open camera, with sentences for what it does not have.
+/// The GenICam features of an open camera, with messages for what it does not have.
 ///
 /// Threads  One caller at a time; each call asks the camera and may take 2.5 s when that is gone.
-/// Errors   Setters return false and leave the sentence in last_error().
+/// Errors   Setters return false and leave the message in last_error().
 class Features {
  public:
   explicit Features(ArvDevice* device) : device_(device) {}
@@ -62,8 +62,8 @@ class Features {
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }
 
  private:
-  [[nodiscard]] bool refuse(std::string sentence) {
-    last_error_ = std::move(sentence);
+  [[nodiscard]] bool refuse(std::string message) {
+    last_error_ = std::move(message);
     return false;
   }
   ArvDevice* device_;
@@ -93,7 +93,7 @@ struct Applied {
 ///
 /// Threads  One caller at a time; `lost()` any. Every call may take 2.5 s when the camera has gone,
 ///          and no longer.
-/// Errors   Statuses, with the sentence in last_error().
+/// Errors   Statuses, with the message in last_error().
 class Session {
  public:
   /// By address or Aravis's id. Null: *status and *error say why. → ok, not_found, busy, failed
@@ -134,7 +134,7 @@ class Session {
 
  private:
   explicit Session(Object<ArvDevice> device);
-  [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string sentence);
+  [[nodiscard]] DeviceStatus refuse(DeviceStatus status, std::string message);
   [[nodiscard]] DeviceStatus set_format(const CameraConfiguration& requested, Applied* applied);
   [[nodiscard]] DeviceStatus set_region(const CameraConfiguration& requested);
   [[nodiscard]] DeviceStatus set_exposure(const CameraConfiguration& requested, Applied* applied);
@@ -145,7 +145,7 @@ class Session {
                                          const Options& options, Applied* applied);
   [[nodiscard]] DeviceStatus set_clock(const Options& options, Applied* applied);
   void enlarge_socket_buffer(const Applied& applied);
-  void note(const std::string& sentence) { remark_ += (remark_.empty() ? "" : "; ") + sentence; }
+  void note(const std::string& message) { remark_ += (remark_.empty() ? "" : "; ") + message; }
 
   Object<ArvDevice> device_;
   Object<ArvStream> stream_;

@@ -23,7 +23,7 @@ void DeliveryQueue::join() noexcept {
 
 void DeliveryQueue::finish(HostStamp at) {
   for (int device = kTriggerDevice; device < static_cast<int>(cameras_.size()); ++device) {
-    Parcel p;
+    QueuedDelivery p;
     p.device = device;
     p.arrival = at;
     p.frame.what = Delivery<Frame>::What::end;
@@ -49,7 +49,7 @@ std::optional<FrameSlot> DeliveryQueue::take_spare(int k) {
   return slot;
 }
 
-void DeliveryQueue::post(Parcel parcel) {
+void DeliveryQueue::post(QueuedDelivery parcel) {
   if (parcel.device >= 0 && parcel.frame.what == Delivery<Frame>::What::item)
     senders_[static_cast<std::size_t>(parcel.device)].on_the_way.fetch_add(1);
   const std::lock_guard lock(mutex_);
@@ -66,7 +66,7 @@ void DeliveryQueue::post(Parcel parcel) {
 void DeliveryQueue::deliver_until(HostStamp horizon) {
   for (;;) {
     if (stopping() || parcels_.empty() || parcels_.top().arrival >= horizon) return;
-    const Parcel parcel = parcels_.top();
+    const QueuedDelivery parcel = parcels_.top();
     parcels_.pop();
     deliver(parcel, parcel.arrival);
   }
@@ -88,7 +88,7 @@ void DeliveryQueue::hand_out_in_time() {
       (void)posted_.wait_for(lock, std::chrono::nanoseconds((parcels_.top().arrival - now).ns()));
       continue;
     }
-    const Parcel parcel = parcels_.top();
+    const QueuedDelivery parcel = parcels_.top();
     parcels_.pop();
     lock.unlock();
     deliver(parcel, monotonic_now());
@@ -107,7 +107,7 @@ bool DeliveryQueue::push_or_wait(S* stream, const D& delivery) {
   }
 }
 
-void DeliveryQueue::deliver(const Parcel& parcel, HostStamp arrival) {
+void DeliveryQueue::deliver(const QueuedDelivery& parcel, HostStamp arrival) {
   if (parcel.device == kTriggerDevice) {
     Delivery<BoardReport> d = parcel.report;
     d.arrival = arrival;
@@ -128,19 +128,19 @@ void DeliveryQueue::deliver(const Parcel& parcel, HostStamp arrival) {
   deliver_frame(parcel, arrival);
 }
 
-void DeliveryQueue::deliver_frame(const Parcel& parcel, HostStamp arrival) {
+void DeliveryQueue::deliver_frame(const QueuedDelivery& parcel, HostStamp arrival) {
   Delivery<Frame> d = parcel.frame;
   d.arrival = arrival;
   const auto k = static_cast<std::size_t>(parcel.device);
   if (d.what != Delivery<Frame>::What::item) {
-    senders_[k].known_gone = parcel.unplugged;
+    senders_[k].known_disconnected = parcel.unplugged;
     (void)push_or_wait(&cameras_[k]->stream, d);
     return;
   }
   senders_[k].on_the_way.fetch_sub(1);
   // What was on the way as the camera was unplugged is lost with it: a stream has nothing but
   // `back` behind a `gone`.
-  if (parcel.unplugged != senders_[k].known_gone) {
+  if (parcel.unplugged != senders_[k].known_disconnected) {
     cameras_[k]->lost.fetch_add(1, std::memory_order_relaxed);
     keep_spare(parcel);
     return;
@@ -152,7 +152,7 @@ void DeliveryQueue::deliver_frame(const Parcel& parcel, HostStamp arrival) {
   keep_spare(parcel);
 }
 
-void DeliveryQueue::keep_spare(const Parcel& parcel) {
+void DeliveryQueue::keep_spare(const QueuedDelivery& parcel) {
   const std::lock_guard lock(mutex_);
   senders_[static_cast<std::size_t>(parcel.device)].spare.push_back(parcel.frame.value.slot);
 }

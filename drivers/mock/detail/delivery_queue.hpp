@@ -16,7 +16,7 @@
 namespace vergence::mock {
 
 /// One delivery on its way; `device`: camera, kInsDevice or kTriggerDevice.
-struct Parcel {
+struct QueuedDelivery {
   HostStamp arrival{};
   std::uint64_t order = 0;  // of posting: breaks ties
   int device = 0;
@@ -24,7 +24,8 @@ struct Parcel {
   Delivery<InsReading> reading{};
   Delivery<BoardReport> report{};
   std::uint32_t unplugged = 0;  // times the camera had been when this was posted
-  [[nodiscard]] bool operator<(const Parcel& o) const noexcept {  // the queue's top is the earliest
+  [[nodiscard]] bool operator<(
+      const QueuedDelivery& o) const noexcept {  // the queue's top is the earliest
     return std::pair(arrival, order) > std::pair(o.arrival, o.order);
   }
 };
@@ -51,7 +52,7 @@ class DeliveryQueue {
   /// Precondition: stopped, or finished.
   void join() noexcept;
 
-  void post(Parcel parcel);
+  void post(QueuedDelivery parcel);
   /// The end of every device's deliveries; nothing more will be posted.
   void finish(HostStamp at);
   /// Virtual time: everything that arrives before that.
@@ -67,15 +68,15 @@ class DeliveryQueue {
  private:
   struct Sender {
     std::atomic<int> on_the_way{0};
-    std::uint32_t unplugged = 0;   // by what was posted; under mutex_
-    std::uint32_t known_gone = 0;  // by what was delivered
-    std::vector<FrameSlot> spare;  // of frames that nobody was there for; under mutex_
+    std::uint32_t unplugged = 0;           // by what was posted; under mutex_
+    std::uint32_t known_disconnected = 0;  // by what was delivered
+    std::vector<FrameSlot> spare;          // of frames that nobody was there for; under mutex_
   };
 
   void hand_out_in_time();
-  void deliver(const Parcel& parcel, HostStamp arrival);
-  void deliver_frame(const Parcel& parcel, HostStamp arrival);
-  void keep_spare(const Parcel& parcel);
+  void deliver(const QueuedDelivery& parcel, HostStamp arrival);
+  void deliver_frame(const QueuedDelivery& parcel, HostStamp arrival);
+  void keep_spare(const QueuedDelivery& parcel);
   template <class S, class D>
   [[nodiscard]] bool push_or_wait(S* stream, const D& delivery);  // false: nobody takes it
   [[nodiscard]] bool stopping() const noexcept { return stop_.load(std::memory_order_acquire); }
@@ -89,7 +90,7 @@ class DeliveryQueue {
   std::uint64_t orders_ = 0;
   std::mutex mutex_;  // of parcels_, in real time
   std::condition_variable posted_;
-  std::priority_queue<Parcel> parcels_;
+  std::priority_queue<QueuedDelivery> parcels_;
   bool finished_ = false;  // under mutex_
   std::thread deliverer_;
 };

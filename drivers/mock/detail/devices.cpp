@@ -48,12 +48,12 @@ void MockCamera::take_memory(const Intrinsics& lens) {
 
 DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
                                       ExposureSetting* actual) noexcept {
-  constexpr double kMostGain = 40;  // dB
+  constexpr double kMaxGain = 40;  // dB
   if (!stream.streaming()) return DeviceStatus::stopped;
   if (requested.exposure <= Duration{} ||
       requested.exposure.to_seconds() * configuration_.rate_hz > 1)
     return DeviceStatus::bad_configuration;
-  const ExposureSetting taken{requested.exposure, std::clamp(requested.gain_db, 0.0, kMostGain)};
+  const ExposureSetting taken{requested.exposure, std::clamp(requested.gain_db, 0.0, kMaxGain)};
   // The next image but one, or later where more are made already.
   constexpr std::uint64_t kLatency = 2;
   const std::uint64_t from = std::max(rig_->looked_at.load() + kLatency, rig_->planned.load());
@@ -95,7 +95,7 @@ DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
     delivered_.fetch_add(1, std::memory_order_relaxed);
     out_.fetch_add(1);
     rig_->room.signal();
-  } else if (status == DeviceStatus::gone) {
+  } else if (status == DeviceStatus::disconnected) {
     if (!gone_) frame->arrival = d.arrival;
     gone_ = true;
   }
@@ -123,7 +123,7 @@ CameraStatistics MockCamera::statistics() const noexcept {
 }
 
 void MockCamera::take(std::span<const Transform> T_camera_enu,
-                      std::span<const Transform> T_camera_bus, const Shot& shot,
+                      std::span<const Transform> T_camera_bus, const RenderRequest& shot,
                       std::uint8_t* out) {
   const auto stride = static_cast<std::ptrdiff_t>(FramePool::stride(pool_->width()));
   renderer_->render(T_camera_enu, shot, mosaic_.empty() ? out : mosaic_.data(), stride,
@@ -221,7 +221,7 @@ DeviceStatus MockTrigger::start(Notifier* ready) noexcept {
 DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
   Delivery<BoardReport> d;
   const DeviceStatus status = stream.take(limit, &d);
-  if (status == DeviceStatus::gone) {
+  if (status == DeviceStatus::disconnected) {
     if (!gone_) pulse->arrival = d.arrival;
     gone_ = true;
     rig_->room.signal();
@@ -247,7 +247,7 @@ DeviceStatus MockTrigger::pause(std::uint32_t pulses) noexcept {
   // not made yet, on any run.
   constexpr std::uint64_t kAhead = 4;
   if (!stream.streaming()) return DeviceStatus::stopped;
-  if (gone_) return DeviceStatus::gone;
+  if (gone_) return DeviceStatus::disconnected;
   const std::lock_guard lock(asking_);
   const bool under_way = pause_end_ > 0 && pause_boot_ == boot_ && newest_ < pause_end_;
   if (pulses == 0 || under_way) return DeviceStatus::ok;

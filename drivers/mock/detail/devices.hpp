@@ -126,7 +126,7 @@ class MockCamera final : public CameraDevice {
   /// The picture through this camera's lens, as this sensor gives it, into width x height bytes in
   /// rows of the pool's stride.
   void take(std::span<const Transform> T_camera_enu, std::span<const Transform> T_camera_bus,
-            const Shot& shot, std::uint8_t* out);
+            const RenderRequest& shot, std::uint8_t* out);
 
  private:
   void take_memory(const Intrinsics& lens);

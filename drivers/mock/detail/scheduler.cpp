@@ -177,7 +177,7 @@ void Scheduler::make_link_events(std::uint64_t pulse) {
   for (; link_events_ < plan_.link().size(); ++link_events_) {
     const PulsePlan::LinkEvent& event = plan_.link()[link_events_];
     if (!last && event.time >= plan_.at(pulse + 1).time) return;
-    Parcel p;
+    QueuedDelivery p;
     p.device = kTriggerDevice;
     p.arrival = start_ + event.time;
     p.report.what =
@@ -220,7 +220,7 @@ PulseExposure Scheduler::feedback(std::uint64_t pulse, int k) const {
 void Scheduler::make_report(std::uint64_t pulse) {
   const HostStamp edge = host_of(pulse);
   const PulsePlan::Slot slot = plan_.at(pulse);
-  Parcel p;
+  QueuedDelivery p;
   p.device = kTriggerDevice;
   p.report.value.slot = pulse;
   Pulse& report = p.report.value.pulse;
@@ -275,7 +275,7 @@ void Scheduler::make_readings(HostStamp until) {
       ins_.lost.fetch_add(1, std::memory_order_relaxed);
       continue;
     }
-    Parcel p;
+    QueuedDelivery p;
     p.device = kInsDevice;
     p.arrival = jittered(at + kInsLatency, 10, readings_);
     p.reading.value.sample = sample;
@@ -313,7 +313,7 @@ bool Scheduler::present(std::uint64_t pulse, int k) {
   Sender& sender = senders_[static_cast<std::size_t>(k)];
   const bool gone = unplugged_at(plan_.at(pulse).time, k);
   if (gone != sender.unplugged) {
-    Parcel p;
+    QueuedDelivery p;
     p.device = k;
     p.arrival = host_of(pulse) + kTransfer;  // after what was under way, before the next frame
     p.frame.what = gone ? Delivery<Frame>::What::gone : Delivery<Frame>::What::back;
@@ -367,7 +367,7 @@ void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
   Sender& sender = senders_[k];
   const Duration open = shooting.setting.exposure;
   const HostStamp begins = host_of(pulse) + camera.trigger_delay();
-  Parcel p;
+  QueuedDelivery p;
   p.device = shooting.camera;
   p.arrival = jittered(begins + open + kTransfer, k, pulse) + shooting.exposure.delay;
   p.frame.value = {shooting.slot,
@@ -384,7 +384,7 @@ void Scheduler::send(std::uint64_t pulse, const Shooting& shooting) {
     camera.label(*copy, pulse);
     const auto from = camera.pool().writable(shooting.slot), to = camera.pool().writable(*copy);
     std::memcpy(to.data(), from.data(), from.size());
-    Parcel again = p;
+    QueuedDelivery again = p;
     again.frame.value.slot = *copy;
     again.arrival = p.arrival + kTransfer;
     queue_.post(again);
@@ -404,7 +404,7 @@ void Scheduler::render(const Shooting& shooting) {
     if (const auto T_enu_bus = rig_.truth->bus_in_enu(at)) bus.push_back(way.back() * *T_enu_bus);
   }
   if (bus.size() != way.size()) bus.clear();  // it comes or goes amid the exposure
-  Shot shot;
+  RenderRequest shot;
   shot.exposure = exposure.brightness * c.exposure.to_seconds() / kNominalExposure.to_seconds() *
                   std::pow(10.0, c.gain_db / 20);
   if (rig_.options.noise) {

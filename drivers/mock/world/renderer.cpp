@@ -77,8 +77,9 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 const Camera& Renderer::camera() const noexcept { return impl_->camera; }
 
-void Renderer::render(std::span<const Transform> T_camera_enu, const Shot& shot, std::uint8_t* out,
-                      std::ptrdiff_t stride, std::span<const Transform> T_camera_bus) {
+void Renderer::render(std::span<const Transform> T_camera_enu, const RenderRequest& shot,
+                      std::uint8_t* out, std::ptrdiff_t stride,
+                      std::span<const Transform> T_camera_bus) {
   assert(T_camera_bus.empty() || T_camera_bus.size() == T_camera_enu.size());
   Impl& m = *impl_;
   std::fill(m.brightness.begin(), m.brightness.end(), 0.0F);

@@ -11,7 +11,7 @@
 namespace vergence::mock {
 
 /// How one picture is taken.
-struct Shot {
+struct RenderRequest {
   double exposure = 1.0;  // relative to the world's nominal daylight exposure; 0 is a covered lens
   double vignetting = 0.5;   // brightness · 1/(1 + vignetting·r²)², r = tan of the angle to the
                              // axis; 1: cos⁴ law, 0: none
@@ -43,9 +43,9 @@ class Renderer {
   /// One picture into width x height bytes, rows `stride` apart. Several poses are the camera's way
   /// during the exposure, averaged (motion blur); precondition: at least one. `T_camera_bus`: where
   /// the bus is at each of them, or nothing.
-  void render(std::span<const Transform> T_camera_enu, const Shot& shot, std::uint8_t* out,
+  void render(std::span<const Transform> T_camera_enu, const RenderRequest& shot, std::uint8_t* out,
               std::ptrdiff_t stride, std::span<const Transform> T_camera_bus = {});
-  void render(const Transform& T_camera_enu, const Shot& shot, std::uint8_t* out,
+  void render(const Transform& T_camera_enu, const RenderRequest& shot, std::uint8_t* out,
               std::ptrdiff_t stride) {
     render(std::span(&T_camera_enu, 1), shot, out, stride);
   }

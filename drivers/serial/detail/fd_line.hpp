@@ -2,13 +2,13 @@
 #include <atomic>
 #include <cstdint>
 
-#include "drivers/serial/byte_line.hpp"
+#include "drivers/serial/serial_link.hpp"
 #include "drivers/unique_fd.hpp"
 
 namespace vergence {
 
 /// Bytes over a tty's descriptor, non-blocking, waiting in poll().
-class FdLine final : public ByteLine {
+class FdLine final : public SerialLink {
  public:
   /// Precondition: the descriptor is open, non-blocking and a raw tty at this baud; `wake` is an
   /// eventfd.

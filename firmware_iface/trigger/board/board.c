@@ -43,7 +43,7 @@ void board_answer_status(TriggerBoard* board, uint64_t now, uint8_t sequence) {
   outbox_answer(&board->outbox, trigger_status, sequence, payload, sizeof payload);
 }
 
-static void tell_edge(TriggerBoard* board, TriggerType type, uint32_t count, uint64_t at) {
+static void report_edge(TriggerBoard* board, TriggerType type, uint32_t count, uint64_t at) {
   const TriggerEdge edge = {board->boot_id, count, tick_of(&board->ticks, at)};
   uint8_t payload[trigger_edge_payload_size];
   trigger_put_edge(&edge, payload);
@@ -112,11 +112,11 @@ void board_edge(TriggerBoard* board, uint64_t now, BoardInput input, bool rising
   if (input == board_input_pps) {
     if (board->config.pps_edge != edge) return;
     board->last_pps = count;
-    tell_edge(board, trigger_pps, board->pps_edges++, count);
+    report_edge(board, trigger_pps, board->pps_edges++, count);
     (void)tick_pps(&board->ticks, count, now);
   } else if (input == board_input_ins) {
     if (board->config.ins_edge != edge) return;
-    tell_edge(board, trigger_ins, board->ins_edges++, count);
+    report_edge(board, trigger_ins, board->ins_edges++, count);
   } else {
     feedback_edge(board, (unsigned)input - board_input_feedback, rising, count);
   }

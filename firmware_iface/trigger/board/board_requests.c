@@ -55,7 +55,7 @@ static uint8_t refusal(const TriggerBoard* board, const TriggerConfig* config,
     return trigger_error_line;
   if (config->rate_millihertz == 0 || config->rate_millihertz > description->max_millihertz)
     return trigger_error_rate;
-  schedule_set(schedule, description->counts_hz, config->rate_millihertz, config->vary_us);
+  schedule_set(schedule, description->counts_hz, config->rate_millihertz, config->dither_us);
   if (schedule_shortest(schedule) <
       (uint64_t)description->counts_hz * 1000U / description->max_millihertz)
     return trigger_error_rate;

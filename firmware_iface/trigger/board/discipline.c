@@ -96,7 +96,7 @@ static uint64_t oldest(const TickDiscipline* d) { return d->edges[d->first]; }
 
 static uint64_t difference(uint64_t a, uint64_t b) { return a > b ? a - b : b - a; }
 
-static void forget_edges(TickDiscipline* d) {
+static void clear_edges(TickDiscipline* d) {
   d->used = 0;
   d->first = 0;
   d->refused = 0;
@@ -176,7 +176,7 @@ bool tick_pps(TickDiscipline* d, uint64_t edge, uint64_t now) {
   }
   if (seconds == 0) {
     if (!d->acquired || ++d->refused >= pps_refused_limit) {
-      forget_edges(d);
+      clear_edges(d);
       d->locked = false;
       keep_edge(d, edge);
     }
@@ -205,7 +205,7 @@ void tick_advance(TickDiscipline* d, uint64_t now) {
   if (d->used > 0 && now > d->last_edge && now - d->last_edge > pps_lost_s * d->counts_hz) {
     if (d->locked) set_rate(d, d->estimate, now); /* without what steered the phase */
     d->locked = false;
-    if (now - d->last_edge > pps_seconds * d->counts_hz) forget_edges(d);
+    if (now - d->last_edge > pps_seconds * d->counts_hz) clear_edges(d);
   }
   if (now > d->segment.count && now - d->segment.count > d->counts_hz)
     set_rate(d, d->segment.rate, now);

@@ -1,12 +1,12 @@
 #include "firmware_iface/trigger/board/schedule.h"
 
 void schedule_set(PulseSchedule* s, uint32_t counts_hz, uint32_t rate_millihertz,
-                  uint32_t vary_us) {
+                  uint32_t dither_us) {
   const uint64_t counts = (uint64_t)counts_hz * 1000U;
   s->interval = counts / rate_millihertz;
   s->remainder = counts % rate_millihertz;
   s->rate_millihertz = rate_millihertz;
-  s->vary = ((uint64_t)counts_hz * vary_us + 500000U) / 1000000U;
+  s->vary = ((uint64_t)counts_hz * dither_us + 500000U) / 1000000U;
   s->carried = 0;
 }
 

@@ -28,12 +28,12 @@ typedef struct {
 
 /* Precondition: rate_millihertz > 0. Keeps the number. */
 void schedule_set(PulseSchedule* schedule, uint32_t counts_hz, uint32_t rate_millihertz,
-                  uint32_t vary_us);
+                  uint32_t dither_us);
 /* The next slot is at `count`, and the grid begins anew there. */
 void schedule_begin(PulseSchedule* schedule, uint64_t count);
 /* On to the slot after the next. */
 void schedule_advance(PulseSchedule* schedule);
-/* Counts of the shortest interval; 0: vary_us is not below the interval. */
+/* Counts of the shortest interval; 0: dither_us is not below the interval. */
 uint64_t schedule_shortest(const PulseSchedule* schedule);
 
 #ifdef __cplusplus

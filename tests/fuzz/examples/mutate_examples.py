@@ -80,7 +80,7 @@ def write_folder(folder: Path) -> None:
     lens = f"size: [{width}, {height}], model: pinhole-radtan, intrinsics: [80, 80, 48, 36], distortion: [0.0, 0.0, 0.0, 0.0]"
     (folder / "calibration.yaml").write_text(
         f"version: 1\nrig: {{name: tiny, baseline: 0.5}}\ncameras:\n  - {{name: left, {lens}}}\n  - {{name: right, {lens},\n"
-        "     T_camera_left: [1, 0, 0, -0.5, 0, 1, 0, 0, 0, 0, 1, 0], sigma_wide: [0.001, 0.001, 0.001, 0.001, 0.001, 0.001]}\n"
+        "     T_camera_left: [1, 0, 0, -0.5, 0, 1, 0, 0, 0, 0, 1, 0], sigma_total: [0.001, 0.001, 0.001, 0.001, 0.001, 0.001]}\n"
         "found: {stamp: 1403636584763555584, source: online, frames: 60, reprojection_px: 0.18, scale_sigma: 0.0021}\n"
     )
 
@@ -201,7 +201,7 @@ def run_once(command: list, work: Path) -> str:
     if used > LIMIT_S:
         return f"took {used:.1f} s"
     if done.returncode == 2 and not done.stderr.startswith(b"vergence: "):
-        return f"refuses without a sentence: {done.stderr[-400:]!r}"
+        return f"refuses without a message: {done.stderr[-400:]!r}"
     return ""
 
 

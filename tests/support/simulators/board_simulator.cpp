@@ -11,7 +11,7 @@ namespace {
 constexpr Duration kSecond = Duration::seconds(1);
 constexpr Duration kPpsWidth = Duration::milliseconds(100);
 constexpr Duration kSyncWidth = Duration::milliseconds(1);
-constexpr std::uint32_t kMostMillihertz = 1'000'000;
+constexpr std::uint32_t kMaxMillihertz = 1'000'000;
 
 }  // namespace
 
@@ -54,7 +54,7 @@ void BoardSimulator::start(HostStamp at) {
   BoardDescription d{};
   d.counts_hz = options_.counts_hz;
   d.crystal_ppm = 100;
-  d.max_millihertz = kMostMillihertz;
+  d.max_millihertz = kMaxMillihertz;
   d.lines = options_.lines;
   d.feedback_inputs = options_.feedback_inputs;
   d.has_pps = options_.has_pps;

@@ -71,7 +71,7 @@ void UsbConverter::discard() noexcept {
 }
 
 /// All bytes under way, and the clock. Every member function with the mutex held.
-class SimulatedPlace::World {
+class SimulatedLinkFactory::World {
  public:
   World(std::shared_ptr<DeviceModel> device, const SimulatedLineOptions& options)
       : device_(std::move(device)),
@@ -293,9 +293,9 @@ class SimulatedPlace::World {
 
 namespace {
 
-class SimulatedLine final : public ByteLine {
+class SimulatedLine final : public SerialLink {
  public:
-  explicit SimulatedLine(std::shared_ptr<SimulatedPlace::World> world)
+  explicit SimulatedLine(std::shared_ptr<SimulatedLinkFactory::World> world)
       : world_(std::move(world)), outages_(world_->outages_begun()) {
     world_->set_open(true);
   }
@@ -308,24 +308,24 @@ class SimulatedLine final : public ByteLine {
 
   LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept override {
     const std::lock_guard lock(world_->mutex);
-    if (gone()) return {DeviceStatus::gone, 0, world_->now()};
+    if (gone()) return {DeviceStatus::disconnected, 0, world_->now()};
     const HostStamp deadline = world_->now() + limit;
     world_->run(deadline);
     if (std::exchange(world_->woken, false)) return {DeviceStatus::stopped, 0, {}};
     const HostStamp now = world_->now();
-    if (gone()) return {DeviceStatus::gone, 0, now};
+    if (gone()) return {DeviceStatus::disconnected, 0, now};
     if (world_->anything_readable()) return {DeviceStatus::ok, world_->take(out), now};
     return {world_->ended() ? DeviceStatus::ended : DeviceStatus::timeout, 0, now};
   }
   DeviceStatus write(std::span<const std::uint8_t> bytes, Duration /*limit*/) noexcept override {
     const std::lock_guard lock(world_->mutex);
-    if (gone()) return DeviceStatus::gone;
+    if (gone()) return DeviceStatus::disconnected;
     world_->send(bytes);
     return DeviceStatus::ok;
   }
   DeviceStatus set_baud(std::uint32_t baud) noexcept override {
     const std::lock_guard lock(world_->mutex);
-    if (gone()) return DeviceStatus::gone;
+    if (gone()) return DeviceStatus::disconnected;
     world_->set_baud(baud);
     return DeviceStatus::ok;
   }
@@ -349,18 +349,19 @@ class SimulatedLine final : public ByteLine {
  private:
   [[nodiscard]] bool gone() const noexcept { return world_->outages_begun() != outages_; }
 
-  std::shared_ptr<SimulatedPlace::World> world_;
+  std::shared_ptr<SimulatedLinkFactory::World> world_;
   std::size_t outages_;  // that had begun when it was opened: one more, and this line is dead
 };
 
 }  // namespace
 
-SimulatedPlace::SimulatedPlace(std::shared_ptr<DeviceModel> device,
-                               const SimulatedLineOptions& options)
+SimulatedLinkFactory::SimulatedLinkFactory(std::shared_ptr<DeviceModel> device,
+                                           const SimulatedLineOptions& options)
     : world_(std::make_shared<World>(std::move(device), options)) {}
-SimulatedPlace::~SimulatedPlace() = default;
+SimulatedLinkFactory::~SimulatedLinkFactory() = default;
 
-std::unique_ptr<ByteLine> SimulatedPlace::open(const LineSettings& settings, DeviceStatus* status) {
+std::unique_ptr<SerialLink> SimulatedLinkFactory::open(const LineSettings& settings,
+                                                       DeviceStatus* status) {
   const std::lock_guard lock(world_->mutex);
   if (world_->unplugged()) {
     *status = DeviceStatus::not_found;
@@ -371,11 +372,11 @@ std::unique_ptr<ByteLine> SimulatedPlace::open(const LineSettings& settings, Dev
   return std::make_unique<SimulatedLine>(world_);
 }
 
-Duration SimulatedPlace::latency_timer() const {
+Duration SimulatedLinkFactory::latency_timer() const {
   return world_->options().converter ? world_->options().latency_timer : Duration{};
 }
 
-bool SimulatedPlace::pass(Duration time) {
+bool SimulatedLinkFactory::pass(Duration time) {
   const std::lock_guard lock(world_->mutex);
   world_->run_through(world_->now() + time);
   return true;

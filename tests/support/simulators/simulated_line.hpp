@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/types/time.hpp"
-#include "drivers/serial/byte_line.hpp"
+#include "drivers/serial/serial_link.hpp"
 #include "tests/support/simulators/device_model.hpp"
 
 namespace vergence::test {
@@ -88,14 +88,14 @@ struct SimulatedLineOptions {
 ///        with a short packet or with eight full ones (496 bytes); only then do the bytes reach the
 ///        reading program. So a dense stream with a long timer comes in bursts of 496 bytes.
 /// Time   Virtual: reading is what lets it pass. Deterministic by the seed.
-/// Threads  As ByteLine says; the place's own calls: one caller, while no line of it is in use.
-class SimulatedPlace final : public LinePlace {
+/// Threads  As SerialLink says; the place's own calls: one caller, while no line of it is in use.
+class SimulatedLinkFactory final : public SerialLinkFactory {
  public:
-  SimulatedPlace(std::shared_ptr<DeviceModel> device, const SimulatedLineOptions& options);
-  ~SimulatedPlace() override;
+  SimulatedLinkFactory(std::shared_ptr<DeviceModel> device, const SimulatedLineOptions& options);
+  ~SimulatedLinkFactory() override;
 
-  [[nodiscard]] std::unique_ptr<ByteLine> open(const LineSettings& settings,
-                                               DeviceStatus* status) override;
+  [[nodiscard]] std::unique_ptr<SerialLink> open(const LineSettings& settings,
+                                                 DeviceStatus* status) override;
   [[nodiscard]] std::string name() const override { return "simulated line"; }
   [[nodiscard]] Duration latency_timer() const override;
   [[nodiscard]] bool pass(Duration time) override;

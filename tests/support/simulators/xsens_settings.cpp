@@ -161,7 +161,7 @@ XsensSettings::Reply XsensSettings::handle_legacy(const Message& m) {
 }
 
 XsensSettings::Reply XsensSettings::handle_mark4(const Message& m) {
-  std::array<std::uint8_t, 4 * kMostOutputs + kMostSyncEntries * kSyncEntrySize> payload{};
+  std::array<std::uint8_t, 4 * kMaxOutputs + kMaxSyncEntries * kSyncEntrySize> payload{};
   switch (static_cast<MessageId>(m.id)) {
     case MessageId::output_configuration: {
       OutputConfiguration asked;

@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const app::BoardPattern kBoard = app::parse_checkerboard("9x6", 0.04);
-constexpr const char* kArguments = " --board 9x6 --square 0.04";
+constexpr const char* kArguments = " --checkerboard 9x6 --square 0.04";
 
 /// Fourteen pairs of drawn boards as left/NN.png and right/NN.png, the layout of a folder that
 /// `replay` takes.
@@ -63,7 +63,7 @@ class Calibrate : public ::testing::Test {
   static inline TemporaryFolder* folder_ = nullptr;
 };
 
-std::size_t sentences(const std::string& text) {
+std::size_t messages(const std::string& text) {
   std::size_t n = 0;
   for (std::size_t at = 0; (at = text.find("vergence: ", at)) != std::string::npos; at += 10) ++n;
   return n;
@@ -96,8 +96,8 @@ TEST_F(Calibrate, aPairOfCamerasIsCalibratedFromFilesAndTheFileServesAReplay) {
   EXPECT_LT(off.tail<3>().norm(), 0.0005) << "m";
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_GT(c.rig.sigma_noise[1][i], 0);
-    EXPECT_NEAR(std::sqrt(c.rig.covariance_wide[1](static_cast<int>(i), static_cast<int>(i))) /
-                    c.rig.sigma_wide[1][i],
+    EXPECT_NEAR(std::sqrt(c.rig.covariance_total[1](static_cast<int>(i), static_cast<int>(i))) /
+                    c.rig.sigma_total[1][i],
                 1, 1e-9);
   }
 
@@ -120,10 +120,10 @@ TEST_F(Calibrate, oneCameraAlone) {
 
 TEST_F(Calibrate, anotherBoardIsSaidOnceAndNotForEveryView) {
   const Outcome o =
-      run_vergence("calibrate --quiet" + images() + " --board 8x5 --square 0.04 --out '" +
+      run_vergence("calibrate --quiet" + images() + " --checkerboard 8x5 --square 0.04 --out '" +
                    file("b.yaml").string() + "'");
   EXPECT_EQ(o.code, 2);
-  EXPECT_EQ(sentences(o.err), 1U) << o.err;
+  EXPECT_EQ(messages(o.err), 1U) << o.err;
   EXPECT_TRUE(test::says(o.err, "no view has the board of 8x5 inner corners"));
 }
 
@@ -131,8 +131,8 @@ TEST_F(Calibrate, badArgumentsAreOneSentence) {
   const std::string good = images() + kArguments, out = " --out '" + file("n.yaml").string() + "'";
   for (const std::string& bad :
        {std::string(""), good, images() + out, good + out + " --baseline -1",
-        good + " --out /proc/none/x.yaml", images() + " --board 9 --square 0.04" + out,
-        images() + " --board 9x6 --square 0" + out,
+        good + " --out /proc/none/x.yaml", images() + " --checkerboard 9 --square 0.04" + out,
+        images() + " --checkerboard 9x6 --square 0" + out,
         " --left '/none/*.png'" + std::string(kArguments) + out, good + out + " --model omni",
         good + out + " --model equidistant --k3", good + out + " --convert a b",
         std::string(" --convert onlyone"),
@@ -141,7 +141,7 @@ TEST_F(Calibrate, badArgumentsAreOneSentence) {
         " --left '" + file("left/00.png").string() + "'" + kArguments + out}) {
     const Outcome o = run_vergence("calibrate --quiet " + bad);
     EXPECT_EQ(o.code, 2) << bad << "\n" << o.err;
-    EXPECT_EQ(sentences(o.err), 1U) << bad << "\n" << o.err;
+    EXPECT_EQ(messages(o.err), 1U) << bad << "\n" << o.err;
     EXPECT_EQ(o.out, "") << bad;
   }
 }
@@ -180,7 +180,7 @@ TEST_F(Calibrate, withoutTheToolTheSentenceNamesItsPackageAndADriveNeedsNone) {
   auto [code, said] = alone("calibrate --quiet" + images() + kArguments + " --out '" +
                             file("none.yaml").string() + "'");
   EXPECT_EQ(code, 2);
-  EXPECT_EQ(sentences(said), 1U) << said;
+  EXPECT_EQ(messages(said), 1U) << said;
   EXPECT_TRUE(test::says(said, "the package vergence-checkerboard"));
   std::tie(code, said) =
       alone("calibrate --drive nowhere --format folder --out '" + file("none.yaml").string() + "'");

@@ -71,10 +71,10 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
   });
   const TemporaryFolder folder;
   const auto out = folder / "calibration.yaml", views = folder / "views";
-  const Outcome o =
-      run_vergence(fmt::format("calibrate '{}/app/config/gige.yaml' --board 9x6 --square 0.04 "
-                               "--out '{}' --keep-views '{}'{}",
-                               VERGENCE_SOURCE_DIR, out.string(), views.string(), settings));
+  const Outcome o = run_vergence(
+      fmt::format("calibrate '{}/app/config/gige.yaml' --checkerboard 9x6 --square 0.04 "
+                  "--out '{}' --keep-views '{}'{}",
+                  VERGENCE_SOURCE_DIR, out.string(), views.string(), settings));
   over = true;
   pulses.join();
   ASSERT_EQ(o.code, 0) << o.err;
@@ -89,7 +89,7 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
   // What was kept gives the same calibration again.
   const Outcome again =
       run_vergence(fmt::format("calibrate --quiet --left '{0}/left_*.png' --right "
-                               "'{0}/right_*.png' --board 9x6 --square 0.04 --out '{1}'",
+                               "'{0}/right_*.png' --checkerboard 9x6 --square 0.04 --out '{1}'",
                                views.string(), (folder / "again.yaml").string()));
   ASSERT_EQ(again.code, 0) << again.err;
   const app::CalibrationFile same = app::read_calibration(folder / "again.yaml");

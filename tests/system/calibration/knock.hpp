@@ -1,5 +1,5 @@
 #pragma once
-#include "tests/system/calibration/course.hpp"
+#include "tests/system/calibration/test_trajectory.hpp"
 
 namespace vergence::test {
 

@@ -155,8 +155,8 @@ TEST(RecordedKnocks, onRealImagesAreToldAndMended) {
     const StereoSequence s = with_right_turned(*d, degrees, kAt, folder / std::to_string(n++));
     const DriveOutcome o = drive_recorded(*d, s, configuration(), begin, kAt);
     EXPECT_EQ(o.knocks, 0) << "before it";
-    ASSERT_GE(o.told_at, 0) << degrees.transpose();
-    EXPECT_LE(o.told_at, static_cast<int>(kAt) + 6) << degrees.transpose();
+    ASSERT_GE(o.reported_at, 0) << degrees.transpose();
+    EXPECT_LE(o.reported_at, static_cast<int>(kAt) + 6) << degrees.transpose();
     EXPECT_GE(o.mended_at, 0) << degrees.transpose();
     EXPECT_LE(o.ok_before_mended, 6) << degrees.transpose();
   }

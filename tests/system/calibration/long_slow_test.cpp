@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/system/calibration/course.hpp"
+#include "tests/system/calibration/test_trajectory.hpp"
 
 namespace vergence::test {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "core/comparison/trajectory_metrics.hpp"
 #include "tests/support/shared_data.hpp"
-#include "tests/system/calibration/course.hpp"
+#include "tests/system/calibration/test_trajectory.hpp"
 #include "tests/system/odometry/recorded_drive.hpp"
 
 namespace vergence::test {

@@ -6,7 +6,7 @@
 
 #include "core/calibration/gates.hpp"
 #include "core/memory/allocation_guard.hpp"
-#include "tests/system/calibration/course.hpp"
+#include "tests/system/calibration/test_trajectory.hpp"
 
 namespace vergence::test {
 namespace {
@@ -120,7 +120,7 @@ TEST(FromScratch, aCameraAFrameLateFromTheStartIsRefused) {
   course.give(street(), 0, street().size(), one_late);
   course.finish();
   EXPECT_EQ(course.count_accepted(), 0) << course.story();
-  EXPECT_TRUE(course.rejected_for(calibration::reason(calibration::Gate::out_of_step)) ||
+  EXPECT_TRUE(course.rejected_for(calibration::reason(calibration::Gate::out_of_sync)) ||
               course.rejected_for(calibration::reason(calibration::Gate::implausible_direction)))
       << course.story();
   EXPECT_EQ(wrong_ok(course.answers(), {}), "") << course.story();
@@ -143,7 +143,7 @@ TEST(StandingStill, fromScratchSaysThatItNeedsMotionAndAdoptsNothing) {
                                                        << course.story();
     }
   }
-  EXPECT_NE(course.first(EstimatorEvent::Kind::calibration_waits), nullptr) << course.story();
+  EXPECT_NE(course.first(EstimatorEvent::Kind::calibration_pending), nullptr) << course.story();
   course.finish();
   EXPECT_EQ(course.count_accepted(), 0) << course.story();
 }

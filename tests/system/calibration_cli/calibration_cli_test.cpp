@@ -77,13 +77,13 @@ TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
 
   const auto s = summary("s");
   EXPECT_EQ(s["frames"]["posed"], s["frames"]["read"]) << "a pose comes out all the time";
-  EXPECT_EQ(s["allocations_after_seal"], 0) << "the solver's thread is sealed, too";
+  EXPECT_EQ(s["runtime_allocations"], 0) << "the solver's thread is sealed, too";
   const auto& c = s["calibration"];
   EXPECT_EQ(c["source"], "online");
-  EXPECT_TRUE(c["before"].is_null());
+  EXPECT_TRUE(c["initial"].is_null());
   EXPECT_GE(c["from_scratch"]["frames"].get<int>(), 25);
   EXPECT_GT(c["from_scratch"]["latency_frames"].get<int>(), 25);
-  EXPECT_TRUE(c["word"].is_string());
+  EXPECT_TRUE(c["rating"].is_string());
   EXPECT_GT(c["depth_error_percent"]["50"].get<double>(),
             c["depth_error_percent"]["20"].get<double>());
   for (const auto& again : s["recalibrations"]) EXPECT_EQ(again["reason"], "refinement");
@@ -97,8 +97,8 @@ TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
   EXPECT_EQ(found.names[0], "links");
   EXPECT_EQ(found.serials[1], "mock-1");
   EXPECT_GT(found.rig.scale_sigma, 0);
-  EXPECT_GT(found.rig.sigma_wide[1][4], 0);
-  EXPECT_EQ(events("s", "calibration_kept").size(), events("s", "calibration_accepted").size());
+  EXPECT_GT(found.rig.sigma_total[1][4], 0);
+  EXPECT_EQ(events("s", "calibration_saved").size(), events("s", "calibration_accepted").size());
   EXPECT_TRUE(
       read_file(state()).starts_with(read_file(session("s") / "calibration.yaml") + "configured:"))
       << "what is kept is what is in use, and what it was found under";
@@ -122,7 +122,7 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
   EXPECT_TRUE(test::says(lines("other", "calibrations.csv").at(1), ",accepted,given,"));
   EXPECT_EQ(read_file(state()), kept) << "nothing was accepted since";
 
-  EXPECT_EQ(events("other", "calibration").size(), 1U) << "and its session has the sentence, too";
+  EXPECT_EQ(events("other", "calibration").size(), 1U) << "and its session has the message, too";
 
   const Outcome lenses = drive("lenses", "--duration 1 --set rig.nominal.focal_px=250");
   EXPECT_TRUE(test::says(lenses.err,
@@ -133,7 +133,8 @@ TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEn
   folder_.write("state", "a file where the folder should be");
   const Outcome o = drive("s", std::string("--from-scratch ") + kLongEnough);
   EXPECT_EQ(o.code, 0) << o.err;
-  EXPECT_EQ(events("s", "calibration_not_kept").size(), events("s", "calibration_accepted").size());
+  EXPECT_EQ(events("s", "calibration_save_failed").size(),
+            events("s", "calibration_accepted").size());
   EXPECT_TRUE(test::says(o.err, "the next drive will not know"));
 }
 

@@ -21,7 +21,7 @@ SKIPPED = 77
 
 
 def emulated(build):
-    """The command before the program's arguments; None with a sentence where it cannot be."""
+    """The command before the program's arguments; None with a message where it cannot be."""
     program, cache = os.path.join(build, "vergence"), os.path.join(build, "CMakeCache.txt")
     qemu = shutil.which("qemu-aarch64-static") or shutil.which("qemu-aarch64")
     if qemu is None or not os.path.exists(program) or not os.path.exists(cache):

@@ -32,9 +32,9 @@ def say(text):
     print("[%4.0f s] %s" % (time.monotonic() - begin, text), flush=True)
 
 
-def need(condition, sentence):
+def need(condition, message):
     if not condition:
-        raise Wrong(sentence)
+        raise Wrong(message)
 
 
 def done(machine, command, limit=120):

@@ -5,7 +5,7 @@
 # Made once (see docs/deployment.md) under ${XDG_CACHE_HOME:-~/.cache}/vergence and made again when the list of packages or this
 # folder's files change. The packages are unpacked here and installed by the machine itself at its first boot, so that no foreign
 # program runs on this one and nothing of it is changed.
-# Exit: 0, 2 bad arguments, 77 cannot be made here (the sentence says why).
+# Exit: 0, 2 bad arguments, 77 cannot be made here (the message says why).
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 

@@ -46,7 +46,7 @@ void read_poses(const std::filesystem::path& file, double from_s, FaultDrive* d)
   while (std::getline(in, line)) {
     const std::vector<std::string> cells = cells_of(line);
     if (cells.size() < columns) continue;
-    JudgedPose pose{Stamp(std::stoll(cells[stamp_ns])), status_of(cells[status]), {}};
+    EvaluatedPose pose{Stamp(std::stoll(cells[stamp_ns])), status_of(cells[status]), {}};
     if (pose.status != PoseStatus::lost) {
       std::array<double, 7> n{};
       for (std::size_t i = 0; i < n.size(); ++i) n[i] = std::stod(cells[x + i]);
@@ -114,17 +114,17 @@ FaultResult judge(const FaultCase& c, const FaultDrive& drive, const NormalError
   const Duration later =
       drive.poses.empty() ? Duration{} : start_of(drive.poses.front().stamp) - kStart;
   const NormalError there = [&](Stamp from, Stamp to) { return normal(from - later, to - later); };
-  r.honesty = judge_honesty(drive.poses, there, drive.truth);
+  r.integrity = evaluate_integrity(drive.poses, there, drive.truth);
   std::size_t first = 0, run = 0;
-  for (std::size_t i = 0; i < drive.poses.size() && run < kHonestyFrames; ++i) {
+  for (std::size_t i = 0; i < drive.poses.size() && run < kIntegrityFrames; ++i) {
     run = drive.poses[i].status == PoseStatus::ok && drive.at_s[i] >= c.until_s ? run + 1 : 0;
     if (run == 1) first = i;
   }
-  if (run < kHonestyFrames) return r;
+  if (run < kIntegrityFrames) return r;
   r.recovery_s = drive.at_s[first] - c.until_s;
-  const std::vector<JudgedPose> after(drive.poses.begin() + static_cast<std::ptrdiff_t>(first),
-                                      drive.poses.end());
-  r.error_after = judge_honesty(after, there, drive.truth).most_full;
+  const std::vector<EvaluatedPose> after(drive.poses.begin() + static_cast<std::ptrdiff_t>(first),
+                                         drive.poses.end());
+  r.error_after = evaluate_integrity(after, there, drive.truth).max_full;
   return r;
 }
 
@@ -141,10 +141,10 @@ Untouched untouched_drive() {
   const auto& poses = u.drive.poses;
   const auto count = [&poses](PoseStatus status) {
     return std::count_if(poses.begin(), poses.end(),
-                         [status](const JudgedPose& p) { return p.status == status; });
+                         [status](const EvaluatedPose& p) { return p.status == status; });
   };
   u.normal = normal_error_there(poses, u.drive.truth);
-  const double usual = normal_errors(poses, u.drive.truth)[kHonestyFrames].way_m;
+  const double usual = normal_errors(poses, u.drive.truth)[kIntegrityFrames].ins_path_m;
   if (u.drive.code != 0 || !u.drive.whole || count(PoseStatus::lost) > 0 ||
       count(PoseStatus::ok) < kOk || !(usual > 0) || usual > kNormal)
     u.unfit = fmt::format("the untouched drive: exit {}, {}, {} ok, {} lost, {:.3f} m off\n{}",
@@ -178,12 +178,12 @@ std::string unsaid(const FaultCase& c, const FaultDrive& drive, const FaultDrive
 bool is_bad(const FaultDrive& drive, const FaultResult& result) {
   // Exit 1: it ended before it was usable again, and says so.
   const bool failed = drive.code != 0 && !(drive.code == 1 && !result.recovery_s);
-  return failed || !drive.whole || result.honesty.wrong > 0 || result.honesty.unjudged > 0;
+  return failed || !drive.whole || result.integrity.wrong > 0 || result.integrity.unjudged > 0;
 }
 
-JudgedDrive drive_until_recovered(FaultCase c, const NormalError& normal) {
+EvaluatedDrive drive_until_recovered(FaultCase c, const NormalError& normal) {
   for (;;) {  // twice at most
-    JudgedDrive d;
+    EvaluatedDrive d;
     d.drive = drive_with_faults(c);
     d.result = judge(c, d.drive, normal);
     if (is_bad(d.drive, d.result) || d.result.recovery_s || c.duration_s >= kMinute) return d;
@@ -214,11 +214,11 @@ std::string fault_table_line(const FaultCase& c, const FaultDrive& drive,
   if (!reasons.empty()) seen += (seen.empty() ? "" : "; ") + reasons;
   const std::string after =
       result.recovery_s ? fmt::format("{:.2f} s", *result.recovery_s) : "not any more";
-  std::string wrong = std::to_string(result.honesty.wrong);
-  if (result.honesty.unjudged > 0)
-    wrong += fmt::format(", {} where there is no truth", result.honesty.unjudged);
-  if (result.honesty.wrong_over_all > 0)
-    wrong += fmt::format(" ({} over `degraded` ones)", result.honesty.wrong_over_all);
+  std::string wrong = std::to_string(result.integrity.wrong);
+  if (result.integrity.unjudged > 0)
+    wrong += fmt::format(", {} where there is no truth", result.integrity.unjudged);
+  if (result.integrity.wrong_over_all > 0)
+    wrong += fmt::format(" ({} over `degraded` ones)", result.integrity.wrong_over_all);
   return fmt::format("| {} | {} | {} | {} | {:.1f} | {} | {} |\n", c.name, faults, seen, after,
                      result.error_after, wrong, drive.code);
 }

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/honesty.hpp"
+#include "tests/support/integrity.hpp"
 
 /// Drives of the mock with faults, by the built program, judged against the truth.
 namespace vergence::test {
@@ -31,7 +31,7 @@ struct FaultDrive {
   /// summary.json and report.html are there, and poses to the end of the drive with the truth
   /// beside them.
   bool whole = false;
-  std::vector<JudgedPose> poses{};
+  std::vector<EvaluatedPose> poses{};
   std::vector<double> at_s{};  // of each pose, since the drive's start
   app::Trajectory truth{};
   std::map<std::string, int> events{};   // by kind
@@ -40,15 +40,15 @@ struct FaultDrive {
 };
 
 struct FaultResult {
-  Honesty honesty{};
-  /// From the last fault's end to the first of kHonestyFrames `ok` poses in a row; none: there were
-  /// none.
+  Integrity integrity{};
+  /// From the last fault's end to the first of kIntegrityFrames `ok` poses in a row; none: there
+  /// were none.
   std::optional<double> recovery_s{};
-  /// Greatest error over kHonestyFrames `ok` poses after recovery, times the normal one.
+  /// Greatest error over kIntegrityFrames `ok` poses after recovery, times the normal one.
   double error_after = 0;
 };
 
-/// mock_board.yaml with a quarter of the pixels: every pair proven, or not used.
+/// mock_board.yaml with a quarter of the pixels: every pair verified, or not used.
 [[nodiscard]] FaultDrive drive_with_faults(const FaultCase& c);
 
 /// The drive without any fault, as long as the longest of the others, and what is normal by it.
@@ -69,13 +69,13 @@ struct Untouched {
 
 [[nodiscard]] FaultResult judge(const FaultCase& c, const FaultDrive& drive,
                                 const NormalError& normal);
-struct JudgedDrive {
+struct EvaluatedDrive {
   FaultDrive drive{};
   FaultResult result{};
 };
 /// The case's drive; where that is not bad and ends before the last fault is over with, one of a
 /// minute.
-[[nodiscard]] JudgedDrive drive_until_recovered(FaultCase c, const NormalError& normal);
+[[nodiscard]] EvaluatedDrive drive_until_recovered(FaultCase c, const NormalError& normal);
 
 /// The faults of docs/mock.md, one at a time; begin at 9 s, when the calibration is confirmed.
 [[nodiscard]] const std::vector<FaultCase>& single_faults();

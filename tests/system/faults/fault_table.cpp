@@ -18,25 +18,45 @@ struct Kind {
   const char* parameters;         // but duration_s
   double seconds;                 // 0: none, it is done at once and stays
   std::vector<std::string> said;  // FaultCase::said
-  // s, within which poses are `ok` again for good: pairing proven, the calibration confirmed anew
+  // s, within which poses are `ok` again for good: pairing verified, the calibration confirmed anew
   double recovers = 3;
 };
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all{
-      {"one camera gone", "camera_gone", "camera=1", 3, {"camera_gone", "camera_back", "no_image"}},
-      {"both cameras gone", "camera_gone", "camera=-1", 3, {"camera_gone", "camera_back"}},
-      {"both cameras blink", "camera_gone", "camera=-1", 0.1, {"camera_gone", "camera_back"}},
-      {"INS gone", "ins_gone", "", 3, {"ins_silent", "ins_ok"}},
-      {"no fix", "no_fix", "", 5, {"ins_no_fix", "ins_ok"}},
+      {"one camera gone",
+       "camera_gone",
+       "camera=1",
+       3,
+       {"camera_disconnected", "camera_reconnected", "no_image"}},
+      {"both cameras gone",
+       "camera_gone",
+       "camera=-1",
+       3,
+       {"camera_disconnected", "camera_reconnected"}},
+      {"both cameras blink",
+       "camera_gone",
+       "camera=-1",
+       0.1,
+       {"camera_disconnected", "camera_reconnected"}},
+      {"INS gone", "ins_gone", "", 3, {"ins_timeout", "ins_recovered"}},
+      {"no fix", "no_fix", "", 5, {"ins_no_fix", "ins_recovered"}},
       {"INS position jumps", "position_jump", "east_m=100", 3, {"ins_jump"}},
-      {"board gone", "board_gone", "", 3, {"board_gone", "board_back"}},
-      {"board gone, pulses on", "board_gone", "powered=1", 3, {"board_gone", "board_back"}},
-      {"board restarts", "board_reboot", "", 0.5, {"board_rebooted"}},
+      {"board gone",
+       "board_gone",
+       "",
+       3,
+       {"trigger_board_disconnected", "trigger_board_reconnected"}},
+      {"board gone, pulses on",
+       "board_gone",
+       "powered=1",
+       3,
+       {"trigger_board_disconnected", "trigger_board_reconnected"}},
+      {"board restarts", "board_reboot", "", 0.5, {"trigger_board_restarted"}},
       {"knock", "knock", "camera=1 pitch_deg=0.2", 0, {"rig_changed", "recalibrating"}, 4},
-      {"one lens covered", "cover", "camera=1", 3, {"image_dark"}},
-      {"both lenses covered", "cover", "camera=-1", 3, {"image_dark"}},
-      {"night", "night", "", 5, {"image_dark"}},
+      {"one lens covered", "cover", "camera=1", 3, {"image_no_contrast"}},
+      {"both lenses covered", "cover", "camera=-1", 3, {"image_no_contrast"}},
+      {"night", "night", "", 5, {"image_no_contrast"}},
       {"tunnel", "night", "factor=0.1", 5, {"weak_geometry"}},
       {"exposure stuck, too bright", "exposure", "factor=6", 5, {"few_inliers"}},
       {"one side dark", "exposure", "camera=1 factor=0.1", 5, {}},
@@ -48,13 +68,13 @@ const std::vector<Kind>& kinds() {
        5,
        {"/devices/camera0_duplicate", "/devices/camera1_duplicate"}},
       {"pairs broken", "break_pairs", "share=1", 3, {"no_image"}},
-      {"one camera a frame late", "lag", "camera=1", 3, {"out_of_step", "in_step"}, 5},
+      {"one camera a frame late", "lag", "camera=1", 3, {"out_of_sync", "cameras_in_sync"}, 5},
       {"cables exchanged", "swap_cables", "", 3, {"cameras_swapped", "rig_changed"}, 9},
       {"three triggers missed", "missed_trigger", "camera=1 pulses=3", 0, {"no_image"}},
       {"a camera's clock set", "time_jump", "camera=1 jump_s=1", 0, {"no_image"}},
       {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0, {"/devices/clock_resets"}},
       {"a bus in the way", "occluder", "", 5, {"few_inliers"}, 9},
-      {"disk full", "disk_full", "", 3, {"disk_full", "disk_room"}},
+      {"disk full", "disk_full", "", 3, {"disk_full", "disk_recovered"}},
       {"recalibration asked for", "recalibrate", "", 0, {"rig_changed", "recalibrating"}, 6},
   };
   return all;

@@ -1,5 +1,5 @@
-// What a long stand does. `fault_bench` drives the other long faults, two at a time and 500 random
-// schedules.
+// What a long stand does. `fault_injection_bench` drives the other long faults, two at a time and
+// 500 random schedules.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace {
 
 // A drift of millimetres a second is normal on the way and a hundred metres in an hour's stand.
 TEST(LongFaults, aStandOfTenMinutesMovesThePoseByCentimetres) {
-  constexpr double kMost = 0.1;  // m
+  constexpr double kMax = 0.1;  // m
   const FaultCase& c = long_faults().front();
   ASSERT_EQ(c.name, "standing 10 minutes");
   const FaultDrive drive = drive_with_faults(c);
@@ -29,7 +29,7 @@ TEST(LongFaults, aStandOfTenMinutesMovesThePoseByCentimetres) {
                   *b = true_pose(drive.truth, drive.poses[to].stamp);
   ASSERT_TRUE(a != nullptr && b != nullptr);
   EXPECT_LT((a->inverse() * *b).t.norm(), 1e-9) << "it does not stand";
-  EXPECT_LT(motion.t.norm(), kMost);
+  EXPECT_LT(motion.t.norm(), kMax);
 }
 
 }  // namespace

@@ -33,8 +33,8 @@ Driven expect_honest(const FaultCase& c) {
   SCOPED_TRACE(described(c, d.drive, d.result));
   EXPECT_EQ(d.drive.code, 0);
   EXPECT_TRUE(d.drive.whole);
-  EXPECT_EQ(d.result.honesty.wrong, 0) << "from line " << d.result.honesty.first_wrong;
-  EXPECT_EQ(d.result.honesty.unjudged, 0);
+  EXPECT_EQ(d.result.integrity.wrong, 0) << "from line " << d.result.integrity.first_wrong;
+  EXPECT_EQ(d.result.integrity.unjudged, 0);
   return d;
 }
 
@@ -67,8 +67,8 @@ TEST(FaultEvents, camerasThatAreInStepAgainConfirmNoCalibration) {
   });
   ASSERT_NE(lag, alone.end());
   FaultDrive drive = drive_with_faults(*lag);
-  EXPECT_EQ(drive.events["in_step"], 1) << drive.err;
-  EXPECT_EQ(drive.events["calibration_confirmed"], 0) << drive.err;
+  EXPECT_EQ(drive.events["cameras_in_sync"], 1) << drive.err;
+  EXPECT_EQ(drive.events["calibration_verified"], 0) << drive.err;
   EXPECT_EQ(drive.events["calibration_contradicted"], 0) << drive.err;
 }
 

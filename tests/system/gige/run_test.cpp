@@ -138,12 +138,12 @@ TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
   const auto& devices = summary["devices"];
   EXPECT_EQ(summary["frames"]["read"], kPairs);
   EXPECT_EQ(summary["frames"]["posed"], kPairs);
-  EXPECT_EQ(summary["allocations_after_seal"], 0);
+  EXPECT_EQ(summary["runtime_allocations"], 0);
   // Aravis takes two blocks for every image that begins (a breakpoint on ThreadAllocations::count).
   test::expect_no_heap_but_of({"vergence-gige", std::uint64_t{2} * 2 * kPairs}, summary);
   EXPECT_EQ(devices["sets_complete"], kPairs);
   EXPECT_EQ(devices["sets_incomplete"], 0);
-  EXPECT_EQ(devices["sets_unproven"], 0);
+  EXPECT_EQ(devices["sets_ambiguous"], 0);
   for (const char* camera : {"camera0_", "camera1_"}) {
     EXPECT_EQ(devices[camera + std::string("delivered")], kPairs);
     EXPECT_EQ(devices[camera + std::string("lost")], 0);
@@ -189,7 +189,7 @@ Outcome record_drive(const RenderedDrive& drive, const std::filesystem::path& se
                       "--set ins.baud=115200 --set ins.port=" +
                       ins.port() +
                       " --set trigger.driver=board --set sync.mode=board --set "
-                      "trigger.vary_us=4000 --set trigger.port=" +
+                      "trigger.dither_us=4000 --set trigger.port=" +
                       board.port());
 }
 

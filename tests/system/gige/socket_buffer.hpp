@@ -9,7 +9,7 @@
 
 namespace vergence::test {
 
-/// Empty: a socket may hold enough here. Else the sentence to skip with.
+/// Empty: a socket may hold enough here. Else the message to skip with.
 inline std::string socket_buffer_obstacle() {
   constexpr std::int64_t kEnough = 2 << 20;  // bytes: two images of 1280 x 960 and some
   const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);

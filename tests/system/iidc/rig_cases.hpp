@@ -143,7 +143,7 @@ TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
     const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(10);
     Frame held;
     bool holds = false;
-    while (status != DeviceStatus::gone && std::chrono::steady_clock::now() < limit) {
+    while (status != DeviceStatus::disconnected && std::chrono::steady_clock::now() < limit) {
       status = cameras_[1]->wait(Duration::milliseconds(200), &frame);
       if (status != DeviceStatus::ok) continue;
       if (holds) {
@@ -153,10 +153,10 @@ TEST_F(IidcRig, UnpluggedWhileStreamingAndPluggedInAgainLeavesNothingBehind) {
         holds = true;
       }
     }
-    ASSERT_EQ(status, DeviceStatus::gone);
+    ASSERT_EQ(status, DeviceStatus::disconnected);
     std::uint32_t number = 0;
     if (holds) number = read_stamp(cameras_[1]->view(held.slot)).number;
-    EXPECT_EQ(cameras_[1]->start(nullptr), DeviceStatus::gone);
+    EXPECT_EQ(cameras_[1]->start(nullptr), DeviceStatus::disconnected);
     EXPECT_FALSE(cameras_[1]->last_error().empty());
     BusUnderTest::replug(emulator_.get(), 1);
     ASSERT_TRUE(start_again(cameras_[1].get())) << cameras_[1]->last_error();

@@ -100,9 +100,9 @@ TEST_F(InsRig, comesBackAfterTheConverterWasUnplugged) {
   ASSERT_TRUE(within(10, [&] {
     do status = device->wait(Duration{}, &r);
     while (status == DeviceStatus::ok);
-    return status == DeviceStatus::gone;
+    return status == DeviceStatus::disconnected;
   }));
-  EXPECT_EQ(device->start(nullptr), DeviceStatus::gone)
+  EXPECT_EQ(device->start(nullptr), DeviceStatus::disconnected)
       << "not back, and start() does not wait for it";
   converter_.command("replug");
   ASSERT_TRUE(within(30, [&] { return device->start(nullptr) == DeviceStatus::ok; }));

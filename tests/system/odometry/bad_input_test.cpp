@@ -67,7 +67,7 @@ TEST(OdometryInBadConditions, allBlackFramesAreLostAndTheWayGoesOnAfterThem) {
                                           {std::size_t{0}, std::size_t{10}, std::size_t{0}}}) {
     const Verdict v(cover(drive(), Cover::both, from, to), from, to);
     v.expect_status(PoseStatus::lost);
-    v.expect_reason(Reason::image_dark);
+    v.expect_reason(Reason::image_no_contrast);
     v.expect_recovery(settled);
   }
 }
@@ -76,7 +76,7 @@ TEST(OdometryInBadConditions, aCameraCoveredForGoodIsNeverOkAgain) {
   for (const Cover side : {Cover::left, Cover::right}) {
     const Verdict v(cover(drive(), side, 20, drive().size()), 20, drive().size());
     EXPECT_EQ(count_ok(v.replayed.answers, 0, 20), 20);
-    EXPECT_EQ(v.replayed.answers.back().sample.reason, Reason::image_dark);
+    EXPECT_EQ(v.replayed.answers.back().sample.reason, Reason::image_no_contrast);
   }
 }
 
@@ -107,7 +107,7 @@ TEST(OdometryInBadConditions, aCameraThatIsAwayForLongLeavesPosesLostUntilItIsBa
     EXPECT_EQ(v.at(kFirst)->sample.status, PoseStatus::degraded);
     for (std::size_t i = kMapHasPassed; i < kBack; ++i)
       EXPECT_EQ(v.at(i)->sample.status, PoseStatus::lost) << i << '\n' << story(v.replayed.answers);
-    EXPECT_EQ(v.at(kBack)->sample.reason, Reason::scene_restarted);
+    EXPECT_EQ(v.at(kBack)->sample.reason, Reason::map_reset);
     EXPECT_EQ(v.replayed.answers.back().sample.status, PoseStatus::ok);
   }
 }
@@ -155,7 +155,7 @@ TEST(OdometryInBadConditions, afterTwoSecondsWithoutFramesItSaysSoAndStartsAnew)
                                     [](const Answer& a) { return a.restarted; });
   if (restart == v.replayed.answers.end()) return;
   EXPECT_EQ(restart->sample.status, PoseStatus::degraded);
-  EXPECT_EQ(restart->sample.reason, Reason::scene_restarted);
+  EXPECT_EQ(restart->sample.reason, Reason::map_reset);
   const Transform& last = v.at(kFirst - 1)->sample.T_world_left;
   const Vec3 step = last.t - v.at(kFirst - 2)->sample.T_world_left.t;
   const double frames = std::min<double>(static_cast<double>(restart->sample.frame - (kFirst - 1)),

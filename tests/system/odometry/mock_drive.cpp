@@ -58,7 +58,7 @@ StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::
     std::array<Picture, 2> pair;
     for (std::size_t k = 0; k < 2; ++k) {
       pair[k] = Picture(rig.intrinsics[k].width, rig.intrinsics[k].height);
-      mock::Shot shot;
+      mock::RenderRequest shot;
       shot.noise_seed = static_cast<std::uint32_t>(2 * i + k + 1);
       renderers[k].render(out.rig.T_camera_left[k] * T_left_enu, shot, pair[k].bytes.data(),
                           pair[k].stride);

@@ -29,7 +29,7 @@ Replay replay(const StereoDrive& drive, const Edit& edit, int threads, bool onli
                       two ? static_cast<PairRunner&>(*two) : one, solver);
   Replay out;
   out.answers.reserve(drive.size());
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   for (std::size_t i = 0; i < drive.size(); ++i) {
     RigFrame frame;
     frame.number = i;
@@ -43,11 +43,11 @@ Replay replay(const StereoDrive& drive, const Edit& edit, int threads, bool onli
       a.sample = estimator.process(frame);
     }
     for (const EstimatorEvent& e : estimator.events())
-      a.restarted = a.restarted || e.kind == EstimatorEvent::Kind::scene_restarted;
+      a.restarted = a.restarted || e.kind == EstimatorEvent::Kind::map_reset;
     a.T_reference_left = drive.truth[i];
     out.answers.push_back(a);
   }
-  out.allocations = AllocationGuard::allocations_after_seal() - before;
+  out.allocations = AllocationGuard::runtime_allocations() - before;
   return out;
 }
 

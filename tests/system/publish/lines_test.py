@@ -12,7 +12,7 @@ import threading
 
 import drive as d
 
-KEYS = {"version", "type", "frame", "stamp_ns", "state", "status", "reason", "pose", "covariance", "motion_covariance", "length_sigma", "earth", "inliers", "stereo_inliers",
+KEYS = {"version", "type", "frame", "stamp_ns", "state", "status", "reason", "pose", "covariance", "motion_covariance", "length_sigma", "enu", "inliers", "stereo_inliers",
         "reprojection_px", "estimate_ms", "age_ms", "dropped"}
 SLACK_MS = 50  # of a machine that runs other tests beside this one; the figure itself is publish_bench's
 
@@ -35,25 +35,25 @@ def check_lines(lines, poses, placed_wanted):
         assert line["reason"] == row["reason"], (line, row)
         assert line["inliers"] == int(row["inliers"])
         if line["status"] == "lost":
-            assert line["pose"] is None and line["earth"] is None and line["covariance"] is None
+            assert line["pose"] is None and line["enu"] is None and line["covariance"] is None
             continue
         assert len(line["covariance"]) == len(line["motion_covariance"]) == 21
         for ours, name in zip(line["pose"]["position_m"], "xyz"):
             assert abs(ours - float(row[name])) < 2e-4, (line, row)
         assert line["age_ms"] is not None and line["age_ms"] > 0
-        if line["earth"] and row["east"]:
+        if line["enu"] and row["east"]:
             placed += 1
-            for ours, name in zip(line["earth"]["enu_m"], ("east", "north", "up")):
+            for ours, name in zip(line["enu"]["enu_m"], ("east", "north", "up")):
                 assert abs(ours - float(row[name])) < 2e-3, (name, line, row)
-            assert abs(line["earth"]["latitude_deg"] - float(row["latitude_deg"])) < 1e-7
-            turn = abs(line["earth"]["heading_deg"] - float(row["heading_deg"]))
+            assert abs(line["enu"]["latitude_deg"] - float(row["latitude_deg"])) < 1e-7
+            turn = abs(line["enu"]["heading_deg"] - float(row["heading_deg"]))
             assert min(turn, 360 - turn) < 1e-2, (line, row)
     assert placed > 20 or not placed_wanted, f"only {placed} lines are on the earth"
 
 
 def over_unix(below):
     path = below / "pose.sock"
-    run = d.Drive(below / "unix", 22, "--set", f"publish.lines=unix://{path}", "--set", "comparison.placement_m=15")
+    run = d.Drive(below / "unix", 22, "--set", f"publish.pose_stream=unix://{path}", "--set", "comparison.alignment_distance_m=15")
     reader = d.connected(path)
     idle = [d.connected(path) for _ in range(3)]  # they never read, and disturb nobody
     lines = [json.loads(line) for line in reader.makefile("r", encoding="utf-8")]
@@ -71,14 +71,14 @@ def over_unix(below):
     assert devices["line_age_p99_us"] > devices["line_behind_pose_p99_us"], devices
     assert not path.exists(), "the socket file stays behind"
     last = run.messages().splitlines()[-3:]
-    assert [line.split(":")[0] for line in last] == ["verdict", "to do", "report"], last
+    assert [line.split(":")[0] for line in last] == ["result", "to do", "report"], last
 
 
 def over_udp(below):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(20)
-        run = d.Drive(below / "udp", 6, "--set", "publish.lines=udp://127.0.0.1:%d" % receiver.getsockname()[1])
+        run = d.Drive(below / "udp", 6, "--set", "publish.pose_stream=udp://127.0.0.1:%d" % receiver.getsockname()[1])
         lines = []
         ended = threading.Event()
 
@@ -101,7 +101,7 @@ def over_udp(below):
 
 def documented_reader(below):
     path = below / "reader.sock"
-    run = d.Drive(below / "reader", 4, "--set", f"publish.lines=unix://{path}")
+    run = d.Drive(below / "reader", 4, "--set", f"publish.pose_stream=unix://{path}")
     d.connected(path).close()
     reader = subprocess.run([sys.executable, os.path.join(os.environ["SOURCES"], "docs/read_poses.py"), f"unix://{path}"],
                             check=True, capture_output=True, text=True, timeout=60)
@@ -116,12 +116,12 @@ def documented_reader(below):
 
 
 def without_a_place(below):
-    run = d.Drive(below / "nowhere", 2, "--set", f"publish.lines=unix://{below}/no/folder/pose.sock")
+    run = d.Drive(below / "nowhere", 2, "--set", f"publish.pose_stream=unix://{below}/no/folder/pose.sock")
     assert run.end() == 0, run.messages()
     assert "the drive goes on without lines" in run.messages(), run.messages()
-    bad = d.Drive(below / "bad", 2, "--set", "publish.lines=tcp://somewhere:1")
+    bad = d.Drive(below / "bad", 2, "--set", "publish.pose_stream=tcp://somewhere:1")
     assert bad.end() == 2, bad.messages()
-    assert "publish.lines" in bad.messages() and not bad.session.exists(), bad.messages()
+    assert "publish.pose_stream" in bad.messages() and not bad.session.exists(), bad.messages()
 
 
 def main():

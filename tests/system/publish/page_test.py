@@ -2,7 +2,7 @@
 """The live page of a mock drive in headless Chromium: its figures are the session's, in both themes, on desktop and phone, with nothing on
 the console; it comes back after the program restarts, with nothing of the drive before; frames that stop and a program that hangs leave no
 OK; refusals say why; actions need the token; garbage, viewers that never read and a thousand connections leave the drive as it was; a port
-in use is a sentence. --pictures DIR keeps what was seen. Exit code 77 without Chromium."""
+in use is a message. --pictures DIR keeps what was seen. Exit code 77 without Chromium."""
 import argparse
 import base64
 import http.client
@@ -157,7 +157,7 @@ def misuse(port, token, problems):
 
 
 def first_drive(driver, below, port, problems, pictures):
-    run = d.Drive(below / "first", 45, "--set", f"publish.http=127.0.0.1:{port}", "--set", "comparison.placement_m=15", "--record", "poses")
+    run = d.Drive(below / "first", 45, "--set", f"publish.http=127.0.0.1:{port}", "--set", "comparison.alignment_distance_m=15", "--record", "poses")
     url = run.wait_for(r"live page: (http://\S+)")
     time.sleep(4)
     looks(driver, url, problems, pictures)
@@ -184,13 +184,13 @@ def first_drive(driver, below, port, problems, pictures):
         if kinds.count(kind) != 1:
             problems.append(f"{kinds.count(kind)} events {kind}, not one: {kinds}")
     summary = run.summary()
-    if summary["allocations_after_seal"] != 0 or summary["frames"]["lost"] != 0:
-        problems.append(f"viewers cost the drive: {summary['allocations_after_seal']} allocations, {summary['frames']}")
+    if summary["runtime_allocations"] != 0 or summary["frames"]["lost"] != 0:
+        problems.append(f"viewers cost the drive: {summary['runtime_allocations']} allocations, {summary['frames']}")
     return url
 
 
 def second_drive(driver, below, port, problems):
-    """The page that is still open comes back, without the last drive's OK where there is no frame yet; a port that is taken is a sentence."""
+    """The page that is still open comes back, without the last drive's OK where there is no frame yet; a port that is taken is a message."""
     for entry in driver.word("POST", "/se/log", {"type": "browser"}):
         if "/events" not in entry["message"]:  # that the program has gone is no fault of the page
             problems.append(f"console says {entry['message'][:200]}")

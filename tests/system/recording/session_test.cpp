@@ -86,7 +86,7 @@ TEST_F(RecordedDrive, replaysBitForBit) {
   expect_same_poses(session(), out("again"));
   EXPECT_EQ(text_of(session() / "reference.tum"), text_of(out("again") / "reference.tum"));
   EXPECT_TRUE(test::says(o.err, "what it was given in the drive"));
-  EXPECT_EQ(summary_of(out("again"))["allocations_after_seal"], 0);
+  EXPECT_EQ(summary_of(out("again"))["runtime_allocations"], 0);
 }
 
 TEST_F(RecordedDrive, holdsEveryMessageOnceAndIsFinished) {
@@ -224,7 +224,7 @@ TEST(Recorded, thePulsesOfATriggerBoardAreRecordedAndTheDriveIsTheSame) {
   expect_same_poses(folder / "plain", folder / "recorded");
   const auto summary = summary_of(folder / "recorded");
   EXPECT_EQ(summary["devices"]["recording_dropped"], 0);
-  EXPECT_EQ(summary["allocations_after_seal"], 0);
+  EXPECT_EQ(summary["runtime_allocations"], 0);
   std::vector<std::uint64_t> numbers;
   for (const auto& m : test::read_mcap(folder / "recorded" / "drive.mcap").messages) {
     if (m.topic != "/vergence/pulse") continue;

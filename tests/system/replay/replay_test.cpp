@@ -28,7 +28,7 @@ TEST_F(ReplayedFolder, givesASessionWithAPoseForEveryFrame) {
   const auto s = summary();
   EXPECT_EQ(s["frames"]["posed"], kFrames);
   EXPECT_EQ(s["frames"]["skipped"], 0);
-  EXPECT_EQ(s["allocations_after_seal"], 0);
+  EXPECT_EQ(s["runtime_allocations"], 0);
   EXPECT_TRUE(s["metrics"].is_null());  // a plain folder has no truth
 }
 
@@ -55,7 +55,7 @@ TEST_F(ReplayedFolder, fromScratchIntrinsicsAndALengthAreEnough) {
   const Outcome o = replay("--from-scratch");
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(summary()["frames"]["posed"], kFrames);
-  EXPECT_TRUE(summary()["calibration"]["before"].is_null());
+  EXPECT_TRUE(summary()["calibration"]["initial"].is_null());
   fs::remove_all(session());
   text.insert(at, "    T_left_camera: [1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0]\n");
   write("calibration.yaml", text);

@@ -102,13 +102,13 @@ def overlaps(boxes):
     return found
 
 
-def problems_of(seen, least_px):
+def problems_of(seen, min_px):
     problems = [f"\"{a}\" lies over \"{b}\"" for a, b in overlaps(seen["boxes"])[:5]]
     if seen["scroll"] > seen["width"]:
         problems.append(f"the page is {seen['scroll']} px wide in a window of {seen['width']} px")
     outside = [b["words"] for b in seen["boxes"] if b["l"] < -0.5 or b["r"] > seen["width"] + 0.5]
     problems += [f"\"{words}\" is cut off at the edge" for words in outside[:5]]
-    small = [b for b in seen["boxes"] if b["px"] < least_px]
+    small = [b for b in seen["boxes"] if b["px"] < min_px]
     problems += [f"\"{b['words']}\" has letters of {b['px']:.1f} px" for b in small[:3]]
     if len(seen["boxes"]) < 20:
         problems.append("hardly any text is on the page")

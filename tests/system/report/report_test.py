@@ -8,7 +8,7 @@ import tempfile
 
 SKIPPED = 77
 HERE = pathlib.Path(__file__).resolve().parent
-HOSTILE = '{"stamp_ns":1772360200000000000,"kind":"<b>x</b>","sentence":"</table><script>document.title=1</script> ' + "w" * 400 + '"}\n'
+HOSTILE = '{"stamp_ns":1772360200000000000,"kind":"<b>x</b>","message":"</table><script>document.title=1</script> ' + "w" * 400 + '"}\n'
 
 # Everything that must be found: one text over another, letters too small, a page too wide, a console message, one theme only.
 BAD = """<!DOCTYPE html><html><body style="background:#fff"><script>console.error("bang")</script><p style="width:3000px">wide</p>
@@ -36,7 +36,7 @@ def drive(folder):
     """A session with every section filled, figures as they really are: the mock's board and INS on simulated lines."""
     configuration = HERE.parents[2] / "app" / "config" / "mock_board.yaml"
     subprocess.run([os.environ["VERGENCE"], "run", str(configuration), "--fast", "--quiet", "--duration", "16", "--out", str(folder),
-                    "--set", "comparison.placement_m=40", "--fault", "knock@10 camera=1 pitch_deg=0.2"], check=True, capture_output=True)
+                    "--set", "comparison.alignment_distance_m=40", "--fault", "knock@10 camera=1 pitch_deg=0.2"], check=True, capture_output=True)
     return folder
 
 

@@ -31,7 +31,7 @@ inline const std::string kSmall =
   std::vector<std::string> found;
   for (std::string line; std::getline(in, line);) {
     const auto event = nlohmann::json::parse(line);
-    if (event["kind"] == kind) found.push_back(event["sentence"]);
+    if (event["kind"] == kind) found.push_back(event["message"]);
   }
   return found;
 }

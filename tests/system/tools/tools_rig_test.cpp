@@ -53,7 +53,7 @@ json finding(const std::string& arguments, const std::string& check) {
 
 /// Types what the doctor printed; root needs no sudo.
 void mend(const json& f) {
-  std::string command = f["mend"].at(0);
+  std::string command = f["fix"].at(0);
   for (auto at = command.find("sudo "); at != std::string::npos; at = command.find("sudo "))
     command.erase(at, 5);
   EXPECT_EQ(std::system((command + " >/dev/null").c_str()), 0) << command;

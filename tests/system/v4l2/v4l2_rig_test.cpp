@@ -214,11 +214,11 @@ TEST_F(V4l2Rig, oneThatStaysSilentIsGoneAndStreamsAgain) {
   set_control(node(0), "percentage_of_dropped_buffers", 100);
   Frame frame;
   DeviceStatus status = DeviceStatus::timeout;
-  for (int i = 0; i < 300 && status != DeviceStatus::gone; ++i) {  // 30 s at most
+  for (int i = 0; i < 300 && status != DeviceStatus::disconnected; ++i) {  // 30 s at most
     status = camera->wait(Duration::milliseconds(100), &frame);
     if (status == DeviceStatus::ok) camera->release(frame.slot);
   }
-  EXPECT_EQ(status, DeviceStatus::gone);
+  EXPECT_EQ(status, DeviceStatus::disconnected);
   set_control(node(0), "percentage_of_dropped_buffers", 0);
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
@@ -235,7 +235,7 @@ TEST_F(V4l2Rig, aBufferWithTheErrorFlagIsTorn) {
   int torn = 0;
   for (int i = 0; i < 10; ++i) {
     ASSERT_EQ(next(camera.get(), &frame), DeviceStatus::ok);
-    torn += frame.status == FrameStatus::torn ? 1 : 0;
+    torn += frame.status == FrameStatus::incomplete ? 1 : 0;
     camera->release(frame.slot);
   }
   EXPECT_EQ(torn, 1);
@@ -250,7 +250,7 @@ TEST_F(V4l2Rig, aQueueInErrorIsGoneAndStartMendsIt) {
   set_control(node(0), "inject_fatal_streaming_error", 1);
   DeviceStatus status = DeviceStatus::ok;
   while ((status = next(camera.get(), &frame)) == DeviceStatus::ok) camera->release(frame.slot);
-  ASSERT_EQ(status, DeviceStatus::gone);
+  ASSERT_EQ(status, DeviceStatus::disconnected);
   EXPECT_GT(frame.arrival.ns(), 0);
   ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error();
   for (int i = 0; i < 40; ++i) {

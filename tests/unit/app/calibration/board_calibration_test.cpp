@@ -38,7 +38,7 @@ void expect_recovered(const BoardCalibration& c, const RigCalibration& truth, do
     if (k == 0) continue;
     const Vec6 e = place_error(c.rig.T_camera_left[k], truth.T_camera_left[k]);
     for (int i = 0; i < 6; ++i)
-      EXPECT_LT(std::abs(e(i)), sigmas * c.rig.sigma_wide[k][static_cast<std::size_t>(i)]) << i;
+      EXPECT_LT(std::abs(e(i)), sigmas * c.rig.sigma_total[k][static_cast<std::size_t>(i)]) << i;
   }
 }
 
@@ -94,8 +94,8 @@ TEST(BoardCalibration, SigmasCoverErrorsOverSeeds) {
     const Vec6 e = place_error(c.rig.T_camera_left[1], truth.T_camera_left[1]);
     for (int i = 0; i < 6; ++i) {
       const auto at = static_cast<std::size_t>(i);
-      squared += std::pow(e(i) / c.rig.sigma_wide[1][at], 2) / (6 * kSeeds);
-      EXPECT_GT(c.rig.sigma_wide[1][at], 0.5 * c.rig.sigma_noise[1][at]);
+      squared += std::pow(e(i) / c.rig.sigma_total[1][at], 2) / (6 * kSeeds);
+      EXPECT_GT(c.rig.sigma_total[1][at], 0.5 * c.rig.sigma_noise[1][at]);
     }
   }
   // The mean of 36 values, of which the six of one seed are correlated.

@@ -91,18 +91,18 @@ TEST(Coverage, cornersThatDoNotTellHowTheBoardStandsHaveNoTilt) {
 TEST(ViewCollector, takesAViewOnceHeldStillAndEndsWhenNothingIsMissing) {
   const RigCalibration rig = known_rig(2, CameraModelKind::pinhole_radtan);
   ViewCollector collector(nothing_yet(rig), 640);
-  EXPECT_EQ(collector.offer({}), OfferVerdict::not_seen);
-  std::map<OfferVerdict, int> verdicts;
+  EXPECT_EQ(collector.offer({}), OfferResult::not_seen);
+  std::map<OfferResult, int> verdicts;
   std::size_t poses = 0;
   for (const Transform& T : shown_around(kBoard, rig)) {
     if (collector.complete()) break;
     ++poses;
     const BoardView seen = seen_board(rig, kBoard, T);
     ASSERT_FALSE(seen.corners[0].empty() || seen.corners[1].empty()) << "pose " << poses;
-    EXPECT_EQ(collector.offer(seen), OfferVerdict::moving) << "it was elsewhere a moment ago";
-    const OfferVerdict held = collector.offer(seen);
-    EXPECT_TRUE(held == OfferVerdict::taken || held == OfferVerdict::nothing_new);
-    EXPECT_EQ(collector.offer(seen), OfferVerdict::nothing_new)
+    EXPECT_EQ(collector.offer(seen), OfferResult::moving) << "it was elsewhere a moment ago";
+    const OfferResult held = collector.offer(seen);
+    EXPECT_TRUE(held == OfferResult::taken || held == OfferResult::nothing_new);
+    EXPECT_EQ(collector.offer(seen), OfferResult::nothing_new)
         << "the same view again tells nothing";
     ++verdicts[held];
   }
@@ -118,10 +118,10 @@ TEST(ViewCollector, aBoardThatDriftsIsNotTaken) {
   (void)collector.offer(seen);
   for (int i = 0; i < 5; ++i) {
     for (BoardCorner& c : seen.corners[1]) c.pixel.x() += 1.2;  // px a set: above 0.15 % of 640
-    EXPECT_EQ(collector.offer(seen), OfferVerdict::moving);
+    EXPECT_EQ(collector.offer(seen), OfferResult::moving);
   }
   for (BoardCorner& c : seen.corners[1]) c.pixel.x() += 0.5;
-  EXPECT_EQ(collector.offer(seen), OfferVerdict::taken);
+  EXPECT_EQ(collector.offer(seen), OfferResult::taken);
 }
 
 TEST(ViewCollector, oneCameraAloneDoesNotCountInARig) {
@@ -129,8 +129,8 @@ TEST(ViewCollector, oneCameraAloneDoesNotCountInARig) {
   ViewCollector collector(nothing_yet(rig), 640);
   BoardView seen = seen_board(rig, kBoard, shown_around(kBoard, rig)[4]);
   seen.corners[1].clear();
-  EXPECT_EQ(collector.offer(seen), OfferVerdict::not_seen);
-  EXPECT_EQ(collector.offer(seen), OfferVerdict::not_seen);
+  EXPECT_EQ(collector.offer(seen), OfferResult::not_seen);
+  EXPECT_EQ(collector.offer(seen), OfferResult::not_seen);
 }
 
 /// In drawn images, sharper than any lens makes them, cornerSubPix is off by a tenth of a pixel

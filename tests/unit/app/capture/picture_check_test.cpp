@@ -1,4 +1,4 @@
-#include "app/capture/taking.hpp"
+#include "app/capture/capture_result.hpp"
 
 #include <gtest/gtest.h>
 
@@ -44,16 +44,16 @@ Picture squares(int w, int h) {
   return p;
 }
 
-std::vector<PictureRemark> judged(const std::vector<Picture>& pictures) {
+std::vector<ImageIssue> judged(const std::vector<Picture>& pictures) {
   static const std::vector<std::string> kNames{"left", "right", "middle"};
-  std::vector<PictureFigures> figures;
+  std::vector<ImageStatistics> figures;
   for (const Picture& p : pictures) figures.push_back(figures_of(p.view()));
-  return judge_pictures(std::span(kNames).first(pictures.size()), figures);
+  return evaluate_images(std::span(kNames).first(pictures.size()), figures);
 }
 
-TEST(PictureFigures, areThoseOfThePixelsAndNotOfThePadding) {
+TEST(ImageStatistics, areThoseOfThePixelsAndNotOfThePadding) {
   Picture p(4, 4, 100);
-  const PictureFigures flat = figures_of(p.view());
+  const ImageStatistics flat = figures_of(p.view());
   EXPECT_DOUBLE_EQ(flat.mean, 100);
   EXPECT_DOUBLE_EQ(flat.contrast, 0);
   EXPECT_DOUBLE_EQ(flat.saturated, 0);
@@ -61,7 +61,7 @@ TEST(PictureFigures, areThoseOfThePixelsAndNotOfThePadding) {
   EXPECT_DOUBLE_EQ(flat.sharpness, 0);
   for (int y = 0; y < 4; ++y) p.at(2, y) = p.at(3, y) = 254;
   p.at(0, 0) = 4;
-  const PictureFigures f = figures_of(p.view());
+  const ImageStatistics f = figures_of(p.view());
   EXPECT_DOUBLE_EQ(f.mean, (7 * 100 + 8 * 254 + 4) / 16.0);
   EXPECT_DOUBLE_EQ(f.saturated, 0.5);
   EXPECT_DOUBLE_EQ(f.dark, 1 / 16.0);
@@ -72,10 +72,10 @@ TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
   const auto remarks =
       judged({Picture(320, 240, 2), Picture(320, 240, 255), Picture(320, 240, 90)});
   ASSERT_EQ(remarks.size(), 3U);
-  EXPECT_TRUE(contains(remarks[0].sentence, "left is black"));
-  EXPECT_TRUE(contains(remarks[1].sentence, "right is overexposed: 100 %"));
-  EXPECT_TRUE(contains(remarks[2].sentence, "middle shows nothing"));
-  for (const PictureRemark& r : remarks) EXPECT_TRUE(r.unusable);
+  EXPECT_TRUE(contains(remarks[0].message, "left is black"));
+  EXPECT_TRUE(contains(remarks[1].message, "right is overexposed: 100 %"));
+  EXPECT_TRUE(contains(remarks[2].message, "middle shows nothing"));
+  for (const ImageIssue& r : remarks) EXPECT_TRUE(r.unusable);
 }
 
 TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
@@ -93,8 +93,8 @@ TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
   const auto remarks = judged({sharp, blurred});
   ASSERT_EQ(remarks.size(), 1U);
   EXPECT_FALSE(remarks[0].unusable);
-  EXPECT_TRUE(contains(remarks[0].sentence, "right is much less sharp than left"))
-      << remarks[0].sentence;
+  EXPECT_TRUE(contains(remarks[0].message, "right is much less sharp than left"))
+      << remarks[0].message;
 }
 
 TEST(PictureFiles, namesOfCamerasAreNamesOfFiles) {

@@ -26,7 +26,7 @@ struct Outcome {
   std::string out, err;
 };
 
-/// The command as a user gives it; a refusal comes back as exit code 2 and its sentence.
+/// The command as a user gives it; a refusal comes back as exit code 2 and its message.
 Outcome evaluate_command(std::vector<std::string> words) {
   CLI::App root("test", "vergence");
   Outcome outcome;
@@ -127,7 +127,8 @@ TEST(EvaluateCommand, estimatesTheMountBetweenTwoBodies) {
   }
   const std::string a = folder.write("ours.tum", ours).string(),
                     b = folder.write("theirs.tum", theirs).string();
-  const Outcome outcome = evaluate_command({a, b, "--axes", "flu", "--estimate-mount", "--json"});
+  const Outcome outcome =
+      evaluate_command({a, b, "--axes", "flu", "--estimate-ins-extrinsics", "--json"});
   ASSERT_EQ(outcome.code, ExitCode::done) << outcome.err;
   const auto mount = nlohmann::json::parse(outcome.out).at("mount");
   // T_ref_est is the inverse: turned back, and the arm seen from the reference.
@@ -181,7 +182,7 @@ TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
     EXPECT_EQ(o.code, ExitCode::done) << o.err;
     return nlohmann::json::parse(o.out);
   };
-  folder.write("s/summary.json", R"({"earth": {"mount": {"lever_arm_m": [0.9, 0.4, 0],
+  folder.write("s/summary.json", R"({"enu": {"mount": {"lever_arm_m": [0.9, 0.4, 0],
                                     "boresight_deg": [0, 0, 2], "source": "the test"}}})");
   for (const std::string& estimate : {session, elsewhere}) {
     const auto told = figures(estimate);
@@ -195,7 +196,7 @@ TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
 
   // Nobody says how it sits: what is left is the boresight of two degrees.
   for (const char* summary : {"{}", "{\"earth\": null}", "[1]", "torn",
-                              R"({"earth": {"mount": {"lever_arm_m": [0, 0, 0]}}})"}) {
+                              R"({"enu": {"mount": {"lever_arm_m": [0, 0, 0]}}})"}) {
     folder.write("s/summary.json", summary);
     const auto axes = figures(session);
     EXPECT_NEAR(axes["heading_error_deg"]["rms"].get<double>(), 2, 0.27) << summary;

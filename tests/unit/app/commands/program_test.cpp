@@ -19,7 +19,7 @@ using test::Outcome;
 using test::run_vergence;
 
 /// Refused as DESIGN §6 wants it: exit 2, nothing on stdout, one line on stderr.
-testing::AssertionResult refused_in_one_sentence(const Outcome& outcome) {
+testing::AssertionResult refused_in_one_message(const Outcome& outcome) {
   const auto lines = std::count(outcome.err.begin(), outcome.err.end(), '\n');
   if (outcome.code == 2 && outcome.out.empty() && lines == 1 && outcome.err.size() > 20)
     return testing::AssertionSuccess();
@@ -43,22 +43,22 @@ TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {
         : row.kind == Kind::option       ? name + " x" + out
                                          : name;
     const Outcome outcome = run_vergence(words);
-    EXPECT_TRUE(refused_in_one_sentence(outcome)) << name;
+    EXPECT_TRUE(refused_in_one_message(outcome)) << name;
     EXPECT_TRUE(contains(outcome.err, std::string(row.instead))) << name << ": " << outcome.err;
   }
 }
 
 TEST(Program, AnUnknownCommandNamesTheNearest) {
   const Outcome outcome = run_vergence("evalute a b");
-  EXPECT_TRUE(refused_in_one_sentence(outcome));
+  EXPECT_TRUE(refused_in_one_message(outcome));
   EXPECT_TRUE(contains(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?"))
       << outcome.err;
-  EXPECT_TRUE(refused_in_one_sentence(run_vergence("''")));
+  EXPECT_TRUE(refused_in_one_message(run_vergence("''")));
 }
 
 TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {
   const Outcome outcome = run_vergence("\"$(printf 'a\\033[2Jb\\nc')\"");
-  EXPECT_TRUE(refused_in_one_sentence(outcome));
+  EXPECT_TRUE(refused_in_one_message(outcome));
   EXPECT_FALSE(contains(outcome.err, "\033"));
 }
 

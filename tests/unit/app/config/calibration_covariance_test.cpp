@@ -116,8 +116,8 @@ TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
            {kRig + "covariance: {parameter: [right.rx], upper: [1]}\n",
             "c.yaml:6: covariance has the unknown key"},
        }) {
-    const std::string sentence = refusal(r.yaml);
-    EXPECT_TRUE(sentence.starts_with(r.beginning) && test::contains(sentence, r.says)) << sentence;
+    const std::string message = refusal(r.yaml);
+    EXPECT_TRUE(message.starts_with(r.beginning) && test::contains(message, r.says)) << message;
   }
 }
 

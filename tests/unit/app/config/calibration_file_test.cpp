@@ -57,7 +57,7 @@ TEST(CalibrationFile, ReadsTheDocumentedForm) {
   EXPECT_EQ(rig.intrinsics[1].distortion[4], 0.01);
   EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.75, 0.01, 0.02));
   EXPECT_EQ(rig.sigma_noise[1][5], 3e-3);
-  EXPECT_EQ(rig.sigma_wide[1][5], 0.0);
+  EXPECT_EQ(rig.sigma_total[1][5], 0.0);
   EXPECT_EQ(rig.found, Stamp(1403636584763555584));
   EXPECT_EQ(rig.frames, 60);
 }
@@ -89,12 +89,12 @@ CalibrationFile awkward() {
     c.rig.T_camera_left[k] = {exp_so3(Vec3(number(0.2), number(0.2), number(0.2))),
                               Vec3(-0.75 + number(0.1), number(0.1), number(0.1))};
     for (std::size_t j = 0; j < 6; ++j)
-      c.rig.sigma_noise[k][j] = (c.rig.sigma_wide[k][j] = number(1e-3) + 1e-3) / 3.0;
+      c.rig.sigma_noise[k][j] = (c.rig.sigma_total[k][j] = number(1e-3) + 1e-3) / 3.0;
     Mat6 root;
     for (int row = 0; row < 6; ++row)
       for (int column = 0; column < 6; ++column) root(row, column) = number(1e-3);
     const Mat6 product = root * root.transpose();
-    c.rig.covariance_wide[k] = product.selfadjointView<Eigen::Upper>();
+    c.rig.covariance_total[k] = product.selfadjointView<Eigen::Upper>();
   }
   c.rig.baseline = c.rig.T_camera_left[1].t.norm() * 1.001;
   c.rig.baseline_sigma = 1e-3 / 7.0;
@@ -126,8 +126,8 @@ TEST(CalibrationFile, WhatIsWrittenReadsBackToTheSameDoubles) {
     EXPECT_TRUE(lens(after) == lens(before));
     const auto place = [k](const CalibrationFile& c) {
       const RigCalibration& r = c.rig;
-      return std::tie(r.T_camera_left[k].R, r.T_camera_left[k].t, r.sigma_noise[k], r.sigma_wide[k],
-                      r.covariance_wide[k]);
+      return std::tie(r.T_camera_left[k].R, r.T_camera_left[k].t, r.sigma_noise[k],
+                      r.sigma_total[k], r.covariance_total[k]);
     };
     EXPECT_TRUE(place(after) == place(before));
   }
@@ -140,7 +140,7 @@ TEST(CalibrationFile, WhatIsWrittenReadsBackToTheSameDoubles) {
   EXPECT_EQ(format_calibration(after), format_calibration(before));
 }
 
-/// A part of the good file, what stands there instead, and how the sentence begins and what it
+/// A part of the good file, what stands there instead, and how the message begins and what it
 /// says.
 struct Fault {
   std::string part, instead;
@@ -203,9 +203,9 @@ TEST(CalibrationPlausibility, WhatCannotBeIsRefusedWithItsPlace) {
            {kGood, "version: 1\ncameras: [1, 2]\n", "c.yaml:2: cameras.0 is not a group"},
            {kGood, "version: 1\ncameras: [{}]\n", "c.yaml:2: cameras lists 1", "2 to 4"},
        }) {
-    const std::string sentence = refusal(with(f.part, f.instead));
-    EXPECT_TRUE(sentence.starts_with(f.beginning) && test::contains(sentence, f.says))
-        << f.instead << " gives: " << sentence;
+    const std::string message = refusal(with(f.part, f.instead));
+    EXPECT_TRUE(message.starts_with(f.beginning) && test::contains(message, f.says))
+        << f.instead << " gives: " << message;
   }
   for (const char* four_or_five : {"[1e-3, 1e-3, 1e-4, 1e-4]", "[1e-3, 1e-3, 1e-4, 1e-4, 1e-2]"})
     EXPECT_EQ(
@@ -249,11 +249,11 @@ TEST(CalibrationFile, fromScratchNothingButTheLengthOfAnOldTransformIsRead) {
   const std::string old =
       std::string(kNewRig).replace(std::string(kNewRig).rfind('}'), 1,
                                    ", T_camera_left: [0, -1, 0, 0.3, 1, 0, 0, 0.4, 0, 0, 1, 0], "
-                                   "sigma_wide: [1, 1, 1, 1, 1, 1]}");
+                                   "sigma_total: [1, 1, 1, 1, 1, 1]}");
   const RigCalibration rig = parse_calibration(old, "c.yaml", {.length_only = true}).rig;
   EXPECT_EQ(rig.T_camera_left[1].R, Mat3(Mat3::Identity()));
   EXPECT_EQ(rig.T_camera_left[1].t, Vec3(-0.5, 0, 0));
-  EXPECT_EQ(rig.sigma_wide[1][0], 0);
+  EXPECT_EQ(rig.sigma_total[1][0], 0);
   std::string no_length = kNewRig;
   no_length.replace(no_length.find("rig: {baseline: 0.5}\n"), 21, "");
   EXPECT_THROW((void)parse_calibration(no_length, "c.yaml", {.length_only = true}), InputError);
@@ -268,11 +268,11 @@ TEST(CalibrationFile, aGivenBaselineScalesEveryLengthByOneFactor) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k) {
     EXPECT_TRUE(rig.T_camera_left[k].t.isApprox(2 * before.T_camera_left[k].t, 1e-15));
     EXPECT_EQ(rig.T_camera_left[k].R, before.T_camera_left[k].R);
-    EXPECT_EQ(rig.sigma_wide[k][2], before.sigma_wide[k][2]);
-    EXPECT_EQ(rig.sigma_wide[k][4], 2 * before.sigma_wide[k][4]);
-    EXPECT_EQ(rig.covariance_wide[k](0, 0), before.covariance_wide[k](0, 0));
-    EXPECT_EQ(rig.covariance_wide[k](1, 4), 2 * before.covariance_wide[k](1, 4));
-    EXPECT_EQ(rig.covariance_wide[k](3, 5), 4 * before.covariance_wide[k](3, 5));
+    EXPECT_EQ(rig.sigma_total[k][2], before.sigma_total[k][2]);
+    EXPECT_EQ(rig.sigma_total[k][4], 2 * before.sigma_total[k][4]);
+    EXPECT_EQ(rig.covariance_total[k](0, 0), before.covariance_total[k](0, 0));
+    EXPECT_EQ(rig.covariance_total[k](1, 4), 2 * before.covariance_total[k](1, 4));
+    EXPECT_EQ(rig.covariance_total[k](3, 5), 4 * before.covariance_total[k](3, 5));
   }
 }
 

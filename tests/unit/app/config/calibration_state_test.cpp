@@ -98,10 +98,10 @@ TEST(StateFile, OfAnotherRigOrConfigurationIsNotUsedAndTheSentenceSaysWhy) {
   const auto path = folder / "not/there/yet/calibration_state.yaml";
   const CalibrationState first = read_state(path, configured());
   EXPECT_FALSE(first.calibration);
-  EXPECT_EQ(first.sentence, "") << "a first drive is nothing to tell";
+  EXPECT_EQ(first.message, "") << "a first drive is nothing to tell";
   write_state(path, configured());
   const CalibrationState same = read_state(path, configured());
-  ASSERT_TRUE(same.calibration) << same.sentence;
+  ASSERT_TRUE(same.calibration) << same.message;
   EXPECT_EQ(same.calibration->serials, configured().serials);
   EXPECT_EQ(same.calibration->configured->cameras[1].T_camera_left,
             configured().configured->cameras[1].T_camera_left);
@@ -143,7 +143,7 @@ TEST(StateFile, OfAnotherRigOrConfigurationIsNotUsedAndTheSentenceSaysWhy) {
     c.of(&expected);
     const CalibrationState state = read_state(path, expected);
     EXPECT_FALSE(state.calibration) << c.why;
-    EXPECT_TRUE(test::says(state.sentence, c.why, "calibration_state.yaml: is not used"));
+    EXPECT_TRUE(test::says(state.message, c.why, "calibration_state.yaml: is not used"));
   }
 }
 
@@ -152,8 +152,7 @@ TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
   folder.write("calibration_state.yaml", "version: 1\ncameras: [{name: left");
   const CalibrationState state = read_state(folder / "calibration_state.yaml", two_cameras());
   EXPECT_FALSE(state.calibration);
-  EXPECT_NE(state.sentence.find("the drive begins without it"), std::string::npos)
-      << state.sentence;
+  EXPECT_NE(state.message.find("the drive begins without it"), std::string::npos) << state.message;
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace {
 
 using test::contains;
 
-/// The sentence with which a configuration is refused; empty when it is taken.
+/// The message with which a configuration is refused; empty when it is taken.
 std::string refusal(const std::string& yaml, const std::vector<std::string>& set = {}) {
   return test::refusal_of([&] { (void)parse_configuration(yaml, "drive.yaml", set); });
 }
@@ -103,17 +103,17 @@ TEST(Configuration, AliasesThatUnfoldWithoutEndAreStopped) {
 
 TEST(Configuration, FilesThatCannotBeReadAreNamed) {
   const test::TemporaryFolder folder;
-  const auto sentence = [](const std::filesystem::path& path) {
+  const auto message = [](const std::filesystem::path& path) {
     return test::refusal_of([&] { (void)load_configuration(path, {}); });
   };
-  EXPECT_EQ(sentence(folder / "none.yaml"),
+  EXPECT_EQ(message(folder / "none.yaml"),
             (folder / "none.yaml").string() + ": there is no such file");
-  EXPECT_TRUE(contains(sentence(folder.path()), "is a folder"));
+  EXPECT_TRUE(contains(message(folder.path()), "is a folder"));
   const std::filesystem::path pipe = folder / "pipe.yaml";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_TRUE(contains(sentence(pipe), "is a pipe or a device"));
+  EXPECT_TRUE(contains(message(pipe), "is a pipe or a device"));
   EXPECT_TRUE(
-      contains(sentence(folder.write("huge.yaml", std::string(2'000'000, ' '))), "is larger than"));
+      contains(message(folder.write("huge.yaml", std::string(2'000'000, ' '))), "is larger than"));
   EXPECT_EQ(load_configuration(folder.write("good.yaml", "threads: 1\n"), {}).threads, 1);
 }
 
@@ -132,11 +132,11 @@ TEST(Configuration, AListOfWhatIsRecordedSwitchesItsWordsOn) {
   EXPECT_EQ(c.record.poses, 1);
   EXPECT_EQ(c.record.ins, 0);
   EXPECT_EQ(c.record.images, 1);
-  const auto keys = parse_configuration("record: {images: on, keep_s: 30}\n", "drive.yaml",
+  const auto keys = parse_configuration("record: {images: on, event_window_s: 30}\n", "drive.yaml",
                                         {"record=[ins]", "record.images=off"});
   EXPECT_EQ(keys.record.ins, 1);
   EXPECT_EQ(keys.record.images, 0);
-  EXPECT_EQ(keys.record.keep_s, 30);
+  EXPECT_EQ(keys.record.event_window_s, 30);
 }
 
 TEST(Configuration, aPresetIsWhatKeysAreThatNobodyGave) {
@@ -156,9 +156,9 @@ TEST(Configuration, aPresetIsWhatKeysAreThatNobodyGave) {
 TEST(Configuration, ABracketOrCommaThatNothingOpenedIsRefused) {
   // yaml-cpp 0.7 reads empty documents there for ever.
   for (const char* text : {",a: 1}", "  ,k: 2]x", "\n, 72], m", "threads: 1\n...\n,a: 1}"}) {
-    const std::string sentence = refusal(text);
-    EXPECT_TRUE(contains(sentence, "is not YAML") || contains(sentence, "several YAML documents"))
-        << text << ": " << sentence;
+    const std::string message = refusal(text);
+    EXPECT_TRUE(contains(message, "is not YAML") || contains(message, "several YAML documents"))
+        << text << ": " << message;
   }
   EXPECT_TRUE(contains(refusal("\n,a: 1}"), ":2: is not YAML: a value is expected"))
       << refusal("\n,a: 1}");

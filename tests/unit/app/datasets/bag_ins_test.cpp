@@ -91,7 +91,7 @@ class BagIns : public ::testing::TestWithParam<BagKind> {
   }
   [[nodiscard]] static std::string all(const RecordedIns& ins) {
     std::string text;
-    for (const std::string& sentence : ins.remarks) text += sentence + "\n";
+    for (const std::string& message : ins.remarks) text += message + "\n";
     return text;
   }
   [[nodiscard]] Vec3 error(const InsSample& s) const {

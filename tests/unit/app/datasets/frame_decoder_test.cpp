@@ -113,8 +113,14 @@ TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
   test::write_tiny_image(folder_ / "left/005.png", 1, 64, 48);
   const auto seen = drain(0, 8);
   ASSERT_EQ(seen.size(), 8U);
-  const std::vector<std::string> kinds = {
-      "", "image_missing", "image_torn", "image_unreadable", "image_torn", "image_size", "", ""};
+  const std::vector<std::string> kinds = {"",
+                                          "image_missing",
+                                          "image_truncated",
+                                          "image_unreadable",
+                                          "image_truncated",
+                                          "image_size",
+                                          "",
+                                          ""};
   for (std::size_t i = 0; i < 8; ++i) {
     EXPECT_EQ(seen[i].pair.kind, kinds[i]) << i;
     EXPECT_EQ(seen[i].pair.decoded, kinds[i].empty()) << i;
@@ -129,8 +135,8 @@ TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
 TEST_F(Decoder, aTimeThatGoesBackOrLeapsAheadSkipsItsFrameAndNotThoseAfterIt) {
   open(5);
   for (const auto& [times, skipped, kind] :
-       {std::tuple{"0.1\n0.2\n0.3\n0.2\n0.4\n", 3U, "time_backwards"},
-        std::tuple{"0.1\n1000.2\n0.3\n0.4\n0.5\n", 1U, "time_ahead"}}) {
+       {std::tuple{"0.1\n0.2\n0.3\n0.2\n0.4\n", 3U, "stamp_not_increasing"},
+        std::tuple{"0.1\n1000.2\n0.3\n0.4\n0.5\n", 1U, "stamp_outlier"}}) {
     folder_.write("times.txt", times);
     reopen();
     const auto seen = drain(0, 5);
@@ -172,14 +178,14 @@ TEST_F(Decoder, theConsumersSideAllocatesNothing) {
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   open(20);
   FrameDecoder decoder(sequence_, 0, 20, pool_);
-  const auto before = AllocationGuard::allocations_after_seal();
+  const auto before = AllocationGuard::runtime_allocations();
   int pairs = 0;
   {
     const SealedScope sealed;
     for (DecodedPair pair; decoder.next(&pair); ++pairs) decoder.release(pair);
   }
   EXPECT_EQ(pairs, 20);
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 }  // namespace

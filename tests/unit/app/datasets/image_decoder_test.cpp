@@ -208,7 +208,7 @@ TEST(JpegDecoder, aHoleInTheMiddleIsTornThoughTheEndIsThere) {
   FileBytes file = jpeg_of(noise);
   const auto third = static_cast<std::ptrdiff_t>(file.size() / 3);
   file.erase(file.begin() + third, file.begin() + 2 * third);
-  EXPECT_EQ(decode(file, 96, 96), ImageFileStatus::torn);
+  EXPECT_EQ(decode(file, 96, 96), ImageFileStatus::truncated);
 }
 
 TEST(JpegDecoder, moreScansThanACameraWritesAreRefusedBeforeTheyTakeHours) {
@@ -254,7 +254,7 @@ TEST(PngDecoder, pixelsThatAreFewerOrMoreThanTheHeadSaysStayInTheirRows) {
     append_chunk(&png, "IDAT", deflated(png_noise(kind, kWidth, rows)));
     append_chunk(&png, "IEND", {});
     EXPECT_EQ(decode(png, kWidth, kHeight),
-              rows < kHeight ? ImageFileStatus::torn : ImageFileStatus::ok)
+              rows < kHeight ? ImageFileStatus::truncated : ImageFileStatus::ok)
         << rows;
   }
 }

@@ -99,7 +99,7 @@ TEST_F(ImageFile, aBmpCutAnywhereIsTornAndOtherDepthsAreRefused) {
   const auto bytes = tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)));
   for (std::size_t n = 2; n < bytes.size(); n += n < 60 ? 1 : 37)
     EXPECT_EQ(decode({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n)}),
-              ImageFileStatus::torn)
+              ImageFileStatus::truncated)
         << n;
   auto other = bytes;
   other[28] = 16;  // bits a pixel
@@ -131,13 +131,13 @@ TEST_F(ImageFile, everyTruncationIsTorn) {
                                            whole.begin() + static_cast<std::ptrdiff_t>(n));
       // Of a few bytes nobody can say what they were to become.
       const ImageFileStatus status = decode(part);
-      EXPECT_TRUE(status == ImageFileStatus::torn ||
+      EXPECT_TRUE(status == ImageFileStatus::truncated ||
                   (n < 8 && status == ImageFileStatus::not_an_image))
           << name << " cut at " << n;
     }
     auto lacks_one = whole;
     lacks_one.pop_back();
-    EXPECT_EQ(decode(lacks_one), ImageFileStatus::torn) << name;
+    EXPECT_EQ(decode(lacks_one), ImageFileStatus::truncated) << name;
   }
 }
 
@@ -151,9 +151,9 @@ TEST_F(ImageFile, aSpoiltPngIsRefusedForWhatItIs) {
   };
   const std::size_t middle = whole.size() / 2;
   EXPECT_EQ(with(middle, middle + 1, static_cast<std::uint8_t>(whole[middle] ^ 4U)),
-            ImageFileStatus::torn)
+            ImageFileStatus::truncated)
       << "a bit of the pixels";
-  EXPECT_EQ(with(33, 37, 0xff), ImageFileStatus::torn) << "a length beyond the file";
+  EXPECT_EQ(with(33, 37, 0xff), ImageFileStatus::truncated) << "a length beyond the file";
   EXPECT_EQ(with(16, 24, 0x7f), ImageFileStatus::not_an_image) << "gigapixels";
   EXPECT_EQ(with(0, 40, 'x'), ImageFileStatus::not_an_image) << "another content";
   test::write_tiny_image(folder_ / "b.png", 1, kTinyWidth + 1, kTinyHeight);

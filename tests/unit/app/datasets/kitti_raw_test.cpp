@@ -102,8 +102,8 @@ void replace(const test::TemporaryFolder& f, const std::string& name, const std:
   ASSERT_NE(at, std::string::npos) << from;
   f.write(name, text.replace(at, from.size(), to));
 }
-std::string joined(const std::vector<std::string>& sentences) {
-  return fmt::format("{}", fmt::join(sentences, "; "));
+std::string joined(const std::vector<std::string>& messages) {
+  return fmt::format("{}", fmt::join(messages, "; "));
 }
 
 TEST(KittiRaw, ADriveIsFoundFromItsFolderItsDateAndAbove) {

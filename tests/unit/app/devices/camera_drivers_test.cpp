@@ -18,7 +18,7 @@ CameraRequest request(const std::string& driver, const std::string& serial) {
   return {"cameras.0",
           driver,
           serial,
-          PictureHalf::whole,
+          ImageHalf::whole,
           {320, 240, 30, Duration::milliseconds(2), 0, CameraTrigger::software}};
 }
 
@@ -41,15 +41,15 @@ TEST(CameraDrivers, whatACameraRefusesIsSaidWithItsName) {
   const test::GigeCamera simulator(small(0));
   CameraRequest r = request("gige", small(0).address);
   r.configuration.width = 640;
-  const std::string sentence = refusal({r});
+  const std::string message = refusal({r});
   EXPECT_NE(
-      sentence.find(
+      message.find(
           "cameras.0 (gige TABLE-0): Width 640 px is not possible: the camera offers 16 to 320 px"),
       std::string::npos)
-      << sentence;
+      << message;
 }
 
-CameraRequest half(const std::string& key, PictureHalf which, const std::string& serial) {
+CameraRequest half(const std::string& key, ImageHalf which, const std::string& serial) {
   CameraRequest r = request("gige", serial);
   r.key = key;
   r.half = which;
@@ -58,20 +58,20 @@ CameraRequest half(const std::string& key, PictureHalf which, const std::string&
 }
 
 TEST(CameraDrivers, entriesThatContradictEachOtherAreRefused) {
-  const CameraRequest left = half("cameras.0", PictureHalf::left, "A");
-  CameraRequest other = half("cameras.1", PictureHalf::right, "A");
+  const CameraRequest left = half("cameras.0", ImageHalf::left, "A");
+  CameraRequest other = half("cameras.1", ImageHalf::right, "A");
   other.configuration.exposure = Duration::milliseconds(1);
   EXPECT_TRUE(test::says(refusal({request("gige", "A"), request("gige", "A")}), "two entries"));
-  EXPECT_TRUE(test::says(refusal({left, half("cameras.1", PictureHalf::right, "B")}),
-                         "cameras.0.half is left, and no other entry is the right half"));
+  EXPECT_TRUE(test::says(refusal({left, half("cameras.1", ImageHalf::right, "B")}),
+                         "cameras.0.image_half is left, and no other entry is the right half"));
   EXPECT_TRUE(test::says(refusal({left, other}), "cameras.0 and cameras.1 are halves"));
 }
 
 TEST(CameraDrivers, twoHalvesAreOneCamera) {
   const test::GigeCamera simulator(small(3));
   std::vector<std::string> remarks;
-  const auto cameras = open_cameras({half("cameras.0", PictureHalf::right, small(3).address),
-                                     half("cameras.1", PictureHalf::left, small(3).address)},
+  const auto cameras = open_cameras({half("cameras.0", ImageHalf::right, small(3).address),
+                                     half("cameras.1", ImageHalf::left, small(3).address)},
                                     &remarks);
   ASSERT_EQ(cameras.size(), 2U);
   EXPECT_NE(cameras[0].device->info().model.find("right half"), std::string::npos);

@@ -28,7 +28,7 @@ std::string pgm(const std::string& head, char value = 1) {
   return head + std::string(kWidth * kHeight, value);
 }
 
-/// The sentence with which a mask of camera 1 is refused.
+/// The message with which a mask of camera 1 is refused.
 std::string refusal(const std::filesystem::path& folder, const std::string& name) {
   Configuration c;
   c.folder = folder;

@@ -60,32 +60,32 @@ std::string refusal(const std::string& yaml) {
 TEST(DriveSync, whatCannotBePairedIsRefusedWithWhatToDo) {
   for (const auto& [yaml, says] : std::vector<std::pair<const char*, const char*>>{
            {"sync: {mode: bord}", "did you mean \"board\"?"},
-           {"sync: {mode: board}", "set trigger.driver to board, or sync.mode to counter"},
+           {"sync: {mode: board}", "set trigger.driver to board, or sync.mode to frame_counter"},
            {"sync: {mode: ins_syncout}", "has no SyncOut"},
            {"sync: {mode: ins_syncout}\nins: {driver: xsens}", "ins.sync_out_hz says how many"},
            {"sync: {mode: ins_syncout}\nins: {driver: xsens, sync_out_hz: 25}\ntrigger: {rate: 30}",
             "both are one rate"},
-           {"sync: {mode: bus}", "share its cycle timer"},
+           {"sync: {mode: ieee1394_cycle_time}", "share its cycle timer"},
            {"sync: {mode: ptp}", "does not say ptp: on"},
-           {"sync: {mode: one_picture}", "cameras.0.half is whole"},
+           {"sync: {mode: side_by_side}", "cameras.0.image_half is whole"},
            {"sync: {mode: master_strobe}", "camera 0 triggers the others, so it is free"},
            {"sync: {mode: master_strobe}\ncameras: [{driver: gige, trigger: free}, {driver: "
             "gige, trigger: free}]",
             "camera 0's strobe triggers it"},
            {"cameras: [{driver: gige, trigger: free}, {driver: gige, trigger: free}]",
-            "set sync.mode to software"},
-           {"sync: {mode: board}\ntrigger: {driver: board, rate: 200, vary_us: 1500}",
+            "set sync.mode to approximate_time"},
+           {"sync: {mode: board}\ntrigger: {driver: board, rate: 200, dither_us: 1500}",
             "the camera would miss pulses"},
-           {"sync: {mode: board}\ntrigger: {driver: board, rate: 100, vary_us: 6000}",
+           {"sync: {mode: board}\ntrigger: {driver: board, rate: 100, dither_us: 6000}",
             "more than half of the 10000"},
-           {"sync: {mode: board}\ntrigger: {driver: board, rate: 10, vary_us: 20000, width_us: "
+           {"sync: {mode: board}\ntrigger: {driver: board, rate: 10, dither_us: 20000, width_us: "
             "90000}",
             "a pulse would last until the next"},
            {"sync: {mode: board}\ntrigger: {driver: board, lines: 1}",
             "leaves out the line of a camera"},
            {"sync: {mode: board}\ntrigger: {driver: board, pps: up}",
             "it is one of none, rising, falling"},
-           {"sync: {mode: software, tolerance_ms: 100}", "at most half of the interval"}})
+           {"sync: {mode: approximate_time, tolerance_ms: 100}", "at most half of the interval"}})
     EXPECT_TRUE(test::says(refusal(yaml), says)) << yaml;
 }
 

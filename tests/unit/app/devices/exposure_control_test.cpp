@@ -99,7 +99,7 @@ TEST(ExposureControl, aCameraThatWasAwayDuringAChangeIsGivenItWhenItIsBack) {
   const ExposureSetting start{Duration::microseconds(1000), 0};
   SlowCamera camera;  // dark: a longer exposure is asked for
   camera.has = start;
-  camera.answer = DeviceStatus::gone;
+  camera.answer = DeviceStatus::disconnected;
   exposure::ExposureOptions options;
   ExposureControl control({&camera}, kWidth, kHeight, {}, options, start, true);
   Frame frame;

@@ -15,14 +15,14 @@ namespace {
 
 enum class Refusal { none, input, device };
 
-Refusal refusal_of(const std::function<void()>& open, std::string* sentence) {
+Refusal refusal_of(const std::function<void()>& open, std::string* message) {
   try {
     open();
   } catch (const InputError& e) {
-    *sentence = e.what();
+    *message = e.what();
     return Refusal::input;
   } catch (const DeviceError& e) {
-    *sentence = e.what();
+    *message = e.what();
     return Refusal::device;
   }
   return Refusal::none;
@@ -36,15 +36,15 @@ TEST(MissingDevices, aCameraThatIsNotThereIsADeviceErrorOfEveryDriver) {
     const CameraRequest request{"cameras.0",
                                 driver,
                                 serial,
-                                PictureHalf::whole,
+                                ImageHalf::whole,
                                 {320, 240, 30, Duration::milliseconds(2), 0, CameraTrigger::free}};
-    std::string sentence;
+    std::string message;
     std::vector<std::string> remarks;
-    EXPECT_EQ(refusal_of([&] { (void)open_cameras({request}, &remarks); }, &sentence),
+    EXPECT_EQ(refusal_of([&] { (void)open_cameras({request}, &remarks); }, &message),
               Refusal::device)
-        << sentence;
-    EXPECT_NE(sentence.find("cameras.0"), std::string::npos) << sentence;
-    EXPECT_NE(sentence.find(serial), std::string::npos) << sentence;
+        << message;
+    EXPECT_NE(message.find("cameras.0"), std::string::npos) << message;
+    EXPECT_NE(message.find(serial), std::string::npos) << message;
   }
 }
 
@@ -54,12 +54,12 @@ TEST(MissingDevices, aPortThatIsNotThereIsADeviceErrorOfEveryIns) {
     request.driver = driver;
     request.port = "/dev/ttyNotThere";
     request.rate_hz = 100;
-    std::string sentence;
+    std::string message;
     std::vector<std::string> remarks;
-    EXPECT_EQ(refusal_of([&] { (void)open_ins(request, &remarks); }, &sentence), Refusal::device)
-        << driver << ": " << sentence;
-    EXPECT_NE(sentence.find("/dev/ttyNotThere cannot be opened: not found"), std::string::npos)
-        << sentence;
+    EXPECT_EQ(refusal_of([&] { (void)open_ins(request, &remarks); }, &message), Refusal::device)
+        << driver << ": " << message;
+    EXPECT_NE(message.find("/dev/ttyNotThere cannot be opened: not found"), std::string::npos)
+        << message;
   }
 }
 
@@ -68,16 +68,16 @@ TEST(MissingDevices, aTriggerBoardThatIsNotThereIsADeviceError) {
   settings.port = "/dev/ttyNotThere";
   TriggerConfiguration pulses;
   pulses.rate_hz = 30;
-  std::string sentence;
+  std::string message;
   std::vector<std::string> remarks;
-  EXPECT_EQ(refusal_of([&] { (void)open_trigger_board(settings, pulses, &remarks); }, &sentence),
+  EXPECT_EQ(refusal_of([&] { (void)open_trigger_board(settings, pulses, &remarks); }, &message),
             Refusal::device)
-      << sentence;
-  EXPECT_NE(sentence.find("trigger: the board on /dev/ttyNotThere"), std::string::npos) << sentence;
+      << message;
+  EXPECT_NE(message.find("trigger: the board on /dev/ttyNotThere"), std::string::npos) << message;
   settings.port = "a serial number that no board has";
-  EXPECT_EQ(refusal_of([&] { (void)open_trigger_board(settings, pulses, &remarks); }, &sentence),
+  EXPECT_EQ(refusal_of([&] { (void)open_trigger_board(settings, pulses, &remarks); }, &message),
             Refusal::device)
-      << sentence;
+      << message;
 }
 
 }  // namespace

@@ -204,7 +204,7 @@ TEST(Doctor, FindingsByMachine) {
     ASSERT_EQ(states, c.states);
     if (found.empty()) continue;
     std::string text = found[0].message;
-    for (const std::string& command : found[0].mend) text += "\n" + command;
+    for (const std::string& command : found[0].fix) text += "\n" + command;
     EXPECT_TRUE(contains(text, c.part)) << text;
   }
 }
@@ -220,7 +220,7 @@ TEST(Doctor, LastingBufferIsReadAfterThePackagesOwn) {
   FakeMachine f;
   put_gige(f);
   f.file("/proc/sys/net/core/rmem_max", "212992\n");
-  const std::string name = std::filesystem::path(f.of("receive_buffer")[0].mend.back()).filename();
+  const std::string name = std::filesystem::path(f.of("receive_buffer")[0].fix.back()).filename();
   int files = 0;
   for (const auto& file : std::filesystem::directory_iterator(VERGENCE_SOURCE_DIR "/packaging")) {
     if (file.path().extension() != ".conf") continue;

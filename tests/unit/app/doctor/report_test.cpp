@@ -30,7 +30,7 @@ TEST(DoctorReport, CommandsStayWholeAndDevicesCannotSteerTheTerminal) {
   EXPECT_EQ(json["ok"], 1);
   EXPECT_EQ(json["findings"][0]["check"], "receive_buffer");
   EXPECT_EQ(json["findings"][0]["state"], "problem");
-  EXPECT_EQ(json["findings"][0]["mend"].at(0), command);
+  EXPECT_EQ(json["findings"][0]["fix"].at(0), command);
 }
 
 TEST(DevicesReport, DevicesCannotSteerTheTerminal) {

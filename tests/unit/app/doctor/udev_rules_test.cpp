@@ -21,7 +21,7 @@ testing::AssertionResult holds_as_rules(const std::string& rules) {
   const test::TemporaryFolder folder;
   const auto file = folder.write("98-rig.rules", rules);
   const std::string command = "python3 '" VERGENCE_SOURCE_DIR
-                              "/tests/system/house/udev_rules.py' '" +
+                              "/tests/system/repository/udev_rules.py' '" +
                               file.string() + "' >'" + (folder / "out").string() + "' 2>&1";
   if (std::system(command.c_str()) == 0) return testing::AssertionSuccess();
   return testing::AssertionFailure() << test::read_file(folder / "out") << rules;

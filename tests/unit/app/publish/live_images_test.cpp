@@ -48,7 +48,7 @@ class Images : public testing::Test {
 
 TEST_F(Images, areTakenOnceWhenSomebodyWantsThemWithoutMemory) {
   const SealedScope sealed;
-  const auto before = AllocationGuard::allocations_after_seal();
+  const auto before = AllocationGuard::runtime_allocations();
   images_->take_images(frame_);
   images_->take_points(frame_, tracks_);
   EXPECT_FALSE(images_->ready()) << "nobody asked";
@@ -69,7 +69,7 @@ TEST_F(Images, areTakenOnceWhenSomebodyWantsThemWithoutMemory) {
   images_->take_images(frame_);
   images_->take_points(frame_, tracks_);
   EXPECT_TRUE(images_->points().empty()) << "the tracks are of frame 9";
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 TEST_F(Images, aThumbnailIsASmallJpegOfTheImage) {

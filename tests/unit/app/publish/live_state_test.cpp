@@ -23,10 +23,10 @@ FrameReport at(double metres, PoseStatus status = PoseStatus::ok) {
   return r;
 }
 
-EventRecord event(const char* kind, std::string_view sentence) {
+EventRecord event(const char* kind, std::string_view message) {
   EventRecord e;
   e.kind = kind;
-  e.set_sentence(sentence);
+  e.set_message(message);
   return e;
 }
 
@@ -38,7 +38,7 @@ CalibrationRecord calibration(bool learnt, double x) {
   c.cause = CalibrationCause::refinement;
   c.calibration.cameras = 2;
   c.calibration.T_camera_left[1].t = {x, 0, 0};
-  if (learnt) c.calibration.sigma_wide[1] = {1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
+  if (learnt) c.calibration.sigma_total[1] = {1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
   return c;
 }
 
@@ -93,8 +93,8 @@ TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
   }
   const json trail = json::parse(state.hello(kNow))["trail"];
   EXPECT_TRUE(anew);
-  EXPECT_LE(trail.size(), LiveTrail::kMost);
-  EXPECT_GE(trail.size(), LiveTrail::kMost / 2);
+  EXPECT_LE(trail.size(), LiveTrail::kMax);
+  EXPECT_GE(trail.size(), LiveTrail::kMax / 2);
   EXPECT_EQ(trail.front()[2], 0.0);
   EXPECT_GE(trail.back()[2].get<double>(), 49'900.0);
   EXPECT_GE(told + 100, trail.size()) << "a viewer who was there has as much";
@@ -164,7 +164,7 @@ TEST(LiveState, eventsAndCalibrationsAreTheNewest) {
   for (int i = 0; i < 1000; ++i) state.add(event("mark", std::to_string(i)));
   const json events = json::parse(state.update(kNow, -1))["events"];
   EXPECT_EQ(events.size(), LiveState::kEvents);
-  EXPECT_EQ(events.back()["sentence"], "999");
+  EXPECT_EQ(events.back()["message"], "999");
   for (int i = 0; i < 100; ++i) state.add(calibration(true, -0.5));
   EXPECT_EQ(json::parse(state.hello(kNow))["calibration"]["history"].size(),
             LiveState::kCalibrations);
@@ -178,7 +178,7 @@ TEST(LiveState, aCalibrationStandsWithTwoSigmaAndWhatTheDriveMeasuredBesideIt) {
   EXPECT_EQ(c["cameras"][1]["figures"][3][0], -750.0);
   EXPECT_TRUE(c["cameras"][1]["figures"][3][1].is_null()) << "given without a sigma";
   EXPECT_FALSE(c.contains("measured"));
-  state.add(event("calibration_confirmed", ""));
+  state.add(event("calibration_verified", ""));
   state.add(calibration(true, -0.751));
   c = json::parse(state.update(kNow, -1))["calibration"];
   EXPECT_TRUE(c["confirmed"].get<bool>());

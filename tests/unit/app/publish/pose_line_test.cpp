@@ -42,7 +42,7 @@ PoseSample sample() {
   return s;
 }
 
-nlohmann::json line_of(const PoseSample& pose, const std::optional<EarthPose>& earth,
+nlohmann::json line_of(const PoseSample& pose, const std::optional<EnuPose>& earth,
                        std::optional<double> age) {
   std::string line = "what was there before";
   write_pose_line(pose, earth, age, 7, &line);
@@ -52,7 +52,7 @@ nlohmann::json line_of(const PoseSample& pose, const std::optional<EarthPose>& e
 }
 
 TEST(PoseLine, hasWhatTheSchemaSays) {
-  EarthPose earth;
+  EnuPose earth;
   earth.T_enu_left.t = {1, 2, 3};
   earth.position = {-27.4975, 153.0137, 60};
   earth.yaw = (90 - 358.25) * std::numbers::pi / 180;
@@ -75,9 +75,9 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   ASSERT_EQ(j["motion_covariance"].size(), 21U);
   EXPECT_DOUBLE_EQ(j["motion_covariance"][6], 0.0004);
   EXPECT_DOUBLE_EQ(j["length_sigma"], 0.0125);
-  EXPECT_EQ(j["earth"]["enu_m"], (std::vector<double>{1, 2, 3}));
-  EXPECT_EQ(j["earth"]["latitude_deg"], -27.4975);
-  EXPECT_EQ(j["earth"]["heading_deg"], 358.25);
+  EXPECT_EQ(j["enu"]["enu_m"], (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(j["enu"]["latitude_deg"], -27.4975);
+  EXPECT_EQ(j["enu"]["heading_deg"], 358.25);
   EXPECT_EQ(j["inliers"], 44);
   EXPECT_EQ(j["stereo_inliers"], 33);
   EXPECT_EQ(j["reprojection_px"], 0.25);
@@ -90,10 +90,10 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
 TEST(PoseLine, ofALostFrameHasNoPlace) {
   PoseSample lost = sample();
   lost.status = PoseStatus::lost;
-  const auto j = line_of(lost, EarthPose{}, std::nullopt);
+  const auto j = line_of(lost, EnuPose{}, std::nullopt);
   EXPECT_TRUE(j["pose"].is_null());
   EXPECT_TRUE(j["covariance"].is_null());
-  EXPECT_TRUE(j["earth"].is_null());
+  EXPECT_TRUE(j["enu"].is_null());
   EXPECT_TRUE(j["age_ms"].is_null());
 }
 
@@ -230,18 +230,18 @@ TEST(LinePublisher, takesNoMemoryOnTheEstimatorsThreadAndBringsPosesToTheEarth) 
   std::atomic<bool> open{true};
   LinePublisher publisher(std::make_unique<Kept>(&lines, &open), &requests, {});
   publisher.on_start({});
-  Placement placement;
-  placement.T_enu_world.t = {1, 2, 3};
+  EnuAlignment alignment;
+  alignment.T_enu_world.t = {1, 2, 3};
   AllocationGuard::seal_thread();
-  const auto before = AllocationGuard::allocations_after_seal();
-  publisher.on_placement(placement, {-27.4975, 153.0137, 60});
+  const auto before = AllocationGuard::runtime_allocations();
+  publisher.on_enu_alignment(alignment, {-27.4975, 153.0137, 60});
   publisher.on_pose(sample(0));
-  const auto taken = AllocationGuard::allocations_after_seal() - before;
+  const auto taken = AllocationGuard::runtime_allocations() - before;
   AllocationGuard::unseal_thread();
   EXPECT_EQ(taken, 0U);
   (void)publisher.counters();
   ASSERT_EQ(lines.size(), 1U);
-  EXPECT_EQ(nlohmann::json::parse(lines[0])["earth"]["enu_m"], (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(nlohmann::json::parse(lines[0])["enu"]["enu_m"], (std::vector<double>{1, 2, 3}));
 }
 
 TEST(LinePublisher, GreetsWithTheNewestCalibrationInUseAndTheAlignment) {
@@ -258,7 +258,7 @@ TEST(LinePublisher, GreetsWithTheNewestCalibrationInUseAndTheAlignment) {
     record.accepted = accepted;
     publisher.on_calibration(record);
   }
-  publisher.on_placement({}, {-27.4975, 153.0137, 60});
+  publisher.on_enu_alignment({}, {-27.4975, 153.0137, 60});
   (void)publisher.counters();
   const std::size_t end = socket->greeting.find('\n') + 1;
   EXPECT_EQ(nlohmann::json::parse(socket->greeting.substr(0, end))["stamp_ns"], 2);

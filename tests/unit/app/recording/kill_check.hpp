@@ -25,9 +25,9 @@ namespace vergence::test {
 
 /// When each message was posted: shared with the process that is killed.
 struct PostTimes {
-  static constexpr std::uint32_t kMost = 1U << 16U;
+  static constexpr std::uint32_t kMax = 1U << 16U;
   std::atomic<std::uint32_t> posted{0};
-  std::array<std::int64_t, kMost> at_ns{};  // steady clock
+  std::array<std::int64_t, kMax> at_ns{};  // steady clock
 };
 
 inline std::int64_t steady_ns() {
@@ -54,7 +54,7 @@ inline Killed record_and_kill(const std::filesystem::path& folder,
     o.files.topics = {{"/text", app::RosType::text, false}, {"/image", app::RosType::image, false}};
     o.queues = {8U << 20U};
     app::Recording recording(folder, o);
-    for (std::uint32_t n = 0; n < PostTimes::kMost; ++n) {
+    for (std::uint32_t n = 0; n < PostTimes::kMax; ++n) {
       const Stamp stamp(std::int64_t{n} * 1'000'000);
       if (n % 33 == 0 && !recording.begin(0, 1, stamp, 100'000, true).empty())
         recording.commit(0, 100'000);

@@ -263,7 +263,7 @@ TEST(Recording, postingAndWritingTakeNoMemory) {
   o.files.roll_bytes = 100'000;
   o.files.disk = &disk;
   Recording recording(folder.path(), o);
-  const auto before = AllocationGuard::allocations_after_seal();
+  const auto before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     for (int i = 0; i < 2000; ++i) {
@@ -276,7 +276,7 @@ TEST(Recording, postingAndWritingTakeNoMemory) {
     }
   }
   recording.close();
-  EXPECT_EQ(AllocationGuard::allocations_after_seal() - before, 0U);
+  EXPECT_EQ(AllocationGuard::runtime_allocations() - before, 0U);
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ TEST(Analysis, withoutAReferenceThereAreNoErrorsAndItIsSaid) {
     EXPECT_EQ(a.source, ErrorSource::none);
     for (const auto* curve : {&a.horizontal_m, &a.vertical_m, &a.heading_deg})
       for (const double v : *curve) EXPECT_TRUE(std::isnan(v));
-    EXPECT_NE(a.source_sentence.find(why), std::string::npos) << a.source_sentence;
+    EXPECT_NE(a.source_message.find(why), std::string::npos) << a.source_message;
   }
   EXPECT_FALSE(analyse(bent_drive(50)).drift.has_value());
   EXPECT_TRUE(analyse(unplaced).ins_unplaced);
@@ -124,13 +124,13 @@ TEST(Analysis, driftAgainstTheInsIsByPositionsWhateverItsAttitudeAndThePlacement
     const Vec3 p = exp_so3({0, 0, 0.4}) * up * f.T_world_left.t;
     f.placed = f.has_ins = f.compared = true;
     f.ins = {p.x(), p.y(), p.z()};
-    f.enu = {0.9 * p.x(), p.y(), p.z()};  // a bad placement: its errors are large
+    f.enu = {0.9 * p.x(), p.y(), p.z()};  // a bad alignment: its errors are large
     f.error = {-0.1 * p.x(), 0, 0};
   }
   EXPECT_LT(analyse(s).drift.value(), 1e-9);
   for (Frame& f : s.frames) f.T_world_left.t *= 1.02;  // two per cent too long
   const Analysis a = analyse(s);
-  EXPECT_NE(a.drift_sentence.find("300 m"), std::string::npos);
+  EXPECT_NE(a.drift_message.find("300 m"), std::string::npos);
   // 300 m of ours are an arc of 300/102 rad on a circle of 102 m; the ways differ by 2 m of radius
   // over its chord.
   EXPECT_NEAR(a.drift.value(), 2 * 2 * std::sin(150.0 / 102) / 300, 2e-4);

@@ -85,13 +85,13 @@ TEST(Page, hostileTextNeverBecomesMarkup) {
   writer_of(200).write(folder.path());
   const std::string evil = "</svg><script>alert(1)</script><img src=x onerror=alert(2)>";
   std::ofstream(folder / "events.jsonl", std::ios::app)
-      << R"({"stamp_ns":1,"kind":")" << evil << R"(","sentence":")" << evil
-      << std::string(5000, 'x') << "\"}\n";
+      << R"({"stamp_ns":1,"kind":")" << evil << R"(","message":")" << evil << std::string(5000, 'x')
+      << "\"}\n";
   std::ofstream(folder / "calibrations.csv", std::ios::app)
       << "1,accepted," << evil << ',' << evil << ",1,7,0,1,1,1,0,1,0,0,0,0,0,0"
       << std::string(20, ',') << '\n';
   folder.write("summary.json", R"({"version":")" + evil + R"(","configuration_hash":")" + evil +
-                                   R"(","calibration":{"source":")" + evil + R"(","word":")" +
+                                   R"(","calibration":{"source":")" + evil + R"(","rating":")" +
                                    evil + R"("},"truth":{")" + evil + R"(":1}})");
   const std::string html = page_of(folder.path());
   EXPECT_EQ(test::xml_problem({html}), "");

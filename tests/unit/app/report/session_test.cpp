@@ -89,9 +89,9 @@ TEST(ReadSession, aWholeOneHasNothingMissing) {
   EXPECT_EQ(s.calibrations[3].held_out_after_px, 0.21);
   EXPECT_TRUE(s.calibrations[4].kept && !s.calibrations[4].accepted);
   EXPECT_FALSE(s.calibrations[1].kept);
-  EXPECT_EQ(s.calibrations[4].judged_depth_m, 20);
+  EXPECT_EQ(s.calibrations[4].reference_depth_m, 20);
   EXPECT_NEAR(s.calibrations[4].depth_sigma_percent, 0.1, 1e-9);
-  EXPECT_NEAR(s.calibrations[4].depth_difference_percent, 0.24, 1e-9);
+  EXPECT_NEAR(s.calibrations[4].depth_error_percent, 0.24, 1e-9);
   EXPECT_EQ(s.reference.size(), 392U);
   EXPECT_TRUE(s.calibration.has_value());
   EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);

@@ -272,7 +272,7 @@ INSTANTIATE_TEST_SUITE_P(All, BridgeStatus,
 /// The bridge's list names reasons as the stream has them: a renamed one would be widened less.
 TEST(Bridge, EveryReasonOfTheListIsOne) {
   std::map<double, int> reasons;  // by the variance that they make of 1
-  for (int i = 1; i <= static_cast<int>(Reason::unproven_pairing); ++i) {
+  for (int i = 1; i <= static_cast<int>(Reason::pairing_ambiguous); ++i) {
     Kept kept;
     Bridge bridge({}, &kept);
     Pose pose;

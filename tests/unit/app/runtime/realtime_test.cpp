@@ -84,11 +84,11 @@ TEST(Realtime, aRefusalIsOneSentenceWithWhatAllowsIt) {
   const auto memory = threads.lock_memory();
   ASSERT_EQ(memory.size(), 1U);
   EXPECT_TRUE(mentions(memory[0], "LimitMEMLOCK") && mentions(memory[0], "ulimit -l")) << memory[0];
-  const auto sentences = threads.apply(kDrive);
-  ASSERT_EQ(sentences.size(), 2U) << "one for each key, however many threads there are";
-  EXPECT_TRUE(mentions(sentences[0], "realtime.affinity")) << sentences[0];
-  EXPECT_TRUE(mentions(sentences[1], "setcap") && mentions(sentences[1], "LimitRTPRIO=40"))
-      << sentences[1];
+  const auto messages = threads.apply(kDrive);
+  ASSERT_EQ(messages.size(), 2U) << "one for each key, however many threads there are";
+  EXPECT_TRUE(mentions(messages[0], "realtime.affinity")) << messages[0];
+  EXPECT_TRUE(mentions(messages[1], "setcap") && mentions(messages[1], "LimitRTPRIO=40"))
+      << messages[1];
   EXPECT_TRUE(threads.apply({{20, "vergence-v4l2"}}).empty());
 }
 
@@ -115,7 +115,7 @@ TEST(Realtime, theKernelSchedulesAThreadAsAskedFor) {
   RealtimeThreads threads(request, system);
   std::vector<ProcessThread> all;
   process_threads(&all);
-  const auto sentences = threads.apply(all);
+  const auto messages = threads.apply(all);
   sched_param parameter{};
   const int policy = ::sched_getscheduler(id);
   EXPECT_EQ(::sched_getparam(id, &parameter), 0);
@@ -127,7 +127,7 @@ TEST(Realtime, theKernelSchedulesAThreadAsAskedFor) {
   worker.join();
   EXPECT_EQ(CPU_COUNT(&set), 1);
   EXPECT_TRUE(CPU_ISSET(first, &set));
-  if (!sentences.empty()) GTEST_SKIP() << "no real-time priority is allowed here: " << sentences[0];
+  if (!messages.empty()) GTEST_SKIP() << "no real-time priority is allowed here: " << messages[0];
   EXPECT_EQ(policy, SCHED_FIFO | SCHED_RESET_ON_FORK);
   EXPECT_EQ(parameter.sched_priority, 9);
 }

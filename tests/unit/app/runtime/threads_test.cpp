@@ -55,7 +55,7 @@ TEST(BackgroundThread, allocatesNothingPerTaskAndSealsItsThread) {
   BackgroundThread runner;
   bool sealed = false;
   auto look = [&] { sealed = AllocationGuard::thread_sealed(); };
-  const auto before = AllocationGuard::allocations_after_seal();
+  const auto before = AllocationGuard::runtime_allocations();
   {
     const SealedScope scope;
     for (int i = 0; i < 200; ++i) {
@@ -64,7 +64,7 @@ TEST(BackgroundThread, allocatesNothingPerTaskAndSealsItsThread) {
     }
   }
   EXPECT_TRUE(sealed);
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 TEST(ThreadRunner, runsHereOnTheCallerAndThereOnOneOtherThread) {

@@ -80,7 +80,7 @@ class RecordedPoses {
 
   test::TemporaryFolder folder_;
   IdleSolver solver_;
-  SolverWatch watch_{solver_};
+  ReplayableSolverRunner watch_{solver_};
   SourceFacts facts_ = calibrated_pair();
   Configuration configuration_;
   DriveRecorder recorder_;
@@ -88,7 +88,7 @@ class RecordedPoses {
 };
 
 TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
-  RecordedPoses drive({"record=[poses]", "record.roll_mb=1"});
+  RecordedPoses drive({"record=[poses]", "record.split_mb=1"});
   for (int i = 0; i < 100 && drive.rigs("drive_1.mcap") == 0; ++i) {
     drive.drive(100);
     std::this_thread::sleep_for(100ms);
@@ -101,7 +101,7 @@ TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
 // The queues are as large as the time asked for needs.
 TEST(DriveRecorder, allOfTheTimeBeforeAnEventIsKept) {
   constexpr int kKept = 20 * 300;
-  RecordedPoses drive({"record=[poses]", "record.keep_s=300"});
+  RecordedPoses drive({"record=[poses]", "record.event_window_s=300"});
   drive.drive(kKept + 100);
   drive.mark();
   drive.drive(1);
@@ -110,7 +110,7 @@ TEST(DriveRecorder, allOfTheTimeBeforeAnEventIsKept) {
 }
 
 TEST(DriveRecorder, whatIsKeptAroundAnEventSaysWhereTheCamerasAre) {
-  RecordedPoses drive({"record=[poses]", "record.keep_s=3"});
+  RecordedPoses drive({"record=[poses]", "record.event_window_s=3"});
   drive.drive(200);                    // 10 s
   std::this_thread::sleep_for(300ms);  // the writer passes over the first of them
   drive.mark();

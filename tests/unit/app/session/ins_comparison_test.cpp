@@ -65,7 +65,7 @@ TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
     PoseSample pose;
     pose.stamp = at(t + 0.003);
     pose.status = PoseStatus::ok;
-    if (i > 0 && i % kPoses == 0) pose.reason = Reason::scene_restarted;
+    if (i > 0 && i % kPoses == 0) pose.reason = Reason::map_reset;
     pose.T_world_left.t = {kSpeed * (t + 0.003), 0, 0};
     comparison.add(pose, 0);
     for (int k = 0; k < 10; ++k) {
@@ -75,9 +75,9 @@ TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
     comparison.drain();
   }
   comparison.finish();
-  const EarthFigures earth = comparison.earth("the test");
-  EXPECT_EQ(earth.placements.size(), static_cast<std::size_t>(kRestarts + 1));
-  EXPECT_EQ(counter(comparison, "placements"), earth.placements.size());
+  const EnuMetrics earth = comparison.earth("the test");
+  EXPECT_EQ(earth.alignments.size(), static_cast<std::size_t>(kRestarts + 1));
+  EXPECT_EQ(counter(comparison, "alignments"), earth.alignments.size());
   (void)session.recorder.close();
 }
 

@@ -38,7 +38,7 @@ std::string line_of(const InsRecord& record) {
 
 const std::string kHead = std::string(kInsHeader) + "\n";
 
-/// The sentence that refuses the file; empty: it was taken.
+/// The message that refuses the file; empty: it was taken.
 std::string refusal(const std::string& text) {
   const test::TemporaryFolder folder;
   return test::refusal_of([&] { (void)read_ins_file(folder.write("ins.csv", text)); });

@@ -81,7 +81,7 @@ TEST(Recorder, acceptedCalibrationsAreKeptOnItsOwnThreadAndAFailureIsAnEventAndA
     const auto events = lines_of(folder / "events.jsonl");
     ASSERT_EQ(events.size(), 1U);
     const auto event = nlohmann::json::parse(events[0]);
-    EXPECT_EQ(event["kind"], fails ? "calibration_not_kept" : "calibration_kept");
+    EXPECT_EQ(event["kind"], fails ? "calibration_save_failed" : "calibration_saved");
     EXPECT_EQ(recorder.take_errors().size(), fails ? 1U : 0U);
   }
 }
@@ -103,8 +103,8 @@ TEST(Recorder, whatTheDriveBeganWithIsKeptOnceItIsConfirmedUnlessAnotherWasFound
     recorder.on_calibration(CalibrationRecord::begin(given, Stamp(kStamp), "given", "mine.yaml"));
     recorder.on_calibration(CalibrationRecord{decision(false)});
     if (found_before) recorder.on_calibration(CalibrationRecord{decision(true)});
-    recorder.on_event(event_at(700, Kind::calibration_confirmed, 0.3));
-    recorder.on_event(event_at(900, Kind::calibration_confirmed, 0.3));
+    recorder.on_event(event_at(700, Kind::calibration_verified, 0.3));
+    recorder.on_event(event_at(900, Kind::calibration_verified, 0.3));
     (void)recorder.close();
     EXPECT_EQ(kept, std::vector<bool>{found_before});
   }

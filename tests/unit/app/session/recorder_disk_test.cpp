@@ -15,12 +15,12 @@ namespace {
 
 /// Sentences of the events of one kind.
 std::vector<std::string> told(const std::filesystem::path& folder, const std::string& kind) {
-  std::vector<std::string> sentences;
+  std::vector<std::string> messages;
   for (const std::string& line : lines_of(folder / "events.jsonl")) {
     const auto event = nlohmann::json::parse(line);
-    if (event["kind"] == kind) sentences.push_back(event["sentence"]);
+    if (event["kind"] == kind) messages.push_back(event["message"]);
   }
-  return sentences;
+  return messages;
 }
 
 /// Frames [first, last) of a drive find the disk full.
@@ -44,7 +44,7 @@ TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
   EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 100U);
   EXPECT_EQ(lines_of(folder / "poses.csv").size(), 101U);
   EXPECT_EQ(told(folder.path(), "disk_full").size(), 1U);
-  EXPECT_EQ(told(folder.path(), "disk_room"),
+  EXPECT_EQ(told(folder.path(), "disk_recovered"),
             std::vector<std::string>{"the disk takes lines again; 0 were lost"});
   const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
   EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
@@ -67,7 +67,7 @@ TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
   const std::size_t written =
       lines_of(folder / "trajectory.tum").size() + lines_of(folder / "poses.csv").size() - 1;
   EXPECT_EQ(written + totals->lost_lines, 2 * kFrames);
-  EXPECT_EQ(told(folder.path(), "disk_room"),
+  EXPECT_EQ(told(folder.path(), "disk_recovered"),
             std::vector<std::string>{"the disk takes lines again; " +
                                      std::to_string(totals->lost_lines) + " were lost"});
 }

@@ -82,11 +82,11 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   Recorder recorder(folder.path(), {});
   EventRecord event;
   event.stamp = Stamp(kStamp);
-  event.kind = "image_torn";
-  event.set_sentence("left/\"a\"\n\xff.png is torn");
+  event.kind = "image_truncated";
+  event.set_message("left/\"a\"\n\xff.png is torn");
   event.fields[0] = {"frame", std::int64_t{7}};
   event.fields[1] = {"seconds", 0.5};
-  event.fields[2] = {"word", "late"};
+  event.fields[2] = {"rating", "late"};
   event.fields[3] = {"whole", 2.0};
   recorder.on_event(event);
   EstimatorEvent change;
@@ -100,13 +100,13 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   ASSERT_EQ(lines.size(), 2U);
   const auto torn = nlohmann::json::parse(lines[0]), state = nlohmann::json::parse(lines[1]);
   EXPECT_EQ(torn["stamp_ns"], kStamp);
-  EXPECT_EQ(torn["kind"], "image_torn");
+  EXPECT_EQ(torn["kind"], "image_truncated");
   EXPECT_EQ(torn["fields"]["frame"], 7);
   EXPECT_EQ(torn["fields"]["seconds"], 0.5);
-  EXPECT_EQ(torn["fields"]["word"], "late");
+  EXPECT_EQ(torn["fields"]["rating"], "late");
   EXPECT_TRUE(torn["fields"]["whole"].is_number_float()) << lines[0];
   EXPECT_EQ(state["kind"], "state");
-  EXPECT_EQ(state["sentence"], "initialising to stereo_odometry: trusted calibration");
+  EXPECT_EQ(state["message"], "initialising to stereo_odometry: trusted calibration");
   EXPECT_EQ(state["fields"]["to"], "stereo_odometry");
 }
 
@@ -160,7 +160,7 @@ TEST(Recorder, postingAllocatesNothing) {
   EstimatorEvent event;
   event.why = "a state changed";
   const CalibrationDecision made = decision(false);
-  const auto before = AllocationGuard::allocations_after_seal();
+  const auto before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     for (std::uint64_t i = 0; i < 1000; ++i) {
@@ -170,7 +170,7 @@ TEST(Recorder, postingAllocatesNothing) {
       recorder.on_reading(InsRecord{});
     }
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   EXPECT_EQ(recorder.close()->dropped_readings, 0U);
   EXPECT_EQ(lines_of(folder / "ins.csv").size(), 1001U);
 }

@@ -45,7 +45,7 @@ class BlackSource final : public FrameSource {
       SourceEvent event;
       event.record.stamp = at(2);
       event.record.kind = "image_missing";
-      event.record.set_sentence("it is not there");
+      event.record.set_message("it is not there");
       event.skipped = noted_ = true;
       *item = event;
       return true;

@@ -127,8 +127,8 @@ Kept kept(bool session_fails, bool has_state, bool state_fails) {
   return kept;
 }
 
-TEST(CalibrationKeeper, whetherItIsKeptIsWhetherTheNextDriveHasIt) {
-  EXPECT_TRUE(kept(false, false, false).sentence.empty());
+TEST(CalibrationStateWriter, whetherItIsKeptIsWhetherTheNextDriveHasIt) {
+  EXPECT_TRUE(kept(false, false, false).message.empty());
   EXPECT_FALSE(kept(false, true, false).failed);
   EXPECT_TRUE(kept(false, true, true).failed);
   EXPECT_TRUE(kept(true, true, true).failed);
@@ -136,9 +136,9 @@ TEST(CalibrationKeeper, whetherItIsKeptIsWhetherTheNextDriveHasIt) {
 
   const Kept here = kept(true, true, false);
   EXPECT_FALSE(here.failed);
-  EXPECT_TRUE(here.sentence.starts_with("the calibration is kept for the next drive: "))
-      << here.sentence;
-  EXPECT_NE(here.sentence.find("session/calibration.yaml"), std::string::npos) << here.sentence;
+  EXPECT_TRUE(here.message.starts_with("the calibration is kept for the next drive: "))
+      << here.message;
+  EXPECT_NE(here.message.find("session/calibration.yaml"), std::string::npos) << here.message;
 }
 
 }  // namespace

@@ -53,8 +53,8 @@ TEST(Summary, countsFramesAndTimesAndHasNullWhereThereIsNoReference) {
   const auto& track = json["timing_ms"]["stage_distributions"]["track"];
   EXPECT_NEAR(track["p50"], 1.0, 0.0035);  // half a bin, and microseconds
   EXPECT_EQ(track["max"], 16.0);
-  EXPECT_EQ(json["memory"]["sum_bytes"], 7);
-  EXPECT_TRUE(json["calibration"]["word"].is_null());
+  EXPECT_EQ(json["memory"]["total_bytes"], 7);
+  EXPECT_TRUE(json["calibration"]["rating"].is_null());
   EXPECT_TRUE(json["calibration"]["depth_error_percent"]["20"].is_null());
 }
 
@@ -90,7 +90,7 @@ RigCalibration with_yaw_sigma(double sigma) {
   for (std::size_t k = 0; k < 2; ++k)
     rig.intrinsics[k] = {.width = 640, .height = 480, .fx = 1500, .fy = 1500, .cx = 320, .cy = 240};
   rig.T_camera_left[1].t = {-0.1, 0, 0};
-  rig.sigma_wide[1] = {1e-9, sigma, 1e-9, 0, 1e-9, 1e-9};
+  rig.sigma_total[1] = {1e-9, sigma, 1e-9, 0, 1e-9, 1e-9};
   return rig;
 }
 
@@ -98,15 +98,15 @@ TEST(Summary, aYawSigmaTellsTheDepthErrorAndTheWord) {
   // A yaw error σ moves the disparity by f σ (a narrow lens: the same everywhere), so σ_z/z = z
   // σ/b: at 20 m 200 σ.
   const std::array<std::pair<double, const char*>, 3> cases{
-      {{8e-5, "good"}, {2e-4, "can be improved"}, {4e-4, "recalibrate"}}};
+      {{8e-5, "good"}, {2e-4, "fair"}, {4e-4, "recalibrate"}}};
   for (const auto& [sigma, word] : cases) {
     auto totals = std::make_unique<SessionTotals>();
     SummaryInput in = input();
     in.calibration = with_yaw_sigma(sigma);
     in.before = with_yaw_sigma(8e-5);
     const auto json = summary_json(*totals, in)["calibration"];
-    EXPECT_EQ(json["word"], word);
-    EXPECT_EQ(json["before"]["word"], "good");
+    EXPECT_EQ(json["rating"], word);
+    EXPECT_EQ(json["initial"]["rating"], "good");
     for (const int z : {1, 5, 10, 20, 50})
       EXPECT_NEAR(json["depth_error_percent"][std::to_string(z)].get<double>(),
                   100 * z * sigma / 0.1, 0.03 * 100 * z * sigma / 0.1)
@@ -120,7 +120,7 @@ TEST(Summary, whatLimitsADepthIsNoiseOrIntrinsics) {
   in.calibration = with_yaw_sigma(2e-4);
   EXPECT_TRUE(summary_json(*totals, in)["calibration"]["limited_by"].is_null())
       << "without the noise's part nobody knows";
-  in.calibration.sigma_noise[1] = in.calibration.sigma_wide[1];
+  in.calibration.sigma_noise[1] = in.calibration.sigma_total[1];
   EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "noise");
   in.calibration.sigma_noise[1][1] = 1e-4;  // a quarter of the variance
   EXPECT_EQ(summary_json(*totals, in)["calibration"]["limited_by"], "intrinsics");
@@ -134,15 +134,15 @@ TEST(Summary, errorsOfACalibrationAreInUnitsAndInSigmas) {
   const Vec3 turn(0.001, -0.002, 0.003);
   in.calibration.T_camera_left[1].R = exp_so3(turn) * truth.T_camera_left[1].R;
   in.calibration.T_camera_left[1].t += Vec3(0, 0.004, 0);
-  in.truth = TruthFigures{std::nullopt, calibration_errors(in.calibration, truth)};
+  in.truth = TruthMetrics{std::nullopt, calibration_errors(in.calibration, truth)};
   const auto json = summary_json(*totals, in)["truth"];
   ASSERT_EQ(json["calibration"].size(), 1U);
   const auto& camera = json["calibration"][0];
   for (std::size_t i = 0; i < 3; ++i)
     EXPECT_NEAR(camera["rotation_rad"][i].get<double>(), turn(static_cast<int>(i)), 1e-12);
   EXPECT_NEAR(camera["translation_m"][1].get<double>(), 0.004, 1e-15);
-  EXPECT_NEAR(camera["sigmas_wide"][1].get<double>(), -2, 1e-9);
-  EXPECT_TRUE(camera["sigmas_wide"][3].is_null()) << "held: no sigma";
+  EXPECT_NEAR(camera["sigmas_total"][1].get<double>(), -2, 1e-9);
+  EXPECT_TRUE(camera["sigmas_total"][3].is_null()) << "held: no sigma";
   EXPECT_TRUE(camera["sigmas_noise"].is_null());
   EXPECT_NEAR(json["calibration_error"][2].get<double>(), 0.003, 1e-12);
 }

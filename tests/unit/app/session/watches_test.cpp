@@ -20,9 +20,9 @@ struct ToldSolver final : BackgroundRunner {
   }
 };
 
-TEST(SolverWatch, notesTheFramesAtWhichTheSolverIsFoundIdle) {
+TEST(ReplayableSolverRunner, notesTheFramesAtWhichTheSolverIsFoundIdle) {
   ToldSolver solver;
-  SolverWatch watch(solver);
+  ReplayableSolverRunner watch(solver);
   watch.begin_frame(std::nullopt);
   EXPECT_FALSE(watch.found_idle()) << "nobody asked";
   solver.is_busy = true;
@@ -36,9 +36,9 @@ TEST(SolverWatch, notesTheFramesAtWhichTheSolverIsFoundIdle) {
   EXPECT_EQ(solver.waits, 0);
 }
 
-TEST(SolverWatch, answersInAReplayAsInTheDrive) {
+TEST(ReplayableSolverRunner, answersInAReplayAsInTheDrive) {
   ToldSolver solver;
-  SolverWatch watch(solver);
+  ReplayableSolverRunner watch(solver);
   watch.begin_frame(false);
   EXPECT_TRUE(watch.busy()) << "the solver is faster now";
   EXPECT_FALSE(watch.found_idle());

@@ -223,7 +223,7 @@ TEST(BundleFuzz, hostileProblemsEndAndNeverWithNaN) {
     for (const Transform& T : p.T_left_world) EXPECT_TRUE(T.finite()) << seed;
     for (const Transform& T : p.T_camera_left) EXPECT_TRUE(T.finite()) << seed;
     EXPECT_TRUE(r.pose_covariance.allFinite()) << seed;
-    for (const Mat6& m : r.covariance_wide) EXPECT_TRUE(m.allFinite()) << seed;
+    for (const Mat6& m : r.covariance_total) EXPECT_TRUE(m.allFinite()) << seed;
     usable += r.usable() ? 1 : 0;
   }
   EXPECT_GT(usable, 100);  // the fuzz reaches the solver, not only its gate

@@ -251,14 +251,14 @@ TEST(Bundle, solveDoesNotAllocate) {
   BundleOptions odometry;
   odometry.pose_covariance = true;
   const BundleProblem p = rig.problem();
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   BundleResult first, second;
   {
     const SealedScope sealed;
     first = own.adjuster.solve(p, o);
     second = own.adjuster.solve(p, odometry);
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   EXPECT_TRUE(first.has_covariance);
   EXPECT_TRUE(second.has_pose_covariance);
 }

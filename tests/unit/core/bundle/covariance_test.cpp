@@ -120,7 +120,7 @@ TEST(BundleCovariance, wideCoversIntrinsicsThatAreOff) {
     ASSERT_TRUE(r.usable() && r.has_covariance) << run;
     const Vec6 e = error_of(rig);
     narrow += normalised_squared(e, r.covariance_noise[1], rig.T_camera_left[1].t, true) / kRuns;
-    wide += normalised_squared(e, r.covariance_wide[1], rig.T_camera_left[1].t, true) / kRuns;
+    wide += normalised_squared(e, r.covariance_total[1], rig.T_camera_left[1].t, true) / kRuns;
   }
   EXPECT_GT(narrow, 50);
   // χ²(5) has a standard error of 0.18 over 300 runs; beyond it the linearisation about the wrong

@@ -197,11 +197,11 @@ TEST(BundleCovariance, theJointOneHoldsTheWideOneAndGivenWhatIsHeldTheOneOfNoise
     for (int j = 0; j < 6; ++j)
       block(i, j) = r.covariance(extrinsic_row(1) + i, extrinsic_row(1) + j);
   // Sums of some ten products of the same doubles in another order.
-  EXPECT_LT((block - r.covariance_wide[1]).norm(), 1e-12 * r.covariance_wide[1].norm());
+  EXPECT_LT((block - r.covariance_total[1]).norm(), 1e-12 * r.covariance_total[1].norm());
   const Mat6 given = block - cross * C_held.ldlt().solve(cross.transpose());
   // What is left is smaller than what it is the difference of by up to 1e4: as many digits less.
-  EXPECT_LT((given - r.covariance_noise[1]).norm(), 1e-10 * r.covariance_wide[1].norm());
-  EXPECT_GT(r.covariance_wide[1].trace(), 2 * r.covariance_noise[1].trace())
+  EXPECT_LT((given - r.covariance_noise[1]).norm(), 1e-10 * r.covariance_total[1].norm());
+  EXPECT_GT(r.covariance_total[1].trace(), 2 * r.covariance_noise[1].trace())
       << "otherwise nothing was shown";
 }
 
@@ -232,7 +232,7 @@ TEST(BundleSharedPrior, numbersThatAreNoneDoNoHarm) {
       EXPECT_TRUE(found.T_camera_left[1].finite()) << i;
       EXPECT_TRUE(std::isfinite(found.cameras[1].intrinsics().fx)) << i;
       EXPECT_TRUE(std::isfinite(r.final_cost)) << i;
-      EXPECT_TRUE(r.covariance_wide[1].allFinite()) << i;
+      EXPECT_TRUE(r.covariance_total[1].allFinite()) << i;
       for (const Vec3& p : found.points) ASSERT_TRUE(p.allFinite()) << i;
     }
   }

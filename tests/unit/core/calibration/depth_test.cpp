@@ -37,8 +37,7 @@ TEST(DepthDifference, ofARigFromItselfIsNone) {
   rig.intrinsics[1].distortion = {-0.12, 0.03, -1e-3, 5e-4, 0};
   // Iterations end at the rounding of a pixel, 1e-13 of a thousand; the disparity is 19 px and
   // more.
-  for (const double z : kHealthDepths)
-    EXPECT_LT(depth_difference_percent(rig, rig, 1, z), 1e-8) << z;
+  for (const double z : kHealthDepths) EXPECT_LT(depth_error_percent(rig, rig, 1, z), 1e-8) << z;
 }
 
 // A yaw δ moves what is straight ahead by f δ, at the edge of the image (x/z = 0.41) by f (1 + x²)
@@ -51,8 +50,7 @@ TEST(DepthDifference, ofAYawGrowsWithTheDepth) {
       RigCalibration off = rig;
       turn(&off, {0, yaw, 0});
       const double straight = 100 * z * std::abs(yaw) / kBaseline;
-      EXPECT_NEAR(depth_difference_percent(rig, off, 1, z), straight, 0.1 * straight)
-          << yaw << ' ' << z;
+      EXPECT_NEAR(depth_error_percent(rig, off, 1, z), straight, 0.1 * straight) << yaw << ' ' << z;
     }
 }
 
@@ -63,13 +61,11 @@ TEST(DepthDifference, ofAYawThatACentreMakesUpForIsSmall) {
   turn(&yaw, {0, 2e-3, 0});
   RigCalibration both = yaw;
   both.intrinsics[1].cx -= kFocal * std::tan(2e-3);
-  EXPECT_LT(depth_difference_percent(rig, both, 1, 20),
-            0.1 * depth_difference_percent(rig, yaw, 1, 20));
+  EXPECT_LT(depth_error_percent(rig, both, 1, 20), 0.1 * depth_error_percent(rig, yaw, 1, 20));
   // The other way round they add up.
   both.intrinsics[1].cx += 2 * kFocal * std::tan(2e-3);
-  EXPECT_NEAR(depth_difference_percent(rig, both, 1, 20),
-              2 * depth_difference_percent(rig, yaw, 1, 20),
-              0.1 * depth_difference_percent(rig, yaw, 1, 20));
+  EXPECT_NEAR(depth_error_percent(rig, both, 1, 20), 2 * depth_error_percent(rig, yaw, 1, 20),
+              0.1 * depth_error_percent(rig, yaw, 1, 20));
 }
 
 TEST(DepthDifference, ofALengthIsItsShareAtEveryDepth) {
@@ -78,12 +74,12 @@ TEST(DepthDifference, ofALengthIsItsShareAtEveryDepth) {
   longer.T_camera_left[1].t *= 1.01;
   // The same disparity at a baseline 1 % longer is a depth 1 % larger.
   for (const double z : {5.0, 20.0, 50.0})
-    EXPECT_NEAR(depth_difference_percent(rig, longer, 1, z), 100 * (1 - 1 / 1.01), 1e-6) << z;
+    EXPECT_NEAR(depth_error_percent(rig, longer, 1, z), 100 * (1 - 1 / 1.01), 1e-6) << z;
 }
 
 TEST(DepthDifference, ofWhatCannotBeSeenByBothIsNotSaid) {
   const RigCalibration rig = wide_rig();
-  EXPECT_EQ(depth_difference_percent(rig, rig, 1, 0.5), 0) << "1870 px of disparity";
+  EXPECT_EQ(depth_error_percent(rig, rig, 1, 0.5), 0) << "1870 px of disparity";
 }
 
 TEST(DepthError, ofAYawAndACentreThatAreKnownTogetherIsSmall) {
@@ -115,7 +111,7 @@ TEST(DepthError, ofOneSigmaIsTheDifferenceThatItMakes) {
     known.covariance = {};
     known.covariance.set(row, row, step * step);
     const double predicted = depth_error_percent(known, 1, 20),
-                 made = depth_difference_percent(rig, off, 1, 20);
+                 made = depth_error_percent(rig, off, 1, 20);
     // Steps of some hundredths of a pixel: beyond the linear part is less than that of a disparity
     // of 47 px.
     EXPECT_NEAR(made, predicted, 2e-3 * predicted + 1e-6) << row;
@@ -141,14 +137,14 @@ TEST(DepthError, ofOneSigmaIsTheDifferenceThatItMakes) {
     }
 }
 
-TEST(JudgedDepth, isNearerWhereASingleMatchIsNoBetter) {
+TEST(EvaluatedDepth, isNearerWhereASingleMatchIsNoBetter) {
   const CalibrationOptions options;
   // A match of 0.15 px in both images is off by 0.21 px, 1 % of a disparity of 21.2 px.
   const double px = std::sqrt(2.0) * 0.15 / 0.01;
-  EXPECT_NEAR(judged_depth_m(rig_with(0.11, 458, 752, 480), 1, options, 0.15), 458 * 0.11 / px,
+  EXPECT_NEAR(reference_depth_m(rig_with(0.11, 458, 752, 480), 1, options, 0.15), 458 * 0.11 / px,
               1e-9);
-  EXPECT_LT(judged_depth_m(rig_with(0.11, 458, 752, 480), 1, options, 0.15), 20);
-  EXPECT_EQ(judged_depth_m(wide_rig(), 1, options, 0.15), 20) << "44 m otherwise";
+  EXPECT_LT(reference_depth_m(rig_with(0.11, 458, 752, 480), 1, options, 0.15), 20);
+  EXPECT_EQ(reference_depth_m(wide_rig(), 1, options, 0.15), 20) << "44 m otherwise";
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ TEST(FocalCheck, oneThatIsAQuarterOffIsContradictedAndTheTrueOneMeasured) {
     const RigCalibration given = given_rig(drive, factor);
     const FocalMeasurement m = check_focal_length(measure(drive, given), given);
     EXPECT_TRUE(m.contradicted) << m.measured_px << " +- " << m.sigma_px;
-    EXPECT_EQ(m.given_px, given.intrinsics[0].fx);
+    EXPECT_EQ(m.configured_px, given.intrinsics[0].fx);
     ASSERT_GT(m.sigma_px, 0);
     EXPECT_LT(std::abs(m.measured_px - drive.left.fx), 1.5 * m.sigma_px);
   }

@@ -98,13 +98,13 @@ TEST(Gates, tooLittleWayNeedsMotion) {
   EXPECT_EQ(c.ask(), Gate::needs_motion);
   c.solution.travelled_m = 2.26;
   EXPECT_EQ(c.ask(), Gate::open);
-  c.options.needs_motion_m = 5;
+  c.options.min_path_m = 5;
   EXPECT_EQ(c.ask(), Gate::needs_motion);
 }
 
 TEST(Gates, tooFewNearPointsNeedNearStructure) {
   Case c;
-  c.solution.near = c.options.needs_near_points - 1;
+  c.solution.near = c.options.min_near_points - 1;
   EXPECT_EQ(c.ask(), Gate::needs_near_structure);
   ++c.solution.near;
   EXPECT_EQ(c.ask(), Gate::open);
@@ -140,7 +140,7 @@ TEST(Gates, aRotationFarFromTheConfiguredOneIsImplausibleUnlessFromScratch) {
 TEST(Gates, camerasOutOfStepHaveNoCalibration) {
   Case c;
   c.solution.lag_frames = 1;
-  EXPECT_EQ(c.ask(), Gate::out_of_step);
+  EXPECT_EQ(c.ask(), Gate::out_of_sync);
 }
 
 TEST(Gates, whatFramesNotUsedContradictIsNotAdopted) {

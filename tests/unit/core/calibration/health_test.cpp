@@ -23,8 +23,8 @@ RigCalibration narrow_rig() {
 }
 
 void know(RigCalibration* rig, std::size_t k, int what, double sigma) {
-  rig->sigma_wide[k][static_cast<std::size_t>(what)] = sigma;
-  rig->covariance_wide[k](what, what) = sigma * sigma;
+  rig->sigma_total[k][static_cast<std::size_t>(what)] = sigma;
+  rig->covariance_total[k](what, what) = sigma * sigma;
 }
 
 TEST(Health, correlatedErrorsCancelAsTheyDoInTheDepth) {
@@ -34,16 +34,16 @@ TEST(Health, correlatedErrorsCancelAsTheyDoInTheDepth) {
   // from: R X moves by ψ Z along x.
   know(&rig, 1, 1, yaw);
   know(&rig, 1, 3, yaw * z);
-  rig.covariance_wide[1](1, 3) = rig.covariance_wide[1](3, 1) = -yaw * yaw * z;
+  rig.covariance_total[1](1, 3) = rig.covariance_total[1](3, 1) = -yaw * yaw * z;
   RigCalibration alone = rig;
-  alone.covariance_wide[1](1, 3) = alone.covariance_wide[1](3, 1) = 0;
+  alone.covariance_total[1](1, 3) = alone.covariance_total[1](3, 1) = 0;
   EXPECT_LT(depth_error_percent(rig, 1, z), 0.01 * depth_error_percent(alone, 1, z));
 }
 
 TEST(Health, withoutACovarianceTheSigmasServeAndWithoutThoseNothing) {
   RigCalibration rig = narrow_rig();
   EXPECT_EQ(depth_error_percent(rig, 1, 20), 0);
-  rig.sigma_wide[1][1] = 1e-4;
+  rig.sigma_total[1][1] = 1e-4;
   RigCalibration full = narrow_rig();
   know(&full, 1, 1, 1e-4);
   EXPECT_DOUBLE_EQ(depth_error_percent(rig, 1, 20), depth_error_percent(full, 1, 20));
@@ -57,8 +57,8 @@ TEST(Health, theWordFollowsTheErrorAtTwentyMetres) {
     return to_string(health(rig, options));
   };
   EXPECT_EQ(word(1.99), "good");
-  EXPECT_EQ(word(2.01), "can be improved");
-  EXPECT_EQ(word(4.99), "can be improved");
+  EXPECT_EQ(word(2.01), "fair");
+  EXPECT_EQ(word(4.99), "fair");
   EXPECT_EQ(word(5.01), "recalibrate");
 }
 
@@ -70,10 +70,10 @@ TEST(Health, aRigIsAsGoodAsItsBestPair) {
   know(&rig, 1, 3, 0.001);  // 1 %
   know(&rig, 2, 3, 0.004);  // 8 %
   EXPECT_NEAR(depth_error_percent(rig, 20.0), 1.0, 1e-9);
-  EXPECT_EQ(health(rig, {}), HealthWord::good);
+  EXPECT_EQ(health(rig, {}), CalibrationRating::good);
   know(&rig, 1, 3, 0.02);  // 20 %
   EXPECT_NEAR(depth_error_percent(rig, 20.0), 8.0, 1e-9);
-  EXPECT_EQ(health(rig, {}), HealthWord::recalibrate);
+  EXPECT_EQ(health(rig, {}), CalibrationRating::recalibrate);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace vergence::test {
 namespace {
 
-using calibration::MonitorVerdict;
+using calibration::MonitorResult;
 using calibration::detail::ChangeDetector;
 using calibration::detail::Decision;
 
@@ -105,7 +105,7 @@ TEST(MonitorFalseAlarms, areFourAtMostInAHundredHours) {
         windows->push(f.evidence);
         const Decision d = windows->decide();
         most = std::max(most, d.statistic);
-        alarm = d.kind != MonitorVerdict::Kind::quiet;
+        alarm = d.kind != MonitorResult::Kind::quiet;
       } else {
         const double s = windows->single(f.evidence.evidence, f.spread_now) / 1.5;
         worst_standing = std::max(worst_standing, s);

@@ -16,8 +16,8 @@ namespace vergence::test {
 namespace {
 
 using calibration::MonitorOptions;
-using calibration::MonitorVerdict;
-using Kind = MonitorVerdict::Kind;
+using calibration::MonitorResult;
+using Kind = MonitorResult::Kind;
 
 constexpr int kBefore = 300;  // frames driven before the rig changes: ten seconds
 
@@ -176,7 +176,7 @@ TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
   calibration::MonitorFrame night;
   for (std::uint64_t i = 60; i < 120; ++i) {
     night.frame = i;
-    const MonitorVerdict v = trial.monitor().look(night);
+    const MonitorResult v = trial.monitor().look(night);
     ASSERT_EQ(v.kind, Kind::quiet);
   }
   night.expected_stereo = 200;
@@ -227,12 +227,12 @@ TEST(Monitor, allocatesNothingWhileLooking) {
   o.changes = {{40, Vec3(0, 0.3, 0) / kRadian, Vec3::Zero(), 0}};
   MonitorTrial trial(o);
   for (int i = 0; i < 80; ++i) (void)trial.step();  // vectors of the trial have grown
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     (void)trial.monitor().look(trial.frame());
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 TEST(Monitor, refusesAReferenceWithoutABaselineAndOptionsOutOfRange) {

@@ -32,13 +32,13 @@ class MonitorTrial {
   }
 
   /// The next frame.
-  const calibration::MonitorVerdict& step() {
+  const calibration::MonitorResult& step() {
     drive_.next();
     return show(drive_);
   }
 
   /// A frame of some drive.
-  const calibration::MonitorVerdict& show(const FeatureDrive& drive) {
+  const calibration::MonitorResult& show(const FeatureDrive& drive) {
     observations_.clear();
     const Pinhole &l = drive.options().left, &r = drive.options().right;
     for (const FeatureTrack& t : drive.tracks()) {
@@ -63,16 +63,16 @@ class MonitorTrial {
   /// Frames until the verdict is `requested` or, without one, anything but quiet; nothing within
   /// `limit` frames.
   [[nodiscard]] std::optional<int> frames_until(
-      int limit, std::optional<calibration::MonitorVerdict::Kind> requested = {}) {
+      int limit, std::optional<calibration::MonitorResult::Kind> requested = {}) {
     for (int i = 1; i <= limit; ++i) {
       const auto kind = step().kind;
-      if (requested ? kind == *requested : kind != calibration::MonitorVerdict::Kind::quiet)
+      if (requested ? kind == *requested : kind != calibration::MonitorResult::Kind::quiet)
         return i;
     }
     return {};
   }
 
-  [[nodiscard]] const calibration::MonitorVerdict& verdict() const { return verdict_; }
+  [[nodiscard]] const calibration::MonitorResult& verdict() const { return verdict_; }
   [[nodiscard]] const calibration::MonitorFrame& frame() const { return frame_; }
   [[nodiscard]] const FeatureDrive& drive() const { return drive_; }
   [[nodiscard]] calibration::Monitor& monitor() { return monitor_; }
@@ -88,7 +88,7 @@ class MonitorTrial {
   EpipolarGeometry epipolar_;
   std::vector<calibration::StereoObservation> observations_;
   calibration::MonitorFrame frame_;
-  calibration::MonitorVerdict verdict_;
+  calibration::MonitorResult verdict_;
 };
 
 /// A calibration as a drive of two seconds through another street finds it: off by its error, with

@@ -65,11 +65,11 @@ Seen drive(const Case& c) {
                         static_cast<std::uint32_t>(k)});
     if (i == kFault) evidence.question();
     evidence.next(static_cast<std::uint64_t>(i + 1), points, T_right_left, kLens, kLens);
-    EXPECT_EQ(evidence.questioned() && evidence.in_step(), false) << c.name;
+    EXPECT_EQ(evidence.questioned() && evidence.cameras_in_sync(), false) << c.name;
     if (i < kFault) seen.before = seen.before || evidence.lag_frames() != 0;
-    if (fault) seen.in_step_during = seen.in_step_during || evidence.in_step();
+    if (fault) seen.in_step_during = seen.in_step_during || evidence.cameras_in_sync();
     if (i == kEnd - 1) seen.lag = evidence.lag_frames();
-    if (i >= kEnd && !evidence.in_step()) ++seen.in_step_after;
+    if (i >= kEnd && !evidence.cameras_in_sync()) ++seen.in_step_after;
   }
   return seen;
 }

@@ -28,7 +28,7 @@ RigCalibration known_rig() {
 
 TEST(Posterior, anHourAddsTheWalkOfAnHourAndFourHoursTwiceItsSigma) {
   CalibrationOptions options;
-  options.drift_mrad = 0.4;
+  options.extrinsic_random_walk_mrad_per_sqrt_h = 0.4;
   const RigCalibration before = known_rig();
   for (const double hours : {1.0, 4.0}) {
     RigCalibration rig = before;
@@ -78,7 +78,7 @@ TEST(Posterior, whatIsNotKnownStaysNotKnown) {
 TEST(Posterior, forgettingTheTransformsLeavesTheLenses) {
   const RigCalibration before = known_rig();
   RigCalibration rig = before;
-  forget_transforms(&rig);
+  clear_transforms(&rig);
   for (int i = 0; i < 12; ++i) {
     const int row = extrinsic_row(1) + i;
     EXPECT_GE(rig.covariance(row, row), std::pow(i % 6 < 3 ? 0.1 : 0.1 * 0.5, 2))

@@ -26,7 +26,7 @@ CalibrationOptions held() {
 // Variances are 3.5 times those of the clusters, for what tracks share in a way that no cluster
 // shows; how much of it these drives have is not known, so squared errors of a length average to
 // 1/3.5 to 1 of them. Three standard errors of a mean of fifty squares, 0.2 of it each, beyond.
-constexpr double kLeastLength = 0.4 / 3.5, kMostLength = 1.6;
+constexpr double kMinLength = 0.4 / 3.5, kMaxLength = 1.6;
 
 // 250 normal errors lie within two sigmas for 95 %, give or take 1.4; ninety leaves room for the
 // drives being few.
@@ -44,7 +44,7 @@ TEST(RigSolverSigmas, holdUpOverFiftyDrivesWithExactIntrinsics) {
     const RigSolution found = s.solver.solve(rig_of(o));
     EXPECT_EQ(found.status, RigSolveStatus::ok) << i;
     const Vec5 e = five_errors(found.rig, o.T_right_left);
-    const Mat5 C = five_covariance(found.rig.covariance_wide[1]);
+    const Mat5 C = five_covariance(found.rig.covariance_total[1]);
     nees += e.dot(C.ldlt().solve(e)) / 5 / kDrives;
     for (int k = 0; k < 5; ++k)
       within += std::abs(e[k]) < 2 * std::sqrt(C(k, k)) ? 1.0 / (5 * kDrives) : 0;
@@ -57,8 +57,8 @@ TEST(RigSolverSigmas, holdUpOverFiftyDrivesWithExactIntrinsics) {
   EXPECT_GT(nees, 0.5);
   EXPECT_LT(nees, 2.0);
   EXPECT_GE(within, 0.90);
-  EXPECT_GT(length, kLeastLength);
-  EXPECT_LT(length, kMostLength);
+  EXPECT_GT(length, kMinLength);
+  EXPECT_LT(length, kMaxLength);
 }
 
 }  // namespace

@@ -60,14 +60,14 @@ TEST(RigSolver, withNoiseTheErrorsAreWithinItsSigmas) {
     const RigSolution s = solve(drive, held(), rig_of(drive));
     ASSERT_EQ(s.status, RigSolveStatus::ok);
     const Vec5 e = five_errors(s.rig, drive.T_right_left);
-    const Mat5 C = five_covariance(s.rig.covariance_wide[1]);
+    const Mat5 C = five_covariance(s.rig.covariance_total[1]);
     for (int i = 0; i < 5; ++i) {
       EXPECT_LT(std::abs(e[i]), 3 * std::sqrt(C(i, i))) << i;
       EXPECT_GT(C(i, i), 0) << i;
     }
     // Exact intrinsics make nothing wider.
     for (std::size_t i = 0; i < 6; ++i)
-      EXPECT_NEAR(s.rig.sigma_wide[1][i], s.rig.sigma_noise[1][i], 0.02 * s.rig.sigma_noise[1][i]);
+      EXPECT_NEAR(s.rig.sigma_total[1][i], s.rig.sigma_noise[1][i], 0.02 * s.rig.sigma_noise[1][i]);
     EXPECT_GT(s.rig.reprojection_px, 0.1);
     EXPECT_LT(s.rig.reprojection_px, 1.0);
   }
@@ -85,10 +85,10 @@ TEST(RigSolver, uncertainIntrinsicsMakeTheSigmasWider) {
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_NEAR(uncertain.rig.sigma_noise[1][i], exact.rig.sigma_noise[1][i],
                 1e-12 + 1e-9 * exact.rig.sigma_noise[1][i]);
-    EXPECT_GE(uncertain.rig.sigma_wide[1][i], uncertain.rig.sigma_noise[1][i]);
+    EXPECT_GE(uncertain.rig.sigma_total[1][i], uncertain.rig.sigma_noise[1][i]);
   }
   // Half a pixel of the principal point is 0.4 mrad of pitch, many times what tracks leave open.
-  EXPECT_GT(uncertain.rig.sigma_wide[1][0], 3e-4);
+  EXPECT_GT(uncertain.rig.sigma_total[1][0], 3e-4);
 }
 
 TEST(RigSolver, theFurtherCamerasFocalLengthIsFoundWhenItIsAskedFor) {
@@ -189,7 +189,7 @@ TEST(RigSolver, aSolveLeavesNoTraceInTheNext) {
   ASSERT_EQ(s.status, RigSolveStatus::ok);
   EXPECT_EQ(s.rig.T_camera_left[1].R, t.rig.T_camera_left[1].R);
   EXPECT_EQ(s.rig.T_camera_left[1].t, t.rig.T_camera_left[1].t);
-  EXPECT_EQ(s.rig.sigma_wide[1], t.rig.sigma_wide[1]);
+  EXPECT_EQ(s.rig.sigma_total[1], t.rig.sigma_total[1]);
 }
 
 TEST(RigSolver, aRightCameraThatIsLateIsOutOfStep) {
@@ -208,10 +208,10 @@ TEST(RigSolver, aRightCameraThatIsLateIsOutOfStep) {
   ASSERT_EQ(solution.status, RigSolveStatus::ok);
   EXPECT_EQ(solution.lag_frames, 1);
   drive.lags.clear();
-  SolverInArena in_step(o);
+  SolverInArena cameras_in_sync(o);
   FeatureDrive e(drive);
-  log_drive(e, 110, kRough, in_step.solver.log());
-  EXPECT_EQ(in_step.solver.solve(rig_of(drive)).lag_frames, 0);
+  log_drive(e, 110, kRough, cameras_in_sync.solver.log());
+  EXPECT_EQ(cameras_in_sync.solver.solve(rig_of(drive)).lag_frames, 0);
 }
 
 TEST(RigSolver, aThirdCameraThatIsLateIsOutOfStep) {
@@ -290,12 +290,12 @@ TEST(RigSolver, worksOffTheHeap) {
   EXPECT_LE(s.arena.used(), s.arena.capacity());
   FeatureDrive d(drive);
   log_drive(d, 30, kRough, s.solver.log());
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     EXPECT_EQ(s.solver.solve(rig_of(drive)).status, RigSolveStatus::ok);
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 }  // namespace

@@ -113,8 +113,8 @@ TEST(Comparison, idealInsAndTruePosesAgreeThroughTheWholeChain) {
   b.drive(0, 100);
   b.finish();
   ASSERT_EQ(b.out.size(), 2001U);
-  ASSERT_EQ(b.comparison.placement().revision, 1U);
-  EXPECT_NEAR(b.comparison.placement().distance, 100, 1);
+  ASSERT_EQ(b.comparison.alignment().revision, 1U);
+  EXPECT_NEAR(b.comparison.alignment().distance, 100, 1);
   EXPECT_LT((b.comparison.plane().to_enu(kOrigin)).norm(), 1e-6);
   std::size_t compared = 0;
   for (const ComparedPose& c : b.out) {
@@ -140,11 +140,11 @@ TEST(Comparison, idealInsAndTruePosesAgreeThroughTheWholeChain) {
 TEST(Comparison, aShortDriveIsPlacedAtItsEnd) {
   Bench b;
   b.drive(0, 4);
-  EXPECT_EQ(b.comparison.placement().revision, 0U);
+  EXPECT_EQ(b.comparison.alignment().revision, 0U);
   b.finish();
-  ASSERT_EQ(b.comparison.placement().revision, 1U);
+  ASSERT_EQ(b.comparison.alignment().revision, 1U);
   EXPECT_LT(
-      (b.comparison.placement().T_enu_world * b.pose(3).T_world_left.t - b.T_enu_left(3).t).norm(),
+      (b.comparison.alignment().T_enu_world * b.pose(3).T_world_left.t - b.T_enu_left(3).t).norm(),
       1e-3);
 }
 
@@ -163,7 +163,7 @@ TEST(Comparison, theErrorIsTheDriftAfterThePlacement) {
   // The world's y axis points down but for the mounting and the slope at the start; the view is
   // level but for them.
   EXPECT_NEAR(c.error_yaw, 0.01, 0.001);
-  EXPECT_EQ(b.comparison.placement().revision, 1U);  // frozen
+  EXPECT_EQ(b.comparison.alignment().revision, 1U);  // frozen
 }
 
 TEST(Comparison, whereTheInsIsAwayPosesGoOnAndAreComparedAgainAfterIt) {
@@ -274,7 +274,7 @@ void expect_placed_behind_a_leap(int last_before, int without_fix) {
   EXPECT_EQ(b.comparison.counters().jumps, 1U);
   ASSERT_TRUE(b.out.back().compared);
   EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);
-  EXPECT_GT((b.comparison.placement().first - at(5.0)).ns(), 0);
+  EXPECT_GT((b.comparison.alignment().first - at(5.0)).ns(), 0);
   for (const ComparedPose& c : b.out) EXPECT_FALSE(c.scale_disagrees);
 }
 
@@ -288,7 +288,7 @@ TEST(Comparison, aJumpWhilePlacingBeginsThePlacementAnewWhetherOrNotAFrameFellIn
 }
 
 /// Poses a second behind the INS, so that several leaps are known before the first pose meets one.
-/// The placement's 100 metres are driven after 10.15 s: between the first leap and the last.
+/// The alignment's 100 metres are driven after 10.15 s: between the first leap and the last.
 TEST(Comparison, ofSeveralJumpsBeforeAPoseNoneIsForgotten) {
   const Vec3 first(30, 100, 0), second(-60, -100, 0);
   for (const Vec3& between : {first, second}) {
@@ -304,7 +304,7 @@ TEST(Comparison, ofSeveralJumpsBeforeAPoseNoneIsForgotten) {
     EXPECT_EQ(b.comparison.counters().jumps, between == first ? 2U : 3U);
     ASSERT_TRUE(b.out.back().compared);
     EXPECT_LT(b.out.back().error_enu.norm(), 1e-3);
-    EXPECT_GT((b.comparison.placement().first - at(10.59)).ns(), 0);
+    EXPECT_GT((b.comparison.alignment().first - at(10.59)).ns(), 0);
     for (const ComparedPose& c : b.out) EXPECT_FALSE(c.scale_disagrees);
   }
 }
@@ -315,9 +315,9 @@ TEST(Comparison, aRestartedOdometryIsPlacedAnew) {
   b.drive(0, 60, {}, [&](double t, PoseSample* p) {
     if (t < 30) return;
     p->T_world_left = elsewhere * p->T_world_left;
-    if (t < 31) p->reason = Reason::scene_restarted;
+    if (t < 31) p->reason = Reason::map_reset;
   });
-  EXPECT_EQ(b.comparison.placement().revision, 2U);
+  EXPECT_EQ(b.comparison.alignment().revision, 2U);
   ASSERT_TRUE(b.out[b.out.size() - 2].compared);
   EXPECT_LT(b.out[b.out.size() - 2].error_enu.norm(), 1e-3);
 }
@@ -359,11 +359,11 @@ TEST(Comparison, positionsAndCourseAloneArePlacedAndCompared) {
   ASSERT_TRUE(c.placed && c.compared);
   EXPECT_EQ(b.comparison.counters().ins_without_attitude, b.comparison.counters().ins_samples);
   // The lever arm is carried level: against the body's roll of up to 0.02 and pitch of 0.0075 that
-  // errs by 0.4 * 0.02 + 1.2 * 0.0075 = 17 mm. The placement's 100 m reach 18 m to the side, and
+  // errs by 0.4 * 0.02 + 1.2 * 0.0075 = 17 mm. The alignment's 100 m reach 18 m to the side, and
   // the end of the drive is 298 m to that side: 2 * 17 mm * 298 / 18 = 0.56 m.
   EXPECT_LT(c.error_enu.norm(), 0.56);
   EXPECT_LT(std::abs(c.error_yaw), 1 * kDegree);
-  EXPECT_GT(b.comparison.placement().rotation_sigma.head<2>().minCoeff(), 0);
+  EXPECT_GT(b.comparison.alignment().rotation_sigma.head<2>().minCoeff(), 0);
 }
 
 TEST(Comparison, withoutAttitudeTheLastHeadingHoldsAtAStandstill) {
@@ -444,7 +444,7 @@ TEST(Comparison, anInsWhoseClockWentBackForGoodIsTakenUpAgainAfterASecondWhateve
 TEST(Comparison, anHourAt120HzTakesNoMemory) {
   Bench b;
   if (!AllocationGuard::available()) GTEST_SKIP() << "the allocation hooks are not in this build";
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::uint64_t out = 0;
   {
     const SealedScope sealed;
@@ -458,7 +458,7 @@ TEST(Comparison, anHourAt120HzTakesNoMemory) {
     b.comparison.finish();
     while (b.comparison.next(&c)) ++out;
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   EXPECT_EQ(out, 108000U);
   EXPECT_GT(b.comparison.counters().compared, 107000U);
 }

@@ -109,7 +109,7 @@ TEST(Mount, anIdealReferenceGivesItsMount) {
     how.late_s = 0.012;
     const Drove d = drove(how);
     Mount m;
-    ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
     for (std::size_t k = 0; k < 3; ++k) {
       ASSERT_TRUE(m.rotation[k].observable) << k;
       EXPECT_NEAR(m.rotation[k].value, true_turn()[static_cast<int>(k)], 1e-4);
@@ -136,7 +136,7 @@ TEST(Mount, aSlowReferenceGivesItsMountAsAQuickOneDoes) {
     how.jitter_s = slow.jitter_s;
     const Drove d = drove(how);
     Mount m;
-    ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
       const MountValue &turn = m.rotation[k], &arm = m.lever_arm[k];
@@ -163,7 +163,8 @@ void sigmas_hold(bool velocity) {
     how.late_s = 0.02;
     const Drove d = drove(how);
     Mount m;
-    ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok) << seed;
+    ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok)
+        << seed;
     for (std::size_t k = 0; k < 3; ++k) {
       const int i = static_cast<int>(k);
       sigmas[k].push_back(m.rotation[k].sigma);
@@ -209,7 +210,7 @@ TEST(Mount, aStraightDriveShowsNoLeverArm) {
   how.velocity = false;
   const Drove d = drove(how);
   Mount m;
-  ASSERT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
+  ASSERT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m), MountStatus::ok);
   EXPECT_FALSE(m.lever_arm[0].observable) << m.lever_arm[0].sigma;
   EXPECT_FALSE(m.lever_arm[2].observable) << m.lever_arm[2].sigma;
   EXPECT_EQ(m.T_ref_est.t.x(), 0) << "no number";
@@ -235,19 +236,19 @@ TEST(Mount, trajectoriesThatDoNotBelongTogetherHaveNoFit) {
       Mount m;
       m.moments = 77;
       Drove d = drove(how);
-      EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m),
+      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
                 MountStatus::not_converged)
           << "a second late";
       how.late_s = 0;
       d = drove(how);
       reverse(&d.reference);
-      EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m),
+      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
                 MountStatus::not_converged)
           << "reversed";
       how.seed = 2;
       how.kind = mock::DriveKind::straight;
       d.reference = drove(how).reference;
-      EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m),
+      EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
                 MountStatus::not_converged)
           << "another drive";
       EXPECT_EQ(m.moments, 77U);
@@ -268,7 +269,7 @@ TEST(Mount, attitudesThatSwayTooFarHaveNoFit) {
       r.T_enu_ref.R = exp_so3(Vec3(0, 0, sway)) * r.T_enu_ref.R;
     }
     Mount m;
-    return estimate_mount(d.estimate, d.reference, nominal(), {}, &m);
+    return estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m);
   };
   EXPECT_EQ(swaying(13), MountStatus::ok);
   EXPECT_EQ(swaying(18), MountStatus::not_converged);
@@ -280,13 +281,16 @@ TEST(Mount, whatCannotBeDoneIsToldAndLeavesTheResultAlone) {
   Drove d = drove(still);
   Mount m;
   m.moments = 77;
-  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::no_motion);
+  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
+            MountStatus::no_motion);
   d.estimate.resize(10);
-  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few);
-  EXPECT_EQ(estimate_mount({}, {}, nominal(), {}, &m), MountStatus::too_few);
+  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
+            MountStatus::too_few);
+  EXPECT_EQ(estimate_ins_extrinsics({}, {}, nominal(), {}, &m), MountStatus::too_few);
   d = drove({});
   for (MountReference& r : d.reference) r.stamp = r.stamp + Duration::seconds(1e6);
-  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few)
+  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
+            MountStatus::too_few)
       << "no time in common";
   // Three readings a second apart, and none for a dozen seconds: eighteen follow on another.
   How slow;
@@ -296,7 +300,8 @@ TEST(Mount, whatCannotBeDoneIsToldAndLeavesTheResultAlone) {
   for (std::size_t i = 0; i < d.reference.size(); ++i)
     if (i % 15 < 3) apart.push_back(d.reference[i]);
   d.reference = apart;
-  EXPECT_EQ(estimate_mount(d.estimate, d.reference, nominal(), {}, &m), MountStatus::too_few);
+  EXPECT_EQ(estimate_ins_extrinsics(d.estimate, d.reference, nominal(), {}, &m),
+            MountStatus::too_few);
   EXPECT_EQ(m.moments, 77U);
 }
 

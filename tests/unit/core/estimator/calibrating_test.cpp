@@ -166,7 +166,7 @@ TEST(Calibrating, aFilesCalibrationIsUnconfirmedUntilTheDriveConfirmsIt) {
   d.drive(0, 45);
   int confirmed = -1;
   for (const EstimatorEvent& e : d.events)
-    if (e.kind == Kind::calibration_confirmed)
+    if (e.kind == Kind::calibration_verified)
       confirmed = static_cast<int>((e.stamp.ns() - 1'000'000'000) / 50'000'000);
   ASSERT_GE(confirmed, 25) << d.story();
   for (const PoseSample& s : d.samples) {

@@ -23,15 +23,15 @@ constexpr std::array kEstimatorTriggerNames = {"calibration_given",
                                                "frames_enough",
                                                "calibration_accepted",
                                                "calibration_rejected",
-                                               "calibration_kept",
+                                               "calibration_saved",
                                                "rig_changed",
                                                "requested",
                                                "pose_lost",
                                                "pose_found",
                                                "pose_found_doubtful",
                                                "pose_found_uncalibrated"};
-constexpr std::array kDoubtNames = {"pairing",    "scene", "frame",       "out_of_step",
-                                    "late_image", "rig",   "calibration", "moving_scene",
+constexpr std::array kDoubtNames = {"pairing",    "scene", "frame",       "out_of_sync",
+                                    "late_image", "rig",   "calibration", "dynamic_scene",
                                     "window",     "motion"};
 static_assert(kDoubtNames.size() == kDoubts);
 

@@ -21,7 +21,7 @@ TEST(DoubtLedger, namesTheStrongestThatStands) {
 TEST(DoubtLedger, anEntryEndsAfterAsMuchEvidenceAsItNeeds) {
   DoubtLedger ledger;
   EXPECT_FALSE(ledger.weaken(Doubt::scene));
-  ledger.enter(Doubt::scene, Reason::scene_restarted, 5, 2);
+  ledger.enter(Doubt::scene, Reason::map_reset, 5, 2);
   EXPECT_FALSE(ledger.weaken(Doubt::scene));
   EXPECT_TRUE(ledger.weaken(Doubt::scene));
   EXPECT_FALSE(ledger.stands(Doubt::scene));

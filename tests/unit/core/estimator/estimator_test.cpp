@@ -121,30 +121,30 @@ TEST(Estimator, aPoseThatStandsGetsNoMoreUncertain) {
 }
 
 TEST(Estimator, ofAContradictedPairingTheFirstImageAloneIsUsedAndThePoseSaysSo) {
-  Standing contradicted, one_camera;
+  Standing contradicted, single_camera;
   for (int i = 0; i < 3; ++i) {
     (void)contradicted.give(i);
-    (void)one_camera.give(i);
+    (void)single_camera.give(i);
   }
   RigFrame frame = contradicted.frame(3);
   frame.pairing = Pairing::contradicted;
   const PoseSample sample = contradicted.estimator.process(frame);
   EXPECT_EQ(sample.status, PoseStatus::degraded);
-  EXPECT_EQ(sample.reason, Reason::unproven_pairing);
-  RigFrame left = one_camera.frame(3);
+  EXPECT_EQ(sample.reason, Reason::pairing_ambiguous);
+  RigFrame left = single_camera.frame(3);
   left.images[1] = {};
-  const PoseSample expected = one_camera.estimator.process(left);
+  const PoseSample expected = single_camera.estimator.process(left);
   EXPECT_EQ(sample.T_world_left.t, expected.T_world_left.t) << "bit for bit";
   EXPECT_EQ(sample.stereo_inliers, 0);
   EXPECT_EQ(contradicted.give(4).status, PoseStatus::ok) << "that one frame only";
 }
 
 TEST(Estimator, aPairingThatNothingProvesIsUsedAsItIs) {
-  Standing proven, assumed;
+  Standing verified, assumed;
   for (int i = 0; i < 3; ++i) {
-    RigFrame frame = proven.frame(i);
-    frame.pairing = Pairing::proven;
-    const PoseSample p = proven.estimator.process(frame);
+    RigFrame frame = verified.frame(i);
+    frame.pairing = Pairing::verified;
+    const PoseSample p = verified.estimator.process(frame);
     const PoseSample a = assumed.give(i);
     EXPECT_EQ(p.status, a.status);
     EXPECT_EQ(p.T_world_left.t, a.T_world_left.t);
@@ -256,12 +256,12 @@ TEST(Estimator, anArenaTooSmallIsRefusedNotOverrun) {
 TEST(Estimator, staysWithinTheMemoryItAskedForAndOffTheHeap) {
   Standing s;
   EXPECT_LE(s.arena.used(), s.arena.capacity());
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     for (int i = 0; i < 6; ++i) (void)s.give(i);
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 }  // namespace

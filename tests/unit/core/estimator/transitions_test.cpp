@@ -21,7 +21,7 @@ TEST(Transitions, everyStateAnswersEveryTriggerAsTheMethodSays) {
       {kStays, calibrating, kStays, kStays, kStays, kStays},               // frames_enough
       {kStays, kStays, stereo_odometry, kStays, stereo_odometry, kStays},  // calibration_accepted
       {kStays, kStays, parallel_monocular, kStays, kStays, kStays},        // calibration_rejected
-      {kStays, kStays, kStays, kStays, stereo_odometry, kStays},           // calibration_kept
+      {kStays, kStays, kStays, kStays, stereo_odometry, kStays},           // calibration_saved
       {kStays, kStays, kStays, recalibrating, kStays, kStays},             // rig_changed
       {kStays, kStays, kStays, recalibrating, kStays, kStays},             // requested
       {kStays, lost, lost, lost, lost, kStays},                            // pose_lost

@@ -7,20 +7,20 @@ namespace {
 
 constexpr int kEnough = 15;  // motions
 
-UsualSpread driven(int motions) {
-  UsualSpread usual;
+CovarianceBaseline driven(int motions) {
+  CovarianceBaseline usual;
   for (int i = 0; i < motions; ++i) EXPECT_FALSE(usual.unusual(0.010 + 0.002 * (i % 5)));
   return usual;  // 0.014 on the median
 }
 
-TEST(UsualSpread, aMotionThreeTimesAsUncertainAsTheOthersIsUnusual) {
+TEST(CovarianceBaseline, aMotionThreeTimesAsUncertainAsTheOthersIsUnusual) {
   EXPECT_TRUE(driven(kEnough).unusual(0.043));
   EXPECT_FALSE(driven(kEnough).unusual(0.041));
   EXPECT_FALSE(driven(kEnough - 1).unusual(0.043)) << "too few to tell";
 }
 
-TEST(UsualSpread, afterOneTwiceAsUncertainIsUnusualStill) {
-  UsualSpread usual = driven(100);
+TEST(CovarianceBaseline, afterOneTwiceAsUncertainIsUnusualStill) {
+  CovarianceBaseline usual = driven(100);
   EXPECT_FALSE(usual.unusual(0.030));
   EXPECT_TRUE(usual.unusual(0.060));
   EXPECT_TRUE(usual.unusual(0.030));
@@ -28,16 +28,16 @@ TEST(UsualSpread, afterOneTwiceAsUncertainIsUnusualStill) {
   EXPECT_FALSE(usual.unusual(0.030));
 }
 
-TEST(UsualSpread, standingIsNotJudgedAndALargeSigmaIsNoStanding) {
-  EXPECT_FALSE(UsualSpread{}.judges(0.027, 0.014));
-  EXPECT_TRUE(UsualSpread{}.judges(0.029, 0.014));
-  const UsualSpread usual = driven(kEnough);
+TEST(CovarianceBaseline, standingIsNotJudgedAndALargeSigmaIsNoStanding) {
+  EXPECT_FALSE(CovarianceBaseline{}.judges(0.027, 0.014));
+  EXPECT_TRUE(CovarianceBaseline{}.judges(0.029, 0.014));
+  const CovarianceBaseline usual = driven(kEnough);
   EXPECT_FALSE(usual.judges(0.027, 0.001));
   EXPECT_TRUE(usual.judges(0.029, 0.1)) << "seven times the usual";
 }
 
-TEST(UsualSpread, whatStaysUnusualNeverBecomesUsual) {
-  UsualSpread usual = driven(200);
+TEST(CovarianceBaseline, whatStaysUnusualNeverBecomesUsual) {
+  CovarianceBaseline usual = driven(200);
   for (int i = 0; i < 100; ++i) EXPECT_TRUE(usual.unusual(0.1)) << i;
   EXPECT_FALSE(usual.unusual(0.014));
 }

@@ -64,7 +64,7 @@ struct Claim {
       for (const CalibrationDecision& d : estimator->calibrations()) {
         decisions.push_back(d);
         story += std::string(d.accepted ? "accepted " : "rejected ") + d.reason +
-                 ", depth off by " + std::to_string(d.depth_difference_percent) + " %, sigma " +
+                 ", depth off by " + std::to_string(d.depth_error_percent) + " %, sigma " +
                  std::to_string(d.depth_sigma_percent) + " %\n";
       }
     }
@@ -83,7 +83,7 @@ struct Claim {
 TEST(Verifying, aTrueCalibrationIsDegradedUntilTheDriveConfirmsIt) {
   Claim c;
   c.drive(60);
-  const int confirmed = c.first(Kind::calibration_confirmed);
+  const int confirmed = c.first(Kind::calibration_verified);
   // 20 frames to solve from and six to hold the result against.
   ASSERT_GE(confirmed, 25) << c.story;
   EXPECT_EQ(c.first(Kind::calibration_contradicted), -1) << c.story;
@@ -104,10 +104,10 @@ TEST(Verifying, afterAnOutageTheDriveHasToConfirmItAgainAndSaysSoOnce) {
   Claim c;
   c.dark_from = 50, c.dark_to = 56;
   c.drive(110);
-  ASSERT_GE(c.first(Kind::calibration_confirmed), 25) << c.story;
-  const int again = c.first(Kind::calibration_confirmed, c.dark_to);
+  ASSERT_GE(c.first(Kind::calibration_verified), 25) << c.story;
+  const int again = c.first(Kind::calibration_verified, c.dark_to);
   ASSERT_GE(again, c.dark_to + 25) << c.story;
-  EXPECT_EQ(c.first(Kind::calibration_confirmed, again + 1), -1) << c.story;
+  EXPECT_EQ(c.first(Kind::calibration_verified, again + 1), -1) << c.story;
   EXPECT_EQ(c.first(Kind::rig_changed), -1) << c.story;
   for (const PoseSample& s : c.samples) {
     const int i = static_cast<int>(s.frame);
@@ -195,8 +195,8 @@ TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
   ASSERT_NE(first, c.decisions.end());
   EXPECT_EQ(first->cause, CalibrationCause::contradicted);
   EXPECT_TRUE(first->learnt);
-  const double off = 100 * first->judged_depth_m * 0.015 / c.given.T_camera_left[1].t.norm();
-  EXPECT_NEAR(first->depth_difference_percent, off, 0.1 * off + 2);
+  const double off = 100 * first->reference_depth_m * 0.015 / c.given.T_camera_left[1].t.norm();
+  EXPECT_NEAR(first->depth_error_percent, off, 0.1 * off + 2);
   EXPECT_TRUE(c.estimator->verified()) << c.story;
   // Straight ahead at 6.6 m, yaw and centre together: within the tolerance twice over of what the
   // truth gives.
@@ -213,7 +213,7 @@ TEST(Verifying, posesOfAContradictedCalibrationAreNotOk) {
   c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * c.given.T_camera_left[1].R;
   c.drive(60);
   const int accepted = c.first(Kind::calibration_accepted),
-            confirmed = c.first(Kind::calibration_confirmed);
+            confirmed = c.first(Kind::calibration_verified);
   ASSERT_GE(accepted, 0) << c.story;
   ASSERT_EQ(confirmed, accepted + 1) << c.story;
   for (const PoseSample& s : c.samples) {
@@ -243,16 +243,16 @@ TEST(Verifying, aYawKnockedBeforeTheClaimIsConfirmedIsSeenAtOnce) {
 // from the knock's first frame on all the same. 5 mrad of pitch are 1.4 px across the epipolar
 // lines.
 TEST(Verifying, aPitchKnockedRightAfterACalibrationWasAdoptedIsNeverOk) {
-  constexpr int kConfirmed = 26, kKnock = kConfirmed + 3;
+  constexpr int kVerified = 26, kKnock = kVerified + 3;
   const Transform truth = Corridor().rig().T_camera_left[1];
   Claim c;
   c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * truth.R;
-  c.drive(kConfirmed + 9, kKnock, {0.005, 0, 0});
-  ASSERT_EQ(c.first(Kind::calibration_confirmed), kConfirmed) << c.story;
-  EXPECT_EQ(c.first(Kind::rig_changed), kConfirmed + 6) << c.story;
+  c.drive(kVerified + 9, kKnock, {0.005, 0, 0});
+  ASSERT_EQ(c.first(Kind::calibration_verified), kVerified) << c.story;
+  EXPECT_EQ(c.first(Kind::rig_changed), kVerified + 6) << c.story;
   for (const PoseSample& s : c.samples)
     EXPECT_EQ(s.status == PoseStatus::ok,
-              static_cast<int>(s.frame) > kConfirmed + 1 && static_cast<int>(s.frame) < kKnock)
+              static_cast<int>(s.frame) > kVerified + 1 && static_cast<int>(s.frame) < kKnock)
         << s.frame << '\n'
         << c.story;
 }
@@ -265,7 +265,7 @@ TEST(Verifying, offlineAClaimStandsAndIsNotCalledUnverified) {
     c.drive(40);
     for (const PoseSample& s : c.samples)
       EXPECT_NE(s.reason, Reason::unverified_calibration) << s.frame;
-    EXPECT_EQ(c.first(Kind::calibration_confirmed), -1) << c.story;
+    EXPECT_EQ(c.first(Kind::calibration_verified), -1) << c.story;
     EXPECT_EQ(c.first(Kind::calibration_contradicted), -1) << c.story;
     EXPECT_TRUE(c.decisions.empty());
     EXPECT_EQ(c.estimator->calibration().T_camera_left[1].R, c.given.T_camera_left[1].R);

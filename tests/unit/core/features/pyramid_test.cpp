@@ -84,12 +84,12 @@ TEST(Pyramid, takesFromTheArenaWhatItSaidAndNothingFromTheHeap) {
   Arena arena(Pyramid::memory_needed(640, 480, 4));
   Pyramid pyramid(640, 480, 4, arena);
   EXPECT_LE(arena.used(), arena.capacity());
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     pyramid.build(image.view());
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 }  // namespace

@@ -338,7 +338,7 @@ TEST(Surf, takesTheMemoryItSaysAndNoneAfterwards) {
   Arena small(Surf::memory_needed(240, 180) / 2);
   EXPECT_THROW(Surf(240, 180, small), std::length_error);
 
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     ASSERT_EQ(surf.set_image(image.view()), SurfStatus::ok);
@@ -348,7 +348,7 @@ TEST(Surf, takesTheMemoryItSaysAndNoneAfterwards) {
     const SurfView view{points.span(), descriptors.first(points.size())};
     ASSERT_EQ(matcher.match(view, view, {}, nullptr, &matches), SurfMatchStatus::ok);
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   ASSERT_GT(points.size(), 30U);
   // Everything finds itself.
   EXPECT_EQ(matches.size(), points.size());

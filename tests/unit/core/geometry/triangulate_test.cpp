@@ -107,7 +107,7 @@ TEST(Triangulate, namesWhatIsWrong) {
 
 TEST(Triangulate, nothingIsNotANumberAndNothingAllocates) {
   Random random(33);
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   for (int k = 0; k < 5000; ++k) {
     std::array<RayView, 3> views;
     for (RayView& v : views)
@@ -118,7 +118,7 @@ TEST(Triangulate, nothingIsNotANumberAndNothingAllocates) {
     ASSERT_TRUE(found.p_world.allFinite() && found.covariance.allFinite() &&
                 std::isfinite(found.inverse_depth_sigma));
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 }  // namespace

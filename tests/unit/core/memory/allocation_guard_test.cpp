@@ -18,12 +18,12 @@ void* volatile sink = nullptr;
 
 /// Allocations that `work` makes on this thread once it is sealed.
 std::uint64_t counted(void (*work)()) {
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     work();
   }
-  return AllocationGuard::allocations_after_seal() - before;
+  return AllocationGuard::runtime_allocations() - before;
 }
 
 class AllocationGuardTest : public testing::Test {
@@ -61,24 +61,24 @@ TEST_F(AllocationGuardTest, countsEveryWayToTheHeap) {
 }
 
 TEST_F(AllocationGuardTest, anUnsealedThreadMayAllocateWhileAnotherIsSealed) {
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::uint64_t inside = 1;
   std::thread other([&inside] {
-    const std::uint64_t start = AllocationGuard::allocations_after_seal();
+    const std::uint64_t start = AllocationGuard::runtime_allocations();
     sink = malloc(1000);
     free(sink);
-    inside = AllocationGuard::allocations_after_seal() - start;
+    inside = AllocationGuard::runtime_allocations() - start;
   });
   {
     const SealedScope sealed;
     other.join();
   }
   EXPECT_EQ(inside, 0U);
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 TEST_F(AllocationGuardTest, everySealedThreadCounts) {
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::vector<std::thread> threads;
   for (int i = 0; i < 3; ++i)
     threads.emplace_back([] {
@@ -87,7 +87,7 @@ TEST_F(AllocationGuardTest, everySealedThreadCounts) {
       free(p);
     });
   for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(AllocationGuard::allocations_after_seal() - before, 3U);
+  EXPECT_EQ(AllocationGuard::runtime_allocations() - before, 3U);
 }
 
 TEST_F(AllocationGuardTest, scopesNest) {

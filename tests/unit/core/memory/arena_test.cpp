@@ -34,9 +34,9 @@ TEST(Arena, whenFullSaysWhoAskedForHowMuchAndStaysUsable) {
     (void)arena.make<std::uint8_t>(65, "tracks");
     FAIL() << "65 bytes went into 64";
   } catch (const std::length_error& error) {
-    const std::string sentence = error.what();
-    EXPECT_NE(sentence.find("tracks"), std::string::npos) << sentence;
-    EXPECT_NE(sentence.find("128"), std::string::npos) << sentence;
+    const std::string message = error.what();
+    EXPECT_NE(message.find("tracks"), std::string::npos) << message;
+    EXPECT_NE(message.find("128"), std::string::npos) << message;
   }
   EXPECT_EQ(arena.make<std::uint8_t>(64, "second").size(), 64U);
   EXPECT_EQ(arena.used(), arena.capacity());

@@ -84,14 +84,14 @@ TEST_F(ThreadAllocationsTest, aThreadThatOutlivesACountIsFoundAgainInTheNext) {
 
 TEST_F(ThreadAllocationsTest, aFullTableCountsTheRestTogether) {
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < ThreadAllocations::kMostNames + 3; ++i)
+  for (std::size_t i = 0; i < ThreadAllocations::kMaxNames + 3; ++i)
     names.push_back("vergence-t" + std::to_string(i));
   ThreadAllocations::begin();
   run_named(names[0], 1);
   for (const std::string& name : names) run_named(name, 1);
   ThreadAllocations::end();
   const ThreadAllocations::Counts counts = ThreadAllocations::counts();
-  EXPECT_EQ(counts.size, ThreadAllocations::kMostNames);
+  EXPECT_EQ(counts.size, ThreadAllocations::kMaxNames);
   EXPECT_GE(counts.others, 3U);  // 3, and one more if this thread itself has taken a row
   EXPECT_EQ(count_of(names[0]), 2U);
   EXPECT_EQ(count_of(names.back()), std::nullopt);

@@ -28,7 +28,7 @@ class FreeMatches : public ::testing::TestWithParam<int> {
   [[nodiscard]] static OdometryOptions options() {
     OdometryOptions o;
     o.features = 300;
-    o.first_pair = GetParam();
+    o.init_features = GetParam();
     return o;
   }
 };
@@ -50,14 +50,14 @@ TEST_P(FreeMatches, ofAMovedPictureLieWhereItMovedWithoutHeap) {
   frame.cameras = 2;
   frame.images[0] = left.view();
   frame.images[1] = right.view();
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   std::span<const FreeMatch> matches;
   {
     const SealedScope sealed;
     (void)front.begin(frame);
     matches = front.match_free(1);
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   ASSERT_GE(matches.size(), 30U);
   std::size_t right_ones = 0;
   // Three sigmas of a corner's place: both are the same pixels but for the rounding of grey values.

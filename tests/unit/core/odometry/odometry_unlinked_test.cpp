@@ -135,13 +135,13 @@ TEST(OdometryUnlinked, aThirdCameraIsFoundThroughTheSceneOfTheFirstTwo) {
 
 TEST(OdometryUnlinked, allocatesNothing) {
   Drive d(false);
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   for (int i = 0; i < 8; ++i) {
     const RigFrame frame = d.corridor.frame(i);
     const SealedScope sealed;
     (void)d.odometry.process(frame);
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   EXPECT_LE(d.arena.used(), d.arena.capacity());
 }
 

@@ -194,7 +194,7 @@ constexpr double kTurned = 2e-3;  // rad: a disparity of 1 px
 
 TEST(WindowAdjuster, aTurnOfACameraIsOneErrorOfAllPointsAndIsFound) {
   Bend b;
-  b.options.rig_turn_sigma = 0.05;
+  b.options.extrinsic_rotation_sigma_rad = 0.05;
   const Vec3 axis = Vec3::UnitZ().cross(b.calibration.T_camera_left[1].t).normalized();
   b.calibration.T_camera_left[1].R = exp_so3(kTurned * axis) * b.calibration.T_camera_left[1].R;
   b.adjuster.take_up_rig();
@@ -218,7 +218,7 @@ TEST(WindowAdjuster, aCalibrationThatIsCertainIsHeld) {
   b.disturb();
   ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
   EXPECT_NEAR(turn_left(b), kTurned, 0.01 * kTurned);
-  b.options.rig_turn_sigma = 0;
+  b.options.extrinsic_rotation_sigma_rad = 0;
   b.adjuster.take_up_rig();
   ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
   EXPECT_NEAR(turn_left(b), kTurned, 1e-12);
@@ -227,12 +227,12 @@ TEST(WindowAdjuster, aCalibrationThatIsCertainIsHeld) {
 TEST(WindowAdjuster, allocatesNothing) {
   Bend b;
   b.disturb();
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     (void)b.adjuster.adjust(b.map);
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ constexpr int kKeyframes = 10, kSteps = 5;
 constexpr double kPoints = 1000, kStep = 40;  // a step of one keyframe: the window takes 2000
 
 /// Of a frame that begins now with so many seconds, usable ones, with the costs above known.
-FrameEffort effort_in(double usable_s) {
+FrameWorkload effort_in(double usable_s) {
   WorkBudget budget;
   budget.points_took(1e3 * kPoints, {});
   budget.window_took(1e3 * kStep * kKeyframes * kSteps, kKeyframes, kSteps);
@@ -28,21 +28,21 @@ TEST(WorkBudget, withoutABudgetAllIsDone) {
 TEST(WorkBudget, withTimeEnoughAllIsDone) { EXPECT_TRUE(effort_in(3010).whole()); }
 
 TEST(WorkBudget, pointsGoFirst) {
-  const FrameEffort e = effort_in(2601);
+  const FrameWorkload e = effort_in(2601);
   EXPECT_EQ(e.points_percent, 60);
-  EXPECT_EQ(e.window_keyframes, FrameEffort::kAll);
-  EXPECT_EQ(e.window_steps, FrameEffort::kAll);
+  EXPECT_EQ(e.window_keyframes, FrameWorkload::kAll);
+  EXPECT_EQ(e.window_steps, FrameWorkload::kAll);
 }
 
 TEST(WorkBudget, thenTheWindowIsSmaller) {
-  const FrameEffort e = effort_in(250 + 1401);  // a quarter of the points, seven keyframes
+  const FrameWorkload e = effort_in(250 + 1401);  // a quarter of the points, seven keyframes
   EXPECT_EQ(e.points_percent, 25);
   EXPECT_EQ(e.window_keyframes, 7);
-  EXPECT_EQ(e.window_steps, FrameEffort::kAll);
+  EXPECT_EQ(e.window_steps, FrameWorkload::kAll);
 }
 
 TEST(WorkBudget, thenItsSolverHasFewerSteps) {
-  const FrameEffort e = effort_in(250 + 321);  // two steps of four keyframes
+  const FrameWorkload e = effort_in(250 + 321);  // two steps of four keyframes
   EXPECT_EQ(e.points_percent, 25);
   EXPECT_EQ(e.window_keyframes, 4);
   EXPECT_EQ(e.window_steps, 2);
@@ -50,7 +50,7 @@ TEST(WorkBudget, thenItsSolverHasFewerSteps) {
 
 TEST(WorkBudget, atLastThereIsNoWindowAndAQuarterOfThePointsStill) {
   for (const double usable_s : {300.0, 1.0}) {
-    const FrameEffort e = effort_in(usable_s);
+    const FrameWorkload e = effort_in(usable_s);
     EXPECT_EQ(e.points_percent, 25);
     EXPECT_EQ(e.window_keyframes, 0);
     EXPECT_EQ(e.window_steps, 0);
@@ -69,7 +69,7 @@ TEST(WorkBudget, aWindowThatWasLeftOutForOneDearOneIsTriedAgain) {
   WorkBudget budget;
   budget.window_took(1e6, kKeyframes, kSteps);
   int frames = 0;
-  FrameEffort e;
+  FrameWorkload e;
   do {
     budget.begin(Duration::seconds(200));
     e = budget.plan(kKeyframes, kSteps);

@@ -33,7 +33,7 @@ constexpr Stamp kStart{1'577'836'800'000'000'000};
 
 struct BenchOptions {
   Duration grid = Duration::nanoseconds(1);
-  SyncMode mode = SyncMode::counter;
+  SyncMode mode = SyncMode::frame_counter;
   Duration vary{};
   double seconds = 4;
 };
@@ -137,7 +137,7 @@ struct EmptyCamera final : test::IdleCamera {
   }
   DeviceStatus wait(Duration, Frame* frame) noexcept override {
     frame->arrival = HostStamp(starts.load());
-    return DeviceStatus::gone;
+    return DeviceStatus::disconnected;
   }
 
   std::atomic<int> starts{0};
@@ -156,7 +156,7 @@ class EmptyBoard final : public TriggerDevice {
   }
   DeviceStatus wait(Duration, Pulse* pulse) noexcept override {
     pulse->arrival = HostStamp(starts.load());
-    return DeviceStatus::gone;
+    return DeviceStatus::disconnected;
   }
   void stop() noexcept override {}
   TriggerStatistics statistics() const noexcept override { return {}; }
@@ -172,7 +172,7 @@ TEST(Acquisition, aDeviceThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
   EmptyBoard board;
   Acquisition::Options options;
   options.sync.interval = Duration::milliseconds(50);
-  options.sync.mode = SyncMode::software;
+  options.sync.mode = SyncMode::approximate_time;
   Acquisition source({&left, &right}, nullptr, &board, options);
   ASSERT_FALSE(source.start());
   constexpr int kTwiceAgain = 3;  // starts
@@ -184,8 +184,8 @@ TEST(Acquisition, aDeviceThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
   std::vector<Acquired> items;
   for (Acquired item; source.next(&item);) items.push_back(item);
   source.join();
-  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_gone), 2) << "each once";
-  EXPECT_EQ(count(items, DeviceEvent::Kind::board_gone), 1);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_disconnected), 2) << "each once";
+  EXPECT_EQ(count(items, DeviceEvent::Kind::trigger_board_disconnected), 1);
 }
 
 TEST(Acquisition, aCameraThatGivesNothingThoughThereArePulsesIsStartedAgain) {
@@ -197,8 +197,8 @@ TEST(Acquisition, aCameraThatGivesNothingThoughThereArePulsesIsStartedAgain) {
   const std::vector<Acquired> items = b.drive();
   EXPECT_EQ(b.watched[0]->starts, 1);
   EXPECT_EQ(b.watched[1]->starts, 2);
-  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_gone), 1);
-  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_back), 1);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_disconnected), 1);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::camera_reconnected), 1);
   EXPECT_GE(b.pulses_of.back()[1], 0) << "it gives images again";
 }
 
@@ -209,9 +209,9 @@ constexpr BenchOptions kByPulses{
 
 /// Sets with both images, all of the same pulse, stamped at its middle within the error; the first
 /// of them after that time.
-void expect_right_pairs(const Bench& b, const std::vector<Acquired>& items, int most_unproven = 0) {
+void expect_right_pairs(const Bench& b, const std::vector<Acquired>& items, int max_ambiguous = 0) {
   std::size_t i = 0;
-  int unproven = 0;
+  int ambiguous = 0;
   for (const Acquired& item : items) {
     const AcquiredFrame* frame = frame_of(item);
     if (frame == nullptr) continue;
@@ -224,24 +224,24 @@ void expect_right_pairs(const Bench& b, const std::vector<Acquired>& items, int 
     const Stamp truth =
         kStart + b.times[static_cast<std::size_t>(first)] + Duration::milliseconds(4);
     EXPECT_LE(std::abs((frame->rig.stamp - truth).ns()), set.error.ns()) << set.number;
-    // One that is not proven for the while says so, and is right all the same.
-    unproven += set.proof == SyncProof::unproven ? 1 : 0;
+    // One that is not verified for the while says so, and is right all the same.
+    ambiguous += set.proof == SyncProof::ambiguous ? 1 : 0;
     EXPECT_EQ(frame->rig.pairing,
-              set.proof == SyncProof::unproven ? Pairing::contradicted : Pairing::proven);
-    EXPECT_TRUE(set.proof == SyncProof::numbered || set.proof == SyncProof::unproven)
+              set.proof == SyncProof::ambiguous ? Pairing::contradicted : Pairing::verified);
+    EXPECT_TRUE(set.proof == SyncProof::numbered || set.proof == SyncProof::ambiguous)
         << to_string(set.proof);
     EXPECT_EQ(set.spread, Duration{}) << "equal exposures of one pulse";
   }
   EXPECT_EQ(i, b.pulses_of.size());
-  EXPECT_LE(unproven, most_unproven);
+  EXPECT_LE(ambiguous, max_ambiguous);
 }
 
 TEST(Acquisition, byPulsesEveryPairIsProvenWithinASecondAndRight) {
   Bench b({}, kByPulses);
   const auto items = b.drive();
   expect_right_pairs(b, items);
-  EXPECT_EQ(count(items, DeviceEvent::Kind::acquiring), 2);
-  EXPECT_EQ(count(items, DeviceEvent::Kind::proven), 2);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::pairing_pending), 2);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::pairing_verified), 2);
   EXPECT_LE(worst_acquisition(items), 1);
   const AcquisitionCounters& c = b.source->counters();
   EXPECT_EQ(c.pulses, b.times.size());
@@ -254,7 +254,7 @@ TEST(Acquisition, byPulsesEveryPairIsProvenWithinASecondAndRight) {
 struct LossCase {
   const char* name;
   std::vector<std::string> faults;
-  int acquisitions;  // proven, in all
+  int acquisitions;  // verified, in all
   DeviceEvent::Kind kind;
   int items;  // of that kind
 };
@@ -264,7 +264,7 @@ TEST_P(AcquisitionByPulses, whateverIsLostNoPairIsWrongAndAllIsSaid) {
   Bench b(GetParam().faults, kByPulses), again(GetParam().faults, kByPulses);
   const auto items = b.drive(), more = again.drive();
   expect_right_pairs(b, items, 2);
-  EXPECT_EQ(count(items, DeviceEvent::Kind::proven), GetParam().acquisitions);
+  EXPECT_EQ(count(items, DeviceEvent::Kind::pairing_verified), GetParam().acquisitions);
   EXPECT_LE(worst_acquisition(items), 1);
   EXPECT_EQ(count(items, GetParam().kind), GetParam().items);
   EXPECT_GT(b.pulses_of.size(), 90U) << "of 160: it came back";
@@ -281,19 +281,24 @@ using Kind = DeviceEvent::Kind;
 INSTANTIATE_TEST_SUITE_P(
     Ways, AcquisitionByPulses,
     ::testing::Values(
-        LossCase{"camera", {"camera_gone@4 camera=1 duration_s=1"}, 3, Kind::camera_back, 1},
-        LossCase{"left", {"camera_gone@4 camera=0 duration_s=1"}, 3, Kind::camera_back, 1},
-        LossCase{"reboot", {"board_reboot@4 duration_s=0.5"}, 4, Kind::board_rebooted, 1},
-        LossCase{"board", {"board_gone@4 duration_s=1"}, 4, Kind::board_back, 1},
-        LossCase{"line", {"board_gone@4 duration_s=1 powered=1"}, 2, Kind::board_gone, 1},
+        LossCase{"camera", {"camera_gone@4 camera=1 duration_s=1"}, 3, Kind::camera_reconnected, 1},
+        LossCase{"left", {"camera_gone@4 camera=0 duration_s=1"}, 3, Kind::camera_reconnected, 1},
+        LossCase{"reboot", {"board_reboot@4 duration_s=0.5"}, 4, Kind::trigger_board_restarted, 1},
+        LossCase{"board", {"board_gone@4 duration_s=1"}, 4, Kind::trigger_board_reconnected, 1},
+        LossCase{"line",
+                 {"board_gone@4 duration_s=1 powered=1"},
+                 2,
+                 Kind::trigger_board_disconnected,
+                 1},
         LossCase{"missed",
                  {"missed_trigger@4 camera=1 pulses=2", "missed_trigger@6 camera=0"},
                  2,
-                 Kind::acquiring,
+                 Kind::pairing_pending,
                  2},
-        LossCase{"frames", {"lose_frames@3 share=0.2 duration_s=0"}, 2, Kind::acquiring, 2},
-        LossCase{"pairs", {"break_pairs@3 share=0.5 duration_s=0"}, 2, Kind::acquiring, 2},
-        LossCase{"doubles", {"duplicate_frames@3 share=0.3 duration_s=0"}, 2, Kind::acquiring, 2}),
+        LossCase{"frames", {"lose_frames@3 share=0.2 duration_s=0"}, 2, Kind::pairing_pending, 2},
+        LossCase{"pairs", {"break_pairs@3 share=0.5 duration_s=0"}, 2, Kind::pairing_pending, 2},
+        LossCase{
+            "doubles", {"duplicate_frames@3 share=0.3 duration_s=0"}, 2, Kind::pairing_pending, 2}),
     [](const auto& i) { return std::string(i.param.name); });
 
 TEST(Acquisition, theClocksOfADriveAreRecorded) {

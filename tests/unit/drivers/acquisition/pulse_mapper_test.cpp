@@ -13,7 +13,7 @@ const HostStamp kHost(70'000'000'000);
 
 ClockMapperOptions exact() {
   ClockMapperOptions o;
-  o.least_delay = Duration::milliseconds(1);
+  o.min_delay = Duration::milliseconds(1);
   return o;
 }
 
@@ -46,14 +46,14 @@ TEST(CameraClock, anExposureThatGrowsIsNoClockThatDrifts) {
   EXPECT_EQ(clock.resets(), 0U);
 }
 
-TEST(PairingWatch, tellsNothingOfCamerasThatGaveNoFrame) {
-  PairingWatch watch;
+TEST(PairingTracker, tellsNothingOfCamerasThatGaveNoFrame) {
+  PairingTracker watch;
   EXPECT_FALSE(watch.look(0, false, kHost));
   watch.frame(0);
   EXPECT_FALSE(watch.look(1, false, kHost));
   const auto change = watch.look(0, false, kHost);
   ASSERT_TRUE(change);
-  EXPECT_FALSE(change->proven);
+  EXPECT_FALSE(change->verified);
 }
 
 }  // namespace

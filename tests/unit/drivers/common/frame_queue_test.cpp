@@ -48,12 +48,12 @@ TEST_F(Queue, aDeviceThatIsBackIsGoneUntilItIsBegunAgain) {
   queue.ready_again();
   EXPECT_EQ(queue.state(), FrameQueue::State::back);
   EXPECT_EQ(ready.count, 3) << "told at every call";
-  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::gone);
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::disconnected);
   queue.fail(HostStamp(50));
-  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::gone);
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::disconnected);
   EXPECT_EQ(out.arrival, HostStamp(50));
   queue.fail();
-  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::gone);
+  EXPECT_EQ(queue.wait({}, &out), DeviceStatus::disconnected);
   EXPECT_EQ(out.arrival, HostStamp(50)) << "as before";
   queue.begin(&ready);
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout);
@@ -97,7 +97,7 @@ TEST_F(Queue, ASilentDeviceIsGoneAndStreamsAgainAfterAStart) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence);
   queue.count_underrun();  // one image
-  EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::gone);
+  EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::disconnected);
   EXPECT_GT(out.arrival - begun, kSilence);
   EXPECT_EQ(queue.state(), FrameQueue::State::gone);
   EXPECT_FALSE(queue.offer(frame(1)));
@@ -118,7 +118,7 @@ TEST_F(Queue, ImagesThatFoundNoSlotAreNoSilence) {
 TEST_F(Queue, TheFirstImageMayTakeLonger) {
   const HostStamp begun = monotonic_now();
   queue.begin(&ready, kSilence);
-  EXPECT_EQ(ask(&queue, kAnswer * 3, &out), DeviceStatus::gone);
+  EXPECT_EQ(ask(&queue, kAnswer * 3, &out), DeviceStatus::disconnected);
   EXPECT_GT(out.arrival - begun, Duration::seconds(10));
 }
 
@@ -127,7 +127,7 @@ TEST_F(Queue, WhoDidNotAskCannotTellSilence) {
   queue.count_underrun();
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));
   EXPECT_EQ(queue.wait({}, &out), DeviceStatus::timeout) << "it was away itself";
-  EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::gone);
+  EXPECT_EQ(ask(&queue, kAnswer, &out), DeviceStatus::disconnected);
 }
 
 TEST(LongestSilence, IsTenIntervalsOfAFreeRunningCameraAndTwoSecondsAtLeast) {

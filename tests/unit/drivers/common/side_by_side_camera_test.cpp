@@ -124,19 +124,20 @@ TEST_F(SideBySide, giveBackOnStopWhatOneOfThemHasNotTaken) {
 
 TEST_F(SideBySide, areBothGoneBeforeEitherComesBack) {
   stream();
-  script_.answers = {DeviceStatus::ok, DeviceStatus::gone};
+  script_.answers = {DeviceStatus::ok, DeviceStatus::disconnected};
   Frame frame;
   ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
-  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::gone);
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::disconnected);
   EXPECT_EQ(frame.arrival, HostStamp(7'000'000));
   const int starts = script_.starts;
-  EXPECT_EQ(left_->start(nullptr), DeviceStatus::gone) << "the right half does not know yet";
+  EXPECT_EQ(left_->start(nullptr), DeviceStatus::disconnected)
+      << "the right half does not know yet";
   EXPECT_EQ(script_.starts, starts);
   ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::ok) << "what came before it went";
-  ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::gone);
-  script_.on_start = DeviceStatus::gone;
-  EXPECT_EQ(left_->start(nullptr), DeviceStatus::gone);
-  EXPECT_EQ(right_->start(nullptr), DeviceStatus::gone);
+  ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::disconnected);
+  script_.on_start = DeviceStatus::disconnected;
+  EXPECT_EQ(left_->start(nullptr), DeviceStatus::disconnected);
+  EXPECT_EQ(right_->start(nullptr), DeviceStatus::disconnected);
   script_.on_start = DeviceStatus::ok;
   EXPECT_EQ(right_->start(nullptr), DeviceStatus::ok);
   EXPECT_EQ(left_->start(nullptr), DeviceStatus::ok);
@@ -147,13 +148,13 @@ TEST_F(SideBySide, areBothGoneBeforeEitherComesBack) {
 
 TEST_F(SideBySide, oneThatGoesAgainBeforeBothAreBackComesBackToo) {
   stream();
-  script_.answers = {DeviceStatus::gone};
+  script_.answers = {DeviceStatus::disconnected};
   Frame frame;
-  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::gone);
-  ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::gone);
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::disconnected);
+  ASSERT_EQ(right_->wait({}, &frame), DeviceStatus::disconnected);
   ASSERT_EQ(left_->start(nullptr), DeviceStatus::ok);
-  script_.answers = {DeviceStatus::gone};
-  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::gone);
+  script_.answers = {DeviceStatus::disconnected};
+  ASSERT_EQ(left_->wait({}, &frame), DeviceStatus::disconnected);
   ASSERT_EQ(right_->start(nullptr), DeviceStatus::ok);
   ASSERT_EQ(left_->start(nullptr), DeviceStatus::ok);
   script_.answers = {DeviceStatus::ok};

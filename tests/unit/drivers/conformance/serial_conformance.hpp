@@ -34,16 +34,16 @@ namespace vergence::test {
 /// What a device gives until it has no more, or this many; `gone` is counted and passed over, the
 /// device is asked to come back.
 template <class Item, class Device>
-[[nodiscard]] std::vector<Item> all_of(Device& device, std::size_t most, int* times_gone) {
+[[nodiscard]] std::vector<Item> all_of(Device& device, std::size_t most, int* disconnects) {
   std::vector<Item> all;
   while (all.size() < most) {
     Item item;
     const DeviceStatus s = device.wait(Duration::seconds(20), &item);
     if (s == DeviceStatus::ok) {
       all.push_back(item);
-    } else if (s == DeviceStatus::gone) {
-      ++*times_gone;
-      while (device.start(nullptr) == DeviceStatus::gone) std::this_thread::yield();
+    } else if (s == DeviceStatus::disconnected) {
+      ++*disconnects;
+      while (device.start(nullptr) == DeviceStatus::disconnected) std::this_thread::yield();
     } else {
       break;
     }
@@ -106,7 +106,7 @@ struct SerialConformance : ::testing::Test {
   }
   /// To the end of its time, stamps in order.
   std::vector<Item> take_to_the_end() {
-    const auto all = all_of<Item>(rig->device(), SIZE_MAX, &times_gone);
+    const auto all = all_of<Item>(rig->device(), SIZE_MAX, &disconnects);
     EXPECT_FALSE(all.empty());
     for (std::size_t i = 0; i < all.size() && !::testing::Test::HasFailure(); ++i) {
       EXPECT_TRUE(all[i].mapped);
@@ -118,7 +118,7 @@ struct SerialConformance : ::testing::Test {
   }
 
   std::unique_ptr<Joined> rig;
-  int times_gone = 0;
+  int disconnects = 0;
 };
 TYPED_TEST_SUITE_P(SerialConformance);
 
@@ -129,13 +129,13 @@ TYPED_TEST_P(SerialConformance, stopsAndStartsAgain) {
   typename TypeParam::Item item;
   for (std::uint64_t i = 1; i <= 3; ++i) {
     ASSERT_EQ(device.start(nullptr), DeviceStatus::ok) << "the first time it is started already";
-    EXPECT_EQ(all_of<typename TypeParam::Item>(device, 20, &this->times_gone).size(), 20U);
+    EXPECT_EQ(all_of<typename TypeParam::Item>(device, 20, &this->disconnects).size(), 20U);
     device.stop();
     device.stop();
     EXPECT_EQ(device.wait(Duration{}, &item), DeviceStatus::stopped);
     EXPECT_EQ(device.statistics().starts, i);
   }
-  EXPECT_EQ(this->times_gone, 0);
+  EXPECT_EQ(this->disconnects, 0);
 }
 
 TYPED_TEST_P(SerialConformance, comesBackAfterItWasUnpluggedWithOrWithoutItsSupply) {
@@ -143,7 +143,7 @@ TYPED_TEST_P(SerialConformance, comesBackAfterItWasUnpluggedWithOrWithoutItsSupp
   line.outages = {{at_s(10), at_s(13), true}, {at_s(18), at_s(20), false}};
   this->begin(line);
   const auto all = this->take_to_the_end();
-  EXPECT_EQ(this->times_gone, 2);
+  EXPECT_EQ(this->disconnects, 2);
   EXPECT_GT(static_cast<double>(all.size()), 15 * TypeParam::kRate);
 }
 
@@ -152,7 +152,7 @@ TYPED_TEST_P(SerialConformance, startsAnewAfterAStopWhileItWasGone) {
   line.outages = {{at_s(10), at_s(13), true}};
   this->begin(line, {}, 120);
   typename TypeParam::Item last;
-  ASSERT_EQ(end_of(this->rig->device(), &last), DeviceStatus::gone);
+  ASSERT_EQ(end_of(this->rig->device(), &last), DeviceStatus::disconnected);
   EXPECT_GE(last.arrival, at_s(10));
   this->rig->device().stop();
   ASSERT_EQ(this->rig->device().start(nullptr), DeviceStatus::ok);
@@ -164,7 +164,7 @@ TYPED_TEST_P(SerialConformance, noiseIsSilenceAndSilenceIsGone) {
     if (at > at_s(12) && at < at_s(18)) std::fill(bytes->begin(), bytes->end(), std::uint8_t{0x55});
   });
   (void)this->take_to_the_end();
-  EXPECT_EQ(this->times_gone, 1);
+  EXPECT_EQ(this->disconnects, 1);
 }
 
 TYPED_TEST_P(SerialConformance, bitsThatFlipCostMessagesAndNothingElse) {
@@ -172,7 +172,7 @@ TYPED_TEST_P(SerialConformance, bitsThatFlipCostMessagesAndNothingElse) {
   line.corrupt = 2e-4;
   this->begin(line);
   const auto all = this->take_to_the_end();
-  EXPECT_EQ(this->times_gone, 0);
+  EXPECT_EQ(this->disconnects, 0);
   EXPECT_GT(static_cast<double>(all.size()), 20 * TypeParam::kRate);
   const auto s = this->rig->device().statistics();
   EXPECT_GT(s.malformed, 0U);

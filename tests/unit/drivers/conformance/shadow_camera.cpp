@@ -68,7 +68,7 @@ void ShadowCamera::configure(const CameraConfiguration& requested) {
   EXPECT_EQ(actual.trigger, requested.trigger);
   now_ = requested;
   state_ = State::stopped;
-  EXPECT_GE(camera_.timing().least_delay, Duration{});
+  EXPECT_GE(camera_.timing().min_delay, Duration{});
   EXPECT_GT(camera_.timing().resolution, Duration{});
 }
 
@@ -119,7 +119,7 @@ void ShadowCamera::stop() {
 void ShadowCamera::trigger_if_asked() {
   if (now_.trigger != CameraTrigger::software || state_ != State::streaming) return;
   const DeviceStatus status = camera_.trigger_once();
-  EXPECT_TRUE(status == DeviceStatus::ok || (unplugged_ && status == DeviceStatus::gone))
+  EXPECT_TRUE(status == DeviceStatus::ok || (unplugged_ && status == DeviceStatus::disconnected))
       << to_string(status) << camera_.last_error();
 }
 
@@ -145,7 +145,7 @@ DeviceStatus ShadowCamera::wait(Duration limit) {
     case DeviceStatus::stopped:
       EXPECT_TRUE(state_ == State::unconfigured || state_ == State::stopped);
       break;
-    case DeviceStatus::gone:
+    case DeviceStatus::disconnected:
       EXPECT_TRUE(unplugged_) << "gone with the cable in: " << camera_.last_error();
       if (state_ == State::streaming) {
         EXPECT_LE(frame.arrival, now());
@@ -232,13 +232,13 @@ bool ShadowCamera::unplug_and_replug() {
     release_all();
     (void)wait(Duration::milliseconds(100));
   }
-  EXPECT_EQ(wait(Duration::milliseconds(50)), DeviceStatus::gone) << "gone stays gone";
-  EXPECT_EQ(camera_.start(&notifier_), DeviceStatus::gone) << "started without a cable";
+  EXPECT_EQ(wait(Duration::milliseconds(50)), DeviceStatus::disconnected) << "gone stays gone";
+  EXPECT_EQ(camera_.start(&notifier_), DeviceStatus::disconnected) << "started without a cable";
   rig_->replug();
   for (const auto deadline = soon();;) {
     const DeviceStatus status = camera_.start(&notifier_);
     if (status == DeviceStatus::ok) break;
-    EXPECT_EQ(status, DeviceStatus::gone);
+    EXPECT_EQ(status, DeviceStatus::disconnected);
     if (steady_clock::now() > deadline) {
       ADD_FAILURE() << "plugged in again, and not back: " << camera_.last_error();
       return true;

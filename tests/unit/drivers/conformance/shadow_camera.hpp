@@ -10,11 +10,11 @@ namespace vergence::test {
 /// Counts what a camera tells it.
 class CountingNotifier final : public Notifier {
  public:
-  void notify() noexcept override { told_.fetch_add(1); }
-  [[nodiscard]] std::uint64_t told() const noexcept { return told_.load(); }
+  void notify() noexcept override { reported_.fetch_add(1); }
+  [[nodiscard]] std::uint64_t told() const noexcept { return reported_.load(); }
 
  private:
-  std::atomic<std::uint64_t> told_{0};
+  std::atomic<std::uint64_t> reported_{0};
 };
 
 /// The model beside the camera: every call goes through it, and what the camera answers is held

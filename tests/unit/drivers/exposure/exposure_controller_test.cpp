@@ -93,11 +93,11 @@ TEST_P(ExposureControl, settlesAfterEveryChangeOfLightAndThenRests) {
   // Daylight, a tunnel, out of it, dusk, noon: at most 5 stops a time. A linear sensor needs a
   // change a stop, one of the square root twice as many until it is in the dead band; every change
   // waits settle_frames.
-  const double most_changes = gamma < 1 ? 14 : 8;
-  const int frames = static_cast<int>(most_changes) * (o.settle_frames + 1) + 60;
+  const double max_changes = gamma < 1 ? 14 : 8;
+  const int frames = static_cast<int>(max_changes) * (o.settle_frames + 1) + 60;
   for (const double light : {1.0, 1.0 / 6, 1.0, 0.3, 8.0, 0.25}) {
     const Stretch s = drive(street, controller, o, light, frames);
-    EXPECT_LE(s.changes, most_changes) << "light " << light;
+    EXPECT_LE(s.changes, max_changes) << "light " << light;
     EXPECT_LT(s.last_change, frames - 60)
         << "light " << light;  // the last 60 frames nothing moves: no limit cycle
     const Brightness b = street.last();
@@ -117,7 +117,7 @@ TEST_P(ExposureControl, aCoverTakenAwayIsGotOverInASecond) {
   street.begin_with({o.most, 0});
   (void)drive(street, controller, o, 0, 120);
   EXPECT_EQ(controller.setting().exposure, o.most);
-  EXPECT_NEAR(controller.setting().gain_db, o.most_gain_db, 1e-9);
+  EXPECT_NEAR(controller.setting().gain_db, o.max_gain_db, 1e-9);
   const Stretch back = drive(street, controller, o, 1, 90);
   // 3 stops of gain too much: two changes while it saturates, and one to the target.
   EXPECT_LE(back.last_change, (gamma < 1 ? 6 : 4) * o.settle_frames);

@@ -142,7 +142,7 @@ TEST(GigeCamera, stampsAreTheCamerasClockInNanosecondsAndThoseOfTheEndGoBackByTh
       EXPECT_EQ(frames[i].exposure, c.exposure);
     }
     EXPECT_EQ(b.camera->timing().resolution, Duration::nanoseconds(tick_ns));
-    EXPECT_GE(b.camera->timing().least_delay, end ? Duration{} : c.exposure);
+    EXPECT_GE(b.camera->timing().min_delay, end ? Duration{} : c.exposure);
   }
 }
 
@@ -161,7 +161,7 @@ TEST(GigeCamera, withoutAClockItSaysSoAndStampsByArrival) {
   EXPECT_NE(b.camera->remark().find("no clock"), std::string::npos) << b.camera->remark();
   b.start();
   for (const Frame& f : b.take(5))
-    EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().least_delay);
+    EXPECT_EQ(f.exposure_start, DeviceStamp(f.arrival.ns()) - b.camera->timing().min_delay);
 }
 
 TEST(GigeCamera, ptpIsSwitchedOnAndItsStateIsTold) {

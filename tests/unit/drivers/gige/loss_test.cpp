@@ -36,7 +36,7 @@ TEST(GigeLoss, brokenFramesAreTornAndTheNextOnesWhole) {
     b.simulator->tear_frames(4);
     const auto frames = b.take(15);
     EXPECT_EQ(std::count_if(frames.begin(), frames.end(),
-                            [](const Frame& f) { return f.status == FrameStatus::torn; }),
+                            [](const Frame& f) { return f.status == FrameStatus::incomplete; }),
               4);
     taken += frames.size() + b.drain().size();
     EXPECT_EQ(b.camera->statistics().lost, 0U);

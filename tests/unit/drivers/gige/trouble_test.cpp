@@ -16,7 +16,7 @@ bool goes(GigeBench* b, double limit_s) {
   const auto begin = Clock::now();
   for (Frame frame; seconds_since(begin) < limit_s;) {
     const DeviceStatus status = b->camera->wait(Duration::milliseconds(100), &frame);
-    if (status == DeviceStatus::gone) return true;
+    if (status == DeviceStatus::disconnected) return true;
     if (status == DeviceStatus::ok) b->camera->release(frame.slot);
   }
   return false;
@@ -25,8 +25,8 @@ bool goes(GigeBench* b, double limit_s) {
 /// Asks until it is not `gone`, or until the limit.
 DeviceStatus start_again(GigeBench* b, double limit_s) {
   const auto begin = Clock::now();
-  DeviceStatus status = DeviceStatus::gone;
-  while ((status = b->camera->start(nullptr)) == DeviceStatus::gone &&
+  DeviceStatus status = DeviceStatus::disconnected;
+  while ((status = b->camera->start(nullptr)) == DeviceStatus::disconnected &&
          seconds_since(begin) < limit_s)
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   return status;

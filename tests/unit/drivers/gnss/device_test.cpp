@@ -97,7 +97,7 @@ struct JoinedReceiver {
                  test::Tampered::Tamper tamper, std::uint32_t baud = 0)
       : model(std::make_shared<Model>(kProtocol == Protocol::ubx ? ubx_epoch : nmea_epoch,
                                       HostStamp{}, duration)),
-        receiver(std::make_unique<test::SimulatedPlace>(
+        receiver(std::make_unique<test::SimulatedLinkFactory>(
                      std::make_shared<test::Tampered>(model, std::move(tamper)), line),
                  {kProtocol, baud, {}}) {}
   DeviceStatus configure() {
@@ -120,11 +120,11 @@ TEST(GnssDevice, oneThatComesBackAtAnotherBaudRateIsFoundUnlessOneIsAskedFor) {
     InsReading r;
     ASSERT_EQ(joined.receiver.wait(Duration::seconds(5), &r), DeviceStatus::ok);
     joined.model->now_baud = 115200;
-    ASSERT_EQ(test::end_of(joined.receiver, &r), DeviceStatus::gone);
-    for (int i = 0; i < 200 && joined.receiver.start(nullptr) == DeviceStatus::gone; ++i)
+    ASSERT_EQ(test::end_of(joined.receiver, &r), DeviceStatus::disconnected);
+    for (int i = 0; i < 200 && joined.receiver.start(nullptr) == DeviceStatus::disconnected; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     EXPECT_EQ(joined.receiver.wait(Duration::seconds(1), &r),
-              asked == 0 ? DeviceStatus::ok : DeviceStatus::gone);
+              asked == 0 ? DeviceStatus::ok : DeviceStatus::disconnected);
     EXPECT_EQ(joined.receiver.last_error(), "") << "the owner's alone";
   }
 }

@@ -67,7 +67,7 @@ TEST_F(IidcCamera, AFrameShortOfBytesIsTornAndKeepsItsNumber) {
   c.bus->expose(1);
   EXPECT_EQ(c.take_and_release().counter, 0U);
   const Frame torn = c.take_and_release();
-  EXPECT_EQ(torn.status, FrameStatus::torn);
+  EXPECT_EQ(torn.status, FrameStatus::incomplete);
   EXPECT_EQ(torn.counter, 1U);
   EXPECT_EQ(c.take_and_release().counter, 4U);
   const CameraStatistics s = c.camera->statistics();
@@ -100,7 +100,7 @@ TEST_F(IidcCamera, ALostPacketIsFoundByTheNextFramesStampInTheImage) {
     own.bus->expose(1);
     EXPECT_EQ(own.take_and_release().status, FrameStatus::complete);
     const Frame torn = own.take_and_release();
-    EXPECT_EQ(torn.status, FrameStatus::torn) << lost;
+    EXPECT_EQ(torn.status, FrameStatus::incomplete) << lost;
     EXPECT_EQ(torn.counter, 1U);
     const Frame good = own.take_and_release();
     EXPECT_EQ(good.status, FrameStatus::complete);
@@ -176,10 +176,9 @@ TEST_F(IidcCamera, TimingIsExposureAndTheWay) {
   CameraUnderTest usb, bus(true);
   usb.configure();
   bus.configure();
-  EXPECT_GT(usb.camera->timing().least_delay, usb.actual.exposure);
+  EXPECT_GT(usb.camera->timing().min_delay, usb.actual.exposure);
   // 75 packets of 4096 bytes, one in each cycle of 125 us.
-  EXPECT_EQ(bus.camera->timing().least_delay,
-            bus.actual.exposure + Duration::microseconds(75 * 125));
+  EXPECT_EQ(bus.camera->timing().min_delay, bus.actual.exposure + Duration::microseconds(75 * 125));
   EXPECT_LT(usb.camera->timing().resolution, Duration::microseconds(1));
 }
 

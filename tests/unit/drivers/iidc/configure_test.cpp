@@ -8,9 +8,9 @@ namespace {
 
 using namespace iidc;
 
-void expect_says(const std::string& sentence, std::initializer_list<const char*> parts) {
+void expect_says(const std::string& message, std::initializer_list<const char*> parts) {
   for (const char* part : parts)
-    EXPECT_NE(sentence.find(part), std::string::npos) << '"' << part << "\" in: " << sentence;
+    EXPECT_NE(message.find(part), std::string::npos) << '"' << part << "\" in: " << message;
 }
 
 using IidcConfigure = WithCamera;

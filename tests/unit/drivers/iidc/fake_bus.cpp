@@ -29,7 +29,7 @@ std::uint32_t FakeBus::command(std::uint32_t offset) {
 }
 
 DeviceStatus FakeBus::read(std::uint64_t address, std::uint32_t* value) noexcept {
-  if (!plugged_) return DeviceStatus::gone;
+  if (!plugged_) return DeviceStatus::disconnected;
   if (all_accesses != DeviceStatus::ok) return all_accesses;
   const bool known = iidc_read(&model_, address, value) == 0;
   if (refused.contains(address) || (!known && !stuck.contains(address)))
@@ -41,7 +41,7 @@ DeviceStatus FakeBus::read(std::uint64_t address, std::uint32_t* value) noexcept
 }
 
 DeviceStatus FakeBus::write(std::uint64_t address, std::uint32_t value) noexcept {
-  if (!plugged_) return DeviceStatus::gone;
+  if (!plugged_) return DeviceStatus::disconnected;
   if (all_accesses != DeviceStatus::ok) return all_accesses;
   written.emplace_back(address, value);
   return refused.contains(address) || iidc_write(&model_, address, value) != 0
@@ -56,7 +56,7 @@ DeviceStatus FakeBus::allocate(const iidc::StreamShape& shape) noexcept {
 }
 
 DeviceStatus FakeBus::start(iidc::StreamSink* sink) noexcept {
-  if (!plugged_) return DeviceStatus::gone;
+  if (!plugged_) return DeviceStatus::disconnected;
   if (start_status != DeviceStatus::ok) return start_status;
   sink_ = sink;
   return DeviceStatus::ok;
@@ -64,7 +64,7 @@ DeviceStatus FakeBus::start(iidc::StreamSink* sink) noexcept {
 
 DeviceStatus FakeBus::reopen() noexcept {
   ++reopened_;
-  return plugged_ ? DeviceStatus::ok : DeviceStatus::gone;
+  return plugged_ ? DeviceStatus::ok : DeviceStatus::disconnected;
 }
 
 void FakeBus::unplug() {

@@ -84,11 +84,11 @@ TEST_F(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConf
   EXPECT_EQ(c.take_and_release().counter, 0U);
   const Frame held = c.take();
   Frame f;
-  EXPECT_EQ(c.camera->wait(Duration::milliseconds(20), &f), DeviceStatus::gone);
+  EXPECT_EQ(c.camera->wait(Duration::milliseconds(20), &f), DeviceStatus::disconnected);
   EXPECT_EQ(f.arrival, c.bus->now() - Duration::milliseconds(100));
-  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
-  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::disconnected);
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::disconnected);
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::disconnected);
   EXPECT_EQ(c.camera->view(held.slot).at(0, 1), 2) << "an image that is held stays";
   c.bus->replug();
   EXPECT_FALSE(c.bus->model().transmitting);
@@ -103,7 +103,7 @@ TEST_F(IidcFaults, AnUnpluggedCameraIsGoneAfterWhatWasUnderWayAndComesBackAsConf
 TEST_F(IidcFaults, ACameraThatDoesNotAnswerIsGoneAndNotWaitedFor) {
   c.configure();
   c.bus->all_accesses = DeviceStatus::timeout;
-  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::gone);
+  EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::disconnected);
   EXPECT_NE(c.camera->last_error().find("did not become ready"), std::string::npos);
   c.bus->all_accesses = DeviceStatus::ok;
   EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
@@ -121,7 +121,7 @@ TEST_F(IidcFaults, ACameraBackOnABusWithoutRoomIsAskedUntilThereIs) {
     EXPECT_EQ(c.camera->start(nullptr), DeviceStatus::no_bandwidth);
     EXPECT_FALSE(c.bus->model().transmitting);
     EXPECT_FALSE(c.camera->last_error().empty());
-    EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
+    EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::disconnected);
   }
   c.bus->start_status = DeviceStatus::ok;
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->last_error();
@@ -139,7 +139,7 @@ TEST_F(IidcFaults, ACameraThatFallsSilentWhileAnImageIsHeldGoesOnBesideIt) {
   DeviceStatus status = DeviceStatus::timeout;
   for (int i = 0; i < 300 && status == DeviceStatus::timeout; ++i)  // 30 s at most
     status = c.camera->wait(Duration::milliseconds(100), &f);
-  ASSERT_EQ(status, DeviceStatus::gone);
+  ASSERT_EQ(status, DeviceStatus::disconnected);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok) << c.camera->last_error();
   EXPECT_EQ(c.bus->reopened(), 1);
   EXPECT_EQ(c.camera->view(held.slot).at(0, 1), seen) << "an image that is held stays";
@@ -159,7 +159,7 @@ TEST_F(IidcFaults, AStreamOutOfStepEndsAndBeginsAnew) {
       std::rotate(image->begin(), image->begin() + 4096, image->end());
     });
   Frame f;
-  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::gone);
+  EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::disconnected);
   ASSERT_EQ(c.camera->start(nullptr), DeviceStatus::ok);
   c.bus->expose(1);
   EXPECT_EQ(c.take_and_release().status, FrameStatus::complete);

@@ -75,7 +75,7 @@ struct MockBench {
     if (status == DeviceStatus::ok) {
       frames[k].push_back({f, mean_of(camera.view(f.slot))});
       camera.release(f.slot);
-    } else if (status == DeviceStatus::gone) {
+    } else if (status == DeviceStatus::disconnected) {
       status = camera.start(nullptr);
       gone[k] += status == DeviceStatus::ok ? 1 : 0;
     }
@@ -91,10 +91,10 @@ struct MockBench {
         EXPECT_EQ(board.pause(5), DeviceStatus::ok);
         EXPECT_EQ(board.pause(5), DeviceStatus::ok) << "one is under way: nothing more";
       }
-    } else if (status == DeviceStatus::gone) {
+    } else if (status == DeviceStatus::disconnected) {
       if (!board_is_gone_) {
         ++board_gone;
-        EXPECT_EQ(board.pause(5), DeviceStatus::gone);
+        EXPECT_EQ(board.pause(5), DeviceStatus::disconnected);
       }
       status = board.start(nullptr);
       board_is_gone_ = status != DeviceStatus::ok;

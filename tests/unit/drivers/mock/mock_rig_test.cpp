@@ -20,13 +20,13 @@ MockBench drive_with(const std::vector<std::string>& faults, double seconds = 3,
 TEST(MockRig, arrivalsKeepTheStatedDelaysAndDeviceStampsTheirClock) {
   const MockBench h = drive_with({});
   const DeviceTiming timing = h.rig->camera(1).timing();
-  ClockMapper mapper({timing.least_delay, timing.delay_spread, timing.resolution});
+  ClockMapper mapper({timing.min_delay, timing.delay_spread, timing.resolution});
   for (std::size_t i = 0; i < h.frames[1].size(); ++i) {
     const Frame& f = h.frames[1][i].frame;
     const HostStamp truth =
         h.rig->start() + Duration::milliseconds(50) * static_cast<std::int64_t>(i);
-    EXPECT_GE(f.arrival, truth + timing.least_delay);
-    EXPECT_LE(f.arrival, truth + timing.least_delay + timing.delay_spread);
+    EXPECT_GE(f.arrival, truth + timing.min_delay);
+    EXPECT_LE(f.arrival, truth + timing.min_delay + timing.delay_spread);
     const MappedStamp m = mapper.map(f.exposure_start, f.arrival);
     EXPECT_LE(std::abs((m.host - truth).ns()), m.error.ns());
   }

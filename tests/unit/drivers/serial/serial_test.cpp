@@ -31,7 +31,7 @@ class SerialLine : public ::testing::Test {
     if (!line_) throw std::runtime_error("the terminal does not open");
   }
   ~SerialLine() override { hang_up(); }
-  ByteLine& line() { return *line_; }
+  SerialLink& line() { return *line_; }
   void send(const Bytes& bytes) {
     ASSERT_EQ(::write(master_, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
   }
@@ -52,7 +52,7 @@ class SerialLine : public ::testing::Test {
 
   int master_;
   std::unique_ptr<SerialPort> place_;
-  std::unique_ptr<ByteLine> line_;
+  std::unique_ptr<SerialLink> line_;
 };
 
 TEST_F(SerialLine, carriesEveryByteBothWays) {
@@ -118,9 +118,9 @@ TEST_F(SerialLine, aHungUpLineIsGoneAtOnceAndDoesNotBurnTime) {
   hang_up();
   std::array<std::uint8_t, 8> some{};
   const HostStamp before = line().now();
-  EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::gone);
-  EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::gone) << "and stays so";
-  EXPECT_EQ(line().write(Bytes{1}, kLong), DeviceStatus::gone);
+  EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::disconnected);
+  EXPECT_EQ(line().read(some, kLong).status, DeviceStatus::disconnected) << "and stays so";
+  EXPECT_EQ(line().write(Bytes{1}, kLong), DeviceStatus::disconnected);
   EXPECT_LT(line().now() - before, kLong);
 }
 

@@ -57,7 +57,7 @@ struct Errors {
 
 ClockMapperOptions options_of(const Line& line, bool two_way) {
   ClockMapperOptions o;
-  if (!two_way) o.least_delay = Duration::nanoseconds(line.floor_back);
+  if (!two_way) o.min_delay = Duration::nanoseconds(line.floor_back);
   return o;
 }
 

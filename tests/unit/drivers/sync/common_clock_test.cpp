@@ -30,7 +30,7 @@ TEST_P(CommonClock, pairsByItsOwnStampsWhateverTheHostsAre) {
       if (n == 100 && k == 1) continue;
       SyncFrame f = rig_frame(k, n, random.next(), rig_time(n), t + Duration::microseconds(k * 80));
       f.middle.host = f.middle.host + Duration::milliseconds(19 * k);
-      EXPECT_EQ(out.offer(&sync, f), SyncVerdict::taken) << n;
+      EXPECT_EQ(out.offer(&sync, f), SyncResult::taken) << n;
     }
   }
   sync.finish();
@@ -39,7 +39,7 @@ TEST_P(CommonClock, pairsByItsOwnStampsWhateverTheHostsAre) {
   EXPECT_EQ(out.complete(), 5999U);
   EXPECT_EQ(sync.counters().lost[1], 1U);
   for (const SyncedSet& s : out.sets) EXPECT_EQ(s.proof, SyncProof::common_clock);
-  EXPECT_TRUE(sync.proven(0));
+  EXPECT_TRUE(sync.verified(0));
 }
 
 /// By a clock that goes right.
@@ -55,11 +55,11 @@ TEST_P(CommonClock, thatDriftsApartByAnIntervalProvesNothing) {
   std::uint64_t doubted = 0;
   for (const SyncedSet& s : out.sets) {
     const bool together = s.spread < kRigInterval / 2;
-    EXPECT_EQ(s.proof, together ? SyncProof::common_clock : SyncProof::unproven) << s.number;
+    EXPECT_EQ(s.proof, together ? SyncProof::common_clock : SyncProof::ambiguous) << s.number;
     doubted += together ? 0 : 1;
   }
   EXPECT_GT(doubted, 40U) << "an exposure and the next";
-  EXPECT_EQ(sync.counters().unproven, doubted);
+  EXPECT_EQ(sync.counters().ambiguous, doubted);
 }
 
 TEST(OneClock, whileOneCameraAloneHasAnotherClockNothingIsProven) {
@@ -82,14 +82,15 @@ TEST(OneClock, whileOneCameraAloneHasAnotherClockNothingIsProven) {
       const bool unsure =
           (i >= at_step && i < at_step + 3) || (i >= at_return && i < at_return + 5);
       if (unsure) continue;
-      EXPECT_EQ(out.sets[i].proof, apart ? SyncProof::unproven : SyncProof::common_clock) << i;
+      EXPECT_EQ(out.sets[i].proof, apart ? SyncProof::ambiguous : SyncProof::common_clock) << i;
     }
     EXPECT_EQ(out.complete(), 200U);
     EXPECT_EQ(sync.counters().missed, 0U);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Modes, CommonClock, ::testing::Values(SyncMode::bus, SyncMode::ptp));
+INSTANTIATE_TEST_SUITE_P(Modes, CommonClock,
+                         ::testing::Values(SyncMode::ieee1394_cycle_time, SyncMode::ptp));
 
 }  // namespace
 }  // namespace vergence

@@ -4,7 +4,7 @@
 
 #include "tests/unit/drivers/sync/pulse_rules.hpp"
 
-/// Whatever a rig does wrong, no pair is called proven that is not one; the rig knows which pulse
+/// Whatever a rig does wrong, no pair is called verified that is not one; the rig knows which pulse
 /// made which frame.
 namespace vergence {
 namespace {
@@ -24,7 +24,7 @@ PulseRigTruth run(const PulseRigOptions& o, double seconds, SyncCounters* counte
   return rig.truth();
 }
 
-/// Sets of a good stretch that must have come out proven, whole.
+/// Sets of a good stretch that must have come out verified, whole.
 void expect_mostly_complete(const PulseRigTruth& t, double least) {
   EXPECT_GE(static_cast<double>(t.complete), least * static_cast<double>(t.pulses));
 }
@@ -104,7 +104,7 @@ TEST(PulseAdversary, evenIntervalsProveNothingUntilAPauseDoes) {
     PulseRig rig(o, board());
     rig.pauses(false);
     rig.run(20);
-    EXPECT_EQ(rig.truth().sets, 0U) << "nothing is proven, nothing goes out";
+    EXPECT_EQ(rig.truth().sets, 0U) << "nothing is verified, nothing goes out";
     EXPECT_GT(rig.counters().acquiring[0], 500U);
   }
   PulseRig rig(o, board());

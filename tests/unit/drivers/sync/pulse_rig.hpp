@@ -53,11 +53,11 @@ struct PulseRigOptions {
 struct PulseRigTruth {
   std::uint64_t pulses = 0;
   std::array<std::uint64_t, kMaxCameras> exposed{}, lost{}, missed{}, duplicated{};
-  std::uint64_t sets = 0, complete = 0, wrong = 0, unproven = 0, unreported = 0;
+  std::uint64_t sets = 0, complete = 0, wrong = 0, ambiguous = 0, unreported = 0;
   std::uint64_t broken = 0;        // promises to the user: a slot twice or never, an order, a flag
   std::uint64_t outside = 0;       // stamps farther from the truth than their bound
   double worst_acquisition_s = 0;  // from the first pulse after a start, reconnect or reboot to the
-                                   // first image of a set that is proven
+                                   // first image of a set that is verified
 };
 
 class PulseRig {
@@ -295,9 +295,9 @@ class PulseRig {
 
   /// What a user of the synchroniser relies on: a slot that is taken comes out once.
   void offer(const SyncFrame& frame) {
-    const SyncVerdict verdict = sync_.offer(frame);
+    const SyncResult verdict = sync_.offer(frame);
     std::uint8_t& held = held_[static_cast<std::size_t>(frame.slot)];
-    if (verdict == SyncVerdict::taken) truth_.broken += held++ == 0 ? 0 : 1;
+    if (verdict == SyncResult::taken) truth_.broken += held++ == 0 ? 0 : 1;
   }
   void check_contract(const SyncedSet& set) {
     bool complete = true;
@@ -317,7 +317,7 @@ class PulseRig {
       truth_.complete += set.complete ? 1 : 0;
       truth_.unreported += set.reported ? 0 : 1;
       if (set.proof != SyncProof::numbered) {
-        ++truth_.unproven;
+        ++truth_.ambiguous;
         continue;
       }
       std::size_t base = 0;

@@ -42,7 +42,7 @@ inline void expect_ten_hours_right(std::uint64_t seed) {
   EXPECT_EQ(t.wrong, 0U);
   EXPECT_EQ(t.outside, 0U);
   // After a missed trigger sets may be in doubt for some frames.
-  EXPECT_LE(t.unproven, 2 * (t.missed[0] + t.missed[1]));
+  EXPECT_LE(t.ambiguous, 2 * (t.missed[0] + t.missed[1]));
   EXPECT_EQ(c.reboots, 3U);
   std::array<std::uint64_t, 2> acquisitions{4, 4};
   for (const auto& g : o.gone) ++acquisitions[static_cast<std::size_t>(g.camera)];

@@ -19,8 +19,8 @@ struct RigSets {
   void drain(RigSynchronizer* sync) {
     for (SyncedSet set; sync->next(&set);) sets.push_back(set);
   }
-  SyncVerdict offer(RigSynchronizer* sync, const SyncFrame& f) {
-    const SyncVerdict verdict = sync->offer(f);
+  SyncResult offer(RigSynchronizer* sync, const SyncFrame& f) {
+    const SyncResult verdict = sync->offer(f);
     drain(sync);
     return verdict;
   }

@@ -133,19 +133,19 @@ TEST(RigModes, aMasterThatStopsAndStartsProvesItsSlaves) {
     rig.counters = {0, 12};
     for (int i = 0; i < 200; ++i) rig.pulse();
     EXPECT_EQ(rig.pauses, 1);
-    EXPECT_TRUE(rig.sync.proven(1));
+    EXPECT_TRUE(rig.sync.verified(1));
     rig.lose = true;
     for (int i = 0; i < 1000; ++i) rig.pulse();
     rig.lose = false;
     for (int i = 0; i < 100; ++i) rig.pulse();
     EXPECT_EQ(rig.pauses, 1);
-    EXPECT_EQ(rig.sync.counters().unproven, 0U);
+    EXPECT_EQ(rig.sync.counters().ambiguous, 0U);
     // At even intervals a trigger that is missed is in doubt until another gap.
     rig.miss = true;
     for (int i = 0; i < 100; ++i) rig.pulse();
     EXPECT_EQ(rig.pauses, 2);
-    EXPECT_GT(rig.sync.counters().unproven, 5U);
-    EXPECT_LT(rig.sync.counters().unproven, 30U);
+    EXPECT_GT(rig.sync.counters().ambiguous, 5U);
+    EXPECT_LT(rig.sync.counters().ambiguous, 30U);
     rig.sync.absent(1);
     rig.slave_here = false;
     for (int i = 0; i < 100; ++i) rig.pulse();
@@ -163,7 +163,7 @@ TEST(RigModes, aMasterThatStopsAndStartsProvesItsSlaves) {
     EXPECT_EQ(c.missed_trigger[1], rig.missed[1]);
     EXPECT_GT(rig.out.complete(), 1200U);
     for (const SyncedSet& s : rig.out.sets)
-      EXPECT_TRUE(s.proof == SyncProof::master || s.proof == SyncProof::unproven);
+      EXPECT_TRUE(s.proof == SyncProof::master || s.proof == SyncProof::ambiguous);
   }
 }
 
@@ -230,7 +230,7 @@ TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
       (void)out.offer(&sync, rig_frame(k, static_cast<int>(n), n, t, DeviceStamp(t.ns())));
     t = t + varied(n);
   }
-  ASSERT_TRUE(sync.proven(0) && sync.proven(1));
+  ASSERT_TRUE(sync.verified(0) && sync.verified(1));
   // The frames come first; the report then says that the pulse went out 700 µs earlier than their
   // stamps do.
   for (int k = 0; k < 2; ++k) (void)out.offer(&sync, rig_frame(k, 40, 40, t, DeviceStamp(t.ns())));
@@ -238,17 +238,17 @@ TEST(RigModes, aReportThatContradictsAFrameMakesItsSetUnproven) {
   sync.pulse(pulse_at(40, t - Duration::microseconds(700)));
   out.drain(&sync);
   ASSERT_EQ(out.sets.size(), before + 1);
-  EXPECT_EQ(out.sets.back().proof, SyncProof::unproven);
+  EXPECT_EQ(out.sets.back().proof, SyncProof::ambiguous);
   EXPECT_EQ(sync.counters().contradictions[0], 1U);
   EXPECT_EQ(sync.counters().contradictions[1], 1U);
-  EXPECT_FALSE(sync.proven(0));
+  EXPECT_FALSE(sync.verified(0));
 }
 
 TEST(RigModes, nothingIsTakenFromTheHeap) {
   if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own heap";
   RigSynchronizer sync(rig_options(SyncMode::board));
   ClockMapper clock{ClockMapperOptions{}};
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   HostStamp t(80'000'000'000);
   std::uint64_t sets = 0;
   {
@@ -268,7 +268,7 @@ TEST(RigModes, nothingIsTakenFromTheHeap) {
       t = t + varied(n);
     }
   }
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   EXPECT_GT(sets, 400U);
 }
 

@@ -44,7 +44,7 @@ std::vector<SyncedSet> drain(RigSynchronizer* sync) {
 }
 
 std::vector<SyncedSet> offer(RigSynchronizer* sync, const SyncFrame& f,
-                             SyncVerdict expected = SyncVerdict::taken) {
+                             SyncResult expected = SyncResult::taken) {
   EXPECT_EQ(sync->offer(f), expected) << "camera " << f.camera << " counter " << f.counter;
   return drain(sync);
 }
@@ -140,14 +140,14 @@ TEST(RigSynchronizer, keepsWhatMapsKnowUnderRandomLossRepetitionAndDelay) {
           if (pulse > *std::min_element(at.begin(), at.end()) + 6) continue;
           ++pulse;
       }
-      const SyncVerdict expected = given[k].contains(number) ? SyncVerdict::duplicate
-                                   : number < first          ? SyncVerdict::late
-                                                             : SyncVerdict::taken;
+      const SyncResult expected = given[k].contains(number) ? SyncResult::duplicate
+                                  : number < first          ? SyncResult::late
+                                                            : SyncResult::taken;
       ASSERT_EQ(sync.offer(frame(static_cast<int>(k), number, number, slot)), expected)
           << "step " << step << " camera " << k << " pulse " << number;
-      duplicates += expected == SyncVerdict::duplicate ? 1 : 0;
-      lates += expected == SyncVerdict::late ? 1 : 0;
-      if (expected == SyncVerdict::taken) given[k].insert(number), waiting[number][k] = slot;
+      duplicates += expected == SyncResult::duplicate ? 1 : 0;
+      lates += expected == SyncResult::late ? 1 : 0;
+      if (expected == SyncResult::taken) given[k].insert(number), waiting[number][k] = slot;
       slot = static_cast<FrameSlot>(slot + 1);
       take_sets();
       ASSERT_TRUE(waiting.empty() || waiting.begin()->second.size() < cameras) << "step " << step;
@@ -191,8 +191,8 @@ TEST(RigSynchronizer, stampsThatDisagreeMakeASetUnproven) {
   sets = offer(&sync, frame(1, 1, 2));  // the same counter, exposed a pulse later
   ASSERT_EQ(sets.size(), 1U);
   EXPECT_TRUE(sets[0].complete);
-  EXPECT_EQ(sets[0].proof, SyncProof::unproven);
-  EXPECT_EQ(sync.counters().unproven, 1U);
+  EXPECT_EQ(sets[0].proof, SyncProof::ambiguous);
+  EXPECT_EQ(sync.counters().ambiguous, 1U);
   EXPECT_EQ(sync.counters().realigned, 0U)
       << "the pulses began with the cameras: the counters are right or a trigger was missed";
 }
@@ -205,26 +205,26 @@ TEST(RigSynchronizer, aStartThatWasFoundWronglyIsFoundAgain) {
   SyncFrame misled = frame(1, 0, 1);
   misled.middle.host = middle_of(0);  // the first stamps of a clock that is not known yet
   (void)offer(&sync, misled);
-  int unproven = 0, counted = 0;
+  int ambiguous = 0, counted = 0;
   for (std::uint64_t n = 1; n < 40; ++n) {
     auto sets = offer(&sync, frame(0, n, n));
     SyncFrame other = frame(1, n, n + 1);  // of the next pulse, in truth
     other.arrival = frame(0, n, n).arrival;
-    EXPECT_NE(sync.offer(other), SyncVerdict::late);
+    EXPECT_NE(sync.offer(other), SyncResult::late);
     for (const SyncedSet& set : drain(&sync)) sets.push_back(set);
     for (const SyncedSet& set : sets) {
-      unproven += set.proof == SyncProof::unproven ? 1 : 0;
+      ambiguous += set.proof == SyncProof::ambiguous ? 1 : 0;
       counted += set.complete && set.proof == SyncProof::counted ? 1 : 0;
     }
   }
-  EXPECT_EQ(unproven, RigSynchronizer::kUnproven);
+  EXPECT_EQ(ambiguous, RigSynchronizer::kAmbiguous);
   EXPECT_GE(counted, 25);
   EXPECT_EQ(sync.counters().realigned, 1U);
 }
 
 SyncOptions by_time() {
   SyncOptions o = options();
-  o.mode = SyncMode::software;
+  o.mode = SyncMode::approximate_time;
   o.tolerance = Duration::milliseconds(3);
   return o;
 }
@@ -260,7 +260,7 @@ TEST(RigSynchronizer, withoutATriggerWhatIsNearInTimeIsPairedAndAPauseOrALostIma
   EXPECT_EQ(complete, 199U);
   EXPECT_EQ(sync.counters().lost[1], 1U);
   EXPECT_TRUE(std::is_sorted(stamps.begin(), stamps.end()));
-  EXPECT_EQ(sync.offer(timed(1, 99, 100)), SyncVerdict::late);
+  EXPECT_EQ(sync.offer(timed(1, 99, 100)), SyncResult::late);
 }
 
 }  // namespace

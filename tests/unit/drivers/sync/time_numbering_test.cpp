@@ -50,7 +50,7 @@ TEST(TimeNumbering, aFrameOfAMissingSetBeforeTheOpenOneGetsTheNumberBetween) {
 }
 
 TEST(TimeNumbering, theBusClockWrapsAfter128Seconds) {
-  const TimeNumbering numbering(options(SyncMode::bus));
+  const TimeNumbering numbering(options(SyncMode::ieee1394_cycle_time));
   OpenSets sets;
   SyncFrame frame;
   frame.exposure = Duration::milliseconds(10);

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "drivers/trigger_board/pulse_account.hpp"
+#include "drivers/trigger_board/pulse_counter.hpp"
 
 namespace vergence::trigger_board {
 namespace {
@@ -70,7 +70,7 @@ TEST_F(Receiving, nothingIsHandedOutWhileItIsBeingSetUp) {
 
 TEST_F(Receiving, numbersThatCannotBeEndInInvalidAfterAFewInARow) {
   event(5, 6 * kPeriod);
-  for (int i = 1; i < BoardReceiver::kMostRefused; ++i) event(5, 6 * kPeriod);
+  for (int i = 1; i < BoardReceiver::kMaxRefused; ++i) event(5, 6 * kPeriod);
   EXPECT_EQ(receiver.finding(), Finding::none) << "one fewer than it takes";
   event(5, 6 * kPeriod);
   EXPECT_EQ(receiver.finding(), Finding::invalid);
@@ -105,7 +105,7 @@ TEST(BoardClock, oneAnswerSaysTheTimeWithinHalfItsRoundTrip) {
   clock.restart(Duration::milliseconds(4), false);
   EXPECT_FALSE(clock.known());
   const std::uint32_t token = clock.ask(host(1000));
-  ASSERT_EQ(clock.answer(pong(token, 1300, 1350), host(1650)), PongWord::taken);
+  ASSERT_EQ(clock.answer(pong(token, 1300, 1350), host(1650)), PongStatus::taken);
   ASSERT_TRUE(clock.known());
   const MappedStamp m = clock.map(stamp_of_tick(1320), host(2000));
   EXPECT_LE(std::abs((m.host - host(1320)).ns()), m.error.ns());
@@ -117,23 +117,23 @@ TEST(BoardClock, whatBytesTakeOnTheWireIsNoRoundTrip) {
   clock.reopen(Duration::microseconds(10));
   // A PING of 13 bytes with nothing else between.
   const std::uint32_t token = clock.ask(host(1000));
-  ASSERT_EQ(clock.answer(pong(token, 1130, 1130), host(1130)), PongWord::taken);
+  ASSERT_EQ(clock.answer(pong(token, 1130, 1130), host(1130)), PongStatus::taken);
   EXPECT_LE(std::abs((clock.map(stamp_of_tick(1130), host(2000)).host - host(1130)).ns()), 1000);
 }
 
 TEST(BoardClock, answersThatCannotBeAreRefused) {
   BoardClock clock;
-  EXPECT_EQ(clock.answer(pong(77, 10, 20), host(30)), PongWord::unasked);
+  EXPECT_EQ(clock.answer(pong(77, 10, 20), host(30)), PongStatus::unasked);
   const std::uint32_t a = clock.ask(host(100));
-  EXPECT_EQ(clock.answer(pong(a, 300, 200), host(400)), PongWord::invalid)
+  EXPECT_EQ(clock.answer(pong(a, 300, 200), host(400)), PongStatus::invalid)
       << "sent before received";
-  EXPECT_EQ(clock.answer(pong(a, 200, 300), host(400)), PongWord::unasked)
+  EXPECT_EQ(clock.answer(pong(a, 200, 300), host(400)), PongStatus::unasked)
       << "it has been answered";
   const std::uint32_t b = clock.ask(host(1000));
-  EXPECT_EQ(clock.answer(pong(b, 1000, 9000), host(2000)), PongWord::invalid)
+  EXPECT_EQ(clock.answer(pong(b, 1000, 9000), host(2000)), PongStatus::invalid)
       << "longer in the board than under way";
   const std::uint32_t c = clock.ask(host(3000));
-  EXPECT_EQ(clock.answer(pong(c, kMostTicks, kMostTicks + 1), host(4000)), PongWord::invalid);
+  EXPECT_EQ(clock.answer(pong(c, kMaxTicks, kMaxTicks + 1), host(4000)), PongStatus::invalid);
   EXPECT_FALSE(clock.known());
   EXPECT_EQ(clock.refused(), 5U);
 }

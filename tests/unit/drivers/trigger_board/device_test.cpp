@@ -119,7 +119,7 @@ TEST(Board, aRebootIsANewBootAndTheBoardGoesOnByItself) {
     board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
   BoardRig rig(board, direct_line());
   const auto all = rig.drive();
-  EXPECT_EQ(rig.times_gone, 0) << "it answers all the while";
+  EXPECT_EQ(rig.disconnects, 0) << "it answers all the while";
   std::size_t boots = 1;
   for (std::size_t i = 1; i < all.size(); ++i) {
     if (all[i].boot == all[i - 1].boot) {
@@ -211,7 +211,7 @@ TEST(Board, anotherOneInItsPlaceIsNotTaken) {
                  *bytes = closed(f);
                });
   const auto all = rig.drive();
-  EXPECT_EQ(rig.times_gone, 1) << "gone while the other is there";
+  EXPECT_EQ(rig.disconnects, 1) << "gone while the other is there";
   for (const Pulse& p : all) EXPECT_FALSE(rig.truth(p) > at_s(10.5) && rig.truth(p) < at_s(20));
   EXPECT_GT(rig.truth(all.back()), at_s(59));
 }
@@ -240,7 +240,7 @@ TEST(Configuration, whatCannotBeIsRefusedWithTheKeyToChange) {
            Refusal{[](C* c) { c->rate_hz = 0.1, c->width = Duration::seconds(2); }, kBad,
                    "trigger.width_us"},
            Refusal{[](C* c) { c->width = Duration::milliseconds(40); }, kBad, "trigger.width_us"},
-           Refusal{[](C* c) { c->vary = Duration::milliseconds(34); }, kBad, "trigger.vary_us"},
+           Refusal{[](C* c) { c->vary = Duration::milliseconds(34); }, kBad, "trigger.dither_us"},
            Refusal{[](C* c) { c->lines = 0; }, kBad, "trigger.lines"},
            Refusal{[](C* c) { c->lines = 0x05; }, kUnsupported, "trigger.lines"},
            Refusal{[](C* c) { c->feedback = 0x03; }, kUnsupported, "trigger.feedback"},

@@ -32,12 +32,12 @@ struct Machine {
                          for (const Port& p : ports) list.push_back(p.info);
                          return list;
                        },
-                       [this](const std::string& name) -> std::unique_ptr<LinePlace> {
+                       [this](const std::string& name) -> std::unique_ptr<SerialLinkFactory> {
                          asked.push_back(name);
                          for (const Port& p : ports)
                            if (p.info.port == name && p.device != nullptr)
-                             return std::make_unique<test::SimulatedPlace>(p.device,
-                                                                           test::direct_line());
+                             return std::make_unique<test::SimulatedLinkFactory>(
+                                 p.device, test::direct_line());
                          return std::make_unique<SerialPort>("/dev/ttyThatIsNotThere");
                        }});
   }

@@ -77,7 +77,7 @@ TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
   ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
   Pulse p;
   ASSERT_EQ(rig.device.wait(Duration::seconds(5), &p), DeviceStatus::ok);
-  const std::uint64_t before = AllocationGuard::allocations_after_seal();
+  const std::uint64_t before = AllocationGuard::runtime_allocations();
   ThreadAllocations::begin();
   {
     const SealedScope sealed;
@@ -87,7 +87,7 @@ TEST(RealTime, theDevicesThreadAllocatesNothingWhileItReads) {
     (void)rig.device.statistics();
   }
   ThreadAllocations::end();
-  EXPECT_EQ(AllocationGuard::allocations_after_seal(), before);
+  EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
   // The simulator's thread, which has the name of the test's, allocates what it sends.
   std::array<char, ThreadAllocations::kNameBytes> own{};
   ASSERT_EQ(pthread_getname_np(pthread_self(), own.data(), own.size()), 0);

@@ -56,7 +56,7 @@ struct BoardRig {
             },
             board)) {
     between = std::make_shared<Tampered>(simulator, std::move(tamper));
-    auto owned = std::make_unique<SimulatedPlace>(between, line);
+    auto owned = std::make_unique<SimulatedLinkFactory>(between, line);
     place = owned.get();
     device = std::make_unique<trigger_board::Device>(std::move(owned), options);
   }
@@ -66,9 +66,9 @@ struct BoardRig {
   PulseSource exposures;
   std::shared_ptr<BoardSimulator> simulator;
   std::shared_ptr<Tampered> between;
-  SimulatedPlace* place = nullptr;
+  SimulatedLinkFactory* place = nullptr;
   std::unique_ptr<trigger_board::Device> device;
-  int times_gone = 0;
+  int disconnects = 0;
 
   /// Configured and started.
   void start(const TriggerConfiguration& requested = thirty_hertz()) {
@@ -78,7 +78,7 @@ struct BoardRig {
   /// Pulses until the device has no more, or this many, each stamped within its bound; `gone` is
   /// passed over.
   std::vector<Pulse> pulses(std::size_t most = SIZE_MAX) {
-    const auto all = all_of<Pulse>(*device, most, &times_gone);
+    const auto all = all_of<Pulse>(*device, most, &disconnects);
     EXPECT_FALSE(all.empty());
     for (const Pulse& p : all) {
       EXPECT_TRUE(p.mapped);

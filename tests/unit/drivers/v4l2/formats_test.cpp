@@ -40,11 +40,11 @@ TEST(V4l2Formats, aWishIsTakenByItsFourCharacters) {
 
 TEST(V4l2Formats, aFrameNeedsNoPaddingAfterItsLastRow) {
   const PixelFormat& grey = format(V4L2_PIX_FMT_GREY);
-  EXPECT_EQ(least_frame_bytes(grey, 640, 480, 640), 640U * 480);
-  EXPECT_EQ(least_frame_bytes(grey, 630, 480, 640), 640U * 479 + 630);
-  EXPECT_EQ(least_frame_bytes(format(V4L2_PIX_FMT_YUYV), 640, 2, 1280), 2560U);
-  EXPECT_EQ(least_row_bytes(format(V4L2_PIX_FMT_Y10P), 640), 800U);
-  EXPECT_EQ(least_row_bytes(format(V4L2_PIX_FMT_Y10P), 641), 802U)
+  EXPECT_EQ(min_frame_bytes(grey, 640, 480, 640), 640U * 480);
+  EXPECT_EQ(min_frame_bytes(grey, 630, 480, 640), 640U * 479 + 630);
+  EXPECT_EQ(min_frame_bytes(format(V4L2_PIX_FMT_YUYV), 640, 2, 1280), 2560U);
+  EXPECT_EQ(min_row_bytes(format(V4L2_PIX_FMT_Y10P), 640), 800U);
+  EXPECT_EQ(min_row_bytes(format(V4L2_PIX_FMT_Y10P), 641), 802U)
       << "a last group of one pixel has its low bits, too";
 }
 
@@ -101,7 +101,7 @@ TEST_P(V4l2Luma, isWhatWasLaidIn) {
   const PixelFormat& f = format(GetParam());
   for (const int width : {1, 3, 4, 7, 64, 97, 640}) {
     const int height = 5;
-    const std::size_t stride = least_row_bytes(f, width) + random.below(9),
+    const std::size_t stride = min_row_bytes(f, width) + random.below(9),
                       to_stride = static_cast<std::size_t>(width) + 3;
     const Laid laid = lay(f.fourcc, width, height, stride, &random);
     std::vector<std::uint8_t> grey(to_stride * height, 0x55);

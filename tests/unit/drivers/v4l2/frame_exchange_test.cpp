@@ -61,7 +61,7 @@ TEST_F(Exchange, aStopFreesWhatNobodyTookButNotWhatSomebodyHolds) {
 }
 
 TEST_F(Exchange, aLossAfterTheStopIsNone) {
-  exchange.note_dead_node();
+  exchange.record_dead_node();
   exchange.end();
   exchange.lose(HostStamp(42));
   EXPECT_EQ(exchange.standing(), DeviceStatus::stopped);
@@ -116,7 +116,7 @@ TEST(V4l2Slots, moreBuffersThanSlotsAreNotUsed) {
     for (std::uint32_t i = 0; i < 32; ++i)
       if (slots.may_enqueue(i)) held.push_back(slots.hold_buffer(i));
   }
-  EXPECT_EQ(held.size(), Slots::kMost);
+  EXPECT_EQ(held.size(), Slots::kMax);
   for (const FrameSlot slot : held) (void)slots.release(slot);
   EXPECT_EQ(slots.held(), 0U);
 }

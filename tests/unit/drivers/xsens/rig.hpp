@@ -46,8 +46,8 @@ struct XsensRig {
                     Tampered::Tamper tamper = {})
       : simulator(std::make_shared<XsensSimulator>(std::move(source), sensor)),
         between(std::make_shared<Tampered>(simulator, std::move(tamper))),
-        device(std::make_unique<xsens::Device>(std::make_unique<SimulatedPlace>(between, line),
-                                               options)) {}
+        device(std::make_unique<xsens::Device>(
+            std::make_unique<SimulatedLinkFactory>(between, line), options)) {}
 
   std::shared_ptr<XsensSimulator> simulator;
   std::shared_ptr<Tampered> between;
@@ -59,14 +59,14 @@ struct XsensRig {
   }
   /// All readings until the device has no more, or this many; `gone` is passed over.
   std::vector<InsReading> readings(std::size_t most = SIZE_MAX) {
-    return all_of<InsReading>(*device, most, &times_gone);
+    return all_of<InsReading>(*device, most, &disconnects);
   }
   /// All readings of the sensor's time.
   std::vector<InsReading> drive(double rate_hz = 100) {
     start(rate_hz);
     return readings();
   }
-  int times_gone = 0;
+  int disconnects = 0;
 };
 
 /// |mapped − true| of every reading after `settled` of the first, in milliseconds, ascending.

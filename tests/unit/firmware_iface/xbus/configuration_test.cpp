@@ -73,7 +73,7 @@ TEST(Commands, syncSettingsAreEntriesOfTwelveBytes) {
   ASSERT_TRUE(read_sync_settings(payload, &back));
   EXPECT_EQ(back, settings);
   EXPECT_FALSE(read_sync_settings(Bytes(13), &back));
-  EXPECT_FALSE(read_sync_settings(Bytes((kMostSyncEntries + 1) * kSyncEntrySize), &back));
+  EXPECT_FALSE(read_sync_settings(Bytes((kMaxSyncEntries + 1) * kSyncEntrySize), &back));
   EXPECT_EQ(back, settings) << "untouched";
 }
 
@@ -101,7 +101,7 @@ TEST(Commands, outputConfigurationIsPairsOfIdAndRate) {
   ASSERT_TRUE(read_output_configuration(payload, &back));
   EXPECT_EQ(back, outputs);
   EXPECT_FALSE(read_output_configuration(Bytes(7), &back));
-  EXPECT_FALSE(read_output_configuration(Bytes(4 * (kMostOutputs + 1)), &back));
+  EXPECT_FALSE(read_output_configuration(Bytes(4 * (kMaxOutputs + 1)), &back));
   EXPECT_EQ(wire_id(PacketId::quaternion, NumberFormat::float64), 0x2013);
   EXPECT_EQ(wire_id(PacketId::velocity, NumberFormat::fp16_32, LocalFrame::ned), 0xD016);
 }

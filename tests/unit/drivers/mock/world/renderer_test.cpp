@@ -68,7 +68,7 @@ struct Picture {
   }
 };
 
-Picture take(Renderer* renderer, const Transform& T_camera_enu, const Shot& shot) {
+Picture take(Renderer* renderer, const Transform& T_camera_enu, const RenderRequest& shot) {
   const Intrinsics& k = renderer->camera().intrinsics();
   Picture p{k.width, k.height,
             std::vector<std::uint8_t>(static_cast<std::size_t>(k.width * k.height))};
@@ -76,8 +76,8 @@ Picture take(Renderer* renderer, const Transform& T_camera_enu, const Shot& shot
   return p;
 }
 
-Shot clean() {
-  Shot s;
+RenderRequest clean() {
+  RenderRequest s;
   s.vignetting = 0;
   return s;
 }
@@ -154,7 +154,7 @@ TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
   scene.plate(-100, 100, -100, 100, 6.0, 1);
   Renderer renderer(scene.world(), Camera(lens(false)));
   const Transform T = looking_north({0, 0, 0});
-  Shot shot = clean();
+  RenderRequest shot = clean();
   shot.shot_noise = 0.03;
   shot.read_noise = 1.5;
   shot.noise_seed = 7;
@@ -183,7 +183,7 @@ TEST(Renderer, everyTargetDrawsTheSamePicture) {
   scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
   const auto town = std::make_shared<const World>(WorldOptions{.seed = 5, .texture_detail = 0});
   const Transform T_town = looking_north({-1.9, 60, town->ground(-1.9, 60) + 1.7});
-  Shot noisy;
+  RenderRequest noisy;
   noisy.noise_seed = 3;
   Renderer renderer(town, Camera(lens(true)));
   const auto targets = hwy::SupportedAndGeneratedTargets();

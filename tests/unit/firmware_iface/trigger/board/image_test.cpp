@@ -99,11 +99,11 @@ struct TriggerBoardImage : testing::Test {
     if (std::string(VERGENCE_QEMU_ARM).empty())
       GTEST_SKIP() << "no qemu-system-arm to run the trigger board's image in";
   }
-  static Bytes config(std::uint32_t millihertz, std::uint32_t vary_us = 0) {
+  static Bytes config(std::uint32_t millihertz, std::uint32_t dither_us = 0) {
     TriggerConfig c{};
     c.rate_millihertz = millihertz;
     c.pulse_us = 2000;
-    c.vary_us = vary_us;
+    c.dither_us = dither_us;
     c.lines = 0x3;
     c.pps_edge = trigger_edge_rising;
     c.ins_edge = trigger_edge_falling;

@@ -51,7 +51,7 @@ TEST(BoardPulses, goOutOnTheirGridWithTheirWidthAndLines) {
   TriggerConfig c = VirtualBoard::config(29'970);
   c.lines = 0x5;
   c.active_low = 0x4;
-  c.vary_us = 800;
+  c.dither_us = 800;
   b.configure(c);
   b.send(trigger_start);
   b.run_for_us(10'000'000);

@@ -1,0 +1,706 @@
+#include "app/report/assessment.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/report/analysis.hpp"
+#include "app/report/session.hpp"
+#include "app/report/svg.hpp"
+
+namespace vergence::app::report {
+
+namespace {
+
+constexpr std::array kPose{
+    Advice{"no_image",
+           "A camera delivered no image: check its cable, its power and the trigger line."},
+    Advice{"image_no_contrast",
+           "Images carried no structure: clean the lenses, take covers off, set exposure and gain "
+           "for the light."},
+    Advice{"image_repeated",
+           "A camera gave an older image again: check its link, its buffers and the trigger rate "
+           "it is set to."},
+    Advice{"few_features",
+           "There was too little texture: raise the exposure, look for fog, rain or dirt on the "
+           "lenses."},
+    Advice{"no_stereo_matches",
+           "Left and right do not fit this calibration: look for folders of different drives, "
+           "T_camera_left inverted (X_camera = R X_left "
+           "+ t), distortion given for images that are rectified already, wrong lens numbers, or "
+           "cameras that do not expose together; --from-scratch finds the "
+           "transform itself."},
+    Advice{"cameras_swapped",
+           "Left and right are swapped, or T_camera_left is inverted: swap cables, folders or the "
+           "cameras' order; X_camera = R X_left + t."},
+    Advice{"few_inliers",
+           "Poses rested on few points: check the images of those moments for dirt, blur or a "
+           "covered lens."},
+    Advice{"single_camera",
+           "One camera did not support the pose: check its images for dirt, blur or a wrong "
+           "exposure."},
+    Advice{"no_pose",
+           "Tracking failed: check the images of those moments; shorter exposure or a higher "
+           "frame rate helps in fast turns."},
+    Advice{
+        "time_gap",
+        "Frames are missing: check cables, trigger and the disk's speed; see the events for when."},
+    Advice{"map_reset",
+           "After a gap the motion across it was extrapolated: do not use distances that span it."},
+    Advice{
+        "weak_geometry",
+        "The points did not hold the pose well or much worse than usual, or a pose was corrected "
+        "far: expect it in tunnels, open fields and beside walls; elsewhere check that the "
+        "cameras are in step."},
+    Advice{"dynamic_scene",
+           "Much of the picture moved by itself, as behind a bus: compare those stretches with the "
+           "map before use."},
+    Advice{"unconfirmed",
+           "The calibration from the last drive was not confirmed: drive on until it is, or give "
+           "one with --calibration."},
+    Advice{"unverified_calibration",
+           "The calibration in use was no longer, or not yet, confirmed by the drive: turns and "
+           "near things at the roadside confirm it."},
+    Advice{"recalibrating",
+           "The rig did not fit its calibration. If it did before, look for a camera that was "
+           "knocked or is loose on its mount; if it never did, check the calibration given: "
+           "T_camera_left, or its rotation, may be inverted, or the lenses be those of images that "
+           "were not yet rectified."},
+    Advice{
+        "uncalibrated",
+        "No calibration had been found yet: these poses only bridge the time until there is one."},
+    Advice{"out_of_sync",
+           "A camera's images were of another instant: check trigger lines and exposure, and "
+           "restart the cameras together."},
+    Advice{"needs_motion",
+           "The calibration could not be found standing still: drive some metres past things at "
+           "the roadside."},
+    Advice{"needs_near_structure",
+           "The calibration could not be found with far things only: drive past houses, cars or "
+           "trees."},
+    Advice{"needs_texture",
+           "The calibration could not be found for want of matches between the cameras: check "
+           "lenses and exposure."},
+    Advice{"pairing_ambiguous",
+           "Pulses, counters and stamps contradicted each other: check trigger lines, exposure and "
+           "the board; see the events."},
+};
+
+constexpr std::array kSkipped{
+    Advice{"stamp_not_increasing",
+           "The times of these frames are not later than those before them: look at the order of "
+           "times.txt and of the files."},
+    Advice{"stamp_outlier",
+           "The times of these frames are later than those after them: look at these lines of "
+           "times.txt."},
+    Advice{"image_missing",
+           "An image that the recording lists is not there: copy the folder again, or leave the "
+           "pair out on both sides."},
+    Advice{"image_truncated",
+           "An image file ends too early: copy it again; the disk that it was recorded to may have "
+           "been full."},
+    Advice{"image_size",
+           "An image has another size than the calibration is for: take out what does not belong "
+           "to this drive."},
+    Advice{"image_unreadable",
+           "An image could not be read as a picture: look at the file; PNG and JPEG are what can "
+           "be read."},
+};
+
+}  // namespace
+
+std::span<const Advice> pose_advice() noexcept { return kPose; }
+
+std::span<const Advice> skip_advice() noexcept { return kSkipped; }
+
+std::string_view advice_for(std::string_view word) noexcept {
+  for (const std::span<const Advice> table : {pose_advice(), skip_advice()})
+    for (const Advice& advice : table)
+      if (advice.word == word) return advice.message;
+  return {};
+}
+
+namespace {
+
+/// Whether a drive has any pose to rely on.
+enum class Use : std::uint8_t {
+  ok,          // at least one frame is ok, or statuses are not known
+  unverified,  // none is, because the drive ended before it could confirm its calibration
+  nothing,     // none is, for other reasons, or for so long
+};
+
+struct Usability {
+  Use use = Use::ok;
+  std::string reason;  // half a message with counts; empty: ok
+  std::string advice;  // what to do about the main reason; may be empty
+};
+
+/// A drive of so many moving frames can confirm its calibration: 36 with a calibration given, 54
+/// from scratch (docs/calibration.md).
+inline constexpr std::size_t kFramesToVerify = 60;
+
+/// A device that gave nothing for a while, by the events camera_disconnected, camera_reconnected,
+/// trigger_board_disconnected and trigger_board_reconnected.
+struct Outage {
+  std::string device;  // `camera 1`, `the trigger board`
+  Stamp from{};
+  std::optional<Stamp> to{};  // nothing: it never came back
+};
+
+/// Reasons that time alone may end.
+bool is_waiting(std::string_view reason) {
+  constexpr std::array kWaiting{"unverified_calibration", "unconfirmed",          "uncalibrated",
+                                "needs_motion",           "needs_near_structure", "needs_texture"};
+  return std::find(kWaiting.begin(), kWaiting.end(), reason) != kWaiting.end();
+}
+
+struct Main {
+  std::string_view word;
+  std::size_t frames = 0;
+};
+
+/// The reason of most frames that are not ok; one that is no waiting goes before, where it is that
+/// of a quarter of them or more. Of frames that were not read, the kind of most events.
+Main main_reason(const Session& s, const Analysis& a) {
+  std::array<Main, 2> most{};  // of those that do not wait, of those that do
+  for (std::size_t i = 0; i < std::min(s.reasons.size(), a.by_reason.size()); ++i) {
+    Main& main = most[is_waiting(s.reasons[i]) ? 1 : 0];
+    if (!s.reasons[i].empty() && a.by_reason[i] > main.frames)
+      main = {s.reasons[i], a.by_reason[i]};
+  }
+  Main main = 4 * most[0].frames >= a.read      ? most[0]
+              : most[0].frames > most[1].frames ? most[0]
+                                                : most[1];
+  for (const Advice& skip : skip_advice()) {
+    const auto count = static_cast<std::size_t>(std::count_if(
+        s.events.begin(), s.events.end(), [&skip](const Event& e) { return e.kind == skip.word; }));
+    if (count > main.frames) main = {skip.word, count};
+  }
+  return main;
+}
+
+/// Frames that a calibration can be confirmed from: those that moved. A vehicle that stands tells
+/// nothing of its rig.
+std::size_t moving_frames(const Session& s, const Analysis& a) {
+  constexpr double kStep = 0.1;  // of the baseline; EuRoC's excerpt moves by 0.12 a frame
+  const double least = kStep * number_at(s.summary, "calibration.baseline_m").value_or(0);
+  if (!(least > 0)) return a.read;
+  std::size_t count = 0;
+  for (std::size_t i = 1; i < a.distance_m.size(); ++i)
+    if (a.distance_m[i] - a.distance_m[i - 1] >= least) ++count;
+  return count;
+}
+
+/// Why no calibration was taken, where the drive sought one in vain.
+std::string_view rejection(const Session& s) {
+  std::string_view why;
+  for (const CalibrationRow& row : s.calibrations) {
+    if (row.accepted) return {};
+    if (!row.kept && !row.reason.empty()) why = row.reason;
+  }
+  return why;
+}
+
+Usability usability_of(const Session& s, const Analysis& a) {
+  if (!a.ok_share || a.ok > 0) return {};
+  std::size_t waiting = 0;
+  for (const Frame& f : s.frames)
+    if (f.status == PoseStatus::degraded && is_waiting(s.reasons[f.reason])) ++waiting;
+  const std::string_view rejected = rejection(s);
+  if (waiting > 0 && waiting == a.degraded && moving_frames(s, a) < kFramesToVerify &&
+      a.lost <= a.read / 10 && a.skipped <= a.read)
+    return {Use::unverified,
+            fmt::format("unverified: the drive ended after {} frames, before it could confirm its "
+                        "calibration, which takes some {} in motion",
+                        a.read, kFramesToVerify),
+            std::string(rejected)};
+  const Main main = main_reason(s, a);
+  const bool posed = a.degraded > 0;
+  Usability u{Use::nothing, "", std::string(advice_for(main.word))};
+  u.reason = posed ? fmt::format("not one of {} frames is ok", a.read + a.skipped)
+                   : "there never was a pose";
+  if (main.frames > 0)
+    u.reason += fmt::format(": {} ({} of {} frames)", main.word, main.frames, a.read + a.skipped);
+  if (!rejected.empty()) {
+    u.reason += fmt::format("; no calibration was found: {}", rejected);
+    u.advice = "";
+  }
+  return u;
+}
+
+constexpr double kLong = 2.0;  // s: the motion across a shorter hole is carried on
+constexpr double kLag = 1.0;   // s: frames that are under way when a device goes or comes
+
+/// `camera 1` of `camera 1 is gone; …`.
+std::string device_of(const Event& e) {
+  if (e.kind.starts_with("board")) return "the trigger board";
+  constexpr std::string_view kCamera = "camera ";
+  const bool named = e.message.starts_with(kCamera) && e.message.size() > kCamera.size() &&
+                     std::isdigit(static_cast<unsigned char>(e.message[kCamera.size()])) != 0;
+  return named ? e.message.substr(0, kCamera.size() + 1) : "a camera";
+}
+
+std::string since_start(const Session& s, Stamp stamp) {
+  const Stamp first = s.frames.empty() ? stamp : s.frames.front().stamp;
+  return duration_text(seconds_between(first, std::max(first, stamp)), 0.1);
+}
+
+double seconds_of(const Outage& o) { return o.to ? seconds_between(o.from, *o.to) : 0; }
+
+bool breaks_the_way(const Outage& o, const Session& s, const Analysis& a) {
+  const auto first = std::lower_bound(s.frames.begin(), s.frames.end(), o.from,
+                                      [](const Frame& f, Stamp stamp) { return f.stamp < stamp; });
+  for (auto i = static_cast<std::size_t>(first - s.frames.begin()); i < s.frames.size(); ++i) {
+    if (!s.frames[i].posed || (i < a.breaks.size() && a.breaks[i] != 0)) return true;
+    if (o.to && s.frames[i].stamp > *o.to && seconds_between(*o.to, s.frames[i].stamp) > kLag)
+      return false;
+  }
+  return false;
+}
+
+/// One piece of advice a device, whatever the number of its outages.
+void advise_on_devices(std::span<const Outage> outages, const Session& s, Findings* findings) {
+  struct DeviceSum {
+    std::size_t count = 0;
+    double seconds = 0;
+    const Outage* first = nullptr;
+    bool open = false;
+  };
+  std::map<std::string, DeviceSum> devices;
+  for (const Outage& o : outages) {
+    DeviceSum& sum = devices[o.device];
+    if (sum.count++ == 0) sum.first = &o;
+    sum.seconds += seconds_of(o);
+    sum.open = !o.to;
+  }
+  for (const auto& [device, sum] : devices) {
+    std::string text = device + " was gone";
+    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+    if (sum.count > 1) text += fmt::format(" {} times", sum.count);
+    if (sum.seconds > 0) text += " for " + duration_text(sum.seconds, 0.1);
+    if (!s.frames.empty()) text += " from " + since_start(s, sum.first->from) + " on";
+    findings->advise(text + (sum.open ? ", to the end" : "") + ": check its cable and power.");
+  }
+}
+
+/// By their begin.
+std::vector<Outage> outages_of(std::span<const Event> events) {
+  std::map<std::string, Stamp> gone;
+  std::vector<Outage> outages;
+  for (const Event& e : events) {
+    const bool begins = e.kind == "camera_disconnected" || e.kind == "trigger_board_disconnected";
+    if (!begins && e.kind != "camera_reconnected" && e.kind != "trigger_board_reconnected")
+      continue;
+    const std::string device = device_of(e);
+    const auto open = gone.find(device);
+    if (begins) {
+      gone.emplace(device, e.stamp);
+    } else if (open != gone.end()) {
+      outages.push_back({device, open->second, std::max(open->second, e.stamp)});
+      gone.erase(open);
+    }
+  }
+  for (const auto& [device, from] : gone) outages.push_back({device, from, std::nullopt});
+  std::stable_sort(outages.begin(), outages.end(),
+                   [](const Outage& a, const Outage& b) { return a.from < b.from; });
+  return outages;
+}
+
+/// Whether frames or poses are missing within an outage: the way after it hangs on a guess, so that
+/// its length says nothing of the rig.
+bool break_the_way(std::span<const Outage> outages, const Session& session,
+                   const Analysis& analysis) {
+  return std::any_of(outages.begin(), outages.end(),
+                     [&](const Outage& o) { return breaks_the_way(o, session, analysis); });
+}
+
+/// What outages say against the drive, and for how long which devices were gone.
+void judge_outages(std::span<const Outage> outages, const Session& session,
+                   const Analysis& analysis, Findings* findings) {
+  for (const Outage& o : outages) {
+    if (o.to) continue;
+    // Frames that were left out may be later.
+    const bool last = session.left_out.empty() &&
+                      (session.frames.empty() || session.frames.back().stamp <= o.from ||
+                       seconds_between(o.from, session.frames.back().stamp) <= kLag);
+    if (session.frames.empty())
+      findings->find(Grade::bad, "there never was a frame: " + o.device + " was gone");
+    else if (last)
+      findings->find(Grade::bad,
+                     "no frame after " +
+                         since_start(session, std::max(o.from, session.frames.back().stamp)) +
+                         ": " + o.device + " was gone");
+    else
+      findings->find(Grade::care,
+                     o.device + " was gone from " + since_start(session, o.from) + " to the end");
+  }
+  advise_on_devices(outages, session, findings);
+  const auto worst = std::max_element(
+      outages.begin(), outages.end(),
+      [](const Outage& a, const Outage& b) { return seconds_of(a) < seconds_of(b); });
+  if (worst != outages.end() && seconds_of(*worst) > kLong &&
+      breaks_the_way(*worst, session, analysis))
+    findings->find(Grade::care,
+                   worst->device + " was gone for " + duration_text(seconds_of(*worst), 0.1));
+}
+
+/// Rejected because the one in use is as good: no reason for doubt.
+bool fits_as_well(const CalibrationRow& rejected) {
+  constexpr double kBetter = 0.9;  // of the held-out error before: clearly better
+  return rejected.held_out_before_px > 0 &&
+         rejected.held_out_after_px > kBetter * rejected.held_out_before_px;
+}
+
+/// What the causes of accepted calibrations ask for.
+void advise_on_causes(const Session& s, Findings* j) {
+  constexpr std::array kCauses{
+      Advice{"knock",
+             "The rig was knocked during the drive and has been calibrated "
+             "again: check the camera's mount before the next drive."},
+      Advice{"collapse",
+             "The rig was knocked hard during the drive and has been calibrated "
+             "again: check the camera's mount before the next drive."},
+      Advice{"drift",
+             "The rig crept out of its calibration and was followed: look "
+             "for a mount that warms up or works loose."}};
+  for (const Advice& advice : kCauses)
+    if (std::any_of(
+            s.calibrations.begin(), s.calibrations.end(),
+            [&advice](const CalibrationRow& c) { return c.accepted && c.cause == advice.word; }))
+      j->advise(advice.message);
+}
+
+/// The last measurement by which the drive confirmed its calibration at the depth where a rig of
+/// that baseline is judged, if it is known well there.
+const CalibrationRow* known_well_near(const Session& s) {
+  constexpr double kKnown = 2.0;  // %, the word `good`
+  constexpr double kFar = 20;     // m, where the word is found
+  const auto last =
+      std::find_if(s.calibrations.rbegin(), s.calibrations.rend(), [](const CalibrationRow& c) {
+        return (c.accepted || c.kept) && std::isfinite(c.reference_depth_m);
+      });
+  if (last == s.calibrations.rend() || !(last->reference_depth_m < kFar) ||
+      !(last->depth_sigma_percent <= kKnown))
+    return nullptr;
+  return &*last;
+}
+
+/// A focal length that the drive itself measures to be another: all distances are off by as much.
+void judge_focal_length(const Session& s, Findings* j) {
+  if (flag_at(s.summary, "calibration.focal_length.contradicted") != true) return;
+  const auto figure = [&](const char* key) {
+    return number_at(s.summary, std::string("calibration.focal_length.") + key).value_or(0);
+  };
+  const double sigma = figure("sigma_px");
+  const std::string measured =
+      sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", figure("measured_px"), sigma)
+                : fmt::format("{:.0f} px or still farther from it", figure("measured_px"));
+  const std::string reason = fmt::format(
+      "the focal length given, {:.0f} px, is not that of these images: the drive measures {}, and "
+      "its distances are off by as much",
+      figure("configured_px"), measured);
+  constexpr const char* kAdvice =
+      "Give the focal length of this lens in pixels of these images (cameras.N.intrinsics, "
+      "--focal): "
+      "of another size of image, a crop or a rectification it is another.";
+  j->find(Grade::bad, reason);
+  j->advise(kAdvice);
+  j->give_up(reason, kAdvice);
+}
+
+/// How well it is known, and whether the last attempt at it succeeded.
+void judge_calibration(const Session& s, const Usability& use, Findings* j) {
+  const std::string rating = text_at(s.summary, "calibration.rating");
+  if (const CalibrationRow* near = known_well_near(s); near != nullptr && rating == "poor") {
+    j->find(Grade::care,
+            fmt::format(
+                "the baseline is short: depths are known to {:.1f} % at {:.1f} m, but not at 20 m",
+                near->depth_sigma_percent, near->reference_depth_m));
+  } else if (rating == "poor") {
+    j->find(Grade::bad, "the calibration is too uncertain for depths");
+    j->advise(text_at(s.summary, "calibration.limited_by") == "intrinsics"
+                  ? "The calibration is weak because focal lengths or principal points are not "
+                    "known better: calibrate the lenses on a "
+                    "checkerboard; driving on does not help."
+                  : "The calibration is weak: drive through a place with near and far structure "
+                    "and some turns, or calibrate on a "
+                    "checkerboard.");
+  } else if (rating == "fair") {
+    j->find(Grade::care, "the calibration can be improved");
+  }
+  // A drive that begins with a calibration has a row of it; a session of another make has no count.
+  if (s.calibrations.empty() && !number_at(s.summary, "calibration.accepted")) return;
+  if (std::none_of(s.calibrations.begin(), s.calibrations.end(),
+                   [](const CalibrationRow& c) { return c.accepted; })) {
+    if (use.use == Use::ok) j->find(Grade::care, "no calibration was found");
+    j->advise(
+        "No calibration was found: drive past things at the roadside, near and far; "
+        "calibrations.csv says what each attempt lacked.");
+  } else {
+    // What the drive measured while it went on was no attempt to replace the one in use.
+    const auto last = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
+                                   [](const CalibrationRow& c) { return !c.kept; });
+    if (last != s.calibrations.rend() && !last->accepted && !fits_as_well(*last)) {
+      j->find(Grade::care, "the last calibration was rejected");
+      if (!last->reason.empty())
+        j->advise("The last calibration was rejected: " + last->reason + ".");
+    }
+  }
+  advise_on_causes(s, j);
+}
+
+/// Whether the drive itself has confirmed what its poses stand on.
+void judge_verification(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
+  if (std::none_of(s.calibrations.begin(), s.calibrations.end(),
+                   [](const CalibrationRow& c) { return c.accepted; }))
+    return;
+  const std::optional<bool> verified = flag_at(s.summary, "calibration.verified");
+  const bool waited_in_vain = !s.summary.is_object() && a.waited > 0 &&
+                              !a.verified_s;  // the summary of a torn session says nothing
+  if (verified.value_or(!waited_in_vain)) return;
+  if (flag_at(s.summary, "calibration.online") == false) {
+    j->find(Grade::care, "the calibration is not verified, nothing watched it");
+    j->advise(
+        "Nothing watched the rig: with calibration.online: on the drive itself confirms the "
+        "calibration, or says that it is wrong.");
+    return;
+  }
+  if (use.use != Use::unverified)
+    j->find(Grade::care, a.verified_s ? "the calibration in use at the end is not verified"
+                                      : "the drive has not confirmed its calibration");
+  j->advise(
+      "The drive did not show that its calibration is right: drive turns, past near things at the "
+      "roadside, and look whether corners of "
+      "the image stay without tracks (dirt, a bonnet, sky only).");
+}
+
+/// What events about calibrations and lengths ask for.
+void advise_on_events(const Session& s, Findings* j) {
+  const auto first = [&s](std::string_view kind) {
+    return std::find_if(s.events.begin(), s.events.end(),
+                        [kind](const Event& e) { return e.kind == kind; });
+  };
+  if (const auto event = first("calibration_save_failed"); event != s.events.end())
+    j->advise("A calibration was not kept: " + event->message + ".");
+  if (const auto event = first("calibration_contradicted"); event != s.events.end()) {
+    j->find(Grade::care, "the calibration given is not that of the rig");
+    j->advise("During the drive " + event->message +
+              ": keep the calibration.yaml of this session, if the drive has confirmed it.");
+  }
+  if (const auto event = first("scale_disagrees"); event != s.events.end()) {
+    j->find(Grade::care, "lengths disagree with the INS");
+    j->advise("At some time " + event->message + ".");
+  }
+}
+
+// Limits of drift, the same as of the depth error's words (METHOD §3): 2 % is good, beyond 5 %
+// something is wrong with the rig.
+constexpr double kGoodDrift = 0.02, kWorstDrift = 0.05;
+// A length measured by the rig against the reference's; 2 % is where the comparison says
+// scale_disagrees.
+constexpr double kGoodScale = 0.02, kWorstScale = 0.05;
+// Share of frames without a pose: a handful is a bump; a tenth are holes that no one can drive by.
+constexpr double kFewLost = 0.002, kManyLost = 0.10;
+constexpr double kFewDegraded = 0.05;
+constexpr double kFewOverBudget = 0.01;  // the 99th percentile is what the summary keeps
+constexpr double kPercent = 100.0;
+
+std::string percent(double share) {
+  return fmt::format("{:.{}f} %", share * kPercent, share < 0.0995 ? 1 : 0);
+}
+
+void judge_frames(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
+  const bool posed =
+      std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.posed; });
+  if (!posed && (!a.ok_share || a.ok > 0)) return j->find(Grade::bad, "there never was a pose");
+  if (!a.ok_share) return j->find(Grade::care, "the status of the frames is not known");
+  if (use.use != Use::ok) {
+    j->find(use.use == Use::unverified ? Grade::care : Grade::bad, use.reason);
+    if (use.use == Use::nothing) return j->give_up(use.reason, use.advice);
+  }
+  const auto all = static_cast<double>(a.read + a.skipped);
+  const double lost = static_cast<double>(a.lost + a.skipped) / all,
+               degraded = static_cast<double>(a.degraded - a.waited) / all;
+  if (lost > kFewLost)
+    j->find(lost > kManyLost ? Grade::bad : Grade::care,
+            fmt::format("{} of the frames have no pose", percent(lost)));
+  if (use.use == Use::ok && degraded > kFewDegraded)
+    j->find(Grade::care, fmt::format("{} of the frames are degraded", percent(degraded)));
+}
+
+/// `broken`: outages broke the way.
+void judge_drift(const Session& s, const Analysis& a, bool broken, Findings* j) {
+  if (a.ins_unplaced) {
+    j->find(Grade::care,
+            "nothing says how far it drifted: the drive was not placed on the earth with its INS");
+    j->advise(
+        "Errors are shown from comparison.alignment_distance_m (100 m) driven with a valid fix on: "
+        "drive "
+        "further, or set it lower.");
+    return;
+  }
+  if (a.source == ErrorSource::none) {
+    j->find(Grade::care, "nothing says how far it drifted: there was no reference");
+    // Two cameras alone cannot tell a wrong unit: everything is too long or too short alike.
+    if (s.calibration)
+      if (const std::string doubt = baseline_doubt(s.calibration->rig); !doubt.empty()) {
+        j->find(Grade::care, doubt);
+        j->advise("Compare the baseline with the rig: all lengths are wrong by as much as it is.");
+      }
+    j->advise(
+        "For a judgement of the drift record with an INS, or compare with a reference: vergence "
+        "evaluate SESSION REFERENCE.");
+    return;
+  }
+  if (!a.drift)
+    j->find(Grade::care, "the drive is too short to measure its drift");
+  else if (*a.drift > kGoodDrift)
+    j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care,
+            fmt::format("it drifts by {} of the distance{}{}", percent(*a.drift),
+                        a.source == ErrorSource::ins ? " against the INS" : "",
+                        broken ? ", across outages" : ""));
+  const double off = a.scale ? std::abs(*a.scale - 1) : 0;
+  if (off > kGoodScale && !broken) {
+    j->find(
+        off > kWorstScale ? Grade::bad : Grade::care,
+        fmt::format("lengths come out {} too {}", percent(off), *a.scale < 1 ? "long" : "short"));
+    j->advise(
+        "Lengths disagree with the reference: measure the baseline again, then calibrate again.");
+  }
+}
+
+void judge_session(const Session& s, const Analysis& a, Findings* j) {
+  if (!s.missing.empty()) j->find(Grade::care, "the session's files are not whole");
+  if (!s.left_out.empty())
+    j->find(Grade::care, "the drive is longer than the report reads: this is of its beginning");
+  if (!s.summary.is_object() && !s.missing.empty())
+    j->advise(
+        "The session was not closed: stop with Ctrl-C and wait for the last message; check power "
+        "and the disk's free space.");
+  const double lines = number_at(s.summary, "drops.lines").value_or(0) +
+                       number_at(s.summary, "drops.records").value_or(0);
+  if (lines > 0) {
+    j->find(Grade::care, fmt::format("{:.0f} lines did not get to the disk", lines));
+    j->advise("The disk did not keep up or was full: make room, or record to a faster one.");
+  }
+  if (const auto allocations = number_at(s.summary, "runtime_allocations");
+      allocations && *allocations > 0)
+    j->advise(fmt::format(
+        "Memory was taken {:.0f} times during the drive, which must not happen: report it "
+        "with this session.",
+        *allocations));
+  const double p99 = number_at(s.summary, "timing_ms.p99").value_or(0) * 1e-3;
+  const double slow =
+      static_cast<double>(std::count_if(s.frames.begin(), s.frames.end(), [&a](const Frame& f) {
+        return f.estimate_ms * 1e-3 > a.interval_s;
+      }));
+  if (a.interval_s > 0 &&
+      (p99 > a.interval_s || slow > kFewOverBudget * static_cast<double>(a.read)))
+    j->advise(
+        "More than one frame in a hundred took longer than the frame interval: live, work would be "
+        "dropped; lower the rate or odometry's "
+        "features.");
+}
+
+void advise_by_reasons(const Session& s, const Analysis& a, Findings* j) {
+  for (const Advice& skip : skip_advice())
+    if (const auto n = std::count_if(s.events.begin(), s.events.end(),
+                                     [&skip](const Event& e) { return e.kind == skip.word; });
+        n > 0)
+      j->advise(fmt::format("{} ({} frame{} skipped): {}", skip.word, n, n == 1 ? "" : "s",
+                            skip.message));
+  const bool changed = std::any_of(s.events.begin(), s.events.end(),
+                                   [](const Event& e) { return e.kind == "rig_changed"; });
+  for (const Advice& advice : pose_advice()) {
+    // Frames that were doubted for a moment, or a calibration that was asked for, are no knock.
+    if (advice.word == std::string_view("recalibrating") && !changed) continue;
+    const auto found = std::find(s.reasons.begin(), s.reasons.end(), advice.word);
+    if (found == s.reasons.end()) continue;
+    const auto i = static_cast<std::size_t>(found - s.reasons.begin());
+    const std::size_t frames =
+        a.by_reason[i] - (i < a.waited_by_reason.size() ? a.waited_by_reason[i] : 0);
+    if (frames > 0)
+      j->advise(fmt::format("{} ({} frame{}): {}", advice.word, frames, frames == 1 ? "" : "s",
+                            advice.message));
+  }
+}
+
+}  // namespace
+
+void Findings::find(Grade grade, std::string reason) {
+  found_.push_back({grade, std::move(reason)});
+  assessment_.grade = std::max(assessment_.grade, grade);
+}
+
+void Findings::give_up(const std::string& reason, const std::string& advice) {
+  assessment_.usable = false;
+  if (assessment_.main_reason.empty())
+    assessment_.main_reason = reason + (advice.empty() ? "" : ". " + advice);
+}
+
+Assessment Findings::assessment() const {
+  std::vector<Found> sorted = found_;
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Found& a, const Found& b) { return a.grade > b.grade; });
+  Assessment assessment = assessment_;
+  for (Found& f : sorted) assessment.reasons.push_back(std::move(f.reason));
+  return assessment;
+}
+
+const char* to_words(Grade grade) noexcept {
+  switch (grade) {
+    case Grade::good:
+      return "Good";
+    case Grade::care:
+      return "Usable with care";
+    case Grade::bad:
+      return "Do not use";
+  }
+  return "";
+}
+
+Assessment judge(const Session& session, const Analysis& analysis) {
+  Findings j;
+  const Usability use = usability_of(session, analysis);
+  const std::vector<Outage> outages = outages_of(session.events);
+  const bool broken = break_the_way(outages, session, analysis);
+  judge_outages(outages, session, analysis, &j);
+  judge_focal_length(session, &j);
+  if (analysis.read > 0 || outages.empty()) judge_frames(session, analysis, use, &j);
+  if (analysis.source != ErrorSource::none) judge_drift(session, analysis, broken, &j);
+  judge_calibration(session, use, &j);
+  // Of a drive without a frame nothing else is to be asked.
+  if (analysis.read > 0) judge_verification(session, analysis, use, &j);
+  advise_on_events(session, &j);
+  judge_session(session, analysis, &j);
+  if (analysis.source == ErrorSource::none && analysis.read > 0)
+    judge_drift(session, analysis, broken, &j);
+  advise_by_reasons(session, analysis, &j);
+  Assessment v = j.assessment();
+  for (const std::string& reason : v.reasons) v.message += (v.message.empty() ? "" : "; ") + reason;
+  if (v.reasons.empty())
+    v.message = fmt::format(
+        "every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames ok{}",
+        percent(analysis.drift.value_or(0)), analysis.path_m, analysis.ok,
+        analysis.read + analysis.skipped,
+        analysis.waited > 0
+            ? fmt::format(", {} before the drive had confirmed its calibration", analysis.waited)
+            : "");
+  v.message.front() =
+      static_cast<char>(std::toupper(static_cast<unsigned char>(v.message.front())));
+  v.message += '.';
+  return v;
+}
+
+}  // namespace vergence::app::report

@@ -1,0 +1,67 @@
+#include "core/calibration/segment_solver.hpp"
+
+#include <algorithm>
+
+#include "core/calibration/posterior.hpp"
+
+namespace vergence::calibration {
+
+SegmentSolver::SegmentSolver(Kind kind, const RigCalibration& given, const RigCalibration& start,
+                             std::size_t frames, const CalibrationOptions& options,
+                             const MonitorOptions& monitor, std::size_t features, Arena& arena)
+    : kind_(kind),
+      options_(options),
+      given_(given),
+      start_(start),
+      frames_(std::clamp(frames, static_cast<std::size_t>(options.min_frames),
+                         static_cast<std::size_t>(options.max_frames))),
+      solver_(options_, monitor, given.cameras, features, arena) {}
+
+std::size_t SegmentSolver::memory_needed(const CalibrationOptions& options,
+                                         const MonitorOptions& monitor, int cameras,
+                                         std::size_t features) noexcept {
+  return RigSolver::memory_needed(options, monitor, cameras, features);
+}
+
+std::optional<RigSolution> SegmentSolver::take(const TrackLog& tracks) noexcept {
+  std::optional<RigSolution> solved;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const LoggedFrame& f = tracks.frame(i);
+    if (any_ && f.number <= newest_) continue;
+    any_ = true;
+    newest_ = f.number;
+    ++taken_;
+    solver_.log().append(f);
+    if (solver_.log().size() == frames_) solved = solve();
+  }
+  return solved;
+}
+
+std::optional<RigSolution> SegmentSolver::end() noexcept {
+  if (solver_.log().size() < static_cast<std::size_t>(options_.min_frames)) return std::nullopt;
+  return solve();
+}
+
+std::optional<RigSolution> SegmentSolver::solve() noexcept {
+  RigSolveRequest request;
+  request.rig = start_;
+  request.freedom = RigFreedom::lenses;
+  request.from_rig = true;
+  request.given = &given_;
+  const Stamp newest = solver_.log().frame(solver_.log().size() - 1).stamp;
+  RigCalibration known =
+      known_;  // as old as it is now: a solve that fails must not age it for the next
+  if (any_known_) {
+    let_drift((newest - known.found).to_seconds() / 3600.0, options_, &known);
+    request.known = &known;
+  }
+  RigSolution s = solver_.solve(request);
+  solver_.log().clear();
+  if (s.status == RigSolveStatus::ok && kind_ == Kind::joined) {
+    start_ = known_ = s.rig;
+    any_known_ = true;
+  }
+  return s;
+}
+
+}  // namespace vergence::calibration

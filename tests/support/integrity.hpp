@@ -1,0 +1,72 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "app/datasets/trajectory_files.hpp"
+#include "core/types/pose_sample.hpp"
+
+/// What makes an `ok` pose wrong, one definition for recorded drives and for the mock's faults.
+///
+/// A pose is wrong when the motion over the last kIntegrityFrames frames, its way or its turn, is
+/// off by more than kHonestyTimes what is normal: what the untouched drive is off by over as long a
+/// time, on its mean or around the same place, whichever is more. Corners are several times harder
+/// than the rest: a focal length that is off turns every corner too far.
+namespace vergence::test {
+
+inline constexpr std::size_t kIntegrityFrames = 20;  // fewer at the beginning
+/// Frames of the untouched drive that what is normal is known over: those between 20 of a drive
+/// that has every third.
+inline constexpr std::size_t kLongestNormal = 3 * kIntegrityFrames;
+inline constexpr double kHonestyTimes = 5;
+/// A turn that is normal at least, rad: five times it are a tenth of a degree.
+inline constexpr double kMinNormalTurn = 0.02 * std::numbers::pi / 180;
+
+/// The true pose nearest in time; null beyond half of EuRoC's interval of truth. Valid as long as
+/// `truth`.
+[[nodiscard]] const Transform* true_pose(const app::Trajectory& truth, Stamp stamp);
+
+struct EvaluatedPose {
+  Stamp stamp{};
+  PoseStatus status = PoseStatus::lost;
+  Transform T_world_left{};
+};
+
+struct MotionError {
+  double ins_path_m = 0, turn_rad = 0;
+};
+/// Mean error of the motion by the number of frames that it is over; of poses that are not `lost`
+/// and whose truth is known.
+using NormalErrors = std::array<MotionError, kLongestNormal + 1>;
+[[nodiscard]] NormalErrors normal_errors(std::span<const EvaluatedPose> poses,
+                                         const app::Trajectory& truth);
+
+/// What is normal of the motion between two times of the drive.
+using NormalError = std::function<MotionError(Stamp from, Stamp to)>;
+/// Of the untouched drive, over as many of its frames as there are between them: the mean or that
+/// of the motions that end within a second of `to`, whichever is more.
+[[nodiscard]] NormalError normal_error_there(std::vector<EvaluatedPose> poses,
+                                             app::Trajectory truth);
+
+struct Integrity {
+  int ok = 0, lost = 0;
+  int wrong = 0;           // `ok`, and wrong over its frames since the last that was not `ok`
+  int wrong_over_all = 0;  // `ok`, and wrong over its frames since the last that was `lost`
+  int unjudged = 0;        // `ok`, and at its stamp or at that of the first pose it is held against
+                           // there is no truth: it says where the rig was at another time
+  std::size_t first_wrong =
+      0;  // index; with it what its motion is off by, and over how many frames
+  MotionError first_error{};
+  std::size_t first_over = 0;
+  double most = 0;      // times the normal error, of those that `wrong` counts among
+  double max_full = 0;  // the same of those over all kIntegrityFrames
+};
+/// `poses` in order, one for each frame, also the lost ones. The first `ok` pose after one that is
+/// not has no motion that is claimed, and is judged by `wrong_over_all` alone.
+[[nodiscard]] Integrity evaluate_integrity(std::span<const EvaluatedPose> poses,
+                                           const NormalError& normal, const app::Trajectory& truth);
+
+}  // namespace vergence::test

@@ -1,0 +1,329 @@
+#include "app/report/assessment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace vergence::app::report {
+namespace {
+
+using enum Grade;
+
+bool any_has(const std::vector<std::string>& messages, const std::string& part) {
+  return std::any_of(messages.begin(), messages.end(),
+                     [&](const std::string& s) { return s.find(part) != std::string::npos; });
+}
+
+Stamp at(double s) { return Stamp(static_cast<std::int64_t>(std::llround(s * 1e9))); }
+
+/// A drive with which nothing is wrong: 1000 frames, a reference, 0.8 % drift.
+struct Case {
+  Session session;
+  Analysis analysis;
+
+  Case() {
+    for (int i = 0; i < 1000; ++i) {
+      Frame f;
+      f.stamp = at(0.05 * i);
+      f.posed = true;
+      f.status = PoseStatus::ok;
+      f.estimate_ms = 10;
+      session.frames.push_back(f);
+    }
+    session.summary = {{"calibration", {{"rating", "good"}}},
+                       {"timing_ms", {{"p99", 20.0}}},
+                       {"runtime_allocations", 0}};
+    analysis.read = analysis.ok = 1000;
+    analysis.ok_share = 1.0;
+    analysis.by_reason = {0};
+    analysis.source = ErrorSource::reference;
+    analysis.drift = 0.008;
+    analysis.scale = 1.001;
+    analysis.interval_s = 0.05;
+  }
+  nlohmann::json& calibration() { return session.summary["calibration"]; }
+  CalibrationRow& attempt(bool accepted, const char* cause, double before_px, double after_px) {
+    CalibrationRow row;
+    row.accepted = accepted;
+    row.decided = true;
+    row.cause = cause;
+    row.reason = accepted ? "" : "it is worse";
+    row.held_out_before_px = before_px;
+    row.held_out_after_px = after_px;
+    session.calibrations.push_back(row);
+    return session.calibrations.back();
+  }
+  void event(double s, const char* kind, const std::string& message = "") {
+    session.events.push_back({at(s), kind, message});
+  }
+  void frames_of(std::size_t degraded, std::size_t lost) {
+    analysis.degraded = degraded, analysis.lost = lost, analysis.ok = 1000 - degraded - lost;
+    analysis.ok_share = 1e-3 * static_cast<double>(analysis.ok);
+  }
+  /// Camera 0 is away.
+  void outage(double from_s, double to_s) {
+    event(from_s, "camera_disconnected", "camera 0 is gone"),
+        event(to_s, "camera_reconnected", "camera 0 is back");
+  }
+  void given(bool verified) { attempt(true, "given", 0, 0), calibration()["verified"] = verified; }
+};
+
+struct Row {
+  const char* name;
+  std::function<void(Case&)> change;
+  Grade grade;
+  std::string reason = {};  // a part of one; empty: any
+  std::string advice = {};  // likewise
+};
+
+TEST(Assessment, GradeReasonAndAdviceByFinding) {
+  const auto drift = [](double d) { return [d](Case& c) { c.analysis.drift = d; }; };
+  const auto lost = [](std::size_t n) { return [n](Case& c) { c.frames_of(0, n); }; };
+  const auto weak_by = [](const char* what) {
+    return [what](Case& c) { c.calibration() = {{"rating", "recalibrate"}, {"limited_by", what}}; };
+  };
+  const auto near_sigma = [](double percent) {
+    return [percent](Case& c) {
+      c.calibration()["rating"] = "recalibrate";
+      CalibrationRow& row = c.attempt(true, "refinement", 1, 0.2);
+      row.reference_depth_m = 2.4, row.depth_sigma_percent = percent;
+    };
+  };
+  const auto rejected = [](const char* cause, double before_px) {
+    return [=](Case& c) {
+      c.attempt(true, "from_scratch", 0, 0.2), c.attempt(false, cause, before_px, 0.2);
+    };
+  };
+  const auto event = [](double s, const char* kind, const char* message) {
+    return [=](Case& c) { c.event(s, kind, message); };
+  };
+  const std::vector<Row> rows{
+      {"nothing is wrong", [](Case&) {}, good},
+      {"no reference",
+       [](Case& c) { c.analysis.source = ErrorSource::none, c.analysis.drift.reset(); }, care,
+       "no reference"},
+      {"an INS without a alignment",
+       [](Case& c) { c.analysis.source = ErrorSource::none, c.analysis.ins_unplaced = true; }, care,
+       "not placed on the earth", "comparison.alignment_distance_m"},
+      {"drift of 2 %", drift(0.02), good},
+      {"drift above 2 %", drift(0.021), care},
+      {"drift of 5 %", drift(0.05), care},
+      {"drift above 5 %", drift(0.051), bad},
+      {"lengths", [](Case& c) { c.analysis.scale = 0.96; }, care, "too long"},
+      {"5 % lost", lost(50), care},
+      {"20 % lost", lost(200), bad},
+      {"no pose",
+       [](Case& c) {
+         for (Frame& f : c.session.frames) f.posed = false;
+       },
+       bad, "never was a pose"},
+      {"weak by lenses", weak_by("intrinsics"), bad, "calibration", "driving on does not help"},
+      {"weak by noise", weak_by("noise"), bad, "calibration", "near and far structure"},
+      {"short baseline, known well near", near_sigma(1), care, "1.0 % at 2.4 m"},
+      {"short baseline, not known near", near_sigma(3), bad},
+      {"a knock that was mended", [](Case& c) { c.attempt(true, "knock", 1.4, 0.2); }, good, "",
+       "knocked"},
+      {"rejected", rejected("drift", 1.4), care, "", "it is worse"},
+      {"rejected, and the one in use fits as well", rejected("requested", 0.2), good},
+      {"measured and kept",
+       [](Case& c) {
+         c.attempt(true, "given", 0, 0), c.attempt(false, "refinement", 1.4, 0.2).kept = true;
+       },
+       good},
+      {"never a calibration", [](Case& c) { c.attempt(false, "from_scratch", 0, 0.9); }, care,
+       "no calibration was found", "near and far"},
+      {"never an attempt", [](Case& c) { c.calibration()["accepted"] = 0; }, care,
+       "no calibration was found"},
+      {"waited for the first confirmation",
+       [](Case& c) {
+         c.session.reasons.emplace_back("unverified_calibration");
+         c.frames_of(400, 0);
+         c.analysis.waited = 400, c.analysis.verified_s = 20;
+         c.analysis.by_reason = c.analysis.waited_by_reason = {0, 400};
+         c.given(true);
+       },
+       good},
+      {"not verified", [](Case& c) { c.given(false); }, care, "has not confirmed its calibration",
+       "near things at the roadside"},
+      {"not verified at the end", [](Case& c) { c.given(false), c.analysis.verified_s = 20; }, care,
+       "at the end is not verified"},
+      {"nothing watched", [](Case& c) { c.given(false), c.calibration()["online"] = false; }, care,
+       "nothing watched it"},
+      {"torn, waited in vain",
+       [](Case& c) {
+         c.session.summary = nullptr, c.attempt(true, "given", 0, 0);
+         c.frames_of(1000, 0), c.analysis.waited = 1000;
+       },
+       bad, "has not confirmed its calibration"},
+      {"contradicted",
+       [](Case& c) {
+         c.attempt(true, "given", 0, 0);
+         c.event(1, "calibration_contradicted", "its depths are off by 6.1 %");
+       },
+       care, "", "off by 6.1 %"},
+      {"another focal length",
+       [](Case& c) {
+         c.calibration()["focal_length"] = {{"configured_px", 898.6},
+                                            {"measured_px", 711.2},
+                                            {"sigma_px", 12.0},
+                                            {"contradicted", true}};
+       },
+       bad, "711 ± 12", "--focal"},
+      {"scale of the INS", event(1, "scale_disagrees", "90.0 % longer"), care, "lengths disagree"},
+      {"calibration not kept", event(2, "calibration_save_failed", "no room"), good, "", "no room"},
+      {"torn",
+       [](Case& c) {
+         c.session.summary = nullptr, c.session.missing = {"summary.json is missing"};
+       },
+       care, "not whole", "not closed"},
+      {"slow",
+       [](Case& c) {
+         for (std::size_t i = 0; i < 20; ++i) c.session.frames[i].estimate_ms = 80;
+       },
+       good, "", "frame interval"},
+      {"allocations", [](Case& c) { c.session.summary["runtime_allocations"] = 3; }, good, "",
+       "Memory was taken 3 times"},
+      {"lines dropped", [](Case& c) { c.session.summary["drops"]["lines"] = 4; }, care, "4 lines"},
+      // Outages
+      {"a camera that never came back",
+       event(49.96, "camera_disconnected", "camera 1 is gone; check it"), bad,
+       "no frame after 50.0 s: camera 1 was gone", "Camera 1 was gone from 50.0 s on, to the end"},
+      {"a board that never came back", event(49.96, "trigger_board_disconnected", "x"), bad,
+       "the trigger board was gone"},
+      {"a camera that the others drove on without",
+       event(30, "camera_disconnected", "camera 1 is gone"), care,
+       "camera 1 was gone from 30.0 s to the end"},
+      {"a loose cable",
+       [](Case& c) {
+         for (int i = 0; i < 50; ++i) c.outage(10 + 0.6 * i, 10.3 + 0.6 * i);
+       },
+       good, "", "Camera 0 was gone 50 times for 15.0 s"},
+      {"a hole breaks the way, so that lengths say nothing",
+       [](Case& c) {
+         c.analysis.scale = 1.045;
+         for (std::size_t i = 400; i < 800; ++i) c.session.frames[i].posed = false;
+         c.outage(20, 40);
+       },
+       care, "camera 0 was gone for 20.0 s"},
+      {"a short outage leaves lengths to be judged",
+       [](Case& c) { c.analysis.scale = 1.045, c.outage(20, 23); }, care, "lengths come out",
+       "Lengths disagree"},
+      {"an outage after the frames that are read",
+       [](Case& c) {
+         c.session.left_out = {"poses.csv has more lines"};
+         c.event(70, "camera_disconnected", "camera 0 is gone");
+       },
+       care, "longer than the report reads"},
+  };
+  for (const Row& row : rows) {
+    SCOPED_TRACE(row.name);
+    Case c;
+    row.change(c);
+    const Assessment v = judge(c.session, c.analysis);
+    EXPECT_EQ(v.grade, row.grade) << v.message;
+    EXPECT_TRUE(row.reason.empty() || any_has(v.reasons, row.reason)) << v.message;
+    EXPECT_TRUE(row.advice.empty() || any_has(v.advice, row.advice))
+        << (v.advice.empty() ? "" : v.advice.front());
+    if (row.grade == good && row.advice.empty()) {
+      EXPECT_TRUE(v.reasons.empty() && v.advice.empty());
+    }
+  }
+}
+
+TEST(Assessment, WorstReasonComesFirstAndTheFirstToGiveUpStands) {
+  Findings f;
+  f.find(care, "first");
+  f.find(bad, "worst");
+  f.find(care, "second");
+  f.give_up("the lens is another", "Calibrate it.");
+  f.give_up("no pose is ok", "");
+  const Assessment v = f.assessment();
+  EXPECT_EQ(v.grade, bad);
+  EXPECT_EQ(v.reasons, (std::vector<std::string>{"worst", "first", "second"}));
+  EXPECT_EQ(v.main_reason, "the lens is another. Calibrate it.");
+  EXPECT_FALSE(v.usable);
+  EXPECT_EQ(judge(Session{}, analyse(Session{})).grade, bad);
+}
+
+TEST(Assessment, EveryReasonOfAPoseHasAdvice) {
+  for (int i = 1; i <= static_cast<int>(Reason::pairing_ambiguous); ++i) {
+    Case c;
+    c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
+    c.analysis.by_reason = {0, 3};
+    c.event(1, "rig_changed");
+    EXPECT_TRUE(any_has(judge(c.session, c.analysis).advice, "3 frames"))
+        << c.session.reasons.back();
+    c.session.events.clear();
+    if (static_cast<Reason>(i) == Reason::recalibrating) {
+      EXPECT_FALSE(any_has(judge(c.session, c.analysis).advice, "knocked")) << "a passing doubt";
+    }
+  }
+}
+
+/// Frames that are all degraded for one reason, the last `lost` of them without a pose.
+Session degraded_drive(std::size_t frames, const char* reason, std::size_t lost = 0) {
+  Session s;
+  s.reasons = {"", reason};
+  for (std::size_t i = 0; i < frames; ++i) {
+    Frame f;
+    f.stamp = at(0.1 * static_cast<double>(i));
+    f.posed = i + lost < frames;
+    f.status = f.posed ? PoseStatus::degraded : PoseStatus::lost;
+    f.reason = 1;
+    s.frames.push_back(f);
+  }
+  s.summary = nlohmann::json::object();
+  return s;
+}
+
+TEST(Usability, OfDrivesWithoutAnOkFrame) {
+  struct Drive {
+    Session session;
+    bool usable;
+    std::string main_reason;
+  };
+  std::vector<Drive> drives{
+      {degraded_drive(100, "few_inliers"), false, "few_inliers (100 of 100 frames)"},
+      {degraded_drive(30, "few_inliers"), false, "few_inliers"},
+      {degraded_drive(40, "cameras_swapped", 40), false, "there never was a pose: cameras_swapped"},
+      {degraded_drive(30, "unverified_calibration", 10), false, ""},
+  };
+  for (const char* waits : {"unverified_calibration", "uncalibrated", "unconfirmed"}) {
+    drives.push_back({degraded_drive(59, waits), true, ""});
+    drives.push_back({degraded_drive(60, waits), false, waits});
+  }
+  // Why no calibration was found is the main reason.
+  drives.push_back({degraded_drive(100, "uncalibrated"), false, "the right camera is on the left"});
+  CalibrationRow rejected;
+  rejected.reason = "the right camera is on the left";
+  drives.back().session.calibrations = {rejected};
+  // Frames that stand still confirm nothing: fifty moved.
+  drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
+  drives.back().session.summary = {{"calibration", {{"baseline_m", 0.5}}}};
+  for (std::size_t i = 50; i < 100; ++i)
+    drives.back().session.frames[i].T_world_left.t.z() = 0.2 * static_cast<double>(i - 50);
+  // Frames that were not read are the reason where they are most.
+  drives.push_back(
+      {degraded_drive(1, "unverified_calibration"), false, "image_truncated (99 of 100"});
+  drives.back().session.summary = {{"frames", {{"skipped", 99}}}};
+  for (int i = 0; i < 99; ++i)
+    drives.back().session.events.push_back({Stamp(i), "image_truncated", ""});
+  // One ok frame, or statuses that are not known.
+  drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
+  drives.back().session.frames.back().status = PoseStatus::ok;
+  drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
+  for (Frame& f : drives.back().session.frames) f.status.reset();
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const Assessment v = judge(drives[i].session, analyse(drives[i].session));
+    EXPECT_EQ(v.usable, drives[i].usable) << i;
+    EXPECT_NE(v.main_reason.find(drives[i].main_reason), std::string::npos)
+        << i << ": " << v.main_reason;
+  }
+}
+
+}  // namespace
+}  // namespace vergence::app::report

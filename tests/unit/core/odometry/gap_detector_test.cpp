@@ -1,0 +1,72 @@
+#include "core/odometry/gap_detector.hpp"
+
+#include <gtest/gtest.h>
+
+namespace vergence::odometry {
+namespace {
+
+constexpr double kUsual = 0.05, kGap = 0.6;  // s
+
+/// Has seen frames an even `interval` apart, the last one at `last_`.
+class Frames {
+ public:
+  GapDetector gaps;
+
+  explicit Frames(double interval = kUsual) {
+    for (int i = 0; i < 5; ++i) (void)next(interval);
+  }
+  /// What is said of a frame so long after the last one.
+  double next(double interval, bool renew = true) {
+    last_ = last_ + Duration::seconds(interval);
+    (void)gaps.since_frame(last_);
+    return gaps.note(interval, renew);
+  }
+
+ private:
+  Stamp last_{1'000'000'000};
+};
+
+TEST(GapDetector, oneGapLeavesARenewalDueUntilItIsDone) {
+  Frames f;
+  EXPECT_EQ(f.next(kUsual), 0);
+  EXPECT_FALSE(f.gaps.renewal_due());
+  EXPECT_EQ(f.next(kGap), kGap);
+  EXPECT_TRUE(f.gaps.renewal_due());
+  EXPECT_EQ(f.next(kUsual), 0);
+  EXPECT_TRUE(f.gaps.renewal_due());
+  f.gaps.forget();
+  EXPECT_FALSE(f.gaps.renewal_due());
+}
+
+TEST(GapDetector, anEvenDriveHasNoneHoweverSlowItIs) {
+  Frames f(1.0);
+  EXPECT_FALSE(f.gaps.renewal_due());
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(f.next(1.0), 0);
+  EXPECT_EQ(f.next(2.0), 0) << "a frame that was lost";
+  EXPECT_EQ(f.next(10.0), 10.0);
+}
+
+TEST(GapDetector, ofTwoGapsInARowTheSceneIsMadeAnewOnce) {
+  Frames f;
+  (void)f.next(kGap);
+  f.gaps.forget();  // it was made anew
+  EXPECT_EQ(f.next(kGap), kGap);
+  EXPECT_FALSE(f.gaps.renewal_due());
+}
+
+TEST(GapDetector, withoutALinkNothingIsDue) {
+  Frames f;
+  EXPECT_EQ(f.next(kGap, false), kGap);
+  EXPECT_FALSE(f.gaps.renewal_due());
+}
+
+TEST(GapDetector, framesAreCountedFromTheOneBeforeWhateverItShowed) {
+  GapDetector gaps;
+  EXPECT_EQ(gaps.since_frame(Stamp(1'000'000'000)), 0);
+  EXPECT_DOUBLE_EQ(gaps.since_frame(Stamp(1'050'000'000)), kUsual);
+  gaps.forget();
+  EXPECT_DOUBLE_EQ(gaps.since_frame(Stamp(1'650'000'000)), kGap);
+}
+
+}  // namespace
+}  // namespace vergence::odometry
