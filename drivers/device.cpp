@@ -11,9 +11,9 @@
 namespace vergence {
 
 std::string_view to_string(DeviceStatus status) noexcept {
-  return name_of(
-      status, std::array{"ok", "timeout", "stopped", "ended", "gone", "not found", "no permission",
-                         "busy", "unsupported", "bad configuration", "no bandwidth", "failed"});
+  return name_of(status, std::array{"ok", "timeout", "stopped", "ended", "disconnected",
+                                    "not found", "no permission", "busy", "unsupported",
+                                    "bad configuration", "no bandwidth", "failed"});
 }
 
 const char* to_string(CameraTrigger trigger) noexcept {

@@ -175,7 +175,8 @@ void Snap::print(const CapturedSet& set, const std::vector<ImageStatistics>& fig
 }
 
 void Snap::write_report() const {
-  const Json all{{"version", std::string(version())},
+  const Json all{{"schema_version", kSchemaVersion},
+                 {"version", std::string(version())},
                  {"trigger", trigger_},
                  {"notes", notes_},
                  {"sets", sets_}};

@@ -49,7 +49,7 @@ void add_doctor(CLI::App& root, ExitCode* exit_code) {
   command->add_option("--set", a->set, "Set a key of the configuration; as often as needed")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
-  command->add_option("--out", a->out, "Where sessions will be written: is there room?")
+  command->add_option("--session-dir", a->out, "Check free space in this directory")
       ->type_name("DIR");
   command->add_flag("--json", a->json, "For programs (docs/doctor.md has the keys)");
   command->footer("Exit code: 0 no problem, 1 at least one, 2 the configuration cannot be read.");

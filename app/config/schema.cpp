@@ -525,7 +525,7 @@ Group comparison() {
              "comparison", "The comparison with the INS.",
              [](auto& c) -> auto& { return c.comparison; })
       .number("alignment_distance_m", &C::alignment_distance_m, 1, 100000, "m",
-              "Distance driven with a valid fix after which the path is placed on the earth.")
+              "Distance travelled with a valid fix after which the path is aligned with ENU.")
       .number("correlation_s", &C::correlation_s, 0.1, 3600, "s",
               "For so long the INS's position errors resemble one another.")
       .number("heading_sigma_deg", &C::heading_sigma_deg, 0, 180, "°",
@@ -634,16 +634,13 @@ Group calibration_options() {
           "max_observations", &C::max_observations, 10'000, 1'000'000, "",
           "Observations that one solve takes; of more, frames are taken at wider steps: time and "
           "memory.")
-      .choice("focal_lengths", &C::estimate_focal_lengths, {"hold", "estimate"},
-              "`estimate`: the focal length of each further camera is found with the transform, by "
-              "its prior; `hold`: it is believed.")
-      .choice("intrinsics", &C::refine_intrinsics, {"hold", "refine"},
-              "`refine`: focal lengths and principal points of all cameras are found, too, by "
-              "their priors.")
-      .choice("lenses", &C::estimate_lenses, {"hold", "estimate"},
-              "`estimate`: focal lengths, principal points and distortion are part of what the "
-              "drive measures, and are taken from it where "
-              "it shows that those given are off; `hold`: they are believed.")
+      .choice("intrinsics", &C::intrinsics,
+              {{"fixed", calibration::IntrinsicsEstimation::fixed},
+               {"focal", calibration::IntrinsicsEstimation::focal},
+               {"full", calibration::IntrinsicsEstimation::full}},
+              "Intrinsics that are estimated with the extrinsics: none, the focal length of each "
+              "additional camera, or all of them where the data show that the initial ones are "
+              "off.")
       .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%",
               "Prior sigma of a focal length.")
       .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px",
@@ -679,9 +676,10 @@ Group calibration_options() {
               "The depth at which that is asked; on a short baseline nearer, where a single match "
               "is no better than that.")
       .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
-              "Predicted depth error at 20 m up to which a calibration is called `good`.")
-      .number("usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
-              "The same up to which it `can be improved`; beyond, the word is `recalibrate`.")
+              "Predicted depth error at 20 m up to which the calibration is rated `good`.")
+      .number(
+          "usable_depth_percent", &C::usable_depth_percent, 0.01, 100, "%",
+          "Predicted depth error at 20 m up to which the rating is `fair`; beyond, it is `poor`.")
       .also(Rows<Configuration>(
                 "calibration", "", [](auto& c) -> auto& { return c; })
                 .choice("online", &Configuration::online, {"off", "on"},

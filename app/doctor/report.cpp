@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/version.hpp"
+
 namespace vergence::app {
 
 namespace {
@@ -264,7 +266,10 @@ std::string devices_json(const Inventory& inventory, const std::string& rules) {
          {"description", p.info.description},
          {"latency_timer_ms", p.info.latency_timer_ms ? Json(*p.info.latency_timer_ms) : Json()},
          {"configuration", p.configuration}});
-  Json all{{"cameras", cameras}, {"serial_ports", ports}, {"drivers", drivers}};
+  Json all{{"schema_version", kSchemaVersion},
+           {"cameras", cameras},
+           {"serial_ports", ports},
+           {"drivers", drivers}};
   if (!rules.empty()) all["udev_rules"] = rules;
   return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -299,7 +304,8 @@ std::string doctor_json(const std::vector<Finding>& findings) {
                     {"state", to_string(f.state)},
                     {"message", f.message},
                     {"fix", f.fix}});
-  const Json all{{"problems", count(findings, FindingState::problem)},
+  const Json all{{"schema_version", kSchemaVersion},
+                 {"problems", count(findings, FindingState::problem)},
                  {"advice", count(findings, FindingState::advice)},
                  {"ok", count(findings, FindingState::ok)},
                  {"findings", rows}};

@@ -10,7 +10,7 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::array<const char*, 3> kTrust{"given", "unconfirmed", "none"};
+constexpr std::array<const char*, 3> kTrust{"given", "state_file", "none"};
 constexpr std::array<const char*, 2> kAdoption{"after_fixed_frames", "when_ready"};
 
 template <class Enum, std::size_t N>

@@ -66,8 +66,7 @@ void count_waiting(const Session& s, Analysis* a) {
   for (const Frame& f : s.frames) {
     if (f.status != PoseStatus::degraded || (confirmed != nullptr && f.stamp > confirmed->stamp))
       continue;
-    constexpr std::array kWaits{Reason::uncalibrated, Reason::unconfirmed,
-                                Reason::unverified_calibration};
+    constexpr std::array kWaits{Reason::uncalibrated, Reason::unverified_calibration};
     const std::string& reason = s.reasons[f.reason];
     if (std::none_of(kWaits.begin(), kWaits.end(),
                      [&reason](Reason r) { return reason == to_string(r); }))

@@ -66,9 +66,6 @@ constexpr std::array kPose{
     Advice{"dynamic_scene",
            "Much of the picture moved by itself, as behind a bus: compare those stretches with the "
            "map before use."},
-    Advice{"unconfirmed",
-           "The calibration from the last drive was not confirmed: drive on until it is, or give "
-           "one with --calibration."},
     Advice{"unverified_calibration",
            "The calibration in use was no longer, or not yet, confirmed by the drive: turns and "
            "near things at the roadside confirm it."},
@@ -160,8 +157,8 @@ struct Outage {
 
 /// Reasons that time alone may end.
 bool is_waiting(std::string_view reason) {
-  constexpr std::array kWaiting{"unverified_calibration", "unconfirmed",          "uncalibrated",
-                                "needs_motion",           "needs_near_structure", "needs_texture"};
+  constexpr std::array kWaiting{"unverified_calibration", "uncalibrated", "needs_motion",
+                                "needs_near_structure", "needs_texture"};
   return std::find(kWaiting.begin(), kWaiting.end(), reason) != kWaiting.end();
 }
 
@@ -244,7 +241,7 @@ constexpr double kLag = 1.0;   // s: frames that are under way when a device goe
 
 /// `camera 1` of `camera 1 is gone; …`.
 std::string device_of(const Event& e) {
-  if (e.kind.starts_with("board")) return "the trigger board";
+  if (e.kind.starts_with("trigger_board")) return "the trigger board";
   constexpr std::string_view kCamera = "camera ";
   const bool named = e.message.starts_with(kCamera) && e.message.size() > kCamera.size() &&
                      std::isdigit(static_cast<unsigned char>(e.message[kCamera.size()])) != 0;

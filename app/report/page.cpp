@@ -115,7 +115,7 @@ void calibration_group(const Session& s, const Analysis& a, Figures* f) {
     }
   }
   if (const std::string word = text_at(s.summary, "calibration.rating"); !word.empty())
-    f->row("health", word);
+    f->row("rating", word);
   verification_rows(s, a, f);
 }
 
@@ -309,7 +309,7 @@ std::string calibrations_table(const Session& session) {
     const std::string from = c.frames > 0 ? fmt::format("from {} frames", c.frames) : "";
     const std::string why =
         from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
-    const char* outcome = c.accepted ? "accepted" : c.kept ? "kept" : "rejected";
+    const char* outcome = c.accepted ? "accepted" : c.kept ? "unchanged" : "rejected";
     out += fmt::format(
         "<tr><td class=\"t\">{}</td> <td class=\"k\">{}</td> <td class=\"w\">{}</td> <td "
         "class=\"w\">{}</td> <td "

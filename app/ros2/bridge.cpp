@@ -27,8 +27,8 @@ double widening_of(std::string_view reason) {
     if (reason == r) return 10;
   // Lengths that stand on a calibration which is not, or not yet, that of the rig.
   for (const std::string_view r :
-       {"unconfirmed", "unverified_calibration", "recalibrating", "uncalibrated", "single_camera",
-        "out_of_sync", "no_stereo_matches", "cameras_swapped"})
+       {"unverified_calibration", "recalibrating", "uncalibrated", "single_camera", "out_of_sync",
+        "no_stereo_matches", "cameras_swapped"})
     if (reason == r) return 3;
   return reason.empty() ? 1 : 2;
 }
@@ -314,7 +314,7 @@ DiagnosticMessage calibration_status(const json& line, const std::string& rating
     d.message = calibrated ? "not verified" : "none yet; drive to calibrate";
   } else if (!rating.empty()) {
     d.message = "verified; rating: " + rating;
-    if (rating != "good") d.level = rating == "recalibrate" ? Level::error : Level::warn;
+    if (rating != "good") d.level = rating == "poor" ? Level::error : Level::warn;
   }
   d.values = {{"verified", text(line.at("verified"))},
               {"rating", rating.empty() ? "unknown" : rating}};

@@ -86,7 +86,7 @@ constexpr std::array kTable{
     Withdrawn{Kind::key, "record.raw",
               "device bytes are no longer recorded; record.images and record.ins hold all that a "
               "replay reads"},
-    Withdrawn{Kind::key, "record.roll_s", "files are split by size alone; set record.roll_mb"},
+    Withdrawn{Kind::key, "record.roll_s", "files are split by size alone; set record.split_mb"},
     Withdrawn{Kind::key, "odometry.min_corner_score",
               "corners are chosen by rank within the image"},
     Withdrawn{Kind::key, "odometry.nearest_baselines",
@@ -113,6 +113,40 @@ constexpr std::array kTable{
     Withdrawn{
         Kind::command, "manual",
         "man pages are part of the Debian package; 'vergence COMMAND --help' prints the same"},
+    Withdrawn{Kind::key, "calibration.focal_lengths",
+              "calibration.intrinsics: fixed, focal or full", true},
+    Withdrawn{Kind::key, "calibration.lenses", "calibration.intrinsics: fixed, focal or full",
+              true},
+    Withdrawn{Kind::key, "odometry.first_pair", "odometry.init_features", true},
+    Withdrawn{Kind::key, "odometry.rig_turn_sigma", "odometry.extrinsic_rotation_sigma_rad", true},
+    Withdrawn{Kind::key, "calibration.drift_mrad",
+              "calibration.extrinsic_random_walk_mrad_per_sqrt_h", true},
+    Withdrawn{Kind::key, "calibration.needs_motion_m", "calibration.min_path_m", true},
+    Withdrawn{Kind::key, "calibration.needs_near_points", "calibration.min_near_points", true},
+    Withdrawn{Kind::key, "calibration.tolerated_depth_percent",
+              "calibration.max_depth_error_percent", true},
+    Withdrawn{Kind::key, "calibration.tolerated_depth_m", "calibration.reference_depth_m", true},
+    Withdrawn{Kind::key, "monitor.claimed_bias_px", "monitor.unverified_bias_px", true},
+    Withdrawn{Kind::key, "monitor.found_bias_px", "monitor.verified_bias_px", true},
+    Withdrawn{Kind::key, "comparison.placement_m", "comparison.alignment_distance_m", true},
+    Withdrawn{Kind::key, "record.keep_s", "record.event_window_s", true},
+    Withdrawn{Kind::key, "record.roll_mb", "record.split_mb", true},
+    Withdrawn{Kind::key, "trigger.vary_us", "trigger.dither_us", true},
+    Withdrawn{Kind::key, "sync.hold_ms", "sync.timeout_ms", true},
+    Withdrawn{Kind::key, "cameras.0.half", "cameras.N.image_half", true},
+    Withdrawn{Kind::key, "publish.lines", "publish.pose_stream", true},
+    Withdrawn{Kind::value, "sync.mode counter", "frame_counter", true},
+    Withdrawn{Kind::value, "sync.mode software", "approximate_time", true},
+    Withdrawn{Kind::value, "sync.mode bus", "ieee1394_cycle_time", true},
+    Withdrawn{Kind::value, "sync.mode one_picture", "side_by_side", true},
+    Withdrawn{Kind::value, "calibration.intrinsics hold", "fixed or focal", true},
+    Withdrawn{Kind::value, "calibration.intrinsics refine", "full", true},
+    Withdrawn{Kind::option, "run --page", "--live-page", true},
+    Withdrawn{Kind::option, "replay --page", "--live-page", true},
+    Withdrawn{Kind::option, "run --memory", "--print-memory", true},
+    Withdrawn{Kind::option, "replay --memory", "--print-memory", true},
+    Withdrawn{Kind::option, "evaluate --estimate-mount", "--estimate-ins-extrinsics", true},
+    Withdrawn{Kind::option, "doctor --out", "--session-dir", true},
 };
 
 }  // namespace
@@ -123,7 +157,8 @@ std::string why_withdrawn(Kind kind, std::string_view name) {
   const auto* row = std::find_if(kTable.begin(), kTable.end(), [&](const Withdrawn& w) {
     return w.kind == kind && w.name == name;
   });
-  return row == kTable.end() ? "" : "; it was removed: " + std::string(row->instead);
+  if (row == kTable.end()) return "";
+  return (row->renamed ? "; it is now " : "; it was removed: ") + std::string(row->instead);
 }
 
 }  // namespace vergence::app

@@ -41,15 +41,17 @@ namespace vergence::app {
 
 /// Something of an earlier version that a user may still write, and what to do now.
 struct Withdrawn {
-  enum class Kind { key, camera_option, record_topic, option, command } kind;
-  std::string_view name;     // record.roll_s, replay --through-devices, completion
+  enum class Kind { key, value, camera_option, record_topic, option, command } kind;
+  std::string_view
+      name;  // record.roll_s, sync.mode ieee1394_cycle_time, replay --through-devices, completion
   std::string_view instead;  // the end of an error message: what replaced it
+  bool renamed = false;      // `instead` is the new name
 };
 
 [[nodiscard]] std::span<const Withdrawn> withdrawn();
 
-/// `; it was removed: …` for an error message about an unknown name; empty where no earlier version
-/// had it.
+/// `; it was removed: …` or `; it is now …` for an error message about an unknown name; empty where
+/// no earlier version had it.
 [[nodiscard]] std::string why_withdrawn(Withdrawn::Kind kind, std::string_view name);
 
 }  // namespace vergence::app

@@ -30,8 +30,7 @@ std::string words(std::string_view name) {
 /// `stereo`, `stereo, verifying the calibration`, `parallel monocular, needs motion`.
 std::string state_words(State state, Reason reason) {
   std::string text = state == State::stereo_odometry ? "stereo" : words(to_string(state));
-  if (reason == Reason::unverified_calibration || reason == Reason::unconfirmed)
-    text += ", verifying the calibration";
+  if (reason == Reason::unverified_calibration) text += ", verifying the calibration";
   if (reason == Reason::needs_motion || reason == Reason::needs_near_structure ||
       reason == Reason::needs_texture)
     text += ", " + words(to_string(reason));

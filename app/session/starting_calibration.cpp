@@ -185,12 +185,12 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
     if (state.calibration) {
       start.file = std::move(*state.calibration);
       name_cameras(c, serials, &start.file);
-      start.trust = CalibrationTrust::unconfirmed;
+      start.trust = CalibrationTrust::state_file;
       start.cause = "state_file";
       start.source = start.state->string();
     }
   }
-  if (from_scratch && start.trust != CalibrationTrust::unconfirmed) {
+  if (from_scratch && start.trust != CalibrationTrust::state_file) {
     apply_use({.length_only = true}, &start.file.rig);
     start.trust = CalibrationTrust::none;
     start.source = "none";

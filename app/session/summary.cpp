@@ -288,6 +288,7 @@ Json summary_json(const SessionTotals& totals, const SummaryInput& input) {
   json["enu"] = input.earth ? enu_json(*input.earth) : Json();
   json["time"] = input.time;
   json["truth"] = truth_json(input.truth, input);
+  json["schema_version"] = kSchemaVersion;
   json["version"] = std::string(version());
   json["simd"] = features::simd_target();
   json["configuration_hash"] = input.configuration_hash;

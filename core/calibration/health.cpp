@@ -12,9 +12,9 @@ constexpr double kWordDepth = 20;  // m
 
 }  // namespace
 
-std::string_view to_string(CalibrationRating word) noexcept {
+std::string_view to_string(CalibrationRating rating) noexcept {
   static constexpr std::array<std::string_view, 3> names = {"good", "fair", "poor"};
-  return names[static_cast<std::size_t>(word)];
+  return names[static_cast<std::size_t>(rating)];
 }
 
 double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noexcept {

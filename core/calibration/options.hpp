@@ -3,6 +3,13 @@
 
 namespace vergence::calibration {
 
+/// Which intrinsics are estimated together with the extrinsics.
+enum class IntrinsicsEstimation : std::uint8_t {
+  fixed,  // none
+  focal,  // the focal length of each additional camera, with its prior
+  full,   // also principal points and distortion, where the data show that the initial ones are off
+};
+
 /// Every number a user may change in `calibration:` (METHOD §3); the configuration's schema has a
 /// row for each field.
 struct CalibrationOptions {
@@ -15,11 +22,7 @@ struct CalibrationOptions {
       4.0;  // enough: of t_y and t_z, for a baseline of 0.75 m, in proportion to it, 0.01 … 1000
   int adopt_after = 30;  // frames after a snapshot at which its solution is decided about at the
                          // latest, 0 … 1000
-  int estimate_focal_lengths = 1;  // 1: of each further camera, with its prior; 0: held
-  int refine_intrinsics =
-      0;  // 1: focal lengths and principal points of all cameras, with their priors
-  int estimate_lenses =
-      1;  // 1: lenses are part of the calibration where the drive shows that they are off; 0: held
+  IntrinsicsEstimation intrinsics = IntrinsicsEstimation::full;
   double focal_sigma_percent = 0.25;  // prior sigma of a focal length, 0.001 … 10
   double principal_point_sigma_px =
       0.5;  // what a principal point that is held may be off by, a coordinate, 0.01 … 50

@@ -146,12 +146,10 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
     const Intrinsics& lens =
         (request.given != nullptr && lenses ? *request.given : rig).intrinsics[c];
     BundleIntrinsics& out = how.intrinsics[c];
-    if (options_.refine_intrinsics != 0)
-      out.free = kPinhole;
-    else if (k > 0)
-      out.free = lenses                                 ? kPinhole
-                 : options_.estimate_focal_lengths != 0 ? kFocal
-                                                        : std::uint16_t{0};
+    if (k > 0)
+      out.free = lenses                                               ? kPinhole
+                 : options_.intrinsics != IntrinsicsEstimation::fixed ? kFocal
+                                                                      : std::uint16_t{0};
     if (focal_lengths) out.free = static_cast<std::uint16_t>(out.free | kFocal);
     if (lenses) out.free = static_cast<std::uint16_t>(out.free | kFourCoefficients);
     const std::array value = {lens.fx, lens.fy, lens.cx, lens.cy};

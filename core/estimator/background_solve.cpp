@@ -16,7 +16,7 @@ BackgroundSolve::BackgroundSolve(const EstimatorOptions& options, const RigCalib
     : options_(options),
       given_(given),
       solver_(options.calibration, options.monitor, given.cameras, tracks, arena),
-      focal_check_(options.calibration.estimate_lenses != 0),
+      focal_check_(options.calibration.intrinsics == calibration::IntrinsicsEstimation::full),
       runner_(runner),
       task_{this} {}
 
@@ -46,14 +46,14 @@ void BackgroundSolve::run() noexcept {
   request.rig = start_.rig;
   request.from_rig = start_.from_rig;
   solved_ = {};
-  if (start_.sought || options_.calibration.estimate_lenses == 0) {
+  if (start_.sought || options_.calibration.intrinsics != calibration::IntrinsicsEstimation::full) {
     solved_.transforms = solver_.solve(request);
     if (solved_.transforms.status == calibration::RigSolveStatus::ok) {
       request.rig.T_camera_left = solved_.transforms.rig.T_camera_left;
       request.from_rig = true;
     }
   }
-  if (options_.calibration.estimate_lenses == 0) return;
+  if (options_.calibration.intrinsics != calibration::IntrinsicsEstimation::full) return;
   request.freedom = calibration::RigFreedom::lenses;
   request.given = &given_;  // what the frames have shown since must not be its own witness
   request.known = start_.prior;

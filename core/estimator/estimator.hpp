@@ -21,8 +21,8 @@ namespace vergence {
 enum class CalibrationTrust : std::uint8_t {
   given,  // in use from the first frame, poses `degraded: unverified_calibration` until the drive
           // has confirmed it
-  unconfirmed,  // of a state file: the same, `degraded: unconfirmed`
-  none,         // from scratch: of the rig only the intrinsics and the baseline length are read
+  state_file,  // from the state file of the last run: handled like `given`
+  none,        // from scratch: of the rig only the intrinsics and the baseline length are read
 };
 
 /// When a solved calibration is adopted.

@@ -86,7 +86,7 @@ void OnlineCalibrator::take_back(const RigCalibration& rig) noexcept {
 void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
   rig_ = rig;
   source_ = calibration::ClaimSource::this_drive;
-  found_with_lenses_ = options_.calibration.estimate_lenses != 0;
+  found_with_lenses_ = options_.calibration.intrinsics == calibration::IntrinsicsEstimation::full;
   monitor_.expect_rebuilt_scene();
 }
 

@@ -37,7 +37,9 @@ const RigSolution& SolutionReview::sought() const noexcept {
 }
 
 const RigSolution& SolutionReview::measured() const noexcept {
-  return context_.options.calibration.estimate_lenses != 0 ? solved_.lenses : solved_.transforms;
+  return context_.options.calibration.intrinsics == calibration::IntrinsicsEstimation::full
+             ? solved_.lenses
+             : solved_.transforms;
 }
 
 bool SolutionReview::lenses_are_off() const noexcept {

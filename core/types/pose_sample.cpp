@@ -28,7 +28,6 @@ std::string_view to_string(Reason r) noexcept {
                                "map_reset",
                                "weak_geometry",
                                "dynamic_scene",
-                               "unconfirmed",
                                "unverified_calibration",
                                "recalibrating",
                                "uncalibrated",

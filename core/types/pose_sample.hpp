@@ -45,9 +45,7 @@ enum class Reason : std::uint8_t {
   weak_geometry,      // the points do not hold the pose well, or several times worse than usual,
                       // or the window moved the pose far
   dynamic_scene,      // more outliers than a rigid scene has
-  unconfirmed,        // calibration from a state file that the drive has not confirmed yet
-  unverified_calibration,  // the drive has not yet confirmed the calibration that the pose stands
-                           // on
+  unverified_calibration,  // the calibration in use is not verified yet, or no longer
   recalibrating,           // the rig no longer fits its calibration, up to ten frames ago
   uncalibrated,  // no calibration yet: each camera's pose is found for itself, the scale is the
                  // last pair's

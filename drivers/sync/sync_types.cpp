@@ -7,8 +7,8 @@
 
 namespace vergence {
 const char* to_string(SyncMode mode) noexcept {
-  return name_of(mode, std::array{"counter", "software", "board", "ins_syncout", "master_strobe",
-                                  "bus", "ptp", "side_by_side"});
+  return name_of(mode, std::array{"frame_counter", "approximate_time", "board", "ins_syncout",
+                                  "master_strobe", "ieee1394_cycle_time", "ptp", "side_by_side"});
 }
 
 const char* to_string(SyncProof proof) noexcept {

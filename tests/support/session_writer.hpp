@@ -172,7 +172,7 @@ struct SessionWriter {
     if (faults) row(0.3, "rejected", "drift", "too little motion", 0.0020, 0.0015);
     row(0.45, "accepted", "requested", "", 0.0001, 0.0003);
     row(0.7, "accepted", "knock", "", 0.0009, 0.0003);
-    row(0.8, "kept", "refinement", "the calibration in use fits as well", 0.0008, 0.0002);
+    row(0.8, "unchanged", "refinement", "the calibration in use fits as well", 0.0008, 0.0002);
   }
 
   void write_events(const std::filesystem::path& folder) const {

@@ -28,10 +28,7 @@ struct Estimator::Parts {
                                  ? kUnlinkedLengthPercent
                                  : o.calibration.max_depth_error_percent) {
     if (!options.online) return;
-    doubts.enter(Doubt::calibration,
-                 o.trust == CalibrationTrust::unconfirmed ? Reason::unconfirmed
-                                                          : Reason::unverified_calibration,
-                 0);
+    doubts.enter(Doubt::calibration, Reason::unverified_calibration, 0);
   }
 
   void transition(Trigger trigger, Stamp stamp) noexcept {

@@ -24,8 +24,7 @@ RigCalibration nominal_of(const RigCalibration& rig) {
 CourseSetting from_scratch(const RigCalibration& rig) {
   CourseSetting s;
   s.options.trust = CalibrationTrust::none;
-  s.options.calibration.estimate_focal_lengths = 0;
-  s.options.calibration.estimate_lenses = 0;
+  s.options.calibration.intrinsics = calibration::IntrinsicsEstimation::fixed;
   s.given = rig;
   for (Transform& T : s.given.T_camera_left) T = {};
   s.nominal = nominal_of(rig);
@@ -34,8 +33,7 @@ CourseSetting from_scratch(const RigCalibration& rig) {
 
 CourseSetting with_calibration(const RigCalibration& rig) {
   CourseSetting s;
-  s.options.calibration.estimate_focal_lengths = 0;
-  s.options.calibration.estimate_lenses = 0;
+  s.options.calibration.intrinsics = calibration::IntrinsicsEstimation::fixed;
   s.given = rig;
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
     s.given.sigma_noise[k] = s.given.sigma_total[k] = {2e-5, 3e-5, 2e-5, 1e-5, 4e-4, 7e-4};

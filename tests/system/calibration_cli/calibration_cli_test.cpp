@@ -111,7 +111,7 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
   const Outcome second = drive("second", "--duration 4");
   ASSERT_EQ(second.code, 0) << second.err;
   EXPECT_TRUE(test::says(lines("second", "calibrations.csv").at(1), ",accepted,state_file,"));
-  EXPECT_GT(frames_with("second", "unconfirmed"), 0U)
+  EXPECT_GT(frames_with("second", "unverified_calibration"), 0U)
       << "until the monitor has seen that it still is true";
   EXPECT_EQ(app::read_calibration(session("second") / "calibration.yaml").rig.T_camera_left[1].t,
             app::read_calibration(state()).rig.T_camera_left[1].t);

@@ -109,7 +109,7 @@ def rules(machine):
     done(machine, "vergence devices --rig /tmp/ports.yaml --write-udev >/etc/udev/rules.d/98-vergence-rig.rules")
     done(machine, "udevadm control --reload && udevadm trigger && udevadm settle")
     done(machine, "ls /dev/vergence/ins-%s /dev/vergence/trigger-%s" % (INS, TRIGGER))
-    status, text = machine.run("vergence doctor /etc/vergence/rig.yaml --out /var/lib/vergence", 300)
+    status, text = machine.run("vergence doctor /etc/vergence/rig.yaml --session-dir /var/lib/vergence", 300)
     say("doctor: %d\n%s" % (status, text))
 
 

@@ -36,7 +36,8 @@ TEST(Program, WhatAnEarlierVersionHadIsRefusedWithWhatReplacedIt) {
   for (const Withdrawn& row : withdrawn()) {
     const std::string name(row.name);
     const std::string words =
-        row.kind == Kind::key ? run + name + "=1"
+        row.kind == Kind::key     ? run + name + "=1"
+        : row.kind == Kind::value ? run + std::string(name).replace(name.find(' '), 1, "=")
         : row.kind == Kind::camera_option
             ? run + "cameras.0.driver=gige --set cameras.0.options." + name + "=1"
         : row.kind == Kind::record_topic ? run + "'record=[" + name + "]'"

@@ -84,11 +84,11 @@ TEST(Assessment, GradeReasonAndAdviceByFinding) {
   const auto drift = [](double d) { return [d](Case& c) { c.analysis.drift = d; }; };
   const auto lost = [](std::size_t n) { return [n](Case& c) { c.frames_of(0, n); }; };
   const auto weak_by = [](const char* what) {
-    return [what](Case& c) { c.calibration() = {{"rating", "recalibrate"}, {"limited_by", what}}; };
+    return [what](Case& c) { c.calibration() = {{"rating", "poor"}, {"limited_by", what}}; };
   };
   const auto near_sigma = [](double percent) {
     return [percent](Case& c) {
-      c.calibration()["rating"] = "recalibrate";
+      c.calibration()["rating"] = "poor";
       CalibrationRow& row = c.attempt(true, "refinement", 1, 0.2);
       row.reference_depth_m = 2.4, row.depth_sigma_percent = percent;
     };
@@ -292,7 +292,7 @@ TEST(Usability, OfDrivesWithoutAnOkFrame) {
       {degraded_drive(40, "cameras_swapped", 40), false, "there never was a pose: cameras_swapped"},
       {degraded_drive(30, "unverified_calibration", 10), false, ""},
   };
-  for (const char* waits : {"unverified_calibration", "uncalibrated", "unconfirmed"}) {
+  for (const char* waits : {"unverified_calibration", "uncalibrated"}) {
     drives.push_back({degraded_drive(59, waits), true, ""});
     drives.push_back({degraded_drive(60, waits), false, waits});
   }

@@ -47,7 +47,7 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
   EXPECT_TRUE(self_contained(html));
   EXPECT_EQ(test::xml_problem({html}), "");
   for (const char* part :
-       {"0.74 %", "rotation x, degrees", "translation z, mm", ">verified</text>", ">kept</td>",
+       {"0.74 %", "rotation x, degrees", "translation z, mm", ">verified</text>", ">unchanged</td>",
         "± 0.10 % at 20 m,", "0.90 → 0.21 px", "(20 times)", "0.0001, 0, 0, 0.001, 0, 0"})
     EXPECT_TRUE(contains(html, part)) << part;
   EXPECT_FALSE(contains(html, "What is missing"));

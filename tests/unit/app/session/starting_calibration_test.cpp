@@ -47,7 +47,7 @@ TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfigurat
   const Configuration c = configuration(folder);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
   const StartingCalibration state = starting_calibration(c, {}, kSerials);
-  EXPECT_EQ(state.trust, CalibrationTrust::unconfirmed);
+  EXPECT_EQ(state.trust, CalibrationTrust::state_file);
   EXPECT_EQ(state.file.rig.T_camera_left[1].t.y(), 0.011);
   EXPECT_STREQ(state.cause, "state_file");
 
@@ -82,7 +82,7 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
 
   const auto drive = [&](const char* own) { return starting_calibration(c, {}, {own, ""}); };
   write_state(folder / "calibration_state.yaml", drive("4711").file);
-  EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
+  EXPECT_EQ(drive("4711").trust, CalibrationTrust::state_file);
   const StartingCalibration other = drive("4712");
   EXPECT_EQ(other.trust, CalibrationTrust::given);
   ASSERT_EQ(other.remarks.size(), 1U);
@@ -95,7 +95,7 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   write_calibration(folder / "old.yaml", old);
   EXPECT_TRUE(starting_calibration(c, {.file = folder / "old.yaml"}, {"4711", ""}).remarks.empty());
   write_calibration(folder / "calibration_state.yaml", old);
-  EXPECT_EQ(drive("4711").trust, CalibrationTrust::unconfirmed);
+  EXPECT_EQ(drive("4711").trust, CalibrationTrust::state_file);
 }
 
 TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
@@ -106,7 +106,7 @@ TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   c.cameras[1].T_camera_left = {};
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::none);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
-  EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::unconfirmed);
+  EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::state_file);
 }
 
 /// What is said of a calibration that was found, where files cannot be written.

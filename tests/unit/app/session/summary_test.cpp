@@ -98,7 +98,7 @@ TEST(Summary, aYawSigmaTellsTheDepthErrorAndTheWord) {
   // A yaw error σ moves the disparity by f σ (a narrow lens: the same everywhere), so σ_z/z = z
   // σ/b: at 20 m 200 σ.
   const std::array<std::pair<double, const char*>, 3> cases{
-      {{8e-5, "good"}, {2e-4, "fair"}, {4e-4, "recalibrate"}}};
+      {{8e-5, "good"}, {2e-4, "fair"}, {4e-4, "poor"}}};
   for (const auto& [sigma, word] : cases) {
     auto totals = std::make_unique<SessionTotals>();
     SummaryInput in = input();

@@ -102,7 +102,7 @@ RigSolution solve_with(const std::vector<test::RigChange>& changes, std::uint64_
   o.changes = changes;
   CalibrationOptions held;
   held.max_frames = 60;
-  held.estimate_focal_lengths = 0;
+  held.intrinsics = IntrinsicsEstimation::fixed;
   test::SolverInArena s(held);
   test::FeatureDrive drive(o);
   test::log_drive(drive, 60, {}, s.solver.log());

@@ -59,7 +59,7 @@ TEST(Health, theWordFollowsTheErrorAtTwentyMetres) {
   EXPECT_EQ(word(1.99), "good");
   EXPECT_EQ(word(2.01), "fair");
   EXPECT_EQ(word(4.99), "fair");
-  EXPECT_EQ(word(5.01), "recalibrate");
+  EXPECT_EQ(word(5.01), "poor");
 }
 
 TEST(Health, aRigIsAsGoodAsItsBestPair) {

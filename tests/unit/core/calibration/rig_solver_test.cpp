@@ -18,7 +18,7 @@ constexpr LogStart kRough{2e-3, 0.02, 5e-3,
 CalibrationOptions held() {
   CalibrationOptions o;
   o.max_frames = 60;
-  o.estimate_focal_lengths = 0;
+  o.intrinsics = calibration::IntrinsicsEstimation::fixed;
   return o;
 }
 
@@ -96,7 +96,7 @@ TEST(RigSolver, theFurtherCamerasFocalLengthIsFoundWhenItIsAskedFor) {
   drive.right.fx *= 1.002;
   drive.right.fy *= 1.002;
   CalibrationOptions o = held();
-  o.estimate_focal_lengths = 1;
+  o.intrinsics = calibration::IntrinsicsEstimation::focal;
   // Two thousandths off, known to five: the tracks outweigh that by far.
   const double sigma = 0.005 * drive.left.fx;
   const RigSolution s =

@@ -31,8 +31,7 @@ struct Drive {
 
   explicit Drive(CalibrationTrust trust) : given(corridor.rig()), nominal(given) {
     options.trust = trust;
-    options.calibration.estimate_focal_lengths = 0;
-    options.calibration.estimate_lenses = 0;
+    options.calibration.intrinsics = calibration::IntrinsicsEstimation::fixed;
     // Pixels of 3.6 mrad instead of the paper's 0.8: what tracks can hold is as much less.
     options.calibration.rotation_sigma_mrad = 1.0;
     options.calibration.translation_sigma_mm = 30;
@@ -161,7 +160,7 @@ TEST(Calibrating, aYawKnockedWhileItIsSoughtBeginsTheSearchAnew) {
 }
 
 TEST(Calibrating, aFilesCalibrationIsUnconfirmedUntilTheDriveConfirmsIt) {
-  Drive d(CalibrationTrust::unconfirmed);
+  Drive d(CalibrationTrust::state_file);
   d.begin();
   d.drive(0, 45);
   int confirmed = -1;
@@ -172,7 +171,7 @@ TEST(Calibrating, aFilesCalibrationIsUnconfirmedUntilTheDriveConfirmsIt) {
   for (const PoseSample& s : d.samples) {
     if (static_cast<int>(s.frame) < confirmed) {
       EXPECT_EQ(s.status, PoseStatus::degraded) << s.frame;
-      EXPECT_EQ(s.reason, Reason::unconfirmed) << s.frame;
+      EXPECT_EQ(s.reason, Reason::unverified_calibration) << s.frame;
     } else {
       EXPECT_EQ(s.status, PoseStatus::ok) << s.frame << ' ' << to_string(s.reason);
     }

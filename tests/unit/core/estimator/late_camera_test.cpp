@@ -31,8 +31,7 @@ struct StopAndGo {
   ImmediateRunner solver;
 
   StopAndGo() {
-    options.calibration.estimate_focal_lengths = 0;
-    options.calibration.estimate_lenses = 0;
+    options.calibration.intrinsics = calibration::IntrinsicsEstimation::fixed;
     given.sigma_noise[1] = {2e-4, 4e-4, 2e-4, 1e-5, 2e-3, 4e-3};
   }
 
