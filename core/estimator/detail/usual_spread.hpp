@@ -1,7 +1,9 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <span>
 
 #include "core/math/robust.hpp"
@@ -10,6 +12,7 @@ namespace vergence {
 
 /// How uncertain the drive's motions usually are: the median of the last ones. A motion that is
 /// several times less certain than that cannot be relied on as the others can, whatever spoils it.
+/// One certain motion among uncertain ones ends nothing.
 ///
 /// Of the recorded drives, untouched, no motion is more than 1.6 times as uncertain as usual, of
 /// the rendered street 2.3 times (build/bench/covariance_bench); cameras that are out of step
@@ -25,13 +28,16 @@ class CovarianceBaseline {
     constexpr double kMoves = 2;  // sigmas
     return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
   }
-  /// Whether a motion is more than 3 times as uncertain as usual; after one that was, more than
-  /// twice. One that is makes nothing usual: what stays so uncertain is told for as long.
+  /// Returns true from a motion more than 3 times as uncertain as usual on, until the last five are
+  /// less than twice as uncertain, root mean square. A motion judged so makes nothing usual: what
+  /// stays so uncertain is reported for as long.
   ///
   /// sigma_m: of the translation of a motion that judges(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
+    recent_[judged_++ % kRecent] = sigma_m * sigma_m;
     times_ = kept_ >= kMin ? sigma_m / median() : 0;
-    unusual_ = times_ > (unusual_ ? kRelease : kTimes);
+    const double squares = std::accumulate(recent_.begin(), recent_.end(), 0.0);
+    unusual_ = unusual_ ? std::sqrt(squares / kRecent) > kRelease * median() : times_ > kTimes;
     if (unusual_) return true;
     sigma_[next_] = sigma_m;
     next_ = (next_ + 1) % kKept;
@@ -43,7 +49,7 @@ class CovarianceBaseline {
   [[nodiscard]] double times_usual() const noexcept { return times_; }
 
  private:
-  static constexpr std::size_t kKept = 61, kMin = 15;  // motions
+  static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 5;  // motions
   static constexpr double kTimes = 3, kRelease = 2;
 
   [[nodiscard]] double median() const noexcept {
@@ -53,6 +59,8 @@ class CovarianceBaseline {
 
   std::array<double, kKept> sigma_{};
   std::size_t next_ = 0, kept_ = 0;
+  std::array<double, kRecent> recent_{};  // squares
+  std::size_t judged_ = 0;
   double times_ = 0;  // the last one
   bool unusual_ = false;
 };

@@ -193,11 +193,11 @@ class StreamSession {
     publisher_.on_calibration(record);
   }
   void align() {
-    EnuAlignment placement;
-    placement.T_enu_world.R << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-    placement.T_enu_world.t = {1, 2, 3};
-    placement.position_sigma = {0.5, 0.5, 1};
-    publisher_.on_enu_alignment(placement, {-27.4975, 153.0137, 60});
+    EnuAlignment alignment;
+    alignment.T_enu_world.R << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+    alignment.T_enu_world.t = {1, 2, 3};
+    alignment.position_sigma = {0.5, 0.5, 1};
+    publisher_.on_enu_alignment(alignment, {-27.4975, 153.0137, 60});
   }
   /// The pose of a camera that looks and drives straight ahead at 0.1 m per frame.
   void pose() {

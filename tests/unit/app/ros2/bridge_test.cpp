@@ -282,7 +282,7 @@ TEST(Bridge, EveryReasonOfTheListIsOne) {
     ++reasons[odometry(kept.messages["/vergence/odometry"].at(0)).pose_covariance(5, 5)];
   }
   EXPECT_EQ(reasons[100], 3);
-  EXPECT_EQ(reasons[9], 8);
+  EXPECT_EQ(reasons[9], 7);
 }
 
 TEST(Bridge, NoSpeedAcrossAGapALostPoseOrAnotherConnection) {
