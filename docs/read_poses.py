@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints the poses that vergence publishes: read_poses.py unix:///run/vergence/pose.sock | udp://127.0.0.1:9870
 
-One JSON object a line, docs/publish.md says what is in it. Ends when the program does.
+One JSON object a line, docs/live_interface.md says what is in it. Ends when the program does.
 """
 import json
 import socket
@@ -28,7 +28,7 @@ def main():
         pose = json.loads(line)
         if pose["version"] != 2:
             sys.exit("read_poses: the stream has version %s, this program reads version 2" % pose["version"])
-        if pose["type"] != "pose":  # calibration, alignment, status: docs/publish.md
+        if pose["type"] != "pose":  # calibration, alignment, status: docs/live_interface.md
             continue
         place = ["%9.3f" % v for v in pose["pose"]["position_m"]] if pose["pose"] else ["no pose"]
         print(pose["frame"], pose["status"], pose["reason"] or "-", *place, flush=True)
