@@ -92,18 +92,19 @@ class Setup {
 
  private:
   [[nodiscard]] DeviceStatus probe(std::uint32_t baud, Duration limit);
-  [[nodiscard]] DeviceStatus set_legacy(double rate_hz, StreamSettings* stream);
-  [[nodiscard]] DeviceStatus set_mark4(double rate_hz, StreamSettings* stream);
-  [[nodiscard]] DeviceStatus set_baud(const Identity& identity);
-  [[nodiscard]] DeviceStatus set_legacy_lines(double rate_hz, StreamSettings* stream);
-  [[nodiscard]] DeviceStatus set_legacy_line(xbus::MessageId id, xbus::LegacySync parameter,
-                                             std::uint32_t value);
-  [[nodiscard]] DeviceStatus set_mark4_lines(StreamSettings* stream);
-  [[nodiscard]] DeviceStatus write(xbus::MessageId id, std::span<const std::uint8_t> payload,
-                                   const char* what);
-  [[nodiscard]] DeviceStatus failed(const char* what);
-  [[nodiscard]] DeviceStatus refuse_load(const xbus::LineBudget& budget, double rate_hz,
-                                         std::uint32_t baud);
+  // Each ends with Refused where the device does not do it; last_error_ says why.
+  [[nodiscard]] Identity identified();
+  void set_legacy(double rate_hz, StreamSettings* stream);
+  void set_mark4(double rate_hz, StreamSettings* stream);
+  void set_baud(const Identity& identity);
+  void set_legacy_lines(double rate_hz, StreamSettings* stream);
+  void set_legacy_line(xbus::MessageId id, xbus::LegacySync parameter, std::uint32_t value);
+  void set_mark4_lines(StreamSettings* stream);
+  void write(xbus::MessageId id, std::span<const std::uint8_t> payload, const char* what);
+  void check_load(const xbus::LineBudget& budget, double rate_hz);
+  [[noreturn]] void refuse(DeviceStatus status, std::string message);
+  /// Of the newest question; `refused`: where the device said no.
+  [[noreturn]] void fail(const char* what, DeviceStatus refused = DeviceStatus::failed);
   [[nodiscard]] std::uint32_t baud_to_be() const noexcept {
     return options_.baud != 0 ? options_.baud : line_.baud();
   }
