@@ -108,13 +108,13 @@ struct KittiRawSettings {
   int left = 0, right = 1;
 };
 
-/// What the intrinsics handed to the estimator are off by, sigmas.
+/// Sigmas of the errors in the intrinsics that the estimator receives.
 struct IntrinsicsErrorSettings {
   double principal_point_px = 0, focal_percent = 0;
   std::int64_t seed = 1;
 };
 
-/// What the stereo transform handed to the estimator is off by: camera 1 as if it had been knocked,
+/// Errors of the stereo transform that the estimator receives: camera 1 as if it had been knocked,
 /// then all lengths.
 struct CalibrationErrorSettings {
   double pitch_deg = 0, yaw_deg = 0, roll_deg = 0;
@@ -209,7 +209,7 @@ struct Configuration {
 [[nodiscard]] Configuration load_configuration(const std::optional<std::filesystem::path>& file,
                                                const std::vector<std::string>& set);
 
-/// The same from text; `name` stands for the file in error messages.
+/// Parses a configuration from text; `name` replaces the file in error messages.
 [[nodiscard]] Configuration parse_configuration(std::string_view yaml, const std::string& name,
                                                 const std::vector<std::string>& set);
 

@@ -91,11 +91,11 @@ struct BagTopics {
          format == SequenceFormat::db3;
 }
 
-/// Of a bag's file by the ending of its name; nothing: it is none.
+/// Returns the bag format by the file name's ending; nullopt if it is none.
 [[nodiscard]] std::optional<SequenceFormat> bag_format(const std::filesystem::path& file);
 
-/// What to do with a bag that was packed as a whole (`drive.mcap.zstd`): a phrase; empty: it was
-/// not.
+/// Returns how to unpack a bag that was compressed as a whole (`drive.mcap.zstd`): a phrase; empty:
+/// it was not.
 [[nodiscard]] std::string unpack_advice(const std::filesystem::path& file);
 
 /// The format of a folder (or a bag's file) by what is in it; nothing: none that is known.

@@ -26,7 +26,7 @@ struct CalibrationText {
   std::string text;
 };
 
-/// Whether the file is a calibration.yaml of this program's. InputError: not readable.
+/// Returns true if the file is a calibration.yaml of this program. InputError: not readable.
 [[nodiscard]] bool is_own_calibration(const std::filesystem::path& file);
 
 /// Reads any of the formats, told by content. `in`: a file, two or three with commas between, or a
@@ -39,7 +39,7 @@ struct CalibrationText {
                                                    const std::optional<ImageSize>& size,
                                                    Remarks* remarks,
                                                    const CalibrationUse& use = {});
-/// The same of texts of other programs.
+/// Parses texts of other programs.
 [[nodiscard]] CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& files,
                                                     const std::optional<ImageSize>& size,
                                                     Remarks* remarks,

@@ -69,7 +69,7 @@ class LinePublisher final : public SessionObserver {
   SessionStart start_{};  // published by started_
   std::atomic<bool> started_{false}, stop_{false};
 
-  // Of the estimator's thread.
+  // Used by the estimator's thread only.
   LiveFrameBuilder builder_;
   // From it to the publisher's.
   Ring<LiveFrame, 64> frames_;
@@ -82,7 +82,7 @@ class LinePublisher final : public SessionObserver {
 
   std::atomic<double> age_p99_ms_{-1};
 
-  // Of the publisher's thread.
+  // Used by the publisher's thread only.
   std::optional<PublishedEnuAlignment> alignment_{};
   std::optional<LiveFrame> newest_{};
   std::string calibration_line_{}, alignment_line_{};

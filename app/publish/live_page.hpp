@@ -145,7 +145,7 @@ class LivePage final : public SessionObserver {
   std::atomic<bool> started_{false}, ended_{false}, stop_{false};
   SessionStart start_{};  // published by started_
 
-  // Of the page's thread.
+  // Used by the page's thread only.
   LiveState state_;
   bool begun_ = false;
   HttpServer server_;

@@ -9,7 +9,7 @@
 
 namespace vergence::app::report {
 
-/// What the errors of the page are differences to.
+/// Reference of the errors on the page.
 enum class ErrorSource : std::uint8_t {
   none,       // there is no reference: no errors
   ins,        // errors of poses.csv, after the alignment on the earth

@@ -67,7 +67,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   const std::string folder_;
   Recording recording_;
 
-  // Of the estimator's thread.
+  // Used by the estimator's thread only.
   RigCalibration rig_;
   bool calibrated_ = false, recalibrate_ = false;
   std::optional<std::uint64_t> rig_in_file_{};  // how many there were when it was posted last

@@ -258,7 +258,7 @@ void Recorder::write(const FrameReport& r) {
   files_->has_reference = true;
 }
 
-/// What became of a calibration. False: there is nothing new.
+/// Outcome of a calibration. False: there is nothing new.
 bool Recorder::take_outcome() {
   CalibrationStateWriter::Outcome outcome;
   if (keeper_ == nullptr || !keeper_->next(&outcome)) return false;

@@ -22,7 +22,7 @@
 
 namespace vergence::app {
 
-/// What became of a calibration that was to be kept: a line of events.jsonl, an error of the
+/// Result of saving a calibration: a line of events.jsonl, an error of the
 /// session as well when it failed.
 struct Kept {
   bool failed = false;
@@ -43,7 +43,7 @@ class CalibrationStateWriter {
  public:
   static constexpr std::size_t kMaxWaiting = 4;  // they come seconds apart
 
-  /// What became of a calibration.
+  /// Outcome of a calibration.
   struct Outcome {
     EventRecord event{};  // `calibration_saved` or `calibration_save_failed`
     bool failed = false;
@@ -55,7 +55,7 @@ class CalibrationStateWriter {
   CalibrationStateWriter(const CalibrationStateWriter&) = delete;
   CalibrationStateWriter& operator=(const CalibrationStateWriter&) = delete;
 
-  /// What the drive begins with. It is kept when it is confirmed before another one is found.
+  /// Sets the initial calibration. It is saved if it is verified before another one is found.
   void begin_with(const RigCalibration& rig) noexcept { unconfirmed_ = rig; }
   /// The drive has confirmed what is in use. False: too many wait; it is not kept.
   [[nodiscard]] bool confirmed(Stamp stamp) noexcept;
@@ -90,7 +90,7 @@ class CalibrationStateWriter {
 
 class LineFile;
 
-/// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
+/// Columns of calibrations.csv: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
 /// noise alone, `sigma_total_` with uncertain intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 …
 /// k4 of an equidistant lens. Latency in frames since the alarm, the request or the start; held-out
 /// errors are medians before and after. `kept`: what the drive measured is no better than what is
@@ -115,7 +115,7 @@ inline constexpr const char* kCalibrationsHeader =
 ///     recorder.on_report(FrameReport::of(sample, 0, std::nullopt));  // of each frame
 ///     const std::unique_ptr<SessionTotals> totals = recorder.close();
 ///
-/// What has been posted is in the files as soon as the thread comes to it, at the latest after a
+/// Posted records reach the files at the latest after a
 /// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
 /// records give the same bytes.
 /// Threads  on_…(): one producer. take_errors(): one consumer. close(): the owner's, after the
@@ -141,8 +141,8 @@ class Recorder final : public SessionObserver {
     /// with the one that the drive began with when it is confirmed first: files may be written
     /// there. May be empty.
     KeepCalibration keep{};
-    /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault
-    /// says. Called on the recorder's thread with the stamp of every pose. May be empty.
+    /// Returns true if a fault of the simulated rig makes the disk full at this time; it
+    /// is called on the recorder's thread with the stamp of every pose. May be empty.
     std::function<bool(Stamp)> disk_full{};
   };
 
@@ -171,7 +171,7 @@ class Recorder final : public SessionObserver {
   static constexpr std::size_t kCalibrations = 8;   // they come seconds apart
 
   using Record = std::variant<FrameReport, EventRecord>;
-  /// What waits for the recorder's thread.
+  /// Queue of values for the recorder's thread.
   template <class Value, std::size_t N>
   struct Queue {
     Ring<Value, N> ring{};
@@ -183,7 +183,7 @@ class Recorder final : public SessionObserver {
     CalibrationRecord calibration{};
     std::uint64_t after = 0;
   };
-  /// What keeps calibrations in their turn among the records.
+  /// Orders calibrations among the records.
   struct Turn {
     std::uint64_t posted = 0;      // records; the producer's
     std::uint64_t written = 0;     // records; of the recorder's thread, as the next

@@ -17,11 +17,11 @@
 #include "app/session/summary.hpp"
 #include "core/types/parallel.hpp"
 
-/// What every command that writes a session folder does alike.
+/// Shared steps of commands that write a session directory.
 namespace vergence::app {
 
-/// Whether the folder of a session is there, empty. InputError: it exists and is not empty, or is
-/// no folder.
+/// Creates a session's directory, or accepts an empty one. InputError: it exists and is not empty,
+/// or is no folder.
 bool check_session_folder(const std::filesystem::path& folder);
 /// Makes the folder of a session. False: it was there, empty. InputError: it exists and is not
 /// empty, is no folder, or cannot be made.
@@ -29,7 +29,7 @@ bool make_session_folder(const std::filesystem::path& folder);
 /// Undoes make_session_folder(): removes what is in the folder, and with `made` the folder itself.
 void discard_session_folder(const std::filesystem::path& folder, bool made) noexcept;
 
-/// What an arena needs beside its contents: the first piece is aligned, too.
+/// Size of an arena including the alignment of its first piece.
 [[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }
 
 /// One worker beside the estimator with two threads or more.
@@ -40,7 +40,7 @@ void write_session_calibration(const std::filesystem::path& session,
                                const CalibrationFile& calibration,
                                std::vector<std::string>* faults);
 
-/// What the recorder does with a calibration found while driving: calibration.yaml of the session
+/// Writes a calibration found online: calibration.yaml of the session
 /// at once, so that a session that is killed has it, and the state file, if there is to be one. One
 /// that the drive began with and has confirmed goes to the state file alone.
 /// `words`: names and serials of the cameras, what the configuration says, and where the first is
@@ -59,7 +59,7 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
                           const SessionTotals& totals, const EstimatorOptions& options,
                           SummaryInput* input);
 
-/// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is
+/// Returns the message about an unverified calibration; empty if it is verified or there is
 /// none.
 [[nodiscard]] std::string verification_message(const SummaryInput& input);
 
@@ -73,7 +73,7 @@ void end_session(const std::filesystem::path& session, const StartingCalibration
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
                            const SummaryInput& input, std::vector<std::string>* faults);
 
-/// What became of report.html.
+/// Result of writing report.html.
 struct SessionReport {
   ReportOutcome outcome{};
   std::string failure{};  // why there is none; empty: it is there

@@ -85,7 +85,7 @@ struct BudgetStatistics {
   void add(const FrameWorkload& effort) noexcept;
 };
 
-/// What a session has come to: for summary.json.
+/// Totals of a session for summary.json.
 struct SessionTotals {
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
   TimeHistogram estimate, decode;                          // ms

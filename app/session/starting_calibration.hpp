@@ -65,13 +65,13 @@ struct StartingCalibration {
                                                        const CalibrationSource& source,
                                                        const std::vector<std::string>& serials);
 
-/// Of a replay; the sequence was opened with the same from_scratch. State files are neither read
-/// nor written.
+/// Initial calibration of a replay; the sequence was opened with the same from_scratch. State files
+/// are neither read nor written.
 [[nodiscard]] StartingCalibration replayed_calibration(const Configuration& configuration,
                                                        const StereoSequence& sequence,
                                                        bool from_scratch);
 
-/// What the gates compare with: parallel cameras a baseline apart; of a camera that is mounted
+/// Nominal geometry for the gates: parallel cameras a baseline apart; of a camera that is mounted
 /// farther from there than the gates let through, its place in `mounted`.
 [[nodiscard]] RigCalibration nominal_geometry(const RigCalibration& given,
                                               const RigCalibration& mounted,

@@ -10,7 +10,7 @@
 
 namespace vergence::app {
 
-/// What a drive tells of time: clocks, pairing, latencies, its stamps against the INS's UTC. Events
+/// Timing of a session: clocks, pairing, latencies, its stamps against the INS's UTC. Events
 /// as messages, figures for summary.json.
 ///
 /// Threads  note…(): the estimator's, sealed. json(): any, after that has joined. Memory: fixed;

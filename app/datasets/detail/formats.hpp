@@ -7,7 +7,7 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 
-/// What the readers of stereo_sequence.hpp share.
+/// Shared parts of the readers of stereo_sequence.hpp.
 namespace vergence::app::detail {
 
 /// Each reader fills root, pairs and, unless `given`, the calibration.
@@ -22,7 +22,7 @@ namespace vergence::app::detail {
 [[nodiscard]] StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given);
 [[nodiscard]] StereoSequence open_bag(BagFormat format, const std::filesystem::path& bag,
                                       bool given, const BagTopics& topics);
-/// The same of a bag whose index is there; `path`: for messages.
+/// Opens a sequence of an indexed bag; `path` is for messages.
 [[nodiscard]] StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag,
                                          bool given, const BagTopics& topics);
 

@@ -63,7 +63,7 @@ struct RosCameraInfo {
 };
 [[nodiscard]] std::optional<RosCameraInfo> read_ros_camera_info(
     std::span<const std::uint8_t> message, MessageEncoding encoding);
-/// Of the images that the camera's rectification makes.
+/// Returns the camera of the rectified images.
 [[nodiscard]] RosCamera rectified(RosCamera camera) noexcept;
 
 }  // namespace vergence::app::detail
