@@ -1,5 +1,5 @@
-// What of `vergence calibrate` needs OpenCV. `vergence` starts it with its own words; nobody has to
-// know its name.
+// Implements the parts of `vergence calibrate` that need OpenCV. `vergence` starts it with its own
+// words; nobody has to know its name.
 #include <iostream>
 #include <memory>
 

@@ -51,7 +51,7 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
   const auto given = root.get_subcommands();
   CLI::App& command = given.empty() ? root : *given.front();
   const std::string who = given.empty() ? "" : command.get_name() + ": ";
-  // What was not understood is said first: it is often why something else seems to be missing.
+  // Unknown arguments are reported first: this is often why something else seems to be missing.
   if (const auto extras = root.remaining(true); !extras.empty()) {
     const std::string& first = extras.front();
     const std::string name = first.substr(0, first.find('='));

@@ -26,7 +26,7 @@ struct ExportArguments {
   bool quiet = false;
 };
 
-/// Of a mock the truth; else the reference that the drive was compared with.
+/// Returns the ground truth of a simulated run, else the reference of the comparison.
 Trajectory truth_of(const std::filesystem::path& session) {
   std::error_code ignored;
   for (const char* name : {"truth.tum", "reference.tum"})

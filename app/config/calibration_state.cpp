@@ -44,14 +44,14 @@ bool same_camera(const CalibrationFile& found, const CalibrationFile& expected, 
 std::string other_configuration(const CalibrationFile& found, const CalibrationFile& expected) {
   if (std::string change = find_change(*found.configured, *expected.configured); !change.empty())
     return change;
-  // Of a drive that was given one with --calibration. Images cannot tell which length is right.
+  // Handles a state file saved from --calibration. Images cannot tell which length is right.
   const double had = found.rig.baseline, says = expected.rig.baseline;
   if (std::abs(had - says) >= kOtherLength * says)
     return fmt::format("its baseline is {:g} m, the configuration's {:g} m", had, says);
   return "";
 }
 
-/// The same of a file that does not say what it was found under.
+/// Handles a file without the configuration it was found under.
 std::string other_numbers(const RigCalibration& found, const RigCalibration& expected) {
   for (std::size_t k = 0; k < static_cast<std::size_t>(found.cameras); ++k)
     if (found.intrinsics[k].kind != expected.intrinsics[k].kind)

@@ -832,7 +832,7 @@ const std::vector<Group>& schema() {
 
 namespace {
 
-/// What of a camera's lens would be read by nobody.
+/// Finds intrinsics of a camera that would be ignored.
 std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
   const auto given = [](double v) { return v != 0; };
   const auto& numbers = camera.intrinsics;

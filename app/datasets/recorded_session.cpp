@@ -113,7 +113,7 @@ struct RecordedSession::Files {
   std::vector<detail::BagFile> list;
 };
 
-/// What a scan gathers.
+/// Result of a scan.
 struct RecordedSession::Reader {
   RecordedSession* session;
   const fs::path& folder;

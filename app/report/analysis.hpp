@@ -43,7 +43,7 @@ struct Analysis {
   std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0;  // frames
   std::size_t skipped = 0;             // without a summary those that are missing by their numbers
   std::vector<std::size_t> by_reason;  // frames that were not ok, by Session::reasons
-  // Of the degraded ones, and of by_reason: without another fault than that the drive had not yet
+  // Degraded frames, also counted in by_reason, whose only fault was that the run had not yet
   // found or confirmed its calibration. A drive is not judged by that wait.
   std::size_t waited = 0;
   std::vector<std::size_t> waited_by_reason;

@@ -107,7 +107,7 @@ std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts&
   return bytes;
 }
 
-/// Of all cameras' images of one frame.
+/// Size of all cameras' images of one frame.
 double frame_bytes(const SourceFacts& facts) {
   double bytes = 0;
   for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
@@ -117,12 +117,12 @@ double frame_bytes(const SourceFacts& facts) {
   return bytes;
 }
 
-/// What an event would keep of records that small.
+/// Queue size for small records around an event.
 double kept_bytes(const Configuration& c, double record_bytes, double rate) {
   return c.record.event_window_s * rate * record_bytes;
 }
 
-/// Of the estimator's thread without images: of frames, and of the INS as it was compared.
+/// Records of the estimator's thread without images: frames and compared INS samples.
 double small_bytes(const Configuration& c) {
   return kSmall + kept_bytes(c, kFrameRecords, c.trigger.rate) +
          kept_bytes(c, kReadingRecords, c.ins.rate);
@@ -130,7 +130,7 @@ double small_bytes(const Configuration& c) {
 
 constexpr double kMinHeld = 16;  // frames that wait: a replay waits for room
 
-/// What an address of this machine reaches; a 32-bit one's program has 3 GB for all.
+/// Address space of this machine; a 32-bit one's program has 3 GB for all.
 constexpr double kMaxQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
 
 /// Bytes of images a second, and how many seconds of them are held.
@@ -190,7 +190,7 @@ void DriveRecorder::close(std::vector<std::string>* faults) {
         folder_, lost));
 }
 
-/// Whether it is in the queue.
+/// True if it is in the queue.
 template <class Write>
 bool DriveRecorder::post(std::size_t topic, Stamp stamp, const Write& write, std::size_t queue,
                          std::size_t most, bool bulky) noexcept {
@@ -248,7 +248,7 @@ void DriveRecorder::post_rig(Stamp stamp) noexcept {
   });
 }
 
-/// Who opens one file of several has no other. Where only what is around events is kept, each
+/// Each file of several must be readable alone. Where only what is around events is kept, each
 /// second may be the first that is.
 bool DriveRecorder::rig_is_due(Stamp stamp) const noexcept {
   if (!calibrated_) return false;

@@ -116,7 +116,7 @@ const char* kind_word(EstimatorEvent::Kind kind) noexcept {
   return "";
 }
 
-/// What stands before the reason that the estimator gives.
+/// Text before the estimator's reason.
 const char* opening(EstimatorEvent::Kind kind) noexcept {
   switch (kind) {
     case EstimatorEvent::Kind::calibration_accepted:

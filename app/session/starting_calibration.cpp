@@ -95,7 +95,7 @@ ConfiguredRig configured_rig(const Configuration& c, const RigCalibration& nomin
   return rig;
 }
 
-/// Whether the configuration says where the cameras sit. The mock's rig is what it says, also when
+/// Returns true if the configuration has extrinsics. The mock's rig is what it says, also when
 /// it says nothing.
 bool placed_by_configuration(const Configuration& c, int cameras) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {

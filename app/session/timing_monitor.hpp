@@ -25,7 +25,7 @@ class TimingMonitor {
 
   explicit TimingMonitor(SyncMode mode, bool virtual_time) : mode_(mode), virtual_(virtual_time) {}
 
-  /// What an event of a device says.
+  /// Message of a device event.
   [[nodiscard]] Message of_device(const DeviceEvent& event) const noexcept;
   /// A set that was handed out: tells when a run of ambiguous ones begins.
   [[nodiscard]] Message of_set(const SyncedSet& set) noexcept;

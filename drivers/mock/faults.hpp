@@ -62,7 +62,7 @@ struct Fault {
   [[nodiscard]] bool concerns(int k) const noexcept { return camera < 0 || camera == k; }
 };
 
-/// What a kind's parameter is; the table behind docs/simulated_rig.md.
+/// Parameter of a fault kind; the table behind docs/simulated_rig.md.
 struct FaultParameter {
   const char* name;  // its unit is its ending: _deg, _m, _s
   double fallback;   // when not given

@@ -8,7 +8,7 @@
 
 namespace vergence::v4l2 {
 
-/// What only Video4Linux cameras have. Ranges and meaning: option_table().
+/// Options of V4L2 cameras. Ranges and meaning: option_table().
 struct Options {
   Duration readout =
       Duration::nanoseconds(-1);  // negative: from the sensor's own figures, else zero

@@ -116,7 +116,7 @@ RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
   return ins;
 }
 
-/// How an odometry's world lies on the earth: p_enu = Rz(yaw) p_world + t in the axes at `origin`.
+/// Georeference of an odometry's world: p_enu = Rz(yaw) p_world + t in the axes at `origin`.
 struct WorldPlace {
   LocalTangentPlane plane{};
   double yaw = 0;
@@ -246,7 +246,7 @@ RecordedIns of_odometry(const std::string& name, const std::vector<RosOdometry>&
   return ins;
 }
 
-/// What was chosen; empty names: not used.
+/// Chosen topics; an empty name means not used.
 struct Choice {
   std::string fix{}, imu{}, odometry{};
 };
