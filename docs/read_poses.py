@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Reads the pose stream: read_poses.py unix:///run/vergence/pose.sock [recalibrate] | udp://127.0.0.1:9870
 
-Poses are printed to standard output; lines of other types (calibration, alignment, status, response) to standard error as they are. With
-`recalibrate` that is requested once. docs/publish.md is the schema. Ends when the program does.
+Poses are printed to standard output; lines of other types (calibration, alignment, status, response) to standard error unchanged. With
+`recalibrate` that is requested once. docs/live_interface.md is the schema. Ends when the program does.
 """
 import json
 import socket

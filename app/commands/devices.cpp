@@ -63,7 +63,7 @@ void add_devices(CLI::App& root, ExitCode* exit_code) {
   CLI::App* command = root.add_subcommand("devices",
                                           "List the cameras, sensors and boards that are "
                                           "connected, with what to paste into a configuration");
-  command->add_flag("--json", a->json, "For programs (docs/devices.md has the keys)");
+  command->add_flag("--json", a->json, "For programs (docs/deployment.md has the keys)");
   CLI::Option* rules = command
                            ->add_option("--write-udev", a->rules,
                                         "Write udev rules for what is plugged in, to FILE or to "

@@ -51,7 +51,7 @@ void add_doctor(CLI::App& root, ExitCode* exit_code) {
       ->allow_extra_args(false);
   command->add_option("--session-dir", a->out, "Check free space in this directory")
       ->type_name("DIR");
-  command->add_flag("--json", a->json, "For programs (docs/doctor.md has the keys)");
+  command->add_flag("--json", a->json, "For programs (docs/deployment.md has the keys)");
   command->footer("Exit code: 0 no problem, 1 at least one, 2 the configuration cannot be read.");
   command->callback([a, exit_code] {
     if (a->configuration.empty() && !a->set.empty())

@@ -71,7 +71,8 @@ void add_export(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<ExportArguments>();
   CLI::App* command = root.add_subcommand(
       "export", "Write a recorded session's images and truth for other programs");
-  command->add_option("SESSION", a->session, "Session folder with drive.mcap (docs/recording.md)")
+  command
+      ->add_option("SESSION", a->session, "Session folder with drive.mcap (docs/session_files.md)")
       ->required();
   command->add_option("--format", a->format, "Layout: euroc, kitti (rectified rigs only), folder")
       ->required()

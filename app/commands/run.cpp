@@ -75,7 +75,7 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option(
           "--record", a->record,
-          "What is recorded into drive.mcap, e.g. poses,ins,images,pulses (docs/recording.md)")
+          "What is recorded into drive.mcap, e.g. poses,ins,images,pulses (docs/session_files.md)")
       ->type_name("WORDS");
   declare_session_options(*command, &a->memory, &a->page);
   a->common.declare(*command);

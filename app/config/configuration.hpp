@@ -139,7 +139,7 @@ struct MockSettings {
   CalibrationErrorSettings calibration_error{};
 };
 
-/// `record:` what goes into drive.mcap of a session (docs/recording.md).
+/// `record:` what goes into drive.mcap of a session (docs/session_files.md).
 struct RecordSettings {
   int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
   double event_window_s = 0;                       // 0: everything
@@ -148,7 +148,7 @@ struct RecordSettings {
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
 };
 
-/// `publish:` what others see of a running session (docs/publish.md). Empty: nothing.
+/// `publish:` what others see of a running session (docs/live_interface.md). Empty: nothing.
 struct PublishSettings {
   std::string pose_stream{};  // unix:///PATH, udp://HOST:PORT
   std::string http{};         // HOST:PORT of the live page
@@ -161,7 +161,7 @@ struct SessionsSettings {
   int quota_mb = 0;  // 0: none
 };
 
-/// `realtime:` scheduling of the drive's threads (docs/realtime.md).
+/// `realtime:` scheduling of the drive's threads (docs/deployment.md).
 struct RealtimeSettings {
   int priority = 0;        // SCHED_FIFO of the most urgent threads; 0: none
   std::string affinity{};  // processors of all but the solver, `0-1,3`; empty: any

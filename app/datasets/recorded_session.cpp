@@ -244,7 +244,7 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
   };
   if (std::none_of(session.frames_.begin(), session.frames_.end(), has_image))
     refuse(folder, 0,
-           "has a recording without images; record: [images] records them (docs/recording.md)");
+           "has a recording without images; record: [images] records them (docs/session_files.md)");
   if (reader.broken > 0)
     session.remarks_.push_back(fmt::format(
         "{} frames or readings of the recording are damaged and were left out", reader.broken));

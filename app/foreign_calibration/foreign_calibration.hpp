@@ -13,7 +13,7 @@
 /// There is one reader: a file's syntax (YAML with or without OpenCV's head, JSON, OpenCV's XML, an
 /// ini) becomes one tree, whose keys are looked up in a vocabulary of what programs call the parts
 /// of a calibration (vocabulary.hpp). From the parts that are there the rig follows: lenses, and
-/// the transform from whichever of the usual forms tells it (docs/checkerboard.md).
+/// the transform from whichever of the usual forms tells it (docs/calibration.md).
 namespace vergence::app {
 
 using Remarks = std::vector<std::string>;

@@ -20,9 +20,9 @@
 
 namespace vergence::app {
 
-/// `publish.pose_stream`: the pose stream to robots and bridges (docs/publish.md). A line per
-/// frame, the calibration and the alignment when a reader connects and when they change, a status
-/// per second.
+/// `publish.pose_stream`: the pose stream to robots and bridges (docs/live_interface.md). A line
+/// per frame, the calibration and the alignment when a reader connects and when they change, a
+/// status per second.
 ///
 /// Threads  on_…(): the estimator's, which pushes into rings and wakes; no lock, no system call
 ///          but the wake. Formatting, sending and requests: a thread of its own, made by the

@@ -79,7 +79,7 @@ class LiveImages {
 /// RFC 4648.
 [[nodiscard]] std::string base64(std::string_view bytes);
 
-/// `publish.http`: the live page (docs/publish.md).
+/// `publish.http`: the live page (docs/live_interface.md).
 ///
 /// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
 ///          picture, copies rows of two images; no lock, no system call. Everything else: a thread

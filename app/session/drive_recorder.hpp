@@ -22,7 +22,8 @@ namespace vergence::app {
 /// Queues of a recording, one for each thread that posts.
 enum Queue : std::size_t { estimator_queue, acquisition_queue };
 
-/// `record:` of the configuration: what goes through a session into drive.mcap (docs/recording.md).
+/// `record:` of the configuration: what goes through a session into drive.mcap
+/// (docs/session_files.md).
 ///
 /// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
 ///            PulseObserver, a queue each. The rest: the owner's.

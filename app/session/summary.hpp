@@ -26,7 +26,7 @@ struct TruthMetrics {
 };
 
 /// Heap allocations by the name of the thread that made them, from the first frame that is
-/// delivered until the last (docs/realtime.md).
+/// delivered until the last (docs/deployment.md).
 struct ThreadAllocationCounts {
   std::vector<std::pair<std::string, std::uint64_t>> ours{};       // 0 where a thread made none
   std::vector<std::pair<std::string, std::uint64_t>> libraries{};  // of threads that libraries have

@@ -29,7 +29,7 @@ struct Options {
       features{};  // of the camera, by its own names, last
 };
 
-/// The table behind docs/cameras/gige.md.
+/// The table behind drivers/gige/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::gige

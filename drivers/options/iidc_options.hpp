@@ -31,7 +31,7 @@ struct Options {
   StampedInstant stamped = StampedInstant::end;
 };
 
-/// The table behind docs/cameras/iidc_usb.md.
+/// The table behind drivers/iidc/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::iidc

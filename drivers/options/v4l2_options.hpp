@@ -23,7 +23,7 @@ struct Options {
   std::vector<std::pair<std::string, std::string>> controls{};  // of the camera, by their names
 };
 
-/// The table behind docs/cameras/v4l2.md.
+/// The table behind drivers/v4l2/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::v4l2

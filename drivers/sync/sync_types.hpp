@@ -21,7 +21,7 @@ enum class SyncMode : std::uint8_t {
                         // proves
   ieee1394_cycle_time,  // the stamps are of one IEEE 1394 cycle timer, which wraps after 128 s:
                         // within `tolerance` in it
-  ptp,           // the stamps are of one PTP clock: within `tolerance` in it
+  ptp,                  // the stamps are of one PTP clock: within `tolerance` in it
   side_by_side,  // both images come in one picture of one camera (side_by_side_camera.hpp), with
                  // one stamp
 };
