@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Reads the pose stream: read_poses.py unix:///run/vergence/pose.sock [recalibrate] | udp://127.0.0.1:9870
 
-Poses are printed to standard output; lines of other types (calibration, alignment, status, response) to standard error as they are. With
-`recalibrate` that is requested first. docs/publish.md is the schema. Ends when the program does.
+Poses are printed to standard output; lines of other types (calibration, alignment, status, response) to standard error unchanged. With
+`recalibrate` that is requested once. docs/live_interface.md is the schema. Ends when the program does.
 """
 import json
 import socket
@@ -17,9 +17,10 @@ def lines(address, request=None):
     if kind == "unix":
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stream:
             stream.connect(place)
-            if request:
-                stream.sendall(json.dumps({"request": request}).encode() + b"\n")
-            yield from stream.makefile("r", encoding="utf-8")
+            for number, line in enumerate(stream.makefile("r", encoding="utf-8")):
+                if request and number == 0:  # the first line shows that the session has begun
+                    stream.sendall(json.dumps({"request": request}).encode() + b"\n")
+                yield line
     else:
         host, _, port = place.rpartition(":")
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as datagrams:

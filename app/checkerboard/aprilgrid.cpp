@@ -102,7 +102,7 @@ class TagDetector {
   std::unique_ptr<apriltag_detector_t, DetectorDeleter> detector_{apriltag_detector_create()};
 };
 
-/// How tags and their corners are numbered.
+/// Numbering of tags and their corners.
 struct Layout {
   bool from_below = true;  // tag 0 is at the lower left
   std::size_t turn = 0;    // corner i of the detection is corner i + turn of the tag
@@ -116,7 +116,7 @@ struct Layout {
   }
 };
 
-/// Of the corners numbered like this.
+/// Residual of corners numbered like this.
 double misfit(const std::vector<Tag>& tags, const BoardPattern& board, const Layout& layout) {
   std::vector<cv::Point2d> on_board, in_image;
   for (const Tag& tag : tags)

@@ -9,7 +9,7 @@ namespace vergence::app {
 /// that view and at all views together.
 [[nodiscard]] bool determine_a_homography(const BoardCorners& corners, const BoardPattern& board);
 
-/// What an image shows of the board: of a checkerboard all corners or none, of an AprilGrid or a
+/// Detects the target in an image: of a checkerboard all corners or none, of an AprilGrid or a
 /// ChArUco board those that are there, if they determine a homography.
 ///
 /// `reference`: what another camera of the rig, mounted the same way up, shows of it at the same

@@ -56,7 +56,7 @@ struct BoardCorner {
   Vec2 pixel = Vec2::Zero();  // raw image, centres of pixels at integers
 };
 
-/// What one image shows of a board, in order of index, none twice; empty: nothing.
+/// Corners of a target in one image, by index without duplicates; empty if none.
 using BoardCorners = std::vector<BoardCorner>;
 
 /// `9x6` and the side of a square in metres. InputError: not two numbers from 3 to 100, as many

@@ -8,7 +8,7 @@
 #include "app/checkerboard/coverage.hpp"
 #include "app/config/calibration_file.hpp"
 
-/// What a checkerboard calibration tells its user.
+/// Report of a target calibration.
 namespace vergence::app {
 
 struct BoardReport {
@@ -22,7 +22,7 @@ struct BoardReport {
 /// Tables for a terminal: lenses, places with their sigmas, views refused, coverage and what it
 /// lacks.
 [[nodiscard]] std::string format_report(const BoardReport& report);
-/// The same for programs; every key with its unit. docs/checkerboard.md.
+/// Formats the report as JSON; every key has its unit. docs/calibration.md.
 [[nodiscard]] nlohmann::ordered_json json_report(const BoardReport& report);
 
 }  // namespace vergence::app

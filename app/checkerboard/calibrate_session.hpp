@@ -32,7 +32,7 @@ struct CalibrateRequest {
 [[nodiscard]] ExitCode calibrate_live(const CalibrateRequest& request,
                                       const Configuration& configuration);
 
-/// What is known of a rig beside what its views tell.
+/// Data of a rig in addition to its views.
 struct CalibratedRig {
   std::string rig_name{};
   std::vector<std::string> names{}, serials{};  // one a camera

@@ -64,7 +64,7 @@ class Layout {
     if (id < 0 || static_cast<std::size_t>(id) >= squares_.size()) return std::nullopt;
     return squares_[static_cast<std::size_t>(id)];
   }
-  /// Of a marker, in metres from the board's upper left edge.
+  /// Position of a marker in metres from the target's upper left edge.
   [[nodiscard]] std::array<cv::Point2d, 4> corners(cv::Point square) const {
     const double gap = (square_ - marker_) / 2;
     const cv::Point2d at(square.x * square_ + gap, square.y * square_ + gap);
@@ -92,7 +92,7 @@ std::vector<Marker> of_board(const std::vector<Marker>& markers, const Layout& l
   return own;
 }
 
-/// Of markers that the board has; infinite: they are too few.
+/// Residual of the target's markers; infinite if there are too few.
 double misfit(const std::vector<Marker>& markers, const Layout& layout) {
   if (markers.size() < kFewestMarkers) return std::numeric_limits<double>::infinity();
   std::vector<cv::Point2d> on_board, in_image;

@@ -15,7 +15,7 @@ namespace vergence::app {
 /// `640x480`. InputError: no such thing.
 [[nodiscard]] ImageSize parse_size(const std::string& text);
 
-/// What a file is to be by its name: a folder or two `.yaml` with a comma: ros; a name with
+/// Returns the format by the file name: a folder or two `.yaml` with a comma: ros; a name with
 /// `camchain`: kalibr; `.yml`, one or two: opencv; any other `.yaml`: vergence. InputError: the
 /// name does not tell.
 [[nodiscard]] CalibrationFormat format_of_name(const std::string& out);

@@ -9,8 +9,8 @@
 
 namespace vergence::app {
 
-/// What views of a checkerboard have shown so far, and what a good calibration still lacks: parts
-/// of each image, tilts, sizes, a number.
+/// Coverage of the views so far, and missing
+/// parts of each image, tilts, sizes and number.
 ///
 /// Parts    Nine of each image, the outer ones a third wide: distortion is determined where the
 ///          corners are, and nowhere else.
@@ -26,9 +26,9 @@ class Coverage {
            double focal_px);
 
   void add(const BoardView& view);
-  /// Whether a view brings a part, a tilt or a size that is still missing.
+  /// Returns true if a view adds a missing part, tilt or size.
   [[nodiscard]] bool brings_something(const BoardView& view) const;
-  /// What is missing in words, the most useful first: "left: top right and bottom", "the board's
+  /// Describes missing coverage, the most useful first: "left: top right and bottom", "the board's
   /// left edge nearer", "5 more views".
   [[nodiscard]] std::vector<std::string> needs() const;
   [[nodiscard]] std::size_t views() const noexcept { return views_; }
@@ -41,7 +41,7 @@ class Coverage {
     std::array<int, kColumns * kRows> cells{};
     std::array<int, kParts> parts{};  // of the view that has most there
   };
-  /// How the board stands before camera 0.
+  /// Pose of the target in front of camera 0.
   struct Stand {
     double extent = 0;  // of the image's width or height, whichever it fills more of
     std::array<bool, kTilts> tilted{};  // right, left, bottom, top edge nearer

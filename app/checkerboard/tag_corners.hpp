@@ -6,7 +6,7 @@
 #include "app/checkerboard/board_pattern.hpp"
 #include "core/types/image.hpp"
 
-/// What boards with coded tags have in common.
+/// Shared parts of targets with coded tags.
 namespace vergence::app {
 
 /// Mean distance, px, of points in an image to those of a flat board; infinite where no homography
@@ -20,7 +20,7 @@ namespace vergence::app {
 [[nodiscard]] BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough,
                                           int half_window, double max_moved);
 
-/// The same pixels; nothing writes them.
+/// Wraps the pixels without copying; they must not be written.
 [[nodiscard]] cv::Mat matrix_of(const ImageView& image);
 
 }  // namespace vergence::app

@@ -6,7 +6,7 @@
 namespace vergence::app {
 namespace {
 
-/// Of the corners that both have; infinite: none.
+/// Mean distance of common corners; infinite if none.
 double mean_distance(const BoardCorners& a, const BoardCorners& b) {
   double sum = 0;
   int n = 0;

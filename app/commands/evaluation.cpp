@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of the usual lengths those that the path is long enough for; KITTI's where it is for none.
+/// Returns the usual lengths that fit the path; KITTI's if none fits.
 void keep_longest(TrajectoryEvaluation* e, EvaluationOptions* options) {
   if (e->segments.size() < 2) return;
   std::size_t kept = 0;
@@ -185,7 +185,7 @@ ExitCode report_no_mount(const EvaluationRequest& a, const Reference& from,
 
 constexpr double kRotationsDiffer = 20 * kRadiansPerDegree;
 
-/// Whether positions agree and rotations do not.
+/// Returns true if positions agree and rotations do not.
 bool rotations_differ(const TrajectoryEvaluation& e) {
   constexpr double kPositionsAgree = 0.05;  // of the path
   return e.status == EvaluationStatus::ok && !e.se3.roll_unobservable &&
@@ -211,7 +211,7 @@ std::optional<double> constant_turn(const Trajectory& estimate, const Trajectory
   return rotation_angle(first);
 }
 
-/// What is probably wrong with rotations that do not agree where positions do.
+/// Explains rotations that disagree while positions agree.
 std::string rotation_remark(const EvaluationRequest& a, const Files& files,
                             const Trajectory& reference, const EvaluationOptions& options,
                             const TrajectoryEvaluation& e) {

@@ -17,7 +17,7 @@ struct EvaluationRequest {
   bool usual_lengths = true;  // of options.segments the longest that the path is long enough for
   bool json = false;
   bool estimate_ins_extrinsics = false;
-  // What the user says of the estimate's file and of the reference's.
+  // Requested time units of the estimate's and the reference's file.
   std::array<std::optional<TimeUnit>, 2> units{};
   std::array<std::optional<QuaternionOrder>, 2> quaternions{};
 };

@@ -109,7 +109,7 @@ nlohmann::ordered_json evaluation_json(const TrajectoryEvaluation& e,
   Json out;
   out["matched"] = e.matched;
   out["dropped"] = Json::object();
-  // Of nearest neighbours only the match is defined, not on which side the others lie.
+  // For nearest neighbours only the match is defined, not on which side the others lie.
   if (options.association == Association::interpolate)
     out["dropped"] = {{"before", e.before}, {"after", e.after}, {"gap", e.gap}};
   if (e.status != EvaluationStatus::ok) return out;
@@ -282,7 +282,7 @@ std::string row(const char* what, const MountValue& v, double unit, const char* 
   return fmt::format("  {:<34}{:>11.4f} ± {:.4f} {}\n", what, v.value * unit, v.sigma * unit, name);
 }
 
-/// What `ins.boresight_deg` would be: roll, pitch, yaw. Nothing: it is no INS's mount, or a part of
+/// Value for `ins.boresight_deg`: roll, pitch, yaw. Nullopt: it is no INS's mount, or a part of
 /// it does not show.
 std::optional<std::array<double, 3>> boresight_deg(const FoundMount& found) {
   const auto& r = found.mount.rotation;

@@ -19,7 +19,7 @@ namespace vergence::app {
 [[nodiscard]] nlohmann::ordered_json evaluation_json(const TrajectoryEvaluation& evaluation,
                                                      const EvaluationOptions& options);
 
-/// The same as a table for a person, lines with their ends.
+/// Formats the evaluation as a table with line ends.
 [[nodiscard]] std::string evaluation_text(const TrajectoryEvaluation& evaluation,
                                           const EvaluationOptions& options);
 
@@ -31,7 +31,7 @@ namespace vergence::app {
 [[nodiscard]] std::string gap_remark(const TrajectoryEvaluation& evaluation,
                                      const EvaluationOptions& options, Duration interval);
 
-/// How an INS is brought to the left camera where no mount is looked for.
+/// INS extrinsics used if none are estimated.
 struct InsMount {
   Transform T_ins_left{};
   std::string source{};    // where it is from

@@ -25,14 +25,14 @@ struct CalibrationFile {
   std::optional<std::map<std::string, std::string>> configured{};
 };
 
-/// What of a calibration is wanted.
+/// Selects the parts of a calibration to read.
 struct CalibrationUse {
   bool length_only = false;  // from scratch: intrinsics and the baseline's length; where the
                              // cameras sit is not read, nor has to be there
   double baseline = 0;       // m: instead of the file's; 0: the file's
 };
 
-/// What is wrong with a calibration: the field as it stands in calibration.yaml
+/// Error in a calibration: the field as named in calibration.yaml
 /// (`cameras.1.T_camera_left`) and half a message that begins with it.
 struct ValidationError {
   std::string field;
@@ -61,7 +61,7 @@ struct ValidationError {
 [[nodiscard]] CalibrationFile parse_calibration(std::string_view yaml, const std::string& name,
                                                 const CalibrationUse& use = {});
 
-/// The same for a calibration of another file. With a baseline all lengths are scaled by one
+/// Applies the use to a calibration of another file. With a baseline all lengths are scaled by one
 /// factor; with length_only the cameras become parallel, one baseline apart, and what belonged to
 /// their places (sigmas, when it was found) is gone; what is known of the lenses stays.
 void apply_use(const CalibrationUse& use, RigCalibration* rig);

@@ -24,7 +24,7 @@ namespace vergence::app {
 /// Relative: from here on a calibration's baseline and the configuration's are two lengths.
 inline constexpr double kOtherLength = 0.02;
 
-/// What a state file came to.
+/// Result of reading a state file.
 struct CalibrationState {
   std::optional<CalibrationFile> calibration{};  // fits the rig that is there
   std::string

@@ -191,7 +191,7 @@ Group record() {
   const std::vector<std::string> off_on{"off", "on"};
   return Rows<R>(
              "record",
-             "What is recorded into `drive.mcap` of the session (docs/recording.md). A list, "
+             "What is recorded into `drive.mcap` of the session (docs/session_files.md). A list, "
              "`record: [poses, ins, images]`, switches its words on.",
              [](auto& c) -> auto& { return c.record; })
       .choice("poses", &R::poses, off_on, "Odometry and transforms of every frame.")
@@ -208,7 +208,8 @@ Group record() {
 Group publish() {
   using P = PublishSettings;
   return Rows<P>(
-             "publish", "What others see of a running session, live or replayed (docs/publish.md).",
+             "publish",
+             "What others see of a running session, live or replayed (docs/live_interface.md).",
              [](auto& c) -> auto& { return c.publish; })
       .text("pose_stream", &P::pose_stream, 200,
             "One JSON object a frame goes there: `unix:///PATH` (a stream socket that readers "
@@ -238,7 +239,8 @@ Group realtime() {
   using R = RealtimeSettings;
   return Rows<R>(
              "realtime",
-             "Scheduling and memory of the threads of a drive (docs/realtime.md). What the system "
+             "Scheduling and memory of the threads of a drive (docs/deployment.md). What the "
+             "system "
              "refuses is said, and the drive goes on.",
              [](auto& c) -> auto& { return c.realtime; })
       .integer("priority", &R::priority, 0, 90, "",
@@ -330,10 +332,10 @@ Group cameras() {
                 "What makes it expose: `hardware`, a pulse at its input; `software`, a command "
                 "at `trigger.rate`; `free`, its own "
                 "clock. All cameras alike.")
-            .options(
-                "options", &C::options, 400,
-                "What only this kind of camera has (docs/cameras): `NAME=VALUE …`, or a group: "
-                "`{packet_size: 9000}`.")
+            .options("options", &C::options, 400,
+                     "What only this kind of camera has (drivers/*/README.md): `NAME=VALUE …`, or "
+                     "a group: "
+                     "`{packet_size: 9000}`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
                     "Time of an exposure; 8000 is daylight in the mock's world.")
             .number("trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
@@ -406,7 +408,7 @@ Group trigger() {
              [](auto& c) -> auto& { return c.trigger; })
       .text("driver", &T::driver, 16,
             "What makes the pulses: `board`, a trigger board on a serial port "
-            "(docs/trigger_board.md); `mock`, with mock cameras; `none`: "
+            "(docs/synchronisation.md); `mock`, with mock cameras; `none`: "
             "something that reports nothing, or nothing at all.")
       .text("port", &T::port, 200,
             "Serial port of the board, `/dev/ttyACM0`, or its serial number. Empty: the only board "
@@ -445,7 +447,8 @@ Group sync() {
              "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
       .choice<SyncMode>(
           "mode", &S::mode, sync_modes(),
-          "By what images are paired, and what proves it (docs/time.md). Proven: `board`, by a "
+          "By what images are paired, and what proves it (docs/synchronisation.md). Proven: "
+          "`board`, by a "
           "trigger board's pulses; `ins_syncout`, by "
           "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE "
           "1394 cycle timer; `ptp`, stamps of one PTP "
@@ -534,7 +537,7 @@ Group odometry() {
       .choice("init_features", &O::init_features, {"corners", "surf"},
               "What is matched across the first images of a rig that is calibrated from scratch: "
               "the corners that are tracked anyway, or "
-              "SURF-64; docs/front_ends.md compares them.")
+              "SURF-64; docs/benchmarks.md compares them.")
       .integer("pyramid_levels", &O::pyramid_levels, 2, 6, "levels",
                "Sizes of the image that are searched, each half of the one before: more levels "
                "follow faster motion.")
@@ -734,7 +737,7 @@ Group mock() {
   using Kind = vergence::mock::DriveKind;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   return Rows<M>(
-             "mock", "The world and the vehicle of the mock drivers; see docs/mock.md.",
+             "mock", "The world and the vehicle of the mock drivers; see docs/simulated_rig.md.",
              [](auto& c) -> auto& { return c.mock; })
       .text("world", &M::world, 16, "What is driven through: `suburb`.")
       .choice("drive", &M::drive,
@@ -776,7 +779,8 @@ Group faults() {
   group.name = "faults";
   group.list = "faults.";
   group.meaning =
-      "What goes wrong in the mock, a list; docs/mock.md has the kinds and their parameters.";
+      "What goes wrong in the mock, a list; docs/simulated_rig.md has the kinds and their "
+      "parameters.";
   for (std::size_t i = 0; i < kMaxFaults; ++i)
     group.keys.push_back(
         {"faults." + std::to_string(i), KeyType::text, "", 0, 200,
@@ -803,7 +807,7 @@ const std::vector<Group>& schema() {
 
 namespace {
 
-/// What of a camera's lens would be read by nobody.
+/// Finds intrinsics of a camera that would be ignored.
 std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
   const auto given = [](double v) { return v != 0; };
   const auto& numbers = camera.intrinsics;

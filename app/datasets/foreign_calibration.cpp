@@ -145,7 +145,7 @@ class RigReader {
                                own("baseline", std::nullopt) != nullptr);
     if (one_for_both) {
       cameras = 2;
-      // What is of camera 0 becomes both cameras'.
+      // Values of camera 0 apply to both cameras.
       for (Fact& fact : facts_)
         if (fact.camera == 0) fact.camera.reset();
     }
@@ -177,7 +177,7 @@ class RigReader {
       if (fact.part == part && fact.camera == camera) return &fact;
     return nullptr;
   }
-  /// Of this camera, else of none in particular.
+  /// Value of this camera, else one without a camera.
   [[nodiscard]] const Fact* find(std::string_view part, int camera) const {
     const Fact* fact = own(part, camera);
     return fact != nullptr ? fact : own(part, std::nullopt);
@@ -220,7 +220,7 @@ class RigReader {
   /// distortion.
   std::optional<CameraModelKind> model(int k, bool* none = nullptr) const {
     std::optional<CameraModelKind> found;
-    // What bends the rays counts; `pinhole` stands beside it.
+    // The distortion model counts; `pinhole` is listed next to it.
     for (const std::string_view part : {"camera_model", "distortion_model", "fisheye"}) {
       const Fact* fact = find(part, k);
       if (fact == nullptr || !fact->node.IsScalar()) continue;
@@ -399,7 +399,7 @@ class RigReader {
     return true;
   }
 
-  /// Of a rectified pair only the length is written.
+  /// A rectified pair has only a baseline length.
   bool from_baseline() {
     const Fact *length = own("baseline", std::nullopt),
                *focal = own("focal_baseline", std::nullopt);

@@ -13,7 +13,7 @@
 /// There is one reader: a file's syntax (YAML with or without OpenCV's head, JSON, OpenCV's XML, an
 /// ini) becomes one tree, whose keys are looked up in a vocabulary of what programs call the parts
 /// of a calibration (vocabulary.hpp). From the parts that are there the rig follows: lenses, and
-/// the transform from whichever of the usual forms tells it (docs/checkerboard.md).
+/// the transform from whichever of the usual forms tells it (docs/calibration.md).
 namespace vergence::app {
 
 using Remarks = std::vector<std::string>;
@@ -26,7 +26,7 @@ struct CalibrationText {
   std::string text;
 };
 
-/// Whether the file is a calibration.yaml of this program's. InputError: not readable.
+/// Returns true if the file is a calibration.yaml of this program. InputError: not readable.
 [[nodiscard]] bool is_own_calibration(const std::filesystem::path& file);
 
 /// Reads any of the formats, told by content. `in`: a file, two or three with commas between, or a
@@ -39,7 +39,7 @@ struct CalibrationText {
                                                    const std::optional<ImageSize>& size,
                                                    Remarks* remarks,
                                                    const CalibrationUse& use = {});
-/// The same of texts of other programs.
+/// Parses texts of other programs.
 [[nodiscard]] CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& files,
                                                     const std::optional<ImageSize>& size,
                                                     Remarks* remarks,

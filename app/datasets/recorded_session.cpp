@@ -97,7 +97,7 @@ struct RecordedSession::Files {
   std::vector<detail::BagFile> list;
 };
 
-/// What a scan gathers.
+/// Result of a scan.
 struct RecordedSession::Reader {
   RecordedSession* session;
   const fs::path& folder;
@@ -208,7 +208,7 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
   };
   if (std::none_of(session.frames_.begin(), session.frames_.end(), has_image))
     refuse(folder, 0,
-           "has a recording without images; record: [images] records them (docs/recording.md)");
+           "has a recording without images; record: [images] records them (docs/session_files.md)");
   if (reader.broken > 0)
     session.remarks_.push_back(fmt::format(
         "{} frames or readings of the recording are damaged and were left out", reader.broken));

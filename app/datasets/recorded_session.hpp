@@ -11,7 +11,7 @@
 #include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
 
-/// What `record:` wrote of a session: everything the estimator was given, in its order.
+/// Recorded session, as written by `record:`: everything the estimator was given, in its order.
 namespace vergence::app {
 
 /// Where the pixels of an image are, 8-bit grey without padding.

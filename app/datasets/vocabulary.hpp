@@ -8,7 +8,7 @@
 
 #include "app/config/yaml_file.hpp"
 
-/// What programs call the parts of a calibration.
+/// Names of the parts of a calibration in other programs.
 namespace vergence::app {
 
 /// A value of a file, with what it is of.

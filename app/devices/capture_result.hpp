@@ -55,7 +55,7 @@ struct CapturedSet {
   std::vector<ImageView> images;  // by camera
 };
 
-/// What came of waiting for them.
+/// Result of waiting for synchronised image sets.
 struct CaptureResult {
   enum class End : std::uint8_t { done, timeout, interrupted } end = End::timeout;
   int sets = 0;                          // complete ones that were handed on
@@ -72,7 +72,7 @@ struct TakingOptions {
 
 /// Starts the devices and hands on complete sets. The devices are stopped when it returns.
 ///
-/// Of the INS only the pulses are used, where it makes them.
+/// Uses only the pulses of the INS, if it makes them.
 /// Threads  `use` on the caller's. Time: `limit` a set, and what starting and stopping take.
 ///          Errors: InputError as start_acquisition(), and
 /// what `use` throws.

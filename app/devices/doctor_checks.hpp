@@ -18,7 +18,7 @@ enum class FindingState : std::uint8_t {
 [[nodiscard]] const char* to_string(FindingState) noexcept;
 
 struct Finding {
-  std::string check;  // name, as in docs/doctor.md
+  std::string check;  // name, as in docs/deployment.md
   FindingState state = FindingState::ok;
   std::string message;
   std::vector<std::string> fix;  // commands as they are typed, the lasting one last

@@ -19,7 +19,7 @@ bool all_mock(const Configuration& c) {
   });
 }
 
-/// What real devices need of a configuration before any of them is opened.
+/// Checks that a configuration suits real devices before opening them.
 std::vector<CameraRequest> requests_of(const Configuration& c) {
   std::vector<CameraRequest> requests;
   const int cameras = nominal_rig(c).cameras;

@@ -19,7 +19,7 @@ struct InterfaceAddress {
   std::uint32_t address = 0, mask = 0;
 };
 
-/// What a folder's file system takes of this process.
+/// Writability and free space of a directory for this process.
 struct DiskRoom {
   std::uint64_t bytes = 0;  // free
   bool read_only = false;
@@ -91,7 +91,7 @@ struct UsbDevice {
 /// Every device but root hubs, in the order of their ports.
 [[nodiscard]] std::vector<UsbDevice> list_usb_devices(const Machine& machine);
 
-/// What is likely to be at a serial port, by the USB ids of what carries it. The port is not
+/// Likely device at a serial port, by the USB ids of what carries it. The port is not
 /// opened, because that resets many boards. The values are keys of `devices --json`.
 enum class SerialKind : std::uint8_t {
   ins,        // XSens' own converter, or an MTi with USB
@@ -124,7 +124,7 @@ struct FoundPort {
 [[nodiscard]] bool names_port(const Machine& machine, const std::string& key,
                               const FoundPort& port);
 
-/// What one driver found.
+/// Devices found by one driver.
 struct DriverFindings {
   std::string name, meaning;
   bool answered = true;  // false: it took longer than the limit

@@ -6,8 +6,8 @@
 #include "app/devices/inventory.hpp"
 #include "app/runtime/terminal_text.hpp"
 
-/// Output of `vergence devices` and `vergence doctor`; the keys of the JSON are in docs/devices.md
-/// and docs/doctor.md.
+/// Output of `vergence devices` and `vergence doctor`; the keys of the JSON are in
+/// docs/deployment.md and docs/deployment.md.
 namespace vergence::app {
 
 /// A file for /etc/udev/rules.d about the devices that are plugged in: who may open them (groups

@@ -88,7 +88,7 @@ constexpr std::size_t kMaxChunkBytes = std::size_t{32} << 20;  // half of what r
 constexpr std::size_t kSpare = std::size_t{1} << 20;           // of a queue, for what is not bulky
 constexpr int kNice = 5;  // poses come first; what is recorded waits in memory
 
-/// How full a queue may be that is not written: a producer that does not wait finds room for an
+/// Fill limit of a queue that is not written: a producer that does not wait finds room for an
 /// image; one that waits (`hurried`) for anything that fits at all.
 std::size_t room_left_at(const RecordRing& ring, bool hurried) noexcept {
   return hurried ? ring.capacity() / 4 : ring.capacity() / 8 * 7;

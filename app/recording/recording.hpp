@@ -142,7 +142,7 @@ class Recording {
     McapMessageHead head{};
     std::span<std::uint8_t> open{};  // head and content
   };
-  /// What waits, as far as a chunk takes it.
+  /// Pending messages, up to the size of a chunk.
   struct Batch {
     std::array<std::span<const std::uint8_t>, McapFile::kMaxParts> parts{};
     std::size_t messages = 0, bytes = 0;

@@ -123,7 +123,7 @@ std::string_view advice_for(std::string_view word) noexcept {
 
 namespace {
 
-/// Whether a drive has any pose to rely on.
+/// Returns true if a session has a usable pose.
 enum class Use : std::uint8_t {
   ok,          // at least one frame is ok, or statuses are not known
   unverified,  // none is, because the drive ended before it could confirm its calibration
@@ -312,7 +312,7 @@ bool fits_as_well(const CalibrationRow& rejected) {
          rejected.held_out_after_px > kBetter * rejected.held_out_before_px;
 }
 
-/// What the causes of accepted calibrations ask for.
+/// Advice for the causes of accepted calibrations.
 void advise_on_causes(const Session& s, Findings* j) {
   constexpr std::array kCauses{
       Advice{"knock",
@@ -369,7 +369,7 @@ void judge_focal_length(const Session& s, Findings* j) {
   j->give_up(reason, kAdvice);
 }
 
-/// How well it is known, and whether the last attempt at it succeeded.
+/// Evaluates its uncertainty and the last attempt.
 void judge_calibration(const Session& s, const Usability& use, Findings* j) {
   const std::string rating = text_at(s.summary, "calibration.rating");
   if (const CalibrationRow* near = known_well_near(s); near != nullptr && rating == "poor") {
@@ -398,7 +398,7 @@ void judge_calibration(const Session& s, const Usability& use, Findings* j) {
         "No calibration was found: drive past things at the roadside, near and far; "
         "calibrations.csv says what each attempt lacked.");
   } else {
-    // What the drive measured while it went on was no attempt to replace the one in use.
+    // Online measurements are no attempts to replace the calibration in use.
     const auto last = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
                                    [](const CalibrationRow& c) { return !c.kept; });
     if (last != s.calibrations.rend() && !last->accepted && !fits_as_well(*last)) {
@@ -410,7 +410,7 @@ void judge_calibration(const Session& s, const Usability& use, Findings* j) {
   advise_on_causes(s, j);
 }
 
-/// Whether the drive itself has confirmed what its poses stand on.
+/// Evaluates whether the calibration was verified.
 void judge_verification(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
   if (std::none_of(s.calibrations.begin(), s.calibrations.end(),
                    [](const CalibrationRow& c) { return c.accepted; }))
@@ -435,7 +435,7 @@ void judge_verification(const Session& s, const Analysis& a, const Usability& us
       "the image stay without tracks (dirt, a bonnet, sky only).");
 }
 
-/// What events about calibrations and lengths ask for.
+/// Advice for events about calibrations and lengths.
 void advise_on_events(const Session& s, Findings* j) {
   const auto first = [&s](std::string_view kind) {
     return std::find_if(s.events.begin(), s.events.end(),
@@ -629,7 +629,7 @@ Assessment judge(const Session& session, const Analysis& analysis) {
   if (analysis.read > 0 || outages.empty()) judge_frames(session, analysis, use, &j);
   if (analysis.source != ErrorSource::none) judge_drift(session, analysis, broken, &j);
   judge_calibration(session, use, &j);
-  // Of a drive without a frame nothing else is to be asked.
+  // A session without frames needs no further evaluation.
   if (analysis.read > 0) judge_verification(session, analysis, use, &j);
   advise_on_events(session, &j);
   judge_session(session, analysis, &j);

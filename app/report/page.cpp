@@ -80,7 +80,7 @@ void error_group(const Analysis& a, Figures* f) {
   f->row("scale (reference over ours)", a.scale, "{:.4f}");
 }
 
-/// What the drive itself has measured of the calibration in use.
+/// Rows about the online estimate of the calibration in use.
 void verification_rows(const Session& s, const Analysis& a, Figures* f) {
   if (const auto verified = flag_at(s.summary, "calibration.verified"))
     f->row("verified by the drive", *verified ? "yes" : "not verified");

@@ -107,7 +107,7 @@ const nlohmann::json* find_path(const nlohmann::json& json, std::string_view pat
   return at;
 }
 
-/// What `read` gives, or a message in `missing`.
+/// Returns the result of `read`, or adds a message to `missing`.
 template <class Read>
 auto part_of(const fs::path& file, const char* consequence, Session* session, const Read& read)
     -> std::optional<decltype(read())> {

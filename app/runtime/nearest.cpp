@@ -102,10 +102,12 @@ constexpr std::array kTable{
               "device bytes are no longer recorded; images and ins hold all that a replay reads"},
     Withdrawn{Kind::key, "record.image_format", "images are recorded as they are"},
     Withdrawn{Kind::key, "record.memory_mb", "six seconds of images wait for the disk"},
-    Withdrawn{Kind::option, "run --also",
-              "poses.csv has latitude, longitude and height of every frame; see docs/session.md"},
-    Withdrawn{Kind::option, "replay --also",
-              "poses.csv has latitude, longitude and height of every frame; see docs/session.md"},
+    Withdrawn{
+        Kind::option, "run --also",
+        "poses.csv has latitude, longitude and height of every frame; see docs/session_files.md"},
+    Withdrawn{
+        Kind::option, "replay --also",
+        "poses.csv has latitude, longitude and height of every frame; see docs/session_files.md"},
     Withdrawn{Kind::option, "replay --distortion",
               "--focal finds the lenses from the drive; coefficients stand in a calibration.yaml"},
     Withdrawn{Kind::option, "replay --through-devices",

@@ -238,7 +238,7 @@ ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
   const Configuration& c = r.configuration;
   const CalibrationUse use{true, r.baseline.value_or(0)};
   std::vector<std::string> remarks;
-  // Of what the drive comes with only lenses and length are read: how its cameras sit need not be
+  // Only intrinsics and baseline length are read: how its cameras sit need not be
   // known.
   const std::array cameras{c.kitti_raw.left, c.kitti_raw.right};
   const StereoSequence sequence =

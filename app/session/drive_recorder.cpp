@@ -96,7 +96,7 @@ std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts&
   return bytes;
 }
 
-/// Of all cameras' images of one frame.
+/// Size of all cameras' images of one frame.
 double frame_bytes(const SourceFacts& facts) {
   double bytes = 0;
   for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
@@ -151,7 +151,7 @@ void DriveRecorder::close(std::vector<std::string>* faults) {
         folder_, lost));
 }
 
-/// Whether it is in the queue.
+/// True if it is in the queue.
 template <class Write>
 bool DriveRecorder::post(std::size_t topic, Stamp stamp, const Write& write, std::size_t queue,
                          std::size_t most, bool bulky) noexcept {

@@ -22,7 +22,8 @@ namespace vergence::app {
 /// Queues of a recording, one for each thread that posts.
 enum Queue : std::size_t { estimator_queue, acquisition_queue };
 
-/// `record:` of the configuration: what goes through a session into drive.mcap (docs/recording.md).
+/// `record:` of the configuration: what goes through a session into drive.mcap
+/// (docs/session_files.md).
 ///
 /// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
 ///            PulseObserver, a queue each. The rest: the owner's.
@@ -66,7 +67,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   const std::string folder_;
   Recording recording_;
 
-  // Of the estimator's thread.
+  // Used by the estimator's thread only.
   RigCalibration rig_;
   bool calibrated_ = false, recalibrate_ = false;
   std::optional<std::uint64_t> rig_in_file_{};  // how many there were when it was posted last

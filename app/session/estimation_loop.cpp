@@ -21,7 +21,7 @@ void print_row(std::string_view name, std::size_t bytes) {
   fmt::print("{:<44}{:>14}\n", name, bytes);
 }
 
-/// What an arena holds, the largest first; those below a hundredth of it in one line.
+/// Parts of an arena, the largest first; those below a hundredth in one line.
 void print_parts(const MemoryRow& row) {
   std::vector<ArenaRow> parts(row.parts.begin(), row.parts.end());
   std::stable_sort(parts.begin(), parts.end(),
@@ -50,7 +50,7 @@ void print_memory_table(const std::vector<MemoryRow>& memory) {
 
 namespace {
 
-/// What a frame may take: in a live drive the next one does not wait.
+/// Time budget of a frame: live, the next one does not wait.
 Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime) noexcept {
   if (facts.frame_interval <= Duration{}) return {};
   return realtime.frame_budget_ms > 0 ? Duration::seconds(1e-3 * realtime.frame_budget_ms)
@@ -128,7 +128,7 @@ void EstimationLoop::request_recalibration(Stamp stamp, const char* message) noe
   log_.log(stamp, "recalibration_requested", message, true);
 }
 
-/// What viewers of the session have asked for.
+/// Handles requests of viewers.
 void EstimationLoop::take_requests(Stamp stamp) noexcept {
   if (requests_ == nullptr) return;
   constexpr auto kOrder = std::memory_order_relaxed;

@@ -31,8 +31,8 @@ struct MemoryRow {
 /// The table of --print-memory on stdout, before the drive.
 void print_memory_table(const std::vector<MemoryRow>& memory);
 
-/// What the estimator's thread does: takes what the source delivers, poses it, compares it with
-/// the INS, and hands everything on to the session's output.
+/// Loop of the estimator's thread: takes input from the source, estimates its pose, compares it
+/// with the INS, and hands everything on to the session's output.
 ///
 /// Threads  run(): the estimator's, sealed. ask_calibration(), drained(), items(), waiting(): any.
 ///          Everything else: the owner's, before run() or after its thread has joined, but for
@@ -40,7 +40,7 @@ void print_memory_table(const std::vector<MemoryRow>& memory);
 /// Memory   Arenas, at construction.
 class EstimationLoop {
  public:
-  /// What is given outlives this.
+  /// The arguments must outlive this object.
   EstimationLoop(FrameSource& source, const Configuration& configuration,
                  const SessionOptions& options);
 

@@ -17,7 +17,7 @@
 
 namespace vergence::app {
 
-/// What a drive is to do.
+/// Request of a live run.
 struct RunRequest {
   SessionOptions session{};
   Configuration configuration;
@@ -75,7 +75,7 @@ class LiveSource final : public FrameSource {
   std::chrono::steady_clock::time_point begun_{};
   std::vector<StampedPose> truth_;
 
-  // Of the estimator's thread; read by others after it has joined.
+  // Used by the estimator's thread; read by others after it has joined.
   TimingMonitor time_;
   std::vector<bool> fault_logged_;
   Acquired in_hand_{};    // given, or held back behind its events

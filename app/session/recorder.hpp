@@ -32,7 +32,7 @@ class LineFile;
 ///     recorder.on_report(FrameReport::of(sample, 0, std::nullopt));  // of each frame
 ///     const std::unique_ptr<SessionTotals> totals = recorder.close();
 ///
-/// What has been posted is in the files as soon as the thread comes to it, at the latest after a
+/// Posted records reach the files at the latest after a
 /// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
 /// records give the same bytes.
 /// Threads  on_…(): one producer. take_errors(): one consumer. close(): the owner's, after the
@@ -81,7 +81,7 @@ class Recorder final : public SessionObserver {
   static constexpr std::size_t kReadings = 1024;    // 2.5 s of the fastest INS
 
   using Record = std::variant<FrameReport, EventRecord>;
-  /// What waits for the recorder's thread.
+  /// Queue of values for the recorder's thread.
   template <class Value, std::size_t N>
   struct Queue {
     Ring<Value, N> ring{};

@@ -11,7 +11,7 @@
 #include "app/session/summary.hpp"
 #include "core/types/parallel.hpp"
 
-/// What every command that writes a session folder does alike.
+/// Shared steps of commands that write a session directory.
 namespace vergence::app {
 
 /// What an arena needs beside its contents: the first piece is aligned, too.
@@ -25,7 +25,7 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
                           const SessionTotals& totals, const EstimatorOptions& options,
                           SummaryInput* input);
 
-/// What is to be said of a calibration that the drive has not confirmed; empty: it has, or there is
+/// Returns the message about an unverified calibration; empty if it is verified or there is
 /// none.
 [[nodiscard]] std::string verification_message(const SummaryInput& input);
 
@@ -33,7 +33,7 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,
                            const SummaryInput& input, std::vector<std::string>* faults);
 
-/// What became of report.html.
+/// Result of writing report.html.
 struct SessionReport {
   ReportOutcome outcome{};
   std::string failure{};  // why there is none; empty: it is there

@@ -151,8 +151,8 @@ std::thread SessionRunner::start_estimating() {
   }
 }
 
-/// Of a session that ends before it began: a service is started again and again until its devices
-/// are there.
+/// Handles a session that ends before it began: a service is started again and again until its
+/// devices are there.
 void SessionRunner::leave_no_folder() {
   std::vector<std::string> ignored;
   if (recording_) recording_->close(&ignored);
@@ -209,7 +209,7 @@ void SessionRunner::open_files() {
         CalibrationRecord::begin(begin.file.rig, facts_.first, begin.cause, begin.source));
 }
 
-/// Whether anything at the end is made of the whole drive's poses, which then are all in memory.
+/// Returns true if the end of the session needs all poses in memory.
 bool SessionRunner::trajectory_is_asked_for() const {
   return loop_.comparison() != nullptr || !facts_.truth.empty() || facts_.knows_truth;
 }
@@ -303,7 +303,7 @@ void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInpu
 
 ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<std::string>& faults,
                                 Progress* progress) const {
-  // Of a drive without a pose, too, the user is told which device was gone.
+  // Also without a pose the user is informed which device was disconnected.
   const std::optional<ExitCode> of_source = source_.verdict(progress);
   if (totals.ok + totals.degraded == 0) {
     progress->say("vergence: there never was a pose; events.jsonl and poses.csv in " +

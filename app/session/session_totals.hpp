@@ -77,7 +77,8 @@ struct Contradiction {
   double depth_percent = 0;  // by which its depths were off
 };
 
-/// Frames whose time was over before their work was done (docs/realtime.md), and what was left out.
+/// Frames whose time was over before their work was done (docs/deployment.md), and what was left
+/// out.
 struct BudgetStatistics {
   std::uint64_t frames = 0, points = 0, keyframes = 0, steps = 0, windows = 0;
 

@@ -350,7 +350,7 @@ class Planner {
     return false;
   }
 
-  /// Of the first way that was tried: the cheapest.
+  /// The error of the first and cheapest mode is reported.
   void explain_refusal(const std::string& why) {
     if (why_not_.empty()) why_not_ = why;
   }

@@ -88,7 +88,7 @@ class Applier {
              control.key + " takes " + range_of(control) + ", not " + std::to_string(value));
     system(error, "setting " + control.key);
   }
-  /// Of a control that may be absent.
+  /// Value of a control that may be absent.
   void set_if_there(std::uint32_t id, std::int64_t value) {
     const Control* c = controls_.find(id);
     if (c != nullptr) set(*c, clamped(*c, value));
@@ -246,7 +246,7 @@ class Applier {
     out_.actual.rate_hz = camera;
   }
 
-  /// Of a raw sensor, which has lines, blanking and a pixel clock instead of a rate. 0: not known.
+  /// Line time of a raw sensor from blanking and pixel clock; 0 if unknown.
   [[nodiscard]] double sensor_rate() const {
     const double line = line_seconds();
     const double lines = static_cast<double>(requested_.height) + read_or(V4L2_CID_VBLANK, 0);

@@ -200,7 +200,7 @@ Identity Setup::identified() {
   dialogue_.ask(MessageId::firmware_request, &reply_);
   if (reply_.answer == Answer::ok && reply_.size >= 3)
     std::copy_n(reply_.payload.begin(), 3, std::begin(found.firmware));
-  // What decides is what it can: only the newer ones know an output configuration.
+  // The decision uses its capabilities: only the newer ones know an output configuration.
   dialogue_.ask(MessageId::output_configuration, &reply_);
   if (reply_.answer == Answer::ok) {
     found.generation = Generation::mark4;
@@ -274,7 +274,7 @@ namespace {
 
 using namespace xbus;
 
-// What the program wants of an MTi-G: fixed point 16.32, so that a position keeps its digits; X
+// Output configuration of an MTi-G: fixed point 16.32, so that a position keeps its digits; X
 // north, Y west, Z up as it comes.
 constexpr std::uint16_t kLegacyMode =
     kModeOrientation | kModePosition | kModeVelocity | kModeStatus;
@@ -364,7 +364,7 @@ namespace {
 
 using namespace xbus;
 
-/// What the program wants of an MTi-G-700/710. Without UTC it still has the receiver's.
+/// Output configuration of an MTi-G-700/710. Without UTC it still has the receiver's.
 OutputConfiguration requested_outputs(std::uint16_t rate_hz, bool utc) noexcept {
   OutputConfiguration o;
   if (utc) (void)o.add({wire_id(PacketId::utc), kEveryMessage});

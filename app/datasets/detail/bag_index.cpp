@@ -70,7 +70,7 @@ std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
   return files;
 }
 
-/// Of `list` what is not in `kept`, an ascending list of indices, goes.
+/// Removes from `list` all entries that are not in `kept`, an ascending list of indices.
 template <typename T>
 void keep(const std::vector<std::size_t>& kept, std::vector<T>* list) {
   for (std::size_t i = 0; i < kept.size(); ++i) (*list)[i] = (*list)[kept[i]];

@@ -77,7 +77,8 @@ struct EvaluatedDrive {
 /// minute.
 [[nodiscard]] EvaluatedDrive drive_until_recovered(FaultCase c, const NormalError& normal);
 
-/// The faults of docs/mock.md, one at a time; begin at 9 s, when the calibration is confirmed.
+/// The faults of docs/simulated_rig.md, one at a time; begin at 9 s, when the calibration is
+/// confirmed.
 [[nodiscard]] const std::vector<FaultCase>& single_faults();
 /// Every two of them at once, the second a second later.
 [[nodiscard]] std::vector<FaultCase> fault_pairs();
@@ -87,7 +88,7 @@ struct EvaluatedDrive {
 /// real time: of `system` the times are the process's, some seconds ahead of the drive's.
 [[nodiscard]] const std::vector<FaultCase>& long_faults();
 
-/// Head and line of the table of docs/faults.md.
+/// Head and line of the table of docs/benchmarks.md.
 [[nodiscard]] std::string fault_table_head();
 [[nodiscard]] std::string fault_table_line(const FaultCase& c, const FaultDrive& drive,
                                            const FaultResult& result);

@@ -30,7 +30,7 @@ constexpr double kPi = std::numbers::pi;
 
 enum class Velocity { east_north_up, north_east_down, north_west_up };
 enum class Yaw { north_to_west, north_to_east, east_to_north };
-/// What a log's numbers mean; by default as the MTi-G has it.
+/// Axis conventions of a log; by default those of the MTi-G.
 struct Conventions {
   Velocity velocity = Velocity::north_west_up;
   Yaw yaw = Yaw::north_to_west;

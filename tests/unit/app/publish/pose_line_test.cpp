@@ -83,7 +83,7 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   EXPECT_EQ(j["estimate_ms"], 7.5);
   EXPECT_EQ(j["age_ms"], 21.5);
   EXPECT_EQ(j["dropped"], 7);
-  EXPECT_EQ(j.size(), 18U) << "a key that docs/publish.md does not have";
+  EXPECT_EQ(j.size(), 18U) << "a key that docs/live_interface.md does not have";
 }
 
 TEST(PoseLine, ofALostFrameHasNoPlace) {
