@@ -81,7 +81,7 @@ CalibrationFile two_cameras() {
   return file;
 }
 
-/// The same with what the configuration says of it, in which cameras are asked for by address.
+/// State file with its configuration, in which cameras are named by address.
 CalibrationFile configured() {
   CalibrationFile file = two_cameras();
   file.configured.emplace().baseline = 0.75;

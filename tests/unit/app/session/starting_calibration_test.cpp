@@ -109,7 +109,7 @@ TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::state_file);
 }
 
-/// What is said of a calibration that was found, where files cannot be written.
+/// Message about a calibration when files cannot be written.
 Kept kept(bool session_fails, bool has_state, bool state_fails) {
   const test::TemporaryFolder folder;
   const auto in_the_way = [&](const char* file) {
