@@ -3,7 +3,7 @@
 
 namespace vergence {
 
-/// How much of a frame's work is done: all of it, or less where its time would be over first
+/// Workload of a frame: all of it, or less where its time would be over first
 /// (docs/deployment.md). The pose is sought whatever is left out.
 struct FrameWorkload {
   static constexpr std::uint8_t kAll = 255;

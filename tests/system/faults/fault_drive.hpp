@@ -9,12 +9,12 @@
 /// Drives of the mock with faults, by the built program, judged against the truth.
 namespace vergence::test {
 
-/// What goes wrong on a drive.
+/// Faults of a drive.
 struct FaultCase {
   std::string name;
   std::vector<std::string> faults{};  // as --fault takes them
   double from_s = 0, until_s = 0;     // of the drive: first fault's start, last one's end
-  /// What must be seen of them: kinds of events, reasons of frames, counters of summary.json
+  /// Expected evidence of the faults: kinds of events, reasons of frames, counters of summary.json
   /// ("/devices/clock_resets") that are not 0, or lines on the terminal. None: poses that are not
   /// those of the untouched drive.
   std::vector<std::string> said{};
@@ -60,7 +60,7 @@ struct Untouched {
   std::string unfit{};
 };
 [[nodiscard]] Untouched untouched_drive();
-/// Of what must be said of these faults, what was not; empty: all was.
+/// Returns expected evidence that is missing; empty if none.
 [[nodiscard]] std::string unsaid(const FaultCase& c, const FaultDrive& drive,
                                  const FaultDrive& untouched);
 /// Nothing of it may be: a wrong `ok`, one at a time at which there is no truth, a session that is

@@ -102,7 +102,7 @@ TEST(BoardCalibration, SigmasCoverErrorsOverSeeds) {
   EXPECT_LT(squared, 2.5);
 }
 
-/// What the corners of one view have in common is no noise: here every left image is stretched by
+/// Errors common to a view's corners are no noise: here every left image is stretched by
 /// an amount of its own.
 TEST(BoardCalibration, SigmasOfALensContainWhatViewsHaveInCommon) {
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);

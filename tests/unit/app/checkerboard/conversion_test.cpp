@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kSamePixel = 1e-9;
 
-/// What a format's file says, in OpenCV's terms: X_camera = R X_left + t.
+/// Content of a format's file in OpenCV's terms: X_camera = R X_left + t.
 struct Reference {
   cv::Mat K, D, R, t;
   bool fisheye = false;

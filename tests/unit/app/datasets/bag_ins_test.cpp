@@ -152,7 +152,7 @@ TEST_P(BagIns, TopicThatIsNoneIsRefused) {
   }
 }
 
-// Of two, one is named: the choice is not what is missing.
+// If one of two is named, the choice is not missing.
 TEST_P(BagIns, WithoutOrientationNothingIsComparedWithANamedFixEither) {
   writer_->channel(6, "/gps/fix", "sensor_msgs/NavSatFix");
   fix(0);

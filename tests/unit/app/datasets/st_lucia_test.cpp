@@ -231,7 +231,7 @@ TEST(StLuciaIns, whateverItsAxesTheDriveShowsThem) {
         }
 }
 
-/// What is done to the lines of a log, what is said of it and how many readings are left.
+/// Edit of a log's lines, expected message and number of remaining samples.
 struct Log {
   const char* what;
   std::function<void(std::vector<std::string>*)> spoil;

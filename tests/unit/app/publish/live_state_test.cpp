@@ -98,7 +98,7 @@ TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
   EXPECT_GE(told + 100, trail.size()) << "a viewer who was there has as much";
 }
 
-/// How many places of the map have a status, and the longest step between two of them.
+/// Number of places on the map with a status, and the longest step between two.
 struct Map {
   std::size_t places = 0, degraded = 0;
   double longest_m = 0;

@@ -181,7 +181,7 @@ class Kept final : public LineSocket {
   }
   [[nodiscard]] LineSocketCounters counters() const noexcept override { return {}; }
 
-  // Of the publisher's thread while there is one.
+  // Used by the publisher's thread while it runs.
   std::string greeting{}, request{}, response{};
   std::atomic<bool> answered{false};
 
