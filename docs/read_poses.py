@@ -1,20 +1,26 @@
 #!/usr/bin/env python3
-"""Prints the poses that vergence publishes: read_poses.py unix:///run/vergence/pose.sock | udp://127.0.0.1:9870
+"""Reads the pose stream: read_poses.py unix:///run/vergence/pose.sock [recalibrate] | udp://127.0.0.1:9870
 
-One JSON object a line, docs/publish.md says what is in it. Ends when the program does.
+Poses are printed to standard output; lines of other types (calibration, alignment, status, response) to standard error unchanged. With
+`recalibrate` that is requested once. docs/live_interface.md is the schema. Ends when the program does.
 """
 import json
 import socket
 import sys
 
+VERSION = 2
 
-def lines(address):
+
+def lines(address, request=None):
     """Lines as they come, from `publish.pose_stream` of the configuration."""
     kind, _, place = address.partition("://")
     if kind == "unix":
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stream:
             stream.connect(place)
-            yield from stream.makefile("r", encoding="utf-8")
+            for number, line in enumerate(stream.makefile("r", encoding="utf-8")):
+                if request and number == 0:  # the first line shows that the session has begun
+                    stream.sendall(json.dumps({"request": request}).encode() + b"\n")
+                yield line
     else:
         host, _, port = place.rpartition(":")
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as datagrams:
@@ -24,14 +30,15 @@ def lines(address):
 
 
 def main():
-    for line in lines(sys.argv[1]):
-        pose = json.loads(line)
-        if pose["version"] != 2:
-            sys.exit("read_poses: the stream has version %s, this program reads version 2" % pose["version"])
-        if pose["type"] != "pose":  # calibration, alignment, status: docs/publish.md
+    for text in lines(*sys.argv[1:3]):
+        line = json.loads(text)
+        if line["version"] != VERSION:
+            sys.exit("read_poses: the stream has version %s, this program reads version %d" % (line["version"], VERSION))
+        if line["type"] != "pose":
+            print(text.rstrip(), file=sys.stderr, flush=True)
             continue
-        place = ["%9.3f" % v for v in pose["pose"]["position_m"]] if pose["pose"] else ["no pose"]
-        print(pose["frame"], pose["status"], pose["reason"] or "-", *place, flush=True)
+        place = ["%9.3f" % v for v in line["pose"]["position_m"]] if line["pose"] else ["no pose"]
+        print(line["frame"], line["status"], line["reason"] or "-", *place, flush=True)
 
 
 if __name__ == "__main__":

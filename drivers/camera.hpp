@@ -20,7 +20,7 @@ enum class CameraTrigger : std::uint8_t {
 /// The word of the configuration: `hardware`.
 [[nodiscard]] const char* to_string(CameraTrigger) noexcept;
 
-/// What a camera is asked to do, and what it then does.
+/// Requested or applied configuration of a camera.
 struct CameraConfiguration {
   int width = 0;       // px
   int height = 0;      // px
@@ -37,11 +37,11 @@ struct CameraConfiguration {
                     // of the bandwidth
 };
 
-/// Whether any camera at all could be asked for this: empty, or what is wrong with it, as in `a
+/// Validates a request for any camera: empty, or the problem, as in `a
 /// size of 0 x 480`.
 [[nodiscard]] std::string find_invalid(const CameraConfiguration& requested);
 
-/// What brightness is set with while a camera streams.
+/// Exposure and gain while a camera streams.
 struct ExposureSetting {
   Duration exposure{};
   double gain_db = 0;

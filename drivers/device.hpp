@@ -6,7 +6,7 @@
 
 #include "core/types/time.hpp"
 
-/// What cameras, INS and trigger boards have in common.
+/// Common parts of cameras, INS and trigger boards.
 namespace vergence {
 
 /// Nanoseconds of a device's own clock, unwrapped by its driver. Origin and rate are the device's:
@@ -29,7 +29,7 @@ enum class DeviceStatus : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(DeviceStatus) noexcept;
 
-/// Who a device is: for lists and messages.
+/// Identity of a device for lists and messages.
 struct DeviceInfo {
   std::string driver;  // mock, gige, …
   std::string serial;
@@ -37,7 +37,7 @@ struct DeviceInfo {
   std::string place;  // address, port, bus path
 };
 
-/// What a driver knows about the way from the measurement to the host, for the configuration in
+/// Timing of the path from measurement to host, for the configuration in
 /// force.
 struct DeviceTiming {
   Duration min_delay{};  // from the stamped instant to the arrival, at best

@@ -10,7 +10,7 @@
 
 namespace vergence {
 
-/// What a device says about itself and its receiver beside the sample.
+/// Status of a device and its receiver next to the sample.
 struct InsQuality {
   std::uint32_t status = 0;     // the device's own word; bits in its protocol's header
   bool utc_valid = false;       // the device knows UTC, leap seconds too

@@ -10,7 +10,7 @@
 
 namespace vergence {
 
-/// What reaches a device's consumer, in the order of arrival.
+/// Stream to a device's consumer, in order of arrival.
 template <class T>
 struct Delivery {
   enum class What : std::uint8_t { item, gone, back, end } what = What::item;

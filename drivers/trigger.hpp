@@ -34,7 +34,7 @@ struct Pulse {
   Duration host_error{};  // |true − host| is below this
 };
 
-/// What a board is asked to do, and what it then does.
+/// Requested or applied configuration of a board.
 struct TriggerConfiguration {
   double rate_hz = 0;
   Duration width = Duration::microseconds(200);  // of a pulse

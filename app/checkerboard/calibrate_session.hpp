@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "app/calibration/board_calibration.hpp"
+#include "app/checkerboard/board_calibration.hpp"
 #include "app/config/configuration.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
@@ -32,7 +32,7 @@ struct CalibrateRequest {
 [[nodiscard]] ExitCode calibrate_live(const CalibrateRequest& request,
                                       const Configuration& configuration);
 
-/// What is known of a rig beside what its views tell.
+/// Data of a rig in addition to its views.
 struct CalibratedRig {
   std::string rig_name{};
   std::vector<std::string> names{}, serials{};  // one a camera

@@ -1,12 +1,12 @@
-// What of `vergence calibrate` needs OpenCV. `vergence` starts it with its own words; nobody has to
-// know its name.
+// Implements the parts of `vergence calibrate` that need OpenCV. `vergence` starts it with its own
+// words; nobody has to know its name.
 #include <iostream>
 #include <memory>
 
 #include <fmt/format.h>
 
-#include "app/calibration/conversion.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
+#include "app/checkerboard/conversion.hpp"
 #include "app/command_line/calibrate_options.hpp"
 #include "app/command_line/program.hpp"
 
@@ -23,11 +23,10 @@ BoardPattern board_of(const CalibrateOptions& a) {
       (a.board.empty() ? 0 : 1) + (a.aprilgrid.empty() ? 0 : 1) + (a.charuco.empty() ? 0 : 1);
   if (boards == 0)
     throw InputError(
-        "--checkerboard is missing: the board's inner corners along and down, like 9x6; or "
-        "--aprilgrid: "
-        "its tags along and up, like 6x6; or --charuco: its squares along and down, like 11x8");
+        "the calibration target is missing; give --checkerboard 9x6 (inner corners), --aprilgrid "
+        "6x6 (tags) or --charuco 11x8 (squares)");
   if (boards > 1)
-    throw InputError("--board, --aprilgrid and --charuco are different boards; give one");
+    throw InputError("--checkerboard, --aprilgrid and --charuco exclude one another; give one");
   if (!a.square)
     throw InputError(fmt::format("--square is missing: the side of a {} in metres, like 0.025",
                                  a.aprilgrid.empty() ? "square" : "tag"));
@@ -68,9 +67,8 @@ ExitCode convert(const CalibrateOptions& a) {
   const CalibrationFormat format = r.format ? *r.format : format_of_name(r.out);
   for (const std::filesystem::path& file : files_written(r.out, format))
     if (std::filesystem::exists(file) && !a.force)
-      throw InputError(
-          file.string() +
-          ": is there already, and nothing is overwritten; add --force, or name another file");
+      throw InputError(file.string() +
+                       ": exists already; add --force to overwrite it, or name another file");
   if (!a.size.empty()) r.size = parse_size(a.size);
   for (const std::string& message : convert_calibration(r))
     std::cerr << "vergence: " << message << '\n';

@@ -44,91 +44,75 @@ ExitCode run_checkerboard_tool(const ProgramWords& words) {
 }
 
 CLI::App* CalibrateOptions::declare(CLI::App& root) {
-  CLI::App* command =
-      root.add_subcommand("calibrate",
-                          "Find lenses and places of the cameras with a checkerboard, from images "
-                          "or live; convert other programs' files");
-  command->add_option(
-      "CONFIG", configuration,
-      "Live: the cameras of this configuration, until nothing is missing or Ctrl-C");
+  CLI::App* command = root.add_subcommand(
+      "calibrate", "Calibrate from target images, live, or a sequence; convert formats");
+  command->add_option("CONFIG", configuration,
+                      "Live calibration with the cameras of this configuration");
   command
       ->add_option("--left", left,
-                   "Images of the left camera, a pattern in quotes; alone: one camera's lens")
+                   "Images of the left camera, quoted; alone: one camera's intrinsics")
       ->type_name("GLOB");
-  command
-      ->add_option("--right", right,
-                   "Images of the right camera, paired by number or order of name")
+  command->add_option("--right", right, "Images of the right camera, paired by number or name")
       ->type_name("GLOB");
   command->add_option("--camera", more_cameras, "Images of a third and a fourth camera")
       ->type_name("GLOB")
       ->allow_extra_args(false);
-  command
-      ->add_option(
-          "--drive", drive,
-          "An ordinary recorded drive instead of a board: lenses and places of the cameras")
+  command->add_option("--drive", drive, "Calibrate from a recorded sequence, without a target")
       ->type_name("DATA");
   command
       ->add_option("--calibration", calibration,
-                   "--drive: lenses and length to begin with, instead of the data set's own")
+                   "--drive: initial calibration instead of the data set's")
       ->type_name("FILE");
   declare_image_topics(*command, &left_topic, &right_topic);
-  command->add_option("--checkerboard", board, "Inner corners along and down")->type_name("9x6");
-  command
-      ->add_option(
-          "--aprilgrid", aprilgrid,
-          "Instead of --checkerboard: tags along and up, family 36h11, as Kalibr prints them")
+  command->add_option("--checkerboard", board, "Inner corners of a checkerboard, columns and rows")
+      ->type_name("9x6");
+  command->add_option("--aprilgrid", aprilgrid, "Tags of an AprilGrid (36h11), columns and rows")
       ->type_name("6x6");
-  command
-      ->add_option("--charuco", charuco,
-                   "Instead of --checkerboard: squares along and down of a ChArUco board")
+  command->add_option("--charuco", charuco, "Squares of a ChArUco target, columns and rows")
       ->type_name("11x8");
-  command->add_option("--square", square, "Side of a square, or of a tag, m")->type_name("M");
-  command->add_option("--marker", marker, "--charuco: side of a marker, m")->type_name("M");
-  command
-      ->add_option("--dictionary", dictionary, "--charuco: the markers' dictionary, OpenCV's names")
+  command->add_option("--square", square, "Size of a square or tag in metres")->type_name("M");
+  command->add_option("--marker", marker, "--charuco: size of a marker in metres")->type_name("M");
+  command->add_option("--dictionary", dictionary, "--charuco: OpenCV's name of the dictionary")
       ->type_name("NAME")
       ->capture_default_str();
-  command
-      ->add_option("--spacing", spacing, "--aprilgrid: gap between two tags over the side of a tag")
+  command->add_option("--spacing", spacing, "--aprilgrid: gap between tags relative to their size")
       ->type_name("R")
       ->capture_default_str();
-  command->add_option("--out", out, "calibration.yaml to write")->type_name("F");
-  command
-      ->add_option("--model", model,
-                   "radtan: k1 k2 p1 p2; equidistant: k1 to k4, for fisheye lenses")
+  command->add_option("--out", out, "Calibration file to write")->type_name("FILE");
+  command->add_option("--model", model, "Lens model: radtan, or equidistant (fisheye)")
       ->check(CLI::IsMember({"radtan", "equidistant"}))
       ->capture_default_str();
-  command->add_flag("--k3", sixth_order, "radtan: estimate k3, too");
+  command->add_flag("--k3", sixth_order, "radtan: also estimate k3");
   command
       ->add_option("--baseline", baseline,
-                   "Distance of left and right as somebody measured it, m: reported against; "
-                   "--drive: instead of the file's")
+                   "Measured baseline in metres; printed for comparison, with --drive used")
       ->type_name("M");
   command->add_flag("--json", json, "Print JSON instead of tables");
-  command
-      ->add_option("--keep-views", keep_views,
-                   "Live: keep the images of the views taken, in a new folder")
+  command->add_option("--keep-views", keep_views, "Live: save the images of accepted views")
       ->type_name("DIR");
   command
       ->add_option("--convert", convert,
-                   "Convert a calibration: calibration.yaml, Kalibr camchain, ROS camera_info "
-                   "(left.yaml,right.yaml or a folder with them), "
-                   "OpenCV stereo YAML (one file, or intrinsics.yml,extrinsics.yml)")
+                   "Convert a calibration between vergence, Kalibr, ROS and OpenCV")
       ->expected(2)
       ->type_name("IN OUT");
-  command
-      ->add_option(
-          "--format", format,
-          "--drive: the layout of DATA, as replay has it [auto]; --convert: the same as --to")
-      ->type_name("WORD");
+  command->add_option("--format", format, "--drive: format of DATA [auto]; --convert: same as --to")
+      ->type_name("FORMAT");
   command
       ->add_option("--to", to,
-                   "--convert: format of OUT, where its name does not say: vergence, kalibr, "
-                   "ros, opencv")
-      ->type_name("WORD");
-  command->add_flag("--force", force, "Overwrite a file that is there already");
-  command->add_option("--size", size, "--convert: image size of an OpenCV file that has none")
+                   "--convert: format of OUT: vergence, kalibr, ros, opencv [by its name]")
+      ->type_name("FORMAT");
+  command->add_flag("--force", force, "Overwrite existing files");
+  command->add_option("--size", size, "--convert: image size, if an OpenCV file has none")
       ->type_name("WxH");
+  command->footer(
+      "Examples:\n"
+      "  vergence calibrate --drive DATA --out calibration.yaml\n"
+      "  vergence calibrate --left 'l*.png' --right 'r*.png' --checkerboard 9x6 --square 0.025 "
+      "--out F.yaml\n"
+      "  vergence calibrate --convert camchain.yaml calibration.yaml\n"
+      "Exit codes: 0 success; 1 no usable calibration; 2 bad arguments or input; 3 camera "
+      "missing;\n"
+      "130 Ctrl-C.");
   common.declare(*command);
   return command;
 }
@@ -149,14 +133,13 @@ void check_writable(const std::filesystem::path& file, bool force) {
   const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
   if (std::filesystem::is_directory(file))
     throw InputError(file.string() +
-                     ": is a folder; --out takes the file to write, calibration.yaml");
+                     ": is a directory; name the file to write, e.g. calibration.yaml");
   if (std::filesystem::exists(file) && !force)
-    throw InputError(
-        file.string() +
-        ": is there already, and nothing is overwritten; add --force, or name another file");
+    throw InputError(file.string() +
+                     ": exists already; add --force to overwrite it, or name another file");
   if (::access(folder.c_str(), W_OK) != 0)
     throw InputError(folder.string() +
-                     ": cannot be written to; --out takes a file in a folder that is there");
+                     ": not writable; choose a file in an existing, writable directory");
 }
 
 }  // namespace vergence::app

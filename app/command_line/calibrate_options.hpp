@@ -26,7 +26,7 @@ inline constexpr const char* kCheckerboardTool = "vergence-checkerboard";
 /// InputError: it is not there, or cannot be started.
 [[nodiscard]] ExitCode run_checkerboard_tool(const ProgramWords& words);
 
-/// What `vergence calibrate` is asked to look at.
+/// Input of `vergence calibrate`.
 enum class CalibrateWay : std::uint8_t { board_images, board_live, drive, convert };
 
 /// The command line of `vergence calibrate`, the words as given: the program declares it, and the

@@ -2,34 +2,37 @@
 
 namespace vergence::app {
 
+const char* const kSessionExitCodes =
+    "Exit codes: 0 success; 1 no usable result; 2 bad arguments, configuration or input;\n"
+    "3 device missing; 4 session incomplete; 130, 143 stopped by SIGINT, SIGTERM.";
+
 void CommonOptions::declare(CLI::App& command) {
-  command
-      .add_option("--set", set,
-                  "Set a key of the configuration (docs/configuration.md); as often as needed")
+  command.add_option("--set", set, "Set a configuration key (docs/configuration.md); repeatable")
       ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);  // one argument each: the next word is not another KEY=VALUE
-  command
-      .add_option("--threads", threads, "Threads of the estimator, 1 or 2; the poses are the same")
-      ->type_name("N");
+      ->allow_extra_args(false)  // one argument each: the next word is not another KEY=VALUE
+      ->group("Configuration");
+  command.add_option("--threads", threads, "Threads of the estimator, 1 or 2; same poses")
+      ->type_name("N")
+      ->group("Performance");
   command.add_option("--seed", seed, "Seed of the random sampling; same seed, same poses")
-      ->type_name("N");
-  command.add_flag("--quiet", quiet, "No progress line");
+      ->type_name("N")
+      ->group("Performance");
+  command.add_flag("--quiet", quiet, "Print no progress line")->group("Output");
 }
 
 void declare_session_options(CLI::App& command, bool* memory, bool* page) {
-  command.add_flag("--print-memory", *memory, "Print what memory is held, by whom");
-  command.add_flag("--live-page", *page,
-                   "Show the session on a page in a browser: publish.http, 127.0.0.1:8080 unless "
-                   "the configuration says otherwise");
+  command.add_flag("--print-memory", *memory, "Print memory use per component")->group("Output");
+  command.add_flag("--live-page", *page, "Serve the live page (default 127.0.0.1:8080)")
+      ->group("Output");
 }
 
 void declare_image_topics(CLI::App& command, std::string* left, std::string* right) {
-  command
-      .add_option("--left-topic", *left,
-                  "Of a bag: topic of the left images, where names do not say")
-      ->type_name("TOPIC");
-  command.add_option("--right-topic", *right, "Of a bag: topic of the right images")
-      ->type_name("TOPIC");
+  command.add_option("--left-topic", *left, "Bag topic of the left images, if ambiguous")
+      ->type_name("TOPIC")
+      ->group("Input");
+  command.add_option("--right-topic", *right, "Bag topic of the right images, if ambiguous")
+      ->type_name("TOPIC")
+      ->group("Input");
 }
 
 Configuration CommonOptions::configuration(const std::optional<std::filesystem::path>& file,

@@ -11,7 +11,7 @@
 
 namespace vergence::app {
 
-/// What every command that runs understands: `--set KEY=VALUE` (any number of times), `--threads
+/// Options of every command that runs: `--set KEY=VALUE` (any number of times), `--threads
 /// N`, `--seed N`, `--quiet`.
 struct CommonOptions {
   std::vector<std::string> set{};
@@ -26,6 +26,9 @@ struct CommonOptions {
   [[nodiscard]] Configuration configuration(const std::optional<std::filesystem::path>& file,
                                             const std::vector<std::string>& before = {}) const;
 };
+
+/// The last lines of the help of commands that write a session.
+extern const char* const kSessionExitCodes;
 
 /// Adds `--print-memory` and `--live-page`, the options of commands that write a session.
 void declare_session_options(CLI::App& command, bool* memory, bool* page);

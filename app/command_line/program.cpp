@@ -43,7 +43,7 @@ std::vector<std::string> option_names(CLI::App& command) {
 /// The command's own name in a hint: `vergence replay --help`.
 std::string help_hint(const CLI::App& command) {
   const std::string word = command.get_parent() == nullptr ? "" : " " + command.get_name();
-  return "'vergence" + word + " --help' shows what is";
+  return "see 'vergence" + word + " --help'";
 }
 
 /// CLI11's errors about a command line, as one message.
@@ -51,7 +51,7 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
   const auto given = root.get_subcommands();
   CLI::App& command = given.empty() ? root : *given.front();
   const std::string who = given.empty() ? "" : command.get_name() + ": ";
-  // What was not understood is said first: it is often why something else seems to be missing.
+  // Unknown arguments are reported first: this is often why something else seems to be missing.
   if (const auto extras = root.remaining(true); !extras.empty()) {
     const std::string& first = extras.front();
     const std::string name = first.substr(0, first.find('='));
@@ -59,9 +59,9 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
     const std::string why = why_withdrawn(Withdrawn::Kind::option, command.get_name() + " " + name);
     return who + (option ? "unknown option " : "unexpected argument ") + "\"" + name + "\"" +
            (option && why.empty() ? did_you_mean(name, option_names(command)) : why) + " (" +
-           help_hint(command) + " understood)";
+           help_hint(command) + ")";
   }
-  return who + error.what() + " (" + help_hint(command) + " expected)";
+  return who + error.what() + " (" + help_hint(command) + ")";
 }
 
 /// A first word that is no command is answered here: CLI11 would only call it unexpected.
@@ -95,11 +95,15 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
   const std::vector<const char*> words = without_words_for_options(given, given_argv);
   const int argc = static_cast<int>(words.size());
   const char* const* argv = words.data();
-  CLI::App root("Stereo odometry that finds and keeps its own calibration", "vergence");
+  CLI::App root("Stereo visual odometry with online calibration", "vergence");
   ExitCode exit_code = ExitCode::done;
   root.set_version_flag("--version",
                         "vergence " + std::string(version()) + ", " + features::simd_target());
   root.require_subcommand(1);
+  root.footer(
+      "Start: vergence replay FOLDER --out DIR. 'vergence COMMAND --help' has options, an example "
+      "and\n"
+      "exit codes.");
   add_commands(root, {given_argv, static_cast<std::size_t>(given)}, &exit_code);
   check_first_word(root, argc, argv);
   try {
@@ -140,7 +144,8 @@ ExitCode run_program(int argc, const char* const* argv, AddCommands add_commands
     (void)std::fputs(
         "vergence: not enough memory; close other programs or choose smaller capacities\n", stderr);
   } catch (const std::exception& error) {
-    print_error(std::string("stopped by an error nobody foresaw: ") + error.what());
+    print_error(std::string("internal error: ") + error.what() +
+                "; please report it with this output");
   }
   return ExitCode::bad_input;
 }

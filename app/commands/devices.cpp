@@ -7,7 +7,7 @@
 
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
-#include "app/doctor/report.hpp"
+#include "app/devices/inventory_report.hpp"
 
 namespace vergence::app {
 namespace {
@@ -61,23 +61,22 @@ void list(const DevicesArguments& a, bool rules_asked) {
 void add_devices(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<DevicesArguments>();
   CLI::App* command = root.add_subcommand("devices",
-                                          "List the cameras, sensors and boards that are "
-                                          "connected, with what to paste into a configuration");
-  command->add_flag("--json", a->json, "For programs (docs/devices.md has the keys)");
-  CLI::Option* rules = command
-                           ->add_option("--write-udev", a->rules,
-                                        "Write udev rules for what is plugged in, to FILE or to "
-                                        "standard output: permissions, names that "
-                                        "stay, latency timer, ModemManager kept away")
-                           ->expected(0, 1)
-                           ->default_str("-")
-                           ->type_name("[FILE]");
+                                          "List connected cameras, serial ports and boards as "
+                                          "configuration snippets");
+  command->add_flag("--json", a->json, "Print JSON (docs/deployment.md)");
+  CLI::Option* rules =
+      command
+          ->add_option("--write-udev", a->rules, "Write udev rules to FILE, or to standard output")
+          ->expected(0, 1)
+          ->default_str("-")
+          ->type_name("[FILE]");
   command
-      ->add_option(
-          "--rig", a->rig,
-          "With --write-udev: rules for the serial ports of this configuration alone, each "
-          "named by what it is there")
+      ->add_option("--rig", a->rig, "With --write-udev: only for the devices of this configuration")
       ->type_name("CONFIG");
+  command->footer(
+      "Example: vergence devices --rig rig.yaml --write-udev | sudo tee "
+      "/etc/udev/rules.d/98-vergence-rig.rules\n"
+      "Exit codes: 0 success; 2 bad arguments or configuration.");
   command->callback([a, rules, exit_code] {
     if (rules->count() > 0 && a->rules.empty()) a->rules = "-";
     list(*a, rules->count() > 0);

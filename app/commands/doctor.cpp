@@ -7,8 +7,8 @@
 
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
+#include "app/devices/inventory_report.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/doctor/report.hpp"
 
 namespace vergence::app {
 namespace {
@@ -41,18 +41,18 @@ ExitCode examine_machine(const DoctorArguments& a) {
 void add_doctor(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<DoctorArguments>();
   CLI::App* command = root.add_subcommand(
-      "doctor",
-      "Check this machine and its devices for what a drive needs; says the command that mends");
-  command->add_option(
-      "CONFIG", a->configuration,
-      "Configuration whose drive is planned; without one what is plugged in is checked");
-  command->add_option("--set", a->set, "Set a key of the configuration; as often as needed")
+      "doctor", "Check machine and devices against a configuration and print fixes");
+  command->add_option("CONFIG", a->configuration,
+                      "Configuration to check; without it, check what is connected");
+  command->add_option("--set", a->set, "Set a configuration key; repeatable")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   command->add_option("--session-dir", a->out, "Check free space in this directory")
       ->type_name("DIR");
-  command->add_flag("--json", a->json, "For programs (docs/doctor.md has the keys)");
-  command->footer("Exit code: 0 no problem, 1 at least one, 2 the configuration cannot be read.");
+  command->add_flag("--json", a->json, "Print JSON (docs/deployment.md)");
+  command->footer(
+      "Example: vergence doctor app/config/gige.yaml --session-dir /data\n"
+      "Exit codes: 0 no problem; 1 at least one problem; 2 the configuration cannot be read.");
   command->callback([a, exit_code] {
     if (a->configuration.empty() && !a->set.empty())
       throw InputError("--set changes a configuration; name one: vergence doctor CONFIG --set …");

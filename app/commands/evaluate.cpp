@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "app/commands/commands.hpp"
+#include "app/commands/evaluation.hpp"
 #include "app/datasets/text_file.hpp"
-#include "app/evaluation/evaluation.hpp"
 
 namespace vergence::app {
 namespace {
@@ -109,50 +109,44 @@ EvaluationRequest evaluate_request(const EvaluateArguments& a) {
 
 void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<EvaluateArguments>();
-  CLI::App* command = root.add_subcommand("evaluate", "Compare a trajectory with a reference");
-  command->add_option("ESTIMATE", a->estimate, "Text file of poses, session folder, or data set")
+  CLI::App* command = root.add_subcommand(
+      "evaluate", "Compare a trajectory with ground truth (ATE, segment errors)");
+  command->add_option("ESTIMATE", a->estimate, "Trajectory file, session or data-set directory")
       ->required();
   command->add_option("REFERENCE", a->reference,
-                      "Text file of poses, KITTI or EuRoC data-set folder; ins.csv of a session, "
-                      "which is brought to "
-                      "the left camera by the session's mount");
-  command->add_flag("--json", a->json, "The figures as JSON");
-  command->add_option(
-      "--lengths", a->lengths,
-      "Lengths of the segments, m [100,200 … 800, on a shorter drive 10 … 50, 1 … 5 or 0.1 … 0.5]");
+                      "Trajectory file, KITTI or EuRoC directory, or ins.csv of a session");
+  command->add_flag("--json", a->json, "Print JSON");
+  command->add_option("--lengths", a->lengths,
+                      "Segment lengths in metres [100,200 … 800; shorter on short paths]");
   command->add_option("--step", a->step,
-                      "A segment begins at every so many poses [10; with shorter lengths 1]");
-  command->add_option("--associate", a->associate, "How a reference is found for a pose")
+                      "Start a segment at every Nth pose [10; with short lengths 1]");
+  command->add_option("--associate", a->associate, "How reference poses are associated")
       ->check(CLI::IsMember({"interpolate", "nearest"}))
       ->capture_default_str();
   command
       ->add_option("--max-gap", a->max_gap,
-                   "interpolate: widest hole of the reference to bridge, s")
+                   "interpolate: largest reference gap to interpolate across, s")
       ->capture_default_str();
-  command
-      ->add_option("--max-difference", a->max_difference,
-                   "nearest: largest difference of stamps, s")
+  command->add_option("--max-difference", a->max_difference, "nearest: maximum stamp difference, s")
       ->capture_default_str();
   command
       ->add_option("--axes", a->axes,
-                   "Axes of the body: camera (z forward) or flu (x forward, y left, z up)")
+                   "Body axes: camera (z forward) or flu (x forward, y left, z up)")
       ->check(CLI::IsMember({"camera", "flu"}))
       ->capture_default_str();
   command
-      ->add_option(
-          "--time-unit", a->unit,
-          "Unit of the times of ESTIMATE[,REFERENCE]: s, ms, us, ns [by their magnitude, or "
-          "s]")
+      ->add_option("--time-unit", a->unit,
+                   "Time unit of ESTIMATE[,REFERENCE]: s, ms, us, ns [by magnitude, or s]")
       ->type_name("UNIT");
   command
-      ->add_option(
-          "--quaternion", a->quaternion,
-          "Order of the quaternion in ESTIMATE[,REFERENCE]: xyzw, wxyz [by the headings, or "
-          "xyzw]")
+      ->add_option("--quaternion", a->quaternion,
+                   "Quaternion order of ESTIMATE[,REFERENCE]: xyzw, wxyz [by headings, or xyzw]")
       ->type_name("ORDER");
   command->add_flag("--estimate-ins-extrinsics", a->estimate_ins_extrinsics,
-                    "Find how the two bodies sit to one another; compare at the estimate's. "
-                    "Without REFERENCE: the session's own INS");
+                    "Estimate lever arm and boresight of the INS");
+  command->footer(
+      "Example: vergence evaluate sessions/monday truth.tum --json\n"
+      "Exit codes: 0 success; 1 no result; 2 bad arguments or input.");
   command->callback([a, exit_code] { *exit_code = run_evaluation(evaluate_request(*a)); });
 }
 

@@ -9,8 +9,8 @@
 #include "app/commands/commands.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/session_export.hpp"
+#include "app/runtime/durable_file.hpp"
 #include "app/runtime/progress.hpp"
-#include "app/session/session_files.hpp"
 
 namespace vergence::app {
 namespace {
@@ -26,7 +26,7 @@ struct ExportArguments {
   bool quiet = false;
 };
 
-/// Of a mock the truth; else the reference that the drive was compared with.
+/// Returns the ground truth of a simulated run, else the reference of the comparison.
 Trajectory truth_of(const std::filesystem::path& session) {
   std::error_code ignored;
   for (const char* name : {"truth.tum", "reference.tum"})
@@ -69,23 +69,27 @@ ExitCode run_export(const ExportArguments& a) {
 
 void add_export(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<ExportArguments>();
-  CLI::App* command = root.add_subcommand(
-      "export", "Write a recorded session's images and truth for other programs");
-  command->add_option("SESSION", a->session, "Session folder with drive.mcap (docs/recording.md)")
+  CLI::App* command =
+      root.add_subcommand("export", "Export a recorded session as EuRoC, KITTI or image folder");
+  command
+      ->add_option("SESSION", a->session,
+                   "Session directory with drive.mcap (docs/session_files.md)")
       ->required();
-  command->add_option("--format", a->format, "Layout: euroc, kitti (rectified rigs only), folder")
+  command->add_option("--format", a->format, "Format: euroc, kitti (rectified rigs only), folder")
       ->required()
       ->check(CLI::IsMember({"euroc", "kitti", "folder"}))
       ->type_name("NAME");
-  command->add_option("--out", a->out, "Folder; must not exist or be empty")
+  command->add_option("--out", a->out, "Directory; must not exist, or be empty")
       ->required()
       ->type_name("DIR");
   command
       ->add_option("--calibration", a->calibration,
-                   "calibration.yaml that goes with the images, instead of the one that the drive "
-                   "began with; SESSION/calibration.yaml is the one it ended with")
+                   "Calibration to export (default: the initial one)")
       ->type_name("FILE");
-  command->add_flag("--quiet", a->quiet, "Say only what goes wrong");
+  command->add_flag("--quiet", a->quiet, "Print only warnings and errors");
+  command->footer(
+      "Example: vergence export sessions/monday --format euroc --out monday-euroc\n"
+      "Exit codes: 0 success; 2 bad arguments or input.");
   command->callback([a, exit_code] { *exit_code = run_export(*a); });
 }
 

@@ -78,57 +78,68 @@ ReplayRequest replay_request(const ReplayArguments& a) {
 
 void add_replay(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<ReplayArguments>();
-  CLI::App* command = root.add_subcommand(
-      "replay", "Run a recorded drive through the estimator and write a session folder");
-  command->add_option("DATA", a->data, "Folder of the data set, or a .mcap, .db3 or .bag file")
+  CLI::App* command =
+      root.add_subcommand("replay", "Run odometry on a recorded data set and write a session");
+  command->add_option("DATA", a->data, "Data-set directory, or a .mcap, .db3 or .bag file")
       ->required();
   command
       ->add_option("--format", a->format,
-                   "Layout of DATA: kitti, kitti-raw, euroc, folder, st-lucia, mcap, rosbag, db3, "
-                   "session; auto: "
-                   "by what is "
-                   "in it")
+                   "Format of DATA: auto, folder, kitti, kitti-raw, euroc, st-lucia, mcap, db3, "
+                   "rosbag, session")
       ->type_name("NAME")
-      ->capture_default_str();
-  command->add_option("--out", a->out, "Session folder; must not exist or be empty")
+      ->capture_default_str()
+      ->group("Input");
+  command->add_option("--out", a->out, "Session directory; must not exist, or be empty")
       ->required()
-      ->type_name("DIR");
-  command
-      ->add_option(
-          "--calibration", a->calibration,
-          "calibration.yaml, or a file of Kalibr, ROS or OpenCV, instead of the data set's own")
-      ->type_name("FILE");
+      ->type_name("DIR")
+      ->group("Output");
   declare_image_topics(*command, &a->topics.left, &a->topics.right);
   command
       ->add_option("--ins-topic", a->topics.ins,
-                   "Of a bag: topic of the INS, NavSatFix or Odometry, where types do not say")
-      ->type_name("TOPIC");
+                   "Bag topic of the INS (NavSatFix or Odometry), if ambiguous")
+      ->type_name("TOPIC")
+      ->group("Input");
   command
       ->add_option("--imu-topic", a->topics.imu,
-                   "Of a bag: topic of the Imu whose orientation goes with the NavSatFix")
-      ->type_name("TOPIC");
-  command->add_option("--start", a->start, "First frame, from 0")->type_name("K");
-  command->add_option("--frames", a->frames, "At most so many frames")->type_name("N");
+                   "Bag topic of sensor_msgs/Imu giving the INS attitude")
+      ->type_name("TOPIC")
+      ->group("Input");
+  command->add_option("--start", a->start, "Index of the first frame")
+      ->type_name("N")
+      ->group("Input");
+  command->add_option("--frames", a->frames, "Maximum number of frames")
+      ->type_name("N")
+      ->group("Input");
+  command
+      ->add_option("--calibration", a->calibration,
+                   "Initial calibration (vergence, Kalibr, ROS, OpenCV …)")
+      ->type_name("FILE")
+      ->group("Calibration");
   command
       ->add_option("--baseline", a->baseline,
-                   "Distance of the two cameras in metres, instead of the calibration's")
-      ->type_name("M");
+                   "Baseline length in metres; overrides the calibration")
+      ->type_name("M")
+      ->group("Calibration");
   command
       ->add_option("--focal", a->focal,
-                   "Focal length in pixels, for images without any calibration: with --baseline, "
-                   "both cameras alike; the rest is found "
-                   "from the whole drive first, "
-                   "or with --from-scratch during the drive, and written")
-      ->type_name("PX");
-  command->add_option("--model", a->model, "--focal: radtan, or equidistant for fisheye lenses")
+                   "Initial focal length of both cameras in pixels, with --baseline")
+      ->type_name("PX")
+      ->group("Calibration");
+  command
+      ->add_option("--model", a->model, "Lens model for --focal: radtan, or equidistant (fisheye)")
       ->check(CLI::IsMember({"radtan", "equidistant"}))
-      ->capture_default_str();
-  command->add_flag("--from-scratch", a->from_scratch,
-                    "Find the calibration from the drive itself: only intrinsics and the "
-                    "baseline's length are read");
-  command->add_flag("--calibrate-first", a->calibrate_first,
-                    "Calibrate from the whole drive, lenses included, then drive with what was "
-                    "found (twice the drive more)");
+      ->capture_default_str()
+      ->group("Calibration");
+  command
+      ->add_flag("--from-scratch", a->from_scratch, "Ignore known extrinsics; estimate them online")
+      ->group("Calibration");
+  command
+      ->add_flag("--calibrate-first", a->calibrate_first,
+                 "Calibrate from the whole sequence, then run (3 passes)")
+      ->group("Calibration");
+  command->footer(
+      "Example: vergence replay FOLDER --focal 458 --baseline 0.11 --out sessions/first\n" +
+      std::string(kSessionExitCodes));
   declare_session_options(*command, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {

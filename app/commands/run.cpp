@@ -43,40 +43,46 @@ RunRequest run_request(const RunArguments& a) {
 
 void add_run(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<RunArguments>();
-  CLI::App* command = root.add_subcommand("run",
-                                          "Drive: with the cameras, the trigger board and the INS "
-                                          "of a configuration, real or rendered");
+  CLI::App* command = root.add_subcommand(
+      "run", "Run live on the cameras, trigger and INS of a configuration, real or simulated");
   command
       ->add_option("CONFIG", a->configuration,
-                   "Configuration (docs/configuration.md), e.g. app/config/mock.yaml")
+                   "Configuration file (docs/configuration.md), e.g. app/config/mock.yaml")
       ->required();
-  command->add_option("--out", a->out, "Session folder; must not exist or be empty")
+  command->add_option("--out", a->out, "Session directory; must not exist, or be empty")
       ->required()
-      ->type_name("DIR");
-  command->add_flag("--fast", a->fast,
-                    "Mock: virtual time, as fast as this machine allows; nothing is dropped");
+      ->type_name("DIR")
+      ->group("Output");
   command
-      ->add_option("--fault", a->faults,
-                   "Mock: something that goes wrong, as in \"knock@42 camera=1 pitch_deg=0.2\"; as "
-                   "often as needed")
-      ->type_name("\"KIND@SECONDS …\"")
-      ->allow_extra_args(false);
-  command->add_option("--duration", a->duration_s, "End the drive after so many seconds")
-      ->type_name("S");
-  command->add_flag("--from-scratch", a->from_scratch,
-                    "Find the calibration from the drive itself: only intrinsics and the "
-                    "baseline's length are read");
-  command
-      ->add_option("--calibration", a->calibration,
-                   "calibration.yaml, or a file of Kalibr, ROS or OpenCV, to begin with, instead "
-                   "of the state file's and the "
-                   "configuration's; SIGUSR1 asks for a new one during the drive")
-      ->type_name("FILE");
+      ->add_flag("--fast", a->fast, "Simulated rig only: run faster than real time, drop nothing")
+      ->group("Simulation");
   command
       ->add_option(
-          "--record", a->record,
-          "What is recorded into drive.mcap, e.g. poses,ins,images,pulses (docs/recording.md)")
-      ->type_name("WORDS");
+          "--fault", a->faults,
+          "Simulated rig only: inject a fault, e.g. \"knock@42 pitch_deg=0.2\"; repeatable")
+      ->type_name("\"KIND@SECONDS …\"")
+      ->allow_extra_args(false)
+      ->group("Simulation");
+  command->add_option("--duration", a->duration_s, "Stop after this many seconds")
+      ->type_name("SECONDS")
+      ->group("Input");
+  command
+      ->add_flag("--from-scratch", a->from_scratch, "Ignore known extrinsics; estimate them online")
+      ->group("Calibration");
+  command
+      ->add_option("--calibration", a->calibration,
+                   "Initial calibration (vergence, Kalibr, ROS, OpenCV)")
+      ->type_name("FILE")
+      ->group("Calibration");
+  command
+      ->add_option("--record", a->record,
+                   "Record poses, ins, images or pulses to drive.mcap (docs/session_files.md)")
+      ->type_name("TOPICS")
+      ->group("Output");
+  command->footer(
+      "Example: vergence run app/config/mock.yaml --fast --out sessions/mock\n"
+      "SIGUSR1 requests a recalibration.\n" +
+      std::string(kSessionExitCodes));
   declare_session_options(*command, &a->memory, &a->page);
   a->common.declare(*command);
   command->callback([a, exit_code] {

@@ -1,9 +1,9 @@
 #include <memory>
 #include <string>
 
-#include "app/capture/snap_session.hpp"
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
+#include "app/devices/snap_session.hpp"
 
 namespace vergence::app {
 namespace {
@@ -32,29 +32,26 @@ SnapRequest snap_request(const SnapArguments& a) {
 
 void add_snap(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<SnapArguments>();
-  CLI::App* command = root.add_subcommand("snap",
-                                          "Take one picture with every camera of a configuration, "
-                                          "at the same time, and say what is wrong with them");
+  CLI::App* command =
+      root.add_subcommand("snap", "Capture synchronised test images and check them");
   command
       ->add_option("CONFIG", a->configuration,
-                   "Configuration (docs/configuration.md); of the devices only its cameras and "
-                   "trigger are used")
+                   "Configuration file; only its cameras and trigger are used")
       ->required();
   command
       ->add_option("--out", a->out,
-                   "Folder for the pictures and snap.json; must not exist or be empty")
+                   "Directory for images and snap.json; must not exist, or be empty")
       ->required()
       ->type_name("DIR");
-  command->add_option("--count", a->count, "Take so many sets, one after the other")
-      ->type_name("N");
-  command->add_option("--wait", a->wait_s, "Longest wait for a set")->type_name("S");
-  command->add_option("--set", a->set, "Set a key of the configuration; as often as needed")
+  command->add_option("--count", a->count, "Number of sets")->type_name("N");
+  command->add_option("--wait", a->wait_s, "Maximum wait for a set")->type_name("SECONDS");
+  command->add_option("--set", a->set, "Set a configuration key; repeatable")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   command->footer(
-      "Exit code: 0 done, 1 the pictures are no good (black, white, twice the same), 2 "
-      "bad arguments,\n"
-      "3 a camera is not there or sent nothing.");
+      "Example: vergence snap app/config/gige.yaml --out first\n"
+      "Exit codes: 0 success; 1 an image is unusable (black, overexposed, identical); "
+      "2 bad arguments;\n3 a camera is missing or sent nothing.");
   command->callback([a, exit_code] { *exit_code = capture_images(snap_request(*a)); });
 }
 

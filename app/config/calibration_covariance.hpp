@@ -23,7 +23,7 @@ void read_covariance(const YamlFile& file, const YAML::Node& group, CalibrationF
 
 /// Lengths grow by a factor: rows and columns of translations do.
 void scale_lengths(double factor, RigCovariance* covariance);
-/// Of where the cameras sit nothing is known any more; what is known of the lenses stays.
+/// Removes the extrinsics' covariance and keeps that of the intrinsics.
 void clear_places(RigCovariance* covariance);
 
 }  // namespace vergence::app

@@ -8,7 +8,6 @@
 #include <set>
 #include <sstream>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -145,7 +144,7 @@ std::string suggestion(const std::string& name) {
                    (why.empty() ? suggestion(entry.name) : why));
 }
 
-/// What to write instead of a keyword that the key does not have; empty if nothing is close.
+/// Suggests a keyword instead of one that the key does not have; empty if nothing is close.
 std::string value_suggestion(const std::string& value, const Key& key) {
   const std::string why = why_withdrawn(Withdrawn::Kind::value, key.name + " " + value);
   return why.empty() ? did_you_mean(value, key.words) : why;
@@ -175,7 +174,7 @@ Number parse_number(const Entry& entry, const Key& key, const char* kind) {
   return value;
 }
 
-/// What YAML 1.1 and people call on and off, as the words that a key has.
+/// Maps YAML 1.1 booleans to the keywords on and off.
 std::string as_switch(const std::string& value, const std::vector<std::string>& words) {
   const auto is_word = [&words](const char* word) {
     return std::find(words.begin(), words.end(), word) != words.end();
@@ -316,7 +315,7 @@ std::vector<Entry> with_record_as_switches(std::vector<Entry> entries) {
   return entries;
 }
 
-/// What `odometry.preset` stands for comes first: a key that is given goes before it. The last
+/// Keys of `odometry.preset` come first: a key that is given goes before it. The last
 /// preset counts; one that is none is refused with the other values.
 std::vector<Entry> with_preset(std::vector<Entry> entries) {
   const auto preset = std::find_if(entries.rbegin(), entries.rend(), [](const Entry& entry) {
@@ -365,6 +364,16 @@ Configuration load_configuration(const std::optional<std::filesystem::path>& fil
 Configuration parse_configuration(std::string_view yaml, const std::string& name,
                                   const std::vector<std::string>& set) {
   return load(YamlFile::parse(yaml, name), set);
+}
+
+std::vector<std::pair<std::string, std::string>> changed_settings(const Configuration& c) {
+  const Configuration defaults;
+  std::vector<std::pair<std::string, std::string>> changed;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys)
+      if (std::string value = to_text(key.get(c)); value != to_text(key.get(defaults)))
+        changed.emplace_back(key.name, std::move(value));
+  return changed;
 }
 
 std::string canonical_text(const Configuration& configuration) {

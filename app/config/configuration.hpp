@@ -108,13 +108,13 @@ struct KittiRawSettings {
   int left = 0, right = 1;
 };
 
-/// What the intrinsics handed to the estimator are off by, sigmas.
+/// Sigmas of the errors in the intrinsics that the estimator receives.
 struct IntrinsicsErrorSettings {
   double principal_point_px = 0, focal_percent = 0;
   std::int64_t seed = 1;
 };
 
-/// What the stereo transform handed to the estimator is off by: camera 1 as if it had been knocked,
+/// Errors of the stereo transform that the estimator receives: camera 1 as if it had been knocked,
 /// then all lengths.
 struct CalibrationErrorSettings {
   double pitch_deg = 0, yaw_deg = 0, roll_deg = 0;
@@ -139,16 +139,15 @@ struct MockSettings {
   CalibrationErrorSettings calibration_error{};
 };
 
-/// `record:` what goes into drive.mcap of a session (docs/recording.md).
+/// `record:` what goes into drive.mcap of a session (docs/session_files.md).
 struct RecordSettings {
   int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
-  double event_window_s = 0;                       // 0: everything
   int split_mb = 0;                                // 0: one file
 
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
 };
 
-/// `publish:` what others see of a running session (docs/publish.md). Empty: nothing.
+/// `publish:` what others see of a running session (docs/live_interface.md). Empty: nothing.
 struct PublishSettings {
   std::string pose_stream{};  // unix:///PATH, udp://HOST:PORT
   std::string http{};         // HOST:PORT of the live page
@@ -161,7 +160,7 @@ struct SessionsSettings {
   int quota_mb = 0;  // 0: none
 };
 
-/// `realtime:` scheduling of the drive's threads (docs/realtime.md).
+/// `realtime:` scheduling of the drive's threads (docs/deployment.md).
 struct RealtimeSettings {
   int priority = 0;        // SCHED_FIFO of the most urgent threads; 0: none
   std::string affinity{};  // processors of all but the solver, `0-1,3`; empty: any
@@ -209,9 +208,13 @@ struct Configuration {
 [[nodiscard]] Configuration load_configuration(const std::optional<std::filesystem::path>& file,
                                                const std::vector<std::string>& set);
 
-/// The same from text; `name` stands for the file in error messages.
+/// Parses a configuration from text; `name` replaces the file in error messages.
 [[nodiscard]] Configuration parse_configuration(std::string_view yaml, const std::string& name,
                                                 const std::vector<std::string>& set);
+
+/// Keys that are not at their default, with their values, in the order of docs/configuration.md.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> changed_settings(
+    const Configuration& configuration);
 
 /// Every key and its value, one `key=value` a line, ordered by key, numbers in the shortest form
 /// that reads back the same.

@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <iterator>
 #include <limits>
-#include <string>
 #include <utility>
-#include <variant>
-#include <vector>
 
 #include <fmt/format.h>
 
-#include "app/config/configuration.hpp"
 #include "app/runtime/realtime.hpp"
 
 namespace vergence::app {
@@ -59,13 +53,14 @@ class Rows {
     return *this;
   }
 
-  /// A list: one key for each number, `name.0` and so on.
+  /// A list: one key for each number, `name.0` and so on. The first one has the meaning.
   template <std::size_t N>
   Rows& numbers(const char* name, std::array<double, N> Settings::*field, double least, double most,
-                const char* unit, const std::array<const char*, N>& meanings) {
+                const char* unit, const char* meaning) {
     for (std::size_t i = 0; i < N; ++i)
       add(
-          name + ("." + std::to_string(i)), KeyType::number, least, most, unit, meanings[i],
+          name + ("." + std::to_string(i)), KeyType::number, least, most, unit,
+          i == 0 ? meaning : "The next number of that list.",
           [field, i](Settings& s, const KeyValue& v) { (s.*field)[i] = std::get<double>(v); },
           [field, i](const Settings& s) -> KeyValue { return (s.*field)[i]; });
     return *this;
@@ -196,7 +191,7 @@ Group record() {
   const std::vector<std::string> off_on{"off", "on"};
   return Rows<R>(
              "record",
-             "What is recorded into `drive.mcap` of the session (docs/recording.md). A list, "
+             "What is recorded into `drive.mcap` of the session (docs/session_files.md). A list, "
              "`record: [poses, ins, images]`, switches its words on.",
              [](auto& c) -> auto& { return c.record; })
       .choice("poses", &R::poses, off_on, "Odometry and transforms of every frame.")
@@ -205,8 +200,6 @@ Group record() {
               "All images that the estimator was given, with their cameras: what `replay --format "
               "session` needs.")
       .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
-      .number("event_window_s", &R::event_window_s, 0, 3600, "s",
-              "0: everything; else only what was so long before an event and so long after it.")
       .integer("split_mb", &R::split_mb, 0, 10'000'000, "MB",
                "Size at which a file ends and the next one begins; 0: one file.")
       .done();
@@ -215,7 +208,8 @@ Group record() {
 Group publish() {
   using P = PublishSettings;
   return Rows<P>(
-             "publish", "What others see of a running session, live or replayed (docs/publish.md).",
+             "publish",
+             "What others see of a running session, live or replayed (docs/live_interface.md).",
              [](auto& c) -> auto& { return c.publish; })
       .text("pose_stream", &P::pose_stream, 200,
             "One JSON object a frame goes there: `unix:///PATH` (a stream socket that readers "
@@ -245,7 +239,8 @@ Group realtime() {
   using R = RealtimeSettings;
   return Rows<R>(
              "realtime",
-             "Scheduling and memory of the threads of a drive (docs/realtime.md). What the system "
+             "Scheduling and memory of the threads of a drive (docs/deployment.md). What the "
+             "system "
              "refuses is said, and the drive goes on.",
              [](auto& c) -> auto& { return c.realtime; })
       .integer("priority", &R::priority, 0, 90, "",
@@ -337,10 +332,10 @@ Group cameras() {
                 "What makes it expose: `hardware`, a pulse at its input; `software`, a command "
                 "at `trigger.rate`; `free`, its own "
                 "clock. All cameras alike.")
-            .options(
-                "options", &C::options, 400,
-                "What only this kind of camera has (docs/cameras): `NAME=VALUE …`, or a group: "
-                "`{packet_size: 9000}`.")
+            .options("options", &C::options, 400,
+                     "What only this kind of camera has (drivers/*/README.md): `NAME=VALUE …`, or "
+                     "a group: "
+                     "`{packet_size: 9000}`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
                     "Time of an exposure; 8000 is daylight in the mock's world.")
             .number("trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
@@ -365,29 +360,13 @@ Group cameras() {
                 "What its lens is like: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a "
                 "fisheye lens, k1 k2 k3 k4.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
-                     {"Focal length along x of this camera's lens; all four 0: the lens is that of "
-                      "`rig.nominal`.",
-                      "Focal length along y.", "Principal point of that lens, x.",
-                      "Principal point of that lens, y."})
+                     "fx, fy, cx, cy of this camera's lens; all four 0: the lens is that of "
+                     "`rig.nominal`.")
             .numbers("distortion", &C::distortion, -2, 2, "",
-                     {"With `intrinsics`: first radial coefficient, k1.",
-                      "Second radial coefficient, k2.",
-                      "First tangential coefficient, p1; of an equidistant lens k3.",
-                      "Second tangential coefficient, p2; of an equidistant lens k4.",
-                      "Third radial coefficient, k3; an equidistant lens has none."})
-            .numbers(
-                "T_camera_left", &C::T_camera_left, -20, 20, "1, m",
-                {"Where the camera sits, X_camera = R X_left + t, as rows of [R t]: r11. All zero: "
-                 "parallel, N baselines to "
-                 "the right.",
-                 "The same transform: r12 of its rotation.",
-                 "The same transform: r13 of its rotation.", "The same transform: t1 in metres.",
-                 "The same transform: r21 of its rotation.",
-                 "The same transform: r22 of its rotation.",
-                 "The same transform: r23 of its rotation.", "The same transform: t2 in metres.",
-                 "The same transform: r31 of its rotation.",
-                 "The same transform: r32 of its rotation.",
-                 "The same transform: r33 of its rotation.", "The same transform: t3 in metres."})
+                     "With `intrinsics`: k1, k2, p1, p2, k3; of an equidistant lens k1 to k4.")
+            .numbers("T_camera_left", &C::T_camera_left, -20, 20, "1, m",
+                     "Where the camera sits, X_camera = R X_left + t, as the rows r11 r12 r13 t1, "
+                     "r21 … of [R t]. All zero: parallel, N baselines to the right.")
             .done();
     all.name = one.name;
     all.meaning = one.meaning;
@@ -429,7 +408,7 @@ Group trigger() {
              [](auto& c) -> auto& { return c.trigger; })
       .text("driver", &T::driver, 16,
             "What makes the pulses: `board`, a trigger board on a serial port "
-            "(docs/trigger_board.md); `mock`, with mock cameras; `none`: "
+            "(docs/synchronisation.md); `mock`, with mock cameras; `none`: "
             "something that reports nothing, or nothing at all.")
       .text("port", &T::port, 200,
             "Serial port of the board, `/dev/ttyACM0`, or its serial number. Empty: the only board "
@@ -468,7 +447,8 @@ Group sync() {
              "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
       .choice<SyncMode>(
           "mode", &S::mode, sync_modes(),
-          "By what images are paired, and what proves it (docs/time.md). Proven: `board`, by a "
+          "By what images are paired, and what proves it (docs/synchronisation.md). Proven: "
+          "`board`, by a "
           "trigger board's pulses; `ins_syncout`, by "
           "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE "
           "1394 cycle timer; `ptp`, stamps of one PTP "
@@ -511,11 +491,9 @@ Group ins() {
               "From a sample to its first byte on the line, as the device's manual says; it goes "
               "into every stamp.")
       .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
-               {"Where the left camera sits in the INS's body: forward.",
-                "The same place, to the left.", "The same place, upwards."})
+               "Where the left camera sits in the INS's body: forward, to the left, upwards.")
       .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",
-               {"How the rig's forward-left-up axes are turned against the INS's: roll.",
-                "The same turn, its pitch.", "The same turn, its yaw."})
+               "How the rig's forward-left-up axes are turned against the INS's: roll, pitch, yaw.")
       .done();
 }
 
@@ -559,7 +537,7 @@ Group odometry() {
       .choice("init_features", &O::init_features, {"corners", "surf"},
               "What is matched across the first images of a rig that is calibrated from scratch: "
               "the corners that are tracked anyway, or "
-              "SURF-64; docs/front_ends.md compares them.")
+              "SURF-64; docs/benchmarks.md compares them.")
       .integer("pyramid_levels", &O::pyramid_levels, 2, 6, "levels",
                "Sizes of the image that are searched, each half of the one before: more levels "
                "follow faster motion.")
@@ -759,7 +737,7 @@ Group mock() {
   using Kind = vergence::mock::DriveKind;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   return Rows<M>(
-             "mock", "The world and the vehicle of the mock drivers; see docs/mock.md.",
+             "mock", "The world and the vehicle of the mock drivers; see docs/simulated_rig.md.",
              [](auto& c) -> auto& { return c.mock; })
       .text("world", &M::world, 16, "What is driven through: `suburb`.")
       .choice("drive", &M::drive,
@@ -801,7 +779,8 @@ Group faults() {
   group.name = "faults";
   group.list = "faults.";
   group.meaning =
-      "What goes wrong in the mock, a list; docs/mock.md has the kinds and their parameters.";
+      "What goes wrong in the mock, a list; docs/simulated_rig.md has the kinds and their "
+      "parameters.";
   for (std::size_t i = 0; i < kMaxFaults; ++i)
     group.keys.push_back(
         {"faults." + std::to_string(i), KeyType::text, "", 0, 200,
@@ -828,7 +807,7 @@ const std::vector<Group>& schema() {
 
 namespace {
 
-/// What of a camera's lens would be read by nobody.
+/// Finds intrinsics of a camera that would be ignored.
 std::string find_unread_lens(const CameraSettings& camera, std::size_t k) {
   const auto given = [](double v) { return v != 0; };
   const auto& numbers = camera.intrinsics;

@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -41,8 +40,8 @@ struct Group {
 /// table in one of schema_*.cpp.
 [[nodiscard]] const std::vector<Group>& schema();
 
-/// What no single row can say (two keys that contradict each other, one that would be read by
-/// nobody): the message, empty when all is well.
+/// Finds contradictions that no single row shows (two keys that contradict each other, one that
+/// would be read by nobody): the message, empty when all is well.
 [[nodiscard]] std::string find_contradiction(const Configuration& configuration);
 
 /// The shortest text that reads back as the same value.

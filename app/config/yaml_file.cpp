@@ -143,7 +143,7 @@ void YamlFile::check_keys(const YAML::Node& map, const std::string& what,
 double YamlFile::number(const YAML::Node& node, const std::string& field) const {
   double value = 0;
   if (!node.IsScalar() || !parse_whole(node.Scalar(), &value)) {
-    // What YAML calls .nan and .inf is a number to the writer, so the message says what is wrong
+    // YAML's .nan and .inf are numbers to the writer, so the message says what is wrong
     // with it.
     double special = 0;
     if (node.IsScalar() && YAML::convert<double>::decode(node, special) && !std::isfinite(special))

@@ -19,7 +19,7 @@ namespace vergence::app {
 /// Nanoseconds as seconds with nine decimals, `-0.000000001`: the integer's digits, nothing
 /// rounded.
 [[nodiscard]] std::string format_seconds(std::int64_t ns);
-/// The same at the end of *line: no memory where the line has room.
+/// Appends to *line without allocating if the line has room.
 void append_seconds(std::string* line, std::int64_t ns);
 
 /// Without blanks, tabs and carriage returns at both ends.

@@ -65,7 +65,7 @@ class FrameDecoder {
  private:
   void work();
   [[nodiscard]] DecodedPair decode(std::size_t index);
-  /// What one image takes on its way into a slot.
+  /// Buffers for decoding one image into a slot.
   struct Workspace {
     std::vector<std::uint8_t> bytes;  // of the file
     std::vector<std::uint8_t>

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <optional>
 #include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -41,11 +40,11 @@ struct ImageSize {
 /// unreadable, not_an_image, torn
 [[nodiscard]] ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* size);
 
-/// The same of the first bytes of such a file. → ok, not_an_image, torn
+/// Reads the size from the first bytes of a file. → ok, not_an_image, torn
 [[nodiscard]] ImageFileStatus read_image_size(std::span<const std::uint8_t> head,
                                               ImageSize* size) noexcept;
 
-/// Whether a PNG, JPEG or BMP is all there. Decoders fill what is missing with grey and say
+/// Checks that a PNG, JPEG or BMP is complete. Decoders fill what is missing with grey and say
 /// nothing, and a half-grey image would be tracked as if it were the world: PNG chunks are walked
 /// to IEND with their check sums, JPEG has to end with its end marker, BMP to hold its rows. → ok,
 /// not_an_image, torn

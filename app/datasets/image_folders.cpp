@@ -307,7 +307,7 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 
 
 // ---- lists of times
 
-/// How a data set lists its times.
+/// Layout of a data set's times.
 struct Lists {
   std::optional<fs::path> shared{};              // of both cameras
   std::array<std::optional<fs::path>, 2> own{};  // of each
@@ -447,7 +447,7 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
   if (run && numbers->front() > 1 && pairs.size() == times.size())
     assumptions->push_back(
         fmt::format("images begin with number {}, that of the first time", numbers->front()));
-  // Who counts by lines has as many lines as the drive has frames, lost ones too.
+  // Without names there must be one line per frame, including lost ones.
   const bool whole = pairs.size() == times.size() && !(by_number && !run);
   if (!whole && !by_number && left == right && left == times.size()) {
     pairs = pair_in_order(*cameras);

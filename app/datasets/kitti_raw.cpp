@@ -42,7 +42,7 @@ enum Column : std::size_t {
   position_mode = 27,
 };
 
-// What the unit, an RT3003 with two antennas, is specified to: its packets have accuracies of place
+// Specified accuracy of the unit, an RT3003 with two antennas: its packets have accuracies of place
 // and velocity alone.
 constexpr double kTiltSigma = 0.03 * kRadiansPerDegree, kHeadingSigma = 0.1 * kRadiansPerDegree;
 constexpr double kHeightOverPlace =

@@ -27,7 +27,7 @@ constexpr std::array kModels{
           "opencvfisheye | kannalabrandt | kannalabrandt4 | kannalabrandt8 | kb4 |",
           CameraModelKind::pinhole_equidistant}};
 
-/// How far a principal point lies from the middle, as a part of the image.
+/// Offset of a principal point from the middle, relative to the image.
 double off_middle(double x, double y, const ImageSize& size) {
   return std::max(std::abs(x / size.width - 0.5), std::abs(y / size.height - 0.5));
 }
@@ -75,7 +75,7 @@ std::string apply_crop(const RosCrop& crop, const std::optional<ImageSize>& imag
   const ImageSize size = image && *image == own && *image != binned ? own : binned;
   if (size.width < 1 || size.height < 1) return "";
   const ToImage whole{part ? crop.x : 0.0, part ? crop.y : 0.0, bx, by};
-  // What REP 104 says goes before what would suit better by little.
+  // REP 104 takes precedence over a slightly better fit.
   constexpr double kNear = 0.15;
   const ToImage* best = &whole;
   const std::array others{ToImage{}, ToImage{0, 0, bx, by}, ToImage{whole.x, whole.y, 1, 1}};

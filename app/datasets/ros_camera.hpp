@@ -8,7 +8,7 @@
 #include "core/math/types.hpp"
 #include "core/types/calibration.hpp"
 
-/// What sensor_msgs/CameraInfo means, whether it comes in a file or in a message.
+/// Interpretation of sensor_msgs/CameraInfo from a file or a message.
 namespace vergence::app {
 
 struct RosCamera {

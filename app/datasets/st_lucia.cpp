@@ -109,7 +109,7 @@ constexpr std::array kYaws{Yaw{"from north counter-clockwise", std::numbers::pi 
                            Yaw{"a compass heading", std::numbers::pi / 2, -1},
                            Yaw{"from east counter-clockwise", 0, 1}};
 
-/// What a log's numbers mean; by default as the MTi-G has it.
+/// Axis conventions of a log; by default those of the MTi-G.
 struct Conventions {
   Mat3 enu_of_velocity{};
   const char* axes = kAxes[0].phrase;

@@ -71,7 +71,7 @@ double middle_of(std::vector<double> values) {
   return *middle;
 }
 
-/// Of times since 1970, which all begin with the same digits; nothing: these are none. A clock that
+/// Unit of times since 1970, which share their leading digits; nullopt if they do not. A clock that
 /// began when the machine did may have as many digits in a smaller unit: then its steps are those
 /// of a drive in `relative` only.
 std::optional<TimeUnit> unit_by_magnitude(std::span<const std::string_view> times,

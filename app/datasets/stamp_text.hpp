@@ -26,7 +26,7 @@ enum class TimeUnit : std::uint8_t {
 /// fraction, a Z or an offset (`+02:00`) at its end; without one it is UTC. Nothing: anything else.
 [[nodiscard]] std::optional<Stamp> parse_iso_time(std::string_view text) noexcept;
 
-/// How the times of one file are written.
+/// Time format of one file.
 struct TimeForm {
   TimeUnit unit = TimeUnit::seconds;
   bool absolute = false;  // since 1970, by the magnitude

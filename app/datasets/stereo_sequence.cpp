@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <system_error>
 
-#include "app/config/calibration_file.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/recorded_session.hpp"
@@ -42,7 +41,7 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
   refuse(folder, 0, "has no reader for its format");
 }
 
-/// What all formats have to hold, whoever gave the calibration. `source`: the file it is from.
+/// Checks common to all formats. `source`: the file it is from.
 StereoSequence checked(StereoSequence sequence, const std::filesystem::path& source,
                        const CalibrationUse& use);
 
@@ -143,7 +142,7 @@ std::string unpack_advice(const std::filesystem::path& file) {
 
 namespace {
 
-/// Of a folder with bags of both kinds those of ROS 2, in whatever order the disk lists them.
+/// A directory with bags of both kinds is read as ROS 2, in whatever order the disk lists them.
 std::optional<SequenceFormat> bag_format_within(const std::filesystem::path& folder) {
   std::optional<SequenceFormat> found;
   std::error_code ignored;

@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "app/config/calibration_file.hpp"
@@ -79,7 +78,7 @@ struct GivenCalibration {
 /// left and right.
 struct BagTopics {
   std::string left{}, right{};
-  std::string ins{};  // of NavSatFix or Odometry
+  std::string ins{};  // of NavSatFix
   std::string imu{};  // of Imu: the orientation that goes with a NavSatFix
   [[nodiscard]] bool empty() const noexcept {
     return left.empty() && right.empty() && ins.empty() && imu.empty();
@@ -91,11 +90,11 @@ struct BagTopics {
          format == SequenceFormat::db3;
 }
 
-/// Of a bag's file by the ending of its name; nothing: it is none.
+/// Returns the bag format by the file name's ending; nullopt if it is none.
 [[nodiscard]] std::optional<SequenceFormat> bag_format(const std::filesystem::path& file);
 
-/// What to do with a bag that was packed as a whole (`drive.mcap.zstd`): a phrase; empty: it was
-/// not.
+/// Returns how to unpack a bag that was compressed as a whole (`drive.mcap.zstd`): a phrase; empty:
+/// it was not.
 [[nodiscard]] std::string unpack_advice(const std::filesystem::path& file);
 
 /// The format of a folder (or a bag's file) by what is in it; nothing: none that is known.
@@ -120,10 +119,11 @@ struct BagTopics {
 ///           left camera. Without times.txt pairs are taken to be 0.1 s apart, which is a remark.
 /// st_lucia  PREFIX_MultiCamera0.log names the images in PREFIX_MultiCamera0/; paired by line, by
 ///           the left camera's stamp; raw Bayer BMP; the calibration published with the data set.
-/// mcap,     A .mcap or .bag file, or a folder with some: a bag of ROS 2 or ROS 1 (docs/bags.md);
-/// rosbag    paired by the nearest header.stamp, that of the left camera counts; CameraInfo beside
+/// mcap,     A .mcap or .bag file, or a folder with some: a bag of ROS 2 or ROS 1
+/// (docs/datasets.md); rosbag    paired by the nearest header.stamp, that of the left camera
+/// counts; CameraInfo beside
 ///           the images, and the INS.
-/// session   A session's folder with drive.mcap (docs/recording.md); the pairs that have both
+/// session   A session's folder with drive.mcap (docs/session_files.md); the pairs that have both
 ///           images, and the INS.
 ///
 /// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data

@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::string_view kBlanks = " \t\r\v\f";
 
-/// What some editors and shells write: two bytes a character, least first or last. Others than
+/// UTF-16 as some editors write it: two bytes a character, least first or last. Others than
 /// those of ASCII become question marks; no number, key or name that is read here has them.
 std::string narrowed(const std::string& wide, bool min_first) {
   std::string text;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
-/// What begins a comment, taken off; nothing: the line is none.
+/// Returns a comment without its marker; nullopt if the line is none.
 std::size_t comment_mark(std::string_view line) noexcept {
   if (line.starts_with('#') || line.starts_with('%')) return 1;
   return line.starts_with("//") ? 2 : 0;

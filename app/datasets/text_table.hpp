@@ -20,7 +20,7 @@ class TextTable {
   /// False at the end. Empty lines and comments (`#`, `%`, `//`) are passed over.
   [[nodiscard]] bool next();
   [[nodiscard]] const std::vector<std::string_view>& fields() const noexcept { return fields_; }
-  /// Of the row last given, from 1.
+  /// Number of the last row, from 1.
   [[nodiscard]] std::size_t line() const noexcept { return number_; }
   /// The row last given is the text's last and has no end of line: its writer may have stopped in
   /// it.

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 // Two decimals of a quaternion already keep its length within this; columns that are no quaternion
 // rarely do.
 constexpr double kQuaternionLength = 0.02;
-// Of R Rᵀ − I: three decimals of a matrix keep within it.
+// Tolerance of R Rᵀ − I: three decimals of a matrix stay within it.
 constexpr double kNearRotation = 5e-3;
 constexpr std::int64_t kRowStep = 100'000'000;  // ns: from row to row where a file has no times
 constexpr std::int64_t kMaxPoses = 100'000'000;
@@ -31,7 +31,7 @@ bool present(const fs::path& p) {
   return fs::exists(p, ignored);
 }
 
-/// What the numbers of a row are.
+/// Meaning of a row's numbers.
 enum class Layout : std::uint8_t { pose, matrix3x4, matrix4x4 };
 
 /// Which column is what.
@@ -234,7 +234,7 @@ Columns columns_of(const fs::path& file, const Sample& sample, std::size_t first
   return c;
 }
 
-/// Whether the file is the truth of an EuRoC data set, by its headings or its name.
+/// Returns true if the file is EuRoC ground truth, by its headings or name.
 bool is_euroc_truth(const fs::path& file, const Sample& sample) {
   return file.filename() == "data.csv" ||
          std::any_of(sample.names.begin(), sample.names.end(),

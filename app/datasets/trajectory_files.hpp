@@ -17,8 +17,8 @@
 /// or semicolons; an index may stand before the stamp; further columns are passed over. Headings
 /// tell which column is which, where there are some.
 ///
-/// Of what is read: stamps strictly ascending, at least one pose, rotations normalised. Rows with
-/// a number that is none (NaN) or a quaternion of zeros are skipped, rows that repeat a stamp
+/// Reads a trajectory: stamps strictly ascending, at least one pose, rotations normalised. Rows
+/// with a number that is none (NaN) or a quaternion of zeros are skipped, rows that repeat a stamp
 /// dropped, the order of the others is restored; all of that is counted in `remarks`. InputError
 /// with file:line: a field that is no number, a quaternion or a matrix that is no rotation, rows
 /// that are no poses, times of which most repeat one another.
@@ -44,10 +44,10 @@ struct TrajectoryFile {
   QuaternionOrder order = QuaternionOrder::xyzw;  // as read
 };
 
-/// What `evaluate` takes: a file, or a folder that stands for one. A session folder: its
+/// Reads an argument of `evaluate`: a file or a directory. A session folder: its
 /// trajectory.tum; a data set of KITTI or EuRoC: its truth.
 ///
-/// Of a KITTI file without times they are looked for beside it (times.txt, or the benchmark's tree
+/// Times of a KITTI file are read from files next to it (times.txt, or the benchmark's tree
 /// sequences/NN). The truth of an EuRoC data set, told by its place or its headings, is that of the
 /// body: it is brought to the left camera by the cam0/sensor.yaml beside it, T_R_left = T_R_B ·
 /// T_BS.
@@ -55,7 +55,7 @@ struct TrajectoryFile {
                                                   const TrajectoryOptions& options = {});
 /// Its poses.
 [[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& path);
-/// The same of one file, whatever lies beside it.
+/// Reads one file without files next to it.
 [[nodiscard]] Trajectory read_tum(const std::filesystem::path& file);
 
 /// KITTI's twelve numbers a line, T_world_left row by row; line k belongs to times[k].

@@ -1,14 +1,11 @@
 #include "app/devices/drive_devices.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
 #include "app/devices/drive_sync.hpp"
-#include "app/devices/mock_drive.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "drivers/clock.hpp"
@@ -22,7 +19,7 @@ bool all_mock(const Configuration& c) {
   });
 }
 
-/// What real devices need of a configuration before any of them is opened.
+/// Checks that a configuration suits real devices before opening them.
 std::vector<CameraRequest> requests_of(const Configuration& c) {
   std::vector<CameraRequest> requests;
   const int cameras = nominal_rig(c).cameras;

@@ -34,7 +34,7 @@ class DriveDevices {
     return trigger_;
   }  // null: pulses come from elsewhere, or none
   [[nodiscard]] const SyncOptions& sync() const noexcept { return sync_; }
-  /// What an acquisition has to know of these devices; the rest as it stands.
+  /// Options of an acquisition of these devices; the rest are defaults.
   [[nodiscard]] Acquisition::Options acquisition_options() const;
   /// The driver of a board on a line; null: there is none.
   [[nodiscard]] const trigger_board::Device* board() const noexcept { return board_.get(); }
@@ -49,7 +49,7 @@ class DriveDevices {
   [[nodiscard]] HostStamp start() const noexcept;
   /// Rig frames of the whole drive; 0: nobody knows.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
-  /// Of a mock; real cameras do not tell.
+  /// Image memory of simulated cameras; unknown for real ones.
   [[nodiscard]] std::size_t image_bytes() const noexcept {
     return mock_.rig ? mock_.rig->image_bytes() : 0;
   }

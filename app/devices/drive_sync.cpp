@@ -7,7 +7,6 @@
 #include <cmath>
 #include <exception>
 #include <string>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -231,7 +230,7 @@ void check_exposures(const Configuration& c, int cameras) {
   });
 }
 
-/// What its stamps have where nothing is said: the V4L2 kernel stamps by the host's clock, the
+/// Default stamp jitter: the V4L2 kernel stamps by the host's clock, the
 /// others have their own.
 Duration jitter_of(const CameraSettings& s) {
   constexpr double kOwnClock = 20, kHostClock = 1000;  // µs

@@ -59,22 +59,22 @@ class SoftwareTrigger final : public TriggerDevice {
   std::thread thread_;
 };
 
-/// How the images are paired. Checks that the devices of the configuration can do what `sync.mode`
-/// needs.
+/// Returns the pairing options. Checks that the devices of the configuration can do what
+/// `sync.mode` needs.
 [[nodiscard]] SyncOptions sync_options(const Configuration& configuration, int cameras);
 
-/// What real devices say beyond the configuration. `trigger`: pulses are started by us.
+/// Adapts the options to the properties of real devices. `trigger`: pulses are started by us.
 void fit_to_devices(const Configuration& configuration, const std::vector<DeviceTiming>& cameras,
                     bool trigger, SyncOptions* options);
 
 /// The INS can make pulses of trigger.rate, and tells of each.
 void check_sync_out(const Configuration& configuration, const DeviceInfo& ins);
 
-/// What the board is asked for.
+/// Requested configuration of the trigger board.
 [[nodiscard]] TriggerConfiguration trigger_configuration(const Configuration& configuration,
                                                          int cameras);
 
-/// What proves the pairing, or that nothing does: for events and reports.
+/// Describes how the pairing is verified, for events and reports.
 [[nodiscard]] const char* proof_message(SyncMode mode) noexcept;
 
 }  // namespace vergence::app

@@ -15,7 +15,7 @@
 
 namespace vergence::app {
 
-/// Of a drive; exact once nobody waits for frames any more and settle() was called.
+/// Counters of a run; exact after the last wait for frames and settle().
 struct ExposureCounters {
   std::uint64_t changes = 0;  // asked of the cameras
   std::uint64_t refused = 0;  // by a camera that was gone, or could not
@@ -67,7 +67,7 @@ class ExposureControl {
   exposure::ExposureController controller_;
   const bool at_once_;
 
-  // Of the thread that waits for frames.
+  // Used by the thread that waits for frames.
   bool asked_ = false;                             // and not yet seen as done
   std::array<int, kMaxCameras> frames_without_{};  // in a row
 

@@ -11,7 +11,7 @@
 /// From the configuration to the mock's rig. All of it throws InputError naming the key.
 namespace vergence::app {
 
-/// Whether a drive with these devices is possible at all.
+/// Checks that a run with these devices is possible.
 void check_drive(const Configuration& configuration);
 
 struct MockDrive {
@@ -24,7 +24,7 @@ struct MockDrive {
                                         const std::vector<std::string>& faults, bool real_time,
                                         std::optional<double> duration_s, bool raw = false);
 
-/// What the stamps of the drive are multiples of: with `mock.pattern: gbrg` whole microseconds,
+/// Resolution of the session's stamps: with `mock.pattern: gbrg` whole microseconds,
 /// which a St Lucia log can hold.
 [[nodiscard]] Duration stamp_grid(const Configuration& configuration) noexcept;
 

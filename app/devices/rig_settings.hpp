@@ -18,7 +18,7 @@ namespace vergence::app {
 /// one baseline apart.
 [[nodiscard]] RigCalibration mounted_rig(const Configuration& configuration);
 
-/// What the estimator is given of it: the mounted rig, for a mock with the errors of
+/// Calibration of the rig for the estimator: the mounted rig, for a mock with the errors of
 /// `mock.intrinsics_error` and `mock.calibration_error`. `baseline` is the length that somebody
 /// measured.
 [[nodiscard]] RigCalibration nominal_rig(const Configuration& configuration);
@@ -33,7 +33,7 @@ namespace vergence::app {
 /// `exposure:` as the controller takes it. InputError names the keys that do not go together.
 [[nodiscard]] exposure::ExposureOptions exposure_options(const Configuration& configuration);
 
-/// What camera k begins with: its own; where exposures are controlled camera 0's, inside the
+/// Initial exposure of camera k: its own; where exposures are controlled camera 0's, inside the
 /// bounds, for all alike.
 [[nodiscard]] ExposureSetting starting_exposure(const Configuration& configuration, std::size_t k);
 

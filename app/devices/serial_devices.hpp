@@ -72,7 +72,7 @@ struct InsDriverRow {
     const TriggerSettings& settings, const TriggerConfiguration& pulses,
     std::vector<std::string>* remarks);
 
-/// What the driver needs to know of a board of this configuration.
+/// Driver options of a trigger board of this configuration.
 [[nodiscard]] trigger_board::Options trigger_board_options(const TriggerSettings& settings);
 
 /// A board for a message: `trigger (board 3000…, on /dev/ttyACM0)`.

@@ -27,7 +27,7 @@ constexpr int kBacklog = 1024;
 constexpr int kSendBuffer =
     256 * 1024;  // bytes: a slow viewer sees the newest, not the last minute
 
-/// What a browser may do with anything from here: nothing but what the page itself holds.
+/// Content security policy: nothing but the page's own content.
 constexpr std::array<std::pair<const char*, const char*>, 6> kHeaders{{
     {"Connection", "close"},
     {"Cache-Control", "no-store"},

@@ -15,7 +15,7 @@ struct MHD_Daemon;
 
 namespace vergence::app {
 
-/// What the live page needs of a request's head.
+/// Fields of a request's head that the live page uses.
 struct HttpRequest {
   std::string_view method{}, path{};  // path without the query
   std::string_view token{};           // of the header X-Vergence-Token, or the query `token=`
@@ -90,7 +90,7 @@ class HttpServer {
   void flush(std::chrono::milliseconds timeout);
 
  private:
-  /// Who reads the stream of events. The library asks for its bytes, and sleeps while there are
+  /// Reader of the event stream. The library asks for its bytes, and sleeps while there are
   /// none.
   struct Viewer {
     HttpServer* server = nullptr;

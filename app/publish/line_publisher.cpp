@@ -151,7 +151,9 @@ std::string LinePublisher::answer(std::string_view request) {
   if (name != "recalibrate")
     return response_line(name, false,
                          R"(unknown request; the only one is {"request": "recalibrate"})");
-  if (!started_.load(std::memory_order_acquire) || !start_.can_recalibrate)
+  if (!started_.load(std::memory_order_acquire))
+    return response_line(name, false, "the session has not begun yet; ask again when poses come");
+  if (!start_.can_recalibrate)
     return response_line(name, false,
                          "this session does not recalibrate on request; use a live session with "
                          "calibration.online: on");

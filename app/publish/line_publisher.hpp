@@ -20,9 +20,9 @@
 
 namespace vergence::app {
 
-/// `publish.pose_stream`: the pose stream to robots and bridges (docs/publish.md). A line per
-/// frame, the calibration and the alignment when a reader connects and when they change, a status
-/// per second.
+/// `publish.pose_stream`: the pose stream to robots and bridges (docs/live_interface.md). A line
+/// per frame, the calibration and the alignment when a reader connects and when they change, a
+/// status per second.
 ///
 /// Threads  on_…(): the estimator's, which pushes into rings and wakes; no lock, no system call
 ///          but the wake. Formatting, sending and requests: a thread of its own, made by the
@@ -69,7 +69,7 @@ class LinePublisher final : public SessionObserver {
   SessionStart start_{};  // published by started_
   std::atomic<bool> started_{false}, stop_{false};
 
-  // Of the estimator's thread.
+  // Used by the estimator's thread only.
   LiveFrameBuilder builder_;
   // From it to the publisher's.
   Ring<LiveFrame, 64> frames_;
@@ -82,7 +82,7 @@ class LinePublisher final : public SessionObserver {
 
   std::atomic<double> age_p99_ms_{-1};
 
-  // Of the publisher's thread.
+  // Used by the publisher's thread only.
   std::optional<PublishedEnuAlignment> alignment_{};
   std::optional<LiveFrame> newest_{};
   std::string calibration_line_{}, alignment_line_{};

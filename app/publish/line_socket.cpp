@@ -25,7 +25,7 @@ namespace vergence::app {
 
 namespace {
 
-/// What another computer may know this machine by.
+/// Names of this machine for other computers.
 std::string machine_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 && name[0] != 0 ? name.data()
@@ -216,7 +216,7 @@ class UnixLineSocket final : public LineSocket {
     return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -1;
   }
 
-  /// What waits for the reader, as far as it has room: the rest of a line, then a greeting.
+  /// Sends pending data as far as the reader has room: the rest of a line, then a greeting.
   void flush(HostStamp now, Reader* reader) noexcept {
     while (!reader->rest.empty() || !reader->greeted) {
       if (reader->rest.empty()) {

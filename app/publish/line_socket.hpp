@@ -19,7 +19,7 @@ struct HostPort {
   [[nodiscard]] bool loopback() const;
   /// As it stands in a URL: brackets around an IPv6 address.
   [[nodiscard]] std::string text() const;
-  /// What a viewer opens: where the host is every address (0.0.0.0, ::), this machine's name.
+  /// Address for viewers: the machine's name if the host is every address (0.0.0.0, ::).
   [[nodiscard]] HostPort link() const;
 };
 
@@ -38,7 +38,7 @@ struct LineAddress {
 /// `key`.
 [[nodiscard]] LineAddress parse_line_address(std::string_view text, std::string_view key);
 
-/// What became of the lines at the socket.
+/// Counters of the lines at the socket.
 struct LineSocketCounters {
   std::uint64_t sent = 0;     // lines that a reader was given, each reader counted
   std::uint64_t refused = 0;  // lines that a reader had no room for, or nobody listened to (UDP)

@@ -79,7 +79,7 @@ class LiveImages {
 /// RFC 4648.
 [[nodiscard]] std::string base64(std::string_view bytes);
 
-/// `publish.http`: the live page (docs/publish.md).
+/// `publish.http`: the live page (docs/live_interface.md).
 ///
 /// Threads  on_…(): the estimator's, which pushes into rings and, when a viewer waits for a
 ///          picture, copies rows of two images; no lock, no system call. Everything else: a thread
@@ -145,7 +145,7 @@ class LivePage final : public SessionObserver {
   std::atomic<bool> started_{false}, ended_{false}, stop_{false};
   SessionStart start_{};  // published by started_
 
-  // Of the page's thread.
+  // Used by the page's thread only.
   LiveState state_;
   bool begun_ = false;
   HttpServer server_;

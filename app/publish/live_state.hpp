@@ -48,7 +48,7 @@ class LiveTrail {
   std::size_t shown_ = 0;  // places that a viewer has as they are
 };
 
-/// What the live page shows, kept so that a viewer who comes late sees the whole drive.
+/// State of the live page, kept so that a late viewer sees the whole session.
 ///
 /// Threads  One. Memory  Bounded: the trail is thinned when it is full, of events and calibrations
 ///          the newest stay.
@@ -66,7 +66,7 @@ class LiveState {
 
   /// All there is to know, for a viewer who has just come. `now` tells whether frames still come.
   [[nodiscard]] std::string hello(HostStamp now) const;
-  /// What is new since the last call, for the others. `line_age_ms`: of the pose lines, 99th
+  /// Changes since the last call, for connected viewers. `line_age_ms`: of the pose lines, 99th
   /// percentile; negative: none.
   [[nodiscard]] std::string update(HostStamp now, double line_age_ms);
 

@@ -11,7 +11,7 @@
 #include "drivers/ins.hpp"
 
 /// Lines of the pose stream: JSON objects, each with a `type` and followed by a line feed.
-/// docs/publish.md is their schema.
+/// docs/live_interface.md is their schema.
 namespace vergence::app {
 
 inline constexpr int kPoseStreamVersion = 2;

@@ -9,7 +9,7 @@
 
 namespace vergence::app {
 
-/// `publish:` of the configuration: what others see of a running session (docs/publish.md).
+/// `publish:` of the configuration: what others see of a running session (docs/live_interface.md).
 ///
 /// Ownership  Outlives the session that its observers are given to.
 /// Threads    One each for lines and page, begun here. Memory: theirs, taken here.

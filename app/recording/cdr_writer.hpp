@@ -87,7 +87,7 @@ class CdrWriter {
     for (const T& v : values) put(v);
     return *this;
   }
-  /// How many items of a sequence follow.
+  /// Writes the number of items of a sequence.
   CdrWriter& count(std::size_t items) noexcept { return put(static_cast<std::uint32_t>(items)); }
   CdrWriter& raw(std::span<const std::uint8_t> bytes) noexcept {
     out_.bytes(bytes.data(), bytes.size());

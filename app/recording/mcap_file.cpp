@@ -15,7 +15,7 @@ namespace vergence::app {
 
 namespace {
 
-/// What says that it is asked in vain (a pipe, an old file system), not that something is lost.
+/// Errors that mean "not supported" (a pipe, an old file system), not data loss.
 bool cannot_write_back(int error) noexcept {
   return error == ESPIPE || error == EINVAL || error == ENOSYS;
 }

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -15,7 +14,7 @@
 
 namespace vergence::app {
 
-/// What a recording asks of the file system; tests put a disk that is full, gone or slow in its
+/// File-system interface of a recording; tests put a full, missing or slow disk in its
 /// place.
 ///
 /// Threads  One. Memory  None. Errors  Negative errno values; nothing throws.
@@ -45,7 +44,7 @@ class Disk {
 /// The system's.
 [[nodiscard]] Disk& system_disk() noexcept;
 
-/// What messages are of: a Schema and a Channel record, the ids of both its place in the list
+/// Type of messages: a Schema and a Channel record, the ids of both its place in the list
 /// plus 1.
 struct McapTopic {
   std::string topic;
@@ -64,7 +63,7 @@ struct McapMessageHead {
   std::uint64_t content = 0;   // bytes
 
   void write(std::span<std::uint8_t, kSize> out) const noexcept;
-  /// Of a record that write() began.
+  /// Reads the head of a record that write() began.
   [[nodiscard]] static McapMessageHead read(std::span<const std::uint8_t, kSize> in) noexcept;
   [[nodiscard]] std::size_t record_size() const noexcept {
     return kSize + static_cast<std::size_t>(content);
@@ -113,11 +112,9 @@ class McapFile {
   [[nodiscard]] bool open() const noexcept { return fd_ >= 0; }
   /// The index has no room for another chunk.
   [[nodiscard]] bool full() const noexcept { return chunks_.size() == kMaxChunks; }
-  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }          // bytes that are good
-  [[nodiscard]] std::uint64_t first_time() const noexcept { return first_; }  // ns; of the messages
-  [[nodiscard]] std::uint64_t last_time() const noexcept { return last_; }
+  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }  // bytes that are good
 
-  /// What the system had taken and then could not bring to the disk.
+  /// Data accepted by the system and then not written to the disk.
   struct Unwritten {
     int error = 0;               // negative errno, the first one; 0: nothing is missing
     std::uint64_t messages = 0;  // of the chunks that the failure may have touched

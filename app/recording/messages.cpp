@@ -3,7 +3,6 @@
 #include <libdeflate.h>
 
 #include <algorithm>
-#include <array>
 #include <set>
 #include <vector>
 
@@ -19,7 +18,7 @@ void put_quaternion(CdrWriter* out, const Mat3& R) noexcept {
   out->put(q.x()).put(q.y()).put(q.z()).put(q.w());
 }
 
-/// Of geometry_msgs/Pose and geometry_msgs/Transform.
+/// Fields of geometry_msgs/Pose and geometry_msgs/Transform.
 void put_pose(CdrWriter* out, const Transform& T) noexcept {
   put_vector(out, T.t);
   put_quaternion(out, T.R);
@@ -38,13 +37,13 @@ std::array<double, 36> full_matrix(const Covariance6& upper) noexcept {
   return full;
 }
 
-/// Of all that was written so far.
+/// Checksum of everything written so far.
 void put_crc(CdrWriter* out) noexcept {
   const auto bytes = out->written();
   out->put(crc32_of(bytes));
 }
 
-/// What rectifies a pair: x along the baseline, z between the optical axes. R maps from a camera
+/// Rectification of a pair: x along the baseline, z between the optical axes. R maps from a camera
 /// into the axes common to both.
 struct Rectification {
   Mat3 R = Mat3::Identity();
@@ -52,7 +51,7 @@ struct Rectification {
   double baseline_x = 0;             // m: 0 for the left camera, −|baseline| for the other
 };
 
-/// Of `camera` as half of the pair that it makes with camera 0; camera 0 itself is that with
+/// Rectification of `camera` in the pair with camera 0; camera 0 itself is that with
 /// camera 1.
 Rectification rectification(const RigCalibration& rig, int camera, bool calibrated) noexcept {
   const auto& lenses = rig.intrinsics;
@@ -279,7 +278,7 @@ constexpr std::array kDefinitions{
                "std_msgs/Header header\ngeometry_msgs/PoseWithCovariance pose\n"},
     Definition{"diagnostic_msgs/DiagnosticArray",
                "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"},
-    // What one call of the estimator was given and what came of it: all that a replay needs beside
+    // Input and result of one estimator call: everything that a replay needs besides
     // the images. `crc` is the CRC-32 of the message's bytes before it, `image_crc` that of pixels.
     Definition{"vergence_msgs/Frame",
                "std_msgs/Header header\nuint64 number\nint64 stamp_ns\nint64 stamp_error_ns\n"
@@ -303,7 +302,7 @@ constexpr std::array kDefinitions{
                "int64 arrival_host_ns\nbool resumed\nuint8 exposures_seen\n"
                "int64[] exposure_start_ns\nint64[] exposure_end_ns\nbool mapped\n"
                "int64 edge_ns\nint64 edge_error_ns\n"},
-    // What those are made of.
+    // Definitions of the parts of those.
     Definition{"diagnostic_msgs/DiagnosticStatus",
                "byte level\nstring name\nstring message\nstring hardware_id\n"
                "diagnostic_msgs/KeyValue[] values\n"},

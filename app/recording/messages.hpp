@@ -31,7 +31,7 @@ inline constexpr std::size_t kMessageRoom = 1024;
 /// sensor_msgs/Image, mono8, rows without padding.
 void write_image(CdrWriter* out, Stamp stamp, std::string_view frame,
                  const ImageView& image) noexcept;
-/// What write_image() takes.
+/// Size of a message of write_image().
 [[nodiscard]] constexpr std::size_t image_message_size(int width, int height,
                                                        std::size_t frame) noexcept {
   return 64 + frame + static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -107,7 +107,7 @@ struct DiagnosticMessage {
 void write_diagnostics(CdrWriter* out, Stamp stamp,
                        std::span<const DiagnosticMessage> diagnostics) noexcept;
 
-/// What one call of the estimator was given beside the images, and what came of it.
+/// Input of one estimator call apart from the images, and its result.
 struct FrameRecord {
   std::uint64_t number = 0;
   Stamp stamp{};

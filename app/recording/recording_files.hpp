@@ -1,5 +1,4 @@
 #pragma once
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -95,7 +94,7 @@ class RecordingFiles {
   Disk& disk_;
   McapFile file_;
 
-  // Of the writer's thread.
+  // Used by the writer's thread only.
   int number_ = 0;             // of the file at hand
   bool several_ = false;       // files have numbers
   bool preamble_due_ = false;  // of the file at hand

@@ -7,7 +7,7 @@
 
 namespace vergence::app {
 
-/// What a replay has to know of a session before its first frame: at the beginning of every file
+/// Session data that a replay needs before its first frame: at the beginning of every file
 /// of a recording, JSON in a std_msgs/String.
 struct SessionDescription {
   static constexpr int kVersion = 1;

@@ -1,5 +1,4 @@
 #pragma once
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -9,7 +8,7 @@
 
 namespace vergence::app::report {
 
-/// What the errors of the page are differences to.
+/// Reference of the errors on the page.
 enum class ErrorSource : std::uint8_t {
   none,       // there is no reference: no errors
   ins,        // errors of poses.csv, after the alignment on the earth
@@ -43,7 +42,7 @@ struct Analysis {
   std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0;  // frames
   std::size_t skipped = 0;             // without a summary those that are missing by their numbers
   std::vector<std::size_t> by_reason;  // frames that were not ok, by Session::reasons
-  // Of the degraded ones, and of by_reason: without another fault than that the drive had not yet
+  // Degraded frames, also counted in by_reason, whose only fault was that the run had not yet
   // found or confirmed its calibration. A drive is not judged by that wait.
   std::size_t waited = 0;
   std::vector<std::size_t> waited_by_reason;

@@ -11,7 +11,7 @@
 
 namespace vergence::app::report {
 
-/// What the word of a pose's reason, or the kind of an event of a frame that was skipped, asks of
+/// Advice for a pose's reason or the kind of a skipped frame's event, addressed to
 /// the user.
 struct Advice {
   std::string_view word;  // of poses.csv or events.jsonl
@@ -28,7 +28,7 @@ struct Advice {
 enum class Grade : std::uint8_t { good, care, bad };
 [[nodiscard]] const char* to_words(Grade) noexcept;  // "Good", "Usable with care", "Do not use"
 
-/// What a field engineer reads first. Every reason that moved the grade is there, the worst first;
+/// Result shown first in the report. Every reason that moved the grade is there, the worst first;
 /// a session without any is good.
 struct Assessment {
   Grade grade = Grade::good;

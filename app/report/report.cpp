@@ -40,13 +40,12 @@ ReportOutcome write_report(const std::filesystem::path& session_folder) {
 std::array<std::string, 3> closing_lines(const ReportOutcome& outcome, const std::string& failure) {
   if (!failure.empty())
     return {"result: not known, there is no report",
-            "to do: mend what keeps the report from being written, then vergence report SESSION",
+            "to do: fix what prevents writing the report, then run vergence report SESSION",
             "report: " + failure};
   const std::string why = outcome.reasons.empty() ? outcome.headline
                           : outcome.usable ? outcome.grade + ": " + first_of(outcome.reasons, "")
                                            : "do not use these poses: " + outcome.main_reason;
-  return {"result: " + why,
-          "to do: " + first_of(outcome.advice, "nothing, these poses can be used as they are"),
+  return {"result: " + why, "to do: " + first_of(outcome.advice, "nothing"),
           "report: " + outcome.page.string()};
 }
 

@@ -6,7 +6,7 @@
 
 namespace vergence::app {
 
-/// What became of a page.
+/// Result of writing a report.
 struct ReportOutcome {
   std::filesystem::path page;  // SESSION/report.html
   std::string headline;        // "Good", "Usable with care", "Do not use", and why, in one message

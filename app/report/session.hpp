@@ -23,8 +23,7 @@ namespace vergence::app::report {
 /// length. What follows the last line's end is left out: a killed writer leaves it, and a number
 /// cut in the middle looks like another one.
 ///
-/// Memory  A block, or the longest line; of a line beyond kLongestLine some bytes are lost, so that
-///         it is a damaged one.
+/// Memory  The longest line; one beyond kLongestLine is passed over.
 /// Errors  The constructor throws InputError: not there, no file, not readable.
 class FileLines {
  public:
@@ -39,12 +38,8 @@ class FileLines {
   [[nodiscard]] bool failed() const noexcept { return in_.bad(); }
 
  private:
-  [[nodiscard]] bool next_whole(std::string_view* line);
-  [[nodiscard]] bool read_block();
-
   std::ifstream in_;
-  std::string read_{};  // and not given yet, from at_ on
-  std::size_t at_ = 0;
+  std::string line_{};
   bool begun_ = false, torn_ = false;
 };
 
@@ -63,14 +58,13 @@ class CsvRows {
   /// False at the end.
   [[nodiscard]] bool next();
 
-  /// Of the row last given. Empty where the column does not exist.
+  /// Field of the last row; empty if the column does not exist.
   [[nodiscard]] std::string_view text(std::optional<std::size_t> column) const noexcept;
   /// Nothing: empty, or not one finite number.
   [[nodiscard]] std::optional<double> number(std::optional<std::size_t> column) const noexcept;
   [[nodiscard]] std::optional<std::int64_t> integer(
       std::optional<std::size_t> column) const noexcept;
 
-  [[nodiscard]] bool has_head() const noexcept { return !names_.empty(); }
   [[nodiscard]] std::size_t torn_rows() const noexcept { return torn_; }
 
  private:
@@ -118,8 +112,8 @@ struct CalibrationRow {
   std::array<double, 6> value{};  // rotation vector, rad; translation, m
   std::array<double, 6> sigma{};  // the wide one, else the noise's; meaningless without has_sigma
   bool has_sigma = false;
-  // What the drive had measured of the depth by then: at which distance, its sigma, and how far off
-  // what was in use is by it.
+  // Depth measured online by then: its distance, its sigma, and the error
+  // of the calibration in use.
   double reference_depth_m = kNone, depth_sigma_percent = kNone, depth_error_percent = kNone;
 };
 
@@ -169,9 +163,9 @@ inline constexpr std::size_t kLongestText =
 /// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no
 /// number.
 [[nodiscard]] std::optional<double> number_at(const nlohmann::json& json, std::string_view path);
-/// The same for true and false.
+/// Reads a boolean at a path.
 [[nodiscard]] std::optional<bool> flag_at(const nlohmann::json& json, std::string_view path);
-/// The same for texts, cut at kLongestText.
+/// Reads a text at a path, cut at kLongestText.
 [[nodiscard]] std::string text_at(const nlohmann::json& json, std::string_view path);
 
 }  // namespace vergence::app::report

@@ -44,13 +44,13 @@ using Line = std::vector<Point>;
 /// Places on an axis: multiples of 1, 2 or 5 times a power of ten, at most `most` of them, all
 /// within [low, high].
 [[nodiscard]] std::vector<double> nice_ticks(double low, double high, int most);
-/// The same for seconds: steps of whole minutes and hours beyond a minute.
+/// Ticks in seconds: steps of whole minutes and hours beyond a minute.
 [[nodiscard]] std::vector<double> time_ticks(double low, double high, int most);
 /// A tick's number with as many decimals as its distance to the next needs.
 [[nodiscard]] std::string tick_label(double value, double step);
 /// Seconds as `8`, `1:05`, `2:03:00`; below a minute with the decimals that `step` needs.
 [[nodiscard]] std::string time_label(double seconds, double step);
-/// The same with its unit: `8 s`, `1:05 min`, `2:03:00 h`, `139 days`.
+/// Duration with its unit: `8 s`, `1:05 min`, `2:03:00 h`, `139 days`.
 [[nodiscard]] std::string duration_text(double seconds, double step);
 
 enum class Anchor : std::uint8_t { start, middle, end };

@@ -7,7 +7,7 @@
 
 namespace vergence::app::ros2 {
 
-/// A reader of the pose stream's Unix socket (docs/publish.md).
+/// A reader of the pose stream's Unix socket (docs/live_interface.md).
 ///
 /// Threads  Not thread-safe: call from one thread. Nothing waits.
 /// Memory   One line of at most kMaxLine bytes; a longer one closes the connection.

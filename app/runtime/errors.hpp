@@ -4,7 +4,7 @@
 
 namespace vergence::app {
 
-/// What the program exits with (DESIGN §6).
+/// Exit codes of the program (DESIGN §6).
 enum class ExitCode : int {
   done = 0,
   not_usable = 1,

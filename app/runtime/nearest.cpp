@@ -1,6 +1,5 @@
 #include "app/runtime/nearest.hpp"
 
-#include <algorithm>
 #include <array>
 
 namespace vergence::app {
@@ -64,6 +63,9 @@ constexpr std::string_view kNoLine =
 constexpr std::array kTable{
     Withdrawn{Kind::key, "ins.sync_in",
               "SyncIn stays as the device has it; set it with the maker's program"},
+    Withdrawn{
+        Kind::key, "record.keep_s",
+        "recordings are whole; record.roll_mb ends files, sessions.quota_mb removes sessions"},
     Withdrawn{Kind::key, "mock.ins_line", kNoLine},
     Withdrawn{Kind::key, "mock.ins_latency_timer_ms", kNoLine},
     Withdrawn{Kind::key, "mock.ins_late_percent", kNoLine},
@@ -100,10 +102,12 @@ constexpr std::array kTable{
               "device bytes are no longer recorded; images and ins hold all that a replay reads"},
     Withdrawn{Kind::key, "record.image_format", "images are recorded as they are"},
     Withdrawn{Kind::key, "record.memory_mb", "six seconds of images wait for the disk"},
-    Withdrawn{Kind::option, "run --also",
-              "poses.csv has latitude, longitude and height of every frame; see docs/session.md"},
-    Withdrawn{Kind::option, "replay --also",
-              "poses.csv has latitude, longitude and height of every frame; see docs/session.md"},
+    Withdrawn{
+        Kind::option, "run --also",
+        "poses.csv has latitude, longitude and height of every frame; see docs/session_files.md"},
+    Withdrawn{
+        Kind::option, "replay --also",
+        "poses.csv has latitude, longitude and height of every frame; see docs/session_files.md"},
     Withdrawn{Kind::option, "replay --distortion",
               "--focal finds the lenses from the drive; coefficients stand in a calibration.yaml"},
     Withdrawn{Kind::option, "replay --through-devices",

@@ -11,7 +11,7 @@
 
 namespace vergence::app {
 
-/// The same names, each once: what makes topics or files of them would put two cameras into one.
+/// Returns the names with duplicates numbered, so that topics and files of two cameras differ.
 /// `left`, `left` → `left`, `left_1`.
 [[nodiscard]] inline std::vector<std::string> distinct_names(
     const std::vector<std::string>& names) {

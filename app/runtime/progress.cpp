@@ -150,7 +150,7 @@ void Progress::redraw(const std::string& whole) {
   columns_ = columns;
 }
 
-/// What takes the line off the terminal.
+/// Escape sequence that erases the line.
 std::string Progress::wiped() const {
   return columns_ > 0 ? '\r' + std::string(columns_, ' ') + '\r' : "";
 }

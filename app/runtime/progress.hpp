@@ -11,7 +11,7 @@
 
 namespace vergence::app {
 
-/// What the progress line tells; what is not set is left out.
+/// Content of the progress line; unset fields are omitted.
 struct ProgressState {
   std::string_view state{};             // `stereo`
   std::uint64_t frame = 0;              // done so far

@@ -13,7 +13,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -34,13 +33,13 @@ constexpr std::array<std::pair<std::string_view, ThreadRole>, 14> kRoles{{
     {"vergence-front", ThreadRole::estimator},
     {"vergence-ins", ThreadRole::ins},
     {"vergence-calib", ThreadRole::solver},
-    // What renders a drive instead of cameras, or reads one instead of them, is no part of it.
+    // Threads that render or read images in place of cameras have no priority.
     {"vergence-mock", ThreadRole::other},
     {"vergence-decode", ThreadRole::other},
     {"vergence-right", ThreadRole::other},
 }};
 
-/// Whether RLIMIT_MEMLOCK binds this program.
+/// Returns true if RLIMIT_MEMLOCK limits this program.
 bool memory_limited() noexcept {
   rlimit limit{};
   if (::getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY) return false;

@@ -27,7 +27,7 @@ struct ProcessThread {
 /// thread that has just begun may still have its creator's name.
 void process_threads(std::vector<ProcessThread>* threads);
 
-/// How urgent a thread is, by its name (docs/realtime.md has the table).
+/// Real-time role of a thread, by its name (docs/deployment.md has the table).
 enum class ThreadRole : std::uint8_t {
   capture,     // cameras, trigger, synchroniser: short, and never late
   estimator,   // and its worker

@@ -22,7 +22,7 @@ class ServiceManager {
   /// longer than the watchdog's interval and the unit's TimeoutStopSec: signs of life that ask for
   /// more time go out until the end, ten minutes at most.
   void stopping() noexcept;
-  /// How a loop does that handles items. It is alive when it handles some, and also when it waits
+  /// Health of a loop that handles items. It is alive when it handles some, and also when it waits
   /// for the next one while the devices' thread goes round: the cameras may be gone and the drive
   /// go on. A thread that a device holds up does not go round (`rounds` stays the same). A sign of
   /// life goes out three times in a watchdog's interval, of a loop that was alive since the last.

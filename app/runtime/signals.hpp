@@ -1,7 +1,6 @@
 #pragma once
-#include <optional>
-
 #include <csignal>
+#include <optional>
 
 #include "app/runtime/errors.hpp"
 
@@ -27,7 +26,7 @@ class SignalGuard {
   /// `interrupted` (130) or `terminated` (143; SIGHUP, too) by the first signal that came; nothing
   /// when none did.
   [[nodiscard]] std::optional<ExitCode> stop_code() const noexcept;
-  /// Whether SIGUSR1 has come since the last call, however often.
+  /// Returns true if SIGUSR1 was received since the last call, however often.
   [[nodiscard]] bool take_calibration_request() const noexcept;
 
  private:

@@ -3,8 +3,9 @@
 
 namespace vergence::app {
 
-/// What `--version` and summary.json say: the project's version, and in a build from a git checkout
-/// the commit, `0.1.0 (1a2b3c4)`, with `+` after the commit when files differed from it.
+/// Version printed by `--version` and stored in summary.json: the project's version, and in a build
+/// from a git checkout the commit, `0.1.0 (1a2b3c4)`, with `+` after the commit when files differed
+/// from it.
 [[nodiscard]] std::string_view version() noexcept;
 
 /// `schema_version` of the JSON that the program writes, except `simulate` and `evaluate`. A change

@@ -7,7 +7,6 @@
 #include <iterator>
 #include <memory>
 #include <numbers>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -15,7 +14,6 @@
 #include "app/devices/camera_masks.hpp"
 #include "app/runtime/background_thread.hpp"
 #include "app/session/session_files.hpp"
-#include "app/session/starting_calibration.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/health.hpp"
 #include "core/calibration/segment_solver.hpp"
@@ -240,7 +238,7 @@ ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
   const Configuration& c = r.configuration;
   const CalibrationUse use{true, r.baseline.value_or(0)};
   std::vector<std::string> remarks;
-  // Of what the drive comes with only lenses and length are read: how its cameras sit need not be
+  // Only intrinsics and baseline length are read: how its cameras sit need not be
   // known.
   const std::array cameras{c.kitti_raw.left, c.kitti_raw.right};
   const StereoSequence sequence =

@@ -28,7 +28,7 @@ struct DriveCalibration {
   std::vector<calibration::Agreement> agreements;   // of camera 1, each stretch with the one before
 };
 
-/// What a pass over a drive shows: after every frame, on the estimator's thread.
+/// Callback of a pass over a sequence: after every frame, on the estimator's thread.
 using DriveWatcher = std::function<void(const Estimator&, const PoseSample&)>;
 
 struct DrivePass {
@@ -52,15 +52,15 @@ struct DrivePass {
 [[nodiscard]] DriveCalibration calibrate_drive(const DrivePass& pass,
                                                const StartingCalibration& given);
 
-/// The same with a progress line, and stopped by signals: the caller's, whose own end they are,
+/// Runs a pass with a progress line that signals stop: the caller's, whose own end they are,
 /// too.
 [[nodiscard]] DriveCalibration calibrate_with_progress(const DrivePass& pass,
                                                        const StartingCalibration& given,
                                                        const SignalGuard& signals,
                                                        Progress* progress);
 
-/// What was found as lines for the terminal: each parameter with its sigma, the depth error, how
-/// far the stretches agree.
+/// Formats the result as lines for the terminal: each parameter with its sigma, the depth error,
+/// how far the stretches agree.
 [[nodiscard]] std::string describe(const DriveCalibration& found);
 
 /// `vergence calibrate --drive`: an ordinary recorded drive instead of a board.

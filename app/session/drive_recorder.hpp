@@ -22,7 +22,8 @@ namespace vergence::app {
 /// Queues of a recording, one for each thread that posts.
 enum Queue : std::size_t { estimator_queue, acquisition_queue };
 
-/// `record:` of the configuration: what goes through a session into drive.mcap (docs/recording.md).
+/// `record:` of the configuration: what goes through a session into drive.mcap
+/// (docs/session_files.md).
 ///
 /// Ownership  Configuration, facts and watch outlive it. Threads: as SessionObserver and
 ///            PulseObserver, a queue each. The rest: the owner's.
@@ -57,7 +58,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
             std::size_t most = kMessageRoom, bool bulky = false) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
-  [[nodiscard]] bool rig_is_due(Stamp stamp) const noexcept;
+  [[nodiscard]] bool rig_is_due() const noexcept;
 
   const RecordSettings& settings_;
   const ReplayableSolverRunner& watch_;
@@ -66,14 +67,12 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   const std::string folder_;
   Recording recording_;
 
-  // Of the estimator's thread.
+  // Used by the estimator's thread only.
   RigCalibration rig_;
   bool calibrated_ = false, recalibrate_ = false;
   std::optional<std::uint64_t> rig_in_file_{};  // how many there were when it was posted last
   std::atomic<bool> stopped_{false};
   FrameRecord frame_{};
-  std::uint64_t frames_seen_ = 0;
-  Stamp last_rig_{};
 };
 
 }  // namespace vergence::app

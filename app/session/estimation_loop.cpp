@@ -21,7 +21,7 @@ void print_row(std::string_view name, std::size_t bytes) {
   fmt::print("{:<44}{:>14}\n", name, bytes);
 }
 
-/// What an arena holds, the largest first; those below a hundredth of it in one line.
+/// Parts of an arena, the largest first; those below a hundredth in one line.
 void print_parts(const MemoryRow& row) {
   std::vector<ArenaRow> parts(row.parts.begin(), row.parts.end());
   std::stable_sort(parts.begin(), parts.end(),
@@ -50,7 +50,7 @@ void print_memory_table(const std::vector<MemoryRow>& memory) {
 
 namespace {
 
-/// What a frame may take: in a live drive the next one does not wait.
+/// Time budget of a frame: live, the next one does not wait.
 Duration frame_budget(const SourceFacts& facts, const RealtimeSettings& realtime) noexcept {
   if (facts.frame_interval <= Duration{}) return {};
   return realtime.frame_budget_ms > 0 ? Duration::seconds(1e-3 * realtime.frame_budget_ms)
@@ -78,11 +78,18 @@ EstimationLoop::EstimationLoop(FrameSource& source, const Configuration& configu
                                                   comparison_arena_, log_);
 }
 
-void EstimationLoop::open(const SessionOutput& output, DriveRecorder* recording) noexcept {
+void EstimationLoop::open(const SessionOutput& output, DriveRecorder* recording,
+                          CalibrationWriter* calibrations) noexcept {
   output_ = output;
   recording_ = recording;
+  calibrations_ = calibrations;
   log_.open(&output_, facts_.first);
   if (comparison_) comparison_->open(&output_);
+}
+
+void EstimationLoop::log_kept_calibrations() noexcept {
+  for (CalibrationWriter::Outcome outcome; calibrations_->next(&outcome);)
+    log_.log(outcome.event, outcome.failed);
 }
 
 bool EstimationLoop::next(SourceItem* item) noexcept {
@@ -121,7 +128,7 @@ void EstimationLoop::request_recalibration(Stamp stamp, const char* message) noe
   log_.log(stamp, "recalibration_requested", message, true);
 }
 
-/// What viewers of the session have asked for.
+/// Handles requests of viewers.
 void EstimationLoop::take_requests(Stamp stamp) noexcept {
   if (requests_ == nullptr) return;
   constexpr auto kOrder = std::memory_order_relaxed;
@@ -140,6 +147,7 @@ void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   if (calibration_asked_.exchange(false, std::memory_order_relaxed))
     request_recalibration(frame.rig.stamp, "a new calibration was asked for by SIGUSR1");
   take_requests(frame.rig.stamp);
+  log_kept_calibrations();
   if (!delivering_) ThreadAllocations::begin();
   delivering_ = true;
   watched_solver_.begin_frame(frame.solver_idle);

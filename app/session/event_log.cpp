@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kWholeAgain = 100;  // frames, after which dropped work is news
 
-/// What a user wants to hear of at once.
+/// Events printed immediately.
 bool is_for_user(EstimatorEvent::Kind kind) noexcept {
   using Kind = EstimatorEvent::Kind;
   return kind == Kind::rig_changed || kind == Kind::out_of_sync || kind == Kind::cameras_in_sync ||

@@ -10,7 +10,7 @@
 
 namespace vergence::app {
 
-/// What becomes of each frame beside its line in poses.csv: events and calibrations for the
+/// Collects by-products of each frame: events and calibrations for the
 /// recorder, the state of things for the progress line, messages for the user.
 ///
 /// Threads  note…(), log(): the estimator's, sealed. show(): the caller's. After the estimator's

@@ -4,7 +4,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <variant>
 #include <vector>
 
@@ -57,7 +56,7 @@ struct SourceIns {
   std::size_t reading_bytes = 0;  // held beside the comparison
 };
 
-/// What a session has to know of its source before the first frame.
+/// Properties of a source before the first frame.
 struct SourceFacts {
   StartingCalibration begin{};
   Adoption adoption = Adoption::after_fixed_frames;
@@ -99,7 +98,7 @@ class FrameSource {
   /// The frame that next() gave last has its pose: takes the slots back.
   virtual void done(const PoseSample& sample) noexcept = 0;
   virtual void stop() noexcept = 0;
-  /// How often what next() waits for has gone round, whether it brought anything or not: what does
+  /// Number of iterations of the thread behind next(), with or without data: a thread that does
   /// not go round any more hangs. Any thread; always 0: nobody can tell.
   [[nodiscard]] virtual std::uint64_t rounds() const noexcept { return 0; }
   /// Called every 50 ms while frames come.
@@ -110,7 +109,7 @@ class FrameSource {
   /// Ends what start() began, after halt().
   virtual void finish(Progress* progress, std::vector<std::string>* faults) = 0;
 
-  /// What it adds to the summary: frames skipped, devices, times, truth.
+  /// Adds to the summary: frames skipped, devices, times, truth.
   virtual void describe(const SessionTotals& totals, const Estimator& estimator,
                         SummaryInput* input) const = 0;
   /// The figures that a user wants to see at the end.

@@ -77,7 +77,7 @@ class InsEvents {
   std::uint64_t match_run_ = 0;  // poses in a row with that
 };
 
-/// What a drive does with its INS, live or recorded alike: the comparison pose by pose into the
+/// Comparison of a session with its INS, live or recorded: the comparison pose by pose into the
 /// recorder, and what there is to tell of it.
 ///
 /// Threads    The estimator's, sealed; after it has joined all is anyone's.

@@ -18,7 +18,7 @@ struct InsRecord {
   InsQuality quality{};
 };
 
-/// What a line has, in this order. Degrees for places, m and m/s east-north-up, the attitude a
+/// Columns of a line, in this order. Degrees for places, m and m/s east-north-up, the attitude a
 /// Hamilton quaternion from the INS's body (forward, left, up) to east-north-up, sigmas in m, m/s,
 /// degrees, `status` the device's own word. Empty where the device told nothing. A position has
 /// 1e-10 degrees, 11 µm.

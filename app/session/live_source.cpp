@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <memory>
 #include <string_view>
 #include <utility>
 
@@ -12,7 +11,6 @@
 #include "app/devices/camera_masks.hpp"
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/session/records.hpp"
 #include "app/session/session_files.hpp"
 #include "drivers/clock.hpp"
@@ -186,7 +184,7 @@ void LiveSource::done(const PoseSample& sample) noexcept {
 // ---- the caller's thread
 
 void LiveSource::look() {
-  // Of simulated devices one always has something to come, and in virtual time a look is an order.
+  // A simulated device always has a next delivery, and in virtual time polling advances it.
   if (devices_.mock() == nullptr) acquisition_->look_again();
   if (request_.duration_s && !request_.fast && std::chrono::steady_clock::now() > end())
     acquisition_->stop();
@@ -325,7 +323,7 @@ ExitCode run_drive(const RunRequest& request) {
     if (const auto stopped = signals.stop_code()) return *stopped;  // devices are opened in seconds
     return run_session(*source, request.configuration, request.session, signals);
   } catch (const DeviceError&) {
-    // Who has stopped it does not miss the device.
+    // After a stop by the user a missing device is no error.
     if (const auto stopped = signals.stop_code()) return *stopped;
     throw;
   }

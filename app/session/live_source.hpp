@@ -17,7 +17,7 @@
 
 namespace vergence::app {
 
-/// What a drive is to do.
+/// Request of a live run.
 struct RunRequest {
   SessionOptions session{};
   Configuration configuration;
@@ -59,7 +59,6 @@ class LiveSource final : public FrameSource {
   void make_acquisition();
   /// An event that goes before the frame in hand. False: none is left.
   [[nodiscard]] bool next_event(SourceItem* item) noexcept;
-  [[nodiscard]] bool next_fault(SourceItem* item) noexcept;
   void write_truth(std::vector<std::string>* faults) const;
   [[nodiscard]] TruthMetrics truth_figures(const SessionTotals& totals,
                                            const Estimator& estimator) const;
@@ -76,7 +75,7 @@ class LiveSource final : public FrameSource {
   std::chrono::steady_clock::time_point begun_{};
   std::vector<StampedPose> truth_;
 
-  // Of the estimator's thread; read by others after it has joined.
+  // Used by the estimator's thread; read by others after it has joined.
   TimingMonitor time_;
   std::vector<bool> fault_logged_;
   Acquired in_hand_{};    // given, or held back behind its events

@@ -53,7 +53,7 @@ bool keep_around(const StereoSequence& sequence, std::size_t first, std::size_t 
   return !readings->empty();
 }
 
-/// Of a recording the whole way is known before the first frame: an attitude that contradicts most
+/// A recording's whole path is known before the first frame: an attitude that contradicts most
 /// of it is taken out from the beginning, and its heading is the course over ground. → how many
 /// readings
 std::size_t drop_contradicted(const ComparisonOptions& options,

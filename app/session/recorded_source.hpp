@@ -25,7 +25,7 @@ struct ReplayedIns {
   std::vector<std::string> remarks{};  // messages
 };
 
-/// Of the frames [request.start, …) of the sequence. A mount that the configuration says
+/// Reads the frames [request.start, …) of the sequence. A mount that the configuration says
 /// (`ins.lever_arm_m`, `ins.boresight_deg`) stands before the data set's own;
 /// `comparison.max_gap_ms` and `max_wait_ms` are no less than one and a half of the recording's
 /// usual interval. InputError: as read_recorded_ins() and comparison_options() say.
@@ -64,7 +64,7 @@ class RecordedSource final : public FrameSource {
   SourceFacts facts_;
   std::unique_ptr<FrameDecoder> decoder_;
 
-  // Of the estimator's thread; read by others after it has joined.
+  // Used by the estimator's thread; read by others after it has joined.
   DecodedPair pair_{};    // given, or held back behind its readings
   bool waiting_ = false;  // pair_ was not given yet
   bool ended_ = false;    // there are no more pairs

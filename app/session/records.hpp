@@ -15,7 +15,7 @@
 #include "core/types/pose_sample.hpp"
 #include "core/types/stamped_pose.hpp"
 
-/// What a session's observers are told: plain values of fixed size, made on the estimator's thread
+/// Input of a session's observers: plain values of fixed size, made on the estimator's thread
 /// without heap, copied through rings.
 namespace vergence::app {
 
@@ -75,7 +75,7 @@ struct FrameReport : ComparedPose {
   /// The reference's pose of the left camera, in the reference's own frame.
   std::optional<Transform> T_reference_left{};
 
-  /// Of a drive without an INS.
+  /// Makes the report of a frame without an INS.
   [[nodiscard]] static FrameReport of(const PoseSample& sample, float decode_ms,
                                       const std::optional<Transform>& T_reference_left) noexcept;
   /// With the INS as the reference.
@@ -111,8 +111,8 @@ struct CalibrationRecord : CalibrationDecision {
   /// outlive the source that has the text.
   std::array<char, 256> origin{};
 
-  /// What the drive begins with. `origin` is copied, cut at the array's end, at a whole UTF-8
-  /// character; `cause` is a constant.
+  /// Record of the initial calibration. `origin` is copied, cut at the array's end, at a whole
+  /// UTF-8 character; `cause` is a constant.
   [[nodiscard]] static CalibrationRecord begin(const RigCalibration& rig, Stamp stamp,
                                                const char* cause, std::string_view origin) noexcept;
   [[nodiscard]] std::string_view cause_word() const noexcept {
@@ -122,7 +122,7 @@ struct CalibrationRecord : CalibrationDecision {
   [[nodiscard]] const char* why() const noexcept { return decided ? reason : origin.data(); }
 };
 
-/// What poses.csv has, in this order (DESIGN §6).
+/// Columns of poses.csv, in this order (DESIGN §6).
 inline constexpr const char* kPosesHeader =
     "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,east,north,up,latitude_deg,longitude_deg,"
     "height_m,heading_deg,"
@@ -130,7 +130,7 @@ inline constexpr const char* kPosesHeader =
     "error_east_m,error_north_m,error_up_m,error_heading_deg,inliers,reprojection_px,estimate_ms";
 /// The line of poses.csv, its end included, in place of what `line` has.
 void format_frame(const FrameReport& report, std::string* line);
-/// The same of a TUM file: the stamp in seconds, position, quaternion.
+/// Formats a line of a TUM file: the stamp in seconds, position, quaternion.
 void format_tum(Stamp stamp, const Transform& T, std::string* line);
 
 /// The line of calibrations.csv (kCalibrationsHeader) of camera k, 1 ≤ k < cameras, end of line

@@ -9,9 +9,7 @@
 
 #include "app/session/drive_calibration.hpp"
 #include "app/session/recorded_source.hpp"
-#include "app/session/session_runner.hpp"
 #include "app/session/session_source.hpp"
-#include "app/session/starting_calibration.hpp"
 
 namespace vergence::app {
 namespace {
@@ -60,7 +58,7 @@ StereoSequence open_drive(const ReplayRequest& request) {
   return sequence;
 }
 
-/// What the drive itself says of its rig, in the place of what it came with; where nothing is found
+/// Replaces the initial calibration by one from the sequence itself; where nothing is found
 /// that stays, and the user hears why.
 bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
                      const StereoSequence& sequence, StartingCalibration* begin) {
@@ -97,7 +95,7 @@ void calibrate_unknown(ReplayRequest request, const SignalGuard& signals, Stereo
   *begin = std::move(other);
 }
 
-/// What a recorded session is to begin with, if it is not what the drive began with.
+/// Initial calibration of a recorded session, if requested to differ from the recorded one.
 std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
                                                    const RecordedSession& session) {
   if (!request.calibration && !request.from_scratch && !request.baseline) return std::nullopt;
@@ -142,7 +140,7 @@ ExitCode replay_recording(const ReplayRequest& request) {
 }  // namespace
 
 std::vector<std::string> recorded_settings(const std::filesystem::path& session) {
-  // What poses depend on; the mock and what is recorded are the drive's own.
+  // Settings that affect poses; those of the simulated rig and the recording stay as recorded.
   constexpr std::array kept{"odometry.",        "calibration.",       "monitor.", "comparison.",
                             "ins.lever_arm_m.", "ins.boresight_deg.", "rig.name="};
   std::vector<std::string> settings = RecordedSession::open(session).description().settings;

@@ -13,7 +13,7 @@
 
 namespace vergence::app {
 
-/// What a replay is to do; checked against the data by run_replay().
+/// Request of a replay; checked against the data by run_replay().
 struct ReplayRequest {
   SessionOptions session{};
   std::filesystem::path data;

@@ -25,7 +25,7 @@ struct ClockTie {
   [[nodiscard]] Stamp stamp_at(HostStamp t) const noexcept { return stamp + (t - host); }
 };
 
-/// What is known of a session before its first frame.
+/// Properties of a session before its first frame.
 struct SessionStart {
   std::string name{};                       // of the session folder
   std::vector<std::string> camera_names{};  // those of the calibration, each once
@@ -37,7 +37,7 @@ struct SessionStart {
   bool recording = false;                   // a drive.mcap is written
 };
 
-/// What a viewer may ask of a running session. Acts at the next frame.
+/// Requests of viewers to a running session. They act at the next frame.
 ///
 /// Threads  Any sets, the estimator's takes. Outlives the session.
 struct SessionRequests {
@@ -68,9 +68,9 @@ class SessionObserver {
   /// The session is about to begin. The caller's thread, not sealed.
   virtual void on_start(const SessionStart& /*start*/) noexcept {}
 
-  /// What the estimator is about to be given: images, stamp, how sure the pairing is.
+  /// Called with the estimator's next input: images, stamp, how sure the pairing is.
   virtual void on_frame(const RigFrame& /*frame*/) noexcept {}
-  /// What it says of that frame, at once.
+  /// Called with the pose of that frame immediately.
   virtual void on_pose(const PoseSample& /*sample*/) noexcept {}
   /// The newest moving frames with their tracks, after on_pose(); valid until it returns. Empty
   /// where nothing watches the calibration.

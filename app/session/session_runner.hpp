@@ -11,7 +11,7 @@
 
 namespace vergence::app {
 
-/// What a session is to write and to say, whatever its source.
+/// Output options of a session.
 struct SessionOptions {
   std::filesystem::path out;
   bool quiet = false;
@@ -39,7 +39,7 @@ struct SessionOptions {
 [[nodiscard]] ExitCode run_session(FrameSource& source, const Configuration& configuration,
                                    const SessionOptions& options, const SignalGuard& signals);
 
-/// What `make` returns; options and rig that do not go together, which core refuses by
+/// Returns the result of `make`; options and rig that do not go together, which core refuses by
 /// std::invalid_argument and std::length_error, as an InputError with the same message.
 template <class Make>
 auto in_words(const Make& make) {

@@ -59,7 +59,7 @@ SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSessi
   return facts;
 }
 
-/// What time decided of a frame's pose in the drive, for the estimator to decide again.
+/// Time-dependent decisions of a recorded frame, which the estimator repeats.
 void decide_as_then(const FrameRecord& given, SourceFrame* frame) noexcept {
   frame->solver_idle = given.solver_done;
   frame->rig.effort = given.sample.effort;

@@ -50,14 +50,15 @@ class SessionSource final : public FrameSource {
   std::array<std::vector<std::uint8_t>, kMaxCameras> pixels_;  // of the frame in hand
   std::atomic<bool> stopped_{false};
 
-  // Of the estimator's thread; read by others after it has joined.
+  // Used by the estimator's thread; read by others after it has joined.
   std::size_t next_frame_ = 0, next_reading_ = 0;
   bool recalibration_said_ = false;  // of the next frame
   std::uint64_t images_missing_ = 0;
   ThreadRunner reader_{BackgroundThread::Role::reader};  // decoding takes heap
 };
 
-/// What a recorded session began with. InputError: the recording's description is damaged.
+/// Returns the initial calibration of a recorded session. InputError: the recording's description
+/// is damaged.
 [[nodiscard]] StartingCalibration recorded_beginning(const SessionDescription& description,
                                                      const std::string& name);
 

@@ -10,12 +10,12 @@
 #include "app/datasets/stereo_sequence.hpp"
 #include "core/estimator/estimator.hpp"
 
-/// What a drive begins with: --from-scratch before --calibration FILE before the state file before
-/// the configuration (METHOD §3).
+/// Initial calibration, in this order: --from-scratch before --calibration FILE before the state
+/// file before the configuration (METHOD §3).
 namespace vergence::app {
 
-/// What is known of a rig without a calibration: both cameras alike, principal points in the middle
-/// of the images.
+/// Assumptions about a rig without a calibration: both cameras alike, principal points in the
+/// middle of the images.
 struct AssumedIntrinsics {
   double focal = 0;     // px
   double baseline = 0;  // m
@@ -38,7 +38,7 @@ struct AssumedIntrinsics {
                                                  std::vector<std::string>* remarks);
 [[nodiscard]] GivenCalibration given_calibration(const AssumedIntrinsics& known);
 
-/// What the command line says about it.
+/// Request of the command line.
 struct CalibrationSource {
   bool from_scratch = false;
   std::optional<std::filesystem::path>
@@ -57,21 +57,21 @@ struct StartingCalibration {
   std::optional<std::filesystem::path> state{};  // where an accepted one is kept; nothing: nowhere
 };
 
-/// Of a drive. `serials`: the cameras' own, as far as they have one; else the configuration names
-/// them. From scratch, too, where the
-/// cameras are real and neither a file nor the configuration says where they sit. Errors
-/// InputError: a file that is damaged or of another rig. A state file that is not used is a remark.
+/// Initial calibration of a live run. `serials`: the cameras' own, as far as they have one; else
+/// the configuration names them. From scratch, too, where the cameras are real and neither a file
+/// nor the configuration says where they sit. Errors InputError: a file that is damaged or of
+/// another rig. A state file that is not used is a remark.
 [[nodiscard]] StartingCalibration starting_calibration(const Configuration& configuration,
                                                        const CalibrationSource& source,
                                                        const std::vector<std::string>& serials);
 
-/// Of a replay; the sequence was opened with the same from_scratch. State files are neither read
-/// nor written.
+/// Initial calibration of a replay; the sequence was opened with the same from_scratch. State files
+/// are neither read nor written.
 [[nodiscard]] StartingCalibration replayed_calibration(const Configuration& configuration,
                                                        const StereoSequence& sequence,
                                                        bool from_scratch);
 
-/// What the gates compare with: parallel cameras a baseline apart; of a camera that is mounted
+/// Nominal geometry for the gates: parallel cameras a baseline apart; of a camera that is mounted
 /// farther from there than the gates let through, its place in `mounted`.
 [[nodiscard]] RigCalibration nominal_geometry(const RigCalibration& given,
                                               const RigCalibration& mounted,

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "app/runtime/version.hpp"
 #include "core/calibration/health.hpp"
@@ -75,7 +74,7 @@ bool given(const std::array<double, 6>& sigmas) {
   return false;
 }
 
-/// Whether every further camera comes with what its uncertainty is; else nothing can be predicted.
+/// Returns true if every additional camera has sigmas; otherwise nothing can be predicted.
 bool has_sigmas(const RigCalibration& rig) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(rig.cameras); ++k)
     if (!given(rig.sigma_total[k]) && !(rig.covariance_total[k].diagonal().maxCoeff() > 0))
@@ -98,7 +97,7 @@ Json health_json(const RigCalibration& rig, const calibration::CalibrationOption
       {"depth_error_percent", depth}};
 }
 
-/// What most of the depth error at 20 m is from: the noise of the images that the calibration was
+/// Main cause of the depth error at 20 m: the noise of the images that the calibration was
 /// found from, which more driving lessens, or intrinsics that are not known better. Null without
 /// sigmas.
 Json limited_by(const RigCalibration& rig) {
@@ -170,7 +169,7 @@ Json calibration_json(const SessionTotals& totals, const SummaryInput& input) {
   return json;
 }
 
-/// What became of alarms and requests; the first calibration of a drive from scratch is none of
+/// Results of alarms and requests; the first calibration of a drive from scratch is none of
 /// them.
 Json recalibrations_json(const SessionTotals& totals) {
   Json json = Json::array();

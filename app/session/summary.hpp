@@ -17,22 +17,22 @@
 
 namespace vergence::app {
 
-/// What a mock drive knows beside: our trajectory and calibration against the truth.
+/// Metrics of the simulated rig: trajectory and calibration against the ground truth.
 struct TruthMetrics {
   std::optional<TrajectoryEvaluation> evaluation;
-  /// Of camera 1 and so on, of the calibration in use at the end: rotation vector, rad;
+  /// Errors of cameras 1 and up in the final calibration: rotation vector, rad;
   /// translation, m; ours against the true one.
   std::vector<std::array<double, 6>> calibration_error{};
 };
 
 /// Heap allocations by the name of the thread that made them, from the first frame that is
-/// delivered until the last (docs/realtime.md).
+/// delivered until the last (docs/deployment.md).
 struct ThreadAllocationCounts {
   std::vector<std::pair<std::string, std::uint64_t>> ours{};       // 0 where a thread made none
   std::vector<std::pair<std::string, std::uint64_t>> libraries{};  // of threads that libraries have
 };
 
-/// What summary.json is made of beside the recorder's totals.
+/// Input of summary.json in addition to the recorder's totals.
 struct SummaryInput {
   std::uint64_t skipped = 0;               // frames that were not read: torn, missing, out of time
   std::uint64_t dropped_by_estimator = 0;  // points and observations over capacity
@@ -60,11 +60,11 @@ struct SummaryInput {
   nlohmann::ordered_json time{};           // how time was over a live drive; null in a replay
 };
 
-/// What the metrics of summary.json are computed with: segments of 100–800 m (step 10), 10–50 m
+/// Options of the metrics in summary.json: segments of 100–800 m (step 10), 10–50 m
 /// (step 1), and these once more after one scale.
 [[nodiscard]] EvaluationOptions summary_evaluation_options();
 
-/// How far a calibration is from the true one: rotation vector, rad, and translation, m, that lead
+/// Error of a calibration against the true one: rotation vector, rad, and translation, m, that lead
 /// from the true transform of each further camera to ours (left perturbation).
 [[nodiscard]] std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours,
                                                                     const RigCalibration& truth);

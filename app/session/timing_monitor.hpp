@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <cstdint>
 
 #include <nlohmann/json.hpp>
 
@@ -10,7 +9,7 @@
 
 namespace vergence::app {
 
-/// What a drive tells of time: clocks, pairing, latencies, its stamps against the INS's UTC. Events
+/// Timing of a session: clocks, pairing, latencies, its stamps against the INS's UTC. Events
 /// as messages, figures for summary.json.
 ///
 /// Threads  note…(): the estimator's, sealed. json(): any, after that has joined. Memory: fixed;
@@ -25,7 +24,7 @@ class TimingMonitor {
 
   explicit TimingMonitor(SyncMode mode, bool virtual_time) : mode_(mode), virtual_(virtual_time) {}
 
-  /// What an event of a device says.
+  /// Message of a device event.
   [[nodiscard]] Message of_device(const DeviceEvent& event) const noexcept;
   /// A set that was handed out: tells when a run of ambiguous ones begins.
   [[nodiscard]] Message of_set(const SyncedSet& set) noexcept;

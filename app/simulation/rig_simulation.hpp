@@ -44,7 +44,7 @@ struct SimulatedRig {
 
   /// The start as a problem in these arrays; the first pose constant.
   [[nodiscard]] BundleProblem problem() noexcept;
-  /// The same as parallel_monocular: a pose an image, image = pose · cameras + camera; `images`
+  /// Variant like parallel_monocular: a pose an image, image = pose · cameras + camera; `images`
   /// keeps the poses.
   [[nodiscard]] BundleProblem monocular_problem(std::vector<Transform>* images,
                                                 std::vector<BundleObservation>* per_image,

@@ -211,7 +211,7 @@ class Solve {
 
   bool rank_deficient() noexcept {
     if (system_.rows() == 0 || !system_.linearise(best(), 0.0)) return false;
-    // What rounding leaves of the pivot of an unseen direction may be well above the tolerance, of
+    // Rounding may leave the pivot of an unobserved direction well above the tolerance, of
     // either sign. It is still far below what the damping alone had made of it.
     constexpr double kLeft = 0.01;  // of the last ratio under damping
     const auto pivots =

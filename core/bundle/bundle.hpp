@@ -37,7 +37,7 @@ struct BundleObservation {
   double x = 0, y = 0;         // px; double, because float resolves only 6e-5 px at 1000 px
 };
 
-/// What is known of a pose from elsewhere: `information` (rotation, then translation) of the
+/// Prior of a pose: `information` (rotation, then translation) of the
 /// perturbation δ = (φ, τ) that takes the prior's transform to the pose: R = Exp(φ) R₀, t = Exp(φ)
 /// t₀ + τ. Adds ½ δᵀ Λ δ to the cost.
 struct BundlePosePrior {
@@ -68,7 +68,7 @@ struct BundleProblem {
 
 enum class BundleLoss : std::uint8_t { none, huber, cauchy };
 
-/// How the length of T_camera_left[k].t is known: it is the scale of everything.
+/// Knowledge of the length of T_camera_left[k].t: it is the scale of everything.
 enum class BundleLength : std::uint8_t {
   exact,  // t_k = metres · u, u on the sphere: 5 free parameters for that camera; the input's t_k
           // is brought to that length
@@ -93,7 +93,7 @@ struct BundleIntrinsics {
                                        // of a principal point
 };
 
-/// What is known of θ_S from earlier solves (stereo_calibration only): ½ weight δᵀ C⁻¹ δ over the
+/// Prior of θ_S from earlier solves (stereo_calibration only): ½ weight δᵀ C⁻¹ δ over the
 /// parameters that are free here.
 struct BundleSharedPrior {
   const RigCalibration* rig = nullptr;  // mean and `covariance`; null: nothing is known. Rows

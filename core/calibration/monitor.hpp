@@ -9,7 +9,7 @@
 namespace vergence::calibration {
 
 /// Every number a user may change in `monitor:`; the configuration's schema has a row for each
-/// field. What the defaults reach, and the commands that measured it: docs/monitor.md.
+/// field. What the defaults reach, and the commands that measured it: docs/design.md.
 struct MonitorOptions {
   double threshold = 45.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false
                             // alarms, 20 … 500

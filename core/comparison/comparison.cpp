@@ -94,7 +94,7 @@ bool Comparison::next(ComparedPose* out) noexcept {
   } else {
     ++counters_.without_ins;
   }
-  // What was before a leap and what comes after do not fit together, also when no frame fell
+  // Samples before and after a jump do not fit together, also when no frame fell
   // between the two readings.
   if (ins_.take_leap(pose.stamp)) {
     ratio_.interrupt();

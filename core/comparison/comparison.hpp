@@ -27,7 +27,7 @@ struct ComparisonOptions {
   double position_sigma_m = 2.5;
   double height_sigma_m = 5.0;
   double tilt_sigma_rad = 0.0087;  // half a degree
-  /// Of the INS's heading with all that lies between it and the camera's axes, for the alignment;
+  /// Sigma of the INS's heading including the mounting, for the alignment;
   /// 0: the heading is the positions' alone, as it must be where nobody knows the mount to a
   /// degree.
   double heading_sigma_rad = 0;
@@ -56,7 +56,7 @@ struct ComparisonOptions {
 /// turn: roll is then the rounding's.
 [[nodiscard]] Vec3 boresight_of(const Mat3& R_ins_left) noexcept;
 
-/// What the INS had to say at a frame's stamp.
+/// INS state at a frame's stamp.
 enum class InsMatch : std::uint8_t {
   ok,
   none,    // no sample yet, or none after the frame: late, gone
@@ -136,7 +136,7 @@ class Comparison {
   Comparison(const ComparisonOptions& options, Arena& arena);
   Comparison(const Comparison&) = delete;  // its parts refer to one another
   Comparison& operator=(const Comparison&) = delete;
-  /// What the arena must have left.
+  /// Free size that the arena must have.
   [[nodiscard]] static std::size_t bytes_needed(const ComparisonOptions& options) noexcept;
 
   /// Samples in order of their stamps; others are refused and counted.

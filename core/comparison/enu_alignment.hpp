@@ -13,8 +13,8 @@ struct EnuAlignmentPair {
   Stamp stamp{};
   Vec3 p_world_left = Vec3::Zero();  // m
   Vec3 p_enu_left = Vec3::Zero();    // m
-  /// What the INS's attitude alone says: R_enu_left · R_left_world. Its roll and pitch are used,
-  /// its heading where it has a sigma.
+  /// Rotation from the INS's attitude alone: R_enu_left · R_left_world. Its roll and pitch are
+  /// used, its heading where it has a sigma.
   Mat3 R_enu_world = Mat3::Identity();
   double position_sigma = 0;  // m, horizontal, each axis; > 0
   double height_sigma = 0;    // m; > 0

@@ -82,7 +82,7 @@ void InsHistory::locate(const InsSample& sample, Reading* r) noexcept {
   begin_plane(sample.position);
   r->valid = true;
   r->flat = sample.fix == FixStatus::fix_2d;
-  // What a receiver writes as the height of a fix in two dimensions may be 0 or years old.
+  // The height of a 2D fix may be 0 or years old.
   Geodetic position = sample.position;
   if (r->flat)
     position.height_m = height_.value_or(plane_.origin().height_m);
@@ -102,7 +102,7 @@ void InsHistory::begin_plane(const Geodetic& position) noexcept {
   has_origin_ = true;
 }
 
-/// Whether the attitude goes with the way that is driven.
+/// Returns true if the attitude agrees with the direction of travel.
 bool InsHistory::agrees(const InsSample& sample, const Mat3& R_local_ins) noexcept {
   begin_plane(sample.position);
   const Vec3 view = R_local_ins * options_.T_ins_left.R.col(2);

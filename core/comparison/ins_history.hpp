@@ -40,9 +40,9 @@ class InsHistory {
   [[nodiscard]] InsMatch reference_at(Stamp stamp, Reference* out) const noexcept;
   /// The newest sample is not older than this.
   [[nodiscard]] bool reaches(Stamp stamp) const noexcept;
-  /// Whether the position has leapt, by `now` at the latest; once for a leap, or for several before
-  /// one `now`. Between the first and the last of several it is true whenever it is asked: no two
-  /// places there need fit together.
+  /// Returns true if the position has jumped, by `now` at the latest; once for a leap, or for
+  /// several before one `now`. Between the first and the last of several it is true whenever it is
+  /// asked: no two places there need fit together.
   [[nodiscard]] bool take_leap(Stamp now) noexcept;
 
   [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
@@ -78,7 +78,7 @@ class InsHistory {
   [[nodiscard]] bool accept_stamp(Stamp stamp) noexcept;
   /// With this refused stamp, too.
   [[nodiscard]] bool back_for_good(Stamp stamp) noexcept;
-  /// Whether a valid reading is farther from the last one than a vehicle drives; counted.
+  /// Returns true if a valid sample is farther from the last one than a vehicle can drive; counted.
   [[nodiscard]] bool leapt(const Reading& r) noexcept;
   void begin_plane(const Geodetic& position) noexcept;
   [[nodiscard]] bool agrees(const InsSample& sample, const Mat3& R_local_ins) noexcept;

@@ -96,15 +96,15 @@ std::vector<Moment> moments_of(std::span<const StampedPose> estimate,
 constexpr Duration kBlock = Duration::milliseconds(3'000);  // in which errors stay alike
 constexpr std::size_t kBlocks = 8;                          // fewer say nothing of their scatter
 
-/// What a block of the drive says of the parameters.
+/// Evidence of a block of the drive about the parameters.
 struct Block {
   Information information = Information::Zero();
   Parameters score = Parameters::Zero();
 };
 
 /// Covariance of the sum of the blocks' scores, from their scatter; zero where there are too few.
-/// What one block holds alone it fits: its score is as if the others had been fitted without it
-/// (jackknife: Bell and McCaffrey 2002).
+/// A parameter seen by one block alone is fitted by it: its score is as if the others had been
+/// fitted without it (jackknife: Bell and McCaffrey 2002).
 Information scatter_of(std::span<const Block> blocks, const Information& whole) {
   Information sum = Information::Zero();
   if (blocks.size() < kBlocks) return sum;
@@ -397,7 +397,8 @@ MountStatus estimate_ins_extrinsics(std::span<const StampedPose> estimate,
   MountOptions spaced = options;
   spaced.step = spacing_of(interval, options.step);
   std::vector<Moment> moments = moments_of(estimate, reference, interval, spaced);
-  // How errors wander is learnt from one moment to the next: of too few they would seem to be none.
+  // Error correlation is estimated between successive moments: of too few they would seem to be
+  // none.
   const auto following =
       std::count_if(moments.begin(), moments.end(), [](const Moment& m) { return m.follows; });
   if (static_cast<std::size_t>(following) < kMountMoments) return MountStatus::too_few;

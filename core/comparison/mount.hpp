@@ -62,7 +62,7 @@ enum class MountStatus : std::uint8_t {
 inline constexpr std::size_t kMountMoments = 20;
 
 struct Mount {
-  /// What was found, with zero where it is not observable: of rotation about the start's axes, of
+  /// Estimate, zero where it is not observable: of rotation about the start's axes, of
   /// the lever arm.
   Transform T_ref_est{};
   std::array<MountValue, 3>
@@ -82,7 +82,7 @@ struct Mount {
                                                   const Mat3& nominal, const MountOptions& options,
                                                   Mount* mount);
 
-/// Of whitening at most; drives with an INS's errors take 7 to 16.
+/// Maximum number of whitening rounds; drives with an INS's errors take 7 to 16.
 inline constexpr int kMountRounds = 24;
 
 }  // namespace vergence

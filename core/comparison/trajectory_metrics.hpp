@@ -9,7 +9,7 @@
 #include "core/types/stamped_pose.hpp"
 #include "core/types/time.hpp"
 
-/// How far an estimated trajectory is from a reference: the figures the literature compares by.
+/// Errors of an estimated trajectory against a reference, as in the literature.
 ///
 /// Trajectories  Strictly ascending stamps, finite poses (precondition, asserted; the readers
 ///               refuse other files). Body of estimate and reference is the same point and the same

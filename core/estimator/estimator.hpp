@@ -41,7 +41,7 @@ struct EstimatorOptions {
   std::array<ImageView, kMaxCameras> masks{};  // by camera, of its images' size: where it is 0
                                                // nothing is looked for; empty: everywhere
   Duration frame_budget{};  // live: what a frame may take before work is left out
-                            // (docs/realtime.md); zero: whatever it takes
+                            // (docs/deployment.md); zero: whatever it takes
   bool online =
       true;  // watch the rig and calibrate it; false: the calibration given is used for ever
 };

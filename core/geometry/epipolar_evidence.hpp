@@ -3,7 +3,7 @@
 
 namespace vergence {
 
-/// How much better the matches of two images fit a calibration than chance does.
+/// Log-likelihood ratio of a calibration against chance for the matches of two images.
 struct EpipolarEvidence {
   double log_likelihood_ratio = 0;  // of "the calibration fits" over "every match is by chance"
   double width_px = 0;              // of the distances' core, 1 σ as measured

@@ -54,7 +54,7 @@ template <int N, int M>
 template <int N>
 [[nodiscard]] Column<N> semidefinite_eigenvalues(const Square<N>& m) noexcept;
 
-/// Whether a symmetric matrix of any size is positive definite. Allocates.
+/// Returns true if a symmetric matrix of any size is positive definite. Allocates.
 [[nodiscard]] bool positive_definite(const Eigen::MatrixXd& A);
 
 /// M = U diag(singular) Vᵀ, singular values greatest first.

@@ -27,7 +27,7 @@ struct Transform {
 /// Unit quaternion of a rotation, w ≥ 0: one sign, so that files are reproducible.
 [[nodiscard]] Eigen::Quaterniond quaternion(const Mat3& R) noexcept;
 
-/// The same camera after everything in the world has grown by `factor` about a place.
+/// Returns the camera after scaling the world by `factor` about a point.
 [[nodiscard]] Transform scaled_about(const Transform& T_camera_world, const Vec3& centre,
                                      double factor) noexcept;
 

@@ -18,7 +18,7 @@ namespace vergence {
 inline constexpr std::size_t kCacheLine =
     64;  // bytes; also the widest SIMD vector's natural alignment (AVX-512)
 
-/// What one name holds of an arena.
+/// Bytes of an arena by name.
 struct ArenaRow {
   const char* name = "";  // a constant
   std::size_t bytes = 0;
@@ -96,7 +96,7 @@ class Arena {
     return {first, n};
   }
 
-  /// Whether a value-initialised T is all zero bytes; one is made at `at`, which is zero.
+  /// Returns true if a value-initialised T is all zero bytes; one is made at `at`, which is zero.
   template <class T>
   [[nodiscard]] static bool zero_by_default(T* at) {
     if constexpr (!std::is_arithmetic_v<T> && !std::is_enum_v<T> && !std::is_pointer_v<T>) {

@@ -7,8 +7,8 @@
 
 namespace vergence {
 
-/// What the two vectors below share: at most capacity() values of type T, never a heap. When full,
-/// push() refuses and says so. Storage has data() and size().
+/// Shared parts of the two vectors below: at most capacity() values of type T, never a heap. When
+/// full, push() refuses and says so. Storage has data() and size().
 template <class T, class Storage>
 class VectorOn {
  public:

@@ -16,7 +16,7 @@ struct RoughMatch {
 inline constexpr std::size_t kMaxBlobs =
     1500;  // of an image: about what a street shows above the default response
 
-/// SURF-64 across two images of which nothing is known: upright, mutually best. docs/front_ends.md
+/// SURF-64 across two images of which nothing is known: upright, mutually best. docs/benchmarks.md
 /// says how it compares with corners.
 ///
 /// Threads  One caller.

@@ -6,9 +6,9 @@ namespace vergence {
 /// Every number a user may change in `odometry:`; the configuration's schema (app/config) has a row
 /// for each field.
 struct OdometryOptions {
-  int features = 400;     // tracked points per image aimed at, 50 … 1000
-  int init_features = 0;  // what finds the transform of a rig that nobody has calibrated: 0
-                          // corners, 1 SURF-64 (docs/front_ends.md)
+  int features = 400;         // tracked points per image aimed at, 50 … 1000
+  int init_features = 0;      // what finds the transform of a rig that nobody has calibrated: 0
+                              // corners, 1 SURF-64 (docs/benchmarks.md)
   int pyramid_levels = 4;     // 2 … 6; each halves the image
   double band_px = 2.0;       // half width of the band about the epipolar line across, 0.5 … 5
   double pixel_sigma = 0.15;  // px, of one coordinate of a tracked corner, level 0; also the floor

@@ -20,7 +20,7 @@ enum class CalibrationCause : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(CalibrationCause) noexcept;
 
-/// What a drive itself measures of the focal length, held against the one that it was given.
+/// Focal length measured online, compared with the configured one.
 struct FocalMeasurement {
   double configured_px = 0;  // fx of the left camera
   double measured_px = 0;    // 0: it has not been measured
@@ -29,7 +29,7 @@ struct FocalMeasurement {
   bool contradicted = false;  // the one given is certainly not that of the images
 };
 
-/// What became of one attempt to calibrate: a line of calibrations.csv. A value.
+/// Result of one calibration attempt: a line of calibrations.csv. A value.
 struct CalibrationDecision {
   Stamp stamp{};  // of the frame it was decided at
   CalibrationCause cause = CalibrationCause::from_scratch;

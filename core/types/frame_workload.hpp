@@ -3,8 +3,8 @@
 
 namespace vergence {
 
-/// How much of a frame's work is done: all of it, or less where its time would be over first
-/// (docs/realtime.md). The pose is sought whatever is left out.
+/// Workload of a frame: all of it, or less where its time would be over first
+/// (docs/deployment.md). The pose is sought whatever is left out.
 struct FrameWorkload {
   static constexpr std::uint8_t kAll = 255;
   std::uint8_t points_percent = 100;     // of `odometry.features`, up to which new points are made

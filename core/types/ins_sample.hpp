@@ -29,7 +29,7 @@ enum class FixStatus : std::uint8_t {
   fix_3d,
 };
 
-/// What a heading without an attitude is of.
+/// Source of a heading without an attitude.
 enum class HeadingSource : std::uint8_t {
   none,
   course,   // the direction of motion: the body's heading while it drives forwards without slip

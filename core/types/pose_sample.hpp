@@ -19,7 +19,7 @@ enum class State : std::uint8_t {
   lost
 };
 
-/// How far a pose may be trusted (DESIGN §6).
+/// Status of a pose (DESIGN §6).
 enum class PoseStatus : std::uint8_t {
   ok,        // use it
   degraded,  // usable, `reason` says what is weak
@@ -69,7 +69,7 @@ inline constexpr int kStages = 6;
 /// Upper triangle of a symmetric 6×6 matrix, row by row.
 using Covariance6 = std::array<float, 21>;
 
-/// What the estimator says about one frame. A value: copied through rings.
+/// Result of the estimator for one frame. A value: copied through rings.
 struct PoseSample {
   std::uint64_t frame = 0;
   Stamp stamp{};

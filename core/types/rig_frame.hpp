@@ -10,7 +10,7 @@
 
 namespace vergence {
 
-/// How sure it is that the images of a rig frame were exposed together.
+/// Evidence that the images of a rig frame were exposed together.
 enum class Pairing : std::uint8_t {
   assumed,       // nothing proves it: a recording, or images paired by count or by arrival
   verified,      // pulse numbers or stamps of one clock leave no other

@@ -9,7 +9,7 @@
 #include "drivers/sync/sync_types.hpp"
 #include "drivers/trigger.hpp"
 
-/// What an acquisition gives out: plain values of fixed size that go through rings.
+/// Output of an acquisition: plain values of fixed size that go through rings.
 namespace vergence {
 
 /// The images of one pulse. `rig.images` are views of the slots, valid until the frame is released.
@@ -59,7 +59,7 @@ using Acquired = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent>;
   return std::get_if<DeviceEvent>(&item)->stamp;
 }
 
-/// What the synchroniser's proof of a set comes to for an estimator.
+/// Converts the synchroniser's evidence to the estimator's pairing.
 [[nodiscard]] constexpr Pairing pairing_of(SyncMode mode, SyncProof proof) noexcept {
   if (!verifies_pairing(mode)) return Pairing::assumed;
   return proof == SyncProof::ambiguous ? Pairing::contradicted : Pairing::verified;

@@ -17,7 +17,7 @@
 
 namespace vergence {
 
-/// What an acquisition has put together, in order, on its way to the consumer's thread.
+/// Output queue of an acquisition, in order, on its way to the consumer's thread.
 ///
 /// Ownership  Cameras outlive it. Slots that the consumer is not given (of frames that were
 ///            refused, of sets that a newer one overtook) go back to their cameras on the
@@ -47,7 +47,7 @@ class AcquiredQueue {
 
   /// The oldest item, waiting for it; images are views of their slots. False: finished.
   [[nodiscard]] bool next(Acquired* item) noexcept;
-  /// Of every set that next() gave, once.
+  /// Call once for every set that next() returned.
   void release(const SyncedSet& set) noexcept;
 
   /// Sets that the consumer was not given because it was late.
@@ -72,7 +72,7 @@ class AcquiredQueue {
   std::atomic<std::size_t> high_water_{0};
 };
 
-/// Whether it is verified which pulses the cameras' frames belong to: tells when that changes.
+/// Tracks whether the frame-to-pulse association of each camera is verified, and reports changes.
 ///
 /// A camera begins as verified, so that where nothing can be verified nothing is told; and as one
 /// of which no frame has come, so that a camera that is not yet there is not told of either.
@@ -89,7 +89,7 @@ class PairingTracker {
   void frame(std::size_t camera) noexcept { cameras_[camera].any = true; }
   /// It was started again.
   void restarted(std::size_t camera) noexcept { cameras_[camera] = {}; }
-  /// What the synchroniser says of it now. None: as before, or no frame has come yet.
+  /// Updates with the synchroniser's state. Nullopt: as before, or no frame has come yet.
   [[nodiscard]] std::optional<Change> look(std::size_t camera, bool verified,
                                            HostStamp now) noexcept {
     Camera& own = cameras_[camera];

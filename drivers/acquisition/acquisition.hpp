@@ -93,20 +93,20 @@ class Acquisition final : private Notifier {
               const Options& options);
   ~Acquisition();
 
-  /// Who waits for pulses first, who makes them last: the board, the INS with `ins_syncout`, camera
-  /// 0 with `master_strobe`.
-  /// → the device that could not be started; the stream has not begun then.
-  /// `observer`: receives the pulses, outlives the acquisition; may be null.
+  /// Order of starting: waiting for pulses first, making them last: the board, the INS with
+  /// `ins_syncout`, camera 0 with `master_strobe`. → the device that could not be started; the
+  /// stream has not begun then. `observer`: receives the pulses, outlives the acquisition; may be
+  /// null.
   [[nodiscard]] std::optional<StartFailure> start(PulseObserver* observer = nullptr);
   /// False: the drive is over, or stop() was called.
   [[nodiscard]] bool next(Acquired* item) noexcept { return queue_.next(item); }
-  /// Of every AcquiredFrame that next() gave, once.
+  /// Call once for every AcquiredFrame that next() returned.
   void release(const AcquiredFrame& frame) noexcept { queue_.release(frame.set); }
   /// Devices that are gone are asked to come back at every look, a second apart at least, and a
   /// look follows on whatever a device brings. From who knows that time passes where none brings
   /// anything: some times a second.
   void look_again() noexcept { notify(); }
-  /// How often its thread has gone round: it stands still while a device holds that up. Any thread.
+  /// Number of iterations of its thread: it stands still while a device holds that up. Any thread.
   [[nodiscard]] std::uint64_t rounds() const noexcept {
     return rounds_.load(std::memory_order_relaxed);
   }

@@ -38,7 +38,7 @@ class CameraClock {
   Duration exposure_{};  // of the first frame: what the mapper's least delay holds for
 };
 
-/// How well a device's clock was known over a drive, from its stamps and where they were mapped to.
+/// Quality of a device clock's mapping, from its stamps and where they were mapped to.
 ///
 /// Threads  One. Memory: fixed. Units: the error of a stamp is a bound.
 class ClockRecord {
@@ -77,7 +77,7 @@ class ClockRecord {
   void restart() noexcept { any_ = false; }
 
   [[nodiscard]] std::uint64_t stamps() const noexcept { return stamps_; }
-  /// Of the host's clock against the device's, ppm; 0 where nothing is known.
+  /// Drift of the host clock against the device's, ppm; 0 if unknown.
   [[nodiscard]] double drift_ppm() const noexcept { return drift_ppm_; }
   [[nodiscard]] Duration error() const noexcept { return error_; }  // of the newest stamp
   [[nodiscard]] Duration worst_error() const noexcept {

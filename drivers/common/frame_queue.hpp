@@ -10,7 +10,7 @@
 
 namespace vergence {
 
-/// How long a camera that exposes at this rate may be without an image before it is taken for gone:
+/// Time without an image after which a camera of this rate counts as disconnected:
 /// ten intervals, two seconds at least. Zero, any time: it exposes when it is told to.
 [[nodiscard]] Duration longest_silence(CameraTrigger trigger, double rate_hz) noexcept;
 
@@ -41,7 +41,7 @@ class FrameQueue {
   void begin(Notifier* ready, Duration silence = {}) noexcept;
   /// Stopped from now on; who waits is told.
   void end() noexcept;
-  /// What began does not stream: gone at this time, or as long as it was before (no `when`).
+  /// Ends a failed start: disconnected at this time, or since earlier (no `when`).
   void fail(HostStamp when) noexcept;
   void fail() noexcept;
   /// Takes out a frame that was offered and that nobody took; false: there is none. Precondition:
@@ -73,7 +73,7 @@ class FrameQueue {
   [[nodiscard]] State state() const noexcept;
   /// Streaming, gone or back: not stopped.
   [[nodiscard]] bool started() const noexcept { return state() != State::stopped; }
-  /// Whether the device can be asked now. → ok (it streams), stopped, gone
+  /// Checks whether the device can be queried now. → ok (it streams), stopped, gone
   [[nodiscard]] DeviceStatus standing() const noexcept;
   /// Slots that the consumer has.
   [[nodiscard]] std::size_t held() const noexcept;

@@ -15,7 +15,7 @@
 
 namespace vergence {
 
-/// What every device on a serial line has: the line and where it is opened, the thread that reads
+/// Base of devices on a serial link: the link and its factory, the thread that reads
 /// it, the ring to the consumer, and the reopening after the device was gone. A driver derives from
 /// it and fills in what its protocol does.
 ///

@@ -21,7 +21,7 @@ class AppliedExposure {
   [[nodiscard]] bool change(const ExposureSetting& setting, HostStamp written) noexcept {
     return changes_.push({written, setting});
   }
-  /// Of an exposure that began then; later ones do not begin earlier.
+  /// Setting of an exposure that began then; later ones do not begin earlier.
   [[nodiscard]] const ExposureSetting& at(HostStamp began) noexcept {
     while (any_ || changes_.pop(&next_)) {
       any_ = true;

@@ -7,7 +7,7 @@
 
 namespace vergence::exposure {
 
-/// How bright an image is. Grey levels, 0 … 255.
+/// Brightness of an image in grey levels, 0 … 255.
 struct Brightness {
   double mean = 0;
   double bright = 0;     // below it lie all pixels but the share that may be saturated
@@ -26,7 +26,7 @@ class BrightnessMeter {
  public:
   static constexpr int kColumns = 48, kRows = 36;
 
-  /// Of images of this size. `mask`: 0 hides; empty, or of another size: nothing is hidden.
+  /// Measures images of this size. `mask`: 0 hides; empty, or of another size: nothing is hidden.
   BrightnessMeter(int width, int height, const ImageView& mask);
 
   /// `may_saturate`: share of the pixels, 0 … 1. Of an image of another size: no samples.

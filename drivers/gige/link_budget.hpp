@@ -3,7 +3,7 @@
 
 namespace vergence::gige {
 
-/// What a link is asked to carry: cameras that are all alike.
+/// Load of a link: identical cameras.
 struct LinkDemand {
   std::int64_t image_bytes = 0;
   double rate_hz = 0;

@@ -292,7 +292,7 @@ bool Decoder::next_ubx(Fix* fix) noexcept {
       fill(pvt, &fix->reading);
       return true;
     }
-    // What is still open when the line is quiet is no frame; there may be one within it.
+    // An incomplete frame on a quiet link is discarded; there may be one within it.
     if (!quiet_ || ubx_.waiting() == 0) break;
     ubx_.abandon();
   }

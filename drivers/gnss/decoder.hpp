@@ -89,7 +89,8 @@ class Decoder {
   explicit Decoder(const Options& options) noexcept;
   /// The line was opened, at this rate; 0: bytes take no time (USB). Counters go on.
   void begin(std::uint32_t baud) noexcept;
-  /// What a read brought. Precondition: next() has said false since the last; at most kMaxBytes.
+  /// Adds the bytes of a read. Precondition: next() has said false since the last; at most
+  /// kMaxBytes.
   void accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept;
   /// The next reading. False: none, *reading untouched.
   [[nodiscard]] bool next(InsReading* reading) noexcept;

@@ -8,7 +8,7 @@
 #include "drivers/options/iidc_options.hpp"
 #include "firmware_iface/iidc/bandwidth.hpp"
 
-/// What an IIDC camera hangs on: registers and a stream, the same for USB, IEEE 1394 and a test's
+/// Connection of an IIDC camera: registers and a stream, the same for USB, IEEE 1394 and a test's
 /// fake.
 namespace vergence::iidc {
 
@@ -25,7 +25,7 @@ class RegisterPort {
   [[nodiscard]] virtual DeviceStatus write(std::uint64_t address, std::uint32_t value) noexcept = 0;
 };
 
-/// What one frame is on its way.
+/// A frame in transit.
 struct StreamShape {
   std::size_t image_bytes = 0;   // pixels
   std::size_t frame_bytes = 0;   // with the padding of the last packet
@@ -47,7 +47,7 @@ struct Arrival {
   HostStamp bus_stamp{};  // when the frame's first packet was on the bus, by the host's clock
 };
 
-/// Who takes what the stream brings. On the stream's thread.
+/// Receiver of the stream's frames. Called on the stream's thread.
 class StreamSink {
  public:
   virtual ~StreamSink() = default;
@@ -57,7 +57,7 @@ class StreamSink {
   virtual void gone(HostStamp at) noexcept = 0;
 };
 
-/// What a bus can, for the choice of a mode.
+/// Capabilities of a bus, for choosing a mode.
 struct BusTraits {
   bool isochronous =
       false;  // one packet a cycle, in order; a lost one shifts the rest of its frame

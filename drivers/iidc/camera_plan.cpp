@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/types/bayer.hpp"
 #include "drivers/common/format_text.hpp"
+#include "drivers/common/refused.hpp"
 
 namespace vergence::iidc {
 bool GreyConversion::possible() const noexcept {
@@ -69,90 +71,85 @@ class Planner {
       : r_(*registers), bus_(bus), requested_(requested), plan_(*plan), last_error_(*error) {}
 
   DeviceStatus run() {
-    if (const DeviceStatus s = check_numbers(); s != DeviceStatus::ok) return s;
-    if (!take_options(requested_.options, option_table(), "IIDC cameras", &plan_.options,
-                      &last_error_))
-      return DeviceStatus::unsupported;
-    plan_.trigger = requested_.trigger;
-    plan_.requested_rate_hz = requested_.rate_hz;
-    plan_.size = {static_cast<std::uint16_t>(requested_.width),
-                  static_cast<std::uint16_t>(requested_.height)};
-    plan_.position = {static_cast<std::uint16_t>(requested_.offset_x),
-                      static_cast<std::uint16_t>(requested_.offset_y)};
-    for (const auto step :
-         {&Planner::choose_speed, &Planner::choose_trigger, &Planner::choose_features,
-          &Planner::choose_strobe, &Planner::choose_mode}) {
-      const bool possible = (this->*step)();
-      if (r_.status() != DeviceStatus::ok) {
-        const DeviceStatus failed = r_.take_status();
-        last_error_ = r_.last_error();
-        return failed;
+    return take_steps([this] {
+      check_numbers();
+      if (!take_options(requested_.options, option_table(), "IIDC cameras", &plan_.options,
+                        &last_error_))
+        throw Refused{DeviceStatus::unsupported};
+      plan_.trigger = requested_.trigger;
+      plan_.requested_rate_hz = requested_.rate_hz;
+      plan_.size = {static_cast<std::uint16_t>(requested_.width),
+                    static_cast<std::uint16_t>(requested_.height)};
+      plan_.position = {static_cast<std::uint16_t>(requested_.offset_x),
+                        static_cast<std::uint16_t>(requested_.offset_y)};
+      for (const auto step :
+           {&Planner::choose_speed, &Planner::choose_trigger, &Planner::choose_features,
+            &Planner::choose_strobe, &Planner::choose_mode}) {
+        (this->*step)();
+        check_registers();
       }
-      if (!possible) return DeviceStatus::unsupported;
-    }
-    return DeviceStatus::ok;
+    });
   }
 
  private:
-  DeviceStatus check_numbers() {
-    constexpr int kMax = 65535;
-    if (const std::string invalid = find_invalid(requested_); !invalid.empty()) {
-      last_error_ = invalid + " is no configuration";
-      return DeviceStatus::bad_configuration;
-    }
-    if (requested_.width > kMax || requested_.height > kMax || requested_.offset_x > kMax ||
-        requested_.offset_y > kMax) {
-      last_error_ =
-          format_text("%d x %d is more than any camera has", requested_.width, requested_.height);
-      return DeviceStatus::unsupported;
-    }
-    return DeviceStatus::ok;
+  /// A register that failed outranks what was read of it.
+  void check_registers() {
+    if (r_.status() == DeviceStatus::ok) return;
+    const DeviceStatus failed = r_.take_status();
+    last_error_ = r_.last_error();
+    throw Refused{failed};
+  }
+  [[noreturn]] void refuse(std::string message, DeviceStatus status = DeviceStatus::unsupported) {
+    check_registers();
+    last_error_ = std::move(message);
+    throw Refused{status};
   }
 
-  bool choose_speed() {
+  void check_numbers() {
+    constexpr int kMax = 65535;
+    if (const std::string invalid = find_invalid(requested_); !invalid.empty())
+      refuse(invalid + " is no configuration", DeviceStatus::bad_configuration);
+    if (requested_.width > kMax || requested_.height > kMax || requested_.offset_x > kMax ||
+        requested_.offset_y > kMax)
+      refuse(
+          format_text("%d x %d is more than any camera has", requested_.width, requested_.height));
+  }
+
+  void choose_speed() {
     const bool beta = BasicFunctions::of(r_.get(reg::kBasicFunctions)).beta;
     BusSpeed most =
         bus_.isochronous && !beta ? std::min(bus_.fastest, BusSpeed::s400) : bus_.fastest;
     if (plan_.options.speed && bus_.isochronous) {
-      if (*plan_.options.speed > most) {
-        last_error_ = format_text("option speed: the camera and its bus reach %s",
-                                  std::string(to_string(most)).c_str());
-        return false;
-      }
+      if (*plan_.options.speed > most)
+        refuse(format_text("option speed: the camera and its bus reach %s",
+                           std::string(to_string(most)).c_str()));
       most = *plan_.options.speed;
     }
     plan_.shape.speed = most;
     plan_.shape.buffers = plan_.options.buffers;
     largest_ = std::min(bus_.largest_packet,
                         bus_.isochronous ? largest_packet(most) : bus_.largest_packet);
-    return true;
   }
 
-  bool choose_trigger() {
-    if (requested_.trigger == CameraTrigger::free) return true;
+  void choose_trigger() {
+    if (requested_.trigger == CameraTrigger::free) return;
     const TriggerInquiry t = TriggerInquiry::of(r_.get(reg::kTriggerInquiry));
     const unsigned source = requested_.trigger == CameraTrigger::software
                                 ? kTriggerSourceSoftware
                                 : plan_.options.trigger_source;
-    if (!t.present || !t.has_source(source) || (!t.has_mode(0) && !t.has_mode(14))) {
-      last_error_ = requested_.trigger == CameraTrigger::software
-                        ? "this camera has no software trigger"
-                        : format_text("this camera has no trigger input %u", source);
-      last_error_ += offered_triggers(t);
-      return false;
-    }
+    if (!t.present || !t.has_source(source) || (!t.has_mode(0) && !t.has_mode(14)))
+      refuse((requested_.trigger == CameraTrigger::software
+                  ? "this camera has no software trigger"
+                  : format_text("this camera has no trigger input %u", source)) +
+             offered_triggers(t));
     plan_.trigger_mode = plan_.options.trigger_mode.value_or(t.has_mode(14) ? 14 : 0);
-    if (!t.has_mode(plan_.trigger_mode)) {
-      last_error_ = format_text("this camera has no trigger mode %u", plan_.trigger_mode) +
-                    offered_triggers(t);
-      return false;
-    }
-    if (!plan_.options.trigger_rising && !t.polarity) {
-      last_error_ =
-          "the edge of this camera's trigger cannot be changed; option trigger_edge must be rising";
-      return false;
-    }
-    return true;
+    if (!t.has_mode(plan_.trigger_mode))
+      refuse(format_text("this camera has no trigger mode %u", plan_.trigger_mode) +
+             offered_triggers(t));
+    if (!plan_.options.trigger_rising && !t.polarity)
+      refuse(
+          "the edge of this camera's trigger cannot be changed; option trigger_edge must be "
+          "rising");
   }
   static std::string offered_triggers(const TriggerInquiry& t) {
     if (!t.present) return "; it offers trigger: free";
@@ -166,51 +163,42 @@ class Planner {
     return out;
   }
 
-  bool choose_features() {
+  void choose_features() {
     constexpr double kFloat = 1e-6;  // single precision in the camera
     const AbsoluteRange shutter = r_.absolute_range(Feature::shutter);
     const double s = requested_.exposure.to_seconds();
-    if (!shutter.present) {
-      last_error_ =
+    if (!shutter.present)
+      refuse(
           "this camera does not take its exposure in seconds, which version 1.31 of IIDC and later "
-          "do";
-      return false;
-    }
-    if (s < shutter.least * (1 - kFloat) || s > shutter.most * (1 + kFloat)) {
-      last_error_ =
+          "do");
+    if (s < shutter.least * (1 - kFloat) || s > shutter.most * (1 + kFloat))
+      refuse(
           format_text("an exposure of %.6g us is not possible; this camera offers %.6g to %.6g us",
-                      s * 1e6, shutter.least * 1e6, shutter.most * 1e6);
-      return false;
-    }
+                      s * 1e6, shutter.least * 1e6, shutter.most * 1e6));
     const AbsoluteRange gain = r_.absolute_range(Feature::gain);
     const double slack = kFloat * std::max(1.0, std::abs(requested_.gain_db));
     if (gain.present
             ? requested_.gain_db < gain.least - slack || requested_.gain_db > gain.most + slack
-            : requested_.gain_db != 0) {
-      last_error_ =
-          gain.present
-              ? format_text("a gain of %g dB is not possible; this camera offers %g to %g dB",
-                            requested_.gain_db, gain.least, gain.most)
-              : "this camera does not take its gain in dB; gain_db must be 0";
-      return false;
-    }
+            : requested_.gain_db != 0)
+      refuse(gain.present
+                 ? format_text("a gain of %g dB is not possible; this camera offers %g to %g dB",
+                               requested_.gain_db, gain.least, gain.most)
+                 : "this camera does not take its gain in dB; gain_db must be 0");
     plan_.exposure = requested_.exposure;
     plan_.gain_db = requested_.gain_db;
     frame_rate_ = r_.absolute_range(Feature::frame_rate);
-    return true;
   }
 
-  bool choose_strobe() {
-    if (!plan_.options.strobe_pin) return true;
+  void choose_strobe() {
+    if (!plan_.options.strobe_pin) return;
     const bool any = (r_.get(reg::kOptionalFunctions) & bit(28)) != 0;
     const std::uint64_t csr = any ? r_.table(reg::kStrobeBase) : 0;
     if (csr != 0 &&
         (r_.get_at(csr + reg::strobe::inquiry(*plan_.options.strobe_pin)) & bit(31)) != 0)
-      return true;
-    last_error_ =
-        csr == 0 ? "this camera has no strobe outputs"
-                 : format_text("this camera has no strobe output %u", *plan_.options.strobe_pin);
-    return false;
+      return;
+    refuse(csr == 0
+               ? "this camera has no strobe outputs"
+               : format_text("this camera has no strobe output %u", *plan_.options.strobe_pin));
   }
 
   [[nodiscard]] std::vector<ColorCoding> codings() {
@@ -219,24 +207,22 @@ class Planner {
     return c ? std::vector{*c} : std::vector<ColorCoding>{};
   }
 
-  bool choose_mode() {
+  void choose_mode() {
     const auto candidates = codings();
     const bool region = requested_.offset_x != 0 || requested_.offset_y != 0;
     const bool may_fixed =
         !region && !plan_.options.packet_bytes && !plan_.options.format7.value_or(false);
     const bool may_format7 = plan_.options.format7.value_or(true);
     for (const ColorCoding c : candidates) {
-      if (may_fixed && fixed(c, true)) return true;
-      if (may_format7 && format7(c)) return true;
-      if (r_.status() != DeviceStatus::ok) return false;
+      if ((may_fixed && fixed(c, true)) || (may_format7 && format7(c))) return;
+      check_registers();
     }
     for (const ColorCoding c : candidates)
-      if (may_fixed && fixed(c, false)) return true;
-    last_error_ = format_text("%d x %d", requested_.width, requested_.height) +
-                  (requested_.pixel_format.empty() ? "" : " " + requested_.pixel_format) +
-                  format_text(" at %g Hz is not possible", requested_.rate_hz) +
-                  (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " + offers();
-    return false;
+      if (may_fixed && fixed(c, false)) return;
+    refuse(format_text("%d x %d", requested_.width, requested_.height) +
+           (requested_.pixel_format.empty() ? "" : " " + requested_.pixel_format) +
+           format_text(" at %g Hz is not possible", requested_.rate_hz) +
+           (why_not_.empty() ? "" : ": " + why_not_) + "; this camera offers " + offers());
   }
 
   /// `exactly`: a free-running camera at the rate that is wanted, not at the next higher one; and
@@ -364,7 +350,7 @@ class Planner {
     return false;
   }
 
-  /// Of the first way that was tried: the cheapest.
+  /// The error of the first and cheapest mode is reported.
   void explain_refusal(const std::string& why) {
     if (why_not_.empty()) why_not_ = why;
   }

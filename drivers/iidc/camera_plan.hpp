@@ -10,7 +10,7 @@
 
 namespace vergence::iidc {
 
-/// How an image as sent becomes 8-bit grey.
+/// Conversion of a transmitted image to 8-bit grey.
 struct GreyConversion {
   ColorCoding coding = ColorCoding::mono8;
   bool mosaic = false;           // 8 bits behind a Bayer filter
@@ -19,7 +19,7 @@ struct GreyConversion {
   [[nodiscard]] bool none() const noexcept {
     return !mosaic && (coding == ColorCoding::mono8 || coding == ColorCoding::raw8);
   }
-  /// Whether there is a way at all.
+  /// Returns true if a mode was found.
   [[nodiscard]] bool possible() const noexcept;
 };
 
@@ -33,7 +33,7 @@ struct GreyConversion {
 void to_grey(const GreyConversion& conversion, const std::uint8_t* in, int width, int height,
              std::uint8_t* out, std::size_t stride) noexcept;
 
-/// How one camera is going to do what it is asked for: the mode, its packets, what is embedded.
+/// Plan for one camera's configuration: the mode, its packets, what is embedded.
 struct CameraPlan {
   Options options{};
   CameraTrigger trigger = CameraTrigger::hardware;

@@ -19,7 +19,7 @@ struct FirewireNode {
 [[nodiscard]] std::vector<FirewireNode> list_firewire_cameras(
     const std::filesystem::path& root = "/sys");
 
-/// Whether the kernel has a FireWire stack at all.
+/// Returns true if the kernel has a FireWire stack.
 [[nodiscard]] bool has_firewire(const std::filesystem::path& root = "/sys");
 
 }  // namespace vergence::iidc

@@ -145,7 +145,8 @@ void FirewireRing::enqueue(std::size_t buffer) noexcept {
 
 void FirewireRing::enqueue_returned() noexcept {
   const std::uint64_t all = returned_.take_all();
-  // Of this ring only: a slot of the one before may have come back while it was replaced.
+  // Accepts slots of this ring only: a slot of the one before may have come back while it was
+  // replaced.
   std::uint64_t bits = all >> generation() * kMaxBuffers & 0xFFFF'FFFFU;
   for (; bits != 0; bits &= bits - 1) enqueue(static_cast<std::size_t>(std::countr_zero(bits)));
 }

@@ -31,7 +31,7 @@ class FirewireRing {
  public:
   static constexpr std::size_t kReserve = 3;
 
-  /// What take() found.
+  /// Result of take().
   enum class Take : std::uint8_t { filled, nothing, gone };
   struct Filled {
     FrameSlot slot = 0;  // kept until give_back() or refuse()

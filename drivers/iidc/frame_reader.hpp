@@ -8,7 +8,7 @@
 
 namespace vergence::iidc {
 
-/// What one arrival is.
+/// Kind of one arrival.
 struct ReadFrame {
   bool taken = false;  // false: nothing an exposure could be told from; its number, if it had one,
                        // shows as a gap
@@ -47,7 +47,7 @@ class FrameReader {
  public:
   void begin(const CameraPlan& plan, bool isochronous, SharedClock* clock) noexcept;
   [[nodiscard]] ReadFrame read(const Arrival& arrival) noexcept;
-  /// What the next frame was exposed for: stamps of other instants are brought to its start.
+  /// Sets the exposure of the next frame: stamps of other instants are brought to its start.
   void set_exposure(Duration exposure) noexcept { exposure_ = exposure; }
 
  private:

@@ -4,7 +4,7 @@
 #include "drivers/camera.hpp"
 
 /// FireWire-class industrial cameras (IIDC 1.31), over USB and over IEEE 1394.
-/// docs/cameras/iidc_usb.md, docs/cameras/iidc_1394.md
+/// drivers/iidc/README.md, drivers/iidc/README.md
 namespace vergence::iidc {
 
 /// Cameras that carry IIDC's registers over USB (Point Grey's Firefly, Chameleon, Flea3,

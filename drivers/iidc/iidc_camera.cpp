@@ -299,7 +299,7 @@ void IidcCamera::release(FrameSlot slot) noexcept {
   if (queue_.release(slot)) return_slot(slot);
 }
 
-/// What a stop left between stream and consumer. Precondition: the stream is stopped.
+/// Discards frames left between stream and consumer. Precondition: the stream is stopped.
 void IidcCamera::drain() noexcept {
   for (FrameSlot slot = 0; queue_.drain(&slot);) return_slot(slot);
 }

@@ -30,7 +30,7 @@ constexpr FaultParameter kLag[] = {kCamera1, kForGood};
 constexpr FaultParameter kSwap[] = {kForGood};
 constexpr FaultParameter kOccluder[] = {
     {"ahead_m", 1.2, -200, 200,
-     "from the left camera to its nearest face, along the vehicle's heading; negative: behind"},
+     "from the left camera to its nearest face, ahead; negative: behind"},
     {"left_m", 0, -50, 50, "its middle, to the left of the vehicle's"},
     {"turn_deg", 0, -180, 180,
      "its heading against the vehicle's, to the left; 90: it stands across"},
@@ -72,13 +72,10 @@ constexpr FaultRow kRows[] = {
      "A recalibration is requested, as with SIGUSR1; nothing happens to the devices.",
      {}},
     {FaultKind::lag, "lag",
-     "A camera is a frame late: the image of the exposure before, with the counter and the stamp "
-     "of this one.",
-     kLag},
+     "A camera is a frame late: the previous image with this one's counter and stamp.", kLag},
     {FaultKind::swap_cables, "swap_cables",
-     "The cables of cameras 0 and 1 are exchanged; the truth stays that of the cameras.", kSwap},
-    {FaultKind::occluder, "occluder", "A bus (12 m, 2.5 m wide, 3.2 m high) is in the way.",
-     kOccluder},
+     "The cables of cameras 0 and 1 are swapped; the ground truth is not.", kSwap},
+    {FaultKind::occluder, "occluder", "A bus (12 × 2.5 × 3.2 m) is in the way.", kOccluder},
     {FaultKind::cover, "cover", "A lens is covered: black pictures.", kCover},
     {FaultKind::night, "night", "It gets dark for every camera.", kNight},
     {FaultKind::exposure, "exposure", "The brightness of the pictures changes.", kExposure},
@@ -96,16 +93,13 @@ constexpr FaultRow kRows[] = {
     {FaultKind::board_gone, "board_gone", "The line to the trigger board is unplugged.",
      kBoardGone},
     {FaultKind::board_reboot, "board_reboot",
-     "The trigger board restarts: its pulses stop, then count from 0 again by a clock from 0.",
-     kReboot},
+     "The trigger board restarts: pulses stop; counter and clock begin at 0.", kReboot},
     {FaultKind::ins_gone, "ins_gone", "The INS is silent; at 0 it starts late.", kInsGone},
     {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kInsGone},
     {FaultKind::position_jump, "position_jump", "The INS's position leaps.", kPositionJump},
     {FaultKind::time_jump, "time_jump", "A device's clock is set.", kTimeJump},
     {FaultKind::disk_full, "disk_full",
-     "The disk of the session takes nothing: lines wait in memory, up to 1 MB a file; nothing "
-     "happens to the devices.",
-     kInsGone},
+     "The session's disk is full: lines wait in memory, up to 1 MB per file.", kInsGone},
 };
 
 double number(std::string_view text, const std::string& what) {

@@ -62,7 +62,7 @@ struct Fault {
   [[nodiscard]] bool concerns(int k) const noexcept { return camera < 0 || camera == k; }
 };
 
-/// What a kind's parameter is; the table behind docs/mock.md.
+/// Parameter of a fault kind; the table behind docs/simulated_rig.md.
 struct FaultParameter {
   const char* name;  // its unit is its ending: _deg, _m, _s
   double fallback;   // when not given
@@ -88,7 +88,7 @@ struct FaultRow {
 /// `knock@42 camera=1 pitch_deg=0.2`. Throws as make_fault().
 [[nodiscard]] Fault parse_fault(std::string_view text);
 
-/// The table of docs/mock.md.
+/// The table of docs/simulated_rig.md.
 [[nodiscard]] std::string fault_document();
 
 }  // namespace vergence::mock

@@ -14,7 +14,7 @@
 
 namespace vergence::mock {
 
-/// What the mock's devices are like beside what their interfaces configure.
+/// Properties of the simulated devices in addition to their configuration.
 struct MockRigOptions {
   bool real_time = false;  // false: virtual time, the producer waits for the consumer
   std::uint64_t seed = 1;

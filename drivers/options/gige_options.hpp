@@ -12,7 +12,7 @@ namespace vergence::gige {
 enum class Resend : std::uint8_t { automatic, on, off };
 enum class TriggerEdge : std::uint8_t { rising, falling };
 
-/// What only GigE Vision cameras have. Ranges and meaning: option_table().
+/// Options of GigE Vision cameras. Ranges and meaning: option_table().
 struct Options {
   int packet_size = 0;                                // bytes; 0: computed
   Duration packet_delay = Duration::nanoseconds(-1);  // negative: computed
@@ -29,7 +29,7 @@ struct Options {
       features{};  // of the camera, by its own names, last
 };
 
-/// The table behind docs/cameras/gige.md.
+/// The table behind drivers/gige/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::gige

@@ -15,7 +15,7 @@ enum class StampedInstant : std::uint8_t { start, middle, end };
 inline constexpr std::size_t kMaxBuffers =
     32;  // half of FramePool::kMaxSlots: two generations of a ring fit into one range of slots
 
-/// What only IIDC cameras have. Ranges and meaning: option_table().
+/// Options of IIDC cameras. Ranges and meaning: option_table().
 struct Options {
   std::optional<bool> format7{};              // only it, or never; empty: where needed
   std::optional<std::size_t> packet_bytes{};  // of Format 7
@@ -31,7 +31,7 @@ struct Options {
   StampedInstant stamped = StampedInstant::end;
 };
 
-/// The table behind docs/cameras/iidc_usb.md.
+/// The table behind drivers/iidc/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::iidc

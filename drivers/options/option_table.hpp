@@ -14,7 +14,7 @@
 
 namespace vergence {
 
-// How the values of options are written.
+// Syntax of option values.
 
 /// The whole text is one finite number.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text);

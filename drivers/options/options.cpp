@@ -168,7 +168,7 @@ const OptionTable<gige::Options>& table_of(const gige::Options&) { return gige::
 const OptionTable<iidc::Options>& table_of(const iidc::Options&) { return iidc::option_table(); }
 const OptionTable<v4l2::Options>& table_of(const v4l2::Options&) { return v4l2::option_table(); }
 
-/// What `use` gives for the options' kind; `none` where there is no kind.
+/// Returns the result of `use` for the options' kind, or `none` without a kind.
 template <class Variant, class Result, class Use>
 Result with_kind(Variant& options, Result none, const Use& use) {
   return std::visit(

@@ -12,7 +12,7 @@
 
 namespace vergence {
 
-/// What only one kind of camera has, in that kind's own type; monostate: as it begins.
+/// Options of one kind of camera, in that kind's own type; monostate: as it begins.
 ///
 ///     CameraConfiguration c;
 ///     c.options = gige::Options{.packet_size = 9000};
@@ -29,14 +29,14 @@ using CameraOptions = std::variant<std::monostate, gige::Options, iidc::Options,
 /// (find_option()); *options is as it was.
 [[nodiscard]] bool set_option(std::string_view name, std::string_view text, CameraOptions* options);
 
-/// Of the kind that `options` holds; without a kind there are none.
+/// Rows of the kind that `options` holds; empty without a kind.
 [[nodiscard]] const std::vector<OptionRow>& option_rows(const CameraOptions& options);
 /// The row of a name; null: there is none.
 [[nodiscard]] const OptionRow* find_option(const CameraOptions& options, std::string_view name);
 /// `NAME=VALUE …` of those that are not as they begin, by name: equal options, equal text.
 [[nodiscard]] std::string options_text(const CameraOptions& options);
 
-/// What a driver finds in a configuration: its own options, checked. Without a kind they are as
+/// Reads a driver's own options from a configuration and checks them. Without a kind they are as
 /// they begin.
 ///
 /// False: *error says which option cannot be, or that they are of another kind of camera; *options

@@ -8,7 +8,7 @@
 
 namespace vergence::v4l2 {
 
-/// What only Video4Linux cameras have. Ranges and meaning: option_table().
+/// Options of V4L2 cameras. Ranges and meaning: option_table().
 struct Options {
   Duration readout =
       Duration::nanoseconds(-1);  // negative: from the sensor's own figures, else zero
@@ -23,7 +23,7 @@ struct Options {
   std::vector<std::pair<std::string, std::string>> controls{};  // of the camera, by their names
 };
 
-/// The table behind docs/cameras/v4l2.md.
+/// The table behind drivers/v4l2/README.md.
 [[nodiscard]] const OptionTable<Options>& option_table();
 
 }  // namespace vergence::v4l2

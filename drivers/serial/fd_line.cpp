@@ -14,7 +14,7 @@
 namespace vergence {
 namespace {
 
-/// What is left until `deadline`, for ppoll(); zero when it is past.
+/// Time left until `deadline`, for ppoll(); zero if it has passed.
 timespec left_until(HostStamp deadline) noexcept {
   const std::int64_t ns = std::max<std::int64_t>(0, (deadline - monotonic_now()).ns());
   return {static_cast<time_t>(ns / 1'000'000'000), static_cast<long>(ns % 1'000'000'000)};

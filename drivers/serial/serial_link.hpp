@@ -10,13 +10,13 @@
 
 namespace vergence {
 
-/// How a line is set: 8 data bits, no parity, no flow control, and these.
+/// Settings of a link: 8 data bits, no parity, no flow control, and these.
 struct LineSettings {
   std::uint32_t baud = 115200;
   int stop_bits = 1;  // 1 or 2
 };
 
-/// What a read brought.
+/// Result of a read.
 struct LineRead {
   DeviceStatus status = DeviceStatus::timeout;
   std::size_t size = 0;  // bytes; 0 unless ok
@@ -41,7 +41,7 @@ class SerialLink {
  public:
   virtual ~SerialLink() = default;
 
-  /// What is there, at least a byte, waiting at most `limit` for the first (0: look once).
+  /// Reads available bytes, waiting at most `limit` for the first (0: poll once).
   /// Precondition: `out` is not empty.
   /// → ok, timeout, stopped (woken), ended (a simulation is at its end), gone, failed
   [[nodiscard]] virtual LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept = 0;
@@ -69,7 +69,7 @@ class SerialLinkFactory {
                                                          DeviceStatus* status) = 0;
   /// For messages: `/dev/ttyUSB0`, …
   [[nodiscard]] virtual std::string name() const = 0;
-  /// How long a chip between device and host may hold bytes back (latency timer of a USB
+  /// Maximum time that a chip between device and host holds bytes back (latency timer of a USB
   /// converter); 0: it does not, or is not known.
   [[nodiscard]] virtual Duration latency_timer() const { return {}; }
   /// For a simulation in virtual time: lets so much of it pass, with no line open. False: time is

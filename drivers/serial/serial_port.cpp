@@ -55,7 +55,7 @@ struct PortFreer {
   void operator()(sp_port* port) const noexcept { ::sp_free_port(port); }
 };
 
-/// What the system tells of a port that is there; nothing: it has vanished, or has no hardware.
+/// System information about a port; nullopt if it has vanished or has no hardware.
 std::optional<SerialPortInfo> info_of(const std::string& name) {
   sp_port* found = nullptr;
   if (::sp_get_port_by_name(name.c_str(), &found) != SP_OK) return std::nullopt;

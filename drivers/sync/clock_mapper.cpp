@@ -113,7 +113,7 @@ MappedStamp ClockMapper::map(DeviceStamp device, HostStamp arrival) noexcept {
   const Point p = point(device, host);
   const double newest = upper_.at[upper_.count - 1].device;
   const double above = p.delay - line(p.device);
-  // What the drift may have done since the newest pair is no jump.
+  // Possible drift since the newest pair is no jump.
   const double silent = std::max(0.0, p.device - newest);
   if (above < -(in_ns(options_.jump) + 2 * options_.drift_bound * silent)) {
     ++resets_;
@@ -257,8 +257,8 @@ void ClockMapper::fit_two_way() noexcept {
 void ClockMapper::bound_two_way() noexcept {
   const double at =
       std::max(upper_.at[upper_.count - 1].device, lower_.at[lower_.count - 1].device);
-  // Of true − chosen: at most `over` at an upper point, at least −over at a lower one; its slope is
-  // what the drift bound leaves.
+  // Bounds of true − chosen: at most `over` at an upper point, at least −over at a lower one; its
+  // slope is what the drift bound leaves.
   double rise = options_.drift_bound - slope_, fall = options_.drift_bound + slope_;
   for (std::size_t i = 0; i < lower_.count; ++i) {
     const Point& l = lower_.at[i];

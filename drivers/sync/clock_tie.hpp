@@ -28,7 +28,7 @@ class ClockTie {
   [[nodiscard]] DeviceStamp edge_of(DeviceStamp stamp) const noexcept;
   /// The edge that a stamp belongs to is within this of edge_of().
   [[nodiscard]] Duration gate(DeviceStamp stamp) const noexcept;
-  /// The same of the newest pair.
+  /// Value of the newest pair.
   [[nodiscard]] Duration gate() const noexcept { return gate(stamp_); }
 
  private:

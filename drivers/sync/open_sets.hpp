@@ -7,7 +7,7 @@
 
 namespace vergence {
 
-/// What pairing knows of an image besides its slot.
+/// Pairing data of an image besides its slot.
 struct SetImage {
   MappedStamp middle{};
   std::int64_t time = 0;  // ns, of the clock that pairs, where stamps do: middle of the exposure
@@ -85,7 +85,7 @@ class OpenSets {
   /// Every set below waits for nobody.
   [[nodiscard]] std::uint64_t flushed_below() const noexcept { return flushed_; }
 
-  /// What was doubtful of this camera's images stays so: their sets are contradicted.
+  /// Suspect images of this camera stay suspect: their sets are contradicted.
   void contradict_doubtful(std::size_t camera) noexcept;
 
  private:

@@ -71,7 +71,8 @@ bool PulseAcquisition::believable(const PulseTrain& train, std::size_t place,
   return true;
 }
 
-/// Whether the run that ends before frame `end` fits with its last frame on the train's `place`.
+/// Checks that the run that ends before frame `end` fits with its last frame on the train's
+/// `place`.
 PulseAcquisition::Fit PulseAcquisition::fit(const PulseTrain& train, std::size_t place,
                                             std::size_t end) const noexcept {
   const std::size_t begin = end - kRun;

@@ -93,7 +93,7 @@ class PulseAcquisition {
   bool begun_ = false;
 };
 
-/// Whether triggers were missed or the camera's clock was set by as much: both look alike at first.
+/// Distinguishes missed triggers from a clock that was set by as much: both look alike at first.
 ///
 /// Method   Had the clock been set instead of s triggers missed, the stamps would now follow the
 ///          pulse s earlier, a constant time off. That is refuted once this time has changed by

@@ -162,7 +162,7 @@ void RigSynchronizer::emit(OpenSet* open, SyncedSet* set) noexcept {
   sets_.close(open);
 }
 
-/// What can be said of a set's togetherness, and whether the pulses have to be found again.
+/// Evaluates the evidence of a set, and whether pulses must be associated again.
 void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
   switch (options_.mode) {
     case SyncMode::approximate_time:

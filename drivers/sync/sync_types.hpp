@@ -6,7 +6,7 @@
 #include "core/types/calibration.hpp"
 #include "drivers/sync/clock_mapper.hpp"
 
-/// What goes into a RigSynchronizer and what comes out.
+/// Input and output of a RigSynchronizer.
 namespace vergence {
 
 /// By what images are paired, and what proves that they belong together.
@@ -21,7 +21,7 @@ enum class SyncMode : std::uint8_t {
                         // proves
   ieee1394_cycle_time,  // the stamps are of one IEEE 1394 cycle timer, which wraps after 128 s:
                         // within `tolerance` in it
-  ptp,           // the stamps are of one PTP clock: within `tolerance` in it
+  ptp,                  // the stamps are of one PTP clock: within `tolerance` in it
   side_by_side,  // both images come in one picture of one camera (side_by_side_camera.hpp), with
                  // one stamp
 };
@@ -44,7 +44,7 @@ enum class SyncMode : std::uint8_t {
          m == SyncMode::ptp || m == SyncMode::side_by_side;
 }
 
-/// Of one camera, for the modes with pulses.
+/// Options of one camera for the modes with pulses.
 struct SyncCameraOptions {
   Duration delay{};  // from the pulse's edge to the start of the exposure, of line and camera
   Duration resolution =
@@ -86,7 +86,7 @@ struct SyncFrame {
   Duration exposure{};           // of Frame. Ignored as above
 };
 
-/// How sure it is that a set's images were exposed together.
+/// Evidence that a set's images were exposed together.
 enum class SyncProof : std::uint8_t {
   counted,       // paired by counter, and the stamps agree within half an interval (also: one image
                  // only)

@@ -11,7 +11,7 @@ namespace vergence {
 
 /// The numbers of sets from stamps of one clock: for the modes software, bus, ptp and side_by_side.
 ///
-/// What was exposed within the tolerance of an open set is of that set; anything else begins one,
+/// An image within the tolerance of an open set belongs to it; anything else begins one,
 /// so many intervals after the newest or before it. What would be before the first set, or between
 /// two that are open, is of none.
 ///

@@ -24,7 +24,7 @@ namespace vergence::trigger_board {
 ///          next 00 is a new beginning.
 class BoardLine {
  public:
-  /// What a frame tells about time.
+  /// Timing of a frame.
   struct Times {
     HostStamp arrival{};    // of the read that completed it
     HostStamp departure{};  // of its first bit, at the latest
@@ -44,11 +44,11 @@ class BoardLine {
   /// → ok, timeout, stopped (woken), ended, gone, failed
   [[nodiscard]] DeviceStatus next(HostStamp deadline, TriggerFrame* frame, Times* times) noexcept;
 
-  /// What was received that is no frame.
+  /// Received bytes that form no frame.
   [[nodiscard]] std::uint64_t refused() const noexcept {
     return refused_before_ + decoder_.bad_coding + decoder_.bad_length + decoder_.bad_crc;
   }
-  /// What the first bytes look like when no frame has come since attach() or forget(). Empty:
+  /// Guess about the first bytes if no frame has come since attach() or forget(). Empty:
   /// nothing was received, or frames were.
   [[nodiscard]] std::string received_instead() const;
   void forget() noexcept;
@@ -92,7 +92,7 @@ class PauseRequest {
   void add(std::uint32_t pulses) noexcept {
     requested_.fetch_add(pulses, std::memory_order_release);
   }
-  /// What was requested and has not been due() yet is none any more.
+  /// Cancels a request that has not been due() yet.
   void drop_new() noexcept { requested_.store(0, std::memory_order_relaxed); }
   /// Nor is what was sent: another start of the board.
   void restart() noexcept;

@@ -37,7 +37,7 @@ void BoardClock::forget() noexcept {
 void BoardClock::report_lock(bool locked, HostStamp now) noexcept {
   if (locked && !locked_) lock_began_ = now;
   locked_ = locked;
-  // What was mapped while it moved is in the older one for so long.
+  // Pulses mapped while the clock moved stay in the older fit for this long.
   moving_ = turns_ && !(locked && now - lock_began_ > kTurn * 2);
 }
 

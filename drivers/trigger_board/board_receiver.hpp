@@ -14,7 +14,7 @@
 
 namespace vergence::trigger_board {
 
-/// What came of a PONG.
+/// Result of a PONG.
 enum class PongStatus : std::uint8_t {
   taken,
   unasked,   // no such question is open
@@ -53,7 +53,7 @@ class BoardClock {
   /// stamps before the first answer.
   /// `pps`: something disciplines its ticks.
   void restart(Duration spread, bool pps) noexcept;
-  /// What the board says of PPS, about every second.
+  /// PPS status of the board, about every second.
   void report_lock(bool locked, HostStamp now) noexcept;
   /// The line was opened again: what was under way is not answered any more. The fit stays. `wire`:
   /// a byte's time on it, 0 where it has none.
@@ -146,9 +146,9 @@ class BoardReceiver final : public FrameSink {
   [[nodiscard]] std::uint32_t boot() const noexcept { return account_.boot(); }
   [[nodiscard]] Finding finding() const noexcept { return finding_; }
   void clear_finding() noexcept { finding_ = Finding::none; }
-  /// What it said of a halt while it was being started is past.
+  /// Clears a halt that was reported during the start.
   void clear_halt() noexcept;
-  /// Of the newest frame, or of stream().
+  /// Time of the newest frame, or of stream().
   [[nodiscard]] HostStamp last_frame() const noexcept { return last_frame_; }
 
   [[nodiscard]] BoardClock& clock() noexcept { return clock_; }

@@ -50,7 +50,7 @@ class Device final : public TriggerDevice,
   [[nodiscard]] std::string remark() const override { return remark_; }
   [[nodiscard]] TriggerStatistics statistics() const noexcept override;
 
-  /// Who the board said it is. Precondition: connected.
+  /// Identity reported by the board. Precondition: connected.
   [[nodiscard]] const TriggerInfo& identity() const noexcept { return identity_; }
 
  private:

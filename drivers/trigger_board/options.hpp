@@ -8,7 +8,7 @@ namespace vergence::trigger_board {
 /// Which edge of an input counts.
 enum class Edge : std::uint8_t { none, rising, falling };
 
-/// How a trigger board is reached, and what its inputs beside the cameras' are for.
+/// Connection of a trigger board and use of its additional inputs.
 struct Options {
   std::uint32_t baud = 0;  // 0: found by asking at kBauds
   bool native_usb =

@@ -6,7 +6,7 @@
 
 #include "drivers/trigger_board/device.hpp"
 
-/// What the device's own thread does.
+/// Loop of the device's own thread.
 namespace vergence::trigger_board {
 namespace {
 
@@ -34,7 +34,7 @@ DeviceStatus Device::begin() noexcept {
     const DeviceStatus status = begin_on(&setup);
     if (status != DeviceStatus::ok && status != DeviceStatus::stopped)
       last_error_.set(place().name() + ": " + setup.last_error());
-    // What it will not do it does not do the next time either; but boards are switched, and
+    // A refusal would be repeated; but boards are replaced, and
     // programs wait.
     return status == DeviceStatus::ok || status == DeviceStatus::stopped ||
                    status == DeviceStatus::ended
@@ -45,7 +45,7 @@ DeviceStatus Device::begin() noexcept {
   }
 }
 
-/// Who is there, what it shall do, what time it is, and off.
+/// Identify, configure, synchronise and start.
 DeviceStatus Device::begin_on(Setup* setup) {
   receiver_.clear_finding();
   TriggerInfo who;

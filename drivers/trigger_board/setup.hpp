@@ -11,7 +11,7 @@
 
 namespace vergence::trigger_board {
 
-// What is asked of a board, as it goes over the wire.
+// Requested configuration of a board in wire format.
 
 /// → ok; bad_configuration, unsupported: *message says what is wrong and what to do, *config is as
 ///   it was.
@@ -19,11 +19,11 @@ namespace vergence::trigger_board {
                                               const Options& options, const TriggerInfo& board,
                                               TriggerConfig* config, std::string* message);
 [[nodiscard]] TriggerConfiguration configuration_of(const TriggerConfig& config) noexcept;
-/// What the board will do otherwise than asked. Empty: nothing.
+/// Deviations from the requested configuration; empty if none.
 [[nodiscard]] std::string remark_about(const TriggerConfiguration& requested,
                                        const TriggerConfig& config);
 
-/// Who gets the frames that answer nothing.
+/// Receiver of unsolicited frames.
 class FrameSink {
  public:
   virtual ~FrameSink() = default;

@@ -38,7 +38,7 @@ class Driver final : public TriggerDriver {
   /// meant), gone, failed
   [[nodiscard]] std::unique_ptr<TriggerDevice> open(std::string_view where,
                                                     DeviceStatus* status) override;
-  /// The same, with what a trigger board has beyond other TriggerDevices.
+  /// Opens a trigger board with its additional interface.
   [[nodiscard]] std::unique_ptr<Device> open_board(std::string_view where, DeviceStatus* status);
   [[nodiscard]] std::string last_error() const override { return last_error_; }
 

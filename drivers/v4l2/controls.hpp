@@ -39,7 +39,7 @@ class Controls {
   std::vector<Control> controls_;
 };
 
-/// What `text` means for a control: a number, or the name of a menu item in any spelling of case
+/// Parses a control's value: a number, or the name of a menu item in any spelling of case
 /// and blanks. False: neither, or out of range.
 [[nodiscard]] bool value_of(const Control& control, std::string_view text, std::int64_t* value);
 /// A value on a control's grid, inside its range.

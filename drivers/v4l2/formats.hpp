@@ -7,7 +7,7 @@
 
 namespace vergence::v4l2 {
 
-/// How the brightness lies in a buffer.
+/// Layout of the brightness in a buffer.
 enum class Layout : std::uint8_t {
   luma_plane,  // 8 bits a pixel, rows of `bytesperline`, at the buffer's start: used where it lies
   words,       // 16 bits a pixel, little endian, brightness in the low bits of the format's depth
@@ -28,7 +28,7 @@ struct PixelFormat {
 /// The four characters, trailing blanks cut; unprintable ones become '?'.
 [[nodiscard]] std::string name_of(std::uint32_t fourcc);
 
-/// Of the formats a camera offers: the one called `requested`, or where that is empty the first of
+/// Returns the format called `requested`, or if that is empty the first of
 /// known_formats(). Null: none.
 [[nodiscard]] const PixelFormat* choose_format(std::span<const std::uint32_t> offered,
                                                std::string_view requested) noexcept;

@@ -146,7 +146,7 @@ class FrameExchange {
                                                      std::size_t with_kernel) noexcept;
   /// A slot to convert into; nothing: all are out. Precondition: not slots().in_place().
   [[nodiscard]] std::optional<FrameSlot> hold_pooled() noexcept;
-  /// Of a slot that is held; free again where it was stopped meanwhile.
+  /// Returns a held slot; it is freed if the stream was stopped meanwhile.
   void offer(const Frame& frame) noexcept;
   void record_dead_node() noexcept;
   /// From streaming: the camera is gone. Nothing happens where it was stopped.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "drivers/common/format_text.hpp"
+#include "drivers/common/refused.hpp"
 
 namespace vergence::v4l2 {
 
@@ -52,42 +53,45 @@ class Applier {
   }
 
   DeviceStatus run(Settings* settings) {
-    for (const auto step :
-         {&Applier::other_controls, &Applier::region, &Applier::format, &Applier::rate,
-          &Applier::exposure, &Applier::gain, &Applier::trigger}) {
-      if (const DeviceStatus status = (this->*step)(); status != DeviceStatus::ok) return status;
-    }
-    out_.readout = options_.readout < Duration{} ? sensor_readout() : options_.readout;
-    *settings = std::move(out_);
-    return DeviceStatus::ok;
+    return take_steps([&] {
+      other_controls();
+      region();
+      format();
+      rate();
+      exposure();
+      gain();
+      trigger();
+      out_.readout = options_.readout < Duration{} ? sensor_readout() : options_.readout;
+      *settings = std::move(out_);
+    });
   }
 
  private:
-  DeviceStatus refuse(DeviceStatus status, std::string message) {
+  [[noreturn]] void refuse(DeviceStatus status, std::string message) {
     *last_error_ = std::move(message);
-    return status;
+    throw Refused{status};
   }
-  DeviceStatus system(int error, const std::string& what) {
+  [[noreturn]] void system(int error, const std::string& what) {
     if (error == EBUSY)
-      return refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
-    return refuse(status_of(error), what + " failed: " + std::strerror(error));
+      refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
+    refuse(status_of(error), what + " failed: " + std::strerror(error));
   }
   void remark(const std::string& message) {
     out_.remark += (out_.remark.empty() ? "" : "; ") + message;
   }
 
-  DeviceStatus set(const Control& control, std::int64_t value) {
+  void set(const Control& control, std::int64_t value) {
     const int error = write(control, value);
-    if (error == 0) return DeviceStatus::ok;
+    if (error == 0) return;
     if (error == EINVAL || error == ERANGE)
-      return refuse(DeviceStatus::unsupported,
-                    control.key + " takes " + range_of(control) + ", not " + std::to_string(value));
-    return system(error, "setting " + control.key);
+      refuse(DeviceStatus::unsupported,
+             control.key + " takes " + range_of(control) + ", not " + std::to_string(value));
+    system(error, "setting " + control.key);
   }
-  /// Of a control that may be absent.
-  DeviceStatus set_if_there(std::uint32_t id, std::int64_t value) {
+  /// Value of a control that may be absent.
+  void set_if_there(std::uint32_t id, std::int64_t value) {
     const Control* c = controls_.find(id);
-    return c == nullptr ? DeviceStatus::ok : set(*c, clamped(*c, value));
+    if (c != nullptr) set(*c, clamped(*c, value));
   }
   [[nodiscard]] double read_or(std::uint32_t id, double fallback) const {
     const Control* c = controls_.find(id);
@@ -95,23 +99,22 @@ class Applier {
     return c != nullptr && read(*c, &value) == 0 ? static_cast<double>(value) : fallback;
   }
 
-  DeviceStatus other_controls() {
+  void other_controls() {
     for (const auto& [key, text] : options_.controls) {
       const Control* c = controls_.find(key);
       if (c == nullptr)
-        return refuse(DeviceStatus::unsupported,
-                      "there is no control " + key + "; this camera has " + controls_.keys());
+        refuse(DeviceStatus::unsupported,
+               "there is no control " + key + "; this camera has " + controls_.keys());
       std::int64_t value = 0;
       if (!value_of(*c, text, &value))
-        return refuse(DeviceStatus::unsupported,
-                      "control_" + key + " is \"" + text + "\"; it takes " + range_of(*c));
-      if (const DeviceStatus status = set(*c, value); status != DeviceStatus::ok) return status;
+        refuse(DeviceStatus::unsupported,
+               "control_" + key + " is \"" + text + "\"; it takes " + range_of(*c));
+      set(*c, value);
     }
-    return DeviceStatus::ok;
   }
 
-  DeviceStatus region() {
-    if (requested_.offset_x == 0 && requested_.offset_y == 0) return DeviceStatus::ok;
+  void region() {
+    if (requested_.offset_x == 0 && requested_.offset_y == 0) return;
     v4l2_selection s{};
     s.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     s.target = V4L2_SEL_TGT_CROP;
@@ -120,11 +123,10 @@ class Applier {
     if (control(fd_, VIDIOC_S_SELECTION, &s) == 0 && s.r.left == requested_.offset_x &&
         s.r.top == requested_.offset_y && s.r.width == static_cast<__u32>(requested_.width) &&
         s.r.height == static_cast<__u32>(requested_.height))
-      return DeviceStatus::ok;
-    return refuse(DeviceStatus::unsupported, "this camera cannot read out a region at " +
-                                                 std::to_string(requested_.offset_x) + ", " +
-                                                 std::to_string(requested_.offset_y) +
-                                                 ": leave offset_x and offset_y at 0");
+      return;
+    refuse(DeviceStatus::unsupported,
+           "this camera cannot read out a region at " + std::to_string(requested_.offset_x) + ", " +
+               std::to_string(requested_.offset_y) + ": leave offset_x and offset_y at 0");
   }
 
   [[nodiscard]] std::vector<std::uint32_t> offered() const {
@@ -150,17 +152,16 @@ class Applier {
     return list;
   }
 
-  DeviceStatus format() {
+  void format() {
     const std::vector<std::uint32_t> list = offered();
     const PixelFormat* chosen = choose_format(list, requested_.pixel_format);
     if (chosen == nullptr) {
       std::string names;
       for (const std::uint32_t f : list) names += (names.empty() ? "" : ", ") + name_of(f);
-      return refuse(
-          DeviceStatus::unsupported,
-          (requested_.pixel_format.empty() ? "no pixel format that gives grey"
-                                           : "no pixel format " + requested_.pixel_format) +
-              "; this camera offers " + (names.empty() ? "none" : names));
+      refuse(DeviceStatus::unsupported,
+             (requested_.pixel_format.empty() ? "no pixel format that gives grey"
+                                              : "no pixel format " + requested_.pixel_format) +
+                 "; this camera offers " + (names.empty() ? "none" : names));
     }
     v4l2_format f{};
     f.type = type_;
@@ -180,7 +181,7 @@ class Applier {
       f.fmt.pix.field = V4L2_FIELD_NONE;
     }
     if (const int error = control(fd_, VIDIOC_S_FMT, &f); error != 0)
-      return system(error, "setting " + name_of(chosen->fourcc) + " " + size_text(width, height));
+      system(error, "setting " + name_of(chosen->fourcc) + " " + size_text(width, height));
     // The kernel changes what it cannot do without a word.
     const __u32 got_width = planes ? f.fmt.pix_mp.width : f.fmt.pix.width,
                 got_height = planes ? f.fmt.pix_mp.height : f.fmt.pix.height;
@@ -188,37 +189,34 @@ class Applier {
                 field = planes ? f.fmt.pix_mp.field : f.fmt.pix.field;
     if (got_width != width || got_height != height) {
       const std::string list_of_sizes = sizes(chosen->fourcc);
-      return refuse(DeviceStatus::unsupported,
-                    "no size " + size_text(width, height) + " in " + name_of(chosen->fourcc) +
-                        "; this camera offers " +
-                        (list_of_sizes.empty() ? size_text(got_width, got_height) : list_of_sizes));
+      refuse(DeviceStatus::unsupported,
+             "no size " + size_text(width, height) + " in " + name_of(chosen->fourcc) +
+                 "; this camera offers " +
+                 (list_of_sizes.empty() ? size_text(got_width, got_height) : list_of_sizes));
     }
     if (got_format != chosen->fourcc || (planes && f.fmt.pix_mp.num_planes != 1))
-      return refuse(DeviceStatus::unsupported, "the camera gives " + name_of(got_format) +
-                                                   " where " + name_of(chosen->fourcc) +
-                                                   " was asked for: name another pixel_format");
+      refuse(DeviceStatus::unsupported, "the camera gives " + name_of(got_format) + " where " +
+                                            name_of(chosen->fourcc) +
+                                            " was asked for: name another pixel_format");
     if (field != V4L2_FIELD_NONE && field != V4L2_FIELD_ANY)
-      return refuse(DeviceStatus::unsupported,
-                    "the camera gives interlaced images, of which two halves are of two moments");
+      refuse(DeviceStatus::unsupported,
+             "the camera gives interlaced images, of which two halves are of two moments");
     out_.stride = planes ? f.fmt.pix_mp.plane_fmt[0].bytesperline : f.fmt.pix.bytesperline;
     out_.image_size = planes ? f.fmt.pix_mp.plane_fmt[0].sizeimage : f.fmt.pix.sizeimage;
     out_.format = *chosen;
     if (chosen->layout == Layout::mosaic && (requested_.width < 2 || requested_.height < 2))
-      return refuse(DeviceStatus::unsupported,
-                    "a mosaic of colours needs at least two rows and columns");
+      refuse(DeviceStatus::unsupported, "a mosaic of colours needs at least two rows and columns");
     if (options_.shift >= 0 && chosen->layout == Layout::words) out_.format.shift = options_.shift;
     out_.stride = std::max(out_.stride, min_row_bytes(out_.format, requested_.width));
     if (out_.image_size <
         min_frame_bytes(out_.format, requested_.width, requested_.height, out_.stride))
-      return refuse(DeviceStatus::unsupported,
-                    "the driver's buffers of " + std::to_string(out_.image_size) +
-                        " bytes do not hold " + size_text(width, height) + " in " +
-                        name_of(chosen->fourcc));
+      refuse(DeviceStatus::unsupported,
+             "the driver's buffers of " + std::to_string(out_.image_size) + " bytes do not hold " +
+                 size_text(width, height) + " in " + name_of(chosen->fourcc));
     out_.actual.pixel_format = name_of(chosen->fourcc);
-    return DeviceStatus::ok;
   }
 
-  DeviceStatus rate() {
+  void rate() {
     v4l2_streamparm p{};
     p.type = type_;
     const int error = control(fd_, VIDIOC_G_PARM, &p);
@@ -226,20 +224,19 @@ class Applier {
       p.parm.capture.timeperframe = {
           1000, static_cast<__u32>(std::lround(requested_.rate_hz * options_.thin * 1000))};
       if (const int set_error = control(fd_, VIDIOC_S_PARM, &p); set_error != 0)
-        return system(set_error, "setting the rate");
+        system(set_error, "setting the rate");
     }
     const v4l2_fract& t = p.parm.capture.timeperframe;
     if (error == 0 && t.numerator > 0 && t.denominator > 0)
       out_.camera_rate_hz = static_cast<double>(t.denominator) / t.numerator;
     if (error != 0) out_.camera_rate_hz = sensor_rate();
-    if (requested_.trigger == CameraTrigger::hardware)
-      return DeviceStatus::ok;  // the pulses are the rate
+    if (requested_.trigger == CameraTrigger::hardware) return;  // the pulses are the rate
     const double camera = out_.camera_rate_hz;
     if (!(camera > 0)) {
       remark("the camera does not say its rate");
-      return DeviceStatus::ok;
+      return;
     }
-    if (options_.thin > 1 && camera >= requested_.rate_hz) return DeviceStatus::ok;
+    if (options_.thin > 1 && camera >= requested_.rate_hz) return;
     if (std::abs(camera - requested_.rate_hz) > kRateTolerance * requested_.rate_hz)
       remark("the camera runs at " + number_text(camera) + " Hz where " +
              number_text(requested_.rate_hz) + " was asked for" +
@@ -247,10 +244,9 @@ class Applier {
                   ? "; the option thin keeps as many as were asked for"
                   : ""));
     out_.actual.rate_hz = camera;
-    return DeviceStatus::ok;
   }
 
-  /// Of a raw sensor, which has lines, blanking and a pixel clock instead of a rate. 0: not known.
+  /// Line time of a raw sensor from blanking and pixel clock; 0 if unknown.
   [[nodiscard]] double sensor_rate() const {
     const double line = line_seconds();
     const double lines = static_cast<double>(requested_.height) + read_or(V4L2_CID_VBLANK, 0);
@@ -265,12 +261,9 @@ class Applier {
     return Duration::seconds(line_seconds() * requested_.height);
   }
 
-  DeviceStatus exposure() {
-    if (DeviceStatus s = set_if_there(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL);
-        s != DeviceStatus::ok)
-      return s;
-    if (DeviceStatus s = set_if_there(V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0); s != DeviceStatus::ok)
-      return s;
+  void exposure() {
+    set_if_there(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL);
+    set_if_there(V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0);
     if (const Control* c = controls_.find(V4L2_CID_EXPOSURE_ABSOLUTE); c != nullptr)
       return set_exposure(*c, 1e-4);
     if (const Control* c = controls_.find(V4L2_CID_EXPOSURE); c != nullptr && line_seconds() > 0)
@@ -278,80 +271,76 @@ class Applier {
     remark(
         "the camera has no exposure that can be set in microseconds; exposure_us is taken for what "
         "it does");
-    return DeviceStatus::ok;
   }
   /// `unit`: seconds a step of the control is.
-  DeviceStatus set_exposure(const Control& c, double unit) {
+  void set_exposure(const Control& c, double unit) {
     const std::int64_t steps = std::llround(requested_.exposure.to_seconds() / unit);
     const std::int64_t value = clamped(c, steps);
     if (std::llabs(value - steps) > c.step)
-      return refuse(DeviceStatus::unsupported,
-                    "no exposure of " + number_text(requested_.exposure.to_seconds() * 1e6) +
-                        " us; this camera offers " +
-                        number_text(static_cast<double>(c.least) * unit * 1e6) + " to " +
-                        number_text(static_cast<double>(c.most) * unit * 1e6) + " us at this rate");
-    if (const DeviceStatus status = set(c, value); status != DeviceStatus::ok) return status;
+      refuse(DeviceStatus::unsupported,
+             "no exposure of " + number_text(requested_.exposure.to_seconds() * 1e6) +
+                 " us; this camera offers " +
+                 number_text(static_cast<double>(c.least) * unit * 1e6) + " to " +
+                 number_text(static_cast<double>(c.most) * unit * 1e6) + " us at this rate");
+    set(c, value);
     out_.exposure_id = c.id;
     out_.exposure_unit_s = unit;
     out_.actual.exposure = Duration::seconds(static_cast<double>(value) * unit);
     if (out_.actual.exposure <= Duration{}) out_.actual.exposure = requested_.exposure;
-    return DeviceStatus::ok;
   }
 
-  DeviceStatus gain() {
-    if (DeviceStatus s = set_if_there(V4L2_CID_AUTOGAIN, 0); s != DeviceStatus::ok) return s;
+  void gain() {
+    set_if_there(V4L2_CID_AUTOGAIN, 0);
     const Control* c = controls_.find(V4L2_CID_ANALOGUE_GAIN);
     if (c == nullptr) c = controls_.find(V4L2_CID_GAIN);
     if (c == nullptr) {
-      if (requested_.gain_db == 0) return DeviceStatus::ok;
-      return refuse(DeviceStatus::unsupported,
-                    "the camera has no gain control: set gain_db to 0; it has " + controls_.keys());
+      if (requested_.gain_db == 0) return;
+      refuse(DeviceStatus::unsupported,
+             "the camera has no gain control: set gain_db to 0; it has " + controls_.keys());
     }
     for (const auto& [key, text] : options_.controls)
-      if (key == c->key) return DeviceStatus::ok;  // given by number
+      if (key == c->key) return;  // given by number
     if (requested_.gain_db != 0 && options_.gain_step_db <= 0)
-      return refuse(DeviceStatus::unsupported,
-                    "how many dB a step of " + c->key + " (" + range_of(*c) +
-                        ") is, the camera does not say: set the option gain_step_db, or control_" +
-                        c->key);
+      refuse(DeviceStatus::unsupported,
+             "how many dB a step of " + c->key + " (" + range_of(*c) +
+                 ") is, the camera does not say: set the option gain_step_db, or control_" +
+                 c->key);
     const double step = options_.gain_step_db > 0 ? options_.gain_step_db : 1;
     const std::int64_t value = c->least + std::llround(requested_.gain_db / step);
     if (value < c->least || value > c->most)
-      return refuse(DeviceStatus::unsupported,
-                    "no gain of " + number_text(requested_.gain_db) +
-                        " dB; this camera offers 0 to " +
-                        number_text(static_cast<double>(c->most - c->least) * step));
+      refuse(DeviceStatus::unsupported,
+             "no gain of " + number_text(requested_.gain_db) + " dB; this camera offers 0 to " +
+                 number_text(static_cast<double>(c->most - c->least) * step));
     out_.gain_id = c->id;
     out_.gain_unit_db = options_.gain_step_db;
     out_.actual.gain_db = static_cast<double>(value - c->least) * options_.gain_step_db;
-    return set(*c, clamped(*c, value));
+    set(*c, clamped(*c, value));
   }
 
-  DeviceStatus trigger() {
+  void trigger() {
     if (requested_.trigger == CameraTrigger::software)
-      return refuse(DeviceStatus::unsupported,
-                    "V4L2 has no software trigger: trigger hardware or free");
+      refuse(DeviceStatus::unsupported, "V4L2 has no software trigger: trigger hardware or free");
     const bool hardware = requested_.trigger == CameraTrigger::hardware;
-    if (options_.trigger_control == "external") return DeviceStatus::ok;
+    if (options_.trigger_control == "external") return;
     const Control* c = options_.trigger_control.empty() ? controls_.trigger()
                                                         : controls_.find(options_.trigger_control);
     if (c == nullptr) {
-      if (!hardware && options_.trigger_control.empty()) return DeviceStatus::ok;
-      return refuse(DeviceStatus::unsupported,
-                    (options_.trigger_control.empty()
-                         ? "the camera has no control with \"trigger\" in its name"
-                         : "there is no control " + options_.trigger_control) +
-                        "; it has " + controls_.keys() +
-                        ". If a module parameter or the device tree switches its trigger, set the "
-                        "option trigger_control to external; "
-                        "else set trigger to free");
+      if (!hardware && options_.trigger_control.empty()) return;
+      refuse(DeviceStatus::unsupported,
+             (options_.trigger_control.empty()
+                  ? "the camera has no control with \"trigger\" in its name"
+                  : "there is no control " + options_.trigger_control) +
+                 "; it has " + controls_.keys() +
+                 ". If a module parameter or the device tree switches its trigger, set the "
+                 "option trigger_control to external; "
+                 "else set trigger to free");
     }
     std::int64_t value = hardware ? trigger_on(*c) : 0;
     if (hardware && !options_.trigger_value.empty() &&
         !value_of(*c, options_.trigger_value, &value))
-      return refuse(DeviceStatus::unsupported, "trigger_value is \"" + options_.trigger_value +
-                                                   "\"; " + c->key + " takes " + range_of(*c));
-    return set(*c, value);
+      refuse(DeviceStatus::unsupported, "trigger_value is \"" + options_.trigger_value + "\"; " +
+                                            c->key + " takes " + range_of(*c));
+    set(*c, value);
   }
 
   int fd_;

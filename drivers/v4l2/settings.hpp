@@ -9,7 +9,7 @@
 
 namespace vergence::v4l2 {
 
-/// What a camera has been brought to.
+/// Settings applied to a camera.
 struct Settings {
   CameraConfiguration actual{};
   Options options{};

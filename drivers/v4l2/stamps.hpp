@@ -6,7 +6,7 @@
 
 namespace vergence::v4l2 {
 
-/// What a buffer's stamp is of.
+/// Instant of a buffer's stamp.
 enum class StampKind : std::uint8_t {
   exposure_start,
   frame_end,  // the last pixel was read out

@@ -20,7 +20,7 @@ namespace vergence::v4l2 {
 /// Time       Stamps are CLOCK_MONOTONIC as the kernel gives them: a start of exposure is taken as
 ///            it is, an end of frame less read-out and exposure; where the driver gives none the
 ///            arrival serves, and timing() is wide.
-/// Options    drivers/options/v4l2_options.hpp, docs/cameras/v4l2.md.
+/// Options    drivers/options/v4l2_options.hpp, drivers/v4l2/README.md.
 /// Errors     configure(): also `busy`, another program streams from it. start(): also `failed`,
 ///            the message has the kernel's reason.
 [[nodiscard]] std::unique_ptr<CameraDriver> make_driver();

@@ -163,7 +163,7 @@ Eigen::Quaterniond enu_from(LocalFrame frame) noexcept {
   return Eigen::Quaterniond::Identity();
 }
 
-/// What both generations' status bits say alike.
+/// Status bits common to both generations.
 void fill_fix(bool filter_valid, bool fix, bool coasting, const Receiver& receiver, HostStamp now,
               InsReading* r) noexcept {
   const bool fresh = receiver.known && now - receiver.received < kReceiverStale;

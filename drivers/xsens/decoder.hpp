@@ -69,7 +69,7 @@ class ArrivalTiming {
   MappedStamp mapped_{};   // … and what it said
 };
 
-/// What a new stamp is against the last one.
+/// Relation of a new stamp to the last one.
 enum class ClockStep : std::uint8_t {
   first,
   forward,
@@ -172,10 +172,11 @@ struct DecoderCounters {
 class Decoder {
  public:
   Decoder() = default;
-  /// Of a device that was set like this, on a line of this rate. Forgets everything but the
+  /// Starts decoding of a device with these settings and baud rate. Clears everything but the
   /// counters and the numbers.
   void begin(const StreamSettings& stream, std::uint32_t baud, Duration processing) noexcept;
-  /// What a read brought. Precondition: next() has said false since the last; at most kMaxBytes.
+  /// Adds the bytes of a read. Precondition: next() has said false since the last; at most
+  /// kMaxBytes.
   void accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noexcept;
   static constexpr std::size_t kMaxBytes = 4096;
   /// The next reading. False: none, *reading untouched.
@@ -197,7 +198,7 @@ class Decoder {
   [[nodiscard]] const ArrivalTiming& timing() const noexcept { return timing_; }
 
  private:
-  /// What the device told of itself that nobody has asked for yet, and of the next reading.
+  /// Status of the device that was not read yet, and of the next sample.
   struct Said {
     bool woke = false, stopped = false, going_on = false;
     bool resumed = false;

@@ -31,7 +31,7 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
 
   [[nodiscard]] DeviceStatus configure(double rate_hz, double* actual_hz) noexcept override;
   [[nodiscard]] DeviceTiming timing() const noexcept override;
-  /// Of an MTi-G-700/710, whose clock goes on meanwhile; others: `unsupported`.
+  /// Supported by MTi-G-700/710, whose clock continues; others: `unsupported`.
   [[nodiscard]] DeviceStatus pause(Duration gap) noexcept override;
 
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }

@@ -7,7 +7,7 @@
 
 namespace vergence::xsens {
 
-/// How an XSens INS is to be set. Defaults leave alone what is not named.
+/// Settings of an XSens INS. Defaults change nothing.
 struct Options {
   std::uint32_t baud = 0;        // 0: as the device has it
   double sync_out_hz = 0;        // 0: as the device has it; negative: off
@@ -16,7 +16,7 @@ struct Options {
       2);  // from a sample to its first byte on the wire: acquisition and filter
 };
 
-/// What a device is.
+/// Identity of a device.
 struct Identity {
   xbus::Generation generation = xbus::Generation::mark4;
   std::uint32_t device_id = 0;
@@ -24,7 +24,7 @@ struct Identity {
   std::uint8_t firmware[3] = {0, 0, 0};
 };
 
-/// How it was set, so far as decoding depends on it.
+/// Settings on which decoding depends.
 struct StreamSettings {
   xbus::Generation generation = xbus::Generation::mark4;
   xbus::MtdataLayout layout{};            // MTi-G

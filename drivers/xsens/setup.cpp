@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "drivers/common/format_text.hpp"
+#include "drivers/common/refused.hpp"
 
 namespace vergence::xsens {
 
@@ -158,28 +159,33 @@ DeviceStatus Setup::find() {
   return DeviceStatus::not_found;
 }
 
-DeviceStatus Setup::failed(const char* what) {
-  last_error_ = reply_.answer == Answer::refused
-                    ? format_text("it refuses %s: %.*s (error %02X)", what,
-                                  static_cast<int>(error_text(reply_.error).size()),
-                                  error_text(reply_.error).data(), reply_.error)
-                    : format_text("it does not answer to %s; check its cable", what);
-  return status_of(reply_.answer);
+void Setup::refuse(DeviceStatus status, std::string message) {
+  last_error_ = std::move(message);
+  throw Refused{status};
 }
 
-DeviceStatus Setup::write(MessageId id, std::span<const std::uint8_t> payload, const char* what) {
+void Setup::fail(const char* what, DeviceStatus refused) {
+  const bool said_no = reply_.answer == Answer::refused;
+  last_error_ = said_no ? format_text("it refuses %s: %.*s (error %02X)", what,
+                                      static_cast<int>(error_text(reply_.error).size()),
+                                      error_text(reply_.error).data(), reply_.error)
+                        : format_text("it does not answer to %s; check its cable", what);
+  throw Refused{said_no ? refused : status_of(reply_.answer)};
+}
+
+void Setup::write(MessageId id, std::span<const std::uint8_t> payload, const char* what) {
   dialogue_.ask(id, payload, &reply_);
-  return reply_.answer == Answer::ok ? DeviceStatus::ok : failed(what);
+  if (reply_.answer != Answer::ok) fail(what);
 }
 
 DeviceStatus Setup::identify(Identity* identity) {
-  if (const DeviceStatus s = write(MessageId::device_id_request, {}, "the question for its id");
-      s != DeviceStatus::ok)
-    return s;
-  if (reply_.size < 4) {
-    last_error_ = "its id has fewer than four bytes: no XSens INS";
-    return DeviceStatus::unsupported;
-  }
+  return take_steps([&] { *identity = identified(); });
+}
+
+Identity Setup::identified() {
+  write(MessageId::device_id_request, {}, "the question for its id");
+  if (reply_.size < 4)
+    refuse(DeviceStatus::unsupported, "its id has fewer than four bytes: no XSens INS");
   Identity found;
   found.device_id = read_u32(reply_.bytes());
   dialogue_.ask(MessageId::product_code_request, &reply_);
@@ -194,82 +200,81 @@ DeviceStatus Setup::identify(Identity* identity) {
   dialogue_.ask(MessageId::firmware_request, &reply_);
   if (reply_.answer == Answer::ok && reply_.size >= 3)
     std::copy_n(reply_.payload.begin(), 3, std::begin(found.firmware));
-  // What decides is what it can: only the newer ones know an output configuration.
+  // The decision uses its capabilities: only the newer ones know an output configuration.
   dialogue_.ask(MessageId::output_configuration, &reply_);
   if (reply_.answer == Answer::ok) {
     found.generation = Generation::mark4;
   } else if (reply_.answer == Answer::refused) {
     found.generation = Generation::legacy;
   } else {
-    return failed("the question for its outputs");
+    fail("the question for its outputs");
   }
-  *identity = found;
-  return DeviceStatus::ok;
+  return found;
 }
 
-DeviceStatus Setup::refuse_load(const LineBudget& b, double rate_hz, std::uint32_t baud) {
-  last_error_ = format_text(
-      "%.0f Hz need %.0f %% of the line at %u baud, more than the %.0f %% that are safe; ", rate_hz,
-      100 * b.load, baud, 100 * kLineLoadMost);
-  last_error_ += b.baud_needed != 0
-                     ? format_text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
-                                   std::floor(b.greatest_rate))
-                     : format_text("set ins.rate to %.0f or less", std::floor(b.greatest_rate));
-  return DeviceStatus::no_bandwidth;
+void Setup::check_load(const LineBudget& b, double rate_hz) {
+  if (b.fits()) return;
+  refuse(DeviceStatus::no_bandwidth,
+         format_text(
+             "%.0f Hz need %.0f %% of the line at %u baud, more than the %.0f %% that are safe; ",
+             rate_hz, 100 * b.load, baud_to_be(), 100 * kLineLoadMost) +
+             (b.baud_needed != 0
+                  ? format_text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
+                                std::floor(b.greatest_rate))
+                  : format_text("set ins.rate to %.0f or less", std::floor(b.greatest_rate))));
 }
 
 DeviceStatus Setup::set(const Identity& identity, double rate_hz, StreamSettings* stream) {
   StreamSettings requested;
   requested.generation = identity.generation;
-  const DeviceStatus set = identity.generation == Generation::legacy
-                               ? set_legacy(rate_hz, &requested)
-                               : set_mark4(rate_hz, &requested);
-  if (set != DeviceStatus::ok) return set;
-  if (const DeviceStatus s = set_baud(identity); s != DeviceStatus::ok) return s;
-  *stream = requested;
-  return DeviceStatus::ok;
+  return take_steps([&] {
+    if (identity.generation == Generation::legacy)
+      set_legacy(rate_hz, &requested);
+    else
+      set_mark4(rate_hz, &requested);
+    set_baud(identity);
+    *stream = requested;
+  });
 }
 
-DeviceStatus Setup::set_baud(const Identity& identity) {
-  if (options_.baud == 0 || options_.baud == line_.baud()) return DeviceStatus::ok;
+void Setup::set_baud(const Identity& identity) {
+  if (options_.baud == 0 || options_.baud == line_.baud()) return;
   const auto code = baud_code(options_.baud, identity.generation);
-  if (!code) {
-    last_error_ = format_text("it has no %u baud; set ins.baud to 115200, 230400, 460800 or 921600",
-                              options_.baud);
-    return DeviceStatus::unsupported;
-  }
+  if (!code)
+    refuse(DeviceStatus::unsupported,
+           format_text("it has no %u baud; set ins.baud to 115200, 230400, 460800 or 921600",
+                       options_.baud));
   const std::array<std::uint8_t, 1> payload{*code};
-  if (const DeviceStatus s = write(MessageId::baudrate, payload, "the baud rate");
-      s != DeviceStatus::ok)
-    return s;
+  write(MessageId::baudrate, payload, "the baud rate");
   // It holds from the next reset on; whether the answer to the reset still comes through does not
   // matter.
   dialogue_.ask(MessageId::reset, {}, &reply_, Duration::milliseconds(100));
   const DeviceStatus status = probe(options_.baud, kAfterReset);
-  if (status == DeviceStatus::timeout) {
-    last_error_ = format_text(
-        "it does not answer at %u baud after it was set to it; check that the converter can do "
-        "that rate",
-        options_.baud);
-    return DeviceStatus::failed;
-  }
-  return status;
+  if (status == DeviceStatus::timeout)
+    refuse(
+        DeviceStatus::failed,
+        format_text(
+            "it does not answer at %u baud after it was set to it; check that the converter can do "
+            "that rate",
+            options_.baud));
+  if (status != DeviceStatus::ok) throw Refused{status};
 }
 
 DeviceStatus Setup::measure() {
   constexpr std::uint8_t kTooMuch = 0x29;
-  dialogue_.ask(MessageId::go_to_measurement, &reply_);
-  if (reply_.answer == Answer::ok) return DeviceStatus::ok;
-  const DeviceStatus status = failed("to measure");
-  return reply_.answer == Answer::refused && reply_.error == kTooMuch ? DeviceStatus::no_bandwidth
-                                                                      : status;
+  return take_steps([&] {
+    dialogue_.ask(MessageId::go_to_measurement, &reply_);
+    if (reply_.answer == Answer::ok) return;
+    fail("to measure",
+         reply_.error == kTooMuch ? DeviceStatus::no_bandwidth : DeviceStatus::failed);
+  });
 }
 
 namespace {
 
 using namespace xbus;
 
-// What the program wants of an MTi-G: fixed point 16.32, so that a position keeps its digits; X
+// Output configuration of an MTi-G: fixed point 16.32, so that a position keeps its digits; X
 // north, Y west, Z up as it comes.
 constexpr std::uint16_t kLegacyMode =
     kModeOrientation | kModePosition | kModeVelocity | kModeStatus;
@@ -278,83 +283,68 @@ constexpr std::uint32_t kLegacySettings =
 
 }  // namespace
 
-DeviceStatus Setup::set_legacy(double rate_hz, StreamSettings* stream) {
+void Setup::set_legacy(double rate_hz, StreamSettings* stream) {
   const auto period = period_of_rate(rate_hz);
-  if (!period) {
-    last_error_ = format_text(
-        "an MTi-G has no %.6g Hz: its rates divide 115200 Hz, from 10 to 512, without those that "
-        "its receiver cannot correct; "
-        "set ins.rate to 100 or 120",
-        rate_hz);
-    return DeviceStatus::unsupported;
-  }
+  if (!period)
+    refuse(DeviceStatus::unsupported, format_text("an MTi-G has no %.6g Hz: its rates divide "
+                                                  "115200 Hz, from 10 to 512, without those that "
+                                                  "its receiver cannot correct; "
+                                                  "set ins.rate to 100 or 120",
+                                                  rate_hz));
   // With the receiver's own fix where the line has room for it.
   MtdataLayout layout{static_cast<std::uint16_t>(kLegacyMode | kModeGnss), kLegacySettings};
   if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.mode = kLegacyMode;
   if (!line_budget(layout, rate_hz, baud_to_be()).fits()) layout.settings &= ~kSettingsUtc;
-  const LineBudget budget = line_budget(layout, rate_hz, baud_to_be());
-  if (!budget.fits()) return refuse_load(budget, rate_hz, baud_to_be());
+  check_load(line_budget(layout, rate_hz, baud_to_be()), rate_hz);
 
-  if (const DeviceStatus s =
-          write(MessageId::configuration_request, {}, "the question for its configuration");
-      s != DeviceStatus::ok)
-    return s;
+  write(MessageId::configuration_request, {}, "the question for its configuration");
   DeviceConfiguration has;
-  if (!read_configuration(reply_.bytes(), &has)) {
-    last_error_ = "its configuration cannot be read: is more than one device on the bus?";
-    return DeviceStatus::unsupported;
-  }
+  if (!read_configuration(reply_.bytes(), &has))
+    refuse(DeviceStatus::unsupported,
+           "its configuration cannot be read: is more than one device on the bus?");
   std::array<std::uint8_t, 4> bytes{};
   const auto u16 = [&bytes](std::uint16_t v) {
     return write_u16(bytes, v), std::span<const std::uint8_t>(bytes).first(2);
   };
-  DeviceStatus s = DeviceStatus::ok;
-  if (has.period != *period) s = write(MessageId::period, u16(*period), "the sample period");
-  if (s == DeviceStatus::ok && has.output_skip != 0)
-    s = write(MessageId::output_skip, u16(0), "the output skip factor");
-  if (s == DeviceStatus::ok && has.output_mode != layout.mode)
-    s = write(MessageId::output_mode, u16(layout.mode), "the output mode");
-  if (s == DeviceStatus::ok && has.output_settings != layout.settings) {
+  if (has.period != *period) write(MessageId::period, u16(*period), "the sample period");
+  if (has.output_skip != 0) write(MessageId::output_skip, u16(0), "the output skip factor");
+  if (has.output_mode != layout.mode)
+    write(MessageId::output_mode, u16(layout.mode), "the output mode");
+  if (has.output_settings != layout.settings) {
     write_u32(bytes, layout.settings);
-    s = write(MessageId::output_settings, bytes, "the output settings");
+    write(MessageId::output_settings, bytes, "the output settings");
   }
-  if (s == DeviceStatus::ok)
-    s = write(MessageId::data_length_request, {}, "the question for its message's length");
-  if (s != DeviceStatus::ok) return s;
-  if (reply_.size != 2 || read_u16(reply_.bytes()) != layout.payload_size()) {
-    last_error_ = format_text(
-        "its messages have %u bytes where its settings mean %zu: this firmware is not known",
-        reply_.size == 2 ? unsigned{read_u16(reply_.bytes())} : 0U,
-        layout.payload_size().value_or(0));
-    return DeviceStatus::unsupported;
-  }
+  write(MessageId::data_length_request, {}, "the question for its message's length");
+  if (reply_.size != 2 || read_u16(reply_.bytes()) != layout.payload_size())
+    refuse(DeviceStatus::unsupported,
+           format_text(
+               "its messages have %u bytes where its settings mean %zu: this firmware is not known",
+               reply_.size == 2 ? unsigned{read_u16(reply_.bytes())} : 0U,
+               layout.payload_size().value_or(0)));
   stream->layout = layout;
   stream->period_numerator = *period;
   stream->period_denominator = kPeriodClock;
-  return set_legacy_lines(rate_hz, stream);
+  set_legacy_lines(rate_hz, stream);
 }
 
-DeviceStatus Setup::set_legacy_line(MessageId id, LegacySync parameter, std::uint32_t value) {
+void Setup::set_legacy_line(MessageId id, LegacySync parameter, std::uint32_t value) {
   const std::uint8_t which = static_cast<std::uint8_t>(parameter);
-  if (const DeviceStatus s = write(id, {&which, 1}, "the question for a synchronisation line");
-      s != DeviceStatus::ok)
-    return s;
+  write(id, {&which, 1}, "the question for a synchronisation line");
   LegacySync stored{};
   std::uint32_t has = 0;
   if (read_legacy_sync(reply_.bytes(), &stored, &has) && stored == parameter && has == value)
-    return DeviceStatus::ok;
+    return;
   std::array<std::uint8_t, 5> bytes{};
-  return write(id, std::span(bytes).first(write_legacy_sync(parameter, value, bytes)),
-               "a setting of a synchronisation line");
+  write(id, std::span(bytes).first(write_legacy_sync(parameter, value, bytes)),
+        "a setting of a synchronisation line");
 }
 
-DeviceStatus Setup::set_legacy_lines(double rate_hz, StreamSettings* stream) {
+void Setup::set_legacy_lines(double rate_hz, StreamSettings* stream) {
   const auto out = [this](LegacySync p, std::uint32_t v) {
-    return set_legacy_line(MessageId::legacy_sync_out, p, v);
+    set_legacy_line(MessageId::legacy_sync_out, p, v);
   };
   if (options_.sync_out_hz < 0) {
-    if (const DeviceStatus s = out(LegacySync::mode, kLegacySyncOutOff); s != DeviceStatus::ok)
-      return s;
+    out(LegacySync::mode, kLegacySyncOutOff);
   } else if (options_.sync_out_hz > 0) {
     double actual = 0;
     const std::uint16_t skip = sync_out_skip(rate_hz, options_.sync_out_hz, &actual);
@@ -365,17 +355,16 @@ DeviceStatus Setup::set_legacy_lines(double rate_hz, StreamSettings* stream) {
           {LegacySync::offset, 0},
           {LegacySync::width, width},
           {LegacySync::mode, kLegacySyncOutPulse | kLegacySyncOutPositive}})
-      if (const DeviceStatus s = out(parameter, value); s != DeviceStatus::ok) return s;
+      out(parameter, value);
     stream->sync_out_hz = actual;
   }
-  return DeviceStatus::ok;
 }
 
 namespace {
 
 using namespace xbus;
 
-/// What the program wants of an MTi-G-700/710. Without UTC it still has the receiver's.
+/// Output configuration of an MTi-G-700/710. Without UTC it still has the receiver's.
 OutputConfiguration requested_outputs(std::uint16_t rate_hz, bool utc) noexcept {
   OutputConfiguration o;
   if (utc) (void)o.add({wire_id(PacketId::utc), kEveryMessage});
@@ -404,33 +393,24 @@ std::uint16_t nearest_rate(double rate_hz) noexcept {
 
 }  // namespace
 
-DeviceStatus Setup::set_mark4(double rate_hz, StreamSettings* stream) {
+void Setup::set_mark4(double rate_hz, StreamSettings* stream) {
   const std::uint16_t rate = nearest_rate(rate_hz);
   OutputConfiguration requested = requested_outputs(rate, true);
   if (!line_budget(requested, baud_to_be()).fits()) requested = requested_outputs(rate, false);
-  const LineBudget budget = line_budget(requested, baud_to_be());
-  if (!budget.fits()) return refuse_load(budget, rate, baud_to_be());
+  check_load(line_budget(requested, baud_to_be()), rate);
 
   // Text output, while set, overrides everything else.
   dialogue_.ask(MessageId::string_output, &reply_);
   if (reply_.answer == Answer::ok && reply_.size == 2 && read_u16(reply_.bytes()) != 0) {
     constexpr std::array<std::uint8_t, 2> kOff{0, 0};
-    if (const DeviceStatus s = write(MessageId::string_output, kOff, "to leave its text output");
-        s != DeviceStatus::ok)
-      return s;
+    write(MessageId::string_output, kOff, "to leave its text output");
   }
-  if (const DeviceStatus s =
-          write(MessageId::output_configuration, {}, "the question for its outputs");
-      s != DeviceStatus::ok)
-    return s;
+  write(MessageId::output_configuration, {}, "the question for its outputs");
   OutputConfiguration has;
   if (!read_output_configuration(reply_.bytes(), &has) || !(has == requested)) {
     std::array<std::uint8_t, 4 * kMaxOutputs> bytes{};
     const std::size_t n = write_output_configuration(requested, bytes);
-    if (const DeviceStatus s = write(MessageId::output_configuration, std::span(bytes).first(n),
-                                     "the outputs asked for");
-        s != DeviceStatus::ok)
-      return s;
+    write(MessageId::output_configuration, std::span(bytes).first(n), "the outputs asked for");
     if (!read_output_configuration(reply_.bytes(), &has)) has = {};
   }
   // It answers with what it took.
@@ -443,39 +423,31 @@ DeviceStatus Setup::set_mark4(double rate_hz, StreamSettings* stream) {
   const bool placed = std::any_of(has.items().begin(), has.items().end(), [](const OutputEntry& e) {
     return packet_id(e.id) == PacketId::latitude_longitude;
   });
-  if (taken == 0 || taken == kEveryMessage || !clocked || !placed) {
-    last_error_ =
-        "it does not give position and attitude together with its clock: this is no MTi-G";
-    return DeviceStatus::unsupported;
-  }
+  if (taken == 0 || taken == kEveryMessage || !clocked || !placed)
+    refuse(DeviceStatus::unsupported,
+           "it does not give position and attitude together with its clock: this is no MTi-G");
   stream->outputs = has;
   stream->period_numerator = 1;
   stream->period_denominator = taken;
-  return set_mark4_lines(stream);
+  set_mark4_lines(stream);
 }
 
-DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
-  if (options_.sync_out_hz == 0) return DeviceStatus::ok;
-  if (const DeviceStatus s =
-          write(MessageId::sync_settings, {}, "the question for its synchronisation lines");
-      s != DeviceStatus::ok)
-    return s;
+void Setup::set_mark4_lines(StreamSettings* stream) {
+  if (options_.sync_out_hz == 0) return;
+  write(MessageId::sync_settings, {}, "the question for its synchronisation lines");
   SyncSettings has;
-  if (!read_sync_settings(reply_.bytes(), &has)) {
-    last_error_ = "its synchronisation settings cannot be read: this firmware is not known";
-    return DeviceStatus::unsupported;
-  }
+  if (!read_sync_settings(reply_.bytes(), &has))
+    refuse(DeviceStatus::unsupported,
+           "its synchronisation settings cannot be read: this firmware is not known");
   // The list replaces the old one: other entries, the receiver's clock among them, stay.
   SyncSettings requested;
   for (const SyncEntry& e : has.items())
     if (e.function != kSyncIntervalTransition || e.line != kSyncLineOut)
       requested.entries[requested.count++] = e;
   if (options_.sync_out_hz > 0) {
-    if (requested.count == requested.entries.size()) {
-      last_error_ =
-          "its list of synchronisation settings is full; clear it with the maker's program";
-      return DeviceStatus::unsupported;
-    }
+    if (requested.count == requested.entries.size())
+      refuse(DeviceStatus::unsupported,
+             "its list of synchronisation settings is full; clear it with the maker's program");
     double actual = 0;
     const std::uint16_t skip = sync_out_skip(kSyncOutBase, options_.sync_out_hz, &actual);
     const auto width = static_cast<std::uint16_t>(
@@ -484,11 +456,10 @@ DeviceStatus Setup::set_mark4_lines(StreamSettings* stream) {
         kSyncIntervalTransition, kSyncLineOut, kSyncPositive, 0, 0, skip, width, 0};
     stream->sync_out_hz = actual;
   }
-  if (requested == has) return DeviceStatus::ok;
+  if (requested == has) return;
   std::array<std::uint8_t, kSyncEntrySize * kMaxSyncEntries> bytes{};
-  return write(MessageId::sync_settings,
-               std::span(bytes).first(write_sync_settings(requested, bytes)),
-               "its synchronisation settings");
+  write(MessageId::sync_settings, std::span(bytes).first(write_sync_settings(requested, bytes)),
+        "its synchronisation settings");
 }
 
 }  // namespace vergence::xsens

@@ -11,7 +11,7 @@
 
 namespace vergence::xsens {
 
-/// What came of a question.
+/// Result of a request.
 enum class Answer : std::uint8_t {
   ok,
   refused,  // the device answered with an error: Reply::error
@@ -48,7 +48,7 @@ class RequestReply {
            Duration limit = kAnswerTime);
   void ask(xbus::MessageId id, Reply* reply) { ask(id, {}, reply); }
 
-  /// What the bytes that were received look like, when they are no Xbus: for a message. Empty:
+  /// Describes received bytes that are no Xbus, for a message. Empty:
   /// nothing was received.
   [[nodiscard]] std::string received_instead() const;
   [[nodiscard]] std::uint64_t messages_received() const noexcept { return messages_; }
@@ -80,8 +80,8 @@ class Setup {
 
   /// Tries the rate asked for, then the usual ones. → ok, not_found, gone, stopped
   [[nodiscard]] DeviceStatus find();
-  /// Who it is; the generation is what it answers, not what its name says. → ok, unsupported, gone,
-  /// stopped
+  /// Identifies the device; the generation is derived from its answer, not its name. → ok,
+  /// unsupported, gone, stopped
   [[nodiscard]] DeviceStatus identify(Identity* identity);
   /// Output, rate, lines and baud rate. → ok, unsupported, no_bandwidth, gone, stopped, failed
   [[nodiscard]] DeviceStatus set(const Identity& identity, double rate_hz, StreamSettings* stream);
@@ -92,18 +92,19 @@ class Setup {
 
  private:
   [[nodiscard]] DeviceStatus probe(std::uint32_t baud, Duration limit);
-  [[nodiscard]] DeviceStatus set_legacy(double rate_hz, StreamSettings* stream);
-  [[nodiscard]] DeviceStatus set_mark4(double rate_hz, StreamSettings* stream);
-  [[nodiscard]] DeviceStatus set_baud(const Identity& identity);
-  [[nodiscard]] DeviceStatus set_legacy_lines(double rate_hz, StreamSettings* stream);
-  [[nodiscard]] DeviceStatus set_legacy_line(xbus::MessageId id, xbus::LegacySync parameter,
-                                             std::uint32_t value);
-  [[nodiscard]] DeviceStatus set_mark4_lines(StreamSettings* stream);
-  [[nodiscard]] DeviceStatus write(xbus::MessageId id, std::span<const std::uint8_t> payload,
-                                   const char* what);
-  [[nodiscard]] DeviceStatus failed(const char* what);
-  [[nodiscard]] DeviceStatus refuse_load(const xbus::LineBudget& budget, double rate_hz,
-                                         std::uint32_t baud);
+  // Each ends with Refused where the device does not do it; last_error_ says why.
+  [[nodiscard]] Identity identified();
+  void set_legacy(double rate_hz, StreamSettings* stream);
+  void set_mark4(double rate_hz, StreamSettings* stream);
+  void set_baud(const Identity& identity);
+  void set_legacy_lines(double rate_hz, StreamSettings* stream);
+  void set_legacy_line(xbus::MessageId id, xbus::LegacySync parameter, std::uint32_t value);
+  void set_mark4_lines(StreamSettings* stream);
+  void write(xbus::MessageId id, std::span<const std::uint8_t> payload, const char* what);
+  void check_load(const xbus::LineBudget& budget, double rate_hz);
+  [[noreturn]] void refuse(DeviceStatus status, std::string message);
+  /// Answer to the newest request; `refused` if the device declined.
+  [[noreturn]] void fail(const char* what, DeviceStatus refused = DeviceStatus::failed);
   [[nodiscard]] std::uint32_t baud_to_be() const noexcept {
     return options_.baud != 0 ? options_.baud : line_.baud();
   }

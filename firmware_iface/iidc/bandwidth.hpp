@@ -3,13 +3,13 @@
 #include <cstdint>
 #include <string_view>
 
-/// How much of an IEEE 1394 bus a stream takes.
+/// Bandwidth of a stream on an IEEE 1394 bus.
 namespace vergence::iidc {
 
 enum class BusSpeed : std::uint8_t { s100, s200, s400, s800 };
 [[nodiscard]] std::string_view to_string(BusSpeed) noexcept;
 
-/// Of the 6144 units of a cycle of 125 µs, 20 % are kept for everything that is not isochronous.
+/// 20 % of the 6144 units of a cycle of 125 µs are reserved for everything that is not isochronous.
 inline constexpr unsigned kBandwidthUnits = 4915;
 
 /// The largest isochronous packet at a speed, bytes.

@@ -28,7 +28,7 @@ struct CycleTime {
     return seconds * std::int64_t{1'000'000'000} + cycle * kCycleNs +
            (tick * kCycleNs + kTicksPerCycle / 2) / kTicksPerCycle;
   }
-  /// Of a time ≥ 0; the tick is rounded down.
+  /// Converts a time ≥ 0; the tick is rounded down.
   [[nodiscard]] static constexpr CycleTime at(std::int64_t ns) noexcept {
     const std::int64_t within = ns % 1'000'000'000;
     return {static_cast<std::uint32_t>(ns / 1'000'000'000 % 128),

@@ -90,7 +90,7 @@ struct TriggerMode {
   }
 };
 
-/// Of one strobe output (reg::strobe::control). Times in 1/1024 ms.
+/// Settings of one strobe output (reg::strobe::control). Times in 1/1024 ms.
 struct StrobeControl {
   bool on = false;
   bool high = true;            // active level

@@ -6,7 +6,8 @@
 
 #include "firmware_iface/iidc/cycle_time.hpp"
 
-/// What Point Grey's cameras write over the first pixels of an image (register FRAME_INFO, 0x12F8).
+/// Data that Point Grey's cameras embed in the first pixels of an image (register FRAME_INFO,
+/// 0x12F8).
 namespace vergence::iidc {
 
 /// Items in the order in which they stand in the image; the number is the bit that enables them.

@@ -41,7 +41,7 @@ inline constexpr std::uint32_t kFrameInfo = 0x12F8;
   return 0x2E0 + 4 * mode;
 }  // quadlet offset
 
-/// Of a Format 7 mode, from its base.
+/// Registers of a Format 7 mode, relative to its base.
 namespace format7 {
 inline constexpr std::uint32_t kMaxSize = 0x00;  // width b31–16, height b15–0, as in the next three
 inline constexpr std::uint32_t kUnitSize = 0x04;
@@ -58,13 +58,13 @@ inline constexpr std::uint32_t kValuePresent = bit(31), kValueApply = bit(30),
                                kErrorRegion = bit(23), kErrorPacket = bit(22);
 }  // namespace format7
 
-/// Of the strobe outputs, from their base.
+/// Registers of the strobe outputs, relative to their base.
 namespace strobe {
 [[nodiscard]] constexpr std::uint32_t inquiry(unsigned pin) noexcept { return 0x100 + 4 * pin; }
 [[nodiscard]] constexpr std::uint32_t control(unsigned pin) noexcept { return 0x200 + 4 * pin; }
 }  // namespace strobe
 
-/// Of a feature with absolute values, from its base.
+/// Registers of a feature with absolute values, relative to its base.
 namespace absolute {
 inline constexpr std::uint32_t kMin = 0, kMax = 4, kValue = 8;  // IEEE 754 single
 }  // namespace absolute

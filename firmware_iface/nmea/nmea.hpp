@@ -18,7 +18,7 @@ inline constexpr std::size_t kMaxFields = 24;
 
 enum class Type : std::uint8_t { other, gga, rmc, vtg, gst, hdt };
 
-/// What a sentence says; absent: the field is empty or makes no sense. Degrees, m, m/s.
+/// Content of a sentence; absent: the field is empty or makes no sense. Degrees, m, m/s.
 struct Sentence {
   Type type = Type::other;
   std::optional<std::int64_t> time_of_day_ns;  // UTC
@@ -58,7 +58,7 @@ class SentenceStream {
  public:
   /// True: this byte completed a sentence; `bytes` of it are counted from `$`.
   [[nodiscard]] bool accept(std::uint8_t byte, Sentence* sentence) noexcept;
-  /// What looked like the beginning of a sentence was none.
+  /// The apparent start of a sentence was none.
   void abandon() noexcept { inside_ = false; }
   [[nodiscard]] const StreamCounters& counters() const noexcept { return counters_; }
   /// Bytes of the newest sentence, from `$` to its CR LF.

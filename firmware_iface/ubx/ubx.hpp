@@ -64,7 +64,7 @@ class FrameStream {
   [[nodiscard]] std::size_t accept(std::span<const std::uint8_t> bytes) noexcept;
   /// The payload lives until the next call of accept(). False: no whole frame.
   [[nodiscard]] bool next(Frame* frame) noexcept;
-  /// What looked like the beginning of a frame was none: the search goes on behind it.
+  /// The apparent start of a frame was none: the search goes on behind it.
   void abandon() noexcept;
   [[nodiscard]] std::size_t waiting() const noexcept { return end_ - begin_; }
   [[nodiscard]] const StreamCounters& counters() const noexcept { return counters_; }

@@ -51,8 +51,8 @@ constexpr void write_u64(std::span<std::uint8_t> b, std::uint64_t v) noexcept {
   write_u32(b.subspan(4), static_cast<std::uint32_t>(v));
 }
 
-/// How floating numbers travel: the lowest two bits of a packet's id (MTData2), bits 8 and 9 of the
-/// output settings (MTData).
+/// Encoding of floating-point numbers: the lowest two bits of a packet's id (MTData2), bits 8 and 9
+/// of the output settings (MTData).
 enum class NumberFormat : std::uint8_t { float32 = 0, fp12_20 = 1, fp16_32 = 2, float64 = 3 };
 
 /// Bytes of one number.

@@ -8,13 +8,13 @@
 
 #include "firmware_iface/xbus/frame.hpp"
 
-/// What a host asks and sets, as payloads; frame.hpp puts them into frames.
+/// Payloads of requests and settings; frame.hpp puts them into frames.
 namespace vergence::xbus {
 
 /// Which of the two protocols a device speaks: the same message id means different things.
 enum class Generation : std::uint8_t { legacy, mark4 };  // MTi-G (MTData); MTi-G-700/710 (MTData2)
 
-/// What a device id tells by its range. Nothing: neither; the device's answer to
+/// Product by the range of a device id. Nullopt: neither; the device's answer to
 /// `output_configuration` decides.
 [[nodiscard]] std::optional<Generation> generation_of_device_id(std::uint32_t id) noexcept;
 
@@ -43,8 +43,8 @@ inline constexpr std::uint32_t kPeriodClock = 115200;  // Hz
 // ---- configuration message (0D) ----
 
 inline constexpr std::size_t kConfigurationSize = 118;  // bytes
-/// What an MTi-G sends before it measures: enough to read a log without knowing how the device was
-/// set.
+/// Configuration that an MTi-G sends before it measures: enough to read a log without knowing how
+/// the device was set.
 struct DeviceConfiguration {
   std::uint32_t master_id = 0;
   std::uint16_t period = 0, output_skip = 0;
@@ -156,7 +156,7 @@ struct SyncSettings {
 
 // ---- errors ----
 
-/// What an error message's code says, for sentences.
+/// Describes an error message's code.
 [[nodiscard]] std::string_view error_text(std::uint8_t code) noexcept;
 inline constexpr std::uint8_t kErrorMessageUnknown =
     0x04;  // what a device of the other generation answers

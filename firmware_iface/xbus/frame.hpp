@@ -95,7 +95,7 @@ struct WrittenFrame {
 [[nodiscard]] WrittenFrame write_frame(const Message& message,
                                        std::span<std::uint8_t> out) noexcept;
 
-/// What a stream held; every byte is in a message or in `garbage_bytes`, or still waits.
+/// Content of a stream; every byte is in a message or in `garbage_bytes`, or still waits.
 struct StreamCounters {
   std::uint64_t messages = 0;
   std::uint64_t message_bytes = 0;  // of whole frames

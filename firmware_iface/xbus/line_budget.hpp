@@ -6,7 +6,7 @@
 #include "firmware_iface/xbus/configuration.hpp"
 #include "firmware_iface/xbus/mtdata.hpp"
 
-/// How much of a serial line an output takes. A byte is ten bits on the line (start, eight, stop).
+/// Load of an output on a serial link. A byte is ten bits on the line (start, eight, stop).
 namespace vergence::xbus {
 
 inline constexpr double kLineLoadMost = 0.9;  // above it a moment's delay is never caught up
@@ -30,12 +30,12 @@ struct LineBudget {
   [[nodiscard]] bool fits() const noexcept { return load <= kLineLoadMost; }
 };
 
-/// Of an MTi-G that sends this layout so often. Precondition: the layout is known, rate and baud
-/// positive.
+/// Load of an MTi-G that sends this layout at this rate. Precondition: the layout is known, rate
+/// and baud positive.
 [[nodiscard]] LineBudget line_budget(const MtdataLayout& layout, double rate_hz,
                                      std::uint32_t baud) noexcept;
-/// Of an MTi-G-700/710: samples at the highest rate of the list, the receiver's packets in messages
-/// of their own.
+/// Load of an MTi-G-700/710: samples at the highest rate of the list, the receiver's packets in
+/// messages of their own.
 [[nodiscard]] LineBudget line_budget(const OutputConfiguration& outputs,
                                      std::uint32_t baud) noexcept;
 

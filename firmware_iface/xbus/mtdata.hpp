@@ -56,14 +56,14 @@ struct MtdataLayout {
   [[nodiscard]] std::optional<std::size_t> payload_size() const noexcept;
 };
 
-/// Of the receiver's fix, as the MTi-G repeats it in every sample, how good it is: a new one has
+/// Quality of the receiver's fix, which the MTi-G repeats in every sample: a new one has
 /// come when `age` is less than in the sample before.
 struct LegacyFix {
   std::uint32_t horizontal_accuracy_mm = 0, vertical_accuracy_mm = 0, speed_accuracy_cm_s = 0;
   std::uint8_t age = 0;  // of the fix, samples
 };
 
-/// Of a message's fields those that an INS sample is made of; absent: not in the layout. Units as
+/// Fields of a message that an INS sample uses; absent: not in the layout. Units as
 /// in Mtdata2.
 struct Mtdata {
   std::optional<LegacyFix> fix;

@@ -84,7 +84,7 @@ class PacketReader {
   std::span<const std::uint8_t> rest_;
 };
 
-/// Of GNSS position, velocity and time (7010) what tells how good the fix is.
+/// Quality of the fix from GNSS position, velocity and time (7010).
 struct GnssPvt {
   std::uint8_t fix =
       0;  // 0 none, 1 dead reckoning, 2 2D, 3 3D, 4 GNSS and dead reckoning, 5 time only
@@ -95,7 +95,7 @@ struct GnssPvt {
   std::uint16_t position_dop_1e2 = 0;  // 9999 without fix
 };
 
-/// Of a message's fields those that an INS sample is made of; absent: the message had no such
+/// Fields of a message that an INS sample uses; absent: the message had no such
 /// packet, or one of a size or with a number that the field cannot have. Units as in the names.
 struct Mtdata2 {
   std::optional<std::uint16_t> packet_counter;  // steps by one with every message, of any content

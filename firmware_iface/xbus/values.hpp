@@ -5,7 +5,7 @@
 
 #include "firmware_iface/xbus/bytes.hpp"
 
-/// What both generations' data messages are made of.
+/// Elements of both generations' data messages.
 namespace vergence::xbus {
 
 using Three = std::array<double, 3>;

@@ -1,4 +1,4 @@
-# Tests that run inside a Linux kernel of their own, on its real drivers with emulated devices behind them (docs/rigs.md).
+# Tests that run inside a Linux kernel of their own, on its real drivers with emulated devices behind them (tests/rigs/README.md).
 set(VERGENCE_RIGS_FOLDER ${PROJECT_SOURCE_DIR}/tests/rigs)
 set(VERGENCE_RIGS_PROGRAMS ${PROJECT_BINARY_DIR}/tests/rigs)
 

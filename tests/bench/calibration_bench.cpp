@@ -63,7 +63,7 @@ void print(const std::string& drive_name, const std::string& what, const DriveOu
   std::fflush(stdout);
 }
 
-/// Whether a focal length that is off is told, and what the drive measures.
+/// Detection of a wrong focal length, and the measured one.
 void print_focal_lengths(const RecordedSequence& d, const app::Configuration& c) {
   const StartingCalibration given = app::replayed_calibration(c, d.sequence, false);
   for (const double factor : {1.0, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25}) {

@@ -1,4 +1,4 @@
-// How well the covariances of poses hold on recorded drives: errors against the drive's truth over
+// Consistency of pose covariances on recorded drives: errors against the drive's truth over
 // so many frames, in the sigmas that were given for them.
 //
 //   covariance_bench [DRIVE|rendered|all]
@@ -35,7 +35,7 @@ namespace {
 
 constexpr double kChi95 = 7.815;  // χ² of three degrees of freedom at 95 %
 
-/// What the truth is off by, 1 σ of a pose.
+/// Error of the ground truth, 1 σ of a pose.
 struct TruthSigma {
   double position_m = 0, rotation_rad = 0;
 };
@@ -91,7 +91,7 @@ struct Means {
 void add_motion(const Posed& a, const Posed& b, const TruthSigma& sigma, Mat6 C, Means* means) {
   const Transform ours = a.sample.T_world_left.inverse() * b.sample.T_world_left;
   const Transform truth = a.T_world_left_true.inverse() * b.T_world_left_true;
-  // Of both ends; the first one's rotation moves the other end, too.
+  // Combines both ends; the first one's rotation also moves the other end.
   const double position = sigma.position_m * sigma.position_m,
                rotation = sigma.rotation_rad * sigma.rotation_rad;
   C.diagonal().head<3>().array() += 2 * position + rotation * truth.t.squaredNorm();
@@ -145,7 +145,7 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
   return poses;
 }
 
-/// What is told of a drive's motions when they are judged.
+/// Statistics of a drive's evaluated motions.
 struct Judged {
   double most_unusual = 0;   // the most uncertain motion, times what is usual
   double largest_share = 0;  // of a motion that the window corrected by more than its sigma

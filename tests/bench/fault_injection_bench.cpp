@@ -1,4 +1,4 @@
-// Drives of the mock with faults, as the table of docs/faults.md:
+// Drives of the mock with faults, as the table of docs/benchmarks.md:
 //   fault_injection_bench [single | long | pairs | random] [COUNT [FIRST] | part of a name]
 // The first 20 of `random`, all of the others, unless COUNT says how many, from FIRST (1) on.
 // Ends with 1 where an `ok` pose was wrong, a session is not whole, the program failed, did not say

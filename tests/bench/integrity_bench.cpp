@@ -35,7 +35,7 @@ struct Driven {
   int knocks = 0;
 };
 
-/// What the estimator says after a frame, for who looks into why.
+/// Prints the estimator's result after a frame, for diagnosis.
 void print_events(const Estimator& e, const PoseSample& sample) {
   fmt::print("    frame {:3d} {} {}\n", sample.frame, to_string(sample.status),
              to_string(sample.reason));
@@ -102,7 +102,7 @@ void judge(const RecordedSequence& drive_of, const std::string& what, std::size_
   std::fflush(stdout);
 }
 
-/// What the untouched drives were off by over 20 frames when this was written, m, and a quarter
+/// Reference errors of the unperturbed drives over 20 frames, m, and a quarter
 /// more: a judge that takes more for normal sees less.
 double most_normal(const std::string& name) {
   constexpr double kMore = 1.25;

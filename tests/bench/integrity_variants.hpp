@@ -9,7 +9,7 @@
 
 namespace vergence::bench {
 
-/// What spoils a recorded drive. `image` changes the images of pair `at` (of `count`) in place;
+/// Perturbation of a recorded drive. `image` changes the images of pair `at` (of `count`) in place;
 /// `pairs` chooses the pairs of the drive, or which right image goes with which left one. Either
 /// may be null. Deterministic: what looks random is drawn from a generator seeded with `at`.
 struct IntegrityVariant {

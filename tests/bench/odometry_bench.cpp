@@ -61,7 +61,7 @@ struct Arguments {
   std::vector<std::string> set;
 };
 
-/// What docs/benchmarks.md shows of one excerpt.
+/// Results of one excerpt for docs/benchmarks.md.
 struct Measured {
   const char* name = "";
   std::size_t frames = 0, posed = 0;

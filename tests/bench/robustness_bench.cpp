@@ -1,4 +1,4 @@
-// Whether poses come out anywhere on the recorded drives, whatever is done to them that an odometry
+// Availability of poses on the recorded drives, whatever is done to them that an odometry
 // should bear.
 //
 //   robustness_bench [drives|cold|windows|times|scenes|planar|all] [DRIVE|all] [variant=PART]
@@ -83,7 +83,7 @@ void row(const std::string& text) {
   std::fflush(stdout);
 }
 
-/// What a drive that is watched and calibrated keeps of the frames that are `ok` without it, from
+/// Share of frames that stay `ok` with online calibration, from
 /// the first frame on at which a calibration given is usually confirmed.
 double share_kept_ok(const DriveOutcome& online, const DriveOutcome& off) {
   constexpr std::size_t kFrom = 36;
@@ -180,8 +180,8 @@ void variants(const Bench& b, const RecordedSequence& d, std::span<const Integri
   }
 }
 
-/// Of positions of frames in [first, last): turned, moved, scaled and shifted in time onto the
-/// track, which is flat.
+/// Alignment of positions of frames in [first, last): rotated, moved, scaled and shifted in time
+/// onto the track, which is flat.
 struct PlanarFit {
   double rms_m = HUGE_VAL, scale = 0;
   std::size_t poses = 0;

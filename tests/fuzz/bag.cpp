@@ -16,7 +16,7 @@ namespace {
 using namespace vergence;
 using namespace vergence::app;
 
-/// What a replay rests on; a bag that breaks it is not read as it should be.
+/// Invariants of a replay; a bag that breaks it is not read as it should be.
 void check(const StereoSequence& s) {
   constexpr std::size_t kMaxPixels = 1U << 20;
   for (std::size_t i = 1; i < s.pairs.size(); ++i)

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/foreign_calibration/foreign_calibration.hpp"
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/runtime/errors.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
@@ -17,7 +17,7 @@ namespace {
 using namespace vergence;
 using namespace vergence::app;
 
-/// What every reader promises of a calibration that it accepts.
+/// Guarantees of every reader for an accepted calibration.
 void check(const CalibrationFile& file) {
   if (file.rig.cameras < 2 || file.rig.cameras > kMaxCameras) std::abort();
   for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {

@@ -15,7 +15,7 @@ void promise(bool kept, const char* what) {
   std::abort();
 }
 
-/// What was decoded must be what a writer of the same message would have sent.
+/// Encoding a decoded message must give the same bytes.
 void probe_decoder(const std::uint8_t* data, std::size_t size) {
   TriggerDecoder decoder{};
   TriggerFrame frame{};

@@ -17,7 +17,7 @@ void require(bool holds, const char* what) {
   std::abort();
 }
 
-/// What is read from a layout is written back byte by byte: no field is lost, shifted or made up.
+/// Reading and writing a layout gives the same bytes: no field is lost, shifted or made up.
 void probe_mtdata(std::span<const std::uint8_t> payload, const MtdataLayout& layout) {
   Mtdata data;
   if (!decode_mtdata(payload, layout, &data)) return;

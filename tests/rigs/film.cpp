@@ -41,7 +41,7 @@ constexpr int kPairs = 100;
 constexpr double kRateHz = 10, kSpeed = 6;  // m/s, on the straights
 constexpr double kStart = 2;                // s of the drive, which stands for its first three
 
-/// What the film is of, in a file that is written last.
+/// Description of the film, in a file that is written last.
 std::string key() {
   std::ostringstream key;
   key << "film 1: " << kPairs << " " << kRateHz << " " << kSpeed << " " << kStart;

@@ -8,7 +8,7 @@
 
 namespace vergence::test {
 
-/// What an emulated camera wrote into row 0 of an image.
+/// Data that an emulated camera wrote into row 0 of an image.
 struct ImageStamp {
   bool valid = false;
   std::uint32_t number = 0;    // of the exposure
@@ -16,7 +16,7 @@ struct ImageStamp {
   std::uint64_t guid = 0;
 };
 [[nodiscard]] ImageStamp read_stamp(ImageView image);
-/// Whether every row shows the emulator's pattern of that exposure.
+/// Returns true if every row shows the emulator's pattern of that exposure.
 [[nodiscard]] bool shows_pattern(ImageView image, std::uint32_t number);
 
 /// The GUIDs of the emulated cameras: the serials under which the drivers list them.
@@ -74,7 +74,7 @@ struct Holdings {
   [[nodiscard]] bool operator==(const Holdings&) const = default;
 };
 
-/// Whether this runs inside the rig's kernel; there, a device that is missing is a failure and no
+/// Returns true inside the rig's kernel; there, a device that is missing is a failure and no
 /// reason to skip.
 [[nodiscard]] bool inside_rig();
 

@@ -61,7 +61,7 @@ class VividPlayer {
     std::int64_t until_ns = 0;  // not later
   };
   static constexpr std::int64_t kNoise = -1;
-  /// What an output has shown, in order; neighbours may overlap by the time between two looks at
+  /// Images shown by an output, in order; neighbours may overlap by the time between two looks at
   /// the output's queue. Call after stop().
   [[nodiscard]] const std::vector<Showing>& showings(std::size_t output) const {
     return outputs_[output].showings;

@@ -4,7 +4,7 @@
 
 #include "drivers/acquisition/acquired.hpp"
 
-/// What tests ask of a stream of an acquisition.
+/// Helpers to query an acquisition's stream.
 namespace vergence::test {
 
 [[nodiscard]] inline const AcquiredFrame* frame_of(const Acquired& item) {
@@ -38,7 +38,7 @@ template <class Kind>
   return worst;
 }
 
-/// The same item at the same time: of frames the same images of the same pulse, of readings the
+/// Compares items and times: of frames the same images of the same pulse, of readings the
 /// same count, of events the same kind.
 [[nodiscard]] inline bool same(const Acquired& a, const Acquired& b) {
   if (a.index() != b.index() || stamp_of(a) != stamp_of(b)) return false;

@@ -29,7 +29,7 @@ namespace vergence::test {
   return sequence_of(name, index_bag(format, name, std::move(files)), given, topics);
 }
 
-/// The same; `mcap`: else a rosbag.
+/// Finishes the bag as `mcap` or else as rosbag.
 [[nodiscard]] inline app::StereoSequence bag_in_memory(bool mcap, std::span<const char> bytes,
                                                        bool given = true,
                                                        const app::BagTopics& topics = {}) {

@@ -9,7 +9,7 @@
 
 namespace vergence::test {
 
-/// How messages are serialised: CDR in either byte order, or as ROS 1 does it.
+/// Serialisation of messages: CDR in either byte order, or as ROS 1 does it.
 enum class Wire : std::uint8_t { cdr, cdr_big, ros1 };
 
 /// The bytes of a ROS message. CDR: values aligned to their size, behind four bytes that say the
@@ -85,7 +85,7 @@ class McapWriter final : public BagWriter {
   void channel(std::uint16_t id, std::string_view topic, std::string_view type) override;
   void message(std::uint16_t channel, std::int64_t log_time, std::string_view content) override;
   void close_chunk() override;
-  /// Of any kind, outside chunks.
+  /// Writes a record of any kind outside chunks.
   void record(std::uint8_t opcode, std::string_view content);
   void finish() override;
 
@@ -104,7 +104,7 @@ class RosbagWriter final : public BagWriter {
   void finish() override;
 
   using Fields = std::vector<std::pair<std::string, std::string>>;
-  /// Of any kind, outside chunks.
+  /// Writes a record of any kind outside chunks.
   void record(const Fields& header, std::string_view data);
 
  private:
@@ -128,7 +128,7 @@ struct BagKind {
 
   [[nodiscard]] bool is_mcap() const { return std::string_view(container) == "mcap"; }
   [[nodiscard]] Wire wire() const { return is_mcap() ? Wire::cdr : Wire::ros1; }
-  /// Of a file's name.
+  /// Returns the format by a file's name.
   [[nodiscard]] std::string ending() const { return is_mcap() ? ".mcap" : ".bag"; }
   [[nodiscard]] std::unique_ptr<BagWriter> writer() const;
 };

@@ -15,7 +15,7 @@ namespace vergence::test {
 /// The built program as a child process; killed by the destructor.
 class ChildProgram {
  public:
-  /// How it starts.
+  /// Options of the start.
   struct Start {
     bool terminal = false;  // one of its own, and leader of its session
     bool session = false;   // leader of a session without a terminal

@@ -76,7 +76,7 @@ class DeviceOnDescriptor {
   std::thread thread_;
 };
 
-/// The same behind a pseudo-terminal: port() is what a driver opens.
+/// Variant behind a pseudo-terminal: port() is what a driver opens.
 class DeviceOnTerminal {
  public:
   explicit DeviceOnTerminal(std::unique_ptr<DeviceModel> device)

@@ -9,7 +9,7 @@
 
 namespace vergence::test {
 
-/// What a simulated camera is like.
+/// Properties of a simulated camera.
 struct GigeCameraOptions {
   std::string address = "127.0.0.2";  // any of 127.0.0.0/8; one camera each
   std::string serial = "SIM-1";
@@ -29,7 +29,7 @@ struct GigeCameraOptions {
   std::function<const std::uint8_t*(std::uint64_t number)> images{};
 };
 
-/// What it did with its exposures, exactly. A frame is one exposure since the acquisition's start.
+/// Exact counts of its exposures. A frame is one exposure since the acquisition's start.
 struct GigeCameraReport {
   std::uint64_t exposed = 0;   // frames
   std::uint64_t whole = 0;     // every packet was sent, at first or when asked again

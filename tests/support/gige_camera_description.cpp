@@ -134,7 +134,7 @@ std::string gige_description(const GigeCameraOptions& o) {
              {{"Initializing", 1}, {"Disabled", 3}, {"Listening", 4}, {"Master", 6}, {"Slave", 9}});
   }
   d.boolean("ChunkModeActive", chunk_mode);
-  // Of the bootstrap registers; bit 0 is the most significant one.
+  // Bits of the bootstrap registers; bit 0 is the most significant one.
   d.bits("GevSCPSPacketSize", 0xD04, 31, 16,
          fmt::format("<Min>{}</Min><Max>{}</Max><Inc>4</Inc>", gvcp::kSmallestPacket,
                      gvcp::kLargestPacket));

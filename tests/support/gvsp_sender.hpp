@@ -54,7 +54,7 @@ class GvspSender {
   GvspSender& operator=(const GvspSender&) = delete;
 
   void aim(const sockaddr_in& target, std::uint32_t packet_size, Duration packet_delay);
-  /// What becomes of a frame on purpose.
+  /// Deliberate damage to a frame.
   enum class Fate : std::uint8_t { normal, unsent, torn };
   void send(GvspFrame frame, Fate fate);
   /// Answers a request; unknown blocks are answered as unavailable.

@@ -9,7 +9,7 @@
 #include "app/datasets/trajectory_files.hpp"
 #include "core/types/pose_sample.hpp"
 
-/// What makes an `ok` pose wrong, one definition for recorded drives and for the mock's faults.
+/// Definition of a wrong `ok` pose, one definition for recorded drives and for the mock's faults.
 ///
 /// A pose is wrong when the motion over the last kIntegrityFrames frames, its way or its turn, is
 /// off by more than kHonestyTimes what is normal: what the untouched drive is off by over as long a
@@ -44,10 +44,10 @@ using NormalErrors = std::array<MotionError, kLongestNormal + 1>;
 [[nodiscard]] NormalErrors normal_errors(std::span<const EvaluatedPose> poses,
                                          const app::Trajectory& truth);
 
-/// What is normal of the motion between two times of the drive.
+/// Normal error of the motion between two times of the drive.
 using NormalError = std::function<MotionError(Stamp from, Stamp to)>;
-/// Of the untouched drive, over as many of its frames as there are between them: the mean or that
-/// of the motions that end within a second of `to`, whichever is more.
+/// Error of the unperturbed drive, over as many of its frames as there are between them: the mean
+/// or that of the motions that end within a second of `to`, whichever is more.
 [[nodiscard]] NormalError normal_error_there(std::vector<EvaluatedPose> poses,
                                              app::Trajectory truth);
 

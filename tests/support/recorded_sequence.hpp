@@ -42,10 +42,10 @@ inline constexpr std::array kRecordedDrives = {"kitti06_51",     "kitti01_51",  
 [[nodiscard]] app::StartingCalibration with_focal_length(const app::StartingCalibration& given,
                                                          double factor);
 
-/// Of the drive's calibration only lenses and length are read.
+/// Only intrinsics and baseline length of the drive's calibration are read.
 [[nodiscard]] app::StartingCalibration blank(const app::StartingCalibration& given);
 
-/// What came of one pass. Frames count from 0; −1: never.
+/// Result of one pass. Frames count from 0; −1: never.
 struct DriveOutcome {
   int frames = 0, ok = 0, degraded = 0, lost = 0;
   int knocks = 0;  // told before `knock_at`

@@ -35,7 +35,7 @@ namespace vergence::test {
       town, drive, calibration, mock::default_T_body_left(), Transform{}, std::move(parsed));
 }
 
-/// What its cameras are set to: triggered, 8 ms.
+/// Configuration of its cameras: triggered, 8 ms.
 [[nodiscard]] inline CameraConfiguration small_camera(double rate_hz = 20) {
   return {64, 48, rate_hz, Duration::milliseconds(8), 0, CameraTrigger::hardware};
 }

@@ -19,7 +19,7 @@ class Tampered final : public DeviceModel {
   explicit Tampered(std::shared_ptr<DeviceModel> device, Tamper tamper = {})
       : device_(std::move(device)), tamper_(std::move(tamper)) {}
   void tamper(Tamper tamper) { tamper_ = std::move(tamper); }
-  /// Of what the host sends; true: it is lost on the way.
+  /// Called for bytes from the host; returns true if they are lost.
   using Loss = std::function<bool(HostStamp at, std::span<const std::uint8_t> bytes)>;
   void lose(Loss loss) { loss_ = std::move(loss); }
   void receive(std::span<const std::uint8_t> bytes, HostStamp at) override {

@@ -20,7 +20,7 @@ class BagImages final : public ImageStore {
   BagImages(BagFormat format, std::vector<BagFile> files, std::array<std::string, 2> topics,
             std::array<std::vector<BagImage>, 2> images) noexcept;
 
-  /// What names image `index` of camera `camera`: `left/image_raw#12`.
+  /// Returns the name of image `index` of camera `camera`: `left/image_raw#12`.
   [[nodiscard]] std::string name(std::size_t camera, std::size_t index) const;
   [[nodiscard]] ImageFileStatus size(const std::string& name, ImageSize* size) const override;
   [[nodiscard]] std::optional<std::uint16_t> peak(const std::string& name,

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,7 +11,7 @@
 #include "app/datasets/detail/ros_ins_messages.hpp"
 #include "app/datasets/detail/ros_messages.hpp"
 
-/// What a recording of ROS holds for a drive, topic by topic.
+/// Content of a ROS recording by topic.
 namespace vergence::app::detail {
 
 /// Where an image of a bag is; its pixels stay in the file.
@@ -23,7 +22,7 @@ struct BagImage {
   std::uint32_t file = 0;  // of the bag's files
 };
 
-/// What is left out of a topic, and where that begins.
+/// Messages of a topic that are omitted, and the first position.
 struct LeftOut {
   std::size_t unreadable = 0, other_size = 0, backwards = 0;
   std::string first{};     // file and offset
@@ -58,7 +57,6 @@ struct BagIndex {
   std::map<std::string, RosCameraInfo> infos{};
   std::map<std::string, ReadingTopic<RosFix>> fixes{};
   std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};  // without orientation: unreadable
-  std::map<std::string, ReadingTopic<RosOdometry>> odometry{};
   std::vector<std::string> others{};   // some topics that are not read, each with its type
   std::vector<std::string> remarks{};  // a message each
 };

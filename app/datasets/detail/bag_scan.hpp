@@ -23,7 +23,7 @@ inline constexpr std::size_t kMaxChannels = 65536;  // of a file
 
 enum class BagFormat : std::uint8_t { mcap, rosbag, sqlite };
 
-/// How the messages of a channel are serialised: by CDR (ROS 2), as ROS 1 does it, or in a way that
+/// Serialisation of a channel's messages: by CDR (ROS 2), as ROS 1 does it, or in a way that
 /// is not read.
 enum class MessageEncoding : std::uint8_t { cdr, ros1, other };
 
@@ -57,7 +57,7 @@ struct BagMessage {
 
 using BagVisitor = std::function<void(const BagMessage&)>;
 
-/// What a scan met.
+/// Result of a scan.
 struct BagScan {
   std::uint64_t messages = 0;
   std::uint64_t orphans = 0;  // messages of no channel that was described before them

@@ -7,7 +7,7 @@
 #include "app/datasets/recorded_ins.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 
-/// What the readers of stereo_sequence.hpp share.
+/// Shared parts of the readers of stereo_sequence.hpp.
 namespace vergence::app::detail {
 
 /// Each reader fills root, pairs and, unless `given`, the calibration.
@@ -22,13 +22,13 @@ namespace vergence::app::detail {
 [[nodiscard]] StereoSequence open_st_lucia(const std::filesystem::path& folder, bool given);
 [[nodiscard]] StereoSequence open_bag(BagFormat format, const std::filesystem::path& bag,
                                       bool given, const BagTopics& topics);
-/// The same of a bag whose index is there; `path`: for messages.
+/// Opens a sequence of an indexed bag; `path` is for messages.
 [[nodiscard]] StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag,
                                          bool given, const BagTopics& topics);
 
 [[nodiscard]] StereoSequence open_recorded_session(const std::filesystem::path& folder, bool given);
 
-/// The packets of oxts/ of a KITTI raw drive as INS samples (docs/kitti_raw.md); what is missing,
+/// The packets of oxts/ of a KITTI raw drive as INS samples (docs/datasets.md); what is missing,
 /// broken or out of order is left out and told. InputError: files that are not there, no packet
 /// that is whole, a calibration that is none.
 [[nodiscard]] RecordedIns read_oxts(const std::filesystem::path& folder,
@@ -37,7 +37,7 @@ namespace vergence::app::detail {
 /// Returns true if open_folder() finds images of two cameras below `root`.
 [[nodiscard]] bool holds_stereo_images(const std::filesystem::path& root);
 
-/// The log of the INS in a St Lucia folder (docs/st_lucia.md). Lines that are no twelve numbers are
+/// The log of the INS in a St Lucia folder (docs/datasets.md). Lines that are no twelve numbers are
 /// left out and counted, readings sorted by their stamps; without sigmas, the log has none. What
 /// the drive cannot tell of its axes (it never is fast or steep enough) is the MTi-G's own: x
 /// forward, y left, z up, yaw from north counter-clockwise. Without a log there are no readings,

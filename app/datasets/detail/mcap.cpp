@@ -43,7 +43,7 @@ std::optional<Record> record_at(const ByteSource& bytes, std::uint64_t offset) n
   return record;
 }
 
-/// What stands before a chunk's records.
+/// Head of a chunk's records.
 struct ChunkHead {
   std::uint64_t unpacked = 0;
   std::uint32_t crc = 0;  // of the unpacked records; 0: not given

@@ -40,7 +40,7 @@ struct PairOffset {
 
 /// Stamps of pairs that are more than 5 ms or 10 % of the interval apart.
 [[nodiscard]] bool is_doubtful(const PairOffset& offset, Duration interval);
-/// What to say then of the two cameras.
+/// Returns the warning about the two cameras.
 [[nodiscard]] std::string doubt(const std::string& left, const std::string& right,
                                 const PairOffset& offset, Duration interval);
 

@@ -44,7 +44,8 @@ inline constexpr std::size_t kRosImageHead =
     4096;  // bytes in which an image's own fields have to end
 
 /// `head`: the first bytes of a message of `size` bytes. Also nothing: other encodings than
-/// those of docs/bags.md. `pixels`: the encoding as the message names it, where that is not null.
+/// those of docs/datasets.md. `pixels`: the encoding as the message names it, where that is not
+/// null.
 [[nodiscard]] std::optional<RosImage> read_ros_image(std::span<const std::uint8_t> head,
                                                      std::size_t size, MessageEncoding encoding,
                                                      std::string* pixels = nullptr);
@@ -62,7 +63,7 @@ struct RosCameraInfo {
 };
 [[nodiscard]] std::optional<RosCameraInfo> read_ros_camera_info(
     std::span<const std::uint8_t> message, MessageEncoding encoding);
-/// Of the images that the camera's rectification makes.
+/// Returns the camera of the rectified images.
 [[nodiscard]] RosCamera rectified(RosCamera camera) noexcept;
 
 }  // namespace vergence::app::detail

@@ -19,7 +19,7 @@ class SqliteBag final : public ByteSource {
   /// InputError: no such file, or SQLite cannot open it. A log of writes beside it (-wal) is read,
   /// too.
   explicit SqliteBag(const std::filesystem::path& file);
-  /// The same of a file's bytes.
+  /// Reads the bag from a file's bytes.
   explicit SqliteBag(std::vector<std::uint8_t> bytes);
   ~SqliteBag() override;
   SqliteBag(const SqliteBag&) = delete;

@@ -60,7 +60,7 @@ void poses_to_shared(double* A, std::size_t ld, std::size_t first, std::size_t s
   }
 }
 
-/// What is known beside the tracks: its information in H, and the variance that it brings into the
+/// Prior in addition to the tracks: its information in H, and the variance that it brings into the
 /// gradient (clusters of their own).
 struct KnownBeside {
   Shared information, variance;

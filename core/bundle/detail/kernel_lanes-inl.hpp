@@ -1,5 +1,5 @@
-// What the kernels share: a point a lane, its residuals in a slot, the loss. Included once for each
-// SIMD target, behind <hwy/highway.h>; hence no `#pragma once`.
+// Shared parts of the kernels: a point a lane, its residuals in a slot, the loss. Included once for
+// each SIMD target, behind <hwy/highway.h>; hence no `#pragma once`.
 #if defined(VERGENCE_CORE_BUNDLE_DETAIL_KERNEL_LANES_INL_HPP) == defined(HWY_TARGET_TOGGLE)
 #ifdef VERGENCE_CORE_BUNDLE_DETAIL_KERNEL_LANES_INL_HPP
 #undef VERGENCE_CORE_BUNDLE_DETAIL_KERNEL_LANES_INL_HPP
@@ -34,8 +34,9 @@ HWY_INLINE void transform(const double* R, const double* t, const V X[3], V out[
         hn::MulAdd(set(R[3 * r + 1]), X[1], hn::MulAdd(set(R[3 * r + 2]), X[2], set(t[r]))));
 }
 
-/// What a slot says of its points. Made whole: its default constructor, which nobody writes, would
-/// be compiled for the machine's least instruction set, and a vector's cannot be inlined there.
+/// Results of a slot for its points. Aggregate-initialised: its default constructor, which nobody
+/// writes, would be compiled for the machine's least instruction set, and a vector's cannot be
+/// inlined there.
 struct Residual {
   V x, y;    // observed less predicted, px
   V weight;  // 1/σ², 0 where there is no observation
@@ -67,7 +68,7 @@ HWY_INLINE Residual project(const KernelCamera& camera, const Slot& slot, std::s
           yn};
 }
 
-/// The same from what the camera model itself has computed.
+/// Computes it from the camera model's results.
 HWY_INLINE Residual from_jets(const double* jet, const Slot& slot, std::size_t lane) {
   const V inverse_sigma = load(slot.inverse_sigma + lane);
   const V zero = hn::Zero(D());

@@ -23,7 +23,7 @@ void back_substitute(KernelJob& job, std::size_t first, std::size_t last,
 /// Cost and residuals alone.
 void evaluate(KernelJob& job, std::size_t first, std::size_t last) noexcept;
 
-/// What Cholesky met.
+/// Result of the Cholesky factorisation.
 struct PivotReport {
   int small =
       0;  // pivots not above `tolerance` times their diagonal: their parameter is left where it is

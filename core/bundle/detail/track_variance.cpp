@@ -159,7 +159,7 @@ class Clusters {
   std::array<bool, static_cast<std::size_t>(kMaxCells* kMaxCells)> any_{};
 };
 
-/// The same with larger clusters, of two kinds, since tracks share errors in both ways: a cell of
+/// Variance with larger clusters, of two kinds, since tracks share errors in both ways: a cell of
 /// the left image (what a lens model leaves is a field over the image, common to all tracks there),
 /// and a block of frames (what a scene does to it). Under independent errors each gives the
 /// variance by tracks; the mean of both is taken. Where all tracks are in one cell, or in the

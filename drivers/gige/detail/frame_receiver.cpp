@@ -86,7 +86,7 @@ void FrameReceiver::take(ArvBuffer* buffer) noexcept {
   if (slots_.offer(frame)) free_.pop_back();
 }
 
-/// What is known of a buffer that is done; false: nothing that could be handed out.
+/// Reads the metadata of a completed buffer; false if it cannot be handed out.
 bool FrameReceiver::describe(ArvBuffer* buffer, HostStamp arrival, Frame* frame) noexcept {
   const bool whole = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
   const std::uint64_t id = arv_buffer_get_frame_id(buffer);

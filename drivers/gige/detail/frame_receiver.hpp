@@ -53,7 +53,7 @@ class BlockCounter {
   std::uint64_t newest_ = 0, counter_ = 0;
 };
 
-/// What Aravis's receive thread does: buffers that are done become frames with number, time,
+/// Callback of Aravis's receive thread: completed buffers become frames with number, time,
 /// exposure and state, and go to the FrameQueue; slots that come back go to the transport again.
 ///
 /// Threads  begin(), supply_buffers(), end(): the owner, while no callback can come. callback():
@@ -66,7 +66,7 @@ class FrameReceiver {
   FrameReceiver(FrameQueue& queue, SlotReturns& slots, ImageMemory& memory)
       : queue_(queue), slots_(slots), memory_(memory) {}
 
-  /// Of Session::open_stream(); `self` is a FrameReceiver.
+  /// Callback for Session::open_stream(); `self` is a FrameReceiver.
   static void callback(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
 
   /// A stream of the session was opened. `applied` is its configuration, `exposure` what the
@@ -81,7 +81,7 @@ class FrameReceiver {
   /// The camera's registers hold this from now on.
   void change_exposure(const ExposureSetting& setting) noexcept;
 
-  /// Of the newest buffer, or of begin().
+  /// Time of the newest buffer, or of begin().
   [[nodiscard]] HostStamp last_buffer() const noexcept {
     return HostStamp(last_buffer_ns_.load(std::memory_order_acquire));
   }
@@ -89,7 +89,7 @@ class FrameReceiver {
   [[nodiscard]] int wrong_sizes() const noexcept {
     return wrong_sizes_.load(std::memory_order_relaxed);
   }
-  /// Of the newest of these; 0: it did not say.
+  /// Value of the newest of these; 0 if unknown.
   [[nodiscard]] int wrong_width() const noexcept {
     return wrong_width_.load(std::memory_order_relaxed);
   }

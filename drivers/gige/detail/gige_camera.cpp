@@ -252,7 +252,7 @@ constexpr int kWrongSizes = 3;                            // in a row: no accide
 
 }  // namespace
 
-/// What one round of the supervisor leaves for the next.
+/// State between two rounds of the supervisor.
 struct GigeCamera::Watch {
   Duration pause = kFirstPause;
   HostStamp next_try{}, asked = monotonic_now();

@@ -108,7 +108,7 @@ class GigeCamera final : public CameraDevice {
   LastError last_error_;
   Published<std::string> remark_;  // of the session
 
-  // Of configure(); constant while streaming.
+  // Set by configure(); constant while streaming.
   CameraConfiguration requested_{};
   Options options_{};
   Applied applied_{};

@@ -7,14 +7,14 @@
 
 namespace vergence::gige {
 
-/// How a pixel format becomes 8-bit grey.
+/// Conversion of a pixel format to 8-bit grey.
 struct GreyFormat {
   const char* name;  // of the standard's pixel format naming convention
   enum class How : std::uint8_t { as_it_is, words, mosaic } how;
   int shift = 0;  // words: bits below the eight that are kept
 };
 
-/// Of the formats a camera offers the one called `requested`, or where that is empty the cheapest.
+/// Returns the format called `requested`, or the cheapest if that is empty.
 /// Null: none that gives grey.
 [[nodiscard]] const GreyFormat* choose_format(const std::vector<std::string>& offered,
                                               std::string_view requested) noexcept;

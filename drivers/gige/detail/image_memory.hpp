@@ -33,7 +33,7 @@ class ImageMemory {
   void clear() noexcept;
 
   [[nodiscard]] std::size_t slots() const noexcept { return slots_; }
-  /// Whether images are converted into the slots; if not, buffer i is slot i.
+  /// True if images are converted into the slots; otherwise buffer i is slot i.
   [[nodiscard]] bool converts() const noexcept { return converts_; }
   [[nodiscard]] const std::vector<ArvBuffer*>& buffers() const noexcept { return buffers_; }
   /// Which of buffers() it is.

@@ -15,7 +15,7 @@ struct Interface {
 /// The one with this IPv4 address; without one the name is empty.
 [[nodiscard]] Interface interface_of(const std::string& address);
 
-/// What a stream asks of its link.
+/// Requirements of a stream on its link.
 struct LinkLoad {
   std::int64_t payload = 0;  // bytes a frame
   double rate_hz = 0;

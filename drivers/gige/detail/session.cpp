@@ -203,8 +203,8 @@ std::string address_of(GSocketAddress* address) {
   return text_of(text.get());
 }
 
-/// Of Aravis's list of devices, which it looks up and makes anew without a lock, while every camera
-/// that is away has a thread that looks for it.
+/// Guards Aravis's list of devices, which it reads and makes anew without a lock, while every
+/// camera that is away has a thread that looks for it.
 std::shared_mutex& device_list() {
   static std::shared_mutex mutex;
   return mutex;

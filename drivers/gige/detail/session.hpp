@@ -14,7 +14,7 @@
 
 namespace vergence::gige {
 
-/// What a driver wants of a camera; cameras call it by different names.
+/// Features of a camera; their names differ between cameras.
 enum class Purpose : std::uint8_t {
   exposure,       // µs
   gain,           // dB
@@ -70,7 +70,7 @@ class Features {
   std::string last_error_;
 };
 
-/// Who answers a broadcast.
+/// Cameras that answer a broadcast.
 struct Found {
   DeviceInfo info;
   std::string id;  // Aravis's, unique

@@ -138,7 +138,7 @@ void DeliveryQueue::deliver_frame(const QueuedDelivery& parcel, HostStamp arriva
     return;
   }
   senders_[k].on_the_way.fetch_sub(1);
-  // What was on the way as the camera was unplugged is lost with it: a stream has nothing but
+  // Frames in transit when the camera was unplugged are lost: a stream has nothing but
   // `back` behind a `gone`.
   if (parcel.unplugged != senders_[k].known_disconnected) {
     cameras_[k]->lost.fetch_add(1, std::memory_order_relaxed);

@@ -31,7 +31,7 @@ struct QueuedDelivery {
 };
 inline constexpr int kInsDevice = -1, kTriggerDevice = -2;
 
-/// What was made for the mock's devices, handed to their streams in the order of arrival.
+/// Deliveries of the simulated devices, handed to their streams in the order of arrival.
 ///
 /// Threads  begin(), join(): the owner. post(), finish(), deliver_until(), take_spare(),
 ///          on_the_way(): the producer. In real time a thread of its own hands out what is due.

@@ -57,7 +57,7 @@ DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
   // The next image but one, or later where more are made already.
   constexpr std::uint64_t kLatency = 2;
   const std::uint64_t from = std::max(rig_->looked_at.load() + kLatency, rig_->planned.load());
-  // Of what is past only the last is of use.
+  // Only the newest past entry is used.
   const std::uint64_t planned = rig_->planned.load();
   const std::uint64_t past = planned > MockRig::kSlots ? planned - MockRig::kSlots : 0;
   try {

@@ -24,7 +24,7 @@
 /// through their streams.
 namespace vergence::mock {
 
-/// What the pulses of a mock's camera are exposed with: a setting holds from its pulse on, until
+/// Exposure settings of a simulated camera by pulse: a setting holds from its pulse on, until
 /// the next.
 ///
 /// Threads  Any. Memory: grows with changes that no pulse has passed yet. Errors: change() may
@@ -66,14 +66,14 @@ class ExposurePlan {
 using vergence::Delivery;
 using vergence::Stream;
 
-/// What the devices of one rig share.
+/// Shared state of the devices of one rig.
 struct RigContext {
   std::shared_ptr<const RigTruth> truth;
   MockRigOptions options;
   WakeEvent room;  // signalled by a consumer that has made some: a slot, a place in a stream
   std::atomic<bool> pulsing{false};  // the scheduler's threads use the devices
-  // Of camera 0, for who sets exposures: the pulse of the image handed out last, and whether images
-  // wait for their consumer or he is at one.
+  // State of camera 0 for exposure control: the pulse of the image handed out last, and whether
+  // images wait for their consumer or he is at one.
   std::atomic<std::uint64_t> looked_at{0};
   std::atomic<int> unseen{0};
   std::atomic<bool> looking{false};
@@ -112,7 +112,7 @@ class MockCamera final : public CameraDevice {
     return rig_->options.trigger_delay[static_cast<std::size_t>(k_)];
   }
   [[nodiscard]] FramePool& pool() noexcept { return *pool_; }
-  /// What an image of that pulse is taken with.
+  /// Exposure setting of that pulse's image.
   [[nodiscard]] ExposureSetting setting_at(std::uint64_t pulse) const {
     return exposures_.at(pulse);
   }
@@ -177,7 +177,7 @@ class MockIns final : public InsDevice {
   std::atomic<std::uint64_t> delivered_{0};
 };
 
-/// Who is told that the board begins to pulse, and that it ends.
+/// Receiver of the board's start and stop.
 class PulseListener {
  public:
   virtual ~PulseListener() = default;

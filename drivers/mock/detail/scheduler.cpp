@@ -46,7 +46,7 @@ Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& p
   std::uint64_t number = 0;
   for (const Fault& f : truth.faults()) {
     ++number;
-    // What happens to the light concerns the camera and the instant that the image is of; the rest,
+    // Faults of the light apply to the camera and instant of the image; the rest,
     // the one that sends it and when.
     const bool light =
         f.kind == FaultKind::cover || f.kind == FaultKind::night || f.kind == FaultKind::exposure;

@@ -55,7 +55,7 @@ struct PulseAt {
   const PulsePlan* plan = nullptr;
 };
 
-/// What becomes of one camera's image of one pulse, by the faults that are due.
+/// Fate of one camera's image of one pulse under the active faults.
 struct Exposure {
   bool missed = false;  // never happens
   bool lost = false;    // never arrives
@@ -103,7 +103,7 @@ class Scheduler final : public PulseListener {
   [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;
 
  private:
-  /// What the scheduler knows of a camera.
+  /// State of a camera in the scheduler.
   struct Sender {
     bool unplugged = false;
     std::uint64_t counter_base = 0;  // of the slot less what the camera counts
@@ -124,7 +124,7 @@ class Scheduler final : public PulseListener {
   void make_link_events(std::uint64_t pulse);
   [[nodiscard]] bool left_out(std::uint64_t pulse);
   void make_report(std::uint64_t pulse);
-  /// What the feedback line of camera k tells of this pulse.
+  /// Feedback of camera k for this pulse.
   [[nodiscard]] PulseExposure feedback(std::uint64_t pulse, int k) const;
   [[nodiscard]] bool pulsed(int k) const noexcept {
     return (board_.lines >> static_cast<unsigned>(k) & 1U) != 0;
@@ -134,9 +134,9 @@ class Scheduler final : public PulseListener {
   [[nodiscard]] std::uint32_t boot_of(std::uint64_t pulse) const noexcept;
   void make_readings(HostStamp until);
   void make_frames(std::uint64_t pulse);
-  /// Whether camera k is there at this pulse; posts its going and coming.
+  /// Returns true if camera k is connected at this pulse; posts disconnects and reconnects.
   [[nodiscard]] bool present(std::uint64_t pulse, int k);
-  /// What camera k will send of this pulse, with a slot for it; nothing: it is lost.
+  /// Image of camera k for this pulse, with a slot; nullopt if it is lost.
   [[nodiscard]] std::optional<Shooting> plan(std::uint64_t pulse, int k);
   void render(const Shooting& shooting);
   void send(std::uint64_t pulse, const Shooting& shooting);

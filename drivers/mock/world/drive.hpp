@@ -72,7 +72,7 @@ inline constexpr Duration kDriveStep =
   return camera_mount({1.2, 0.375, 1.7}, 0.0);
 }
 
-/// What a renderer asks for: p_camera = T_camera_enu · p_enu, from where the body is and where the
+/// Input of the renderer: p_camera = T_camera_enu · p_enu, from where the body is and where the
 /// camera sits on it.
 [[nodiscard]] inline Transform camera_pose(const BodyState& body,
                                            const Transform& T_body_camera) noexcept {

@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 
-/// What may be chosen of the mock's world by name.
+/// Named choices of the simulated world.
 namespace vergence::mock {
 
 enum class DriveKind : std::uint8_t {

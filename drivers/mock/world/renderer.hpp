@@ -10,7 +10,7 @@
 
 namespace vergence::mock {
 
-/// How one picture is taken.
+/// Parameters of one image.
 struct RenderRequest {
   double exposure = 1.0;  // relative to the world's nominal daylight exposure; 0 is a covered lens
   double vignetting = 0.5;   // brightness · 1/(1 + vignetting·r²)², r = tan of the angle to the

@@ -9,7 +9,7 @@ namespace vergence::mock {
 
 struct Scene;
 
-/// What is built. The same options give the same world on every machine.
+/// Options of the world. The same options give the same world on every machine.
 struct WorldOptions {
   std::uint64_t seed = 1;
   int texture_detail = 1;  // 0: facades of 4.7 cm a texel, 1: 2.3 cm, 2: 1.2 cm (8, 32, 128 MB)
@@ -44,8 +44,8 @@ class World {
     double distance = 0;  // in units of |direction|, to the first solid surface
     bool veiled = false;  // leaves or another surface with holes may be in front of it
   };
-  /// What a ray from `origin` (m) meets; nothing where there is only sky. Plain and slow: the
-  /// measure for tests.
+  /// Returns the surface hit by a ray from `origin` (m); nullopt where there is only sky. Plain and
+  /// slow: the measure for tests.
   [[nodiscard]] std::optional<Hit> cast(const Vec3& origin, const Vec3& direction) const noexcept;
 
   [[nodiscard]] const WorldOptions& options() const noexcept { return options_; }

@@ -1,8 +1,8 @@
 #ifndef VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_HAL_H
 #define VERGENCE_FIRMWARE_IFACE_TRIGGER_BOARD_HAL_H
 /*
- * What a port provides: this and an entry point that calls firmware_main(). docs/trigger_board.md
- * says how to write one.
+ * What a port provides: this and an entry point that calls firmware_main().
+ * firmware_iface/trigger/README.md says how to write one.
  *
  * Threads    The main loop calls; interrupts only stamp edges and bytes into rings.
  * Time       One free-running 32-bit counter; an edge is made or stamped by it in hardware.

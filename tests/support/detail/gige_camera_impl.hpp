@@ -35,7 +35,7 @@ inline constexpr std::uint32_t kSmallestPacket = 576, kLargestPacket = 16'000;  
 }
 }  // namespace gvcp
 
-/// What GigeCamera is made of: gige_camera.cpp has its beginning and end, gige_camera_control.cpp
+/// Implementation of GigeCamera: gige_camera.cpp has its beginning and end, gige_camera_control.cpp
 /// its registers, gige_camera_frames.cpp its exposures.
 class GigeCamera::Impl {
  public:

@@ -20,7 +20,7 @@ struct SimulatedPulse {
   std::uint8_t lines = 0;  // mask of those that were pulsed
 };
 
-/// What a camera's exposure-active output does after a pulse, by the host's clock. No earlier than
+/// Exposure-active output of a camera after a pulse, by the host's clock. No earlier than
 /// the edge.
 struct SimulatedExposure {
   bool happens = false;

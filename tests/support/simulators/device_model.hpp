@@ -19,7 +19,7 @@ class DeviceModel {
   virtual void receive(std::span<const std::uint8_t> bytes, HostStamp at) = 0;
   /// When it has something to send next; nothing: not before it is asked.
   [[nodiscard]] virtual std::optional<HostStamp> next() const = 0;
-  /// What it hands to its transmitter at that time.
+  /// Bytes for its transmitter at that time.
   virtual void produce(HostStamp at, std::vector<std::uint8_t>* out) = 0;
   /// Rate of its transmitter and receiver: another at the host means garbage both ways.
   [[nodiscard]] virtual std::uint32_t baud() const = 0;

@@ -38,7 +38,7 @@ class UsbConverter {
   [[nodiscard]] HostStamp frame_at() const noexcept { return next_frame_; }
 
   void receive(std::uint8_t byte) { chip_.push_back(byte); }
-  /// What is there now goes with the next frame, what comes later does not.
+  /// Available bytes are sent with the next frame, later ones are not.
   void run_out();
   /// A USB frame: the transfers that are complete by it are appended.
   void frame(HostStamp now, std::vector<std::vector<std::uint8_t>>* transfers);

@@ -200,7 +200,7 @@ bool XsensMessages::fix_requested() const noexcept {
   return requested;
 }
 
-/// Of the oldest sample that is remembered.
+/// Number of the oldest stored sample.
 XsensMessages::Message XsensMessages::fix() {
   const Sample& then = history_.front();
   const InsSample& s = then.sample;

@@ -9,7 +9,7 @@
 
 namespace vergence::test {
 
-/// How often a host wrote which setting: a driver that changes only what differs leaves these at
+/// Number of writes by setting: a driver that changes only what differs leaves these at
 /// zero the second time.
 struct XsensWrites {
   int outputs = 0, layout = 0, period = 0, skip = 0, sync_out = 0, sync_settings = 0, baud = 0;
@@ -17,11 +17,11 @@ struct XsensWrites {
   int refused = 0;  // messages answered with an error
 };
 
-/// What a simulated XSens INS is set to, and its answers to who asks for it or changes it: the
+/// Settings of a simulated XSens INS and its answers to requests: the
 /// requests of its configuration state.
 ///
 /// Settings stay over a reset, as those of the device do; the baud rate holds from the next one on.
-/// What the generation does not know is refused.
+/// Requests unknown to the generation are refused.
 /// Threads  One caller. Errors: none; a refusal is a reply.
 class XsensSettings {
  public:
@@ -51,7 +51,7 @@ class XsensSettings {
   /// Between two samples, by the device's clock.
   [[nodiscard]] std::int64_t period_ns() const noexcept;
   [[nodiscard]] double rate_hz() const noexcept { return 1e9 / static_cast<double>(period_ns()); }
-  /// What measuring takes of the line: 1 is all of it.
+  /// Load of the link while measuring: 1 is full.
   [[nodiscard]] double line_load(std::uint32_t baud) const noexcept;
   /// A pulse of SyncOut went out after `from_ns` and up to `to_ns`, by the device's clock.
   [[nodiscard]] bool sync_out_within(std::int64_t from_ns, std::int64_t to_ns) const noexcept;

@@ -16,8 +16,8 @@
 
 namespace vergence::test {
 
-/// What the simulated sensor measures: the reading of this number at a time of the drive. Called in
-/// order of the numbers, none left out.
+/// Measurement of the simulated sensor: the reading of this number at a time of the drive. Called
+/// in order of the numbers, none left out.
 using InsSource = std::function<InsSample(std::uint64_t number, Duration time)>;
 
 /// An XSens INS at byte level: MTi-G (MTData) or MTi-G-700/710 (MTData2).

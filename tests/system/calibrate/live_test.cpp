@@ -15,8 +15,8 @@
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/gige/socket_buffer.hpp"
-#include "tests/unit/app/calibration/board_picture.hpp"
-#include "tests/unit/app/calibration/board_scene.hpp"
+#include "tests/unit/app/checkerboard/board_picture.hpp"
+#include "tests/unit/app/checkerboard/board_scene.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {
@@ -86,7 +86,7 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
   EXPECT_LT(off.head<3>().norm(), 0.15 * M_PI / 180);
   EXPECT_LT(off.tail<3>().norm(), 0.0005) << "m";
 
-  // What was kept gives the same calibration again.
+  // The saved images give the same calibration.
   const Outcome again =
       run_vergence(fmt::format("calibrate --quiet --left '{0}/left_*.png' --right "
                                "'{0}/right_*.png' --checkerboard 9x6 --square 0.04 --out '{1}'",

@@ -84,7 +84,7 @@ void expect_noticed_and_mended(const Knock& knock) {
   if (knock.matches) {
     EXPECT_EQ(wrong_ok(course.answers(), {}), "") << course.story();
   } else {
-    // What the way was while nothing measured its scale stays in it: right before, and right after.
+    // The path driven without a measured scale remains: right before, and right after.
     const auto after_mending = course.answers().begin() + static_cast<std::ptrdiff_t>(mended.frame);
     EXPECT_EQ(wrong_ok({course.answers().begin(), after_mending}, {}), "") << course.story();
     EXPECT_EQ(wrong_ok({after_mending, course.answers().end()}, {}), "") << course.story();

@@ -3,7 +3,7 @@
 
 namespace vergence::test {
 
-/// What happens to the right camera, and how soon that has to be noticed.
+/// Change of the right camera and the maximum time to detect it.
 struct Knock {
   const char* name;
   Vec3 turn_deg, shift_mm;
@@ -16,7 +16,7 @@ struct Knock {
 /// A rig that knows its calibration is knocked on the way and mended.
 void expect_noticed_and_mended(const Knock& knock);
 
-/// The same of one that is too small to be told, a depth error of less than half a percent: within
+/// Change that is too small to detect, a depth error of less than half a percent: within
 /// `frames` what the drive learns takes up most of it, and no pose is wrong meanwhile.
 void expect_taken_up(const Knock& knock);
 

@@ -87,7 +87,7 @@ TEST(RecordedClaims, aNominalCalibrationThatIsWrongIsNeverOkAndMended) {
   EXPECT_EQ(o.ok_before_verified, 0);
   EXPECT_EQ(o.knocks, 0) << "what is off from the first frame is no knock";
   ASSERT_TRUE(o.rig);
-  // What six drives of that car agree on, 25.7 to 27.2 mrad, within three sigmas of so few frames.
+  // Six drives of that car agree on 25.7 to 27.2 mrad, within three sigmas of so few frames.
   EXPECT_NEAR(log_so3(o.rig->T_camera_left[1].R).y(), 26.5e-3, 2e-3);
 }
 

@@ -51,7 +51,7 @@ void print(const char* name, const RigCalibration& rig) {
               r.x(), r.y(), r.z(), t.x(), t.y(), t.z(), rig.frames);
 }
 
-/// Of a second drive with the calibration found.
+/// Result of a second drive with the estimated calibration.
 TrajectoryEvaluation odometry_with(StereoDrive drive, const RigCalibration& rig) {
   drive.rig = rig;
   std::vector<StampedPose> estimate, truth;

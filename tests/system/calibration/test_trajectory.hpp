@@ -10,7 +10,7 @@
 
 namespace vergence::test {
 
-/// How an estimator is set up for one course.
+/// Settings of an estimator for one trajectory.
 struct CourseSetting {
   EstimatorOptions options;
   RigCalibration given;    // what the estimator is handed
@@ -21,7 +21,7 @@ struct CourseSetting {
 /// Cameras side by side looking the same way, as far apart as the true ones: all that a
 /// configuration knows.
 [[nodiscard]] RigCalibration nominal_of(const RigCalibration& rig);
-/// Of the rig only intrinsics and the baseline's length. Focal lengths held: the mock's are exact.
+/// Uses only the rig's intrinsics and baseline length. Focal lengths held: the mock's are exact.
 [[nodiscard]] CourseSetting from_scratch(const RigCalibration& rig);
 /// The rig's own calibration in use, watched; with sigmas as sixty frames give them.
 [[nodiscard]] CourseSetting with_calibration(const RigCalibration& rig);

@@ -23,7 +23,7 @@ constexpr Duration kLongestDrive = Duration::seconds(86400.0);
 constexpr double kMinute = 60;
 constexpr double kStarting = 6;  // s of a drive in real time that may be gone before its first pose
 
-/// Of the drive with this first pose: in real time that is where it begins.
+/// Ground truth of the drive with this first pose: in real time it begins there.
 Stamp start_of(Stamp first) { return first - kStart > kLongestDrive ? first : kStart; }
 
 std::vector<std::string> cells_of(const std::string& line) {

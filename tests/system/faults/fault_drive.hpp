@@ -9,12 +9,12 @@
 /// Drives of the mock with faults, by the built program, judged against the truth.
 namespace vergence::test {
 
-/// What goes wrong on a drive.
+/// Faults of a drive.
 struct FaultCase {
   std::string name;
   std::vector<std::string> faults{};  // as --fault takes them
   double from_s = 0, until_s = 0;     // of the drive: first fault's start, last one's end
-  /// What must be seen of them: kinds of events, reasons of frames, counters of summary.json
+  /// Expected evidence of the faults: kinds of events, reasons of frames, counters of summary.json
   /// ("/devices/clock_resets") that are not 0, or lines on the terminal. None: poses that are not
   /// those of the untouched drive.
   std::vector<std::string> said{};
@@ -60,7 +60,7 @@ struct Untouched {
   std::string unfit{};
 };
 [[nodiscard]] Untouched untouched_drive();
-/// Of what must be said of these faults, what was not; empty: all was.
+/// Returns expected evidence that is missing; empty if none.
 [[nodiscard]] std::string unsaid(const FaultCase& c, const FaultDrive& drive,
                                  const FaultDrive& untouched);
 /// Nothing of it may be: a wrong `ok`, one at a time at which there is no truth, a session that is
@@ -77,7 +77,8 @@ struct EvaluatedDrive {
 /// minute.
 [[nodiscard]] EvaluatedDrive drive_until_recovered(FaultCase c, const NormalError& normal);
 
-/// The faults of docs/mock.md, one at a time; begin at 9 s, when the calibration is confirmed.
+/// The faults of docs/simulated_rig.md, one at a time; begin at 9 s, when the calibration is
+/// confirmed.
 [[nodiscard]] const std::vector<FaultCase>& single_faults();
 /// Every two of them at once, the second a second later.
 [[nodiscard]] std::vector<FaultCase> fault_pairs();
@@ -87,7 +88,7 @@ struct EvaluatedDrive {
 /// real time: of `system` the times are the process's, some seconds ahead of the drive's.
 [[nodiscard]] const std::vector<FaultCase>& long_faults();
 
-/// Head and line of the table of docs/faults.md.
+/// Head and line of the table of docs/benchmarks.md.
 [[nodiscard]] std::string fault_table_head();
 [[nodiscard]] std::string fault_table_line(const FaultCase& c, const FaultDrive& drive,
                                            const FaultResult& result);

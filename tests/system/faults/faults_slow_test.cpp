@@ -1,5 +1,5 @@
-// What a long stand does. `fault_injection_bench` drives the other long faults, two at a time and
-// 500 random schedules.
+// Effects of a long standstill. `fault_injection_bench` drives the other long faults, two at a time
+// and 500 random schedules.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -11,7 +11,7 @@
 #include "tests/rigs/iidc_rig.hpp"
 #include "tests/support/camera_options.hpp"
 
-/// What holds on both buses: one set of cases, included once by each bus's test with its own
+/// Cases for both buses: one set of cases, included once by each bus's test with its own
 /// BusUnderTest.
 ///
 ///   struct BusUnderTest { static constexpr const char* kEmulator; static constexpr const char*

@@ -93,7 +93,7 @@ std::filesystem::path run_film(const std::string& name, const std::string& confi
   return out;
 }
 
-/// What every drive on the film must be: all pairs posed, nothing allocated, the way right.
+/// Requirements for every drive on the film: all pairs posed, nothing allocated, the way right.
 void expect_a_drive(const std::filesystem::path& session, const nlohmann::json& summary,
                     const Film& film) {
   const auto& frames = summary.at("frames");
@@ -146,7 +146,7 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
     const auto lost = devices.at(name + "lost").get<std::int64_t>(),
                underruns = devices.at(name + "underruns").get<std::int64_t>();
     EXPECT_EQ(devices.at("frames_incomplete").get<int>(), 0);
-    // What the emulator says it exposed, but for the images that came when the drive had ended: the
+    // Exposures counted by the emulator, without images after the end of the drive: the
     // cameras are stopped by the next look of the caller's thread (50 ms), one after the other, on
     // the one processor of this machine. At 10 Hz that is within 0.4 s.
     constexpr int kAfterTheEnd = 4;

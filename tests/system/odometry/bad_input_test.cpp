@@ -15,8 +15,8 @@ constexpr std::size_t kFirst = 120, kLast = 135;
 constexpr bool kCalibrationHeld =
     false;  // what the odometry alone makes of it; else the rig would be calibrated as it is now
 
-/// What every condition is asked: no `ok` while it lasts, none that is wrong at any time, and `ok`
-/// again at the end.
+/// Requirements for every condition: no `ok` while it lasts, none that is wrong at any time, and
+/// `ok` again at the end.
 struct Verdict {
   Replay replayed;
   std::size_t first, last;

@@ -15,7 +15,7 @@ constexpr int kBonnet = 110;  // rows
 const std::array<Eigen::Vector2i, 2> kDirt{Eigen::Vector2i(210, 170), Eigen::Vector2i(430, 205)};
 constexpr int kDirtRadius = 38;  // px
 
-/// What of camera k's picture is not the street: the bonnet, dirt on the glass.
+/// Part of camera k's image that is not the street: the bonnet, dirt on the glass.
 bool is_painted(std::size_t k, int x, int y, int height) {
   return y >= height - kBonnet ||
          (Eigen::Vector2i(x, y) - kDirt[k]).squaredNorm() < kDirtRadius * kDirtRadius;
@@ -35,7 +35,7 @@ Picture paint(int width, int height) {
   return p;
 }
 
-/// The same as the other camera sees it, as if it stood some metres off: so that it matches across
+/// View of the other camera, as if it stood some metres off: so that it matches across
 /// and looks like a thing in the street.
 Picture seen_from_the_other(const Picture& left, const RigCalibration& rig) {
   constexpr double kDepth = 8;  // m
@@ -151,7 +151,7 @@ TEST(MaskedOdometry, sightsNothingUnderAMaskAndIsAsGoodAsOnCleanGlass) {
   for (std::size_t k = 0; k < 2; ++k) {
     EXPECT_EQ(masked.painted[k], 0) << "camera " << k;
     EXPECT_GT(masked.observations[k], static_cast<int>(kFrames) * 100) << "camera " << k;
-    // What the mask is for: without it the paint is followed.
+    // Without the mask the paint is tracked.
     EXPECT_GT(bare.painted[k], static_cast<int>(kFrames)) << "camera " << k;
   }
   EXPECT_EQ(masked.posed, static_cast<int>(kFrames));

@@ -8,7 +8,7 @@ namespace vergence::test {
 /// baseline with the right camera turned a little, sensor noise, 20 pairs a second.
 [[nodiscard]] StereoDrive render_drive(const mock::DriveOptions& options, Duration from,
                                        std::size_t frames);
-/// The same through another rig's two lenses.
+/// Renders through another rig's two lenses.
 [[nodiscard]] StereoDrive render_drive(const mock::DriveOptions& options, Duration from,
                                        std::size_t frames, const RigCalibration& rig);
 

@@ -33,7 +33,7 @@ struct StereoDrive {
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size(); }
 };
 
-/// What an estimator said about one frame, and where the left camera truly was when its image was
+/// Estimate of one frame, and the true pose of the left camera when its image was
 /// taken.
 struct Answer {
   PoseSample sample;
@@ -68,7 +68,7 @@ struct MotionError {
 };
 [[nodiscard]] MotionError motion_error(const Answer& from, const Answer& to);
 
-/// How far a pose called `ok` may be from the truth, relative to the first `ok` pose since the
+/// Maximum error of an `ok` pose relative to the first `ok` pose since the
 /// drive's start or the last marked restart.
 struct OkBound {
   double translation = 0.05;  // m

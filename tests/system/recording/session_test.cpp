@@ -155,7 +155,7 @@ TEST_F(RecordedDrive, isExportedForOtherPrograms) {
   const Outcome euroc = to("euroc");
   EXPECT_EQ(euroc.code, 0) << euroc.err;
   EXPECT_LE(replay(out("euroc"), out("of-euroc")).code, 1);
-  // The same pixels, stamps and rig, the rig's last digit aside.
+  // Pixels, stamps and rig agree, except the rig's last digit.
   const auto a = app::read_tum(out("of-folder") / "trajectory.tum");
   const auto b = app::read_tum(out("of-euroc") / "trajectory.tum");
   ASSERT_EQ(a.size(), b.size());

@@ -1,4 +1,4 @@
-// What the README tells a newcomer to copy must work as it stands there.
+// Checks that examples of the README work unchanged.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -99,7 +99,7 @@ std::size_t resident_kb(pid_t pid) {
   return 0;
 }
 
-/// Of a process, user and system.
+/// CPU time of a process, user and system.
 double cpu_seconds(pid_t pid) {
   std::ifstream stat(fmt::format("/proc/{}/stat", pid));
   std::string field;

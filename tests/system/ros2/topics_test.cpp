@@ -1,4 +1,4 @@
-// What Cyclone DDS, which the product does not use, reads of vergence-ros2's topics.
+// Checks vergence-ros2's topics with Cyclone DDS, which the product does not use.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/eventfd.h>

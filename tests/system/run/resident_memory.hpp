@@ -19,7 +19,7 @@
 
 #include "tests/support/temporary_folder.hpp"
 
-/// What is resident of a drive through the mock while it goes on.
+/// Resident memory during a simulated run.
 namespace vergence::test {
 
 constexpr std::int64_t kKiB = 1024;
@@ -34,7 +34,7 @@ struct Resident {
 };
 constexpr std::int64_t kLargeMapping = 64 * 1024 * kKiB;
 
-/// Of a process by its smaps (proc(5)); nothing: it has ended.
+/// Resident memory of a process by its smaps (proc(5)); nullopt if it has ended.
 inline std::optional<Resident> resident_of(pid_t process) {
   std::ifstream smaps("/proc/" + std::to_string(process) + "/smaps");
   std::int64_t size = 0, all = 0;

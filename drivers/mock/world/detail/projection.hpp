@@ -24,7 +24,7 @@ struct RayTiles {
   Bounds all{};
 };
 
-/// What one pose sees: the polygons in front of the camera and the candidates of every tile.
+/// View of one pose: the polygons in front of the camera and the candidates of every tile.
 class Projection {
  public:
   /// `T_camera_bus`: null, there is none.

@@ -26,7 +26,7 @@ class Canvas {
   /// Blends `value` over [u0, u1] x [v0, v1] (m) with exact area coverage at the border texels;
   /// wraps around the edges.
   void rectangle(double u0, double v0, double u1, double v1, float value, float opacity = 1.0F);
-  /// The same for a disc; the border is one texel wide.
+  /// Disc texture; the border is one texel wide.
   void disc(double u, double v, double radius_m, float value, float opacity = 1.0F);
   /// A straight stroke of the given width.
   void stroke(double u0, double v0, double u1, double v1, double width_m, float value,

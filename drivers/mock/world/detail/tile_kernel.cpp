@@ -169,7 +169,7 @@ HWY_INLINE void insert(Layers& l, VF q, VF c, VI p) {
   (void)step(l.q3, l.c3, l.p3);
 }
 
-/// What lies on the inner side of an edge at signed distance e (px) in a pixel blurred by two unit
+/// Share on the inner side of an edge at signed distance e (px) in a pixel blurred by two unit
 /// boxes, its own aperture and the lens: the integral of a triangle. Its samples at whole pixels
 /// add up to the exact distance, so an edge is seen where it is at every sub-pixel phase (a ramp of
 /// any other width sways by some 0.05 px).
@@ -306,8 +306,8 @@ void ShadeTile(const TileInput& in, float weight, float* out, std::ptrdiff_t out
         add(l.q2, l.c2, l.p2);
         add(l.q3, l.c3, l.p3);
       }
-      // What more than kLayers surfaces left uncovered looks like the covered part; nothing at all
-      // is haze without end.
+      // The part left uncovered by more than kLayers surfaces looks like the covered part; nothing
+      // at all is haze without end.
       const VF trace = hn::Set(f, 1e-3F);
       sum = hn::Div(hn::MulAdd(trace, hn::Set(f, in.haze), sum), hn::Add(covered, trace));
       float* at = out + static_cast<std::ptrdiff_t>(row) * out_stride + column;

@@ -50,7 +50,7 @@ struct TileInput {
 /// run time for the machine's SIMD.
 void shade_tile(const TileInput& in, float weight, float* out, std::ptrdiff_t out_stride) noexcept;
 
-/// How a sensor turns brightness into numbers.
+/// Response of a sensor to brightness.
 struct SensorInput {
   const float* ray_x = nullptr;  // kTilePixels, rows of kTile
   const float* ray_y = nullptr;

@@ -186,7 +186,7 @@ void add_block_houses(SceneBuilder* builder, const WorldOptions& options, const 
     }
 }
 
-/// What stands behind the houses: tall flats and rows of trees inside a block, 35 m and more from
+/// Background behind the houses: tall flats and rows of trees inside a block, 35 m and more from
 /// any street.
 void add_block_interior(SceneBuilder* builder, const Block& b, Random* random) {
   const double cx = 0.5 * (b.x0 + b.x1), cy = 0.5 * (b.y0 + b.y1), half = 0.5 * (b.x1 - b.x0);

@@ -50,7 +50,7 @@ class SceneBuilder {
   /// Flat quad or triangle; (u, v) start at corner 0 with u along corner 0 → 1 and v at right
   /// angles to it.
   void flat(std::span<const Vec3> corners, const Face& face, bool two_sided = false);
-  /// The same with the whole texture (its metres over `span_u` x `span_v` of the polygon).
+  /// Adds a polygon with the whole texture (its metres over `span_u` x `span_v` of the polygon).
   void picture(std::span<const Vec3> corners, int material, float light, double span_u,
                double span_v);
   /// Upright box: centre of the base, unit direction of its length, half length and half width,

@@ -10,7 +10,7 @@
 
 namespace vergence::test {
 
-/// What one run of the built program left behind.
+/// Result of one run of the built program.
 struct Outcome {
   int code = -1;  // exit code; 128 + number when a signal ended it
   std::string out, err;

@@ -35,7 +35,7 @@ TEST(Simulate, WritesOneObjectANoiseLevelWithTheFiguresOfTheContract) {
     EXPECT_EQ(level["failed"], 0);
   }
   EXPECT_LT(levels[0]["mean_reprojection_px"], 1e-10);
-  // The same geometry at every level: errors grow with the noise, up to the curvature of the
+  // Every level has the same geometry: errors grow with the noise, up to the curvature of the
   // problem.
   for (const char* key : {"mean_reprojection_px", "mean_pose_error_m", "mean_rotation_error_rad",
                           "mean_translation_error_m"})

@@ -1,7 +1,6 @@
-// What each encoding of sensor_msgs/Image and CompressedImage becomes, in both containers.
+// Decoded pixels of each encoding of sensor_msgs/Image and CompressedImage, in both containers.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <memory>
 
@@ -53,7 +52,7 @@ void expect_grey(const Grey& out, const Wanted& wanted, const std::string& what,
 
 class BagPixels : public ::testing::TestWithParam<BagKind> {
  protected:
-  /// The same message left and right; until the next one.
+  /// Writes one message for left and right, valid until the next one.
   [[nodiscard]] StereoSequence sequence_of(const char* type, const std::string& message) {
     writer_ = GetParam().writer();
     writer_->channel(1, "/left/image", type);

@@ -30,7 +30,7 @@ std::string image(Wire wire, std::int64_t stamp, std::uint32_t width = kWidth) {
   return image_message(wire, stamp, {width, kHeight, kStride, "mono8", data});
 }
 
-/// Of a rectified pair 0.12 m apart, f = 60.
+/// CameraInfo of a rectified pair 0.12 m apart, f = 60.
 std::string camera_info(Wire wire, double fx_times_b, const std::string& model = "plumb_bob") {
   return camera_info_message(
       wire, kStart,

@@ -41,7 +41,7 @@ FileBytes deflated(const FileBytes& raw) {
   return packed;
 }
 
-/// What a PNG is before its pixels. `colours` as in IHDR: 0 grey, 2 RGB, 3 palette, 4 grey and
+/// Head of a PNG before its pixels. `colours` as in IHDR: 0 grey, 2 RGB, 3 palette, 4 grey and
 /// alpha, 6 RGBA.
 struct PngKind {
   int colours = 0, depth = 8;

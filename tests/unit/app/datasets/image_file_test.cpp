@@ -5,8 +5,6 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <fstream>
-
 #include "app/datasets/image_writer.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"
@@ -129,7 +127,7 @@ TEST_F(ImageFile, everyTruncationIsTorn) {
     for (std::size_t n = 0; n < whole.size(); n += n < 200 ? 1 : 37) {
       const std::vector<std::uint8_t> part(whole.begin(),
                                            whole.begin() + static_cast<std::ptrdiff_t>(n));
-      // Of a few bytes nobody can say what they were to become.
+      // A few bytes do not identify a format.
       const ImageFileStatus status = decode(part);
       EXPECT_TRUE(status == ImageFileStatus::truncated ||
                   (n < 8 && status == ImageFileStatus::not_an_image))

@@ -33,7 +33,7 @@ const std::string kDrive = "2011_09_26/2011_09_26_drive_0001_extract";
 const std::string kCameras = "2011_09_26/calib_cam_to_cam.txt",
                   kImu = "2011_09_26/calib_imu_to_velo.txt";
 
-/// Of the data set's form, ns after kStart; within the same minute.
+/// Stamp in the data set's format, ns after kStart within the same minute.
 std::string stamp_line(std::int64_t ns) {
   const std::int64_t t = kStart - 1'317'045'900'000'000'000 + ns;
   return fmt::format("2011-09-26 14:05:{:02d}.{:09d}\n", t / 1'000'000'000, t % 1'000'000'000);
@@ -151,7 +151,7 @@ TEST(KittiRaw, OtherSizesAndCamerasTakeTheirPartOfTheCalibration) {
       -0.32 + 0.06, 1e-9);
 }
 
-/// What is done to a whole drive, and what comes of it: pairs that have both images, or a refusal.
+/// Edit of a whole drive and its result: pairs that have both images, or a refusal.
 struct Spoilt {
   const char* what;
   std::function<void(const test::TemporaryFolder&)> spoil;

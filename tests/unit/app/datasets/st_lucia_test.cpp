@@ -30,7 +30,7 @@ constexpr double kPi = std::numbers::pi;
 
 enum class Velocity { east_north_up, north_east_down, north_west_up };
 enum class Yaw { north_to_west, north_to_east, east_to_north };
-/// What a log's numbers mean; by default as the MTi-G has it.
+/// Axis conventions of a log; by default those of the MTi-G.
 struct Conventions {
   Velocity velocity = Velocity::north_west_up;
   Yaw yaw = Yaw::north_to_west;
@@ -231,7 +231,7 @@ TEST(StLuciaIns, whateverItsAxesTheDriveShowsThem) {
         }
 }
 
-/// What is done to the lines of a log, what is said of it and how many readings are left.
+/// Edit of a log's lines, expected message and number of remaining samples.
 struct Log {
   const char* what;
   std::function<void(std::vector<std::string>*)> spoil;

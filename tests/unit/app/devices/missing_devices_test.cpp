@@ -9,7 +9,7 @@
 #include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
 
-/// What is not there is not what is wrongly asked for: scripts and the service tell them apart.
+/// A missing device differs from a wrong request: scripts and the service tell them apart.
 namespace vergence::app {
 namespace {
 

@@ -35,7 +35,7 @@ std::string all_of(const FileDescriptor& socket) {
   return text;
 }
 
-/// What the publisher does between two lines.
+/// Work of the publisher between two lines.
 void wait(LineSocket* socket, const LineSocket::Answer& answer = {}) {
   const FileDescriptor wake(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   socket->wait(wake.get(), Duration::milliseconds(1), answer);
@@ -70,7 +70,7 @@ TEST_F(UnixLines, whoDoesNotReadLosesWholeLinesAndHoldsNobodyUp) {
   }
   EXPECT_EQ(std::count(eager_text.begin(), eager_text.end(), '\n'), kLines);
   EXPECT_GT(socket->counters().refused, 0U);
-  // What comes after is whole again.
+  // Later lines are complete again.
   std::string text = all_of(idle);
   for (int i = 0; i < 3; ++i) {
     socket->send("end\n");
@@ -147,7 +147,7 @@ TEST_F(UnixLines, RequestsAreAnsweredToWhoeverSentThem) {
   EXPECT_EQ(all_of(asking), "");
   send(asking, "f\ntwo\n\n");
   EXPECT_EQ(all_of(asking), "<half>\n<two>\n<>\n");
-  // Who closes only its own side goes on reading.
+  // A reader that closes only its own side continues reading.
   (void)::shutdown(asking.get(), SHUT_WR);
   wait(socket.get(), answer);
   socket->send("line\n");

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
-#include <memory>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -100,7 +98,7 @@ TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
   EXPECT_GE(told + 100, trail.size()) << "a viewer who was there has as much";
 }
 
-/// How many places of the map have a status, and the longest step between two of them.
+/// Number of places on the map with a status, and the longest step between two.
 struct Map {
   std::size_t places = 0, degraded = 0;
   double longest_m = 0;

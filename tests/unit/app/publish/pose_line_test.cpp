@@ -8,7 +8,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <numbers>
 #include <string>
 #include <thread>
@@ -84,7 +83,7 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   EXPECT_EQ(j["estimate_ms"], 7.5);
   EXPECT_EQ(j["age_ms"], 21.5);
   EXPECT_EQ(j["dropped"], 7);
-  EXPECT_EQ(j.size(), 18U) << "a key that docs/publish.md does not have";
+  EXPECT_EQ(j.size(), 18U) << "a key that docs/live_interface.md does not have";
 }
 
 TEST(PoseLine, ofALostFrameHasNoPlace) {
@@ -182,7 +181,7 @@ class Kept final : public LineSocket {
   }
   [[nodiscard]] LineSocketCounters counters() const noexcept override { return {}; }
 
-  // Of the publisher's thread while there is one.
+  // Used by the publisher's thread while it runs.
   std::string greeting{}, request{}, response{};
   std::atomic<bool> answered{false};
 

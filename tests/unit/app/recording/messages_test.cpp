@@ -1,7 +1,6 @@
 #include "app/recording/messages.hpp"
 
 #include <array>
-#include <cstring>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -39,7 +38,8 @@ TEST(CdrWriter, saysWhenThereIsNoRoomAndWritesNoFurther) {
   EXPECT_EQ(bytes[8], 0);
 }
 
-// The same numbers as a NavSatFix that Fast CDR wrote and @foxglove/rosmsg2-serialization read.
+// Bytes of the same numbers as a NavSatFix that Fast CDR wrote and @foxglove/rosmsg2-serialization
+// read.
 TEST(Messages, navSatFixIsAsAnotherWriterHasIt) {
   InsSample s;
   s.stamp = Stamp(1'336'964'645'250'000'000);

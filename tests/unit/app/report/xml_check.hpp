@@ -7,7 +7,7 @@
 
 namespace vergence::test {
 
-/// What a strict XML parser says against documents; empty: they are well-formed.
+/// Errors that a strict XML parser finds in documents; empty: they are well-formed.
 inline std::string xml_problem(const std::vector<std::string>& documents) {
   const TemporaryFolder folder;
   const std::string said = (folder / "said").string();

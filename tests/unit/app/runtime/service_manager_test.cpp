@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// What systemd would hear.
+/// Messages that systemd would receive.
 class Manager {
  public:
   explicit Manager(const std::filesystem::path& path)

@@ -9,7 +9,7 @@
 #include "app/session/records.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-/// What tests give a recorder, and how they read what it wrote.
+/// Inputs of a recorder in tests, and readers of its output.
 namespace vergence::app {
 
 inline constexpr std::int64_t kStamp = 1403636584763555584;  // ns: a double loses its last digits

@@ -7,7 +7,7 @@
 namespace vergence {
 namespace {
 
-/// Of T_camera_left[1], from the truth.
+/// Error of T_camera_left[1] against the ground truth.
 Vec6 error_of(const SimulatedRig& rig) { return way(rig.true_cameras[1], rig.T_camera_left[1]); }
 
 /// eᵀ C⁻¹ e in the space where C is not singular: with an exact length the direction of t is left

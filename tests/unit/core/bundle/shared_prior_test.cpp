@@ -1,4 +1,4 @@
-// What is known of a rig from earlier solves, and the covariance that one solve hands to the next.
+// Prior of a rig from earlier solves, and the covariance that one solve hands to the next.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -153,7 +153,7 @@ TEST(BundleSharedPrior, itsWeightSaysHowMuchItPulls) {
     // w / (1 + w), the variance by a hundred tracks being 14 % uncertain, and more in directions
     // that are hardly seen.
     EXPECT_NEAR(share, weight / (1 + weight), 0.2) << weight;
-    // What is known errs as much whatever it weighs: (1 + w²) / (1 + w)² of the tracks' variance.
+    // The prior's error is independent of its weight: (1 + w²) / (1 + w)² of the tracks' variance.
     EXPECT_NEAR(r.covariance_noise[1](1, 1) / (sigma[1] * sigma[1]),
                 (1 + weight * weight) / ((1 + weight) * (1 + weight)), 0.2)
         << weight;
@@ -199,7 +199,7 @@ TEST(BundleCovariance, theJointOneHoldsTheWideOneAndGivenWhatIsHeldTheOneOfNoise
   // Sums of some ten products of the same doubles in another order.
   EXPECT_LT((block - r.covariance_total[1]).norm(), 1e-12 * r.covariance_total[1].norm());
   const Mat6 given = block - cross * C_held.ldlt().solve(cross.transpose());
-  // What is left is smaller than what it is the difference of by up to 1e4: as many digits less.
+  // The difference is up to 1e4 times smaller than its terms: as many digits less.
   EXPECT_LT((given - r.covariance_noise[1]).norm(), 1e-10 * r.covariance_total[1].norm());
   EXPECT_GT(r.covariance_total[1].trace(), 2 * r.covariance_noise[1].trace())
       << "otherwise nothing was shown";

@@ -98,7 +98,7 @@ Drove drove(const How& how) {
 
 Mat3 nominal() { return mount_of(Vec3::Zero(), Vec3::Zero()).R; }
 
-/// What the truth is in Mount's parameters.
+/// Ground truth in Mount's parameters.
 Vec3 true_turn() { return log_so3(mount_of(kLever, kBoresight).R * nominal().transpose()); }
 
 TEST(Mount, anIdealReferenceGivesItsMount) {

@@ -173,7 +173,7 @@ TEST(Evaluate, headingOfACameraIsTakenAboutItsWorldsUp) {
   EXPECT_EQ(e.up_world, Vec3(-Vec3::UnitY()));
   EXPECT_NEAR(e.heading_start_aligned.last, 0.05, kRounding);
 
-  // The same camera in an enu world: up is z there, and the error is the same.
+  // Camera in an enu world: up is z there, and the error is the same.
   const Transform T_enu_world{(Mat3() << 0, 0, 1, -1, 0, 0, 0, -1, 0).finished(), {100, 200, 30}};
   e = evaluate(moved(T_enu_world, 1.0, estimate), moved(T_enu_world, 1.0, reference), {});
   EXPECT_EQ(e.up_world, Vec3(Vec3::UnitZ()));

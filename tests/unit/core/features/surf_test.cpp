@@ -68,8 +68,8 @@ double distance(const SurfDescriptor& a, const SurfDescriptor& b) {
   return std::sqrt(square);
 }
 
-/// Of the octave whose inner sizes hold a blob: boxes of some 5.2 σ answer it most; those of 12 …
-/// 24, 21 … 45, 39 … 87 px can be a maximum.
+/// Uses the octave whose inner sizes contain a blob: boxes of some 5.2 σ answer it most; those of
+/// 12 … 24, 21 … 45, 39 … 87 px can be a maximum.
 double places_apart(double sigma) { return 5.2 * sigma < 21 ? 1 : 5.2 * sigma < 42 ? 2 : 4; }
 
 TEST(SurfHessian, isTheSumOverTheBoxesItStandsFor) {

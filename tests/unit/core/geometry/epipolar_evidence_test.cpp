@@ -1,4 +1,4 @@
-// What distances from epipolar lines say of a calibration, by likelihood.
+// Likelihood of a calibration from distances to epipolar lines.
 #include "core/geometry/epipolar_evidence.hpp"
 
 #include <gtest/gtest.h>

@@ -143,7 +143,7 @@ struct EmptyCamera final : test::IdleCamera {
   std::atomic<int> starts{0};
 };
 
-/// The same of a board.
+/// Drives a trigger board.
 class EmptyBoard final : public TriggerDevice {
  public:
   const DeviceInfo& info() const noexcept override { return info_; }

@@ -21,7 +21,7 @@ int asked_for(const char* name, int fallback) {
   return text == nullptr ? fallback : std::atoi(text);
 }
 
-/// What no camera can do.
+/// Requests that no camera supports.
 std::vector<CameraConfiguration> nonsense(const CameraConfiguration& good) {
   std::vector<CameraConfiguration> all(6, good);
   all[0].width = 0;

@@ -25,11 +25,11 @@ class ConformanceRig {
 
   /// Opened, not configured. Lives as long as the rig.
   [[nodiscard]] virtual CameraDevice& camera() = 0;
-  /// What it can do, at least one: small pictures at a high rate, so that the suite is short. With
-  /// CameraTrigger::software the suite triggers. With CameraTrigger::hardware the rig pulses by
-  /// itself while the camera streams.
+  /// Supported configurations, at least one: small pictures at a high rate, so that the suite is
+  /// short. With CameraTrigger::software the suite triggers. With CameraTrigger::hardware the rig
+  /// pulses by itself while the camera streams.
   [[nodiscard]] virtual std::vector<CameraConfiguration> possible() = 0;
-  /// What it must refuse, beside the nonsense that the suite knows: a size, a format, an option
+  /// Configurations to refuse in addition to the suite's own: a size, a format, an option
   /// that it does not have.
   [[nodiscard]] virtual std::vector<CameraConfiguration> impossible() { return {}; }
   /// After a start() that was ok.
@@ -47,7 +47,7 @@ class ConformanceRig {
     (void)exposures;
     return false;
   }
-  /// Whether these are the pixels of that frame.
+  /// Returns true if these are the pixels of that frame.
   [[nodiscard]] virtual bool content_fits(const Frame& frame, ImageView image) {
     (void)frame, (void)image;
     return true;

@@ -31,7 +31,7 @@ namespace vergence::test {
 
 [[nodiscard]] inline HostStamp at_s(double s) { return HostStamp{} + Duration::seconds(s); }
 
-/// What a device gives until it has no more, or this many; `gone` is counted and passed over, the
+/// Collects samples until there are no more, or this many; `gone` is counted and passed over, the
 /// device is asked to come back.
 template <class Item, class Device>
 [[nodiscard]] std::vector<Item> all_of(Device& device, std::size_t most, int* disconnects) {

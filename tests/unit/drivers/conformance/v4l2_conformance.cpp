@@ -1,4 +1,4 @@
-// V4L2 on the kernel's test camera, inside the rig's kernel (docs/rigs.md).
+// V4L2 on the kernel's test camera, inside the rig's kernel (tests/rigs/README.md).
 #include <fcntl.h>
 
 #include <filesystem>

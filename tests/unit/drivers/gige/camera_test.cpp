@@ -77,7 +77,7 @@ TEST(GigeCamera, whatItCannotDoIsRefusedWithWhatItOffers) {
       "Off, ReadOut");
   refused([](auto* c) { c->options = gige::Options{.features = {{"Gamma", "2"}}}; }, "Gamma");
   refused([](auto* c) { c->options = gige::Options{.packet_size = 2}; }, "packet_size");
-  // What was configured before is in force again.
+  // The earlier configuration is active again.
   b.start();
   EXPECT_EQ(b.take(3).size(), 3U);
   EXPECT_EQ(b.reg(reg::width), 320U);

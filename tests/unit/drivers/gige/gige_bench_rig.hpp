@@ -45,7 +45,8 @@ struct GigeBench {
   }
   void start() { ASSERT_EQ(camera->start(nullptr), DeviceStatus::ok) << camera->last_error(); }
 
-  /// What comes until `count` complete frames came, or a second nothing; all slots given back.
+  /// Collects frames until `count` are complete or nothing comes for a second; all slots given
+  /// back.
   std::vector<Frame> take(std::size_t count, Duration limit = Duration::seconds(1)) {
     std::vector<Frame> frames;
     const std::size_t before = numbers.size();
@@ -62,7 +63,7 @@ struct GigeBench {
     simulator->silence(true);
     return take(SIZE_MAX, Duration::milliseconds(400));
   }
-  /// What the image says it is.
+  /// Frame number stored in the image.
   [[nodiscard]] std::uint64_t number(const Frame& frame) const {
     std::uint64_t n = 0;
     for (int i = 7; i >= 0; --i) n = n << 8U | camera->view(frame.slot).at(i, 0);

@@ -59,7 +59,7 @@ class Model final : public test::DeviceModel {
   int epoch_ = 1;
 };
 
-/// The same in real time behind a terminal.
+/// Runs the device in real time behind a terminal.
 test::DeviceOnTerminal on_terminal(Model::Epoch epoch) {
   return test::DeviceOnTerminal(
       std::make_unique<Model>(epoch, monotonic_now(), Duration::seconds(600)));

@@ -49,7 +49,7 @@ struct CameraUnderTest {
     camera->release(f.slot);
     return f;
   }
-  /// What configure() answers; its message in *said.
+  /// Returns the status of configure() and its message in *said.
   DeviceStatus refuse(const CameraConfiguration& c, std::string* said) {
     const DeviceStatus s = camera->configure(c, nullptr);
     *said = camera->last_error();

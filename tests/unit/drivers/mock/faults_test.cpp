@@ -48,11 +48,11 @@ TEST(Faults, everyKindStandsInTheTableAtItsPlaceAndTakesItsOwnParametersAtBothEn
 }
 
 TEST(Faults, thePageHasTheTable) {
-  std::ifstream in(std::string(VERGENCE_SOURCE_DIR) + "/docs/mock.md", std::ios::binary);
+  std::ifstream in(std::string(VERGENCE_SOURCE_DIR) + "/docs/simulated_rig.md", std::ios::binary);
   std::ostringstream page;
   page << in.rdbuf();
   EXPECT_NE(page.str().find("-->\n" + fault_document() + "<!--"), std::string::npos)
-      << "the table between the comments of docs/mock.md is not this one:\n"
+      << "the table between the comments of docs/simulated_rig.md is not this one:\n"
       << fault_document();
 }
 

@@ -143,7 +143,7 @@ TEST(MockRig, aKnockTurnsTheTrueRigByWhatItSays) {
   EXPECT_TRUE(truth->camera_on_body(0, t).t.isApprox(default_T_body_left().t, 1e-14));
 }
 
-/// What the INS says of its position, less where it truly is.
+/// Error of the INS's position.
 Vec3 position_error(const RigTruth& truth, const InsSample& s, Duration t) {
   static const GeographicLib::LocalCartesian plane(
       kWorldOrigin.latitude_deg, kWorldOrigin.longitude_deg, kWorldOrigin.height_m);

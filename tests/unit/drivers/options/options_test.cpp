@@ -128,8 +128,8 @@ TEST(CameraOptions, aDriverTakesItsOwnKindAndWhatIsPossible) {
 
 TEST(CameraOptions, thePagesHaveEveryRowAsItStands) {
   std::set<std::string> lines;
-  for (const char* page : {"gige.md", "iidc_usb.md", "iidc_1394.md", "v4l2.md"}) {
-    std::ifstream file(std::string(VERGENCE_SOURCE_DIR) + "/docs/cameras/" + page);
+  for (const char* page : {"gige", "iidc", "v4l2"}) {
+    std::ifstream file(std::string(VERGENCE_SOURCE_DIR) + "/drivers/" + page + "/README.md");
     for (std::string line; std::getline(file, line);) lines.insert(line);
   }
   for (const char* driver : {"gige", "iidc-usb", "v4l2"})

@@ -7,7 +7,7 @@
 #include "core/math/random.hpp"
 #include "drivers/sync/clock_mapper.hpp"
 
-/// What the clocks reach over a line with delays of a constant floor and exponential jitter, and
+/// Accuracy of the clocks over a link with delays of a constant floor and exponential jitter, and
 /// that the bounds they state hold.
 namespace vergence {
 namespace {

@@ -49,7 +49,7 @@ struct PulseRigOptions {
                      // lost with a camera that went
 };
 
-/// What the rig did, by name.
+/// Actions of the rig by name.
 struct PulseRigTruth {
   std::uint64_t pulses = 0;
   std::array<std::uint64_t, kMaxCameras> exposed{}, lost{}, missed{}, duplicated{};
@@ -293,7 +293,7 @@ class PulseRig {
     }
   }
 
-  /// What a user of the synchroniser relies on: a slot that is taken comes out once.
+  /// Contract of the synchroniser: a slot that is taken comes out once.
   void offer(const SyncFrame& frame) {
     const SyncResult verdict = sync_.offer(frame);
     std::uint8_t& held = held_[static_cast<std::size_t>(frame.slot)];
@@ -335,7 +335,7 @@ class PulseRig {
       }
       const std::int64_t off = std::abs(set.stamp.ns() - first.middle);
       truth_.outside += off <= set.error.ns() ? 0 : 1;
-      // Of another pulse than the frames': a stamp that is nearer to its neighbour.
+      // Report of another pulse than the frames': a stamp that is nearer to its neighbour.
       truth_.wrong += right && static_cast<double>(off) * 1e-9 * o_.rate_hz < 0.4 ? 0 : 1;
     }
   }

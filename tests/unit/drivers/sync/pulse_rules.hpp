@@ -6,7 +6,7 @@
 
 #include "tests/unit/drivers/sync/pulse_rig.hpp"
 
-/// What must hold for every seed: a few in the ordinary tests, many in the slow ones.
+/// Properties for every seed: a few in the ordinary tests, many in the slow ones.
 namespace vergence::testing {
 
 inline SyncOptions board() {

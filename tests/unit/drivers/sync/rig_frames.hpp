@@ -60,7 +60,7 @@ inline SyncOptions rig_options(SyncMode mode) {
   return o;
 }
 
-/// What comes of so many pulses that both cameras expose at, stamped by their own clocks; to the
+/// Sets from this many pulses that expose both cameras, stamped by their own clocks; to the
 /// end.
 template <class Stamp>
 RigSets sets_of(RigSynchronizer* sync, int pulses, const Stamp& stamp_ns) {

@@ -14,7 +14,7 @@ constexpr std::int64_t kBegin = 1'000'000'000, kTenHours = 36'000'000'000'000;  
 constexpr std::int64_t kSample = 10'000'000;                                    // ns
 constexpr std::int64_t kOffset = 5;  // ns, the host's clock before the device's
 
-/// What came of ten hours.
+/// Result of ten hours.
 struct Account {
   std::int64_t taken = 0, wrong = 0;
 

@@ -35,7 +35,7 @@ void set_back(Bytes* bytes, std::uint64_t ticks) {
   *bytes = closed(f);
 }
 
-/// What half a minute gave of which some frames were tampered with, from the fifth second on.
+/// Result of half a minute with tampered frames, from the fifth second on.
 struct Outcome {
   std::uint64_t tampered = 0, events = 0;  // frames in all, and those of them that are EVENTs
   TriggerStatistics statistics;

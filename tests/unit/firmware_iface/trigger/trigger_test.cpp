@@ -111,7 +111,7 @@ TEST(TriggerFrames, idleZerosAreNothing) {
   EXPECT_EQ(all.decoder.bad_coding + all.decoder.bad_length + all.decoder.bad_crc, 0U);
 }
 
-/// The bytes of docs/trigger_board.md, worked out by hand from its tables.
+/// The bytes of firmware_iface/trigger/README.md, worked out by hand from its tables.
 TEST(TriggerPayloads, everyLayoutStandsByteForByteWhereItsTableSays) {
   EXPECT_EQ((laid<trigger_info_payload_size, TriggerInfo>(
                 trigger_put_info, {1,

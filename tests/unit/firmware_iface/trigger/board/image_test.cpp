@@ -21,9 +21,9 @@ using Bytes = std::vector<std::uint8_t>;
 
 /// The real image in qemu-system-arm -M netduinoplus2, its line to the host on a socket.
 ///
-/// What the machine is: RCC reads 0, so that the image runs on the clock it falls back to, 16 MHz;
-/// the timers count 1 GHz of virtual time, so that a second of the board's is 16 ms; compare and
-/// capture units do nothing, so that pulses are forced by the main loop (late). An instruction
+/// Properties of the machine: RCC reads 0, so that the image runs on the clock it falls back to, 16
+/// MHz; the timers count 1 GHz of virtual time, so that a second of the board's is 16 ms; compare
+/// and capture units do nothing, so that pulses are forced by the main loop (late). An instruction
 /// takes 8 ns of virtual time: nothing depends on how busy the host is.
 ///
 /// Ownership  The process is killed by the destructor, and by the kernel when the test dies.

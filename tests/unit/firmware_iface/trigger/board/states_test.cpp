@@ -1,4 +1,4 @@
-// What the board answers, and in which state it does what.
+// Answers of the board by state.
 #include <gtest/gtest.h>
 
 #include "tests/unit/firmware_iface/trigger/board/virtual_board.hpp"

@@ -90,7 +90,7 @@ class VirtualBoard {
   }
   void run_for_us(std::uint64_t us) { run_until(now + us * kHz / 1'000'000); }
 
-  /// What the board has to say, decoded; `deaf`: the line is stuck.
+  /// Decoded messages of the board; `deaf`: the line is stuck.
   void listen() {
     std::uint8_t out[trigger_max_frame];
     for (std::size_t size = 0; !deaf && (size = board_send(&board, now, out)) > 0;)

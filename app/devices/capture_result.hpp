@@ -1,0 +1,83 @@
+#pragma once
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "app/config/configuration.hpp"
+#include "app/devices/drive_devices.hpp"
+#include "app/runtime/signals.hpp"
+#include "core/types/image.hpp"
+
+namespace vergence::app {
+
+struct ImageStatistics {
+  double mean = 0;       // grey levels
+  double contrast = 0;   // standard deviation, grey levels
+  double saturated = 0;  // share of pixels at 254 and above
+  double dark = 0;       // share of pixels at 4 and below
+  double sharpness = 0;  // mean squared gradient (central differences), (grey levels / px)²: falls
+                         // with blur, rises with noise
+};
+/// Precondition: not empty. Images of one row or column have no sharpness.
+[[nodiscard]] ImageStatistics figures_of(const ImageView& image) noexcept;
+
+/// One thing that strikes the eye.
+struct ImageIssue {
+  bool unusable = false;  // these pictures are no good; else they could be better
+  std::string message;
+};
+
+/// Exposure of each picture, and sharpness of each against the sharpest.
+[[nodiscard]] std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
+                                                      std::span<const ImageStatistics> figures);
+
+/// Returns whether two pictures are the same pixel for pixel, as one camera's would be if it were
+/// opened twice. Flat ones (a lens cap) are not called that.
+[[nodiscard]] bool are_identical(const ImageView& a, const ImageView& b) noexcept;
+
+/// The configuration of a capture, for which of the devices only the cameras and what triggers them
+/// are used: pictures need no position and the INS may be elsewhere, so it is left out, unless its
+/// SyncOut makes the pulses.
+[[nodiscard]] Configuration capture_configuration(const Configuration& configuration);
+
+/// Names of the cameras for files and messages: those of the configuration (letters, digits, `_`
+/// and `-`, everything else becomes `_`), `camera0` … where there is none, each once.
+[[nodiscard]] std::vector<std::string> camera_names(const Configuration& configuration,
+                                                    int cameras);
+
+/// One synchronised set, while its images are there.
+struct CapturedSet {
+  int index = 0;  // 0, 1, …
+  Stamp stamp{};
+  Duration stamp_error{}, spread{};
+  SyncProof proof = SyncProof::counted;
+  std::vector<ImageView> images;  // by camera
+};
+
+/// Result of waiting for synchronised image sets.
+struct CaptureResult {
+  enum class End : std::uint8_t { done, timeout, interrupted } end = End::timeout;
+  int sets = 0;                          // complete ones that were handed on
+  std::vector<std::uint64_t> delivered;  // images by camera, also those of incomplete sets
+  std::vector<bool> gone;                // by camera, at the end
+};
+
+struct TakingOptions {
+  int count = 1;
+  int skip = 0;  // complete sets passed over first: the first exposures after a start may be
+                 // another's, or dark
+  Duration limit = Duration::seconds(5);  // for the first set, and between two
+};
+
+/// Starts the devices and hands on complete sets. The devices are stopped when it returns.
+///
+/// Uses only the pulses of the INS, if it makes them.
+/// Threads  `use` on the caller's. Time: `limit` a set, and what starting and stopping take.
+///          Errors: InputError as start_acquisition(), and
+/// what `use` throws.
+[[nodiscard]] CaptureResult take_sets(DriveDevices& devices, const TakingOptions& options,
+                                      const SignalGuard& signals,
+                                      const std::function<void(const CapturedSet&)>& use);
+
+}  // namespace vergence::app
