@@ -6,7 +6,7 @@
 
 #include "core/types/names.hpp"
 #include "drivers/camera.hpp"
-#include "drivers/common/format_text.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/types/bayer.hpp"
-#include "drivers/common/format_text.hpp"
 #include "drivers/common/refused.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence::iidc {
 bool GreyConversion::possible() const noexcept {

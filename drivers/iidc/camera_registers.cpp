@@ -8,7 +8,7 @@
 #include <span>
 
 #include "drivers/clock.hpp"
-#include "drivers/common/format_text.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence::iidc {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <charconv>
 
-#include "drivers/common/format_text.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence::iidc {
 

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "drivers/clock.hpp"
-#include "drivers/common/format_text.hpp"
+#include "drivers/format_text.hpp"
 #include "drivers/iidc/camera_registers.hpp"
 #include "drivers/iidc/identity.hpp"
 #include "drivers/iidc/iidc.hpp"

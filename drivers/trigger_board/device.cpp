@@ -4,7 +4,7 @@
 #include <exception>
 #include <utility>
 
-#include "drivers/common/format_text.hpp"
+#include "drivers/format_text.hpp"
 #include "drivers/trigger_board/setup.hpp"
 
 namespace vergence::trigger_board {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "drivers/common/format_text.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence::trigger_board {
 

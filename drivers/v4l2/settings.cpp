@@ -9,8 +9,8 @@
 #include <cstring>
 #include <vector>
 
-#include "drivers/common/format_text.hpp"
 #include "drivers/common/refused.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence::v4l2 {
 

@@ -6,7 +6,7 @@
 #include <exception>
 #include <utility>
 
-#include "drivers/common/format_text.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence::xsens {
 namespace {

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "drivers/common/format_text.hpp"
 #include "drivers/common/refused.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence::xsens {
 

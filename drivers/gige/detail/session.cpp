@@ -10,7 +10,7 @@
 #include <thread>
 #include <utility>
 
-#include "drivers/common/format_text.hpp"
+#include "drivers/format_text.hpp"
 
 namespace vergence::gige {
 
