@@ -1,5 +1,4 @@
 
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -8,11 +7,11 @@
 
 #include <fmt/format.h>
 
-#include "app/calibration/board_detector.hpp"
-#include "app/calibration/view_collector.hpp"
-#include "app/capture/capture_result.hpp"
+#include "app/checkerboard/board_detector.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
+#include "app/checkerboard/view_collector.hpp"
 #include "app/datasets/image_writer.hpp"
+#include "app/devices/capture_result.hpp"
 #include "app/devices/drive_devices.hpp"
 #include "app/devices/rig_settings.hpp"
 #include "app/runtime/nearest.hpp"

@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/calibration/board_images.hpp"
-#include "app/calibration/board_report.hpp"
+#include "app/checkerboard/board_images.hpp"
+#include "app/checkerboard/board_report.hpp"
 #include "app/config/calibration_file.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "app/calibration/board_calibration.hpp"
+#include "app/checkerboard/board_calibration.hpp"
 #include "app/config/configuration.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"

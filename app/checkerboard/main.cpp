@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "app/calibration/conversion.hpp"
 #include "app/checkerboard/calibrate_session.hpp"
+#include "app/checkerboard/conversion.hpp"
 #include "app/command_line/calibrate_options.hpp"
 #include "app/command_line/program.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
-#include "app/doctor/report.hpp"
+#include "app/devices/inventory_report.hpp"
 
 namespace vergence::app {
 namespace {

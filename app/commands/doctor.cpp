@@ -7,8 +7,8 @@
 
 #include "app/commands/commands.hpp"
 #include "app/config/configuration.hpp"
+#include "app/devices/inventory_report.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/doctor/report.hpp"
 
 namespace vergence::app {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "app/commands/commands.hpp"
+#include "app/commands/evaluation.hpp"
 #include "app/datasets/text_file.hpp"
-#include "app/evaluation/evaluation.hpp"
 
 namespace vergence::app {
 namespace {

@@ -9,8 +9,8 @@
 #include "app/commands/commands.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/session_export.hpp"
+#include "app/runtime/durable_file.hpp"
 #include "app/runtime/progress.hpp"
-#include "app/session/session_files.hpp"
 
 namespace vergence::app {
 namespace {

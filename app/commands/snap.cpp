@@ -1,9 +1,9 @@
 #include <memory>
 #include <string>
 
-#include "app/capture/snap_session.hpp"
 #include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
+#include "app/devices/snap_session.hpp"
 
 namespace vergence::app {
 namespace {

@@ -11,7 +11,6 @@
 
 #include <fmt/format.h>
 
-#include "app/config/calibration_file.hpp"
 #include "app/runtime/nearest.hpp"
 #include "core/math/linear_solve.hpp"
 

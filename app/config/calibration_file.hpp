@@ -3,43 +3,15 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "app/config/yaml_file.hpp"
 #include "core/types/calibration.hpp"
 
 namespace vergence::app {
-
-/// The part of a configuration that a calibration depends on. The state file
-/// (calibration_state.hpp) keeps it: a calibration found under other words is of another rig.
-struct ConfiguredCamera {
-  std::string serial_key{};  // cameras.N.serial; not in the file
-  CameraModelKind model = CameraModelKind::pinhole_radtan;
-  std::array<double, 2> offset{};  // px, of the region on the sensor
-  std::array<double, 4> intrinsics{};
-  std::array<double, 5> distortion{};
-  std::array<double, 12> T_camera_left{};  // rows of [R t]
-
-  /// The lens and the place that the estimator would be given.
-  [[nodiscard]] static ConfiguredCamera of(const Intrinsics& lens, const Transform& place);
-};
-
-struct ConfiguredRig {
-  double baseline = 0;  // m
-  std::vector<ConfiguredCamera> cameras{};
-};
-
-/// The block `configured:`, the last of the file.
-[[nodiscard]] std::string format_configured(const ConfiguredRig& rig);
-/// Errors  InputError with file:line.
-[[nodiscard]] ConfiguredRig read_configured(const YamlFile& file, const YAML::Node& node);
-
-/// The first thing that the configuration says otherwise now, as the end of a message; empty:
-/// nothing.
-[[nodiscard]] std::string find_change(const ConfiguredRig& then, const ConfiguredRig& now);
 
 /// calibration.yaml (DESIGN §6): the rig's numbers and the words around them.
 struct CalibrationFile {
@@ -48,7 +20,9 @@ struct CalibrationFile {
   std::array<std::string, kMaxCameras> names{"left", "right", "camera2", "camera3"};
   std::array<std::string, kMaxCameras> serials{};  // empty: not known
   std::string source{};  // what found it: `given`, `online`, `checkerboard`; empty: not said
-  std::optional<ConfiguredRig> configured{};  // what it was found under; the state file keeps it
+  /// What the configuration said of the rig when it was found, by key (calibration_state.hpp); the
+  /// state file keeps it.
+  std::optional<std::map<std::string, std::string>> configured{};
 };
 
 /// Selects the parts of a calibration to read.

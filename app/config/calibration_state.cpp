@@ -1,5 +1,7 @@
 #include "app/config/calibration_state.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
@@ -14,7 +16,11 @@ namespace vergence::app {
 namespace {
 
 constexpr const char* kFileName = "calibration_state.yaml";
-constexpr double kSameLength = 1e-3;  // relative: beyond, somebody has measured the baseline again
+// Keys that a calibration depends on begin so, or are those of a camera that end so.
+constexpr std::array<std::string_view, 3> kOfRig{"rig.nominal.", "mock.intrinsics_error.",
+                                                 "mock.calibration_error."};
+constexpr std::array<std::string_view, 5> kOfCamera{".model", ".offset.", ".intrinsics.",
+                                                    ".distortion.", ".T_camera_left."};
 
 std::string folder_name(const std::string& rig_name) {
   std::string name = rig_name.empty() ? "rig" : rig_name;
@@ -32,33 +38,22 @@ std::optional<std::filesystem::path> folder_of(const char* variable) {
   return std::filesystem::path(value);
 }
 
-/// Older releases named a camera by what the configuration asks for it with, which may be an
-/// address.
-bool same_camera(const CalibrationFile& found, const CalibrationFile& expected, std::size_t k) {
-  if (found.serials[k] == expected.serials[k]) return true;
-  return !found.configured && expected.configured && !found.serials[k].empty() &&
-         found.serials[k] == expected.configured->cameras[k].serial_key;
-}
-
 /// Why a calibration was found under another configuration; empty: it was not.
 std::string other_configuration(const CalibrationFile& found, const CalibrationFile& expected) {
-  if (std::string change = find_change(*found.configured, *expected.configured); !change.empty())
-    return change;
-  // Handles a state file saved from --calibration. Images cannot tell which length is right.
+  if (!found.configured) return "it does not say under which configuration it was found";
+  const auto value = [](const CalibrationFile& file, const std::string& key) {
+    const auto at = file.configured->find(key);
+    return at == file.configured->end() ? "its default" : at->second;
+  };
+  for (const CalibrationFile* file : {&found, &expected})
+    for (const auto& [key, ignored] : *file->configured)
+      if (value(found, key) != value(expected, key))
+        return fmt::format("when it was found {} was {}, it is {} now", key, value(found, key),
+                           value(expected, key));
+  // Of a drive that was given one with --calibration. Images cannot tell which length is right.
   const double had = found.rig.baseline, says = expected.rig.baseline;
   if (std::abs(had - says) >= kOtherLength * says)
     return fmt::format("its baseline is {:g} m, the configuration's {:g} m", had, says);
-  return "";
-}
-
-/// Handles a file without the configuration it was found under.
-std::string other_numbers(const RigCalibration& found, const RigCalibration& expected) {
-  for (std::size_t k = 0; k < static_cast<std::size_t>(found.cameras); ++k)
-    if (found.intrinsics[k].kind != expected.intrinsics[k].kind)
-      return fmt::format("its camera {} has another lens model than the configuration's", k);
-  if (!(std::abs(found.baseline - expected.baseline) <= kSameLength * expected.baseline))
-    return fmt::format("it was found with a baseline of {:g} m, the configuration says {:g} m",
-                       found.baseline, expected.baseline);
   return "";
 }
 
@@ -68,7 +63,7 @@ std::string mismatch(const CalibrationFile& found, const CalibrationFile& expect
   if (a.cameras != b.cameras)
     return fmt::format("it is of {} cameras, the configuration has {}", a.cameras, b.cameras);
   for (std::size_t k = 0; k < static_cast<std::size_t>(a.cameras); ++k) {
-    if (!same_camera(found, expected, k))
+    if (found.serials[k] != expected.serials[k])
       return fmt::format("its camera {} has the serial \"{}\", the one that is there \"{}\"", k,
                          found.serials[k], expected.serials[k]);
     const Intrinsics &x = a.intrinsics[k], &y = b.intrinsics[k];
@@ -76,11 +71,24 @@ std::string mismatch(const CalibrationFile& found, const CalibrationFile& expect
       return fmt::format("its camera {} has {} x {} pixels, the configuration's {} x {}", k,
                          x.width, x.height, y.width, y.height);
   }
-  return found.configured && expected.configured ? other_configuration(found, expected)
-                                                 : other_numbers(a, b);
+  return other_configuration(found, expected);
 }
 
 }  // namespace
+
+std::map<std::string, std::string> configured_rig(const Configuration& configuration) {
+  std::map<std::string, std::string> values;
+  for (const auto& [key, value] : changed_settings(configuration)) {
+    const auto begins = [&key](std::string_view part) { return key.starts_with(part); };
+    const auto has = [&key](std::string_view part) {
+      return key.starts_with("cameras.") && key.find(part) != std::string::npos;
+    };
+    if (std::any_of(kOfRig.begin(), kOfRig.end(), begins) ||
+        std::any_of(kOfCamera.begin(), kOfCamera.end(), has))
+      values.emplace(key, value);
+  }
+  return values;
+}
 
 std::optional<std::filesystem::path> state_file(const RigSettings& rig) {
   if (rig.state_dir == "none") return std::nullopt;
@@ -120,7 +128,12 @@ void write_state(const std::filesystem::path& file, const CalibrationFile& calib
     throw InputError(file.parent_path().string() + ": cannot be made (" + error.message() +
                      "): set rig.state_dir to a folder that can, or to none");
   std::string text = format_calibration(calibration);
-  if (calibration.configured) text += format_configured(*calibration.configured);
+  if (calibration.configured) {
+    text += "configured:  # keys that were not at their default when it was found\n";
+    for (const auto& [key, value] : *calibration.configured)
+      text += fmt::format("  {}: {}\n", key, value);
+    if (calibration.configured->empty()) text += "  {}\n";
+  }
   replace_durably(file, text);
 }
 

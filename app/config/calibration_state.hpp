@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -16,6 +17,10 @@ namespace vergence::app {
 /// become `_`; a rig without a name is `rig`.
 [[nodiscard]] std::optional<std::filesystem::path> state_file(const RigSettings& rig);
 
+/// What a configuration says of lenses, read-out regions, places and the baseline: keys that are
+/// not at their default, with their values. A calibration found under other ones is of another rig.
+[[nodiscard]] std::map<std::string, std::string> configured_rig(const Configuration& configuration);
+
 /// Relative: from here on a calibration's baseline and the configuration's are two lengths.
 inline constexpr double kOtherLength = 0.02;
 
@@ -28,10 +33,7 @@ struct CalibrationState {
 
 /// Reads the file if there is one. It is used for the rig it was found on: as many cameras of the
 /// same sizes, the same serials in the same order, and a configuration that says what it said then
-/// of lenses, read-out regions, places and the baseline, which the one found differs from by less
-/// than kOtherLength. A file without what the configuration said, of an older release: the same
-/// lens models, the same measured length of the baseline (to a thousandth), and a camera may bear
-/// the configuration's `serial`.
+/// (configured_rig()) and whose baseline the one found differs from by less than kOtherLength.
 /// Errors  None: a message.
 [[nodiscard]] CalibrationState read_state(const std::filesystem::path& file,
                                           const CalibrationFile& expected);

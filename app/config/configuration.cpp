@@ -8,7 +8,6 @@
 #include <set>
 #include <sstream>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -365,6 +364,16 @@ Configuration load_configuration(const std::optional<std::filesystem::path>& fil
 Configuration parse_configuration(std::string_view yaml, const std::string& name,
                                   const std::vector<std::string>& set) {
   return load(YamlFile::parse(yaml, name), set);
+}
+
+std::vector<std::pair<std::string, std::string>> changed_settings(const Configuration& c) {
+  const Configuration defaults;
+  std::vector<std::pair<std::string, std::string>> changed;
+  for (const Group& group : schema())
+    for (const Key& key : group.keys)
+      if (std::string value = to_text(key.get(c)); value != to_text(key.get(defaults)))
+        changed.emplace_back(key.name, std::move(value));
+  return changed;
 }
 
 std::string canonical_text(const Configuration& configuration) {

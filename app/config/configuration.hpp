@@ -142,7 +142,6 @@ struct MockSettings {
 /// `record:` what goes into drive.mcap of a session (docs/session_files.md).
 struct RecordSettings {
   int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
-  double event_window_s = 0;                       // 0: everything
   int split_mb = 0;                                // 0: one file
 
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
@@ -212,6 +211,10 @@ struct Configuration {
 /// Parses a configuration from text; `name` replaces the file in error messages.
 [[nodiscard]] Configuration parse_configuration(std::string_view yaml, const std::string& name,
                                                 const std::vector<std::string>& set);
+
+/// Keys that are not at their default, with their values, in the order of docs/configuration.md.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> changed_settings(
+    const Configuration& configuration);
 
 /// Every key and its value, one `key=value` a line, ordered by key, numbers in the shortest form
 /// that reads back the same.

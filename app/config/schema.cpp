@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <iterator>
 #include <limits>
-#include <string>
 #include <utility>
-#include <variant>
-#include <vector>
 
 #include <fmt/format.h>
 
-#include "app/config/configuration.hpp"
 #include "app/runtime/realtime.hpp"
 
 namespace vergence::app {
@@ -59,13 +53,14 @@ class Rows {
     return *this;
   }
 
-  /// A list: one key for each number, `name.0` and so on.
+  /// A list: one key for each number, `name.0` and so on. The first one has the meaning.
   template <std::size_t N>
   Rows& numbers(const char* name, std::array<double, N> Settings::*field, double least, double most,
-                const char* unit, const std::array<const char*, N>& meanings) {
+                const char* unit, const char* meaning) {
     for (std::size_t i = 0; i < N; ++i)
       add(
-          name + ("." + std::to_string(i)), KeyType::number, least, most, unit, meanings[i],
+          name + ("." + std::to_string(i)), KeyType::number, least, most, unit,
+          i == 0 ? meaning : "The next number of that list.",
           [field, i](Settings& s, const KeyValue& v) { (s.*field)[i] = std::get<double>(v); },
           [field, i](const Settings& s) -> KeyValue { return (s.*field)[i]; });
     return *this;
@@ -205,8 +200,6 @@ Group record() {
               "All images that the estimator was given, with their cameras: what `replay --format "
               "session` needs.")
       .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
-      .number("event_window_s", &R::event_window_s, 0, 3600, "s",
-              "0: everything; else only what was so long before an event and so long after it.")
       .integer("split_mb", &R::split_mb, 0, 10'000'000, "MB",
                "Size at which a file ends and the next one begins; 0: one file.")
       .done();
@@ -367,29 +360,13 @@ Group cameras() {
                 "What its lens is like: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a "
                 "fisheye lens, k1 k2 k3 k4.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
-                     {"Focal length along x of this camera's lens; all four 0: the lens is that of "
-                      "`rig.nominal`.",
-                      "Focal length along y.", "Principal point of that lens, x.",
-                      "Principal point of that lens, y."})
+                     "fx, fy, cx, cy of this camera's lens; all four 0: the lens is that of "
+                     "`rig.nominal`.")
             .numbers("distortion", &C::distortion, -2, 2, "",
-                     {"With `intrinsics`: first radial coefficient, k1.",
-                      "Second radial coefficient, k2.",
-                      "First tangential coefficient, p1; of an equidistant lens k3.",
-                      "Second tangential coefficient, p2; of an equidistant lens k4.",
-                      "Third radial coefficient, k3; an equidistant lens has none."})
-            .numbers(
-                "T_camera_left", &C::T_camera_left, -20, 20, "1, m",
-                {"Where the camera sits, X_camera = R X_left + t, as rows of [R t]: r11. All zero: "
-                 "parallel, N baselines to "
-                 "the right.",
-                 "The same transform: r12 of its rotation.",
-                 "The same transform: r13 of its rotation.", "The same transform: t1 in metres.",
-                 "The same transform: r21 of its rotation.",
-                 "The same transform: r22 of its rotation.",
-                 "The same transform: r23 of its rotation.", "The same transform: t2 in metres.",
-                 "The same transform: r31 of its rotation.",
-                 "The same transform: r32 of its rotation.",
-                 "The same transform: r33 of its rotation.", "The same transform: t3 in metres."})
+                     "With `intrinsics`: k1, k2, p1, p2, k3; of an equidistant lens k1 to k4.")
+            .numbers("T_camera_left", &C::T_camera_left, -20, 20, "1, m",
+                     "Where the camera sits, X_camera = R X_left + t, as the rows r11 r12 r13 t1, "
+                     "r21 … of [R t]. All zero: parallel, N baselines to the right.")
             .done();
     all.name = one.name;
     all.meaning = one.meaning;
@@ -514,11 +491,9 @@ Group ins() {
               "From a sample to its first byte on the line, as the device's manual says; it goes "
               "into every stamp.")
       .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
-               {"Where the left camera sits in the INS's body: forward.",
-                "The same place, to the left.", "The same place, upwards."})
+               "Where the left camera sits in the INS's body: forward, to the left, upwards.")
       .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",
-               {"How the rig's forward-left-up axes are turned against the INS's: roll.",
-                "The same turn, its pitch.", "The same turn, its yaw."})
+               "How the rig's forward-left-up axes are turned against the INS's: roll, pitch, yaw.")
       .done();
 }
 

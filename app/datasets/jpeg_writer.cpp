@@ -1,7 +1,6 @@
 #include "app/datasets/jpeg_writer.hpp"
 
 #include <csetjmp>
-#include <cstdio>
 #include <cstdlib>
 
 #include <jpeglib.h>

@@ -3,16 +3,13 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
-#include <new>
 #include <system_error>
-#include <utility>
 
 #include <fmt/format.h>
 
 #include "app/datasets/detail/bag_index.hpp"
 #include "app/datasets/detail/ros_messages.hpp"
 #include "app/datasets/detail/ros_reader.hpp"
-#include "app/datasets/image_file.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/runtime/version.hpp"
 
@@ -94,19 +91,6 @@ std::optional<RecordedReading> read_reading(std::span<const std::uint8_t> bytes)
   return r;
 }
 
-/// A PNG of the recording, decoded into rows without padding.
-bool read_png(const detail::ByteSource& file, const RecordedImage& image,
-              std::uint8_t* out) noexcept {
-  try {
-    std::vector<std::uint8_t> png(image.packed);
-    return file.read(image.offset, png) &&
-           decode_grey(png, {image.width, image.height}, out,
-                       static_cast<std::size_t>(image.width)) == ImageFileStatus::ok;
-  } catch (const std::bad_alloc&) {
-    return false;
-  }
-}
-
 }  // namespace
 
 struct RecordedSession::Files {
@@ -121,14 +105,12 @@ struct RecordedSession::Reader {
   bool described = false;
   std::array<RecordedImage, kMaxCameras> newest{};  // not yet of a frame
   std::array<Stamp, kMaxCameras> newest_stamp{};
-  std::map<std::pair<Stamp, std::size_t>, RecordedImage> packed{};  // by camera
   std::size_t broken = 0, images_lost = 0;
 
   void take(const detail::BagMessage& m, std::uint32_t file) {
     const std::string& type = m.channel->type;
     if (m.channel->topic == SessionDescription::kTopic) return take_description(m);
-    if (type == "sensor_msgs/Image") return take_image(m, file, false);
-    if (type == "sensor_msgs/CompressedImage") return take_image(m, file, true);
+    if (type == "sensor_msgs/Image") return take_image(m, file);
     if (type == "vergence_msgs/Frame") return take_frame(m);
     if (type == "vergence_msgs/InsReading") return take_reading(m);
   }
@@ -147,37 +129,17 @@ struct RecordedSession::Reader {
     described = true;
   }
 
-  /// A PNG, encoded by a thread of its own, comes behind its frame more often than before it.
-  void take_image(const detail::BagMessage& m, std::uint32_t file, bool png) {
+  void take_image(const detail::BagMessage& m, std::uint32_t file) {
     const auto camera = cameras.find(m.channel->topic);
     if (camera == cameras.end() || m.place.chunk != detail::BagPlace::kNoChunk) return;
-    const auto read = png ? detail::read_ros_compressed_image : detail::read_ros_image;
-    const auto image = read(detail::first_bytes(m, detail::kRosImageHead), m.place.size,
-                            detail::MessageEncoding::cdr, nullptr);
-    if (!image || image->bytes == 0) return;
-    const RecordedImage found{file, png ? image->bytes : 0, m.place.offset + image->offset,
-                              image->size.width, image->size.height};
-    if (png) {
-      packed[{image->stamp, camera->second}] = found;
-    } else if (image->layout == detail::PixelLayout::grey &&
-               image->step == static_cast<std::uint32_t>(image->size.width)) {
-      newest[camera->second] = found;
-      newest_stamp[camera->second] = image->stamp;
-    }
-  }
-
-  /// Images that the frames do not have yet, among those that were packed.
-  void finish() {
-    for (RecordedFrame& frame : session->frames_)
-      for (std::size_t k = 0; k < static_cast<std::size_t>(frame.given.cameras); ++k) {
-        if ((frame.given.images_present >> k & 1U) == 0 || frame.images[k].offset != 0) continue;
-        const auto found = packed.find({frame.given.stamp, k});
-        if (found == packed.end()) {
-          ++images_lost;
-          continue;
-        }
-        frame.images[k] = found->second;
-      }
+    const auto image = detail::read_ros_image(detail::first_bytes(m, detail::kRosImageHead),
+                                              m.place.size, detail::MessageEncoding::cdr, nullptr);
+    if (!image || image->bytes == 0 || image->layout != detail::PixelLayout::grey ||
+        image->step != static_cast<std::uint32_t>(image->size.width))
+      return;
+    newest[camera->second] = {file, m.place.offset + image->offset, image->size.width,
+                              image->size.height};
+    newest_stamp[camera->second] = image->stamp;
   }
 
   void take_frame(const detail::BagMessage& m) {
@@ -191,7 +153,10 @@ struct RecordedSession::Reader {
     RecordedFrame frame{*record, {}, session->readings_.size()};
     for (std::size_t k = 0; k < static_cast<std::size_t>(record->cameras); ++k) {
       if ((record->images_present >> k & 1U) == 0) continue;
-      if (newest[k].offset != 0 && newest_stamp[k] == record->stamp) frame.images[k] = newest[k];
+      if (newest[k].offset != 0 && newest_stamp[k] == record->stamp)
+        frame.images[k] = newest[k];
+      else
+        ++images_lost;
     }
     newest = {};
     session->frames_.push_back(frame);
@@ -230,7 +195,6 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
     scan->remark(file.name, &session.remarks_);
     session.complete_ = session.complete_ && !scan->first_broken;
   }
-  reader.finish();
   if (!reader.described)
     refuse(folder, 0,
            "holds no recording of a session: its .mcap files are another program's, which "
@@ -267,8 +231,7 @@ bool RecordedSession::read(const RecordedFrame& frame, std::size_t camera, std::
   const auto size = width * static_cast<std::size_t>(image.height);
   const detail::ByteSource& file = *files_->list[image.file].bytes;
   // In one piece, so that the check sum is one; then the rows move apart, the last one first.
-  if (image.packed == 0 ? !file.read(image.offset, {out, size}) : !read_png(file, image, out))
-    return false;
+  if (!file.read(image.offset, {out, size})) return false;
   if (crc32_of({out, size}) != frame.given.image_crc[camera]) return false;
   if (stride != width)
     for (std::size_t y = static_cast<std::size_t>(image.height); y-- > 0;)

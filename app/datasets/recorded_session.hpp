@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,10 +14,9 @@
 /// Recorded session, as written by `record:`: everything the estimator was given, in its order.
 namespace vergence::app {
 
-/// Where the pixels of an image are, 8-bit grey without padding, or the PNG of them.
+/// Where the pixels of an image are, 8-bit grey without padding.
 struct RecordedImage {
   std::uint32_t file = 0;    // of the recording's files
-  std::uint32_t packed = 0;  // bytes of the PNG; 0: pixels
   std::uint64_t offset = 0;  // in the file; 0: there is no such image
   int width = 0, height = 0;
 };
@@ -52,7 +50,7 @@ class RecordedSession {
   /// All images that the estimator had are here, and no frame is missing between two.
   [[nodiscard]] bool complete() const noexcept { return complete_; }
   /// Pixels of a frame's image of camera `camera`, rows `stride` bytes apart. False: they cannot be
-  /// read, or are not those that were recorded. Takes heap where the image is a PNG.
+  /// read, or are not those that were recorded.
   [[nodiscard]] bool read(const RecordedFrame& frame, std::size_t camera, std::uint8_t* out,
                           std::size_t stride) const noexcept;
   /// Gives back what frames() and readings() take, and they are empty; all else stays.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <system_error>
 
-#include "app/config/calibration_file.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/recorded_session.hpp"

@@ -7,7 +7,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "app/config/calibration_file.hpp"
@@ -79,7 +78,7 @@ struct GivenCalibration {
 /// left and right.
 struct BagTopics {
   std::string left{}, right{};
-  std::string ins{};  // of NavSatFix or Odometry
+  std::string ins{};  // of NavSatFix
   std::string imu{};  // of Imu: the orientation that goes with a NavSatFix
   [[nodiscard]] bool empty() const noexcept {
     return left.empty() && right.empty() && ins.empty() && imu.empty();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <span>
-#include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>

@@ -1,14 +1,11 @@
 #include "app/devices/drive_devices.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
 #include "app/devices/drive_sync.hpp"
-#include "app/devices/mock_drive.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/devices/serial_devices.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
 #include "drivers/clock.hpp"

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <exception>
 #include <string>
-#include <vector>
 
 #include <fmt/format.h>
 

@@ -1,7 +1,5 @@
 #include "app/devices/serial_devices.hpp"
 
-#include <utility>
-
 #include <fmt/format.h>
 
 #include "app/runtime/errors.hpp"

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -113,9 +112,7 @@ class McapFile {
   [[nodiscard]] bool open() const noexcept { return fd_ >= 0; }
   /// The index has no room for another chunk.
   [[nodiscard]] bool full() const noexcept { return chunks_.size() == kMaxChunks; }
-  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }          // bytes that are good
-  [[nodiscard]] std::uint64_t first_time() const noexcept { return first_; }  // ns; of the messages
-  [[nodiscard]] std::uint64_t last_time() const noexcept { return last_; }
+  [[nodiscard]] std::uint64_t size() const noexcept { return end_; }  // bytes that are good
 
   /// Data accepted by the system and then not written to the disk.
   struct Unwritten {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cerrno>
-#include <limits>
 #include <system_error>
 
 #include "core/memory/allocation_guard.hpp"
@@ -102,10 +101,7 @@ McapMessageHead head_of(std::span<const std::uint8_t> records) noexcept {
 }  // namespace
 
 Recording::Recording(const std::filesystem::path& folder, const Options& options)
-    : options_(options),
-      sequences_(options.files.topics.size()),
-      files_(folder, options.files),
-      keep_until_ns_(std::numeric_limits<std::int64_t>::min()) {
+    : options_(options), sequences_(options.files.topics.size()), files_(folder, options.files) {
   assert(options_.queues.size() <= McapFile::kMaxParts);
   for (const std::size_t bytes : options_.queues) queues_.push_back(std::make_unique<Queue>(bytes));
   thread_ = std::thread([this] { work(); });
@@ -149,16 +145,7 @@ void Recording::commit(std::size_t queue, std::size_t size) noexcept {
   q.head.content = size;
   q.head.write(q.open.first<McapMessageHead::kSize>());
   q.ring.commit(McapMessageHead::kSize + size);
-  newest_ns_.store(q.head.log_time, std::memory_order_relaxed);
   q.open = {};
-}
-
-void Recording::mark_event(Stamp stamp) noexcept {
-  const std::int64_t until = (stamp + options_.keep).ns();
-  std::int64_t now = keep_until_ns_.load(std::memory_order_relaxed);
-  while (now < until &&
-         !keep_until_ns_.compare_exchange_weak(now, until, std::memory_order_relaxed)) {
-  }
 }
 
 // ---- the writer
@@ -182,18 +169,8 @@ void Recording::work() noexcept {
   files_.finish(static_cast<std::uint64_t>(std::max<std::int64_t>(options_.start.ns(), 0)));
 }
 
-bool Recording::holding() const noexcept {
-  return options_.keep > Duration{} &&
-         static_cast<std::int64_t>(newest_ns_.load(std::memory_order_relaxed)) >
-             keep_until_ns_.load(std::memory_order_relaxed);
-}
-
 void Recording::drain(bool at_once, bool last) noexcept {
   for (;;) {
-    if (holding()) {
-      pass_over_old(at_once, last);
-      return;
-    }
     const Batch batch = gather();
     if (batch.messages == 0) {
       waiting_since_ns_ = 0;
@@ -245,30 +222,15 @@ void Recording::release(const Batch& batch) noexcept {
   if (options_.when_full == WhenFull::wait) freed_.signal();
 }
 
-void Recording::drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counter) noexcept {
+void Recording::drop_oldest(RecordRing* ring) noexcept {
   ring->release(head_of(ring->waiting()).record_size());
-  counter->fetch_add(1, std::memory_order_relaxed);
-}
-
-/// While nothing happens: what is older than what an event would keep, and what a full queue would
-/// refuse new messages for.
-void Recording::pass_over_old(bool hurried, bool all) noexcept {
-  const auto newest = static_cast<std::int64_t>(newest_ns_.load(std::memory_order_relaxed));
-  for (const auto& q : queues_)
-    while (q->ring.fill() > 0) {
-      const auto oldest = static_cast<std::int64_t>(head_of(q->ring.waiting()).log_time);
-      if (!all && newest - oldest <= options_.keep.ns() &&
-          q->ring.fill() <= room_left_at(q->ring, hurried))
-        break;
-      drop_oldest(&q->ring, &counts_.passed_over);
-    }
-  if (options_.when_full == WhenFull::wait) freed_.signal();
+  counts_.lost.fetch_add(1, std::memory_order_relaxed);
 }
 
 /// While the disk takes nothing: the newest are worth more than the oldest.
 void Recording::make_room(bool hurried) noexcept {
   for (const auto& q : queues_)
-    while (q->ring.fill() > room_left_at(q->ring, hurried)) drop_oldest(&q->ring, &counts_.lost);
+    while (q->ring.fill() > room_left_at(q->ring, hurried)) drop_oldest(&q->ring);
   if (options_.when_full == WhenFull::wait) freed_.signal();
 }
 
@@ -303,7 +265,7 @@ RecordingCounters Recording::counters() const noexcept {
   c.messages = get(counts_.messages), c.bytes = get(counts_.bytes);
   c.chunks = get(counts_.chunks), c.files = files_.files();
   c.dropped = get(counts_.dropped), c.dropped_images = get(counts_.dropped_images);
-  c.lost = get(counts_.lost) + files_.unwritten(), c.passed_over = get(counts_.passed_over);
+  c.lost = get(counts_.lost) + files_.unwritten();
   for (const auto& q : queues_) {
     c.queue_bytes += q->ring.capacity();
     c.queue_high_water += q->ring.high_water();

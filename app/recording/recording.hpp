@@ -81,7 +81,6 @@ struct RecordingCounters {
   std::uint64_t dropped_images = 0;  // of these, the large ones
   std::uint64_t lost = 0;  // messages that waited for a disk until there was no room, or that it
                            // had taken and did not keep
-  std::uint64_t passed_over = 0;  // messages older than what is kept before an event
   std::size_t queue_bytes = 0, queue_high_water = 0;  // of all queues, the most that waited in each
 };
 
@@ -98,12 +97,10 @@ struct RecordingCounters {
 /// Files      Split by size and when the index is full: drive.mcap becomes drive_0.mcap, the next
 /// is
 ///            drive_1.mcap. Every file begins with all schemas, channels and the preamble.
-/// Events     With keep > 0 only what was posted up to so long before an event and so long after
-///            it is written; the rest is passed over.
-/// Threads    begin(), commit(): one thread a queue. mark_event(): any. take_errors(), counters():
-///            any, counters exact after close(). close(): the owner's, after the last commit().
-/// Memory     All at construction; the writer's thread is sealed.
-/// Full       drop: begin() refuses, counted; what is bulky leaves room for the rest. wait:
+/// Threads    begin(), commit(): one thread a queue. take_errors(), counters(): any, counters exact
+/// after close(). close(): the owner's, after the last commit(). Memory     All at construction;
+/// the writer's thread is sealed. Full       drop: begin() refuses, counted; what is bulky leaves
+/// room for the rest. wait:
 ///            begin() waits for room (virtual time, replay).
 /// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). When
 ///            a write fails the data wait in their queue while there is room and the same file is
@@ -115,7 +112,6 @@ class Recording {
     RecordingFiles::Options files{};
     std::vector<std::size_t> queues;  // bytes of each
     Stamp start{};                    // of the preamble where nothing follows
-    Duration keep{};                  // 0: everything
     WhenFull when_full = WhenFull::drop;
   };
 
@@ -131,8 +127,6 @@ class Recording {
                                               std::size_t most, bool bulky = false) noexcept;
   /// The first `size` bytes of what begin() gave are the message. 0: there is none after all.
   void commit(std::size_t queue, std::size_t size) noexcept;
-  /// Something happened: what is around it is kept.
-  void mark_event(Stamp stamp) noexcept;
 
   /// Sentences about the disk since the last call.
   [[nodiscard]] std::vector<std::string> take_errors() { return files_.take_errors(); }
@@ -159,7 +153,7 @@ class Recording {
   /// RecordingCounters as they grow.
   struct Counts {
     std::atomic<std::uint64_t> messages{0}, bytes{0}, chunks{0};
-    std::atomic<std::uint64_t> dropped{0}, dropped_images{0}, lost{0}, passed_over{0};
+    std::atomic<std::uint64_t> dropped{0}, dropped_images{0}, lost{0};
   };
 
   void work() noexcept;
@@ -168,11 +162,9 @@ class Recording {
   [[nodiscard]] Batch gather() const noexcept;
   [[nodiscard]] bool due(const Batch& batch) noexcept;
   void release(const Batch& batch) noexcept;
-  void pass_over_old(bool hurried, bool all) noexcept;
   void make_room(bool hurried) noexcept;
-  static void drop_oldest(RecordRing* ring, std::atomic<std::uint64_t>* counter) noexcept;
+  void drop_oldest(RecordRing* ring) noexcept;
   [[nodiscard]] bool store(const Batch& batch) noexcept;
-  [[nodiscard]] bool holding() const noexcept;
 
   const Options options_;
   std::vector<std::uint32_t> sequences_;  // by topic; of its producer
@@ -180,8 +172,6 @@ class Recording {
   RecordingFiles files_;
   std::int64_t waiting_since_ns_ = 0;  // monotonic; of the writer's thread
 
-  std::atomic<std::int64_t> keep_until_ns_;
-  std::atomic<std::uint64_t> newest_ns_{0};  // of what was posted
   Counts counts_;
   std::mutex mutex_;  // with stop_ and hurry_, for the writer that sleeps
   std::condition_variable wake_;

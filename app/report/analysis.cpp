@@ -1,7 +1,6 @@
 #include "app/report/analysis.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 

@@ -5,18 +5,11 @@
 #include <cctype>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <map>
 #include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include <fmt/format.h>
 
-#include "app/report/analysis.hpp"
-#include "app/report/session.hpp"
 #include "app/report/svg.hpp"
 
 namespace vergence::app::report {
@@ -147,14 +140,6 @@ struct Usability {
 /// from scratch (docs/calibration.md).
 inline constexpr std::size_t kFramesToVerify = 60;
 
-/// A device that gave nothing for a while, by the events camera_disconnected, camera_reconnected,
-/// trigger_board_disconnected and trigger_board_reconnected.
-struct Outage {
-  std::string device;  // `camera 1`, `the trigger board`
-  Stamp from{};
-  std::optional<Stamp> to{};  // nothing: it never came back
-};
-
 /// Reasons that time alone may end.
 bool is_waiting(std::string_view reason) {
   constexpr std::array kWaiting{"unverified_calibration", "uncalibrated", "needs_motion",
@@ -237,7 +222,15 @@ Usability usability_of(const Session& s, const Analysis& a) {
 }
 
 constexpr double kLong = 2.0;  // s: the motion across a shorter hole is carried on
-constexpr double kLag = 1.0;   // s: frames that are under way when a device goes or comes
+constexpr double kLag = 1.0;   // s: frames that are under way when a device goes
+
+/// How often and for how long a device gave nothing.
+struct Outages {
+  std::size_t count = 0;
+  double seconds = 0, longest_s = 0;  // of those that ended
+  Stamp first{};
+  std::optional<Stamp> open{};  // it never came back
+};
 
 /// `camera 1` of `camera 1 is gone; …`.
 std::string device_of(const Event& e) {
@@ -253,103 +246,63 @@ std::string since_start(const Session& s, Stamp stamp) {
   return duration_text(seconds_between(first, std::max(first, stamp)), 0.1);
 }
 
-double seconds_of(const Outage& o) { return o.to ? seconds_between(o.from, *o.to) : 0; }
-
-bool breaks_the_way(const Outage& o, const Session& s, const Analysis& a) {
-  const auto first = std::lower_bound(s.frames.begin(), s.frames.end(), o.from,
-                                      [](const Frame& f, Stamp stamp) { return f.stamp < stamp; });
-  for (auto i = static_cast<std::size_t>(first - s.frames.begin()); i < s.frames.size(); ++i) {
-    if (!s.frames[i].posed || (i < a.breaks.size() && a.breaks[i] != 0)) return true;
-    if (o.to && s.frames[i].stamp > *o.to && seconds_between(*o.to, s.frames[i].stamp) > kLag)
-      return false;
-  }
-  return false;
-}
-
-/// One piece of advice a device, whatever the number of its outages.
-void advise_on_devices(std::span<const Outage> outages, const Session& s, Findings* findings) {
-  struct DeviceSum {
-    std::size_t count = 0;
-    double seconds = 0;
-    const Outage* first = nullptr;
-    bool open = false;
-  };
-  std::map<std::string, DeviceSum> devices;
-  for (const Outage& o : outages) {
-    DeviceSum& sum = devices[o.device];
-    if (sum.count++ == 0) sum.first = &o;
-    sum.seconds += seconds_of(o);
-    sum.open = !o.to;
-  }
-  for (const auto& [device, sum] : devices) {
-    std::string text = device + " was gone";
-    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
-    if (sum.count > 1) text += fmt::format(" {} times", sum.count);
-    if (sum.seconds > 0) text += " for " + duration_text(sum.seconds, 0.1);
-    if (!s.frames.empty()) text += " from " + since_start(s, sum.first->from) + " on";
-    findings->advise(text + (sum.open ? ", to the end" : "") + ": check its cable and power.");
-  }
-}
-
-/// By their begin.
-std::vector<Outage> outages_of(std::span<const Event> events) {
-  std::map<std::string, Stamp> gone;
-  std::vector<Outage> outages;
+/// By device, from the events camera_disconnected, camera_reconnected, trigger_board_disconnected
+/// and trigger_board_reconnected.
+std::map<std::string, Outages> outages_of(std::span<const Event> events) {
+  std::map<std::string, Outages> all;
   for (const Event& e : events) {
     const bool begins = e.kind == "camera_disconnected" || e.kind == "trigger_board_disconnected";
     if (!begins && e.kind != "camera_reconnected" && e.kind != "trigger_board_reconnected")
       continue;
-    const std::string device = device_of(e);
-    const auto open = gone.find(device);
-    if (begins) {
-      gone.emplace(device, e.stamp);
-    } else if (open != gone.end()) {
-      outages.push_back({device, open->second, std::max(open->second, e.stamp)});
-      gone.erase(open);
+    Outages& o = all[device_of(e)];
+    if (begins && !o.open) {
+      if (o.count++ == 0) o.first = e.stamp;
+      o.open = e.stamp;
+    } else if (!begins && o.open) {
+      const double s = seconds_between(*o.open, std::max(*o.open, e.stamp));
+      o.seconds += s;
+      o.longest_s = std::max(o.longest_s, s);
+      o.open.reset();
     }
   }
-  for (const auto& [device, from] : gone) outages.push_back({device, from, std::nullopt});
-  std::stable_sort(outages.begin(), outages.end(),
-                   [](const Outage& a, const Outage& b) { return a.from < b.from; });
-  return outages;
+  return all;
 }
 
-/// Checks for missing frames or poses within an outage: the path after it is extrapolated, so that
-/// its length says nothing of the rig.
-bool break_the_way(std::span<const Outage> outages, const Session& session,
-                   const Analysis& analysis) {
-  return std::any_of(outages.begin(), outages.end(),
-                     [&](const Outage& o) { return breaks_the_way(o, session, analysis); });
+/// A device that never came back.
+void judge_open_outage(const std::string& device, Stamp from, const Session& s, Findings* j) {
+  // Frames that were left out may be later.
+  const bool last = s.left_out.empty() && (s.frames.empty() || s.frames.back().stamp <= from ||
+                                           seconds_between(from, s.frames.back().stamp) <= kLag);
+  if (s.frames.empty())
+    j->find(Grade::bad, "there never was a frame: " + device + " was gone");
+  else if (last)
+    j->find(Grade::bad, "no frame after " + since_start(s, std::max(from, s.frames.back().stamp)) +
+                            ": " + device + " was gone");
+  else
+    j->find(Grade::care, device + " was gone from " + since_start(s, from) + " to the end");
 }
 
-/// Evaluates outages, with the devices that were disconnected and for how long.
-void judge_outages(std::span<const Outage> outages, const Session& session,
-                   const Analysis& analysis, Findings* findings) {
-  for (const Outage& o : outages) {
-    if (o.to) continue;
-    // Frames that were left out may be later.
-    const bool last = session.left_out.empty() &&
-                      (session.frames.empty() || session.frames.back().stamp <= o.from ||
-                       seconds_between(o.from, session.frames.back().stamp) <= kLag);
-    if (session.frames.empty())
-      findings->find(Grade::bad, "there never was a frame: " + o.device + " was gone");
-    else if (last)
-      findings->find(Grade::bad,
-                     "no frame after " +
-                         since_start(session, std::max(o.from, session.frames.back().stamp)) +
-                         ": " + o.device + " was gone");
-    else
-      findings->find(Grade::care,
-                     o.device + " was gone from " + since_start(session, o.from) + " to the end");
+/// What outages say against the drive, and one piece of advice a device. True: poses are missing
+/// within a long one, so that the path's length says nothing of the rig.
+bool judge_outages(const std::map<std::string, Outages>& outages, const Session& s,
+                   const Analysis& a, Findings* j) {
+  const bool holes =
+      std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return !f.posed; }) ||
+      std::find(a.breaks.begin(), a.breaks.end(), 1) != a.breaks.end();
+  bool broken = false;
+  for (const auto& [device, o] : outages) {
+    if (o.open) judge_open_outage(device, *o.open, s, j);
+    if (holes && o.longest_s > kLong)
+      j->find(Grade::care, device + " was gone for " + duration_text(o.longest_s, 0.1));
+    broken = broken || (holes && (o.open || o.longest_s > kLong));
+    std::string text = device + " was gone";
+    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+    if (o.count > 1) text += fmt::format(" {} times", o.count);
+    if (o.seconds > 0) text += " for " + duration_text(o.seconds, 0.1);
+    if (!s.frames.empty()) text += " from " + since_start(s, o.first) + " on";
+    j->advise(text + (o.open ? ", to the end" : "") + ": check its cable and power.");
   }
-  advise_on_devices(outages, session, findings);
-  const auto worst = std::max_element(
-      outages.begin(), outages.end(),
-      [](const Outage& a, const Outage& b) { return seconds_of(a) < seconds_of(b); });
-  if (worst != outages.end() && seconds_of(*worst) > kLong &&
-      breaks_the_way(*worst, session, analysis))
-    findings->find(Grade::care,
-                   worst->device + " was gone for " + duration_text(seconds_of(*worst), 0.1));
+  return broken;
 }
 
 /// Rejected because the one in use is as good: no reason for doubt.
@@ -670,9 +623,8 @@ const char* to_words(Grade grade) noexcept {
 Assessment judge(const Session& session, const Analysis& analysis) {
   Findings j;
   const Usability use = usability_of(session, analysis);
-  const std::vector<Outage> outages = outages_of(session.events);
-  const bool broken = break_the_way(outages, session, analysis);
-  judge_outages(outages, session, analysis, &j);
+  const std::map<std::string, Outages> outages = outages_of(session.events);
+  const bool broken = judge_outages(outages, session, analysis, &j);
   judge_focal_length(session, &j);
   if (analysis.read > 0 || outages.empty()) judge_frames(session, analysis, use, &j);
   if (analysis.source != ErrorSource::none) judge_drift(session, analysis, broken, &j);

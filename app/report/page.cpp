@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -20,8 +19,6 @@
 namespace vergence::app::report {
 
 namespace {
-
-constexpr std::size_t kMaxRows = 40;  // of a group whose keys come from a file
 
 /// Rows "name value" under heads; names of ours are plain text, all else is escaped by who adds it.
 class Figures {
@@ -119,56 +116,6 @@ void calibration_group(const Session& s, const Analysis& a, Figures* f) {
   verification_rows(s, a, f);
 }
 
-/// Counters in full, other numbers with `digits`.
-std::string number_text(const nlohmann::json& value, int digits) {
-  if (value.is_number_unsigned()) return grouped(value.get<std::uint64_t>());
-  if (value.is_number_integer()) {
-    const auto v = value.get<std::int64_t>();
-    return v < 0 ? "-" + grouped(std::uint64_t{0} - static_cast<std::uint64_t>(v))
-                 : grouped(static_cast<std::uint64_t>(v));
-  }
-  return fmt::format("{:.{}g}", value.get<double>(), digits);
-}
-
-/// `1.2, -0.3, 4`; empty for anything but a short row of numbers.
-std::string numbers_text(const nlohmann::json& value) {
-  constexpr std::size_t kMaxNumbers = 8;
-  if (value.is_number()) return number_text(value, 5);
-  std::string text;
-  if (!value.is_array() || value.size() > kMaxNumbers) return text;
-  for (const auto& item : value) {
-    if (!item.is_number()) return "";
-    text += (text.empty() ? "" : ", ") + number_text(item, 3);
-  }
-  return text;
-}
-
-/// Numbers below an object, its keys as names; for blocks whose keys are not fixed. Beyond
-/// kMaxRows they are only counted.
-// NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
-void flatten(const nlohmann::json& json, const std::string& prefix, int depth, std::size_t* rows,
-             Figures* f) {
-  constexpr int kDeepest = 3;
-  if (!json.is_object() || depth > kDeepest) return;
-  for (const auto& [key, value] : json.items()) {
-    std::string name = prefix + key.substr(0, 60);
-    std::replace(name.begin(), name.end(), '_', ' ');
-    if (const std::string text = numbers_text(value); text.empty())
-      flatten(value, name + " ", depth + 1, rows, f);
-    else if (++*rows <= kMaxRows)
-      f->row(name, text);
-  }
-}
-
-void block_group(const Session& s, const char* key, const char* head, Figures* f) {
-  if (!s.summary.is_object() || !s.summary.contains(key)) return;
-  f->group(head);
-  std::size_t rows = 0;
-  flatten(s.summary[key], "", 0, &rows, f);
-  if (rows > kMaxRows)
-    f->row(fmt::format("… {} more in summary.json", grouped(rows - kMaxRows)), "");
-}
-
 std::string event_time(const Session& s, Stamp stamp) {
   if (s.frames.empty()) return "";
   const Stamp first = s.frames.front().stamp;
@@ -225,15 +172,10 @@ std::string figures_table(const Session& session, const Analysis& analysis) {
   f.row("way", fmt::format("{:.1f} m", analysis.path_m));
   frames_group(session, analysis, &f);
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
-  block_group(session, "timing_ms", "Time a frame, ms", &f);
+  f.group("Time a frame, ms");
+  for (const char* key : {"mean", "p50", "p99", "max"})
+    f.row(key, number_at(session.summary, std::string("timing_ms.") + key), "{:.2f}");
   calibration_group(session, analysis, &f);
-  block_group(session, "truth", "Against the truth of the mock drive (metres, radians)", &f);
-  block_group(session, "devices", "Devices", &f);
-  block_group(session, "comparison", "Comparison with the INS", &f);
-  block_group(session, "time", "Clocks and pairing", &f);
-  block_group(session, "memory", "Memory", &f);
-  f.row("allocations after the seal", number_at(session.summary, "runtime_allocations"), "{:.0f}");
-  block_group(session, "drops", "Drops", &f);
   return std::move(f).finish();
 }
 
@@ -561,8 +503,11 @@ std::string page_html(const Session& session, const Analysis& analysis,
   calibration_sections(session, analysis, &out);
   out += section("wide long", "Events",
                  session.events.empty() ? "<p>None was recorded.</p>" : events_table(session));
-  out += section("wide long", "Figures",
-                 "<div class=\"two\">" + figures_table(session, analysis) + "</div>");
+  out +=
+      section("wide long", "Figures",
+              "<div class=\"two\">" + figures_table(session, analysis) +
+                  "</div><p class=\"soft\">summary.json has those of devices, clocks, memory and "
+                  "drops.</p>");
   out += "</div>\n" + footer(session) + "</main></body></html>\n";
   return out;
 }

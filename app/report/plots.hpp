@@ -1,8 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "app/report/analysis.hpp"
 #include "app/report/session.hpp"

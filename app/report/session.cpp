@@ -1,14 +1,10 @@
 #include "app/report/session.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdint>
 #include <cstring>
 #include <span>
-#include <string>
-#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -29,43 +25,27 @@ FileLines::FileLines(const std::filesystem::path& file) {
   if (!in_) refuse(file, 0, std::string("cannot be opened (") + std::strerror(errno) + ")");
 }
 
-bool FileLines::read_block() {
-  std::array<char, 1U << 16U> block;
-  in_.read(block.data(), block.size());
-  if (in_.gcount() <= 0) return false;
-  read_.erase(0, at_);
-  at_ = 0;
-  if (read_.size() > kLongestLine) read_.resize(kLongestLine);
-  read_.append(block.data(), static_cast<std::size_t>(in_.gcount()));
-  return true;
-}
-
-bool FileLines::next_whole(std::string_view* line) {
-  for (std::size_t looked = at_;;) {
-    const std::size_t end = read_.find('\n', looked);
-    if (end != std::string::npos) {
-      *line = std::string_view(read_).substr(at_, end - at_);
-      at_ = end + 1;
-      return true;
-    }
-    const std::size_t left = std::min(read_.size() - at_, kLongestLine);
-    if (!read_block()) {
-      torn_ = left > 0;
-      return false;
-    }
-    looked = left;
-  }
-}
-
 bool FileLines::next(std::string_view* line) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  for (std::string_view whole; next_whole(&whole);) {
+  line_.resize(kLongestLine);
+  for (;;) {
+    in_.getline(line_.data(), static_cast<std::streamsize>(line_.size()));
+    if (in_.eof()) {
+      torn_ = in_.gcount() > 0;
+      return false;
+    }
+    if (in_.bad()) return false;
+    if (in_.fail()) {  // too long
+      in_.clear();
+      in_.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+      continue;
+    }
+    std::string_view whole(line_.data(), static_cast<std::size_t>(in_.gcount()) - 1);
     if (!std::exchange(begun_, true) && whole.starts_with(kByteOrderMark))
       whole.remove_prefix(kByteOrderMark.size());
     *line = trimmed(whole);
     if (!line->empty() && line->front() != '#') return true;
   }
-  return false;
 }
 
 CsvRows::CsvRows(NextLine next_line) : next_line_(std::move(next_line)) {

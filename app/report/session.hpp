@@ -23,8 +23,7 @@ namespace vergence::app::report {
 /// length. What follows the last line's end is left out: a killed writer leaves it, and a number
 /// cut in the middle looks like another one.
 ///
-/// Memory  A block, or the longest line; of a line beyond kLongestLine some bytes are lost, so that
-///         it is a damaged one.
+/// Memory  The longest line; one beyond kLongestLine is passed over.
 /// Errors  The constructor throws InputError: not there, no file, not readable.
 class FileLines {
  public:
@@ -39,12 +38,8 @@ class FileLines {
   [[nodiscard]] bool failed() const noexcept { return in_.bad(); }
 
  private:
-  [[nodiscard]] bool next_whole(std::string_view* line);
-  [[nodiscard]] bool read_block();
-
   std::ifstream in_;
-  std::string read_{};  // and not given yet, from at_ on
-  std::size_t at_ = 0;
+  std::string line_{};
   bool begun_ = false, torn_ = false;
 };
 
@@ -70,7 +65,6 @@ class CsvRows {
   [[nodiscard]] std::optional<std::int64_t> integer(
       std::optional<std::size_t> column) const noexcept;
 
-  [[nodiscard]] bool has_head() const noexcept { return !names_.empty(); }
   [[nodiscard]] std::size_t torn_rows() const noexcept { return torn_; }
 
  private:

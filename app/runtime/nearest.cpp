@@ -1,6 +1,5 @@
 #include "app/runtime/nearest.hpp"
 
-#include <algorithm>
 #include <array>
 
 namespace vergence::app {
@@ -64,6 +63,9 @@ constexpr std::string_view kNoLine =
 constexpr std::array kTable{
     Withdrawn{Kind::key, "ins.sync_in",
               "SyncIn stays as the device has it; set it with the maker's program"},
+    Withdrawn{
+        Kind::key, "record.keep_s",
+        "recordings are whole; record.roll_mb ends files, sessions.quota_mb removes sessions"},
     Withdrawn{Kind::key, "mock.ins_line", kNoLine},
     Withdrawn{Kind::key, "mock.ins_latency_timer_ms", kNoLine},
     Withdrawn{Kind::key, "mock.ins_late_percent", kNoLine},

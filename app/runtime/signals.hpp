@@ -1,7 +1,6 @@
 #pragma once
-#include <optional>
-
 #include <csignal>
+#include <optional>
 
 #include "app/runtime/errors.hpp"
 

@@ -7,7 +7,6 @@
 #include <iterator>
 #include <memory>
 #include <numbers>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -15,7 +14,6 @@
 #include "app/devices/camera_masks.hpp"
 #include "app/runtime/background_thread.hpp"
 #include "app/session/session_files.hpp"
-#include "app/session/starting_calibration.hpp"
 #include "core/calibration/gates.hpp"
 #include "core/calibration/health.hpp"
 #include "core/calibration/segment_solver.hpp"

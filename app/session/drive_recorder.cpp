@@ -1,16 +1,11 @@
 #include "app/session/drive_recorder.hpp"
 
 #include <algorithm>
-#include <filesystem>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include <fmt/format.h>
 
 #include "app/config/calibration_file.hpp"
-#include "app/config/schema.hpp"
-#include "app/recording/messages.hpp"
 #include "app/recording/session_description.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/runtime/nearest.hpp"
@@ -47,9 +42,6 @@ std::vector<std::string> recorded_names(const CalibrationFile& file) {
 constexpr std::size_t kSmall = std::size_t{4} << 20;  // bytes of a queue without images
 constexpr double kDiskS = 6;  // s of a disk that stalls: one second more than it may take
 constexpr std::size_t kPulseQueue = std::size_t{1} << 20;  // bytes
-// Bytes that are recorded of each, and some to spare: of a frame beside its images (1310), of a
-// reading of the INS (740), of a pulse (300).
-constexpr double kFrameRecords = 2048, kReadingRecords = 1024, kPulseRecords = 512;
 
 std::vector<RecordedTopic> topics(const CalibrationFile& file) {
   std::vector<RecordedTopic> out{{SessionDescription::kTopic, RosType::text, true},
@@ -69,17 +61,14 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file) {
   return out;
 }
 
-/// Keys that are not as they are when nobody says anything.
+/// As `--set` takes them.
 std::vector<std::string> settings_of(const Configuration& c) {
-  const Configuration defaults;
   std::vector<std::string> out;
-  for (const Group& group : schema())
-    for (const Key& key : group.keys)
-      if (std::string value = to_text(key.get(c)); value != to_text(key.get(defaults))) {
-        if (key.name.ends_with(".mask"))  // beside the configuration, wherever the replay runs
-          value = std::filesystem::absolute(c.folder / value).string();
-        out.push_back(key.name + "=" + value);
-      }
+  for (auto& [key, value] : changed_settings(c)) {
+    if (key.ends_with(".mask"))  // beside the configuration, wherever the replay runs
+      value = std::filesystem::absolute(c.folder / value).string();
+    out.push_back(key + "=" + value);
+  }
   return out;
 }
 
@@ -117,50 +106,22 @@ double frame_bytes(const SourceFacts& facts) {
   return bytes;
 }
 
-/// Queue size for small records around an event.
-double kept_bytes(const Configuration& c, double record_bytes, double rate) {
-  return c.record.event_window_s * rate * record_bytes;
-}
-
-/// Records of the estimator's thread without images: frames and compared INS samples.
-double small_bytes(const Configuration& c) {
-  return kSmall + kept_bytes(c, kFrameRecords, c.trigger.rate) +
-         kept_bytes(c, kReadingRecords, c.ins.rate);
-}
-
 constexpr double kMinHeld = 16;  // frames that wait: a replay waits for room
 
-/// Address space of this machine; a 32-bit one's program has 3 GB for all.
-constexpr double kMaxQueue = sizeof(void*) > 4 ? 1e15 : 2e9;  // bytes
-
-/// Bytes of images a second, and how many seconds of them are held.
-double wanted_queue_bytes(const Configuration& c, const SourceFacts& facts) {
-  if (c.record.images == 0) return small_bytes(c);
-  const double held = facts.when_full == Recorder::WhenFull::wait
-                          ? kMinHeld
-                          : (kDiskS + c.record.event_window_s) * c.trigger.rate;
-  return small_bytes(c) + frame_bytes(facts) * std::max(held, kMinHeld);
-}
-
+/// Of the queue of the estimator's thread, whose images are held for a disk that stalls.
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
-  const double bytes = wanted_queue_bytes(c, facts);
-  if (bytes > kMaxQueue)
-    throw InputError(fmt::format(
-        "record.event_window_s: {:.0f} MB of images are to wait, more than this machine "
-        "can address",
-        bytes / 1e6));
-  return static_cast<std::size_t>(bytes);
+  if (c.record.images == 0) return kSmall;
+  const double held = facts.when_full == Recorder::WhenFull::wait ? 0 : kDiskS * c.trigger.rate;
+  return kSmall + static_cast<std::size_t>(frame_bytes(facts) * std::max(held, kMinHeld));
 }
 
 Recording::Options recording_options(const Configuration& c, const SourceFacts& facts) {
   Recording::Options o;
   o.files.topics = topics(facts.begin.file);
-  o.queues = {queue_bytes(c, facts),
-              kPulseQueue + static_cast<std::size_t>(kept_bytes(c, kPulseRecords, c.trigger.rate))};
+  o.queues = {queue_bytes(c, facts), kPulseQueue};
   o.files.preamble = {{session_topic, description(c, facts)}};
   o.start = facts.first;
   o.files.roll_bytes = static_cast<std::uint64_t>(c.record.split_mb) * 1'000'000;
-  o.keep = Duration::seconds(c.record.event_window_s);
   o.when_full = facts.when_full == Recorder::WhenFull::wait ? Recording::WhenFull::wait
                                                             : Recording::WhenFull::drop;
   return o;
@@ -204,7 +165,6 @@ bool DriveRecorder::post(std::size_t topic, Stamp stamp, const Write& write, std
 }
 
 void DriveRecorder::on_frame(const RigFrame& frame) noexcept {
-  ++frames_seen_;
   frame_ = {};
   frame_.number = frame.number;
   frame_.stamp = frame.stamp;
@@ -244,16 +204,12 @@ void DriveRecorder::post_rig(Stamp stamp) noexcept {
   post(tf_static_topic, stamp, [&](CdrWriter* out) {
     write_rig_transforms(out, stamp, rig_, std::span(frame_names_).first(cameras));
     rig_in_file_ = files;
-    last_rig_ = stamp;
   });
 }
 
-/// Each file of several must be readable alone. Where only what is around events is kept, each
-/// second may be the first that is.
-bool DriveRecorder::rig_is_due(Stamp stamp) const noexcept {
-  if (!calibrated_) return false;
-  return rig_in_file_ != recording_.counters().files ||
-         (settings_.event_window_s > 0 && stamp - last_rig_ >= Duration::seconds(1));
+/// Who opens one file of several has no other.
+bool DriveRecorder::rig_is_due() const noexcept {
+  return calibrated_ && rig_in_file_ != recording_.counters().files;
 }
 
 void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
@@ -261,7 +217,7 @@ void DriveRecorder::on_pose(const PoseSample& sample) noexcept {
   frame_.solver_done = watch_.found_idle();
   post(frame_topic, sample.stamp, [&](CdrWriter* out) { write_frame(out, frame_); });
   if (settings_.poses == 0) return;
-  if (rig_is_due(sample.stamp)) post_rig(sample.stamp);
+  if (rig_is_due()) post_rig(sample.stamp);
   post(odometry_topic, sample.stamp, [&](CdrWriter* out) { write_odometry(out, sample); });
   if (sample.status != PoseStatus::lost)
     post(tf_topic, sample.stamp, [&](CdrWriter* out) { write_pose_transform(out, sample); });
@@ -280,7 +236,6 @@ void DriveRecorder::on_event(const EventRecord& event) noexcept {
   const std::string_view kind = event.kind, message = event.message.data();
   recalibrate_ = recalibrate_ || kind == "recalibration_requested" ||
                  (kind == "fault" && message.starts_with("recalibrate"));
-  if (frames_seen_ > 0) recording_.mark_event(event.stamp);  // before it is set-up
 }
 
 void DriveRecorder::on_calibration(const CalibrationRecord& calibration) noexcept {

@@ -58,7 +58,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
             std::size_t most = kMessageRoom, bool bulky = false) noexcept;
   void post_image(const RigFrame& frame, std::size_t camera) noexcept;
   void post_rig(Stamp stamp) noexcept;
-  [[nodiscard]] bool rig_is_due(Stamp stamp) const noexcept;
+  [[nodiscard]] bool rig_is_due() const noexcept;
 
   const RecordSettings& settings_;
   const ReplayableSolverRunner& watch_;
@@ -73,8 +73,6 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   std::optional<std::uint64_t> rig_in_file_{};  // how many there were when it was posted last
   std::atomic<bool> stopped_{false};
   FrameRecord frame_{};
-  std::uint64_t frames_seen_ = 0;
-  Stamp last_rig_{};
 };
 
 }  // namespace vergence::app

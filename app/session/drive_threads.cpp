@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "app/runtime/realtime.hpp"
 #include "core/memory/thread_allocations.hpp"
 
 namespace vergence::app {

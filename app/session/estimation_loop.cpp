@@ -78,11 +78,18 @@ EstimationLoop::EstimationLoop(FrameSource& source, const Configuration& configu
                                                   comparison_arena_, log_);
 }
 
-void EstimationLoop::open(const SessionOutput& output, DriveRecorder* recording) noexcept {
+void EstimationLoop::open(const SessionOutput& output, DriveRecorder* recording,
+                          CalibrationWriter* calibrations) noexcept {
   output_ = output;
   recording_ = recording;
+  calibrations_ = calibrations;
   log_.open(&output_, facts_.first);
   if (comparison_) comparison_->open(&output_);
+}
+
+void EstimationLoop::log_kept_calibrations() noexcept {
+  for (CalibrationWriter::Outcome outcome; calibrations_->next(&outcome);)
+    log_.log(outcome.event, outcome.failed);
 }
 
 bool EstimationLoop::next(SourceItem* item) noexcept {
@@ -140,6 +147,7 @@ void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   if (calibration_asked_.exchange(false, std::memory_order_relaxed))
     request_recalibration(frame.rig.stamp, "a new calibration was asked for by SIGUSR1");
   take_requests(frame.rig.stamp);
+  log_kept_calibrations();
   if (!delivering_) ThreadAllocations::begin();
   delivering_ = true;
   watched_solver_.begin_frame(frame.solver_idle);

@@ -9,6 +9,7 @@
 #include "app/datasets/reference_track.hpp"
 #include "app/devices/camera_masks.hpp"
 #include "app/runtime/background_thread.hpp"
+#include "app/session/calibration_writer.hpp"
 #include "app/session/drive_recorder.hpp"
 #include "app/session/event_log.hpp"
 #include "app/session/frame_source.hpp"
@@ -43,8 +44,12 @@ class EstimationLoop {
   EstimationLoop(FrameSource& source, const Configuration& configuration,
                  const SessionOptions& options);
 
-  /// Before run(). `recording`: what viewers may stop; null: nothing is recorded.
-  void open(const SessionOutput& output, DriveRecorder* recording) noexcept;
+  /// Before run(). `recording`: what viewers may stop; null: nothing is recorded. `calibrations`:
+  /// whose outcomes become events.
+  void open(const SessionOutput& output, DriveRecorder* recording,
+            CalibrationWriter* calibrations) noexcept;
+  /// Events of what became of calibrations. The estimator's thread, or after it has joined.
+  void log_kept_calibrations() noexcept;
   /// Until the source has nothing more.
   void run() noexcept;
   /// From the next frame on a new calibration is sought.
@@ -98,6 +103,7 @@ class EstimationLoop {
   ReplayableSolverRunner watched_solver_{solver_};
   std::unique_ptr<Estimator> estimator_;
   DriveRecorder* recording_ = nullptr;
+  CalibrationWriter* calibrations_ = nullptr;
   SessionOutput output_;
   EventLog log_;
   std::unique_ptr<InsComparison> comparison_;

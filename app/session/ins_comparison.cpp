@@ -1,15 +1,12 @@
 #include "app/session/ins_comparison.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 
-#include "core/comparison/comparison.hpp"
 #include "core/math/angle.hpp"
 
 namespace vergence::app {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <memory>
 #include <string_view>
 #include <utility>
 
@@ -12,7 +11,6 @@
 #include "app/devices/camera_masks.hpp"
 #include "app/devices/drive_sync.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/runtime/errors.hpp"
 #include "app/session/records.hpp"
 #include "app/session/session_files.hpp"
 #include "drivers/clock.hpp"

@@ -59,7 +59,6 @@ class LiveSource final : public FrameSource {
   void make_acquisition();
   /// An event that goes before the frame in hand. False: none is left.
   [[nodiscard]] bool next_event(SourceItem* item) noexcept;
-  [[nodiscard]] bool next_fault(SourceItem* item) noexcept;
   void write_truth(std::vector<std::string>* faults) const;
   [[nodiscard]] TruthMetrics truth_figures(const SessionTotals& totals,
                                            const Estimator& estimator) const;

@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <new>
 #include <optional>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -16,83 +14,26 @@
 
 #include "app/datasets/trajectory_files.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/session/records.hpp"
 #include "core/memory/allocation_guard.hpp"
 
 namespace vergence::app {
-
-CalibrationStateWriter::CalibrationStateWriter(KeepCalibration keep, WakeEvent* wake)
-    : keep_(std::move(keep)), wake_(wake), thread_([this] { work(); }) {}
-
-bool CalibrationStateWriter::confirmed(Stamp stamp) noexcept {
-  if (!unconfirmed_) return true;
-  const Waiting begun_with{stamp, *unconfirmed_, false};
-  unconfirmed_.reset();
-  return post(begun_with);
-}
-
-bool CalibrationStateWriter::found(Stamp stamp, const RigCalibration& rig) noexcept {
-  unconfirmed_.reset();
-  return post({stamp, rig, true});
-}
-
-bool CalibrationStateWriter::post(const Waiting& waiting) noexcept {
-  if (!waiting_.push(waiting)) return false;
-  filled_.signal();
-  return true;
-}
-
-void CalibrationStateWriter::stop() noexcept {
-  if (!thread_.joinable()) return;
-  stop_.store(true, std::memory_order_release);
-  filled_.signal();
-  thread_.join();
-}
-
-void CalibrationStateWriter::work() {
-  (void)pthread_setname_np(pthread_self(), "vergence-state");
-  for (Waiting waiting;;) {
-    const WakeEvent::Ticket seen = filled_.ticket();
-    const bool stopping = stop_.load(std::memory_order_acquire);  // before the ring
-    if (waiting_.pop(&waiting))
-      keep(waiting);
-    else if (stopping)
-      return;
-    else
-      filled_.wait(seen);
-  }
-}
-
-void CalibrationStateWriter::keep(const Waiting& waiting) {
-  const Kept kept = keep_(waiting.rig, waiting.found);
-  if (kept.message.empty()) return;
-  Outcome outcome;
-  outcome.failed = kept.failed;
-  outcome.event.stamp = waiting.stamp;
-  outcome.event.kind = kept.failed ? "calibration_save_failed" : "calibration_saved";
-  outcome.event.set_message(kept.message);
-  (void)outcomes_.push(outcome);
-  wake_->signal();
-}
 
 struct Recorder::Files {
   Files(const std::filesystem::path& session, const Options& options)
       : trajectory(session / "trajectory.tum"),
         reference(session / "reference.tum"),
         poses(session / "poses.csv"),
-        calibrations(session / "calibrations.csv"),
         events(session / "events.jsonl"),
-        all{&trajectory, &reference, &poses, &calibrations, &events} {
+        all{&trajectory, &reference, &poses, &events} {
     constexpr std::size_t kMinutes = std::size_t{16} << 20;  // bytes: readings are many
     if (options.ins) all.push_back(&ins.emplace(session / "ins.csv", kMinutes));
   }
   /// The first line of a table; empty: the file has none.
   [[nodiscard]] std::string head(const LineFile* file) const {
     if (file == &poses) return std::string(kPosesHeader) + "\n";
-    if (file == &calibrations) return std::string(kCalibrationsHeader) + "\n";
     return ins && file == &*ins ? std::string(kInsHeader) + "\n" : "";
   }
-  LineFile trajectory, reference, poses, calibrations, events;
+  LineFile trajectory, reference, poses, events;
   std::optional<LineFile> ins{};
   bool has_reference = false;  // a line was written there
   std::vector<LineFile*> all;
@@ -100,16 +41,13 @@ struct Recorder::Files {
 
 namespace {
 
-constexpr std::string_view kVerified = "calibration_verified";  // an event's kind
-constexpr std::size_t kLongestLine = 2048;  // bytes: calibrations.csv has the longest, some 800
+constexpr std::size_t kLongestLine = 2048;  // bytes: an event's message may be of \u.... alone
 
 }  // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, const Options& options)
     : options_(options), files_(std::make_unique<Files>(folder, options)), newest_(options.first) {
   line_.reserve(kLongestLine);
-  if (options.keep) keeper_ = std::make_unique<CalibrationStateWriter>(options.keep, &filled_);
-  memory_ = totals_.memory();
   for (LineFile* file : files_->all) {
     memory_ += file->pending();
     file->append(files_->head(file));
@@ -142,15 +80,9 @@ bool Recorder::push(Queue<Value, N>* queue, const Value& value) noexcept {
   return true;
 }
 
-void Recorder::post(const Record& record) noexcept {
-  if (push(&records_, record)) ++turn_.posted;
-}
+void Recorder::post(const Record& record) noexcept { (void)push(&records_, record); }
 
 void Recorder::on_reading(const InsRecord& reading) noexcept { (void)push(&readings_, reading); }
-
-void Recorder::on_calibration(const CalibrationRecord& calibration) noexcept {
-  (void)push(&calibrations_, {calibration, turn_.posted});
-}
 
 void Recorder::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-record");
@@ -170,8 +102,7 @@ void Recorder::work() {
     const WakeEvent::Ticket seen = filled_.ticket();
     const bool stopping = stop_.load(
         std::memory_order_acquire);  // before the ring: what was posted before is still found
-    const bool took = take(), decided = take_outcome();
-    if (took || decided) {
+    if (take()) {
       if (Clock::now() - flushed < kFlushAtLeast) continue;
     } else if (stopping) {
       break;
@@ -184,36 +115,15 @@ void Recorder::work() {
   }
 }
 
-/// The oldest record and reading, as far as there are any, behind the calibrations whose turn it
-/// is. False: there were none.
+/// The oldest record and the oldest reading, as far as there are any. False: there were none.
 bool Recorder::take() {
   Record record;
   InsRecord reading;
   const bool one = records_.ring.pop(&record), other = readings_.ring.pop(&reading);
   if (one || other) freed_.signal();
-  // After the record: all that were posted before it are found.
-  const bool calibrated = take_calibrations();
-  if (one) {
-    std::visit([this](const auto& r) { write(r); }, record);
-    ++turn_.written;
-  }
+  if (one) std::visit([this](const auto& r) { write(r); }, record);
   if (other) write(reading);
-  return one || other || calibrated;
-}
-
-/// Those that were posted before the next record that is written. False: there are none.
-bool Recorder::take_calibrations() {
-  for (bool any = false;; any = true) {
-    if (!turn_.next) {
-      Placed oldest;
-      if (!calibrations_.ring.pop(&oldest)) return any;
-      freed_.signal();
-      turn_.next = oldest;
-    }
-    if (turn_.next->after > turn_.written) return any;
-    write(turn_.next->calibration);
-    turn_.next.reset();
-  }
+  return one || other;
 }
 
 void Recorder::write(const InsRecord& reading) {
@@ -225,22 +135,6 @@ void Recorder::write(const EventRecord& e) {
   totals_.add(e);
   format_event(e, &line_);
   files_->events.append(line_);
-  if (keeper_ != nullptr && std::string_view(e.kind) == kVerified)
-    report_kept(keeper_->confirmed(e.stamp));
-}
-
-void Recorder::write(const CalibrationRecord& c) {
-  for (int k = 1; k < c.calibration.cameras; ++k) {
-    format_calibration(c, k, &line_);
-    files_->calibrations.append(line_);
-  }
-  if (!c.decided && keeper_ != nullptr) keeper_->begin_with(c.calibration);
-  if (!c.decided || !totals_.add(c) || keeper_ == nullptr) return;
-  report_kept(keeper_->found(c.stamp, c.calibration));
-}
-
-void Recorder::report_kept(bool kept) noexcept {
-  if (!kept) report_error("a calibration is not kept: the disk has not taken those before it");
 }
 
 void Recorder::write(const FrameReport& r) {
@@ -256,15 +150,6 @@ void Recorder::write(const FrameReport& r) {
   format_tum(stamp, *r.T_reference_left, &line_);
   files_->reference.append(line_);
   files_->has_reference = true;
-}
-
-/// Outcome of a calibration. False: there is nothing new.
-bool Recorder::take_outcome() {
-  CalibrationStateWriter::Outcome outcome;
-  if (keeper_ == nullptr || !keeper_->next(&outcome)) return false;
-  write(outcome.event);
-  if (outcome.failed) report_error("{}", outcome.event.message.data());
-  return true;
 }
 
 /// Writes what waits. After a failure no file is written again before kRetry has passed: every
@@ -365,9 +250,6 @@ void Recorder::read_back() {
 std::unique_ptr<SessionTotals> Recorder::close() {
   stop_and_join();
   SessionTotals& totals = totals_.totals();
-  if (keeper_ != nullptr) keeper_->stop();
-  while (take_outcome()) {
-  }
   for (LineFile* file : files_->all) {
     const bool good = file->close();
     totals.lost_lines += file->lost_lines();
@@ -381,8 +263,7 @@ std::unique_ptr<SessionTotals> Recorder::close() {
   std::error_code ignored;
   if (!files_->has_reference) std::filesystem::remove(files_->reference.path(), ignored);
   if (options_.keep_trajectory) read_back();
-  totals.dropped_records = records_.dropped.load(std::memory_order_relaxed) +
-                           calibrations_.dropped.load(std::memory_order_relaxed);
+  totals.dropped_records = records_.dropped.load(std::memory_order_relaxed);
   totals.dropped_readings = readings_.dropped.load(std::memory_order_relaxed);
   totals.ring_high_water = records_.high_water;
   return std::make_unique<SessionTotals>(std::move(totals));

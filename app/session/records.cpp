@@ -4,16 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <iterator>
 #include <numbers>
-#include <string_view>
-#include <variant>
 
 #include <fmt/format.h>
 
@@ -77,60 +73,32 @@ bool LineFile::close() {
 
 namespace {
 
-/// The words of events.jsonl, in the order of EstimatorEvent::Kind.
-const char* kind_word(EstimatorEvent::Kind kind) noexcept {
-  switch (kind) {
-    case EstimatorEvent::Kind::state:
-      return "state";
-    case EstimatorEvent::Kind::map_reset:
-      return "map_reset";
-    case EstimatorEvent::Kind::time_gap:
-      return "time_gap";
-    case EstimatorEvent::Kind::relocalised:
-      return "relocalised";
-    case EstimatorEvent::Kind::dropped:
-      return "points_dropped";
-    case EstimatorEvent::Kind::rig_changed:
-      return "rig_changed";
-    case EstimatorEvent::Kind::out_of_sync:
-      return "out_of_sync";
-    case EstimatorEvent::Kind::cameras_in_sync:
-      return "cameras_in_sync";
-    case EstimatorEvent::Kind::calibration_verified:
-      return "calibration_verified";
-    case EstimatorEvent::Kind::calibration_contradicted:
-      return "calibration_contradicted";
-    case EstimatorEvent::Kind::focal_length_contradicted:
-      return "focal_length_contradicted";
-    case EstimatorEvent::Kind::calibration_accepted:
-      return "calibration_accepted";
-    case EstimatorEvent::Kind::calibration_rejected:
-      return "calibration_rejected";
-    case EstimatorEvent::Kind::calibration_taken_up:
-      return "calibration_taken_up";
-    case EstimatorEvent::Kind::calibration_pending:
-      return "calibration_pending";
-    case EstimatorEvent::Kind::calibration_resumed:
-      return "calibration_resumed";
-  }
-  return "";
-}
-
-/// Text before the estimator's reason.
-const char* opening(EstimatorEvent::Kind kind) noexcept {
-  switch (kind) {
-    case EstimatorEvent::Kind::calibration_accepted:
-      return "a new calibration is in use";
-    case EstimatorEvent::Kind::calibration_rejected:
-      return "a calibration was rejected";
-    case EstimatorEvent::Kind::calibration_pending:
-      return "the calibration waits";
-    case EstimatorEvent::Kind::calibration_resumed:
-      return "the last calibration is in use again";
-    default:
-      return "";
-  }
-}
+/// How an event of the estimator stands in events.jsonl.
+struct EventWords {
+  const char* kind;
+  const char* opening;  // before the estimator's own words; empty: nothing
+  const char* field;    // the name of EstimatorEvent::value; null: nothing is counted
+};
+/// In the order of EstimatorEvent::Kind.
+constexpr std::array kEventWords{
+    EventWords{"state", "", nullptr},
+    EventWords{"map_reset", "", "gap_s"},
+    EventWords{"time_gap", "", "gap_s"},
+    EventWords{"relocalised", "", nullptr},
+    EventWords{"points_dropped", "", "count"},
+    EventWords{"rig_changed", "", "frames_since_onset"},
+    EventWords{"out_of_sync", "", "lag_frames"},
+    EventWords{"cameras_in_sync", "", nullptr},
+    EventWords{"calibration_verified", "", "depth_sigma_percent"},
+    EventWords{"calibration_contradicted", "", "depth_percent"},
+    EventWords{"focal_length_contradicted", "", "measured_px"},
+    EventWords{"calibration_accepted", "a new calibration is in use", "frames"},
+    EventWords{"calibration_rejected", "a calibration was rejected", "frames"},
+    EventWords{"calibration_taken_up", "", "fitting_percent"},
+    EventWords{"calibration_pending", "the calibration waits", nullptr},
+    EventWords{"calibration_resumed", "the last calibration is in use again", nullptr}};
+static_assert(kEventWords.size() ==
+              static_cast<std::size_t>(EstimatorEvent::Kind::calibration_resumed) + 1);
 
 /// As much of the text as fits, in whole UTF-8 characters, with a 0 behind it.
 template <std::size_t N>
@@ -168,7 +136,8 @@ void EventRecord::set_message(std::string_view text) noexcept { copy_text(text, 
 EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
   EventRecord r;
   r.stamp = event.stamp;
-  r.kind = kind_word(event.kind);
+  const EventWords& words = kEventWords[static_cast<std::size_t>(event.kind)];
+  r.kind = words.kind;
   const bool state = event.kind == EstimatorEvent::Kind::state;
   if (state) {
     std::array<char, 256> text{};
@@ -180,7 +149,7 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     r.fields[0] = {"from", from.data()};
     r.fields[1] = {"to", to.data()};
   } else {
-    const char* begin = opening(event.kind);
+    const char* begin = words.opening;
     const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
     std::array<char, 256> text{};
     if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
@@ -193,7 +162,7 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
       (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
                           *begin != 0 && *why != 0 ? ": " : "", why);
     r.set_message(text.data());
-    r.fields[0] = {"value", event.value};
+    if (words.field != nullptr) r.fields[0] = {words.field, event.value};
   }
   return r;
 }

@@ -9,9 +9,7 @@
 
 #include "app/session/drive_calibration.hpp"
 #include "app/session/recorded_source.hpp"
-#include "app/session/session_runner.hpp"
 #include "app/session/session_source.hpp"
-#include "app/session/starting_calibration.hpp"
 
 namespace vergence::app {
 namespace {

@@ -17,6 +17,7 @@
 
 #include "app/runtime/nearest.hpp"
 #include "app/runtime/service_manager.hpp"
+#include "app/session/calibration_writer.hpp"
 #include "app/session/drive_recorder.hpp"
 #include "app/session/drive_threads.hpp"
 #include "app/session/estimation_loop.hpp"
@@ -36,8 +37,8 @@ class SessionRunner {
   [[nodiscard]] ExitCode run();
 
  private:
-  void open(std::vector<std::string>* faults);
-  void open_files(std::vector<std::string>* faults);
+  void open();
+  void open_files();
   [[nodiscard]] bool trajectory_is_asked_for() const;
   [[nodiscard]] SessionStart session_start() const;
   void print_remarks(Progress* progress);
@@ -65,6 +66,7 @@ class SessionRunner {
   const SignalGuard& signals_;
   EstimationLoop loop_;
   std::unique_ptr<Recorder> recorder_;
+  std::unique_ptr<CalibrationWriter> calibrations_;
   std::unique_ptr<DriveRecorder> recording_;  // null: nothing is recorded
   std::vector<SessionObserver*> observers_;
 
@@ -154,6 +156,7 @@ std::thread SessionRunner::start_estimating() {
 void SessionRunner::leave_no_folder() {
   std::vector<std::string> ignored;
   if (recording_) recording_->close(&ignored);
+  if (calibrations_) calibrations_->close(nullptr, &ignored);
   if (recorder_) (void)recorder_->close();
   discard_session_folder(request_.out, folder_made_);
 }
@@ -165,29 +168,31 @@ void SessionRunner::print_recording_errors(Progress* progress) {
     progress->say("vergence: " + message);
 }
 
-void SessionRunner::open(std::vector<std::string>* faults) {
+void SessionRunner::open() {
   // On a full disk there is room for the folder only when the quota has made some.
   if (const int quota_mb = configuration_.sessions.quota_mb; quota_mb > 0)
     removed_ = keep_session_quota(request_.out, static_cast<std::uint64_t>(quota_mb) * 1'000'000);
   folder_made_ = make_session_folder(request_.out);
   try {
-    open_files(faults);
+    open_files();
   } catch (const std::exception&) {
     leave_no_folder();
     throw;
   }
 }
 
-void SessionRunner::open_files(std::vector<std::string>* faults) {
+void SessionRunner::open_files() {
   Recorder::Options to_record;
   to_record.first = facts_.first;
   to_record.when_full = facts_.when_full;
   to_record.keep_trajectory = trajectory_is_asked_for();
   to_record.ins = loop_.comparison() != nullptr;
-  to_record.keep = calibration_keeper(request_.out, facts_.begin.file, facts_.begin.state);
   to_record.disk_full = facts_.disk_full;
   recorder_ = std::make_unique<Recorder>(request_.out, to_record);
-  observers_ = {recorder_.get()};
+  calibrations_ = std::make_unique<CalibrationWriter>(
+      CalibrationWriter::Options{request_.out, facts_.begin.file, facts_.begin.state,
+                                 facts_.when_full == Recorder::WhenFull::wait});
+  observers_ = {recorder_.get(), calibrations_.get()};
   observers_.insert(observers_.end(), request_.observers.begin(), request_.observers.end());
   if (configuration_.record.any()) {
     recording_ =
@@ -197,8 +202,11 @@ void SessionRunner::open_files(std::vector<std::string>* faults) {
   }
   const SessionStart start = session_start();
   for (SessionObserver* observer : observers_) observer->on_start(start);
-  loop_.open(SessionOutput(observers_), recording_.get());
-  begin_session(request_.out, facts_.begin, facts_.first, &loop_.output(), faults);
+  loop_.open(SessionOutput(observers_), recording_.get(), calibrations_.get());
+  const StartingCalibration& begin = facts_.begin;
+  if (begin.trust != CalibrationTrust::none)
+    loop_.output().post(
+        CalibrationRecord::begin(begin.file.rig, facts_.first, begin.cause, begin.source));
 }
 
 /// Returns true if the end of the session needs all poses in memory.
@@ -242,7 +250,7 @@ std::vector<MemoryRow> SessionRunner::memory() const {
            loop_.comparison_arena().capacity() + (facts_.ins ? facts_.ins->reading_bytes : 0)},
           {"images_bytes", facts_.image_bytes},
           {"recording_bytes", recording_ ? recording_->memory() : 0},
-          {"recorder_bytes", recorder_ ? recorder_->memory() : 0},
+          {"recorder_bytes", recorder_->memory() + calibrations_->memory()},
           {"rings_bytes", sizeof(Recorder) + sizeof(EventLog) + facts_.ring_bytes}};
 }
 
@@ -272,7 +280,6 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
 
 void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput& input,
                                 std::vector<std::string>* faults, Progress* progress) {
-  end_session(request_.out, facts_.begin, input, totals, faults);
   write_session_summary(request_.out, totals, input, faults);
   faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
   for (const std::string& message : recorder_->take_errors()) progress->say("vergence: " + message);
@@ -316,7 +323,7 @@ ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<s
 
 ExitCode SessionRunner::run() {
   std::vector<std::string> faults;
-  open(&faults);
+  open();
   if (request_.print_memory) print_memory_table(memory());
   Progress progress = Progress::on_stderr(request_.quiet);
   const auto allocations_before = AllocationGuard::runtime_allocations();
@@ -333,7 +340,13 @@ ExitCode SessionRunner::run() {
 
   if (recording_) recording_->close(&faults);
   print_recording_errors(&progress);
+  const Estimator& estimator = loop_.estimator();
+  calibrations_->close(estimator.calibrated() ? &estimator.calibration() : nullptr, &faults);
+  loop_.log_kept_calibrations();
+  loop_.event_log().show(&progress, facts_.frames);
   const auto totals = recorder_->close();
+  static_cast<CalibrationTotals&>(*totals) = calibrations_->totals();
+  totals->dropped_records += calibrations_->dropped();
   const SummaryInput input =
       summary_input(*totals, AllocationGuard::runtime_allocations() - allocations_before);
   write_files(*totals, input, &faults, &progress);

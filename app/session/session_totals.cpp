@@ -1,7 +1,5 @@
 #include "app/session/session_totals.hpp"
 
-#include <cmath>
-
 namespace vergence::app {
 
 void BudgetStatistics::add(const FrameWorkload& effort) noexcept {
@@ -12,12 +10,6 @@ void BudgetStatistics::add(const FrameWorkload& effort) noexcept {
   keyframes += window && effort.window_keyframes != FrameWorkload::kAll ? 1 : 0;
   steps += window && effort.window_steps != FrameWorkload::kAll ? 1 : 0;
   windows += window ? 0 : 1;
-}
-
-TotalsBuilder::TotalsBuilder() { totals_.attempts.reserve(kMaxAttempts); }
-
-std::size_t TotalsBuilder::memory() const noexcept {
-  return totals_.attempts.capacity() * sizeof(CalibrationAttempt);
 }
 
 void TotalsBuilder::add(const FrameReport& report) {
@@ -62,20 +54,19 @@ void TotalsBuilder::add(const EventRecord& e) {
   }
 }
 
-bool TotalsBuilder::add(const CalibrationRecord& c) {
-  if (c.focal.measured_px > 0) totals_.focal = c.focal;
+bool CalibrationTotals::add(const CalibrationRecord& c) {
+  if (c.focal.measured_px > 0) focal = c.focal;
   if (c.learnt && !c.accepted) return false;  // the drive goes on: nothing was attempted
-  ++(c.accepted ? totals_.accepted : totals_.rejected);
-  if (totals_.attempts.size() == kMaxAttempts) totals_.attempts.erase(totals_.attempts.begin());
+  ++(c.accepted ? accepted : rejected);
+  if (attempts.size() == kMaxAttempts) attempts.erase(attempts.begin());
   const CalibrationAttempt attempt{c.stamp,          c.cause_word(),       c.reason,  c.accepted,
                                    c.latency_frames, c.calibration.frames, c.solve_ms};
-  totals_.attempts.push_back(attempt);
-  if (FromScratch& search = totals_.from_scratch;
-      !search.found && attempt.cause == "from_scratch") {
+  attempts.push_back(attempt);
+  if (!from_scratch.found && attempt.cause == "from_scratch") {
     if (attempt.accepted)
-      search.found = attempt;
+      from_scratch.found = attempt;
     else
-      ++search.rejected;
+      ++from_scratch.rejected;
   }
   return c.accepted;
 }

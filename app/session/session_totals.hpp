@@ -85,20 +85,29 @@ struct BudgetStatistics {
   void add(const FrameWorkload& effort) noexcept;
 };
 
-/// Totals of a session for summary.json.
-struct SessionTotals {
+inline constexpr std::size_t kMaxAttempts = 1000;  // in summary.json; calibrations.csv has all
+
+/// What the attempts to calibrate came to.
+struct CalibrationTotals {
+  std::vector<CalibrationAttempt> attempts{};  // the newest kMaxAttempts
+  std::uint64_t accepted = 0, rejected = 0;    // of all of them
+  FromScratch from_scratch{};
+  FocalMeasurement focal{};  // the newest
+
+  /// An attempt that was decided. True: it was accepted.
+  bool add(const CalibrationRecord& calibration);
+};
+
+/// What a session has come to: for summary.json.
+struct SessionTotals : CalibrationTotals {
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
   TimeHistogram estimate, decode;                          // ms
   TimeHistogram calibrating;  // ms, of the frames in other states than stereo_odometry and lost
   std::array<TimeHistogram, kStages> stages;
-  std::vector<CalibrationAttempt> attempts;  // the newest kMaxAttempts
-  std::uint64_t accepted = 0, rejected = 0;  // of all of them
-  FromScratch from_scratch{};
   std::optional<Stamp> confirmed{};  // when the drive first confirmed the calibration in use
   std::optional<std::uint64_t> verified_frame{};  // the frame of that stamp
   std::optional<Contradiction>
       contradicted{};                   // the first time that it showed another one than was in use
-  FocalMeasurement focal{};             // the newest
   double path_m = 0;                    // sum of the steps between successive poses
   std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum, read back
   std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
@@ -110,20 +119,11 @@ struct SessionTotals {
   std::vector<std::string> faults;  // a message for each file that is not whole
 };
 
-inline constexpr std::size_t kMaxAttempts = 1000;  // in summary.json; calibrations.csv has all
-
-/// Adds up what the records of a session come to. One thread; takes no memory but at construction:
-/// room for kMaxAttempts.
+/// Adds up what the frames and events of a session come to. One thread; takes no memory.
 class TotalsBuilder {
  public:
-  TotalsBuilder();
-
   void add(const FrameReport& report);
   void add(const EventRecord& event);
-  /// An attempt that was decided. True: it was accepted.
-  bool add(const CalibrationRecord& calibration);
-
-  [[nodiscard]] std::size_t memory() const noexcept;
   [[nodiscard]] SessionTotals& totals() noexcept { return totals_; }
 
  private:

@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>
 
-#include "app/config/calibration_file.hpp"
 #include "app/config/calibration_state.hpp"
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_file.hpp"
 #include "app/devices/rig_settings.hpp"
-#include "app/foreign_calibration/foreign_calibration.hpp"
 #include "app/runtime/errors.hpp"
 #include "core/math/angle.hpp"
 #include "core/math/so3.hpp"
@@ -83,19 +81,7 @@ void name_cameras(const Configuration& c, const std::vector<std::string>& serial
   }
 }
 
-ConfiguredRig configured_rig(const Configuration& c, const RigCalibration& nominal) {
-  ConfiguredRig rig;
-  rig.baseline = nominal.baseline;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(nominal.cameras); ++k) {
-    rig.cameras.push_back(ConfiguredCamera::of(nominal.intrinsics[k], nominal.T_camera_left[k]));
-    rig.cameras[k].serial_key = c.cameras[k].serial;
-    rig.cameras[k].offset = {static_cast<double>(c.cameras[k].offset_x),
-                             static_cast<double>(c.cameras[k].offset_y)};
-  }
-  return rig;
-}
-
-/// Returns true if the configuration has extrinsics. The mock's rig is what it says, also when
+/// Whether the configuration says where the cameras sit. The mock's rig is what it says, also when
 /// it says nothing.
 bool placed_by_configuration(const Configuration& c, int cameras) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {
@@ -121,8 +107,7 @@ void check_same_rig(const std::string& name, const CalibrationFile& file,
           fmt::format("{}: is for images of {} x {} pixels, cameras.{}.size is {} x {}", name,
                       theirs.width, theirs.height, k, ours.width, ours.height));
     if (!file.serials[k].empty() && !configured.serials[k].empty() &&
-        file.serials[k] != configured.serials[k] &&
-        file.serials[k] != configured.configured->cameras[k].serial_key)  // of an older release
+        file.serials[k] != configured.serials[k])
       remarks->push_back(fmt::format(
           "{}: is of a camera {} with the serial \"{}\"; the one that is there has \"{}\"", name, k,
           file.serials[k], configured.serials[k]));
@@ -165,7 +150,7 @@ StartingCalibration starting_calibration(const Configuration& c, const Calibrati
   configured.rig = nominal_rig(c);
   configured.source = "given";
   name_cameras(c, serials, &configured);
-  configured.configured = configured_rig(c, configured.rig);
+  configured.configured = configured_rig(c);
   start.file = configured;
   start.source = "the configuration";
   start.state = state_file(c.rig);

@@ -1,10 +1,8 @@
 #include "app/session/timing_monitor.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <utility>
 
 #include <fmt/format.h>
 

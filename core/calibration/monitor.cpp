@@ -16,7 +16,6 @@ using Kind = MonitorResult::Kind;
 constexpr int kStandingFrames = 3;       // in a row over the threshold while standing
 constexpr double kStandingFactor = 1.5;  // of the threshold: one frame's few hundred errors are
                                          // less normal than the sum of many frames'
-constexpr double kAgrees = 0.5;          // of the threshold: below, a frame agrees
 
 void check(bool good, const char* name, const char* range) {
   if (!good)
@@ -49,14 +48,14 @@ struct Monitor::Parts {
   detail::MonitorResiduals looks{};
   detail::ChangeDetector windows{};
   detail::Decision latest{};
-  int agreed = 0, collapsed = 0, standing_over = 0;
+  int collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
 
   void forget() noexcept {
     looks.reset();
     windows.reset(options, covariance);
     latest = detail::Decision{};
-    agreed = collapsed = standing_over = 0;
+    collapsed = standing_over = 0;
   }
   void watch_collapse(const MonitorFrame& frame) noexcept;
   void watch_matches(const MonitorFrame& frame) noexcept;
@@ -102,8 +101,6 @@ void Monitor::expect_scatter(double bias_px) noexcept { parts_->windows.expect_s
 
 void Monitor::reset() noexcept { parts_->forget(); }
 
-int Monitor::frames_agreed() const noexcept { return parts_->agreed; }
-
 void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
   const bool missing = frame.expected_stereo >= options.collapse_expected &&
                        frame.found_stereo < options.collapse_share * frame.expected_stereo;
@@ -133,10 +130,6 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
   e.spread_life = stereo.spread_life;
   windows.push(e);
   latest = windows.decide();
-  const bool measured = windows.frames() >= static_cast<std::uint64_t>(options.short_window);
-  agreed = measured && latest.kind == Kind::quiet && latest.statistic < kAgrees * options.threshold
-               ? agreed + 1
-               : 0;
 }
 
 void Monitor::Parts::watch_standing(const MonitorFrame& frame,
@@ -146,7 +139,6 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
   latest.statistic = windows.single(look.evidence, look.spread_now) / kStandingFactor;
   if (latest.statistic > options.threshold) {
     if (standing_over++ == 0) standing_from = frame.frame;
-    agreed = 0;
   } else {
     standing_over = 0;
   }
@@ -174,7 +166,6 @@ MonitorResult Monitor::look(const MonitorFrame& frame) noexcept {
   v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
   v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
   if (p.collapsed >= p.options.collapse_frames) {
-    p.agreed = 0;
     v.kind = Kind::collapse;
     v.onset_frame = p.collapsed_from;
     v.frames_since_onset = p.collapsed;

@@ -121,10 +121,6 @@ class Monitor {
   /// Forgets what was seen (the scene was lost); the reference stays.
   void reset() noexcept;
 
-  /// Moving frames in a row that measured something and agreed with the reference: what confirms a
-  /// calibration from a file.
-  [[nodiscard]] int frames_agreed() const noexcept;
-
  private:
   struct Parts;
   Parts* parts_;  // in the arena

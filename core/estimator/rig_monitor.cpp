@@ -12,15 +12,14 @@ using calibration::MonitorResult;
 using odometry::MapPoint;
 
 constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need not be found
-// Sigmas of the reference while a calibration is a claim: of rotation (rad), and of t in baselines.
-// What is off from the first frame is a calibration that does not fit, no knock; only a change is
-// one.
-constexpr std::array kClaimed = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
-// And of one that the drive has confirmed, until the monitor has measured its own: what the lens
-// model leaves in one stretch.
-constexpr std::array kVerified = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
-constexpr double kLearnedCovariance =
-    1.5;                     // times the monitor's own: the scene it was measured in was one
+// Sigmas of a reference that is not known: of rotation (rad), and of t in baselines. What is off
+// from the first frame is a calibration that does not fit, no knock; a change against what the
+// frames before have shown is one.
+constexpr std::array kReference = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
+// And of one that was solved from images and is verified: what the lens model leaves in one
+// stretch. The solve's own sigmas are of no use: turns and principal points are known together
+// only.
+constexpr std::array kFound = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
 constexpr int kWitness = 2;  // frames: a point just made was searched for in the band of the
                              // calibration in use
 // Frames after a new reference in which the monitor does not yet know how far matches spread: what
@@ -31,12 +30,12 @@ constexpr double kFarFromLines = 0.5;
 // Times the distance in the frame before: matches of one that is spoilt lie so much farther off.
 // 2.5 rows of skew on `sand_rover` are 28 times (1.77 px of 0.06).
 constexpr double kSpoilt = 2;
-constexpr int kLearnFrames = 45;      // moving, in agreement
 constexpr double kMovingSpeed = 0.5;  // m/s: slower, and neighbouring images are nearly the same
 
-Mat6 reference_covariance(const std::array<double, 6>& sigma, double baseline) noexcept {
+/// `length`: unit of the last three, m.
+Mat6 squares(const std::array<double, 6>& sigma, double length) noexcept {
   Vec6 spread = Eigen::Map<const Vec6>(sigma.data());
-  spread.tail<3>() *= baseline;
+  spread.tail<3>() *= length;
   return spread.cwiseAbs2().asDiagonal();
 }
 
@@ -85,10 +84,9 @@ void RigMonitor::watch(const RigCalibration& rig, bool confirmed) noexcept {
   expect_scatter(confirmed ? options_.verified_bias_px : options_.unverified_bias_px);
   for (int k = 1; k < cameras_; ++k) {
     Watched& w = camera(k);
-    w.learning = true;
     w.pairing.reset();
     const Transform& T = transform(rig_, k);
-    set_monitor_reference(k, T, reference_covariance(confirmed ? kVerified : kClaimed, T.t.norm()));
+    set_monitor_reference(k, T, squares(confirmed ? kFound : kReference, T.t.norm()));
   }
 }
 
@@ -102,19 +100,6 @@ void RigMonitor::set_monitor_reference(int k, const Transform& T_camera_left,
   Watched& w = camera(k);
   (void)w.monitor.set_reference(T_camera_left, pinhole(rig_, 0), pinhole(rig_, k), covariance);
   w.grace = kGraceFrames;
-}
-
-void RigMonitor::learn_reference(int k, const MonitorResult& verdict) noexcept {
-  Watched& w = camera(k);
-  if (!w.learning || verdict.kind != MonitorResult::Kind::quiet ||
-      w.monitor.frames_agreed() < kLearnFrames)
-    return;
-  w.learning = false;
-  const Transform& T = transform(rig_, k);
-  const double length = T.t.norm();
-  Transform measured = perturbed(T, verdict.offset.head<3>(), verdict.offset.tail<3>());
-  measured.t *= length / measured.t.norm();
-  set_monitor_reference(k, measured, kLearnedCovariance * verdict.covariance);
 }
 
 void RigMonitor::map_rebuilt(const odometry::Map& map, const RigCalibration& rig,
@@ -235,7 +220,6 @@ MonitorResult RigMonitor::monitor_verdict(int k, const odometry::Odometry& odome
     v = MonitorResult{};
     v.undecided = doubted;
   }
-  learn_reference(k, v);
   return v;
 }
 

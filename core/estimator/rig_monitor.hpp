@@ -80,7 +80,6 @@ class RigMonitor {
     calibration::Monitor monitor;
     calibration::DisparityJumpDetector jumps;
     calibration::PairingEvidence pairing;
-    bool learning = false;           // the monitor's reference is a claim, its own not yet measured
     int grace = 0;                   // frames whose verdict is no more than a doubt yet
     Transform T_camera_left_before;  // with the cameras unlinked
   };
@@ -94,9 +93,6 @@ class RigMonitor {
                                                            const odometry::FrameOutcome& outcome,
                                                            const RigFrame& frame, int found,
                                                            bool moving) noexcept;
-  /// A claim does not say how exact it is; the monitor's own measurement does: what it sees in the
-  /// first frames that agree with each other is what must not change.
-  void learn_reference(int k, const calibration::MonitorResult& verdict) noexcept;
   /// Motion of the left camera since the frame watched before.
   [[nodiscard]] Transform step_to(const Transform& T_left_world) noexcept;
   /// Camera k's matches into `stereo_`; how many of them hold poses.

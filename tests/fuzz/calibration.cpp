@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "app/foreign_calibration/foreign_calibration.hpp"
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/runtime/errors.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);

@@ -84,18 +84,17 @@ class Indexer {
     bag_.files = std::move(files);
     for (; file_ < bag_.files.size(); ++file_) scan();
     for (auto& [topic, of_topic] : bag_.images) put_in_order(&of_topic);
-    const auto order = [](auto& topics, const auto& stamp_of) {
+    const auto order = [](auto& topics) {
       for (auto& [name, topic] : topics) {
         std::vector<Stamp> stamps;
-        for (const auto& reading : topic.readings) stamps.push_back(stamp_of(reading));
+        for (const auto& reading : topic.readings) stamps.push_back(reading.stamp);
         const std::vector<std::size_t> kept = ascending(stamps);
         topic.backwards = stamps.size() - kept.size();
         keep(kept, &topic.readings);
       }
     };
-    order(bag_.fixes, [](const RosFix& r) { return r.stamp; });
-    order(bag_.attitudes, [](const RosAttitude& r) { return r.stamp; });
-    order(bag_.odometry, [](const RosOdometry& r) { return r.attitude.stamp; });
+    order(bag_.fixes);
+    order(bag_.attitudes);
   }
   BagIndex take_index() { return std::move(bag_); }
 
@@ -118,8 +117,6 @@ class Indexer {
       return take_reading(message, read_ros_fix, &bag_.fixes[topic]);
     if (type == "sensor_msgs/Imu")
       return take_reading(message, read_ros_attitude, &bag_.attitudes[topic]);
-    if (type == "nav_msgs/Odometry")
-      return take_reading(message, read_ros_odometry, &bag_.odometry[topic]);
     take_other(message);
   }
 

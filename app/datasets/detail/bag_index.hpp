@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -58,7 +57,6 @@ struct BagIndex {
   std::map<std::string, RosCameraInfo> infos{};
   std::map<std::string, ReadingTopic<RosFix>> fixes{};
   std::map<std::string, ReadingTopic<RosAttitude>> attitudes{};  // without orientation: unreadable
-  std::map<std::string, ReadingTopic<RosOdometry>> odometry{};
   std::vector<std::string> others{};   // some topics that are not read, each with its type
   std::vector<std::string> remarks{};  // a message each
 };

@@ -1,6 +1,5 @@
 #include "app/datasets/detail/ros_ins_messages.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "app/datasets/detail/ros_reader.hpp"
@@ -9,7 +8,6 @@ namespace vergence::app::detail {
 namespace {
 
 constexpr double kUnitLength = 1e-2;     // what a quaternion's length may differ from 1 by
-constexpr double kFarthest = 1e7;        // m from the world's origin: a quarter of the earth
 constexpr double kUnknownHeight = 1000;  // m: sigma of a height that is not measured
 
 /// From the variances of two axes, or of one twice.
@@ -70,37 +68,6 @@ std::optional<RosAttitude> read_ros_attitude(std::span<const std::uint8_t> messa
   attitude.tilt_sigma = sigma(covariance[0], covariance[4]);
   attitude.heading_sigma = sigma(covariance[8], covariance[8]);
   return attitude;
-}
-
-std::optional<RosOdometry> read_ros_odometry(std::span<const std::uint8_t> message,
-                                             MessageEncoding encoding) {
-  RosReader in(message, encoding);
-  RosOdometry odometry;
-  RosAttitude& attitude = odometry.attitude;
-  attitude.stamp = in.header();
-  (void)in.text();  // the body's name
-  const auto place = in.doubles<3>();
-  attitude.q_world_body = in.doubles<4>();
-  const auto of_pose = in.doubles<36>();  // m², rad²: x, y, z, about x, y, z
-  const auto linear = in.doubles<3>();
-  (void)in.doubles<3>();
-  const auto of_twist = in.doubles<36>();
-  const auto far = [](double v) { return !(std::abs(v) <= kFarthest); };
-  if (!in.ok() || std::any_of(place.begin(), place.end(), far) ||
-      !make_unit(&attitude.q_world_body))
-    return std::nullopt;
-  constexpr std::size_t kNext = 7;  // from one number of the diagonal to the next
-  odometry.p_world_body = {place[0], place[1], place[2]};
-  odometry.position_sigma = sigma(of_pose[0], of_pose[kNext]);
-  odometry.height_sigma = sigma(of_pose[2 * kNext], of_pose[2 * kNext]);
-  attitude.tilt_sigma = sigma(of_pose[3 * kNext], of_pose[4 * kNext]);
-  attitude.heading_sigma = sigma(of_pose[5 * kNext], of_pose[5 * kNext]);
-  odometry.v_body = {linear[0], linear[1], linear[2]};
-  odometry.velocity_sigma = sigma(of_twist[0], of_twist[kNext]);
-  // Publishers that know no velocity leave it all zero.
-  odometry.velocity_valid = std::none_of(linear.begin(), linear.end(), far) &&
-                            (odometry.v_body.norm() > 0 || odometry.velocity_sigma > 0);
-  return odometry;
 }
 
 }  // namespace vergence::app::detail

@@ -5,7 +5,6 @@
 #include <span>
 
 #include "app/datasets/detail/bag_scan.hpp"
-#include "core/math/types.hpp"
 #include "core/types/ins_sample.hpp"
 
 /// The messages of ROS that an INS publishes, of ROS 2 (CDR) and ROS 1. By REP 103 the world is
@@ -32,17 +31,6 @@ struct RosAttitude {
 /// The orientation of a sensor_msgs/Imu. Also nothing: it has none, by its covariance or its
 /// length.
 [[nodiscard]] std::optional<RosAttitude> read_ros_attitude(std::span<const std::uint8_t> message,
-                                                           MessageEncoding encoding);
-
-/// nav_msgs/Odometry.
-struct RosOdometry {
-  RosAttitude attitude{};
-  Vec3 p_world_body = Vec3::Zero();                                 // m
-  Vec3 v_body = Vec3::Zero();                                       // m/s, in the body's axes
-  bool velocity_valid = false;                                      // else it is not known
-  double position_sigma = 0, height_sigma = 0, velocity_sigma = 0;  // m, m/s; 0: not known
-};
-[[nodiscard]] std::optional<RosOdometry> read_ros_odometry(std::span<const std::uint8_t> message,
                                                            MessageEncoding encoding);
 
 }  // namespace vergence::app::detail

@@ -17,8 +17,8 @@
 #include "app/config/calibration_file.hpp"
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/unit/app/calibration/board_picture.hpp"
-#include "tests/unit/app/calibration/board_scene.hpp"
+#include "tests/unit/app/checkerboard/board_picture.hpp"
+#include "tests/unit/app/checkerboard/board_scene.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {

@@ -15,8 +15,8 @@
 #include "tests/support/refusal.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/system/gige/socket_buffer.hpp"
-#include "tests/unit/app/calibration/board_picture.hpp"
-#include "tests/unit/app/calibration/board_scene.hpp"
+#include "tests/unit/app/checkerboard/board_picture.hpp"
+#include "tests/unit/app/checkerboard/board_scene.hpp"
 #include "tests/unit/app/commands/run_vergence.hpp"
 
 namespace vergence::test {

@@ -36,8 +36,8 @@ WORLDS_OF_THEIR_OWN = ("firmware_iface/trigger/board/", "tests/rigs/kernel/")
 
 # Libraries (the include's first folder) → where they may be used.
 LIBRARIES = {
-    "opencv2": ("app/calibration/", "tests/"),  # the checkerboard tool; the program needs none of it
-    "opencv": ("app/calibration/", "tests/"),
+    "opencv2": ("app/checkerboard/", "tests/"),  # the checkerboard tool; the program needs none of it
+    "opencv": ("app/checkerboard/", "tests/"),
     "fastdds": ("app/ros2/", "tests/"),  # the ROS 2 bridge; the program links no DDS
     "fastrtps": ("app/ros2/", "tests/"),
     "dds": ("tests/",),  # Cyclone DDS, which reads what the bridge publishes
@@ -269,7 +269,7 @@ def self_test():
         ("tests/rigs/kernel/a.c", '#include "core.h"', False),
         ("tests/rigs/emulators/a.c", '#include "core.h"', True),
         ("app/report/a.cpp", '#include "core/estimator/estimator.hpp"', False),
-        ("app/calibration/a.cpp", "#include <opencv2/core.hpp>", False),
+        ("app/checkerboard/a.cpp", "#include <opencv2/core.hpp>", False),
         ("app/report/a.cpp", "#include <opencv2/core.hpp>", True),
         ("app/datasets/a.cpp", "#include <png.h>", False),
         ("app/report/a.cpp", "#include <png.h>", True),

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/commands/commands.hpp"
-#include "app/evaluation/evaluation_report.hpp"
+#include "app/commands/evaluation_report.hpp"
 #include "app/session/ins_file.hpp"
 #include "core/comparison/comparison.hpp"
 #include "core/comparison/geodesy.hpp"

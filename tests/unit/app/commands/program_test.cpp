@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <sstream>
 #include <string>
-#include <vector>
 
 #include <gtest/gtest.h>
 

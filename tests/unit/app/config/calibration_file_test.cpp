@@ -1,6 +1,5 @@
 #include "app/config/calibration_file.hpp"
 
-#include <cmath>
 #include <string>
 #include <tuple>
 #include <vector>

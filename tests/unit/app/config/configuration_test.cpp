@@ -2,7 +2,6 @@
 
 #include <sys/stat.h>
 
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -132,11 +131,11 @@ TEST(Configuration, AListOfWhatIsRecordedSwitchesItsWordsOn) {
   EXPECT_EQ(c.record.poses, 1);
   EXPECT_EQ(c.record.ins, 0);
   EXPECT_EQ(c.record.images, 1);
-  const auto keys = parse_configuration("record: {images: on, event_window_s: 30}\n", "drive.yaml",
+  const auto keys = parse_configuration("record: {images: on, split_mb: 30}\n", "drive.yaml",
                                         {"record=[ins]", "record.images=off"});
   EXPECT_EQ(keys.record.ins, 1);
   EXPECT_EQ(keys.record.images, 0);
-  EXPECT_EQ(keys.record.event_window_s, 30);
+  EXPECT_EQ(keys.record.split_mb, 30);
 }
 
 TEST(Configuration, aPresetIsWhatKeysAreThatNobodyGave) {

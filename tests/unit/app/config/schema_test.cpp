@@ -1,6 +1,5 @@
 #include "app/config/schema.hpp"
 
-#include <cmath>
 #include <fstream>
 #include <limits>
 #include <sstream>

@@ -56,7 +56,6 @@ class BagIns : public ::testing::TestWithParam<BagKind> {
                        image_message(wire(), kStart, {8, 8, 8, "mono8", std::string(64, 'x')}));
     writer_->channel(3, "/fix", "sensor_msgs/NavSatFix");
     writer_->channel(4, "/imu/data", "sensor_msgs/Imu");
-    writer_->channel(5, "/odom", "nav_msgs/Odometry");
   }
   [[nodiscard]] static Wire wire() { return GetParam().wire(); }
   void fix(double t, std::int8_t status = 0, std::uint16_t channel = 3) {
@@ -68,16 +67,6 @@ class BagIns : public ::testing::TestWithParam<BagKind> {
   void imu(double t, std::uint16_t channel = 4) {
     write(channel, t, [&](std::int64_t ns) {
       return imu_message(wire(), ns, coefficients(attitude(t)), 1e-4);
-    });
-  }
-  /// In a world that is turned by `turn` against east, north, up and has its origin elsewhere.
-  void odometry(double t, double turn) {
-    const Mat3 R_world_enu = yaw(-turn);
-    const Vec3 p = R_world_enu * place(t) + Vec3(5, -3, 2);
-    write(5, t, [&](std::int64_t ns) {
-      return odometry_message(
-          wire(), ns,
-          {{p.x(), p.y(), p.z()}, coefficients(R_world_enu * attitude(t)), {15.7, 0, 0}, 0.04});
     });
   }
   template <typename Make>
@@ -137,47 +126,6 @@ TEST_P(BagIns, FixWithoutOrientationAroundItHasNoAttitude) {
   EXPECT_TRUE(says(all(ins), "2 fixes have no orientation of /imu/data within 100 ms"));
 }
 
-TEST_P(BagIns, OdometryIsPlacedAndTurnedByTheFixes) {
-  for (int i = 0; i <= 400; ++i) odometry(0.05 * i, 0.7);
-  for (int i = 0; i <= 20; ++i) fix(i);
-  const RecordedIns ins = open();
-  ASSERT_EQ(ins.readings.size(), 401U);
-  for (const RecordedReading& r : ins.readings) {
-    const InsSample& s = r.sample;
-    // Noise-free, the fit is exact but for the plane's axes at the first fix against those at the
-    // origin: up bends by (200 m)²/2R = 3 mm.
-    EXPECT_LT(error(s).norm(), 5e-3);
-    // ... and a meridian's direction by 200 m / R · tan 27.5° = 2e-5 rad.
-    const double t = (s.stamp - Stamp(kStart)).to_seconds();
-    EXPECT_LT((rotation_of(s) - attitude(t)).norm(), 1e-4);
-    EXPECT_NEAR(std::hypot(s.velocity_enu[0], s.velocity_enu[1], s.velocity_enu[2]), 15.7, 1e-9);
-    EXPECT_TRUE(s.velocity_valid);
-    EXPECT_DOUBLE_EQ(s.position_sigma, 0.2);
-  }
-  EXPECT_TRUE(says(all(ins), "turned by 40.1 deg"));
-}
-
-TEST_P(BagIns, OdometryPausesWhereTheReceiverHasNoFix) {
-  for (int i = 0; i <= 100; ++i) odometry(0.1 * i, 0);
-  for (int i = 0; i <= 10; ++i) fix(i, static_cast<std::int8_t>(i == 5 ? -1 : 0));
-  for (const RecordedReading& r : open().readings) {
-    const double t = (r.sample.stamp - Stamp(kStart)).to_seconds();
-    EXPECT_EQ(r.sample.fix, t > 4.99 && t < 5.99 ? FixStatus::dead_reckoning : FixStatus::fix_3d)
-        << t;
-  }
-}
-
-TEST_P(BagIns, OdometryAloneSaysWhatItCannotTell) {
-  for (int i = 0; i <= 20; ++i) odometry(0.05 * i, 0);
-  const RecordedIns ins = open();
-  ASSERT_EQ(ins.readings.size(), 21U);
-  EXPECT_NEAR(ins.readings[0].sample.position.latitude_deg, 0, 1e-3);
-  EXPECT_TRUE(says(all(ins), "no NavSatFix says where on the earth it is"));
-  // Distances are those of the world.
-  const LocalTangentPlane plane(ins.readings[0].sample.position);
-  EXPECT_NEAR(plane.to_enu(ins.readings[20].sample.position).norm(), place(1).norm(), 1e-3);
-}
-
 TEST_P(BagIns, SeveralTopicsAreListedAndOneIsChosen) {
   writer_->channel(6, "/gps/fix", "sensor_msgs/NavSatFix");
   for (const double t : {0.0, 0.01}) imu(t);
@@ -187,20 +135,10 @@ TEST_P(BagIns, SeveralTopicsAreListedAndOneIsChosen) {
   EXPECT_TRUE(ins.readings.empty());
   EXPECT_TRUE(says(all(ins),
                    "choose with --ins-topic and --imu-topic; topics of NavSatFix: /fix, "
-                   "/gps/fix; of Imu with an orientation: /imu/data; of Odometry: none"));
+                   "/gps/fix; of Imu with an orientation: /imu/data"));
   ins = open({"", "", "/gps/fix", ""});
   ASSERT_EQ(ins.readings.size(), 1U);
   EXPECT_EQ(ins.readings[0].sample.stamp.ns(), kStart + 6 * kMs);
-}
-
-TEST_P(BagIns, OneIsChosenOfFixesAndOdometry) {
-  for (int i = 0; i < 3; ++i) {
-    imu(0.01 * i);
-    fix(0.01 * i);
-    odometry(0.01 * i + 0.005, 0);
-  }
-  EXPECT_EQ(open().readings[0].sample.stamp.ns(), kStart) << "NavSatFix and Imu come first";
-  EXPECT_EQ(open({"", "", "/odom", ""}).readings[0].sample.stamp.ns(), kStart + 5 * kMs);
 }
 
 TEST_P(BagIns, TopicThatIsNoneIsRefused) {

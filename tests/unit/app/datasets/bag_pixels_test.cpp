@@ -1,7 +1,6 @@
 // Decoded pixels of each encoding of sensor_msgs/Image and CompressedImage, in both containers.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <memory>
 

@@ -5,8 +5,6 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <fstream>
-
 #include "app/datasets/image_writer.hpp"
 #include "app/runtime/errors.hpp"
 #include "tests/support/refusal.hpp"

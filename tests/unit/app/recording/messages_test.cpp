@@ -1,7 +1,6 @@
 #include "app/recording/messages.hpp"
 
 #include <array>
-#include <cstring>
 #include <string>
 
 #include <gtest/gtest.h>

@@ -3,11 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <string>
 #include <thread>
 
@@ -234,24 +232,6 @@ TEST(Recording, aDiskThatTakesNoFileAtTheBeginningIsRefused) {
     o.files.disk = &disk;
     EXPECT_THROW(Recording(folder.path(), o), InputError) << error;
   }
-}
-
-TEST(Recording, keepsWhatIsAroundAnEvent) {
-  const TemporaryFolder folder;
-  Recording::Options o = options();
-  o.when_full = Recording::WhenFull::drop;
-  o.keep = Duration::nanoseconds(100'000'000);  // messages are 1 ms apart
-  Recording recording(folder.path(), o);
-  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(post(&recording, i));
-  std::this_thread::sleep_for(200ms);
-  recording.mark_event(Stamp(1'000'000'000));
-  for (int i = 1000; i < 1100; ++i) ASSERT_TRUE(post(&recording, i));
-  std::this_thread::sleep_for(300ms);
-  for (int i = 1100; i < 2000; ++i) ASSERT_TRUE(post(&recording, i));
-  recording.close();
-  const auto kept = numbers(folder / "drive.mcap");
-  EXPECT_EQ(kept, sequence(899, 1100));
-  EXPECT_EQ(recording.counters().passed_over, 2000U - kept.size());
 }
 
 TEST(Recording, postingAndWritingTakeNoMemory) {

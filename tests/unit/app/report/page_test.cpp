@@ -2,11 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "app/report/report.hpp"
@@ -46,9 +44,8 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
   const std::string html = page_of(folder.path());
   EXPECT_TRUE(self_contained(html));
   EXPECT_EQ(test::xml_problem({html}), "");
-  for (const char* part :
-       {"0.74 %", "rotation x, degrees", "translation z, mm", ">verified</text>", ">unchanged</td>",
-        "± 0.10 % at 20 m,", "0.90 → 0.21 px", "(20 times)", "0.0001, 0, 0, 0.001, 0, 0"})
+  for (const char* part : {"0.74 %", "rotation x, degrees", "translation z, mm", ">verified</text>",
+                           ">unchanged</td>", "± 0.10 % at 20 m,", "0.90 → 0.21 px", "(20 times)"})
     EXPECT_TRUE(contains(html, part)) << part;
   EXPECT_FALSE(contains(html, "What is missing"));
   EXPECT_FALSE(contains(html, ">nan")) << "a number that is not there has no row";

@@ -44,13 +44,6 @@ class RecordedPoses {
       recorder_.on_pose(sample);
     }
   }
-  void mark() {
-    EventRecord event;
-    event.stamp = stamp();
-    event.kind = "mark";
-    recorder_.on_event(event);
-  }
-  [[nodiscard]] DriveRecorder& recorder() { return recorder_; }
   void close() {
     std::vector<std::string> faults;
     recorder_.close(&faults);
@@ -96,27 +89,6 @@ TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
   drive.close();
   EXPECT_EQ(drive.rigs("drive_0.mcap"), 1);
   EXPECT_EQ(drive.rigs("drive_1.mcap"), 1);
-}
-
-// The queues are as large as the time asked for needs.
-TEST(DriveRecorder, allOfTheTimeBeforeAnEventIsKept) {
-  constexpr int kKept = 20 * 300;
-  RecordedPoses drive({"record=[poses]", "record.event_window_s=300"});
-  drive.drive(kKept + 100);
-  drive.mark();
-  drive.drive(1);
-  drive.close();
-  EXPECT_GE(drive.messages("/vergence/odometry", "drive.mcap"), kKept);
-}
-
-TEST(DriveRecorder, whatIsKeptAroundAnEventSaysWhereTheCamerasAre) {
-  RecordedPoses drive({"record=[poses]", "record.event_window_s=3"});
-  drive.drive(200);                    // 10 s
-  std::this_thread::sleep_for(300ms);  // the writer passes over the first of them
-  drive.mark();
-  drive.drive(2);
-  drive.close();
-  EXPECT_GE(drive.rigs("drive.mcap"), 2);
 }
 
 }  // namespace

@@ -10,9 +10,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
 #include "app/session/records.hpp"
-#include "app/session/session_files.hpp"
 #include "core/memory/allocation_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
@@ -95,9 +95,12 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   change.to = State::stereo_odometry;
   change.why = "trusted calibration";
   recorder.on_event(EventRecord::of(change));
+  change.kind = EstimatorEvent::Kind::time_gap;
+  change.value = 2.5;
+  recorder.on_event(EventRecord::of(change));
   (void)recorder.close();
   const auto lines = lines_of(folder / "events.jsonl");
-  ASSERT_EQ(lines.size(), 2U);
+  ASSERT_EQ(lines.size(), 3U);
   const auto torn = nlohmann::json::parse(lines[0]), state = nlohmann::json::parse(lines[1]);
   EXPECT_EQ(torn["stamp_ns"], kStamp);
   EXPECT_EQ(torn["kind"], "image_truncated");
@@ -108,6 +111,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   EXPECT_EQ(state["kind"], "state");
   EXPECT_EQ(state["message"], "initialising to stereo_odometry: trusted calibration");
   EXPECT_EQ(state["fields"]["to"], "stereo_odometry");
+  EXPECT_EQ(nlohmann::json::parse(lines[2])["fields"], nlohmann::json({{"gap_s", 2.5}}));
 }
 
 TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
@@ -120,21 +124,13 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
     if (!std::exchange(hung, true)) (void)all_posted.wait_for(std::chrono::seconds(10));
     return false;
   };
-  std::vector<int> kept;
-  options.keep = [&kept](const RigCalibration& rig, bool /*found*/) {
-    kept.push_back(rig.frames);
-    return Kept{false, "kept"};
-  };
   Recorder recorder(folder.path(), options);
   constexpr std::uint64_t kFrames = 1000;  // many times what may wait
   for (std::uint64_t i = 0; i < kFrames; ++i) recorder.on_report(pose(i, PoseStatus::ok, 0));
-  recorder.on_calibration(CalibrationRecord{decision(true)});
   posted.set_value();
   const auto totals = recorder.close();
   EXPECT_GT(totals->dropped_records, 0U);
   EXPECT_GT(totals->read, 0U);
-  EXPECT_EQ(kept, std::vector<int>{60})
-      << "a calibration is no pose, of which the next one says the same";
   EXPECT_EQ(totals->read + totals->dropped_records, kFrames);
   EXPECT_EQ(lines_of(folder / "poses.csv").size(), totals->read + 1);
   EXPECT_TRUE(totals->trajectory.empty());
@@ -159,14 +155,12 @@ TEST(Recorder, postingAllocatesNothing) {
   Recorder recorder(folder.path(), {.ins = true});
   EstimatorEvent event;
   event.why = "a state changed";
-  const CalibrationDecision made = decision(false);
   const auto before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
     for (std::uint64_t i = 0; i < 1000; ++i) {
       recorder.on_report(pose(i, PoseStatus::ok, 0));
       recorder.on_event(EventRecord::of(event));
-      recorder.on_calibration(CalibrationRecord{made});
       recorder.on_reading(InsRecord{});
     }
   }

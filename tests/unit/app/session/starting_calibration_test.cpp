@@ -2,13 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <optional>
 #include <string>
 
 #include "app/config/calibration_state.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/session/session_files.hpp"
 #include "core/math/so3.hpp"
 #include "tests/unit/app/session/recorder_inputs.hpp"
 
@@ -88,14 +85,6 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
   ASSERT_EQ(other.remarks.size(), 1U);
   EXPECT_NE(other.remarks[0].find("\"4711\", the one that is there \"4712\""), std::string::npos)
       << other.remarks[0];
-
-  // Files of older releases have the address: no word of them, for ever.
-  CalibrationFile old = drive("4711").file;
-  old.serials[0] = "192.168.7.2";
-  write_calibration(folder / "old.yaml", old);
-  EXPECT_TRUE(starting_calibration(c, {.file = folder / "old.yaml"}, {"4711", ""}).remarks.empty());
-  write_calibration(folder / "calibration_state.yaml", old);
-  EXPECT_EQ(drive("4711").trust, CalibrationTrust::state_file);
 }
 
 TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
@@ -107,38 +96,6 @@ TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::none);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::state_file);
-}
-
-/// Message about a calibration when files cannot be written.
-Kept kept(bool session_fails, bool has_state, bool state_fails) {
-  const test::TemporaryFolder folder;
-  const auto in_the_way = [&](const char* file) {
-    std::filesystem::create_directories(folder / (std::string(file) + ".new"));
-  };
-  std::filesystem::create_directory(folder / "session");
-  if (session_fails) in_the_way("session/calibration.yaml");
-  if (state_fails) in_the_way("state.yaml");
-  CalibrationFile file;
-  file.rig = two_cameras();
-  file.rig.baseline = file.rig.T_camera_left[1].t.norm();
-  const auto state = has_state ? std::optional(folder / "state.yaml") : std::nullopt;
-  const Kept kept = calibration_keeper(folder / "session", file, state)(file.rig, true);
-  EXPECT_EQ(std::filesystem::exists(folder / "state.yaml"), has_state && !state_fails);
-  return kept;
-}
-
-TEST(CalibrationStateWriter, whetherItIsKeptIsWhetherTheNextDriveHasIt) {
-  EXPECT_TRUE(kept(false, false, false).message.empty());
-  EXPECT_FALSE(kept(false, true, false).failed);
-  EXPECT_TRUE(kept(false, true, true).failed);
-  EXPECT_TRUE(kept(true, true, true).failed);
-  EXPECT_TRUE(kept(true, false, false).failed) << "the session's is all there is to keep";
-
-  const Kept here = kept(true, true, false);
-  EXPECT_FALSE(here.failed);
-  EXPECT_TRUE(here.message.starts_with("the calibration is kept for the next drive: "))
-      << here.message;
-  EXPECT_NE(here.message.find("session/calibration.yaml"), std::string::npos) << here.message;
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include "app/runtime/background_thread.hpp"
 #include "app/session/timing_monitor.hpp"
 

@@ -139,7 +139,6 @@ TEST(Monitor, isQuietWhenNothingHappensStandingIncluded) {
       standing += trial.frame().moving ? 0 : 1;
     }
     EXPECT_GT(standing, 900);
-    EXPECT_GT(trial.monitor().frames_agreed(), 1000);
   }
 }
 
@@ -188,18 +187,6 @@ TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
     EXPECT_EQ(trial.monitor().look(dark).kind, Kind::quiet);
   }
   EXPECT_EQ(trial.monitor().look(night).kind, Kind::collapse);
-}
-
-TEST(Monitor, countsMovingFramesThatAgree) {
-  MonitorTrial still(street(0, 9));
-  for (int i = 0; i < 60; ++i) (void)still.step();
-  EXPECT_EQ(still.monitor().frames_agreed(), 0);
-  MonitorTrial moving(street(8, 9));
-  for (int i = 0; i < 60; ++i) (void)moving.step();
-  EXPECT_EQ(moving.monitor().frames_agreed(),
-            57);  // of 59 that move: the shortest window wants three
-  moving.monitor().reset();
-  EXPECT_EQ(moving.monitor().frames_agreed(), 0);
 }
 
 TEST(Monitor, leavesOutWhatIsNotANumber) {

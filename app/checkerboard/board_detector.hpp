@@ -1,0 +1,20 @@
+#pragma once
+#include "app/checkerboard/board_pattern.hpp"
+#include "app/checkerboard/checkerboard.hpp"
+
+namespace vergence::app {
+
+/// At least six corners (of a board of fewer: all), and neither all nor all but one of them on a
+/// line. With others there is no homography, and nothing that begins with one: OpenCV throws, at
+/// that view and at all views together.
+[[nodiscard]] bool determine_a_homography(const BoardCorners& corners, const BoardPattern& board);
+
+/// Detects the target in an image: of a checkerboard all corners or none, of an AprilGrid or a
+/// ChArUco board those that are there, if they determine a homography.
+///
+/// `reference`: what another camera of the rig, mounted the same way up, shows of it at the same
+/// time; it decides where the board does not tell its ends. May be empty.
+[[nodiscard]] BoardCorners find_board(const ImageView& image, const BoardPattern& board,
+                                      BoardSearch search, const BoardCorners& reference);
+
+}  // namespace vergence::app

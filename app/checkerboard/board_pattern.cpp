@@ -1,0 +1,142 @@
+#include "app/checkerboard/board_pattern.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr int kFewest = 3, kMax = 100;                          // inner corners a side
+constexpr int kMaxTagsAlong = 24, kFamily = 587;                // codes of 36h11
+constexpr double kSmallestSquare = 0.001, kLargest = 10.0;      // m
+constexpr double kNarrowest = 0.05, kWidest = 2;                // gap over the side of a tag
+constexpr double kSmallestMarker = 0.3, kLargestMarker = 0.95;  // of the side of a square
+
+bool parse_whole(std::string_view text, int* value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+/// `9x6`.
+bool parse_product(std::string_view text, BoardPattern* board) {
+  const std::size_t x = text.find('x');
+  return x != std::string_view::npos && parse_whole(text.substr(0, x), &board->columns) &&
+         parse_whole(text.substr(x + 1), &board->rows);
+}
+
+std::string upper(std::string_view text) {
+  std::string result(text);
+  std::transform(result.begin(), result.end(), result.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return result;
+}
+
+std::size_t parse_dictionary(const std::string& text) {
+  constexpr std::string_view kPrefix = "DICT_";
+  std::string name = upper(text);
+  if (name.starts_with(kPrefix)) name.erase(0, kPrefix.size());
+  for (std::size_t i = 0; i < kMarkerDictionaries.size(); ++i)
+    if (upper(kMarkerDictionaries[i]) == name) return i;
+  throw InputError(
+      fmt::format("--dictionary is \"{}\"; it takes {}", text.substr(0, 60),
+                  fmt::join(kMarkerDictionaries.begin(), kMarkerDictionaries.end(), ", ")));
+}
+
+void check_side(double square) {
+  if (!(square >= kSmallestSquare && square <= kLargest))
+    throw InputError(
+        fmt::format("--square is {}; it takes the side of a square in metres, {} to {}", square,
+                    kSmallestSquare, kLargest));
+}
+
+}  // namespace
+
+std::size_t BoardPattern::corners() const noexcept {
+  const std::size_t n = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  return kind == BoardKind::aprilgrid ? 4 * n : n;
+}
+
+Vec3 BoardPattern::corner(std::size_t i) const noexcept {
+  const std::size_t at = kind == BoardKind::aprilgrid ? i / 4 : i;
+  const auto n = static_cast<std::size_t>(columns);
+  const std::size_t in_column = at % n, in_row = at / n;
+  const auto column = static_cast<double>(in_column), row = static_cast<double>(in_row);
+  if (kind != BoardKind::aprilgrid) return {square * column, square * row, 0};
+  const double pitch = square * (1 + spacing);
+  const bool right = i % 4 == 1 || i % 4 == 2, upper = i % 4 >= 2;
+  return {pitch * column + (right ? square : 0), pitch * row + (upper ? square : 0), 0};
+}
+
+std::string BoardPattern::words() const {
+  if (kind == BoardKind::charuco)
+    return fmt::format("{}x{} squares with markers {}", columns + 1, rows + 1,
+                       kMarkerDictionaries[dictionary]);
+  return fmt::format("{}x{} {}", columns, rows,
+                     kind == BoardKind::aprilgrid ? "tags" : "inner corners");
+}
+
+BoardPattern parse_checkerboard(const std::string& inner_corners, double square) {
+  BoardPattern board;
+  if (!parse_product(inner_corners, &board) || std::min(board.columns, board.rows) < kFewest ||
+      std::max(board.columns, board.rows) > kMax)
+    throw InputError(fmt::format(
+        "--checkerboard is \"{}\"; it takes the inner corners along and down, {} to {}, like 9x6",
+        inner_corners.substr(0, 60), kFewest, kMax));
+  if (board.columns == board.rows)
+    throw InputError(fmt::format(
+        "--checkerboard {}: a board with as many corners along as down looks the same after a "
+        "quarter turn; take another",
+        inner_corners));
+  check_side(square);
+  board.square = square;
+  return board;
+}
+
+BoardPattern parse_aprilgrid(const std::string& tags, double side, double spacing) {
+  BoardPattern board;
+  board.kind = BoardKind::aprilgrid;
+  if (!parse_product(tags, &board) || std::min(board.columns, board.rows) < 1 ||
+      std::max(board.columns, board.rows) > kMaxTagsAlong || board.columns * board.rows > kFamily)
+    throw InputError(
+        fmt::format("--aprilgrid is \"{}\"; it takes the tags along and up, 1 to {}, like 6x6",
+                    tags.substr(0, 60), kMaxTagsAlong));
+  check_side(side);
+  if (!(spacing >= kNarrowest && spacing <= kWidest))
+    throw InputError(fmt::format(
+        "--spacing is {}; it takes the gap between two tags over the side of a tag, {} to {}: 0.3 "
+        "on Kalibr's own sheets",
+        spacing, kNarrowest, kWidest));
+  board.square = side;
+  board.spacing = spacing;
+  return board;
+}
+
+BoardPattern parse_charuco(const std::string& squares, double square, double marker,
+                           const std::string& dictionary) {
+  BoardPattern board;
+  board.kind = BoardKind::charuco;
+  if (!parse_product(squares, &board) || std::min(board.columns, board.rows) < kFewest ||
+      std::max(board.columns, board.rows) > kMax)
+    throw InputError(
+        fmt::format("--charuco is \"{}\"; it takes the squares along and down, {} to {}, like 11x8",
+                    squares.substr(0, 60), kFewest, kMax));
+  check_side(square);
+  if (!(marker >= kSmallestMarker * square && marker <= kLargestMarker * square))
+    throw InputError(
+        fmt::format("--marker is {}; it takes the side of a marker in metres, {} to {} with this "
+                    "--square",
+                    marker, kSmallestMarker * square, kLargestMarker * square));
+  --board.columns, --board.rows;  // inner corners
+  board.square = square;
+  board.marker = marker;
+  board.dictionary = parse_dictionary(dictionary);
+  return board;
+}
+
+}  // namespace vergence::app

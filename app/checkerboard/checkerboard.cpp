@@ -1,0 +1,113 @@
+#include "app/checkerboard/checkerboard.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace vergence::app {
+namespace {
+
+constexpr int kLargeImage =
+    1200;  // px: from this width on squares may be too large for the detector's windows
+constexpr int kNarrowestWindow = 2, kWidestWindow = 11;  // px, half windows
+constexpr double kWindowOfSquare = 0.3;  // half window over the smallest distance of two corners
+constexpr double kBlur =
+    0.7;  // px: the refinement's interpolation shifts corners of sharper images
+constexpr int kRefineSteps = 100;
+constexpr double kRefineTolerance = 1e-4;  // px
+
+cv::Mat matrix_of(const ImageView& image) {
+  // cv::Mat has no view of constant pixels; nothing below writes them.
+  return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data),
+          static_cast<std::size_t>(image.stride)};
+}
+
+double smallest_spacing(const std::vector<cv::Point2f>& corners, const BoardPattern& board) {
+  const auto n = static_cast<std::size_t>(board.columns);
+  double least = 1e9;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if ((i + 1) % n != 0) least = std::min(least, cv::norm(corners[i + 1] - corners[i]));
+    if (i + n < corners.size()) least = std::min(least, cv::norm(corners[i + n] - corners[i]));
+  }
+  return least;
+}
+
+bool detect(const cv::Mat& image, const BoardPattern& board, BoardSearch search,
+            std::vector<cv::Point2f>* corners) {
+  const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE |
+                    (search == BoardSearch::quick ? cv::CALIB_CB_FAST_CHECK : 0);
+  const cv::Size size(board.columns, board.rows);
+  if (image.cols < kLargeImage) return cv::findChessboardCorners(image, size, *corners, flags);
+  cv::Mat half;
+  cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  if (cv::findChessboardCorners(half, size, *corners, flags)) {
+    for (cv::Point2f& c : *corners)
+      c = 2 * c + cv::Point2f(0.5F, 0.5F);  // centres of pixels at integers
+    return true;
+  }
+  return search == BoardSearch::thorough && cv::findChessboardCorners(image, size, *corners, flags);
+}
+
+/// Rows run to the right when columns run down: a board seen from its front.
+void make_right_handed(const BoardPattern& board, std::vector<cv::Point2f>* corners) {
+  const auto n = static_cast<std::ptrdiff_t>(board.columns);
+  const cv::Point2f along = corners->at(static_cast<std::size_t>(n - 1)) - corners->front();
+  const cv::Point2f down =
+      corners->at(corners->size() - static_cast<std::size_t>(n)) - corners->front();
+  if (along.cross(down) > 0) return;
+  for (auto row = corners->begin(); row != corners->end(); row += n) std::reverse(row, row + n);
+}
+
+/// Positive where the square right and below of the first corner is brighter than its neighbours.
+double first_square_brighter(const cv::Mat& image, const BoardPattern& board,
+                             const std::vector<cv::Point2f>& corners) {
+  const auto n = static_cast<std::size_t>(board.columns);
+  double sum = 0;
+  for (std::size_t row = 0; row + 1 < static_cast<std::size_t>(board.rows); ++row)
+    for (std::size_t col = 0; col + 1 < n; ++col) {
+      const std::size_t i = row * n + col;
+      const cv::Point2f c =
+          0.25F * (corners[i] + corners[i + 1] + corners[i + n] + corners[i + n + 1]);
+      const int x = std::clamp(static_cast<int>(std::lround(c.x)), 0, image.cols - 1);
+      const int y = std::clamp(static_cast<int>(std::lround(c.y)), 0, image.rows - 1);
+      sum += ((row + col) % 2 == 0 ? 1.0 : -1.0) * image.at<std::uint8_t>(y, x);
+    }
+  return sum;
+}
+
+}  // namespace
+
+std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image,
+                                                   const BoardPattern& board, BoardSearch search) {
+  if (image.empty()) return std::nullopt;
+  const cv::Mat pixels = matrix_of(image);
+  std::vector<cv::Point2f> corners;
+  if (!detect(pixels, board, search, &corners) || corners.size() != board.corners())
+    return std::nullopt;
+  const int window =
+      std::clamp(static_cast<int>(kWindowOfSquare * smallest_spacing(corners, board)),
+                 kNarrowestWindow, kWidestWindow);
+  cv::Mat soft;
+  cv::GaussianBlur(pixels, soft, {}, kBlur);
+  cv::cornerSubPix(
+      soft, corners, {window, window}, {-1, -1},
+      {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
+  make_right_handed(board, &corners);
+  if (board.tells_its_ends() && first_square_brighter(pixels, board, corners) < 0)
+    std::reverse(corners.begin(), corners.end());
+  std::vector<Vec2> found;
+  found.reserve(corners.size());
+  for (const cv::Point2f& c : corners) found.emplace_back(c.x, c.y);
+  return found;
+}
+
+void same_way_up(const std::vector<Vec2>& reference, std::vector<Vec2>* corners) {
+  if (reference.empty() || corners->empty()) return;
+  const Vec2 there = reference.back() - reference.front(),
+             here = corners->back() - corners->front();
+  if (there.dot(here) < 0) std::reverse(corners->begin(), corners->end());
+}
+
+}  // namespace vergence::app

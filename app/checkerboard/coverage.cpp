@@ -1,0 +1,158 @@
+#include "app/checkerboard/coverage.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <opencv2/calib3d.hpp>
+
+#include "app/checkerboard/board_detector.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::array kPartNames{"top left", "top",         "top right", "left",        "the middle",
+                                "right",    "bottom left", "bottom",    "bottom right"};
+constexpr std::array kTiltNames{"right", "left", "bottom", "top"};
+constexpr int kFewCorners = 10, kManyCorners = 40;  // a cell, in the grid's characters
+
+std::size_t part_of(double share) { return share < 1.0 / 3 ? 0 : share < 2.0 / 3 ? 1 : 2; }
+
+/// "a, b and c".
+std::string listed(const std::vector<std::string>& words) {
+  if (words.size() < 2) return words.empty() ? "" : words.front();
+  const std::vector<std::string> first(words.begin(), words.end() - 1);
+  return fmt::format("{} and {}", fmt::join(first, ", "), words.back());
+}
+
+}  // namespace
+
+Coverage::Coverage(const BoardPattern& board, std::vector<std::string> names,
+                   std::vector<ImageSize> sizes, double focal_px)
+    : board_(board),
+      names_(std::move(names)),
+      sizes_(std::move(sizes)),
+      focal_px_(focal_px),
+      seen_(sizes_.size()) {}
+
+void Coverage::count(const BoardView& view, std::size_t camera, Seen* seen) const {
+  const ImageSize size = sizes_[camera];
+  std::array<int, kParts> parts{};
+  for (const BoardCorner& c : view.corners[camera]) {
+    const double x = std::clamp(c.pixel.x() / size.width, 0.0, 0.999),
+                 y = std::clamp(c.pixel.y() / size.height, 0.0, 0.999);
+    ++seen->cells[static_cast<std::size_t>(y * kRows) * kColumns +
+                  static_cast<std::size_t>(x * kColumns)];
+    ++parts[part_of(y) * 3 + part_of(x)];
+  }
+  for (std::size_t i = 0; i < kParts; ++i) seen->parts[i] = std::max(seen->parts[i], parts[i]);
+}
+
+Coverage::Stand Coverage::stand_of(const BoardView& view) const {
+  Stand stand;
+  const auto& corners = view.corners[0];
+  if (corners.empty()) return stand;
+  std::vector<cv::Point3d> object;
+  std::vector<cv::Point2d> image;
+  Vec2 least = corners.front().pixel, most = least;
+  for (const BoardCorner& c : corners) {
+    const Vec3 X = board_.corner(c.index);
+    object.emplace_back(X.x(), X.y(), X.z());
+    image.emplace_back(c.pixel.x(), c.pixel.y());
+    least = least.cwiseMin(c.pixel);
+    most = most.cwiseMax(c.pixel);
+  }
+  stand.extent =
+      std::max((most.x() - least.x()) / sizes_[0].width, (most.y() - least.y()) / sizes_[0].height);
+  if (!determine_a_homography(corners, board_)) return stand;
+  const cv::Mat K = (cv::Mat_<double>(3, 3) << focal_px_, 0, 0.5 * (sizes_[0].width - 1), 0,
+                     focal_px_, 0.5 * (sizes_[0].height - 1), 0, 0, 1);
+  cv::Mat turn, place, R;
+  try {
+    if (!cv::solvePnP(object, image, K, cv::noArray(), turn, place)) return stand;
+  } catch (const cv::Exception&) {
+    return stand;  // e.g. corners that lie on a line in the image: its tilts are not known
+  }
+  cv::Rodrigues(turn, R);
+  // The board's normal away from the camera: where it leans to the right, the right edge is the
+  // nearer one.
+  const double along = R.at<double>(2, 2) < 0 ? -1 : 1;
+  const double right = std::atan2(along * R.at<double>(0, 2), along * R.at<double>(2, 2));
+  const double down = std::atan2(along * R.at<double>(1, 2), along * R.at<double>(2, 2));
+  stand.tilted = {right > kTilt, right<-kTilt, down> kTilt, down < -kTilt};
+  return stand;
+}
+
+void Coverage::add(const BoardView& view) {
+  for (std::size_t k = 0; k < seen_.size(); ++k) count(view, k, &seen_[k]);
+  const Stand stand = stand_of(view);
+  for (std::size_t i = 0; i < kTilts; ++i) tilted_[i] = tilted_[i] || stand.tilted[i];
+  nearest_ = std::max(nearest_, stand.extent);
+  farthest_ = std::min(farthest_, stand.extent);
+  ++views_;
+}
+
+bool Coverage::brings_something(const BoardView& view) const {
+  for (std::size_t k = 0; k < seen_.size(); ++k) {
+    Seen more = seen_[k];
+    count(view, k, &more);
+    for (std::size_t i = 0; i < kParts; ++i)
+      if (seen_[k].parts[i] < kEnoughCorners && more.parts[i] >= kEnoughCorners) return true;
+  }
+  const Stand stand = stand_of(view);
+  for (std::size_t i = 0; i < kTilts; ++i)
+    if (stand.tilted[i] && !tilted_[i]) return true;
+  if (nearest_ < kNearExtent) return stand.extent >= kNearExtent;
+  return farthest_ > kFarOfNear * nearest_ && stand.extent <= kFarOfNear * nearest_;
+}
+
+std::vector<std::string> Coverage::needs() const {
+  std::vector<std::string> needs;
+  for (std::size_t k = 0; k < seen_.size(); ++k) {
+    std::vector<std::string> parts;
+    for (std::size_t i = 0; i < kParts; ++i)
+      if (seen_[k].parts[i] < kEnoughCorners) parts.emplace_back(kPartNames[i]);
+    if (parts.size() == kParts)
+      needs.push_back(names_[k] + ": every part of the image");
+    else if (!parts.empty())
+      needs.push_back(fmt::format("{}: {}", names_[k], listed(parts)));
+  }
+  std::vector<std::string> edges;
+  for (std::size_t i = 0; i < kTilts; ++i)
+    if (!tilted_[i]) edges.emplace_back(kTiltNames[i]);
+  if (edges.size() == kTilts)
+    needs.emplace_back("tilted, each edge nearer in turn");
+  else if (!edges.empty())
+    needs.push_back(fmt::format("tilted, the {} {}", listed(edges),
+                                edges.size() == 1 ? "edge nearer" : "edges nearer in turn"));
+  if (nearest_ < kNearExtent)
+    needs.emplace_back("nearer");
+  else if (farthest_ > kFarOfNear * nearest_)
+    needs.emplace_back("farther");
+  if (views_ < kEnoughViews)
+    needs.push_back(fmt::format("{} more view{}", kEnoughViews - views_,
+                                kEnoughViews - views_ == 1 ? "" : "s"));
+  return needs;
+}
+
+std::string Coverage::grid() const {
+  std::string text;
+  for (const std::string& name : names_) text += fmt::format("{:<{}}", name, 2 * kColumns + 3);
+  text.erase(text.find_last_not_of(' ') + 1);
+  text += '\n';
+  for (std::size_t row = 0; row < kRows; ++row) {
+    std::string line;
+    for (std::size_t k = 0; k < seen_.size(); ++k) {
+      if (k > 0) line += "    ";
+      for (std::size_t column = 0; column < kColumns; ++column) {
+        const int n = seen_[k].cells[row * kColumns + column];
+        line += column > 0 ? " " : "";
+        line += n == 0 ? "·" : n < kFewCorners ? "-" : n < kManyCorners ? "+" : "#";
+      }
+    }
+    text += line + '\n';
+  }
+  return text;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,62 @@
+#include "app/checkerboard/tag_corners.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace vergence::app {
+namespace {
+
+constexpr double kBlur = 0.7;  // px, as for checkerboards
+constexpr int kRefineSteps = 100;
+constexpr double kRefineTolerance = 1e-4;  // px
+
+}  // namespace
+
+double homography_misfit(const std::vector<cv::Point2d>& on_board,
+                         const std::vector<cv::Point2d>& in_image) {
+  const cv::Mat H = cv::findHomography(on_board, in_image);
+  if (H.empty()) return std::numeric_limits<double>::infinity();
+  std::vector<cv::Point2d> back;
+  cv::perspectiveTransform(on_board, back, H);
+  double sum = 0;
+  for (std::size_t i = 0; i < back.size(); ++i) sum += cv::norm(back[i] - in_image[i]);
+  return sum / static_cast<double>(back.size());
+}
+
+BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough, int half_window,
+                            double max_moved) {
+  cv::Mat soft;
+  cv::GaussianBlur(image, soft, {}, kBlur);
+  const double margin = half_window + 2;
+  BoardCorners corners;
+  std::vector<cv::Point2f> fine;
+  for (const BoardCorner& c : rough) {
+    if (c.pixel.x() < margin || c.pixel.y() < margin || c.pixel.x() > image.cols - 1 - margin ||
+        c.pixel.y() > image.rows - 1 - margin)
+      continue;
+    corners.push_back(c);
+    fine.emplace_back(static_cast<float>(c.pixel.x()), static_cast<float>(c.pixel.y()));
+  }
+  if (fine.empty()) return {};
+  cv::cornerSubPix(
+      soft, fine, {half_window, half_window}, {-1, -1},
+      {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
+  BoardCorners refined;
+  for (std::size_t i = 0; i < fine.size(); ++i)
+    if (const Vec2 at(fine[i].x, fine[i].y); (at - corners[i].pixel).norm() <= max_moved)
+      refined.push_back({corners[i].index, at});
+  std::sort(refined.begin(), refined.end(),
+            [](const BoardCorner& a, const BoardCorner& b) { return a.index < b.index; });
+  return refined;
+}
+
+cv::Mat matrix_of(const ImageView& image) {
+  // cv::Mat has no view of constant pixels.
+  return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data),
+          static_cast<std::size_t>(image.stride)};
+}
+
+}  // namespace vergence::app

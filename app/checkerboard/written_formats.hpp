@@ -1,0 +1,41 @@
+#pragma once
+#include <array>
+#include <span>
+#include <string>
+
+#include "app/datasets/foreign_calibration.hpp"
+
+/// Calibrations written in other programs' files.
+///
+/// Ours     X_camera = R X_left + t, T_camera_left = [R t], metres; pixel centres at integers;
+///          radtan k1 k2 p1 p2 [k3], equidistant k1 … k4.
+///          All formats here share pixels, metres, axes (x right, y down, z forward) and the two
+///          distortion models.
+/// Errors   InputError: the format has no place for what images would need.
+/// Remarks  One message each for what is not carried over.
+namespace vergence::app {
+
+/// Kalibr's camchain: cam0, cam1 … with T_cn_cnm1, X_cn = T_cn_cnm1 X_cn-1.
+[[nodiscard]] std::string format_kalibr(const CalibrationFile& calibration, Remarks* remarks);
+
+/// ROS camera_info of a stereo pair, left and right. Rectified by OpenCV's stereoRectify (fisheye's
+/// for equidistant) to the same size without black edges.
+[[nodiscard]] std::array<std::string, 2> format_ros(const CalibrationFile& calibration,
+                                                    Remarks* remarks);
+
+/// OpenCV's intrinsics and extrinsics without the head `%YAML:1.0`; a file may hold either or one
+/// after the other.
+[[nodiscard]] std::array<std::string, 2> format_opencv(const CalibrationFile& calibration,
+                                                       Remarks* remarks);
+
+/// `[a, b, c]` with as many digits as give the same doubles again.
+[[nodiscard]] std::string number_list(std::span<const double> values);
+
+namespace detail {
+/// Remarks what every one of these formats lacks; `serials`, `names`: the format lacks those, too.
+void remark_lost(const CalibrationFile& calibration, const char* format, Remarks* remarks);
+/// Remarks cameras beyond the pair that a format holds.
+void remark_more_cameras(const CalibrationFile& calibration, const char* format, Remarks* remarks);
+}  // namespace detail
+
+}  // namespace vergence::app

@@ -1,0 +1,307 @@
+#include "app/commands/evaluation.hpp"
+
+#include <algorithm>
+#include <iostream>
+#include <limits>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/commands/evaluation_report.hpp"
+#include "app/runtime/terminal_text.hpp"
+#include "app/session/ins_file.hpp"
+#include "core/math/angle.hpp"
+#include "core/math/so3.hpp"
+
+namespace vergence::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Returns the usual lengths that fit the path; KITTI's if none fits.
+void keep_longest(TrajectoryEvaluation* e, EvaluationOptions* options) {
+  if (e->segments.size() < 2) return;
+  std::size_t kept = 0;
+  for (std::size_t i = e->segments.size(); i-- > 0;)
+    if (e->segments[i].count > 0) kept = i;
+  e->segments = {e->segments[kept]};
+  options->segments = {options->segments[kept]};
+}
+
+/// Where the reference is.
+struct Reference {
+  std::filesystem::path path{};
+  bool is_ins = false;  // readings of an INS; else poses
+};
+
+Reference reference_of(const EvaluationRequest& a) {
+  if (a.reference.empty() && !a.estimate_ins_extrinsics)
+    throw InputError(
+        "REFERENCE is missing; name a trajectory, or with --estimate-ins-extrinsics a session "
+        "folder that "
+        "has an ins.csv");
+  // A session folder stands for its poses, but where a mount is asked for: that is the INS's.
+  const std::filesystem::path path = a.reference.empty() ? a.estimate : a.reference;
+  std::error_code ignored;
+  const bool poses = !a.estimate_ins_extrinsics && std::filesystem::is_directory(path, ignored);
+  const std::filesystem::path ins = poses ? std::filesystem::path{} : find_ins_file(path);
+  if (!ins.empty()) return {ins, true};
+  if (a.reference.empty())
+    throw InputError(a.estimate.string() +
+                     ": is no session folder with an ins.csv; name a REFERENCE");
+  return {path, false};
+}
+
+/// Both as they are read; an INS's readings are no trajectory yet.
+struct Files {
+  TrajectoryFile estimate{}, reference{};
+};
+
+void say(const std::string& message) { std::cerr << "vergence: " << harmless(message) << '\n'; }
+
+/// Rows of a file without times belong to the rows of the other one, with its times if it has some.
+void pair_rows(const EvaluationRequest& a, const Reference& from, Files* files) {
+  TrajectoryFile &e = files->estimate, &r = files->reference;
+  if (e.timed && (r.timed || from.is_ins)) return;
+  const std::string help = "put the sequence's times.txt beside it";
+  if (from.is_ins) throw InputError(a.estimate.string() + ": has no times; " + help);
+  if (e.rows != r.rows)
+    throw InputError(fmt::format(
+        "{}: has {} poses and {} has {}: {}, so that row belongs to row, which takes as many; {}",
+        a.estimate.string(), e.rows, from.path.string(), r.rows,
+        e.timed   ? "the reference has no times"
+        : r.timed ? "the estimate has no times"
+                  : "neither has times",
+        help));
+  say(std::string(e.timed == r.timed ? "neither file has times" : "one of the files has no times") +
+      ": row belongs to row");
+  if (e.timed == r.timed) return;
+  TrajectoryFile& without = e.timed ? r : e;
+  const TrajectoryFile& with = e.timed ? e : r;
+  if (without.poses.size() != with.poses.size())
+    throw InputError("rows without numbers are skipped in one of the files, which has no times; " +
+                     help);
+  for (std::size_t i = 0; i < with.poses.size(); ++i) without.poses[i].stamp = with.poses[i].stamp;
+}
+
+TrajectoryFile read(const fs::path& path, std::optional<TimeUnit> unit,
+                    std::optional<QuaternionOrder> quaternion, std::string_view unit_option) {
+  TrajectoryFile file = read_trajectory_file(path, {unit, quaternion, unit_option});
+  if (!file.remarks.empty())
+    say(fmt::format("{}: {}", path.string(), fmt::join(file.remarks, "; ")));
+  return file;
+}
+
+/// One unit given is the estimate's, and also the reference's where that has none to be told by.
+TrajectoryFile read_reference(const EvaluationRequest& a, const fs::path& path) {
+  constexpr std::string_view kOption =
+      "--time-unit ,s (or ,ms ,us ,ns: the reference's follows the comma)";
+  if (a.units[1] || !a.units[0]) return read(path, a.units[1], a.quaternions[1], kOption);
+  try {
+    return read(path, std::nullopt, a.quaternions[1], kOption);
+  } catch (const InputError&) {
+    return read(path, a.units[0], a.quaternions[1], kOption);
+  }
+}
+
+Files read_files(const EvaluationRequest& a, const Reference& from) {
+  Files files;
+  files.estimate = read(a.estimate, a.units[0], a.quaternions[0], "--time-unit s, ms, us or ns");
+  if (!from.is_ins) files.reference = read_reference(a, from.path);
+  pair_rows(a, from, &files);
+  return files;
+}
+
+Duration usual_interval(const Trajectory& poses) {
+  std::vector<std::int64_t> ns;
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    ns.push_back(poses[i].stamp.ns() / 2 - poses[i - 1].stamp.ns() / 2);
+  if (ns.empty()) return {};
+  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
+  std::nth_element(ns.begin(), middle, ns.end());
+  return Duration::nanoseconds(2 * std::min(*middle, std::numeric_limits<std::int64_t>::max() / 2));
+}
+
+/// Stamps of 0 s, 1 s, 2 s … are most often numbers of frames.
+bool counts_frames(const Trajectory& poses) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    if (poses[i].stamp.ns() != poses[0].stamp.ns() + static_cast<std::int64_t>(i) * kSecond ||
+        poses[0].stamp.ns() % kSecond != 0 || std::abs(poses[0].stamp.ns()) > kSecond)
+      return false;
+  return poses.size() > 1;
+}
+
+/// A reference at the estimate's body, and how it came there.
+struct Brought {
+  Trajectory poses{};
+  FoundMount found{};              // where a mount is asked for; not ok: there are no poses
+  std::optional<InsMount> told{};  // of an INS's readings, else
+};
+
+Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readings,
+                  const Trajectory& estimate) {
+  const std::vector<MountReference> moments = ins_moments(read_ins_file(readings));
+  if (moments.empty())
+    throw InputError(readings.string() + ": has no reading with an attitude and a satellites' fix");
+  Brought out;
+  out.poses = poses_of(moments);
+  if (a.estimate_ins_extrinsics)
+    out.found = find_ins_mount(estimate, moments);
+  else if (a.options.axes == BodyAxes::camera)  // else both are forward, left, up
+    out.told = ins_mount_of(a.estimate, readings);
+  return out;
+}
+
+Brought bring_reference(const EvaluationRequest& a, const Reference& from, Files* files) {
+  const Trajectory& estimate = files->estimate.poses;
+  Brought out;
+  if (from.is_ins) {
+    out = bring_ins(a, from.path, estimate);
+  } else {
+    out.poses = files->reference.poses;
+    if (a.estimate_ins_extrinsics) out.found = find_mount(estimate, out.poses);
+  }
+  if (a.estimate_ins_extrinsics && out.found.status == MountStatus::ok)
+    out.poses = brought_over(out.poses, out.found.mount.T_ref_est);
+  if (out.told) out.poses = brought_over(out.poses, out.told->T_ins_left);
+  return out;
+}
+
+/// Without a mount nothing can be compared.
+ExitCode report_no_mount(const EvaluationRequest& a, const Reference& from,
+                         const FoundMount& found) {
+  if (a.json) {
+    nlohmann::ordered_json out;
+    out["mount"] = mount_json(found);
+    std::cout << out.dump(1) << '\n';
+  }
+  std::cerr << "vergence: no mount between " << a.estimate.string() << " and " << from.path.string()
+            << ": " << mount_problem(found.status) << '\n';
+  return ExitCode::not_usable;
+}
+
+constexpr double kRotationsDiffer = 20 * kRadiansPerDegree;
+
+/// Returns true if positions agree and rotations do not.
+bool rotations_differ(const TrajectoryEvaluation& e) {
+  constexpr double kPositionsAgree = 0.05;  // of the path
+  return e.status == EvaluationStatus::ok && !e.se3.roll_unobservable &&
+         e.ate_se3.rmse < kPositionsAgree * e.path_reference &&
+         e.rotation_se3.median > kRotationsDiffer;
+}
+
+/// The turn from one body to the other where it is the same all the way; nothing: it is not.
+std::optional<double> constant_turn(const Trajectory& estimate, const Trajectory& reference,
+                                    const EvaluationOptions& options,
+                                    const TrajectoryEvaluation& e) {
+  const MatchedTrajectories matched = associate(estimate, reference, options);
+  const auto turn = [&](std::size_t i) -> Mat3 {
+    return matched.reference[i].T_world_body.R.transpose() * e.se3.R_reference_estimate *
+           matched.estimate[i].T_world_body.R;
+  };
+  if (matched.estimate.empty()) return std::nullopt;
+  const Mat3 first = turn(matched.estimate.size() / 2);
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < matched.estimate.size(); ++i)
+    near += rotation_angle(first.transpose() * turn(i)) < kRotationsDiffer / 2 ? 1 : 0;
+  if (10 * near < 9 * matched.estimate.size()) return std::nullopt;
+  return rotation_angle(first);
+}
+
+/// Explains rotations that disagree while positions agree.
+std::string rotation_remark(const EvaluationRequest& a, const Files& files,
+                            const Trajectory& reference, const EvaluationOptions& options,
+                            const TrajectoryEvaluation& e) {
+  const std::string what = fmt::format("positions agree and rotations do not ({:.0f} deg, median)",
+                                       e.rotation_se3.median * kDegreesPerRadian);
+  const auto helps = [&](const Trajectory& of_estimate, const Trajectory& of_reference) {
+    const TrajectoryEvaluation other = evaluate(of_estimate, of_reference, options);
+    return other.status == EvaluationStatus::ok && other.rotation_se3.median < kRotationsDiffer;
+  };
+  const auto option = [](const TrajectoryFile& file) {
+    return file.order == QuaternionOrder::xyzw ? "wxyz" : "xyzw";
+  };
+  const auto order = [&](const fs::path& path, const char* comma, const TrajectoryFile& file) {
+    return fmt::format(
+        "{}: probably {} has the quaternion with w {}; --quaternion {}{} reads it so", what,
+        path.string(), file.order == QuaternionOrder::xyzw ? "first" : "last", comma, option(file));
+  };
+  const Trajectory& estimate = files.estimate.poses;
+  const auto of_estimate = [&] {
+    return helps(in_other_order(estimate, files.estimate.order), reference);
+  };
+  const auto of_reference = [&] {
+    return !files.reference.poses.empty() && !a.estimate_ins_extrinsics &&
+           helps(estimate, in_other_order(files.reference.poses, files.reference.order));
+  };
+  // Where both would help, the order that is unusual is the doubtful one.
+  const bool reference_first = files.reference.order == QuaternionOrder::wxyz &&
+                               !files.reference.order_reported &&
+                               files.estimate.order == QuaternionOrder::xyzw;
+  if (reference_first && of_reference()) return order(a.reference, ",", files.reference);
+  if (of_estimate()) return order(a.estimate, "", files.estimate);
+  if (of_reference()) return order(a.reference, ",", files.reference);
+  if (const auto turn = constant_turn(estimate, reference, options, e))
+    return fmt::format(
+        "{}: the two bodies have different axes, turned by {:.0f} deg all the way (a camera and an "
+        "IMU or a vehicle?); --estimate-ins-extrinsics finds the turn",
+        what, *turn * kDegreesPerRadian);
+  Trajectory inverse = estimate;
+  for (StampedPose& pose : inverse) pose.T_world_body.R.transposeInPlace();
+  if (helps(inverse, reference))
+    return what +
+           ": the estimate's rotations are probably from world to body, the inverse of what "
+           "is expected";
+  return what +
+         ": check which axes and which order of the quaternion the two files have "
+         "(--quaternion wxyz)";
+}
+
+void print(const EvaluationRequest& a, const EvaluationOptions& options, const Brought& reference,
+           const TrajectoryEvaluation& evaluation) {
+  if (a.json) {
+    nlohmann::ordered_json out = evaluation_json(evaluation, options);
+    if (a.estimate_ins_extrinsics) out["mount"] = mount_json(reference.found);
+    if (reference.told) out["ins_mount"] = ins_mount_json(*reference.told);
+    std::cout << out.dump(1) << '\n';
+    return;
+  }
+  if (a.estimate_ins_extrinsics) std::cout << mount_text(reference.found);
+  if (reference.told) std::cout << ins_mount_text(*reference.told) << '\n';
+  std::cout << evaluation_text(evaluation, options);
+}
+
+}  // namespace
+
+ExitCode run_evaluation(const EvaluationRequest& a) {
+  EvaluationOptions options = a.options;
+  const Reference from = reference_of(a);
+  Files files = read_files(a, from);
+  const Trajectory& estimate = files.estimate.poses;
+  const Brought reference = bring_reference(a, from, &files);
+  if (a.estimate_ins_extrinsics && reference.found.status != MountStatus::ok)
+    return report_no_mount(a, from, reference.found);
+  TrajectoryEvaluation evaluation = evaluate(estimate, reference.poses, options);
+  if (a.usual_lengths) keep_longest(&evaluation, &options);
+  print(a, options, reference, evaluation);
+  const Duration interval = usual_interval(reference.poses);
+  if (evaluation.status == EvaluationStatus::ok) {
+    if (const std::string holes = gap_remark(evaluation, options, interval); !holes.empty())
+      say(holes);
+    if (rotations_differ(evaluation))
+      say(rotation_remark(a, files, reference.poses, options, evaluation));
+    return ExitCode::done;
+  }
+  say(a.estimate.string() + " against " + from.path.string() + ": " +
+      evaluation_problem(evaluation, options, interval));
+  if (counts_frames(estimate) != counts_frames(reference.poses))
+    say((counts_frames(estimate) ? a.estimate : from.path).string() +
+        ": its first column counts the poses: these are numbers of frames and no times; put the "
+        "times of the frames there");
+  return ExitCode::not_usable;
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,283 @@
+#include "app/datasets/vocabulary.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+
+#include <fmt/format.h>
+
+namespace vergence::app {
+namespace {
+
+struct Words {
+  std::string_view part, words;
+};
+/// The last part of a key in small letters without signs, the camera's words and number taken off.
+constexpr std::array kWords{
+    Words{"matrix", " k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics "},
+    Words{"fx", " fx mu "},
+    Words{"fy", " fy mv "},
+    Words{"cx", " cx u0 "},
+    Words{"cy", " cy v0 "},
+    Words{"focal", " f focal focallength "},
+    Words{"centre", " principalpoint pp "},
+    Words{"distortion",
+          " d dist distcoeff distcoeffs distcoef distcoefs distortion distortioncoeffs "
+          "distortioncoefficients distortionvector distortionparameters coefficients "},
+    Words{"camera_model", " model modeltype cameramodel cameratype type "},
+    Words{"distortion_model", " distortionmodel distortiontype "},
+    Words{"fisheye", " fisheye fisheyemodel "},
+    Words{"size", " size imagesize imgsize imagedimension resolution "},
+    Words{"width", " width imagewidth imgwidth cols "},
+    Words{"height", " height imageheight imgheight rows "},
+    Words{"rectification", " rectification rectificationmatrix rrect "},
+    Words{"projection", " p projection projectionmatrix prect "},
+    Words{"rotation", " r rot rotation rotationmatrix rmat om rvec rotationvector "},
+    Words{"translation",
+          " t tran trans trns translation translationvector translationmatrix tvec "},
+    Words{"to_previous", " tcncnm "},
+    Words{"from_body", " tcamimu tcambody tcb tci "},
+    Words{"to_body", " timucam tbodycam bodytcam tbs tsc tbc tic "},
+    Words{"baseline", " baseline b "},
+    Words{"focal_baseline", " bf focalxbaseline "},
+    Words{"binning_x", " binningx "},
+    Words{"binning_y", " binningy "},
+    Words{"roi_x", " roixoffset "},
+    Words{"roi_y", " roiyoffset "},
+    Words{"roi_width", " roiwidth "},
+    Words{"roi_height", " roiheight "},
+    Words{"name", " cameraname "},
+    Words{"file", " calib camcalib "}};
+
+struct Program {
+  std::string_view key;  // at the root, or the beginning of one
+  std::string_view name;
+  std::string_view needs;  // nothing: its files are not read, whatever they hold
+};
+constexpr std::array kPrograms{
+    Program{"value0", "Basalt", ""},
+    Program{"cameraData", "DepthAI", ""},
+    Program{"LEFT_CAM_", "ZED (its factory file)", ""},
+    Program{"num_of_cam", "VINS",
+            "the files beside it that cam0_calib and cam1_calib name, body_T_cam0 and body_T_cam1"},
+    Program{"projection_parameters", "VINS", "the configuration with body_T_cam0 and body_T_cam1"},
+    Program{"Camera.bf", "ORB-SLAM",
+            "Camera.width and Camera.height, of raw images LEFT.K, D, R, P and RIGHT.…, too"},
+    Program{"Camera.type", "ORB-SLAM3", "Camera1.…, Camera2.… and Stereo.T_c1_c2"},
+    Program{"Camera", "stella_vslam", "cols, rows and focal_x_baseline"},
+    Program{"T_BS", "EuRoC or Kimera", "both cameras' files, left first, with a comma between"},
+    Program{"projection_matrix", "ROS", "camera_info of both cameras, with P"},
+    Program{"cam0", "Kalibr", "T_cn_cnm1 of cam1, or T_cam_imu (T_imu_cam) of both"}};
+
+/// Parts of a key: letters and digits apart, capitals inside a word begin the next.
+std::vector<std::string> tokens_of(std::string_view key) {
+  std::vector<std::string> tokens;
+  enum { sign, digit, small, capital } before = sign;
+  for (const char c : key) {
+    const auto kind = c >= '0' && c <= '9'   ? digit
+                      : c >= 'a' && c <= 'z' ? small
+                      : c >= 'A' && c <= 'Z' ? capital
+                                             : sign;
+    const bool begins = before == sign || (kind == digit) != (before == digit) ||
+                        (kind == capital && before == small);
+    if (kind != sign && begins) tokens.emplace_back();
+    if (kind != sign) tokens.back().push_back(kind == capital ? static_cast<char>(c | 0x20) : c);
+    before = kind;
+  }
+  return tokens;
+}
+
+bool is_number(const std::string& token) { return token[0] >= '0' && token[0] <= '9'; }
+
+/// Which camera a key or a group is of, as it counts; the token that says so is taken out.
+struct Side {
+  std::optional<int> number{};
+  bool word = false;  // left or right: counted from 0
+};
+Side take_side(std::vector<std::string>* tokens) {
+  const auto take = [&](std::size_t i, int number, bool word) {
+    tokens->erase(tokens->begin() + static_cast<std::ptrdiff_t>(i));
+    return Side{number, word};
+  };
+  const std::size_t n = tokens->size();
+  for (std::size_t i = 0; i < n; ++i)
+    if (const std::string& token = (*tokens)[i];
+        token == "left" || token == "right" ||
+        (n > 1 && i + 1 == n && (token == "l" || token == "r")))
+      return take(i, token[0] == 'r' ? 1 : 0, true);
+  for (std::size_t i = n; i-- > 0;)
+    if (const std::string& token = (*tokens)[i]; is_number(token) && token.size() <= 2)
+      return take(i, std::stoi(token), false);
+  return {};
+}
+
+std::string joined(const std::vector<std::string>& tokens) {
+  std::string word;
+  for (const std::string& token : tokens) word += token;
+  return word;
+}
+
+const Words* find_word(const std::string& word) {
+  const std::string whole = " " + word + " ";
+  return std::find_if(kWords.begin(), kWords.end(), [&](const Words& w) {
+    return w.words.find(whole) != std::string_view::npos;
+  });
+}
+
+/// k1 … k6, p1 or p2 of a scalar, whose number is no camera's; empty: another key.
+std::string_view coefficient_of(const std::vector<std::string>& tokens) {
+  if (tokens.size() < 2) return {};
+  constexpr std::array<std::string_view, 8> kNames{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+  const auto at =
+      std::find(kNames.begin(), kNames.end(), tokens[tokens.size() - 2] + tokens.back());
+  return at == kNames.end() ? std::string_view() : *at;
+}
+
+bool is_value(const YAML::Node& node) {
+  if (node.IsScalar()) return true;
+  if (node.IsMap()) return node["data"] && node["data"].IsSequence();
+  return node.IsSequence() && (node.size() == 0 || !node[0].IsMap());
+}
+
+class Walk {
+ public:
+  explicit Walk(const YamlFile& file) : file_(file) {}
+
+  std::vector<Fact> facts() {
+    visit(file_.root(), "", {}, 0);
+    // Cameras are counted from 0 if one of them is.
+    const bool from_one = std::none_of(counted_.begin(), counted_.end(),
+                                       [&](std::size_t i) { return facts_[i].camera == 0; });
+    for (const std::size_t i : counted_)
+      if (from_one) --*facts_[i].camera;
+    std::erase_if(facts_,
+                  [](const Fact& f) { return f.camera && (*f.camera < 0 || *f.camera > 9); });
+    return std::move(facts_);
+  }
+
+ private:
+  // NOLINTNEXTLINE(misc-no-recursion): down to kDeepest
+  void visit(const YAML::Node& node, const std::string& above,
+             const std::vector<std::string>& groups, int depth) {
+    constexpr int kDeepest = 12;
+    if (depth > kDeepest) return;
+    if (node.IsSequence()) {
+      for (std::size_t i = 0; i < node.size(); ++i)
+        if (node[i].IsMap() || node[i].IsSequence()) {
+          auto inner = groups;
+          inner.push_back(std::to_string(i));
+          visit(node[i], above + "[" + std::to_string(i) + "]", inner, depth + 1);
+        }
+      return;
+    }
+    if (!node.IsMap()) return;
+    for (const auto& entry : node) {
+      if (!entry.first.IsScalar()) continue;
+      const std::string key = entry.first.Scalar();
+      const std::string path = above.empty() ? key : above + "." + key;
+      if (is_value(entry.second)) {
+        take(entry.second, path, groups, key);
+      } else {
+        auto inner = groups;
+        inner.push_back(key);
+        visit(entry.second, path, inner, depth + 1);
+      }
+    }
+  }
+
+  void take(const YAML::Node& node, const std::string& path, std::vector<std::string> groups,
+            std::string key) {
+    if (const std::size_t dot = key.rfind('.'); dot != std::string::npos) {
+      groups.push_back(key.substr(0, dot));
+      key.erase(0, dot + 1);
+    }
+    std::vector<std::string> tokens = tokens_of(key);
+    if (tokens.empty()) return;
+    Fact fact;
+    fact.file = &file_;
+    fact.node.reset(node);
+    fact.key = path;
+    Side side;
+    if (node.IsScalar()) fact.part = coefficient_of(tokens);
+    if (!fact.part.empty()) {
+      tokens.resize(tokens.size() - 2);
+      side = take_side(&tokens);
+    } else if (!take_transform(tokens, &fact)) {
+      // Numbers in these names are no camera's.
+      const std::string whole = joined(tokens);
+      if (whole == "tcncnm1")
+        tokens.pop_back();
+      else if (!node.IsScalar() || (whole != "u0" && whole != "v0"))
+        side = take_side(&tokens);
+      if (!look_up(tokens, groups, &side, &fact)) return;
+    }
+    for (std::size_t i = groups.size(); !side.number && i-- > 0;) {
+      std::vector<std::string> group = tokens_of(groups[i]);
+      side = take_side(&group);
+    }
+    fact.camera = side.number;
+    if (side.number && !side.word && fact.part != "between") counted_.push_back(facts_.size());
+    facts_.push_back(std::move(fact));
+  }
+
+  /// `T_c1_c2`, `T_cam1_cam0`, `T_right_left`, `Tlr`: between two cameras that the key names.
+  static bool take_transform(const std::vector<std::string>& tokens, Fact* fact) {
+    const std::string word = joined(tokens);
+    std::vector<int> cameras;
+    if (word == "tlr" || word == "trl") cameras = {word[1] == 'r', word[2] == 'r'};
+    for (const std::string& token : tokens)
+      if (token == "left" || token == "right")
+        cameras.push_back(token == "right" ? 1 : 0);
+      else if (is_number(token) && token.size() == 1)
+        cameras.push_back(token[0] - '0');
+    if (fact->node.IsScalar() || (tokens[0] != "t" && word.size() != 3) || cameras.size() != 2 ||
+        std::abs(cameras[0] - cameras[1]) != 1)
+      return false;
+    fact->part = "between";
+    fact->index = cameras[0] > cameras[1] ? 1 : 0;
+    return true;
+  }
+
+  /// `KL` is K of the left camera, `stereo_R` is R.
+  static bool look_up(const std::vector<std::string>& tokens,
+                      const std::vector<std::string>& groups, Side* side, Fact* fact) {
+    std::string word = joined(tokens);
+    auto known = find_word((!groups.empty() && groups.back() == "roi" ? "roi" : "") + word);
+    if (known == kWords.end() && !side->number && (word.ends_with('l') || word.ends_with('r'))) {
+      known = find_word(word.substr(0, word.size() - 1));
+      if (known != kWords.end()) *side = {word.back() == 'r' ? 1 : 0, true};
+    }
+    if (const std::size_t at = word.find("stereo");
+        known == kWords.end() && at != std::string::npos)
+      known = find_word(word.erase(at, std::string_view("stereo").size()));
+    if (known == kWords.end()) return false;
+    fact->part = known->part;
+    return true;
+  }
+
+  const YamlFile& file_;
+  std::vector<Fact> facts_;
+  std::vector<std::size_t> counted_;  // facts whose camera is counted as the file counts
+};
+
+}  // namespace
+
+std::vector<Fact> facts_of(const YamlFile& file) { return Walk(file).facts(); }
+
+std::string program_of(const YamlFile& file, bool* never) {
+  if (!file.root().IsMap()) return "";
+  for (const Program& program : kPrograms)
+    for (const auto& entry : file.root())
+      if (entry.first.IsScalar() &&
+          (entry.first.Scalar() == program.key ||
+           (program.key.ends_with('_') && entry.first.Scalar().starts_with(program.key)))) {
+        *never = program.needs.empty();
+        return fmt::format(
+            "is of {}{}{}", program.name,
+            *never ? ", which is not read; files of Kalibr, ROS and OpenCV are" : ": it needs ",
+            program.needs);
+      }
+  return "";
+}
+
+}  // namespace vergence::app

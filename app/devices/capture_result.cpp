@@ -1,0 +1,231 @@
+#include "app/devices/capture_result.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <cstring>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "drivers/clock.hpp"
+#include "drivers/sync/sync_types.hpp"
+
+namespace vergence::app {
+
+namespace {
+
+constexpr int kSaturated = 254, kDark = 4;  // grey levels
+constexpr double kMuch = 0.5,
+                 kSome = 0.05;  // shares of an image: nothing left to see, a sky that may be lost
+constexpr double kBlack = 6, kDim = 30;  // mean, grey levels
+constexpr double kFlat = 1.5;            // contrast, grey levels: less is noise
+constexpr double kBlurred = 0.2;         // of the sharpest camera's sharpness
+
+ImageIssue remark(bool unusable, std::string message) { return {unusable, std::move(message)}; }
+
+std::optional<std::string> why_unusable(const ImageStatistics& f, const std::string& who) {
+  if (f.mean < kBlack) return who + " is black: a cap on the lens, no light, or no exposure";
+  if (f.saturated > kMuch)
+    return fmt::format(
+        "{} is overexposed: {:.0f} % of it is white; lower exposure_us, then gain_db", who,
+        100 * f.saturated);
+  if (f.contrast < kFlat)
+    return who + " shows nothing: one grey all over; a cap, fog on the glass, or no sensor signal";
+  return std::nullopt;
+}
+
+}  // namespace
+
+ImageStatistics figures_of(const ImageView& image) noexcept {
+  ImageStatistics f;
+  double sum = 0, squares = 0, gradients = 0;
+  std::int64_t bright = 0, dark = 0;
+  for (int y = 0; y < image.height; ++y) {
+    const std::uint8_t* row = image.row(y);
+    for (int x = 0; x < image.width; ++x) {
+      const int v = row[x];
+      sum += v;
+      squares += v * v;
+      bright += v >= kSaturated ? 1 : 0;
+      dark += v <= kDark ? 1 : 0;
+      if (x == 0 || y == 0 || x + 1 == image.width || y + 1 == image.height) continue;
+      const int dx = row[x + 1] - row[x - 1], dy = image.at(x, y + 1) - image.at(x, y - 1);
+      gradients += dx * dx + dy * dy;
+    }
+  }
+  const double n = static_cast<double>(image.width) * image.height;
+  const double inner = static_cast<double>(image.width - 2) * (image.height - 2);
+  f.mean = sum / n;
+  f.contrast = std::sqrt(std::max(0.0, squares / n - f.mean * f.mean));
+  f.saturated = static_cast<double>(bright) / n;
+  f.dark = static_cast<double>(dark) / n;
+  if (image.width > 2 && image.height > 2) f.sharpness = gradients / 4 / inner;
+  return f;
+}
+
+std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
+                                        std::span<const ImageStatistics> figures) {
+  std::vector<ImageIssue> remarks;
+  double sharpest = 0;
+  std::size_t sharpest_at = 0;
+  for (std::size_t k = 0; k < figures.size(); ++k)
+    if (figures[k].sharpness > sharpest) sharpest = figures[k].sharpness, sharpest_at = k;
+  for (std::size_t k = 0; k < figures.size(); ++k) {
+    const ImageStatistics& f = figures[k];
+    const std::string& who = names[k];
+    if (const auto reason = why_unusable(f, who)) {
+      remarks.push_back(remark(true, *reason));
+      continue;
+    }
+    if (f.saturated > kSome)
+      remarks.push_back(remark(false, fmt::format("{}: {:.0f} % of it is white, where nothing can "
+                                                  "be tracked; a shorter exposure_us may help",
+                                                  who, 100 * f.saturated)));
+    if (f.mean < kDim)
+      remarks.push_back(
+          remark(false, fmt::format("{} is underexposed (mean {:.0f} of 255); raise exposure_us up "
+                                    "to what motion allows, then gain_db",
+                                    who, f.mean)));
+    if (k != sharpest_at && f.sharpness < kBlurred * sharpest)
+      remarks.push_back(
+          remark(false, fmt::format("{} is much less sharp than {} ({:.0f} against {:.0f}): focus, "
+                                    "dirt, or something near before it",
+                                    who, names[sharpest_at], f.sharpness, sharpest)));
+  }
+  return remarks;
+}
+
+bool are_identical(const ImageView& a, const ImageView& b) noexcept {
+  if (a.empty() || b.empty() || a.width != b.width || a.height != b.height) return false;
+  for (int y = 0; y < a.height; ++y)
+    if (std::memcmp(a.row(y), b.row(y), static_cast<std::size_t>(a.width)) != 0) return false;
+  return figures_of(a).contrast >= kFlat;
+}
+
+Configuration capture_configuration(const Configuration& configuration) {
+  Configuration c = configuration;
+  if (c.sync.mode != SyncMode::ins_syncout) c.ins.driver = "none";
+  return c;
+}
+
+std::vector<std::string> camera_names(const Configuration& c, int cameras) {
+  std::vector<std::string> names;
+  for (int k = 0; k < cameras; ++k) {
+    std::string name = c.cameras[static_cast<std::size_t>(k)].name;
+    std::replace_if(
+        name.begin(), name.end(),
+        [](unsigned char ch) { return std::isalnum(ch) == 0 && ch != '_' && ch != '-'; }, '_');
+    if (name.empty()) name = "camera" + std::to_string(k);
+    while (std::find(names.begin(), names.end(), name) != names.end())
+      name += "_" + std::to_string(k);
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
+namespace {
+
+/// Ends the stream when nothing has come for too long, or a signal has.
+class Watchdog {
+ public:
+  Watchdog(Acquisition* source, Duration limit, const SignalGuard& signals)
+      : source_(source),
+        limit_(limit.ns()),
+        signals_(signals),
+        until_(std::chrono::steady_clock::now() + limit_),
+        thread_([this] { watch(); }) {}
+  ~Watchdog() {
+    {
+      const std::lock_guard lock(mutex_);
+      quit_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+  }
+  Watchdog(const Watchdog&) = delete;
+  Watchdog& operator=(const Watchdog&) = delete;
+
+  void feed() {
+    const std::lock_guard lock(mutex_);
+    until_ = std::chrono::steady_clock::now() + limit_;
+  }
+
+ private:
+  void watch() {
+    constexpr auto kLook = std::chrono::milliseconds(50);
+    std::unique_lock lock(mutex_);
+    while (!quit_ && !signals_.stop_requested() && std::chrono::steady_clock::now() < until_)
+      changed_.wait_for(lock, kLook);
+    source_->stop();
+  }
+
+  Acquisition* source_;
+  std::chrono::nanoseconds limit_;
+  const SignalGuard& signals_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool quit_ = false;
+  std::chrono::steady_clock::time_point until_;
+  std::thread thread_;
+};
+
+void note(const DeviceEvent& event, CaptureResult* taking) {
+  const auto k = static_cast<std::size_t>(event.camera);
+  if (event.kind == DeviceEvent::Kind::camera_disconnected) taking->gone[k] = true;
+  if (event.kind == DeviceEvent::Kind::camera_reconnected) taking->gone[k] = false;
+}
+
+}  // namespace
+
+CaptureResult take_sets(DriveDevices& devices, const TakingOptions& options,
+                        const SignalGuard& signals,
+                        const std::function<void(const CapturedSet&)>& use) {
+  const std::size_t n = devices.cameras().size();
+  CaptureResult taking;
+  taking.delivered.assign(n, 0);
+  taking.gone.assign(n, false);
+  Acquisition::Options o = devices.acquisition_options();
+  const HostMoment now = moment_now();
+  o.tie_stamp = now.day;
+  o.tie_host = devices.mock() != nullptr ? devices.start() : now.host;
+  Acquisition source(devices.cameras(), devices.ins(), devices.trigger(), o);
+  start_acquisition(&source);
+  {
+    Watchdog watchdog(&source, options.limit, signals);
+    int passed = 0;
+    for (Acquired item; taking.sets < options.count && source.next(&item);) {
+      if (const auto* event = std::get_if<DeviceEvent>(&item)) note(*event, &taking);
+      const auto* frame = std::get_if<AcquiredFrame>(&item);
+      if (frame == nullptr) continue;
+      for (std::size_t i = 0; i < n; ++i) taking.delivered[i] += frame->set.present[i] ? 1 : 0;
+      if (frame->set.complete && passed++ >= options.skip) {
+        const RigFrame& rig = frame->rig;
+        use({taking.sets,
+             rig.stamp,
+             rig.stamp_error,
+             rig.spread,
+             frame->set.proof,
+             {rig.images.begin(), rig.images.begin() + static_cast<std::ptrdiff_t>(n)}});
+        ++taking.sets;
+        watchdog.feed();
+      }
+      source.release(*frame);
+    }
+  }
+  source.stop();
+  for (Acquired item; source.next(&item);)
+    if (const auto* frame = std::get_if<AcquiredFrame>(&item)) source.release(*frame);
+  source.join();
+  taking.end = taking.sets == options.count ? CaptureResult::End::done
+               : signals.stop_requested()   ? CaptureResult::End::interrupted
+                                            : CaptureResult::End::timeout;
+  return taking;
+}
+
+}  // namespace vergence::app

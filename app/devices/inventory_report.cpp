@@ -1,0 +1,314 @@
+#include "app/devices/inventory_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/runtime/version.hpp"
+
+namespace vergence::app {
+
+namespace {
+
+bool plain(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_' || c == '-';
+}
+
+/// At most 64 letters; those that mean something in a rule or a path become `other`.
+std::string plain_text(const std::string& text, char other) {
+  std::string out = text.substr(0, 64);
+  std::replace_if(
+      out.begin(), out.end(), [](char c) { return !plain(c); }, other);
+  return out;
+}
+
+/// The right side of `==`, which is a pattern.
+std::string pattern(const std::string& text) { return plain_text(text, '?'); }
+
+/// A name under /dev/vergence.
+std::string part_of_name(const std::string& text) { return plain_text(text, '_'); }
+
+/// For a comment: one line.
+std::string comment(const std::string& text) {
+  std::string out = text.substr(0, 80);
+  std::replace_if(
+      out.begin(), out.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7F; }, '?');
+  return out;
+}
+
+/// Matches a device by vendor, product and, where it has one, serial number. `attribute`: ATTR of
+/// the device itself, ATTRS of one below it.
+std::string which(const char* attribute, std::uint16_t vendor, std::uint16_t product,
+                  const std::string& serial) {
+  std::string s = fmt::format("{0}{{idVendor}}==\"{1:04x}\", {0}{{idProduct}}==\"{2:04x}\"",
+                              attribute, vendor, product);
+  if (!serial.empty()) s += fmt::format(", {}{{serial}}==\"{}\"", attribute, pattern(serial));
+  return s;
+}
+
+const char* name_of(SerialKind kind) {
+  if (kind == SerialKind::ins) return "ins";
+  return kind == SerialKind::board ? "trigger" : "serial";
+}
+
+std::string port_rules(const FoundPort& port) {
+  const SerialPortInfo& i = port.info;
+  const std::string who = which("ATTRS", i.usb_vendor, i.usb_product, i.usb_serial);
+  std::string out = fmt::format("\n# {}: {}\n", i.port, comment(i.description));
+  out += fmt::format(
+      "ENV{{DEVTYPE}}==\"usb_device\", {}, ENV{{ID_MM_DEVICE_IGNORE}}=\"1\", "
+      "ATTR{{power/control}}=\"on\"\n",
+      which("ATTR", i.usb_vendor, i.usb_product, i.usb_serial));
+  out += fmt::format("SUBSYSTEM==\"tty\", {}, GROUP=\"dialout\", MODE=\"0660\", ", who);
+  if (!i.usb_serial.empty())
+    out += fmt::format("SYMLINK+=\"vergence/{}-{}\", ", name_of(port.kind),
+                       part_of_name(i.usb_serial));
+  out += "ENV{ID_MM_PORT_IGNORE}=\"1\"\n";
+  if (is_ftdi(i.usb_vendor, i.usb_product))
+    out += fmt::format(
+        "ACTION==\"add|bind\", SUBSYSTEM==\"usb-serial\", DRIVER==\"ftdi_sio\", {}, "
+        "ATTR{{latency_timer}}=\"16\"\n",
+        who);
+  return out;
+}
+
+std::string usb_camera_rules(const UsbDevice& d) {
+  const bool iidc = d.vendor == kPointGreyVendor;
+  std::string out = fmt::format("\n# camera on USB {}: {}\n", d.port, comment(d.title));
+  out += fmt::format(
+      "ENV{{DEVTYPE}}==\"usb_device\", {}, GROUP=\"video\", MODE=\"0660\", "
+      "ATTR{{power/control}}=\"on\"",
+      which("ATTR", d.vendor, d.product, d.serial));
+  if (iidc && !d.serial.empty())
+    out += fmt::format(", SYMLINK+=\"vergence/camera-{}\"", part_of_name(d.serial));
+  out += "\n";
+  if (!d.video.empty())
+    out += fmt::format("SUBSYSTEM==\"video4linux\", {}, GROUP=\"video\", MODE=\"0660\"\n",
+                       which("ATTRS", d.vendor, d.product, d.serial));
+  if (!d.video.empty() && !d.serial.empty())
+    out += fmt::format(
+        "SUBSYSTEM==\"video4linux\", ATTR{{index}}==\"0\", {}, SYMLINK+=\"vergence/camera-{}\"\n",
+        which("ATTRS", d.vendor, d.product, d.serial), part_of_name(d.serial));
+  return out;
+}
+
+std::string firewire_rules(const iidc::FirewireNode& node) {
+  return fmt::format(
+      "\n# camera on IEEE 1394, {}: {}\nSUBSYSTEM==\"firewire\", ATTR{{guid}}==\"0x{:016x}\", "
+      "GROUP=\"video\", MODE=\"0660\", "
+      "SYMLINK+=\"vergence/camera-{:016x}\"\n",
+      node.device, comment(node.rom.model.data()), node.rom.guid, node.rom.guid);
+}
+
+}  // namespace
+
+std::string udev_rules(const Inventory& inventory) {
+  std::string rules;
+  for (const FoundPort& port : inventory.ports)
+    if (port.info.usb_vendor != 0) rules += port_rules(port);
+  for (const UsbDevice& d : inventory.usb)
+    if (d.vendor == kPointGreyVendor || !d.video.empty()) rules += usb_camera_rules(d);
+  for (const iidc::FirewireNode& node : inventory.firewire) rules += firewire_rules(node);
+
+  const std::string head =
+      "# Devices of this rig for members of the groups dialout (serial lines) and video (cameras), "
+      "by `vergence devices --write-udev`.\n"
+      "# Install: copy to /etc/udev/rules.d/98-vergence-rig.rules, then: udevadm control --reload "
+      "&& udevadm trigger\n";
+  if (rules.empty())
+    return head + "# Nothing that needs a rule is plugged in. Network cameras need none.\n";
+  return head + "\nACTION==\"remove\", GOTO=\"vergence_rig_end\"\n" + rules +
+         "\nLABEL=\"vergence_rig_end\"\n";
+}
+
+Inventory ports_of_rig(Inventory inventory, const Configuration& drive, const Machine& machine) {
+  std::vector<FoundPort> ports;
+  const auto add = [&](const std::string& driver, const std::string& key, SerialKind kind) {
+    if (!is_real_driver(driver)) return;
+    for (FoundPort port : inventory.ports) {
+      const bool likely = port.kind == kind || port.kind == SerialKind::ftdi;
+      if (!names_port(machine, key, port) || (key.empty() && !likely)) continue;
+      port.kind = kind;
+      ports.push_back(std::move(port));
+    }
+  };
+  add(drive.ins.driver, drive.ins.port, SerialKind::ins);
+  add(drive.trigger.driver, drive.trigger.port, SerialKind::board);
+  inventory.ports = std::move(ports);
+  return inventory;
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Row = std::vector<std::string>;
+
+/// Rows with their columns aligned.
+std::string table(const std::vector<Row>& rows) {
+  std::vector<std::size_t> widths;
+  for (const Row& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (widths.size() <= i) widths.push_back(0);
+      widths[i] = std::max(widths[i], columns(row[i]));
+    }
+  std::string text;
+  for (const Row& row : rows) {
+    std::string line = " ";
+    for (std::size_t i = 0; i < row.size(); ++i) line += " " + padded(row[i], widths[i]) + " ";
+    text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
+  }
+  return text;
+}
+
+std::string usb_ids(const SerialPortInfo& info) {
+  return info.usb_vendor == 0 ? ""
+                              : fmt::format("{:04x}:{:04x}", info.usb_vendor, info.usb_product);
+}
+
+std::string cameras_text(const Inventory& inventory, const Terminal& t) {
+  std::vector<Row> rows;
+  for (const DriverFindings& d : inventory.drivers)
+    for (const DeviceInfo& c : d.cameras)
+      rows.push_back({d.name, c.serial.empty() ? "?" : harmless(c.serial), harmless(c.model),
+                      harmless(c.place)});
+  return rows.empty() ? "" : t.in(Terminal::Ink::bold, "Cameras") + "\n" + table(rows) + "\n";
+}
+
+std::string ports_text(const Inventory& inventory, const Terminal& t) {
+  if (inventory.ports.empty()) return {};
+  std::vector<Row> rows;
+  for (const FoundPort& p : inventory.ports)
+    rows.push_back({p.info.port, usb_ids(p.info), harmless(p.info.usb_serial), to_string(p.kind),
+                    p.info.latency_timer_ms
+                        ? fmt::format("latency timer {} ms", *p.info.latency_timer_ms)
+                        : ""});
+  return t.in(Terminal::Ink::bold, "Serial ports") + "\n" + table(rows) + "\n";
+}
+
+std::string paste_text(const Inventory& inventory, const Terminal& t) {
+  std::string text;
+  for (const DriverFindings& d : inventory.drivers)
+    for (const DeviceInfo& c : d.cameras)
+      if (!c.serial.empty() || d.name == "gige") text += "    - " + camera_line(c) + "\n";
+  if (!text.empty()) text = "  cameras:\n" + text;
+  for (const FoundPort& p : inventory.ports)
+    if (!p.configuration.empty()) text += "  " + p.configuration + "\n";
+  return text.empty() ? ""
+                      : t.in(Terminal::Ink::bold, "For the configuration") + "\n" + text + "\n";
+}
+
+/// One line a driver, its message beside it.
+std::string notes_text(const Inventory& inventory, const Terminal& t) {
+  std::string text;
+  constexpr std::size_t kName = 14;
+  const auto note = [&](const std::string& name, const std::string& message) {
+    std::string head = "  " + padded(name, kName - 2);
+    for (const std::string& line : wrapped(message, t.width - kName)) {
+      text += head + line + "\n";
+      head = std::string(kName, ' ');
+    }
+  };
+  for (const DriverFindings& d : inventory.drivers) {
+    if (!d.cameras.empty() && d.note.empty()) continue;
+    note(d.name, d.note.empty() ? "none" : harmless(d.note));
+  }
+  if (inventory.ports.empty()) note("serial", "no port");
+  return text.empty() ? "" : t.in(Terminal::Ink::bold, "Not found") + "\n" + text;
+}
+
+constexpr std::size_t kState = 9, kCheck = 19;  // columns
+
+std::string state_text(FindingState state, const Terminal& t) {
+  constexpr std::array kInks{Terminal::Ink::green, Terminal::Ink::yellow, Terminal::Ink::red};
+  return t.in(kInks.at(static_cast<std::size_t>(state)), padded(to_string(state), kState));
+}
+
+std::size_t count(const std::vector<Finding>& findings, FindingState state) {
+  return static_cast<std::size_t>(std::count_if(
+      findings.begin(), findings.end(), [state](const Finding& f) { return f.state == state; }));
+}
+
+}  // namespace
+
+std::string devices_text(const Inventory& inventory, const Terminal& t) {
+  std::string text = cameras_text(inventory, t) + ports_text(inventory, t) +
+                     paste_text(inventory, t) + notes_text(inventory, t);
+  while (text.ends_with("\n\n")) text.pop_back();
+  return text;
+}
+
+std::string devices_json(const Inventory& inventory, const std::string& rules) {
+  Json cameras = Json::array(), drivers = Json::array(), ports = Json::array();
+  for (const DriverFindings& d : inventory.drivers) {
+    drivers.push_back({{"name", d.name},
+                       {"meaning", d.meaning},
+                       {"found", d.cameras.size()},
+                       {"answered", d.answered},
+                       {"note", d.note}});
+    for (const DeviceInfo& c : d.cameras)
+      cameras.push_back({{"driver", d.name},
+                         {"serial", c.serial},
+                         {"model", c.model},
+                         {"place", c.place},
+                         {"configuration", camera_line(c)}});
+  }
+  for (const FoundPort& p : inventory.ports)
+    ports.push_back(
+        {{"port", p.info.port},
+         {"by_id", p.by_id},
+         {"kind", to_string(p.kind)},
+         {"usb_ids", usb_ids(p.info)},
+         {"usb_serial", p.info.usb_serial},
+         {"description", p.info.description},
+         {"latency_timer_ms", p.info.latency_timer_ms ? Json(*p.info.latency_timer_ms) : Json()},
+         {"configuration", p.configuration}});
+  Json all{{"schema_version", kSchemaVersion},
+           {"cameras", cameras},
+           {"serial_ports", ports},
+           {"drivers", drivers}};
+  if (!rules.empty()) all["udev_rules"] = rules;
+  return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string doctor_text(const std::vector<Finding>& findings, bool given, const Terminal& t) {
+  std::string text;
+  const std::string margin(kState + kCheck, ' ');
+  for (const Finding& f : findings) {
+    std::string head = state_text(f.state, t) + padded(f.check, kCheck);
+    for (const std::string& line : wrapped(harmless(f.message), t.width - margin.size())) {
+      text += head + line + "\n";
+      head = margin;
+    }
+    for (const std::string& command : f.fix)
+      text += margin + t.in(Terminal::Ink::bold, "  " + harmless(command)) +
+              "\n";  // never broken: it is copied
+    if (!f.fix.empty()) text += "\n";
+  }
+  if (!text.ends_with("\n\n")) text += "\n";
+  text +=
+      fmt::format("problems: {}, advice: {}, well: {}\n", count(findings, FindingState::problem),
+                  count(findings, FindingState::advice), count(findings, FindingState::ok));
+  if (!given)
+    text += "Name a configuration to have checked what its drive needs: vergence doctor CONFIG\n";
+  return text;
+}
+
+std::string doctor_json(const std::vector<Finding>& findings) {
+  Json rows = Json::array();
+  for (const Finding& f : findings)
+    rows.push_back({{"check", f.check},
+                    {"state", to_string(f.state)},
+                    {"message", f.message},
+                    {"fix", f.fix}});
+  const Json all{{"schema_version", kSchemaVersion},
+                 {"problems", count(findings, FindingState::problem)},
+                 {"advice", count(findings, FindingState::advice)},
+                 {"ok", count(findings, FindingState::ok)},
+                 {"findings", rows}};
+  return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace vergence::app

@@ -1,0 +1,145 @@
+#include "app/session/calibration_writer.hpp"
+
+#include <pthread.h>
+
+#include <cstring>
+#include <string_view>
+#include <utility>
+
+#include "app/config/calibration_state.hpp"
+#include "app/runtime/errors.hpp"
+
+namespace vergence::app {
+namespace {
+
+constexpr std::size_t kPending = std::size_t{1} << 18;  // bytes: some 300 lines
+
+}  // namespace
+
+CalibrationWriter::CalibrationWriter(Options options)
+    : options_(std::move(options)), lines_(options_.session / "calibrations.csv", kPending) {
+  totals_.attempts.reserve(kMaxAttempts);
+  lines_.append(std::string(kCalibrationsHeader) + "\n");
+  thread_ = std::thread([this] { work(); });
+}
+
+void CalibrationWriter::post(const Item& item) noexcept {
+  for (;;) {
+    const WakeEvent::Ticket seen = freed_.ticket();
+    if (waiting_.push(item)) break;
+    if (!options_.wait_when_full) {
+      ++dropped_;
+      return;
+    }
+    freed_.wait(seen);
+  }
+  filled_.signal();
+}
+
+void CalibrationWriter::on_event(const EventRecord& event) noexcept {
+  if (std::string_view(event.kind) == "calibration_verified") post(event.stamp);
+}
+
+void CalibrationWriter::on_calibration(const CalibrationRecord& calibration) noexcept {
+  post(calibration);
+}
+
+void CalibrationWriter::stop() noexcept {
+  if (!thread_.joinable()) return;
+  stop_.store(true, std::memory_order_release);
+  filled_.signal();
+  thread_.join();
+}
+
+void CalibrationWriter::work() {
+  (void)pthread_setname_np(pthread_self(), "vergence-state");
+  (void)lines_.flush();
+  for (Item item;;) {
+    const WakeEvent::Ticket seen = filled_.ticket();
+    const bool stopping = stop_.load(std::memory_order_acquire);  // before the ring
+    if (waiting_.pop(&item)) {
+      freed_.signal();
+      std::visit([this](const auto& value) { write(value); }, item);
+      (void)lines_.flush();
+      lines_.write_back();
+    } else if (stopping) {
+      return;
+    } else {
+      filled_.wait(seen);
+    }
+  }
+}
+
+void CalibrationWriter::write(const CalibrationRecord& c) {
+  for (int k = 1; k < c.calibration.cameras; ++k) {
+    format_calibration(c, k, &line_);
+    lines_.append(line_);
+  }
+  if (!c.decided) {
+    unconfirmed_ = c.calibration;
+    write_session_file(c.calibration);
+  } else if (totals_.add(c)) {
+    unconfirmed_.reset();
+    keep(c.stamp, c.calibration, true);
+  }
+}
+
+void CalibrationWriter::write(Stamp confirmed) {
+  if (!unconfirmed_) return;
+  keep(confirmed, *unconfirmed_, false);
+  unconfirmed_.reset();
+}
+
+void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found) {
+  // The next drive's first: the session's disk may stand still.
+  std::string message;
+  bool failed = false;
+  if (options_.state) try {
+      CalibrationFile file = options_.words;
+      file.rig = rig;
+      if (found) file.source = "online";
+      write_state(*options_.state, file);
+      message = "the calibration is kept for the next drive: " + options_.state->string();
+    } catch (const InputError& e) {
+      failed = true;
+      message = std::string(e.what()) + "; the next drive will not know this calibration";
+    }
+  if (found) write_session_file(rig);
+  if (found && !fault_.empty()) {
+    failed = failed || !options_.state;
+    message += (message.empty() ? "" : "; ") + fault_;
+  }
+  if (message.empty()) return;
+  Outcome outcome;
+  outcome.failed = failed;
+  outcome.event.stamp = stamp;
+  outcome.event.kind = failed ? "calibration_save_failed" : "calibration_saved";
+  outcome.event.set_message(message);
+  (void)outcomes_.push(outcome);
+}
+
+void CalibrationWriter::write_session_file(const RigCalibration& rig) {
+  CalibrationFile file = options_.words;
+  file.rig = rig;
+  if (totals_.accepted > 0) file.source = "online";
+  fault_.clear();
+  try {
+    write_calibration(options_.session / "calibration.yaml", file);
+  } catch (const InputError& e) {
+    fault_ = e.what();
+  }
+}
+
+void CalibrationWriter::close(const RigCalibration* in_use, std::vector<std::string>* faults) {
+  stop();
+  if (in_use != nullptr) write_session_file(*in_use);
+  if (!fault_.empty()) faults->push_back(fault_);
+  const bool good = lines_.close();
+  if (good && lines_.lost_lines() == 0) return;
+  faults->push_back(lines_.path().string() + ": is not complete (" +
+                    (good ? std::to_string(lines_.lost_lines()) + " lines are lost"
+                          : std::strerror(lines_.fault())) +
+                    "); check that disk and make room on it");
+}
+
+}  // namespace vergence::app
