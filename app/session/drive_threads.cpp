@@ -64,7 +64,7 @@ std::string allocations_message(const ThreadAllocationCounts& figures) {
   for (const auto* names : {&figures.ours, &figures.libraries})
     for (const auto& [name, count] : *names)
       if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", name, count);
-  return list.empty() ? "" : "heap allocations while frames came: " + list;
+  return list.empty() ? "" : "runtime heap allocations: " + list;
 }
 
 }  // namespace vergence::app

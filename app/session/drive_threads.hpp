@@ -34,7 +34,7 @@ class DriveThreads {
   std::set<std::string> ours_{};
 };
 
-/// `heap allocations while frames came: vergence-sync 3`, with the threads that are not 0; empty:
+/// `runtime heap allocations: vergence-sync 3`, with the threads that are not 0; empty:
 /// there are none.
 [[nodiscard]] std::string allocations_message(const ThreadAllocationCounts& figures);
 

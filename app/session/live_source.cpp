@@ -302,7 +302,7 @@ void LiveSource::print_figures(const SessionTotals& /*totals*/, const SummaryInp
       : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
                        : "";
   progress->say(
-      fmt::format("against the mock's truth over {:.1f} m: ATE {:.3f} m{}{}", e.path_reference,
+      fmt::format("error against ground truth over {:.1f} m: ATE {:.3f} m{}{}", e.path_reference,
                   e.ate_se3.rmse, segments,
                   devices_.ins() != nullptr
                       ? " (the report compares with the INS, whose own errors are in its figures)"

@@ -296,7 +296,8 @@ void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInpu
       totals.estimate.percentile(0.99)));
   if (const std::string message = verification_message(input); !message.empty())
     progress->say(message);
-  if (const std::string message = allocations_message(input.allocations); !message.empty())
+  if (const std::string message = allocations_message(input.allocations);
+      request_.print_memory && !message.empty())
     progress->say(message);
   source_.print_figures(totals, input, progress);
 }
