@@ -62,7 +62,7 @@ ExitCode convert(const CalibrateOptions& a) {
   r.in = a.convert[0];
   r.out = a.convert[1];
   if (!a.to.empty() && !a.format.empty())
-    throw InputError("--to and --format both say what OUT is to be; give --to");
+    throw InputError("--to and --format exclude one another; use --to");
   if (!a.to.empty() || !a.format.empty()) r.format = parse_format(a.to.empty() ? a.format : a.to);
   const CalibrationFormat format = r.format ? *r.format : format_of_name(r.out);
   for (const std::filesystem::path& file : files_written(r.out, format))
@@ -110,7 +110,7 @@ ExitCode run(const CalibrateOptions& a) {
     case CalibrateWay::drive:
       break;
   }
-  throw InputError("calibrate --drive needs no board: 'vergence calibrate' does it");
+  throw InputError("calibrate --drive needs no target: use 'vergence calibrate'");
 }
 
 }  // namespace

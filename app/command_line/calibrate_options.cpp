@@ -122,8 +122,8 @@ CalibrateWay CalibrateOptions::way() const {
                    (convert.empty() ? 0 : 1) + (drive.empty() ? 0 : 1);
   if (ways != 1)
     throw InputError(
-        "calibrate: give image files (--left, --right), a CONFIG with cameras, --drive DATA, or "
-        "--convert IN OUT; one of them");
+        "calibrate: pass exactly one of: image files (--left, --right), CONFIG (live), --drive "
+        "DATA, --convert IN OUT");
   if (!drive.empty()) return CalibrateWay::drive;
   if (!convert.empty()) return CalibrateWay::convert;
   return configuration.empty() ? CalibrateWay::board_images : CalibrateWay::board_live;
