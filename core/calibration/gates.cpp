@@ -75,7 +75,7 @@ HeldOut fit_of(std::span<double> medians) noexcept {
   return h;
 }
 
-/// How well camera k fits the newest frames after a number.
+/// Fit of camera k on the newest frames after frame number `after`.
 HeldOut fit_of_held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig,
                         int k) noexcept {
   std::array<double, kHeldOutFrames> medians;
@@ -86,7 +86,8 @@ HeldOut fit_of_held_out(const TrackLog& log, std::uint64_t after, const RigCalib
   return fit_of(std::span(medians).first(n));
 }
 
-/// The same of the newest frames that a solution up to `newest` rests on.
+/// Fit of camera k on the newest frames that a solution was solved from, up to frame number
+/// `newest`.
 HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibration& rig,
                     int k) noexcept {
   std::array<double, kHeldOutFrames> medians;
@@ -98,8 +99,8 @@ HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibrat
   return fit_of(std::span(medians).first(n));
 }
 
-/// Whether frames that were not used contradict camera k of `rig`, by what a solution makes of the
-/// frames that it rests on.
+/// Returns true if frames that were not used contradict camera k of `rig`, measured by the fit of
+/// `solved` on the frames it was solved from.
 bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
                   std::uint64_t newest, int k) noexcept {
   const HeldOut fit = fit_of_held_out(log, newest, rig, k);
@@ -111,7 +112,7 @@ bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalib
   return fit.median_px > worst;
 }
 
-/// The same of any camera.
+/// Returns true if contradicted() holds for any camera.
 bool misfits(const TrackLog& log, std::uint64_t newest, const RigCalibration& solved,
              const RigCalibration& rig) noexcept {
   for (int k = 1; k < solved.cameras; ++k)
@@ -212,7 +213,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     const double least = source == ClaimSource::this_drive ? m : kOfClaim * m;
     sharper = sharper && s < least;
     a.nearer = a.nearer || (s < least && difference > kChance * s);
-    // What is known against one camera counts before what is not known of another.
+    // Evidence against one camera takes precedence over missing evidence about another.
     if (k > 1 && (contradicted == a.contradicted ? off <= worst : a.contradicted)) continue;
     worst = off;
     a.contradicted = contradicted;
@@ -222,7 +223,8 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     a.difference_percent = difference;
   }
   a.worse = fits_better(log, after, claimed, measured);
-  // Of a full window, what the lines show is no chance of where the structure was.
+  // In a full window a misfit to the epipolar lines cannot be an accident of where the structure
+  // was.
   const bool lines =
       misfits(log, after, measured, claimed) || (sharper && measured.frames >= o.max_frames);
   a.better =
@@ -279,7 +281,7 @@ double sigma_excess(const RigCalibration& rig, const CalibrationOptions& o) noex
 
 namespace {
 
-/// What has to be so whatever was estimated.
+/// Gates that apply whichever parameters were estimated.
 Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;

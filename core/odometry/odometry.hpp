@@ -15,7 +15,7 @@
 
 namespace vergence::odometry {
 
-/// What one frame came to.
+/// Result of one frame.
 struct FrameOutcome {
   bool posed = false;
   Transform T_left_world{};
@@ -58,7 +58,7 @@ struct FrameOutcome {
   }
 };
 
-/// How the cameras hang together.
+/// Whether the cameras are treated as one rigid rig.
 enum class Link : std::uint8_t {
   linked,    // one rigid rig with the calibration in use: stereo odometry
   unlinked,  // each camera's pose is found for itself; the baseline's length alone keeps the scale:
@@ -90,36 +90,39 @@ class Odometry {
                                                  const RigCalibration& rig,
                                                  std::span<const ImageView> masks = {}) noexcept;
 
-  /// `budget`: less is done where the frame would take longer, in WorkBudget's order; zero: all.
-  /// Of a frame that says how much was done, as much.
+  /// Estimates the pose of one frame. If it would take longer than `budget`, work is left out in
+  /// WorkBudget's order; zero is no limit. A replayed frame that states how much work was done gets
+  /// as much again.
   [[nodiscard]] FrameOutcome process(const RigFrame& frame, Duration budget = {}) noexcept;
 
-  /// From the next frame on the cameras are one rig with this calibration: that frame is still
-  /// posed as before, then rebuild() goes over to it. Of linked cameras the scene stays, seen
-  /// through the new lenses; without a link a new one is made from that frame, if it can be.
+  /// Changes to this calibration, with linked cameras. The next frame is still posed with the old
+  /// one; its rebuild() then makes the change. If the cameras were linked the scene is kept and
+  /// recomputed with the new calibration; if not, a new scene is made from that frame where
+  /// possible.
   void link(const RigCalibration& rig) noexcept;
-  /// After process() of every frame: what its outcome says is due. Of a link that was taken back
-  /// since, nothing.
+  /// Call after process() of every frame: does what the outcome says is due, unless a link was
+  /// revoked since.
   void rebuild(FrameOutcome* out) noexcept;
-  /// From the next frame on the cameras are not linked; the scene stays.
+  /// Unlinks the cameras from the next frame on; the scene stays.
   ///
-  /// The calibration before the last one is kept until another takes the last one's place. Where a
-  /// scene has to be begun and cannot be with the one in use, or there is none, it is tried
-  /// (FrameOutcome::resumed).
+  /// The previous calibration is kept until the one in use is replaced. It is tried when a scene
+  /// has to be started and cannot be with the one in use (FrameOutcome::resumed).
   void unlink() noexcept;
-  /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with
-  /// finding it.
+  /// Discards the transform between the cameras: the next scene of unlinked cameras begins with
+  /// estimating it.
   void reset_extrinsics() noexcept;
   [[nodiscard]] Link linked() const noexcept { return link_; }
-  /// From the next frame on: nothing is known against the calibration, so what is grossly off is a
-  /// wrong point. So it begins. While a calibration is a claim, that may be its own error.
+  /// Sets whether, from the next frame on, gross residuals are treated as wrong points and left out
+  /// of fits (initially true). Set it to false while the calibration is unverified, when they may
+  /// be its own error.
   void trust_rig(bool trusted) noexcept { poses_.drop_gross(trusted); }
 
   [[nodiscard]] const RigCalibration& rig() const noexcept { return rig_; }
   [[nodiscard]] const Map& map() const noexcept { return map_; }
   [[nodiscard]] Map& map() noexcept { return map_; }
   [[nodiscard]] const FrontEnd& front_end() const noexcept { return front_end_; }
-  /// Bit k by map point: camera k's observation of the last frame agrees with its pose.
+  /// For each map point, bit k is set if camera k's observation in the last frame agrees with its
+  /// pose.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return poses_.agrees(); }
 
  private:
@@ -127,12 +130,14 @@ class Odometry {
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured,
                               FrameOutcome* out) noexcept;
   [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
-  /// Seeks the place among all points; those long out of sight are followed again, and *revived.
+  /// Searches the pose among all map points. Points long out of sight are followed again and marked
+  /// in *revived.
   [[nodiscard]] PoseFit relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived) noexcept;
-  /// Cameras whose own pose was not found are sought by what the points look like.
+  /// Relocalises cameras whose own pose was not found by the points' descriptors.
   void recover_cameras(const PoseFit& fit) noexcept;
   void settle_points(const PoseFit& fit) noexcept;
-  /// Whether the other cameras still see what they have seen.
+  /// Updates stereo_fails_: whether further cameras still see the points that they have seen
+  /// before.
   void count_across(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(Stamp stamp, FrameOutcome* out) noexcept;

@@ -11,7 +11,7 @@
 #include "core/odometry/drift_covariance.hpp"
 #include "core/odometry/odometry.hpp"
 
-/// What an Estimator is made of, for its own sources.
+/// Implementation of Estimator, shared by its sources.
 namespace vergence {
 
 struct Estimator::Parts {
