@@ -18,8 +18,8 @@ constexpr double kFullWindow = 3.0;         // times the wanted sigmas, at max_f
 constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of t is given
 constexpr int kFewestHeldOut = 3;           // frames that say anything
 constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
-// And how many times that of the frames that were; under so many pixels they may differ: on
-// recorded drives both are 0.08 to 0.25 px.
+// The residual of held-out frames may be kTimesUsed times that of the frames used, or kMinMisfit
+// px; on recorded drives both residuals are 0.08 to 0.25 px.
 constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
 // rad, of the turn between two cameras that no epipolar line shows: what a calibration that does
 // not state its sigmas is off by when it is the rig's, and when it is not. Chosen: on the seven

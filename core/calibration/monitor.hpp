@@ -13,12 +13,12 @@ namespace vergence::calibration {
 struct MonitorOptions {
   double threshold = 45.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false
                             // alarms, 20 … 500
-  double bias_px = 0.02;  // px rms over the image: slow error of vertical differences that is
-                          // overlooked at least, 0 … 1
-  // The same with a calibration that was found from images and is confirmed, expected until it is
-  // measured, 0 … 2.
+  double bias_px = 0.02;  // px rms over the image: minimum of the slowly varying error of vertical
+                          // differences that is tolerated, 0 … 1
+  // Expected value of the same error, until it is measured, for a calibration that was found from
+  // images and is verified, 0 … 2.
   double verified_bias_px = 0.12;
-  double unverified_bias_px = 0.3;  // and with one that is given, 0 … 5
+  double unverified_bias_px = 0.3;  // expected with an unverified calibration, 0 … 5
   int min_matches =
       30;  // stereo matches under which a frame measures nothing (`needs_texture`), 12 … 1000
   int short_window = 3;   // moving frames of the shortest window: large knocks, 1 … 10
@@ -59,9 +59,9 @@ struct MonitorResult {
     collapse,  // matches are expected and not there: too far off to be measured
   };
   Kind kind = Kind::quiet;
-  bool undecided = false;  // over the threshold in a frame that may be an exception
+  bool undecided = false;  // over the threshold in one frame, which may be an outlier
   double statistic = 0;    // largest of all windows
-  double threshold = 0;    // what it is held against
+  double threshold = 0;    // the limit of `statistic`
   Vec6 offset = Vec6::Zero();  // true minus reference, (φ rad, τ m): R ← Exp(φ) R, t ← t + τ; since
                                // the onset, else of the longest window; first order
   Mat6 covariance = Mat6::Zero();  // of `offset`; rank 5, the length is not seen

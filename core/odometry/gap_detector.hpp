@@ -36,7 +36,7 @@ class GapDetector {
     return gap ? dt : 0;
   }
   [[nodiscard]] bool renewal_due() const noexcept { return due_; }
-  /// The scene is new, or of another kind.
+  /// Clears the request: the scene was made anew or replaced, or cannot be made anew.
   void forget() noexcept { due_ = false; }
 
  private:
@@ -45,7 +45,7 @@ class GapDetector {
   // where its last motion would have it after six of them: nothing near is found there any more.
   static constexpr double kLongest = 6;
 
-  /// The median, of which a gap is no part unless there is nothing else.
+  /// The median, so that a gap has no effect unless most intervals are gaps.
   [[nodiscard]] double usual_interval() const noexcept {
     const std::size_t n = std::min(count_, kIntervals);
     if (n == 0) return 0;

@@ -32,19 +32,20 @@ struct FrameOutcome {
                              // or, of a left image that came twice, is without it
   bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
-  bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
-                             // tracks are of no more use
-  bool relinked = false;     // it was, in this frame
+  bool relink_due = false;   // rebuild() will change to the next calibration; call it when this
+                             // frame's tracks are no longer needed
+  bool relinked = false;     // rebuild() has changed to it in this frame
   bool resumed = false;    // the one in use before the last was: a scene can be made by it, and not
                            // by the last
   double points_kept = 0;  // with `relinked`: share of the scene's points that fit the calibration
   bool renewal_due = false;     // after a gap rebuild() makes the scene anew from this frame
-  bool renewed = false;         // it did
+  bool renewed = false;         // rebuild() has made it anew
   bool initialised = false;     // the rig's transform was found from this frame's images alone
-  double gap_s = 0;             // time since the frame before, when it was too long to predict over
+  double gap_s = 0;             // time since the frame before if it was a gap, else 0
   std::uint8_t structured = 0;  // bit k: camera k gave an image that shows something new
   bool images_good = false;     // every camera gave an image, new and with structure
-  bool moving = false;          // what is seen is not one rigid scene, or not the one posed by
+  bool moving =
+      false;  // the points seen do not move as one rigid scene, or most do not agree with the pose
   bool uneven = false;  // a camera gave an older image again and another a new one: from here on
                         // the one may be an exposure behind
   double scale =
@@ -58,7 +59,7 @@ struct FrameOutcome {
   }
 };
 
-/// Whether the cameras are treated as one rigid rig.
+/// Relation between the cameras' poses.
 enum class Link : std::uint8_t {
   linked,    // one rigid rig with the calibration in use: stereo odometry
   unlinked,  // each camera's pose is found for itself; the baseline's length alone keeps the scale:
@@ -141,7 +142,7 @@ class Odometry {
   void count_across(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(Stamp stamp, FrameOutcome* out) noexcept;
-  /// Makes points to be tried. Returns what it took, ms.
+  /// Makes candidate points. Returns the time it took, ms.
   double new_points(int at_least, FrameOutcome* out) noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
@@ -149,18 +150,17 @@ class Odometry {
                                  FrameOutcome* out) noexcept;
   void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
                    double dt, FrameOutcome* out) noexcept;
-  /// The scene is made anew from the newest frame, where its pose says that the camera is. False:
-  /// it cannot be, and the old one goes on.
+  /// Makes the scene anew from the newest frame at its pose. Returns false if that fails; the old
+  /// scene is kept.
   bool renew_scene(FrameOutcome* out) noexcept;
   void take_up(const RigCalibration& rig) noexcept;
-  /// Takes up a calibration and keeps the scene: what the window saw is what the new lenses make of
-  /// the same pixels, points are triangulated again, and the newest pose stays. False: this
-  /// frame's matches do not fit it.
+  /// Changes to a calibration and keeps the scene: the window's pixels are undistorted with the new
+  /// lenses, points are triangulated again, and the newest pose stays. Returns false if this
+  /// frame's matches do not fit the calibration.
   [[nodiscard]] bool reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept;
-  /// The calibration before the last is used again if a scene can be made of this frame by it.
+  /// Changes back to the previous calibration if this frame gives a scene with it.
   [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
-  /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
-  /// again.
+  /// Discards the scene; without a calibration the rig has to be initialised again.
   void lose_scene() noexcept;
   void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;
 
