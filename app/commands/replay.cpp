@@ -93,8 +93,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
       ->group("Output");
   declare_image_topics(*command, &a->topics.left, &a->topics.right);
   command
-      ->add_option("--ins-topic", a->topics.ins,
-                   "Bag topic of the INS (NavSatFix or Odometry), if ambiguous")
+      ->add_option("--ins-topic", a->topics.ins, "Bag topic of the INS (NavSatFix), if ambiguous")
       ->type_name("TOPIC")
       ->group("Input");
   command
