@@ -17,7 +17,7 @@ enum class CameraTrigger : std::uint8_t {
   software,  // the driver asks for each
   free,      // the camera's own clock
 };
-/// The word of the configuration: `hardware`.
+/// The configuration's value, as `hardware`.
 [[nodiscard]] const char* to_string(CameraTrigger) noexcept;
 
 /// Requested or applied configuration of a camera.

@@ -30,7 +30,7 @@ struct SessionStart {
   std::string name{};                       // of the session folder
   std::vector<std::string> camera_names{};  // those of the calibration, each once
   Stamp first{};                            // of the drive
-  std::uint64_t frames = 0;                 // of the whole drive; 0: nobody knows
+  std::uint64_t frames = 0;                 // of the whole drive; 0 if unknown
   std::optional<ClockTie> tie{};            // none in a replay and in virtual time
   std::size_t image_bytes = 0;              // of one frame of the largest camera
   bool can_recalibrate = false;             // SessionRequests::recalibrate is listened to

@@ -17,7 +17,7 @@ struct SessionOptions {
   bool quiet = false;
   bool print_memory = false;  // a table of what is held, on stdout
   std::vector<SessionObserver*> observers{};
-  SessionRequests* requests = nullptr;  // of observers; null: nobody asks for anything
+  SessionRequests* requests = nullptr;  // from observers; may be null
 };
 
 /// Runs a source through estimator and comparison into a session folder (DESIGN §6): set-up,

@@ -41,8 +41,8 @@ struct EstimatorOptions {
   Adoption adoption = Adoption::after_fixed_frames;
   std::array<ImageView, kMaxCameras> masks{};  // by camera, of its images' size: where it is 0
                                                // nothing is looked for; empty: everywhere
-  Duration frame_budget{};  // live: what a frame may take before work is left out
-                            // (docs/deployment.md); zero: whatever it takes
+  Duration frame_budget{};  // live: time that a frame may take before work is left out
+                            // (docs/deployment.md); zero: no limit
   bool online =
       true;  // watch the rig and calibrate it; false: the calibration given is used for ever
 };
@@ -56,7 +56,8 @@ struct EstimatorEvent {
     time_gap,
     relocalised,
     dropped,
-    rig_changed,  // the monitor raised, or the user asked; value: frames since the onset
+    rig_changed,  // the monitor found a change, or the user requested a calibration; value: frames
+                  // since the onset
     out_of_sync,  // the cameras' images are not of the same instant; value: the lag in frames, 0
                   // where it is not known
     cameras_in_sync,            // cameras that were out of step are so no more
