@@ -43,12 +43,11 @@ void make_empty_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder, error))
-    throw InputError(
-        folder.string() +
-        ": cannot be made a folder; --keep-views takes one that is not there or empty");
+    throw InputError(folder.string() +
+                     ": cannot be created; --keep-views needs a new or empty directory");
   if (!fs::is_empty(folder, error))
     throw InputError(folder.string() +
-                     ": is not empty; --keep-views takes a folder that is not there or empty");
+                     ": is not empty; --keep-views needs a new or empty directory");
 }
 
 /// Sets of images from the cameras, the board in them, until nothing is missing. Its thread looks,

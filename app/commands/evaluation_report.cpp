@@ -249,7 +249,7 @@ InsMount ins_mount_of(const std::filesystem::path& estimate,
     const bool folder = std::filesystem::is_directory(path, ignored);
     if (auto mount = mount_in((folder ? path : path.parent_path()) / "summary.json")) return *mount;
   }
-  return {mount_of(Vec3::Zero(), Vec3::Zero()), "nobody: the axes alone", true};
+  return {mount_of(Vec3::Zero(), Vec3::Zero()), "the axes only", true};
 }
 
 Json ins_mount_json(const InsMount& mount) {

@@ -106,7 +106,7 @@ CalibrationState read_state(const std::filesystem::path& file, const Calibration
   if (!std::filesystem::exists(file, error)) {
     if (error)
       state.message = file.string() + ": cannot be looked at (" + error.message() +
-                      "); the drive begins without it";
+                      "); the run starts without it";
     return state;
   }
   try {
@@ -116,7 +116,7 @@ CalibrationState read_state(const std::filesystem::path& file, const Calibration
     else
       state.calibration = std::move(found);
   } catch (const InputError& e) {
-    state.message = std::string(e.what()) + "; the drive begins without it";
+    state.message = std::string(e.what()) + "; the run starts without it";
   }
   return state;
 }

@@ -194,7 +194,7 @@ KittiRawFolders find_kitti_raw(const fs::path& folder) {
   std::vector<fs::path> found = drives_in(folder);
   if (found.empty())
     refuse(folder, 0,
-           "holds no KITTI raw drive: a folder with image_00, image_01 and oxts is expected");
+           "is not a KITTI raw drive; a directory with image_00, image_01 and oxts is expected");
   if (found.size() > 1) {
     constexpr std::size_t kMaxNamed = 8;
     std::sort(found.begin(), found.end());

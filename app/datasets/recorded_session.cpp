@@ -201,7 +201,8 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
            "--format mcap replays");
   if (session.frames_.empty())
     refuse(folder, 0,
-           "has a recording without a whole frame; the drive was too short, or the file is cut");
+           "has a recording without a complete frame; the run was too short, or the file is "
+           "truncated");
   const auto has_image = [](const RecordedFrame& f) {
     return std::any_of(f.images.begin(), f.images.end(),
                        [](const RecordedImage& i) { return i.offset != 0; });
@@ -214,7 +215,7 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
         "{} frames or readings of the recording are damaged and were left out", reader.broken));
   if (reader.images_lost > 0)
     session.remarks_.push_back(
-        fmt::format("{} images that the drive had are not in the recording", reader.images_lost));
+        fmt::format("{} images of the run are missing in the recording", reader.images_lost));
   session.complete_ = session.complete_ && reader.broken == 0 && reader.images_lost == 0;
   if (session.description_.program != version())
     session.remarks_.push_back(

@@ -103,8 +103,8 @@ void check_rectified(const RigCalibration& rig) {
   if (rig.intrinsics[0].has_distortion() || rig.intrinsics[1].has_distortion() ||
       !T.R.isApprox(Mat3::Identity(), 1e-9) || std::abs(T.t.y()) > 1e-9 || std::abs(T.t.z()) > 1e-9)
     throw InputError(
-        "--format kitti has no place for distortion and turned cameras, which these images have; "
-        "euroc and folder do");
+        "--format kitti cannot store distortion and rotated cameras, which this rig has; use euroc "
+        "or folder");
 }
 
 /// Where images go, and what the text files of the layout hold.
@@ -259,7 +259,7 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
   check_sizes(first, request.calibration);
   if (first.given.cameras > 2)
     result.remarks.push_back(fmt::format(
-        "{} cameras were recorded; the first two are exported, the layout holds no more",
+        "{} cameras were recorded; the first two are exported, because the format has only two",
         first.given.cameras));
   request.calibration.rig.cameras = 2;
   Writer writer(request);

@@ -292,7 +292,7 @@ Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* rem
   remarks->push_back(fmt::format(
       "the INS's velocity is along {}, its yaw {}, its pitch field {}, {} with the nose up{}",
       c.axes, c.yaw.phrase, c.pitch_first ? 10 : 11, c.nose_up_positive ? "positive" : "negative",
-      slope ? "" : " (taken: the drive is too level to show it)"));
+      slope ? "" : " (assumed: the path is too level to show it)"));
   return c;
 }
 

@@ -169,17 +169,17 @@ void check_ptp(const Configuration& c, int cameras) {
     const auto* options = std::get_if<gige::Options>(&s.options);
     if (options == nullptr || !options->ptp)
       refuse(c, fmt::format(
-                    "cameras.{}.options does not say ptp: on, so its clock follows nobody's", k));
+                    "cameras.{}.options does not contain ptp: on, so its clock is not synchronised",
+                    k));
   });
 }
 
 void check_one_picture(const Configuration& c, int cameras) {
   for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
     if (s.half == ImageHalf::whole)
-      refuse(c, fmt::format(
-                    "cameras.{}.image_half is whole, so it has a picture of its own; with both "
-                    "images in one picture it is left or right",
-                    k));
+      refuse(c, fmt::format("cameras.{}.image_half is whole, so it has its own frames; with both "
+                            "images in one frame it is left or right",
+                            k));
   });
 }
 
@@ -202,8 +202,7 @@ void check_mode(const Configuration& c, int cameras) {
         throw InputError(
             "cameras[].trigger is free: nothing makes the cameras expose together, so their "
             "counters cannot pair the images; "
-            "trigger them, or set sync.mode to approximate_time (both in one picture: "
-            "side_by_side)");
+            "trigger them, or set sync.mode to approximate_time (both in one frame: side_by_side)");
       return;
     case SyncMode::approximate_time:
       return;

@@ -133,7 +133,7 @@ LivePage::LivePage(const Options& options, SessionRequests* requests,
           work();
         } catch (
             const std::exception& e) {  // no memory: whoever looks loses the page, not the drive
-          fmt::print(stderr, "vergence: the live page has ended ({}); the drive goes on\n",
+          fmt::print(stderr, "vergence: the live page has ended ({}); the run continues\n",
                      e.what());
         }
       }) {}

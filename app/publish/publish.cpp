@@ -61,7 +61,7 @@ Publishing::Publishing(const Configuration& configuration) {
       lines_ = std::make_unique<LinePublisher>(open_line_socket(address, "publish.pose_stream"),
                                                &requests_, configuration.calibration);
     } catch (const InputError& e) {
-      fmt::print(stderr, "vergence: {}; the drive goes on without lines\n", e.what());
+      fmt::print(stderr, "vergence: {}; the run continues without the pose stream\n", e.what());
     }
   }
   if (!settings.http.empty()) open_page(configuration);
@@ -86,7 +86,7 @@ void Publishing::open_page(const Configuration& configuration) {
                 : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",
                               options.address.link().text(), settings.token_file);
   } catch (const InputError& e) {
-    fmt::print(stderr, "vergence: {}; the drive goes on without its page\n", e.what());
+    fmt::print(stderr, "vergence: {}; the run continues without the live page\n", e.what());
   }
 }
 

@@ -628,13 +628,13 @@ Assessment judge(const Session& session, const Analysis& analysis) {
   Assessment v = j.assessment();
   for (const std::string& reason : v.reasons) v.message += (v.message.empty() ? "" : "; ") + reason;
   if (v.reasons.empty())
-    v.message = fmt::format(
-        "every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames ok{}",
-        percent(analysis.drift.value_or(0)), analysis.path_m, analysis.ok,
-        analysis.read + analysis.skipped,
-        analysis.waited > 0
-            ? fmt::format(", {} before the drive had confirmed its calibration", analysis.waited)
-            : "");
+    v.message =
+        fmt::format("every check passed: drift of {} on a drive of {:.0f} m, {} of {} frames ok{}",
+                    percent(analysis.drift.value_or(0)), analysis.path_m, analysis.ok,
+                    analysis.read + analysis.skipped,
+                    analysis.waited > 0
+                        ? fmt::format(", {} before the calibration was verified", analysis.waited)
+                        : "");
   v.message.front() =
       static_cast<char>(std::toupper(static_cast<unsigned char>(v.message.front())));
   v.message += '.';

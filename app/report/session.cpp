@@ -391,8 +391,7 @@ std::optional<Event> parse_event(std::string_view line) {
 }
 
 void read_events(const fs::path& folder, Session* session) {
-  auto lines =
-      open_part(folder / "events.jsonl", "what happened during the drive is not known", session);
+  auto lines = open_part(folder / "events.jsonl", "the events of the run are unknown", session);
   if (!lines) return;
   std::size_t damaged = 0;
   for (std::string_view line; lines->next(&line);) {

@@ -94,10 +94,11 @@ std::vector<std::string> RealtimeThreads::lock_memory() {
   if (!request_.lock_memory) return {};
   RealtimeSystem::Locked locked = RealtimeSystem::Locked::everything;
   if (const int error = system_.lock_memory(&locked); error != 0)
-    return {fmt::format(
-        "realtime.lock_memory is refused ({}), the drive goes on without: allow it with `ulimit -l "
-        "unlimited`, in a service with LimitMEMLOCK=infinity",
-        reason(error))};
+    return {
+        fmt::format("realtime.lock_memory is refused ({}), the run continues without it: allow it "
+                    "with `ulimit -l "
+                    "unlimited`, in a service with LimitMEMLOCK=infinity",
+                    reason(error))};
   if (locked == RealtimeSystem::Locked::present)
     return {
         "realtime.lock_memory: what there is now is locked, memory taken later is not, under "
@@ -136,7 +137,8 @@ void RealtimeThreads::apply(const ProcessThread& thread, std::vector<std::string
   const int error = system_.set_fifo(thread.id, priority);
   if (error == 0 || error == ESRCH || std::exchange(priority_refused_, true)) return;
   messages->push_back(fmt::format(
-      "realtime.priority: {} gets no priority {} ({}), the drive goes on without: allow it with "
+      "realtime.priority: {} does not get priority {} ({}), the run continues without it: allow it "
+      "with "
       "`sudo setcap cap_sys_nice,cap_ipc_lock+ep $(command -v vergence)`, in a service with "
       "LimitRTPRIO={}",
       thread.name, priority, reason(error), request_.priority));
@@ -148,7 +150,7 @@ void RealtimeThreads::set_affinity(pid_t thread, const cpu_set_t& cpus, bool sol
   bool& refused = solver ? solver_affinity_refused_ : affinity_refused_;
   if (error == 0 || error == ESRCH || std::exchange(refused, true)) return;
   messages->push_back(
-      fmt::format("realtime.{}: there is none of these processors for us ({}), the drive goes on "
+      fmt::format("realtime.{}: none of these processors is available ({}), the run continues "
                   "on all of them: `taskset -pc $$` lists those that there are",
                   solver ? "solver_affinity" : "affinity", reason(error)));
 }

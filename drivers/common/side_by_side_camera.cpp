@@ -37,7 +37,7 @@ class Whole final : public Notifier {
     const DeviceStatus status = camera_->configure(doubled, &made);
     if (status != DeviceStatus::ok) {
       *error = camera_->last_error();
-      if (!error->empty()) *error += " (twice the width of one image: both are in one picture)";
+      if (!error->empty()) *error += " (twice the width of one image: both are in one frame)";
       return status;
     }
     sizes_[half] = size;

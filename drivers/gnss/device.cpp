@@ -137,7 +137,7 @@ DeviceStatus Device::configure(double rate_hz, double* actual_hz) noexcept {
       return DeviceStatus::unsupported;
     }
     const HeadingSource heading = decoder_.best_heading();
-    remark_ = "it gives no attitude: the comparison is of position and ";
+    remark_ = "it sends no attitude: the comparison is of position and ";
     remark_ += heading == HeadingSource::heading ? "measured heading"
                                                  : "course, as heading, once the vehicle moves";
     if (rate_hz_ <= 0) remark_ += "; it has no fix yet";

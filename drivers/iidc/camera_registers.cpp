@@ -134,7 +134,7 @@ std::string CameraRegisters::last_error() const {
   const char* what = last_failure_ == DeviceStatus::timeout       ? "did not become ready in time"
                      : last_failure_ == DeviceStatus::unsupported ? "was refused by the camera"
                      : last_failure_ == DeviceStatus::disconnected
-                         ? "was not answered: the camera is gone"
+                         ? "was not answered: the camera is disconnected"
                          : "could not be reached";
   return format_text("register 0x%llx %s%s",
                      static_cast<unsigned long long>(failed_at_ - kRegisterSpace), what,

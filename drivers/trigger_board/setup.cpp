@@ -252,7 +252,7 @@ DeviceStatus Setup::hello(Duration limit, TriggerInfo* info) {
 
 DeviceStatus Setup::other_version(unsigned theirs) {
   last_error_ = format_text(
-      "the trigger board speaks version %u of the protocol and this program version %d; flash this "
+      "the trigger board uses protocol version %u, this program version %d; flash this "
       "release's firmware",
       theirs, static_cast<int>(trigger_protocol_version));
   return DeviceStatus::unsupported;

@@ -197,7 +197,7 @@ class Applier {
     if (got_format != chosen->fourcc || (planes && f.fmt.pix_mp.num_planes != 1))
       refuse(DeviceStatus::unsupported, "the camera gives " + name_of(got_format) + " where " +
                                             name_of(chosen->fourcc) +
-                                            " was asked for: name another pixel_format");
+                                            " was requested: name another pixel_format");
     if (field != V4L2_FIELD_NONE && field != V4L2_FIELD_ANY)
       refuse(DeviceStatus::unsupported,
              "the camera gives interlaced images, of which two halves are of two moments");
@@ -241,7 +241,7 @@ class Applier {
       remark("the camera runs at " + number_text(camera) + " Hz where " +
              number_text(requested_.rate_hz) + " was asked for" +
              (camera > 1.5 * requested_.rate_hz
-                  ? "; the option thin keeps as many as were asked for"
+                  ? "; the option thin reduces the rate to the requested one"
                   : ""));
     out_.actual.rate_hz = camera;
   }

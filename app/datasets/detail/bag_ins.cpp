@@ -137,7 +137,7 @@ RecordedIns bag_ins(const std::filesystem::path& path, const BagIndex& bag,
     remark_left_out(imu, bag.attitudes.at(imu), &ins.remarks);
   } else if (!fix.empty() && imus.empty()) {
     ins.remarks.push_back("the NavSatFix of " + fix +
-                          " has no orientation beside it (of an Imu): nothing can be compared");
+                          " has no matching Imu orientation: nothing can be compared");
   } else {
     ins.remarks.push_back(fmt::format(
         "several topics could be the INS, nothing is compared; choose with --ins-topic and "

@@ -32,7 +32,7 @@ void BagScan::broken(std::uint64_t BagScan::*counter, std::uint64_t offset, std:
 void BagScan::remark(const std::string& name, std::vector<std::string>* remarks) const {
   if (!finished)
     remarks->push_back(fmt::format(
-        "{} is unfinished: it was read up to offset {}, where its last whole record ends", name,
+        "{} is incomplete: it was read up to offset {}, the end of its last complete record", name,
         end));
   if (first_broken)
     remarks->push_back(

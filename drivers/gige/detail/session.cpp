@@ -599,7 +599,7 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
   const char* enable = features_.find(Purpose::ptp_enable);
   if (o.ptp && enable == nullptr)
     return refuse(DeviceStatus::unsupported,
-                  "the camera knows no PTP (IEEE 1588); set the option ptp to off");
+                  "the camera does not support PTP (IEEE 1588); set the option ptp to off");
   if (enable != nullptr && !features_.switch_on(enable, o.ptp) && o.ptp)
     return refuse(DeviceStatus::unsupported, features_.last_error());
   if (!o.ptp) {

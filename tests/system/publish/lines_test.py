@@ -121,7 +121,7 @@ def documented_reader(below):
 def without_a_place(below):
     run = d.Drive(below / "nowhere", 2, "--set", f"publish.pose_stream=unix://{below}/no/folder/pose.sock")
     assert run.end() == 0, run.messages()
-    assert "the drive goes on without lines" in run.messages(), run.messages()
+    assert "the run continues without the pose stream" in run.messages(), run.messages()
     bad = d.Drive(below / "bad", 2, "--set", "publish.pose_stream=tcp://somewhere:1")
     assert bad.end() == 2, bad.messages()
     assert "publish.pose_stream" in bad.messages() and not bad.session.exists(), bad.messages()

@@ -165,7 +165,7 @@ TEST_F(RecordedDrive, isExportedForOtherPrograms) {
   }
   const Outcome kitti = to("kitti");
   EXPECT_EQ(kitti.code, 2);
-  EXPECT_TRUE(test::says(kitti.err, "no place for distortion"));
+  EXPECT_TRUE(test::says(kitti.err, "cannot store distortion"));
   EXPECT_FALSE(std::filesystem::exists(out("kitti")));
 }
 

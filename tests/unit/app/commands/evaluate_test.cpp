@@ -200,7 +200,7 @@ TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
     folder.write("s/summary.json", summary);
     const auto axes = figures(session);
     EXPECT_NEAR(axes["heading_error_deg"]["rms"].get<double>(), 2, 0.27) << summary;
-    EXPECT_EQ(axes["ins_mount"]["source"], "nobody: the axes alone");
+    EXPECT_EQ(axes["ins_mount"]["source"], "the axes only");
   }
 }
 

@@ -145,7 +145,7 @@ TEST(StateFile, ADamagedOneIsASentenceAndNoEnd) {
   folder.write("calibration_state.yaml", "version: 1\ncameras: [{name: left");
   const CalibrationState state = read_state(folder / "calibration_state.yaml", two_cameras());
   EXPECT_FALSE(state.calibration);
-  EXPECT_NE(state.message.find("the drive begins without it"), std::string::npos) << state.message;
+  EXPECT_NE(state.message.find("the run starts without it"), std::string::npos) << state.message;
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ TEST(DriveSync, whatCannotBePairedIsRefusedWithWhatToDo) {
            {"sync: {mode: ins_syncout}\nins: {driver: xsens, sync_out_hz: 25}\ntrigger: {rate: 30}",
             "both are one rate"},
            {"sync: {mode: ieee1394_cycle_time}", "share its cycle timer"},
-           {"sync: {mode: ptp}", "does not say ptp: on"},
+           {"sync: {mode: ptp}", "does not contain ptp: on"},
            {"sync: {mode: side_by_side}", "cameras.0.image_half is whole"},
            {"sync: {mode: master_strobe}", "camera 0 triggers the others, so it is free"},
            {"sync: {mode: master_strobe}\ncameras: [{driver: gige, trigger: free}, {driver: "
