@@ -104,8 +104,9 @@ TEST(Configuration, FilesThatCannotBeReadAreNamed) {
   const auto message = [](const std::filesystem::path& path) {
     return test::refusal_of([&] { (void)load_configuration(path, {}); });
   };
-  EXPECT_EQ(message(folder / "none.yaml"), (folder / "none.yaml").string() + ": no such file");
-  EXPECT_TRUE(contains(message(folder.path()), "is a folder"));
+  EXPECT_EQ(message(folder / "none.yaml"),
+            (folder / "none.yaml").string() + ": no such file; check the path");
+  EXPECT_TRUE(contains(message(folder.path()), "is a directory"));
   const std::filesystem::path pipe = folder / "pipe.yaml";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_TRUE(contains(message(pipe), "is a pipe or a device"));
