@@ -60,6 +60,8 @@ using Kind = Withdrawn::Kind;
 constexpr std::string_view kNoLine =
     "the mock's devices have no serial line; drivers on simulated lines are part of the tests";
 
+constexpr std::string_view kCalibrateTarget = "'vergence calibrate target --left GLOB'";
+
 constexpr std::array kTable{
     Withdrawn{Kind::key, "ins.sync_in",
               "SyncIn stays as the device has it; set it with the maker's program"},
@@ -151,6 +153,12 @@ constexpr std::array kTable{
     Withdrawn{Kind::option, "replay --memory", "--print-memory", true},
     Withdrawn{Kind::option, "evaluate --estimate-mount", "--estimate-ins-extrinsics", true},
     Withdrawn{Kind::option, "doctor --out", "--session-dir", true},
+    Withdrawn{Kind::option, "calibrate --left", kCalibrateTarget, true},
+    Withdrawn{Kind::option, "calibrate --right", kCalibrateTarget, true},
+    Withdrawn{Kind::option, "calibrate --camera", kCalibrateTarget, true},
+    Withdrawn{Kind::option, "calibrate --drive", "'vergence calibrate sequence DATA'", true},
+    Withdrawn{Kind::option, "calibrate --convert", "'vergence calibrate convert IN OUT'", true},
+    Withdrawn{Kind::option, "calibrate CONFIG", "'vergence calibrate live CONFIG'", true},
 };
 
 }  // namespace
