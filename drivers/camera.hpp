@@ -17,7 +17,7 @@ enum class CameraTrigger : std::uint8_t {
   software,  // the driver asks for each
   free,      // the camera's own clock
 };
-/// The word of the configuration: `hardware`.
+/// The configuration's value, as `hardware`.
 [[nodiscard]] const char* to_string(CameraTrigger) noexcept;
 
 /// Requested or applied configuration of a camera.
@@ -112,18 +112,19 @@ class CameraDevice {
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// While not streaming and with every slot released, else `busy`. *actual (may be null): what the
-  /// camera will do, rounded to what it can. → ok, unsupported, bad_configuration, busy, gone
+  /// camera will do, rounded to what it can. → ok, unsupported, bad_configuration, busy,
+  /// disconnected
   [[nodiscard]] virtual DeviceStatus configure(const CameraConfiguration& requested,
                                                CameraConfiguration* actual) noexcept = 0;
   /// From the start of an exposure to its arrival. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
-  /// Starts streaming, also again after `gone`; while streaming it does nothing. `ready` (may be
-  /// null) is told of every frame and of the device's going. → ok, gone, ended, no_permission,
-  /// no_bandwidth, bad_configuration (not configured)
+  /// Starts streaming, also again after `disconnected`; while streaming it does nothing. `ready`
+  /// (may be null) is notified of every frame and of a disconnect. → ok, disconnected, ended,
+  /// no_permission, no_bandwidth, bad_configuration (not configured)
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
   /// Oldest frame not yet handed out, waiting at most `limit` (0: look once). `ok`: frame->slot is
-  /// the caller's. `gone`: frame->arrival says when it was noticed. → ok, timeout, stopped, ended,
-  /// gone
+  /// the caller's. `disconnected`: frame->arrival says when it was noticed. → ok, timeout, stopped,
+  /// ended, disconnected
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, Frame* frame) noexcept = 0;
   /// Precondition: the slot was handed out and not yet released.
   [[nodiscard]] virtual ImageView view(FrameSlot slot) const noexcept = 0;
@@ -133,13 +134,13 @@ class CameraDevice {
   /// harmless.
   virtual void stop() noexcept = 0;
   /// One exposure, with CameraTrigger::software and while streaming. → ok, unsupported, stopped,
-  /// gone
+  /// disconnected
   [[nodiscard]] virtual DeviceStatus trigger_once() noexcept { return DeviceStatus::unsupported; }
   /// Exposure and gain from one of the next frames on, while streaming; those frames tell it, and a
   /// camera that comes back has it. Outside of what the camera has the nearest is taken; *actual
   /// (may be null): what it took. Talks to the device: as long as that, never for ever; not for a
   /// thread that has a frame to give. → ok, unsupported, bad_configuration (not positive, longer
-  /// than the interval), stopped, gone, failed
+  /// than the interval), stopped, disconnected, failed
   [[nodiscard]] virtual DeviceStatus set_exposure(const ExposureSetting& /*wanted*/,
                                                   ExposureSetting* /*actual*/) noexcept {
     return DeviceStatus::unsupported;

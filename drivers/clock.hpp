@@ -13,19 +13,19 @@ namespace vergence {
   return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
 }
 
-/// The host's clock that arrivals are told in.
+/// The host's clock of all arrival stamps: CLOCK_MONOTONIC.
 [[nodiscard]] inline HostStamp monotonic_now() noexcept {
   return HostStamp(clock_ns(CLOCK_MONOTONIC));
 }
 
-/// One moment by the host's clock of the day and by the one that arrivals are told in.
+/// One instant on the host's real-time clock and on its monotonic clock.
 struct HostMoment {
   Stamp day{};
   HostStamp host{};
 };
 
-/// The day's clock is read between two looks at the other. A thread may be held up between them: of
-/// several trials the one counts that took the least time.
+/// Reads the real-time clock between two readings of the monotonic one. The thread may be preempted
+/// in between, so the shortest of several trials counts.
 template <class Day, class Host>
 [[nodiscard]] HostMoment tightest_moment(Day day, Host host) {
   constexpr int kTrials = 5;

@@ -45,7 +45,7 @@ struct DeviceTiming {
   Duration resolution = Duration::microseconds(1);    // of the device's stamps
 };
 
-/// Told by a driver that something can be taken. One may serve several devices.
+/// Callback of a driver when something can be taken. One Notifier may serve several devices.
 ///
 /// Threads  notify() from the driver's threads, at any time between start() and the return of
 ///          stop(); it neither blocks nor calls back.

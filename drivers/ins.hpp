@@ -68,14 +68,15 @@ class InsDevice {
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// Readings a second. *actual_hz (may be null): what it will do. → ok, unsupported,
-  /// bad_configuration, gone
+  /// bad_configuration, disconnected
   [[nodiscard]] virtual DeviceStatus configure(double rate_hz, double* actual_hz) noexcept = 0;
   /// From the measurement to its arrival. Precondition: configured.
   [[nodiscard]] virtual DeviceTiming timing() const noexcept = 0;
   /// As CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
   /// Oldest reading not yet taken, in the order of measurement, waiting at most `limit` (0: look
-  /// once). `gone`: reading->arrival says when it was noticed. → ok, timeout, stopped, ended, gone
+  /// once). `disconnected`: reading->arrival says when it was noticed. → ok, timeout, stopped,
+  /// ended, disconnected
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, InsReading* reading) noexcept = 0;
   virtual void stop() noexcept = 0;
   /// While it streams: makes neither readings nor pulses (SyncOut) for so long, as soon as it can;

@@ -18,7 +18,7 @@ struct Delivery {
   T value{};
 };
 
-/// From the thread of a driver to the consumer of its device.
+/// Queue from the thread of a driver to the consumer of its device.
 ///
 /// Threads  push(), full(), empty(), wait_for_room(): producer. start(), stop(): owner. take(): one
 ///          consumer; with limit 0 it takes no lock.
@@ -49,7 +49,8 @@ class Stream {
     return streaming_.load(std::memory_order_acquire);
   }
 
-  /// While gone: whether it has come back.
+  /// Starts the consumer's side. After a disconnect, `ok` only once the device is back. → ok,
+  /// disconnected, ended
   [[nodiscard]] DeviceStatus start(Notifier* notifier) noexcept {
     {
       const std::lock_guard lock(mutex_);
@@ -77,8 +78,8 @@ class Stream {
     }
     filled_.notify_all();
   }
-  /// Forgets what was not taken, and that the device was gone. Precondition: stopped, the
-  /// producer's thread has ended, nobody is in take().
+  /// Drops what was not taken, and the disconnected state. Precondition: stopped, the producer's
+  /// thread has ended, no thread is in take().
   void clear() noexcept {
     for (Delivery<T> d; ring_.pop(&d);) ended_ = ended_ || d.what == Delivery<T>::What::end;
     gone_ = false;

@@ -71,7 +71,7 @@ class TriggerDevice {
   virtual ~TriggerDevice() = default;  // stops
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
-  /// → ok, unsupported, bad_configuration, gone
+  /// → ok, unsupported, bad_configuration, disconnected
   [[nodiscard]] virtual DeviceStatus configure(const TriggerConfiguration& requested,
                                                TriggerConfiguration* actual) noexcept = 0;
   /// From the edge to the arrival of its report. Precondition: configured.
@@ -79,11 +79,11 @@ class TriggerDevice {
   /// The first pulse goes out after this. As CameraDevice::start().
   [[nodiscard]] virtual DeviceStatus start(Notifier* ready) noexcept = 0;
   /// Oldest report not yet taken, waiting at most `limit` (0: look once). → ok, timeout, stopped,
-  /// ended, gone
+  /// ended, disconnected
   [[nodiscard]] virtual DeviceStatus wait(Duration limit, Pulse* pulse) noexcept = 0;
   /// Leaves so many pulses out, as soon as it can, then goes on by itself: a gap that every camera
   /// shows. While streaming; does not wait for the board. Any one thread. → ok, unsupported,
-  /// stopped, gone
+  /// stopped, disconnected
   [[nodiscard]] virtual DeviceStatus pause(std::uint32_t /*pulses*/) noexcept {
     return DeviceStatus::unsupported;
   }

@@ -26,9 +26,9 @@ void remark_lost(const CalibrationFile& calibration, const char* format, Remarks
   bool sigmas = rig.baseline_sigma != 0 || !rig.covariance.empty();
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
     sigmas = sigmas || rig.intrinsics[k].sigma[0] > 0 || rig.sigma_total[k][0] > 0;
-  remarks->push_back(
-      fmt::format("{} has lenses and places alone; {}serials and origin are left out", format,
-                  sigmas ? "sigmas, " : ""));
+  remarks->push_back(fmt::format(
+      "{} holds intrinsics and extrinsics only; {}serial numbers and origin are left out", format,
+      sigmas ? "sigmas, " : ""));
 }
 
 void remark_more_cameras(const CalibrationFile& calibration, const char* format, Remarks* remarks) {

@@ -20,8 +20,8 @@ struct CalibrationFile {
   std::array<std::string, kMaxCameras> names{"left", "right", "camera2", "camera3"};
   std::array<std::string, kMaxCameras> serials{};  // empty: not known
   std::string source{};  // what found it: `given`, `online`, `checkerboard`; empty: not said
-  /// What the configuration said of the rig when it was found, by key (calibration_state.hpp); the
-  /// state file keeps it.
+  /// The configuration's values about the rig when the calibration was found, by key
+  /// (calibration_state.hpp); kept in the state file.
   std::optional<std::map<std::string, std::string>> configured{};
 };
 

@@ -50,7 +50,7 @@ std::string other_configuration(const CalibrationFile& found, const CalibrationF
       if (value(found, key) != value(expected, key))
         return fmt::format("when it was found {} was {}, it is {} now", key, value(found, key),
                            value(expected, key));
-  // Of a drive that was given one with --calibration. Images cannot tell which length is right.
+  // Differs after a drive with --calibration. Images do not show which length is right.
   const double had = found.rig.baseline, says = expected.rig.baseline;
   if (std::abs(had - says) >= kOtherLength * says)
     return fmt::format("its baseline is {:g} m, the configuration's {:g} m", had, says);

@@ -17,8 +17,8 @@ namespace vergence::app {
 /// become `_`; a rig without a name is `rig`.
 [[nodiscard]] std::optional<std::filesystem::path> state_file(const RigSettings& rig);
 
-/// What a configuration says of lenses, read-out regions, places and the baseline: keys that are
-/// not at their default, with their values. A calibration found under other ones is of another rig.
+/// Keys of a configuration about lenses, read-out regions, transforms and the baseline that are not
+/// at their default, with their values. A calibration found under other ones is of another rig.
 [[nodiscard]] std::map<std::string, std::string> configured_rig(const Configuration& configuration);
 
 /// Relative: from here on a calibration's baseline and the configuration's are two lengths.

@@ -224,7 +224,7 @@ Usability usability_of(const Session& s, const Analysis& a) {
 constexpr double kLong = 2.0;  // s: the motion across a shorter hole is carried on
 constexpr double kLag = 1.0;   // s: frames that are under way when a device goes
 
-/// How often and for how long a device gave nothing.
+/// Outages of one device: how many, and how long.
 struct Outages {
   std::size_t count = 0;
   double seconds = 0, longest_s = 0;  // of those that ended
@@ -282,8 +282,8 @@ void judge_open_outage(const std::string& device, Stamp from, const Session& s, 
     j->find(Grade::care, device + " was gone from " + since_start(s, from) + " to the end");
 }
 
-/// What outages say against the drive, and one piece of advice a device. True: poses are missing
-/// within a long one, so that the path's length says nothing of the rig.
+/// Adds the findings about outages, with one piece of advice per device. Returns true if poses are
+/// missing within a long outage, so that the path's length is no measure of the rig.
 bool judge_outages(const std::map<std::string, Outages>& outages, const Session& s,
                    const Analysis& a, Findings* j) {
   const bool holes =

@@ -12,8 +12,8 @@ namespace vergence::app {
 /// what the system says and what to do.
 void replace_durably(const std::filesystem::path& file, std::string_view text);
 
-/// Whether the folder of a session is there, empty. InputError: it exists and is not empty, or is
-/// no folder.
+/// Returns true if the session's folder exists and is empty. InputError: it exists and is not
+/// empty, or is no folder.
 bool check_session_folder(const std::filesystem::path& folder);
 /// Makes the folder of a session. False: it was there, empty. InputError: it exists and is not
 /// empty, is no folder, or cannot be made.

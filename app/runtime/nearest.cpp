@@ -67,7 +67,7 @@ constexpr std::array kTable{
               "SyncIn stays as the device has it; set it with the maker's program"},
     Withdrawn{
         Kind::key, "record.keep_s",
-        "recordings are whole; record.roll_mb ends files, sessions.quota_mb removes sessions"},
+        "recordings are whole; record.split_mb ends files, sessions.quota_mb removes sessions"},
     Withdrawn{Kind::key, "mock.ins_line", kNoLine},
     Withdrawn{Kind::key, "mock.ins_latency_timer_ms", kNoLine},
     Withdrawn{Kind::key, "mock.ins_late_percent", kNoLine},
@@ -135,7 +135,6 @@ constexpr std::array kTable{
     Withdrawn{Kind::key, "monitor.claimed_bias_px", "monitor.unverified_bias_px", true},
     Withdrawn{Kind::key, "monitor.found_bias_px", "monitor.verified_bias_px", true},
     Withdrawn{Kind::key, "comparison.placement_m", "comparison.alignment_distance_m", true},
-    Withdrawn{Kind::key, "record.keep_s", "record.event_window_s", true},
     Withdrawn{Kind::key, "record.roll_mb", "record.split_mb", true},
     Withdrawn{Kind::key, "trigger.vary_us", "trigger.dither_us", true},
     Withdrawn{Kind::key, "sync.hold_ms", "sync.timeout_ms", true},

@@ -17,7 +17,7 @@
 
 namespace vergence::app {
 
-/// What calibrations.csv has: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
+/// Columns of calibrations.csv: rotation vectors and their sigmas in rad, lengths in m, `sigma_` by
 /// noise alone, `sigma_total_` with uncertain intrinsics, pixels; d0 … d3 are k1 k2 p1 p2, or k1 …
 /// k4 of an equidistant lens. Latency in frames since the alarm, the request or the start; held-out
 /// errors are medians before and after. `kept`: what the drive measured is no better than what is
@@ -33,10 +33,10 @@ inline constexpr const char* kCalibrationsHeader =
     "left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_left_d2,sigma_left_d3,"
     "reference_depth_m,depth_sigma_percent,depth_error_percent,verified,lenses";
 
-/// Writes all that a session keeps of calibrations: a line of calibrations.csv for each,
-/// calibration.yaml with the one in use, and the state file with what the next drive begins with.
-/// The state file gets a calibration that the drive has found, or the one that the drive began with
-/// once the drive has confirmed it.
+/// Writes the calibrations of a session: a line of calibrations.csv for each, calibration.yaml with
+/// the one in use, and the state file that the next drive starts from. The state file gets a
+/// calibration that the drive has found, or the one that the drive began with once the drive has
+/// confirmed it.
 ///
 /// Threads  on_…(): one producer. next(): one consumer. The files are written on a thread of its
 ///          own (`vergence-state`), because YAML takes heap memory and a disk may stand still.
@@ -53,8 +53,7 @@ class CalibrationWriter final : public SessionObserver {
     std::optional<std::filesystem::path> state{};  // nothing: the next drive is not to know
     bool wait_when_full = false;
   };
-  /// Whether the next drive has a calibration: the event `calibration_saved` or
-  /// `calibration_save_failed`.
+  /// Outcome of writing the state file: the event `calibration_saved` or `calibration_save_failed`.
   struct Outcome {
     EventRecord event{};
     bool failed = false;
@@ -97,7 +96,7 @@ class CalibrationWriter final : public SessionObserver {
   std::atomic<bool> stop_{false};
   std::uint64_t dropped_ = 0;  // of the producer
 
-  // Of the writer's thread, and of who has joined it.
+  // Used by the writer's thread, and by the owner after joining it.
   std::string line_;
   std::optional<RigCalibration> unconfirmed_{};  // what the drive began with
   std::string fault_;                            // of calibration.yaml; empty: it is whole

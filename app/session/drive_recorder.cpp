@@ -108,7 +108,7 @@ double frame_bytes(const SourceFacts& facts) {
 
 constexpr double kMinHeld = 16;  // frames that wait: a replay waits for room
 
-/// Of the queue of the estimator's thread, whose images are held for a disk that stalls.
+/// Size of the estimator thread's queue, which holds images while the disk stalls.
 std::size_t queue_bytes(const Configuration& c, const SourceFacts& facts) {
   if (c.record.images == 0) return kSmall;
   const double held = facts.when_full == Recorder::WhenFull::wait ? 0 : kDiskS * c.trigger.rate;
@@ -207,7 +207,7 @@ void DriveRecorder::post_rig(Stamp stamp) noexcept {
   });
 }
 
-/// Who opens one file of several has no other.
+/// Each file of a split recording has the rig, so that it can be read without the others.
 bool DriveRecorder::rig_is_due() const noexcept {
   return calibrated_ && rig_in_file_ != recording_.counters().files;
 }

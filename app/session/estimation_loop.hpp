@@ -48,19 +48,19 @@ class EstimationLoop {
   /// whose outcomes become events.
   void open(const SessionOutput& output, DriveRecorder* recording,
             CalibrationWriter* calibrations) noexcept;
-  /// Events of what became of calibrations. The estimator's thread, or after it has joined.
+  /// Logs the outcomes of saving calibrations. The estimator's thread, or after it was joined.
   void log_kept_calibrations() noexcept;
-  /// Until the source has nothing more.
+  /// Runs until the source is exhausted.
   void run() noexcept;
-  /// From the next frame on a new calibration is sought.
+  /// Requests a new calibration; acts at the next frame.
   void ask_calibration() noexcept { calibration_asked_.store(true, std::memory_order_relaxed); }
-  /// The source has given its last item; the estimator may still be deciding a calibration.
+  /// True if the source has given its last item; the estimator may still be deciding a calibration.
   [[nodiscard]] bool drained() const noexcept { return drained_.load(std::memory_order_acquire); }
-  /// Items handled so far.
+  /// Number of items handled so far.
   [[nodiscard]] std::uint64_t items() const noexcept {
     return beat_.items.load(std::memory_order_relaxed);
   }
-  /// It has nothing to do until the source has its next item.
+  /// True while the loop waits for the source's next item.
   [[nodiscard]] bool waiting() const noexcept {
     return beat_.waiting.load(std::memory_order_relaxed);
   }
@@ -70,7 +70,7 @@ class EstimationLoop {
   [[nodiscard]] SessionOutput& output() noexcept { return output_; }
   [[nodiscard]] const Estimator& estimator() const noexcept { return *estimator_; }
   [[nodiscard]] const EstimatorOptions& options() const noexcept { return options_; }
-  /// Null: there is no INS.
+  /// Null without an INS.
   [[nodiscard]] const InsComparison* comparison() const noexcept { return comparison_.get(); }
   [[nodiscard]] const ReplayableSolverRunner& solver_watch() const noexcept {
     return watched_solver_;
@@ -79,7 +79,7 @@ class EstimationLoop {
   [[nodiscard]] const Arena& comparison_arena() const noexcept { return comparison_arena_; }
 
  private:
-  struct Beat {  // for who asks whether the loop hangs
+  struct Beat {  // for the check that the loop does not hang
     std::atomic<std::uint64_t> items{0};
     std::atomic<bool> waiting{false};
   };

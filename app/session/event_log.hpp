@@ -10,34 +10,33 @@
 
 namespace vergence::app {
 
-/// Collects by-products of each frame: events and calibrations for the
-/// recorder, the state of things for the progress line, messages for the user.
+/// Collects by-products of each frame: events and calibrations for the session's output, progress
+/// snapshots and messages for the terminal.
 ///
-/// Threads  note…(), log(): the estimator's, sealed. show(): the caller's. After the estimator's
-///          thread has joined all is anyone's.
-/// Memory   Fixed. Full: of the states for the
-///          line the newest are lost, the next one tells the same and more; of the messages too,
-///          and events.jsonl has them.
+/// Threads  note(), record_…(), log(): the estimator's, sealed. show(): the caller's. No
+/// synchronisation is needed after the estimator's thread has been joined. Memory   Fixed. If a
+/// ring is full, the newest snapshot or message is dropped; every message also is in events.jsonl.
 class EventLog {
  public:
   /// The output outlives the last note.
   void open(SessionOutput* output, Stamp first) noexcept;
 
-  /// After a process() or finish() call: its events and its calibrations.
+  /// Call after process() or finish(): forwards its events and calibrations.
   void note(const Estimator& estimator) noexcept;
-  /// The sample of a process() call.
+  /// Call with the result of process(): updates the progress.
   void note(const PoseSample& sample) noexcept;
-  /// A frame that was not read.
+  /// Counts a frame that was not read.
   void record_skipped() noexcept;
   void record_distance_from_ins(double metres) noexcept { now_.from_ins_m = metres; }
   /// An event of the session's own. `kind` points to a constant. `to_user`: on stderr, too.
   void log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept;
   void log(const EventRecord& event, bool to_user) noexcept;
 
-  /// Points and observations over the estimator's capacity.
+  /// Number of points and observations beyond the estimator's capacity.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
-  /// Says what there is to say and updates the line. `frames` of the whole drive; 0: nobody knows.
+  /// Prints the waiting messages and updates the progress line. `frames`: of the whole drive; 0 if
+  /// unknown.
   void show(Progress* progress, std::uint64_t frames);
 
  private:

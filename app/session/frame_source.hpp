@@ -30,7 +30,7 @@ struct SourceFrame {
                       // at this frame, and is to answer again (ReplayableSolverRunner)
 };
 
-/// Something to be noted, at its place among the frames.
+/// An event, in its order among the frames.
 struct SourceEvent {
   EventRecord record{};
   bool to_user = false;      // on stderr, too
@@ -62,7 +62,7 @@ struct SourceFacts {
   Adoption adoption = Adoption::after_fixed_frames;
   Recorder::WhenFull when_full = Recorder::WhenFull::wait;
   std::function<bool(Stamp)> disk_full{};  // of Recorder::Options
-  std::uint64_t frames = 0;                // of the whole drive; 0: nobody knows
+  std::uint64_t frames = 0;                // of the whole drive; 0 if unknown
   Stamp first{};                           // of the drive
   std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
   std::optional<SourceIns> ins{};
@@ -76,8 +76,8 @@ struct SourceFacts {
   bool on_request = false;                  // SIGUSR1 asks for a new calibration
 };
 
-/// Where a session's frames, readings and device events come from: devices (LiveSource), or a
-/// recorded drive (RecordedSource). SessionRunner does the rest, the same for both.
+/// Source of a session's frames, readings and device events: devices (LiveSource) or a recorded
+/// drive (RecordedSource). run_session() treats both alike.
 ///
 /// Threads  next(), done(): the estimator's, sealed. stop(): any. The rest: the caller's; finish()
 ///          and what comes after it when the estimator's has joined.
@@ -98,8 +98,8 @@ class FrameSource {
   /// The frame that next() gave last has its pose: takes the slots back.
   virtual void done(const PoseSample& sample) noexcept = 0;
   virtual void stop() noexcept = 0;
-  /// Number of iterations of the thread behind next(), with or without data: a thread that does
-  /// not go round any more hangs. Any thread; always 0: nobody can tell.
+  /// Number of iterations of the thread behind next(), with or without data: a thread whose number
+  /// no longer grows hangs. Any thread. Always 0 if it is not counted.
   [[nodiscard]] virtual std::uint64_t rounds() const noexcept { return 0; }
   /// Called every 50 ms while frames come.
   virtual void look() {}
@@ -112,10 +112,11 @@ class FrameSource {
   /// Adds to the summary: frames skipped, devices, times, truth.
   virtual void describe(const SessionTotals& totals, const Estimator& estimator,
                         SummaryInput* input) const = 0;
-  /// The figures that a user wants to see at the end.
+  /// Prints the statistics shown at the end.
   virtual void print_figures(const SessionTotals& totals, const SummaryInput& input,
                              Progress* progress) const = 0;
-  /// A reason of its own why the session did not go well, said; poses are there.
+  /// Exit code for a problem of the source itself, whose message it has printed; called if there
+  /// are poses.
   [[nodiscard]] virtual std::optional<ExitCode> verdict(Progress* /*progress*/) const {
     return std::nullopt;
   }

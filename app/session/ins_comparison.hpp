@@ -18,7 +18,7 @@
 
 namespace vergence::app {
 
-/// A alignment and from when on it holds.
+/// An alignment and the stamp from which it holds.
 struct EnuAlignmentRecord {
   Stamp stamp{};
   EnuAlignment alignment{};

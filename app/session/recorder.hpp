@@ -53,8 +53,8 @@ class Recorder final : public SessionObserver {
     bool keep_trajectory = true;
     bool ins = false;  // readings are posted: ins.csv is there
     Stamp first{};     // of the recorder's own events before the first pose
-    /// Whether the disk is to be taken for full at this time of the drive, which a mock's fault
-    /// says. Called on the recorder's thread with the stamp of every pose. May be empty.
+    /// Returns true while the disk is to be treated as full, for the mock's fault. Called on the
+    /// recorder's thread with the stamp of every pose. May be empty.
     std::function<bool(Stamp)> disk_full{};
   };
 

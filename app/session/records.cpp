@@ -73,7 +73,7 @@ bool LineFile::close() {
 
 namespace {
 
-/// How an event of the estimator stands in events.jsonl.
+/// Representation of an event of the estimator in events.jsonl.
 struct EventWords {
   const char* kind;
   const char* opening;  // before the estimator's own words; empty: nothing

@@ -67,9 +67,9 @@ class LineFile {
   std::string waiting_;
 };
 
-/// All that a session says of one frame that was read: its pose, placed on the earth beside the
-/// INS where there is one, and what it took. A line of poses.csv and, unless lost, one of
-/// trajectory.tum.
+/// Report of one frame: its pose, also in ENU beside the INS where there is one, and its times.
+/// format_frame() makes the line of poses.csv of it; unless lost, it is a line of trajectory.tum,
+/// too.
 struct FrameReport : ComparedPose {
   float decode_ms = 0;
   /// The reference's pose of the left camera, in the reference's own frame.
@@ -128,7 +128,8 @@ inline constexpr const char* kPosesHeader =
     "height_m,heading_deg,"
     "ins_east,ins_north,ins_up,ins_latitude_deg,ins_longitude_deg,ins_height_m,ins_heading_deg,"
     "error_east_m,error_north_m,error_up_m,error_heading_deg,inliers,reprojection_px,estimate_ms";
-/// The line of poses.csv, its end included, in place of what `line` has.
+/// Formats the line of poses.csv (kPosesHeader), end of line included; replaces the content of
+/// *line.
 void format_frame(const FrameReport& report, std::string* line);
 /// Formats a line of a TUM file: the stamp in seconds, position, quaternion.
 void format_tum(Stamp stamp, const Transform& T, std::string* line);

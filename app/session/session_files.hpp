@@ -14,7 +14,7 @@
 /// Shared steps of commands that write a session directory.
 namespace vergence::app {
 
-/// What an arena needs beside its contents: the first piece is aligned, too.
+/// Size of an arena for so many bytes of contents, with the alignment of the first piece.
 [[nodiscard]] constexpr std::size_t arena_size(std::size_t bytes) { return bytes + 64; }
 
 /// One worker beside the estimator with two threads or more.
@@ -40,7 +40,7 @@ struct SessionReport {
 };
 [[nodiscard]] SessionReport write_session_report(const std::filesystem::path& session);
 
-/// The last words of a session: closing_lines(); quiet, only what must not be missed.
+/// Prints closing_lines(); with `quiet` only those that must not be missed.
 void print_verdict(const SessionReport& report, bool quiet, Progress* progress);
 
 }  // namespace vergence::app

@@ -30,7 +30,7 @@ struct SessionStart {
   std::string name{};                       // of the session folder
   std::vector<std::string> camera_names{};  // those of the calibration, each once
   Stamp first{};                            // of the drive
-  std::uint64_t frames = 0;                 // of the whole drive; 0: nobody knows
+  std::uint64_t frames = 0;                 // of the whole drive; 0 if unknown
   std::optional<ClockTie> tie{};            // none in a replay and in virtual time
   std::size_t image_bytes = 0;              // of one frame of the largest camera
   bool can_recalibrate = false;             // SessionRequests::recalibrate is listened to
@@ -46,8 +46,8 @@ struct SessionRequests {
   std::atomic<bool> stop_recording{false};  // no more into drive.mcap; the drive goes on
 };
 
-/// Sees what goes through a session, live or replayed: what a recording of images, a live page or a
-/// line publisher is attached by. RunRequest::observers and ReplayRequest::observers take them.
+/// Interface of everything that is attached to a session, live or replayed: recording, live page,
+/// pose stream. RunRequest::observers and ReplayRequest::observers take them.
 ///
 /// Ownership  Everything is a reference to a plain value of fixed size that the observer copies if
 ///            it wants to keep it. The images of a frame are views of driver memory: valid until
@@ -75,12 +75,13 @@ class SessionObserver {
   /// The newest moving frames with their tracks, after on_pose(); valid until it returns. Empty
   /// where nothing watches the calibration.
   virtual void on_tracks(const calibration::TrackLog& /*tracks*/) noexcept {}
-  /// The odometry's world was placed on the earth; `origin` is that of enu. Acts from the next
-  /// pose on.
+  /// Called when the odometry's world was aligned with ENU; `origin` is the origin of ENU. Applies
+  /// from the next pose on.
   virtual void on_enu_alignment(const EnuAlignment& /*alignment*/,
                                 const Geodetic& /*origin*/) noexcept {}
-  /// All there is to say of a frame: the pose placed on the earth, the INS beside it. Without an
-  /// INS at once; with one after the readings around the frame have come.
+  /// Called with the complete report of a frame: its pose, also in ENU once aligned, and the
+  /// comparison with the INS. Without an INS it follows on_pose() at once; with one it waits for
+  /// the readings around the frame.
   virtual void on_report(const FrameReport& /*report*/) noexcept {}
   /// A reading of the INS, stamped on the session's clock; in order of arrival.
   virtual void on_reading(const InsRecord& /*reading*/) noexcept {}
@@ -93,7 +94,7 @@ class SessionObserver {
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> counters() { return {}; }
 };
 
-/// Where all that a session has to say goes: to every observer, in their order.
+/// Forwards everything to all observers of a session, in their order.
 ///
 /// Ownership  Observers outlive the last call. Threads: as SessionObserver. Memory: none.
 class SessionOutput {

@@ -17,7 +17,7 @@ struct SessionOptions {
   bool quiet = false;
   bool print_memory = false;  // a table of what is held, on stdout
   std::vector<SessionObserver*> observers{};
-  SessionRequests* requests = nullptr;  // of observers; null: nobody asks for anything
+  SessionRequests* requests = nullptr;  // from observers; may be null
 };
 
 /// Runs a source through estimator and comparison into a session folder (DESIGN §6): set-up,
@@ -39,8 +39,8 @@ struct SessionOptions {
 [[nodiscard]] ExitCode run_session(FrameSource& source, const Configuration& configuration,
                                    const SessionOptions& options, const SignalGuard& signals);
 
-/// Returns the result of `make`; options and rig that do not go together, which core refuses by
-/// std::invalid_argument and std::length_error, as an InputError with the same message.
+/// Returns the result of `make`. Turns std::invalid_argument and std::length_error, by which core
+/// refuses options and rig that do not fit together, into an InputError with the same message.
 template <class Make>
 auto in_words(const Make& make) {
   try {

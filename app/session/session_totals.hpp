@@ -87,7 +87,7 @@ struct BudgetStatistics {
 
 inline constexpr std::size_t kMaxAttempts = 1000;  // in summary.json; calibrations.csv has all
 
-/// What the attempts to calibrate came to.
+/// Totals of the attempts to calibrate.
 struct CalibrationTotals {
   std::vector<CalibrationAttempt> attempts{};  // the newest kMaxAttempts
   std::uint64_t accepted = 0, rejected = 0;    // of all of them
@@ -98,7 +98,7 @@ struct CalibrationTotals {
   bool add(const CalibrationRecord& calibration);
 };
 
-/// What a session has come to: for summary.json.
+/// Totals of a session, for summary.json.
 struct SessionTotals : CalibrationTotals {
   std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
   TimeHistogram estimate, decode;                          // ms
@@ -119,7 +119,7 @@ struct SessionTotals : CalibrationTotals {
   std::vector<std::string> faults;  // a message for each file that is not whole
 };
 
-/// Adds up what the frames and events of a session come to. One thread; takes no memory.
+/// Accumulates the totals from the frames and events of a session. Not thread-safe.
 class TotalsBuilder {
  public:
   void add(const FrameReport& report);

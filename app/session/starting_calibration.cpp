@@ -81,8 +81,8 @@ void name_cameras(const Configuration& c, const std::vector<std::string>& serial
   }
 }
 
-/// Whether the configuration says where the cameras sit. The mock's rig is what it says, also when
-/// it says nothing.
+/// Returns true if the configuration states the cameras' transforms. The mock's rig always is the
+/// configured one, defaults included.
 bool placed_by_configuration(const Configuration& c, int cameras) {
   for (std::size_t k = 1; k < static_cast<std::size_t>(cameras); ++k) {
     const auto& T = c.cameras[k].T_camera_left;

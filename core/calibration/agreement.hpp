@@ -18,8 +18,8 @@ struct Agreement {
   double intrinsics = 0;  // mean of fx fy cx cy of camera k, each by itself
 };
 
-/// Sigmas are those of noise alone: what held intrinsics are off by is the same in both. `k`: of
-/// camera k ≥ 1. Both with their joint covariance. Threads pure.
+/// Compares camera k ≥ 1 of two calibrations, both with their joint covariance. Sigmas are those of
+/// noise alone, because errors of held intrinsics are the same in both. Pure.
 [[nodiscard]] Agreement agreement(const RigCalibration& a, const RigCalibration& b, int k) noexcept;
 
 /// The joint covariance given that camera 0's focal lengths and centre, which solves hold, are as

@@ -8,7 +8,7 @@
 
 namespace vergence::calibration {
 
-/// How far the disparities of one frame are from what those of the frame before make of them.
+/// Change of the disparities of one frame against their prediction from the frame before.
 struct DisparityJump {
   bool measured = false;  // false: too few tracks
   double px = 0;          // common to all tracks, along the epipolar lines
@@ -20,8 +20,8 @@ struct DisparityJump {
   std::uint64_t onset_frame = 0;  // with `confirmed`: the first frame of the changed rig
 };
 
-/// Sees a camera turned about the axis that no epipolar line shows (yaw, for cameras side by side):
-/// from one frame to the next such a turn moves all disparities alike.
+/// Detects a sudden turn of a camera about the axis that epipolar lines do not show (yaw, for
+/// cameras side by side): it moves all disparities alike from one frame to the next.
 ///
 /// A track's point is triangulated in the frame before, moved by the left camera's motion and
 /// projected again. What is left of its disparity is fitted, robustly, by a shift and by an error
@@ -39,17 +39,18 @@ class DisparityJumpDetector {
   [[nodiscard]] static std::size_t memory_needed(std::size_t capacity) noexcept;
   DisparityJumpDetector(std::size_t capacity, Arena& arena);
 
-  /// The cameras' transform and pinholes in use; forgets the frame before.
+  /// Sets the transform and pinholes in use, and clears the frame before.
   void set_reference(const Transform& T_camera_left, const Pinhole& left,
                      const Pinhole& camera) noexcept;
-  /// Another calibration of the same rig, and another scene: the frame before is the one of which
-  /// these are the new scene's points. A shift that waits for the next frame still does.
+  /// Changes to another calibration of the same rig and to another scene; `stereo`, points of the
+  /// new scene, take the place of the frame before. A suspected shift still waits for the next
+  /// frame.
   void rebase(const Transform& T_camera_left, const Pinhole& left, const Pinhole& camera,
               std::span<const StereoObservation> stereo) noexcept;
-  /// The same rig known better, or from one frame to the next where the cameras are not linked: the
-  /// frame before stays.
+  /// Changes the transform and keeps the frame before: for a refined calibration, and for every
+  /// frame while the cameras are not linked.
   void set_transform(const Transform& T_camera_left) noexcept { T_camera_left_ = T_camera_left; }
-  /// The scene was lost: the next frame is compared with none.
+  /// Call when the scene was lost: the next frame is compared with none.
   void reset() noexcept {
     count_ = 0;
     pending_ = Pending{};
@@ -60,9 +61,9 @@ class DisparityJumpDetector {
   /// Frames in order, each with the motion of the left camera since the one before.
   [[nodiscard]] DisparityJump next(std::uint64_t frame, std::span<const StereoObservation> stereo,
                                    const Transform& T_now_previous) noexcept;
-  /// Of a frame in which one of the two cameras showed nothing: the next is compared with the one
-  /// before it. Where too many are skipped there is nothing to compare with, and a shift that
-  /// waits is a change.
+  /// Call instead of next() for a frame in which one of the two cameras showed nothing: the next
+  /// frame is compared with the one before it. If too many are skipped there is nothing to compare
+  /// with, and a suspected shift counts as a change.
   void skip(const Transform& T_now_previous) noexcept;
 
  private:

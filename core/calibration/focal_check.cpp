@@ -5,7 +5,7 @@
 namespace vergence::calibration {
 namespace {
 
-// What the drive's own focal length is off by beyond its noise: at most 3.2 % over the recorded
+// Systematic error of the measured focal length: at most 3.2 % over the recorded
 // drives after 25 frames (docs/calibration.md), and on `sand_rover` it follows what was given from
 // 246 to 251 px of 258. What is certain lies beyond that and three sigmas of noise.
 constexpr double kSystematic = 0.04;

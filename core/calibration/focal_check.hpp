@@ -4,7 +4,7 @@
 
 namespace vergence::calibration {
 
-/// Whether the focal length given is that of the images.
+/// Compares the focal length given with the one that the images show.
 ///
 /// A focal length that is off by a share makes all distances off by it, and neither epipolar lines
 /// nor a solve that believes it show that. A solve with every focal length free by kFocalDoubt
@@ -15,7 +15,7 @@ namespace vergence::calibration {
 [[nodiscard]] FocalMeasurement check_focal_length(const RigSolution& found,
                                                   const RigCalibration& given) noexcept;
 
-/// The measurements of a drive: which solves make one, and what has come of them.
+/// Decides which solves of a drive measure the focal length, and keeps the newest result.
 ///
 /// Threads  measure() on the solver's, the others on the estimator's while no solve runs.
 class FocalCheck {
@@ -34,7 +34,7 @@ class FocalCheck {
   void take(bool full) noexcept;
 
   [[nodiscard]] const FocalMeasurement& newest() const noexcept { return newest_; }
-  /// Of the solve under way, or the last one.
+  /// Time of the measurement in the running solve, or the last one, ms.
   [[nodiscard]] double solve_ms() const noexcept { return solve_ms_; }
 
  private:

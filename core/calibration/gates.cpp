@@ -18,8 +18,8 @@ constexpr double kFullWindow = 3.0;         // times the wanted sigmas, at max_f
 constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of t is given
 constexpr int kFewestHeldOut = 3;           // frames that say anything
 constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
-// And how many times that of the frames that were; under so many pixels they may differ: on
-// recorded drives both are 0.08 to 0.25 px.
+// The residual of held-out frames may be kTimesUsed times that of the frames used, or kMinMisfit
+// px; on recorded drives both residuals are 0.08 to 0.25 px.
 constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
 // rad, of the turn between two cameras that no epipolar line shows: what a calibration that does
 // not state its sigmas is off by when it is the rig's, and when it is not. Chosen: on the seven
@@ -75,7 +75,7 @@ HeldOut fit_of(std::span<double> medians) noexcept {
   return h;
 }
 
-/// How well camera k fits the newest frames after a number.
+/// Fit of camera k on the newest frames after frame number `after`.
 HeldOut fit_of_held_out(const TrackLog& log, std::uint64_t after, const RigCalibration& rig,
                         int k) noexcept {
   std::array<double, kHeldOutFrames> medians;
@@ -86,7 +86,8 @@ HeldOut fit_of_held_out(const TrackLog& log, std::uint64_t after, const RigCalib
   return fit_of(std::span(medians).first(n));
 }
 
-/// The same of the newest frames that a solution up to `newest` rests on.
+/// Fit of camera k on the newest frames that a solution was solved from, up to frame number
+/// `newest`.
 HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibration& rig,
                     int k) noexcept {
   std::array<double, kHeldOutFrames> medians;
@@ -98,8 +99,8 @@ HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibrat
   return fit_of(std::span(medians).first(n));
 }
 
-/// Whether frames that were not used contradict camera k of `rig`, by what a solution makes of the
-/// frames that it rests on.
+/// Returns true if frames that were not used contradict camera k of `rig`, measured by the fit of
+/// `solved` on the frames it was solved from.
 bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
                   std::uint64_t newest, int k) noexcept {
   const HeldOut fit = fit_of_held_out(log, newest, rig, k);
@@ -111,7 +112,7 @@ bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalib
   return fit.median_px > worst;
 }
 
-/// The same of any camera.
+/// Returns true if contradicted() holds for any camera.
 bool misfits(const TrackLog& log, std::uint64_t newest, const RigCalibration& solved,
              const RigCalibration& rig) noexcept {
   for (int k = 1; k < solved.cameras; ++k)
@@ -212,7 +213,7 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     const double least = source == ClaimSource::this_drive ? m : kOfClaim * m;
     sharper = sharper && s < least;
     a.nearer = a.nearer || (s < least && difference > kChance * s);
-    // What is known against one camera counts before what is not known of another.
+    // Evidence against one camera takes precedence over missing evidence about another.
     if (k > 1 && (contradicted == a.contradicted ? off <= worst : a.contradicted)) continue;
     worst = off;
     a.contradicted = contradicted;
@@ -222,7 +223,8 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     a.difference_percent = difference;
   }
   a.worse = fits_better(log, after, claimed, measured);
-  // Of a full window, what the lines show is no chance of where the structure was.
+  // In a full window a misfit to the epipolar lines cannot be an accident of where the structure
+  // was.
   const bool lines =
       misfits(log, after, measured, claimed) || (sharper && measured.frames >= o.max_frames);
   a.better =
@@ -279,7 +281,7 @@ double sigma_excess(const RigCalibration& rig, const CalibrationOptions& o) noex
 
 namespace {
 
-/// What has to be so whatever was estimated.
+/// Gates that apply whichever parameters were estimated.
 Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;

@@ -8,37 +8,37 @@
 
 namespace vergence::calibration {
 
-/// How well a calibration fits frames that it was not solved from: distances of stereo matches to
+/// Residuals of a calibration on frames that it was not solved from: distances of stereo matches to
 /// their epipolar lines.
 struct HeldOut {
   int frames = 0;
   double median_px = 0;  // of the frames' medians
 };
 
-/// Frames newer than `after`. At most the newest kHeldOutFrames, and of each at most
-/// kHeldOutMatches. Of more than one further camera the one that fits worst, px of its own. Threads
-/// pure.
+/// Measures the fit on frames newer than frame number `after`: at most the newest kHeldOutFrames,
+/// and at most kHeldOutMatches of each. With more than one further camera the worst one counts, in
+/// its own pixels. Pure.
 inline constexpr std::size_t kHeldOutFrames = 12, kHeldOutMatches = 150;
 [[nodiscard]] HeldOut held_out(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& rig) noexcept;
 
-/// Whether `better` fits those frames better than `worse` by more than chance: mean over frames of
-/// the difference of medians against `chance` of its standard errors; true, too, where hardly a
-/// frame can say. Of more than one further camera the sum of what each gains: a camera that was
-/// knocked tells, and another that a shorter drive holds a little less well does not outweigh it.
-/// Threads pure.
+/// Returns true if `better` fits those frames better than `worse` by more than chance: the mean
+/// over frames of the difference of medians exceeds `chance` of its standard errors. Also true if
+/// hardly any frame can be compared. With more than one further camera the gains are added, so that
+/// a knocked camera is not outweighed by another one that a short drive determines slightly less
+/// well. Pure.
 inline constexpr double kChance = 2.0;
-inline constexpr double kRareChance = 3.0;  // of a question that every solve asks
+inline constexpr double kRareChance = 3.0;  // for a test that is repeated with every solve
 [[nodiscard]] bool fits_better(const TrackLog& log, std::uint64_t after,
                                const RigCalibration& better, const RigCalibration& worse,
                                double chance = kChance) noexcept;
 
-/// What a drive's own measurement of the rig says of the calibration in use (METHOD §7).
+/// Comparison of the calibration in use, the claim, with the drive's own measurement of the rig
+/// (METHOD §7).
 ///
-/// The difference d of their depths, at the depth that calibrations are judged at, is evidence
-/// between two hypotheses: the rig is the one of the claim, which is off by no more than a
-/// calibration of its kind is (sigma m), or it is another one (sigma M). With s, the
-/// sigma of the measurement,
+/// The difference d of their depths at reference_depth_m() decides between two hypotheses: the rig
+/// is the one of the claim, whose error is that of a calibration of its kind (sigma m), or it is
+/// another one (sigma M). With s, the sigma of the measurement,
 ///
 ///     log_odds = log N(d; 0, m² + s²) − log N(d; 0, M² + s²).
 struct Assessment {
@@ -55,12 +55,12 @@ struct Assessment {
   bool contradicted = false;  // the rig certainly is another one
 };
 
-/// Where a claim is from: the sigma of one that was solved from this drive's frames, which the
-/// measurement rests on, too, is no evidence beside it.
+/// Origin of a claim. The sigma of a claim that was solved from this drive is not independent of
+/// the measurement and is not used beside it.
 enum class ClaimSource : std::uint8_t { elsewhere, this_drive };
 
-/// The worst of the rig's further cameras. `log` with frames after `after` that `measured` does not
-/// rest on. Threads pure.
+/// Assesses the worst of the rig's further cameras. `log` holds frames newer than frame number
+/// `after`, which `measured` was not solved from. Pure.
 [[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
                                 ClaimSource source, const TrackLog& log, std::uint64_t after,
                                 const CalibrationOptions& options, double pixel_sigma) noexcept;
@@ -80,10 +80,10 @@ enum class Gate : std::uint8_t {
   rig_changed,    // among the very frames it was solved from
   depth_unknown,  // with the lenses free the tracks do not hold the depth yet
 };
-/// The message for events and calibrations.csv; empty for `open`.
+/// Message for events.jsonl and calibrations.csv; empty for `open`. A constant.
 [[nodiscard]] const char* reason(Gate gate) noexcept;
 
-/// Whether a solution that came to this gate is at least one of the rig that the images are of now.
+/// Returns true if a solution that this gate stopped still is a measurement of the present rig.
 [[nodiscard]] constexpr bool of_this_rig(Gate gate) noexcept {
   switch (gate) {
     case Gate::not_solved:
@@ -121,14 +121,15 @@ struct AcceptanceInput {
       false;  // max_frames were used, or no more will come: three times the sigmas are enough
 };
 
-/// METHOD §4: what stands between a solution and its use. Threads pure.
+/// Decides whether a solution may be used (METHOD §4). Returns the first gate that stops it, or
+/// `open`. Pure.
 [[nodiscard]] Gate check_acceptance(const AcceptanceInput& question,
                                     const CalibrationOptions& options) noexcept;
 
-/// Whether the log has as many frames after that number as it takes to hold a solution against.
+/// Returns true if the log has enough frames newer than frame number `after` to test a solution.
 [[nodiscard]] bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept;
 
-/// How many times the wanted sigmas the worst of the solution is; ≤ 1: enough.
+/// Largest ratio of a sigma of `rig` to the one required; at most 1 if all suffice.
 [[nodiscard]] double sigma_excess(const RigCalibration& rig,
                                   const CalibrationOptions& options) noexcept;
 

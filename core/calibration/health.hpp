@@ -13,32 +13,32 @@ enum class CalibrationRating : std::uint8_t { good, can_be_improved, recalibrate
 
 inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};  // m
 
-/// What a calibration's uncertainty does to a depth measured with camera 0 and camera `k`, 1 sigma,
-/// percent of the depth.
+/// Sigma of a depth measured with camera 0 and camera `k` that the calibration's uncertainty
+/// causes, percent of the depth.
 ///
-/// The root mean over a grid of directions that both cameras see of the relative depth's gradient
-/// propagated through `covariance`, lenses included; without one, that of the transform through
-/// covariance_total; without that, through the sigmas; without those 0. Matching noise is not in
-/// it: this is what stays however well a point is found. Threads pure.
+/// Root mean square over a grid of directions that both cameras see. The relative depth's gradient
+/// is propagated through the first of these that the rig has: `covariance` (lenses included),
+/// covariance_total of the transform, the sigmas of the transform; 0 without any. Matching noise is
+/// not included. Pure.
 [[nodiscard]] double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noexcept;
 
-/// How far apart the depths are that two calibrations give to the same pairs of pixels, at a depth
-/// by `measured`: root mean over the image, percent (of the inverse depth). Threads pure.
+/// Difference of the depths that two calibrations give to the same pairs of pixels, for points that
+/// `measured` puts at depth_m: root mean square over the image, percent of the inverse depth. Pure.
 [[nodiscard]] double depth_error_percent(const RigCalibration& measured,
                                          const RigCalibration& claimed, int k,
                                          double depth_m) noexcept;
 
-/// Where a calibration has to be good to `max_depth_error_percent`: at reference_depth_m, or
-/// nearer, where the noise of one match, of that pixel sigma, is half of it: there short baselines
-/// can reach it. m.
+/// Depth at which a calibration must be within `max_depth_error_percent`, m:
+/// options.reference_depth_m, or nearer for short baselines, where the noise of one match with that
+/// pixel sigma is half of the tolerance.
 [[nodiscard]] double reference_depth_m(const RigCalibration& rig, int k,
                                        const CalibrationOptions& options,
                                        double pixel_sigma) noexcept;
 
-/// The same for the whole rig: its best pair, as a depth is measured with.
+/// Sigma of a depth measured with the rig's best pair of cameras, percent of the depth.
 [[nodiscard]] double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept;
 
-/// The word for a rig, by its depth error at 20 m.
+/// Rating of a rig by its depth error at 20 m.
 [[nodiscard]] CalibrationRating health(const RigCalibration& rig,
                                        const CalibrationOptions& options) noexcept;
 

@@ -113,7 +113,7 @@ void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
 }
 
 void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
-  // Of a pair that mostly finds nothing, what is found is chance.
+  // If most of the expected matches are missing, the few that are found are chance matches.
   const detail::StereoResiduals stereo =
       collapsed > 0 ? detail::StereoResiduals{}
                     : looks.stereo(reference, frame, options.min_matches, frame.moving);

@@ -8,17 +8,17 @@
 
 namespace vergence::calibration {
 
-/// Every number a user may change in `monitor:`; the configuration's schema has a row for each
-/// field. What the defaults reach, and the commands that measured it: docs/design.md.
+/// Options of `monitor:`; the configuration's schema has a row for each field. docs/design.md
+/// describes what the defaults achieve.
 struct MonitorOptions {
   double threshold = 45.0;  // of the statistic that raises a knock or a drift; ≥ 80 h between false
                             // alarms, 20 … 500
-  double bias_px = 0.02;  // px rms over the image: slow error of vertical differences that is
-                          // overlooked at least, 0 … 1
-  // The same with a calibration that was found from images and is confirmed, expected until it is
-  // measured, 0 … 2.
+  double bias_px = 0.02;  // px rms over the image: minimum of the slowly varying error of vertical
+                          // differences that is tolerated, 0 … 1
+  // Expected value of the same error, until it is measured, for a calibration that was found from
+  // images and is verified, 0 … 2.
   double verified_bias_px = 0.12;
-  double unverified_bias_px = 0.3;  // and with one that is given, 0 … 5
+  double unverified_bias_px = 0.3;  // expected with an unverified calibration, 0 … 5
   int min_matches =
       30;  // stereo matches under which a frame measures nothing (`needs_texture`), 12 … 1000
   int short_window = 3;   // moving frames of the shortest window: large knocks, 1 … 10
@@ -40,7 +40,7 @@ struct StereoObservation {
   std::uint32_t track = 0;  // the same number in every frame that sees the same point
 };
 
-/// What the monitor is shown of one frame. Views: they live until look() returns.
+/// Input of one frame. The views must stay valid until look() returns.
 struct MonitorFrame {
   std::uint64_t frame = 0;  // strictly increasing
   bool moving = false;      // false: the images repeat themselves, so their errors do not average
@@ -50,7 +50,7 @@ struct MonitorFrame {
   int found_stereo = 0;  // matches there are
 };
 
-/// What the monitor says after one frame.
+/// Result of the monitor after one frame.
 struct MonitorResult {
   enum class Kind : std::uint8_t {  // in order of weight
     quiet,
@@ -59,9 +59,9 @@ struct MonitorResult {
     collapse,  // matches are expected and not there: too far off to be measured
   };
   Kind kind = Kind::quiet;
-  bool undecided = false;  // over the threshold in a frame that may be an exception
+  bool undecided = false;  // over the threshold in one frame, which may be an outlier
   double statistic = 0;    // largest of all windows
-  double threshold = 0;    // what it is held against
+  double threshold = 0;    // the limit of `statistic`
   Vec6 offset = Vec6::Zero();  // true minus reference, (φ rad, τ m): R ← Exp(φ) R, t ← t + τ; since
                                // the onset, else of the longest window; first order
   Mat6 covariance = Mat6::Zero();  // of `offset`; rank 5, the length is not seen
@@ -70,23 +70,25 @@ struct MonitorResult {
   int frames_since_onset = 0;  // frames measured since then
 };
 
-/// Watches whether the transform of one further camera still is true (METHOD §4). One Monitor per
+/// Tests whether the transform of one further camera still holds (METHOD §4). One Monitor per
 /// further camera.
 ///
-/// Every frame the stereo matches give, through the distance to the epipolar line, a gradient g and
-/// an information A of θ = (φ, α, β), the five of moved_on_sphere(). Over a window of n matches
+/// The distances of a frame's stereo matches from their epipolar lines give a gradient g and an
+/// information matrix A of θ = (φ, α, β), the five parameters of moved_on_sphere(). Over a window
+/// of n matches
 ///
 ///     A = Σ A_f/μ,  g = Σ g_f/μ,  μ = λ + n b²/5σ²
 ///     statistic = gᵀ (A + A C A)⁻¹ g
 ///
-/// λ: spread of whole tracks over the white one, measured. b: MonitorOptions::bias_px, or what is
-/// measured. C: covariance of the reference. A turn about the axis that no epipolar line shows
-/// (yaw, for cameras side by side) is seen by DisparityJumpDetector and by solves.
+/// λ is the measured inflation: variance of the gradient with errors correlated along tracks, over
+/// the one of independent errors. b is MonitorOptions::bias_px or the measured scatter. C is the
+/// covariance of the reference. A turn about the axis that no epipolar line shows (yaw, for cameras
+/// side by side) is seen by DisparityJumpDetector and by solves.
 ///
-/// The same against what the two minutes before the window have shown, whose covariance is smaller
-/// than the reference's: small knocks. Windows of a few to several hundred moving frames; the
-/// largest statistic counts. Standing frames are tested one by one, more strictly: their errors
-/// stay.
+/// Small knocks are found by a second test: the window is compared with the estimate of the two
+/// minutes before it, whose covariance is smaller than the reference's. Windows have a few to
+/// several hundred moving frames; the largest statistic counts. Frames of a standing rig are tested
+/// one by one against a higher threshold, because their errors repeat.
 ///
 ///     Arena arena(Monitor::memory_needed(options));
 ///     Monitor monitor(options, arena);
@@ -104,21 +106,21 @@ class Monitor {
   [[nodiscard]] static std::size_t memory_needed(const MonitorOptions& options) noexcept;
   Monitor(const MonitorOptions& options, Arena& arena);
 
-  /// A new calibration in use: X_k = T_camera_left X_left; forgets everything seen. `covariance` of
-  /// its left perturbation, noise only: what uncertain intrinsics do to a calibration shows in no
-  /// residual, so the wide one would make the monitor blind.
-  /// False: |t| is zero or something is not finite; then every look() is quiet.
+  /// Sets the calibration to test, X_k = T_camera_left X_left, and clears all evidence.
+  /// `covariance` is of its left perturbation (rad, m) by noise alone: errors of the intrinsics
+  /// show in no residual, so the total covariance would make the monitor insensitive. False: |t| is
+  /// zero or something is not finite; then every look() is quiet.
   bool set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right,
                      const Mat6& covariance) noexcept;
 
-  /// How much stretches of a drive are expected to disagree, px rms over the image, until that is
-  /// measured: what the lenses in use leave. Outlives set_reference() and reset(), as what was
-  /// measured does; monitor.bias_px is the least, and all there is without this call.
+  /// Sets the scatter that lens errors are expected to cause between stretches of a drive, px rms
+  /// over the image, until it is measured; at least monitor.bias_px, which is also the default. It
+  /// survives set_reference() and reset(), as the measured scatter does.
   void expect_scatter(double bias_px) noexcept;
 
   [[nodiscard]] MonitorResult look(const MonitorFrame& frame) noexcept;
 
-  /// Forgets what was seen (the scene was lost); the reference stays.
+  /// Clears all evidence (the scene was lost); the reference stays.
   void reset() noexcept;
 
  private:

@@ -9,16 +9,17 @@
 
 namespace vergence::calibration {
 
-/// Which images of two cameras are of one instant, of those of successive frames (METHOD §7.3): the
-/// left one and the camera's, the left one of the frame before and the camera's (the camera is a
-/// frame late), or the other way round.
+/// Tests which images of two cameras are of the same instant (METHOD §7.3): the left image and the
+/// camera's of one frame, or the left image of the frame before and the camera's (the camera is a
+/// frame late), or the other way round (the left one is late).
 ///
-/// Of the right pairing the points' distances from the epipolar lines are as wide as they usually
-/// are, w. With widths a of this frame's pairs and b of the shifted ones a point's log-likelihood
-/// ratio of the shifted pairing is ln(a / w) − (b²/w² − 1)/2: positive where the shifted pairs are
-/// usual and this frame's are not, negative after a knock, when neither are, and zero for a rig
-/// that stands. With a and b exchanged it is that of this frame's pairing against the shifted one.
-/// Sums that never fall below zero are Page's test (E. S. Page, Biometrika 41, 1954).
+/// In the true pairing the points' distances from the epipolar lines have their usual spread w.
+/// With a and b the median distances in this frame's pairing and in the shifted one, the
+/// log-likelihood ratio of a point for the shifted pairing is ln(a / w) − (b²/w² − 1)/2: positive
+/// where the shifted distances are usual and this frame's are not, negative after a knock, when
+/// neither are, and zero for a rig that stands. With a and b exchanged it is the ratio for this
+/// frame's pairing. Sums that never fall below zero are Page's test (E. S. Page, Biometrika 41,
+/// 1954).
 ///
 /// Memory   From the arena; points beyond `capacity` are left out.
 /// Threads  One caller. Time: linear but for a sort of the points.
@@ -33,20 +34,20 @@ class PairingEvidence {
             const Transform& T_camera_left, const Pinhole& left, const Pinhole& camera) noexcept;
   /// Median distance of the newest frame's points from their epipolar lines, px; 0 without any.
   [[nodiscard]] double distance_px() const noexcept { return distance_px_; }
-  /// In frames: 1: the camera is late, −1: the left one is; 0: nothing is known of a lag.
+  /// Lag in frames: 1 if the camera is late, −1 if the left one is, 0 if no lag is known.
   [[nodiscard]] int lag_frames() const noexcept;
-  /// A frame or two speak for a lag: what else they seem to say is not to be relied on.
+  /// True if one or two frames speak for a lag: other conclusions from them are unreliable.
   [[nodiscard]] bool suspected() const noexcept;
-  /// An image came twice: a camera may be a frame late from now on.
+  /// Call when an image came twice: a camera may be a frame late from now on.
   void question() noexcept {
     questioned_ = true;
     in_step_[0] = in_step_[1] = 0;
   }
-  /// From question() until motion shows that the cameras are in step.
+  /// True from question() until motion shows that the cameras are in sync.
   [[nodiscard]] bool questioned() const noexcept { return questioned_; }
-  /// Since the last lag or question(), motion shows that the cameras are in step.
+  /// True if motion since the last lag or question() has shown that the cameras are in sync.
   [[nodiscard]] bool cameras_in_sync() const noexcept;
-  /// The scene was lost.
+  /// Call when the scene was lost: clears all evidence.
   void reset() noexcept {
     count_ = 0;
     usual_px_ = 0;

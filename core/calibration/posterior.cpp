@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kAnyRotation = 0.2;   // rad, sigma of what may be anything
 constexpr double kAnyDirection = 0.2;  // of t, in baselines
-// What a lens wanders against the rig's own drift: heat moves both.
+// Random walk of the lenses relative to that of the extrinsics; temperature causes both.
 constexpr double kFocalOfDrift = 0.3, kCentreOfDrift = 0.3, kDistortionOfDrift = 1.0;
 
 void widen(RigCovariance* C, int row, double sigma) noexcept {

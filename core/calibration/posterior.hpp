@@ -4,12 +4,11 @@
 
 namespace vergence::calibration {
 
-/// What is known of a rig grows old: a random walk of `hours` is added to its joint covariance
-/// (METHOD §6.1). Threads pure.
+/// Widens the joint covariance of a calibration by the random walk of `hours` (METHOD §6.1). Pure.
 void let_drift(double hours, const CalibrationOptions& options, RigCalibration* rig) noexcept;
 
-/// The cameras may sit elsewhere than they did, the lenses are the same: of the transforms nothing
-/// is known any more. Threads pure.
+/// Marks the transforms as unknown and keeps the lenses: for cameras that may have been moved.
+/// Pure.
 void clear_transforms(RigCalibration* rig) noexcept;
 
 }  // namespace vergence::calibration

@@ -159,7 +159,8 @@ void RigSolver::drop_outliers(double limit) noexcept {
     for (; i < observations_.size() && observations_[i].point == point; ++i)
       if (static_cast<double>(residuals_[i]) < limit * limit)
         observations_[kept++] = observations_[i];
-    // What is left of a point has to hold it, and say something about the rig.
+    // A point must keep three observations of at least two cameras, to be determined and to
+    // constrain the rig.
     unsigned cameras = 0;
     for (std::size_t j = first; j < kept; ++j) cameras |= 1U << observations_[j].camera;
     if (kept - first < 3 || (cameras & (cameras - 1U)) == 0) kept = first;

@@ -20,7 +20,7 @@ enum class RigSolveStatus : std::uint8_t {
   not_observable,  // converged, but the tracks leave some direction of the transform open
 };
 
-/// What a solve may move.
+/// Parameters that a solve estimates.
 enum class RigFreedom : std::uint8_t {
   transforms,  // and further cameras' focal lengths, as the options say; lenses are taken as they
                // are
@@ -31,7 +31,7 @@ enum class RigFreedom : std::uint8_t {
 };
 inline constexpr double kFocalDoubt = 0.1;  // prior sigma of a focal length, a share of it
 
-/// What to solve for and where to begin. `known` and `given` are read during solve() only.
+/// Start, prior and free parameters of a solve. `known` and `given` are read during solve() only.
 struct RigSolveRequest {
   RigCalibration rig{};  // cameras, intrinsics, baseline; T_camera_left with from_rig
   RigFreedom freedom = RigFreedom::transforms;
@@ -60,9 +60,10 @@ struct RigSolution {
   double solve_ms = 0;           // wall time
 };
 
-/// The stereo calibration adjustment of METHOD §3 over a snapshot of the track log: candidate pair,
-/// right cameras re-initialised through it, points triangulated, all adjusted with the shared
-/// transform; sigmas noise-only and wide.
+/// Estimates the calibration from a snapshot of the track log (METHOD §3): chooses the frame whose
+/// transforms fit best, re-initialises the further cameras through them, triangulates the points
+/// and adjusts everything with transforms shared by all frames. Sigmas are computed for noise alone
+/// and in total.
 ///
 ///     RigSolver solver(options, monitor, 2, features, arena);
 ///     solver.log().begin(frame);  // of each posed frame, and what it saw
@@ -119,7 +120,8 @@ class RigSolver {
   /// tie together.
   [[nodiscard]] double length_noise(const BundleResult& r) const noexcept;
   void watch_frames(RigSolution* s) noexcept;
-  /// What the frames used say of one camera, held against the result.
+  /// Result of running the monitors of one camera over the frames used, with the solution as the
+  /// reference.
   struct Watch {
     int lag_frames = 0;
     std::uint64_t changed_at = 0;

@@ -174,7 +174,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
     }
     out.prior_mean[8] = lens.distortion[4];
     if (request.known == nullptr) continue;
-    // What is known of the lenses already holds what a prior would add.
+    // The covariance of the known lenses already contains their prior.
     for (std::size_t i = 0; i < 8; ++i)
       if (request.known->covariance.known(intrinsic_row(k) + static_cast<int>(i)))
         out.prior_sigma[i] = 0;

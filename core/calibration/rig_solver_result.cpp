@@ -4,7 +4,7 @@
 
 #include "core/calibration/rig_solver.hpp"
 
-/// What an adjustment found, as a solution.
+/// Conversion of an adjustment's result to a RigSolution.
 namespace vergence::calibration {
 namespace {
 
@@ -53,8 +53,8 @@ double RigSolver::length_noise(const BundleResult& r) const noexcept {
 }
 
 void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexcept {
-  // What uncertain intrinsics do to the scale of the path (METHOD's numbers, §3.3 and §5): half of
-  // what the focal lengths are off, and 0.31 % for each mrad that the principal points are off.
+  // Scale error of the path from uncertain intrinsics (METHOD's numbers, §3.3 and §5): half of the
+  // relative error of the focal lengths, and 0.31 % per mrad of error of the principal points.
   constexpr double kScaleByFocal = 0.5, kScaleByRadian = 3.1;
   RigCalibration& rig = s->rig;
   for (int k = 0; k < count_; ++k) {
@@ -82,8 +82,8 @@ void RigSolver::write_result(const BundleResult& r, RigSolution* s) const noexce
   rig.scale_sigma = std::hypot(noise, std::hypot(kScaleByFocal * focal, kScaleByRadian * centre));
 }
 
-/// What the monitors would have said during the drive, had they known the result: a camera out of
-/// step, or two rigs in one solve.
+/// Runs the monitors over the frames used, with the result as the reference, to find a camera out
+/// of sync or a change of the rig within the solve.
 void RigSolver::watch_frames(RigSolution* s) noexcept {
   for (int k = 1; k < count_; ++k) {
     const Watch seen = watch_camera(k, s->rig);

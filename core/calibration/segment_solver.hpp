@@ -5,13 +5,12 @@
 
 namespace vergence::calibration {
 
-/// A drive's tracks cut into stretches of so many moving frames, each solved with the lenses free
-/// when it is full.
+/// Cuts a drive's tracks into stretches of `frames` moving frames and solves each with the lenses
+/// free when it is full.
 ///
-/// Ownership  `given`: whose lenses and sigmas are the priors; `start`: where the first solve
-///            begins, found in these very tracks or not;
-/// copied.
-/// Threads    One caller; solves happen in take() and end(), some hundred milliseconds each.
+/// Ownership  `given`, whose lenses and sigmas are the priors, and `start`, where the first solve
+/// begins, are copied. Threads    One caller; solves happen in take() and end(), some hundred
+/// milliseconds each.
 ///            Memory: from the arena.
 class SegmentSolver {
  public:
@@ -26,11 +25,11 @@ class SegmentSolver {
                                                  const MonitorOptions& monitor, int cameras,
                                                  std::size_t features) noexcept;
 
-  /// Takes over the frames of `tracks` that are newer than those taken before. A value: a stretch
-  /// was full and is solved.
+  /// Adds the frames of `tracks` that are newer than those added before. Returns the solution if
+  /// that filled a stretch.
   [[nodiscard]] std::optional<RigSolution> take(const TrackLog& tracks) noexcept;
-  /// The drive is over: what is left is solved if it is enough; kind `joined`: also less than a
-  /// stretch counts.
+  /// Call after the last frame: solves what is left if it is enough. With Kind::joined less than a
+  /// full stretch suffices.
   [[nodiscard]] std::optional<RigSolution> end() noexcept;
   [[nodiscard]] std::uint64_t frames() const noexcept { return taken_; }
 

@@ -35,33 +35,33 @@ struct LoggedFrame {
   std::span<LoggedObservation> observations;
 };
 
-/// The newest moving rig frames with their tracks: what a calibration is found from.
+/// Ring of the newest moving rig frames with their tracks, from which a calibration is solved.
 ///
-/// Policies when full  Frames: the oldest goes. Observations of a frame: the rest is left out and
-/// counted. Threads one. Memory from the arena at construction.
+/// If full, the oldest frame is dropped; observations of a frame beyond its capacity are left out
+/// and counted. Not thread-safe. Memory from the arena at construction.
 class TrackLog {
  public:
   TrackLog(std::size_t frames, std::size_t observations, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(std::size_t frames,
                                                  std::size_t observations) noexcept;
 
-  /// A new frame; push() then fills it.
+  /// Begins a new frame, which push() then fills. `frame.observations` is not read.
   void begin(const LoggedFrame& frame) noexcept;
   void push(const LoggedObservation& observation) noexcept;
 
   void clear() noexcept { size_ = 0; }
-  /// Forgets frames with a number below.
+  /// Drops frames with a smaller number.
   void drop_before(std::uint64_t number) noexcept;
-  /// The world was scaled about a place: the poses follow.
+  /// Scales all poses about a point of the world, as the odometry scaled its world.
   void scale_about(const Vec3& centre, double factor) noexcept;
-  /// A frame of another log with its observations.
+  /// Copies a frame of another log with its observations.
   void append(const LoggedFrame& frame) noexcept;
-  /// The newest `frames` of another log with its observations, in place of what is here.
+  /// Replaces the content by the newest `frames` frames of another log.
   void copy(const TrackLog& from, std::size_t frames) noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
-  /// i = 0: the oldest.
+  /// Frame i; 0 is the oldest.
   [[nodiscard]] LoggedFrame& frame(std::size_t i) noexcept { return frames_[slot(i)]; }
   [[nodiscard]] const LoggedFrame& frame(std::size_t i) const noexcept { return frames_[slot(i)]; }
   [[nodiscard]] std::uint64_t left_out() const noexcept { return left_out_; }

@@ -8,8 +8,8 @@
 #include "core/types/stamped_pose.hpp"
 #include "core/types/time.hpp"
 
-/// How the body of a reference (an INS) and the body of an estimate (the left camera) sit to one
-/// another, from a drive: hand-eye calibration with a clock offset.
+/// Transform between the body of a reference (an INS) and the body of an estimate (the left
+/// camera), estimated from a drive: hand-eye calibration with a clock offset.
 ///
 /// Model     With T_ref_est = (R_m, l), the estimate's body in the reference's, and T_enu_world,
 /// the estimate's world on the earth:

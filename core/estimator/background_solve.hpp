@@ -15,8 +15,8 @@ namespace vergence {
 ///       use(solve.solved());
 ///     }
 ///
-/// Threads  One caller; the task runs where the BackgroundRunner runs it, and until it is done
-/// it writes into this; the destructor waits for it. Memory from the arena at construction.
+/// Threads  One caller. The task runs on the BackgroundRunner's thread and writes into this object
+/// until it is done; the destructor waits for it. Memory from the arena at construction.
 class BackgroundSolve {
  public:
   /// Where a solve begins and what is known before it.
@@ -42,32 +42,33 @@ class BackgroundSolve {
 
   /// Precondition: !running().
   void start(const calibration::TrackLog& log, const Start& start) noexcept;
-  /// From start() to close().
+  /// True from start() to close().
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] bool sought() const noexcept { return start_.sought; }
-  /// Once a frame while it runs. True: it is done, and its turn has come. In a live drive that is
-  /// never waited for (Adoption::when_ready); else it is.
+  /// Call once per frame while running(). Returns true if the solver has finished and a decision
+  /// about its solutions is due at this frame. Waits for the solver with
+  /// Adoption::after_fixed_frames only; with Adoption::when_ready it returns false until the solver
+  /// has finished.
   [[nodiscard]] bool next_frame() noexcept;
-  /// Its last turn: it is adopted or rejected.
+  /// True if this is the last frame to decide at: the solution has to be adopted or rejected.
   [[nodiscard]] bool last_turn() const noexcept;
-  /// The next turn is some frames later.
+  /// Puts the decision off by some frames, so that more of them are not in the solve.
   void postpone() noexcept;
-  /// How long the last next_frame() waited for the solver: with Adoption::after_fixed_frames only,
-  /// a live drive never does.
+  /// Time that the last next_frame() waited for the solver, ms; 0 with Adoption::when_ready.
   [[nodiscard]] float waited_ms() const noexcept { return waited_ms_; }
   void clear_waited() noexcept { waited_ms_ = 0; }
   /// Waits for the task.
   void finish() noexcept;
-  /// What the solve under way finds is of no use: its frames no longer count.
+  /// Marks the running solve, if any, as outdated: its frames no longer describe the rig.
   void discard() noexcept { discarded_ = running_; }
-  /// It is discarded, or for another purpose than now.
+  /// True if the solve was discarded, or was started for another purpose than `seeking` says.
   [[nodiscard]] bool outdated(bool seeking) const noexcept {
     return discarded_ || start_.sought != seeking;
   }
-  /// The solutions have been looked at; another solve may start.
+  /// Ends the solve after its solutions have been used; another one may start.
   void close() noexcept { running_ = false; }
   [[nodiscard]] const Solved& solved() const noexcept { return solved_; }
-  /// Measures with the same snapshots; while no solve runs.
+  /// Focal length measurements of the same snapshots. Read it only while no solve runs.
   [[nodiscard]] calibration::FocalCheck& focal_check() noexcept { return focal_check_; }
   [[nodiscard]] const calibration::FocalCheck& focal_check() const noexcept { return focal_check_; }
 

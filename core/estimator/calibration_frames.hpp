@@ -9,8 +9,8 @@ namespace vergence {
 /// into it, and how many there have to be before the next solve.
 ///
 /// A segment is what one calibration after the other is solved from, while it grows;
-/// begin_segment() closes it. `wanted` counts frames taken since the segment began, and those it
-/// began with.
+/// begin_segment() closes it. The number of frames wanted counts those that the segment began with,
+/// too.
 ///
 /// Threads one. Memory from the arena at construction.
 class CalibrationFrames {
@@ -20,42 +20,45 @@ class CalibrationFrames {
   [[nodiscard]] static std::size_t memory_needed(const calibration::CalibrationOptions& options,
                                                  std::size_t tracks) noexcept;
 
-  /// What a posed frame saw goes into the log, if the rig has moved since the last one that did.
+  /// Logs the tracks of a posed frame if the image has moved by a pixel on average since the last
+  /// frame logged, and every camera gave a good image.
   void take(odometry::Odometry& odometry, const odometry::FrameOutcome& outcome,
             const RigFrame& frame) noexcept;
-  /// No frame was taken for so long that the rig must be standing.
+  /// True if no frame was logged for so long that the rig must be standing.
   [[nodiscard]] bool standing() const noexcept;
   void restart_standing() noexcept { frames_still_ = 0; }
 
-  /// Another segment of the frames from `number` on; older ones are forgotten.
+  /// Begins another segment with the logged frames from `number` on; older ones are dropped.
   void begin_segment(std::uint64_t number) noexcept;
   void begin_segment() noexcept;
-  /// The same segment without its frames before `number`.
+  /// Drops the segment's frames before `number`; the segment goes on.
   void drop_before(std::uint64_t number) noexcept { log_.drop_before(number); }
-  /// And without any.
+  /// Drops all frames and begins another segment.
   void clear() noexcept;
 
-  /// Enough for the next solve.
+  /// True if there are frames enough for the next solve.
   [[nodiscard]] bool enough() const noexcept;
-  /// Enough for a solve at all.
+  /// True if there are frames enough for any solve.
   [[nodiscard]] bool enough_for_any() const noexcept;
-  /// There are new ones since solve_begun(), worth another solve.
+  /// True if enough frames were logged since solve_begun() to make another solve worthwhile.
   [[nodiscard]] bool new_since_solve() const noexcept;
   void solve_begun() noexcept { solved_frames_ = log_.size(); }
-  /// Of the segment, in the newest solve.
+  /// Number of the segment's frames in the newest solve.
   [[nodiscard]] std::size_t solved_frames() const noexcept { return solved_frames_; }
 
-  /// The next solve needs this many frames of the segment, and kNewFrames new ones at least.
+  /// Makes the next solve wait for this many frames of the segment, and for kNewFrames new ones at
+  /// least.
   void want(std::size_t frames) noexcept;
-  /// The next solve needs so many frames beside those the log has lost.
+  /// Makes the next solve wait until the log holds `frames` frames.
   void want_new(std::size_t frames) noexcept { wanted_ = logged_ - log_.size() + frames; }
-  /// One solve after the other while the segment grows.
+  /// Makes the next solve wait for least() frames more than the newest solve had, or for a full
+  /// segment.
   void want_more() noexcept;
   void want_full() noexcept { wanted_ = most(); }
   [[nodiscard]] std::size_t most() const noexcept;
-  /// Of the first solve of a calibration that is sought.
+  /// Minimum number of frames of the first solve of an estimation.
   [[nodiscard]] std::size_t least() const noexcept;
-  /// Of any solve: what a calibration that is given is confirmed with.
+  /// Minimum number of frames of any solve; enough to confirm a calibration that was given.
   [[nodiscard]] std::size_t fewest() const noexcept;
 
   [[nodiscard]] const calibration::TrackLog& log() const noexcept { return log_; }

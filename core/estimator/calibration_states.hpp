@@ -4,7 +4,7 @@
 
 namespace vergence {
 
-/// What is known of the calibration in use.
+/// State of the calibration in use.
 enum class CalibrationState : std::uint8_t {
   none,        // there is none; one is sought
   unverified,  // in use, and the drive has not confirmed it
@@ -12,7 +12,7 @@ enum class CalibrationState : std::uint8_t {
   suspect,     // the rig seems to have changed; another one is sought
 };
 
-/// What can happen to it.
+/// Event that changes the state of the calibration in use.
 enum class CalibrationTrigger : std::uint8_t {
   adopted,           // what was sought is found
   adopted_verified,  // the same, by a drive that holds its depths to the tolerated error
@@ -28,7 +28,7 @@ struct CalibrationTransition {
   CalibrationState to;
 };
 
-/// All edges there are; any other trigger changes nothing.
+/// All edges; a trigger without an edge from the current state changes nothing.
 inline constexpr std::array kCalibrationTransitions = {
     CalibrationTransition{CalibrationState::none, CalibrationTrigger::adopted,
                           CalibrationState::unverified},

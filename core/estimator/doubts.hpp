@@ -8,7 +8,7 @@
 
 namespace vergence {
 
-/// The reasons for which poses can be doubted. Where several doubts stand, the first of them here
+/// Reasons for which poses are `degraded`, strongest first: where several stand, the first of them
 /// names the reason.
 enum class Doubt : std::uint8_t {
   pairing,        // this frame's images are contradicted to have been exposed together
@@ -35,7 +35,7 @@ inline constexpr std::size_t kDoubts = static_cast<std::size_t>(Doubt::motion) +
 /// Threads  One. Memory: none of the heap.
 class DoubtLedger {
  public:
-  /// Only strike() ends it.
+  /// Value of `left` for a doubt that only strike() ends.
   static constexpr int kUntilStruck = std::numeric_limits<int>::max();
 
   struct Entry {
@@ -44,20 +44,20 @@ class DoubtLedger {
     int left = 0;                  // frames of evidence that end it
   };
 
-  /// One that stands already keeps the frame that it began in.
+  /// Enters a doubt, or renews it: one that stands already keeps the frame that it began in.
   void enter(Doubt doubt, Reason reason, std::uint64_t frame, int left = kUntilStruck) noexcept {
     Entry& e = at(doubt);
     e = {reason, e.reason == Reason::none ? frame : e.since, left};
   }
   void strike(Doubt doubt) noexcept { at(doubt) = {}; }
-  /// It stands exactly while something is so.
+  /// Enters the doubt if `so`, else ends it: for doubts that stand exactly while a condition holds.
   void hold(Doubt doubt, bool so, Reason reason, std::uint64_t frame) noexcept {
     if (so)
       enter(doubt, reason, frame);
     else
       strike(doubt);
   }
-  /// One frame of evidence against it. True: it was the last one needed.
+  /// Counts one frame of evidence against a doubt. Returns true if that ended it.
   bool weaken(Doubt doubt) noexcept {
     Entry& e = at(doubt);
     if (e.reason == Reason::none || e.left == kUntilStruck || --e.left > 0) return false;
@@ -71,8 +71,8 @@ class DoubtLedger {
   [[nodiscard]] bool stands(Doubt doubt) const noexcept {
     return (*this)[doubt].reason != Reason::none;
   }
-  /// The first that stands; nullptr: none. Of a pose that does not move nothing is wrong by an
-  /// exposure.
+  /// The strongest doubt that stands; nullptr if none does. `late_image` does not count while the
+  /// rig stands (`moves` false): an image that is an exposure late shows the same then.
   [[nodiscard]] const Entry* strongest(bool moves) const noexcept {
     for (std::size_t i = 0; i < kDoubts; ++i)
       if (entries_[i].reason != Reason::none &&
@@ -80,7 +80,7 @@ class DoubtLedger {
         return &entries_[i];
     return nullptr;
   }
-  /// Whether one of them stands, `last` or stronger.
+  /// Returns true if `last` or a stronger doubt stands.
   [[nodiscard]] bool any_up_to(Doubt last) const noexcept {
     for (std::size_t i = 0; i <= static_cast<std::size_t>(last); ++i)
       if (entries_[i].reason != Reason::none) return true;

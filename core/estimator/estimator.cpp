@@ -12,7 +12,7 @@
 namespace vergence {
 namespace {
 
-/// What must be known of a rig.
+/// Throws std::invalid_argument if the rig or the options cannot be used.
 void check(const EstimatorOptions& options, const RigCalibration& rig) {
   const bool known = options.trust != CalibrationTrust::none;
   if (rig.cameras < 2 || rig.cameras > kMaxCameras)
@@ -108,7 +108,8 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
       if (!linked && (p.calibrator.seeking() || p.calibrator.monitor().map_reset_pending()))
         p.watch_estimate(out, frame);
-      // Of cameras out of step there is no calibration, also where no lag shows for a while.
+      // Images of cameras out of sync cannot be calibrated from, even where no lag shows for a
+      // while.
       if (!p.doubts.stands(Doubt::out_of_sync) || p.state != State::stereo_odometry)
         p.calibrator.frames().take(p.odometry, out, frame);
     }

@@ -17,7 +17,8 @@
 
 namespace vergence {
 
-/// What the calibration handed to the estimator is worth (METHOD §3).
+/// Origin of the calibration handed to the estimator, and with it how far it is trusted (METHOD
+/// §3).
 enum class CalibrationTrust : std::uint8_t {
   given,  // in use from the first frame, poses `degraded: unverified_calibration` until the drive
           // has confirmed it
@@ -40,13 +41,13 @@ struct EstimatorOptions {
   Adoption adoption = Adoption::after_fixed_frames;
   std::array<ImageView, kMaxCameras> masks{};  // by camera, of its images' size: where it is 0
                                                // nothing is looked for; empty: everywhere
-  Duration frame_budget{};  // live: what a frame may take before work is left out
-                            // (docs/deployment.md); zero: whatever it takes
+  Duration frame_budget{};  // live: time that a frame may take before work is left out
+                            // (docs/deployment.md); zero: no limit
   bool online =
       true;  // watch the rig and calibrate it; false: the calibration given is used for ever
 };
 
-/// Something worth a line in events.jsonl. `why` points to a constant.
+/// Event of the estimator: a line of events.jsonl. `why` points to a constant.
 struct EstimatorEvent {
   Stamp stamp{};
   enum class Kind : std::uint8_t {
@@ -55,7 +56,8 @@ struct EstimatorEvent {
     time_gap,
     relocalised,
     dropped,
-    rig_changed,  // the monitor raised, or the user asked; value: frames since the onset
+    rig_changed,  // the monitor found a change, or the user requested a calibration; value: frames
+                  // since the onset
     out_of_sync,  // the cameras' images are not of the same instant; value: the lag in frames, 0
                   // where it is not known
     cameras_in_sync,            // cameras that were out of step are so no more
@@ -80,7 +82,8 @@ struct EstimatorEvent {
       0;  // seconds of a gap, count of what was dropped, frames; 0 where nothing is counted
 };
 
-/// Rig frames in, a pose for each out: the front door of core.
+/// Estimates the pose of each rig frame, and the rig's calibration while it drives. This is the
+/// entry point of core.
 ///
 ///     Arena arena(Estimator::memory_needed(options, rig));
 ///     SequentialRunner runner;
@@ -102,7 +105,7 @@ struct EstimatorEvent {
 ///            process() never does.
 class Estimator {
  public:
-  /// What the arena must offer for these options and this rig, bytes.
+  /// Bytes that the arena must have free for these options and this rig.
   [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
                                                  const RigCalibration& rig);
 
@@ -115,32 +118,33 @@ class Estimator {
   Estimator(const Estimator&) = delete;
   Estimator& operator=(const Estimator&) = delete;
 
-  /// One frame, stamps strictly increasing (a frame that is not newer is answered `lost`, reason
-  /// time_gap, and changes nothing). An empty image is a camera that gave none. Of a frame whose
-  /// pairing is contradicted the first image alone is used, and its pose is degraded. T_world_left
-  /// never jumps but across a marked gap.
+  /// Estimates the pose of one frame. Stamps must increase strictly: a frame that is not newer
+  /// gives `lost` with reason time_gap and changes nothing. An empty image stands for a camera that
+  /// gave none. If the frame's pairing is contradicted, only its first image is used, and the pose
+  /// is degraded. T_world_left is continuous except across a marked gap.
   [[nodiscard]] PoseSample process(const RigFrame& frame) noexcept;
 
-  /// No more frames will come. A calibration still sought is solved and decided from what there is;
-  /// events() and calibrations() tell of it. Waits for the solver.
+  /// Call after the last frame. Solves for and decides about a calibration that is still being
+  /// estimated, from the frames there are; events() and calibrations() have the outcome. Waits for
+  /// the solver.
   void finish() noexcept;
 
-  /// A new calibration is wanted, whatever the monitor says; acts at the next frame.
+  /// Requests a new calibration, whatever the monitor's result; acts at the next frame.
   /// Async-signal-safe.
   void request_recalibration() noexcept;
 
-  /// Of the last process() call, oldest first; valid until the next.
+  /// Events of the last process() or finish() call, oldest first; valid until the next call.
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept;
-  /// Calibrations decided about in the last process() call: each a line of calibrations.csv; an
-  /// accepted one is in use, and wants the state file written.
+  /// Calibrations decided about in the last process() or finish() call, each a line of
+  /// calibrations.csv. An accepted one is in use from then on and belongs into the state file.
   [[nodiscard]] std::span<const CalibrationDecision> calibrations() const noexcept;
 
   [[nodiscard]] State state() const noexcept;
   /// The calibration in use; before there is one, the rig given, without T_camera_left.
   [[nodiscard]] const RigCalibration& calibration() const noexcept;
   [[nodiscard]] bool calibrated() const noexcept;
-  /// The drive itself has confirmed the calibration in use to the tolerated depth error (METHOD
-  /// §6.4).
+  /// True if the drive itself has confirmed the calibration in use to the tolerated depth error
+  /// (METHOD §6.4).
   [[nodiscard]] bool verified() const noexcept;
   /// The newest moving frames with their tracks; empty without `online`. Valid until the next
   /// process().

@@ -4,7 +4,7 @@
 
 #include "core/estimator/detail/estimator_parts.hpp"
 
-/// What the estimator does about its rig's calibration, frame by frame.
+/// The estimator's handling of the rig's calibration, frame by frame.
 namespace vergence {
 namespace {
 
@@ -103,7 +103,8 @@ void Estimator::Parts::record_out_of_sync(Stamp stamp, double lag_frames) noexce
   calibrator.clear_frames();
 }
 
-/// What the monitors say of a frame posed with the calibration in use.
+/// Acts on the monitors' assessment of a frame posed with the calibration in use: knock, drift,
+/// collapse or lag.
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorResult::Kind;
   const RigAssessment v = calibrator.monitor().update(odometry, out, frame, calibrator.verified());
@@ -145,7 +146,8 @@ void Estimator::Parts::watch_estimate(const odometry::FrameOutcome& out,
       frame);
 }
 
-/// What the search has so far is of another rig. No cause: that of the search.
+/// Restarts the estimation because its frames are of another rig. Without a cause, the estimation's
+/// own is kept.
 void Estimator::Parts::restart_estimation(std::optional<CalibrationCause> cause,
                                           std::uint64_t onset, const RigFrame& frame) noexcept {
   calibrator.seek(cause, onset, frame.number);
@@ -165,8 +167,8 @@ void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
   notify_missing(frame.stamp);
 }
 
-/// How far lengths may be off now: a calibration that is adopted by its own sigma, one that stays
-/// also by what the drive measured beside it.
+/// Updates the relative sigma of lengths: for an adopted calibration its own sigma, for one that
+/// stays also its difference from the drive's measurement.
 void Estimator::Parts::record_length_sigma(const CalibrationDecision& decision) noexcept {
   if (!(decision.depth_sigma_percent > 0)) return;
   if (decision.accepted)
@@ -185,7 +187,7 @@ void Estimator::Parts::adopt(const CalibrationDecision& decision) noexcept {
   odometry.link(decision.calibration);
 }
 
-/// What the drive has measured of the rig while it went on.
+/// Acts on the decision of a refinement.
 void Estimator::Parts::take_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept {
   if (calibrator.last_gate() == calibration::Gate::out_of_sync) return record_out_of_sync(stamp, 0);
   const bool was_doubted = doubts.stands(Doubt::calibration),

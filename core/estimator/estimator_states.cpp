@@ -130,7 +130,7 @@ void Estimator::Parts::doubt_motion(const odometry::FrameOutcome& out, const Mat
               last_number);
 }
 
-/// What a posed frame gives to doubt.
+/// Enters the doubts that a posed frame gives rise to.
 void Estimator::Parts::renew_doubts(const odometry::FrameOutcome& out, Pairing pairing) noexcept {
   doubts.hold(Doubt::pairing, pairing == Pairing::contradicted, Reason::pairing_ambiguous,
               last_number);
@@ -141,9 +141,9 @@ void Estimator::Parts::renew_doubts(const odometry::FrameOutcome& out, Pairing p
   if (state == State::recalibrating) doubts.enter(Doubt::rig, Reason::recalibrating, last_number);
   if (out.moving && !doubts.any_up_to(Doubt::rig))
     doubts.enter(Doubt::dynamic_scene, Reason::dynamic_scene, last_number, kMovingFrames);
-  // What was wrong for some frames stays in the window's keyframes and points when it is over: the
-  // window takes it back over the next frames, and their motions are off by it. So as many frames
-  // as were doubted are doubted again, of a window at most.
+  // Errors of doubted frames stay in the window's keyframes and points; the window corrects them
+  // over the next frames, whose motions are off by the corrections. So poses stay degraded for as
+  // many frames as were doubted, at most for a window's length.
   if (out.relinked || out.restarted)
     doubts.strike(Doubt::window);
   else if (out.gap_s > 0 || out.renewed)
@@ -153,7 +153,7 @@ void Estimator::Parts::renew_doubts(const odometry::FrameOutcome& out, Pairing p
                  std::min(doubts[Doubt::window].left + 2, kWindowFrames + 1));
 }
 
-/// What a posed frame says against the doubts that stood for it.
+/// Weakens or ends the doubts that a posed frame is evidence against.
 void Estimator::Parts::weaken_doubts(const odometry::FrameOutcome& out, Stamp stamp) noexcept {
   for (const Doubt doubt : {Doubt::scene, Doubt::dynamic_scene, Doubt::window})
     (void)doubts.weaken(doubt);
@@ -163,8 +163,7 @@ void Estimator::Parts::weaken_doubts(const odometry::FrameOutcome& out, Stamp st
   if (out.relinked && doubts.weaken(Doubt::calibration)) notify_verified(stamp);
 }
 
-/// What a pose of cameras that are not linked says of its calibration: the most particular that is
-/// known.
+/// The most specific known reason for poses of unlinked cameras.
 Reason Estimator::Parts::why_uncalibrated() const noexcept {
   if (calibrator.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
   if (doubts.stands(Doubt::out_of_sync)) return Reason::out_of_sync;

@@ -20,7 +20,7 @@ std::size_t max_tracks(const EstimatorOptions& o) noexcept {
   return static_cast<std::size_t>(o.odometry.features);
 }
 
-/// How far off the epipolar lines of the calibration in use are beyond the matches' own noise, px.
+/// Misfit of the calibration in use beyond the noise of the matches, px from the epipolar lines.
 double misfit_px(const CalibrationDecision& d) noexcept {
   const double before = d.held_out_before_px, after = d.held_out_after_px;
   return std::sqrt(std::max(0.0, before * before - after * after));
@@ -71,7 +71,7 @@ void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
 
 void OnlineCalibrator::keep() noexcept {
   state_ = after(state_, CalibrationTrigger::kept);
-  // What was learnt before the rig was doubted is no witness of it as it is.
+  // Measurements from before the rig became suspect do not describe the present rig.
   if (search_.cause != CalibrationCause::requested) clear_rig(&learnt_);
   monitor_.expect_rebuilt_scene();
   frames_.begin_segment();
@@ -164,9 +164,9 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
   // Frames that stand are not logged: who stops then waits with the decision, for frames that were
   // not used have to speak for it.
   if (!solve_.outdated(seeking()) && !review(false).held_out_enough()) return std::nullopt;
-  // What is sought is adopted as soon as the frames after it confirm it; it is rejected only when
-  // more of them would not help. What is learnt beside a calibration in use waits for no more than
-  // it is judged by.
+  // An estimate is adopted as soon as the frames after its snapshot confirm it, and rejected only
+  // when more of them would not help. A refinement waits only for the frames that it is evaluated
+  // with.
   if (solve_.sought() && !solve_.outdated(seeking()) && !solve_.last_turn()) {
     const SolutionReview now = review(false);
     if (now.gate(now.sought()) != Gate::open) {
@@ -233,8 +233,8 @@ void OnlineCalibrator::plan_search(const RigSolution& found) noexcept {
     search_.change_believed = true;
     frames_.begin_segment(found.changed_at);
   } else {
-    // The same frames would say the same again; and what is rejected again and again is asked about
-    // less and less often.
+    // Solving the same frames again gives the same result, so they are dropped. After each
+    // rejection the next solve waits for twice as many frames, at most 16 times.
     frames_.drop_before(found.newest + 1);
     frames_.want_new(frames_.least() << std::min(search_.rejections, kMaxDoublings));
     ++search_.rejections;

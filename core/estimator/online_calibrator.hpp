@@ -12,16 +12,16 @@ namespace vergence {
 
 class SolutionReview;
 
-/// The rig's calibration while it drives (METHOD §3, §6): collects frames, watches that they fit,
-/// has calibrations solved beside the frames and decides about them. The estimator reports what
-/// was posed and follows its advice. What is known of the calibration in use is a state of the
-/// table in calibration_states.hpp; the states of the odometry are the estimator's.
+/// Calibrates the rig while it drives (METHOD §3, §6): collects frames, monitors the calibration in
+/// use, has calibrations solved in the background and decides about them. The estimator hands in
+/// posed frames and acts on the decisions. The state of the calibration in use is one of the table
+/// in calibration_states.hpp; the states of the odometry belong to the estimator.
 ///
-/// Two things are solved for. *Seeking*: there is no calibration, or the one in use is doubted;
-/// frames since the onset, until one passes the gates. *Learning*: all the time else; what the
-/// drive itself measures, lenses free, confirms the calibration in use, or contradicts it, or
-/// refines it. Learning grows a segment of frames, solving again and again; a full segment is
-/// closed, and what it measured is the next one's prior.
+/// There are two modes. *Seeking*: there is no calibration, or the one in use is suspect; the
+/// frames since the onset are solved until a solution passes the gates. *Refining*: at all other
+/// times; the drive's own measurement, with the lenses free, confirms, contradicts or refines the
+/// calibration in use. A refinement solves repeatedly while its segment of frames grows; a full
+/// segment is closed, and its result is the prior of the next.
 ///
 ///     calibrator.frames().take(odometry, out, frame);  // every posed frame
 ///     if (calibrator.can_solve()) calibrator.start_solve();
@@ -36,60 +36,60 @@ class OnlineCalibrator {
   [[nodiscard]] static std::size_t memory_needed(const EstimatorOptions& options,
                                                  const RigCalibration& rig) noexcept;
 
-  /// What calibrations are solved from: take() posed frames.
+  /// Frames that calibrations are solved from; call take() with each posed frame.
   [[nodiscard]] CalibrationFrames& frames() noexcept { return frames_; }
-  /// What watches the rig: update() it with posed frames.
+  /// Monitor of the rig; call update() with each posed frame.
   [[nodiscard]] RigMonitor& monitor() noexcept { return monitor_; }
 
-  /// From now on a calibration is sought. Frames before `onset` belong to another rig and are
-  /// forgotten, and so is a solve of them that is still under way. No cause: that of the search
-  /// before.
+  /// Starts estimating a new calibration. Frames before frame number `onset` belong to another rig
+  /// and are dropped, and a running solve of them is discarded. Without a cause, that of the
+  /// estimation before is kept.
   void seek(std::optional<CalibrationCause> cause, std::uint64_t onset, std::uint64_t now) noexcept;
   [[nodiscard]] bool seeking() const noexcept {
     return state_ == CalibrationState::none || state_ == CalibrationState::suspect;
   }
-  /// There are frames enough to solve from and no solve is under way.
+  /// True if there are frames enough to solve from and no solve is running.
   [[nodiscard]] bool can_solve() const noexcept;
   /// Takes a snapshot and starts the solver on it.
   void start_solve() noexcept;
-  /// Whether it is under way, and how long the last decide() waited for it.
+  /// The background solve: whether it is running, and how long the last decide() waited for it.
   [[nodiscard]] const BackgroundSolve& solve() const noexcept { return solve_; }
-  /// After every frame. A value: the solve is over and decided.
+  /// Call after every frame. Returns the decision if the solve is over and was decided about.
   [[nodiscard]] std::optional<CalibrationDecision> decide(Stamp stamp,
                                                           std::uint64_t number) noexcept;
-  /// No more frames come: waits for the solve under way and decides.
+  /// Call after the last frame: waits for the running solve and decides.
   [[nodiscard]] std::optional<CalibrationDecision> decide_now(Stamp stamp,
                                                               std::uint64_t number) noexcept;
-  /// And this begins one with whatever is logged; false: that is too little.
+  /// Starts a last solve with all that is logged. Returns false if that is too little.
   [[nodiscard]] bool start_last_solve() noexcept;
   [[nodiscard]] calibration::Gate last_gate() const noexcept { return gate_; }
 
-  /// What the calibration sought waits for: needs_motion, needs_near_structure; `none` if nothing
-  /// is known to be missing.
+  /// What the estimation lacks: needs_motion or needs_near_structure; `none` if nothing is known to
+  /// be missing.
   [[nodiscard]] Reason missing() const noexcept;
 
-  /// Another calibration is in use, whose scene has just been made; it is watched from here on.
+  /// Call when the scene of the calibration in use was made; the rig is monitored from here on.
   void map_rebuilt(const odometry::Odometry& odometry) noexcept;
-  /// Frames until now say nothing about the rig from here on: monitors and log begin again, the
-  /// calibration in use stays.
+  /// Drops all frames and restarts the monitors; the calibration in use stays. For when earlier
+  /// frames no longer describe the rig.
   void clear_frames() noexcept;
-  /// The scene was lost: what is logged does not go on, and what was learnt of the rig is no
-  /// witness that nobody knocked it meanwhile.
+  /// Call when the scene was lost. Logged tracks end there, and earlier measurements of the rig do
+  /// not show that it was left alone meanwhile.
   void map_lost() noexcept;
-  /// The calibration in use is the one of this decision, which was sought.
+  /// Puts the estimated calibration of this decision into use.
   void use(const CalibrationDecision& found) noexcept;
-  /// The same of one that was learnt: the frames stay.
+  /// Puts a refined calibration into use; the logged frames stay.
   void refine(const RigCalibration& rig) noexcept;
-  /// The one in use goes on: what was sought is no better.
+  /// Ends the estimation without a result: the calibration in use is as good and stays.
   void keep() noexcept;
-  /// The one that was in use before it, or before another was sought, is again: the images fit it.
+  /// Puts an earlier calibration back into use, because the images fit it.
   void take_back(const RigCalibration& rig) noexcept;
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
   [[nodiscard]] bool calibrated() const noexcept { return state_ != CalibrationState::none; }
   [[nodiscard]] bool verified() const noexcept { return state_ == CalibrationState::verified; }
 
  private:
-  /// What a calibration is sought for, and how that goes.
+  /// Cause and progress of an estimation.
   struct Search {
     CalibrationCause cause = CalibrationCause::from_scratch;
     std::uint64_t onset = 0, since = 0;  // frame numbers
@@ -111,7 +111,7 @@ class OnlineCalibrator {
                                                       std::uint64_t number) noexcept;
   [[nodiscard]] CalibrationDecision evaluate_refinement(const SolutionReview& review, Stamp stamp,
                                                         std::uint64_t number, bool last) noexcept;
-  /// What the gate says of the frames to solve from next.
+  /// Chooses the frames of the next solve from the gate's result.
   void plan_search(const calibration::RigSolution& found) noexcept;
   void plan_learning(const calibration::RigSolution& found) noexcept;
 

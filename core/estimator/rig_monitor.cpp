@@ -16,9 +16,9 @@ constexpr double kImageMargin = 12.0;  // px: nearer to the edge a track need no
 // from the first frame is a calibration that does not fit, no knock; a change against what the
 // frames before have shown is one.
 constexpr std::array kReference = {0.05, 0.05, 0.05, 0.1, 0.1, 0.1};
-// And of one that was solved from images and is verified: what the lens model leaves in one
-// stretch. The solve's own sigmas are of no use: turns and principal points are known together
-// only.
+// Sigmas of a calibration that was solved from images and is verified: the residual lens error in
+// one stretch. The solve's own sigmas cannot be used, because rotations and principal points are
+// determined together only.
 constexpr std::array kFound = {2e-4, 5e-4, 2e-4, 0.003, 0.003, 0.006};
 constexpr int kWitness = 2;  // frames: a point just made was searched for in the band of the
                              // calibration in use

@@ -9,7 +9,7 @@
 
 namespace vergence {
 
-/// What a frame says of the rig: the worst that any further camera's monitor says.
+/// Assessment of the rig after one frame: the worst result of all further cameras' monitors.
 struct RigAssessment {
   calibration::MonitorResult::Kind kind = calibration::MonitorResult::Kind::quiet;
   std::uint64_t onset_frame = 0;  // of `kind`
@@ -18,12 +18,12 @@ struct RigAssessment {
   bool cameras_in_sync = false;   // motion shows that all cameras' images are of the same instant
 };
 
-/// Watches, frame by frame, whether the rig still is the one that its calibration describes
-/// (METHOD §4): for each further camera a monitor of the epipolar lines and a detector of jumps in
-/// the disparities, and what tells whether its images are of the left ones' instants.
+/// Checks, frame by frame, that the calibration still describes the rig (METHOD §4). Each further
+/// camera has a monitor of the distances to epipolar lines, a detector of jumps in the disparities,
+/// and a test that its images are of the same instant as the left ones.
 ///
-/// With the cameras linked update() compares a posed frame with the calibration watched. While a
-/// calibration is sought the cameras are not linked, and update_unlinked() looks for jumps alone.
+/// With the cameras linked, update() compares a posed frame with the reference calibration. While a
+/// calibration is estimated the cameras are not linked, and update_unlinked() looks for jumps only.
 ///
 ///     monitor.watch(rig, confirmed);  // a calibration is in use, its scene is there
 ///     const auto verdict = monitor.update(odometry, outcome, frame);  // each posed frame
@@ -37,39 +37,41 @@ class RigMonitor {
   [[nodiscard]] static std::size_t memory_needed(const calibration::MonitorOptions& options,
                                                  int cameras, std::size_t capacity) noexcept;
 
-  /// This calibration is the reference from now on. `confirmed` by the drive: less scatter is
-  /// expected of it.
+  /// Makes this calibration the reference. `confirmed`: the drive has confirmed it, so less scatter
+  /// is expected.
   void watch(const RigCalibration& rig, bool confirmed) noexcept;
-  /// How much stretches of the drive are expected to disagree, px rms over the image.
+  /// Sets the scatter expected between stretches of the drive, px rms over the image.
   void expect_scatter(double bias_px) noexcept;
-  /// The jump detectors compare with this calibration.
+  /// Sets the calibration that the jump detectors compare with.
   void set_jump_reference(const RigCalibration& rig) noexcept;
-  /// A calibration is adopted; until map_rebuilt() only jumps count.
+  /// Call when a calibration is adopted; until map_rebuilt() only jumps count.
   void expect_rebuilt_scene() noexcept { map_reset_pending_ = true; }
   [[nodiscard]] bool map_reset_pending() const noexcept { return map_reset_pending_; }
-  /// The scene of the calibration adopted has just been made; it is watched from here on.
+  /// Call when the scene of the adopted calibration was made; it is the reference from here on.
   void map_rebuilt(const odometry::Map& map, const RigCalibration& rig, bool confirmed) noexcept;
-  /// A scene of the same calibration has just been made: its points are compared from here on.
+  /// Call when the scene was made anew with the same calibration: its points are compared from here
+  /// on.
   void map_renewed(const odometry::Map& map) noexcept;
-  /// The cameras are not linked from now on: a calibration is sought.
+  /// Call when the cameras are unlinked because a calibration is estimated.
   void begin_unlinked(const RigCalibration& rig) noexcept;
 
-  /// A posed frame; linked odometry only. `verified`: the drive has confirmed the calibration
-  /// watched. Of a claim a monitor cannot distinguish its own errors, which differ from place to
-  /// place, from a change of the rig: it leaves the rig undecided.
+  /// Assesses a posed frame of linked cameras. `verified`: the drive has confirmed the reference.
+  /// An unverified calibration has errors that differ from place to place; the monitor cannot tell
+  /// them from a change of the rig, and the result is `undecided`.
   [[nodiscard]] RigAssessment update(const odometry::Odometry& odometry,
                                      const odometry::FrameOutcome& outcome, const RigFrame& frame,
                                      bool verified) noexcept;
-  /// The same while the cameras are not linked. A value: the rig has changed, from that frame on.
+  /// Looks for jumps in a posed frame of unlinked cameras. Returns the number of the first frame of
+  /// the changed rig, or nothing.
   [[nodiscard]] std::optional<std::uint64_t> update_unlinked(const odometry::Odometry& odometry,
                                                              const odometry::FrameOutcome& outcome,
                                                              std::uint64_t number) noexcept;
 
-  /// An image came twice: a camera may be a frame late from now on, until motion shows otherwise.
+  /// Call when an image came twice: a camera may be a frame late until motion shows otherwise.
   void question_pairing() noexcept;
-  /// Forgets what the monitors have seen; references and jump detectors stay.
+  /// Clears what the monitors have measured; references and jump detectors stay.
   void reset() noexcept;
-  /// The scene was lost: the next frame is compared with none before it.
+  /// Call when the scene was lost: the next frame is compared with none before it.
   void map_lost() noexcept;
 
  private:

@@ -5,7 +5,7 @@
 
 namespace vergence {
 
-/// What can happen to the running system (METHOD §3).
+/// Event that can change the estimator's state (METHOD §3).
 enum class Trigger : std::uint8_t {
   calibration_given,     // one is in use from the first frame
   pair_found,            // the first pair gave the cameras' transform
@@ -21,7 +21,7 @@ enum class Trigger : std::uint8_t {
   pose_found_uncalibrated,  // without one
 };
 
-/// One edge of the state machine; `why` goes to events.jsonl as it stands.
+/// One edge of the state machine; `why` is written to events.jsonl unchanged.
 struct Transition {
   State from;
   Trigger on;
@@ -29,7 +29,7 @@ struct Transition {
   const char* why;
 };
 
-/// All edges there are.
+/// All edges of the state machine.
 inline constexpr std::array kTransitions = {
     Transition{State::initialising, Trigger::calibration_given, State::stereo_odometry,
                "a calibration is given"},
@@ -61,7 +61,7 @@ inline constexpr std::array kTransitions = {
                "a pose again, without a calibration"},
 };
 
-/// The row that fires, or nullptr: the trigger means nothing in this state and nothing happens.
+/// Returns the edge of this trigger in this state; nullptr if there is none, and nothing happens.
 [[nodiscard]] constexpr const Transition* find_transition(State state, Trigger trigger) noexcept {
   for (const Transition& t : kTransitions)
     if (t.from == state && t.on == trigger) return &t;

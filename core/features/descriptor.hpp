@@ -16,7 +16,8 @@ struct Descriptor {
 inline constexpr int kDescriptorLevel =
     1;  // of the pyramid: less noise, and a neighbourhood of 56 px
 
-/// Of the patch's level kDescriptorLevel, or its coarsest below that.
+/// Computes the descriptor at the patch's level kDescriptorLevel, or at its coarsest level if it
+/// has fewer.
 [[nodiscard]] Descriptor describe(const Patch& patch) noexcept;
 
 /// Bits that differ, 0 … 256; unrelated patches differ in 128 ± 8.

@@ -23,7 +23,7 @@ class Mask {
   Mask(const ImageView& image, int margin, Arena& arena);
   [[nodiscard]] static std::size_t memory_needed(int width, int height) noexcept;
 
-  /// Pixels outside the image are not hidden: whoever asks knows its edge.
+  /// Pixels outside the image are not hidden: callers check the image's edge themselves.
   [[nodiscard]] bool hides(int x, int y) const noexcept {
     if (bits_.empty() || x < 0 || y < 0 || x >= width_ || y >= height_) return false;
     return (bits_[word(x, y)] >> (static_cast<unsigned>(x) % 64U) & 1U) != 0;

@@ -13,8 +13,8 @@ namespace {
 
 constexpr int kHalf = kPatchSide / 2;  // the middle pixel's index
 constexpr float kSettled = 0.01F;      // px of the level: a tenth of what noise leaves
-// What rounding to whole grey levels (1/√12 of one) makes by itself is no contrast: twice its
-// standard deviation, and of a gradient's square 1/24, six times.
+// Rounding to whole grey levels alone has a standard deviation of 1/√12 and a mean squared gradient
+// of 1/24: the limits are twice the one and six times the other.
 constexpr float kMinContrast = 0.6F;  // grey levels, standard deviation of the window
 constexpr float kMinHessian =
     0.25F;  // grey levels² / px², least eigenvalue over the window's pixels

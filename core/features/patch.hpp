@@ -15,7 +15,7 @@ inline constexpr int kPatchBytes =
 inline constexpr int kWindow = 12;        // px aligned a side
 inline constexpr int kWindowStride = 16;  // floats a row of the window in memory
 
-/// What a point looked like where it was first seen: the pixels about it at several levels. Its
+/// Appearance of a point where it was first seen: the pixels around it at several levels. Its
 /// anchor is the pixel (x, y) of level 0 it was cut at; at level l the patch's middle pixel is the
 /// anchor's nearest, and `offset` says where in that pixel the anchor lies, so that no level moves
 /// it.

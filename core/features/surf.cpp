@@ -81,7 +81,7 @@ bool Surf::greatest(int layer, int column, int row) const noexcept {
       const float* r = responses(k, j) + column;
       for (int i = -1; i <= 1; ++i) {
         if (k == layer && j == row && i == 0) continue;
-        // Of equal neighbours the first is the maximum: a blob between two pixels has one.
+        // The first of equal neighbours is the maximum, so that a blob between two pixels has one.
         const bool before = k != layer ? k < layer : j != row ? j < row : i < 0;
         if (before ? !(value > r[i]) : !(value >= r[i])) return false;
       }

@@ -23,7 +23,7 @@ Mat3 skew(const Vec3& v) noexcept {
   return S;
 }
 
-/// Of perturbations (τ, φ): Exp(δ') T = T Exp(δ).
+/// Adjoint of T for perturbations δ = (τ, φ): Exp(δ') T = T Exp(δ), δ' = A δ.
 Mat6 adjoint(const Transform& T) noexcept {
   Mat6 A = Mat6::Zero();
   A.topLeftCorner<3, 3>() = A.bottomRightCorner<3, 3>() = T.R;

@@ -16,17 +16,17 @@ inline constexpr double kLongestExtrapolation =
 /// kLongestExtrapolation. Threads pure.
 [[nodiscard]] Mat6 motion_covariance(const Mat6& fit, const Transform& T_now_before,
                                      double extrapolated_s) noexcept;
-/// What the window's correction of a pose makes of the motion to it: off by as much, since what it
-/// takes back was said of motions before. T_adjusted_fitted as FrameOutcome::corrected; translation
-/// (m) first, then rotation (rad), about the left camera's axes. Threads pure.
+/// Covariance that the window's correction of a pose adds to the motion to it: the motion is off by
+/// the correction, which belongs to earlier motions. T_adjusted_fitted as FrameOutcome::corrected;
+/// translation (m) first, then rotation (rad), about the left camera's axes. Threads pure.
 [[nodiscard]] Mat6 correction_covariance(const Transform& T_adjusted_fitted) noexcept;
 
-/// Whether a motion may as well be none, `motion` its covariance: within three sigmas, together
-/// those of all six. Of two fits of a rig that stands one in a million is not, as they are
-/// inflated.
+/// Returns true if a motion with covariance `motion` is consistent with none: within three sigmas
+/// in all six components together. For a standing rig it returns false once in a million frames,
+/// because the covariance is inflated.
 [[nodiscard]] bool may_be_none(const Transform& T_now_before, const Mat6& motion) noexcept;
 
-/// How uncertain dead reckoning is, propagated from pose to pose.
+/// Covariance of dead reckoning, propagated from pose to pose.
 ///
 /// Model  Motions have independent errors. Besides, all of a drive share four: lengths are off by
 ///        one factor, that of the calibration's depth, and what is wrong with a lens turns the path
@@ -52,15 +52,15 @@ class DriftCovariance {
   [[nodiscard]] Transform motion_to(const Transform& T_left_world) const noexcept {
     return any_ ? T_left_world * now_.T_left_world.inverse() : Transform{};
   }
-  /// Of the pose T_world_left since the first one: left camera's position (m), then rotation (rad),
-  /// both about the world's axes.
+  /// Covariance of the pose T_world_left relative to the first one: left camera's position (m),
+  /// then rotation (rad), both about the world's axes.
   [[nodiscard]] Mat6 pose() const noexcept;
 
  private:
   struct Pose {
     Transform T_left_world{};
     Mat6 noise = Mat6::Zero();  // of T_left_world: left perturbation, translation first
-    // Of the same, 1 σ of each shared error: of lengths, then of turns about x, y, z.
+    // 1 σ effect on T_left_world of each shared error: lengths, then rotations about x, y, z.
     Eigen::Matrix<double, 6, 4> shared = Eigen::Matrix<double, 6, 4>::Zero();
   };
   bool any_ = false;

@@ -17,7 +17,8 @@ constexpr double kGreyNoise = 1;
 constexpr int kMaskMargin =
     features::kWindow / 2 + 1;  // px: no pixel that holds a feature is a masked one
 
-/// Of a small image: whether it shows something, and whether it is the one seen before.
+/// Fingerprint of a small image, which shows whether it has structure and whether it is a
+/// repetition.
 FrontEnd::Fingerprint fingerprint(const ImageView& image) noexcept {
   // Knuth's, of MMIX: odd, so that no pixel's part is lost in what follows it.
   constexpr std::uint64_t kMultiplier = 6364136223846793005U;
@@ -141,7 +142,7 @@ ImageCheck FrontEnd::begin(const RigFrame& frame) noexcept {
     }
     if (repeated[i]) check.repeated = true;
     if (structured[i] && !repeated[i]) renewed = true;
-    // What a further camera has shown before it does not see now; the left one's pose stands.
+    // A repeated image of a further camera is not of this instant; the left camera's pose is valid.
     if (k > 0 && repeated[i] && !repeated[0]) structured[i] = false;
     if (structured[i])
       check.structured =

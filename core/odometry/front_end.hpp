@@ -18,7 +18,7 @@
 
 namespace vergence::odometry {
 
-/// What the images of one frame are good for.
+/// Checks of the images of one frame.
 struct ImageCheck {
   std::uint8_t given = 0;       // bit k: camera k delivered an image
   std::uint8_t structured = 0;  // bit k: and it shows something of this frame
@@ -28,7 +28,7 @@ struct ImageCheck {
   bool uneven = false;         // one repeated an image while another gave a new one
 };
 
-/// How the search across went for the corners of one frame.
+/// Result of stereo matching for the corners of one frame.
 struct StereoCount {
   int corners = 0;
   int matched = 0;              // in front of the rig
@@ -54,8 +54,9 @@ struct FreeMatch {
 ///            corners are dropped.
 class FrontEnd {
  public:
-  /// Of the coarsest level: equal for equal images. The sums alone are so by chance, too, twice an
-  /// hour of standing at 30 Hz; the hash, of where each grey value is, never.
+  /// Fingerprint of the coarsest level, equal for equal images. Equal sums alone occur by chance
+  /// twice an hour on a rig that stands at 30 Hz; the hash over positions and grey values excludes
+  /// that.
   struct Fingerprint {
     std::int64_t sum = 0, square = 0;
     std::uint64_t hash = 0;
@@ -99,11 +100,11 @@ class FrontEnd {
   /// map. As many as there is room for, by the effort, and `at_least` so many whatever that is.
   [[nodiscard]] StereoCount match_new(const Map* map, const FrameWorkload& effort = {},
                                       int at_least = 0) noexcept;
-  /// What the distances of this frame's points from the epipolar lines between the first two
-  /// cameras say.
+  /// Weighs the distances of this frame's points from the epipolar lines between the first two
+  /// cameras.
   [[nodiscard]] EpipolarEvidence weigh_points(const Map& map) noexcept;
-  /// What the last match_new() has matched becomes points of the given stage, each with its
-  /// observation in `now`.
+  /// Adds the matches of the last match_new() to the map as points of the given stage, each with
+  /// its observation in `now`.
   void add_points(const Transform& T_left_world, PointStage stage, Map* map) noexcept;
 
   /// The corners of the last match_new() fit the rig with its cameras exchanged better than as it
@@ -162,7 +163,7 @@ class FrontEnd {
   /// Aligns a rough match and keeps it if that succeeds and there is room.
   void keep_free_match(const features::Patch& patch, const RoughMatch& rough, int k) noexcept;
   void match_all(std::span<const features::Corner> corners, bool exchanged) noexcept;
-  /// What the distances of the matches with a larger disparity say.
+  /// Weighs the epipolar distances of the matches whose disparity exceeds `min_disparity`.
   [[nodiscard]] EpipolarEvidence weigh(double min_disparity) noexcept;
   /// Where camera k sits is known, if only roughly: before, its transform is the identity.
   [[nodiscard]] bool placed(int k) const noexcept {

@@ -41,7 +41,7 @@ void FrontEnd::match_stereo(const features::Corner& corner, bool exchanged,
   for (int k = 1; k < cameras_; ++k) {
     if (((structured_ >> static_cast<unsigned>(k)) & 1U) == 0 || !placed(k)) continue;
     const auto i = static_cast<std::size_t>(k);
-    // Of exchanged cameras the first image is what camera k saw.
+    // With the cameras exchanged, the first image is that of camera k.
     const UndistortedCamera& here = lenses_[exchanged ? i : 0];
     if (!here.ray_jacobian(at, &out->ray, &out->d_ray_d_pixel)) continue;
     const Transform& T_k_left = rig_.T_camera_left[i];

@@ -7,13 +7,13 @@
 
 namespace vergence::odometry {
 
-/// Gaps between frames, too long to predict the motion over, and what they leave to be done.
+/// Detects gaps between frames that are too long for motion prediction, and requests a new scene
+/// after one.
 ///
-/// How long that is depends on the drive: the usual interval between its frames is learnt from
-/// their stamps, and an even 1 Hz has no gaps. After a gap the scene is due to be made anew: the
-/// few points that the map still knows are seen from where the rig now is by one frame alone, and a
-/// window that holds to them takes back over many frames what the pose across the gap was off by.
-/// Where every interval is a gap the window is all there is, and stays.
+/// The limit follows the drive: it is a multiple of the usual interval between frames, so that a
+/// steady 1 Hz has no gaps. After a gap the few surviving points constrain only one frame, and
+/// keeping them would spread the gap's pose error over many frames; so a new scene is requested. If
+/// every interval is a gap, no request is made.
 ///
 /// Not thread-safe. Does not allocate.
 class GapDetector {
@@ -36,7 +36,7 @@ class GapDetector {
     return gap ? dt : 0;
   }
   [[nodiscard]] bool renewal_due() const noexcept { return due_; }
-  /// The scene is new, or of another kind.
+  /// Clears the request: the scene was made anew or replaced, or cannot be made anew.
   void forget() noexcept { due_ = false; }
 
  private:
@@ -45,7 +45,7 @@ class GapDetector {
   // where its last motion would have it after six of them: nothing near is found there any more.
   static constexpr double kLongest = 6;
 
-  /// The median, of which a gap is no part unless there is nothing else.
+  /// The median, so that a gap has no effect unless most intervals are gaps.
   [[nodiscard]] double usual_interval() const noexcept {
     const std::size_t n = std::min(count_, kIntervals);
     if (n == 0) return 0;

@@ -20,8 +20,8 @@ inline constexpr double kNearDisparity =
 // Depth given to a point whose disparity is within the noise of zero.
 inline constexpr double kFarBaselines = 2000.0;
 
-/// What one rig frame saw of a point: pixels of an ideal pinhole camera with each camera's own K,
-/// distortion removed.
+/// Observations of a point in one rig frame: pixels of an ideal pinhole camera with each camera's
+/// own K, distortion removed.
 struct PointObservation {
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};
   std::array<float, kMaxCameras> sigma{};  // px, one coordinate

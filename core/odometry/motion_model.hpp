@@ -4,28 +4,28 @@
 
 namespace vergence::odometry {
 
-/// Constant velocity: where the rig is expected, from its last two poses. A value; threads one.
+/// Constant-velocity prediction of the rig's pose from its last two poses. Not thread-safe.
 class MotionModel {
  public:
-  /// There is a pose; before that the others mean nothing.
+  /// True once there is a pose; the other values are undefined before.
   [[nodiscard]] bool any() const noexcept { return any_; }
   [[nodiscard]] const Transform& T_left_world() const noexcept { return T_left_world_; }
   [[nodiscard]] Stamp stamp() const noexcept { return stamp_; }
 
-  /// The pose so long after the last one; at standstill before the second.
+  /// Predicts the pose `dt_s` seconds after the last one; without motion before the second pose.
   [[nodiscard]] Transform predict(double dt_s) const noexcept;
-  /// The next frame's pose, as measured: from the last one to it the rig has its speed.
+  /// Sets the next frame's measured pose; the velocity is that of the step to it.
   void update(const Transform& T_left_world, Stamp stamp) noexcept;
-  /// The next frame's pose, as assumed: the speed stays.
+  /// Sets the next frame's pose as predicted or assumed; the velocity stays.
   void assume(const Transform& T_left_world, Stamp stamp) noexcept;
-  /// The last pose, better known; the speed stays.
+  /// Corrects the last pose; the velocity stays.
   void correct(const Transform& T_left_world) noexcept { T_left_world_ = T_left_world; }
-  /// The world was scaled by this factor.
+  /// Scales the velocity as the world was scaled.
   void scale(double factor) noexcept { shift_per_s_ *= factor; }
 
  private:
   Transform T_left_world_{};  // of the last posed frame
-  // Of the last step: rotation vector and translation of T_now_before, a second.
+  // Velocity: rotation vector (rad/s) and translation (m/s) of T_now_before over the last step.
   Vec3 turn_per_s_ = Vec3::Zero(), shift_per_s_ = Vec3::Zero();
   Stamp stamp_{};
   bool any_ = false;

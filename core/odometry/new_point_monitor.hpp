@@ -2,14 +2,14 @@
 
 namespace vergence::odometry {
 
-/// Whether most of the points made lately do not fit the pose but another motion. Where the pose
-/// follows what moves in front of the scene they are lost as soon as they are made. Threads  One.
-/// Memory: none of the heap.
+/// Detects that most of the points made lately do not fit the pose: if the pose follows an object
+/// that moves in front of the scene, new points are lost as soon as they are made. Not thread-safe.
+/// Does not allocate.
 class NewPointMonitor {
  public:
-  /// New points that were looked for in a frame, and how many of them do not move by themselves.
-  /// Few at a time are judged together: else one blurred frame's verdict stood until many came at
-  /// once.
+  /// Adds the number of new points searched for in a frame and the number found at rest in the
+  /// scene. Small numbers are summed over frames before they are evaluated, so that one blurred
+  /// frame does not decide.
   void add(int tried, int kept) noexcept {
     tried_ += tried;
     kept_ += kept;
@@ -17,9 +17,9 @@ class NewPointMonitor {
     lost_ = kept_ < kKept * tried_;
     tried_ = kept_ = 0;
   }
-  /// Of those judged last.
+  /// True if the points evaluated last were mostly lost.
   [[nodiscard]] bool lost() const noexcept { return lost_; }
-  /// The map is made anew.
+  /// Call when the map is made anew.
   void forget() noexcept { *this = {}; }
 
  private:

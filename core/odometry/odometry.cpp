@@ -193,8 +193,8 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   out.stereo_inliers = fit.stereo;
   out.reprojection_px = fit.rms_px;
   out.fit_covariance = fit.covariance;
-  // The same image again says nothing about motion: the speed stays what it was, and where that
-  // has led by now is not seen.
+  // A repeated image contains no information about motion: the velocity is kept, and the motion
+  // that it predicts is reported as expected, not seen.
   if (images.left_repeated)
     out.expect(dt, predicted * motion_.T_left_world().inverse());
   else

@@ -15,7 +15,7 @@
 
 namespace vergence::odometry {
 
-/// What one frame came to.
+/// Result of one frame.
 struct FrameOutcome {
   bool posed = false;
   Transform T_left_world{};
@@ -32,19 +32,20 @@ struct FrameOutcome {
                              // or, of a left image that came twice, is without it
   bool restarted = false;    // the scene was rebuilt in this frame
   bool relocalised = false;  // found again in the window after being lost
-  bool relink_due = false;   // a calibration waits to be taken up: rebuild() when this frame's
-                             // tracks are of no more use
-  bool relinked = false;     // it was, in this frame
+  bool relink_due = false;   // rebuild() will change to the next calibration; call it when this
+                             // frame's tracks are no longer needed
+  bool relinked = false;     // rebuild() has changed to it in this frame
   bool resumed = false;    // the one in use before the last was: a scene can be made by it, and not
                            // by the last
   double points_kept = 0;  // with `relinked`: share of the scene's points that fit the calibration
   bool renewal_due = false;     // after a gap rebuild() makes the scene anew from this frame
-  bool renewed = false;         // it did
+  bool renewed = false;         // rebuild() has made it anew
   bool initialised = false;     // the rig's transform was found from this frame's images alone
-  double gap_s = 0;             // time since the frame before, when it was too long to predict over
+  double gap_s = 0;             // time since the frame before if it was a gap, else 0
   std::uint8_t structured = 0;  // bit k: camera k gave an image that shows something new
   bool images_good = false;     // every camera gave an image, new and with structure
-  bool moving = false;          // what is seen is not one rigid scene, or not the one posed by
+  bool moving =
+      false;  // the points seen do not move as one rigid scene, or most do not agree with the pose
   bool uneven = false;  // a camera gave an older image again and another a new one: from here on
                         // the one may be an exposure behind
   double scale =
@@ -58,7 +59,7 @@ struct FrameOutcome {
   }
 };
 
-/// How the cameras hang together.
+/// Relation between the cameras' poses.
 enum class Link : std::uint8_t {
   linked,    // one rigid rig with the calibration in use: stereo odometry
   unlinked,  // each camera's pose is found for itself; the baseline's length alone keeps the scale:
@@ -90,36 +91,39 @@ class Odometry {
                                                  const RigCalibration& rig,
                                                  std::span<const ImageView> masks = {}) noexcept;
 
-  /// `budget`: less is done where the frame would take longer, in WorkBudget's order; zero: all.
-  /// Of a frame that says how much was done, as much.
+  /// Estimates the pose of one frame. If it would take longer than `budget`, work is left out in
+  /// WorkBudget's order; zero is no limit. A replayed frame that states how much work was done gets
+  /// as much again.
   [[nodiscard]] FrameOutcome process(const RigFrame& frame, Duration budget = {}) noexcept;
 
-  /// From the next frame on the cameras are one rig with this calibration: that frame is still
-  /// posed as before, then rebuild() goes over to it. Of linked cameras the scene stays, seen
-  /// through the new lenses; without a link a new one is made from that frame, if it can be.
+  /// Changes to this calibration, with linked cameras. The next frame is still posed with the old
+  /// one; its rebuild() then makes the change. If the cameras were linked the scene is kept and
+  /// recomputed with the new calibration; if not, a new scene is made from that frame where
+  /// possible.
   void link(const RigCalibration& rig) noexcept;
-  /// After process() of every frame: what its outcome says is due. Of a link that was taken back
-  /// since, nothing.
+  /// Call after process() of every frame: does what the outcome says is due, unless a link was
+  /// revoked since.
   void rebuild(FrameOutcome* out) noexcept;
-  /// From the next frame on the cameras are not linked; the scene stays.
+  /// Unlinks the cameras from the next frame on; the scene stays.
   ///
-  /// The calibration before the last one is kept until another takes the last one's place. Where a
-  /// scene has to be begun and cannot be with the one in use, or there is none, it is tried
-  /// (FrameOutcome::resumed).
+  /// The previous calibration is kept until the one in use is replaced. It is tried when a scene
+  /// has to be started and cannot be with the one in use (FrameOutcome::resumed).
   void unlink() noexcept;
-  /// What is known of the cameras' transform is of no use: unlinked, the next scene begins with
-  /// finding it.
+  /// Discards the transform between the cameras: the next scene of unlinked cameras begins with
+  /// estimating it.
   void reset_extrinsics() noexcept;
   [[nodiscard]] Link linked() const noexcept { return link_; }
-  /// From the next frame on: nothing is known against the calibration, so what is grossly off is a
-  /// wrong point. So it begins. While a calibration is a claim, that may be its own error.
+  /// Sets whether, from the next frame on, gross residuals are treated as wrong points and left out
+  /// of fits (initially true). Set it to false while the calibration is unverified, when they may
+  /// be its own error.
   void trust_rig(bool trusted) noexcept { poses_.drop_gross(trusted); }
 
   [[nodiscard]] const RigCalibration& rig() const noexcept { return rig_; }
   [[nodiscard]] const Map& map() const noexcept { return map_; }
   [[nodiscard]] Map& map() noexcept { return map_; }
   [[nodiscard]] const FrontEnd& front_end() const noexcept { return front_end_; }
-  /// Bit k by map point: camera k's observation of the last frame agrees with its pose.
+  /// For each map point, bit k is set if camera k's observation in the last frame agrees with its
+  /// pose.
   [[nodiscard]] std::span<const std::uint8_t> agrees() const noexcept { return poses_.agrees(); }
 
  private:
@@ -127,16 +131,18 @@ class Odometry {
   [[nodiscard]] PoseFit track(const Transform& predicted, std::uint8_t structured,
                               FrameOutcome* out) noexcept;
   [[nodiscard]] int points_in_view(const Transform& T_left_world) const noexcept;
-  /// Seeks the place among all points; those long out of sight are followed again, and *revived.
+  /// Searches the pose among all map points. Points long out of sight are followed again and marked
+  /// in *revived.
   [[nodiscard]] PoseFit relocalise(FrameOutcome* out, std::bitset<kMaxPoints>* revived) noexcept;
-  /// Cameras whose own pose was not found are sought by what the points look like.
+  /// Relocalises cameras whose own pose was not found by the points' descriptors.
   void recover_cameras(const PoseFit& fit) noexcept;
   void settle_points(const PoseFit& fit) noexcept;
-  /// Whether the other cameras still see what they have seen.
+  /// Updates stereo_fails_: whether further cameras still see the points that they have seen
+  /// before.
   void count_across(const PoseFit& fit) noexcept;
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(Stamp stamp, FrameOutcome* out) noexcept;
-  /// Makes points to be tried. Returns what it took, ms.
+  /// Makes candidate points. Returns the time it took, ms.
   double new_points(int at_least, FrameOutcome* out) noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
@@ -144,18 +150,17 @@ class Odometry {
                                  FrameOutcome* out) noexcept;
   void begin_scene(const RigFrame& frame, const ImageCheck& images, const Transform& predicted,
                    double dt, FrameOutcome* out) noexcept;
-  /// The scene is made anew from the newest frame, where its pose says that the camera is. False:
-  /// it cannot be, and the old one goes on.
+  /// Makes the scene anew from the newest frame at its pose. Returns false if that fails; the old
+  /// scene is kept.
   bool renew_scene(FrameOutcome* out) noexcept;
   void take_up(const RigCalibration& rig) noexcept;
-  /// Takes up a calibration and keeps the scene: what the window saw is what the new lenses make of
-  /// the same pixels, points are triangulated again, and the newest pose stays. False: this
-  /// frame's matches do not fit it.
+  /// Changes to a calibration and keeps the scene: the window's pixels are undistorted with the new
+  /// lenses, points are triangulated again, and the newest pose stays. Returns false if this
+  /// frame's matches do not fit the calibration.
   [[nodiscard]] bool reexpress_scene(const RigCalibration& rig, double* points_kept) noexcept;
-  /// The calibration before the last is used again if a scene can be made of this frame by it.
+  /// Changes back to the previous calibration if this frame gives a scene with it.
   [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
-  /// Nothing of the scene is of use any more; without a calibration the rig has to be initialised
-  /// again.
+  /// Discards the scene; without a calibration the rig has to be initialised again.
   void lose_scene() noexcept;
   void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;
 

@@ -7,7 +7,7 @@
 #include "core/math/robust.hpp"
 #include "core/odometry/detail/frame_steps.hpp"
 
-/// How scenes begin and end.
+/// Scenes: initialisation, change of calibration, loss.
 namespace vergence::odometry {
 
 using detail::kNearEnough;
@@ -198,7 +198,8 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
         o->drop(k);
     }
   };
-  // What two images saw as X in the old left camera, triangulated with the new rig.
+  // Triangulates with the new rig the pixels at which the old rig saw X (in the left camera's
+  // frame).
   const auto triangulate = [&](const Vec3& X, const Transform& T_right_left_before,
                                Vec3* again) noexcept {
     const Vec3 X_right = T_right_left_before * X;

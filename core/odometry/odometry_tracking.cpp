@@ -7,7 +7,7 @@
 #include "core/math/robust.hpp"
 #include "core/odometry/detail/frame_steps.hpp"
 
-/// How a frame's pose is found among the points that are there.
+/// Tracking: the pose of a frame from the map's points.
 namespace vergence::odometry {
 
 using detail::kRigidShare;
@@ -17,8 +17,9 @@ namespace {
 
 constexpr int kSample =
     100;  // points followed from far away: enough for MLESAC, a third of the work
-// Of the sample, below which the prediction was wrong. Three points hold a pose; that five more of
-// thirty, found within 32 px, agree with it to half a pixel is chance once in 10¹⁰ hypotheses.
+// Inliers of the sample, below which the prediction was wrong. Three points determine a pose; five
+// more of thirty, found within 32 px, agree with it to half a pixel by chance once in 10¹⁰
+// hypotheses.
 constexpr int kSampleInliers = 8;
 constexpr double kSampleShare = 0.3;     // and of those found, which must agree
 constexpr double kMinSampleShare = 0.2;  // where no start does better: a calibration that does
@@ -29,7 +30,7 @@ constexpr int kRelocaliseInliers = 15;    // that agree on one pose: by chance o
 constexpr double kRecognisedShare = 0.5;  // of the points in view that must be found again where
                                           // the way to a place was not followed
 constexpr double kBorder = 12.0;          // px: nearer to the edge a patch does not fit
-// Of the points that other cameras have seen and that are in their view: under that they see
+// Share of the points in view of further cameras that they must still see; below it they see
 // something else.
 constexpr double kSeenAcross = 0.3;
 constexpr std::uint8_t kMissesAllowed = 2;  // frames a point may be hidden

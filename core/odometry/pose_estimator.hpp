@@ -52,8 +52,8 @@ class PoseEstimator {
   [[nodiscard]] bool fit_camera(const Map& map, int k, const Transform& start, bool sample,
                                 Transform* T_camera_world) noexcept;
 
-  /// After settle_points(): whether what was found and does not fit the pose agrees on another
-  /// motion. Wrong matches, as of things that look alike, agree on none.
+  /// Call after settle_points(). Returns true if the points that were found but do not fit the pose
+  /// agree on another motion; wrong matches do not.
   [[nodiscard]] bool others_move(const Map& map, const Transform& T_left_world) noexcept;
 
   /// From the next fit on: whether observations that are grossly off are left out of a fit by
@@ -78,7 +78,7 @@ class PoseEstimator {
   bool collect_point(const Map& map, std::size_t i, std::uint8_t cameras) noexcept;
   void collect_camera(const Map& map, int k) noexcept;
   [[nodiscard]] Solved solve(const Transform& start, bool sample) noexcept;
-  /// Of the camera's own pose, solved from all rows of the table.
+  /// Returns true if a camera's own pose, solved from all rows of the table, can be relied on.
   [[nodiscard]] bool holds_camera(const Solved& s) const noexcept;
   [[nodiscard]] PoseRefineOptions how_to_refine(bool rough) const noexcept;
   void count(const Map& map, PoseFit* fit) const noexcept;

@@ -19,11 +19,11 @@ struct WindowOutcome {
 /// Adjusts the window's poses and points together (METHOD §2, stereo odometry): the oldest keyframe
 /// is constant.
 ///
-/// What a calibration is off by moves all depths of a window together: one disparity, common to all
-/// points, and not one more independent error of each. So the turn of every further camera that
-/// shifts disparities is estimated with the window, about the calibration's own, by the sigma that
-/// the calibration's depths have (a consider parameter that the window may answer). It is found
-/// afresh in each window, so that nothing is counted twice, and it never leaves the odometry.
+/// A calibration error moves all depths of a window together, by one disparity common to all
+/// points, rather than by independent errors. So the turn of every further camera that shifts
+/// disparities is estimated with the window, about the calibration's own, by the sigma that the
+/// calibration's depths have (a consider parameter that the window may answer). It is found afresh
+/// in each window, so that nothing is counted twice, and it never leaves the odometry.
 ///
 /// Memory  From the arena at construction. More observations than fit: the rest are left out of
 /// this
@@ -38,13 +38,13 @@ class WindowAdjuster {
   /// limit. T_camera_left() is what it found.
   /// Not more than `effort` allows: the newest keyframes, so many steps.
   WindowOutcome adjust(Map& map, const FrameWorkload& effort = {}) noexcept;
-  /// The same with the cameras not linked: every image has a pose of its own, in
+  /// As adjust(), with unlinked cameras: every image has a pose of its own, in
   /// Keyframe::T_camera_left (METHOD §2, parallel monocular). Both images of the oldest keyframe
   /// are constant; the caller renews the scale.
   WindowOutcome adjust_unlinked(Map& map, const FrameWorkload& effort = {}) noexcept;
-  /// The owner's rig is another calibration than before.
+  /// Call when the owner's rig was changed to another calibration.
   void take_up_rig() noexcept;
-  /// The rig as the last adjustment found it; as many as cameras.
+  /// Transforms estimated by the last adjustment, one per camera.
   [[nodiscard]] std::span<const Transform> T_camera_left() const noexcept {
     return std::span(T_camera_left_).first(static_cast<std::size_t>(rig_.cameras));
   }
@@ -52,7 +52,7 @@ class WindowAdjuster {
  private:
   [[nodiscard]] static BundleCapacities capacities(const OdometryOptions& options,
                                                    const RigCalibration& rig) noexcept;
-  /// What the calibration knows of itself, as a prior of the cameras' turns.
+  /// Sets the prior of the further cameras' rotations from the calibration's covariance.
   void doubt_rig() noexcept;
   void gather(Map& map, bool linked, const FrameWorkload& effort) noexcept;
   [[nodiscard]] WindowOutcome solve(BundleConfiguration configuration,

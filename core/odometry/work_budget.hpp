@@ -6,23 +6,22 @@
 
 namespace vergence::odometry {
 
-/// A frame's time and what is left of it for work that the pose does not wait for. Dropped in this
-/// order: new points, down to a quarter; keyframes of the window, down to four; steps of its
-/// solver, down to one; the window. What a piece of work takes is taken from the frames before:
-/// the dearest of late.
+/// Plans the optional work of a frame within its time budget. Work is left out in this order: new
+/// points, down to a quarter; keyframes of the window, down to four; steps of its solver, down to
+/// one; the window. The time of each piece of work is predicted by the slowest of the last frames.
 ///
-/// Threads one. No memory. Without a budget everything is done and no clock is asked.
+/// Not thread-safe. Does not allocate. Without a budget all work is planned and no clock is read.
 class WorkBudget {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// A frame begins; `budget` zero: it has all the time it needs.
+  /// Starts the clock of a frame. A `budget` of zero is no limit.
   void begin(Duration budget) noexcept;
-  /// What there is time for, of a window of so many keyframes and steps a keyframe.
+  /// The work there is time for, given a window of `keyframes` and `steps` solver steps.
   [[nodiscard]] FrameWorkload plan(int keyframes, int steps) const noexcept;
   [[nodiscard]] bool limited() const noexcept { return budget_ms_ > 0; }
 
-  /// What new points and a window have taken.
+  /// Report the measured times of new points and of a window.
   void points_took(double ms, const FrameWorkload& effort) noexcept;
   void window_took(double ms, int keyframes, int steps) noexcept;
 

@@ -9,7 +9,7 @@
 
 namespace vergence {
 
-/// METHOD §3: what the running system is doing.
+/// State of the estimator (METHOD §3).
 enum class State : std::uint8_t {
   initialising,
   parallel_monocular,
@@ -47,14 +47,14 @@ enum class Reason : std::uint8_t {
   dynamic_scene,      // more outliers than a rigid scene has
   unverified_calibration,  // the calibration in use is not verified yet, or no longer
   recalibrating,           // the rig no longer fits its calibration, up to ten frames ago
-  uncalibrated,  // no calibration yet: each camera's pose is found for itself, the scale is the
-                 // last pair's
+  uncalibrated,  // no calibration yet: each camera's pose is estimated separately, with the scale
+                 // of the assumed baseline
   out_of_sync,   // a camera's images are of another instant than the others'
   needs_motion,  // the calibration has to be found and cannot be without driving
-  needs_near_structure,  // the same, without points near the rig
-  needs_texture,         // the same, without anything to stereo match
-  pairing_ambiguous,  // what proves that its images were exposed together has contradicted: one of
-                      // them alone was used
+  needs_near_structure,  // the calibration cannot be found without points near the rig
+  needs_texture,         // the calibration cannot be found without texture to match
+  pairing_ambiguous,  // the synchronisation contradicts that its images were exposed together: only
+                      // one of them was used
 };
 
 [[nodiscard]] std::string_view to_string(State) noexcept;

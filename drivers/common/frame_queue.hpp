@@ -73,7 +73,7 @@ class FrameQueue {
   [[nodiscard]] State state() const noexcept;
   /// Streaming, gone or back: not stopped.
   [[nodiscard]] bool started() const noexcept { return state() != State::stopped; }
-  /// Checks whether the device can be queried now. → ok (it streams), stopped, gone
+  /// Checks whether the device can be queried now. → ok (it streams), stopped, disconnected
   [[nodiscard]] DeviceStatus standing() const noexcept;
   /// Slots that the consumer has.
   [[nodiscard]] std::size_t held() const noexcept;

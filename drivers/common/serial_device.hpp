@@ -20,9 +20,9 @@ namespace vergence {
 /// it and fills in what its protocol does.
 ///
 /// States     The thread begins (begin(): the device streams), reads (read_on()), and on anything
-///            but `stopped` and `ended` reports `gone` once and reopens every kReopenInterval until
-///            the device is back, also where it opens but does not begin; `back` precedes its next
-///            reading.
+///            but `stopped` and `ended` reports `disconnected` once and reopens every
+///            kReopenInterval until the device is back, also where it opens but does not begin;
+///            `back` precedes its next reading.
 /// Ownership  The derived class calls stop_thread() in its destructor: the hooks are its own.
 /// Threads    Owner's thread: the protected functions named so. The hooks run on the device's
 ///            thread, which owns line() from start_thread() to stop_thread().
@@ -44,9 +44,10 @@ class SerialDevice {
 
   // ---- hooks, on the device's thread
 
-  /// Puts the device behind line() into streaming. → ok, stopped, ended; anything else: gone
+  /// Puts the device behind line() into streaming. → ok, stopped, ended; anything else:
+  /// disconnected
   [[nodiscard]] virtual DeviceStatus begin() noexcept = 0;
-  /// Reads and hands out. → ok (begin again), stopped, ended; anything else: gone
+  /// Reads and hands out. → ok (begin again), stopped, ended; anything else: disconnected
   [[nodiscard]] virtual DeviceStatus read_on() noexcept = 0;
   /// Opens the line and finds the device again. → ok, or the attempt failed
   [[nodiscard]] virtual DeviceStatus reopen() = 0;
@@ -126,7 +127,7 @@ class SerialDevice {
     return starts_.load(std::memory_order_relaxed);
   }
 
-  /// Consumer's thread. `gone`: *value has its `arrival` set.
+  /// Consumer's thread. `disconnected`: *value has its `arrival` set.
   [[nodiscard]] DeviceStatus take(Duration limit, Value* value) noexcept {
     Item item;
     const DeviceStatus status = out_.take(limit, &item);

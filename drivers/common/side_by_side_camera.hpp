@@ -22,7 +22,7 @@ namespace vergence {
 /// Calls      configure() of the second must ask for the size that the first has (else
 ///            `bad_configuration`). stop() of either ends both, one start() each begins them again.
 ///            trigger_once() of the left is the exposure of both; exposure and gain are both's.
-/// Gone       Each half says it once, and start() gives `gone` until both have.
+/// Disconnect Each half reports it once, and start() gives `disconnected` until both have.
 [[nodiscard]] std::pair<std::unique_ptr<CameraDevice>, std::unique_ptr<CameraDevice>>
 split_side_by_side(std::unique_ptr<CameraDevice> whole);
 

@@ -12,8 +12,8 @@ namespace vergence::gnss {
 ///
 /// As InsDevice says. connect() listens at the baud rate asked for or at the usual ones, up to 1.3
 /// s each, and then until the interval between fixes is known; so the owner calls it before the
-/// drive. After `gone` the line is opened again, and listened at likewise, until fixes come. Silent
-/// for kSilent is gone.
+/// drive. After `disconnected` the line is opened again, and listened at likewise, until fixes
+/// come. Silent for kSilent is gone.
 ///
 /// Time     Readings are mapped: `host` and `host_error` are set (decoder.hpp).
 /// Samples  No attitude; heading_source says what the heading is of.
@@ -25,7 +25,7 @@ class Device final : public SerialInsDevice<256> {  // 12 s at 20 Hz
   ~Device() override;
 
   /// Opens the line and listens. → ok, not_found (silent, or another protocol), no_permission,
-  /// busy, gone, failed
+  /// busy, disconnected, failed
   [[nodiscard]] DeviceStatus connect();
 
   /// `unsupported`: the receiver's rate is another.

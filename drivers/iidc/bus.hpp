@@ -17,7 +17,7 @@ namespace vergence::iidc {
 /// Threads  One caller at a time.
 /// Time     Every call ends, at the latest after the transport's own time-out (a second on USB, the
 ///          split time-out on 1394).
-/// Errors   → ok, unsupported (the camera refuses that address), timeout, gone, failed
+/// Errors   → ok, unsupported (the camera refuses that address), timeout, disconnected, failed
 class RegisterPort {
  public:
   virtual ~RegisterPort() = default;
@@ -82,13 +82,13 @@ class CameraBus : public RegisterPort {
   [[nodiscard]] virtual const BusTraits& traits() const noexcept = 0;
   /// Memory for such frames. Precondition: stopped, no slot kept. → ok, failed
   [[nodiscard]] virtual DeviceStatus allocate(const StreamShape& shape) noexcept = 0;
-  /// Buffers are ready for the camera when this returns. → ok, gone, no_permission, no_bandwidth,
-  /// failed
+  /// Buffers are ready for the camera when this returns. → ok, disconnected, no_permission,
+  /// no_bandwidth, failed
   [[nodiscard]] virtual DeviceStatus start(StreamSink* sink) noexcept = 0;
   /// The camera has been told to be quiet, or is gone. No call of the sink after it returns. Twice
   /// is harmless.
   virtual void stop() noexcept = 0;
-  /// After gone: finds the camera again and opens it. Precondition: stopped. → ok, gone,
+  /// After gone: finds the camera again and opens it. Precondition: stopped. → ok, disconnected,
   /// no_permission, busy
   [[nodiscard]] virtual DeviceStatus reopen() noexcept = 0;
 

@@ -49,8 +49,8 @@ class FirewireRing {
   /// For the next set_up(). Precondition: !captured().
   void set_shape(const StreamShape& shape) noexcept { shape_ = shape; }
   [[nodiscard]] const StreamShape& shape() const noexcept { return shape_; }
-  /// All buffers are with the kernel. `device`: the camera's node. → ok, gone, no_bandwidth,
-  /// failed; then *error says why
+  /// All buffers are with the kernel. `device`: the camera's node. → ok, disconnected,
+  /// no_bandwidth, failed; then *error says why
   [[nodiscard]] DeviceStatus set_up(dc1394camera_t* camera, const std::string& device,
                                     std::string* error);
   /// Between set_up() and end() or abandon().

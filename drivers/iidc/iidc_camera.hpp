@@ -67,7 +67,7 @@ class IidcCamera final : public CameraDevice, private StreamSink {
                                                 CameraConfiguration* actual);
   [[nodiscard]] DeviceStatus begin(Notifier* ready);
   [[nodiscard]] Duration transfer_time() const noexcept;
-  /// → ok, stopped, gone
+  /// → ok, stopped, disconnected
   [[nodiscard]] DeviceStatus standing() const noexcept;
   void return_slot(FrameSlot slot) noexcept;
   void drain() noexcept;

@@ -36,19 +36,19 @@ struct LineRead {
 ///            simulator keeps. All limits are of that
 ///            clock: a driver that reckons in now() runs the same in virtual time. No call outlasts
 ///            its limit but for the scheduler.
-/// Errors     Nothing throws. `gone` stays: close it and open another.
+/// Errors     Nothing throws. `disconnected` stays: close it and open another.
 class SerialLink {
  public:
   virtual ~SerialLink() = default;
 
   /// Reads available bytes, waiting at most `limit` for the first (0: poll once).
   /// Precondition: `out` is not empty.
-  /// → ok, timeout, stopped (woken), ended (a simulation is at its end), gone, failed
+  /// → ok, timeout, stopped (woken), ended (a simulation is at its end), disconnected, failed
   [[nodiscard]] virtual LineRead read(std::span<std::uint8_t> out, Duration limit) noexcept = 0;
-  /// All of `bytes`, or not ok: some may have gone out. → ok, timeout, gone, failed
+  /// All of `bytes`, or not ok: some may have gone out. → ok, timeout, disconnected, failed
   [[nodiscard]] virtual DeviceStatus write(std::span<const std::uint8_t> bytes,
                                            Duration limit) noexcept = 0;
-  /// Discards what waits to be read, at the old baud and the new. → ok, unsupported, gone
+  /// Discards what waits to be read, at the old baud and the new. → ok, unsupported, disconnected
   [[nodiscard]] virtual DeviceStatus set_baud(std::uint32_t baud) noexcept = 0;
   [[nodiscard]] virtual std::uint32_t baud() const noexcept = 0;
   virtual void discard_input() noexcept = 0;

@@ -20,7 +20,7 @@ namespace vergence {
 /// A set goes out as soon as every camera that is there has given its image, or has given a later
 /// one (its image is lost), and its pulse's report is here where there are pulses; or `hold` after
 /// the set's first image, by the arrivals of others. Sets go out in order of their numbers, each
-/// once. Determined by what is offered and in which order; no clock is read.
+/// once. Deterministic: the result depends on the input and its order only; no clock is read.
 ///
 ///     RigSynchronizer synchronizer({.cameras = 2, .interval = Duration::milliseconds(50)});
 ///     if (synchronizer.offer(frame) != SyncResult::taken) camera.release(frame.slot);
@@ -40,12 +40,12 @@ namespace vergence {
 /// One clock  Of a set paired by stamps of one bus or PTP clock the host's stamps must agree within
 ///            half an interval, else it is `ambiguous`; so is every set while a camera that is
 ///            there has a clock far from the others'.
-/// A limit    A camera that hands out the image of one exposure under the stamp of the next cannot
-///            be told here.
-/// Ownership  A slot that is `taken` comes out of next() in exactly one set; then it is the
+/// Limits A camera that hands out the image of one exposure under the stamp of the next is not
+/// detected here. Ownership  A slot that is `taken` comes out of next() in exactly one set; then it
+/// is the
 ///            caller's again.
 /// Threads    One caller. Memory: fixed, kOpen pulses. Time: constant a call.
-/// Errors     Nothing throws. What cannot be paired is told by the verdict and counted.
+/// Errors     Nothing throws. Frames that cannot be paired are reported by SyncResult and counted.
 class RigSynchronizer {
  public:
   static constexpr std::size_t kOpen = OpenSets::kOpen;
@@ -65,24 +65,24 @@ class RigSynchronizer {
   /// does nothing). next() as after offer().
   /// Precondition: pulse.mapped.
   void pulse(const Pulse& pulse) noexcept;
-  /// So many pulses should be left out, because the intervals prove nothing; mostly 0. Asked for
-  /// once, and again when it did not help.
-  /// board: TriggerDevice::pause() with just that number, another could hide a report that was
-  /// lost. ins_syncout, master_strobe: stop the source and start it again.
+  /// Number of pulses to leave out because the intervals do not identify them; mostly 0. Returned
+  /// once, and again if the pause did not help. board: TriggerDevice::pause() with just that
+  /// number, another could hide a report that was lost. ins_syncout, master_strobe: stop the source
+  /// and start it again.
   [[nodiscard]] std::uint32_t wants_pause() noexcept;
-  /// Nothing is left to be verified of that camera's frames: always, where nothing can be.
+  /// Returns true if that camera's pairing is verified; always true in modes that cannot verify it.
   [[nodiscard]] bool verified(int camera) const noexcept;
 
-  /// That exposure of a camera gave no image that could be used: nobody waits for it. Else as
-  /// offer(); not where stamps pair.
+  /// Call for an exposure without a usable image: its set does not wait for it. Preconditions as
+  /// offer(). Not in modes that pair by stamps.
   void lost(int camera, std::uint64_t counter) noexcept;
-  /// A camera has gone: nobody waits for it.
+  /// Call when a camera was disconnected: sets no longer wait for it.
   void absent(int camera) noexcept;
-  /// It has come back and counts from zero. By counter: its first frame joins the pulse nearest in
-  /// time, the others follow. With pulses: it acquires, the others go on; a master's count goes on
-  /// by its clock.
+  /// Call when it has come back and counts from zero. By counter: its first frame joins the pulse
+  /// nearest in time, the others follow. With pulses: it acquires, the others go on; a master's
+  /// count goes on by its clock.
   void restarted(int camera) noexcept;
-  /// No more frames will come: everything open goes out by next().
+  /// Call after the last frame: next() then returns all open sets.
   void finish() noexcept { finishing_ = true; }
 
   [[nodiscard]] SyncCounters counters() const noexcept;

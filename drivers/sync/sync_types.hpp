@@ -9,14 +9,14 @@
 /// Input and output of a RigSynchronizer.
 namespace vergence {
 
-/// By what images are paired, and what proves that they belong together.
+/// Method of pairing images, and of verifying that they were exposed together.
 enum class SyncMode : std::uint8_t {
   frame_counter,     // exposure n of every camera belongs to pulse n; nothing proves it
   approximate_time,  // what was exposed within `tolerance` by the host's clock belongs together:
                      // nothing makes the cameras expose at once
   board,  // a trigger board's pulses, by number; intervals that vary, or a pause, prove which frame
           // is of which
-  ins_syncout,          // the same with the INS's SyncOut for pulses; a gap proves
+  ins_syncout,          // as `board`, with the INS's SyncOut for pulses; a gap proves
   master_strobe,        // camera 0 triggers the others: its frames are the pulses; a gap of its own
                         // proves
   ieee1394_cycle_time,  // the stamps are of one IEEE 1394 cycle timer, which wraps after 128 s:
@@ -53,8 +53,8 @@ struct SyncCameraOptions {
   /// milliseconds (DeviceTiming::delay_spread) where its stamps are the host's. With more than half
   /// of what the intervals vary by only a pause proves.
   Duration jitter = Duration::microseconds(20);
-  /// From a pulse to the arrival of its frame at most, rather much than little: what would say more
-  /// proves nothing.
+  /// Upper bound of the time from a pulse to the arrival of its frame. Choose it conservatively:
+  /// frames that arrive later are not used to verify the pairing.
   Duration latest = Duration::milliseconds(500);
 };
 
@@ -66,11 +66,11 @@ struct SyncOptions {
   SyncMode mode = SyncMode::frame_counter;
   Duration tolerance = Duration::milliseconds(
       2);  // modes that pair by time: between the middles of a set's exposures
-  /// counter: the pulses may have begun before the cameras, so each camera's first exposure is
-  /// given its pulse by its stamp; and again after kAmbiguous ambiguous sets in a row.
+  /// frame_counter: the pulses may have begun before the cameras, so each camera's first exposure
+  /// is given its pulse by its stamp; and again after kAmbiguous ambiguous sets in a row.
   bool align_start = false;
   std::array<SyncCameraOptions, kMaxCameras> camera{};  // board, ins_syncout, master_strobe
-  /// Nothing wrong: nullptr; else a message.
+  /// Returns nullptr if the options are valid, else a message.
   [[nodiscard]] const char* validate() const noexcept;
 };
 
@@ -82,7 +82,7 @@ struct SyncFrame {
   MappedStamp middle{};       // of the exposure, host time
   HostStamp arrival{};
   DeviceStamp exposure_start{};  // of Frame: by the camera's own clock. Ignored in the modes
-                                 // counter and software
+                                 // frame_counter and approximate_time
   Duration exposure{};           // of Frame. Ignored as above
 };
 

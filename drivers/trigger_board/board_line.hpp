@@ -36,12 +36,12 @@ class BoardLine {
   /// A byte's time on the wire, 0 where it has none.
   void set_byte_time(Duration time) noexcept { byte_time_ = time; }
   [[nodiscard]] HostStamp now() const noexcept { return line_->now(); }
-  /// Sends a frame, `sequence` (may be null): the number that its answer has. → ok, timeout, gone,
-  /// failed
+  /// Sends a frame, `sequence` (may be null): the number that its answer has. → ok, timeout,
+  /// disconnected, failed
   [[nodiscard]] DeviceStatus send(std::uint8_t type, std::span<const std::uint8_t> payload,
                                   std::uint8_t* sequence) noexcept;
   /// The next frame, reading until `deadline` of the line's clock.
-  /// → ok, timeout, stopped (woken), ended, gone, failed
+  /// → ok, timeout, stopped (woken), ended, disconnected, failed
   [[nodiscard]] DeviceStatus next(HostStamp deadline, TriggerFrame* frame, Times* times) noexcept;
 
   /// Received bytes that form no frame.

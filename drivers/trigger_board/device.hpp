@@ -18,8 +18,8 @@ namespace vergence::trigger_board {
 ///
 /// As TriggerDevice says. connect() and configure() talk to the board and may take a second, at
 /// most seven where none answers. start() never waits: a thread of the device's own asks for the
-/// board's time, starts it, reads, and after `gone` opens and sets it again until it is back. A
-/// board that says nothing for kSilent is gone. One that begins again (another boot_id) is
+/// board's time, starts it, reads, and after `disconnected` opens and sets it again until it is
+/// back. A board that says nothing for kSilent is gone. One that begins again (another boot_id) is
 /// configured and started by itself, the pulses of another `boot` follow. A board that kept its
 /// pulses going while the line was away goes on with them.
 /// Time     Pulses are mapped: by pings, kFirstPings of them before the board starts, then every
@@ -35,7 +35,7 @@ class Device final : public TriggerDevice,
   ~Device() override;
 
   /// Opens the line and asks who is there. → ok, not_found (another make, or nobody),
-  /// no_permission, busy, unsupported (another protocol version), gone, failed
+  /// no_permission, busy, unsupported (another protocol version), disconnected, failed
   [[nodiscard]] DeviceStatus connect();
 
   [[nodiscard]] const DeviceInfo& info() const noexcept override { return info_; }

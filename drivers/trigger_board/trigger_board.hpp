@@ -35,7 +35,7 @@ class Driver final : public TriggerDriver {
   /// `where`: a port (`/dev/ttyACM0`, a link to one), a board's serial number as enumerate() tells
   /// it, or empty: the only board there is.
   /// → ok, not_found, no_permission, busy, unsupported, bad_configuration (more than one may be
-  /// meant), gone, failed
+  /// meant), disconnected, failed
   [[nodiscard]] std::unique_ptr<TriggerDevice> open(std::string_view where,
                                                     DeviceStatus* status) override;
   /// Opens a trigger board with its additional interface.

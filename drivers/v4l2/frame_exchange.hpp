@@ -119,7 +119,7 @@ class FrameExchange {
 
   // Any thread.
   [[nodiscard]] bool started() const noexcept { return queue_.started(); }
-  /// → ok (it streams), stopped, gone
+  /// → ok (it streams), stopped, disconnected
   [[nodiscard]] DeviceStatus standing() const noexcept { return queue_.standing(); }
   [[nodiscard]] ImageView view(FrameSlot slot) const noexcept { return slots_.view(slot); }
   [[nodiscard]] CameraStatistics statistics() const noexcept { return queue_.statistics(); }

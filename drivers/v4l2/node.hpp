@@ -23,7 +23,8 @@ struct Node {
   std::uint32_t type = 0;  // of buffers: V4L2_BUF_TYPE_VIDEO_CAPTURE or …_MPLANE
 };
 
-/// → ok, not_found, no_permission, unsupported (does not capture and stream), gone, failed. Not
+/// → ok, not_found, no_permission, unsupported (does not capture and stream), disconnected, failed.
+/// Not
 ///   `ok`: nothing stays open.
 [[nodiscard]] DeviceStatus open_node(const std::string& path, UniqueFd* fd, Node* node);
 

@@ -28,14 +28,15 @@ struct Settings {
 /// Brings an open camera to a configuration: format, region, rate, exposure, gain, trigger, other
 /// controls.
 ///
-/// → ok, unsupported, busy, gone, failed; not `ok`: *error, and the camera may be somewhere in
+/// → ok, unsupported, busy, disconnected, failed; not `ok`: *error, and the camera may be somewhere
+/// in
 ///   between.
 [[nodiscard]] DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls,
                                  const CameraConfiguration& requested, const Options& options,
                                  Settings* settings, std::string* error);
 
 /// The nearest exposure and gain that the camera has, also while it streams. *actual: what it took.
-/// → ok, unsupported, gone, failed
+/// → ok, unsupported, disconnected, failed
 [[nodiscard]] DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
                                            const ExposureSetting& requested,
                                            ExposureSetting* actual) noexcept;

@@ -14,10 +14,10 @@ namespace vergence::xsens {
 ///
 /// As InsDevice says. configure() finds the device (baud scan), sets what differs, and may take
 /// seconds; so the owner calls it before the drive. start() never waits: a thread of the device's
-/// own puts it into measurement, reads, and after `gone` opens and sets it again until it is back.
-/// A device that sends no sample for kSilent, or four of its intervals, is one that is gone, also
-/// where it sends something else: it may have lost its settings. So is one that tells of a restart.
-/// Time  Readings are mapped: `host` and `host_error` are set (decoder.hpp).
+/// own puts it into measurement, reads, and after `disconnected` opens and sets it again until it
+/// is back. A device that sends no sample for kSilent, or four of its intervals, is one that is
+/// gone, also where it sends something else: it may have lost its settings. So is one that tells of
+/// a restart. Time  Readings are mapped: `host` and `host_error` are set (decoder.hpp).
 class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 Hz
  public:
   static constexpr Duration kSilent = Duration::seconds(2);
@@ -26,7 +26,7 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
   ~Device() override;
 
   /// Opens the line, finds the device and asks who it is; leaves it in its configuration state. →
-  /// ok, not_found, no_permission, busy, unsupported (another make), gone, failed
+  /// ok, not_found, no_permission, busy, unsupported (another make), disconnected, failed
   [[nodiscard]] DeviceStatus connect();
 
   [[nodiscard]] DeviceStatus configure(double rate_hz, double* actual_hz) noexcept override;

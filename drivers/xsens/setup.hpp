@@ -78,14 +78,15 @@ class Setup {
   Setup(SerialLink& line, const Options& options, const std::atomic<bool>& stop)
       : line_(line), options_(options), dialogue_(line, stop) {}
 
-  /// Tries the rate asked for, then the usual ones. → ok, not_found, gone, stopped
+  /// Tries the rate asked for, then the usual ones. → ok, not_found, disconnected, stopped
   [[nodiscard]] DeviceStatus find();
   /// Identifies the device; the generation is derived from its answer, not its name. → ok,
-  /// unsupported, gone, stopped
+  /// unsupported, disconnected, stopped
   [[nodiscard]] DeviceStatus identify(Identity* identity);
-  /// Output, rate, lines and baud rate. → ok, unsupported, no_bandwidth, gone, stopped, failed
+  /// Output, rate, lines and baud rate. → ok, unsupported, no_bandwidth, disconnected, stopped,
+  /// failed
   [[nodiscard]] DeviceStatus set(const Identity& identity, double rate_hz, StreamSettings* stream);
-  /// → ok, no_bandwidth, gone, stopped, failed
+  /// → ok, no_bandwidth, disconnected, stopped, failed
   [[nodiscard]] DeviceStatus measure();
 
   [[nodiscard]] const std::string& last_error() const noexcept { return last_error_; }

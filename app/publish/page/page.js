@@ -231,7 +231,7 @@ function link(words, bad, past) {
   $("link").className = bad ? "off" : "soft";
 }
 
-// Of another drive nothing may stay: its OK would be read as this one's.
+// Clears all values of another drive: its OK would be read as this one's.
 function blank() {
   tone("none");
   for (const [id, words] of BLANK) show(id, words);

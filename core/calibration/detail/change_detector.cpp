@@ -8,8 +8,8 @@
 namespace vergence::calibration::detail {
 namespace {
 
-// What correlated tracks bring in over their life, until it is measured: times the spread of the
-// first frame; and the frames that guess weighs.
+// Initial inflation by errors correlated along tracks, as a multiple of the first frame's spread,
+// and the number of frames that this guess weighs.
 constexpr double kFirstLife = 6.5, kGuessFrames = 30;
 constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10;  // a frame
 constexpr double kMinInflation = 0.3,
@@ -22,8 +22,8 @@ constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may
 constexpr std::size_t kLearnWindow = 10, kLearnLongest = 150;
 constexpr std::size_t kScatterBlocks =
     10;  // before a block, that it is held against: longer ago a rig may have crept
-// Of the blocks older than so many only every fourth is asked whether it is the onset: a search
-// every frame of an alarm costs little then.
+// Beyond kFineBlocks only every kCoarse-th block is tried as the onset, which keeps the search
+// cheap in every frame of an alarm.
 constexpr std::size_t kFineBlocks = 24, kCoarse = 4;
 constexpr double kRelease = 0.5;  // of the threshold: an alarm stands until the statistic is below
 constexpr double kRampShare = 0.05;  // a ramp's best step explains 8/9 of it
@@ -61,7 +61,7 @@ void ChangeDetector::renew_floor() noexcept {
 
 /// The block just closed against those before it.
 void ChangeDetector::measure_scatter() noexcept {
-  // What may be a change of the rig is no scatter.
+  // A possible change of the rig must not be counted as scatter.
   if (history_.closed() == 0 || newest_statistic_ > kRelease * options_.threshold) return;
   Evidence past;
   for (std::size_t i = 0; i < std::min(history_.blocks(), kScatterBlocks); ++i)
@@ -229,7 +229,8 @@ void ChangeDetector::search(const Vec5& mean, Search* found) const noexcept {
 }
 
 void ChangeDetector::attribute(std::size_t window, Decision* d) const noexcept {
-  // What the rig was before, where that is known: a reference that is a little off is no onset.
+  // The offset before the window, where it is known, is subtracted: a slightly wrong reference is
+  // not an onset.
   Vec5 mean = Vec5::Zero();
   const std::size_t recent_frames = std::clamp(window, kLearnWindow, kLearnLongest);
   if (history_.frames() >= 2 * recent_frames) {

@@ -11,14 +11,14 @@
 
 namespace vergence::calibration::detail {
 
-/// What one moving frame brings.
+/// Evidence of one moving frame.
 struct FrameEvidence {
   std::uint64_t frame = 0;
   Evidence evidence;
   double spread_now = 0, spread_life = 0;  // of the StereoResiduals
 };
 
-/// What all windows together say. Angles rad, as θ.
+/// Result of all windows together. Angles in rad, parameters as θ.
 struct Decision {
   MonitorResult::Kind kind = MonitorResult::Kind::quiet;
   double statistic = 0;
@@ -38,8 +38,7 @@ class ChangeDetector {
  public:
   /// covariance: of θ's first five at the reference.
   void reset(const MonitorOptions& options, const Mat5& covariance) noexcept;
-  /// How much stretches of the drive are expected to disagree until that is measured; outlives
-  /// reset(), as what was measured does.
+  /// As Monitor::expect_scatter().
   void expect_scatter(double bias_px) noexcept;
   /// A frame that stands out by itself counts once the next one does, too: a knock stays, and
   /// images that are spoilt once (skewed exposure, a shaken rolling shutter) do not.

@@ -29,7 +29,8 @@ DepthGradient depth_gradient(const CovisiblePoint& p, const Transform& T, int k,
   Vec2 unused;
   Mat23 G_left;
   if (p.left->project(p.ray, &unused, &G_left) != ProjectStatus::ok) return g;
-  // Of a pixel that is held, the ray moves against what the lens would have moved the pixel by.
+  // The pixel is fixed, so a change of the intrinsics moves the ray: by the negative of the pixel's
+  // change, through the inverse projection.
   const Eigen::Matrix<double, 2, 9> ray_by_left =
       -G_left.leftCols<2>().inverse() * p.left->intrinsics_jacobian(p.ray);
   const Mat2 by_ray = p.depth_m * (p.G * T.R.leftCols<2>());

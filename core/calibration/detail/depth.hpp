@@ -8,7 +8,7 @@ namespace vergence::calibration::detail {
 
 inline constexpr int kDepthGrid = 7;  // places a side of the image
 
-/// A place of the left image, a depth, and what camera k of a rig makes of the point there.
+/// A pixel of the left image, a depth, and the projection of that point into camera k.
 struct CovisiblePoint {
   const Camera* left = nullptr;
   const Camera* right = nullptr;
@@ -72,8 +72,8 @@ struct DepthGradient {
 class DepthReader {
  public:
   DepthReader(const RigCalibration& rig, int k) noexcept;
-  /// How much larger the inverse depth is that this rig gives to the place's two pixels, relative.
-  /// False: outside its lenses' models.
+  /// Relative excess of the inverse depth that this rig gives to the place's two pixels. Returns
+  /// false if they are outside its lens models.
   [[nodiscard]] bool difference(const CovisiblePoint& place, double* relative) const noexcept;
 
  private:

@@ -43,9 +43,10 @@ class EvidenceHistory {
   [[nodiscard]] const Entry& block(std::size_t age) const noexcept {
     return blocks_[(closed_ - 1 - age) % kBlocks];
   }
-  /// Of the newest frames, up to the edge of the block that holds the oldest of them.
+  /// Sums the evidence of the newest `frames` frames, extended to the edge of the block that holds
+  /// the oldest of them.
   void sum_of(std::size_t frames, Evidence* sum) const noexcept;
-  /// Of all frames there are.
+  /// Sum of the evidence of all frames kept.
   [[nodiscard]] Evidence total() const noexcept;
 
  private:

@@ -11,7 +11,7 @@ namespace vergence::calibration::detail {
 
 inline constexpr std::size_t kMaxObservations = 1024;  // of a frame; further ones are left out
 
-/// The reference as the looks need it.
+/// The reference calibration with derived quantities.
 struct Reference {
   Transform T_right_left{};
   EpipolarGeometry epipolar{Transform{}};
@@ -20,7 +20,7 @@ struct Reference {
   Pinhole left{}, right{};
 };
 
-/// What one frame's stereo matches say.
+/// Evidence from one frame's stereo matches.
 struct StereoResiduals {
   bool usable = false;  // enough matches
   Evidence evidence;

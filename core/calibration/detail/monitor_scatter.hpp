@@ -6,9 +6,9 @@
 
 namespace vergence::calibration::detail {
 
-/// How much successive stretches of a drive disagree beyond the noise of their tracks: what a lens
-/// model leaves shows as an offset that goes with where the structure is, and differs from stretch
-/// to stretch (METHOD §6.3).
+/// Scatter between successive stretches of a drive beyond the noise of their tracks. Residual lens
+/// errors appear as an offset that depends on where the structure is in the image, and so differs
+/// from stretch to stretch (METHOD §6.3).
 ///
 /// A running mean of (dᵀ A d − expected by noise) / (5 n) over blocks of frames, d a block's own
 /// offset from the blocks before it; begins with an expectation that weighs some blocks. A value.

@@ -11,7 +11,7 @@
 #include "core/odometry/drift_covariance.hpp"
 #include "core/odometry/odometry.hpp"
 
-/// What an Estimator is made of, for its own sources.
+/// Implementation of Estimator, shared by its sources.
 namespace vergence {
 
 struct Estimator::Parts {
@@ -83,16 +83,16 @@ struct Estimator::Parts {
   odometry::DriftCovariance drift{};
   CovarianceBaseline usual{};
   DoubtLedger doubts{};
-  double length_sigma_percent;  // of all lengths, by what is known of the calibration in use
+  double length_sigma_percent;  // relative sigma of all lengths, from the calibration in use
   State state = State::initialising;
   Stamp last{};
   std::uint64_t last_number = 0;
   bool any = false;
   double verified_percent = 0;      // depth error of the calibration that was confirmed
-  bool focal_contradicted = false;  // and noted
-  bool moves = false;               // this frame's pose, for all that is known of it
+  bool focal_contradicted = false;  // an event has reported it
+  bool moves = false;  // this frame's pose differs from the last one by more than its uncertainty
   int without_pose = 0;
-  bool in_gap = false;       // and the last event has said so
+  bool in_gap = false;       // a gap was reported and has not ended
   int unmatched_frames = 0;  // in a row
   Reason notified_missing = Reason::none;
   std::atomic<bool> requested{false};

@@ -4,9 +4,9 @@
 
 namespace vergence {
 
-/// The solutions of one solve, held against the frames since its snapshot and the calibration in
-/// use. Made where a decision is due, of references to what its owner has; decides nothing itself.
-/// Threads pure.
+/// Compares the solutions of one solve with the frames since its snapshot and with the calibration
+/// in use. It holds references to its owner's data, is constructed where a decision is due, and
+/// does not decide. All functions are pure.
 class SolutionReview {
  public:
   struct Context {
@@ -25,11 +25,11 @@ class SolutionReview {
   /// `must_be_better` than the calibration in use.
   [[nodiscard]] calibration::Gate gate(const calibration::RigSolution& found,
                                        bool must_be_better = true) const noexcept;
-  /// There are frames that were not used, as many as it takes to hold the solutions against; where
-  /// all failed none are needed.
+  /// True if enough frames that were not in the solve are logged to test the solutions; none are
+  /// needed if all solutions failed.
   [[nodiscard]] bool held_out_enough() const noexcept;
-  /// Of a calibration that was sought: lenses are taken from the drive where it shows that the ones
-  /// in use are off, and holds them well enough; else transforms alone.
+  /// The solution to use while seeking: the one with the lenses free if it shows that those in use
+  /// are off and determines them well enough, else the one of the transforms only.
   [[nodiscard]] const calibration::RigSolution& sought() const noexcept;
   /// The drive's own measurement of the rig, with the lenses free where they are not believed.
   [[nodiscard]] const calibration::RigSolution& measured() const noexcept;
@@ -38,7 +38,7 @@ class SolutionReview {
                                                calibration::ClaimSource source) const noexcept;
   /// The measurement against `next`, which is in use after this decision.
   void assess_next(const RigCalibration& next, CalibrationDecision* decision) const noexcept;
-  /// What a decision about `found` says of it, whatever the outcome.
+  /// Makes a CalibrationDecision with the data of `found`; the outcome is left to the caller.
   [[nodiscard]] CalibrationDecision decision(const calibration::RigSolution& found,
                                              Stamp stamp) const noexcept;
 

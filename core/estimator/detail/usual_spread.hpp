@@ -10,13 +10,13 @@
 
 namespace vergence {
 
-/// How uncertain the drive's motions usually are: the median of the last ones. A motion that is
-/// several times less certain than that cannot be relied on as the others can, whatever spoils it.
-/// One certain motion among uncertain ones ends nothing.
+/// Baseline of the motions' uncertainty: the median of the last ones. A motion whose sigma is
+/// several times larger is reported as less reliable, whatever the cause; a single certain motion
+/// among uncertain ones does not end the report.
 ///
-/// Of the recorded drives, untouched, no motion is more than 1.6 times as uncertain as usual, of
-/// the rendered street 2.3 times (build/bench/covariance_bench); cameras that are out of step
-/// make it more than 4 times, and a tunnel 3 from its third frame on
+/// Without faults no motion is more than 1.6 times as uncertain as usual on the recorded drives,
+/// and 2.3 times on the rendered street (build/bench/covariance_bench). Cameras out of sync give
+/// more than 4 times, a tunnel 3 times from its third frame on
 /// (FaultPairs.anImageLateFromALostOneOnIsNotOk).
 ///
 /// Threads  One. Memory: none of the heap.
@@ -45,7 +45,7 @@ class CovarianceBaseline {
     return false;
   }
 
-  /// What is usual, the last one was so many times as uncertain; 0: there were too few to tell.
+  /// Sigma of the last motion over the baseline; 0 with too few motions to have one.
   [[nodiscard]] double times_usual() const noexcept { return times_; }
 
  private:

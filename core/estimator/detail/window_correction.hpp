@@ -2,13 +2,12 @@
 
 namespace vergence {
 
-/// What the window moved a frame's fitted pose by. What was wrong in its older frames it takes back
-/// in the newest one's motion, at one step, and that motion is off by it. It cannot be relied on
-/// where that is both the larger part of what the motion can be off by and enough of the motion to
-/// matter.
+/// Correction of a frame's fitted pose by the window adjustment. When the window corrects errors of
+/// older frames, the correction appears as a jump in the newest motion. The motion is unreliable if
+/// the jump exceeds both its own sigma and the share kShare of its length.
 ///
-/// Of the recorded drives, untouched, the largest of those beyond the sigma is 4.0 % of its motion
-/// (build/bench/covariance_bench). Threads: a value.
+/// On the recorded drives without faults the largest jump beyond the sigma is 4.0 % of its motion
+/// (build/bench/covariance_bench).
 struct WindowCorrection {
   static constexpr double kShare = 0.05;
 

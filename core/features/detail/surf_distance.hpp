@@ -3,7 +3,7 @@
 
 namespace vergence::features::detail {
 
-/// Of two descriptors, squared.
+/// Squared Euclidean distance of two descriptors.
 [[nodiscard]] float squared_distance(const SurfDescriptor& a, const SurfDescriptor& b) noexcept;
 
 }  // namespace vergence::features::detail

@@ -103,24 +103,24 @@ class Session {
 
   [[nodiscard]] const DeviceInfo& info() const noexcept { return info_; }
   /// The whole configuration, in the order that cameras want. → ok, unsupported, bad_configuration,
-  /// gone
+  /// disconnected
   [[nodiscard]] DeviceStatus apply(const CameraConfiguration& requested, const Options& options,
                                    Applied* applied);
 
   /// Makes the stream; the callback comes from its thread, from the first push() on. → ok,
-  /// gone, failed
+  /// disconnected, failed
   [[nodiscard]] DeviceStatus open_stream(const Applied& applied, ArvStreamCallback callback,
                                          void* user);
   /// Precondition: a stream is open.
   void push(ArvBuffer* buffer) noexcept;
   [[nodiscard]] ArvStream* stream() noexcept { return stream_.get(); }
-  /// The camera begins to expose. → ok, gone
+  /// The camera begins to expose. → ok, disconnected
   [[nodiscard]] DeviceStatus start_acquisition();
   /// Ends both; after it no callback comes. `reachable`: the camera is told, too.
   void close_stream(bool reachable) noexcept;
   [[nodiscard]] DeviceStatus trigger();
   /// The nearest that the camera has, also while it streams. *actual: as read back. → ok,
-  /// unsupported, gone
+  /// unsupported, disconnected
   [[nodiscard]] DeviceStatus change_exposure(const ExposureSetting& requested,
                                              ExposureSetting* actual);
 

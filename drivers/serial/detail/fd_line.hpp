@@ -31,7 +31,8 @@ class FdLine final : public SerialLink {
   LineSettings settings_;
 };
 
-/// Sets a tty raw with these settings; what the system did is read back. → ok, unsupported, gone
+/// Sets a tty raw with these settings; what the system did is read back. → ok, unsupported,
+/// disconnected
 [[nodiscard]] DeviceStatus set_raw_tty(int fd, const LineSettings& settings) noexcept;
 
 }  // namespace vergence

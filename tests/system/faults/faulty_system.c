@@ -1,4 +1,4 @@
-// What goes wrong below the program, in front of the C library (LD_PRELOAD):
+// Injects faults below the program by LD_PRELOAD:
 //   VERGENCE_STALL='AT SECONDS'      writes to files, begun in that time since the start, last to
 //   its end VERGENCE_CLOCK_SET='AT SECONDS'  CLOCK_REALTIME is so much later from then on
 #define _GNU_SOURCE

@@ -81,7 +81,7 @@ CalibrationFile two_cameras() {
   return file;
 }
 
-/// The same with what the configuration says of it.
+/// A two-camera file with the configured values.
 CalibrationFile configured() {
   CalibrationFile file = two_cameras();
   file.configured = {{"rig.nominal.baseline_m", "0.75"},

@@ -29,7 +29,7 @@ RigCalibration rig() {
   return r;
 }
 
-/// Of noise: what a drive leaves, everything going with everything, t along the baseline exact.
+/// Covariance of noise as a drive leaves it: all parameters correlated, t along the baseline exact.
 Free covariance_of_noise(Random& random) {
   FreeVector sigma;
   sigma << 1e-4, 2e-4, 1e-4, 0, 1e-3, 1e-3, 0.5, 0.5, 1, 1, 1e-3, 1e-3, 2e-4, 2e-4, 1e-4;
@@ -47,7 +47,7 @@ RigCovariance published(const Free& C) {
   return out;
 }
 
-/// The same with what camera 0's focal lengths and centre, held, may be off by: D Σ Dᵀ, and −D Σ
+/// Adds the uncertainty of camera 0's fixed focal lengths and principal point: D Σ Dᵀ, and −D Σ
 /// beside it.
 RigCovariance with_held(const Free& noise, Random& random) {
   Eigen::Matrix<double, kFree, 4> D;

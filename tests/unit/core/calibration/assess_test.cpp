@@ -1,4 +1,5 @@
-// What a measured rig says of the one in use, and rigs that change among the frames of one solve.
+// Comparison of a measured rig with the one in use, and rigs that change among the frames of one
+// solve.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -89,7 +90,7 @@ TEST(Assessment, aPitchIsSeenOnFramesThatWereNotUsed) {
   EXPECT_TRUE(a.better);
   EXPECT_FALSE(a.worse);
   EXPECT_FALSE(a.contradicted);
-  // And the other way round.
+  // Claim and measurement exchanged.
   const Assessment b = assess(m.claimed, m.measured, m.source, m.log, 5, m.options, kPixelSigma);
   EXPECT_FALSE(b.better);
   EXPECT_TRUE(b.worse);

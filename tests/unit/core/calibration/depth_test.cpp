@@ -54,7 +54,7 @@ TEST(DepthDifference, ofAYawGrowsWithTheDepth) {
     }
 }
 
-// What is left is f x² δ: x² is 0.056 over an image 0.41 to each side, root mean square.
+// The remaining error is f x² δ; the rms of x² is 0.056 over an image 0.41 to each side.
 TEST(DepthDifference, ofAYawThatACentreMakesUpForIsSmall) {
   const RigCalibration rig = wide_rig();
   RigCalibration yaw = rig;
@@ -72,7 +72,7 @@ TEST(DepthDifference, ofALengthIsItsShareAtEveryDepth) {
   const RigCalibration rig = wide_rig();
   RigCalibration longer = rig;
   longer.T_camera_left[1].t *= 1.01;
-  // The same disparity at a baseline 1 % longer is a depth 1 % larger.
+  // An equal disparity with a baseline 1 % longer is a depth 1 % larger.
   for (const double z : {5.0, 20.0, 50.0})
     EXPECT_NEAR(depth_error_percent(rig, longer, 1, z), 100 * (1 - 1 / 1.01), 1e-6) << z;
 }

@@ -32,7 +32,7 @@ namespace vergence::test {
   rig.baseline = drive.T_right_left.t.norm();
   return rig;
 }
-/// The same with intrinsics that are exact.
+/// Rig with exact intrinsics.
 [[nodiscard]] inline RigCalibration rig_of(const FeatureDriveOptions& drive) {
   constexpr double kExact = 1e-6;  // px; zero would say that nothing is known of them
   return rig_of(drive, {drive.left, drive.right}, {kExact, kExact, kExact, kExact});
@@ -56,8 +56,8 @@ struct FurtherCamera {
   return rig;
 }
 
-/// How far what is logged is from the truth, beyond the errors of the tracks: where a solve starts
-/// from.
+/// Errors of the logged poses and transforms, from which a solve starts; tracks have errors of
+/// their own.
 struct LogStart {
   double pose_rad = 0, pose_m = 0;  // of every frame's pose but the first, each axis, sigma
   double rig_rad = 0, rig_m = 0;    // of every frame's T_camera_left

@@ -13,9 +13,9 @@
 
 namespace vergence::test {
 
-/// What a drive shows a monitor, below the level of tracks: the information of recorded frames, and
-/// gradients drawn anew with the variances, the correlation in time and the slow error that the
-/// recorded tracks had. A thousand times an hour's tracks in a minute.
+/// Simulates a monitor's input below the level of tracks: the information of recorded frames, and
+/// gradients drawn with the variances, the correlation in time and the slow error of the recorded
+/// tracks. Much faster than simulating tracks.
 class ModeDrive {
  public:
   struct Frame {

@@ -1,5 +1,4 @@
-// How much stretches of a drive disagree beyond their noise, from blocks drawn with what is to be
-// found.
+// Measured scatter between stretches of a drive, from blocks drawn with a known scatter.
 #include "core/calibration/detail/monitor_scatter.hpp"
 
 #include <gtest/gtest.h>

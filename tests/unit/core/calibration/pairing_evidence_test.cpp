@@ -15,7 +15,7 @@ namespace {
 constexpr Pinhole kLens{500, 500, 320, 240};
 constexpr std::size_t kPoints = 150;
 
-/// What spoils a drive of 40 frames from frame 20 on.
+/// Disturbance of a drive of 40 frames from frame 20 on.
 struct Case {
   std::string name;
   double step_m = 0.3;  // forward, a frame, with a nod of 3 mrad

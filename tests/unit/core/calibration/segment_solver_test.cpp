@@ -81,9 +81,9 @@ TEST(SegmentSolver, eachByItselfFindsTheTransform) {
     EXPECT_EQ(s.frames, static_cast<int>(kStretch));
     const Vec5 e = five_errors(s.rig, o.T_right_left);
     const Mat5 C = five_covariance(s.rig.covariance_total[1]);
-    // Of fifteen errors none is beyond four sigmas; and since a yaw goes with a centre, what both
-    // do to the depth is what counts: it is within the tolerance, and began at 20 m · 3 mrad / 0.75
-    // m, 8 %.
+    // None of fifteen errors is beyond four sigmas. A yaw is correlated with a principal point, so
+    // their joint effect on the depth counts: it is within the tolerance, and began at 20 m · 3
+    // mrad / 0.75 m, 8 %.
     for (int i = 0; i < 5; ++i) EXPECT_LT(std::abs(e[i]), 4 * std::sqrt(C(i, i))) << i;
     EXPECT_LT(calibration::depth_error_percent(rig_of(o), s.rig, 1, 20), 2.0) << e.transpose();
     EXPECT_EQ(s.rig.frames, static_cast<int>(kStretch)) << "of its own frames only";
@@ -188,8 +188,7 @@ TEST(SegmentSolver, whatWasToldLongAgoCountsForLess) {
   EXPECT_GT(sigma[1], sigma[0]);
 }
 
-// What was known grows old by the time that has passed since, once, whether or not somebody tried
-// to add to it.
+// The prior is widened once for the time that has passed, whether or not a solve failed meanwhile.
 TEST(SegmentSolver, oneThatFailsLeavesNoTraceInTheNext) {
   const FeatureDriveOptions o = little_noise();
   const RigCalibration given = rig_of(o, {o.left, o.right}, kNotGiven);

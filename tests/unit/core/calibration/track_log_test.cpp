@@ -143,7 +143,7 @@ TEST(TrackLog, aCopyHasTheNewestFramesOfItsOwn) {
   ASSERT_EQ(all.log.size(), 5U);
   ASSERT_EQ(fewer.log.size(), 3U);
   ASSERT_EQ(small.log.size(), 2U) << "as many as it can hold";
-  // What happens to the source afterwards does not show.
+  // Later changes of the source do not affect the copies.
   for (std::uint64_t n = 8; n <= 12; ++n) from.frame(n, 1);
   for (std::size_t i = 0; i < 5; ++i) expect_frame(all.log.frame(i), 3 + i, 4);
   for (std::size_t i = 0; i < 3; ++i) expect_frame(fewer.log.frame(i), 5 + i, 4);

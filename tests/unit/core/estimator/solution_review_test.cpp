@@ -69,8 +69,7 @@ TEST(SolutionReview, aYawThatNoEpipolarLineShowsIsJudgedByDepth) {
   }
 }
 
-// And one that the depth does not contradict by more than chance leaves the calibration where it
-// is.
+// A measurement whose depth does not differ by more than chance leaves the calibration unchanged.
 TEST(SolutionReview, aYawWithinWhatIsToleratedChangesNothing) {
   for (const double yaw : {1.5e-4, -1.5e-4})
     EXPECT_EQ(Review({0, yaw, 0}).gate(), Gate::no_better) << yaw;

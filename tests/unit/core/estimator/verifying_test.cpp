@@ -139,7 +139,7 @@ TEST(Verifying, aYawKnockedInAnOutageIsNeverOkWithTheOldCalibration) {
   EXPECT_TRUE(c.estimator->verified()) << c.story;
 }
 
-// What a full segment has taught is the prior of the solves after it: of another rig it is none.
+// A full segment's result is the prior of later solves, but must not be after the rig has changed.
 void expect_mended_once(double yaw_rad) {
   SCOPED_TRACE(yaw_rad);
   constexpr int kKnock = 80;  // after the first full segment
@@ -166,7 +166,7 @@ void expect_mended_once(double yaw_rad) {
 
 TEST(Verifying, aYawKnockedAfterARigWasLearntIsMendedOnceAndNotDrawnBack) {
   expect_mended_once(0.015);
-  // And a turn that is just large enough to be told at once.
+  // A rotation just large enough to be detected at once.
   expect_mended_once(0.004);
 }
 

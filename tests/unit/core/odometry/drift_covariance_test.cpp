@@ -91,7 +91,7 @@ TEST(DriftCovariance, isThatOfManyDrives) {
     exact.push_back(looking(0.05 * i, {0.2 * i, 0.1 * std::sin(0.3 * i), 1.0 * i}));
     drift.step(exact.back(), noise(kMetres, kRadians), 0, false);
   }
-  // What all turns share is taken off again: this is about the rest.
+  // The error shared by all rotations is subtracted; this test is about the independent ones.
   DriftCovariance shared;
   for (const Transform& T : exact) shared.step(T, Mat6::Zero(), 0, false);
   const Mat6 expected = drift.pose() - shared.pose();

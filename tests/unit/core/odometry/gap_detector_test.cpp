@@ -15,7 +15,7 @@ class Frames {
   explicit Frames(double interval = kUsual) {
     for (int i = 0; i < 5; ++i) (void)next(interval);
   }
-  /// What is said of a frame so long after the last one.
+  /// Result for a frame `interval` seconds after the last one.
   double next(double interval, bool renew = true) {
     last_ = last_ + Duration::seconds(interval);
     (void)gaps.since_frame(last_);

@@ -1,4 +1,4 @@
-// What speaks against a pose is told as soon as it is seen, and no longer.
+// Reasons against a pose are reported from the first frame that shows them, and no longer.
 #include <gtest/gtest.h>
 
 #include "core/odometry/odometry.hpp"

@@ -1,4 +1,4 @@
-// What a scene is begun from, and what it is not.
+// Conditions for starting a scene.
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 

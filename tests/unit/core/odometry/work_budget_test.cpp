@@ -9,7 +9,7 @@ constexpr int kKeyframes = 10, kSteps = 5;
 // s: what the clock passes within a test is nothing beside it.
 constexpr double kPoints = 1000, kStep = 40;  // a step of one keyframe: the window takes 2000
 
-/// Of a frame that begins now with so many seconds, usable ones, with the costs above known.
+/// Plan of a frame that has `usable_s` seconds from now, with the costs above known.
 FrameWorkload effort_in(double usable_s) {
   WorkBudget budget;
   budget.points_took(1e3 * kPoints, {});
