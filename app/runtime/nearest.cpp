@@ -157,6 +157,7 @@ constexpr std::array kTable{
     Withdrawn{Kind::option, "calibrate --camera", kCalibrateTarget, true},
     Withdrawn{Kind::option, "calibrate --drive", "'vergence calibrate sequence DATA'", true},
     Withdrawn{Kind::option, "calibrate --convert", "'vergence calibrate convert IN OUT'", true},
+    // The first argument of calibrate that is no option.
     Withdrawn{Kind::option, "calibrate CONFIG", "'vergence calibrate live CONFIG'", true},
 };
 

@@ -42,8 +42,8 @@ namespace vergence::app {
 /// Something of an earlier version that a user may still write, and what to do now.
 struct Withdrawn {
   enum class Kind { key, value, camera_option, record_topic, option, command } kind;
-  std::string_view name;  // record.roll_s, sync.mode ieee1394_cycle_time, replay --through-devices,
-                          // completion; calibrate CONFIG is its first argument that is no option
+  std::string_view
+      name;  // record.roll_s, sync.mode ieee1394_cycle_time, replay --through-devices, completion
   std::string_view instead;  // the end of an error message: what replaced it
   bool renamed = false;      // `instead` is the new name
 };
