@@ -41,7 +41,7 @@ void list(const DevicesArguments& a, bool rules_asked) {
   std::optional<Configuration> drive;
   if (!a.rig.empty()) drive = load_configuration(a.rig, {});
   if (drive && !rules_asked)
-    throw InputError("--rig says whose rules are written; add --write-udev");
+    throw InputError("--rig selects the devices of --write-udev; add --write-udev");
   const Machine machine = Machine::here();
   const Inventory inventory = take_inventory(machine, {});
   std::string rules;

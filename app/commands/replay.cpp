@@ -29,11 +29,11 @@ std::optional<AssumedIntrinsics> known_numbers(const ReplayArguments& a) {
   if (!a.focal) return std::nullopt;
   if (a.calibration)
     throw InputError(
-        "--focal is for rigs without a calibration; give it or --calibration, not both");
+        "--focal is for rigs without a calibration; use either --focal or --calibration");
   if (!a.baseline)
     throw InputError(
-        "--focal needs --baseline, the distance of the two cameras in metres, which images cannot "
-        "tell");
+        "--focal needs --baseline, the distance of the two cameras in metres; images cannot show "
+        "it");
   if (!(*a.focal >= 10 && *a.focal <= 1e5))
     throw InputError("--focal is the focal length in pixels, 10 to 100000");
   AssumedIntrinsics known;
@@ -56,9 +56,7 @@ ReplayRequest replay_request(const ReplayArguments& a) {
   check_topics(r.format, r.topics);
   r.known = known_numbers(a);
   if (a.calibrate_first && a.from_scratch)
-    throw InputError(
-        "--calibrate-first begins from scratch, and drives with what it finds; leave "
-        "--from-scratch away");
+    throw InputError("--calibrate-first already starts from scratch; remove --from-scratch");
   r.session.out = a.out;
   if (a.calibration) r.calibration = *a.calibration;
   r.baseline = a.baseline;
@@ -96,8 +94,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
       ->group("Output");
   declare_image_topics(*command, &a->topics.left, &a->topics.right);
   command
-      ->add_option("--ins-topic", a->topics.ins,
-                   "Bag topic of the INS (NavSatFix or Odometry), if ambiguous")
+      ->add_option("--ins-topic", a->topics.ins, "Bag topic of the INS (NavSatFix), if ambiguous")
       ->type_name("TOPIC")
       ->group("Input");
   command

@@ -43,9 +43,10 @@ class Flattener {
            const std::string& origin, int depth = 0) {
     const std::string here = origin.empty() ? file.at(node) : origin;
     if (depth > kDeepest)
-      throw InputError(here + ": \"" + name.substr(0, 60) + "\" is nested too deeply; no key is");
+      throw InputError(here + ": \"" + name.substr(0, 60) +
+                       "\" is nested too deeply; see docs/configuration.md");
     if (entries_->size() >= kMaxEntries)
-      throw InputError(here + ": more values than any configuration has; is it the right file?");
+      throw InputError(here + ": too many values; is this the right file?");
     if (node.IsMap() && node.size() > 0) {
       for (const auto& item : node) {
         if (!item.first.IsScalar()) throw InputError(here + ": a key that is not a word");
@@ -121,12 +122,24 @@ std::string suggestion(const std::string& name) {
       names.push_back(key.name);
       last_parts.push_back(last_part(key.name));
     }
-  if (const auto near = nearest(name, names)) return "; did you mean \"" + *near + "\"?";
-  if (const auto near = nearest(last_part(name), last_parts)) {
-    const auto index = std::find(last_parts.begin(), last_parts.end(), *near) - last_parts.begin();
+  const auto near = nearest(name, names);
+  // A key of another group with exactly this name is more likely meant than one spelled similarly.
+  const std::string part = last_part(name);
+  const auto same = std::find(last_parts.begin(), last_parts.end(), part);
+  if (same != last_parts.end() && !(near && edit_distance(name, *near) <= 1) &&
+      part.find_first_not_of("0123456789") != std::string::npos) {
+    std::string found;
+    for (const std::string& known : names)
+      if (last_part(known) == part) found += (found.empty() ? "\"" : " or \"") + known + "\"";
+    return "; did you mean " + found + "?";
+  }
+  if (near) return "; did you mean \"" + *near + "\"?";
+  if (const auto near_part = nearest(part, last_parts)) {
+    const auto index =
+        std::find(last_parts.begin(), last_parts.end(), *near_part) - last_parts.begin();
     return "; did you mean \"" + names[static_cast<std::size_t>(index)] + "\"?";
   }
-  return "; docs/configuration.md lists them all";
+  return "; docs/configuration.md lists all keys";
 }
 
 [[noreturn]] void refuse_unknown(const Entry& entry) {
@@ -140,7 +153,7 @@ std::string suggestion(const std::string& name) {
   std::string in_table = entry.name;
   if (in_table.starts_with("cameras.") && in_table.size() > 8) in_table[8] = '0';
   const std::string why = why_withdrawn(Withdrawn::Kind::key, in_table);
-  throw InputError(entry.origin + ": there is no key \"" + shown + "\"" +
+  throw InputError(entry.origin + ": unknown key \"" + shown + "\"" +
                    (why.empty() ? suggestion(entry.name) : why));
 }
 

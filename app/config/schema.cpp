@@ -60,7 +60,7 @@ class Rows {
     for (std::size_t i = 0; i < N; ++i)
       add(
           name + ("." + std::to_string(i)), KeyType::number, least, most, unit,
-          i == 0 ? meaning : "The next number of that list.",
+          i == 0 ? meaning : "Next element of the list.",
           [field, i](Settings& s, const KeyValue& v) { (s.*field)[i] = std::get<double>(v); },
           [field, i](const Settings& s) -> KeyValue { return (s.*field)[i]; });
     return *this;
@@ -167,8 +167,7 @@ Group general() {
   group.meaning = "Keys that belong to no group.";
   group.keys.push_back(
       {"threads", KeyType::integer, "", 1, 2,
-       "Threads of the estimator: with 2 the second image is searched and tracked beside the "
-       "first; the poses are the same.",
+       "Threads of the estimator: 2 processes both images in parallel; the poses are the same.",
        [](Configuration& c, const KeyValue& v) {
          c.threads = static_cast<int>(std::get<std::int64_t>(v));
        },
@@ -192,16 +191,16 @@ Group record() {
   return Rows<R>(
              "record",
              "What is recorded into `drive.mcap` of the session (docs/session_files.md). A list, "
-             "`record: [poses, ins, images]`, switches its words on.",
+             "`record: [poses, ins, images]`, enables the listed topics.",
              [](auto& c) -> auto& { return c.record; })
       .choice("poses", &R::poses, off_on, "Odometry and transforms of every frame.")
-      .choice("ins", &R::ins, off_on, "All readings of the INS, as they were compared.")
-      .choice("images", &R::images, off_on,
-              "All images that the estimator was given, with their cameras: what `replay --format "
-              "session` needs.")
+      .choice("ins", &R::ins, off_on, "All INS samples, as compared.")
+      .choice(
+          "images", &R::images, off_on,
+          "All images of the estimator, with camera_info; `replay --format session` needs them.")
       .choice("pulses", &R::pulses, off_on, "The trigger board's pulses of a live run.")
       .integer("split_mb", &R::split_mb, 0, 10'000'000, "MB",
-               "Size at which a file ends and the next one begins; 0: one file.")
+               "Size at which a new file starts; 0: one file.")
       .done();
 }
 
@@ -209,29 +208,29 @@ Group publish() {
   using P = PublishSettings;
   return Rows<P>(
              "publish",
-             "What others see of a running session, live or replayed (docs/live_interface.md).",
+             "Pose stream and live page of a running session or replay (docs/live_interface.md).",
              [](auto& c) -> auto& { return c.publish; })
       .text("pose_stream", &P::pose_stream, 200,
-            "One JSON object a frame goes there: `unix:///PATH` (a stream socket that readers "
-            "connect to) or `udp://HOST:PORT`; empty: nowhere.")
+            "Address of the pose stream, one JSON object per frame: `unix:///PATH` (stream socket) "
+            "or `udp://HOST:PORT`; empty: off.")
       .text("http", &P::http, 200,
-            "HOST:PORT of the live page, e.g. `127.0.0.1:8080`; beyond this machine viewers need "
-            "the token. Empty: no page.")
+            "HOST:PORT of the live page, e.g. `127.0.0.1:8080`; viewers on other machines need the "
+            "token. Empty: off.")
       .text("token_file", &P::token_file, 400,
             "File whose first line is the page's token, 16 to 128 letters and digits; empty: a "
             "new one each session, shown when it starts.")
-      .integer("viewers", &P::viewers, 1, 16, "viewers", "So many may look at the page at a time.")
+      .integer("viewers", &P::viewers, 1, 16, "viewers", "Maximum number of simultaneous viewers.")
       .done();
 }
 
 Group sessions() {
   using S = SessionsSettings;
   return Rows<S>(
-             "sessions", "The session folders beside the one of `--out`.",
+             "sessions", "Session directories next to the one of `--out`.",
              [](auto& c) -> auto& { return c.sessions; })
-      .integer("quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
-               "What they may take together: before a drive the oldest that are over it are "
-               "removed, whole. 0: none is ever removed.")
+      .integer(
+          "quota_mb", &S::quota_mb, 0, 1'000'000'000, "MB",
+          "Maximum total size: before a run the oldest sessions beyond it are removed. 0: never.")
       .done();
 }
 
@@ -239,24 +238,21 @@ Group realtime() {
   using R = RealtimeSettings;
   return Rows<R>(
              "realtime",
-             "Scheduling and memory of the threads of a drive (docs/deployment.md). What the "
-             "system "
-             "refuses is said, and the drive goes on.",
+             "Scheduling and memory of a live run (docs/deployment.md). If the system refuses a "
+             "setting, a warning is printed and the run continues.",
              [](auto& c) -> auto& { return c.realtime; })
       .integer("priority", &R::priority, 0, 90, "",
                "SCHED_FIFO priority of the threads of cameras, trigger and synchroniser; the "
-               "estimator has one less, the INS two, files three, the solver none. 0: no thread "
-               "has one.")
+               "estimator has one less, the INS two, files three, the solver none. 0: off.")
       .text("affinity", &R::affinity, 64,
-            "Processors of these threads, as taskset has them: `0-1,3`. Empty: any.")
+            "Processors of these threads, in the syntax of taskset: `0-1,3`. Empty: any.")
       .text("solver_affinity", &R::solver_affinity, 64,
             "Processors of the calibration solver. Empty: any.")
       .choice("lock_memory", &R::lock_memory, {"off", "on"},
-              "`on`: memory is locked before the first frame (mlockall), so that none of it is "
-              "ever fetched from a disk.")
+              "`on`: lock memory before the first frame (mlockall), so that it is never paged out.")
       .number("frame_budget_ms", &R::frame_budget_ms, 0, 10000, "ms",
-              "What the estimator may take for a frame of a live drive before it leaves out work "
-              "that the pose does not wait for. 0: the frame interval.")
+              "Time per live frame beyond which the estimator omits work other than the pose. 0: "
+              "the frame interval.")
       .done();
 }
 
@@ -286,12 +282,11 @@ Group rig() {
       .number("nominal.k1", &R::k1, -1, 1, "",
               "First radial coefficient of every lens, of the model that it has.")
       .number("nominal.k2", &R::k2, -1, 1, "", "Second radial coefficient of every lens.")
-      .text(
-          "state_dir", &R::state_dir, 400,
-          "Folder of `calibration_state.yaml`, the last calibration accepted or confirmed: written "
-          "at once, where the next `run` begins. Empty: "
-          "`$XDG_STATE_HOME/vergence/NAME`, without that variable "
-          "`~/.local/state/vergence/NAME`; `none`: there is none.")
+      .text("state_dir", &R::state_dir, 400,
+            "Directory of `calibration_state.yaml`, the last calibration accepted or verified, "
+            "with which the next `run` starts. Empty: "
+            "`$XDG_STATE_HOME/vergence/NAME`, without that variable "
+            "`~/.local/state/vergence/NAME`; `none`: no state file.")
       .done();
 }
 
@@ -304,69 +299,66 @@ Group cameras() {
             "cameras." + std::to_string(k), "The cameras, a list; the first is the left one.",
             [k](auto& c) -> auto& { return c.cameras[k]; })
             .text("driver", &C::driver, 16,
-                  "What talks to it: `mock`, `gige`, `iidc-usb`, `iidc-1394` or `v4l2`. Empty: "
+                  "Driver: `mock`, `gige`, `iidc-usb`, `iidc-1394` or `v4l2`. Empty: "
                   "there is no such camera.")
-            .text("name", &C::name, 32, "How it is called in messages and in calibration.yaml.")
+            .text("name", &C::name, 32, "Name in messages and in calibration.yaml.")
             .text("serial", &C::serial, 64,
-                  "Which one, where there are several; empty: the next one. GigE: or its address.")
+                  "Serial number, or for GigE the address; empty: the next camera found.")
             .choice<ImageHalf>(
                 "image_half", &C::half,
                 {{"whole", ImageHalf::whole},
                  {"left", ImageHalf::left},
                  {"right", ImageHalf::right}},
-                "Of a camera that gives both images side by side in one picture: which one this "
-                "is. Two entries with one `serial` then are one camera of twice the `size.0`.")
+                "For a camera that delivers both images side by side: the half that this entry "
+                "uses. Two entries with the same `serial` are one camera of twice the `size.0`.")
             .integer("size.0", &C::width, 64, 4096, "px", "Width of the image in pixels.")
             .integer("size.1", &C::height, 48, 4096, "px", "Height of the image in pixels.")
             .integer("offset.0", &C::offset_x, 0, 16384, "px",
                      "Left edge of the region that is read out, on the sensor.")
             .integer("offset.1", &C::offset_y, 0, 16384, "px", "Upper edge of that region.")
             .text("pixel_format", &C::pixel_format, 32,
-                  "The device's own name (`Mono8`, `BayerGB8`, `GREY`); empty: the cheapest that "
-                  "gives grey.")
+                  "The device's own name (`Mono8`, `BayerGB8`, `GREY`); empty: the cheapest format "
+                  "with grey values.")
             .choice<CameraTrigger>(
                 "trigger", &C::trigger,
                 {{"hardware", CameraTrigger::hardware},
                  {"software", CameraTrigger::software},
                  {"free", CameraTrigger::free}},
-                "What makes it expose: `hardware`, a pulse at its input; `software`, a command "
+                "Trigger source: `hardware`, a pulse at its input; `software`, a command "
                 "at `trigger.rate`; `free`, its own "
                 "clock. All cameras alike.")
             .options("options", &C::options, 400,
-                     "What only this kind of camera has (drivers/*/README.md): `NAME=VALUE …`, or "
+                     "Options of this driver (drivers/*/README.md): `NAME=VALUE …`, or "
                      "a group: "
                      "`{packet_size: 9000}`.")
             .number("exposure_us", &C::exposure_us, 10, 1e6, "µs",
-                    "Time of an exposure; 8000 is daylight in the mock's world.")
+                    "Exposure time; 8000 suits daylight on the simulated rig.")
             .number("trigger_delay_us", &C::trigger_delay_us, 0, 20000, "µs",
                     "From a pulse's edge to the start of the exposure: of the input (10 to 100 µs "
                     "if it is opto-coupled) and of the camera. "
                     "With `sync.mode` `board`, `ins_syncout` or `master_strobe` it goes into every "
                     "stamp, unless `trigger.feedback` measures it.")
             .number("stamp_jitter_us", &C::stamp_jitter_us, 0, 5000, "µs",
-                    "By how much its stamps may be off the pulses; 0: what this driver's stamps "
-                    "have (20, of a camera that only the host "
-                    "stamps 1000). With more than half of `trigger.dither_us` only a pause proves "
-                    "the pairing.")
+                    "Maximum deviation of its stamps from the pulses; 0: the default of the driver "
+                    "(20; 1000 for host stamps). Above half of `trigger.dither_us` only a pause "
+                    "verifies the pairing.")
             .number("gain_db", &C::gain_db, 0, 40, "dB", "Gain of the sensor's amplifier.")
             .text("mask", &C::mask, 400,
-                  "PNG or PGM of the image's size, 0 where nothing is to be looked for: the "
-                  "vehicle itself, dirt. A relative path begins "
-                  "at this file's folder.")
+                  "PNG or PGM of the image size; pixels of value 0 are not used (bonnet, dirt). "
+                  "Paths are relative to this file.")
             .choice<CameraModelKind>(
                 "model", &C::model,
                 {{"pinhole-radtan", CameraModelKind::pinhole_radtan},
                  {"pinhole-equidistant", CameraModelKind::pinhole_equidistant}},
-                "What its lens is like: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a "
+                "Lens model: `pinhole-radtan`, k1 k2 p1 p2 k3; `pinhole-equidistant`, a "
                 "fisheye lens, k1 k2 k3 k4.")
             .numbers("intrinsics", &C::intrinsics, 0, 20000, "px",
-                     "fx, fy, cx, cy of this camera's lens; all four 0: the lens is that of "
-                     "`rig.nominal`.")
+                     "fx, fy, cx, cy; all four 0: the intrinsics are those of `rig.nominal`.")
             .numbers("distortion", &C::distortion, -2, 2, "",
                      "With `intrinsics`: k1, k2, p1, p2, k3; of an equidistant lens k1 to k4.")
             .numbers("T_camera_left", &C::T_camera_left, -20, 20, "1, m",
-                     "Where the camera sits, X_camera = R X_left + t, as the rows r11 r12 r13 t1, "
-                     "r21 … of [R t]. All zero: parallel, N baselines to the right.")
+                     "Extrinsics, X_camera = R X_left + t, as rows r11 r12 r13 t1, r21 … of [R t]. "
+                     "All zero: parallel, N baselines to the right.")
             .done();
     all.name = one.name;
     all.meaning = one.meaning;
@@ -383,55 +375,49 @@ Group exposure() {
              "Exposure and gain of all cameras together, while driving (docs/cameras.md).",
              [](auto& c) -> auto& { return c.exposure; })
       .choice("mode", &E::mode, {"fixed", "auto"},
-              "`fixed`: as `cameras` says. `auto`: by the brightness of camera 0's images, the "
-              "same for all cameras; they begin with camera "
-              "0's.")
-      .number("target", &E::target, 20, 200, "grey levels",
-              "Mean of the image aimed at, of what its mask shows.")
+              "`fixed`: as configured in `cameras`. `auto`: controlled by the brightness of camera "
+              "0, equal for all cameras, starting with the settings of camera 0.")
+      .number("target", &E::target, 20, 200, "grey levels", "Target mean of the unmasked pixels.")
       .number("saturated_percent", &E::saturated_percent, 0, 50, "%",
-              "Share of the pixels that may be at the end of the scale.")
-      .number("min_us", &E::min_us, 5, 100000, "µs", "Shortest exposure that is chosen.")
+              "Maximum share of saturated pixels.")
+      .number("min_us", &E::min_us, 5, 100000, "µs", "Minimum exposure.")
       .number("max_us", &E::max_us, 10, 200000, "µs",
-              "Longest exposure, for the sake of motion blur; what is missing then comes from the "
-              "gain.")
-      .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Largest gain that is chosen.")
-      .integer(
-          "settle_frames", &E::settle_frames, 2, 60, "frames",
-          "Images after a change until one is judged again: one more than the cameras take for it.")
+              "Maximum exposure, limits motion blur; beyond it the gain is raised.")
+      .number("max_gain_db", &E::max_gain_db, 0, 40, "dB", "Maximum gain.")
+      .integer("settle_frames", &E::settle_frames, 2, 60, "frames",
+               "Images skipped after a change: one more than the cameras need to apply it.")
       .done();
 }
 
 Group trigger() {
   using T = TriggerSettings;
   return Rows<T>(
-             "trigger", "What makes the cameras expose together.",
-             [](auto& c) -> auto& { return c.trigger; })
+             "trigger", "Trigger of the cameras.", [](auto& c) -> auto& { return c.trigger; })
       .text("driver", &T::driver, 16,
-            "What makes the pulses: `board`, a trigger board on a serial port "
-            "(docs/synchronisation.md); `mock`, with mock cameras; `none`: "
-            "something that reports nothing, or nothing at all.")
+            "Source of the pulses: `board`, a trigger board on a serial port "
+            "(docs/synchronisation.md); `mock`, with mock cameras; `none`: a source that reports "
+            "nothing, or no source.")
       .text("port", &T::port, 200,
-            "Serial port of the board, `/dev/ttyACM0`, or its serial number. Empty: the only board "
-            "there is.")
+            "Serial port of the trigger board, `/dev/ttyACM0`, or its serial number. Empty: the "
+            "only one connected.")
       .integer("baud", &T::baud, 0, 3000000, "baud",
-               "Rate of that line where it has one; 0: found by asking.")
-      .number("rate", &T::rate, 1, 200, "Hz", "Pulses, and so images of every camera, a second.")
+               "Baud rate of the serial link, if it has one; 0: detected.")
+      .number("rate", &T::rate, 1, 200, "Hz", "Pulse rate, and so frame rate of every camera.")
       .number("width_us", &T::width_us, 1, 100000, "µs",
-              "Length of a pulse; what the cameras' inputs need.")
-      .number("dither_us", &T::dither_us, 0, 20000, "µs",
-              "Every interval is longer or shorter by this, in an order that does not repeat: the "
-              "cameras' own stamps then prove at any time "
-              "which frame is of which pulse. 0: even intervals, a pause proves it.")
+              "Length of a pulse, as the camera inputs require.")
+      .number(
+          "dither_us", &T::dither_us, 0, 20000, "µs",
+          "Variation of every interval in a non-repeating order, so that camera stamps verify at "
+          "any time which frame belongs to which pulse. 0: even intervals, verified by a pause.")
       .integer("lines", &T::lines, 0, 15, "",
-               "Outputs that are pulsed, a mask: bit k is line k, wired to camera k. 0: one for "
+               "Bit mask of the pulsed outputs: bit k is line k, wired to camera k. 0: one for "
                "each camera.")
-      .integer("active_low", &T::active_low, 0, 15, "",
-               "Of these, the ones whose pulse is low: a mask.")
+      .integer("active_low", &T::active_low, 0, 15, "", "Bit mask of the lines whose pulse is low.")
       .integer("feedback", &T::feedback, 0, 15, "",
-               "Inputs that the cameras' exposure-active outputs are wired to, a mask: stamps are "
-               "then the measured middle of the exposure.")
+               "Bit mask of the inputs wired to exposure-active outputs; stamps are then the "
+               "measured middle of the exposure.")
       .integer("feedback_active_low", &T::feedback_active_low, 0, 15, "",
-               "Of these, the ones that are low while a camera exposes.")
+               "Bit mask of the feedback inputs that are low during exposure.")
       .choice(
           "pps", &T::pps, edges(),
           "Edge of the GNSS receiver's pulse per second at the board: `none` is wired, `rising` "
@@ -447,53 +433,51 @@ Group sync() {
              "sync", "How images are paired.", [](auto& c) -> auto& { return c.sync; })
       .choice<SyncMode>(
           "mode", &S::mode, sync_modes(),
-          "By what images are paired, and what proves it (docs/synchronisation.md). Proven: "
-          "`board`, by a "
+          "How images are paired and verified (docs/synchronisation.md). Verified: `board`, by a "
           "trigger board's pulses; `ins_syncout`, by "
-          "the INS's; `master_strobe`, camera 0 triggers the others; `bus`, stamps of one IEEE "
+          "the INS's; `master_strobe`, camera 0 triggers the others; `ieee1394_cycle_time`, stamps "
+          "of one IEEE "
           "1394 cycle timer; `ptp`, stamps of one PTP "
           "clock; `side_by_side`, both images come in one (`cameras.N.image_half`). Not verified: "
           "`counter`, exposure n of every camera belongs together; "
           "`software`, what was exposed within "
           "`tolerance_ms` by the host's clock, for cameras that nothing triggers.")
       .number("timeout_ms", &S::timeout_ms, 1, 10000, "ms",
-              "How long the images of a pulse wait for one that is late.")
-      .number(
-          "tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
-          "With `software`, `bus`, `ptp` and `side_by_side`: the farthest that exposures of one "
-          "set are apart.")
+              "Maximum wait for a late image of a pulse.")
+      .number("tolerance_ms", &S::tolerance_ms, 0.01, 1000, "ms",
+              "With `approximate_time`, `ieee1394_cycle_time`, `ptp` and `side_by_side`: maximum "
+              "difference of the exposure times of one set.")
       .done();
 }
 
 Group ins() {
   using I = InsSettings;
   return Rows<I>(
-             "ins", "The inertial navigation system that the pose is compared with.",
+             "ins", "Inertial navigation system that the pose is compared with.",
              [](auto& c) -> auto& { return c.ins; })
       .text("driver", &I::driver, 16,
-            "What talks to it: `xsens`, `nmea` or `ubx` (satellite receivers), `mock` (with mock "
+            "Driver: `xsens`, `nmea` or `ubx` (satellite receivers), `mock` (with mock "
             "cameras), or `none`.")
       .text("port", &I::port, 200,
-            "Serial port of the INS, `/dev/ttyUSB0` or better a link that stays: "
-            "`/dev/serial/by-id/…`. Empty: the only one on USB.")
+            "Serial port, preferably a stable link: `/dev/serial/by-id/…`. Empty: the only USB "
+            "serial port.")
       .integer("baud", &I::baud, 0, 2000000, "baud",
-               "Rate of that line; the device is brought to it. 0: as the device has it, which is "
-               "looked for.")
+               "Baud rate to set; 0: keep the rate of the device, which is detected.")
       .number("rate", &I::rate, 1, 400, "Hz",
-              "Readings of the INS a second; an MTi-G-700/710 takes the nearest it has (100 for "
-              "120). With "
-              "`nmea` and `ubx` what the receiver sends.")
+              "Sample rate; an MTi-G-700/710 uses the nearest it supports (100 for 120). With "
+              "`nmea` and `ubx` the rate that the receiver sends.")
       .number("sync_out_hz", &I::sync_out_hz, -1, 400, "Hz",
-              "Pulses a second at the INS's SyncOut; 0: as the device has it, -1: none. An "
-              "MTi-G-700/710 makes 400 Hz / n, no 30.")
-      .number("sync_out_width_ms", &I::sync_out_width_ms, 0.1, 100, "ms", "Length of such a pulse.")
+              "Pulse rate at SyncOut; 0: unchanged, -1: off. An MTi-G-700/710 generates 400 Hz / "
+              "n, so not 30.")
+      .number("sync_out_width_ms", &I::sync_out_width_ms, 0.1, 100, "ms",
+              "Length of a SyncOut pulse.")
       .number("processing_ms", &I::processing_ms, 0, 50, "ms",
-              "From a sample to its first byte on the line, as the device's manual says; it goes "
-              "into every stamp.")
+              "Delay from a sample to its first byte on the serial link, from the manual; enters "
+              "every stamp.")
       .numbers("lever_arm_m", &I::lever_arm_m, -100, 100, "m",
-               "Where the left camera sits in the INS's body: forward, to the left, upwards.")
+               "Position of the left camera in the INS body: forward, left, up.")
       .numbers("boresight_deg", &I::boresight_deg, -180, 180, "°",
-               "How the rig's forward-left-up axes are turned against the INS's: roll, pitch, yaw.")
+               "Rotation of the rig's forward-left-up axes relative to the INS: roll, pitch, yaw.")
       .done();
 }
 
@@ -505,16 +489,14 @@ Group comparison() {
       .number("alignment_distance_m", &C::alignment_distance_m, 1, 100000, "m",
               "Distance travelled with a valid fix after which the path is aligned with ENU.")
       .number("correlation_s", &C::correlation_s, 0.1, 3600, "s",
-              "For so long the INS's position errors resemble one another.")
+              "Correlation time of the INS's position errors.")
       .number("heading_sigma_deg", &C::heading_sigma_deg, 0, 180, "°",
-              "Of the INS's heading as the camera has it, mount included: so it weighs in the "
-              "placement. 0: not at all, or with a mount "
-              "published by a data set "
-              "0.3°.")
+              "Sigma of the INS heading including the boresight, as a weight in the alignment. 0: "
+              "heading not used, or 0.3° with extrinsics published by a data set.")
       .number("max_gap_ms", &C::max_gap_ms, 1, 10000, "ms",
-              "Readings farther apart than this are not interpolated between.")
+              "Maximum interval between INS samples to interpolate across.")
       .number("max_wait_ms", &C::max_wait_ms, 1, 3000, "ms",
-              "A pose waits so long for the reading after it.")
+              "Maximum wait of a pose for the next INS sample.")
       .number("jump_m", &C::jump_m, 0.1, 1e6, "m",
               "A step of the INS's position beyond this (and 60 m/s) is a jump.")
       .number("scale_tolerance", &C::scale_tolerance, 0.001, 1, "",
@@ -527,51 +509,47 @@ Group odometry() {
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   Rows<O> rows(
       "odometry",
-      "How motion is found from the images. The defaults suit road vehicles and hand-held rigs; "
+      "Motion estimation. The defaults suit road vehicles and hand-held rigs; "
       "change one at a time.",
       [](auto& c) -> auto& { return c.odometry; });
   rows.integer("features", &O::features, 50, 1000, "points",
-               "Points tracked in each image: more of them cost time and hold the pose better "
-               "where texture is poor. They are spread "
-               "over a grid of cells of the size that this number asks for.")
+               "Points tracked in each image, spread over a grid: more cost time and constrain the "
+               "pose better where texture is poor.")
       .choice("init_features", &O::init_features, {"corners", "surf"},
-              "What is matched across the first images of a rig that is calibrated from scratch: "
-              "the corners that are tracked anyway, or "
-              "SURF-64; docs/benchmarks.md compares them.")
+              "Features matched between the first images when calibrating from scratch: the "
+              "tracked corners, or SURF-64; docs/benchmarks.md compares them.")
       .integer("pyramid_levels", &O::pyramid_levels, 2, 6, "levels",
-               "Sizes of the image that are searched, each half of the one before: more levels "
-               "follow faster motion.")
-      .number("band_px", &O::band_px, 0.5, 5, "px",
-              "Half the width of the band along the epipolar line in which a match across is "
-              "sought: wide for a poor calibration.")
+               "Image pyramid levels; more levels follow faster motion.")
+      .number(
+          "band_px", &O::band_px, 0.5, 5, "px",
+          "Half width of the search band along the epipolar line; wider for a poor calibration.")
       .number("pixel_sigma", &O::pixel_sigma, 0.02, 5, "px",
-              "Standard deviation of a tracked corner's position, each coordinate, at full "
-              "resolution; the scale of all residuals.")
+              "Standard deviation of a tracked corner per coordinate at full resolution; scales "
+              "all residuals.")
       .number("parallax_sigma", &O::parallax_sigma, 0, 10, "px",
               "Added to it (in quadrature) for a patch seen from one depth further to the side "
               "than where it was cut: its slope is unknown.")
-      .number("huber", &O::huber, 1, 10, "sigmas",
-              "Residuals beyond this count less and less (Huber's weight).")
+      .number("huber", &O::huber, 1, 10, "sigmas", "Huber threshold of the residuals.")
       .integer("window_keyframes", &O::window_keyframes, 3, 20, "keyframes",
-               "Keyframes that are adjusted together with their points.")
+               "Keyframes in the sliding window.")
       .number("extrinsic_rotation_sigma_rad", &O::extrinsic_rotation_sigma_rad, 0, 0.05, "rad",
-              "What the turn between two cameras that shifts all disparities alike may be off by, "
-              "where their calibration does not say less: "
-              "it is estimated with every window. 0: the calibration is held as exact.")
+              "Uncertainty of the rotation between two cameras that shifts all disparities "
+              "equally, if the calibration does not state less; estimated with every window. 0: "
+              "the calibration is exact.")
       .integer("window_steps", &O::window_steps, 1, 30, "steps",
-               "Most solver steps of one such adjustment.")
+               "Maximum solver steps per window adjustment.")
       .number("keyframe_parallax", &O::keyframe_parallax, 0.005, 0.3, "rad",
-              "Median turn of the rays to the points since the last keyframe that makes a new one.")
+              "Median parallax since the last keyframe that creates a new one.")
       .number("keyframe_tracked", &O::keyframe_tracked, 0.1, 1, "",
-              "A new keyframe is made when less than this share of the last one's points is still "
-              "tracked.")
+              "A new keyframe is created when less than this share of the last one's points is "
+              "still tracked.")
       .integer("min_inliers", &O::min_inliers, 6, 200, "points",
-               "A pose on fewer points than this is not believed: status `lost`.")
+               "Minimum inliers of a pose; below, the status is `lost`.")
       .integer("ok_inliers", &O::ok_inliers, 6, 1000, "points",
-               "A pose on fewer points than this is `degraded` with the reason `few_inliers`; not "
-               "below `min_inliers`.")
+               "Below this number of inliers the pose is `degraded: few_inliers`; not below "
+               "`min_inliers`.")
       .integer("mlesac_hypotheses", &O::mlesac_hypotheses, 10, 1000, "",
-               "Most poses tried on random point triples, a frame.")
+               "Maximum MLESAC hypotheses per frame.")
       .integer("seed", &O::seed, 0, kLargestSeed, "",
                "Seed of that sampling: the same seed gives the same poses.");
   return rows
@@ -580,8 +558,8 @@ Group odometry() {
                 .choice("preset", &Configuration::preset, {"default", "small"},
                         "`small`, for small boards: `odometry.features` 250, "
                         "`odometry.window_keyframes` 8, `calibration.max_frames` 100 and "
-                        "`calibration.max_observations` 50000 where they are not given; what it "
-                        "costs and saves is in docs/deployment.md.")
+                        "`calibration.max_observations` 50000 unless these are set; see "
+                        "docs/deployment.md.")
                 .done())
       .done();
 }
@@ -589,29 +567,24 @@ Group odometry() {
 Group calibration_options() {
   using C = calibration::CalibrationOptions;
   return Rows<C>(
-             "calibration",
-             "How the stereo transform is found and kept while driving; docs/calibration.md tells "
-             "more.",
+             "calibration", "Online calibration of the rig; see docs/calibration.md.",
              [](auto& c) -> auto& { return c.calibration; })
       .integer("min_frames", &C::min_frames, 5, 150, "frames",
-               "Frames with motion that are gathered before a calibration is tried; not above "
-               "`max_frames`.")
+               "Moving frames before a calibration is solved; not above `max_frames`.")
       .integer("max_frames", &C::max_frames, 10, 150, "frames",
-               "The newest so many are kept, and solved at once.")
+               "Maximum number of frames solved together; older ones are dropped.")
       .number("rotation_sigma_mrad", &C::rotation_sigma_mrad, 0.001, 10, "mrad",
-              "Enough: predicted sigma of each rotation axis, noise only, at which a calibration "
-              "is solved before `max_frames`.")
+              "Predicted rotation sigma (noise only) at which a calibration is solved before "
+              "`max_frames`.")
       .number("translation_sigma_mm", &C::translation_sigma_mm, 0.01, 1000, "mm",
-              "The same of the translation across the baseline, for a baseline of 0.75 m and in "
+              "The same for the translation across the baseline, for a baseline of 0.75 m and in "
               "proportion to it.")
       .integer("adopt_after", &C::adopt_after, 0, 1000, "frames",
-               "A result is adopted when the frames after its snapshot confirm it, 6 of them or "
-               "more; so many frames after the snapshot it is decided about, one way or the other. "
-               "In a replay and with `--fast` the solver is waited for: alike on every machine.")
-      .integer(
-          "max_observations", &C::max_observations, 10'000, 1'000'000, "",
-          "Observations that one solve takes; of more, frames are taken at wider steps: time and "
-          "memory.")
+               "Frames after its snapshot within which a result is adopted or rejected; adoption "
+               "needs at least 6 frames that support it. In a replay and with `--fast` the "
+               "estimator waits for the solver, so results do not depend on the machine.")
+      .integer("max_observations", &C::max_observations, 10'000, 1'000'000, "",
+               "Maximum observations per solve (time and memory); beyond it frames are subsampled.")
       .choice("intrinsics", &C::intrinsics,
               {{"fixed", calibration::IntrinsicsEstimation::fixed},
                {"focal", calibration::IntrinsicsEstimation::focal},
@@ -622,37 +595,37 @@ Group calibration_options() {
       .number("focal_sigma_percent", &C::focal_sigma_percent, 0.001, 10, "%",
               "Prior sigma of a focal length.")
       .number("principal_point_sigma_px", &C::principal_point_sigma_px, 0.01, 50, "px",
-              "What a coordinate of a principal point that is held may be off by; with "
-              "`intrinsics: refine` its prior sigma.")
+              "Assumed error of a fixed principal-point coordinate; with `intrinsics: full` its "
+              "prior sigma.")
       .number("lens_centre_sigma_px", &C::lens_centre_sigma_px, 0.01, 100, "px",
-              "Prior sigma of a further camera's principal point with `lenses: estimate`; one in "
-              "calibration.yaml goes before it.")
+              "Prior sigma of an additional camera's principal point with `intrinsics: full`; a "
+              "sigma in calibration.yaml takes precedence.")
       .number("distortion_sigma", &C::distortion_sigma, 1e-5, 1, "",
-              "The same of a radial coefficient (k1, k2), of an equidistant lens k1 to k4.")
+              "Prior sigma of a radial coefficient (k1, k2; equidistant: k1 to k4).")
       .number("tangential_sigma", &C::tangential_sigma, 1e-6, 0.1, "",
-              "The same of a tangential coefficient (p1, p2).")
+              "Prior sigma of a tangential coefficient (p1, p2).")
       .number("max_direction_deg", &C::max_direction_deg, 0.1, 180, "°",
-              "A calibration whose translation points farther from the nominal one is rejected.")
+              "Maximum angle between the translation and the nominal one; beyond it a calibration "
+              "is rejected.")
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
-              "The same of the rotation; the first calibration of a drive from scratch is asked "
-              "for its direction only.")
+              "Maximum rotation from the nominal one; not checked for the first calibration from "
+              "scratch.")
       .number("min_path_m", &C::min_path_m, 0.01, 1000, "m",
-              "Way within the frames gathered (or three baselines) below which the reason is "
+              "Minimum path length of the collected frames (and three baselines); below: "
               "`needs_motion`.")
       .integer("min_near_points", &C::min_near_points, 0, 1000, "points",
-               "Near points among those gathered below which the reason is `needs_near_structure`.")
+               "Minimum near points of the collected frames; below: `needs_near_structure`.")
       .number("near_baselines", &C::near_baselines, 5, 500, "baselines",
-              "Nearer than this a point is near.")
+              "Maximum distance of a near point, in baselines.")
       .number("extrinsic_random_walk_mrad_per_sqrt_h", &C::extrinsic_random_walk_mrad_per_sqrt_h, 0,
               100, "mrad/√h",
-              "How far a rig that nobody touches wanders in an hour, as a random walk: what is "
-              "known of it grows old by this.")
+              "Random walk of the extrinsics of an undisturbed rig; widens the prior with time.")
       .number("max_depth_error_percent", &C::max_depth_error_percent, 0.1, 50, "%",
-              "Depth error up to which the drive has confirmed a calibration; until then poses are "
+              "Depth error up to which a calibration counts as verified; until then poses are "
               "`degraded: unverified_calibration`.")
       .number("reference_depth_m", &C::reference_depth_m, 0.5, 500, "m",
-              "The depth at which that is asked; on a short baseline nearer, where a single match "
-              "is no better than that.")
+              "Depth of that test; nearer on a short baseline, where a single match is no better "
+              "than that.")
       .number("good_depth_percent", &C::good_depth_percent, 0.01, 100, "%",
               "Predicted depth error at 20 m up to which the calibration is rated `good`.")
       .number(
@@ -661,7 +634,8 @@ Group calibration_options() {
       .also(Rows<Configuration>(
                 "calibration", "", [](auto& c) -> auto& { return c; })
                 .choice("online", &Configuration::online, {"off", "on"},
-                        "`off`: nothing watches the rig, the calibration given is used to the end.")
+                        "`off`: the rig is not monitored, and the initial calibration is used "
+                        "throughout.")
                 .done())
       .done();
 }
@@ -669,32 +643,30 @@ Group calibration_options() {
 Group monitor() {
   using M = calibration::MonitorOptions;
   return Rows<M>(
-             "monitor", "What watches whether the calibration in use is still true.",
+             "monitor", "Monitoring of the calibration in use.",
              [](auto& c) -> auto& { return c.monitor; })
       .number("threshold", &M::threshold, 20, 500, "",
-              "Statistic that raises a knock or a drift: higher for fewer false alarms, lower for "
-              "smaller knocks found sooner.")
-      .number("bias_px", &M::bias_px, 0, 1, "px",
-              "Slow error that imperfect intrinsics leave in the matches across and that is no "
-              "knock, at least.")
+              "Test statistic that reports a knock or a drift: higher for fewer false alarms, "
+              "lower for smaller knocks and faster detection.")
+      .number(
+          "bias_px", &M::bias_px, 0, 1, "px",
+          "Minimum slow error that imperfect intrinsics leave in stereo matches without a knock.")
       .number("verified_bias_px", &M::verified_bias_px, 0, 2, "px",
-              "The same with a calibration that was found from images and is confirmed, expected "
-              "until the monitor has measured it.")
+              "The same for a verified calibration, until the monitor has measured it.")
       .number("unverified_bias_px", &M::unverified_bias_px, 0, 5, "px",
-              "The same with a calibration that is given.")
+              "The same for an unverified calibration.")
       .integer("min_matches", &M::min_matches, 12, 1000, "matches",
-               "A frame with fewer matches across measures nothing.")
+               "Frames with fewer stereo matches are not used.")
       .integer("short_window", &M::short_window, 1, 10, "frames",
                "Shortest window of moving frames that is tested: for large knocks.")
       .integer("long_window", &M::long_window, 60, 1800, "frames",
                "Longest window of moving frames that is tested: for drift.")
       .integer("collapse_frames", &M::collapse_frames, 2, 60, "frames",
-               "So many frames in a row without the matches across that there should be are a "
-               "`collapse`.")
+               "Consecutive frames without the expected stereo matches that are a `collapse`.")
       .number("collapse_share", &M::collapse_share, 0.01, 0.9, "",
-              "Of the matches expected: finding fewer is that.")
+              "Share of the expected matches below which a frame counts towards a collapse.")
       .integer("collapse_expected", &M::collapse_expected, 10, 1000, "matches",
-               "Matches that must be expected before their absence says anything.")
+               "Minimum expected matches for a frame to count.")
       .done();
 }
 
@@ -703,13 +675,12 @@ Group intrinsics_error() {
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   return Rows<E>(
              "mock.intrinsics_error", "", [](auto& c) -> auto& { return c.mock.intrinsics_error; })
-      .number("principal_point_px", &E::principal_point_px, 0, 50, "px",
-              "Sigma of the error of each principal point coordinate that the estimator is given; "
-              "what is rendered stays exact.")
+      .number(
+          "principal_point_px", &E::principal_point_px, 0, 50, "px",
+          "Sigma of the error of each supplied principal-point coordinate; rendering stays exact.")
       .number("focal_percent", &E::focal_percent, 0, 10, "%",
-              "Sigma of the error of the focal length that it is given, one draw a camera.")
-      .integer("seed", &E::seed, 0, kLargestSeed, "",
-               "Of these errors: the same seed, the same errors.")
+              "Sigma of the error of the supplied focal length, drawn per camera.")
+      .integer("seed", &E::seed, 0, kLargestSeed, "", "Seed of these errors.")
       .done();
 }
 
@@ -719,16 +690,16 @@ Group calibration_error() {
              "mock.calibration_error", "",
              [](auto& c) -> auto& { return c.mock.calibration_error; })
       .number("pitch_deg", &E::pitch_deg, -45, 45, "°",
-              "Camera 1 of the transform that the estimator is given, against the true one: turned "
-              "about its x axis.")
-      .number("yaw_deg", &E::yaw_deg, -45, 45, "°", "The same, turned about its y axis.")
-      .number("roll_deg", &E::roll_deg, -45, 45, "°", "The same, turned about its z axis.")
-      .number("x_m", &E::x_m, -1, 1, "m", "The same, shifted along its x axis.")
-      .number("y_m", &E::y_m, -1, 1, "m", "The same, shifted along its y axis.")
-      .number("z_m", &E::z_m, -1, 1, "m", "The same, shifted along its z axis.")
+              "Error of the supplied extrinsics of camera 1: rotation about its x axis.")
+      .number("yaw_deg", &E::yaw_deg, -45, 45, "°", "The same about its y axis.")
+      .number("roll_deg", &E::roll_deg, -45, 45, "°", "The same about its z axis.")
+      .number("x_m", &E::x_m, -1, 1, "m",
+              "Error of the supplied extrinsics of camera 1: translation along its x axis.")
+      .number("y_m", &E::y_m, -1, 1, "m", "The same along its y axis.")
+      .number("z_m", &E::z_m, -1, 1, "m", "The same along its z axis.")
       .number("length_percent", &E::length_percent, -60, 200, "%",
-              "By how much every length that it is given is too long, the baseline's included; "
-              "images alone cannot show it.")
+              "Scale error of the supplied lengths including the baseline; images alone cannot "
+              "show it.")
       .done();
 }
 
@@ -737,18 +708,18 @@ Group mock() {
   using Kind = vergence::mock::DriveKind;
   constexpr std::int64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
   return Rows<M>(
-             "mock", "The world and the vehicle of the mock drivers; see docs/simulated_rig.md.",
+             "mock", "World and vehicle of the simulated rig (docs/simulated_rig.md).",
              [](auto& c) -> auto& { return c.mock; })
-      .text("world", &M::world, 16, "What is driven through: `suburb`.")
+      .text("world", &M::world, 16, "Rendered world: `suburb`.")
       .choice("drive", &M::drive,
               {{"loop", Kind::loop},
                {"figure-eight", Kind::figure_eight},
                {"straight", Kind::straight},
                {"brief", Kind::brief},
                {"still", Kind::still}},
-              "Where: `loop` (1 km), `figure-eight`, `straight`, `brief` (120 m) or `still`.")
+              "Route: `loop` (1 km), `figure-eight`, `straight`, `brief` (120 m) or `still`.")
       .integer("seed", &M::seed, 0, kLargestSeed, "",
-               "Of the town, the vehicle's unrest and all noise: the same seed, the same drive.")
+               "Seed of the world, the vehicle's motion and all noise: same seed, same run.")
       .choice("pattern", &M::pattern,
               {{"grey", vergence::mock::Pattern::grey}, {"gbrg", vergence::mock::Pattern::gbrg}},
               "Sensors: `grey`, or `gbrg` (Bayer).")
@@ -762,10 +733,9 @@ Group mock() {
       .number("speed", &M::speed, 0.01, 20, "m/s", "Speed on the straights.")
       .number("suspension", &M::suspension, 0, 3, "",
               "Gain on pitch, roll and heave of the springs.")
-      .number("vibration", &M::vibration, 0, 5, "", "Gain on the shake at 6 to 12 Hz.")
-      .number(
-          "stop_s", &M::stop_s, 1, 3600, "s",
-          "Length of each stop, and of the standing start and end, which last a minute at most.")
+      .number("vibration", &M::vibration, 0, 5, "", "Gain on the vibration at 6 to 12 Hz.")
+      .number("stop_s", &M::stop_s, 1, 3600, "s",
+              "Duration of each stop, and of the standing start and end (at most a minute).")
       .number("hill_deg", &M::hill_deg, 0, 5, "°", "Steepest slope of the streets.")
       .number("clock_drift_ppm", &M::clock_drift_ppm, 0, 150, "ppm",
               "Largest drift of the devices' clocks; each has its own.")
@@ -779,7 +749,7 @@ Group faults() {
   group.name = "faults";
   group.list = "faults.";
   group.meaning =
-      "What goes wrong in the mock, a list; docs/simulated_rig.md has the kinds and their "
+      "Faults of the simulated rig, a list; docs/simulated_rig.md has the kinds and their "
       "parameters.";
   for (std::size_t i = 0; i < kMaxFaults; ++i)
     group.keys.push_back(

@@ -23,11 +23,12 @@ namespace {
 std::string contents(const std::filesystem::path& path) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) throw InputError(path.string() + ": there is no such file");
+  if (!std::filesystem::exists(status))
+    throw InputError(path.string() + ": no such file; check the path");
   if (std::filesystem::is_directory(status))
-    throw InputError(path.string() + ": is a folder, not a YAML file");
+    throw InputError(path.string() + ": is a directory; name a YAML file");
   if (!std::filesystem::is_regular_file(status))  // reading a pipe would wait for ever
-    throw InputError(path.string() + ": is a pipe or a device, not a YAML file");
+    throw InputError(path.string() + ": is a pipe or a device; name a YAML file");
   errno = 0;
   std::ifstream in(path, std::ios::binary);
   if (!in) throw InputError(path.string() + ": cannot be opened: " + std::strerror(errno));

@@ -23,9 +23,8 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
   if (const auto at = std::find(words.begin(), words.end(), word); at != words.end())
     return static_cast<SequenceFormat>(at - words.begin());
   if (word != "auto")
-    throw InputError(fmt::format(
-        "--format \"{}\" is not known{}; {} are what can be read, and auto finds out which it is",
-        word, did_you_mean(word, words), fmt::join(words, ", ")));
+    throw InputError(fmt::format("--format \"{}\": unknown format{}; use auto or one of {}", word,
+                                 did_you_mean(word, words), fmt::join(words, ", ")));
   std::error_code ignored;
   if (const auto bag = bag_format(folder); bag && !std::filesystem::is_directory(folder, ignored))
     return *bag;
@@ -33,21 +32,22 @@ SequenceFormat sequence_format(const std::string& word, const std::filesystem::p
     if (const std::string advice = unpack_advice(folder); !advice.empty())
       throw InputError(folder.string() + ": " + advice);
   if (!std::filesystem::is_directory(folder, ignored))
-    throw InputError(folder.string() + ": is no folder; a folder with a drive is expected");
+    throw InputError(
+        folder.string() +
+        ": no such directory; pass a data-set directory, or a .mcap, .db3 or .bag file");
   if (const auto found = find_format(folder)) return *found;
   for (std::filesystem::directory_iterator it(folder, ignored), end; !ignored && it != end;
        it.increment(ignored))
     if (const std::string advice = unpack_advice(it->path()); !advice.empty())
       throw InputError(it->path().string() + ": " + advice);
-  throw InputError(folder.string() + ": holds no drive that is known: " + kLayouts);
+  throw InputError(folder.string() + ": no known data-set format; expected: " + kLayouts);
 }
 
 void check_topics(SequenceFormat format, const BagTopics& topics) {
   if (!is_bag(format) && !topics.empty())
     throw InputError(
-        "topics are chosen of bags (--format mcap, db3 or rosbag); leave --left-topic, "
-        "--right-topic, "
-        "--ins-topic and --imu-topic away");
+        "--left-topic, --right-topic, --ins-topic and --imu-topic are for bags (--format mcap, db3 "
+        "or rosbag); remove them");
 }
 
 }  // namespace vergence::app

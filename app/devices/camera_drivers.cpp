@@ -21,9 +21,8 @@ const CameraDriverRow& row_of(const CameraRequest& request) {
   for (const CameraDriverRow& row : camera_driver_rows())
     if (request.driver == row.name) return row;
   const auto names = camera_driver_names();
-  throw InputError(fmt::format("{}.driver is \"{}\"{}; this version knows {}", request.key,
-                               request.driver, did_you_mean(request.driver, names),
-                               fmt::join(names, ", ")));
+  throw InputError(fmt::format("{}.driver is \"{}\"{}; supported: {}", request.key, request.driver,
+                               did_you_mean(request.driver, names), fmt::join(names, ", ")));
 }
 
 std::string list_of(const std::vector<DeviceInfo>& found) {
@@ -71,19 +70,18 @@ void check_half(const CameraRequest& request, const std::vector<CameraRequest>& 
   const bool left = request.half == ImageHalf::left;
   if (other == requests.end())
     throw InputError(fmt::format(
-        "{}.image_half is {}, and no other entry is the {} half of the same picture: give one the "
-        "same "
-        "driver and serial, and half: {}",
+        "{}.image_half is {}, and no other entry is the {} half of the same image: give one the "
+        "same driver and serial, and image_half: {}",
         request.key, left ? "left" : "right", left ? "right" : "left", left ? "right" : "left"));
   const CameraConfiguration& a = request.configuration;
   const CameraConfiguration& b = other->configuration;
   if (a.exposure != b.exposure || a.gain_db != b.gain_db || a.pixel_format != b.pixel_format ||
       a.offset_x != b.offset_x || a.offset_y != b.offset_y ||
       options_text(a.options) != options_text(b.options))
-    throw InputError(fmt::format(
-        "{} and {} are halves of one camera's picture and differ: exposure_us, gain_db, "
-        "pixel_format, offset and options are that camera's, give both the same",
-        request.key, other->key));
+    throw InputError(
+        fmt::format("{} and {} are halves of one camera's image and differ: set exposure_us, "
+                    "gain_db, pixel_format, offset and options equally",
+                    request.key, other->key));
 }
 
 /// The drivers in use, and who is taken.
@@ -151,9 +149,9 @@ class Openings {
       return d.serial;
     }
     const std::string said = driver.last_error();
-    throw DeviceError(fmt::format("{}: no {} camera is left to be it; {}; check cable and power{}",
-                                  request.key, request.driver, list_of(found),
-                                  said.empty() ? "" : ": " + said));
+    throw DeviceError(
+        fmt::format("{}: no unassigned {} camera was found; {}; check cable and power{}",
+                    request.key, request.driver, list_of(found), said.empty() ? "" : ": " + said));
   }
 
   std::map<std::string, std::unique_ptr<CameraDriver>> drivers_;

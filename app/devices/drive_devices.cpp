@@ -25,14 +25,15 @@ std::vector<CameraRequest> requests_of(const Configuration& c) {
   const int cameras = nominal_rig(c).cameras;
   if (cameras < 2)
     throw InputError(
-        "one camera alone has no scale; two are the least, cameras: [{driver: gige}, {driver: "
-        "gige}]");
+        "cameras: one camera is configured, two are needed for scale; for example cameras: "
+        "[{driver: gige}, {driver: gige}]");
   for (int k = 0; k < cameras; ++k) {
     const CameraSettings& s = c.cameras[static_cast<std::size_t>(k)];
     const std::string key = fmt::format("cameras.{}", k);
     if (s.driver == "mock")
       throw InputError(key +
-                       ".driver is mock, another camera is real; a mock's cameras share one world");
+                       ".driver is mock, but another camera is real; simulated and real cameras "
+                       "cannot be mixed");
     if (s.width != c.cameras[0].width || s.height != c.cameras[0].height)
       throw InputError(fmt::format(
           "{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a rig have one size",
@@ -84,9 +85,9 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
                            bool fast, std::optional<double> duration_s)
     : fast_(fast) {
   if (!all_mock(c)) {
-    if (fast)
-      throw InputError("--fast is virtual time, which real cameras do not keep; run without it");
-    if (!faults.empty()) throw InputError("--fault is for the mock; real cameras have their own");
+    if (fast) throw InputError("--fast needs simulated cameras; remove it");
+    if (!faults.empty())
+      throw InputError("--fault needs simulated cameras (driver: mock); remove it");
     open_real(c);
     if (duration_s) frames_ = static_cast<std::uint64_t>(*duration_s * c.trigger.rate) + 1;
     return;

@@ -124,9 +124,7 @@ void check_ins_syncout(const Configuration& c, int cameras) {
                           "wired to the cameras",
                           c.ins.driver));
   if (!(c.ins.sync_out_hz > 0))
-    refuse(
-        c,
-        "ins.sync_out_hz says how many pulses a second the INS makes; set it, to 25 for instance");
+    refuse(c, "set ins.sync_out_hz, the pulse rate of the INS, for example to 25");
   if (std::abs(c.ins.sync_out_hz - c.trigger.rate) > 1e-3 * c.trigger.rate)
     refuse(c, fmt::format("trigger.rate is {} and ins.sync_out_hz {}; the INS triggers the "
                           "cameras, so both are one rate",
@@ -262,7 +260,7 @@ SyncOptions sync_options(const Configuration& c, int cameras) {
     camera.jitter = jitter_of(s);
   });
   if (const char* message = o.validate())
-    throw InputError(fmt::format("sync ({}): {}", to_string(c.sync.mode), message));
+    throw InputError(fmt::format("sync.mode {}: {}", to_string(c.sync.mode), message));
   return o;
 }
 
@@ -328,17 +326,16 @@ const char* proof_message(SyncMode mode) noexcept {
     case SyncMode::master_strobe:
       return "pairs are verified by the exposures of camera 0, which triggers the others";
     case SyncMode::ieee1394_cycle_time:
-      return "pairs are verified by stamps of the bus's one clock";
+      return "pairs are verified by stamps of one bus clock";
     case SyncMode::ptp:
       return "pairs are verified by stamps of one PTP clock";
     case SyncMode::side_by_side:
-      return "pairs are verified: both images come in one picture";
+      return "pairs are verified: both images are in one frame";
     case SyncMode::frame_counter:
-      return "nothing proves that paired images were exposed together: sync.mode is counter, they "
-             "are counted and their stamps compared";
+      return "pairing is not verified: sync.mode is frame_counter (counters and stamps are "
+             "compared)";
     case SyncMode::approximate_time:
-      return "nothing proves that paired images were exposed together: sync.mode is software, "
-             "their stamps are near each other";
+      return "pairing is not verified: sync.mode is approximate_time (nearest stamps)";
   }
   return "";
 }

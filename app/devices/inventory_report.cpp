@@ -288,11 +288,9 @@ std::string doctor_text(const std::vector<Finding>& findings, bool given, const 
     if (!f.fix.empty()) text += "\n";
   }
   if (!text.ends_with("\n\n")) text += "\n";
-  text +=
-      fmt::format("problems: {}, advice: {}, well: {}\n", count(findings, FindingState::problem),
-                  count(findings, FindingState::advice), count(findings, FindingState::ok));
-  if (!given)
-    text += "Name a configuration to have checked what its drive needs: vergence doctor CONFIG\n";
+  text += fmt::format("problems: {}, advice: {}, ok: {}\n", count(findings, FindingState::problem),
+                      count(findings, FindingState::advice), count(findings, FindingState::ok));
+  if (!given) text += "To check a configuration: vergence doctor CONFIG\n";
   return text;
 }
 

@@ -55,12 +55,11 @@ void check_drive(const Configuration& c) {
   const int n = camera_count(c);
   if (n == 0)
     throw InputError(
-        "the configuration names no camera; cameras: [{driver: mock}, {driver: mock}] is the "
-        "least");
+        "cameras: no camera is configured; set at least cameras: [{driver: mock}, {driver: mock}]");
   if (n < 2)
     throw InputError(
-        "one camera alone has no scale; two are the least, cameras: [{driver: mock}, {driver: "
-        "mock}]");
+        "cameras: one camera is configured, two are needed for scale; for example cameras: "
+        "[{driver: mock}, {driver: mock}]");
   for (int k = 0; k < n; ++k) {
     const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
     one_of(fmt::format("cameras.{}.driver", k), camera.driver, {"mock"});

@@ -84,9 +84,9 @@ std::unique_ptr<InsDriver> make_gnss(const InsRequest& request) {
 const InsDriverRow& row_of(const InsRequest& request) {
   if (const InsDriverRow* row = find_ins_driver(request.driver)) return *row;
   const auto names = ins_driver_names();
-  throw InputError(fmt::format(
-      "ins.driver is \"{}\"{}; this version knows {}, mock (with mock cameras) and none",
-      request.driver, did_you_mean(request.driver, names), fmt::join(names, ", ")));
+  throw InputError(
+      fmt::format("ins.driver is \"{}\"{}; supported: {}, mock (with mock cameras) and none",
+                  request.driver, did_you_mean(request.driver, names), fmt::join(names, ", ")));
 }
 
 }  // namespace

@@ -106,8 +106,9 @@ std::vector<ImageIssue> Snap::look_at(const CapturedSet& set,
       if (are_identical(set.images[i], set.images[k]))
         remarks.push_back(
             {true,
-             fmt::format("{} and {} are the same picture: one camera twice? give each its serial",
-                         names_[i], names_[k])});
+             fmt::format(
+                 "{} and {} are identical images; set cameras.N.serial if one camera is used twice",
+                 names_[i], names_[k])});
   return remarks;
 }
 
@@ -145,8 +146,7 @@ void Snap::keep(const CapturedSet& set) {
     say(r.message);
   }
   if (set.proof == SyncProof::ambiguous)
-    say("the cameras' stamps do not agree: that these pictures were exposed together is not "
-        "verified");
+    say("the stamps of the cameras do not agree; simultaneous exposure is not verified");
   sets_.push_back({{"stamp_ns", set.stamp.ns()},
                    {"stamp_error_ms", rounded(set.stamp_error.to_seconds() * kMilli, 4)},
                    {"spread_ms", rounded(set.spread.to_seconds() * kMilli, 4)},
@@ -200,7 +200,8 @@ ExitCode Snap::verdict(const CaptureResult& taking) const {
         "{} {}; check its cable, its power, and what triggers it ({}.trigger; `free` needs no "
         "pulse)",
         camera_title(names_[k], devices_->cameras()[k]->info()),
-        taking.gone[k] ? "has gone" : fmt::format("sent no image within {:g} s", request_.wait_s),
+        taking.gone[k] ? "is disconnected"
+                       : fmt::format("sent no image within {:g} s", request_.wait_s),
         fmt::format("cameras.{}", k)));
   }
   if (!silent)
@@ -208,7 +209,7 @@ ExitCode Snap::verdict(const CaptureResult& taking) const {
         "images came from every camera, but {}: {} of {} sets were taken; cameras that are not "
         "triggered together need "
         "sync.mode: approximate_time and a sync.tolerance_ms of half their period",
-        sets_.empty() ? "never two that belong together" : "too few that belong together",
+        sets_.empty() ? "no images within the tolerance" : "too few within the tolerance",
         taking.sets, request_.count));
   return ExitCode::device_failed;
 }

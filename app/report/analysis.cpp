@@ -194,20 +194,18 @@ void take_reference(const Session& s, Analysis* a) {
       ours.empty() ? MatchedTrajectories{} : associate(ours, s.reference, EvaluationOptions{});
   if (m.estimate.empty()) {
     a->source_message =
-        "reference.tum has no pose at the times of ours: there is nothing to compare, so no errors "
-        "are shown.";
+        "No errors: the stamps of reference.tum and of the estimate do not overlap.";
     return;
   }
   const Laid laid = lay_on(m);
   const bool up_is_z = world_up(m.reference, BodyAxes::camera).z() > 0.5;
   a->source = ErrorSource::reference;
   a->source_message = fmt::format(
-      "Errors against the reference trajectory. Ours was laid on it once, rigidly and without "
-      "scale, over the first {:.0f} m ({}); what "
-      "grows after that is drift.",
+      "Errors against the reference trajectory. The estimate is aligned once, rigidly and without "
+      "scale, over the first {:.0f} m ({}); what grows after that is drift.",
       laid.stretch,
       laid.by_rotations
-          ? "by attitudes and mean position: the path is too straight for positions alone"
+          ? "by attitudes and mean position, because the path is too straight for positions alone"
           : "by positions");
   compare_with_reference(s, m, laid, up_is_z, a);
 }
@@ -234,12 +232,12 @@ void find_alignments(const Session& s, Analysis* a) {
 
 std::string alignment_text(const Analysis& a) {
   constexpr std::size_t kReported = 5;
-  if (a.placed_s.size() < 2) return ", which was fitted at the start and then frozen";
-  std::string words = fmt::format(", which was placed {} times, at ", a.placed_s.size());
+  if (a.placed_s.size() < 2) return ", which is fitted at the start and then fixed";
+  std::string words = fmt::format(", which was fitted {} times, at ", a.placed_s.size());
   for (std::size_t i = 0; i < std::min(kReported, a.placed_s.size()); ++i)
     words += (i > 0 ? ", " : "") + duration_text(a.placed_s[i], 0.1);
   return words + (a.placed_s.size() > kReported ? ", …" : "") +
-         ", where the way had broken off: errors and positions step there";
+         ", after interruptions: errors and positions step there";
 }
 
 void take_ins(const Session& s, Analysis* a) {
@@ -257,13 +255,12 @@ void take_ins(const Session& s, Analysis* a) {
     a->heading_deg[i] = f.error_heading_deg;
   }
   if (!compared) {
-    a->source_message =
-        "There was an INS, but never a frame that could be compared with it: no errors are shown.";
+    a->source_message = "No errors: no frame could be compared with the INS.";
     return;
   }
   a->source = ErrorSource::ins;
-  a->source_message = "Errors against the INS after the alignment on the earth" +
-                      alignment_text(*a) + "; they hold the INS's own errors, too.";
+  a->source_message = "Errors against the INS after the ENU alignment" + alignment_text(*a) +
+                      "; they include the INS's own errors.";
 }
 
 void take_world(const Session& s, Analysis* a) {
@@ -285,17 +282,13 @@ void compare(const Session& s, Analysis* a) {
   if (placed) return take_ins(s, a);
   if (ins) {
     a->ins_unplaced = true;
-    a->source_message =
-        "There was an INS, but the drive could not be placed on the earth with it: no errors are "
-        "shown.";
+    a->source_message = "No errors: the run has no ENU alignment with its INS.";
     return take_world(s, a);
   }
   if (!s.reference.empty()) take_reference(s, a);
   if (a->source != ErrorSource::none) return;
   if (a->source_message.empty())
-    a->source_message =
-        "There was no reference: how far the trajectory drifted is not known, so no errors are "
-        "shown.";
+    a->source_message = "No errors: no reference was available, so the drift is unknown.";
   take_world(s, a);
 }
 
@@ -377,8 +370,8 @@ void drift_by_positions(const Session& s, Analysis* a) {
     const auto difference = mean_difference(m, R, driven, length);
     if (!difference) continue;
     a->drift = *difference / length;
-    a->drift_message = fmt::format(
-        "horizontal, over segments of {:.0f} m; the INS's own errors are in it", length);
+    a->drift_message =
+        fmt::format("horizontal, over segments of {:.0f} m; includes the INS's own errors", length);
     return;
   }
 }

@@ -23,28 +23,25 @@ constexpr std::array kPose{
            "Images carried no structure: clean the lenses, take covers off, set exposure and gain "
            "for the light."},
     Advice{"image_repeated",
-           "A camera gave an older image again: check its link, its buffers and the trigger rate "
-           "it is set to."},
+           "A camera sent an image twice: check its link, its buffers and its trigger rate."},
     Advice{"few_features",
-           "There was too little texture: raise the exposure, look for fog, rain or dirt on the "
-           "lenses."},
+           "Too little texture: raise the exposure; check for fog, rain or dirt on the lenses."},
     Advice{"no_stereo_matches",
-           "Left and right do not fit this calibration: look for folders of different drives, "
-           "T_camera_left inverted (X_camera = R X_left "
-           "+ t), distortion given for images that are rectified already, wrong lens numbers, or "
-           "cameras that do not expose together; --from-scratch finds the "
-           "transform itself."},
+           "Left and right do not fit this calibration: check for directories of different "
+           "sequences, an inverted T_camera_left (X_camera = R X_left + t), distortion set for "
+           "rectified images, wrong intrinsics, or cameras that do not expose together; "
+           "--from-scratch estimates the transform."},
     Advice{"cameras_swapped",
-           "Left and right are swapped, or T_camera_left is inverted: swap cables, folders or the "
-           "cameras' order; X_camera = R X_left + t."},
+           "Left and right are swapped, or T_camera_left is inverted: swap cables, directories or "
+           "the order of the cameras; X_camera = R X_left + t."},
     Advice{"few_inliers",
-           "Poses rested on few points: check the images of those moments for dirt, blur or a "
+           "Poses rested on few points: check the images at those times for dirt, blur or a "
            "covered lens."},
     Advice{"single_camera",
            "One camera did not support the pose: check its images for dirt, blur or a wrong "
            "exposure."},
     Advice{"no_pose",
-           "Tracking failed: check the images of those moments; shorter exposure or a higher "
+           "Tracking failed: check the images at those times; a shorter exposure or a higher "
            "frame rate helps in fast turns."},
     Advice{
         "time_gap",
@@ -53,59 +50,57 @@ constexpr std::array kPose{
            "After a gap the motion across it was extrapolated: do not use distances that span it."},
     Advice{
         "weak_geometry",
-        "The points did not hold the pose well or much worse than usual, or a pose was corrected "
-        "far: expect it in tunnels, open fields and beside walls; elsewhere check that the "
-        "cameras are in step."},
+        "The points constrained the pose poorly, or the window corrected it by much: expected in "
+        "tunnels, open fields and next to walls; elsewhere check that the cameras are in sync."},
     Advice{"dynamic_scene",
-           "Much of the picture moved by itself, as behind a bus: compare those stretches with the "
-           "map before use."},
+           "Much of the image moved independently, for example a bus: compare those sections with "
+           "the map before use."},
     Advice{"unverified_calibration",
-           "The calibration in use was no longer, or not yet, confirmed by the drive: turns and "
-           "near things at the roadside confirm it."},
+           "The calibration in use was not verified yet, or no longer: turns and near objects at "
+           "the roadside verify it."},
     Advice{"recalibrating",
            "The rig did not fit its calibration. If it did before, look for a camera that was "
-           "knocked or is loose on its mount; if it never did, check the calibration given: "
-           "T_camera_left, or its rotation, may be inverted, or the lenses be those of images that "
-           "were not yet rectified."},
-    Advice{
-        "uncalibrated",
-        "No calibration had been found yet: these poses only bridge the time until there is one."},
+           "knocked or is loose on its mount; if it never did, check the supplied calibration: "
+           "T_camera_left or its rotation may be inverted, or the intrinsics belong to unrectified "
+           "images."},
+    Advice{"uncalibrated",
+           "No calibration was available yet: do not use these poses for measurements."},
     Advice{"out_of_sync",
-           "A camera's images were of another instant: check trigger lines and exposure, and "
+           "A camera's images were taken at another instant: check trigger lines and exposure, and "
            "restart the cameras together."},
     Advice{"needs_motion",
-           "The calibration could not be found standing still: drive some metres past things at "
+           "The calibration cannot be estimated at standstill: drive some metres past objects at "
            "the roadside."},
     Advice{"needs_near_structure",
-           "The calibration could not be found with far things only: drive past houses, cars or "
-           "trees."},
+           "The calibration cannot be estimated from distant objects only: drive past houses, cars "
+           "or trees."},
     Advice{"needs_texture",
-           "The calibration could not be found for want of matches between the cameras: check "
-           "lenses and exposure."},
+           "Too few matches between the cameras to estimate the calibration: check lenses and "
+           "exposure."},
     Advice{"pairing_ambiguous",
            "Pulses, counters and stamps contradicted each other: check trigger lines, exposure and "
-           "the board; see the events."},
+           "the trigger board; see the events."},
 };
 
 constexpr std::array kSkipped{
     Advice{"stamp_not_increasing",
-           "The times of these frames are not later than those before them: look at the order of "
-           "times.txt and of the files."},
+           "The stamps of these frames do not increase: check the order of times.txt and of the "
+           "files."},
     Advice{"stamp_outlier",
-           "The times of these frames are later than those after them: look at these lines of "
+           "The stamps of these frames are later than those that follow: check these lines of "
            "times.txt."},
     Advice{"image_missing",
-           "An image that the recording lists is not there: copy the folder again, or leave the "
-           "pair out on both sides."},
-    Advice{"image_truncated",
-           "An image file ends too early: copy it again; the disk that it was recorded to may have "
-           "been full."},
+           "An image listed by the recording is missing: copy the directory again, or remove the "
+           "pair on both sides."},
+    Advice{
+        "image_truncated",
+        "An image file is truncated: copy it again; the disk may have been full during recording."},
     Advice{"image_size",
-           "An image has another size than the calibration is for: take out what does not belong "
-           "to this drive."},
+           "The size of an image differs from that of the calibration: remove images that do not "
+           "belong to this sequence."},
     Advice{"image_unreadable",
-           "An image could not be read as a picture: look at the file; PNG and JPEG are what can "
-           "be read."},
+           "An image could not be decoded: check the file; PNG, JPEG, BMP, PGM and PPM are "
+           "supported."},
 };
 
 }  // namespace
@@ -203,15 +198,15 @@ Usability usability_of(const Session& s, const Analysis& a) {
   if (waiting > 0 && waiting == a.degraded && moving_frames(s, a) < kFramesToVerify &&
       a.lost <= a.read / 10 && a.skipped <= a.read)
     return {Use::unverified,
-            fmt::format("unverified: the drive ended after {} frames, before it could confirm its "
-                        "calibration, which takes some {} in motion",
+            fmt::format("unverified: the run ended after {} frames; verifying the calibration "
+                        "takes about {} frames in motion",
                         a.read, kFramesToVerify),
             std::string(rejected)};
   const Main main = main_reason(s, a);
   const bool posed = a.degraded > 0;
   Usability u{Use::nothing, "", std::string(advice_for(main.word))};
-  u.reason = posed ? fmt::format("not one of {} frames is ok", a.read + a.skipped)
-                   : "there never was a pose";
+  u.reason =
+      posed ? fmt::format("none of {} frames is ok", a.read + a.skipped) : "no frame has a pose";
   if (main.frames > 0)
     u.reason += fmt::format(": {} ({} of {} frames)", main.word, main.frames, a.read + a.skipped);
   if (!rejected.empty()) {
@@ -232,7 +227,7 @@ struct Outages {
   std::optional<Stamp> open{};  // it never came back
 };
 
-/// `camera 1` of `camera 1 is gone; …`.
+/// `camera 1` of `camera 1 is disconnected; …`.
 std::string device_of(const Event& e) {
   if (e.kind.starts_with("trigger_board")) return "the trigger board";
   constexpr std::string_view kCamera = "camera ";
@@ -274,12 +269,12 @@ void judge_open_outage(const std::string& device, Stamp from, const Session& s, 
   const bool last = s.left_out.empty() && (s.frames.empty() || s.frames.back().stamp <= from ||
                                            seconds_between(from, s.frames.back().stamp) <= kLag);
   if (s.frames.empty())
-    j->find(Grade::bad, "there never was a frame: " + device + " was gone");
+    j->find(Grade::bad, "no frame was received: " + device + " was disconnected");
   else if (last)
     j->find(Grade::bad, "no frame after " + since_start(s, std::max(from, s.frames.back().stamp)) +
-                            ": " + device + " was gone");
+                            ": " + device + " was disconnected");
   else
-    j->find(Grade::care, device + " was gone from " + since_start(s, from) + " to the end");
+    j->find(Grade::care, device + " was disconnected from " + since_start(s, from) + " to the end");
 }
 
 /// Adds the findings about outages, with one piece of advice per device. Returns true if poses are
@@ -293,9 +288,9 @@ bool judge_outages(const std::map<std::string, Outages>& outages, const Session&
   for (const auto& [device, o] : outages) {
     if (o.open) judge_open_outage(device, *o.open, s, j);
     if (holes && o.longest_s > kLong)
-      j->find(Grade::care, device + " was gone for " + duration_text(o.longest_s, 0.1));
+      j->find(Grade::care, device + " was disconnected for " + duration_text(o.longest_s, 0.1));
     broken = broken || (holes && (o.open || o.longest_s > kLong));
-    std::string text = device + " was gone";
+    std::string text = device + " was disconnected";
     text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
     if (o.count > 1) text += fmt::format(" {} times", o.count);
     if (o.seconds > 0) text += " for " + duration_text(o.seconds, 0.1);
@@ -316,14 +311,13 @@ bool fits_as_well(const CalibrationRow& rejected) {
 void advise_on_causes(const Session& s, Findings* j) {
   constexpr std::array kCauses{
       Advice{"knock",
-             "The rig was knocked during the drive and has been calibrated "
-             "again: check the camera's mount before the next drive."},
-      Advice{"collapse",
-             "The rig was knocked hard during the drive and has been calibrated "
-             "again: check the camera's mount before the next drive."},
+             "The rig was knocked and recalibrated: check the camera mount before the next run."},
+      Advice{
+          "collapse",
+          "The rig was knocked hard and recalibrated: check the camera mount before the next run."},
       Advice{"drift",
-             "The rig crept out of its calibration and was followed: look "
-             "for a mount that warms up or works loose."}};
+             "The extrinsics drifted and were followed: check for a mount that warms up or works "
+             "loose."}};
   for (const Advice& advice : kCauses)
     if (std::any_of(
             s.calibrations.begin(), s.calibrations.end(),
@@ -355,15 +349,14 @@ void judge_focal_length(const Session& s, Findings* j) {
   const double sigma = figure("sigma_px");
   const std::string measured =
       sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", figure("measured_px"), sigma)
-                : fmt::format("{:.0f} px or still farther from it", figure("measured_px"));
+                : fmt::format("{:.0f} px or even further off", figure("measured_px"));
   const std::string reason = fmt::format(
-      "the focal length given, {:.0f} px, is not that of these images: the drive measures {}, and "
-      "its distances are off by as much",
+      "the configured focal length, {:.0f} px, is contradicted by the images, which give {}; "
+      "distances are wrong by the same ratio",
       figure("configured_px"), measured);
   constexpr const char* kAdvice =
-      "Give the focal length of this lens in pixels of these images (cameras.N.intrinsics, "
-      "--focal): "
-      "of another size of image, a crop or a rectification it is another.";
+      "Set the focal length in pixels of these images (cameras.N.intrinsics or --focal); resizing, "
+      "cropping or rectification changes it.";
   j->find(Grade::bad, reason);
   j->advise(kAdvice);
   j->give_up(reason, kAdvice);
@@ -373,21 +366,20 @@ void judge_focal_length(const Session& s, Findings* j) {
 void judge_calibration(const Session& s, const Usability& use, Findings* j) {
   const std::string rating = text_at(s.summary, "calibration.rating");
   if (const CalibrationRow* near = known_well_near(s); near != nullptr && rating == "poor") {
-    j->find(Grade::care,
-            fmt::format(
-                "the baseline is short: depths are known to {:.1f} % at {:.1f} m, but not at 20 m",
-                near->depth_sigma_percent, near->reference_depth_m));
+    j->find(
+        Grade::care,
+        fmt::format(
+            "the baseline is short: depths are accurate to {:.1f} % at {:.1f} m, but not at 20 m",
+            near->depth_sigma_percent, near->reference_depth_m));
   } else if (rating == "poor") {
-    j->find(Grade::bad, "the calibration is too uncertain for depths");
+    j->find(Grade::bad, "the calibration is too uncertain (rating: poor)");
     j->advise(text_at(s.summary, "calibration.limited_by") == "intrinsics"
-                  ? "The calibration is weak because focal lengths or principal points are not "
-                    "known better: calibrate the lenses on a "
-                    "checkerboard; driving on does not help."
-                  : "The calibration is weak: drive through a place with near and far structure "
-                    "and some turns, or calibrate on a "
-                    "checkerboard.");
+                  ? "The calibration is limited by focal lengths or principal points: calibrate "
+                    "the intrinsics with a target; driving on does not help."
+                  : "The calibration is weak: drive turns with near and far structure in view, or "
+                    "calibrate with a target.");
   } else if (rating == "fair") {
-    j->find(Grade::care, "the calibration can be improved");
+    j->find(Grade::care, "the calibration is only fair");
   }
   // A drive that begins with a calibration has a row of it; a session of another make has no count.
   if (s.calibrations.empty() && !number_at(s.summary, "calibration.accepted")) return;
@@ -395,8 +387,8 @@ void judge_calibration(const Session& s, const Usability& use, Findings* j) {
                    [](const CalibrationRow& c) { return c.accepted; })) {
     if (use.use == Use::ok) j->find(Grade::care, "no calibration was found");
     j->advise(
-        "No calibration was found: drive past things at the roadside, near and far; "
-        "calibrations.csv says what each attempt lacked.");
+        "No calibration was found: drive past objects near and far; calibrations.csv has the "
+        "reason of each attempt.");
   } else {
     // Online measurements are no attempts to replace the calibration in use.
     const auto last = std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
@@ -420,19 +412,18 @@ void judge_verification(const Session& s, const Analysis& a, const Usability& us
                               !a.verified_s;  // the summary of a torn session says nothing
   if (verified.value_or(!waited_in_vain)) return;
   if (flag_at(s.summary, "calibration.online") == false) {
-    j->find(Grade::care, "the calibration is not verified, nothing watched it");
+    j->find(Grade::care, "the calibration is not verified (calibration.online: off)");
     j->advise(
-        "Nothing watched the rig: with calibration.online: on the drive itself confirms the "
-        "calibration, or says that it is wrong.");
+        "The rig was not monitored: set calibration.online: on to verify the calibration while "
+        "driving.");
     return;
   }
   if (use.use != Use::unverified)
     j->find(Grade::care, a.verified_s ? "the calibration in use at the end is not verified"
-                                      : "the drive has not confirmed its calibration");
+                                      : "the calibration was never verified");
   j->advise(
-      "The drive did not show that its calibration is right: drive turns, past near things at the "
-      "roadside, and look whether corners of "
-      "the image stay without tracks (dirt, a bonnet, sky only).");
+      "The calibration was not verified: drive turns past near objects, and check whether image "
+      "corners have no tracks (dirt, bonnet, sky).");
 }
 
 /// Advice for events about calibrations and lengths.
@@ -442,19 +433,19 @@ void advise_on_events(const Session& s, Findings* j) {
                         [kind](const Event& e) { return e.kind == kind; });
   };
   if (const auto event = first("calibration_save_failed"); event != s.events.end())
-    j->advise("A calibration was not kept: " + event->message + ".");
+    j->advise("A calibration was not saved: " + event->message + ".");
   if (const auto event = first("calibration_contradicted"); event != s.events.end()) {
-    j->find(Grade::care, "the calibration given is not that of the rig");
-    j->advise("During the drive " + event->message +
-              ": keep the calibration.yaml of this session, if the drive has confirmed it.");
+    j->find(Grade::care, "the initial calibration does not fit the rig");
+    j->advise("Event calibration_contradicted: " + event->message +
+              ". Use the calibration.yaml of this session if it is verified.");
   }
   if (const auto event = first("scale_disagrees"); event != s.events.end()) {
     j->find(Grade::care, "lengths disagree with the INS");
-    j->advise("At some time " + event->message + ".");
+    j->advise("Event scale_disagrees: " + event->message + ".");
   }
 }
 
-// Limits of drift, the same as of the depth error's words (METHOD §3): 2 % is good, beyond 5 %
+// Limits of drift, the same as those of the calibration rating: up to 2 % is good, beyond 5 %
 // something is wrong with the rig.
 constexpr double kGoodDrift = 0.02, kWorstDrift = 0.05;
 // A length measured by the rig against the reference's; 2 % is where the comparison says
@@ -473,7 +464,7 @@ std::string percent(double share) {
 void judge_frames(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
   const bool posed =
       std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.posed; });
-  if (!posed && (!a.ok_share || a.ok > 0)) return j->find(Grade::bad, "there never was a pose");
+  if (!posed && (!a.ok_share || a.ok > 0)) return j->find(Grade::bad, "no frame has a pose");
   if (!a.ok_share) return j->find(Grade::care, "the status of the frames is not known");
   if (use.use != Use::ok) {
     j->find(use.use == Use::unverified ? Grade::care : Grade::bad, use.reason);
@@ -492,48 +483,48 @@ void judge_frames(const Session& s, const Analysis& a, const Usability& use, Fin
 /// `broken`: outages broke the way.
 void judge_drift(const Session& s, const Analysis& a, bool broken, Findings* j) {
   if (a.ins_unplaced) {
-    j->find(Grade::care,
-            "nothing says how far it drifted: the drive was not placed on the earth with its INS");
+    j->find(Grade::care, "drift unknown: no ENU alignment with the INS");
     j->advise(
-        "Errors are shown from comparison.alignment_distance_m (100 m) driven with a valid fix on: "
-        "drive "
+        "The alignment needs comparison.alignment_distance_m (100 m) with a valid fix: drive "
         "further, or set it lower.");
     return;
   }
   if (a.source == ErrorSource::none) {
-    j->find(Grade::care, "nothing says how far it drifted: there was no reference");
+    j->find(Grade::care, "drift unknown: no reference");
     // Two cameras alone cannot tell a wrong unit: everything is too long or too short alike.
     if (s.calibration)
       if (const std::string doubt = baseline_doubt(s.calibration->rig); !doubt.empty()) {
         j->find(Grade::care, doubt);
-        j->advise("Compare the baseline with the rig: all lengths are wrong by as much as it is.");
+        j->advise(
+            "Measure the baseline of the rig: all lengths are wrong by the same ratio as the "
+            "baseline.");
       }
     j->advise(
-        "For a judgement of the drift record with an INS, or compare with a reference: vergence "
-        "evaluate SESSION REFERENCE.");
+        "To measure drift, record with an INS, or compare with ground truth: vergence evaluate "
+        "SESSION REFERENCE.");
     return;
   }
   if (!a.drift)
-    j->find(Grade::care, "the drive is too short to measure its drift");
+    j->find(Grade::care, "the path is too short to measure drift");
   else if (*a.drift > kGoodDrift)
     j->find(*a.drift > kWorstDrift ? Grade::bad : Grade::care,
-            fmt::format("it drifts by {} of the distance{}{}", percent(*a.drift),
+            fmt::format("drift is {} of the distance travelled{}{}", percent(*a.drift),
                         a.source == ErrorSource::ins ? " against the INS" : "",
                         broken ? ", across outages" : ""));
   const double off = a.scale ? std::abs(*a.scale - 1) : 0;
   if (off > kGoodScale && !broken) {
-    j->find(
-        off > kWorstScale ? Grade::bad : Grade::care,
-        fmt::format("lengths come out {} too {}", percent(off), *a.scale < 1 ? "long" : "short"));
+    j->find(off > kWorstScale ? Grade::bad : Grade::care,
+            fmt::format("lengths are {} too {}", percent(off), *a.scale < 1 ? "long" : "short"));
     j->advise(
         "Lengths disagree with the reference: measure the baseline again, then calibrate again.");
   }
 }
 
 void judge_session(const Session& s, const Analysis& a, Findings* j) {
-  if (!s.missing.empty()) j->find(Grade::care, "the session's files are not whole");
+  if (!s.missing.empty()) j->find(Grade::care, "session files are incomplete");
   if (!s.left_out.empty())
-    j->find(Grade::care, "the drive is longer than the report reads: this is of its beginning");
+    j->find(Grade::care,
+            "the session is longer than the report reads: only its beginning is shown");
   if (!s.summary.is_object() && !s.missing.empty())
     j->advise(
         "The session was not closed: stop with Ctrl-C and wait for the last message; check power "
@@ -541,14 +532,13 @@ void judge_session(const Session& s, const Analysis& a, Findings* j) {
   const double lines = number_at(s.summary, "drops.lines").value_or(0) +
                        number_at(s.summary, "drops.records").value_or(0);
   if (lines > 0) {
-    j->find(Grade::care, fmt::format("{:.0f} lines did not get to the disk", lines));
-    j->advise("The disk did not keep up or was full: make room, or record to a faster one.");
+    j->find(Grade::care, fmt::format("{:.0f} lines were not written to disk", lines));
+    j->advise("The disk was full or too slow: free space, or use a faster disk.");
   }
   if (const auto allocations = number_at(s.summary, "runtime_allocations");
       allocations && *allocations > 0)
     j->advise(fmt::format(
-        "Memory was taken {:.0f} times during the drive, which must not happen: report it "
-        "with this session.",
+        "{:.0f} runtime allocations, which must not happen: please report it with this session.",
         *allocations));
   const double p99 = number_at(s.summary, "timing_ms.p99").value_or(0) * 1e-3;
   const double slow =
@@ -558,9 +548,8 @@ void judge_session(const Session& s, const Analysis& a, Findings* j) {
   if (a.interval_s > 0 &&
       (p99 > a.interval_s || slow > kFewOverBudget * static_cast<double>(a.read)))
     j->advise(
-        "More than one frame in a hundred took longer than the frame interval: live, work would be "
-        "dropped; lower the rate or odometry's "
-        "features.");
+        "More than 1 % of the frames took longer than the frame interval; live, work would be "
+        "dropped: lower trigger.rate or odometry.features.");
 }
 
 void advise_by_reasons(const Session& s, const Analysis& a, Findings* j) {

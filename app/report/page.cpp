@@ -20,7 +20,7 @@ namespace vergence::app::report {
 
 namespace {
 
-/// Rows "name value" under heads; names of ours are plain text, all else is escaped by who adds it.
+/// Table rows "name value" under group headings. Names and values are escaped here.
 class Figures {
  public:
   void group(const char* head) { pending_ = head; }
@@ -47,8 +47,8 @@ std::optional<double> times(std::optional<double> value, double factor) {
 }
 
 const char* name_of_skipped(const Session& s) {
-  if (!s.summary.is_object()) return "missing by their numbers";
-  return is_live(s) ? "never came, or were dropped" : "skipped (not readable)";
+  if (!s.summary.is_object()) return "missing (gaps in the frame numbers)";
+  return is_live(s) ? "not received or dropped" : "skipped (unreadable)";
 }
 
 void frames_group(const Session& s, const Analysis& a, Figures* f) {
@@ -66,35 +66,36 @@ void frames_group(const Session& s, const Analysis& a, Figures* f) {
 }
 
 void error_group(const Analysis& a, Figures* f) {
-  f->group(a.source == ErrorSource::ins ? "Against the INS" : "Against the reference");
+  f->group(a.source == ErrorSource::ins ? "Errors against the INS"
+                                        : "Errors against the reference");
   f->row("drift, " + a.drift_message, times(a.drift, 100), "{:.2f} %");
-  f->row("KITTI segment error, with the INS's attitude", times(a.segment_error, 100), "{:.2f} %");
-  f->row("horizontal error, rms", metres(a.horizontal.rms));
-  f->row("horizontal error, largest", metres(a.horizontal.max));
-  f->row("vertical error, rms", metres(a.vertical.rms));
-  f->row("heading error, rms", a.heading.rms, "{:.2f}°");
-  f->row("heading error, largest", a.heading.max, "{:.2f}°");
+  f->row("KITTI segment error (with the INS attitude)", times(a.segment_error, 100), "{:.2f} %");
+  f->row("horizontal error, RMS", metres(a.horizontal.rms));
+  f->row("horizontal error, maximum", metres(a.horizontal.max));
+  f->row("vertical error, RMS", metres(a.vertical.rms));
+  f->row("heading error, RMS", a.heading.rms, "{:.2f}°");
+  f->row("heading error, maximum", a.heading.max, "{:.2f}°");
   f->row("rotation error", a.rotation_deg_per_m, "{:.4f} °/m");
-  if (a.ate_m) f->row("whole path laid on it, rms (ATE)", metres(*a.ate_m));
-  f->row("error at the end", times(a.end_error, 100), "{:.2f} % of the distance");
-  f->row("scale (reference over ours)", a.scale, "{:.4f}");
+  if (a.ate_m) f->row("ATE (RMS after SE(3) alignment)", metres(*a.ate_m));
+  f->row("error at the end", times(a.end_error, 100), "{:.2f} % of the distance travelled");
+  f->row("scale (reference / estimate)", a.scale, "{:.4f}");
 }
 
 /// Rows about the online estimate of the calibration in use.
 void verification_rows(const Session& s, const Analysis& a, Figures* f) {
   if (const auto verified = flag_at(s.summary, "calibration.verified"))
-    f->row("verified by the drive", *verified ? "yes" : "not verified");
+    f->row("verified online", *verified ? "yes" : "not verified");
   if (a.verified_s) f->row("first verified after", duration_text(*a.verified_s, 0.1));
-  f->row("contradicted: depths were off by",
+  f->row("contradicted: depth error",
          number_at(s.summary, "calibration.contradicted.depth_percent"), "{:.1f} %");
   const auto newest =
       std::find_if(s.calibrations.rbegin(), s.calibrations.rend(),
                    [](const CalibrationRow& c) { return std::isfinite(c.depth_sigma_percent); });
   if (newest == s.calibrations.rend()) return;
-  const std::string at = fmt::format(" at {:.0f} m, newest measurement", newest->reference_depth_m);
+  const std::string at = fmt::format(" at {:.0f} m, latest estimate", newest->reference_depth_m);
   f->row("depth sigma" + at, newest->depth_sigma_percent, "{:.2f} %");
   if (newest->depth_error_percent > 0)
-    f->row("what was in use differs" + at, newest->depth_error_percent, "{:.2f} %");
+    f->row("depth error of the calibration in use" + at, newest->depth_error_percent, "{:.2f} %");
 }
 
 void calibration_group(const Session& s, const Analysis& a, Figures* f) {
@@ -167,12 +168,12 @@ std::string metres(double value) { return fmt::format("{:.{}f} m", value, value 
 
 std::string figures_table(const Session& session, const Analysis& analysis) {
   Figures f;
-  f.group("Drive");
+  f.group("Session");
   if (analysis.duration_s > 0) f.row("duration", duration_text(analysis.duration_s, 0.1));
-  f.row("way", fmt::format("{:.1f} m", analysis.path_m));
+  f.row("distance travelled", fmt::format("{:.1f} m", analysis.path_m));
   frames_group(session, analysis, &f);
   if (analysis.source != ErrorSource::none) error_group(analysis, &f);
-  f.group("Time a frame, ms");
+  f.group("Processing time per frame, ms");
   for (const char* key : {"mean", "p50", "p99", "max"})
     f.row(key, number_at(session.summary, std::string("timing_ms.") + key), "{:.2f}");
   calibration_group(session, analysis, &f);
@@ -202,14 +203,14 @@ std::string held_out_text(const CalibrationRow& c) {
   return fmt::format("{:.2f} → {:.2f} px", c.held_out_before_px, c.held_out_after_px);
 }
 
-/// `± 0.26 % at 20 m, was off 1.4 %` as parts that no line breaks; empty where nothing was
+/// `± 0.26 % at 20 m, off by 1.4 %` as parts that no line breaks; empty where nothing was
 /// measured.
 std::string depth_text(const CalibrationRow& c) {
   if (!(c.reference_depth_m > 0) || !std::isfinite(c.depth_sigma_percent)) return "";
   const bool off = c.depth_error_percent > 0;
   std::string text = fmt::format("<span class=\"w\">± {:.2f} % at {:.0f} m{}</span>",
                                  c.depth_sigma_percent, c.reference_depth_m, off ? "," : "");
-  if (off) text += fmt::format(" <span class=\"w\">was off {:.2f} %</span>", c.depth_error_percent);
+  if (off) text += fmt::format(" <span class=\"w\">off by {:.2f} %</span>", c.depth_error_percent);
   return text;
 }
 
@@ -219,29 +220,28 @@ std::string health_table(const Session& session) {
   const std::string rows = health_row(session.summary, "at the start", "calibration.initial.") +
                            health_row(session.summary, "at the end", "calibration.");
   if (rows.empty()) return "";
-  return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>calibration</th><th "
+  return "<div class=\"scroll\"><table class=\"health\"><tr><th></th><th>rating</th><th "
          "class=\"n\">1 m</th><th class=\"n\">5 "
          "m</th><th class=\"n\">10 "
          "m</th>"
          "<th class=\"n\">20 m</th><th class=\"n\">50 m</th></tr>\n" +
          rows +
-         "</table></div>\n<p class=\"soft\">Predicted error of a depth at that distance, one "
-         "sigma, from what the calibration leaves "
-         "open.</p>\n";
+         "</table></div>\n<p class=\"soft\">Predicted depth error (1 σ) at each distance, from the "
+         "uncertainty of the calibration.</p>\n";
 }
 
 std::string calibrations_table(const Session& session) {
   constexpr std::size_t kMax = 60;
   std::string out =
       "<table "
-      "class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>after</th><th>held-out "
-      "error</th><th>depth</th><th>why</th></tr>\n";
+      "class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>latency</th><th>held-out "
+      "RMS</th><th>depth error</th><th>reason</th></tr>\n";
   std::vector<const CalibrationRow*> rows;  // one for all cameras: they are decided together
   for (const CalibrationRow& c : session.calibrations)
     if (c.camera == 1) rows.push_back(&c);
   const std::size_t n = rows.size();
   if (n > kMax)
-    out += fmt::format("<tr><td colspan=\"7\">{} earlier ones are in calibrations.csv</td></tr>",
+    out += fmt::format("<tr><td colspan=\"7\">{} earlier rows are in calibrations.csv</td></tr>",
                        grouped(n - kMax));
   for (std::size_t i = n > kMax ? n - kMax : 0; i < n; ++i) {
     const CalibrationRow& c = *rows[i];
@@ -265,14 +265,13 @@ std::string calibrations_table(const Session& session) {
 std::string events_table(const Session& session) {
   constexpr std::size_t kEachEnd = 80;
   const std::vector<EventRun> runs = condensed(session.events);
-  std::string out = "<table class=\"stack\"><tr><th>time</th><th>kind</th><th>what</th></tr>\n";
+  std::string out = "<table class=\"stack\"><tr><th>time</th><th>kind</th><th>message</th></tr>\n";
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const bool many = runs.size() > 2 * kEachEnd;
     if (many && i == kEachEnd) {
       const std::size_t left_out = runs.size() - 2 * kEachEnd;
       out += fmt::format(
-          "<tr><td></td><td></td><td>… {} rows are left out here; events.jsonl has them "
-          "…</td></tr>\n",
+          "<tr><td></td><td></td><td>… {} rows omitted; all are in events.jsonl …</td></tr>\n",
           grouped(left_out));
       i += left_out;
     }
@@ -286,8 +285,12 @@ std::string events_table(const Session& session) {
 
 namespace {
 
-std::string figure(std::string_view caption, const std::string& picture) {
-  return fmt::format("<section><figure><h3>{}</h3>{}</figure></section>\n", caption, picture);
+/// A plot with its title and, below it, one sentence that says how to read it.
+std::string figure(std::string_view caption, const std::string& picture,
+                   std::string_view note = "") {
+  const std::string below = note.empty() ? "" : fmt::format("<p class=\"soft\">{}</p>", note);
+  return fmt::format("<section><figure><h3>{}</h3>{}{}</figure></section>\n", caption, picture,
+                     below);
 }
 
 std::string section(std::string_view css, std::string_view head, const std::string& body) {
@@ -334,29 +337,29 @@ std::string drift_card(const Analysis& a) {
                      : a.source == ErrorSource::reference ? "Drift against the reference"
                                                           : "Drift";
   if (a.drift) return number_card(fmt::format("{:.2f} %", *a.drift * 100), name, a.drift_message);
-  if (a.source == ErrorSource::none) return number_card("not known", name, "no reference");
-  return number_card("not known", name, "the drive is too short");
+  if (a.source == ErrorSource::none) return number_card("unknown", name, "no reference");
+  return number_card("unknown", name, "path too short");
 }
 
 std::string error_card(const Analysis& a) {
   const std::string name =
-      a.source == ErrorSource::ins ? "Error to the INS" : "Error to the reference";
-  if (a.source == ErrorSource::none) return number_card("not known", name, "no reference");
+      a.source == ErrorSource::ins ? "Error against the INS" : "Error against the reference";
+  if (a.source == ErrorSource::none) return number_card("unknown", name, "no reference");
   return number_card(metres(a.horizontal.rms), name,
-                     "horizontal, rms; " + metres(a.horizontal.max) + " at most");
+                     "horizontal RMS; maximum " + metres(a.horizontal.max));
 }
 
 std::string ok_card(const Session& s, const Analysis& a) {
   if (!a.ok_share)
-    return number_card("not known", "Frames ok",
-                       a.read > 0 ? "poses.csv is missing" : "there was no frame");
-  // Rounded down: 100 % is said of nothing less.
+    return number_card("unknown", "Frames ok",
+                       a.read > 0 ? "poses.csv is missing" : "no frame was received");
+  // Rounded down, so that 100 % means every frame.
   const double percent = std::floor(*a.ok_share * 1000) / 10;
   const std::string skipped = a.skipped > 0 ? fmt::format(", {} {}", grouped(a.skipped),
-                                                          is_live(s) ? "never came" : "skipped")
+                                                          is_live(s) ? "not received" : "skipped")
                                             : "";
   const std::string waited =
-      a.waited > 0 ? fmt::format(" ({} until the calibration was confirmed)", grouped(a.waited))
+      a.waited > 0 ? fmt::format(" ({} before the calibration was verified)", grouped(a.waited))
                    : "";
   return number_card(fmt::format("{:.{}f} %", percent, percent == 100 ? 0 : 1), "Frames ok",
                      fmt::format("of {}: {} degraded{}, {} lost{}", grouped(a.read + a.skipped),
@@ -376,18 +379,20 @@ std::string assessment_section(const Session& s, const Analysis& a, const Assess
 
 std::string map_section(const Session& s, const Analysis& a) {
   const std::string map = map_picture(a, s.frames);
-  if (map.empty()) return section("", "Map", "<p>There is no pose to draw.</p>");
+  if (map.empty()) return section("", "Map", "<p>No pose to draw.</p>");
   const bool theirs =
       std::any_of(a.theirs_x.begin(), a.theirs_x.end(), [](double v) { return std::isfinite(v); });
   std::string legend =
-      "<p class=\"soft legend\"><span><i class=\"key k-ours\"></i>ours (● start, ■ end)</span>";
+      "<p class=\"soft legend\"><span><i class=\"key k-ours\"></i>estimate (● start, ■ end)</span>";
   if (theirs)
     legend += fmt::format("<span><i class=\"key k-theirs\"></i>{}</span>",
                           a.map_is_enu ? "INS" : "reference");
-  if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>ours, degraded</span>";
-  if (a.lost > 0) legend += "<span>× no pose from here</span>";
-  if (a.map_is_enu) legend += "<br/>Ours begins where the drive was placed on the earth";
-  if (a.map_is_enu) legend += a.placed_s.size() > 1 ? ", and anew where it was placed again." : ".";
+  if (a.degraded > 0) legend += "<span><i class=\"key k-care\"></i>estimate, degraded</span>";
+  if (a.lost > 0) legend += "<span>× lost from here</span>";
+  legend += a.map_is_enu
+                ? "<br/>View from above, north up. The estimate starts at the ENU alignment"
+                : "<br/>View from above; the bar is the scale.";
+  if (a.map_is_enu) legend += a.placed_s.size() > 1 ? " and again at each later one." : ".";
   return section("tall", "Map", map + legend + "</p>");
 }
 
@@ -397,17 +402,19 @@ void error_plots(const Session& s, const Analysis& a, std::string* out) {
     const std::vector<double>* values;
     const char* css;
     bool from_zero;
+    const char* note;
   };
-  const std::array kinds{
-      Kind{"Horizontal error, m", &a.horizontal_m, "curve s-ours", true},
-      Kind{"Vertical error, m (ours above is positive)", &a.vertical_m, "curve s-theirs", false},
-      Kind{"Heading error, degrees (clockwise is positive)", &a.heading_deg, "curve s-third",
-           false}};
+  const std::array kinds{Kind{"Horizontal error, m", &a.horizontal_m, "curve s-ours", true,
+                              "Distance in the ground plane; a steady rise is drift."},
+                         Kind{"Vertical error, m", &a.vertical_m, "curve s-theirs", false,
+                              "Positive where the estimate is above the reference."},
+                         Kind{"Heading error, degrees", &a.heading_deg, "curve s-third", false,
+                              "Positive where the estimate is rotated clockwise."}};
   for (const Kind& k : kinds) {
     if (const std::string plot =
             curve_plot({k.caption, *k.values, k.css, k.from_zero}, a, s.frames);
         !plot.empty())
-      *out += figure(std::string(k.caption) + " · over time", plot);
+      *out += figure(std::string(k.caption) + " · over time", plot, k.note);
   }
 }
 
@@ -415,24 +422,34 @@ std::string errors_head(const Analysis& a) {
   return section("wide", "Errors",
                  "<p>" + escape(a.source_message, 500) + "</p>" +
                      (a.lost > 0 && a.source != ErrorSource::none
-                          ? "<p class=\"soft\">Red stripes: frames without a pose. Curves stop "
-                            "there and are not carried across.</p>"
+                          ? "<p class=\"soft\">Red stripes are frames without a pose; curves are "
+                            "interrupted there.</p>"
                           : ""));
 }
 
 void running_plots(const Session& s, const Analysis& a, std::string* out) {
   if (const std::string bands = bands_picture(s, a); !bands.empty())
-    *out += figure("Status and state · over time", bands);
+    *out += figure("Status and state · over time", bands,
+                   "Upper rows: status of each frame. Lower rows: state of the estimator. Ticks: "
+                   "events, listed below.");
   std::vector<double> inliers, times;
   for (const Frame& f : s.frames) {
     inliers.push_back(f.inliers >= 0 && f.posed ? f.inliers : kNone);
     times.push_back(f.estimate_ms);
   }
-  for (const auto& [caption, values] : {std::pair{"Inliers (points that hold the pose)", &inliers},
-                                        std::pair{"Time a frame, ms", &times}})
+  struct Running {
+    const char* caption;
+    const std::vector<double>* values;
+    const char* note;
+  };
+  for (const auto& [caption, values, note] :
+       {Running{"Inliers, points", &inliers,
+                "Points that constrain the pose; few of them make a pose degraded or lost."},
+        Running{"Processing time per frame, ms", &times,
+                "From the decoded images to the pose; it must stay below the frame interval."}})
     if (const std::string plot = curve_plot({caption, *values, "curve s-ours", true}, a, s.frames);
         !plot.empty())
-      *out += figure(std::string(caption) + " · over time", plot);
+      *out += figure(std::string(caption) + " · over time", plot, note);
 }
 
 /// A single one that the drive began with is no curve.
@@ -455,15 +472,15 @@ void calibration_sections(const Session& s, const Analysis& a, std::string* out)
   }
   std::string body = health_table(s);
   if (s.calibrations.empty())
-    body += "<p>No calibration was recorded.</p>";
+    body += "<p>No calibration in this session.</p>";
   else if (plots.empty())
-    body += "<p>One calibration throughout; it did not change.</p>" + calibrations_table(s);
+    body += "<p>One calibration was used throughout.</p>" + calibrations_table(s);
   else
     body +=
-        "<p class=\"soft\">Where the other cameras sit relative to the left one, as it was in use; "
-        "the band is ± 2 σ (wide, with uncertain "
-        "intrinsics). Hollow red marks were rejected; hollow grey ones are what the drive measured "
-        "while it kept what was in use.</p>" +
+        "<p class=\"soft\">Each plot shows one component of T_camera_left over time. The line is "
+        "the value in use, the band ± 2 σ (sigma_total). Hollow red marks are rejected "
+        "calibrations; hollow grey marks are online estimates that left the calibration "
+        "unchanged.</p>" +
         calibrations_table(s);
   *out += section("wide long", "Calibration", body) + plots;
 }
@@ -472,8 +489,7 @@ std::string footer(const Session& s) {
   const std::string version = text_at(s.summary, "version"),
                     hash = text_at(s.summary, "configuration_hash");
   std::string line =
-      "Made by vergence from the session's own files; <code>vergence report SESSION</code> makes "
-      "it again.";
+      "<code>vergence report SESSION</code> regenerates this page from the session's files.";
   if (!version.empty()) line += " Recorded with version " + escape(version, 60) + ".";
   if (!hash.empty()) line += " Configuration " + escape(hash, 60) + ".";
   return "<p class=\"soft\" style=\"margin-top:12px\">" + line + "</p>\n";
@@ -502,12 +518,11 @@ std::string page_html(const Session& session, const Analysis& analysis,
   if (analysis.source != ErrorSource::none) error_plots(session, analysis, &out);
   calibration_sections(session, analysis, &out);
   out += section("wide long", "Events",
-                 session.events.empty() ? "<p>None was recorded.</p>" : events_table(session));
-  out +=
-      section("wide long", "Figures",
-              "<div class=\"two\">" + figures_table(session, analysis) +
-                  "</div><p class=\"soft\">summary.json has those of devices, clocks, memory and "
-                  "drops.</p>");
+                 session.events.empty() ? "<p>No events.</p>" : events_table(session));
+  out += section("wide long", "Metrics",
+                 "<div class=\"two\">" + figures_table(session, analysis) +
+                     "</div><p class=\"soft\">Metrics of devices, clocks, memory and drops are in "
+                     "summary.json.</p>");
   out += "</div>\n" + footer(session) + "</main></body></html>\n";
   return out;
 }

@@ -235,7 +235,7 @@ std::string bands_picture(const Session& session, const Analysis& analysis) {
   const double events_top = box.top + kLaneHeight * static_cast<double>(lanes.size()) + 2 * kApart;
   box.bottom = events_top + kLaneHeight;
   Svg svg(kPlotWidth, box.bottom + 36,
-          "Status of the frames, state of the system and events over time");
+          "Status of the frames, state of the estimator and events over time");
   for (std::size_t i = 0; i < lanes.size(); ++i)
     draw_lane(lanes[i], box,
               box.top + kLaneHeight * static_cast<double>(i) + (i >= kStatuses ? kApart : 0), &svg);
@@ -352,7 +352,7 @@ std::string calibration_plot(const Session& session, const Analysis& analysis, i
   PlotBox box = time_box(analysis);
   box.left = 74;  // four decimals
   fit_calibration(curve, &box);
-  Svg svg(kPlotWidth, kPlotHeight, "A number of the calibration over time with two sigmas");
+  Svg svg(kPlotWidth, kPlotHeight, "A calibration parameter over time with its 2 sigma band");
   box.draw_time_axis(&svg);
   box.draw_y_axis(&svg);
   if (analysis.verified_s) draw_verification(*analysis.verified_s, box, &svg);
@@ -483,7 +483,7 @@ std::string map_picture(const Analysis& analysis, std::span<const Frame> frames)
   }
   if (!bounds.any) return {};
   const MapScale scale = scale_for(bounds);
-  Svg svg(kPlotWidth, scale.height, "The drive from above");
+  Svg svg(kPlotWidth, scale.height, "Trajectory seen from above");
   draw_path("curve map-theirs s-theirs", analysis.theirs_x, analysis.theirs_y, analysis.breaks,
             scale, &svg);
   draw_path("curve map-ours s-ours", analysis.ours_x, analysis.ours_y, breaks_of_ours(analysis),

@@ -39,8 +39,8 @@ ReportOutcome write_report(const std::filesystem::path& session_folder) {
 
 std::array<std::string, 3> closing_lines(const ReportOutcome& outcome, const std::string& failure) {
   if (!failure.empty())
-    return {"result: not known, there is no report",
-            "to do: fix what prevents writing the report, then run vergence report SESSION",
+    return {"result: unknown, no report was written",
+            "to do: free space or fix permissions, then run vergence report SESSION",
             "report: " + failure};
   const std::string why = outcome.reasons.empty() ? outcome.headline
                           : outcome.usable ? outcome.grade + ": " + first_of(outcome.reasons, "")

@@ -478,14 +478,13 @@ bool is_live(const Session& session) {
 Session read_session(const fs::path& folder, std::size_t max_frames) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
-    throw InputError(
-        folder.string() +
-        ": is no folder; give the session folder that --out named when it was recorded");
+    throw InputError(folder.string() +
+                     ": no such directory; pass the session directory (--out of run or replay)");
   if (!looks_like_a_session(folder))
     throw InputError(folder.string() +
-                     ": has none of a session's files (poses.csv, trajectory.tum, summary.json, "
+                     ": is not a session directory (no poses.csv, trajectory.tum, summary.json or "
                      "events.jsonl); " +
-                     "give the folder that --out named when it was recorded");
+                     "pass the directory of --out");
   Session session;
   session.name = fs::weakly_canonical(folder, error).filename().string();
   read_summary(folder, &session);

@@ -63,15 +63,14 @@ void replace_durably(const std::filesystem::path& file, std::string_view text) {
   struct stat old {};
   if (::stat(file.c_str(), &old) == 0 &&
       !S_ISREG(old.st_mode))  // a device in whose place a file came would be gone for all
-    throw InputError(file.string() +
-                     ": cannot be replaced: it is no ordinary file; give another name");
+    throw InputError(file.string() + ": cannot be replaced: not a regular file; name another file");
   std::filesystem::path fresh = file;
   fresh += ".new";
   int error = write_whole(fresh, text);
   if (error != 0) {
     (void)::unlink(fresh.c_str());
     throw InputError(file.string() + ": cannot be written (" + std::strerror(error) +
-                     "): check the folder's permissions and the disk's space");
+                     "): check the directory's permissions and the free space");
   }
   if (std::rename(fresh.c_str(), file.c_str()) != 0) {
     error = errno;
@@ -88,20 +87,18 @@ void replace_durably(const std::filesystem::path& file, std::string_view text) {
 bool check_session_folder(const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
   const std::string name = folder.string();
-  if (name.empty()) throw InputError("--out is empty; name a folder for the session");
+  if (name.empty()) throw InputError("--out is empty; name a directory for the session");
   std::error_code error;
   if (!fs::exists(folder, error)) return false;
   if (!fs::is_directory(folder, error))
-    throw InputError(name +
-                     ": is not a folder; name a new or empty one for the session with --out");
+    throw InputError(name + ": is not a directory; name a new or empty one with --out");
   const bool empty = fs::is_empty(folder, error);
   if (error)
-    throw InputError(name + ": cannot be looked into (" + error.message() +
-                     "): check its permissions");
+    throw InputError(name + ": cannot be read (" + error.message() + "): check its permissions");
   if (!empty)
-    throw InputError(
-        name +
-        ": is not empty, and nothing is ever overwritten; name a new or empty folder with --out");
+    throw InputError(name +
+                     ": is not empty, and sessions are never overwritten; name a new or empty "
+                     "directory with --out");
   return true;
 }
 
@@ -110,8 +107,8 @@ bool make_session_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error)
-    throw InputError(folder.string() + ": cannot be made (" + error.message() +
-                     "): check that disk and the folder above it");
+    throw InputError(folder.string() + ": cannot be created (" + error.message() +
+                     "): check that disk and the parent directory");
   return true;
 }
 

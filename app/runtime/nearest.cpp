@@ -64,10 +64,10 @@ constexpr std::string_view kCalibrateTarget = "'vergence calibrate target --left
 
 constexpr std::array kTable{
     Withdrawn{Kind::key, "ins.sync_in",
-              "SyncIn stays as the device has it; set it with the maker's program"},
-    Withdrawn{
-        Kind::key, "record.keep_s",
-        "recordings are whole; record.split_mb ends files, sessions.quota_mb removes sessions"},
+              "the SyncIn setting of the device is kept; change it with the maker's program"},
+    Withdrawn{Kind::key, "record.keep_s",
+              "recordings are complete; record.split_mb splits files, sessions.quota_mb removes "
+              "old sessions"},
     Withdrawn{Kind::key, "mock.ins_line", kNoLine},
     Withdrawn{Kind::key, "mock.ins_latency_timer_ms", kNoLine},
     Withdrawn{Kind::key, "mock.ins_late_percent", kNoLine},
@@ -77,7 +77,7 @@ constexpr std::array kTable{
     Withdrawn{Kind::key, "mock.board_late_percent", kNoLine},
     Withdrawn{Kind::key, "mock.board_late_ms", kNoLine},
     Withdrawn{Kind::camera_option, "chunks",
-              "a frame's exposure is the one that the camera held when it began"},
+              "the exposure of a frame is read from the camera's settings"},
     Withdrawn{Kind::camera_option, "packet_socket", "images come by UDP"},
     Withdrawn{Kind::camera_option, "frame_retention_ms",
               "a frame waits for three of its intervals"},
@@ -111,7 +111,7 @@ constexpr std::array kTable{
         Kind::option, "replay --also",
         "poses.csv has latitude, longitude and height of every frame; see docs/session_files.md"},
     Withdrawn{Kind::option, "replay --distortion",
-              "--focal finds the lenses from the drive; coefficients stand in a calibration.yaml"},
+              "--focal estimates the distortion; put known coefficients into a calibration.yaml"},
     Withdrawn{Kind::option, "replay --through-devices",
               "a replay reads the recorded frames and INS samples, and gives the same poses"},
     Withdrawn{Kind::command, "completion",

@@ -99,10 +99,10 @@ void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found)
       file.rig = rig;
       if (found) file.source = "online";
       write_state(*options_.state, file);
-      message = "the calibration is kept for the next drive: " + options_.state->string();
+      message = "the calibration is saved for the next run: " + options_.state->string();
     } catch (const InputError& e) {
       failed = true;
-      message = std::string(e.what()) + "; the next drive will not know this calibration";
+      message = std::string(e.what()) + "; the next run will not use this calibration";
     }
   if (found) write_session_file(rig);
   if (found && !fault_.empty()) {

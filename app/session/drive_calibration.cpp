@@ -24,7 +24,7 @@ namespace vergence::app {
 namespace {
 
 constexpr std::size_t kMiddleDepth = 2;  // of Agreement::kDepthM: 20 m
-constexpr const char* kInterrupted = "it was interrupted";
+constexpr const char* kInterrupted = "interrupted";
 constexpr int kMoreFeatures = 2,
               kMaxFeatures = 1000;      // of a drive's own: nobody waits for a pose here
 constexpr int kObservations = 240'000;  // of a solve that nobody waits for
@@ -181,7 +181,7 @@ DriveCalibration calibrate_with_progress(const DrivePass& pass, const StartingCa
     if (done < last) before += last;  // the next pass
     last = done;
     ProgressState state;
-    state.state = "calibrating from the drive";
+    state.state = "calibrating from the sequence";
     state.frame = before + done;
     state.frames = kPasses * pass.count;
     progress->update(state);
@@ -218,7 +218,7 @@ std::string describe(const DriveCalibration& found) {
                    1e3 * t.x(), 1e3 * sigma[3], 1e3 * t.y(), 1e3 * sigma[4], 1e3 * t.z(),
                    1e3 * sigma[5]);
   }
-  fmt::format_to(out, "depths at {:.1f} m are good to {:.2f} % (1 sigma), from {} moving frames\n",
+  fmt::format_to(out, "depth sigma at {:.1f} m: {:.2f} % (1 sigma), from {} moving frames\n",
                  found.depth_m, found.depth_sigma_percent, rig.frames);
   if (found.agreements.empty()) return text;
   double sigmas = 0, percent = 0;
@@ -227,8 +227,8 @@ std::string describe(const DriveCalibration& found) {
     percent = std::max(percent, a.depth_percent[kMiddleDepth]);
   }
   fmt::format_to(out,
-                 "{} stretches solved by themselves: transforms differ by {:.1f} of their sigmas, "
-                 "depths at {:g} m by {:.2f} % at most\n",
+                 "{} segments solved independently: transforms differ by {:.1f} sigma, depths at "
+                 "{:g} m by at most {:.2f} %\n",
                  found.stretches.size(), std::sqrt(sigmas),
                  calibration::Agreement::kDepthM[kMiddleDepth], percent);
   return text;
@@ -257,7 +257,7 @@ ExitCode calibrate_from_drive(const DriveCalibrationRequest& r) {
   const DriveCalibration found = calibrate_with_progress(
       {sequence, c, 0, sequence.pairs.size(), {}, {}}, given, signals, &progress);
   if (!found.rig) {
-    progress.say(fmt::format("vergence: {}: no calibration was found, nothing is written: {}",
+    progress.say(fmt::format("vergence: {}: no calibration was found, no file is written: {}",
                              r.data.string(), found.why));
     return signals.stop_code().value_or(ExitCode::not_usable);
   }

@@ -133,19 +133,19 @@ void EstimationLoop::take_requests(Stamp stamp) noexcept {
   if (requests_ == nullptr) return;
   constexpr auto kOrder = std::memory_order_relaxed;
   if (requests_->recalibrate.exchange(false, kOrder) && facts_.on_request)
-    request_recalibration(stamp, "a new calibration was asked for on the live page");
+    request_recalibration(stamp, "a recalibration was requested on the live page");
   if (requests_->mark.exchange(false, kOrder))
     log_.log(stamp, "mark", "marked on the live page", true);
   if (requests_->stop_recording.exchange(false, kOrder) && recording_) {
-    log_.log(stamp, "recording_stopped",
-             "drive.mcap ends here, as asked for on the live page; the drive goes on", true);
+    log_.log(stamp, "recording_stopped", "recording stopped on the live page; the run continues",
+             true);
     recording_->stop();
   }
 }
 
 void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   if (calibration_asked_.exchange(false, std::memory_order_relaxed))
-    request_recalibration(frame.rig.stamp, "a new calibration was asked for by SIGUSR1");
+    request_recalibration(frame.rig.stamp, "a recalibration was requested by SIGUSR1");
   take_requests(frame.rig.stamp);
   log_kept_calibrations();
   if (!delivering_) ThreadAllocations::begin();

@@ -66,7 +66,8 @@ void EventLog::record_effort(const PoseSample& sample) noexcept {
   EventRecord event;
   event.stamp = sample.stamp;
   event.kind = "work_dropped";
-  event.set_message("frames take longer than there is time: less is done beside the pose");
+  event.set_message(
+      "frames take longer than the frame budget: work other than the pose is omitted");
   event.fields[0] = {"points_percent", std::int64_t{sample.effort.points_percent}};
   event.fields[1] = {"window_keyframes", std::int64_t{sample.effort.window_keyframes}};
   event.fields[2] = {"window_steps", std::int64_t{sample.effort.window_steps}};

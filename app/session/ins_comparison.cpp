@@ -69,17 +69,14 @@ Json enu_json(const EnuMetrics& figures) {
 void InsEvents::note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept {
   record_attitude(sample);
   if (contradicted && !std::exchange(contradiction_noted_, true))
-    event_log_.log(
-        sample.stamp, "ins_attitude",
-        "the INS's attitude is more than 30 degrees off the way that is driven: it is not "
-        "used while it is; check its filter, and ins.boresight_deg",
-        true);
+    event_log_.log(sample.stamp, "ins_attitude",
+                   "the INS heading differs from the direction of travel by more than 30 deg and "
+                   "is not used meanwhile: check its filter and ins.boresight_deg",
+                   true);
   if (jumps == jumps_) return;
   jumps_ = jumps;
-  event_log_.log(
-      sample.stamp, "ins_jump",
-      "the INS's position leapt: not interpolated across, errors from here on contain the leap",
-      true);
+  event_log_.log(sample.stamp, "ins_jump",
+                 "the INS position jumped: errors from here on include the jump", true);
 }
 
 void InsEvents::note(const ComparedPose& pose, std::uint64_t matches) noexcept {
@@ -90,7 +87,7 @@ void InsEvents::note(const ComparedPose& pose, std::uint64_t matches) noexcept {
 void InsEvents::note(const EnuAlignment& p, Stamp stamp) noexcept {
   std::array<char, 160> text{};
   (void)std::snprintf(text.data(), text.size(),
-                      "placed on the earth after %.1f m: heading to %.2f deg, residual %.2f m",
+                      "aligned with ENU after %.1f m: heading sigma %.2f deg, residual %.2f m",
                       p.distance, p.rotation_sigma.z() * kDegreesPerRadian, p.residual);
   event_log_.log(stamp, "enu_alignment", text.data(), false);
 }
@@ -101,12 +98,11 @@ void InsEvents::record_attitude(const InsSample& sample) noexcept {
       std::exchange(attitude_noted_, true))
     return;
   const bool heading = sample.heading_source == HeadingSource::heading;
-  event_log_.log(sample.stamp, "ins_without_attitude",
-                 heading ? "the INS gives no roll and pitch: taken as level; position and measured "
-                           "heading are compared"
-                         : "the INS gives no attitude: taken as level; position and course are "
-                           "compared",
-                 false);
+  event_log_.log(
+      sample.stamp, "ins_without_attitude",
+      heading ? "the INS sends no roll and pitch (assumed level): position and heading are compared"
+              : "the INS sends no attitude (assumed level): position and course are compared",
+      false);
 }
 
 void InsEvents::record_match(const ComparedPose& pose, std::uint64_t matches) noexcept {
@@ -119,19 +115,19 @@ void InsEvents::record_match(const ComparedPose& pose, std::uint64_t matches) no
     case InsMatch::ok:
       if (matches > kSettled)
         event_log_.log(pose.pose.stamp, "ins_recovered",
-                       "the INS has a position again; the comparison goes on", false);
+                       "the INS has a position again; the comparison continues", false);
       break;
     case InsMatch::none:
       event_log_.log(
           pose.pose.stamp, "ins_timeout",
           recorded
-              ? "the recording has no reading of the INS here: these poses are not compared"
-              : "the INS is silent: the drive goes on without it; check its cable and its rate",
+              ? "no INS samples in the recording here: these poses are not compared"
+              : "the INS sends nothing; the run continues without it: check its cable and rate",
           true);
       break;
     case InsMatch::gap:
       event_log_.log(pose.pose.stamp, "ins_gap",
-                     "readings of the INS are missing: these poses are not compared", true);
+                     "INS samples are missing: these poses are not compared", true);
       break;
     case InsMatch::no_fix:
       event_log_.log(pose.pose.stamp, "ins_no_fix",
@@ -149,12 +145,11 @@ void InsEvents::record_scale(const ComparedPose& pose) noexcept {
   scale_disagrees_ = pose.scale_disagrees;
   std::array<char, 200> text{};
   if (scale_disagrees_)
-    (void)std::snprintf(
-        text.data(), text.size(),
-        "the distance travelled comes out %.1f %% %s than the INS's over %.0f m: images cannot "
-        "tell, measure the baseline again",
-        100 * std::abs(pose.path_ratio - 1), pose.path_ratio > 1 ? "longer" : "shorter",
-        scale_stretch_m_);
+    (void)std::snprintf(text.data(), text.size(),
+                        "the distance travelled is %.1f %% %s than the INS's over %.0f m: measure "
+                        "the baseline again",
+                        100 * std::abs(pose.path_ratio - 1),
+                        pose.path_ratio > 1 ? "longer" : "shorter", scale_stretch_m_);
   else
     (void)std::snprintf(text.data(), text.size(),
                         "the distance travelled agrees with the INS again");
@@ -279,9 +274,7 @@ void InsComparison::take_enu_alignment(Stamp stamp) noexcept {
     alignments_.push_back({stamp, p});
     if (alignments_.size() == kMaxPlacements)
       event_log_.log(stamp, "enu_alignment_limit",
-                     "the drive was placed on the earth anew so often that summary.json has no "
-                     "further alignment; poses.csv has every one",
-                     true);
+                     "too many ENU alignments for summary.json; poses.csv has all of them", true);
   }
   output_->post(p, comparison_.plane().origin());
   events_.note(p, stamp);

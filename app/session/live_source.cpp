@@ -97,7 +97,7 @@ void LiveSource::make_facts() {
   facts_.remarks.push_back({proof_message(mode), "pairing", false});
   if (mode == SyncMode::approximate_time)
     facts_.remarks.push_back(
-        {std::string(proof_message(mode)) + "; poses in motion suffer from it"});
+        {std::string(proof_message(mode)) + "; poses in motion are less accurate"});
   facts_.knows_truth = devices_.mock() != nullptr;
   facts_.image_bytes = devices_.image_bytes();
   facts_.ring_bytes = sizeof(Acquisition);
@@ -205,8 +205,8 @@ void LiveSource::finish(Progress* progress, std::vector<std::string>* /*faults*/
   if (exposure_) exposure_->settle();
   if (exposure_ && exposure_->counters().unsupported)
     progress->say(
-        "vergence: exposure.mode is auto, but a camera cannot change its exposure while it "
-        "streams; set it to fixed");
+        "vergence: exposure.mode is auto, but a camera cannot change its exposure while streaming: "
+        "set exposure.mode to fixed");
 }
 
 void LiveSource::write_truth(std::vector<std::string>* faults) const {
@@ -221,7 +221,7 @@ void LiveSource::write_truth(std::vector<std::string>* faults) const {
       if (++lines % kTogether == 0) (void)file.flush();
     }
     if (!file.close() || file.lost_lines() > 0)
-      faults->push_back(file.path().string() + ": is not complete; make room on that disk");
+      faults->push_back(file.path().string() + ": incomplete; free space on that disk");
   } catch (const InputError& e) {
     faults->emplace_back(e.what());
   }
@@ -301,18 +301,18 @@ void LiveSource::print_figures(const SessionTotals& /*totals*/, const SummaryInp
       far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
       : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
                        : "";
-  progress->say(
-      fmt::format("error against ground truth over {:.1f} m: ATE {:.3f} m{}{}", e.path_reference,
-                  e.ate_se3.rmse, segments,
-                  devices_.ins() != nullptr
-                      ? " (the report compares with the INS, whose own errors are in its figures)"
-                      : ""));
+  progress->say(fmt::format("error against ground truth over {:.1f} m: ATE {:.3f} m{}{}",
+                            e.path_reference, e.ate_se3.rmse, segments,
+                            devices_.ins() != nullptr
+                                ? " (the report compares with the INS, including its errors)"
+                                : ""));
 }
 
 std::optional<ExitCode> LiveSource::verdict(Progress* progress) const {
   if (acquisition_->missing().empty()) return std::nullopt;
-  progress->say(fmt::format("vergence: camera {} was gone at the end; check its cable and power",
-                            fmt::join(acquisition_->missing(), ", ")));
+  progress->say(
+      fmt::format("vergence: camera {} was disconnected at the end; check its cable and power",
+                  fmt::join(acquisition_->missing(), ", ")));
   return ExitCode::device_failed;
 }
 

@@ -95,8 +95,8 @@ std::string mount_message(const Transform& T_ins_left, const std::string& source
   const Vec3 turn = boresight_of(T_ins_left.R) * (180 / std::numbers::pi);
   const Vec3& arm = T_ins_left.t;
   return fmt::format(
-      "the left camera sits at [{:.3f}, {:.3f}, {:.3f}] m in the INS's body, turned by [{:.3f}, "
-      "{:.3f}, {:.3f}] deg, by {}",
+      "INS extrinsics: lever arm [{:.3f}, {:.3f}, {:.3f}] m, boresight [{:.3f}, {:.3f}, {:.3f}] "
+      "deg, from {}",
       arm.x(), arm.y(), arm.z(), turn.x(), turn.y(), turn.z(), source);
 }
 
@@ -116,16 +116,16 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
   const std::size_t count = std::min(request.frames.value_or(sequence.pairs.size()),
                                      sequence.pairs.size() - request.start);
   if (!keep_around(sequence, request.start, count, &out.readings)) {
-    out.remarks.push_back(
-        "the INS has no reading of the time of these frames; nothing can be compared");
+    out.remarks.push_back("no INS samples at the time of these frames; poses are not compared");
     return out;
   }
   const Duration usual = usual_interval(out.readings);
   const Duration rarely = Duration::seconds(kMaxOfInterval * usual.to_seconds());
   out.options.max_gap = std::max(out.options.max_gap, rarely);
   out.options.max_wait = std::max(out.options.max_wait, rarely);
-  out.mount_source = says_mount(c.ins) ? "the configuration"
-                                       : "nobody: ins.lever_arm_m and ins.boresight_deg are zero";
+  out.mount_source = says_mount(c.ins)
+                         ? "the configuration"
+                         : "defaults: ins.lever_arm_m and ins.boresight_deg are not set";
   if (recorded.T_ins_left) {
     out.options.T_ins_left = *recorded.T_ins_left;
     if (out.options.heading_sigma_rad == 0) out.options.heading_sigma_rad = kPublishedHeading;
@@ -133,9 +133,8 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
   }
   if (const std::size_t dropped = drop_contradicted(out.options, &out.readings); dropped > 0)
     out.remarks.push_back(
-        fmt::format("the INS's attitude is not used, {} readings: it is more than 30 degrees off "
-                    "the course over "
-                    "ground for 50 m or more; heading is the course",
+        fmt::format("the attitude of {} INS samples is not used: it differs from the course over "
+                    "ground by more than 30 deg for 50 m or more; the course is used instead",
                     dropped));
   out.remarks.push_back(mount_message(out.options.T_ins_left, out.mount_source));
   return out;
@@ -159,7 +158,7 @@ SourceEvent event_of(const DecodedPair& pair, std::uint64_t unread) noexcept {
   event.record.set_message(
       unread <= kMaxListed
           ? pair.note.data()
-          : "1000 frames could not be read; further ones are counted (summary.json: skipped)");
+          : "1000 frames could not be read; further ones are only counted (summary.json: skipped)");
   event.record.fields[0] = {"frame", static_cast<std::int64_t>(pair.frame)};
   return event;
 }
@@ -168,14 +167,13 @@ void report_enu_errors(const EnuMetrics& earth, double alignment_distance_m, Pro
   const EnuErrors& e = earth.errors;
   if (e.poses > 0)
     progress->say(fmt::format(
-        "beside the INS after the alignment: {:.2f} m at the end, {:.2f} % of {:.1f} "
-        "m; at most {:.2f} m; heading off by "
-        "{:.2f} deg rms, {:.2f} deg at the end",
+        "error against the INS after the alignment: {:.2f} m at the end ({:.2f} % of {:.1f} m), "
+        "maximum {:.2f} m; heading {:.2f} deg RMS, {:.2f} deg at the end",
         e.horizontal_end_m, e.ins_path_m > 0 ? 100 * e.horizontal_end_m / e.ins_path_m : 0,
         e.ins_path_m, e.horizontal_max_m, e.heading_rms_deg, e.heading_end_deg));
   else
     progress->say(
-        fmt::format("nothing is compared after the alignment: it takes {:g} m with a fix "
+        fmt::format("not compared with the INS: the alignment needs {:g} m with a fix "
                     "(comparison.alignment_distance_m)",
                     alignment_distance_m));
 }
@@ -279,17 +277,17 @@ void RecordedSource::print_figures(const SessionTotals& /*totals*/, const Summar
     const std::string segments =
         near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.2f} %", 100 * near.translation)
                        : "";
-    progress->say(fmt::format(
-        "against the reference over {:.2f} m: ATE {:.4f} m, {:.4f} m after a scale of {:.4f}{}",
-        e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
+    progress->say(
+        fmt::format("error against the reference over {:.2f} m: ATE {:.4f} m (SE(3)), {:.4f} m "
+                    "with scale {:.4f}{}",
+                    e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
     if (!facts_.ins)
       progress->say(fmt::format("next: vergence evaluate {} {}",
                                 (request_.session.out / "trajectory.tum").string(),
                                 request_.data.string()));
   } else if (!facts_.ins) {
-    progress->say(
-        fmt::format("there is no reference to compare with; next: vergence evaluate {} REFERENCE",
-                    (request_.session.out / "trajectory.tum").string()));
+    progress->say(fmt::format("no reference to compare with; next: vergence evaluate {} REFERENCE",
+                              (request_.session.out / "trajectory.tum").string()));
   }
   if (facts_.ins)
     report_enu_errors(*input.earth, request_.configuration.comparison.alignment_distance_m,

@@ -95,7 +95,7 @@ constexpr std::array kEventWords{
     EventWords{"calibration_accepted", "a new calibration is in use", "frames"},
     EventWords{"calibration_rejected", "a calibration was rejected", "frames"},
     EventWords{"calibration_taken_up", "", "fitting_percent"},
-    EventWords{"calibration_pending", "the calibration waits", nullptr},
+    EventWords{"calibration_pending", "the calibration is postponed", nullptr},
     EventWords{"calibration_resumed", "the last calibration is in use again", nullptr}};
 static_assert(kEventWords.size() ==
               static_cast<std::size_t>(EstimatorEvent::Kind::calibration_resumed) + 1);
@@ -153,11 +153,9 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
     std::array<char, 256> text{};
     if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
-      (void)std::snprintf(text.data(), text.size(), "%s: its depths are off by %.1f %%", why,
-                          event.value);
+      (void)std::snprintf(text.data(), text.size(), "%s: depth error %.1f %%", why, event.value);
     else if (event.kind == EstimatorEvent::Kind::focal_length_contradicted)
-      (void)std::snprintf(text.data(), text.size(), "%s: the drive measures %.0f px", why,
-                          event.value);
+      (void)std::snprintf(text.data(), text.size(), "%s: measured %.0f px", why, event.value);
     else
       (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
                           *begin != 0 && *why != 0 ? ": " : "", why);

@@ -68,12 +68,12 @@ bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
   const DriveCalibration found = calibrate_with_progress(
       {sequence, request.configuration, request.start, count, {}, {}}, *begin, signals, &progress);
   if (!found.rig) {
-    progress.say("vergence: the drive gives no calibration: " + found.why);
+    progress.say("vergence: no calibration from the sequence: " + found.why);
     return false;
   }
   if (!request.session.quiet) progress.say(describe(found));
   begin->file.rig = *found.rig;
-  begin->file.source = begin->source = "the drive itself";
+  begin->file.source = begin->source = "the sequence itself";
   begin->cause = "whole_drive";
   begin->trust = CalibrationTrust::given;
   return true;
@@ -86,7 +86,7 @@ void calibrate_unknown(ReplayRequest request, const SignalGuard& signals, Stereo
   if (calibrate_first(request, signals, *sequence, begin) || signals.stop_requested()) return;
   if (!request.known || request.known->model != CameraModelKind::pinhole_radtan) return;
   if (!request.session.quiet)
-    fmt::print(stderr, "vergence: once more, with the distortion of a wide lens to begin with\n");
+    fmt::print(stderr, "vergence: retrying with the initial distortion of a wide lens\n");
   request.known->wide = true;
   StereoSequence wide = open_drive(request);
   StartingCalibration other = replayed_calibration(request.configuration, wide, true);
@@ -107,9 +107,9 @@ std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
     begin.file = read_given_calibration(*request.calibration, use,
                                         ImageSize{lens.width, lens.height}, &begin.remarks);
     if (begin.file.rig.cameras != recorded)
-      throw InputError(fmt::format("{}: is of {} cameras, {} was recorded with {}",
-                                   *request.calibration, begin.file.rig.cameras,
-                                   request.data.string(), recorded));
+      throw InputError(fmt::format(
+          "{}: has {} cameras, but {} was recorded with {}; use the calibration of that rig",
+          *request.calibration, begin.file.rig.cameras, request.data.string(), recorded));
     begin.source = std::filesystem::path(*request.calibration).filename().string();
     for (const std::string& message : begin.remarks)
       if (!request.session.quiet) fmt::print(stderr, "vergence: {}\n", message);
@@ -127,8 +127,9 @@ std::optional<StartingCalibration> other_beginning(const ReplayRequest& request,
 ExitCode replay_recording(const ReplayRequest& request) {
   RecordedSession session = RecordedSession::open(request.data);
   if (request.start >= session.frames().size())
-    throw InputError(fmt::format("--start {} is beyond the drive: {} has {} frames", request.start,
-                                 request.data.string(), session.frames().size()));
+    throw InputError(
+        fmt::format("--start {} is beyond the end: {} has {} frames; choose a smaller index",
+                    request.start, request.data.string(), session.frames().size()));
   auto other = other_beginning(request, session);
   const auto source = in_words([&] {
     return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
@@ -157,8 +158,9 @@ ExitCode run_replay(const ReplayRequest& request) {
     return replay_recording(request);
   StereoSequence sequence = open_drive(request);
   if (request.start >= sequence.pairs.size())
-    throw InputError(fmt::format("--start {} is beyond the drive: {} has {} frames", request.start,
-                                 request.data.string(), sequence.pairs.size()));
+    throw InputError(
+        fmt::format("--start {} is beyond the end: {} has {} frames; choose a smaller index",
+                    request.start, request.data.string(), sequence.pairs.size()));
   check_image_sizes(sequence, request.start, request.frames.value_or(sequence.pairs.size()));
   StartingCalibration begin =
       replayed_calibration(request.configuration, sequence, request.from_scratch || request.known);

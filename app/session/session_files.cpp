@@ -29,10 +29,9 @@ void describe_calibration(const Estimator& estimator, const StartingCalibration&
 
 std::string verification_message(const SummaryInput& input) {
   if (input.verified || !input.calibrated) return "";
-  if (!input.online)
-    return "the calibration is not verified: nothing watched it (calibration.online: off)";
-  return "the drive has not confirmed its calibration; what would: turns, near structure at the "
-         "roadside, tracks in the images' corners";
+  if (!input.online) return "the calibration is not verified: calibration.online is off";
+  return "the calibration was never verified; drive turns past near objects, with tracks in the "
+         "image corners";
 }
 
 void write_session_summary(const std::filesystem::path& session, const SessionTotals& totals,

@@ -144,10 +144,10 @@ std::thread SessionRunner::start_estimating() {
     source_.stop();
     halt_source();
     leave_no_folder();
-    throw InputError(fmt::format(
-        "the system gives no thread to the estimator ({}): raise the limit of processes (ulimit "
-        "-u, of a service TasksMax) or of memory",
-        e.code().message()));
+    throw InputError(
+        fmt::format("the estimator thread cannot be started ({}): raise the limit of processes "
+                    "(ulimit -u; in a service TasksMax) or of memory",
+                    e.code().message()));
   }
 }
 
@@ -288,12 +288,12 @@ void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput&
 
 void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInput& input,
                                   Progress* progress) const {
-  progress->say(fmt::format(
-      "session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; {:.1f} ms a "
-      "frame, {:.1f} at p99",
-      request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded, totals.lost,
-      input.skipped, facts_.word_of_skipped, totals.path_m, totals.estimate.mean(),
-      totals.estimate.percentile(0.99)));
+  progress->say(
+      fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; {:.1f} "
+                  "ms per frame, p99 {:.1f} ms",
+                  request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded,
+                  totals.lost, input.skipped, facts_.word_of_skipped, totals.path_m,
+                  totals.estimate.mean(), totals.estimate.percentile(0.99)));
   if (const std::string message = verification_message(input); !message.empty())
     progress->say(message);
   if (const std::string message = allocations_message(input.allocations);
@@ -307,15 +307,14 @@ ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<s
   // Also without a pose the user is informed which device was disconnected.
   const std::optional<ExitCode> of_source = source_.verdict(progress);
   if (totals.ok + totals.degraded == 0) {
-    progress->say("vergence: there never was a pose; events.jsonl and poses.csv in " +
-                  request_.out.string() + " say why");
+    progress->say("vergence: no frame has a pose; events.jsonl and poses.csv in " +
+                  request_.out.string() + " have the reasons");
     return ExitCode::not_usable;
   }
   if (of_source) return *of_source;
   if (loop_.comparison() != nullptr && loop_.comparison()->matches() == 0) {
     progress->say(
-        "vergence: the INS never had a position for a frame: nothing is compared; the poses are "
-        "there");
+        "vergence: the INS never had a position, so no pose is compared; the poses are written");
     return ExitCode::not_usable;
   }
   return faults.empty() ? ExitCode::done : ExitCode::not_written;

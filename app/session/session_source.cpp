@@ -49,7 +49,7 @@ SourceFacts facts_of_recording(const ReplayRequest& request, const RecordedSessi
   for (const std::string& message : session.remarks())
     facts.remarks.push_back({message, "data", !request.session.quiet});
   if (as_then && !session.complete())
-    facts.remarks.push_back({"the recording is not whole: the poses are not those of the drive",
+    facts.remarks.push_back({"the recording is incomplete: the poses differ from those of the run",
                              "data", !request.session.quiet});
   for (int k = 0; k < facts.begin.file.rig.cameras; ++k) {
     const Intrinsics& lens = facts.begin.file.rig.intrinsics[static_cast<std::size_t>(k)];
@@ -70,7 +70,7 @@ SourceEvent recalibration_as_then(Stamp stamp) noexcept {
   SourceEvent event;
   event.record.stamp = stamp;
   event.record.kind = "recalibration_requested";
-  event.record.set_message("a new calibration was asked for, as in the drive");
+  event.record.set_message("a recalibration was requested, as in the recorded run");
   event.recalibrate = true;
   return event;
 }
@@ -97,10 +97,10 @@ SessionSource::SessionSource(const ReplayRequest& request, RecordedSession sessi
       if (image.offset != 0 &&
           (k >= static_cast<std::size_t>(rig.cameras) || image.width != rig.intrinsics[k].width ||
            image.height != rig.intrinsics[k].height))
-        throw InputError(fmt::format(
-            "{}: frame {} of the recording has an image of camera {} of {} x {} pixels, which the "
-            "calibration has not",
-            request.data.string(), frame.given.number, k, image.width, image.height));
+        throw InputError(
+            fmt::format("{}: frame {} of the recording: the image of camera {} has {} x {} pixels, "
+                        "unlike the calibration; use the calibration of this recording",
+                        request.data.string(), frame.given.number, k, image.width, image.height));
     }
   }
   // From the middle of a drive: what came before is not for it.
@@ -166,10 +166,11 @@ SourceFrame SessionSource::load(const RecordedFrame& recorded) noexcept {
 
 void SessionSource::finish(Progress* progress, std::vector<std::string>* /*faults*/) {
   if (images_missing_ > 0)
-    progress->say(fmt::format(
-        "vergence: {} images of the drive are damaged or not in the recording; frames went without "
-        "them",
-        images_missing_));
+    progress->say(
+        fmt::format("vergence: {} images are damaged or missing in the recording; frames were "
+                    "processed without "
+                    "them",
+                    images_missing_));
   session_.clear_frames();  // the report is not to be written on top of them
 }
 
@@ -181,7 +182,7 @@ void SessionSource::describe(const SessionTotals& /*totals*/, const Estimator& /
 void SessionSource::print_figures(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
                                   Progress* progress) const {
   if (!other_ && session_.complete() && images_missing_ == 0 && request_.start == 0)
-    progress->say("the estimator was given what it was given in the drive; compare with " +
+    progress->say("the estimator received the same input as in the recorded run; compare with " +
                   (request_.data / "trajectory.tum").string());
 }
 

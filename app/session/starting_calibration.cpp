@@ -98,14 +98,16 @@ bool placed_by_configuration(const Configuration& c, int cameras) {
 void check_same_rig(const std::string& name, const CalibrationFile& file,
                     const CalibrationFile& configured, std::vector<std::string>* remarks) {
   if (file.rig.cameras != configured.rig.cameras)
-    throw InputError(fmt::format("{}: is of {} cameras, the configuration has {}", name,
-                                 file.rig.cameras, configured.rig.cameras));
+    throw InputError(fmt::format(
+        "{}: has {} cameras, but the configuration has {}; use the calibration of this rig", name,
+        file.rig.cameras, configured.rig.cameras));
   for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
     const Intrinsics &theirs = file.rig.intrinsics[k], &ours = configured.rig.intrinsics[k];
     if (theirs.width != ours.width || theirs.height != ours.height)
       throw InputError(
-          fmt::format("{}: is for images of {} x {} pixels, cameras.{}.size is {} x {}", name,
-                      theirs.width, theirs.height, k, ours.width, ours.height));
+          fmt::format("{}: is for images of {} x {} pixels, but cameras.{}.size is {} x {}; use "
+                      "the calibration of this image size",
+                      name, theirs.width, theirs.height, k, ours.width, ours.height));
     if (!file.serials[k].empty() && !configured.serials[k].empty() &&
         file.serials[k] != configured.serials[k])
       remarks->push_back(fmt::format(
@@ -115,9 +117,10 @@ void check_same_rig(const std::string& name, const CalibrationFile& file,
   // Images show no length.
   const double had = file.rig.baseline, says = configured.rig.baseline;
   if (std::abs(had - says) >= kOtherLength * says)
-    remarks->push_back(fmt::format(
-        "{}: has a baseline of {:g} m, the configuration says {:g} m: all lengths go by the file",
-        name, had, says));
+    remarks->push_back(
+        fmt::format("{}: has a baseline of {:g} m, but the configuration {:g} m; the file is used "
+                    "for all lengths",
+                    name, had, says));
 }
 
 double angle_between(const Vec3& a, const Vec3& b) {

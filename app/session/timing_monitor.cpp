@@ -68,24 +68,24 @@ TimingMonitor::Message TimingMonitor::of_device(const DeviceEvent& event) const 
   using Kind = DeviceEvent::Kind;
   switch (event.kind) {
     case Kind::camera_disconnected:
-      return message("camera_disconnected", true, "camera %d is gone; the drive goes on without it",
-                     event.camera);
+      return message("camera_disconnected", true,
+                     "camera %d is disconnected; the run continues without it", event.camera);
     case Kind::camera_reconnected:
-      return message("camera_reconnected", true, "camera %d is back", event.camera);
+      return message("camera_reconnected", true, "camera %d is reconnected", event.camera);
     case Kind::trigger_board_disconnected:
-      return message("trigger_board_disconnected", true,
-                     "the trigger board is gone: check its cable; it is looked for every second");
+      return message(
+          "trigger_board_disconnected", true,
+          "the trigger board is disconnected: check its cable; reconnecting every second");
     case Kind::trigger_board_reconnected:
-      return message("trigger_board_reconnected", true, "the trigger board is back");
+      return message("trigger_board_reconnected", true, "the trigger board is reconnected");
     case Kind::trigger_board_restarted:
       return message("trigger_board_restarted", true,
-                     "the trigger board has restarted: its pulses count from 0, the pairing is "
+                     "the trigger board restarted: its pulses count from 0; the pairing is being "
                      "verified again");
     case Kind::pairing_pending:
-      return message(
-          "pairing_pending", false,
-          "nothing proves yet which pulses the images of camera %d are of; they are not used",
-          event.camera);
+      return message("pairing_pending", false,
+                     "images of camera %d are not used until their pulses are identified",
+                     event.camera);
     case Kind::pairing_verified:
       return message("pairing_verified", false, "the pairing of camera %d is verified after %.2f s",
                      event.camera, event.seconds);
@@ -97,10 +97,9 @@ TimingMonitor::Message TimingMonitor::of_set(const SyncedSet& set) noexcept {
   const bool was = ambiguous_;
   ambiguous_ = set.proof == SyncProof::ambiguous;
   if (was || !ambiguous_) return {};
-  return message(
-      "pairing_ambiguous", true,
-      "images do not belong together for sure: pulses, counters and stamps contradict each other%s",
-      verifies_pairing(mode_) ? "; one of them alone is used" : "");
+  return message("pairing_ambiguous", true,
+                 "ambiguous pair: pulses, counters and stamps contradict each other%s",
+                 verifies_pairing(mode_) ? "; one image is used alone" : "");
 }
 
 TimingMonitor::Message TimingMonitor::of_reading(const AcquiredReading& reading) noexcept {
@@ -122,8 +121,8 @@ TimingMonitor::Message TimingMonitor::of_reading(const AcquiredReading& reading)
       q.filter_valid;  // a device that says nothing of its filter has no status either
   return message("ins_status", false, "the INS has %s%s%s", word_of(fix_), satellites.data(),
                  !given           ? ""
-                 : q.filter_valid ? ", its filter is valid"
-                                  : ", its filter is not valid");
+                 : q.filter_valid ? ", filter valid"
+                                  : ", filter not valid");
 }
 
 TimingMonitor::Message TimingMonitor::of_utc(const AcquiredReading& reading) noexcept {
@@ -135,8 +134,8 @@ TimingMonitor::Message TimingMonitor::of_utc(const AcquiredReading& reading) noe
   utc_reported_ = true;
   reported_ahead_s_ = ahead;
   return message("utc_offset", false,
-                 "the session's stamps are %.4f s %s the INS's UTC: they follow the host's clock "
-                 "of the day as it was at the start",
+                 "the session's stamps are %.4f s %s the INS's UTC; they follow the host clock as "
+                 "set at the start",
                  std::abs(ahead), ahead < 0 ? "behind" : "ahead of");
 }
 

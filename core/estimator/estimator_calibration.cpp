@@ -36,20 +36,19 @@ CalibrationCause cause_of(calibration::MonitorResult::Kind kind) noexcept {
 const char* sentence_of(CalibrationCause cause) noexcept {
   switch (cause) {
     case CalibrationCause::from_scratch:
-      return "there is no calibration";
+      return "no calibration";
     case CalibrationCause::knock:
       return "the rig has changed: a camera was knocked";
     case CalibrationCause::drift:
-      return "the rig is creeping away from its calibration";
+      return "the extrinsics are drifting";
     case CalibrationCause::collapse:
-      return "left and right hardly match any more: a camera was knocked far off or is out of "
-             "focus";
+      return "left and right hardly match: a camera was knocked far off or is out of focus";
     case CalibrationCause::out_of_sync:
-      return "the cameras' images are not of the same instant";
+      return "the images of the cameras are from different instants";
     case CalibrationCause::requested:
-      return "a new calibration is asked for";
+      return "a recalibration was requested";
     case CalibrationCause::contradicted:
-      return "left and right hardly match with the calibration in use: it is not that of the rig";
+      return "left and right hardly match: the calibration in use does not fit the rig";
     case CalibrationCause::refinement:
       break;  // no reason to seek one
   }
@@ -116,7 +115,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
   if (v.cameras_in_sync) {
     doubts.strike(Doubt::late_image);
     if (doubts.weaken(Doubt::out_of_sync)) {
-      note(EstimatorEvent::Kind::cameras_in_sync, frame.stamp, "the cameras are in step again", 0);
+      note(EstimatorEvent::Kind::cameras_in_sync, frame.stamp, "the cameras are in sync again", 0);
       calibrator.clear_frames();
     }
   }
@@ -139,8 +138,7 @@ void Estimator::Parts::watch_estimate(const odometry::FrameOutcome& out,
   if (!onset) return;
   if (!calibrator.seeking()) return doubt(CalibrationCause::knock, *onset, frame);
   note(EstimatorEvent::Kind::rig_changed, frame.stamp,
-       "a camera was knocked while the calibration was sought",
-       static_cast<double>(frame.number - *onset));
+       "a camera was knocked during the calibration", static_cast<double>(frame.number - *onset));
   restart_estimation(
       calibrator.calibrated() ? CalibrationCause::knock : CalibrationCause::from_scratch, *onset,
       frame);
@@ -194,7 +192,7 @@ void Estimator::Parts::take_refinement(const CalibrationDecision& decision, Stam
              contradicted = decision.cause == CalibrationCause::contradicted;
   if (contradicted && was_doubted)
     note(EstimatorEvent::Kind::calibration_contradicted, stamp,
-         "the calibration in use is not that of the rig", decision.depth_error_percent);
+         "the calibration in use does not fit the rig", decision.depth_error_percent);
   if (decision.accepted) {
     note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
          decision.calibration.frames);
@@ -212,15 +210,15 @@ void Estimator::Parts::take_refinement(const CalibrationDecision& decision, Stam
 }
 
 void Estimator::Parts::notify_verified(Stamp stamp) noexcept {
-  note(EstimatorEvent::Kind::calibration_verified, stamp,
-       "the drive confirms the calibration in use", verified_percent);
+  note(EstimatorEvent::Kind::calibration_verified, stamp, "the calibration in use is verified",
+       verified_percent);
 }
 
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
   (void)decisions.push(decision);
   if (decision.focal.contradicted && !std::exchange(focal_contradicted, true))
     note(EstimatorEvent::Kind::focal_length_contradicted, stamp,
-         "the focal length given is not that of these images", decision.focal.measured_px);
+         "the configured focal length does not fit the images", decision.focal.measured_px);
   focal_contradicted = decision.focal.contradicted;
   if (decision.learnt) {
     take_refinement(decision, stamp);
@@ -259,10 +257,10 @@ void Estimator::Parts::notify_missing(Stamp stamp) noexcept {
   notified_missing = missing;
   if (missing == Reason::needs_motion)
     note(EstimatorEvent::Kind::calibration_pending, stamp,
-         "the rig has to move before it can be calibrated", 0);
+         "the rig must move before it can be calibrated", 0);
   else if (missing == Reason::needs_near_structure)
     note(EstimatorEvent::Kind::calibration_pending, stamp,
-         "nearer things have to be seen before the rig can be calibrated", 0);
+         "near objects must be visible before the rig can be calibrated", 0);
 }
 
 }  // namespace vergence

@@ -68,7 +68,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     calibrator.take_back(odometry.rig());
     doubts.strike(Doubt::rig);
     note(EstimatorEvent::Kind::calibration_resumed, frame.stamp,
-         "the calibration from before fits the images again", 0);
+         "the previous calibration fits the images again", 0);
   }
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
@@ -86,8 +86,8 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
     lose_track_of_rig(frame.number);
   }
   if (out.relocalised)
-    note(EstimatorEvent::Kind::relocalised, frame.stamp, "found again among the window's points",
-         0);
+    note(EstimatorEvent::Kind::relocalised, frame.stamp,
+         "relocalised against the points of the window", 0);
 }
 
 /// Frames were missed in which nobody watched the rig: the drive has to confirm the calibration

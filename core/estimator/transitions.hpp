@@ -32,11 +32,11 @@ struct Transition {
 /// All edges of the state machine.
 inline constexpr std::array kTransitions = {
     Transition{State::initialising, Trigger::calibration_given, State::stereo_odometry,
-               "a calibration is given"},
+               "a calibration is supplied"},
     Transition{State::initialising, Trigger::pair_found, State::parallel_monocular,
-               "the first pair gave a transform between the cameras"},
+               "the first pair gave the initial extrinsics"},
     Transition{State::parallel_monocular, Trigger::frames_enough, State::calibrating,
-               "there are frames enough to calibrate from"},
+               "enough frames to calibrate from"},
     Transition{State::parallel_monocular, Trigger::pose_lost, State::lost,
                "no pose for three frames"},
     Transition{State::calibrating, Trigger::calibration_accepted, State::stereo_odometry,
@@ -47,18 +47,18 @@ inline constexpr std::array kTransitions = {
     Transition{State::stereo_odometry, Trigger::rig_changed, State::recalibrating,
                "the rig no longer fits its calibration"},
     Transition{State::stereo_odometry, Trigger::requested, State::recalibrating,
-               "a new calibration is asked for"},
+               "a recalibration was requested"},
     Transition{State::stereo_odometry, Trigger::pose_lost, State::lost, "no pose for three frames"},
     Transition{State::recalibrating, Trigger::calibration_accepted, State::stereo_odometry,
                "the new calibration is accepted"},
     Transition{State::recalibrating, Trigger::calibration_saved, State::stereo_odometry,
                "the calibration in use fits as well as a new one"},
     Transition{State::recalibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
-    Transition{State::lost, Trigger::pose_found, State::stereo_odometry, "a pose again"},
+    Transition{State::lost, Trigger::pose_found, State::stereo_odometry, "relocalised"},
     Transition{State::lost, Trigger::pose_found_doubtful, State::recalibrating,
-               "a pose again, the rig still in doubt"},
+               "relocalised; the rig is still suspect"},
     Transition{State::lost, Trigger::pose_found_uncalibrated, State::initialising,
-               "a pose again, without a calibration"},
+               "relocalised, without a calibration"},
 };
 
 /// Returns the edge of this trigger in this state; nullptr if there is none, and nothing happens.

@@ -10,93 +10,95 @@ namespace vergence::mock {
 namespace {
 
 constexpr double kLongest = 86400;  // s: a day
-constexpr FaultParameter kCamera{"camera", -1, -1, 3, "which camera, from 0; -1: every one"};
-constexpr FaultParameter kCamera1{"camera", 1, 0, 3, "which camera, from 0"};
-constexpr FaultParameter kDuration{"duration_s", 5, 0, kLongest, "for how long; 0: to the end"};
-constexpr FaultParameter kForGood{"duration_s", 0, 0, kLongest, "for how long; 0: to the end"};
-constexpr FaultParameter kShare{"share", 0.1, 0, 1, "of the frames, drawn at random"};
-constexpr FaultParameter kPitch{"pitch_deg", 0, -45, 45, "turn about the camera's x axis (right)"};
-constexpr FaultParameter kYaw{"yaw_deg", 0, -45, 45, "turn about its y axis (down)"};
-constexpr FaultParameter kRoll{"roll_deg", 0, -45, 45, "turn about its z axis (forward)"};
-constexpr FaultParameter kX{"x_m", 0, -1, 1, "shift along its x axis"};
-constexpr FaultParameter kY{"y_m", 0, -1, 1, "shift along its y axis"};
-constexpr FaultParameter kZ{"z_m", 0, -1, 1, "shift along its z axis"};
+constexpr FaultParameter kCamera{"camera", -1, -1, 3, "camera index from 0; -1: all"};
+constexpr FaultParameter kCamera1{"camera", 1, 0, 3, "camera index from 0"};
+constexpr FaultParameter kDuration{"duration_s", 5, 0, kLongest, "duration; 0: to the end"};
+constexpr FaultParameter kForGood{"duration_s", 0, 0, kLongest, "duration; 0: to the end"};
+constexpr FaultParameter kShare{"share", 0.1, 0, 1, "share of the frames, random"};
+constexpr FaultParameter kPitch{"pitch_deg", 0, -45, 45,
+                                "rotation about the camera's x axis (right)"};
+constexpr FaultParameter kYaw{"yaw_deg", 0, -45, 45, "rotation about its y axis (down)"};
+constexpr FaultParameter kRoll{"roll_deg", 0, -45, 45, "rotation about its z axis (forward)"};
+constexpr FaultParameter kX{"x_m", 0, -1, 1, "translation along its x axis"};
+constexpr FaultParameter kY{"y_m", 0, -1, 1, "translation along its y axis"};
+constexpr FaultParameter kZ{"z_m", 0, -1, 1, "translation along its z axis"};
 
 constexpr FaultParameter kKnock[] = {kCamera1, kPitch, kYaw, kRoll, kX, kY, kZ};
 constexpr FaultParameter kDrift[] = {
-    kCamera1, kPitch, kYaw, kRoll,
-    kX,       kY,     kZ,   {"duration_s", 60, 1, kLongest, "how long it takes; then it stays"}};
+    kCamera1, kPitch,
+    kYaw,     kRoll,
+    kX,       kY,
+    kZ,       {"duration_s", 60, 1, kLongest, "duration of the change, which then remains"}};
 constexpr FaultParameter kLag[] = {kCamera1, kForGood};
 constexpr FaultParameter kSwap[] = {kForGood};
 constexpr FaultParameter kOccluder[] = {
     {"ahead_m", 1.2, -200, 200,
-     "from the left camera to its nearest face, ahead; negative: behind"},
-    {"left_m", 0, -50, 50, "its middle, to the left of the vehicle's"},
-    {"turn_deg", 0, -180, 180,
-     "its heading against the vehicle's, to the left; 90: it stands across"},
+     "distance from the left camera to its nearest face; negative: behind"},
+    {"left_m", 0, -50, 50, "lateral offset of its centre, to the left"},
+    {"turn_deg", 0, -180, 180, "heading relative to the vehicle, to the left; 90: across the road"},
     {"speed_mps", 0, -40, 40,
      "along its own heading, relative to the vehicle; 0: it moves with the rig"},
     kDuration};
 constexpr FaultParameter kCover[] = {kCamera, kDuration};
-constexpr FaultParameter kNight[] = {{"factor", 0.02, 0, 1, "brightness against daylight"},
+constexpr FaultParameter kNight[] = {{"factor", 0.02, 0, 1, "brightness relative to daylight"},
                                      kDuration};
 constexpr FaultParameter kExposure[] = {
-    kCamera, {"factor", 3, 0, 100, "brightness against what was set"}, kDuration};
+    kCamera, {"factor", 3, 0, 100, "brightness relative to the setting"}, kDuration};
 constexpr FaultParameter kLose[] = {kCamera, kShare, kDuration};
 constexpr FaultParameter kLate[] = {
-    kCamera, kShare, {"delay_s", 0.2, 0, 10, "later than usual by this"}, kDuration};
-constexpr FaultParameter kBreakPairs[] = {{"share", 1, 0, 1, "of the pulses, drawn at random"},
+    kCamera, kShare, {"delay_s", 0.2, 0, 10, "additional delay"}, kDuration};
+constexpr FaultParameter kBreakPairs[] = {{"share", 1, 0, 1, "share of the pulses, random"},
                                           kDuration};
-constexpr FaultParameter kMissed[] = {kCamera1, {"pulses", 1, 1, 1e6, "one after the other"}};
+constexpr FaultParameter kMissed[] = {kCamera1,
+                                      {"pulses", 1, 1, 1e6, "number of consecutive pulses"}};
 constexpr FaultParameter kBoardGone[] = {
     kDuration,
     {"powered", 0, 0, 1,
-     "1: it has a supply of its own and pulses on; 0: it stops with the line and restarts"}};
-constexpr FaultParameter kReboot[] = {{"duration_s", 0.5, 0.01, kLongest, "until it pulses again"}};
+     "1: separate supply, pulses continue; 0: stops and restarts with the link"}};
+constexpr FaultParameter kReboot[] = {
+    {"duration_s", 0.5, 0.01, kLongest, "time until it pulses again"}};
 constexpr FaultParameter kInsGone[] = {kDuration};
 constexpr FaultParameter kPositionJump[] = {
-    {"east_m", 100, -1e5, 1e5, "towards east"},
-    {"north_m", 0, -1e5, 1e5, "towards north"},
-    {"up_m", 0, -1e4, 1e4, "upwards"},
-    {"duration_s", 0, 0, kLongest, "then it jumps back; 0: it stays"}};
+    {"east_m", 100, -1e5, 1e5, "jump towards east"},
+    {"north_m", 0, -1e5, 1e5, "jump towards north"},
+    {"up_m", 0, -1e4, 1e4, "jump upwards"},
+    {"duration_s", 0, 0, kLongest, "time until it jumps back; 0: permanent"}};
 constexpr FaultParameter kTimeJump[] = {
-    {"camera", -1, -1, 3, "whose clock; -1: the INS's"},
-    {"jump_s", 1, -kLongest, kLongest, "forward, or back if negative"}};
+    {"camera", -1, -1, 3, "camera index of the clock; -1: the INS"},
+    {"jump_s", 1, -kLongest, kLongest, "jump forward; negative: back"}};
 
 constexpr FaultRow kRows[] = {
-    {FaultKind::knock, "knock", "A camera is knocked out of its place and stays so.", kKnock},
-    {FaultKind::drift, "drift", "A camera turns or moves evenly, as a mount that warms up.",
+    {FaultKind::knock, "knock", "A camera is knocked: its pose changes abruptly and permanently.",
+     kKnock},
+    {FaultKind::drift, "drift", "A camera rotates or moves steadily, like a mount that warms up.",
      kDrift},
-    {FaultKind::recalibrate,
-     "recalibrate",
-     "A recalibration is requested, as with SIGUSR1; nothing happens to the devices.",
-     {}},
+    {FaultKind::recalibrate, "recalibrate", "A recalibration is requested, as with SIGUSR1.", {}},
     {FaultKind::lag, "lag",
      "A camera is a frame late: the previous image with this one's counter and stamp.", kLag},
     {FaultKind::swap_cables, "swap_cables",
      "The cables of cameras 0 and 1 are swapped; the ground truth is not.", kSwap},
-    {FaultKind::occluder, "occluder", "A bus (12 × 2.5 × 3.2 m) is in the way.", kOccluder},
-    {FaultKind::cover, "cover", "A lens is covered: black pictures.", kCover},
-    {FaultKind::night, "night", "It gets dark for every camera.", kNight},
-    {FaultKind::exposure, "exposure", "The brightness of the pictures changes.", kExposure},
+    {FaultKind::occluder, "occluder", "A bus (12 × 2.5 × 3.2 m) covers part of the view.",
+     kOccluder},
+    {FaultKind::cover, "cover", "A lens is covered: black images.", kCover},
+    {FaultKind::night, "night", "Darkness for every camera.", kNight},
+    {FaultKind::exposure, "exposure", "The brightness of the images changes.", kExposure},
     {FaultKind::camera_gone, "camera_gone",
-     "A camera is unplugged; if it comes back it counts from 0 again.", kCover},
-    {FaultKind::lose_frames, "lose_frames", "Frames never arrive; the counter shows the gaps.",
-     kLose},
+     "A camera is unplugged; after a reconnect its counter starts at 0.", kCover},
+    {FaultKind::lose_frames, "lose_frames", "Frames are lost; the counter shows the gaps.", kLose},
     {FaultKind::late_frames, "late_frames",
-     "Frames arrive late; those on the way as their camera goes are lost.", kLate},
+     "Frames arrive late; frames in transit are lost when their camera disconnects.", kLate},
     {FaultKind::duplicate_frames, "duplicate_frames", "Frames arrive twice.", kLose},
     {FaultKind::break_pairs, "break_pairs",
-     "Of a pulse one camera's image, drawn at random, never arrives.", kBreakPairs},
+     "One randomly chosen camera's image of a pulse is lost.", kBreakPairs},
     {FaultKind::missed_trigger, "missed_trigger",
      "A camera does not see a pulse: it exposes nothing and does not count it.", kMissed},
-    {FaultKind::board_gone, "board_gone", "The line to the trigger board is unplugged.",
+    {FaultKind::board_gone, "board_gone", "The serial link to the trigger board is unplugged.",
      kBoardGone},
     {FaultKind::board_reboot, "board_reboot",
      "The trigger board restarts: pulses stop; counter and clock begin at 0.", kReboot},
-    {FaultKind::ins_gone, "ins_gone", "The INS is silent; at 0 it starts late.", kInsGone},
+    {FaultKind::ins_gone, "ins_gone", "The INS sends nothing; at 0 s it starts late.", kInsGone},
     {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kInsGone},
-    {FaultKind::position_jump, "position_jump", "The INS's position leaps.", kPositionJump},
+    {FaultKind::position_jump, "position_jump", "The position of the INS jumps.", kPositionJump},
     {FaultKind::time_jump, "time_jump", "A device's clock is set.", kTimeJump},
     {FaultKind::disk_full, "disk_full",
      "The session's disk is full: lines wait in memory, up to 1 MB per file.", kInsGone},
@@ -116,8 +118,7 @@ const FaultRow& row_of(const std::string& kind) {
     if (kind == row.name) return row;
   std::string known;
   for (const FaultRow& row : kRows) known += std::string(known.empty() ? "" : ", ") + row.name;
-  throw std::invalid_argument("there is no fault \"" + kind.substr(0, 40) + "\"; there are " +
-                              known);
+  throw std::invalid_argument("unknown fault \"" + kind.substr(0, 40) + "\"; known: " + known);
 }
 
 void set(Fault* fault, std::string_view name, double value) {

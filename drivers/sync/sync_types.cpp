@@ -17,23 +17,26 @@ const char* to_string(SyncProof proof) noexcept {
 }
 
 const char* SyncOptions::validate() const noexcept {
-  if (cameras < 1 || cameras > kMaxCameras) return "a rig has one to four cameras";
-  if (interval <= Duration{}) return "the interval between two pulses must be positive";
-  if (hold <= Duration{}) return "the time a set waits for its images must be positive";
+  if (cameras < 1 || cameras > kMaxCameras) return "the number of cameras must be 1 to 4";
+  if (interval <= Duration{}) return "trigger.rate must be positive";
+  if (hold <= Duration{}) return "sync.timeout_ms must be positive";
   if (pairs_by_time(mode) && (tolerance <= Duration{} || tolerance * 2 > interval))
-    return "the tolerance must be positive and at most half of the interval between two exposures";
+    return "sync.tolerance_ms must be positive and at most half of the frame interval (1000 / "
+           "trigger.rate)";
   if (mode == SyncMode::master_strobe && cameras < 2)
-    return "a master without another camera triggers nobody";
+    return "camera 0 triggers the others, but no other camera is configured";
   for (std::size_t k = 0; proves_numbers(mode) && k < static_cast<std::size_t>(cameras); ++k) {
     const SyncCameraOptions& c = camera[k];
     if (c.resolution < Duration{} || c.jitter < Duration{})
-      return "a camera's stamps cannot be better than exact";
+      return "cameras.N.stamp_jitter_us must be at least 0";
     if ((c.resolution + c.jitter) * 8 > interval)
-      return "a camera's stamps are too coarse to distinguish consecutive pulses";
+      return "cameras.N.stamp_jitter_us is too large for trigger.rate: consecutive pulses cannot "
+             "be distinguished";
     if (c.latest <= Duration{})
       return "a frame arrives after its pulse: the latest arrival must be positive";
     if (c.delay < Duration{} || c.delay >= interval)
-      return "a line's delay must be at least 0 and below the interval of the pulses";
+      return "cameras.N.trigger_delay_us must be at least 0 and below the pulse interval (1e6 / "
+             "trigger.rate)";
   }
   return nullptr;
 }

@@ -58,7 +58,7 @@ void print(const std::string& drive_name, const std::string& what, const DriveOu
   if (r.contradicted_at >= 0)
     fmt::print("  contradicted at {} by {:.1f} %", r.contradicted_at, r.contradicted_percent);
   if (r.reported_at >= 0 || r.mended_at >= 0)
-    fmt::print("  told at {} mended at {}", r.reported_at, r.mended_at);
+    fmt::print("  detected at {}, recalibrated at {}", r.reported_at, r.mended_at);
   fmt::print("\n");
   std::fflush(stdout);
 }
@@ -126,7 +126,8 @@ void run_drive(const RecordedSequence& d, const app::Configuration& c) {
         with_right_turned(d, turn, at, folder / fmt::format("knock{}", index++));
     const DriveOutcome r = drive_recorded(d, s, c, first, at);
     fmt::print(
-        "{:12s} knock at {} by ({:g}, {:g}, {:g}) deg: told after {}, mended after {}, {} ok "
+        "{:12s} knock at {} by ({:g}, {:g}, {:g}) deg: detected after {}, recalibrated after {}, "
+        "{} ok "
         "before that, {} false before it; seg {:.3f} % ATE {:.4f} m\n",
         d.name, at, turn.x(), turn.y(), turn.z(),
         r.reported_at < 0 ? -1 : r.reported_at - static_cast<int>(at),

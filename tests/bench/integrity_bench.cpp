@@ -148,7 +148,7 @@ void run(RecordedSequence d, const std::string& filter, bool events, Tally* tall
              test::kIntegrityFrames, usual.ins_path_m, usual.turn_rad * 180 / std::numbers::pi);
   if (!(usual.ins_path_m < most_normal(d.name)) || !found.rig) {
     fmt::print("{}: NOTHING CAN BE JUDGED: {}\n", d.name,
-               found.rig ? "that is more than it was" : "the drive gives no calibration");
+               found.rig ? "that is more than it was" : "no calibration from the sequence");
     ++tally->unfit;
     return;
   }

@@ -183,8 +183,8 @@ struct SessionWriter {
     };
     event(0, "state", "initialising to parallel_monocular: enough points and parallax");
     event(0.08, "state", "calibrating to stereo_odometry: the calibration passed its gates");
-    event(0.085, "calibration_verified", "the drive confirms the calibration in use");
-    event(0.09, "enu_alignment", "placed on the earth over 100 m; heading known to 1.2 degrees");
+    event(0.085, "calibration_verified", "the calibration in use is verified");
+    event(0.09, "enu_alignment", "aligned with ENU after 100.0 m: heading sigma 1.20 deg");
     for (int i = 0; faults && i < 20; ++i)
       event(0.6 + 0.001 * i, "points_dropped", "points beyond the window's capacity were dropped");
     if (faults) event(0.62, "state", "stereo_odometry to lost: no pose for ten frames");

@@ -6,11 +6,11 @@ const show = (id, text) => { const e = $(id), t = String(text); if (e.textConten
 const number = (v, digits) => v === null || v === undefined ? "–" : Number(v).toFixed(digits);
 const colour = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 
-const STATES = {initialising: "starting", parallel_monocular: "without a calibration, cameras apart", calibrating: "calibrating",
+const STATES = {initialising: "starting", parallel_monocular: "uncalibrated, cameras tracked independently", calibrating: "calibrating",
                 stereo_odometry: "stereo odometry", recalibrating: "calibrating anew", lost: "lost"};
 const token = () => location.hash.slice(1).replace(/[^\w-]/g, "");
-const CAUSES = {given: "given", state_file: "from the last drive", whole_drive: "from the whole drive", knock: "found anew after a knock",
-                collapse: "found anew after a hard knock", drift: "found anew after a drift"};
+const CAUSES = {given: "supplied", state_file: "from the last run", whole_drive: "from the whole sequence", knock: "recalibrated after a knock",
+                collapse: "recalibrated after a hard knock", drift: "recalibrated after a drift"};
 const drive = {trail: [], enu_alignment: null, now: null, can: {}, ended: false};
 const BLANK = new Map(["status", "state", "why", "frame", "frames", "path", "from_ins", "ins_more", "inliers", "stereo", "ms", "ms_more",
                        "age", "image_frame"].map(id => [id, $(id).textContent]));
@@ -37,7 +37,7 @@ function showSilence(now) {
   tone("none");
   show("status", "NO FRAMES");
   show("state", "for " + lasting(now.since_s));
-  show("why", `the last one was ${now.status.toUpperCase()}; the events tell what is gone`);
+  show("why", `the last one was ${now.status.toUpperCase()}; see the events`);
 }
 
 function showNow(now) {
@@ -56,15 +56,15 @@ function showNow(now) {
   rows($("times"), [
     ["frames read", now.read],
     ["ok / degraded / lost", `${now.ok} / ${now.degraded} / ${now.lost}`],
-    ["frames that never came", now.missing],
+    ["missing frames", now.missing],
     ["stamp error, at most", number(now.stamp_error_us, 1) + " µs"],
-    ["spread of the exposures", number(now.spread_us, 1) + " µs"],
-    ["images belong together", now.pairing],
+    ["exposure spread", number(now.spread_us, 1) + " µs"],
+    ["pairing", now.pairing],
     ["residual", number(now.reprojection_px, 2) + " px"],
-    ["pose lines, age at p99", now.line_age_p99_ms === null || now.line_age_p99_ms === undefined ? "no lines" : number(now.line_age_p99_ms, 1) + " ms"],
-    ["latitude", now.enu ? number(now.enu.latitude_deg, 6) + "°" : "not placed yet"],
-    ["longitude", now.enu ? number(now.enu.longitude_deg, 6) + "°" : "not placed yet"],
-    ["heading", now.enu ? number(now.enu.heading_deg, 1) + "°" : "not placed yet"],
+    ["pose stream, age p99", now.line_age_p99_ms === null || now.line_age_p99_ms === undefined ? "off" : number(now.line_age_p99_ms, 1) + " ms"],
+    ["latitude", now.enu ? number(now.enu.latitude_deg, 6) + "°" : "not aligned yet"],
+    ["longitude", now.enu ? number(now.enu.longitude_deg, 6) + "°" : "not aligned yet"],
+    ["heading", now.enu ? number(now.enu.heading_deg, 1) + "°" : "not aligned yet"],
   ]);
 }
 
@@ -98,8 +98,8 @@ function showEvents(list, anew) {
 }
 
 function showCalibration(c) {
-  const words = c.cameras.length < 2 ? "none yet: drive past things at the roadside"
-    : `${CAUSES[c.cause] || "found: " + (c.cause || "").replaceAll("_", " ")}, ${c.confirmed ? "confirmed by the drive" : "not confirmed yet"}`;
+  const words = c.cameras.length < 2 ? "none yet: drive past near objects"
+    : `${CAUSES[c.cause] || "found: " + (c.cause || "").replaceAll("_", " ")}, ${c.confirmed ? "verified" : "not verified yet"}`;
   show("calibration_words", words + (c.depth ? ` · depth ±${number(2 * c.depth.sigma_percent, 1)} % at ${number(c.depth.at_m, 0)} m` : ""));
   const names = ["rotation x, °", "rotation y, °", "rotation z, °", "translation x, mm", "translation y, mm", "translation z, mm"];
   const parts = [];
@@ -114,7 +114,7 @@ function showCalibration(c) {
   }
   const note = document.createElement("p");
   note.className = "soft";
-  note.textContent = "σ with uncertain lenses; a calibration that was given without has none until the drive has measured.";
+  note.textContent = "σ includes uncertain intrinsics; a calibration supplied without σ has none until it is measured online.";
   $("calibration").replaceChildren(...parts, ...(parts.length ? [note] : []));
   $("history").replaceChildren(...c.history.slice(-HISTORY).reverse().map(h =>
     item(`${number(h.s, 1)} s · ${h.what} · ${h.cause.replaceAll("_", " ")}${h.reason ? " · " + h.reason : ""}`)));
@@ -139,7 +139,7 @@ function drawMap() {
   g.clearRect(0, 0, canvas.width, canvas.height);
   const ours = drive.trail.map(onEarth), theirs = drive.enu_alignment ? drive.trail.filter(p => p.length > 4).map(p => [p[4], p[5]]) : [];
   if (drive.now && drive.now.position_m) ours.push(onEarth(drive.now.position_m));  // steps of the trail are long after a long drive
-  show("map_words", drive.enu_alignment ? "north is up" : "left camera's start looks up; the INS comes once the drive is placed on the earth");
+  show("map_words", drive.enu_alignment ? "north is up" : "the first viewing direction points up; the INS appears after the ENU alignment");
   if (!ours.length) return;
   let [l, b, r, t] = [Infinity, Infinity, -Infinity, -Infinity];
   for (const [x, y] of ours.concat(theirs)) { l = Math.min(l, x); r = Math.max(r, x); b = Math.min(b, y); t = Math.max(t, y); }
@@ -248,7 +248,7 @@ function begin(message) {
   document.title = "vergence · " + message.session;
   for (const button of document.querySelectorAll("button")) button.disabled = !token()
     || (button.dataset.action === "recalibrate" && !message.can_recalibrate) || (button.dataset.action === "stop-recording" && !message.recording);
-  show("action_words", token() ? "" : "actions need the token: open the link that the program shows when it starts");
+  show("action_words", token() ? "" : "actions need the token: open the link printed at the start");
   showEvents(message.events, true);
   take(message);
 }
@@ -260,7 +260,7 @@ function take(message) {
   drive.ended = message.ended;
   if (message.now) showNow(message.now);
   const silent = drive.now && drive.now.silent;
-  const words = drive.ended ? "the drive is over" : !drive.now ? "waiting for the first frame" : silent ? "no frame comes" : "live";
+  const words = drive.ended ? "the session has ended" : !drive.now ? "waiting for the first frame" : silent ? "no frames" : "live";
   link(words + " · " + drive.session, !drive.ended && silent, drive.ended || !drive.now || silent);
   redraw();
 }
@@ -306,31 +306,31 @@ async function look() {
   heard = performance.now();
   const answer = await fetch("/events", {headers: token() ? {"X-Vergence-Token": token()} : {}, signal: stream.signal});
   if (answer.ok) {
-    link("connected, waiting for the session to begin", false, true);
+    link("connected, waiting for the session to start", false, true);
     return read(answer.body);
   }
   const message = (await answer.text()).trim();
-  link(`refused (${answer.status}): ${message}${answer.status === 403 ? "; open the link that the program shows when it starts" : ""}`, true, true);
+  link(`refused (${answer.status}): ${message}${answer.status === 403 ? "; open the link printed at the start" : ""}`, true, true);
   return REFUSED_MS;
 }
 
 async function connect() {
   const wait = await look().catch(() => 0);
   stream = null;
-  if (!wait) link(drive.ended ? "the drive is over; the page waits for the next one" : "no connection: trying again", !drive.ended, true);
+  if (!wait) link(drive.ended ? "the session has ended; waiting for the next one" : "no connection: retrying", !drive.ended, true);
   setTimeout(connect, wait || AGAIN_MS);
 }
 
 // A network that has gone, or a program that hangs, ends no stream.
 setInterval(() => {
   const quiet = performance.now() - heard;
-  if (stream && greeted && quiet > QUIET_MS) link(`nothing heard for ${lasting(quiet / 1000)}: is the network there?`, true, true);
+  if (stream && greeted && quiet > QUIET_MS) link(`no data for ${lasting(quiet / 1000)}: check the network`, true, true);
   if (stream && quiet > GIVEN_UP_MS) stream.abort();
 }, 500);
 
 for (const button of document.querySelectorAll("button")) button.addEventListener("click", async () => {
   const answer = await fetch("/" + button.dataset.action, {method: "POST", headers: {"X-Vergence-Token": token()}}).catch(() => null);
-  show("action_words", answer && answer.ok ? button.textContent + ": asked for" : answer && answer.status === 403 ? "refused: the token is of another session" : "the program does not answer");
+  show("action_words", answer && answer.ok ? button.textContent + ": requested" : answer && answer.status === 403 ? "refused: the token belongs to another session" : "no response from the program");
 });
 window.updates = 0;
 connect();

@@ -134,7 +134,7 @@ TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEn
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(events("s", "calibration_save_failed").size(),
             events("s", "calibration_accepted").size());
-  EXPECT_TRUE(test::says(o.err, "the next drive will not know"));
+  EXPECT_TRUE(test::says(o.err, "the next run will not use"));
 }
 
 TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) {

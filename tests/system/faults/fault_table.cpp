@@ -24,12 +24,12 @@ struct Kind {
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all{
-      {"one camera gone",
+      {"one camera disconnected",
        "camera_gone",
        "camera=1",
        3,
        {"camera_disconnected", "camera_reconnected", "no_image"}},
-      {"both cameras gone",
+      {"both cameras disconnected",
        "camera_gone",
        "camera=-1",
        3,
@@ -39,15 +39,15 @@ const std::vector<Kind>& kinds() {
        "camera=-1",
        0.1,
        {"camera_disconnected", "camera_reconnected"}},
-      {"INS gone", "ins_gone", "", 3, {"ins_timeout", "ins_recovered"}},
+      {"INS disconnected", "ins_gone", "", 3, {"ins_timeout", "ins_recovered"}},
       {"no fix", "no_fix", "", 5, {"ins_no_fix", "ins_recovered"}},
       {"INS position jumps", "position_jump", "east_m=100", 3, {"ins_jump"}},
-      {"board gone",
+      {"trigger board disconnected",
        "board_gone",
        "",
        3,
        {"trigger_board_disconnected", "trigger_board_reconnected"}},
-      {"board gone, pulses on",
+      {"trigger board disconnected, pulses continue",
        "board_gone",
        "powered=1",
        3,
@@ -75,7 +75,7 @@ const std::vector<Kind>& kinds() {
       {"the INS's clock set", "time_jump", "camera=-1 jump_s=1", 0, {"/devices/clock_resets"}},
       {"a bus in the way", "occluder", "", 5, {"few_inliers"}, 9},
       {"disk full", "disk_full", "", 3, {"disk_full", "disk_recovered"}},
-      {"recalibration asked for", "recalibrate", "", 0, {"rig_changed", "recalibrating"}, 6},
+      {"recalibration requested", "recalibrate", "", 0, {"rig_changed", "recalibrating"}, 6},
   };
   return all;
 }
@@ -104,7 +104,7 @@ const std::vector<FaultCase>& single_faults() {
     std::vector<Kind> alone = kinds();
     // Not one of kinds(): a seed of random drives stands for the same faults as before.
     Kind left = alone.front();
-    left.name = "the left camera gone", left.parameters = "camera=0";
+    left.name = "the left camera disconnected", left.parameters = "camera=0";
     alone.insert(alone.begin() + 1, left);
     for (const Kind& kind : alone) {
       FaultCase c;

@@ -99,8 +99,8 @@ def figures_are_the_sessions(seen, run, problems):
     x = [row for row in seen["rotation"] if row[0] == "translation x, mm"]
     if not x or not x[0][1].startswith("-750.00"):
         problems.append(f"the page's calibration is {seen['rotation']}")
-    if "the drive is over" not in seen["link"]:
-        problems.append(f"the page does not know that the drive is over: {seen['link']}")
+    if "the session has ended" not in seen["link"]:
+        problems.append(f"the page does not show that the session has ended: {seen['link']}")
 
 
 def answer(port, method, path, **headers):
@@ -168,7 +168,7 @@ def first_drive(driver, below, port, problems, pictures):
         time.sleep(0.3)
     time.sleep(2)
     after = figures(driver)
-    if not before["updates"] < after["updates"] or "asked for" not in after["action"]:
+    if not before["updates"] < after["updates"] or "requested" not in after["action"]:
         problems.append(f"the viewer lost its page: {before} {after}")
     if min(after["lit"]) < 0.9 or "points" not in after["image"]:
         problems.append(f"the images are not there: {after['lit']} {after['image']}")
@@ -214,12 +214,12 @@ def frames_stop(driver, below, port, problems):
     if seen["link"] != "live · third" or "past" in seen["band"] or seen["pale"] != "none":
         problems.append(f"the page is not live: {seen}")
     run.process.send_signal(signal.SIGSTOP)
-    seen = figures_when(driver, lambda seen: "nothing heard" in seen["link"], 10)
+    seen = figures_when(driver, lambda seen: "no data" in seen["link"], 10)
     run.process.send_signal(signal.SIGCONT)
-    if "nothing heard" not in seen["link"] or "past" not in seen["band"] or "grayscale" not in seen["pale"]:
+    if "no data" not in seen["link"] or "past" not in seen["band"] or "grayscale" not in seen["pale"]:
         problems.append(f"a program that hangs looks alive: {seen}")
     seen = figures_when(driver, lambda seen: seen["status"] == "NO FRAMES", 40)
-    if seen["status"] != "NO FRAMES" or not seen["state"].startswith("for ") or seen["link"] != "no frame comes · third":
+    if seen["status"] != "NO FRAMES" or not seen["state"].startswith("for ") or seen["link"] != "no frames · third":
         problems.append(f"frames have stopped, and the page says {seen}")
     if "past" not in seen["band"] or "tone-none" not in seen["band"] or "grayscale" not in seen["pale"]:
         problems.append(f"frames have stopped, and the page is in colour: {seen}")

@@ -85,7 +85,7 @@ TEST_F(RecordedDrive, replaysBitForBit) {
   EXPECT_LE(o.code, 1) << o.err;
   expect_same_poses(session(), out("again"));
   EXPECT_EQ(text_of(session() / "reference.tum"), text_of(out("again") / "reference.tum"));
-  EXPECT_TRUE(test::says(o.err, "what it was given in the drive"));
+  EXPECT_TRUE(test::says(o.err, "the same input as in the recorded run"));
   EXPECT_EQ(summary_of(out("again"))["runtime_allocations"], 0);
 }
 
@@ -117,7 +117,7 @@ TEST_F(RecordedDrive, aDamagedImageIsSaidAndTheRestReplays) {
   const Outcome o = replay(damaged, out("of-damaged"));
   EXPECT_LE(o.code, 1) << o.err;
   EXPECT_TRUE(test::says(o.err, "3 images of the drive are damaged"));
-  EXPECT_FALSE(test::contains(o.err, "what it was given in the drive")) << o.err;
+  EXPECT_FALSE(test::contains(o.err, "the same input as in the recorded run")) << o.err;
   EXPECT_EQ(summary_of(out("of-damaged"))["frames"]["read"],
             summary_of(session())["frames"]["read"]);
 }

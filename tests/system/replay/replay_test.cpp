@@ -39,7 +39,7 @@ TEST_F(ReplayedFolder, aDriveTooShortToConfirmItsCalibrationSaysSo) {
   ASSERT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(summary()["calibration"]["verified"], false);
   EXPECT_TRUE(summary()["calibration"]["verified_frame"].is_null());
-  EXPECT_TRUE(test::says(o.err, "the drive has not confirmed its calibration"));
+  EXPECT_TRUE(test::says(o.err, "the calibration was never verified"));
   EXPECT_TRUE(test::says(read_file(session() / "poses.csv"), "degraded,unverified_calibration"));
   EXPECT_TRUE(test::says(read_file(session() / "report.html"), "not verified"));
 }
@@ -79,7 +79,7 @@ TEST_F(ReplayedFolder, whoStopsTheCalibrationStopsTheReplay) {
     ChildProgram program(
         {"replay", data(), "--format", "folder", "--calibrate-first", "--out", session()},
         {.terminal = true});
-    ASSERT_TRUE(shows(program.terminal(), "calibrating from the drive"));
+    ASSERT_TRUE(shows(program.terminal(), "calibrating from the sequence"));
     program.signal(number);
     EXPECT_EQ(program.wait(), 128 + number);
   }

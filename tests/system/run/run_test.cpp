@@ -195,8 +195,8 @@ TEST(Run, onADiskThatStaysFullFilesAreWholeOrNotThereAndTheExitCodeSaysSo) {
   for (const char* name : {"summary.json", "summary.json.new", "report.html", "report.html.new"})
     EXPECT_FALSE(std::filesystem::exists(session / name)) << name;
   EXPECT_TRUE(test::says(o.err,
-                         "summary.json: cannot be written (File too large): check the folder's "
-                         "permissions and the disk's space"));
+                         "summary.json: cannot be written (File too large): check the directory's "
+                         "permissions and the free space"));
   EXPECT_TRUE(test::says(o.err, "poses.csv"));
   const std::string poses = text_of(session / "poses.csv");
   EXPECT_LE(poses.size(), 2048U);
@@ -259,12 +259,12 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"--set ins.rate=0", "ins.rate is 0"},
         BadCase{"--set cameras.1.size=[800,600]", "all cameras of a rig have one size"},
         BadCase{"--set cameras.0.exposure_us=60000", "longer than the 50000 µs between two pulses"},
-        BadCase{"--set cameras.0.driver=gige", "--fast is virtual time"},
-        BadCase{"--set cameras.1.driver=", "one camera alone has no scale"},
+        BadCase{"--set cameras.0.driver=gige", "--fast needs simulated cameras"},
+        BadCase{"--set cameras.1.driver=", "one camera is configured"},
         BadCase{"--set sync.mode=bord", "did you mean \"board\"?"},
         BadCase{"--set mock.drive=lop", "did you mean \"loop\"?"},
         BadCase{"--set rig.nominal.focal_px=3", "rig.nominal"},
-        BadCase{"--fault knok@3", "there is no fault \"knok\""},
+        BadCase{"--fault knok@3", "unknown fault \"knok\""},
         BadCase{"--fault 'cover@1 camera=3'", "there is no camera 3"},
         BadCase{"--set 'faults.0=drift@x'", "faults.0: the time of drift is \"x\""},
         BadCase{"--duration=-1", "--duration needs seconds"}));

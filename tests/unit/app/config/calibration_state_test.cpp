@@ -107,7 +107,7 @@ TEST(StateFile, OfAnotherRigOrConfigurationIsNotUsedAndTheSentenceSaysWhy) {
   for (const Change& c : {
            Change{"serial \"102\", the one that is there \"103\"",
                   [](CalibrationFile* f) { f->serials[1] = "103"; }},
-           Change{"2 cameras, the configuration has 3",
+           Change{"2 cameras, but the configuration has 3",
                   [](CalibrationFile* f) { f->rig.cameras = 3; }},
            Change{"640 x 480", [](CalibrationFile* f) { f->rig.intrinsics[0].width = 1280; }},
            Change{

@@ -62,7 +62,7 @@ TEST(DriveSync, whatCannotBePairedIsRefusedWithWhatToDo) {
            {"sync: {mode: bord}", "did you mean \"board\"?"},
            {"sync: {mode: board}", "set trigger.driver to board, or sync.mode to frame_counter"},
            {"sync: {mode: ins_syncout}", "has no SyncOut"},
-           {"sync: {mode: ins_syncout}\nins: {driver: xsens}", "ins.sync_out_hz says how many"},
+           {"sync: {mode: ins_syncout}\nins: {driver: xsens}", "set ins.sync_out_hz"},
            {"sync: {mode: ins_syncout}\nins: {driver: xsens, sync_out_hz: 25}\ntrigger: {rate: 30}",
             "both are one rate"},
            {"sync: {mode: ieee1394_cycle_time}", "share its cycle timer"},
@@ -85,7 +85,8 @@ TEST(DriveSync, whatCannotBePairedIsRefusedWithWhatToDo) {
             "leaves out the line of a camera"},
            {"sync: {mode: board}\ntrigger: {driver: board, pps: up}",
             "it is one of none, rising, falling"},
-           {"sync: {mode: approximate_time, tolerance_ms: 100}", "at most half of the interval"}})
+           {"sync: {mode: approximate_time, tolerance_ms: 100}",
+            "at most half of the frame interval"}})
     EXPECT_TRUE(test::says(refusal(yaml), says)) << yaml;
 }
 

@@ -72,8 +72,8 @@ TEST(Analysis, withoutAReferenceThereAreNoErrorsAndItIsSaid) {
   for (Frame& f : unplaced.frames) f.has_ins = true, f.ins = {1, 2, 3};
   for (const auto& [session, why] :
        {std::pair(bent_drive(50), "no reference"),
-        std::pair(other_time, "reference.tum has no pose at the times of ours"),
-        std::pair(unplaced, "could not be placed")}) {
+        std::pair(other_time, "reference.tum and of the estimate do not overlap"),
+        std::pair(unplaced, "no ENU alignment")}) {
     const Analysis a = analyse(session);
     EXPECT_EQ(a.source, ErrorSource::none);
     for (const auto* curve : {&a.horizontal_m, &a.vertical_m, &a.heading_deg})

@@ -106,9 +106,9 @@ TEST(Assessment, GradeReasonAndAdviceByFinding) {
       {"no reference",
        [](Case& c) { c.analysis.source = ErrorSource::none, c.analysis.drift.reset(); }, care,
        "no reference"},
-      {"an INS without a alignment",
+      {"an INS without an alignment",
        [](Case& c) { c.analysis.source = ErrorSource::none, c.analysis.ins_unplaced = true; }, care,
-       "not placed on the earth", "comparison.alignment_distance_m"},
+       "no ENU alignment", "comparison.alignment_distance_m"},
       {"drift of 2 %", drift(0.02), good},
       {"drift above 2 %", drift(0.021), care},
       {"drift of 5 %", drift(0.05), care},
@@ -120,7 +120,7 @@ TEST(Assessment, GradeReasonAndAdviceByFinding) {
        [](Case& c) {
          for (Frame& f : c.session.frames) f.posed = false;
        },
-       bad, "never was a pose"},
+       bad, "no frame has a pose"},
       {"weak by lenses", weak_by("intrinsics"), bad, "calibration", "driving on does not help"},
       {"weak by noise", weak_by("noise"), bad, "calibration", "near and far structure"},
       {"short baseline, known well near", near_sigma(1), care, "1.0 % at 2.4 m"},
@@ -147,18 +147,17 @@ TEST(Assessment, GradeReasonAndAdviceByFinding) {
          c.given(true);
        },
        good},
-      {"not verified", [](Case& c) { c.given(false); }, care, "has not confirmed its calibration",
-       "near things at the roadside"},
+      {"not verified", [](Case& c) { c.given(false); }, care, "was never verified", "near objects"},
       {"not verified at the end", [](Case& c) { c.given(false), c.analysis.verified_s = 20; }, care,
        "at the end is not verified"},
-      {"nothing watched", [](Case& c) { c.given(false), c.calibration()["online"] = false; }, care,
-       "nothing watched it"},
+      {"not monitored", [](Case& c) { c.given(false), c.calibration()["online"] = false; }, care,
+       "calibration.online: off"},
       {"torn, waited in vain",
        [](Case& c) {
          c.session.summary = nullptr, c.attempt(true, "given", 0, 0);
          c.frames_of(1000, 0), c.analysis.waited = 1000;
        },
-       bad, "has not confirmed its calibration"},
+       bad, "was never verified"},
       {"contradicted",
        [](Case& c) {
          c.attempt(true, "given", 0, 0);
@@ -179,38 +178,39 @@ TEST(Assessment, GradeReasonAndAdviceByFinding) {
        [](Case& c) {
          c.session.summary = nullptr, c.session.missing = {"summary.json is missing"};
        },
-       care, "not whole", "not closed"},
+       care, "incomplete", "not closed"},
       {"slow",
        [](Case& c) {
          for (std::size_t i = 0; i < 20; ++i) c.session.frames[i].estimate_ms = 80;
        },
        good, "", "frame interval"},
       {"allocations", [](Case& c) { c.session.summary["runtime_allocations"] = 3; }, good, "",
-       "Memory was taken 3 times"},
+       "3 runtime allocations"},
       {"lines dropped", [](Case& c) { c.session.summary["drops"]["lines"] = 4; }, care, "4 lines"},
       // Outages
       {"a camera that never came back",
        event(49.96, "camera_disconnected", "camera 1 is gone; check it"), bad,
-       "no frame after 50.0 s: camera 1 was gone", "Camera 1 was gone from 50.0 s on, to the end"},
+       "no frame after 50.0 s: camera 1 was disconnected",
+       "Camera 1 was disconnected from 50.0 s on, to the end"},
       {"a board that never came back", event(49.96, "trigger_board_disconnected", "x"), bad,
-       "the trigger board was gone"},
+       "the trigger board was disconnected"},
       {"a camera that the others drove on without",
        event(30, "camera_disconnected", "camera 1 is gone"), care,
-       "camera 1 was gone from 30.0 s to the end"},
+       "camera 1 was disconnected from 30.0 s to the end"},
       {"a loose cable",
        [](Case& c) {
          for (int i = 0; i < 50; ++i) c.outage(10 + 0.6 * i, 10.3 + 0.6 * i);
        },
-       good, "", "Camera 0 was gone 50 times for 15.0 s"},
+       good, "", "Camera 0 was disconnected 50 times for 15.0 s"},
       {"a hole breaks the way, so that lengths say nothing",
        [](Case& c) {
          c.analysis.scale = 1.045;
          for (std::size_t i = 400; i < 800; ++i) c.session.frames[i].posed = false;
          c.outage(20, 40);
        },
-       care, "camera 0 was gone for 20.0 s"},
+       care, "camera 0 was disconnected for 20.0 s"},
       {"a short outage leaves lengths to be judged",
-       [](Case& c) { c.analysis.scale = 1.045, c.outage(20, 23); }, care, "lengths come out",
+       [](Case& c) { c.analysis.scale = 1.045, c.outage(20, 23); }, care, "lengths are 4",
        "Lengths disagree"},
       {"an outage after the frames that are read",
        [](Case& c) {
@@ -289,7 +289,7 @@ TEST(Usability, OfDrivesWithoutAnOkFrame) {
   std::vector<Drive> drives{
       {degraded_drive(100, "few_inliers"), false, "few_inliers (100 of 100 frames)"},
       {degraded_drive(30, "few_inliers"), false, "few_inliers"},
-      {degraded_drive(40, "cameras_swapped", 40), false, "there never was a pose: cameras_swapped"},
+      {degraded_drive(40, "cameras_swapped", 40), false, "no frame has a pose: cameras_swapped"},
       {degraded_drive(30, "unverified_calibration", 10), false, ""},
   };
   for (const char* waits : {"unverified_calibration", "uncalibrated"}) {

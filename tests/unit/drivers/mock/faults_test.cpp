@@ -58,7 +58,7 @@ TEST(Faults, thePageHasTheTable) {
 
 TEST(Faults, nonsenseIsNamed) {
   EXPECT_NE(refusal("knock").find("KIND@SECONDS"), std::string::npos);
-  EXPECT_NE(refusal("knok@3").find("there is no fault \"knok\""), std::string::npos);
+  EXPECT_NE(refusal("knok@3").find("unknown fault \"knok\""), std::string::npos);
   EXPECT_NE(refusal("knock@soon").find("not a number"), std::string::npos);
   EXPECT_NE(refusal("knock@-1").find("0 … 86400"), std::string::npos);
   EXPECT_NE(refusal("knock@nan").find("0 … 86400"), std::string::npos);
