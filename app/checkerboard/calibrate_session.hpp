@@ -9,7 +9,7 @@
 #include "app/runtime/errors.hpp"
 #include "app/runtime/progress.hpp"
 
-/// `vergence calibrate` with a checkerboard. All of it throws InputError where arguments, images or
+/// `vergence calibrate target` and `live`. All of it throws InputError where arguments, images or
 /// devices cannot be used.
 namespace vergence::app {
 

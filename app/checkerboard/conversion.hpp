@@ -7,7 +7,7 @@
 #include "app/checkerboard/written_formats.hpp"
 #include "app/datasets/foreign_calibration.hpp"
 
-/// `vergence calibrate --convert IN OUT`.
+/// `vergence calibrate convert IN OUT`.
 namespace vergence::app {
 
 /// `vergence`, `kalibr`, `ros`, `opencv`. InputError: another word, with the nearest.

@@ -39,7 +39,6 @@ BoardPattern board_of(const CalibrateOptions& a) {
 
 CalibrateRequest request_of(const CalibrateOptions& a) {
   const BoardPattern board = board_of(a);
-  if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
   if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100))
     throw InputError("--baseline needs metres, more than 0 and less than 100");
   if (a.sixth_order && a.model == "equidistant")
@@ -59,11 +58,9 @@ CalibrateRequest request_of(const CalibrateOptions& a) {
 
 ExitCode convert(const CalibrateOptions& a) {
   ConversionRequest r;
-  r.in = a.convert[0];
-  r.out = a.convert[1];
-  if (!a.to.empty() && !a.format.empty())
-    throw InputError("--to and --format exclude one another; use --to");
-  if (!a.to.empty() || !a.format.empty()) r.format = parse_format(a.to.empty() ? a.format : a.to);
+  r.in = a.in;
+  r.out = a.out;
+  if (!a.to.empty()) r.format = parse_format(a.to);
   const CalibrationFormat format = r.format ? *r.format : format_of_name(r.out);
   for (const std::filesystem::path& file : files_written(r.out, format))
     if (std::filesystem::exists(file) && !a.force)
@@ -79,15 +76,7 @@ ExitCode convert(const CalibrateOptions& a) {
   return ExitCode::done;
 }
 
-ExitCode calibrate_board_live(const CalibrateOptions& a) {
-  if (!a.right.empty() || !a.more_cameras.empty())
-    throw InputError("calibrate: a CONFIG has its cameras; --right and --camera go with --left");
-  return calibrate_live(request_of(a), a.common.configuration(a.configuration));
-}
-
-ExitCode calibrate_board_images(const CalibrateOptions& a) {
-  if (a.keep_views)
-    throw InputError("--keep-views is for live views; image files are kept as they are");
+ExitCode calibrate_target(const CalibrateOptions& a) {
   if (a.right.empty() && !a.more_cameras.empty())
     throw InputError("--camera is for a third and fourth camera; --right comes first");
   std::vector<std::vector<std::string>> patterns{a.left};
@@ -100,17 +89,17 @@ ExitCode calibrate_board_images(const CalibrateOptions& a) {
 }
 
 ExitCode run(const CalibrateOptions& a) {
-  switch (a.way()) {
-    case CalibrateWay::board_images:
-      return calibrate_board_images(a);
-    case CalibrateWay::board_live:
-      return calibrate_board_live(a);
-    case CalibrateWay::convert:
+  switch (a.given) {
+    case CalibrateCommand::target:
+      return calibrate_target(a);
+    case CalibrateCommand::live:
+      return calibrate_live(request_of(a), a.common.configuration(a.configuration));
+    case CalibrateCommand::convert:
       return convert(a);
-    case CalibrateWay::drive:
+    case CalibrateCommand::sequence:
       break;
   }
-  throw InputError("calibrate --drive needs no target: use 'vergence calibrate'");
+  throw InputError("calibrate sequence needs no target; 'vergence calibrate sequence' does it");
 }
 
 }  // namespace

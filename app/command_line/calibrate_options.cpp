@@ -43,93 +43,172 @@ ExitCode run_checkerboard_tool(const ProgramWords& words) {
   throw InputError(fmt::format("{}: cannot be started: {}", tool->string(), std::strerror(errno)));
 }
 
+namespace {
+
+void declare_out(CLI::App& command, CalibrateOptions& o) {
+  command.add_option("--out", o.out, "Calibration file to write")
+      ->required()
+      ->type_name("FILE")
+      ->group("Output");
+  command.add_flag("--force", o.force, "Overwrite an existing file")->group("Output");
+}
+
+/// The options that `target` and `live` share.
+void declare_board(CLI::App& command, CalibrateOptions& o) {
+  command
+      .add_option("--checkerboard", o.board,
+                  "Inner corners of a checkerboard, columns and rows: 9x6")
+      ->type_name("NxN")
+      ->group("Target");
+  command.add_option("--aprilgrid", o.aprilgrid, "Tags of an AprilGrid (36h11): 6x6")
+      ->type_name("NxN")
+      ->group("Target");
+  command.add_option("--charuco", o.charuco, "Squares of a ChArUco target: 11x8")
+      ->type_name("NxN")
+      ->group("Target");
+  command.add_option("--square", o.square, "Size of a square or tag in metres")
+      ->type_name("M")
+      ->group("Target");
+  command
+      .add_option("--spacing", o.spacing, "--aprilgrid: gap between tags relative to their size")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group("Target");
+  command.add_option("--marker", o.marker, "--charuco: size of a marker in metres")
+      ->type_name("M")
+      ->group("Target");
+  command.add_option("--dictionary", o.dictionary, "--charuco: OpenCV's name of the dictionary")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group("Target");
+  command.add_option("--model", o.model, "Lens model: radtan, or equidistant (fisheye)")
+      ->check(CLI::IsMember({"radtan", "equidistant"}))
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group("Calibration");
+  command.add_flag("--k3", o.sixth_order, "radtan: also estimate k3")->group("Calibration");
+  command.add_option("--baseline", o.baseline, "Measured baseline in metres, for comparison")
+      ->type_name("M")
+      ->group("Calibration");
+  declare_out(command, o);
+  command.add_flag("--json", o.json, "Print JSON instead of tables")->group("Output");
+  o.common.declare_quiet(command);
+}
+
+void declare_target(CLI::App& command, CalibrateOptions& o) {
+  command
+      .add_option("--left", o.left,
+                  "Images of the left camera, quoted; alone: one camera's intrinsics")
+      ->required()
+      ->type_name("GLOB")
+      ->group("Input");
+  command.add_option("--right", o.right, "Images of the right camera, paired by number or name")
+      ->type_name("GLOB")
+      ->group("Input");
+  command.add_option("--camera", o.more_cameras, "Images of a third and a fourth camera")
+      ->type_name("GLOB")
+      ->allow_extra_args(false)
+      ->group("Input");
+  declare_board(command, o);
+  command.footer(
+      "Example: vergence calibrate target --left 'l*.png' --right 'r*.png' --checkerboard 9x6 "
+      "--square 0.025 \\\n           --out calibration.yaml\n"
+      "Exit codes: 0 success; 1 no usable calibration; 2 bad arguments or input.");
+}
+
+void declare_live(CLI::App& command, CalibrateOptions& o) {
+  command.add_option("CONFIG", o.configuration, "Configuration file (docs/configuration.md)")
+      ->required()
+      ->type_name("FILE");
+  declare_board(command, o);
+  command.add_option("--keep-views", o.keep_views, "Save the images of accepted views")
+      ->type_name("DIR")
+      ->group("Output");
+  o.common.declare_set(command);
+  command.footer(
+      "Example: vergence calibrate live app/config/gige.yaml --checkerboard 9x6 --square 0.025 "
+      "\\\n           --out calibration.yaml\n"
+      "Exit codes: 0 success; 1 no usable calibration; 2 bad arguments or configuration;\n"
+      "3 camera missing; 130, 143 stopped by SIGINT, SIGTERM.");
+}
+
+void declare_sequence(CLI::App& command, CalibrateOptions& o) {
+  command.add_option("DATA", o.data, "Data-set directory, or a .mcap, .db3 or .bag file")
+      ->required()
+      ->type_name("DIR|FILE");
+  command.add_option("--format", o.format, "Format of DATA; the names are those of replay")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group("Input");
+  declare_image_topics(command, &o.left_topic, &o.right_topic);
+  command
+      .add_option("--calibration", o.calibration,
+                  "Initial calibration instead of the data set's (vergence, Kalibr, ROS, OpenCV)")
+      ->type_name("FILE")
+      ->group("Calibration");
+  command
+      .add_option("--baseline", o.baseline, "Baseline length in metres; overrides the calibration")
+      ->type_name("M")
+      ->group("Calibration");
+  declare_out(command, o);
+  o.common.declare(command);
+  command.footer(
+      "Example: vergence calibrate sequence FOLDER --out calibration.yaml\n"
+      "Exit codes: 0 success; 1 no usable calibration; 2 bad arguments or input;\n"
+      "130, 143 stopped by SIGINT, SIGTERM.");
+}
+
+void declare_convert(CLI::App& command, CalibrateOptions& o) {
+  command
+      .add_option("IN", o.in,
+                  "Calibration to read, its format detected; two files with a comma between")
+      ->required()
+      ->type_name("FILE");
+  command.add_option("OUT", o.out, "File or files to write, or a directory for ROS")
+      ->required()
+      ->type_name("FILE|DIR");
+  command
+      .add_option("--to", o.to, "Format of OUT: vergence, kalibr, ros, opencv [by the name of OUT]")
+      ->type_name("NAME")
+      ->group("Output");
+  command.add_flag("--force", o.force, "Overwrite existing files")->group("Output");
+  command.add_option("--size", o.size, "Image size in pixels, if an OpenCV file has none: 640x480")
+      ->type_name("NxN")
+      ->group("Input");
+  command.footer(
+      "Example: vergence calibrate convert camchain.yaml calibration.yaml\n"
+      "Exit codes: 0 success; 2 bad arguments or input.");
+}
+
+}  // namespace
+
 CLI::App* CalibrateOptions::declare(CLI::App& root) {
   CLI::App* command = root.add_subcommand(
       "calibrate", "Calibrate from target images, live, or a sequence; convert formats");
-  command->add_option("CONFIG", configuration,
-                      "Live calibration with the cameras of this configuration");
-  command
-      ->add_option("--left", left,
-                   "Images of the left camera, quoted; alone: one camera's intrinsics")
-      ->type_name("GLOB");
-  command->add_option("--right", right, "Images of the right camera, paired by number or name")
-      ->type_name("GLOB");
-  command->add_option("--camera", more_cameras, "Images of a third and a fourth camera")
-      ->type_name("GLOB")
-      ->allow_extra_args(false);
-  command->add_option("--drive", drive, "Calibrate from a recorded sequence, without a target")
-      ->type_name("DATA");
-  command
-      ->add_option("--calibration", calibration,
-                   "--drive: initial calibration instead of the data set's")
-      ->type_name("FILE");
-  declare_image_topics(*command, &left_topic, &right_topic);
-  command->add_option("--checkerboard", board, "Inner corners of a checkerboard, columns and rows")
-      ->type_name("9x6");
-  command->add_option("--aprilgrid", aprilgrid, "Tags of an AprilGrid (36h11), columns and rows")
-      ->type_name("6x6");
-  command->add_option("--charuco", charuco, "Squares of a ChArUco target, columns and rows")
-      ->type_name("11x8");
-  command->add_option("--square", square, "Size of a square or tag in metres")->type_name("M");
-  command->add_option("--marker", marker, "--charuco: size of a marker in metres")->type_name("M");
-  command->add_option("--dictionary", dictionary, "--charuco: OpenCV's name of the dictionary")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command->add_option("--spacing", spacing, "--aprilgrid: gap between tags relative to their size")
-      ->type_name("R")
-      ->capture_default_str();
-  command->add_option("--out", out, "Calibration file to write")->type_name("FILE");
-  command->add_option("--model", model, "Lens model: radtan, or equidistant (fisheye)")
-      ->check(CLI::IsMember({"radtan", "equidistant"}))
-      ->capture_default_str();
-  command->add_flag("--k3", sixth_order, "radtan: also estimate k3");
-  command
-      ->add_option("--baseline", baseline,
-                   "Measured baseline in metres; printed for comparison, with --drive used")
-      ->type_name("M");
-  command->add_flag("--json", json, "Print JSON instead of tables");
-  command->add_option("--keep-views", keep_views, "Live: save the images of accepted views")
-      ->type_name("DIR");
-  command
-      ->add_option("--convert", convert,
-                   "Convert a calibration between vergence, Kalibr, ROS and OpenCV")
-      ->expected(2)
-      ->type_name("IN OUT");
-  command->add_option("--format", format, "--drive: format of DATA [auto]; --convert: same as --to")
-      ->type_name("FORMAT");
-  command
-      ->add_option("--to", to,
-                   "--convert: format of OUT: vergence, kalibr, ros, opencv [by its name]")
-      ->type_name("FORMAT");
-  command->add_flag("--force", force, "Overwrite existing files");
-  command->add_option("--size", size, "--convert: image size, if an OpenCV file has none")
-      ->type_name("WxH");
+  command->require_subcommand(1);
   command->footer(
-      "Examples:\n"
-      "  vergence calibrate --drive DATA --out calibration.yaml\n"
-      "  vergence calibrate --left 'l*.png' --right 'r*.png' --checkerboard 9x6 --square 0.025 "
-      "--out F.yaml\n"
-      "  vergence calibrate --convert camchain.yaml calibration.yaml\n"
-      "Exit codes: 0 success; 1 no usable calibration; 2 bad arguments or input; 3 camera "
-      "missing;\n"
-      "130 Ctrl-C.");
-  common.declare(*command);
+      "Example: vergence calibrate sequence FOLDER --out calibration.yaml\n"
+      "'vergence calibrate SUBCOMMAND --help' has options, an example and exit codes.");
+  const auto add = [&](const char* name, const char* description, CalibrateCommand which,
+                       void (*declare_options)(CLI::App&, CalibrateOptions&)) {
+    CLI::App* sub = command->add_subcommand(name, description);
+    declare_options(*sub, *this);
+    sub->callback([this, which] { given = which; });
+  };
+  add("target", "Calibrate from image files of a calibration target", CalibrateCommand::target,
+      declare_target);
+  add("live", "Calibrate from a target shown to the cameras of a configuration",
+      CalibrateCommand::live, declare_live);
+  add("sequence", "Calibrate from a recorded sequence, without a target",
+      CalibrateCommand::sequence, declare_sequence);
+  add("convert", "Convert a calibration between vergence, Kalibr, ROS and OpenCV",
+      CalibrateCommand::convert, declare_convert);
   return command;
 }
 
-CalibrateWay CalibrateOptions::way() const {
-  const int ways = (configuration.empty() ? 0 : 1) + (left.empty() ? 0 : 1) +
-                   (convert.empty() ? 0 : 1) + (drive.empty() ? 0 : 1);
-  if (ways != 1)
-    throw InputError(
-        "calibrate: pass exactly one of: image files (--left, --right), CONFIG (live), --drive "
-        "DATA, --convert IN OUT");
-  if (!drive.empty()) return CalibrateWay::drive;
-  if (!convert.empty()) return CalibrateWay::convert;
-  return configuration.empty() ? CalibrateWay::board_images : CalibrateWay::board_live;
-}
-
 void check_writable(const std::filesystem::path& file, bool force) {
+  if (file.empty())
+    throw InputError("--out is empty; name the file to write, e.g. calibration.yaml");
   const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
   if (std::filesystem::is_directory(file))
     throw InputError(file.string() +

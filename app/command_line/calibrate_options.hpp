@@ -26,30 +26,30 @@ inline constexpr const char* kCheckerboardTool = "vergence-checkerboard";
 /// InputError: it is not there, or cannot be started.
 [[nodiscard]] ExitCode run_checkerboard_tool(const ProgramWords& words);
 
-/// Input of `vergence calibrate`.
-enum class CalibrateWay : std::uint8_t { board_images, board_live, drive, convert };
+/// The subcommands of `vergence calibrate`.
+enum class CalibrateCommand : std::uint8_t { target, live, sequence, convert };
 
-/// The command line of `vergence calibrate`, the words as given: the program declares it, and the
-/// checkerboard tool, which the program starts with the same words.
+/// The command lines of `vergence calibrate`, the words as given: the program declares them, and
+/// the checkerboard tool, which the program starts with the same words.
 struct CalibrateOptions {
+  /// The subcommand of the words; the callback of the command that declare() returns may read it.
+  CalibrateCommand given = CalibrateCommand::target;
   CommonOptions common{};
-  std::string configuration{}, board{}, aprilgrid{}, charuco{}, out{}, model = "radtan", format{},
-                                                                       size{}, drive{};
+  std::string configuration{}, data{}, in{}, out{};
+  std::string board{}, aprilgrid{}, charuco{}, model = "radtan", format = "auto", size{}, to{};
   std::optional<std::string> calibration{};
-  std::vector<std::string> left{}, right{}, convert{};
+  std::vector<std::string> left{}, right{};
   std::vector<std::string> more_cameras{};  // one pattern each
   std::optional<std::string> keep_views{};
   std::optional<double> square{}, marker{}, baseline{};
   std::string dictionary = "5X5_1000";
   double spacing = 0.3;  // Kalibr's own sheets
-  std::string to{};
-  std::string left_topic{}, right_topic{};  // --drive
+  std::string left_topic{}, right_topic{};
   bool sixth_order = false, json = false, force = false;
 
-  /// The subcommand with its options; `this` outlives its parsing.
+  /// Declares the command and its subcommands, each with its own options; `this` outlives their
+  /// parsing.
   CLI::App* declare(CLI::App& root);
-  /// InputError: none of the ways, or several.
-  [[nodiscard]] CalibrateWay way() const;
 };
 
 /// Before the board is carried around for half an hour, not after it: InputError unless a file can

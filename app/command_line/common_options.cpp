@@ -6,18 +6,26 @@ const char* const kSessionExitCodes =
     "Exit codes: 0 success; 1 no usable result; 2 bad arguments, configuration or input;\n"
     "3 device missing; 4 session incomplete; 130, 143 stopped by SIGINT, SIGTERM.";
 
-void CommonOptions::declare(CLI::App& command) {
+void CommonOptions::declare_set(CLI::App& command) {
   command.add_option("--set", set, "Set a configuration key (docs/configuration.md); repeatable")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false)  // one argument each: the next word is not another KEY=VALUE
       ->group("Configuration");
+}
+
+void CommonOptions::declare_quiet(CLI::App& command) {
+  command.add_flag("--quiet", quiet, "Print no progress line")->group("Output");
+}
+
+void CommonOptions::declare(CLI::App& command) {
+  declare_set(command);
   command.add_option("--threads", threads, "Threads of the estimator, 1 or 2; same poses")
       ->type_name("N")
       ->group("Performance");
   command.add_option("--seed", seed, "Seed of the random sampling; same seed, same poses")
       ->type_name("N")
       ->group("Performance");
-  command.add_flag("--quiet", quiet, "Print no progress line")->group("Output");
+  declare_quiet(command);
 }
 
 void declare_session_options(CLI::App& command, bool* memory, bool* page) {

@@ -21,6 +21,9 @@ struct CommonOptions {
 
   /// Declares the options on a subcommand; `this` outlives its parsing.
   void declare(CLI::App& command);
+  /// Declares `--set` alone, `--quiet` alone.
+  void declare_set(CLI::App& command);
+  void declare_quiet(CLI::App& command);
   /// load_configuration() with --threads and --seed as the last --set. Errors  InputError.
   /// `before`: KEY=VALUE that `set` overrules.
   [[nodiscard]] Configuration configuration(const std::optional<std::filesystem::path>& file,

@@ -40,28 +40,63 @@ std::vector<std::string> option_names(CLI::App& command) {
   return names;
 }
 
-/// The command's own name in a hint: `vergence replay --help`.
-std::string help_hint(const CLI::App& command) {
-  const std::string word = command.get_parent() == nullptr ? "" : " " + command.get_name();
-  return "see 'vergence" + word + " --help'";
+/// The words of a command: `calibrate target`; of the program: none.
+std::string words_of(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  if (parent == nullptr) return "";
+  const std::string before = words_of(*parent);
+  return before + (before.empty() ? "" : " ") + command.get_name();
+}
+
+/// The command that the words given name; of one with subcommands, the one before the first words
+/// that it does not know.
+CLI::App& named_command(CLI::App& root) {
+  CLI::App* command = &root;
+  while (command->remaining().empty() && !command->get_subcommands().empty())
+    command = command->get_subcommands().front();
+  return *command;
+}
+
+/// What is wrong with a word that `command` does not know: the word, and what it may have meant.
+struct UnknownWord {
+  std::string name, why;
+  bool option = false;
+};
+
+UnknownWord unknown_word(const std::string& given, CLI::App& command) {
+  UnknownWord word;
+  word.name = given.substr(0, given.find('='));
+  word.option = word.name.size() > 1 && word.name.front() == '-';
+  if (!word.option) word.why = did_you_mean(word.name, command_words(command));
+  if (word.why.empty())
+    word.why = why_withdrawn(Withdrawn::Kind::option,
+                             words_of(command) + " " + (word.option ? word.name : "CONFIG"));
+  return word;
 }
 
 /// CLI11's errors about a command line, as one message.
 std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
-  const auto given = root.get_subcommands();
-  CLI::App& command = given.empty() ? root : *given.front();
-  const std::string who = given.empty() ? "" : command.get_name() + ": ";
+  CLI::App& command = named_command(root);
+  const std::string words = words_of(command), who = words.empty() ? "" : words + ": ";
+  const std::string hint = " (see 'vergence" + (words.empty() ? "" : " " + words) + " --help')";
   // Unknown arguments are reported first: this is often why something else seems to be missing.
-  if (const auto extras = root.remaining(true); !extras.empty()) {
-    const std::string& first = extras.front();
-    const std::string name = first.substr(0, first.find('='));
-    const bool option = name.size() > 1 && name.front() == '-';
-    const std::string why = why_withdrawn(Withdrawn::Kind::option, command.get_name() + " " + name);
-    return who + (option ? "unknown option " : "unexpected argument ") + "\"" + name + "\"" +
-           (option && why.empty() ? did_you_mean(name, option_names(command)) : why) + " (" +
-           help_hint(command) + ")";
-  }
-  return who + error.what() + " (" + help_hint(command) + ")";
+  const auto extras = command.remaining();
+  if (extras.empty()) return who + error.what() + hint;
+  // An option of an earlier version explains the other words.
+  std::vector<UnknownWord> unknown;
+  for (const std::string& extra : extras) unknown.push_back(unknown_word(extra, command));
+  const auto explained = [&](bool option) {
+    return std::find_if(unknown.begin(), unknown.end(), [&](const UnknownWord& word) {
+      return word.option == option && !word.why.empty();
+    });
+  };
+  auto first = explained(true);
+  if (first == unknown.end()) first = explained(false);
+  if (first == unknown.end()) first = unknown.begin();
+  if (first->option && first->why.empty())
+    first->why = did_you_mean(first->name, option_names(command));
+  return who + (first->option ? "unknown option " : "unexpected argument ") + "\"" + first->name +
+         "\"" + first->why + hint;
 }
 
 /// A first word that is no command is answered here: CLI11 would only call it unexpected.
@@ -78,7 +113,8 @@ void check_first_word(CLI::App& root, int argc, const char* const* argv) {
                    " ('vergence --help' lists the commands)");
 }
 
-/// `help`, `help COMMAND` and `version` as the options that they stand for.
+/// `help`, `help COMMAND`, `help COMMAND SUBCOMMAND` and `version` as the options that they stand
+/// for.
 std::vector<const char*> without_words_for_options(int argc, const char* const* argv) {
   std::vector<const char*> words(argv, argv + argc);
   if (argc < 2) return words;
@@ -86,7 +122,7 @@ std::vector<const char*> without_words_for_options(int argc, const char* const* 
   if (first == "version") words[1] = "--version";
   if (first != "help") return words;
   words.erase(words.begin() + 1);
-  words.resize(std::min<std::size_t>(words.size(), 2));
+  words.resize(std::min<std::size_t>(words.size(), 3));
   words.push_back("--help");
   return words;
 }

@@ -9,13 +9,11 @@
 namespace vergence::app {
 namespace {
 
-/// An ordinary drive instead of a board.
-DriveCalibrationRequest calibrate_request(const CalibrateOptions& a) {
-  if (a.out.empty()) throw InputError("--out is missing: the calibration.yaml to write");
+DriveCalibrationRequest sequence_request(const CalibrateOptions& a) {
   check_writable(a.out, a.force);
   DriveCalibrationRequest r;
-  r.data = a.drive;
-  r.format = sequence_format(a.format.empty() ? "auto" : a.format, a.drive);
+  r.data = a.data;
+  r.format = sequence_format(a.format, a.data);
   r.topics = {a.left_topic, a.right_topic, "", ""};
   check_topics(r.format, r.topics);
   r.out = a.out;
@@ -31,8 +29,8 @@ DriveCalibrationRequest calibrate_request(const CalibrateOptions& a) {
 void add_calibrate(CLI::App& root, const ProgramWords& words, ExitCode* exit_code) {
   const auto a = std::make_shared<CalibrateOptions>();
   a->declare(root)->callback([a, words, exit_code] {
-    *exit_code = a->way() == CalibrateWay::drive ? calibrate_from_drive(calibrate_request(*a))
-                                                 : run_checkerboard_tool(words);
+    *exit_code = a->given == CalibrateCommand::sequence ? calibrate_from_drive(sequence_request(*a))
+                                                        : run_checkerboard_tool(words);
   });
 }
 

@@ -42,8 +42,10 @@ void add_doctor(CLI::App& root, ExitCode* exit_code) {
   const auto a = std::make_shared<DoctorArguments>();
   CLI::App* command = root.add_subcommand(
       "doctor", "Check machine and devices against a configuration and print fixes");
-  command->add_option("CONFIG", a->configuration,
-                      "Configuration to check; without it, check what is connected");
+  command
+      ->add_option("CONFIG", a->configuration,
+                   "Configuration to check; without it, check what is connected")
+      ->type_name("FILE");
   command->add_option("--set", a->set, "Set a configuration key; repeatable")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);

@@ -112,22 +112,31 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   CLI::App* command = root.add_subcommand(
       "evaluate", "Compare a trajectory with ground truth (ATE, segment errors)");
   command->add_option("ESTIMATE", a->estimate, "Trajectory file, session or data-set directory")
-      ->required();
-  command->add_option("REFERENCE", a->reference,
-                      "Trajectory file, KITTI or EuRoC directory, or ins.csv of a session");
+      ->required()
+      ->type_name("DIR|FILE");
+  command
+      ->add_option("REFERENCE", a->reference,
+                   "Trajectory file, KITTI or EuRoC directory, or ins.csv of a session")
+      ->type_name("DIR|FILE");
   command->add_flag("--json", a->json, "Print JSON");
-  command->add_option("--lengths", a->lengths,
-                      "Segment lengths in metres [100,200 … 800; shorter on short paths]");
-  command->add_option("--step", a->step,
-                      "Start a segment at every Nth pose [10; with short lengths 1]");
+  command
+      ->add_option("--lengths", a->lengths,
+                   "Segment lengths in metres [100,200 … 800; shorter on short paths]")
+      ->type_name("M,…");
+  command
+      ->add_option("--step", a->step,
+                   "Start a segment at every Nth pose [10; with short lengths 1]")
+      ->type_name("N");
   command->add_option("--associate", a->associate, "How reference poses are associated")
       ->check(CLI::IsMember({"interpolate", "nearest"}))
       ->capture_default_str();
   command
       ->add_option("--max-gap", a->max_gap,
-                   "interpolate: largest reference gap to interpolate across, s")
+                   "interpolate: largest reference gap to interpolate across")
+      ->type_name("SECONDS")
       ->capture_default_str();
-  command->add_option("--max-difference", a->max_difference, "nearest: maximum stamp difference, s")
+  command->add_option("--max-difference", a->max_difference, "nearest: maximum stamp difference")
+      ->type_name("SECONDS")
       ->capture_default_str();
   command
       ->add_option("--axes", a->axes,

@@ -74,7 +74,8 @@ void add_export(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option("SESSION", a->session,
                    "Session directory with drive.mcap (docs/session_files.md)")
-      ->required();
+      ->required()
+      ->type_name("DIR");
   command->add_option("--format", a->format, "Format: euroc, kitti (rectified rigs only), folder")
       ->required()
       ->check(CLI::IsMember({"euroc", "kitti", "folder"}))

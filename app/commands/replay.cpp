@@ -79,7 +79,8 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   CLI::App* command =
       root.add_subcommand("replay", "Run odometry on a recorded data set and write a session");
   command->add_option("DATA", a->data, "Data-set directory, or a .mcap, .db3 or .bag file")
-      ->required();
+      ->required()
+      ->type_name("DIR|FILE");
   command
       ->add_option("--format", a->format,
                    "Format of DATA: auto, folder, kitti, kitti-raw, euroc, st-lucia, mcap, db3, "
@@ -125,6 +126,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option("--model", a->model, "Lens model for --focal: radtan, or equidistant (fisheye)")
       ->check(CLI::IsMember({"radtan", "equidistant"}))
+      ->type_name("NAME")
       ->capture_default_str()
       ->group("Calibration");
   command

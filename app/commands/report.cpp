@@ -20,7 +20,7 @@ void make_report(const std::string& session) {
 void add_report(CLI::App& root, ExitCode* exit_code) {
   const auto session = std::make_shared<std::string>();
   CLI::App* command = root.add_subcommand("report", "Regenerate report.html of a session");
-  command->add_option("SESSION", *session, "Session directory")->required();
+  command->add_option("SESSION", *session, "Session directory")->required()->type_name("DIR");
   command->footer(
       "Example: vergence report sessions/monday\nExit codes: 0 success; 2 bad arguments or input.");
   command->callback([session, exit_code] {

@@ -48,7 +48,8 @@ void add_run(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option("CONFIG", a->configuration,
                    "Configuration file (docs/configuration.md), e.g. app/config/mock.yaml")
-      ->required();
+      ->required()
+      ->type_name("FILE");
   command->add_option("--out", a->out, "Session directory; must not exist, or be empty")
       ->required()
       ->type_name("DIR")

@@ -37,7 +37,8 @@ void add_snap(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option("CONFIG", a->configuration,
                    "Configuration file; only its cameras and trigger are used")
-      ->required();
+      ->required()
+      ->type_name("FILE");
   command
       ->add_option("--out", a->out,
                    "Directory for images and snap.json; must not exist, or be empty")

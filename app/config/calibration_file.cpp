@@ -143,7 +143,7 @@ void refuse_other_transforms(const YamlFile& file, const YAML::Node& node,
       Other{"T_right_left", "is called T_camera_left here: X_camera = R X_left + t"},
       Other{"T_cn_cnm1",
             "is Kalibr's: give the camchain itself with --calibration, or convert it with vergence "
-            "calibrate --convert IN OUT"},
+            "calibrate convert IN OUT"},
       Other{"T_BS", "is of EuRoC's sensor.yaml: T_camera_left = T_BS(camera)^-1 T_BS(left)"},
       Other{
           "extrinsics",

@@ -60,6 +60,8 @@ using Kind = Withdrawn::Kind;
 constexpr std::string_view kNoLine =
     "the mock's devices have no serial line; drivers on simulated lines are part of the tests";
 
+constexpr std::string_view kCalibrateTarget = "'vergence calibrate target --left GLOB'";
+
 constexpr std::array kTable{
     Withdrawn{Kind::key, "ins.sync_in",
               "the SyncIn setting of the device is kept; change it with the maker's program"},
@@ -150,6 +152,13 @@ constexpr std::array kTable{
     Withdrawn{Kind::option, "replay --memory", "--print-memory", true},
     Withdrawn{Kind::option, "evaluate --estimate-mount", "--estimate-ins-extrinsics", true},
     Withdrawn{Kind::option, "doctor --out", "--session-dir", true},
+    Withdrawn{Kind::option, "calibrate --left", kCalibrateTarget, true},
+    Withdrawn{Kind::option, "calibrate --right", kCalibrateTarget, true},
+    Withdrawn{Kind::option, "calibrate --camera", kCalibrateTarget, true},
+    Withdrawn{Kind::option, "calibrate --drive", "'vergence calibrate sequence DATA'", true},
+    Withdrawn{Kind::option, "calibrate --convert", "'vergence calibrate convert IN OUT'", true},
+    // The first argument of calibrate that is no option.
+    Withdrawn{Kind::option, "calibrate CONFIG", "'vergence calibrate live CONFIG'", true},
 };
 
 }  // namespace

@@ -63,7 +63,7 @@ struct DrivePass {
 /// how far the stretches agree.
 [[nodiscard]] std::string describe(const DriveCalibration& found);
 
-/// `vergence calibrate --drive`: an ordinary recorded drive instead of a board.
+/// `vergence calibrate sequence`: an ordinary recorded drive instead of a target.
 struct DriveCalibrationRequest {
   std::filesystem::path data;
   SequenceFormat format = SequenceFormat::kitti;

@@ -1,6 +1,6 @@
 # Man pages from --help, by help2man:
 #   cmake -DPROGRAM="…;…" -DVERSION=… -DOUT=… -P manuals.cmake      PROGRAM: with the emulator before it where it is a foreign one
-# OUT/man1/vergence.1.gz and vergence-COMMAND.1.gz; none where help2man is not installed.
+# OUT/man1/vergence.1.gz, vergence-COMMAND.1.gz and vergence-COMMAND-SUBCOMMAND.1.gz; none where help2man is not installed.
 file(REMOVE_RECURSE ${OUT}/man1)
 find_program(HELP2MAN help2man)
 if(NOT HELP2MAN)
@@ -19,12 +19,24 @@ function(page name description command)
   execute_process(COMMAND gzip -9 -n -f ${OUT}/man1/${name}.1 COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
 
-execute_process(COMMAND ${PROGRAM} --help OUTPUT_VARIABLE help COMMAND_ERROR_IS_FATAL ANY)
+# Pages of the subcommands that the help of a command, or of the program, lists, and of theirs.
+function(pages name command)
+  execute_process(COMMAND ${command} --help OUTPUT_VARIABLE help COMMAND_ERROR_IS_FATAL ANY)
+  string(REPLACE ";" "," help "${help}")  # a list of CMake is split there
+  if(NOT help MATCHES "\nSubcommands:")
+    return()
+  endif()
+  string(REGEX REPLACE ".*\nSubcommands:" "" commands "${help}")
+  string(REGEX MATCHALL "\n  [a-z]+ +[^\n]+" commands "${commands}")
+  foreach(line IN LISTS commands)
+    string(REGEX MATCH "^\n  ([a-z]+) +(.*)$" matched "${line}")
+    set(word ${CMAKE_MATCH_1})
+    list(JOIN command " " joined)
+    page(${name}-${word} "${CMAKE_MATCH_2}" "${joined} ${word}")
+    pages(${name}-${word} "${command};${word}")
+  endforeach()
+endfunction()
+
+string(REPLACE " " ";" words "${program}")
 page(vergence "stereo visual odometry that finds and keeps its own calibration" "${program}")
-string(REPLACE ";" "," help "${help}")  # a list of CMake is split there
-string(REGEX REPLACE ".*Subcommands:" "" commands "${help}")
-string(REGEX MATCHALL "\n  [a-z]+ +[^\n]+" commands "${commands}")
-foreach(line IN LISTS commands)
-  string(REGEX MATCH "^\n  ([a-z]+) +(.*)$" matched "${line}")
-  page(vergence-${CMAKE_MATCH_1} "${CMAKE_MATCH_2}" "${program} ${CMAKE_MATCH_1}")
-endforeach()
+pages(vergence "${words}")

@@ -1,4 +1,4 @@
-// `vergence calibrate CONFIG` on real GigE Vision over the loopback: a drawn board before two
+// `vergence calibrate live CONFIG` on real GigE Vision over the loopback: a drawn board before two
 // simulated cameras.
 #include <gtest/gtest.h>
 
@@ -72,7 +72,7 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
   const TemporaryFolder folder;
   const auto out = folder / "calibration.yaml", views = folder / "views";
   const Outcome o = run_vergence(
-      fmt::format("calibrate '{}/app/config/gige.yaml' --checkerboard 9x6 --square 0.04 "
+      fmt::format("calibrate live '{}/app/config/gige.yaml' --checkerboard 9x6 --square 0.04 "
                   "--out '{}' --keep-views '{}'{}",
                   VERGENCE_SOURCE_DIR, out.string(), views.string(), settings));
   over = true;
@@ -88,7 +88,7 @@ TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
 
   // The saved images give the same calibration.
   const Outcome again =
-      run_vergence(fmt::format("calibrate --quiet --left '{0}/left_*.png' --right "
+      run_vergence(fmt::format("calibrate target --quiet --left '{0}/left_*.png' --right "
                                "'{0}/right_*.png' --checkerboard 9x6 --square 0.04 --out '{1}'",
                                views.string(), (folder / "again.yaml").string()));
   ASSERT_EQ(again.code, 0) << again.err;

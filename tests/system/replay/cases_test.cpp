@@ -240,7 +240,7 @@ Case calibration(const char* name, const Files& files, std::string says = "0.11 
               f.write(file.substr(beside ? 1 : 0), content);
               if (!beside) given += (given.empty() ? "@/" : ",@/") + file;
             }
-            return "calibrate --convert '" + given + "' @/out.yaml --to vergence " + options;
+            return "calibrate convert '" + given + "' @/out.yaml --to vergence " + options;
           },
           code, std::move(says)};
 }
@@ -755,21 +755,21 @@ std::vector<Case> bags() {
 
 std::vector<Case> boards() {
   const auto board = [](const char* name, const std::string& square, std::string says, int code) {
-    return Case{name,
-                [=](const TemporaryFolder& f) {
-                  cv::Mat image(240, 320, CV_8U, cv::Scalar(200));
-                  for (int y = 0; y < 7; ++y)
-                    for (int x = 0; x < 10; ++x)
-                      if ((x + y) % 2 == 0)
-                        image(cv::Rect(30 + 25 * x, 30 + 25 * y, 25, 25)).setTo(20);
-                  for (int i = 0; i < 5; ++i)
-                    for (const char* side : {"left", "right"})
-                      cv::imwrite((f / fmt::format("{}{}.png", side, i)).string(), image);
-                  return "calibrate --left '@/left*.png' --right '@/right*.png' --checkerboard 9x6 "
-                         "--square " +
-                         square + " --out @/c.yaml";
-                },
-                code, std::move(says)};
+    return Case{
+        name,
+        [=](const TemporaryFolder& f) {
+          cv::Mat image(240, 320, CV_8U, cv::Scalar(200));
+          for (int y = 0; y < 7; ++y)
+            for (int x = 0; x < 10; ++x)
+              if ((x + y) % 2 == 0) image(cv::Rect(30 + 25 * x, 30 + 25 * y, 25, 25)).setTo(20);
+          for (int i = 0; i < 5; ++i)
+            for (const char* side : {"left", "right"})
+              cv::imwrite((f / fmt::format("{}{}.png", side, i)).string(), image);
+          return "calibrate target --left '@/left*.png' --right '@/right*.png' --checkerboard 9x6 "
+                 "--square " +
+                 square + " --out @/c.yaml";
+        },
+        code, std::move(says)};
   };
   return {board("60 one view repeated", "0.025", "the views do not determine", 1),
           board("60 a square in millimetres", "25", "metres", 2),

@@ -21,17 +21,17 @@ for file in lib/udev/rules.d/99-vergence.rules lib/systemd/system/vergence.servi
   [ -f "$work/usr/$file" ] || fail "$file is not installed"
 done
 if command -v help2man >/dev/null; then  # of the packages' build alone
-  for command in $("$program" --help | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p'); do
+  for command in $("$program" --help | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p') calibrate-target; do
     zcat "$work/usr/share/man/man1/vergence-$command.1.gz" | grep -q '^\.SH OPTIONS\|^\.SS "Options' || fail "$command has no man page"
   done
 fi
 
 status=0
-"$program" calibrate --convert "$work/session/calibration.yaml" "$work/camchain.yaml" 2>"$work/err" || status=$?
+"$program" calibrate convert "$work/session/calibration.yaml" "$work/camchain.yaml" 2>"$work/err" || status=$?
 if [ "$status" -ne 2 ] || ! grep -q 'the package vergence-checkerboard' "$work/err"; then
   fail "without the tool: exit $status, $(cat "$work/err")"
 fi
 cmake --install "$build" --prefix "$work/usr" --component checkerboard >"$work/log" 2>&1 || fail "$(cat "$work/log")"
 [ -x "$work/usr/libexec/vergence/vergence-checkerboard" ] || fail "the checkerboard tool is not installed"
-"$program" calibrate --convert "$work/session/calibration.yaml" "$work/camchain.yaml" || fail "the program does not find the tool it is installed with"
+"$program" calibrate convert "$work/session/calibration.yaml" "$work/camchain.yaml" || fail "the program does not find the tool it is installed with"
 [ -s "$work/camchain.yaml" ] || fail "nothing was converted"
