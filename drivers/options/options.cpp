@@ -21,7 +21,7 @@ OptionTable<Options> make_table() {
            "Cameras that share that link.");
   t.choice<Resend, Resend>(
       "resend", &O::resend, {{"auto", Resend::automatic}, {"on", Resend::on}, {"off", Resend::off}},
-      nullptr, "Asks again for lost packets; auto: where the camera says that it can.");
+      nullptr, "Asks again for lost packets; auto: if the camera supports it.");
   t.number("socket_buffer_kb", &O::socket_buffer_kb, {64, 500000}, "KiB", "eight frames",
            "Receive buffer of the socket; needs net.core.rmem_max of that size.");
   t.number("buffers", &O::buffers, {4, 48}, "", nullptr, "Frames that may be in use at once.");

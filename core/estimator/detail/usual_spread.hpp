@@ -28,9 +28,9 @@ class CovarianceBaseline {
     constexpr double kMoves = 2;  // sigmas
     return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
   }
-  /// Returns true from a motion more than 3 times as uncertain as usual on, until the last five are
-  /// less than twice as uncertain, root mean square. A motion judged so makes nothing usual: what
-  /// stays so uncertain is reported for as long.
+  /// Returns true from a motion more than 3 times as uncertain as usual on, until the last three
+  /// are less than twice as uncertain, root mean square. A motion judged so makes nothing usual:
+  /// what stays so uncertain is reported for as long.
   ///
   /// sigma_m: of the translation of a motion that judges(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
@@ -49,7 +49,7 @@ class CovarianceBaseline {
   [[nodiscard]] double times_usual() const noexcept { return times_; }
 
  private:
-  static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 5;  // motions
+  static constexpr std::size_t kKept = 61, kMin = 15, kRecent = 3;  // motions
   static constexpr double kTimes = 3, kRelease = 2;
 
   [[nodiscard]] double median() const noexcept {

@@ -116,7 +116,7 @@ TEST_F(RecordedDrive, aDamagedImageIsSaidAndTheRestReplays) {
   });
   const Outcome o = replay(damaged, out("of-damaged"));
   EXPECT_LE(o.code, 1) << o.err;
-  EXPECT_TRUE(test::says(o.err, "3 images of the drive are damaged"));
+  EXPECT_TRUE(test::says(o.err, "3 images are damaged"));
   EXPECT_FALSE(test::contains(o.err, "the same input as in the recorded run")) << o.err;
   EXPECT_EQ(summary_of(out("of-damaged"))["frames"]["read"],
             summary_of(session())["frames"]["read"]);

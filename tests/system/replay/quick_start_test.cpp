@@ -37,7 +37,7 @@ TEST_F(QuickStart, rawImagesWithoutTheirDistortionAreNotToBeUsed) {
             "0.008998467, 0.999489, -0.01252488]}\n");
   const Outcome o = replay(data, "");
   EXPECT_EQ(o.code, 1) << o.err;
-  EXPECT_TRUE(test::says(o.err, "lens"));
+  EXPECT_TRUE(test::says(o.err, "distortion"));
   EXPECT_TRUE(test::says(report(), "Do not use"));
 }
 

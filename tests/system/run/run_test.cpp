@@ -207,7 +207,7 @@ TEST(Run, aCameraThatNeverComesBackIsADeviceThatFailed) {
   const Outcome o =
       drive(folder / "s", "--duration 4 --fault 'camera_gone@2 camera=1 duration_s=0'" + kSmall);
   EXPECT_EQ(o.code, 3) << o.err;
-  EXPECT_TRUE(test::says(o.err, "camera 1 was gone at the end"));
+  EXPECT_TRUE(test::says(o.err, "camera 1 was disconnected at the end"));
   EXPECT_EQ(summary_of(folder / "s")["frames"]["read"], 81) << "the drive went on with the other";
 }
 

@@ -252,7 +252,7 @@ TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
         parse_any_calibration({{"camchain.yaml", text}}, std::nullopt, &remarks);
     expect_same(c, back);
     ASSERT_EQ(remarks.size(), 1U);
-    EXPECT_TRUE(test::says(remarks[0], "serials"));
+    EXPECT_TRUE(test::says(remarks[0], "serial"));
   }
 }
 
