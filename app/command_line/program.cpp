@@ -57,7 +57,7 @@ CLI::App& named_command(CLI::App& root) {
   return *command;
 }
 
-/// What is wrong with a word that `command` does not know: the word, and what it may have meant.
+/// Error message for an argument that `command` does not define, with the nearest one that it does.
 struct UnknownWord {
   std::string name, why;
   bool option = false;

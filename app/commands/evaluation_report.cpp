@@ -262,7 +262,8 @@ Json ins_mount_json(const InsMount& mount) {
 
 std::string ins_mount_text(const InsMount& mount) {
   if (mount.axes_only)
-    return "nobody says how the camera sits on the INS: it is taken to look along the INS's x, at "
+    return "the data set has no INS-to-camera extrinsics: the camera is assumed to look along the "
+           "INS's x, at "
            "its place; --estimate-ins-extrinsics finds more\n";
   return fmt::format("the INS is brought to the left camera by {}\n", mount.source);
 }

@@ -24,7 +24,7 @@ class FileDescriptor {
     if (fd_ >= 0) ::close(fd_);
     fd_ = -1;
   }
-  /// Somebody else closes it from now on.
+  /// Releases ownership: the caller closes the descriptor.
   void release() noexcept { fd_ = -1; }
   [[nodiscard]] int get() const noexcept { return fd_; }
   [[nodiscard]] explicit operator bool() const noexcept { return fd_ >= 0; }

@@ -64,7 +64,7 @@ class CalibrationWriter final : public SessionObserver {
 
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
-  /// The oldest outcome that nobody has taken. False: there is none.
+  /// Pops the oldest outcome. Returns false if there is none.
   [[nodiscard]] bool next(Outcome* outcome) noexcept { return outcomes_.pop(outcome); }
   /// Writes what waits and calibration.yaml with what is in use at the end, null: there is none.
   /// Messages about files that are not whole go to *faults. Once, after the last on_…().

@@ -13,7 +13,7 @@ void AttitudeCheck::add(const Vec2& place, double sigma, double yaw) noexcept {
   constexpr double kMaxOff = 30 * std::numbers::pi / 180;
   if (!anchor_) anchor_ = place;
   const Vec2 step = place - *anchor_;
-  // A position jump or an outage counts as one long step.
+  // A position jump or an outage counts as one long step: twice the longest ordinary one.
   constexpr double kMaxOfStep = 20;  // m
   const double length = std::min(step.norm(), kMaxOfStep);
   if (length < std::clamp(kSigmas * sigma, kShortest, kLongest)) return;

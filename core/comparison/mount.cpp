@@ -201,6 +201,7 @@ bool Fit::start(const Mat3& nominal) {
          way_ref * way_est.transpose();  // a radian weighs as 20 m
     way += way_est.norm();
   }
+  // Chosen, not measured.
   constexpr double kMinWay = 10;  // m
   if (way < kMinWay) return false;
   const auto rotation_of = [](const Mat3& M) {

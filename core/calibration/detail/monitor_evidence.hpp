@@ -24,7 +24,8 @@ struct Evidence {
   }
 };
 
-/// A with a prior of 0.2 rad: directions that nothing was seen of stay where they are.
+/// A with a prior of 0.2 rad, wider than any rig that still matches is off: unobserved directions
+/// stay where they are.
 [[nodiscard]] inline Cholesky<5> with_prior(const Mat5& A) noexcept {
   constexpr double kPriorSigma = 0.2;  // rad
   return Cholesky<5>(A + Mat5::Identity() / (kPriorSigma * kPriorSigma));
