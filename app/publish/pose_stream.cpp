@@ -175,6 +175,17 @@ std::string status_line(const StreamStatus& s) {
   return line_of("status", fields);
 }
 
+std::string image_line(std::uint64_t frame, Stamp stamp, int camera, std::string_view name,
+                       const ImageView& image) {
+  return line_of("image", {{"frame", frame},
+                           {"stamp_ns", stamp.ns()},
+                           {"camera", camera},
+                           {"name", name},
+                           {"width", image.width},
+                           {"height", image.height},
+                           {"bytes", std::int64_t{image.width} * image.height}});
+}
+
 std::string response_line(std::string_view request, bool accepted, std::string_view message) {
   return line_of("response", {{"request", request}, {"accepted", accepted}, {"message", message}});
 }
