@@ -57,14 +57,14 @@ class Stream {
       notifier_ = notifier;
     }
     if (ended_) return DeviceStatus::ended;
-    if (gone_) {
+    if (disconnected_) {
       Delivery<T> d;
       if (!ring_.pop(&d)) return DeviceStatus::disconnected;
       if (d.what == Delivery<T>::What::end) {
         ended_ = true;
         return DeviceStatus::ended;
       }
-      gone_ = false;  // nothing but `back` and `end` follows a `gone`
+      disconnected_ = false;  // nothing but `back` and `end` follows a `gone`
     }
     streaming_.store(true, std::memory_order_release);
     return DeviceStatus::ok;
@@ -82,12 +82,12 @@ class Stream {
   /// thread has ended, no thread is in take().
   void clear() noexcept {
     for (Delivery<T> d; ring_.pop(&d);) ended_ = ended_ || d.what == Delivery<T>::What::end;
-    gone_ = false;
+    disconnected_ = false;
   }
 
   [[nodiscard]] DeviceStatus take(Duration limit, Delivery<T>* d) noexcept {
     if (!streaming()) return DeviceStatus::stopped;
-    if (gone_) return DeviceStatus::disconnected;
+    if (disconnected_) return DeviceStatus::disconnected;
     if (ended_) return DeviceStatus::ended;
     if (!ring_.pop(d)) {
       if (limit <= Duration{}) return DeviceStatus::timeout;
@@ -98,9 +98,11 @@ class Stream {
       if (!ring_.pop(d)) return DeviceStatus::timeout;
     }
     notify_release();
-    gone_ = d->what == Delivery<T>::What::gone;
+    disconnected_ = d->what == Delivery<T>::What::gone;
     ended_ = d->what == Delivery<T>::What::end;
-    return gone_ ? DeviceStatus::disconnected : ended_ ? DeviceStatus::ended : DeviceStatus::ok;
+    return disconnected_ ? DeviceStatus::disconnected
+           : ended_      ? DeviceStatus::ended
+                         : DeviceStatus::ok;
   }
 
  private:
@@ -111,8 +113,8 @@ class Stream {
 
   Ring<Delivery<T>, N> ring_;
   std::atomic<bool> streaming_{false};
-  std::atomic<std::uint32_t> taken_{0};  // the width a futex has
-  bool gone_ = false, ended_ = false;    // the consumer's
+  std::atomic<std::uint32_t> taken_{0};        // the width a futex has
+  bool disconnected_ = false, ended_ = false;  // the consumer's
   std::mutex mutex_;
   Notifier* notifier_ = nullptr;  // under mutex_
   std::condition_variable filled_;

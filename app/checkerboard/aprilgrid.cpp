@@ -155,7 +155,7 @@ BoardCorners find_aprilgrid(const ImageView& image, const BoardPattern& board, B
   if (image.empty()) return {};
   thread_local TagDetector detector;  // threads look at different cameras
   const std::size_t ids = board.corners() / 4;
-  const cv::Mat pixels = matrix_of(image);
+  const cv::Mat pixels = to_mat(image);
   std::vector<Tag> tags = detector.detect(pixels, 1, ids);
   // Large and blurred tags touch by more.
   if (search == BoardSearch::thorough && tags.size() < ids)

@@ -33,7 +33,7 @@ struct Places {
   }
 };
 
-std::vector<Vec2> pixels_of(const BoardCorners& corners) {
+std::vector<Vec2> to_pixels(const BoardCorners& corners) {
   std::vector<Vec2> pixels;
   pixels.reserve(corners.size());
   for (const BoardCorner& c : corners) pixels.push_back(c.pixel);
@@ -46,7 +46,7 @@ BoardCorners find_any_board(const ImageView& image, const BoardPattern& board, B
   if (board.kind == BoardKind::charuco) return find_charuco(image, board);
   auto found = find_checkerboard(image, board, search);
   if (!found) return {};
-  if (!board.is_asymmetric()) same_way_up(pixels_of(reference), &*found);
+  if (!board.is_asymmetric()) same_way_up(to_pixels(reference), &*found);
   BoardCorners corners;
   for (std::size_t i = 0; i < found->size(); ++i) corners.push_back({i, (*found)[i]});
   return corners;

@@ -49,7 +49,7 @@ Numbered numbered(const std::vector<fs::path>& files) {
 }
 
 /// In order of number.
-std::vector<fs::path> files_of(const Numbered& numbered) {
+std::vector<fs::path> list_files(const Numbered& numbered) {
   std::vector<fs::path> files;
   for (const auto& [number, file] : numbered) files.push_back(file);
   return files;
@@ -129,7 +129,7 @@ std::vector<std::vector<fs::path>> group_views(const std::vector<std::vector<fs:
   if (same_length && (alone.empty() || 2 * views.size() < cameras[0].size())) {
     if (!all_numbered) return by_order(cameras);
     std::vector<std::vector<fs::path>> in_order(numbers.size());
-    std::transform(numbers.begin(), numbers.end(), in_order.begin(), files_of);
+    std::transform(numbers.begin(), numbers.end(), in_order.begin(), list_files);
     return by_order(in_order);
   }
   if (views.empty()) {

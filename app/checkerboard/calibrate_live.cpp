@@ -102,11 +102,11 @@ class Collection {
   }
 
   void on_event(const DeviceEvent& event) {
-    const bool gone = event.kind == DeviceEvent::Kind::camera_disconnected;
-    if (!gone && event.kind != DeviceEvent::Kind::camera_reconnected) return;
+    const bool disconnected = event.kind == DeviceEvent::Kind::camera_disconnected;
+    if (!disconnected && event.kind != DeviceEvent::Kind::camera_reconnected) return;
     const std::lock_guard lock(mutex_);
-    messages_.push_back(
-        fmt::format("camera {} is {}", event.camera, gone ? "gone; waiting for it" : "back"));
+    messages_.push_back(fmt::format("camera {} is {}", event.camera,
+                                    disconnected ? "gone; waiting for it" : "back"));
   }
 
   void offer(const RigFrame& frame) {
@@ -172,7 +172,7 @@ class Collection {
   std::vector<std::string> messages_;
 };
 
-CalibratedRig rig_of(const Configuration& c, const DriveDevices& devices) {
+CalibratedRig make_rig(const Configuration& c, const DriveDevices& devices) {
   constexpr std::array kNames{"left", "right", "camera2", "camera3"};
   CalibratedRig rig;
   rig.rig_name = c.rig.name;
@@ -195,7 +195,7 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   DriveDevices devices(c, {}, false, std::nullopt);
   Progress progress = Progress::on_stderr(request.quiet);
   for (const std::string& message : devices.remarks()) progress.print("vergence: " + message);
-  const CalibratedRig rig = rig_of(c, devices);
+  const CalibratedRig rig = make_rig(c, devices);
   Acquisition::Options options = devices.acquisition_options();
   options.tie_host = monotonic_now();
   Acquisition source(devices.cameras(), devices.ins(), devices.trigger(), options);

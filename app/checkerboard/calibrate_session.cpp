@@ -20,9 +20,9 @@ namespace {
 constexpr double kSquarePixels = 0.03;  // fx over fy from 1
 constexpr double kVagueFocal = 0.01;    // sigma over focal length
 
-Coverage coverage_of(const CalibrateRequest& request, const CalibrationFile& file,
-                     const std::vector<ImageSize>& sizes, const std::vector<BoardView>& views,
-                     const BoardCalibration& found) {
+Coverage make_coverage(const CalibrateRequest& request, const CalibrationFile& file,
+                       const std::vector<ImageSize>& sizes, const std::vector<BoardView>& views,
+                       const BoardCalibration& found) {
   const auto cameras = static_cast<std::size_t>(file.rig.cameras);
   Coverage coverage(request.board,
                     {file.names.begin(), file.names.begin() + static_cast<std::ptrdiff_t>(cameras)},
@@ -164,7 +164,7 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
     if (!rig.names[k].empty()) file.names[k] = rig.names[k];
   for (std::size_t k = 0; k < rig.serials.size(); ++k) file.serials[k] = rig.serials[k];
   write_calibration(request.out, file);
-  const Coverage coverage = coverage_of(request, file, rig.sizes, views, found);
+  const Coverage coverage = make_coverage(request, file, rig.sizes, views, found);
   const BoardReport report{found, file, request.board, coverage, request.measured_baseline};
   std::cout << (request.json ? json_report(report).dump(1) + "\n" : format_report(report));
   remark(file, progress);

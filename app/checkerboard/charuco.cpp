@@ -146,7 +146,7 @@ double mean_side(const std::vector<Marker>& markers) {
 
 BoardCorners find_charuco(const ImageView& image, const BoardPattern& board) {
   if (image.empty()) return {};
-  const cv::Mat pixels = matrix_of(image);
+  const cv::Mat pixels = to_mat(image);
   const std::vector<Marker> all = detect(pixels, board);
   const std::array<Layout, 2> layouts{Layout(board, true), Layout(board, false)};
   // One layout may have a marker more than the other.

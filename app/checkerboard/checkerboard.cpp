@@ -18,7 +18,7 @@ constexpr double kBlur =
 constexpr int kRefineSteps = 100;
 constexpr double kRefineTolerance = 1e-4;  // px
 
-cv::Mat matrix_of(const ImageView& image) {
+cv::Mat to_mat(const ImageView& image) {
   // cv::Mat has no view of constant pixels; nothing below writes them.
   return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data),
           static_cast<std::size_t>(image.stride)};
@@ -82,7 +82,7 @@ double first_square_brighter(const cv::Mat& image, const BoardPattern& board,
 std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image,
                                                    const BoardPattern& board, BoardSearch search) {
   if (image.empty()) return std::nullopt;
-  const cv::Mat pixels = matrix_of(image);
+  const cv::Mat pixels = to_mat(image);
   std::vector<cv::Point2f> corners;
   if (!detect(pixels, board, search, &corners) || corners.size() != board.corners())
     return std::nullopt;

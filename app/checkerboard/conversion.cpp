@@ -52,7 +52,7 @@ ImageSize parse_size(const std::string& text) {
 
 CalibrationFormat format_of_name(const std::string& out) {
   if (is_folder(out)) return CalibrationFormat::ros;
-  const std::vector<fs::path> files = detail::files_of(out, false);
+  const std::vector<fs::path> files = detail::split_files(out, false);
   const fs::path extension = files.front().extension();
   if (files.size() == 2)
     return extension == ".yml" ? CalibrationFormat::opencv : CalibrationFormat::ros;
@@ -66,7 +66,7 @@ CalibrationFormat format_of_name(const std::string& out) {
 }
 
 std::vector<fs::path> files_written(const std::string& out, CalibrationFormat format) {
-  return detail::files_of(out, is_ros_folder(out, format));
+  return detail::split_files(out, is_ros_folder(out, format));
 }
 
 const char* describe(CalibrationFormat format) noexcept {
@@ -86,7 +86,7 @@ const char* describe(CalibrationFormat format) noexcept {
 void write_any_calibration(const std::string& out, CalibrationFormat format,
                            const CalibrationFile& calibration, Remarks* remarks) {
   const bool folder = is_ros_folder(out, format);
-  const std::vector<fs::path> files = detail::files_of(out, folder);
+  const std::vector<fs::path> files = detail::split_files(out, folder);
   const auto one_file = [&](const char* what) {
     if (files.size() != 1) throw InputError(fmt::format("{}: {} is one file", out, what));
   };

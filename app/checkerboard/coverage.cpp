@@ -48,7 +48,7 @@ void Coverage::count(const BoardView& view, std::size_t camera, Seen* seen) cons
   for (std::size_t i = 0; i < kParts; ++i) seen->parts[i] = std::max(seen->parts[i], parts[i]);
 }
 
-Coverage::Stand Coverage::stand_of(const BoardView& view) const {
+Coverage::Stand Coverage::pose_bin(const BoardView& view) const {
   Stand stand;
   const auto& corners = view.corners[0];
   if (corners.empty()) return stand;
@@ -85,7 +85,7 @@ Coverage::Stand Coverage::stand_of(const BoardView& view) const {
 
 void Coverage::add(const BoardView& view) {
   for (std::size_t k = 0; k < seen_.size(); ++k) count(view, k, &seen_[k]);
-  const Stand stand = stand_of(view);
+  const Stand stand = pose_bin(view);
   for (std::size_t i = 0; i < kTilts; ++i) tilted_[i] = tilted_[i] || stand.tilted[i];
   nearest_ = std::max(nearest_, stand.extent);
   farthest_ = std::min(farthest_, stand.extent);
@@ -99,7 +99,7 @@ bool Coverage::brings_something(const BoardView& view) const {
     for (std::size_t i = 0; i < kParts; ++i)
       if (seen_[k].parts[i] < kEnoughCorners && more.parts[i] >= kEnoughCorners) return true;
   }
-  const Stand stand = stand_of(view);
+  const Stand stand = pose_bin(view);
   for (std::size_t i = 0; i < kTilts; ++i)
     if (stand.tilted[i] && !tilted_[i]) return true;
   if (nearest_ < kNearExtent) return stand.extent >= kNearExtent;

@@ -46,7 +46,7 @@ class Coverage {
     double extent = 0;  // of the image's width or height, whichever it fills more of
     std::array<bool, kTilts> tilted{};  // right, left, bottom, top edge nearer
   };
-  [[nodiscard]] Stand stand_of(const BoardView& view) const;
+  [[nodiscard]] Stand pose_bin(const BoardView& view) const;
   void count(const BoardView& view, std::size_t camera, Seen* seen) const;
 
   BoardPattern board_;

@@ -18,7 +18,7 @@ CameraModelKind parse_model(const std::string& word) {
                                : CameraModelKind::pinhole_radtan;
 }
 
-BoardPattern board_of(const CalibrateOptions& a) {
+BoardPattern make_board(const CalibrateOptions& a) {
   const int boards =
       (a.board.empty() ? 0 : 1) + (a.aprilgrid.empty() ? 0 : 1) + (a.charuco.empty() ? 0 : 1);
   if (boards == 0)
@@ -37,8 +37,8 @@ BoardPattern board_of(const CalibrateOptions& a) {
   return parse_charuco(a.charuco, *a.square, *a.marker, a.dictionary);
 }
 
-CalibrateRequest request_of(const CalibrateOptions& a) {
-  const BoardPattern board = board_of(a);
+CalibrateRequest make_request(const CalibrateOptions& a) {
+  const BoardPattern board = make_board(a);
   if (a.baseline && !(*a.baseline > 0 && *a.baseline < 100))
     throw InputError("--baseline needs metres, more than 0 and less than 100");
   if (a.sixth_order && a.model == "equidistant")
@@ -85,7 +85,7 @@ ExitCode calibrate_target(const CalibrateOptions& a) {
   if (patterns.size() > kMaxCameras)
     throw InputError(
         fmt::format("a rig has up to {} cameras, {} are given", kMaxCameras, patterns.size()));
-  return calibrate_images(request_of(a), patterns);
+  return calibrate_images(make_request(a), patterns);
 }
 
 ExitCode run(const CalibrateOptions& a) {
@@ -93,7 +93,7 @@ ExitCode run(const CalibrateOptions& a) {
     case CalibrateCommand::target:
       return calibrate_target(a);
     case CalibrateCommand::live:
-      return calibrate_live(request_of(a), a.common.configuration(a.configuration));
+      return calibrate_live(make_request(a), a.common.configuration(a.configuration));
     case CalibrateCommand::convert:
       return convert(a);
     case CalibrateCommand::sequence:

@@ -11,7 +11,7 @@
 namespace vergence::app {
 namespace {
 
-cv::Mat matrix_of(const Mat3& m) {
+cv::Mat to_mat(const Mat3& m) {
   return (cv::Mat_<double>(3, 3) << m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0),
           m(2, 1), m(2, 2));
 }
@@ -55,7 +55,7 @@ std::array<std::string, 2> format_ros(const CalibrationFile& calibration, Remark
     std::copy_n(lens.distortion.begin(), D[k].rows, D[k].begin<double>());
   }
   const Transform& T = rig.T_camera_left[1];
-  const cv::Mat R = matrix_of(T.R), t = (cv::Mat_<double>(3, 1) << T.t.x(), T.t.y(), T.t.z());
+  const cv::Mat R = to_mat(T.R), t = (cv::Mat_<double>(3, 1) << T.t.x(), T.t.y(), T.t.z());
   cv::Mat R_l, R_r, P_l, P_r, Q;
   const cv::Size size(l.width, l.height);
   try {

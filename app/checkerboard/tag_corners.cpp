@@ -53,7 +53,7 @@ BoardCorners refine_corners(const cv::Mat& image, const BoardCorners& rough, int
   return refined;
 }
 
-cv::Mat matrix_of(const ImageView& image) {
+cv::Mat to_mat(const ImageView& image) {
   // cv::Mat has no view of constant pixels.
   return {image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.data),
           static_cast<std::size_t>(image.stride)};

@@ -21,6 +21,6 @@ namespace vergence::app {
                                           int half_window, double max_moved);
 
 /// Wraps the pixels without copying; they must not be written.
-[[nodiscard]] cv::Mat matrix_of(const ImageView& image);
+[[nodiscard]] cv::Mat to_mat(const ImageView& image);
 
 }  // namespace vergence::app

@@ -77,7 +77,7 @@ std::optional<QuaternionOrder> parse_order(std::string_view word) {
   return std::nullopt;
 }
 
-EvaluationOptions options_of(const EvaluateArguments& a) {
+EvaluationOptions make_options(const EvaluateArguments& a) {
   EvaluationOptions options;
   options.association = a.associate == "nearest" ? Association::nearest : Association::interpolate;
   options.max_gap = parse_duration("--max-gap", a.max_gap);
@@ -95,7 +95,7 @@ EvaluationRequest evaluate_request(const EvaluateArguments& a) {
   EvaluationRequest r;
   r.estimate = a.estimate;
   r.reference = a.reference;
-  r.options = options_of(a);
+  r.options = make_options(a);
   r.usual_lengths = !a.lengths;
   r.json = a.json;
   r.estimate_ins_extrinsics = a.estimate_ins_extrinsics;

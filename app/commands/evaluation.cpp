@@ -36,7 +36,7 @@ struct Reference {
   bool is_ins = false;  // readings of an INS; else poses
 };
 
-Reference reference_of(const EvaluationRequest& a) {
+Reference load_reference(const EvaluationRequest& a) {
   if (a.reference.empty() && !a.estimate_ins_extrinsics)
     throw InputError(
         "REFERENCE is missing; name a trajectory, or with --estimate-ins-extrinsics a session "
@@ -152,7 +152,7 @@ Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readi
   if (a.estimate_ins_extrinsics)
     out.found = find_ins_mount(estimate, moments);
   else if (a.options.axes == BodyAxes::camera)  // else both are forward, left, up
-    out.estimated = ins_mount_of(a.estimate, readings);
+    out.estimated = load_ins_mount(a.estimate, readings);
   return out;
 }
 
@@ -279,7 +279,7 @@ void print(const EvaluationRequest& a, const EvaluationOptions& options, const B
 
 ExitCode run_evaluation(const EvaluationRequest& a) {
   EvaluationOptions options = a.options;
-  const Reference from = reference_of(a);
+  const Reference from = load_reference(a);
   Files files = read_files(a, from);
   const Trajectory& estimate = files.estimate.poses;
   const Brought reference = bring_reference(a, from, &files);

@@ -212,7 +212,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// Nothing: no three finite numbers.
-std::optional<Vec3> vector_of(const Json& mount, const char* key) {
+std::optional<Vec3> read_vector(const Json& mount, const char* key) {
   const auto found = mount.find(key);
   if (found == mount.end() || !found->is_array() || found->size() != 3) return std::nullopt;
   Vec3 v;
@@ -232,7 +232,7 @@ std::optional<InsMount> mount_in(const std::filesystem::path& summary) {
   const Json all = Json::parse(read_text(summary, kLargest), nullptr, false);
   const Json mount = all.is_object() ? all.value("/enu/mount"_json_pointer, Json()) : Json();
   if (!mount.is_object()) return std::nullopt;
-  const auto arm = vector_of(mount, "lever_arm_m"), turn = vector_of(mount, "boresight_deg");
+  const auto arm = read_vector(mount, "lever_arm_m"), turn = read_vector(mount, "boresight_deg");
   if (!arm || !turn) return std::nullopt;
   std::string source = summary.string();
   if (const auto said = mount.find("source"); said != mount.end() && said->is_string())
@@ -242,8 +242,8 @@ std::optional<InsMount> mount_in(const std::filesystem::path& summary) {
 
 }  // namespace
 
-InsMount ins_mount_of(const std::filesystem::path& estimate,
-                      const std::filesystem::path& readings) {
+InsMount load_ins_mount(const std::filesystem::path& estimate,
+                        const std::filesystem::path& readings) {
   std::error_code ignored;
   for (const std::filesystem::path& path : {estimate, readings}) {
     const bool folder = std::filesystem::is_directory(path, ignored);

@@ -40,8 +40,8 @@ struct InsMount {
 
 /// The mount that the sessions around these files or folders compared with, of the first that has
 /// one in its summary.json; else the axes alone.
-[[nodiscard]] InsMount ins_mount_of(const std::filesystem::path& estimate,
-                                    const std::filesystem::path& readings);
+[[nodiscard]] InsMount load_ins_mount(const std::filesystem::path& estimate,
+                                      const std::filesystem::path& readings);
 
 /// For a machine, as summary.json has it.
 [[nodiscard]] nlohmann::ordered_json ins_mount_json(const InsMount& mount);

@@ -27,7 +27,7 @@ struct ExportArguments {
 };
 
 /// Returns the ground truth of a simulated run, else the reference of the comparison.
-Trajectory truth_of(const std::filesystem::path& session) {
+Trajectory load_truth(const std::filesystem::path& session) {
   std::error_code ignored;
   for (const char* name : {"truth.tum", "reference.tum"})
     if (std::filesystem::exists(session / name, ignored)) return read_tum(session / name);
@@ -43,7 +43,7 @@ ExitCode run_export(const ExportArguments& a) {
   request.calibration = a.calibration
                             ? read_calibration(*a.calibration)
                             : parse_calibration(session.description().calibration, a.session);
-  request.truth = truth_of(a.session);
+  request.truth = load_truth(a.session);
   (void)check_session_folder(request.out);
   Progress progress = Progress::on_stderr(a.quiet);
   const ExportResult result = export_session(session, std::move(request), [&](std::size_t done) {

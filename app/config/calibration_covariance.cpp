@@ -54,7 +54,7 @@ void append_rows(const std::string& camera, const std::array<const char*, N>& na
 }
 
 /// Every parameter of the rig, in the order of the rows.
-std::vector<NamedRow> rows_of(const CalibrationFile& c, bool by_name) {
+std::vector<NamedRow> make_rows(const CalibrationFile& c, bool by_name) {
   const auto camera = [&](int k) {
     return by_name ? c.names[static_cast<std::size_t>(k)] : std::to_string(k);
   };
@@ -74,9 +74,9 @@ std::vector<NamedRow> rows_of(const CalibrationFile& c, bool by_name) {
 std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list,
                                 const CalibrationFile& calibration) {
   const std::string field = "covariance.parameters";
-  std::vector<NamedRow> known = rows_of(calibration, false);
+  std::vector<NamedRow> known = make_rows(calibration, false);
   if (has_row_names(calibration)) {
-    const std::vector<NamedRow> named = rows_of(calibration, true);
+    const std::vector<NamedRow> named = make_rows(calibration, true);
     known.insert(known.begin(), named.begin(), named.end());
   }
   std::vector<std::string> names;
@@ -112,7 +112,7 @@ std::vector<int> known_rows(const RigCovariance& covariance) {
 
 std::string format_covariance(const CalibrationFile& calibration) {
   const RigCovariance& C = calibration.rig.covariance;
-  std::vector<NamedRow> rows = rows_of(calibration, has_row_names(calibration));
+  std::vector<NamedRow> rows = make_rows(calibration, has_row_names(calibration));
   std::erase_if(rows, [&C](const NamedRow& r) { return !C.known(r.row); });
   if (rows.empty()) return {};
   std::vector<std::string> names;

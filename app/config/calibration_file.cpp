@@ -263,14 +263,14 @@ CalibrationFile read_file(const YamlFile& file, const CalibrationUse& use) {
 /// quotes.
 std::string scalar(const std::string& text) {
   const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
-  static const std::vector<std::string> kWords{"true", "false", "yes", "no", "on",
-                                               "off",  "null",  "y",   "n"};
+  static const std::vector<std::string> kChoices{"true", "false", "yes", "no", "on",
+                                                 "off",  "null",  "y",   "n"};
   std::string lower;
   for (const char c : text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   const bool letter_first =
       !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0;
   if (letter_first && std::all_of(text.begin(), text.end(), plain) &&
-      std::find(kWords.begin(), kWords.end(), lower) == kWords.end())
+      std::find(kChoices.begin(), kChoices.end(), lower) == kChoices.end())
     return text;
   return double_quoted(text);
 }

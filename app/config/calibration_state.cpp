@@ -32,7 +32,7 @@ std::string folder_name(const std::string& rig_name) {
 }
 
 /// An absolute path from the environment, as the XDG rules want; nothing for any other.
-std::optional<std::filesystem::path> folder_of(const char* variable) {
+std::optional<std::filesystem::path> environment_folder(const char* variable) {
   const char* value = std::getenv(variable);
   if (value == nullptr || value[0] != '/') return std::nullopt;
   return std::filesystem::path(value);
@@ -51,9 +51,9 @@ std::string other_configuration(const CalibrationFile& found, const CalibrationF
         return fmt::format("when it was found {} was {}, it is {} now", key, value(found, key),
                            value(expected, key));
   // Differs after a drive with --calibration. Images do not show which length is right.
-  const double had = found.rig.baseline, says = expected.rig.baseline;
-  if (std::abs(had - says) >= kOtherLength * says)
-    return fmt::format("its baseline is {:g} m, the configuration's {:g} m", had, says);
+  const double found_m = found.rig.baseline, expected_m = expected.rig.baseline;
+  if (std::abs(found_m - expected_m) >= kOtherLength * expected_m)
+    return fmt::format("its baseline is {:g} m, the configuration's {:g} m", found_m, expected_m);
   return "";
 }
 
@@ -95,8 +95,8 @@ std::optional<std::filesystem::path> state_file(const RigSettings& rig) {
   if (!rig.state_dir.empty()) return std::filesystem::path(rig.state_dir) / kFileName;
   const std::filesystem::path below =
       std::filesystem::path("vergence") / folder_name(rig.name) / kFileName;
-  if (const auto state = folder_of("XDG_STATE_HOME")) return *state / below;
-  if (const auto home = folder_of("HOME")) return *home / ".local" / "state" / below;
+  if (const auto state = environment_folder("XDG_STATE_HOME")) return *state / below;
+  if (const auto home = environment_folder("HOME")) return *home / ".local" / "state" / below;
   return std::nullopt;
 }
 

@@ -27,7 +27,7 @@ std::string camera_of(std::string_view topic) {
 }
 
 /// The CameraInfo of an image's topic: beside it, or below where the topic is the camera's name.
-std::string info_of(const BagIndex& bag, const std::string& topic) {
+std::string topic_summary(const BagIndex& bag, const std::string& topic) {
   const std::string below = topic + "/camera_info";
   return bag.infos.contains(below) ? below : camera_of(topic) + "/camera_info";
 }
@@ -80,7 +80,7 @@ void require_topic(const fs::path& path, const BagIndex& bag, const std::string&
 int merit(const BagIndex& bag, const Topics& topics, bool given) {
   int sum = 0;
   for (const std::string& topic : topics) {
-    if (given || bag.infos.contains(info_of(bag, topic))) sum += 4;
+    if (given || bag.infos.contains(topic_summary(bag, topic))) sum += 4;
     if (!is_rectified(topic)) sum += 2;
     if (!topic.ends_with("/compressed")) sum += 1;
   }
@@ -134,7 +134,7 @@ Topics choose(const fs::path& path, const BagIndex& bag, const BagTopics& reques
                      best.size(), list_of_image_topics(bag)));
 }
 
-std::vector<Stamp> stamps_of(const std::vector<BagImage>& images) {
+std::vector<Stamp> collect_stamps(const std::vector<BagImage>& images) {
   std::vector<Stamp> stamps;
   stamps.reserve(images.size());
   for (const BagImage& image : images) stamps.push_back(image.image.stamp);
@@ -176,7 +176,7 @@ std::vector<std::array<std::size_t, 2>> pair_images(
     const fs::path& path, const Topics& topics, const std::array<std::vector<BagImage>, 2>& images,
     StereoSequence* sequence) {
   constexpr double kHalf = 0.5;  // of the interval
-  const std::array stamps{stamps_of(images[0]), stamps_of(images[1])};
+  const std::array stamps{collect_stamps(images[0]), collect_stamps(images[1])};
   const Duration interval = usual_interval(stamps[0]);
   const Duration most = Duration::seconds(kMaxApart * interval.to_seconds());
   const auto near =
@@ -225,7 +225,7 @@ void remark_left_out(const std::string& name, const LeftOut& out,
 
 RosCamera camera_info(const fs::path& path, const BagIndex& bag, const std::string& topic,
                       StereoSequence* sequence) {
-  const std::string name = info_of(bag, topic);
+  const std::string name = topic_summary(bag, topic);
   const auto found = bag.infos.find(name);
   if (found == bag.infos.end())
     refuse(path, 0,
@@ -269,11 +269,11 @@ void remark_mosaics(const BagIndex& bag, const std::string& topic, StereoSequenc
 
 StereoSequence open_bag(BagFormat format, const std::filesystem::path& path, bool given,
                         const BagTopics& topics) {
-  return sequence_of(path, index_bag(format, path, open_bag_files(format, path)), given, topics);
+  return make_sequence(path, index_bag(format, path, open_bag_files(format, path)), given, topics);
 }
 
-StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag, bool given,
-                           const BagTopics& topics) {
+StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag, bool given,
+                             const BagTopics& topics) {
   auto ins = std::make_shared<const RecordedIns>(bag_ins(path, bag, topics));
   const Topics chosen = choose(path, bag, topics, given);
   if (chosen[0] == chosen[1])
@@ -292,11 +292,11 @@ StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag, bool
     if (bag.images.size() > 2 || chosen[0].find("left") == std::string::npos)
       sequence.assumptions.push_back(chosen[0] + " is left and " + chosen[1] + " is right");
   for (const std::string& name : chosen) remark_mosaics(bag, name, &sequence);
-  if (!given && info_of(bag, chosen[0]) == info_of(bag, chosen[1]))
+  if (!given && topic_summary(bag, chosen[0]) == topic_summary(bag, chosen[1]))
     refuse(path, 0,
            fmt::format("has no CameraInfo of its own for each of {} and {}, only {}; give a "
                        "calibration with --calibration",
-                       chosen[0], chosen[1], info_of(bag, chosen[0])));
+                       chosen[0], chosen[1], topic_summary(bag, chosen[0])));
   if (!given) {
     const std::array cameras{camera_info(path, bag, chosen[0], &sequence),
                              camera_info(path, bag, chosen[1], &sequence)};
@@ -323,7 +323,7 @@ StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag, bool
         fmt::format("{} images have no partner within {:.0f} % of the interval and were left out",
                     alone, 100 * kMaxApart));
   sequence.left_out += alone;
-  const std::vector<Stamp> stamps = stamps_of(images[0]);
+  const std::vector<Stamp> stamps = collect_stamps(images[0]);
   const auto store = std::make_shared<const BagImages>(bag.format, std::move(bag.files), chosen,
                                                        std::move(images));
   for (const auto& [l, r] : pairs)

@@ -25,7 +25,7 @@ YamlFile read_yaml(const std::filesystem::path& file) {
   return yaml;
 }
 
-Transform mount_of(const YamlFile& yaml) {
+Transform read_mount(const YamlFile& yaml) {
   const YAML::Node mount = yaml.root()["T_BS"];
   if (!mount || !mount.IsMap() || !mount["data"])
     refuse(yaml.name(), 0, "has no T_BS with `data`: give the sensor.yaml of the camera");
@@ -44,7 +44,7 @@ Transform mount_of(const YamlFile& yaml) {
 }
 
 /// Lens and size of a camera's sensor.yaml.
-Intrinsics lens_of(const YamlFile& yaml) {
+Intrinsics read_intrinsics(const YamlFile& yaml) {
   const auto value = [&](const char* key) {
     const YAML::Node node = yaml.root()[key];
     if (!node) refuse(yaml.name(), 0, std::string("has no ") + key);
@@ -84,15 +84,17 @@ bool accept_rotation(const Mat3& written, Mat3* R) noexcept {
   return true;
 }
 
-Transform read_sensor_mount(const std::filesystem::path& file) { return mount_of(read_yaml(file)); }
+Transform read_sensor_mount(const std::filesystem::path& file) {
+  return read_mount(read_yaml(file));
+}
 
 RigCalibration read_sensor_rig(const std::filesystem::path& left,
                                const std::filesystem::path& right) {
   const YamlFile of_left = read_yaml(left), of_right = read_yaml(right);
   RigCalibration rig;
   rig.cameras = 2;
-  rig.intrinsics = {lens_of(of_left), lens_of(of_right)};
-  rig.T_camera_left[1] = mount_of(of_right).inverse() * mount_of(of_left);
+  rig.intrinsics = {read_intrinsics(of_left), read_intrinsics(of_right)};
+  rig.T_camera_left[1] = read_mount(of_right).inverse() * read_mount(of_left);
   rig.T_camera_left[1].R = normalised(rig.T_camera_left[1].R);
   rig.baseline = rig.T_camera_left[1].t.norm();
   return rig;

@@ -30,7 +30,7 @@ double number_of(const Fact& fact) { return fact.file->number(fact.node, fact.ke
 }
 
 /// All numbers of a value: one, a list, a list of lists, or `{rows, cols, data}`.
-std::vector<double> numbers_of(const Fact& fact) {
+std::vector<double> read_numbers(const Fact& fact) {
   constexpr std::size_t kMax = 64;
   const YAML::Node data = fact.node.IsMap() ? fact.node["data"] : fact.node;
   if (data.IsScalar()) return {fact.file->number(data, fact.key)};
@@ -50,24 +50,24 @@ std::vector<double> numbers_of(const Fact& fact) {
   return values;
 }
 
-std::vector<double> numbers_of(const Fact& fact, std::size_t count, const char* what) {
-  auto values = numbers_of(fact);
+std::vector<double> read_numbers(const Fact& fact, std::size_t count, const char* what) {
+  auto values = read_numbers(fact);
   if (values.size() != count)
     fail(fact, fmt::format(" has {} numbers; {} is expected", values.size(), what));
   return values;
 }
 
 /// A matrix of 3 x 3, or a rotation vector.
-Mat3 rotation_of(const Fact& fact) {
-  const auto v = numbers_of(fact);
+Mat3 to_rotation(const Fact& fact) {
+  const auto v = read_numbers(fact);
   if (v.size() == 3) return exp_so3(Vec3(v[0], v[1], v[2]));
   if (v.size() != 9) fail(fact, " is neither a matrix of 3 x 3 numbers nor a rotation vector");
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(v.data());
 }
 
 /// 4x4, or 3x4 without its last row.
-Transform transform_of(const Fact& fact) {
-  const auto v = numbers_of(fact);
+Transform to_transform(const Fact& fact) {
+  const auto v = read_numbers(fact);
   if (v.size() != 12 && v.size() != 16) fail(fact, " is not a matrix of 4 x 4 numbers");
   if (v.size() == 16 && (v[12] != 0 || v[13] != 0 || v[14] != 0 || v[15] != 1))
     fail(fact, " does not end with the row 0 0 0 1");
@@ -91,7 +91,7 @@ std::vector<Fact> with_cameras(const std::vector<YamlFile>& files) {
                        [](const Fact& f) { return is_lens(f) && !f.camera; });
   };
   std::vector<std::vector<Fact>> of_files(files.size());
-  std::transform(files.begin(), files.end(), of_files.begin(), facts_of);
+  std::transform(files.begin(), files.end(), of_files.begin(), find_facts);
   const bool one_each = std::count_if(of_files.begin(), of_files.end(), nameless) > 1;
   std::vector<Fact> all;
   int camera = 0;
@@ -108,7 +108,7 @@ std::vector<Fact> with_cameras(const std::vector<YamlFile>& files) {
 
 // ---- lenses
 
-std::string names_of(const std::vector<YamlFile>& files) {
+std::string join_names(const std::vector<YamlFile>& files) {
   std::string names;
   for (const YamlFile& file : files)
     if (names.find(file.name()) == std::string::npos)
@@ -119,13 +119,13 @@ std::string names_of(const std::vector<YamlFile>& files) {
 [[noreturn]] void fail_missing(const std::vector<YamlFile>& files, const std::string& what) {
   bool never = false;
   for (const YamlFile& file : files)
-    if (const std::string program = program_of(file, &never); !program.empty())
+    if (const std::string program = find_program(file, &never); !program.empty())
       throw InputError(
-          fmt::format("{}: {} is missing; the file {}", names_of(files), what, program));
+          fmt::format("{}: {} is missing; the file {}", join_names(files), what, program));
   throw InputError(fmt::format(
       "{}: {} is missing; calibrations that are read: calibration.yaml, Kalibr, ROS camera_info, "
       "OpenCV (M1 D1 M2 D2 R T), EuRoC, KITTI, ORB-SLAM, VINS, Kimera",
-      names_of(files), what));
+      join_names(files), what));
 }
 
 /// Reads the lenses and transforms of one calibration.
@@ -153,7 +153,7 @@ class RigReader {
     for (int k = 0; k < 2; ++k) (void)model(k);
     if (cameras < 2) fail_missing(files_, "the lens of a second camera");
     if (cameras > kMaxCameras)
-      throw InputError(fmt::format("{}: has {} cameras; a rig has up to {}", names_of(files_),
+      throw InputError(fmt::format("{}: has {} cameras; a rig has up to {}", join_names(files_),
                                    cameras, kMaxCameras));
     RigCalibration& rig = out_.rig;
     rig.cameras = cameras;
@@ -188,7 +188,7 @@ class RigReader {
   void read_lens(int k) {
     std::array<double, 4> fx_fy_cx_cy{};
     if (const Fact* matrix = find("matrix", k)) {
-      const auto v = numbers_of(*matrix);
+      const auto v = read_numbers(*matrix);
       if (v.size() == 4)
         std::copy(v.begin(), v.end(), fx_fy_cx_cy.begin());
       else if (v.size() == 9 && v[1] == 0 && v[3] == 0 && v[6] == 0 && v[7] == 0 && v[8] == 1)
@@ -205,7 +205,7 @@ class RigReader {
         }
         const Fact* list = i < 2 ? focal : centre;
         if (list == nullptr) fail_missing(files_, fmt::format("the camera matrix of camera {}", k));
-        const auto values = numbers_of(*list);
+        const auto values = read_numbers(*list);
         if (values.empty() || (values.size() < 2 && list == centre))
           fail(*list, " is not a list of two numbers");
         fx_fy_cx_cy[i] = values[std::min(i % 2, values.size() - 1)];
@@ -253,7 +253,7 @@ class RigReader {
     const Fact* list = find("distortion", k);
     std::vector<double> values;
     if (list != nullptr) {
-      values = numbers_of(*list);
+      values = read_numbers(*list);
     } else {
       // In radtan's order; an equidistant lens has k1 … k4, or k2 … k5 of those who count the angle
       // itself as the first.
@@ -272,14 +272,14 @@ class RigReader {
     }
     if (!stated && values.size() == 4 && k == 0)
       remarks_->push_back(
-          names_of(files_) +
+          join_names(files_) +
           ": four distortion coefficients are taken for k1 k2 p1 p2 (radtan); if they are k1 k2 k3 "
           "k4 of cv::fisheye, add the line `fisheye_model: 1`, else `fisheye_model: 0`");
     if (const std::string fault =
             set_ros_distortion(equidistant ? "equidistant" : "radtan", values, &lens(k));
         !fault.empty()) {
       if (list != nullptr) fail(*list, " " + fault);
-      throw InputError(names_of(files_) + ": the list of distortion coefficients " + fault);
+      throw InputError(join_names(files_) + ": the list of distortion coefficients " + fault);
     }
   }
 
@@ -291,11 +291,11 @@ class RigReader {
     if (width == nullptr && size_)
       sides = {static_cast<double>(size_->width), static_cast<double>(size_->height)};
     else if (width == nullptr)
-      throw InputError(names_of(files_) +
+      throw InputError(join_names(files_) +
                        ": holds no image size, as OpenCV's sample writes none; add --size "
                        "WIDTHxHEIGHT");
     else
-      sides = width == size ? numbers_of(*size, 2, "[width, height]")
+      sides = width == size ? read_numbers(*size, 2, "[width, height]")
                             : std::vector{number_of(*width), number_of(*height)};
     for (const double side : sides)
       if (!(side >= 1 && side <= kLargest) || side != std::floor(side))
@@ -317,7 +317,7 @@ class RigReader {
   bool from_previous(int k) {
     const Fact* step = own("to_previous", k);
     if (step == nullptr) return false;
-    place(k) = transform_of(*step) * place(k - 1);
+    place(k) = to_transform(*step) * place(k - 1);
     return true;
   }
 
@@ -329,8 +329,8 @@ class RigReader {
         fail_missing(files_, fmt::format("{} of camera 2 from camera 1", R == nullptr ? "R" : "T"));
       return false;
     }
-    place(1).R = rotation_of(*R);
-    const auto t = numbers_of(*T, 3, "a vector of 3");
+    place(1).R = to_rotation(*R);
+    const auto t = read_numbers(*T, 3, "a vector of 3");
     place(1).t = {t[0], t[1], t[2]};
     return true;
   }
@@ -338,7 +338,7 @@ class RigReader {
   bool from_between() {
     for (const Fact& fact : facts_)
       if (fact.part == "between") {
-        const Transform T = transform_of(fact);
+        const Transform T = to_transform(fact);
         place(1) = fact.index == 1 ? T : T.inverse();
         return true;
       }
@@ -352,19 +352,19 @@ class RigReader {
       RosCamera& camera = cameras[static_cast<std::size_t>(k)];
       const Fact* P = own("projection", k);
       if (P == nullptr) return false;
-      const auto p = numbers_of(*P, 12, "a matrix of 3 x 4");
+      const auto p = read_numbers(*P, 12, "a matrix of 3 x 4");
       camera.P = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(p.data());
       if (!(camera.P(0, 0) > 0 && camera.P(1, 1) > 0)) fail(*P, " has no positive focal lengths");
       camera.lens = lens(k);
       const Fact* R = own("rectification", k);
       if (R == nullptr) R = own("rotation", k);
       if (R != nullptr) {
-        camera.R = rotation_of(*R);
+        camera.R = to_rotation(*R);
         if (camera.R.isZero(0) && is_rectified(camera)) camera.R.setIdentity();
         if (!((camera.R.transpose() * camera.R - Mat3::Identity()).cwiseAbs().maxCoeff() <= 1e-3))
           fail(*R, " is not a rotation");
       }
-      apply_crop_of(k, &camera);
+      apply_camera_crop(k, &camera);
     }
     const Fact* P = own("projection", 1);
     if (const std::string fault = set_ros_rig(cameras[0], cameras[1], &out_.rig); !fault.empty())
@@ -372,7 +372,7 @@ class RigReader {
     return true;
   }
 
-  void apply_crop_of(int k, RosCamera* camera) {
+  void apply_camera_crop(int k, RosCamera* camera) {
     RosCrop crop;
     for (const auto& [part, value] : {std::pair{"binning_x", &crop.binning_x},
                                       {"binning_y", &crop.binning_y},
@@ -383,14 +383,14 @@ class RigReader {
       if (const Fact* fact = own(part, k))
         *value = static_cast<std::uint32_t>(fact->file->integer(fact->node, fact->key, 0, 1 << 20));
     if (std::string taken = apply_crop(crop, size_, camera); !taken.empty())
-      remarks_->push_back(names_of(files_) + ": " + taken);
+      remarks_->push_back(join_names(files_) + ": " + taken);
   }
 
   /// From where both cameras sit in a body.
   bool from_body(int k) {
     const auto T_camera_body = [this](int camera) -> std::optional<Transform> {
-      if (const Fact* fact = own("from_body", camera)) return transform_of(*fact);
-      if (const Fact* fact = own("to_body", camera)) return transform_of(*fact).inverse();
+      if (const Fact* fact = own("from_body", camera)) return to_transform(*fact);
+      if (const Fact* fact = own("to_body", camera)) return to_transform(*fact).inverse();
       return std::nullopt;
     };
     const auto left = T_camera_body(0), right = T_camera_body(k);
@@ -411,7 +411,7 @@ class RigReader {
     const double b = length != nullptr ? number_of(*length) : number_of(*focal) / fx;
     Mat3 R_rectified[2] = {Mat3::Identity(), Mat3::Identity()};
     for (int k = 0; k < 2; ++k)
-      if (const Fact* R = own("rotation", k)) R_rectified[k] = rotation_of(*R);
+      if (const Fact* R = own("rotation", k)) R_rectified[k] = to_rotation(*R);
     place(1).R = R_rectified[1].transpose() * R_rectified[0];
     place(1).t = R_rectified[1].transpose() * Vec3(-b, 0, 0);
     return true;
@@ -443,7 +443,7 @@ std::optional<RigCalibration> read_kitti_text(const std::string& name, const std
 void add_named_files(std::vector<YamlFile>* files) {
   std::vector<YamlFile> named;
   for (const YamlFile& file : *files)
-    for (const Fact& fact : facts_of(file)) {
+    for (const Fact& fact : find_facts(file)) {
       if (fact.part != "file" || !fact.node.IsScalar()) continue;
       const fs::path path =
           fs::path(file.name()).parent_path() / fs::path(fact.node.Scalar()).filename();
@@ -489,7 +489,7 @@ bool is_own(const YamlFile& file) {
 
 namespace detail {
 
-std::vector<std::filesystem::path> files_of(const std::string& text, bool folder) {
+std::vector<std::filesystem::path> split_files(const std::string& text, bool folder) {
   if (folder) return {fs::path(text) / "left.yaml", fs::path(text) / "right.yaml"};
   std::error_code ignored;
   if (fs::exists(text, ignored)) return {text};  // a name may have a comma, too
@@ -527,7 +527,7 @@ CalibrationFile parse_any_calibration(const std::vector<CalibrationText>& texts,
       if (!file.root().IsMap())
         throw InputError(file.name() +
                          ": is not a group of keys (`key: value`); a calibration is expected");
-      if (const std::string program = program_of(file, &never); never)
+      if (const std::string program = find_program(file, &never); never)
         throw InputError(file.name() + ": " + program);
     }
     add_named_files(&files);
@@ -542,7 +542,7 @@ CalibrationFile read_any_calibration(const std::string& in, const std::optional<
   std::error_code ignored;
   if (fs::is_regular_file(in, ignored) && is_own_calibration(in)) return read_calibration(in, use);
   std::vector<CalibrationText> texts;
-  for (const fs::path& path : detail::files_of(in, fs::is_directory(in, ignored)))
+  for (const fs::path& path : detail::split_files(in, fs::is_directory(in, ignored)))
     texts.push_back({path.string(), read_text(path, kLargestYaml)});
   return parse_any_calibration(texts, size, remarks, use);
 }

@@ -48,7 +48,7 @@ struct CalibrationText {
 namespace detail {
 /// The files that IN or OUT stand for; a folder stands for left.yaml and right.yaml in it. Commas
 /// stand between files where there is none of the whole name.
-[[nodiscard]] std::vector<std::filesystem::path> files_of(const std::string& text, bool folder);
+[[nodiscard]] std::vector<std::filesystem::path> split_files(const std::string& text, bool folder);
 }  // namespace detail
 
 }  // namespace vergence::app

@@ -17,7 +17,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-const char* kind_of(ImageFileStatus status) noexcept {
+const char* skip_kind(ImageFileStatus status) noexcept {
   switch (status) {
     case ImageFileStatus::missing:
       return "image_missing";
@@ -136,7 +136,7 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
     const std::string name = !listed.file[k].empty() ? listed.file[k]
                              : k == 0                ? "the left image"
                                                      : "the right image";
-    set_issue(&pair, kind_of(status[k]),
+    set_issue(&pair, skip_kind(status[k]),
               fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status[k])));
     return pair;
   }

@@ -19,7 +19,7 @@ constexpr off_t kMaxFile = off_t{256}
                            << 20;  // bytes; a 100-megapixel grey PNG that does not compress is less
 
 /// Null: none that is read.
-const detail::ImageKind* kind_of(Bytes bytes) noexcept {
+const detail::ImageKind* detect_kind(Bytes bytes) noexcept {
   for (const detail::ImageKind* kind :
        {&detail::kPng, &detail::kJpeg, &detail::kBmp, &detail::kNetpbm})
     if (kind->is(bytes)) return kind;
@@ -115,14 +115,14 @@ ImageFileStatus read_image_size(const std::filesystem::path& file, ImageSize* si
   std::size_t enough = detail::kPng.head;
   if (const auto status = read_bytes(file, enough, &head); status != ImageFileStatus::ok)
     return status;
-  if (const auto* kind = kind_of(head); kind != nullptr && kind->head > enough)
+  if (const auto* kind = detect_kind(head); kind != nullptr && kind->head > enough)
     if (const auto status = read_bytes(file, kind->head, &head); status != ImageFileStatus::ok)
       return status;
   return read_image_size(head, size);
 }
 
 ImageFileStatus read_image_size(Bytes head, ImageSize* size) noexcept {
-  if (const auto* kind = kind_of(head)) return kind->size(head, size);
+  if (const auto* kind = detect_kind(head)) return kind->size(head, size);
   // A file of nothing, or of the first bytes of a signature, is a torn write; another content is
   // another kind of file.
   return detail::may_become_png(head) ? ImageFileStatus::truncated : ImageFileStatus::not_an_image;
@@ -130,13 +130,13 @@ ImageFileStatus read_image_size(Bytes head, ImageSize* size) noexcept {
 
 ImageFileStatus check_image(Bytes bytes, ImageSize* size) noexcept {
   const auto status = read_image_size(bytes, size);
-  return status == ImageFileStatus::ok ? kind_of(bytes)->check(bytes) : status;
+  return status == ImageFileStatus::ok ? detect_kind(bytes)->check(bytes) : status;
 }
 
 std::optional<std::uint16_t> peak_of_deep_image(Bytes bytes) {
   ImageSize size;
   if (check_image(bytes, &size) != ImageFileStatus::ok) return std::uint16_t{0};
-  const detail::ImageKind& kind = *kind_of(bytes);
+  const detail::ImageKind& kind = *detect_kind(bytes);
   if (!kind.deep(bytes)) return std::nullopt;
   const auto width = static_cast<std::size_t>(size.width);
   std::vector<std::uint8_t> pixels(width * static_cast<std::size_t>(size.height));
@@ -152,7 +152,7 @@ ImageFileStatus decode_grey(Bytes bytes, ImageSize size, std::uint8_t* out, std:
   if (const auto status = check_image(bytes, &found); status != ImageFileStatus::ok) return status;
   if (found != size) return ImageFileStatus::wrong_size;
   detail::DeepSamples deep{deep_bits};
-  return kind_of(bytes)->decode(bytes, size, out, stride, &deep);
+  return detect_kind(bytes)->decode(bytes, size, out, stride, &deep);
 }
 
 }  // namespace vergence::app

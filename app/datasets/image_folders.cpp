@@ -38,7 +38,7 @@ bool present(const fs::path& path) {
 
 // ---- where the images are
 
-std::vector<std::string> entries_of(const fs::path& folder, bool folders) {
+std::vector<std::string> list_entries(const fs::path& folder, bool folders) {
   std::vector<std::string> names;
   std::error_code ignored;
   for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end;
@@ -54,13 +54,13 @@ std::vector<std::string> entries_of(const fs::path& folder, bool folders) {
 
 /// Two folders with the usual names and images in them, or in a folder of one name below both.
 std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& above) {
-  for (const auto& [left, right] : stereo_names(entries_of(root / above, true))) {
-    std::vector<std::string> inner = entries_of(root / above / left, true);
+  for (const auto& [left, right] : stereo_names(list_entries(root / above, true))) {
+    std::vector<std::string> inner = list_entries(root / above / left, true);
     inner.insert(inner.begin(), "");
     for (const std::string& name : inner) {
       const std::string below = name.empty() ? "" : "/" + name;
-      if (!entries_of(root / (above + left + below), false).empty() &&
-          !entries_of(root / (above + right + below), false).empty())
+      if (!list_entries(root / (above + left + below), false).empty() &&
+          !list_entries(root / (above + right + below), false).empty())
         return Cameras{Camera{above + left + below}, Camera{above + right + below}};
     }
   }
@@ -69,7 +69,7 @@ std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& a
 
 /// Images of both cameras in one folder, distinguished by a word of their names.
 std::optional<Cameras> in_one_folder(const fs::path& root, const std::string& above) {
-  const std::vector<std::string> files = entries_of(root / above, false);
+  const std::vector<std::string> files = list_entries(root / above, false);
   const std::array<std::string, 2> sides = side_names(files);
   if (sides[0].empty()) return std::nullopt;
   Cameras cameras;
@@ -83,17 +83,17 @@ std::optional<Cameras> in_one_folder(const fs::path& root, const std::string& ab
   return cameras;
 }
 
-std::optional<Cameras> cameras_of(const fs::path& root, const std::string& above) {
+std::optional<Cameras> read_cameras(const fs::path& root, const std::string& above) {
   auto cameras = in_two_folders(root, above);
   return cameras ? cameras : in_one_folder(root, above);
 }
 
 /// In the folder, else in the one folder below it that has some.
 std::optional<Cameras> find_cameras(const fs::path& root) {
-  std::optional<Cameras> found = cameras_of(root, "");
+  std::optional<Cameras> found = read_cameras(root, "");
   if (found) return found;
-  for (const std::string& name : entries_of(root, true)) {
-    auto cameras = cameras_of(root, name + "/");
+  for (const std::string& name : list_entries(root, true)) {
+    auto cameras = read_cameras(root, name + "/");
     if (cameras && found) return std::nullopt;
     if (cameras) found = std::move(cameras);
   }
@@ -104,7 +104,7 @@ std::optional<Cameras> find_cameras(const fs::path& root) {
 std::vector<std::string> list_images(const fs::path& root, const std::string& below) {
   const fs::path folder = root / below;
   require_folder(folder, "images");
-  std::vector<std::string> names = entries_of(folder, false);
+  std::vector<std::string> names = list_entries(folder, false);
   if (names.empty()) {
     std::string advice;  // by the ending of a file that is none
     std::error_code error;
@@ -132,7 +132,7 @@ Cameras cameras_in(const fs::path& root, const std::array<std::string, 2>& below
 // ---- what names tell
 
 /// The name without its ending and without what tells the camera.
-std::string stem_of(const Camera& camera, const std::string& name) {
+std::string to_stem(const Camera& camera, const std::string& name) {
   const std::string stem = fs::path(name).stem().string();
   return camera.side.empty() ? stem : without_side(stem, camera.side).value_or(stem);
 }
@@ -150,13 +150,13 @@ std::string_view last_number(std::string_view stem) {
 
 /// The last number in a name without its leading zeros.
 std::string number_key(const Camera& camera, const std::string& name) {
-  const std::string stem = stem_of(camera, name);
+  const std::string stem = to_stem(camera, name);
   const std::string_view number = last_number(stem);
   return std::string(number.substr(std::min(number.find_first_not_of('0'), number.size())));
 }
 
-std::optional<std::size_t> number_of(const Camera& camera, const std::string& name) {
-  const std::string stem = stem_of(camera, name);
+std::optional<std::size_t> parse_index(const Camera& camera, const std::string& name) {
+  const std::string stem = to_stem(camera, name);
   if (last_number(stem).empty()) return std::nullopt;
   const std::string key = number_key(camera, name);
   const auto n = key.empty() ? std::optional<std::int64_t>(0) : parse_integer(key);
@@ -179,7 +179,7 @@ std::string time_in(const std::string& stem) {
 /// The times that the names are; nothing: they are none.
 std::optional<std::vector<Stamp>> stamps_in(const Camera& camera, std::string* unit) {
   std::vector<std::string> texts;
-  for (const std::string& name : camera.names) texts.push_back(time_in(stem_of(camera, name)));
+  for (const std::string& name : camera.names) texts.push_back(time_in(to_stem(camera, name)));
   const std::vector<std::string_view> numbers(texts.begin(), texts.end());
   const TimeForm form = find_time_form(numbers, std::nullopt, TimeUnit::nanoseconds);
   if (!form.absolute) return std::nullopt;
@@ -231,7 +231,7 @@ std::optional<std::vector<StereoPair>> pair_by_names(Cameras* cameras) {
   const auto met = [](const Cameras& c, const std::vector<StereoPair>& pairs) {
     return c[0].names.size() + c[1].names.size() - pairs.size();
   };
-  auto pairs = pair_by_key(*cameras, stem_of);
+  auto pairs = pair_by_key(*cameras, to_stem);
   if (2 * met(*cameras, pairs) >= least) return pairs;
   Cameras numbered = *cameras;
   for (Camera& camera : numbered) {
@@ -374,7 +374,7 @@ Stamped stamped(const fs::path& root, const Camera& camera, const fs::path& list
   std::vector<std::string> of_line(times.lines.size());
   std::size_t end = 0, odd = 0, without = 0;
   for (const std::string& name : camera.names) {
-    const auto number = number_of(camera, name);
+    const auto number = parse_index(camera, name);
     if (number && *number < of_line.size())
       of_line[*number] = name, end = std::max(end, *number + 1);
     else
@@ -411,12 +411,12 @@ std::vector<StereoPair> pair_as_named(const fs::path& file, const std::vector<Ti
 }
 
 /// The numbers of pairs by their names; nothing: a name has none, or there are no pairs.
-std::optional<std::vector<std::size_t>> numbers_of(const Cameras& cameras,
-                                                   const std::vector<StereoPair>& pairs) {
+std::optional<std::vector<std::size_t>> parse_indices(const Cameras& cameras,
+                                                      const std::vector<StereoPair>& pairs) {
   std::vector<std::size_t> numbers;
   for (const StereoPair& pair : pairs) {
     const std::size_t k = pair.file[0].empty() ? 1 : 0;
-    const auto n = number_of(cameras[k], pair.file[k]);
+    const auto n = parse_index(cameras[k], pair.file[k]);
     if (!n) return std::nullopt;
     numbers.push_back(*n);
   }
@@ -442,7 +442,7 @@ std::vector<StereoPair> pair_with_times(const fs::path& folder, const std::vecto
                                         std::vector<std::string>* assumptions) {
   const std::size_t left = (*cameras)[0].names.size(), right = (*cameras)[1].names.size();
   std::vector<StereoPair> pairs = pair_by_names(cameras).value_or(std::vector<StereoPair>{});
-  const auto numbers = numbers_of(*cameras, pairs);
+  const auto numbers = parse_indices(*cameras, pairs);
   const bool run = numbers && numbers->back() - numbers->front() + 1 == pairs.size();
   if (run && numbers->front() > 1 && pairs.size() == times.size())
     assumptions->push_back(

@@ -104,7 +104,7 @@ class Text {
 std::string key(const char* name, int camera) { return fmt::format("{}_{:02d}", name, camera); }
 
 /// Where a camera sits, from camera 00 before rectification, and how it sees.
-Intrinsics camera_of(const Text& text, int number, bool rectified, Transform* T_camera_camera0) {
+Intrinsics read_camera(const Text& text, int number, bool rectified, Transform* T_camera_camera0) {
   Intrinsics lens;
   if (rectified) {
     // All were turned into the axes of camera 00 as it became.
@@ -168,7 +168,7 @@ KittiRawRig read_kitti_raw_rig(const KittiRawFolders& folders, const std::array<
   std::array<Transform, 2> T_camera_camera0;
   out.rig.cameras = 2;
   for (std::size_t k = 0; k < 2; ++k)
-    out.rig.intrinsics[k] = camera_of(text, cameras[k], are_rectified, &T_camera_camera0[k]);
+    out.rig.intrinsics[k] = read_camera(text, cameras[k], are_rectified, &T_camera_camera0[k]);
   out.T_left_camera0 = T_camera_camera0[0];
   out.rig.T_camera_left[1] = T_camera_camera0[1] * T_camera_camera0[0].inverse();
   if (are_rectified)

@@ -56,7 +56,7 @@ constexpr int kLocked =
 /// 10 no data, 11 blanked: carried on by inertia.
 bool has_position(int mode) noexcept { return (mode >= 3 && mode <= 9) || mode >= 13; }
 
-FixStatus fix_of(int status, int satellites_used, int mode) noexcept {
+FixStatus to_fix_status(int status, int satellites_used, int mode) noexcept {
   if (status != kLocked) return FixStatus::none;
   return has_position(mode) && satellites_used != 0 ? FixStatus::fix_3d : FixStatus::dead_reckoning;
 }
@@ -80,7 +80,7 @@ std::optional<RecordedReading> parse_packet(std::string_view text) noexcept {
     return std::nullopt;  // degrees, or other columns
   const int used = whole(v[satellites]), status = whole(v[navigation_status]),
             mode = whole(v[position_mode]);
-  s.fix = fix_of(status, used, mode);
+  s.fix = to_fix_status(status, used, mode);
   s.attitude_valid = s.velocity_valid = status == kLocked;
   s.velocity_enu = {v[to_east], v[to_north], v[upward]};
   const Mat3 R =

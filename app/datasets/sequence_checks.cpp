@@ -17,8 +17,8 @@ constexpr double kShortestStep = 1e-3, kLongestStep = 10;
 constexpr std::size_t kSampledPairs = 5;  // pairs, spread over the drive: a tunnel is not all of it
 
 /// Nothing: an image of another kind. 0: one that says nothing, for it is missing, torn or black.
-std::optional<std::uint16_t> peak_of(const StereoSequence& s, const std::string& name,
-                                     std::vector<std::uint8_t>* bytes) {
+std::optional<std::uint16_t> find_peak(const StereoSequence& s, const std::string& name,
+                                       std::vector<std::uint8_t>* bytes) {
   if (name.empty()) return std::uint16_t{0};
   if (s.store) return s.store->peak(name, bytes);
   return read_image_file(s.root / name, bytes) == ImageFileStatus::ok ? peak_of_deep_image(*bytes)
@@ -113,7 +113,7 @@ void find_deep_bits(StereoSequence* sequence) {
     const StereoPair& pair =
         sequence->pairs[i * (sequence->pairs.size() - 1) / (kSampledPairs - 1)];
     for (const std::string& name : pair.file) {
-      const auto found = peak_of(*sequence, name, &bytes);
+      const auto found = find_peak(*sequence, name, &bytes);
       if (!found) return;
       peak = std::max(peak, *found);
     }

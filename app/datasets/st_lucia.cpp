@@ -118,7 +118,7 @@ struct Conventions {
   bool nose_up_positive = false;
 };
 
-Mat3 matrix_of(const Axes& axes) {
+Mat3 to_matrix(const Axes& axes) {
   return Eigen::Map<const Eigen::Matrix<int, 3, 3, Eigen::RowMajor>>(axes.to_enu.data())
       .cast<double>();
 }
@@ -234,7 +234,7 @@ void decide_axes(const std::vector<Moving>& moving, const std::vector<Moving>& f
                  Conventions* c) {
   double least = 1e300, most = -1e300;
   for (const Axes& axes : kAxes) {
-    const Mat3 to_enu = matrix_of(axes);
+    const Mat3 to_enu = to_matrix(axes);
     double sum = 0;
     for (const Moving& m : moving)
       sum += (to_enu * m.line->velocity - m.motion).head<2>().squaredNorm();
@@ -276,7 +276,7 @@ bool decide_pitch(const std::vector<Moving>& fast, Conventions* c) {
 
 Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* remarks) {
   Conventions c;
-  c.enu_of_velocity = matrix_of(kAxes[0]);
+  c.enu_of_velocity = to_matrix(kAxes[0]);
   const std::vector<Moving> moving = motions(lines);
   std::vector<Moving> fast;
   for (const Moving& m : moving)
@@ -296,7 +296,7 @@ Conventions decide(const std::vector<Line>& lines, std::vector<std::string>* rem
   return c;
 }
 
-InsSample sample_of(const Line& line, const Conventions& c, std::uint64_t number) {
+InsSample to_sample(const Line& line, const Conventions& c, std::uint64_t number) {
   InsSample s;
   s.number = number;
   s.stamp = line.stamp;
@@ -356,7 +356,7 @@ RecordedIns read_st_lucia_ins(const std::filesystem::path& folder) {
   ins.readings.reserve(lines.size());
   for (const Line& line : lines) {
     RecordedReading reading;
-    reading.sample = sample_of(line, conventions, ins.readings.size());
+    reading.sample = to_sample(line, conventions, ins.readings.size());
     reading.quality.filter_valid = true;  // the log tells nothing else
     ins.readings.push_back(reading);
   }

@@ -132,7 +132,7 @@ double off_rotation(const Mat3& R) {
 }
 
 template <std::size_t N>
-Mat3 rotation_of(const std::array<double, N>& v) {
+Mat3 to_rotation(const std::array<double, N>& v) {
   Mat3 R;
   R << v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10];
   return R;
@@ -144,7 +144,7 @@ bool is_matrix(const std::vector<std::string_view>& fields, std::size_t first, L
   constexpr double kRoughly = 0.1;  // the matrix is meant; rows that are off are refused one by one
   return finite_numbers(fields, first,
                         std::span(v).first(layout == Layout::matrix3x4 ? 12U : 16U)) &&
-         off_rotation(rotation_of(v)) < kRoughly && v[12] == 0 && v[13] == 0 && v[14] == 0 &&
+         off_rotation(to_rotation(v)) < kRoughly && v[12] == 0 && v[13] == 0 && v[14] == 0 &&
          v[15] == 1;
 }
 
@@ -198,7 +198,7 @@ struct Sample {
   char separator = ' ';
 };
 
-Sample sample_of(std::string_view text) {
+Sample to_sample(std::string_view text) {
   constexpr std::size_t kRows = 1000;
   Sample s;
   TextTable table(text);
@@ -210,7 +210,7 @@ Sample sample_of(std::string_view text) {
   return s;
 }
 
-Columns columns_of(const fs::path& file, const Sample& sample, std::size_t first_line) {
+Columns find_columns(const fs::path& file, const Sample& sample, std::size_t first_line) {
   if (auto named = columns_of_names(sample.names)) return *named;
   for (const auto& row : sample.rows)
     if (auto found = columns_of_row(row, sample.time)) return *found;
@@ -254,10 +254,10 @@ void sort_by_stamp(Trajectory* poses) {
 class Reader {
  public:
   Reader(const fs::path& file, std::string_view text, const TrajectoryOptions& options)
-      : file_(file), text_(text), options_(options), sample_(sample_of(text)) {
+      : file_(file), text_(text), options_(options), sample_(to_sample(text)) {
     TextTable table(text);
     if (!table.next()) refuse(file, 0, "has no pose in it: there is no row of numbers");
-    columns_ = columns_of(file, sample_, table.line());
+    columns_ = find_columns(file, sample_, table.line());
     euroc_ = is_euroc_truth(file, sample_);
     find_times();
     find_order();
@@ -400,7 +400,7 @@ class Reader {
       *T = {q.normalized().toRotationMatrix(), {v[0], v[1], v[2]}};
       return true;
     }
-    const Mat3 written = rotation_of(v);
+    const Mat3 written = to_rotation(v);
     const double off = off_rotation(written);
     if (!(off <= kNearRotation))
       refuse(
@@ -482,7 +482,7 @@ class Reader {
   TrajectoryFile out_;
 };
 
-fs::path folder_of(const fs::path& file) {
+fs::path folder_name(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
@@ -508,7 +508,7 @@ void set_times(const fs::path& file, std::span<const Stamp> times, const std::st
 }
 
 void set_times_beside(const fs::path& file, TrajectoryFile* trajectory) {
-  const fs::path folder = folder_of(file);
+  const fs::path folder = folder_name(file);
   const auto times_path = first_present(
       {folder / "times.txt", folder / ".." / "sequences" / file.stem() / "times.txt"});
   if (!times_path) return;
@@ -530,7 +530,7 @@ TrajectoryFile read_file(const fs::path& path, const TrajectoryOptions& options)
   TrajectoryFile out = reader.read();
   if (!out.timed) set_times_beside(path, &out);
   if (!reader.euroc()) return out;
-  const fs::path folder = folder_of(path);
+  const fs::path folder = folder_name(path);
   if (const auto sensor =
           first_present({folder / ".." / "cam0" / "sensor.yaml", folder / "cam0" / "sensor.yaml"}))
     bring_to_camera(*sensor, &out.poses);

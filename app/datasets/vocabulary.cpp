@@ -126,7 +126,7 @@ const Vocabulary* find_part(const std::string& word) {
 }
 
 /// k1 … k6, p1 or p2 of a scalar, whose number is no camera's; empty: another key.
-std::string_view coefficient_of(const std::vector<std::string>& tokens) {
+std::string_view find_coefficient(const std::vector<std::string>& tokens) {
   if (tokens.size() < 2) return {};
   constexpr std::array<std::string_view, 8> kNames{"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
   const auto at =
@@ -199,7 +199,7 @@ class Walk {
     fact.node.reset(node);
     fact.key = path;
     Side side;
-    if (node.IsScalar()) fact.part = coefficient_of(tokens);
+    if (node.IsScalar()) fact.part = find_coefficient(tokens);
     if (!fact.part.empty()) {
       tokens.resize(tokens.size() - 2);
       side = extract_side(&tokens);
@@ -263,9 +263,9 @@ class Walk {
 
 }  // namespace
 
-std::vector<Fact> facts_of(const YamlFile& file) { return Walk(file).facts(); }
+std::vector<Fact> find_facts(const YamlFile& file) { return Walk(file).facts(); }
 
-std::string program_of(const YamlFile& file, bool* never) {
+std::string find_program(const YamlFile& file, bool* never) {
   if (!file.root().IsMap()) return "";
   for (const Program& program : kPrograms)
     for (const auto& entry : file.root())

@@ -33,11 +33,11 @@ struct Fact {
 /// All values whose keys are in the vocabulary, in the order of the file. Keys are compared without
 /// capitals and signs; a camera is told by the words left and right, l and r, or a number (from 0
 /// or from 1) in the key or a group around it.
-[[nodiscard]] std::vector<Fact> facts_of(const YamlFile& file);
+[[nodiscard]] std::vector<Fact> find_facts(const YamlFile& file);
 
 /// The program that a file is of, by a key that only its files have, and what it needs to be read:
 /// half a message. Empty: none that is known. *never is set where a program's files are never
 /// read.
-[[nodiscard]] std::string program_of(const YamlFile& file, bool* never);
+[[nodiscard]] std::string find_program(const YamlFile& file, bool* never);
 
 }  // namespace vergence::app

@@ -17,7 +17,7 @@
 namespace vergence::app {
 namespace {
 
-const CameraDriverRow& row_of(const CameraRequest& request) {
+const CameraDriverRow& find_row(const CameraRequest& request) {
   for (const CameraDriverRow& row : camera_driver_rows())
     if (request.driver == row.name) return row;
   const auto names = camera_driver_names();
@@ -25,7 +25,7 @@ const CameraDriverRow& row_of(const CameraRequest& request) {
                                did_you_mean(request.driver, names), fmt::join(names, ", ")));
 }
 
-std::string list_of(const std::vector<DeviceInfo>& found) {
+std::string format_list(const std::vector<DeviceInfo>& found) {
   if (found.empty()) return "none was found";
   std::string text = "found:";
   for (const DeviceInfo& d : found)
@@ -43,7 +43,7 @@ std::string refusal(const CameraRequest& request, const std::string& serial,
   switch (status) {
     case DeviceStatus::not_found:
       return fmt::format("{}was not found; {}; check cable, power and {}.serial{}", who,
-                         list_of(driver.enumerate()), request.key,
+                         format_list(driver.enumerate()), request.key,
                          error.empty() ? "" : ": " + error);
     case DeviceStatus::busy:
       return fmt::format("{}is in use by another program; end that one{}", who,
@@ -93,10 +93,10 @@ class Openings {
       check_half(r, requests);
       if (r.half == ImageHalf::right) continue;  // its left half stands for the camera
       ++sharing_[r.driver];
-      if (!r.serial.empty()) taken_.emplace_back(r.driver, r.serial);
+      if (!r.serial.empty()) reserved_.emplace_back(r.driver, r.serial);
     }
-    for (const auto& [name, serial] : taken_)
-      if (std::count(taken_.begin(), taken_.end(), std::pair(name, serial)) > 1)
+    for (const auto& [name, serial] : reserved_)
+      if (std::count(reserved_.begin(), reserved_.end(), std::pair(name, serial)) > 1)
         throw InputError(fmt::format(
             "two entries of cameras have the serial \"{}\"; each camera can be one only", serial));
   }
@@ -129,7 +129,7 @@ class Openings {
   }
 
   std::unique_ptr<CameraDevice> open_device(const CameraRequest& request) {
-    const CameraDriverRow& row = row_of(request);
+    const CameraDriverRow& row = find_row(request);
     std::unique_ptr<CameraDriver>& driver = drivers_[request.driver];
     if (driver == nullptr) driver = row.make();
     std::string serial = request.serial;
@@ -145,20 +145,20 @@ class Openings {
     const std::vector<DeviceInfo> found = driver.enumerate();
     for (const DeviceInfo& d : found) {
       const std::pair who(request.driver, d.serial);
-      if (std::find(taken_.begin(), taken_.end(), who) != taken_.end()) continue;
-      taken_.push_back(who);
+      if (std::find(reserved_.begin(), reserved_.end(), who) != reserved_.end()) continue;
+      reserved_.push_back(who);
       return d.serial;
     }
     const std::string error = driver.last_error();
     throw DeviceError(fmt::format(
         "{}: no unassigned {} camera was found; {}; check cable and power{}", request.key,
-        request.driver, list_of(found), error.empty() ? "" : ": " + error));
+        request.driver, format_list(found), error.empty() ? "" : ": " + error));
   }
 
   std::map<std::string, std::unique_ptr<CameraDriver>> drivers_;
   std::map<std::string, int> sharing_;
   std::vector<OpenHalf> halves_;  // opened with the other one, not asked for yet
-  std::vector<std::pair<std::string, std::string>> taken_;  // driver, serial
+  std::vector<std::pair<std::string, std::string>> reserved_;  // driver, serial
 };
 
 }  // namespace

@@ -177,8 +177,8 @@ class Watchdog {
 
 void on_event(const DeviceEvent& event, CaptureResult* capture) {
   const auto k = static_cast<std::size_t>(event.camera);
-  if (event.kind == DeviceEvent::Kind::camera_disconnected) capture->gone[k] = true;
-  if (event.kind == DeviceEvent::Kind::camera_reconnected) capture->gone[k] = false;
+  if (event.kind == DeviceEvent::Kind::camera_disconnected) capture->disconnected[k] = true;
+  if (event.kind == DeviceEvent::Kind::camera_reconnected) capture->disconnected[k] = false;
 }
 
 }  // namespace
@@ -189,7 +189,7 @@ CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,
   const std::size_t n = devices.cameras().size();
   CaptureResult capture;
   capture.delivered.assign(n, 0);
-  capture.gone.assign(n, false);
+  capture.disconnected.assign(n, false);
   Acquisition::Options o = devices.acquisition_options();
   const HostMoment now = moment_now();
   o.tie_stamp = now.day;

@@ -60,7 +60,7 @@ struct CaptureResult {
   enum class End : std::uint8_t { done, timeout, interrupted } end = End::timeout;
   int sets = 0;                          // complete ones that were handed on
   std::vector<std::uint64_t> delivered;  // images by camera, also those of incomplete sets
-  std::vector<bool> gone;                // by camera, at the end
+  std::vector<bool> disconnected;        // by camera, at the end
 };
 
 struct CaptureOptions {

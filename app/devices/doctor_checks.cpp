@@ -75,7 +75,7 @@ bool means(const Machine& machine, const std::string& requested, const DeviceInf
 }
 
 /// Serials of the cameras that a driver found, or why there is none.
-std::string list_of(const DriverFindings* d) {
+std::string format_list(const DriverFindings* d) {
   if (d == nullptr) return "no such driver";
   if (d->cameras.empty())
     return d->explanation.empty() ? "none is there" : "none is there: " + d->explanation;
@@ -113,7 +113,7 @@ void check_cameras(const CheckContext& p, std::vector<Finding>* findings) {
                            fmt::format("{}: the {} camera{} is not there ({}); check cable, power "
                                        "and serial",
                                        who, n.driver, n.serial.empty() ? "" : " " + n.serial,
-                                       list_of(find_driver(p.inventory, n.driver))),
+                                       format_list(find_driver(p.inventory, n.driver))),
                            {}});
   }
   if (!present.empty())
@@ -179,7 +179,7 @@ std::vector<std::string> camera_nodes(const CheckContext& p) {
 }
 
 /// Serial ports that matter: those of the configuration, without one all on USB.
-std::vector<const FoundPort*> ports_of(const CheckContext& p, bool ins, bool trigger) {
+std::vector<const FoundPort*> find_ports(const CheckContext& p, bool ins, bool trigger) {
   const Configuration& n = p.needs();
   std::vector<const FoundPort*> some;
   for (const FoundPort& port : p.inventory.ports)
@@ -209,7 +209,7 @@ void check_port(const CheckContext& p, const std::string& group, const std::stri
 
 void check_serial_permission(const CheckContext& p, std::vector<Finding>* findings) {
   std::set<std::string> nodes;
-  for (const FoundPort* port : ports_of(p, true, true)) nodes.insert(port->info.port);
+  for (const FoundPort* port : find_ports(p, true, true)) nodes.insert(port->info.port);
   // A port that the list lacks, for instance of the board itself, is checked all the same.
   const auto add = [&](const std::string& driver, const std::string& port) {
     if (is_real_driver(driver) && port.starts_with("/") && p.machine.exists(port))
@@ -222,7 +222,7 @@ void check_serial_permission(const CheckContext& p, std::vector<Finding>* findin
 
 void check_latency(const CheckContext& p, std::vector<Finding>* findings) {
   constexpr int kAdvisedLatency = 16;  // ms: docs/ins.md
-  for (const FoundPort* port : ports_of(p, true, false)) {
+  for (const FoundPort* port : find_ports(p, true, false)) {
     const bool ins = port->kind == SerialKind::ins || port->kind == SerialKind::ftdi;
     if (!port->info.latency_timer_ms || !ins) continue;
     const int ms = *port->info.latency_timer_ms;

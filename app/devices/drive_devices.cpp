@@ -20,7 +20,7 @@ bool all_mock(const Configuration& c) {
 }
 
 /// Checks that a configuration suits real devices before opening them.
-std::vector<CameraRequest> requests_of(const Configuration& c) {
+std::vector<CameraRequest> make_requests(const Configuration& c) {
   std::vector<CameraRequest> requests;
   const int cameras = nominal_rig(c).cameras;
   if (cameras < 2)
@@ -102,7 +102,7 @@ DriveDevices::DriveDevices(const Configuration& c, const std::vector<std::string
 }
 
 void DriveDevices::open_real(const Configuration& c) {
-  const std::vector<CameraRequest> requests = requests_of(c);
+  const std::vector<CameraRequest> requests = make_requests(c);
   sync_ = sync_options(c, static_cast<int>(requests.size()));
   const TriggerConfiguration pulses = trigger_configuration(c, sync_.cameras);
   opened_ = open_cameras(requests, &remarks_);

@@ -229,7 +229,7 @@ void check_exposures(const Configuration& c, int cameras) {
 
 /// Default stamp jitter: the V4L2 kernel stamps by the host's clock, the
 /// others have their own.
-Duration jitter_of(const CameraSettings& s) {
+Duration max_jitter(const CameraSettings& s) {
   constexpr double kOwnClock = 20, kHostClock = 1000;  // µs
   const double us = s.stamp_jitter_us > 0 ? s.stamp_jitter_us
                     : s.driver == "v4l2"  ? kHostClock
@@ -256,7 +256,7 @@ SyncOptions sync_options(const Configuration& c, int cameras) {
   for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
     SyncCameraOptions& camera = o.camera[static_cast<std::size_t>(k)];
     camera.delay = microseconds(s.trigger_delay_us);
-    camera.jitter = jitter_of(s);
+    camera.jitter = max_jitter(s);
   });
   if (const char* message = o.validate())
     throw InputError(fmt::format("sync.mode {}: {}", to_string(c.sync.mode), message));

@@ -71,7 +71,7 @@ ExposureControl::ExposureControl(const std::vector<CameraDevice*>& cameras, int 
       at_once_(at_once) {
   for (CameraDevice* camera : cameras)
     watched_.push_back(std::make_unique<Watched>(this, watched_.size(), camera));
-  taken_.fill(start);
+  applied_.fill(start);
   if (!at_once_) thread_ = std::thread([this] { work(); });
 }
 
@@ -124,7 +124,7 @@ void ExposureControl::observe(std::size_t k, const Frame& frame, const ImageView
 bool ExposureControl::is_without(std::size_t k, const Frame& frame) noexcept {
   const int patience = 4 * options_.settle_frames;
   int& n = frames_without_[k];
-  n = has(frame, taken_[k]) ? 0 : n + 1;
+  n = has(frame, applied_[k]) ? 0 : n + 1;
   if (n < patience) return false;
   n = 0;
   return true;
@@ -150,12 +150,12 @@ void ExposureControl::set_all(const ExposureSetting& requested) noexcept {
     if (status != DeviceStatus::ok) {
       refused_.fetch_add(1, std::memory_order_relaxed);
       // One that is away comes back with what it had: its frames tell, and it is asked again.
-      if (status == DeviceStatus::disconnected) taken_[k] = requested;
+      if (status == DeviceStatus::disconnected) applied_[k] = requested;
       continue;
     }
-    taken_[k] = actual;
-    unequal = unequal || !alike(actual.exposure, taken_[0].exposure) ||
-              !alike_gain(actual.gain_db, taken_[0].gain_db);
+    applied_[k] = actual;
+    unequal = unequal || !alike(actual.exposure, applied_[0].exposure) ||
+              !alike_gain(actual.gain_db, applied_[0].gain_db);
   }
   if (unequal) unequal_.fetch_add(1, std::memory_order_relaxed);
 }

@@ -72,7 +72,7 @@ class ExposureControl {
   std::array<int, kMaxCameras> frames_without_{};  // in a row
 
   std::array<ExposureSetting, kMaxCameras>
-      taken_{};  // as each camera rounded; of who asks, of the others while nothing is under way
+      applied_{};  // as each camera rounded; of who asks, of the others while nothing is under way
   Ring<ExposureSetting, 4> requests_;
   std::atomic<bool> under_way_{false}, stop_{false}, unsupported_{false};
   std::atomic<std::uint64_t> changes_{0}, refused_{0}, unequal_{0}, again_{0};

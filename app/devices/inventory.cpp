@@ -90,7 +90,7 @@ std::string group_of_node(const std::string& node) {
   return group_name(s.st_gid);
 }
 
-std::optional<DiskRoom> room_of(const fs::path& folder) {
+std::optional<DiskRoom> disk_room(const fs::path& folder) {
   // The folder may still have to be made, or be closed to this user: what counts is the disk that
   // it will be on, by the first folder above it that tells.
   std::error_code error;
@@ -126,7 +126,7 @@ Machine Machine::here() {
   m.addresses = own_addresses();
   m.may_use = [](const std::string& node) { return ::access(node.c_str(), R_OK | W_OK) == 0; };
   m.group_of = group_of_node;
-  m.room_at = room_of;
+  m.room_at = disk_room;
   m.clock_synchronised = kernel_clock_synchronised();
   return m;
 }

@@ -17,8 +17,8 @@ namespace vergence::app {
 namespace {
 
 /// Checks a key that takes one of a few words where cameras are the mock's.
-void one_of(const std::string& key, const std::string& value,
-            const std::vector<std::string>& words) {
+void require_choice(const std::string& key, const std::string& value,
+                    const std::vector<std::string>& words) {
   for (const std::string& word : words)
     if (value == word) return;
   throw InputError(fmt::format("{} is \"{}\"{}; with mock cameras it takes {}", key, value,
@@ -62,16 +62,16 @@ void check_drive(const Configuration& c) {
         "[{driver: mock}, {driver: mock}]");
   for (int k = 0; k < n; ++k) {
     const CameraSettings& camera = c.cameras[static_cast<std::size_t>(k)];
-    one_of(fmt::format("cameras.{}.driver", k), camera.driver, {"mock"});
+    require_choice(fmt::format("cameras.{}.driver", k), camera.driver, {"mock"});
     if (camera.width != c.cameras[0].width || camera.height != c.cameras[0].height)
       throw InputError(
           fmt::format("cameras.{}.size is {} x {}, that of camera 0 is {} x {}; all cameras of a "
                       "rig have one size",
                       k, camera.width, camera.height, c.cameras[0].width, c.cameras[0].height));
   }
-  one_of("ins.driver", c.ins.driver, {"mock", "none"});
-  one_of("trigger.driver", c.trigger.driver, {"mock"});
-  one_of("mock.world", c.mock.world, {"suburb"});
+  require_choice("ins.driver", c.ins.driver, {"mock", "none"});
+  require_choice("trigger.driver", c.trigger.driver, {"mock"});
+  require_choice("mock.world", c.mock.world, {"suburb"});
   (void)sync_options(c, n);
   (void)trigger_configuration(c, n);
 }

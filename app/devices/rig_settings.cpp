@@ -17,7 +17,7 @@ namespace {
 constexpr double kFocalOfWidth =
     0.72;  // of the image's width: 70° across, what machine-vision rigs on cars have
 
-Intrinsics lens_of(const Configuration& c, const CameraSettings& camera) {
+Intrinsics read_intrinsics(const Configuration& c, const CameraSettings& camera) {
   Intrinsics lens;
   lens.width = camera.width;
   lens.height = camera.height;
@@ -37,7 +37,7 @@ Intrinsics lens_of(const Configuration& c, const CameraSettings& camera) {
   return lens;
 }
 
-Transform place_of(const Configuration& c, std::size_t k) {
+Transform camera_transform(const Configuration& c, std::size_t k) {
   const auto& rows = c.cameras[k].T_camera_left;
   Transform T;
   if (std::all_of(rows.begin(), rows.end(), [](double v) { return v == 0; })) {
@@ -91,8 +91,8 @@ RigCalibration mounted_rig(const Configuration& c) {
   RigCalibration rig;
   rig.cameras = camera_count(c);
   for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k) {
-    rig.intrinsics[k] = lens_of(c, c.cameras[k]);
-    if (k > 0) rig.T_camera_left[k] = place_of(c, k);
+    rig.intrinsics[k] = read_intrinsics(c, c.cameras[k]);
+    if (k > 0) rig.T_camera_left[k] = camera_transform(c, k);
   }
   rig.baseline = rig.T_camera_left[1].t.norm();
   if (const auto bad = find_implausible(&rig))

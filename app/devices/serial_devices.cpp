@@ -81,7 +81,7 @@ std::unique_ptr<InsDriver> make_gnss(const InsRequest& request) {
   return gnss::make_driver(gnss_options<kProtocol>(request));
 }
 
-const InsDriverRow& row_of(const InsRequest& request) {
+const InsDriverRow& find_row(const InsRequest& request) {
   if (const InsDriverRow* row = find_ins_driver(request.driver)) return *row;
   const auto names = ins_driver_names();
   throw InputError(
@@ -128,7 +128,7 @@ std::string ins_title(const DeviceInfo& info) {
 
 std::unique_ptr<InsDevice> open_ins(const InsRequest& request, std::vector<std::string>* remarks) {
   if (request.driver == "none") return nullptr;
-  const InsDriverRow& row = row_of(request);
+  const InsDriverRow& row = find_row(request);
   const std::unique_ptr<InsDriver> driver = row.make(request);
   DeviceStatus status = DeviceStatus::ok;
   std::unique_ptr<InsDevice> device = driver->open(request.port, &status);

@@ -200,8 +200,8 @@ ExitCode Snap::verdict(const CaptureResult& capture) const {
         "{} {}; check its cable, its power, and what triggers it ({}.trigger; `free` needs no "
         "pulse)",
         camera_title(names_[k], devices_->cameras()[k]->info()),
-        capture.gone[k] ? "is disconnected"
-                        : fmt::format("sent no image within {:g} s", request_.wait_s),
+        capture.disconnected[k] ? "is disconnected"
+                                : fmt::format("sent no image within {:g} s", request_.wait_s),
         fmt::format("cameras.{}", k)));
   }
   if (!silent)

@@ -145,13 +145,13 @@ class UnixLineSocket final : public LineSocket {
   void send(std::string_view line) noexcept override {
     const HostStamp now = monotonic_now();
     for (Reader& reader : readers_)
-      if (reader.socket && !reader.takes_images()) send(line, now, &reader);
+      if (reader.socket && !reader.copies_images()) send(line, now, &reader);
   }
   void greet(std::string lines) noexcept override {
     greeting_ = std::move(lines);
     const HostStamp now = monotonic_now();
     for (Reader& reader : readers_) {
-      reader.greeted = reader.takes_images();
+      reader.greeted = reader.copies_images();
       if (reader.socket) flush(now, &reader);
     }
   }
@@ -162,7 +162,7 @@ class UnixLineSocket final : public LineSocket {
     events[1] = {now >= accept_again_ ? listener_.get() : -1, POLLIN, 0};
     for (std::size_t i = 0; i < kReaders; ++i) {
       Reader& reader = readers_[i];
-      if (reader.takes_images() && !reader.rest.empty() && now - reader.progress >= kPatience)
+      if (reader.copies_images() && !reader.rest.empty() && now - reader.progress >= kPatience)
         close(&reader);
       // One request after the other: the next one when the answer to the last one is out.
       const short event = !reader.rest.empty() ? POLLOUT : reader.asks ? POLLIN : short{0};
@@ -207,9 +207,9 @@ class UnixLineSocket final : public LineSocket {
     Duration image_interval{};  // positive: it gets images and no lines
     HostStamp next_image{};
 
-    [[nodiscard]] bool takes_images() const noexcept { return image_interval > Duration{}; }
+    [[nodiscard]] bool copies_images() const noexcept { return image_interval > Duration{}; }
     [[nodiscard]] bool image_due(HostStamp now) const noexcept {
-      return socket && takes_images() && rest.empty() && now >= next_image;
+      return socket && copies_images() && rest.empty() && now >= next_image;
     }
   };
 

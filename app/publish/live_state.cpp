@@ -22,7 +22,7 @@ json rounded(double value, double digits) {
   return std::round(value * scale) / scale;
 }
 
-std::string text_of(const json& value) {
+std::string format_value(const json& value) {
   return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -215,7 +215,7 @@ std::string LiveState::hello(HostStamp now) const {
   out["calibration"] = calibration_json();
   if (alignment_) out["enu_alignment"] = enu_alignment_json(*alignment_);
   if (newest_) out["now"] = frame_json(now);
-  return text_of(out);
+  return format_value(out);
 }
 
 std::string LiveState::update(HostStamp now, double line_age_ms) {
@@ -235,7 +235,7 @@ std::string LiveState::update(HostStamp now, double line_age_ms) {
   events_shown_ = events_seen_;
   if (std::exchange(calibration_new_, false)) out["calibration"] = calibration_json();
   if (std::exchange(alignment_new_, false)) out["enu_alignment"] = enu_alignment_json(*alignment_);
-  return text_of(out);
+  return format_value(out);
 }
 
 namespace {

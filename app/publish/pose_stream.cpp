@@ -95,7 +95,7 @@ namespace {
 using nlohmann::json;
 
 /// A line of its type with `fields`. Names may hold bytes that are no UTF-8.
-std::string line_of(const char* type, const json& fields) {
+std::string format_line(const char* type, const json& fields) {
   json line{{"version", kPoseStreamVersion}, {"type", type}};
   line.update(fields);
   return line.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
@@ -110,9 +110,9 @@ json rows(const Transform& T) {
 
 json numbers(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-const char* to_word(FixStatus fix) noexcept {
-  constexpr std::array kWords{"none", "dead_reckoning", "2d", "3d"};
-  return kWords[static_cast<std::size_t>(fix)];
+const char* fix_name(FixStatus fix) noexcept {
+  constexpr std::array kNames{"none", "dead_reckoning", "2d", "3d"};
+  return kNames[static_cast<std::size_t>(fix)];
 }
 
 }  // namespace
@@ -133,22 +133,23 @@ std::string calibration_line(const CalibrationRecord& record, std::span<const st
   }
   constexpr double kDepth = 20;  // m: where health() evaluates the rig
   const bool known = calibration::depth_error_percent(rig, kDepth) > 0;
-  return line_of("calibration",
-                 {{"stamp_ns", record.stamp.ns()},
-                  {"cause", record.cause_name()},
-                  {"rating", known ? json(to_string(calibration::health(rig, options))) : json()},
-                  {"cameras", cameras}});
+  return format_line(
+      "calibration",
+      {{"stamp_ns", record.stamp.ns()},
+       {"cause", record.cause_name()},
+       {"rating", known ? json(to_string(calibration::health(rig, options))) : json()},
+       {"cameras", cameras}});
 }
 
 std::string alignment_line(const PublishedEnuAlignment& p) {
-  return line_of("alignment", {{"stamp_ns", p.alignment.last.ns()},
-                               {"origin",
-                                {{"latitude_deg", p.origin.latitude_deg},
-                                 {"longitude_deg", p.origin.longitude_deg},
-                                 {"height_m", p.origin.height_m}}},
-                               {"T_enu_world", rows(p.alignment.T_enu_world)},
-                               {"position_sigma_m", numbers(p.alignment.position_sigma)},
-                               {"rotation_sigma_rad", numbers(p.alignment.rotation_sigma)}});
+  return format_line("alignment", {{"stamp_ns", p.alignment.last.ns()},
+                                   {"origin",
+                                    {{"latitude_deg", p.origin.latitude_deg},
+                                     {"longitude_deg", p.origin.longitude_deg},
+                                     {"height_m", p.origin.height_m}}},
+                                   {"T_enu_world", rows(p.alignment.T_enu_world)},
+                                   {"position_sigma_m", numbers(p.alignment.position_sigma)},
+                                   {"rotation_sigma_rad", numbers(p.alignment.rotation_sigma)}});
 }
 
 std::string status_line(const StreamStatus& s) {
@@ -171,23 +172,24 @@ std::string status_line(const StreamStatus& s) {
   }
   if (s.ins)
     fields["ins"] = {
-        {"fix", to_word(s.ins->fix)}, {"silent_s", s.ins->silent_s}, {"aligned", s.aligned}};
-  return line_of("status", fields);
+        {"fix", fix_name(s.ins->fix)}, {"silent_s", s.ins->silent_s}, {"aligned", s.aligned}};
+  return format_line("status", fields);
 }
 
 std::string image_line(std::uint64_t frame, Stamp stamp, int camera, std::string_view name,
                        const ImageView& image) {
-  return line_of("image", {{"frame", frame},
-                           {"stamp_ns", stamp.ns()},
-                           {"camera", camera},
-                           {"name", name},
-                           {"width", image.width},
-                           {"height", image.height},
-                           {"bytes", std::int64_t{image.width} * image.height}});
+  return format_line("image", {{"frame", frame},
+                               {"stamp_ns", stamp.ns()},
+                               {"camera", camera},
+                               {"name", name},
+                               {"width", image.width},
+                               {"height", image.height},
+                               {"bytes", std::int64_t{image.width} * image.height}});
 }
 
 std::string response_line(std::string_view request, bool accepted, std::string_view message) {
-  return line_of("response", {{"request", request}, {"accepted", accepted}, {"message", message}});
+  return format_line("response",
+                     {{"request", request}, {"accepted", accepted}, {"message", message}});
 }
 
 }  // namespace vergence::app

@@ -97,14 +97,14 @@ struct RecordingCounters {
 /// Files      Split by size and when the index is full: drive.mcap becomes drive_0.mcap, the next
 /// is
 ///            drive_1.mcap. Every file begins with all schemas, channels and the preamble.
-/// Threads    begin(), commit(): one thread a queue. take_errors(), counters(): any, counters exact
+/// Threads    begin(), commit(): one thread a queue. pop_errors(), counters(): any, counters exact
 /// after close(). close(): the owner's, after the last commit(). Memory     All at construction;
 /// the writer's thread is sealed. Full       drop: begin() refuses, counted; what is bulky leaves
 /// room for the rest. wait:
 ///            begin() waits for room (virtual time, replay).
 /// Errors     The constructor throws InputError (folder, disk) and std::system_error (memory). When
 ///            a write fails the data wait in their queue while there is room and the same file is
-///            tried again every RecordingFiles::kRetry; messages by take_errors().
+///            tried again every RecordingFiles::kRetry; messages by pop_errors().
 class Recording {
  public:
   enum class WhenFull : std::uint8_t { drop, wait };
@@ -129,7 +129,7 @@ class Recording {
   void commit(std::size_t queue, std::size_t size) noexcept;
 
   /// Sentences about the disk since the last call.
-  [[nodiscard]] std::vector<std::string> take_errors() { return files_.take_errors(); }
+  [[nodiscard]] std::vector<std::string> pop_errors() { return files_.pop_errors(); }
   [[nodiscard]] RecordingCounters counters() const noexcept;
   /// Writes what waits, ends the file. Once.
   void close() noexcept;

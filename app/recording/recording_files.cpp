@@ -154,7 +154,7 @@ const char* RecordingFiles::path(std::vector<char>* out) const noexcept {
 
 // ---- anybody
 
-std::vector<std::string> RecordingFiles::take_errors() {
+std::vector<std::string> RecordingFiles::pop_errors() {
   const std::lock_guard lock(errors_mutex_);
   std::vector<std::string> out;
   for (Notice n; notices_.pop(&n);) out.push_back(message(n));

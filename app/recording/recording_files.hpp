@@ -33,7 +33,7 @@ struct RecordingPreamble {
 /// Threads  append(), roll(), finish(), resting(): the writer's. Sentences and counters: any.
 /// Memory   All at construction.
 /// Errors   A write that fails is tried again in the same file by whoever has the data, every
-///          kRetry: see resting(). Messages for the user: take_errors().
+///          kRetry: see resting(). Messages for the user: pop_errors().
 class RecordingFiles {
  public:
   static constexpr Duration kRetry = Duration::seconds(3);
@@ -60,7 +60,7 @@ class RecordingFiles {
   [[nodiscard]] bool resting() const noexcept;
 
   /// Sentences about the disk since the last call.
-  [[nodiscard]] std::vector<std::string> take_errors();
+  [[nodiscard]] std::vector<std::string> pop_errors();
   [[nodiscard]] std::uint64_t files() const noexcept {
     return files_.load(std::memory_order_relaxed);
   }
@@ -103,7 +103,7 @@ class RecordingFiles {
   std::vector<char> path_, other_path_;
 
   std::atomic<std::uint64_t> files_{0}, unwritten_{0};
-  Ring<Notice, 64> notices_;  // writer to take_errors()
+  Ring<Notice, 64> notices_;  // writer to pop_errors()
   std::mutex errors_mutex_;   // of those who take
 };
 

@@ -14,8 +14,8 @@ constexpr std::array<const char*, 3> kTrust{"given", "state_file", "none"};
 constexpr std::array<const char*, 2> kAdoption{"after_fixed_frames", "when_ready"};
 
 template <class Enum, std::size_t N>
-Enum value_of(const std::array<const char*, N>& words, const std::string& word,
-              const std::string& name) {
+Enum to_enum(const std::array<const char*, N>& words, const std::string& word,
+             const std::string& name) {
   for (std::size_t i = 0; i < N; ++i)
     if (word == words[i]) return static_cast<Enum>(i);
   throw InputError(name + ": the description of the recorded session says \"" + word.substr(0, 40) +
@@ -53,10 +53,10 @@ SessionDescription parse_session_description(std::string_view json, const std::s
     j.at("program").get_to(d.program);
     j.at("calibration").get_to(d.calibration);
     j.at("nominal").get_to(d.nominal);
-    d.trust = value_of<CalibrationTrust>(kTrust, j.at("trust"), name);
+    d.trust = to_enum<CalibrationTrust>(kTrust, j.at("trust"), name);
     j.at("cause").get_to(d.cause);
     j.at("source").get_to(d.source);
-    d.adoption = value_of<Adoption>(kAdoption, j.at("adoption"), name);
+    d.adoption = to_enum<Adoption>(kAdoption, j.at("adoption"), name);
     j.at("ins").get_to(d.ins);
     j.at("mount_source").get_to(d.mount_source);
     j.at("settings").get_to(d.settings);

@@ -292,7 +292,7 @@ void compare(const Session& s, Analysis* a) {
   add_world(s, a);
 }
 
-Analysis::Spread spread_of(const std::vector<double>& values) {
+Analysis::Spread make_spread(const std::vector<double>& values) {
   Analysis::Spread s;
   double sum = 0;
   std::size_t n = 0;
@@ -392,9 +392,9 @@ Analysis analyse(const Session& session) {
   count_frames(session, &a);
   count_waiting(session, &a);
   compare(session, &a);
-  a.horizontal = spread_of(a.horizontal_m);
-  a.vertical = spread_of(a.vertical_m);
-  a.heading = spread_of(a.heading_deg);
+  a.horizontal = make_spread(a.horizontal_m);
+  a.vertical = make_spread(a.vertical_m);
+  a.heading = make_spread(a.heading_deg);
   if (a.source == ErrorSource::none) return a;
   add_metrics(session, &a);
   if (a.source == ErrorSource::ins) drift_by_positions(session, &a);

@@ -189,7 +189,7 @@ std::string_view rejection(const Session& s) {
   return why;
 }
 
-Usability usability_of(const Session& s, const Analysis& a) {
+Usability assess_usability(const Session& s, const Analysis& a) {
   if (!a.ok_share || a.ok > 0) return {};
   std::size_t waiting = 0;
   for (const Frame& f : s.frames)
@@ -228,7 +228,7 @@ struct Outages {
 };
 
 /// `camera 1` of `camera 1 is disconnected; …`.
-std::string device_of(const Event& e) {
+std::string device_name(const Event& e) {
   if (e.kind.starts_with("trigger_board")) return "the trigger board";
   constexpr std::string_view kCamera = "camera ";
   const bool named = e.message.starts_with(kCamera) && e.message.size() > kCamera.size() &&
@@ -249,7 +249,7 @@ std::map<std::string, Outages> outages_of(std::span<const Event> events) {
     const bool begins = e.kind == "camera_disconnected" || e.kind == "trigger_board_disconnected";
     if (!begins && e.kind != "camera_reconnected" && e.kind != "trigger_board_reconnected")
       continue;
-    Outages& o = all[device_of(e)];
+    Outages& o = all[device_name(e)];
     if (begins && !o.open) {
       if (o.count++ == 0) o.first = e.stamp;
       o.open = e.stamp;
@@ -597,7 +597,7 @@ Assessment Findings::assessment() const {
   return assessment;
 }
 
-const char* to_words(Grade grade) noexcept {
+const char* spaced(Grade grade) noexcept {
   switch (grade) {
     case Grade::good:
       return "Good";
@@ -611,7 +611,7 @@ const char* to_words(Grade grade) noexcept {
 
 Assessment assess(const Session& session, const Analysis& analysis) {
   Findings j;
-  const Usability use = usability_of(session, analysis);
+  const Usability use = assess_usability(session, analysis);
   const std::map<std::string, Outages> outages = outages_of(session.events);
   const bool broken = assess_outages(outages, session, analysis, &j);
   assess_focal_length(session, &j);

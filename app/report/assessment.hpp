@@ -26,7 +26,7 @@ struct Advice {
 [[nodiscard]] std::string_view advice_for(std::string_view word) noexcept;
 
 enum class Grade : std::uint8_t { good, care, bad };
-[[nodiscard]] const char* to_words(Grade) noexcept;  // "Good", "Usable with care", "Do not use"
+[[nodiscard]] const char* spaced(Grade) noexcept;  // "Good", "Usable with care", "Do not use"
 
 /// Result shown first in the report. Every reason that moved the grade is there, the worst first;
 /// a session without any is good.

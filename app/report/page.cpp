@@ -307,7 +307,7 @@ std::string list(const std::vector<std::string>& messages) {
 }
 
 /// `2026-03-01 10:15:00 UTC`; empty for stamps that count from a drive's start.
-std::string date_of(Stamp stamp) {
+std::string format_date(Stamp stamp) {
   constexpr std::int64_t kYear2000 = 946'684'800, kYear2200 = 7'258'118'400;  // s since 1970
   const std::int64_t seconds = stamp.ns() / 1'000'000'000;
   if (seconds < kYear2000 || seconds > kYear2200) return "";
@@ -317,7 +317,7 @@ std::string date_of(Stamp stamp) {
 std::string title_line(const Session& s, const Analysis& a) {
   std::string line = "Session " + s.name;
   if (!s.frames.empty())
-    if (const std::string date = date_of(s.frames.front().stamp); !date.empty())
+    if (const std::string date = format_date(s.frames.front().stamp); !date.empty())
       line += " · " + date;
   line += a.path_m >= 1000 ? fmt::format(" · {:.2f} km", a.path_m / 1000)
                            : fmt::format(" · {:.0f} m", a.path_m);
@@ -373,7 +373,7 @@ std::string assessment_section(const Session& s, const Analysis& a, const Assess
   return fmt::format(
       "<section class=\"assessment {}\"><p class=\"word\">{} {}</p><p>{}</p><div "
       "class=\"numbers\">{}{}{}</div></section>\n",
-      kTones[i], kMarks[i], to_words(v.grade), escape(v.message, 600), drift_card(a), error_card(a),
+      kTones[i], kMarks[i], spaced(v.grade), escape(v.message, 600), drift_card(a), error_card(a),
       ok_card(s, a));
 }
 

@@ -181,7 +181,7 @@ constexpr std::array<const char*, 3> kStatusCss{"f-good", "f-care", "f-bad"};
 constexpr std::array<const char*, 6> kStateCss{"f-care", "f-third",  "f-theirs",
                                                "f-ours", "f-fourth", "f-bad"};
 
-std::vector<Lane> lanes_of(const Session& s, const Analysis& a, const PlotBox& box) {
+std::vector<Lane> make_lanes(const Session& s, const Analysis& a, const PlotBox& box) {
   const auto columns = static_cast<std::size_t>(box.right - box.left) * 2;
   const auto empty = [columns](std::string_view name, const char* css) {
     return Lane{std::string(name), css, std::vector<std::uint8_t>(columns, 0)};
@@ -229,7 +229,7 @@ std::string bands_plot(const Session& session, const Analysis& analysis) {
   PlotBox box = time_box(analysis);
   box.left = kBandLeft;
   box.top = 2;
-  const std::vector<Lane> lanes = lanes_of(session, analysis, box);
+  const std::vector<Lane> lanes = make_lanes(session, analysis, box);
   constexpr std::size_t kStatuses = 3;
   constexpr double kApart = 8;  // between statuses, states and events
   const double events_top = box.top + kLaneHeight * static_cast<double>(lanes.size()) + 2 * kApart;
@@ -269,7 +269,7 @@ struct Component {
 };
 
 /// A number of a row in the unit it is shown in.
-Component component_of(const CalibrationRow& c, int component) {
+Component get_component(const CalibrationRow& c, int component) {
   const double unit = component < 3 ? kDegreesPerRadian : kMillimetres;
   const auto k = static_cast<std::size_t>(component);
   return {c.value[k] * unit, c.has_sigma ? c.sigma[k] * unit : kNone};
@@ -279,7 +279,7 @@ CalibrationCurve calibration_curve(const Session& s, const Analysis& a, int came
   CalibrationCurve curve;
   for (const CalibrationRow& c : s.calibrations) {
     if (c.camera != camera) continue;
-    const Component number = component_of(c, component);
+    const Component number = get_component(c, component);
     const double since = s.frames.empty() ? 0
                                           : (static_cast<double>(c.stamp.ns()) -
                                              static_cast<double>(s.frames.front().stamp.ns())) *

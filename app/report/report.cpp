@@ -12,7 +12,7 @@ namespace vergence::app {
 namespace {
 
 /// The first of them, and how many more there are: a line of a terminal has no room for all.
-std::string first_of(const std::vector<std::string>& messages, const char* none) {
+std::string first_message(const std::vector<std::string>& messages, const char* none) {
   if (messages.empty()) return none;
   if (messages.size() == 1) return messages.front();
   return fmt::format("{} (and {} more in the report)", messages.front(), messages.size() - 1);
@@ -27,11 +27,11 @@ ReportOutcome write_report(const std::filesystem::path& session_folder) {
   ReportOutcome outcome;
   outcome.page = session_folder / "report.html";
   replace_durably(outcome.page, report::page_html(session, analysis, assessment));
-  outcome.headline = std::string(report::to_words(assessment.grade)) + ": " + assessment.message;
+  outcome.headline = std::string(report::spaced(assessment.grade)) + ": " + assessment.message;
   outcome.usable = assessment.usable;
   outcome.main_reason = assessment.main_reason;
   outcome.missing = session.not_had();
-  outcome.grade = report::to_words(assessment.grade);
+  outcome.grade = report::spaced(assessment.grade);
   outcome.reasons = assessment.reasons;
   outcome.advice = assessment.advice;
   return outcome;
@@ -43,9 +43,10 @@ std::array<std::string, 3> closing_lines(const ReportOutcome& outcome, const std
             "to do: free space or fix permissions, then run vergence report SESSION",
             "report: " + failure};
   const std::string why = outcome.reasons.empty() ? outcome.headline
-                          : outcome.usable ? outcome.grade + ": " + first_of(outcome.reasons, "")
-                                           : "do not use these poses: " + outcome.main_reason;
-  return {"result: " + why, "to do: " + first_of(outcome.advice, "nothing"),
+                          : outcome.usable
+                              ? outcome.grade + ": " + first_message(outcome.reasons, "")
+                              : "do not use these poses: " + outcome.main_reason;
+  return {"result: " + why, "to do: " + first_message(outcome.advice, "nothing"),
           "report: " + outcome.page.string()};
 }
 

@@ -109,7 +109,7 @@ const nlohmann::json* find_path(const nlohmann::json& json, std::string_view pat
 
 /// Returns the result of `read`, or adds a message to `missing`.
 template <class Read>
-auto part_of(const fs::path& file, const char* consequence, Session* session, const Read& read)
+auto read_section(const fs::path& file, const char* consequence, Session* session, const Read& read)
     -> std::optional<decltype(read())> {
   std::error_code error;
   if (!fs::exists(file, error)) {
@@ -127,12 +127,12 @@ auto part_of(const fs::path& file, const char* consequence, Session* session, co
 
 std::optional<std::string> read_part(const fs::path& file, std::size_t limit,
                                      const char* consequence, Session* session) {
-  return part_of(file, consequence, session, [&] { return read_text(file, limit); });
+  return read_section(file, consequence, session, [&] { return read_text(file, limit); });
 }
 
 std::optional<FileLines> open_part(const fs::path& file, const char* consequence,
                                    Session* session) {
-  return part_of(file, consequence, session, [&] { return FileLines(file); });
+  return read_section(file, consequence, session, [&] { return FileLines(file); });
 }
 
 void leave_out(const char* file, std::size_t most, Session* session) {

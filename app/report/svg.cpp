@@ -135,7 +135,7 @@ constexpr double kLargestCoordinate = 1e6;  // far outside every picture
 
 /// Least value of `steps` with at most `most` intervals over `span`; the last when none does.
 template <std::size_t N>
-double step_of(const std::array<double, N>& steps, double span, int most) {
+double choose_step(const std::array<double, N>& steps, double span, int most) {
   for (const double step : steps)
     if (span / step <= most) return step;
   return steps.back();
@@ -197,8 +197,8 @@ std::vector<double> time_ticks(double low, double high, int most) {
   const double span = high - low;
   if (span / kShort.front() < most || span / kSteps.back() > most)
     return nice_ticks(low, high, most);
-  const double step =
-      span / kShort.back() <= most ? step_of(kShort, span, most) : step_of(kSteps, span, most);
+  const double step = span / kShort.back() <= most ? choose_step(kShort, span, most)
+                                                   : choose_step(kSteps, span, most);
   return multiples(low, high, step, most);
 }
 

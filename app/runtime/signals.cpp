@@ -58,7 +58,7 @@ bool SignalGuard::stop_requested() const noexcept {
   return caught.load(std::memory_order_relaxed) != 0;
 }
 
-bool SignalGuard::take_calibration_request() const noexcept {
+bool SignalGuard::poll_calibration_request() const noexcept {
   return calibration_asked.exchange(false);
 }
 

@@ -27,7 +27,7 @@ class SignalGuard {
   /// when none did.
   [[nodiscard]] std::optional<ExitCode> stop_code() const noexcept;
   /// Returns true if SIGUSR1 was received since the last call, however often.
-  [[nodiscard]] bool take_calibration_request() const noexcept;
+  [[nodiscard]] bool poll_calibration_request() const noexcept;
 
  private:
   struct sigaction former_interrupt_ {};

@@ -31,8 +31,9 @@ constexpr int kObservations = 240'000;  // of a solve that nobody waits for
 constexpr std::size_t kAloneFrames =
     40;  // of a stretch by itself, at most about: short drives, too, are to have two
 
-calibration::AcceptanceInput question_of(const calibration::RigSolution& s,
-                                         const StartingCalibration& given, const Configuration& c) {
+calibration::AcceptanceInput make_gate_input(const calibration::RigSolution& s,
+                                             const StartingCalibration& given,
+                                             const Configuration& c) {
   calibration::AcceptanceInput q;
   q.solution = &s;
   q.nominal = &given.nominal;
@@ -133,7 +134,7 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
   const auto keep = [&](const std::optional<calibration::RigSolution>& s) {
     if (!s) return;
     const calibration::Gate gate =
-        calibration::check_acceptance(question_of(*s, given, c), c.calibration);
+        calibration::check_acceptance(make_gate_input(*s, given, c), c.calibration);
     if (gate == calibration::Gate::open)
       last = s;
     else

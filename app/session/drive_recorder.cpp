@@ -62,7 +62,7 @@ std::vector<RecordedTopic> topics(const CalibrationFile& file) {
 }
 
 /// As `--set` takes them.
-std::vector<std::string> settings_of(const Configuration& c) {
+std::vector<std::string> list_settings(const Configuration& c) {
   std::vector<std::string> out;
   for (auto& [key, value] : changed_settings(c)) {
     if (key.ends_with(".mask"))  // beside the configuration, wherever the replay runs
@@ -85,7 +85,7 @@ std::vector<std::uint8_t> description(const Configuration& c, const SourceFacts&
   d.adoption = facts.adoption;
   d.ins = facts.ins.has_value();
   if (facts.ins) d.mount_source = facts.ins->mount_source;
-  d.settings = settings_of(c);
+  d.settings = list_settings(c);
   for (std::size_t k = 0; k < static_cast<std::size_t>(facts.begin.file.rig.cameras); ++k)
     d.cameras.push_back(topics(facts.begin.file)[image_topic(k)].name);
   const std::string json = to_json(d);

@@ -44,7 +44,7 @@ class DriveRecorder final : public SessionObserver, public PulseObserver {
   void on_pulse(Stamp arrival, const Pulse& pulse, Stamp edge) noexcept override;
 
   /// Messages about the disk, since the last call.
-  [[nodiscard]] std::vector<std::string> take_errors() { return recording_.take_errors(); }
+  [[nodiscard]] std::vector<std::string> pop_errors() { return recording_.pop_errors(); }
   /// Ends the files. What a disk failure cost becomes a message of *faults.
   void close(std::vector<std::string>* faults);
   /// Nothing more is recorded. The estimator's thread.

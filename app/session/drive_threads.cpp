@@ -11,7 +11,7 @@ namespace vergence::app {
 
 namespace {
 
-RealtimeRequest request_of(const RealtimeSettings& settings) {
+RealtimeRequest make_request(const RealtimeSettings& settings) {
   RealtimeRequest request;
   request.priority = settings.priority;
   request.affinity = parse_cpu_list(settings.affinity);
@@ -27,7 +27,7 @@ void print(const std::vector<std::string>& messages, Progress* progress) {
 }  // namespace
 
 DriveThreads::DriveThreads(const RealtimeSettings& settings)
-    : realtime_(request_of(settings), system_) {
+    : realtime_(make_request(settings), system_) {
   constexpr std::size_t kThreads = 64;  // more than a drive has: looking takes no heap then
   threads_.reserve(kThreads);
 }

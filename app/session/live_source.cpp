@@ -22,14 +22,14 @@ constexpr Stamp kVirtualEpoch{
     1'577'836'800'000'000'000};  // 2020-01-01 00:00 UTC: a drive in virtual time has the same
                                  // stamps on every run
 
-std::vector<std::string> serials_of(const std::vector<CameraDevice*>& cameras) {
+std::vector<std::string> list_serials(const std::vector<CameraDevice*>& cameras) {
   std::vector<std::string> serials;
   serials.reserve(cameras.size());
   for (const CameraDevice* camera : cameras) serials.push_back(camera->info().serial);
   return serials;
 }
 
-SourceEvent event_of(Stamp stamp, const TimingMonitor::Message& message) noexcept {
+SourceEvent make_event(Stamp stamp, const TimingMonitor::Message& message) noexcept {
   SourceEvent event;
   event.record.stamp = stamp;
   event.record.kind = message.kind;
@@ -47,7 +47,7 @@ LiveSource::LiveSource(const RunRequest& request)
       time_(devices_.sync().mode, request.fast),
       fault_logged_(devices_.faults().size(), false) {
   facts_.begin =
-      starting_calibration(configuration_, request.calibration, serials_of(devices_.cameras()));
+      starting_calibration(configuration_, request.calibration, list_serials(devices_.cameras()));
   make_acquisition();
   make_facts();
 }
@@ -131,7 +131,7 @@ bool LiveSource::next(SourceItem* item) noexcept {
       const Stamp stamp = reading->sample.stamp;
       in_hand_ = DeviceEvent{};
       if (message.kind != nullptr) {
-        *item = event_of(stamp, message);
+        *item = make_event(stamp, message);
         return true;
       }
     }
@@ -140,7 +140,7 @@ bool LiveSource::next(SourceItem* item) noexcept {
       waiting_ = true;
       const TimingMonitor::Message message = time_.of_set(frame->set);
       if (message.kind == nullptr) continue;
-      *item = event_of(frame->rig.stamp, message);
+      *item = make_event(frame->rig.stamp, message);
       return true;
     }
     if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
@@ -148,7 +148,7 @@ bool LiveSource::next(SourceItem* item) noexcept {
       return true;
     }
     const auto* event = std::get_if<DeviceEvent>(&in_hand_);
-    *item = event_of(event->stamp, time_.of_device(*event));
+    *item = make_event(event->stamp, time_.of_device(*event));
     return true;
   }
 }

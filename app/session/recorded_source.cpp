@@ -149,7 +149,7 @@ int height_of(const StereoSequence& s) { return s.calibration.intrinsics[0].heig
 /// elsewhere has a million.
 constexpr std::uint64_t kMaxListed = 1000;
 
-SourceEvent event_of(const DecodedPair& pair, std::uint64_t unread) noexcept {
+SourceEvent make_event(const DecodedPair& pair, std::uint64_t unread) noexcept {
   SourceEvent event;
   event.skipped = true;
   event.listed = unread <= kMaxListed + 1;
@@ -228,7 +228,7 @@ bool RecordedSource::next(SourceItem* item) noexcept {
     ended_ = !decoder_->next(&pair_);
     if (!ended_ && !pair_.decoded) {
       ++skipped_;
-      *item = event_of(pair_, ++unread_);
+      *item = make_event(pair_, ++unread_);
       return true;
     }
     waiting_ = !ended_;

@@ -220,7 +220,7 @@ void Recorder::report_error(const char* format, const Arguments&... arguments) n
   (void)error_messages_.push(message);
 }
 
-std::vector<std::string> Recorder::take_errors() {
+std::vector<std::string> Recorder::pop_errors() {
   std::vector<std::string> messages;
   for (ErrorMessage c; error_messages_.pop(&c);) messages.emplace_back(c.data());
   messages.insert(messages.end(), errors_.begin(), errors_.end());

@@ -35,7 +35,7 @@ class LineFile;
 /// Posted records reach the files at the latest after a
 /// second, so a killed session keeps its lines. Stamps are printed from their integers. The same
 /// records give the same bytes.
-/// Threads  on_…(): one producer. take_errors(): one consumer. close(): the owner's, after the
+/// Threads  on_…(): one producer. pop_errors(): one consumer. close(): the owner's, after the
 ///          last of these. The recorder's own is sealed: what takes heap memory is done by others.
 /// Memory   Fixed, whatever the length of the drive; with keep_trajectory close() reads the
 ///          trajectories back from their files.
@@ -71,7 +71,7 @@ class Recorder final : public SessionObserver {
   /// Bytes taken at the beginning: lines that may wait.
   [[nodiscard]] std::size_t memory() const noexcept { return memory_; }
   /// Messages about the disk since the last call.
-  [[nodiscard]] std::vector<std::string> take_errors();
+  [[nodiscard]] std::vector<std::string> pop_errors();
   /// Writes what is waiting, closes the files. Once.
   [[nodiscard]] std::unique_ptr<SessionTotals> close();
 

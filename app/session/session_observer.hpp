@@ -103,25 +103,25 @@ class SessionOutput {
   explicit SessionOutput(std::span<SessionObserver* const> observers) noexcept
       : observers_(observers) {}
 
-  void post(const RigFrame& frame) noexcept { tell(&SessionObserver::on_frame, frame); }
-  void post(const PoseSample& sample) noexcept { tell(&SessionObserver::on_pose, sample); }
+  void post(const RigFrame& frame) noexcept { position(&SessionObserver::on_frame, frame); }
+  void post(const PoseSample& sample) noexcept { position(&SessionObserver::on_pose, sample); }
   void post(const calibration::TrackLog& tracks) noexcept {
-    tell(&SessionObserver::on_tracks, tracks);
+    position(&SessionObserver::on_tracks, tracks);
   }
   void post(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
-    tell(&SessionObserver::on_enu_alignment, alignment, origin);
+    position(&SessionObserver::on_enu_alignment, alignment, origin);
   }
-  void post(const FrameReport& report) noexcept { tell(&SessionObserver::on_report, report); }
-  void post(const EventRecord& event) noexcept { tell(&SessionObserver::on_event, event); }
+  void post(const FrameReport& report) noexcept { position(&SessionObserver::on_report, report); }
+  void post(const EventRecord& event) noexcept { position(&SessionObserver::on_event, event); }
   void post(const CalibrationRecord& calibration) noexcept {
-    tell(&SessionObserver::on_calibration, calibration);
+    position(&SessionObserver::on_calibration, calibration);
   }
   /// Precondition: Recorder::Options::ins.
-  void post(const InsRecord& reading) noexcept { tell(&SessionObserver::on_reading, reading); }
+  void post(const InsRecord& reading) noexcept { position(&SessionObserver::on_reading, reading); }
 
  private:
   template <class Call, class... Values>
-  void tell(Call call, const Values&... values) noexcept {
+  void position(Call call, const Values&... values) noexcept {
     for (SessionObserver* o : observers_) (o->*call)(values...);
   }
 

@@ -105,7 +105,7 @@ void SessionRunner::watch(Progress* progress) {
     source_.poll();
     service_.alive(loop_.items(), loop_.waiting(), source_.rounds(),
                    std::chrono::steady_clock::now());
-    if (facts_.on_request && signals_.take_calibration_request()) loop_.ask_calibration();
+    if (facts_.on_request && signals_.poll_calibration_request()) loop_.ask_calibration();
     lock.unlock();
     if (loop_.drained()) halt_source();
     threads_.poll(progress);
@@ -162,10 +162,10 @@ void SessionRunner::leave_no_folder() {
 }
 
 void SessionRunner::print_recording_errors(Progress* progress) {
-  for (const std::string& message : recorder_->take_errors())
+  for (const std::string& message : recorder_->pop_errors())
     progress->print("vergence: " + message);
   if (!recording_) return;
-  for (const std::string& message : recording_->take_errors())
+  for (const std::string& message : recording_->pop_errors())
     progress->print("vergence: " + message);
 }
 
@@ -283,7 +283,7 @@ void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput&
                                 std::vector<std::string>* faults, Progress* progress) {
   write_session_summary(request_.out, totals, input, faults);
   faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
-  for (const std::string& message : recorder_->take_errors())
+  for (const std::string& message : recorder_->pop_errors())
     progress->print("vergence: " + message);
   for (const std::string& message : *faults) progress->print("vergence: " + message);
 }

@@ -12,7 +12,7 @@ namespace vergence::app {
 namespace {
 
 /// A word of calibrations.csv, which are constants.
-const char* cause_of(const std::string& word) {
+const char* to_cause(const std::string& word) {
   for (const char* known : {"state_file", "whole_drive"})
     if (word == known) return known;
   return "given";
@@ -25,7 +25,7 @@ StartingCalibration recorded_beginning(const SessionDescription& d, const std::s
   begin.file = parse_calibration(d.calibration, name + " (calibration)");
   begin.nominal = parse_calibration(d.nominal, name + " (nominal)").rig;
   begin.trust = d.trust;
-  begin.cause = cause_of(d.cause);
+  begin.cause = to_cause(d.cause);
   begin.source = d.source;
   return begin;
 }

@@ -66,7 +66,7 @@ namespace {
 
 /// The device's own serial says which camera it is: what the configuration finds it by may be an
 /// address, behind which it can be exchanged. A mock's camera is the one asked for.
-std::string serial_of(const CameraSettings& camera, const std::string& own) {
+std::string expected_serial(const CameraSettings& camera, const std::string& own) {
   return own.empty() || (camera.driver == "mock" && !camera.serial.empty()) ? camera.serial : own;
 }
 
@@ -76,7 +76,7 @@ void name_cameras(const Configuration& c, const std::vector<std::string>& serial
   if (!c.rig.name.empty()) file->rig_name = c.rig.name;
   for (std::size_t k = 0; k < static_cast<std::size_t>(file->rig.cameras); ++k) {
     if (!c.cameras[k].name.empty()) file->names[k] = c.cameras[k].name;
-    const std::string serial = serial_of(c.cameras[k], k < serials.size() ? serials[k] : "");
+    const std::string serial = expected_serial(c.cameras[k], k < serials.size() ? serials[k] : "");
     if (!serial.empty()) file->serials[k] = serial;
   }
 }
@@ -115,12 +115,12 @@ void check_same_rig(const std::string& name, const CalibrationFile& file,
           file.serials[k], configured.serials[k]));
   }
   // Images show no length.
-  const double had = file.rig.baseline, says = configured.rig.baseline;
-  if (std::abs(had - says) >= kOtherLength * says)
+  const double found_m = file.rig.baseline, expected_m = configured.rig.baseline;
+  if (std::abs(found_m - expected_m) >= kOtherLength * expected_m)
     remarks->push_back(
         fmt::format("{}: has a baseline of {:g} m, but the configuration {:g} m; the file is used "
                     "for all lengths",
-                    name, had, says));
+                    name, found_m, expected_m));
 }
 
 double angle_between(const Vec3& a, const Vec3& b) {

@@ -130,7 +130,7 @@ void run_once(BundleAdjuster& adjuster, const Experiment& a, const SimulationOpt
   level->steps.add(result.steps);
 }
 
-nlohmann::ordered_json json_of(const std::vector<Level>& levels) {
+nlohmann::ordered_json levels_json(const std::vector<Level>& levels) {
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const Level& l : levels)
     all.push_back({{"pixel_noise", l.noise},
@@ -210,7 +210,7 @@ ExitCode run_experiment(const Experiment& given) {
   progress.finish();
   print_table(a, levels);
   if (json.is_open()) {
-    json << json_of(levels).dump(1) << '\n';
+    json << levels_json(levels).dump(1) << '\n';
     json.close();
     if (!json)
       throw InputError("--json: " + a.json + " could not be written to its end; is the disk full?");

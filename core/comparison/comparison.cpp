@@ -96,7 +96,7 @@ bool Comparison::next(ComparedPose* out) noexcept {
   }
   // Samples before and after a jump do not fit together, also when no frame fell
   // between the two readings.
-  if (ins_.take_leap(pose.stamp)) {
+  if (ins_.pop_leap(pose.stamp)) {
     ratio_.interrupt();
     if (builder_.collecting()) builder_.restart();
   }

@@ -146,7 +146,7 @@ bool InsHistory::reaches(Stamp stamp) const noexcept {
   return end_ > begin_ && reading(end_ - 1).stamp >= stamp;
 }
 
-bool InsHistory::take_leap(Stamp now) noexcept {
+bool InsHistory::pop_leap(Stamp now) noexcept {
   if (!leaps_ || now < leaps_->first) return false;
   if (now >= leaps_->last) leaps_.reset();
   return true;

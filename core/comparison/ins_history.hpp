@@ -43,7 +43,7 @@ class InsHistory {
   /// Returns true if the position has jumped, by `now` at the latest; once for a leap, or for
   /// several before one `now`. Between the first and the last of several it is true whenever it is
   /// asked: no two places there need fit together.
-  [[nodiscard]] bool take_leap(Stamp now) noexcept;
+  [[nodiscard]] bool pop_leap(Stamp now) noexcept;
 
   [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
   [[nodiscard]] const LocalTangentPlane& plane() const noexcept { return plane_; }

@@ -53,7 +53,7 @@ class PulseObserver {
 
 using Acquired = std::variant<AcquiredFrame, AcquiredReading, DeviceEvent>;
 
-[[nodiscard]] inline Stamp stamp_of(const Acquired& item) noexcept {
+[[nodiscard]] inline Stamp item_stamp(const Acquired& item) noexcept {
   if (const auto* frame = std::get_if<AcquiredFrame>(&item)) return frame->rig.stamp;
   if (const auto* reading = std::get_if<AcquiredReading>(&item)) return reading->sample.stamp;
   return std::get_if<DeviceEvent>(&item)->stamp;

@@ -119,7 +119,7 @@ void Acquisition::work() {
   sync_.finish();
   hand_out_sets();
   for (std::size_t k = 0; k < heads_.size(); ++k) {
-    if (heads_[k].gone) missing_.push_back(static_cast<int>(k));
+    if (heads_[k].disconnected) missing_.push_back(static_cast<int>(k));
   }
   queue_.finish();
 }
@@ -140,7 +140,7 @@ void Acquisition::poll_ins() {
   }
   if (!ins_head_.held || !ins_head_.event) return;
   ins_head_.held = false;  // nobody is told: a comparison without readings says so itself
-  ins_head_.gone = true;
+  ins_head_.disconnected = true;
 }
 
 int Acquisition::earliest() const {
@@ -205,7 +205,7 @@ void Acquisition::push_frame(std::size_t k) {
 
 void Acquisition::record_disconnect(int camera, HostStamp when) {
   auto& head = heads_[static_cast<std::size_t>(camera)];
-  head.gone = true;
+  head.disconnected = true;
   sync_.absent(camera);
   // One that started and gave nothing has not been back: it is not gone once more.
   if (!head.back) push_event(DeviceEvent::Kind::camera_disconnected, when, camera);
@@ -255,7 +255,7 @@ void Acquisition::poll_board() {
   auto& head = board_head_;
   head.held = false;
   if (head.event) {
-    head.gone = true;
+    head.disconnected = true;
     // As a camera: one that started and gave nothing is not gone once more.
     if (!head.back) push_event(DeviceEvent::Kind::trigger_board_disconnected, head.value.arrival);
     return;
@@ -291,7 +291,7 @@ void Acquisition::give_up_mute_cameras(HostStamp now) {
   constexpr Duration kLongest = Duration::seconds(10);
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     auto& head = heads_[k];
-    if (head.gone || head.ended || head.held) continue;
+    if (head.disconnected || head.ended || head.held) continue;
     if (options_.sync.interval * ++head.pulses_without <= kLongest) continue;
     head.pulses_without = 0;
     cameras_[k]->stop();
@@ -321,17 +321,17 @@ void Acquisition::pause_pulses() {
   if (status != DeviceStatus::ok) ++counters_.pauses_refused;
   if (master) {
     sync_.restarted(0);
-    if (status != DeviceStatus::ok) heads_[0].gone = true;
+    if (status != DeviceStatus::ok) heads_[0].disconnected = true;
   } else {
     ins_clock_->restart();
     sync_out_->restart();
-    if (status != DeviceStatus::ok) ins_head_.gone = true;
+    if (status != DeviceStatus::ok) ins_head_.disconnected = true;
   }
 }
 
 void Acquisition::record_proofs(HostStamp now) {
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
-    if (heads_[k].gone) continue;
+    if (heads_[k].disconnected) continue;
     const auto change = pairing_.update(k, sync_.verified(static_cast<int>(k)), now);
     if (!change) continue;
     push_event(

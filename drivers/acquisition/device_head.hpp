@@ -21,7 +21,7 @@ struct DeviceHead {
   Device* device = nullptr;
   bool held = false;   // `value` waits to be taken
   bool event = false;  // held: no value but that the device has gone, at value.arrival
-  bool gone = false;
+  bool disconnected = false;
   bool back = false;  // it was started again, which nobody has been told yet
   bool ended = false;
   std::int64_t pulses_without = 0;  // reported, since a camera's newest frame
@@ -32,7 +32,7 @@ struct DeviceHead {
   /// that is gone is asked at each poll.
   void poll(Notifier* ready, bool ask_always) {
     if (device == nullptr) ended = true;
-    if (held || ended || (gone && !start_again(ready, ask_always))) return;
+    if (held || ended || (disconnected && !start_again(ready, ask_always))) return;
     const DeviceStatus status = device->wait(Duration{}, &value);
     event = status == DeviceStatus::disconnected;
     held = status == DeviceStatus::ok || event;
@@ -49,7 +49,7 @@ struct DeviceHead {
     ask_ns = done + std::max(kAskAgain, kRest * (done - begun));
     ended = status == DeviceStatus::ended;
     if (status != DeviceStatus::ok) return false;
-    gone = false;
+    disconnected = false;
     back = true;
     return true;
   }

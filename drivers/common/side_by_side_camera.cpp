@@ -49,14 +49,14 @@ class Whole final : public Notifier {
   DeviceStatus start(std::size_t half, Notifier* ready, std::string* error) noexcept {
     const std::lock_guard lock(mutex_);
     if (!sizes_[half]) return DeviceStatus::bad_configuration;
-    if (gone_ && !noticed_[1 - half]) return DeviceStatus::disconnected;
+    if (disconnected_ && !noticed_[1 - half]) return DeviceStatus::disconnected;
     ready_[half].store(ready, std::memory_order_release);
     const DeviceStatus status = camera_->start(this);
     if (status != DeviceStatus::ok) {
       *error = camera_->last_error();
       return status;
     }
-    gone_ = false;
+    disconnected_ = false;
     noticed_ = {};
     return DeviceStatus::ok;
   }
@@ -68,7 +68,7 @@ class Whole final : public Notifier {
       {
         const std::lock_guard lock(mutex_);
         if (take(half, frame)) return DeviceStatus::ok;
-        if (gone_) return notice(half, frame);
+        if (disconnected_) return notice(half, frame);
       }
       const auto left = Duration::nanoseconds((end - std::chrono::steady_clock::now()).count());
       Frame next;
@@ -78,7 +78,7 @@ class Whole final : public Notifier {
       if (status == DeviceStatus::ok) {
         queue(next);
       } else {
-        gone_ = true;
+        disconnected_ = true;
         disconnected_at_ = next.arrival;
       }
     }
@@ -103,7 +103,7 @@ class Whole final : public Notifier {
     for (Waiting& w : waiting_)
       for (; w.count > 0; --w.count, w.first = (w.first + 1) % w.frames.size())
         release_locked(w.frames[w.first].slot);
-    gone_ = false;
+    disconnected_ = false;
     noticed_ = {};
     for (auto& ready : ready_) ready.store(nullptr, std::memory_order_release);
   }
@@ -184,7 +184,7 @@ class Whole final : public Notifier {
   std::array<Waiting, 2> waiting_{};
   std::array<std::uint8_t, FramePool::kMaxSlots> users_{};  // halves that have a slot, by slot
   std::size_t held_ = 0;                                    // slots
-  bool gone_ = false;
+  bool disconnected_ = false;
   HostStamp disconnected_at_{};
   std::array<bool, 2> noticed_{};  // that it is gone
 };

@@ -9,7 +9,7 @@ namespace {
 constexpr double kDbAStop = 6.020599913279624;  // 20 log10 2
 constexpr double kDarkest = 1.0;                // grey level: below it the mean is noise
 
-double stops_of(const ExposureOptions& o, const ExposureSetting& s) noexcept {
+double to_stops(const ExposureOptions& o, const ExposureSetting& s) noexcept {
   return std::log2(static_cast<double>(s.exposure.ns()) / static_cast<double>(o.least.ns())) +
          s.gain_db / kDbAStop;
 }
@@ -25,7 +25,7 @@ ExposureController::ExposureController(const ExposureOptions& options,
                                        const ExposureSetting& start) noexcept
     : options_(options),
       setting_(within(options, start)),
-      stops_(stops_of(options_, setting_)),
+      stops_(to_stops(options_, setting_)),
       since_change_(options.settle_frames) {}
 
 double ExposureController::requested_stops(const Brightness& image) const noexcept {
@@ -55,7 +55,7 @@ std::optional<ExposureSetting> ExposureController::step(const Brightness& image)
       std::clamp(requested_stops(image), -options_.down_stops, options_.up_stops);
   if (std::abs(requested) <= options_.dead_band) return std::nullopt;
   const ExposureSetting next = split(stops_ + requested);
-  const double stops = stops_of(options_, next);
+  const double stops = to_stops(options_, next);
   if (std::abs(stops - stops_) < 0.5 * options_.dead_band) return std::nullopt;  // at a bound
   stops_ = stops;
   setting_ = next;

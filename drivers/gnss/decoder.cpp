@@ -19,7 +19,7 @@ constexpr Duration kFresh = Duration::milliseconds(1100);  // VTG and HDT, at 1 
 
 unsigned bit(Type type) noexcept { return 1U << static_cast<unsigned>(type); }
 
-FixStatus fix_of(const Sentence& gga, bool has_height) noexcept {
+FixStatus to_fix_status(const Sentence& gga, bool has_height) noexcept {
   // NovAtel's 9 is a fix with corrections of satellites.
   constexpr std::uint8_t kFirstFix = 1, kLastFix = 5, kEstimated = 6, kOfNovatel = 9;
   if (gga.quality == kEstimated) return FixStatus::dead_reckoning;
@@ -119,7 +119,7 @@ void NmeaEpochs::finish(Fix* fix) noexcept {
   InsQuality& quality = f.reading.quality;
   const Sentence& where = has_gga ? gga_ : rmc_;
   if (has_gga) {
-    sample.fix = fix_of(gga_, gga_.altitude_m.has_value());
+    sample.fix = to_fix_status(gga_, gga_.altitude_m.has_value());
     sample.position.height_m = gga_.altitude_m.value_or(0) + gga_.geoid_m.value_or(0);
     quality.status = gga_.quality;
     quality.satellites = gga_.satellites;
@@ -178,7 +178,7 @@ ClockMapperOptions mapping(const Options& o) noexcept {
   return m;
 }
 
-FixStatus fix_of(const ubx::Pvt& p) noexcept {
+FixStatus to_fix_status(const ubx::Pvt& p) noexcept {
   if (!p.fix_ok) return FixStatus::none;
   switch (p.fix) {
     case ubx::FixType::dead_reckoning:
@@ -197,7 +197,7 @@ FixStatus fix_of(const ubx::Pvt& p) noexcept {
 
 void fill(const ubx::Pvt& p, InsReading* r) noexcept {
   InsSample& s = r->sample;
-  s.fix = fix_of(p);
+  s.fix = to_fix_status(p);
   s.position = {p.latitude_deg, p.longitude_deg, p.height_m};
   // The horizontal accuracy is of the plane, both axes together.
   s.position_sigma = p.horizontal_sigma_m / std::numbers::sqrt2;

@@ -95,7 +95,7 @@ class Planner {
   /// A register that failed outranks what was read of it.
   void check_registers() {
     if (r_.status() == DeviceStatus::ok) return;
-    const DeviceStatus failed = r_.take_status();
+    const DeviceStatus failed = r_.pop_status();
     last_error_ = r_.last_error();
     throw Refused{failed};
   }
@@ -523,7 +523,7 @@ DeviceStatus apply_plan(CameraRegisters* registers, const BusTraits& bus, Camera
   write_strobe(r, out.options);
   out.info = write_frame_info(r, out.options.embedded);
   out.grey.effective_bits = effective_bits(r, out);
-  const DeviceStatus status = r.take_status();
+  const DeviceStatus status = r.pop_status();
   if (status != DeviceStatus::ok) {
     *error = r.last_error();
     return status;

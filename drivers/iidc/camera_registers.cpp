@@ -123,7 +123,7 @@ bool CameraRegisters::apply_format7(std::uint64_t csr, std::uint32_t error) noex
   return (get_at(csr + kValueSetting) & error) == 0 && status_ == DeviceStatus::ok;
 }
 
-DeviceStatus CameraRegisters::take_status() noexcept {
+DeviceStatus CameraRegisters::pop_status() noexcept {
   const DeviceStatus status = status_;
   status_ = DeviceStatus::ok;
   return status;

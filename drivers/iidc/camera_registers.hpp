@@ -14,7 +14,7 @@ struct AbsoluteRange {
 };
 
 /// The registers of a camera by their meaning. The first access that fails sticks: what follows
-/// does nothing and reads 0, and take_status() tells at the end. So a sequence of registers is
+/// does nothing and reads 0, and pop_status() tells at the end. So a sequence of registers is
 /// written as one, and checked once.
 ///
 /// Threads  One caller at a time. Time: no wait is longer than `patience` beside the port's own
@@ -58,7 +58,7 @@ class CameraRegisters {
   [[nodiscard]] bool apply_format7(std::uint64_t csr, std::uint32_t error) noexcept;
 
   /// The first failure since the last call, ok otherwise; begins again.
-  [[nodiscard]] DeviceStatus take_status() noexcept;
+  [[nodiscard]] DeviceStatus pop_status() noexcept;
   [[nodiscard]] DeviceStatus status() const noexcept { return status_; }
   /// About the failure: which register, what it did.
   [[nodiscard]] std::string last_error() const;

@@ -25,7 +25,7 @@ constexpr Duration kSlow = Duration::milliseconds(
 
 constexpr const char* kNoStack = "this kernel has no FireWire stack: modprobe firewire-ohci";
 
-DeviceInfo info_of(const FirewireNode& node) {
+DeviceInfo to_device_info(const FirewireNode& node) {
   return {"iidc-1394", guid_text(node.rom.guid),
           node.rom.model[0] != 0 ? node.rom.model.data() : "IIDC camera", node.device};
 }
@@ -87,7 +87,7 @@ DeviceStatus FirewireBus::open_node(std::string_view requested) {
       continue;
     }
     node_ = node;
-    info_ = info_of(node);
+    info_ = to_device_info(node);
     last_error_.clear();
     return DeviceStatus::ok;
   }
@@ -198,7 +198,7 @@ class FirewireDriver final : public CameraDriver {
   std::vector<DeviceInfo> enumerate() override {
     last_error_ = has_firewire() ? "" : kNoStack;
     std::vector<DeviceInfo> out;
-    for (const FirewireNode& n : list_firewire_cameras()) out.push_back(info_of(n));
+    for (const FirewireNode& n : list_firewire_cameras()) out.push_back(to_device_info(n));
     return out;
   }
   std::unique_ptr<CameraDevice> open(std::string_view serial, DeviceStatus* status) override {

@@ -98,7 +98,7 @@ DeviceStatus IidcCamera::start(Notifier* ready) noexcept {
     if (status == DeviceStatus::ok) return status;
     if (!lost_.load(std::memory_order_acquire)) {
       registers_.transmit(false);
-      (void)registers_.take_status();
+      (void)registers_.pop_status();
     }
     bus_->stop();
     if (again) {  // still gone, until it comes back or stop()
@@ -151,7 +151,7 @@ DeviceStatus IidcCamera::begin(Notifier* ready) {
   status = bus_->start(this);
   if (status == DeviceStatus::ok) {
     registers_.transmit(true);
-    status = registers_.take_status();
+    status = registers_.pop_status();
     if (status != DeviceStatus::ok) why = registers_.last_error();
     if (status == DeviceStatus::timeout || status == DeviceStatus::unsupported)
       status = DeviceStatus::disconnected;
@@ -174,7 +174,7 @@ void IidcCamera::stop() noexcept {
   const std::lock_guard lock(asking_);  // libdc1394 takes no question while a capture ends
   if (!lost_.load(std::memory_order_acquire)) {
     registers_.transmit(false);
-    if (registers_.take_status() == DeviceStatus::disconnected)
+    if (registers_.pop_status() == DeviceStatus::disconnected)
       lost_.store(true, std::memory_order_release);
   }
   bus_->stop();
@@ -190,7 +190,7 @@ DeviceStatus IidcCamera::trigger_once() noexcept {
   const std::lock_guard lock(asking_);
   if (const DeviceStatus s = standing(); s != DeviceStatus::ok) return s;
   registers_.software_trigger();
-  const DeviceStatus status = registers_.take_status();
+  const DeviceStatus status = registers_.pop_status();
   if (status == DeviceStatus::ok) return status;
   try {
     last_error_ = registers_.last_error();
@@ -215,7 +215,7 @@ DeviceStatus IidcCamera::set_exposure(const ExposureSetting& requested,
         registers_.set_absolute(Feature::shutter, nearest(r, requested.exposure.to_seconds())));
   if (const AbsoluteRange r = registers_.absolute_range(Feature::gain); r.present)
     taken.gain_db = registers_.set_absolute(Feature::gain, nearest(r, requested.gain_db));
-  const DeviceStatus status = registers_.take_status();
+  const DeviceStatus status = registers_.pop_status();
   if (status != DeviceStatus::ok)
     return status == DeviceStatus::disconnected ? status : DeviceStatus::failed;
   plan_.exposure = taken.exposure;  // also after a stop or a replug

@@ -38,7 +38,7 @@ constexpr unsigned char kReadRequest = 0xC0, kWriteRequest = 0x40;  // vendor, d
 constexpr unsigned char kQuadlets = 0x7F;                           // addresses 0xFFFF….
 unsigned limit_ms() noexcept { return static_cast<unsigned>(kUsbRegisterLimit.ns() / 1'000'000); }
 
-const Product* product_of(const libusb_device_descriptor& d) noexcept {
+const Product* find_product(const libusb_device_descriptor& d) noexcept {
   if (d.idVendor != kPointGrey) return nullptr;
   for (const Product& p : kProducts)
     if (p.id == d.idProduct) return &p;
@@ -184,7 +184,7 @@ bool for_each_usb_camera(libusb_context* context, std::string* message,
   for (ssize_t i = 0; i < n && !done; ++i) {
     libusb_device_descriptor d{};
     if (libusb_get_device_descriptor(list[i], &d) != LIBUSB_SUCCESS) continue;
-    const Product* product = product_of(d);
+    const Product* product = find_product(d);
     if (product == nullptr) continue;
     FoundUsbCamera found = ask(list[i], d, *product, message);
     done = look(&found);

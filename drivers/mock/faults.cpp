@@ -82,7 +82,7 @@ constexpr FaultRow kRows[] = {
     {FaultKind::cover, "cover", "A lens is covered: black images.", kCover},
     {FaultKind::night, "night", "Darkness for every camera.", kNight},
     {FaultKind::exposure, "exposure", "The brightness of the images changes.", kExposure},
-    {FaultKind::camera_gone, "camera_gone",
+    {FaultKind::camera_disconnected, "camera_gone",
      "A camera is unplugged; after a reconnect its counter starts at 0.", kCover},
     {FaultKind::lose_frames, "lose_frames", "Frames are lost; the counter shows the gaps.", kLose},
     {FaultKind::late_frames, "late_frames",
@@ -92,11 +92,12 @@ constexpr FaultRow kRows[] = {
      "One randomly chosen camera's image of a pulse is lost.", kBreakPairs},
     {FaultKind::missed_trigger, "missed_trigger",
      "A camera does not see a pulse: it exposes nothing and does not count it.", kMissed},
-    {FaultKind::board_gone, "board_gone", "The serial link to the trigger board is unplugged.",
-     kBoardGone},
+    {FaultKind::board_disconnected, "board_gone",
+     "The serial link to the trigger board is unplugged.", kBoardGone},
     {FaultKind::board_reboot, "board_reboot",
      "The trigger board restarts: pulses stop; counter and clock begin at 0.", kReboot},
-    {FaultKind::ins_gone, "ins_gone", "The INS sends nothing; at 0 s it starts late.", kInsGone},
+    {FaultKind::ins_disconnected, "ins_gone", "The INS sends nothing; at 0 s it starts late.",
+     kInsGone},
     {FaultKind::no_fix, "no_fix", "The satellite receiver has no position.", kInsGone},
     {FaultKind::position_jump, "position_jump", "The position of the INS jumps.", kPositionJump},
     {FaultKind::time_jump, "time_jump", "A device's clock is set.", kTimeJump},
@@ -113,7 +114,7 @@ double number(std::string_view text, const std::string& what) {
   return value;
 }
 
-const FaultRow& row_of(const std::string& kind) {
+const FaultRow& find_row(const std::string& kind) {
   for (const FaultRow& row : kRows)
     if (kind == row.name) return row;
   std::string known;
@@ -140,7 +141,7 @@ void set(Fault* fault, std::string_view name, double value) {
   if (name == "powered") fault->powered = value != 0;
 }
 
-std::string text_of(double value) {
+std::string to_text(double value) {
   std::ostringstream out;
   out << value;
   return out.str();
@@ -155,7 +156,7 @@ std::string_view to_string(FaultKind kind) noexcept {
 
 Fault make_fault(const std::string& kind, double at_s,
                  const std::vector<std::pair<std::string, double>>& parameters) {
-  const FaultRow& row = row_of(kind);
+  const FaultRow& row = find_row(kind);
   if (!(at_s >= 0 && at_s <= kLongest))
     throw std::invalid_argument(kind + " must be at 0 … 86400 s of the drive");
   Fault fault;
@@ -175,9 +176,9 @@ Fault make_fault(const std::string& kind, double at_s,
       throw std::invalid_argument(kind + " has no parameter \"" + name.substr(0, 40) +
                                   "\"; it has " + names);
     if (!(value >= known->least && value <= known->most))
-      throw std::invalid_argument(kind + "'s " + name + " is " + text_of(value) +
-                                  "; it must be in " + text_of(known->least) + " … " +
-                                  text_of(known->most));
+      throw std::invalid_argument(kind + "'s " + name + " is " + to_text(value) +
+                                  "; it must be in " + to_text(known->least) + " … " +
+                                  to_text(known->most));
     if ((name == "camera" || name == "pulses" || name == "powered") &&
         value != static_cast<int>(value))
       throw std::invalid_argument(kind + "'s " + name + " is not a whole number");
@@ -220,8 +221,8 @@ std::string fault_document() {
     bool first = true;
     for (const FaultParameter& p : row.parameters) {
       table += first ? "| `" + std::string(row.name) + "` | " + row.meaning : std::string("| | ");
-      table += " | `" + std::string(p.name) + "` | " + text_of(p.fallback) + " | " +
-               text_of(p.least) + " … " + text_of(p.most) + " | " + p.meaning + " |\n";
+      table += " | `" + std::string(p.name) + "` | " + to_text(p.fallback) + " | " +
+               to_text(p.least) + " … " + to_text(p.most) + " | " + p.meaning + " |\n";
       first = false;
     }
   }

@@ -53,7 +53,7 @@ std::size_t MockRig::image_bytes() const noexcept {
 }
 HostStamp MockRig::start() const noexcept { return impl_->scheduler.start(); }
 std::vector<Duration> MockRig::pulse_times() const {
-  const PulsePlan plan = impl_->scheduler.plan_of(impl_->trigger.configuration());
+  const PulsePlan plan = impl_->scheduler.make_plan(impl_->trigger.configuration());
   std::vector<Duration> times;
   times.reserve(plan.size());
   for (std::size_t i = 0; i < plan.size(); ++i) times.push_back(plan.at(i).time);

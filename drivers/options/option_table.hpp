@@ -69,7 +69,7 @@ class OptionTable {
           if (range.step > 0 && std::fmod(*v, range.step) != 0) return false;
           return assign(*v, scale, &(o->*field));
         },
-        [field, scale](const Options& o) { return number_text_of(o.*field, scale); });
+        [field, scale](const Options& o) { return format_number(o.*field, scale); });
   }
 
   /// A member that takes one of a few values, each with its word.
@@ -154,7 +154,7 @@ class OptionTable {
   }
 
   /// The options that are not as they begin, by name: `NAME=VALUE …`. Equal options, equal text.
-  [[nodiscard]] std::string text_of(const Options& options) const {
+  [[nodiscard]] std::string to_text(const Options& options) const {
     std::vector<std::string> given;
     const Options begin{};
     for (const Entry& e : entries_)
@@ -224,13 +224,13 @@ class OptionTable {
   }
 
   template <class Field>
-  static std::string number_text_of(const Field& field, double scale) {
+  static std::string format_number(const Field& field, double scale) {
     if constexpr (std::is_same_v<Field, Duration>)
       return shortest_text(static_cast<double>(field.ns()) / scale);
     else if constexpr (std::is_arithmetic_v<Field>)
       return shortest_text(static_cast<double>(field));
     else
-      return field ? number_text_of(*field, scale) : std::string();
+      return field ? format_number(*field, scale) : std::string();
   }
 
   std::vector<Entry> entries_;

@@ -207,7 +207,7 @@ const OptionRow* find_option(const CameraOptions& options, std::string_view name
 
 std::string options_text(const CameraOptions& options) {
   return with_kind(options, std::string(),
-                   [](const auto& table, const auto& kind) { return table.text_of(kind); });
+                   [](const auto& table, const auto& kind) { return table.to_text(kind); });
 }
 
 }  // namespace vergence

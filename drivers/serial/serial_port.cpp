@@ -30,7 +30,7 @@ fs::path resolved(const std::string& port) {
   return error ? fs::path(port) : real;
 }
 
-DeviceStatus status_of(int system_error) noexcept {
+DeviceStatus to_status(int system_error) noexcept {
   switch (system_error) {
     case ENOENT:
     case ENODEV:
@@ -56,7 +56,7 @@ struct PortFreer {
 };
 
 /// System information about a port; nullopt if it has vanished or has no hardware.
-std::optional<SerialPortInfo> info_of(const std::string& name) {
+std::optional<SerialPortInfo> read_port_info(const std::string& name) {
   sp_port* found = nullptr;
   if (::sp_get_port_by_name(name.c_str(), &found) != SP_OK) return std::nullopt;
   const std::unique_ptr<sp_port, PortFreer> owned(found);
@@ -101,14 +101,14 @@ std::vector<std::string> names_of_ttys() {
 /// that.
 DeviceStatus hold(int fd) noexcept {
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0)
-    return errno == EWOULDBLOCK ? DeviceStatus::busy : status_of(errno);
-  return ::ioctl(fd, TIOCEXCL) == 0 ? DeviceStatus::ok : status_of(errno);
+    return errno == EWOULDBLOCK ? DeviceStatus::busy : to_status(errno);
+  return ::ioctl(fd, TIOCEXCL) == 0 ? DeviceStatus::ok : to_status(errno);
 }
 
 /// Not ok: *tty is as it was.
 DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, UniqueFd* tty) {
   UniqueFd fd(::open(real.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (!fd.valid()) return status_of(errno);
+  if (!fd.valid()) return to_status(errno);
   if (::isatty(fd.get()) == 0) return DeviceStatus::unsupported;
   if (const DeviceStatus s = hold(fd.get()); s != DeviceStatus::ok) return s;
   if (const DeviceStatus s = set_raw_tty(fd.get(), settings); s != DeviceStatus::ok) return s;
@@ -124,7 +124,7 @@ DeviceStatus open_tty(const fs::path& real, const LineSettings& settings, Unique
 std::vector<SerialPortInfo> list_serial_ports() {
   std::vector<SerialPortInfo> ports;
   for (const std::string& name : names_of_ttys())
-    if (auto info = info_of(name)) ports.push_back(std::move(*info));
+    if (auto info = read_port_info(name)) ports.push_back(std::move(*info));
   return ports;
 }
 

@@ -11,7 +11,7 @@ void ClockTie::clear() noexcept {
   rate_ = 0;
 }
 
-DeviceStamp ClockTie::edge_of(DeviceStamp stamp) const noexcept {
+DeviceStamp ClockTie::to_edge(DeviceStamp stamp) const noexcept {
   const Duration since = stamp - stamp_;
   return edge_ + since + scaled(since, rate_);
 }
@@ -35,7 +35,7 @@ void ClockTie::add(DeviceStamp stamp, DeviceStamp edge) noexcept {
   if (since <= Duration{}) return;
   pairs_ = std::min(pairs_ + 1, kMemory);
   const double n = pairs_, g = 2 * (2 * n - 1) / (n * (n + 1)), h = 6 / (n * (n + 1));
-  const DeviceStamp expected = edge_of(stamp);
+  const DeviceStamp expected = to_edge(stamp);
   const Duration off = edge - expected;
   stamp_ = stamp;
   edge_ = expected + scaled(off, g);

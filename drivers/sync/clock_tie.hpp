@@ -15,7 +15,7 @@ inline constexpr double kMaxDrift = 400e-6;
 /// Errors   None. A pair that is not later than the one before is passed over.
 ///
 ///     tie.add(frame.exposure_start, pulse.edge);
-///     const bool same = magnitude(next.edge - tie.edge_of(stamp)) <= tie.gate(stamp);
+///     const bool same = magnitude(next.edge - tie.to_edge(stamp)) <= tie.gate(stamp);
 class ClockTie {
  public:
   /// `noise`: by how much a stamp may be off its edge plus a constant. `interval`: of the pulses.
@@ -25,8 +25,8 @@ class ClockTie {
   void add(DeviceStamp stamp, DeviceStamp edge) noexcept;
 
   /// Where the stamp lies by the source's clock. Precondition: a pair was added since clear().
-  [[nodiscard]] DeviceStamp edge_of(DeviceStamp stamp) const noexcept;
-  /// The edge that a stamp belongs to is within this of edge_of().
+  [[nodiscard]] DeviceStamp to_edge(DeviceStamp stamp) const noexcept;
+  /// The edge that a stamp belongs to is within this of to_edge().
   [[nodiscard]] Duration gate(DeviceStamp stamp) const noexcept;
   /// Value of the newest pair.
   [[nodiscard]] Duration gate() const noexcept { return gate(stamp_); }

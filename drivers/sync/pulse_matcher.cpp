@@ -182,7 +182,7 @@ std::optional<std::uint64_t> PulseMatcher::report(const PulseTrain& train,
   for (std::size_t i = 0; i < pendings_; ++i) {
     const StampedFrame& frame = pending_[i];
     const bool at_edge =
-                   magnitude(pulse.edge - tie_.edge_of(frame.stamp)) <= tie_.gate(frame.stamp),
+                   magnitude(pulse.edge - tie_.to_edge(frame.stamp)) <= tie_.gate(frame.stamp),
                numbered = frame.number == pulse.number;
     const bool in_pause = pulse.resumed && frame.number < pulse.number && frame.number > before;
     if (at_edge != numbered || in_pause) {
@@ -287,7 +287,7 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
     return m.outcome == Outcome::again ? m : contradict(frame);
   }
   Match m;
-  m.edge = tie_.edge_of(frame.stamp);
+  m.edge = tie_.to_edge(frame.stamp);
   m.gate = tie_.gate(frame.stamp);
   if (m.gate * 3 > interval_)
     return contradict(
@@ -303,7 +303,7 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
   m.lost = exposures - 1;
   // A clock that was set may point at another pulse; then the frame seems quicker than ever, or is
   // here before its pulse.
-  const MappedStamp host = train.host_of(m.edge);
+  const MappedStamp host = train.to_host(m.edge);
   const Duration delay = frame.arrival - host.host;
   if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < min_delay_))
     return contradict(frame);

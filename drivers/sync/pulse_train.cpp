@@ -109,7 +109,7 @@ std::optional<PulseTrain::Place> PulseTrain::place(DeviceStamp edge, Duration ga
   return std::nullopt;
 }
 
-MappedStamp PulseTrain::host_of(DeviceStamp edge) const noexcept {
+MappedStamp PulseTrain::to_host(DeviceStamp edge) const noexcept {
   constexpr std::int64_t kDrift = 5'000;  // 1 / 200 ppm
   const Entry* nearest = &newest();
   for (std::size_t i = count_; i-- > 0;) {

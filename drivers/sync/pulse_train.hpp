@@ -69,7 +69,7 @@ class PulseTrain {
   /// no pulse went out then.
   [[nodiscard]] std::optional<Place> place(DeviceStamp edge, Duration gate) const noexcept;
   /// The host's time of an edge near or after those held. Precondition: size() > 0.
-  [[nodiscard]] MappedStamp host_of(DeviceStamp edge) const noexcept;
+  [[nodiscard]] MappedStamp to_host(DeviceStamp edge) const noexcept;
   /// Pulses held with a number above `after` and below `before`.
   [[nodiscard]] std::uint64_t between(std::uint64_t after, std::uint64_t before) const noexcept;
   /// The pulses that went out after one and up to another, at least; at most the difference of the

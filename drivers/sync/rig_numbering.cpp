@@ -31,7 +31,7 @@ Duration RigSynchronizer::noise_of(std::size_t camera) const noexcept {
 void RigSynchronizer::pulse(const Pulse& pulse) noexcept {
   if (!wants_pulses(options_.mode)) return;
   now_ = std::max(now_, pulse.arrival);
-  take_pulse(pulse);
+  add_pulse(pulse);
 }
 
 void RigSynchronizer::begin_again() noexcept {
@@ -48,7 +48,7 @@ void RigSynchronizer::acquired(std::size_t camera) noexcept {
   steady_from_ = std::max(steady_from_, sets_.first_free());
 }
 
-void RigSynchronizer::take_pulse(const Pulse& pulse) noexcept {
+void RigSynchronizer::add_pulse(const Pulse& pulse) noexcept {
   const PulseTrain::Step step = train_.add(pulse, sets_.first_free());
   if (step == PulseTrain::Step::known) return;
   if (step == PulseTrain::Step::began) begin_again();
@@ -128,7 +128,7 @@ RigSynchronizer::Step RigSynchronizer::number_by_master(const SyncFrame& frame,
   image->edge = frame.exposure_start;
   counters_.contradictions[0] += report.contradicted ? 1 : 0;
   counters_.lost[0] += report.lost;
-  if (!report.again) take_pulse(report.pulse);
+  if (!report.again) add_pulse(report.pulse);
   *number = train_.newest().number;
   return report.again ? Step::again : Step::numbered;
 }

@@ -113,7 +113,7 @@ void RigSynchronizer::stamp_by_pulse(const OpenSet& open, SyncedSet* set) const 
   if (pulse != nullptr) {
     edge = {pulse->host, pulse->host_error};
   } else {
-    edge = train_.host_of(open.images[base].edge);
+    edge = train_.to_host(open.images[base].edge);
     edge.error = edge.error + open.images[base].gate;
   }
   const auto middle = [&](std::size_t k) {

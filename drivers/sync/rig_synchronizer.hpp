@@ -105,7 +105,7 @@ class RigSynchronizer {
                                       SetImage* image) noexcept;
   [[nodiscard]] SyncResult verdict_on_late(std::size_t camera, std::uint64_t number, Step step,
                                            const SetImage& image) noexcept;
-  void take_pulse(const Pulse& pulse) noexcept;
+  void add_pulse(const Pulse& pulse) noexcept;
   void acquired(std::size_t camera) noexcept;
   void begin_again() noexcept;
   [[nodiscard]] Duration noise_of(std::size_t camera) const noexcept;

@@ -160,7 +160,7 @@ void BoardReceiver::accept(const TriggerFrame& frame, const BoardLine::Times& ti
     handle_pong(pong, times.departure);
   } else if (frame.type == trigger_status && trigger_get_status(frame.payload, size, &status)) {
     pause_.answered(frame.sequence);
-    take_status(status);
+    pop_status(status);
   } else if ((frame.type == trigger_pps || frame.type == trigger_ins) &&
              trigger_get_edge(frame.payload, size, &edge)) {
     (void)same_boot(edge.boot_id);
@@ -195,7 +195,7 @@ void BoardReceiver::handle_pong(const TriggerPong& pong, HostStamp departure) no
   if (clock_.resets() != resets) account_.clear_time();
 }
 
-void BoardReceiver::take_status(const TriggerStatus& status) noexcept {
+void BoardReceiver::pop_status(const TriggerStatus& status) noexcept {
   clock_.report_lock(status.pps_locked != 0, last_frame_);
   if (!streaming_ || !same_boot(status.boot_id)) return;
   if (status.state == trigger_stopped || status.configuration != mark_) finding_ = Finding::halted;

@@ -160,7 +160,7 @@ class BoardReceiver final : public FrameSink {
  private:
   void handle_event(const TriggerEvent& event, HostStamp arrival) noexcept;
   void handle_pong(const TriggerPong& pong, HostStamp departure) noexcept;
-  void take_status(const TriggerStatus& status) noexcept;
+  void pop_status(const TriggerStatus& status) noexcept;
   void handle_error(const TriggerError& error) noexcept;
   [[nodiscard]] bool same_boot(std::uint32_t boot) noexcept;
 

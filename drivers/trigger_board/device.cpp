@@ -13,8 +13,8 @@ namespace {
 /// Nobody tells these questions to end: they are short.
 const std::atomic<bool> kNever{false};
 
-DeviceTiming timing_of(const TriggerConfig& config, Duration byte_time,
-                       Duration latency_timer) noexcept {
+DeviceTiming make_timing(const TriggerConfig& config, Duration byte_time,
+                         Duration latency_timer) noexcept {
   constexpr std::int64_t kReportBytes = trigger_event_payload_size + trigger_overhead + 2;
   DeviceTiming t;
   t.min_delay = byte_time * kReportBytes;
@@ -27,7 +27,7 @@ DeviceTiming timing_of(const TriggerConfig& config, Duration byte_time,
   return t;
 }
 
-std::string hex_of(const std::uint8_t (&bytes)[12]) {
+std::string to_hex(const std::uint8_t (&bytes)[12]) {
   std::string text;
   for (const std::uint8_t b : bytes) text += format_text("%02x", static_cast<unsigned>(b));
   return text;
@@ -70,7 +70,7 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
   status = setup.find(options_.native_usb ? line()->baud() : options_.baud, &who);
   if (status != DeviceStatus::ok)
     return last_error_.refuse(status, place().name() + ": " + setup.last_error());
-  const std::string serial = hex_of(who.serial);
+  const std::string serial = to_hex(who.serial);
   // Another board would have other lines: that is for a person to decide.
   if (connected_ && serial != info_.serial)
     return last_error_.refuse(DeviceStatus::not_found,
@@ -113,7 +113,7 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
         wire_configuration(requested, options_, identity_, &config, &message);
     if (possible != DeviceStatus::ok) return last_error_.refuse(possible, std::move(message));
     config_ = config;
-    mark_ = mark_of(config);
+    mark_ = configuration_mark(config);
     DeviceStatus status = set_up();
     if (status ==
         DeviceStatus::disconnected) {  // it was unplugged since: once more, from the port on
@@ -122,9 +122,9 @@ DeviceStatus Device::configure(const TriggerConfiguration& requested,
     }
     if (status != DeviceStatus::ok) return status;
     configured_ = true;
-    timing_ = timing_of(config_, byte_time(), place().latency_timer());
+    timing_ = make_timing(config_, byte_time(), place().latency_timer());
     remark_ = remark_about(requested, config_);
-    if (actual != nullptr) *actual = configuration_of(config_);
+    if (actual != nullptr) *actual = to_configuration(config_);
     return DeviceStatus::ok;
   } catch (const std::exception&) {  // out of memory
     return DeviceStatus::failed;

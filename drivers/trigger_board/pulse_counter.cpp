@@ -16,7 +16,7 @@ std::int64_t steps_from(std::uint64_t expected, std::uint32_t low) noexcept {
 
 enum class ExposureStatus : std::uint8_t { none, good, invalid };
 
-ExposureStatus exposure_of(const TriggerExposure& reported, PulseExposure* exposure) noexcept {
+ExposureStatus to_exposure(const TriggerExposure& reported, PulseExposure* exposure) noexcept {
   constexpr std::int32_t kLongest = 10'000'000;  // µs
   if (reported.start_us == TRIGGER_NOT_SEEN || reported.end_us == TRIGGER_NOT_SEEN)
     return ExposureStatus::none;
@@ -87,7 +87,7 @@ bool PulseCounter::take(const TriggerEvent& event, Pulse* pulse) noexcept {
   p.boot = event.boot_id;
   p.resumed = flagged || over;
   for (std::size_t k = 0; k < p.exposure.size(); ++k)
-    if (exposure_of(event.exposure[k], &p.exposure[k]) == ExposureStatus::invalid)
+    if (to_exposure(event.exposure[k], &p.exposure[k]) == ExposureStatus::invalid)
       ++counters_.exposures_refused;
   *pulse = p;
   next_ = p.number + 1;

@@ -89,7 +89,7 @@ DeviceStatus wire_configuration(const TriggerConfiguration& requested, const Opt
   return DeviceStatus::ok;
 }
 
-TriggerConfiguration configuration_of(const TriggerConfig& config) noexcept {
+TriggerConfiguration to_configuration(const TriggerConfig& config) noexcept {
   TriggerConfiguration c;
   c.rate_hz = static_cast<double>(config.rate_millihertz) / 1000;
   c.width = Duration::microseconds(config.pulse_us);
@@ -167,7 +167,7 @@ std::string error_text(std::uint8_t code) {
 
 }  // namespace
 
-std::uint32_t mark_of(const TriggerConfig& config) noexcept {
+std::uint32_t configuration_mark(const TriggerConfig& config) noexcept {
   std::array<std::uint8_t, trigger_config_payload_size> payload{};
   trigger_put_config(&config, payload.data());
   return trigger_crc32(payload.data(), payload.size());
@@ -313,8 +313,9 @@ DeviceStatus Setup::halt(TriggerStatus* status) {
 DeviceStatus Setup::configure(const TriggerConfig& config, TriggerStatus* status) {
   std::array<std::uint8_t, trigger_config_payload_size> payload{};
   trigger_put_config(&config, payload.data());
-  return ask_status(trigger_config, payload, status,
-                    [&](const TriggerStatus& s) { return s.configuration == mark_of(config); });
+  return ask_status(trigger_config, payload, status, [&](const TriggerStatus& s) {
+    return s.configuration == configuration_mark(config);
+  });
 }
 
 DeviceStatus Setup::start(TriggerStatus* status) {

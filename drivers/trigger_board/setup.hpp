@@ -18,7 +18,7 @@ namespace vergence::trigger_board {
 [[nodiscard]] DeviceStatus wire_configuration(const TriggerConfiguration& requested,
                                               const Options& options, const TriggerInfo& board,
                                               TriggerConfig* config, std::string* message);
-[[nodiscard]] TriggerConfiguration configuration_of(const TriggerConfig& config) noexcept;
+[[nodiscard]] TriggerConfiguration to_configuration(const TriggerConfig& config) noexcept;
 /// Deviations from the requested configuration; empty if none.
 [[nodiscard]] std::string remark_about(const TriggerConfiguration& requested,
                                        const TriggerConfig& config);
@@ -76,6 +76,6 @@ class Setup {
 };
 
 /// CONFIG as it goes over the wire has this mark in STATUS once it is in effect.
-[[nodiscard]] std::uint32_t mark_of(const TriggerConfig& config) noexcept;
+[[nodiscard]] std::uint32_t configuration_mark(const TriggerConfig& config) noexcept;
 
 }  // namespace vergence::trigger_board

@@ -78,7 +78,7 @@ void CaptureThread::capture() noexcept {
     std::uint64_t woken = 0;
     if (fds[1].revents != 0) (void)!::read(wake_.get(), &woken, sizeof woken);
     if (fds[0].revents == 0) continue;
-    if (!take_filled()) {
+    if (!dequeue_filled()) {
       exchange_.lose(monotonic_now());
       return;
     }
@@ -90,7 +90,7 @@ void CaptureThread::capture() noexcept {
 }
 
 void CaptureThread::enqueue_returned() noexcept {
-  const FrameExchange::Buffers returned = exchange_.take_returned();
+  const FrameExchange::Buffers returned = exchange_.pop_returned();
   for (const std::uint32_t buffer : returned.list()) give_back(buffer);
 }
 
@@ -100,7 +100,7 @@ void CaptureThread::give_back(std::uint32_t buffer) noexcept {
 }
 
 /// False: the camera is gone.
-bool CaptureThread::take_filled() noexcept {
+bool CaptureThread::dequeue_filled() noexcept {
   Filled filled;
   switch (queue_->dequeue(&filled)) {
     case 0:

@@ -45,7 +45,7 @@ class CaptureThread {
  private:
   void capture() noexcept;
   void enqueue_returned() noexcept;
-  [[nodiscard]] bool take_filled() noexcept;
+  [[nodiscard]] bool dequeue_filled() noexcept;
   void handle(Filled filled) noexcept;
   [[nodiscard]] bool hand_over(const Filled& filled, Frame frame) noexcept;
   void give_back(std::uint32_t buffer) noexcept;

@@ -105,7 +105,7 @@ std::string Controls::keys(std::size_t most) const {
   return list.empty() ? "none" : list;
 }
 
-bool value_of(const Control& control, std::string_view text, std::int64_t* value) {
+bool parse_value(const Control& control, std::string_view text, std::int64_t* value) {
   for (const auto& [item, name] : control.menu) {
     if (name != key_of(text)) continue;
     *value = item;
@@ -127,15 +127,15 @@ std::int64_t clamped(const Control& control, std::int64_t value) noexcept {
 }
 
 std::int64_t trigger_on(const Control& control) noexcept {
-  constexpr std::array<std::string_view, 5> kWords = {"external", "hardware", "slave", "enable",
+  constexpr std::array<std::string_view, 5> kNames = {"external", "hardware", "slave", "enable",
                                                       "on"};
-  for (const std::string_view word : kWords)
+  for (const std::string_view word : kNames)
     for (const auto& [item, name] : control.menu)
       if (("_" + name + "_").find("_" + std::string(word)) != std::string::npos) return item;
   return 1;
 }
 
-std::string range_of(const Control& control) {
+std::string format_range(const Control& control) {
   if (control.menu.empty())
     return std::to_string(control.least) + " to " + std::to_string(control.most) + " in steps of " +
            std::to_string(control.step);

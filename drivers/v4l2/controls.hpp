@@ -41,14 +41,14 @@ class Controls {
 
 /// Parses a control's value: a number, or the name of a menu item in any spelling of case
 /// and blanks. False: neither, or out of range.
-[[nodiscard]] bool value_of(const Control& control, std::string_view text, std::int64_t* value);
+[[nodiscard]] bool parse_value(const Control& control, std::string_view text, std::int64_t* value);
 /// A value on a control's grid, inside its range.
 [[nodiscard]] std::int64_t clamped(const Control& control, std::int64_t value) noexcept;
 /// The value a trigger control takes to be on: a menu item whose name speaks of external, hardware,
 /// on or enabled; else 1.
 [[nodiscard]] std::int64_t trigger_on(const Control& control) noexcept;
 /// "0 to 4095 in steps of 1", or the names of the menu.
-[[nodiscard]] std::string range_of(const Control& control);
+[[nodiscard]] std::string format_range(const Control& control);
 
 /// → 0 or the errno.
 [[nodiscard]] int write(const Control& control, std::int64_t value) noexcept;

@@ -157,7 +157,7 @@ bool FrameExchange::release(FrameSlot slot) noexcept {
 
 // ---- the capture thread
 
-FrameExchange::Buffers FrameExchange::take_returned() noexcept {
+FrameExchange::Buffers FrameExchange::pop_returned() noexcept {
   const std::lock_guard lock(mutex_);
   const Buffers taken = returned_;
   returned_.count = 0;

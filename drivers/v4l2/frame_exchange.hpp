@@ -133,7 +133,7 @@ class FrameExchange {
   [[nodiscard]] bool release(FrameSlot slot) noexcept;
 
   // The capture thread.
-  [[nodiscard]] Buffers take_returned() noexcept;
+  [[nodiscard]] Buffers pop_returned() noexcept;
   /// Constant while it streams, as are the buffers. Before it does, the owner's too.
   [[nodiscard]] const Slots& slots() const noexcept { return slots_; }
   [[nodiscard]] std::span<std::uint8_t> writable(FrameSlot slot) noexcept {

@@ -26,7 +26,7 @@ std::string size_text(std::uint32_t width, std::uint32_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-DeviceStatus status_of(int error) noexcept {
+DeviceStatus to_status(int error) noexcept {
   switch (error) {
     case ENODEV:
       return DeviceStatus::disconnected;
@@ -74,7 +74,7 @@ class Applier {
   [[noreturn]] void system(int error, const std::string& what) {
     if (error == EBUSY)
       refuse(DeviceStatus::busy, "another program streams from this camera: end it first");
-    refuse(status_of(error), what + " failed: " + std::strerror(error));
+    refuse(to_status(error), what + " failed: " + std::strerror(error));
   }
   void remark(const std::string& message) {
     out_.remark += (out_.remark.empty() ? "" : "; ") + message;
@@ -85,7 +85,7 @@ class Applier {
     if (error == 0) return;
     if (error == EINVAL || error == ERANGE)
       refuse(DeviceStatus::unsupported,
-             control.key + " takes " + range_of(control) + ", not " + std::to_string(value));
+             control.key + " takes " + format_range(control) + ", not " + std::to_string(value));
     system(error, "setting " + control.key);
   }
   /// Value of a control that may be absent.
@@ -106,9 +106,9 @@ class Applier {
         refuse(DeviceStatus::unsupported,
                "there is no control " + key + "; this camera has " + controls_.keys());
       std::int64_t value = 0;
-      if (!value_of(*c, text, &value))
+      if (!parse_value(*c, text, &value))
         refuse(DeviceStatus::unsupported,
-               "control_" + key + " is \"" + text + "\"; it takes " + range_of(*c));
+               "control_" + key + " is \"" + text + "\"; it takes " + format_range(*c));
       set(*c, value);
     }
   }
@@ -302,7 +302,7 @@ class Applier {
       if (key == c->key) return;  // given by number
     if (requested_.gain_db != 0 && options_.gain_step_db <= 0)
       refuse(DeviceStatus::unsupported,
-             "how many dB a step of " + c->key + " (" + range_of(*c) +
+             "how many dB a step of " + c->key + " (" + format_range(*c) +
                  ") is, the camera does not say: set the option gain_step_db, or control_" +
                  c->key);
     const double step = options_.gain_step_db > 0 ? options_.gain_step_db : 1;
@@ -337,9 +337,9 @@ class Applier {
     }
     std::int64_t value = hardware ? trigger_on(*c) : 0;
     if (hardware && !options_.trigger_value.empty() &&
-        !value_of(*c, options_.trigger_value, &value))
+        !parse_value(*c, options_.trigger_value, &value))
       refuse(DeviceStatus::unsupported, "trigger_value is \"" + options_.trigger_value + "\"; " +
-                                            c->key + " takes " + range_of(*c));
+                                            c->key + " takes " + format_range(*c));
     set(*c, value);
   }
 
@@ -362,7 +362,7 @@ DeviceStatus apply(int fd, std::uint32_t buffer_type, const Controls& controls,
 
 DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
                              const ExposureSetting& requested, ExposureSetting* actual) noexcept {
-  const auto status_of = [](int error) {
+  const auto to_status = [](int error) {
     return error == 0        ? DeviceStatus::ok
            : error == ENODEV ? DeviceStatus::disconnected
                              : DeviceStatus::failed;
@@ -372,7 +372,7 @@ DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
   if (exposure == nullptr) return DeviceStatus::unsupported;
   const std::int64_t steps =
       clamped(*exposure, std::llround(requested.exposure.to_seconds() / settings.exposure_unit_s));
-  if (const DeviceStatus s = status_of(write(*exposure, steps)); s != DeviceStatus::ok) return s;
+  if (const DeviceStatus s = to_status(write(*exposure, steps)); s != DeviceStatus::ok) return s;
   *actual = {Duration::seconds(static_cast<double>(steps) * settings.exposure_unit_s),
              settings.actual.gain_db};
   const Control* gain = settings.gain_id != 0 && settings.gain_unit_db > 0
@@ -381,7 +381,7 @@ DeviceStatus change_exposure(const Controls& controls, const Settings& settings,
   if (gain == nullptr) return DeviceStatus::ok;
   const std::int64_t level =
       clamped(*gain, gain->least + std::llround(requested.gain_db / settings.gain_unit_db));
-  if (const DeviceStatus s = status_of(write(*gain, level)); s != DeviceStatus::ok) return s;
+  if (const DeviceStatus s = to_status(write(*gain, level)); s != DeviceStatus::ok) return s;
   actual->gain_db = static_cast<double>(level - gain->least) * settings.gain_unit_db;
   return DeviceStatus::ok;
 }

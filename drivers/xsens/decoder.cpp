@@ -249,7 +249,7 @@ std::array<double, 3> enu_vector(const Three& v, LocalFrame frame) noexcept {
   return v;
 }
 
-Receiver receiver_of(const GnssPvt& p, HostStamp received) noexcept {
+Receiver to_receiver(const GnssPvt& p, HostStamp received) noexcept {
   constexpr std::uint32_t kUnknown = 0xFFFFFFFF;
   constexpr std::uint16_t kNoDop = 9999;
   const auto metres = [](std::uint32_t mm) { return mm == kUnknown ? 0 : 1e-3 * mm; };
@@ -266,7 +266,7 @@ Receiver receiver_of(const GnssPvt& p, HostStamp received) noexcept {
   return r;
 }
 
-Receiver receiver_of(const LegacyFix& f, std::uint8_t status, HostStamp received) noexcept {
+Receiver to_receiver(const LegacyFix& f, std::uint8_t status, HostStamp received) noexcept {
   Receiver r;
   r.known = true;
   r.received = received;
@@ -354,14 +354,14 @@ bool Decoder::next(InsReading* reading) noexcept {
     } else if (m.is(MessageId::mtdata) && set_.generation == Generation::legacy) {
       if (read_mtdata(m, begin, end, reading)) return true;
     } else {
-      take_other(m);
+      read_other(m);
     }
     timing_.other(end);
   }
   return false;
 }
 
-void Decoder::take_other(const Message& m) noexcept {
+void Decoder::read_other(const Message& m) noexcept {
   if (m.is(MessageId::wake_up)) replies_.woke = true;
   if (answers(m, MessageId::go_to_config)) replies_.stopped = true;
   if (answers(m, MessageId::go_to_measurement)) replies_.going_on = replies_.resumed = true;
@@ -396,7 +396,7 @@ bool Decoder::read_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t 
     return false;
   }
   if (d.packet_counter) count_messages(*d.packet_counter);
-  if (d.gnss_pvt) receiver_ = receiver_of(*d.gnss_pvt, arrival_);
+  if (d.gnss_pvt) receiver_ = to_receiver(*d.gnss_pvt, arrival_);
   // A receiver's message has no sample of its own.
   if (!d.sample_time_fine || !(d.quaternion || d.latitude_longitude_deg)) {
     counters_.malformed += d.gnss_pvt || d.satellites || d.sample_time_fine ? 0U : 1U;
@@ -433,7 +433,7 @@ bool Decoder::read_mtdata(const Message& m, std::uint64_t begin, std::uint64_t e
   if (d.fix) {
     // The block is repeated in every sample; its age drops when a new one has come.
     if (d.fix->age <= last_fix_age_ || !receiver_.known)
-      receiver_ = receiver_of(*d.fix, d.status.value_or(0), arrival_);
+      receiver_ = to_receiver(*d.fix, d.status.value_or(0), arrival_);
     last_fix_age_ = d.fix->age;
   }
   InsReading r;

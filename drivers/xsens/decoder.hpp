@@ -136,8 +136,8 @@ struct Receiver {
   double position_sigma = 0, height_sigma = 0,
          velocity_sigma = 0;  // m, m, m/s, each axis; 0: not told
 };
-[[nodiscard]] Receiver receiver_of(const xbus::GnssPvt& pvt, HostStamp received) noexcept;
-[[nodiscard]] Receiver receiver_of(const xbus::LegacyFix& fix, std::uint8_t status,
+[[nodiscard]] Receiver to_receiver(const xbus::GnssPvt& pvt, HostStamp received) noexcept;
+[[nodiscard]] Receiver to_receiver(const xbus::LegacyFix& fix, std::uint8_t status,
                                    HostStamp received) noexcept;
 
 /// Fills attitude, velocity, position, fix, sigmas and quality; number and times are the caller's.
@@ -207,7 +207,7 @@ class Decoder {
                                   std::uint64_t end, InsReading* reading) noexcept;
   [[nodiscard]] bool read_mtdata(const xbus::Message& message, std::uint64_t begin,
                                  std::uint64_t end, InsReading* reading) noexcept;
-  void take_other(const xbus::Message& message) noexcept;
+  void read_other(const xbus::Message& message) noexcept;
   [[nodiscard]] bool step(ClockStep step) noexcept;
   [[nodiscard]] bool finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t end,
                             InsReading* reading) noexcept;

@@ -168,7 +168,8 @@ DeviceStatus Device::pause(Duration gap) noexcept {
 /// A pulse leaves with every so many samples: all up to the device's answer are handed out, and all
 /// from its next one on.
 DeviceStatus Device::make_gap(Duration gap) noexcept {
-  if (const DeviceStatus s = tell(xbus::MessageId::go_to_config); s != DeviceStatus::ok) return s;
+  if (const DeviceStatus s = announce(xbus::MessageId::go_to_config); s != DeviceStatus::ok)
+    return s;
   const HostStamp end = line()->now() + gap;
   while (line()->now() < end) {
     if (stop_requested()) return DeviceStatus::stopped;
@@ -176,11 +177,11 @@ DeviceStatus Device::make_gap(Duration gap) noexcept {
     if (s != DeviceStatus::ok && s != DeviceStatus::timeout) return s;
   }
   last_sample_ = line()->now();  // it was silent because it was told to be
-  return tell(xbus::MessageId::go_to_measurement);
+  return announce(xbus::MessageId::go_to_measurement);
 }
 
 /// → ok: it has answered; stopped, gone, failed
-DeviceStatus Device::tell(xbus::MessageId request) noexcept {
+DeviceStatus Device::announce(xbus::MessageId request) noexcept {
   constexpr int kTimes = 4;
   constexpr Duration kAnswer = Duration::milliseconds(150), kWrite = Duration::milliseconds(100);
   std::array<std::uint8_t, xbus::kMaxFrame> frame{};

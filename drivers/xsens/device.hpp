@@ -46,7 +46,7 @@ class Device final : public SerialInsDevice<1024> {  // readings: 2.5 s at 400 H
   void finished() noexcept override;
   [[nodiscard]] DeviceStatus read_once(Duration limit) noexcept;
   [[nodiscard]] DeviceStatus make_gap(Duration gap) noexcept;
-  [[nodiscard]] DeviceStatus tell(xbus::MessageId request) noexcept;
+  [[nodiscard]] DeviceStatus announce(xbus::MessageId request) noexcept;
   [[nodiscard]] Duration silent_after() const noexcept;
   void count_decoded() noexcept;
 

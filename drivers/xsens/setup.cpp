@@ -102,7 +102,7 @@ constexpr Duration kProbe = Duration::milliseconds(
     500);  // a device that measures speaks within this, one that listens answers
 constexpr Duration kAfterReset = Duration::milliseconds(2500);
 
-DeviceStatus status_of(Answer answer) noexcept {
+DeviceStatus to_status(Answer answer) noexcept {
   switch (answer) {
     case Answer::ok:
       return DeviceStatus::ok;
@@ -126,7 +126,7 @@ DeviceStatus Setup::probe(std::uint32_t baud, Duration limit) {
     dialogue_.reset();
   }
   dialogue_.ask(MessageId::go_to_config, {}, &reply_, limit);
-  return reply_.answer == Answer::silent ? DeviceStatus::timeout : status_of(reply_.answer);
+  return reply_.answer == Answer::silent ? DeviceStatus::timeout : to_status(reply_.answer);
 }
 
 DeviceStatus Setup::find() {
@@ -170,7 +170,7 @@ void Setup::fail(const char* what, DeviceStatus refused) {
                                                 static_cast<int>(error_text(reply_.error).size()),
                                                 error_text(reply_.error).data(), reply_.error)
                                   : format_text("it does not answer to %s; check its cable", what);
-  throw Refused{refused_by_device ? refused : status_of(reply_.answer)};
+  throw Refused{refused_by_device ? refused : to_status(reply_.answer)};
 }
 
 void Setup::write(MessageId id, std::span<const std::uint8_t> payload, const char* what) {

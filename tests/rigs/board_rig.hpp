@@ -24,9 +24,9 @@ class BoardBehindConverter {
   static constexpr const char* kWire = "/run/vergence-board";
 
   /// `told`: of every pulse as it is made; returns what the cameras' exposure outputs do.
-  explicit BoardBehindConverter(PulseSource told = {}, BoardSimulatorOptions options = {})
+  explicit BoardBehindConverter(PulseSource reported = {}, BoardSimulatorOptions options = {})
       : converter_("sim_ftdi", {"--wire", kWire, "--serial", "VGBOARD1"}),
-        reported_(std::move(told)) {
+        reported_(std::move(reported)) {
     options.power_on = monotonic_now();
     auto board = std::make_unique<BoardSimulator>(
         [this](const SimulatedPulse& pulse) { return take(pulse); }, options);

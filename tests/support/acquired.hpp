@@ -41,7 +41,7 @@ template <class Kind>
 /// Compares items and times: of frames the same images of the same pulse, of readings the
 /// same count, of events the same kind.
 [[nodiscard]] inline bool same(const Acquired& a, const Acquired& b) {
-  if (a.index() != b.index() || stamp_of(a) != stamp_of(b)) return false;
+  if (a.index() != b.index() || item_stamp(a) != item_stamp(b)) return false;
   if (frame_of(a) != nullptr)
     return frame_of(a)->set.number == frame_of(b)->set.number &&
            frame_of(a)->set.present == frame_of(b)->set.present;

@@ -42,12 +42,12 @@ constexpr std::array kContainers{
     Container{BagFormat::sqlite, SequenceFormat::db3, ".db3",
               "an SQLite file of rosbag2, with the tables topics and messages"}};
 
-const Container& container_of(BagFormat format) {
+const Container& find_container(BagFormat format) {
   return kContainers[static_cast<std::size_t>(format)];
 }
 
-std::vector<fs::path> files_of(BagFormat format, const fs::path& bag) {
-  const Container& container = container_of(format);
+std::vector<fs::path> list_files(BagFormat format, const fs::path& bag) {
+  const Container& container = find_container(format);
   const std::string ending = container.ending;
   std::error_code error;
   if (!fs::is_directory(bag, error)) {
@@ -104,7 +104,8 @@ class Indexer {
     const auto scan =
         scan_bag(bag_.format, *file.bytes, [this](const BagMessage& m) { read_message(m); });
     if (!scan)
-      refuse(path_, 0, fmt::format("{} is not {}", file.name, container_of(bag_.format).beginning));
+      refuse(path_, 0,
+             fmt::format("{} is not {}", file.name, find_container(bag_.format).beginning));
     scan->remark(file.name, &bag_.remarks);
   }
 
@@ -239,7 +240,7 @@ class Indexer {
 
 std::vector<BagFile> open_bag_files(BagFormat format, const fs::path& path) {
   std::vector<BagFile> files;
-  for (const fs::path& file : files_of(format, path))
+  for (const fs::path& file : list_files(format, path))
     files.push_back({file.filename().string(),
                      format == BagFormat::sqlite
                          ? std::unique_ptr<const ByteSource>(std::make_unique<SqliteBag>(file))

@@ -35,7 +35,7 @@ void remark_left_out(const std::string& name, const ReadingTopic<Reading>& topic
                   name, topic.unreadable, topic.backwards));
 }
 
-Eigen::Quaterniond quaternion_of(const RosAttitude& a) {
+Eigen::Quaterniond to_quaternion(const RosAttitude& a) {
   const auto& q = a.q_world_body;
   return {q[3], q[0], q[1], q[2]};
 }
@@ -45,7 +45,7 @@ void set_attitude(const Eigen::Quaterniond& q, InsSample* s) {
   s->attitude_valid = true;
 }
 
-RecordedReading reading_of(const RosFix& fix, std::size_t number) {
+RecordedReading to_reading(const RosFix& fix, std::size_t number) {
   RecordedReading r;
   r.sample.number = number;
   r.sample.stamp = fix.stamp;
@@ -66,14 +66,14 @@ bool attitude_at(const std::vector<RosAttitude>& attitudes, std::size_t* next, R
   if (*next == attitudes.size()) return false;
   const RosAttitude& after = attitudes[*next];
   if (after.stamp == stamp) {
-    set_attitude(quaternion_of(after), &r->sample);
+    set_attitude(to_quaternion(after), &r->sample);
   } else {
     if (*next == 0) return false;
     const RosAttitude& before = attitudes[*next - 1];
     if (after.stamp - before.stamp > kMaxGap) return false;
     const double share =
         (stamp - before.stamp).to_seconds() / (after.stamp - before.stamp).to_seconds();
-    set_attitude(quaternion_of(before).slerp(share, quaternion_of(after)), &r->sample);
+    set_attitude(to_quaternion(before).slerp(share, to_quaternion(after)), &r->sample);
   }
   r->sample.tilt_sigma = after.tilt_sigma;
   r->sample.heading_sigma = after.heading_sigma;
@@ -97,7 +97,7 @@ RecordedIns of_fixes(const std::string& name, const std::vector<RosFix>& fixes,
   ins.readings.reserve(fixes.size());
   std::size_t next = 0, without = 0;
   for (const RosFix& fix : fixes) {
-    RecordedReading& r = ins.readings.emplace_back(reading_of(fix, ins.readings.size()));
+    RecordedReading& r = ins.readings.emplace_back(to_reading(fix, ins.readings.size()));
     if (!attitude_at(attitudes, &next, &r)) ++without;
   }
   ins.remarks.push_back(fmt::format("the INS is {} with the orientation of {}", name, imu));

@@ -31,17 +31,17 @@ std::size_t row_bytes(std::uint32_t width, std::uint32_t bits) noexcept {
 }
 
 /// The grey value of one pixel (blue, green, red).
-std::uint8_t grey_of(const std::uint8_t* bgr) noexcept { return luminance(bgr[2], bgr[1], bgr[0]); }
+std::uint8_t to_grey(const std::uint8_t* bgr) noexcept { return luminance(bgr[2], bgr[1], bgr[0]); }
 
 /// Grey levels of the palette's indices; without a palette the indices are grey levels.
-std::array<std::uint8_t, 256> palette_of(ImageBytes b) noexcept {
+std::array<std::uint8_t, 256> read_palette(ImageBytes b) noexcept {
   std::array<std::uint8_t, 256> grey{};
   const std::size_t first = kFileHeader + u32(b, kHeaderSize), end = u32(b, kPixelsAt);
   const std::size_t count = u32(b, kColours) == 0 ? 256 : u32(b, kColours),
                     there = first < end ? (end - first) / 4 : 0;
   for (std::size_t i = 0; i < grey.size(); ++i)
     grey[i] = there == 0                   ? static_cast<std::uint8_t>(i)
-              : i < std::min(count, there) ? grey_of(&b[first + 4 * i])
+              : i < std::min(count, there) ? to_grey(&b[first + 4 * i])
                                            : std::uint8_t{0};
   return grey;
 }
@@ -76,14 +76,14 @@ ImageFileStatus decode_bmp(ImageBytes b, ImageSize size, std::uint8_t* out, std:
   const std::uint32_t bits = u16(b, kBits);
   if (!is_plain(b) || (bits != 8 && bits != 24 && bits != 32)) return ImageFileStatus::undecodable;
   const std::array<std::uint8_t, 256> grey =
-      bits == 8 ? palette_of(b) : std::array<std::uint8_t, 256>{};
+      bits == 8 ? read_palette(b) : std::array<std::uint8_t, 256>{};
   const std::size_t width = static_cast<std::size_t>(size.width),
                     height = static_cast<std::size_t>(size.height);
   const std::size_t row = row_bytes(static_cast<std::uint32_t>(size.width), bits);
   for (std::size_t y = 0; y < height; ++y, out += stride) {
     const std::uint8_t* from = &b[u32(b, kPixelsAt) + (top_down(b) ? y : height - 1 - y) * row];
     for (std::size_t x = 0; x < width; ++x)
-      out[x] = bits == 8 ? grey[from[x]] : grey_of(from + bits / 8 * x);
+      out[x] = bits == 8 ? grey[from[x]] : to_grey(from + bits / 8 * x);
   }
   return ImageFileStatus::ok;
 }

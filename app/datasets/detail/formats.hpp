@@ -23,8 +23,8 @@ namespace vergence::app::detail {
 [[nodiscard]] StereoSequence open_bag(BagFormat format, const std::filesystem::path& bag,
                                       bool given, const BagTopics& topics);
 /// Opens a sequence of an indexed bag; `path` is for messages.
-[[nodiscard]] StereoSequence sequence_of(const std::filesystem::path& path, BagIndex bag,
-                                         bool given, const BagTopics& topics);
+[[nodiscard]] StereoSequence make_sequence(const std::filesystem::path& path, BagIndex bag,
+                                           bool given, const BagTopics& topics);
 
 [[nodiscard]] StereoSequence open_recorded_session(const std::filesystem::path& folder, bool given);
 

@@ -86,7 +86,7 @@ std::string unpack(const ByteSource& file, const ChunkHead& head,
   return "";
 }
 
-MessageEncoding encoding_of(const std::string& name) {
+MessageEncoding to_encoding(const std::string& name) {
   return name == "cdr"    ? MessageEncoding::cdr
          : name == "ros1" ? MessageEncoding::ros1
                           : MessageEncoding::other;
@@ -164,7 +164,7 @@ class Scanner {
       return;
     }
     const std::uint16_t schema = in.u16();
-    BagChannel channel{in.text(), "", encoding_of(in.text())};
+    BagChannel channel{in.text(), "", to_encoding(in.text())};
     if (!in.ok() || channel.topic.size() > kMaxName)
       return scan_.broken(&BagScan::broken_records, here,
                           "a channel whose lengths contradict each other");

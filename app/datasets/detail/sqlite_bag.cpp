@@ -14,7 +14,7 @@ namespace {
 constexpr unsigned kRowBits = 32;  // below them the offset in a row's bytes
 
 /// A file's name as SQLite's URI has it.
-std::string uri_of(const std::filesystem::path& file) {
+std::string to_uri(const std::filesystem::path& file) {
   constexpr std::string_view kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-";
   constexpr std::string_view kHex = "0123456789ABCDEF";
@@ -70,7 +70,7 @@ SqliteBag::SqliteBag(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file, ignored))
     refuse(file, 0, "is no regular file; a bag is expected");
   sqlite3* database = nullptr;
-  const int status = sqlite3_open_v2(uri_of(file).c_str(), &database,
+  const int status = sqlite3_open_v2(to_uri(file).c_str(), &database,
                                      SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
   database_.reset(database);
   if (status != SQLITE_OK)

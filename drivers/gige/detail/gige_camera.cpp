@@ -174,7 +174,7 @@ DeviceStatus GigeCamera::begin(Notifier* ready) {
       s != DeviceStatus::ok)
     return last_error_.refuse(s, session_->last_error());
   receiver_.begin(*session_, applied_, requested_.width, requested_.height, in_force_);
-  slots_.take_back();
+  slots_.withdraw();
   queue_.begin(ready);
   receiver_.supply_buffers();
   if (const DeviceStatus s = session_->start_acquisition(); s != DeviceStatus::ok)

@@ -25,7 +25,7 @@ constexpr int kHeaders = 20 + 8 + 8;  // IP, UDP, GVSP
 constexpr int kExtendedHeaders = 20 + 8 + 20;
 constexpr int kMaxBySwitches = 9000;  // bytes; beyond it few switches go
 
-double packets_of(const LinkLoad& load, int packet_size) noexcept {
+double packet_count(const LinkLoad& load, int packet_size) noexcept {
   const int data = std::max(1, packet_size - (load.extended_ids ? kExtendedHeaders : kHeaders));
   const auto filled = (load.payload + data - 1) / data;
   return static_cast<double>(filled + 2);  // leader and trailer
@@ -33,7 +33,7 @@ double packets_of(const LinkLoad& load, int packet_size) noexcept {
 
 }  // namespace
 
-Interface interface_of(const std::string& address) {
+Interface find_interface(const std::string& address) {
   Interface found;
   in_addr requested{};
   if (::inet_pton(AF_INET, address.c_str(), &requested) != 1) return found;
@@ -78,7 +78,7 @@ LinkPlan plan_link(const LinkLoad& load, int packet_size, std::int64_t speed,
                 : 0;
   plan.delay = delay >= Duration{} ? delay : Duration::seconds(1.1 * (load.cameras - 1) * on_wire);
   plan.transfer =
-      Duration::seconds(packets_of(load, packet_size) * (on_wire + plan.delay.to_seconds()));
+      Duration::seconds(packet_count(load, packet_size) * (on_wire + plan.delay.to_seconds()));
   plan.share = plan.transfer.to_seconds() * load.rate_hz;
   return plan;
 }

@@ -13,7 +13,7 @@ struct Interface {
   std::int64_t speed = 0;  // bit/s; 0: the system does not say (loopback, virtual)
 };
 /// The one with this IPv4 address; without one the name is empty.
-[[nodiscard]] Interface interface_of(const std::string& address);
+[[nodiscard]] Interface find_interface(const std::string& address);
 
 /// Requirements of a stream on its link.
 struct LinkLoad {

@@ -194,13 +194,13 @@ constexpr std::uint32_t kCanResend = 4;
 constexpr std::int64_t kMinSocketBuffer = 4 << 20;  // bytes
 constexpr std::int64_t kBufferedFrames = 8;         // that the socket holds while nobody reads
 
-std::string text_of(const char* text) { return text == nullptr ? "" : text; }
+std::string to_text(const char* text) { return text == nullptr ? "" : text; }
 
-std::string address_of(GSocketAddress* address) {
+std::string to_address(GSocketAddress* address) {
   if (address == nullptr || !G_IS_INET_SOCKET_ADDRESS(address)) return "";
   const Memory<char> text(
       g_inet_address_to_string(g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(address))));
-  return text_of(text.get());
+  return to_text(text.get());
 }
 
 /// Guards Aravis's list of devices, which it reads and makes anew without a lock, while every
@@ -219,11 +219,11 @@ std::vector<Found> discover() {
   std::vector<Found> all;
   const unsigned n = arv_interface_get_n_devices(gv);
   for (unsigned i = 0; i < n; ++i)
-    all.push_back({{"gige", text_of(arv_interface_get_device_serial_nbr(gv, i)),
-                    text_of(arv_interface_get_device_vendor(gv, i)) + " " +
-                        text_of(arv_interface_get_device_model(gv, i)),
-                    text_of(arv_interface_get_device_address(gv, i))},
-                   text_of(arv_interface_get_device_id(gv, i))});
+    all.push_back({{"gige", to_text(arv_interface_get_device_serial_nbr(gv, i)),
+                    to_text(arv_interface_get_device_vendor(gv, i)) + " " +
+                        to_text(arv_interface_get_device_model(gv, i)),
+                    to_text(arv_interface_get_device_address(gv, i))},
+                   to_text(arv_interface_get_device_id(gv, i))});
   std::sort(all.begin(), all.end(),
             [](const Found& a, const Found& b) { return a.info.serial < b.info.serial; });
   return all;
@@ -258,8 +258,8 @@ Session::Session(Object<ArvDevice> device) : device_(std::move(device)), feature
   if (const char* name = features_.find(Purpose::serial)) info_.serial = features_.text(name);
   info_.model = features_.text("DeviceVendorName") + " " + features_.text("DeviceModelName");
   ArvGvDevice* gv = ARV_GV_DEVICE(device_.get());
-  info_.place = address_of(arv_gv_device_get_device_address(gv));
-  link_ = interface_of(address_of(arv_gv_device_get_interface_address(gv)));
+  info_.place = to_address(arv_gv_device_get_device_address(gv));
+  link_ = find_interface(to_address(arv_gv_device_get_interface_address(gv)));
   const auto noticed =
       +[](ArvDevice*, Session* self) { self->lost_.store(true, std::memory_order_release); };
   (void)g_signal_connect(device_.get(), "control-lost", G_CALLBACK(noticed), this);

@@ -5,12 +5,12 @@
 namespace vergence::gige {
 
 void SlotReturns::set_limit(std::size_t most) noexcept {
-  take_back();
+  withdraw();
   const std::lock_guard lock(mutex_);
   most_ = most;
 }
 
-void SlotReturns::take_back() noexcept {
+void SlotReturns::withdraw() noexcept {
   const std::lock_guard lock(mutex_);
   for (FrameSlot slot = 0; queue_.drain(&slot);) {
   }

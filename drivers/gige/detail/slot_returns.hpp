@@ -25,7 +25,7 @@ class SlotReturns {
   void set_limit(std::size_t most) noexcept;
   /// Before the queue begins: what was offered and not taken, and what is on its way back, is the
   /// transport's. Precondition: nobody offers.
-  void take_back() noexcept;
+  void withdraw() noexcept;
 
   // The releaser.
   void release(FrameSlot slot) noexcept;

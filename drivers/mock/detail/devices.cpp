@@ -71,10 +71,10 @@ DeviceStatus MockCamera::set_exposure(const ExposureSetting& requested,
 
 DeviceStatus MockCamera::start(Notifier* ready) noexcept {
   if (pool_ == nullptr) return DeviceStatus::bad_configuration;
-  const bool was = stream.streaming() && !gone_;
+  const bool was = stream.streaming() && !disconnected_;
   const DeviceStatus status = stream.start(ready);
   if (status == DeviceStatus::ok && !was) {
-    gone_ = false;
+    disconnected_ = false;
     starts_.fetch_add(1, std::memory_order_relaxed);
   }
   return status;
@@ -96,8 +96,8 @@ DeviceStatus MockCamera::wait(Duration limit, Frame* frame) noexcept {
     out_.fetch_add(1);
     rig_->room.signal();
   } else if (status == DeviceStatus::disconnected) {
-    if (!gone_) frame->arrival = d.arrival;
-    gone_ = true;
+    if (!disconnected_) frame->arrival = d.arrival;
+    disconnected_ = true;
   }
   return status;
 }
@@ -205,9 +205,9 @@ DeviceStatus MockTrigger::start(Notifier* ready) noexcept {
   if (!(configuration_.rate_hz > 0)) return DeviceStatus::bad_configuration;
   const bool was = stream.streaming();
   const DeviceStatus status = stream.start(ready);
-  if (status != DeviceStatus::ok || (was && !gone_)) return status;
+  if (status != DeviceStatus::ok || (was && !disconnected_)) return status;
   starts_.fetch_add(1, std::memory_order_relaxed);
-  gone_ = false;
+  disconnected_ = false;
   if (was) return status;  // it is back; its pulses go on by themselves
   try {
     listener_->begin(configuration_);
@@ -222,8 +222,8 @@ DeviceStatus MockTrigger::wait(Duration limit, Pulse* pulse) noexcept {
   Delivery<BoardReport> d;
   const DeviceStatus status = stream.take(limit, &d);
   if (status == DeviceStatus::disconnected) {
-    if (!gone_) pulse->arrival = d.arrival;
-    gone_ = true;
+    if (!disconnected_) pulse->arrival = d.arrival;
+    disconnected_ = true;
     rig_->room.signal();
   }
   if (status != DeviceStatus::ok) return status;
@@ -247,7 +247,7 @@ DeviceStatus MockTrigger::pause(std::uint32_t pulses) noexcept {
   // not made yet, on any run.
   constexpr std::uint64_t kAhead = 4;
   if (!stream.streaming()) return DeviceStatus::stopped;
-  if (gone_) return DeviceStatus::disconnected;
+  if (disconnected_) return DeviceStatus::disconnected;
   const std::lock_guard lock(asking_);
   const bool under_way = pause_end_ > 0 && pause_boot_ == boot_ && newest_ < pause_end_;
   if (pulses == 0 || under_way) return DeviceStatus::ok;

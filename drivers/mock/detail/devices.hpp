@@ -144,7 +144,7 @@ class MockCamera final : public CameraDevice {
   std::atomic<int> out_{0};  // slots the consumer holds
   std::array<std::atomic<std::uint64_t>, MockRig::kSlots> pulse_of_{};
   ExposurePlan exposures_;
-  bool gone_ = false;  // the consumer's
+  bool disconnected_ = false;  // the consumer's
 };
 
 class MockIns final : public InsDevice {
@@ -229,7 +229,7 @@ class MockTrigger final : public TriggerDevice {
   DeviceInfo info_{"mock", "mock-board", "simulated trigger board", "world"};
   DeviceOscillator clock_;
   TriggerConfiguration configuration_{};
-  std::atomic<bool> gone_{false};
+  std::atomic<bool> disconnected_{false};
   std::atomic<std::uint64_t> pulses_{0}, starts_{0};
   std::mutex asking_;  // of what follows
   bool any_ = false;

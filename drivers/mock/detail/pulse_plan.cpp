@@ -9,7 +9,8 @@ namespace vergence::mock {
 namespace {
 
 bool stops_the_board(const Fault& f) noexcept {
-  return f.kind == FaultKind::board_reboot || (f.kind == FaultKind::board_gone && !f.powered);
+  return f.kind == FaultKind::board_reboot ||
+         (f.kind == FaultKind::board_disconnected && !f.powered);
 }
 
 /// When the board runs again if it does not at that time, else that time; the largest Duration:
@@ -29,7 +30,7 @@ Duration running_from(const std::vector<Fault>& faults, Duration time) noexcept 
 
 bool down_by(const std::vector<Fault>& faults, Duration time) noexcept {
   return std::any_of(faults.begin(), faults.end(), [&](const Fault& f) {
-    return f.kind == FaultKind::board_gone && f.active(time);
+    return f.kind == FaultKind::board_disconnected && f.active(time);
   });
 }
 
@@ -63,7 +64,7 @@ PulsePlan::PulsePlan(const TriggerConfiguration& c, Duration length,
   }
   std::vector<Duration> edges;
   for (const Fault& f : faults) {
-    if (f.kind != FaultKind::board_gone) continue;
+    if (f.kind != FaultKind::board_disconnected) continue;
     edges.push_back(f.at);
     if (f.duration > Duration{}) edges.push_back(f.at + f.duration);
   }

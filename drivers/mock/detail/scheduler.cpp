@@ -34,8 +34,8 @@ void choose_image(const RigTruth& truth, const PulseAt& pulse, Exposure* e) noex
 
 }  // namespace
 
-Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& pulse,
-                     int camera) noexcept {
+Exposure make_exposure(const RigTruth& truth, std::uint64_t seed, const PulseAt& pulse,
+                       int camera) noexcept {
   constexpr std::uint64_t kEveryCamera =
       77;  // stream of the draws that are one for the whole pulse
   Exposure e;
@@ -84,14 +84,14 @@ Duration Scheduler::length() const noexcept {
   return rig_.options.duration > Duration{} ? std::min(all, rig_.options.duration) : all;
 }
 
-PulsePlan Scheduler::plan_of(const TriggerConfiguration& c) const {
+PulsePlan Scheduler::make_plan(const TriggerConfiguration& c) const {
   return {c, length(), rig_.truth->faults()};
 }
 
 void Scheduler::begin(const TriggerConfiguration& c) {
   halt();
   board_ = c;
-  plan_ = plan_of(c);
+  plan_ = make_plan(c);
   stop_ = false;
   constexpr Duration kLead =
       Duration::milliseconds(100);  // the first pictures are rendered before they are due
@@ -204,14 +204,14 @@ PulseAt Scheduler::pulse_at(std::uint64_t pulse, int k) const noexcept {
 
 bool Scheduler::unplugged_at(Duration time, int k) const noexcept {
   return std::any_of(rig_.truth->faults().begin(), rig_.truth->faults().end(), [&](const Fault& f) {
-    return f.kind == FaultKind::camera_gone && f.concerns(k) && f.active(time);
+    return f.kind == FaultKind::camera_disconnected && f.concerns(k) && f.active(time);
   });
 }
 
 PulseExposure Scheduler::feedback(std::uint64_t pulse, int k) const {
   const MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
   if (!pulsed(k) || unplugged_at(plan_.at(pulse).time, k) || !camera.stream.streaming()) return {};
-  if (exposure_of(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k).missed) return {};
+  if (make_exposure(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k).missed) return {};
   const auto in_ticks = [](Duration d) { return Duration::microseconds((d.ns() + 500) / 1000); };
   return {true, in_ticks(camera.trigger_delay()),
           in_ticks(camera.trigger_delay() + camera.setting_at(pulse).exposure)};
@@ -270,7 +270,7 @@ void Scheduler::make_readings(HostStamp until) {
     InsSample sample = ins_.model().sample(readings_, time);
     bool silent = false;
     for (const Fault& f : rig_.truth->faults())
-      silent = silent || (f.kind == FaultKind::ins_gone && f.active(time));
+      silent = silent || (f.kind == FaultKind::ins_disconnected && f.active(time));
     if (silent) {
       ins_.lost.fetch_add(1, std::memory_order_relaxed);
       continue;
@@ -324,7 +324,7 @@ bool Scheduler::present(std::uint64_t pulse, int k) {
   return !gone && pulsed(k) && cameras_[static_cast<std::size_t>(k)]->stream.streaming();
 }
 
-std::optional<FrameSlot> Scheduler::slot_of(int k) {
+std::optional<FrameSlot> Scheduler::get_slot(int k) {
   MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
   for (;;) {
     const WakeEvent::Ticket seen = rig_.room.ticket();
@@ -342,7 +342,7 @@ std::optional<Scheduler::Shooting> Scheduler::plan(std::uint64_t pulse, int k) {
   MockCamera& camera = *cameras_[static_cast<std::size_t>(k)];
   Shooting s;
   s.camera = k;
-  s.exposure = exposure_of(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k);
+  s.exposure = make_exposure(*rig_.truth, rig_.options.seed, pulse_at(pulse, k), k);
   if (s.exposure.missed) {
     ++senders_[static_cast<std::size_t>(k)].counter_base;
     return std::nullopt;
@@ -351,7 +351,7 @@ std::optional<Scheduler::Shooting> Scheduler::plan(std::uint64_t pulse, int k) {
     camera.lost.fetch_add(1, std::memory_order_relaxed);
     return std::nullopt;
   }
-  const auto slot = slot_of(k);
+  const auto slot = get_slot(k);
   if (!slot) {
     camera.underruns.fetch_add(1, std::memory_order_relaxed);
     return std::nullopt;

@@ -69,8 +69,8 @@ struct Exposure {
 };
 
 /// Pure function of its arguments; the draws of faults with a share come from `seed`.
-[[nodiscard]] Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& pulse,
-                                   int camera) noexcept;
+[[nodiscard]] Exposure make_exposure(const RigTruth& truth, std::uint64_t seed,
+                                     const PulseAt& pulse, int camera) noexcept;
 
 /// Makes what the devices deliver, pulse after pulse; the DeliveryQueue hands it out.
 ///
@@ -97,7 +97,7 @@ class Scheduler final : public PulseListener {
   void leave_out(std::uint64_t from, std::uint32_t pulses, std::uint32_t boot) noexcept override {
     pauses_.request(from, pulses, boot);
   }
-  [[nodiscard]] PulsePlan plan_of(const TriggerConfiguration& c) const;
+  [[nodiscard]] PulsePlan make_plan(const TriggerConfiguration& c) const;
   /// The host's time at the drive's start.
   [[nodiscard]] HostStamp start() const noexcept { return start_; }
   [[nodiscard]] std::uint64_t pulses(double rate_hz) const noexcept;
@@ -140,7 +140,7 @@ class Scheduler final : public PulseListener {
   [[nodiscard]] std::optional<Shooting> plan(std::uint64_t pulse, int k);
   void render(const Shooting& shooting);
   void send(std::uint64_t pulse, const Shooting& shooting);
-  [[nodiscard]] std::optional<FrameSlot> slot_of(int k);
+  [[nodiscard]] std::optional<FrameSlot> get_slot(int k);
   [[nodiscard]] HostStamp jittered(HostStamp least, std::uint64_t device,
                                    std::uint64_t number) const noexcept;
   [[nodiscard]] HostStamp host_of(std::uint64_t pulse) const noexcept {

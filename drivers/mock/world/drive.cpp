@@ -22,7 +22,7 @@ struct Route {
   std::vector<double> stops;  // m of path where the vehicle stops
 };
 
-Route route_of(DriveKind kind) {
+Route make_route(DriveKind kind) {
   constexpr double X = kStreetSpacingX, Y = kStreetSpacingY, o = kLane;
   switch (kind) {
     case DriveKind::loop:
@@ -217,7 +217,7 @@ const DriveOptions& checked(const DriveOptions& o) {
 }  // namespace
 
 Drive::Drive(const DriveOptions& options, const World& world) : options_(checked(options)) {
-  const Route route = route_of(options_.kind);
+  const Route route = make_route(options_.kind);
   const Path path(route.corners);
   std::vector<double> s;
   if (options_.kind == DriveKind::still) {

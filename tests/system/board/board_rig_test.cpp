@@ -73,10 +73,10 @@ class BoardRig : public ::testing::Test {
   /// Every report against the pulse that was made: number, and the time of the edge within the
   /// bound that goes with it (half of the shortest way there and back: the chip's latency timer is
   /// in it).
-  void expect_true_edges(const std::vector<Pulse>& told) {
+  void expect_true_edges(const std::vector<Pulse>& reported) {
     std::map<std::uint64_t, HostStamp> made;
     for (const test::SimulatedPulse& p : board_.pulses()) made[p.number] = p.edge;
-    for (const Pulse& p : told) {
+    for (const Pulse& p : reported) {
       ASSERT_TRUE(made.contains(p.number)) << p.number;
       ASSERT_TRUE(p.mapped);
       const Duration off = p.host - made[p.number];
@@ -98,11 +98,11 @@ TEST_F(BoardRig, reportsEveryPulseThroughTheRealDriverWithEitherLatencyTimer) {
     const std::uint64_t before =
         device->statistics().malformed;  // heard at other rates, when the board was looked for
     ASSERT_EQ(device->start(nullptr), DeviceStatus::ok);
-    const auto told = take(*device, 90);
-    ASSERT_EQ(told.size(), 90U) << device->last_error();
-    for (std::size_t i = 1; i < told.size(); ++i)
-      ASSERT_EQ(told[i].number, told[i - 1].number + 1) << "none is lost";
-    expect_true_edges(told);
+    const auto reported = take(*device, 90);
+    ASSERT_EQ(reported.size(), 90U) << device->last_error();
+    for (std::size_t i = 1; i < reported.size(); ++i)
+      ASSERT_EQ(reported[i].number, reported[i - 1].number + 1) << "none is lost";
+    expect_true_edges(reported);
     EXPECT_LE(device->statistics().malformed, before + 1)
         << "but for what was under way when the line was taken over";
     EXPECT_EQ(device->statistics().lost, 0U);

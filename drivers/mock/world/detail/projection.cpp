@@ -59,7 +59,7 @@ Bounds ray_bounds(const std::array<Vec3, 4>& corners, int count) noexcept {
 }
 
 /// The ray of a pixel, or of the nearest point towards the principal point that has one.
-Vec3 ray_of(const Camera& camera, Vec2 pixel) noexcept {
+Vec3 pixel_ray(const Camera& camera, Vec2 pixel) noexcept {
   const Vec2 centre(camera.intrinsics().cx, camera.intrinsics().cy);
   Vec3 ray(0, 0, 1);
   for (int i = 0; i < 64; ++i) {  // 0.97^64 = 0.14: well inside any lens
@@ -89,7 +89,7 @@ RayTiles::RayTiles(const Camera& camera) {
       for (int k = 0; k < kTilePixels; ++k) {
         const Vec2 pixel(std::min(c * kTile + k % kTile, width - 1),
                          std::min(r * kTile + k / kTile, height - 1));
-        const Vec3 ray = ray_of(camera, pixel);
+        const Vec3 ray = pixel_ray(camera, pixel);
         const std::size_t at = tile * kTilePixels + static_cast<std::size_t>(k);
         x[at] = static_cast<float>(ray.x());
         y[at] = static_cast<float>(ray.y());

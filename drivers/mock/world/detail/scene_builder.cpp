@@ -19,7 +19,7 @@ double amplitude(double hill_deg) noexcept {
 }
 
 /// Sun from the north-east over an even sky; the ground receives about 1.15.
-float light_of(const Vec3& normal) noexcept {
+float shade(const Vec3& normal) noexcept {
   static const Vec3 sun = Vec3(0.40, 0.50, 0.77).normalized();
   return static_cast<float>(0.60 + 0.72 * std::max(0.0, normal.dot(sun)));
 }
@@ -108,7 +108,7 @@ void SceneBuilder::ground_polygon(std::span<const Vec2> outline, double lift_m, 
     Polygon p;
     p.normal = Vec3(-slope, 0, 1).normalized();
     p.material = material;
-    p.light = light * light_of(p.normal);
+    p.light = light * shade(p.normal);
     const Vec2 origin(kTexturePeriod * std::floor(piece[0].x() / kTexturePeriod),
                       kTexturePeriod * std::floor(piece[0].y() / kTexturePeriod));
     p.texture_origin = {origin.x(), origin.y(), height(origin.x())};
@@ -168,7 +168,7 @@ void SceneBuilder::flat(std::span<const Vec3> corners, const Face& face, bool tw
   const Vec3 up = p.normal.cross(along);
   p.two_sided = two_sided;
   p.material = face.material;
-  p.light = face.light * light_of(p.normal);
+  p.light = face.light * shade(p.normal);
   p.texture_origin = corners[0] - face.u_offset_m * along - face.v_offset_m * up;
   p.axis_u = along * m.texels_per_metre_u;
   p.axis_v = up * m.texels_per_metre_v;

@@ -185,12 +185,12 @@ TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
   folder.write("s/summary.json", R"({"enu": {"mount": {"lever_arm_m": [0.9, 0.4, 0],
                                     "boresight_deg": [0, 0, 2], "source": "the test"}}})");
   for (const std::string& estimate : {session, elsewhere}) {
-    const auto told = figures(estimate);
-    EXPECT_LT(told["heading_error_deg"]["max_abs"], 0.27);
-    EXPECT_LT(told["rotation_error_deg"]["max"], 0.27);
-    EXPECT_LT(told["segments"][0]["t_percent"], 0.5);
-    EXPECT_LT(told["end_error_start_aligned_percent"], 0.5);
-    EXPECT_EQ(told["ins_mount"]["boresight_deg"][2], 2);
+    const auto reported = figures(estimate);
+    EXPECT_LT(reported["heading_error_deg"]["max_abs"], 0.27);
+    EXPECT_LT(reported["rotation_error_deg"]["max"], 0.27);
+    EXPECT_LT(reported["segments"][0]["t_percent"], 0.5);
+    EXPECT_LT(reported["end_error_start_aligned_percent"], 0.5);
+    EXPECT_EQ(reported["ins_mount"]["boresight_deg"][2], 2);
   }
   EXPECT_FALSE(figures(session, "flu").contains("ins_mount")) << "both are forward, left, up";
 

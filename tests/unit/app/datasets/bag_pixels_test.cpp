@@ -53,7 +53,7 @@ void expect_grey(const Grey& out, const Wanted& wanted, const std::string& what,
 class BagPixels : public ::testing::TestWithParam<BagKind> {
  protected:
   /// Writes one message for left and right, valid until the next one.
-  [[nodiscard]] StereoSequence sequence_of(const char* type, const std::string& message) {
+  [[nodiscard]] StereoSequence make_sequence(const char* type, const std::string& message) {
     writer_ = GetParam().writer();
     writer_->channel(1, "/left/image", type);
     writer_->channel(2, "/right/image", type);
@@ -72,7 +72,7 @@ class BagPixels : public ::testing::TestWithParam<BagKind> {
   /// Empty: no pair.
   [[nodiscard]] Grey grey_of(const char* type, const std::string& message) {
     Grey grey;
-    refusal_ = test::refusal_of([&] { grey = right_of(sequence_of(type, message)); });
+    refusal_ = test::refusal_of([&] { grey = right_of(make_sequence(type, message)); });
     return grey;
   }
   [[nodiscard]] Grey grey_of(const ImageMessage& image) {
@@ -167,7 +167,7 @@ TEST_P(BagPixels, PngOfTwelveBitsInSixteenIsTakenForWhatItIs) {
   ASSERT_TRUE(cv::imencode(".png", source, file));
   const std::string message = compressed_message(
       GetParam().wire(), kStart, "mono16; compressed png", std::string(file.begin(), file.end()));
-  StereoSequence s = sequence_of("sensor_msgs/CompressedImage", message);
+  StereoSequence s = make_sequence("sensor_msgs/CompressedImage", message);
   find_deep_bits(&s);
   EXPECT_EQ(s.deep_bits, 12);
   expect_grey(
@@ -191,7 +191,7 @@ TEST_P(BagPixels, SixteenBitsAreReadInEitherByteOrderAndAsManyAsAreUsed) {
             image.data[at + (big_endian ? 1 : 0)] = static_cast<char>(sample & 255);
           }
         StereoSequence s =
-            sequence_of("sensor_msgs/Image", image_message(GetParam().wire(), kStart, image));
+            make_sequence("sensor_msgs/Image", image_message(GetParam().wire(), kStart, image));
         find_deep_bits(&s);
         EXPECT_EQ(s.deep_bits, bits);
         expect_grey(

@@ -79,15 +79,15 @@ TEST(LiveState, updateSendsChangesOnceHelloEverything) {
 
 TEST(LiveState, longTrailIsThinnedOverItsWholeLength) {
   LiveState state;
-  std::size_t told = 0;
+  std::size_t reported = 0;
   bool anew = false;
   for (int i = 0; i < 50'000; ++i) {
     state.add(at(i));
     if (i % 100 != 0) continue;
     const json update = json::parse(state.update(kNow, -1));
     const auto from = update["trail_from"].get<std::size_t>();
-    anew = anew || from < told;
-    told = from + update["trail"].size();
+    anew = anew || from < reported;
+    reported = from + update["trail"].size();
   }
   const json trail = json::parse(state.hello(kNow))["trail"];
   EXPECT_TRUE(anew);
@@ -95,7 +95,7 @@ TEST(LiveState, longTrailIsThinnedOverItsWholeLength) {
   EXPECT_GE(trail.size(), LiveTrail::kMax / 2);
   EXPECT_EQ(trail.front()[2], 0.0);
   EXPECT_GE(trail.back()[2].get<double>(), 49'900.0);
-  EXPECT_GE(told + 100, trail.size()) << "a viewer who was there has as much";
+  EXPECT_GE(reported + 100, trail.size()) << "a viewer who was there has as much";
 }
 
 /// Number of places on the map with a status, and the longest step between two.

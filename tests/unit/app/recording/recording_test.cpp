@@ -172,7 +172,7 @@ TEST(Recording, aDiskThatFailsForAWhileIsTriedAgainInTheSameFile) {
   const auto chunks = recording.counters().chunks;
   await_chunks(recording, chunks + 1);  // within RecordingFiles::kRetry
   recording.close();
-  const auto errors = recording.take_errors();
+  const auto errors = recording.pop_errors();
   ASSERT_EQ(errors.size(), 2U);
   EXPECT_NE(errors[0].find("Input/output error"), std::string::npos) << errors[0];
   EXPECT_EQ(numbers(folder / "drive.mcap"), sequence(0, 200));
@@ -192,7 +192,7 @@ TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {
   const RecordingCounters c = recording.counters();
   EXPECT_EQ(c.lost, 2000U);
   EXPECT_EQ(c.messages, 0U);
-  const auto errors = recording.take_errors();
+  const auto errors = recording.pop_errors();
   ASSERT_EQ(errors.size(), 2U);
   EXPECT_NE(errors[1].find("no summary"), std::string::npos) << errors[1];
   EXPECT_TRUE(numbers(folder / "drive.mcap").empty());
@@ -215,7 +215,7 @@ TEST(Recording, whatTheDiskTookAndDidNotKeepIsCountedAndSaid) {
   recording.close();
   EXPECT_EQ(recording.counters().lost, 1U) << "of the chunk before";
   EXPECT_EQ(recording.counters().files, 1U);
-  const auto errors = recording.take_errors();
+  const auto errors = recording.pop_errors();
   ASSERT_EQ(errors.size(), 1U);
   EXPECT_NE(errors[0].find("did not keep what it had taken (Input/output error): 1 messages"),
             std::string::npos)

@@ -32,11 +32,11 @@ TEST(SignalGuard, PutsTheFormerHandlerBack) {
 
 TEST(SignalGuard, SigusrAsksForACalibrationEachTimeAndStopsNothing) {
   const SignalGuard guard;
-  EXPECT_FALSE(guard.take_calibration_request());
+  EXPECT_FALSE(guard.poll_calibration_request());
   for (int i = 0; i < 3; ++i) {
     std::raise(SIGUSR1);
-    EXPECT_TRUE(guard.take_calibration_request());
-    EXPECT_FALSE(guard.take_calibration_request());
+    EXPECT_TRUE(guard.poll_calibration_request());
+    EXPECT_FALSE(guard.poll_calibration_request());
   }
   EXPECT_FALSE(guard.stop_requested());
 }

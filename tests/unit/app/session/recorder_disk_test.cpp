@@ -13,7 +13,7 @@ namespace vergence::app {
 namespace {
 
 /// Sentences of the events of one kind.
-std::vector<std::string> told(const std::filesystem::path& folder, const std::string& kind) {
+std::vector<std::string> reported(const std::filesystem::path& folder, const std::string& kind) {
   std::vector<std::string> messages;
   for (const std::string& line : lines_of(folder / "events.jsonl")) {
     const auto event = nlohmann::json::parse(line);
@@ -42,12 +42,12 @@ TEST(Recorder, aDiskThatIsFullForAWhileCostsNothingThatMemoryHolds) {
   EXPECT_EQ(totals->lost_lines, 0U);
   EXPECT_EQ(lines_of(folder / "trajectory.tum").size(), 100U);
   EXPECT_EQ(lines_of(folder / "poses.csv").size(), 101U);
-  EXPECT_EQ(told(folder.path(), "disk_full").size(), 1U);
-  EXPECT_EQ(told(folder.path(), "disk_recovered"),
+  EXPECT_EQ(reported(folder.path(), "disk_full").size(), 1U);
+  EXPECT_EQ(reported(folder.path(), "disk_recovered"),
             std::vector<std::string>{"the disk takes lines again; 0 were lost"});
   const auto full = nlohmann::json::parse(lines_of(folder / "events.jsonl").front());
   EXPECT_EQ(full["stamp_ns"], kStamp + 20 * std::int64_t{50'000'000});
-  const auto errors = recorder.take_errors();
+  const auto errors = recorder.pop_errors();
   ASSERT_EQ(errors.size(), 1U) << "once, not for every file";
   EXPECT_NE(errors[0].find("No space left on device"), std::string::npos) << errors[0];
 }
@@ -66,7 +66,7 @@ TEST(Recorder, aDiskThatIsFullForLongLosesWholeLinesAndSaysHowMany) {
   const std::size_t written =
       lines_of(folder / "trajectory.tum").size() + lines_of(folder / "poses.csv").size() - 1;
   EXPECT_EQ(written + totals->lost_lines, 2 * kFrames);
-  EXPECT_EQ(told(folder.path(), "disk_recovered"),
+  EXPECT_EQ(reported(folder.path(), "disk_recovered"),
             std::vector<std::string>{"the disk takes lines again; " +
                                      std::to_string(totals->lost_lines) + " were lost"});
 }

@@ -35,7 +35,7 @@ struct StopAndGo {
     given.sigma_noise[1] = {2e-4, 4e-4, 2e-4, 1e-5, 2e-3, 4e-3};
   }
 
-  [[nodiscard]] static std::string told(const PoseSample& s, const Estimator& estimator) {
+  [[nodiscard]] static std::string reported(const PoseSample& s, const Estimator& estimator) {
     std::string line = std::to_string(s.frame) + ' ' + std::string(to_string(s.status)) + ' ' +
                        std::string(to_string(s.reason)) + '\n';
     for (const EstimatorEvent& e : estimator.events()) line += std::string(e.why) + '\n';
@@ -66,7 +66,7 @@ TEST(LateCamera, thatRepeatedAnImageWhileStandingIsNotBelievedUntilTheRigHasDriv
   std::string story;
   int ok_standing = 0, suspected = 0;
   d.drive(true, [&](int i, const PoseSample& s, const Estimator& e) {
-    story += StopAndGo::told(s, e);
+    story += StopAndGo::reported(s, e);
     if (i > StopAndGo::kRepeat && i < StopAndGo::kGo) ok_standing += s.status == PoseStatus::ok;
     if (i < StopAndGo::kMoves) return;
     EXPECT_NE(s.status, PoseStatus::ok) << i << '\n' << story;
@@ -81,7 +81,7 @@ TEST(LateCamera, thatOnlyRepeatedAnImageIsBelievedOnceADozenFramesHaveShownIt) {
   std::string story;
   int first_ok = -1, suspected = 0;
   d.drive(false, [&](int i, const PoseSample& s, const Estimator& e) {
-    story += StopAndGo::told(s, e);
+    story += StopAndGo::reported(s, e);
     if (i < StopAndGo::kMoves) return;
     suspected += s.reason == Reason::image_repeated;
     if (s.status == PoseStatus::ok && first_ok < 0) first_ok = i;

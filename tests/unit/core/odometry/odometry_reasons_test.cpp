@@ -44,7 +44,7 @@ TEST(OdometryReasons, camerasThatDoNotConfirmEachOtherAreToldAtOnceAndNoLonger) 
   test::Corridor corridor;
   test::LinkedOdometry f(corridor.rig());
   for (int i = 0; i < kSettled; ++i) ASSERT_TRUE(f.odometry.process(corridor.frame(i)).posed);
-  int told = 0;
+  int reported = 0;
   for (int i = kSettled; i < kSettled + 4; ++i) {
     RigFrame frame = corridor.frame(i);
     features::test::Image half = noise(frame.images[1]);
@@ -52,10 +52,10 @@ TEST(OdometryReasons, camerasThatDoNotConfirmEachOtherAreToldAtOnceAndNoLonger) 
       for (int x = 0; x < half.view().width / 4; ++x) half.at(x, y) = frame.images[1].row(y)[x];
     frame.images[1] = half.view();
     const FrameOutcome out = f.odometry.process(frame);
-    if (out.reason == Reason::no_stereo_matches) ++told;
+    if (out.reason == Reason::no_stereo_matches) ++reported;
     EXPECT_NE(out.status, PoseStatus::ok) << i;
   }
-  EXPECT_GT(told, 0);
+  EXPECT_GT(reported, 0);
   FrameOutcome out;
   for (int i = 0; i < 10; ++i)
     out = f.odometry.process(corridor.frame_at(kSettled + 4 + i, kSettled + 3));

@@ -16,9 +16,9 @@ TEST(Clock, ofAMomentTheTrialCountsThatWasNotHeldUp) {
   const auto day = [&] {
     ++trial;
     if (trial == 2) now = now + Duration::milliseconds(7);
-    const Stamp told(now.ns() + 1'000'000'000'000);
+    const Stamp reported(now.ns() + 1'000'000'000'000);
     if (trial == 1) now = now + Duration::milliseconds(7);
-    return told;
+    return reported;
   };
   const HostMoment moment = tightest_moment(day, host);
   EXPECT_LE(std::abs(moment.day.ns() - moment.host.ns() - 1'000'000'000'000), 1000);

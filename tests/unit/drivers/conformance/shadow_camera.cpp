@@ -108,12 +108,12 @@ void ShadowCamera::start() {
 
 void ShadowCamera::stop() {
   camera_.stop();
-  const std::uint64_t told = notifier_.told();
+  const std::uint64_t reported = notifier_.reported();
   if (state_ != State::unconfigured) state_ = State::stopped;
   Frame frame;
   EXPECT_EQ(camera_.wait(Duration::milliseconds(5), &frame), DeviceStatus::stopped);
   camera_.stop();
-  EXPECT_EQ(notifier_.told(), told) << "told after stop() returned";
+  EXPECT_EQ(notifier_.reported(), reported) << "told after stop() returned";
 }
 
 void ShadowCamera::trigger_if_asked() {

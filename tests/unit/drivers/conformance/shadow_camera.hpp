@@ -11,7 +11,7 @@ namespace vergence::test {
 class CountingNotifier final : public Notifier {
  public:
   void notify() noexcept override { reported_.fetch_add(1); }
-  [[nodiscard]] std::uint64_t told() const noexcept { return reported_.load(); }
+  [[nodiscard]] std::uint64_t reported() const noexcept { return reported_.load(); }
 
  private:
   std::atomic<std::uint64_t> reported_{0};

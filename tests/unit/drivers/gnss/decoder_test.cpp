@@ -145,11 +145,11 @@ TEST(GnssDecoder, theTimeBeforeTheFirstFixIsNoWitness) {
     for (int i = 0; i < 600; ++i) {
       const bool fix = i >= 300;
       const std::int64_t since = i * 100'000'000LL,
-                         told = since + (fix ? 0 : ahead_ms * 1'000'000LL);
+                         reported = since + (fix ? 0 : ahead_ms * 1'000'000LL);
       test::PvtBytes pvt;
-      pvt.put(9, 1, 23 + told / 60'000'000'000);
-      pvt.put(10, 1, told / 1'000'000'000 % 60);
-      pvt.put(16, 4, told % 1'000'000'000);
+      pvt.put(9, 1, 23 + reported / 60'000'000'000);
+      pvt.put(10, 1, reported / 1'000'000'000 % 60);
+      pvt.put(16, 4, reported % 1'000'000'000);
       if (!fix) pvt.put(20, 1, 0), pvt.put(21, 1, 0);
       const HostStamp truth(7'000'000'000 + since);
       const auto all = read(&d, pvt.frame(), truth + Duration::milliseconds(30 + (i * 37) % 61));

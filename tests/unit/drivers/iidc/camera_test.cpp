@@ -35,7 +35,7 @@ TEST_F(IidcCamera, FramesCarryCounterStampArrivalAndTheirPixels) {
     EXPECT_EQ(view.at(100, 9), (9 + n) & 0xFFU);
     c.camera->release(f.slot);
   }
-  EXPECT_EQ(notifier.told(), 5U);
+  EXPECT_EQ(notifier.reported(), 5U);
   Frame f;
   EXPECT_EQ(c.camera->wait(Duration{}, &f), DeviceStatus::timeout);
   const CameraStatistics s = c.camera->statistics();

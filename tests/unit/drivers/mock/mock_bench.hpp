@@ -64,7 +64,7 @@ struct MockBench {
   std::array<CameraStatistics, 2> statistics;
   std::vector<InsReading> readings;
   std::vector<Pulse> pulses;
-  int board_gone = 0;
+  int board_disconnected = 0;
 
  private:
   /// True: it has ended.
@@ -92,17 +92,17 @@ struct MockBench {
         EXPECT_EQ(board.pause(5), DeviceStatus::ok) << "one is under way: nothing more";
       }
     } else if (status == DeviceStatus::disconnected) {
-      if (!board_is_gone_) {
-        ++board_gone;
+      if (!board_is_disconnected_) {
+        ++board_disconnected;
         EXPECT_EQ(board.pause(5), DeviceStatus::disconnected);
       }
       status = board.start(nullptr);
-      board_is_gone_ = status != DeviceStatus::ok;
+      board_is_disconnected_ = status != DeviceStatus::ok;
     }
     return status == DeviceStatus::ended;
   }
 
-  bool board_is_gone_ = false;
+  bool board_is_disconnected_ = false;
 };
 
 }  // namespace vergence::mock

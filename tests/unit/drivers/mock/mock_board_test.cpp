@@ -70,12 +70,12 @@ TEST(MockBoard, feedbackTellsEveryExposureAndThatOneNeverCame) {
       EXPECT_EQ(p.exposure[1].start, Duration::microseconds(35));
       EXPECT_EQ(p.exposure[1].end, Duration::microseconds(35) + kExposure);
     }
-    const Duration told = p.arrival - b.rig->start() - b.rig->pulse_times()[p.number];
-    EXPECT_GT(told, kExposure);
+    const Duration reported = p.arrival - b.rig->start() - b.rig->pulse_times()[p.number];
+    EXPECT_GT(reported, kExposure);
     if (left && right) {
-      EXPECT_LT(told, kExposure + Duration::milliseconds(4));
+      EXPECT_LT(reported, kExposure + Duration::milliseconds(4));
     }
-    EXPECT_LT(told, kPeriod + Duration::milliseconds(3));
+    EXPECT_LT(reported, kPeriod + Duration::milliseconds(3));
   }
 }
 
@@ -91,14 +91,14 @@ TEST(MockBoard, aRebootedBoardCountsAndTicksFromZeroWithAnotherBoot) {
   EXPECT_EQ(b.rig->pulse_times()[40], Duration::seconds(2.5));
   EXPECT_EQ(b.frames[0].size(), 71U) << "no pulse, no exposure";
   EXPECT_EQ(b.frames[0].back().frame.counter, 70U) << "the cameras know nothing of it";
-  EXPECT_EQ(b.board_gone, 0);
+  EXPECT_EQ(b.board_disconnected, 0);
   EXPECT_EQ(b.rig->trigger().statistics().reboots, 1U);
 }
 
 TEST(MockBoard, anUnpluggedBoardStopsWithItsLineUnlessItHasASupplyOfItsOwn) {
   MockBench bare({"board_gone@2 duration_s=0.5"}, four_seconds());
   bare.drive();
-  EXPECT_EQ(bare.board_gone, 1);
+  EXPECT_EQ(bare.board_disconnected, 1);
   EXPECT_EQ(bare.frames[0].size(), 71U);
   ASSERT_EQ(bare.pulses.size(), 71U);
   EXPECT_EQ(bare.pulses[40].number, 0U);
@@ -106,7 +106,7 @@ TEST(MockBoard, anUnpluggedBoardStopsWithItsLineUnlessItHasASupplyOfItsOwn) {
 
   MockBench powered({"board_gone@2 duration_s=0.5 powered=1"}, four_seconds());
   powered.drive();
-  EXPECT_EQ(powered.board_gone, 1);
+  EXPECT_EQ(powered.board_disconnected, 1);
   EXPECT_EQ(powered.frames[0].size(), 81U) << "pulses nobody heard of";
   ASSERT_EQ(powered.pulses.size(), 71U);
   EXPECT_EQ(powered.pulses[40].number, 50U);

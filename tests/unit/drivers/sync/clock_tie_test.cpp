@@ -23,7 +23,7 @@ TEST(ClockTie, findsTheRateOfTwoCrystals) {
   // Without noise a line through the pairs is exact, but for the rounding to nanoseconds: half a
   // nanosecond a pair at the far end of the lever, which is as long ahead as it was behind.
   const DeviceStamp later = stamp + kInterval * 50;
-  EXPECT_LE(magnitude(tie.edge_of(later) - source_of(later, kDrift)).ns(), 10);
+  EXPECT_LE(magnitude(tie.to_edge(later) - source_of(later, kDrift)).ns(), 10);
 }
 
 TEST(ClockTie, theGateGrowsWithTheTimeSinceTheNewestPairAndNeverReachesAFifthOfTheInterval) {

@@ -100,13 +100,13 @@ TEST(XsensDevice, aPauseLosesNoReadingOnEitherSideAndTheFirstAfterItIsMarked) {
   const auto rest = rig.readings();
   all.insert(all.end(), rest.begin(), rest.end());
   const auto made = gap_in(rig.simulator->sample_times_ns(), [](std::int64_t ns) { return ns; });
-  const auto told = gap_in(all, [](const InsReading& r) { return r.measured.ns(); });
+  const auto reported = gap_in(all, [](const InsReading& r) { return r.measured.ns(); });
   EXPECT_GE(made.second - made.first, 200'000'000);
   EXPECT_LT(made.second - made.first, 400'000'000);
   const std::int64_t origin = rig.simulator->sample_time_origin_ns();
-  EXPECT_EQ(told.first - origin, made.first);
-  EXPECT_EQ(told.second - origin, made.second);
-  for (const InsReading& r : all) EXPECT_EQ(r.resumed, r.measured.ns() == told.second);
+  EXPECT_EQ(reported.first - origin, made.first);
+  EXPECT_EQ(reported.second - origin, made.second);
+  for (const InsReading& r : all) EXPECT_EQ(r.resumed, r.measured.ns() == reported.second);
   const auto marked =
       std::count_if(all.begin(), all.end(), [](const InsReading& r) { return r.quality.sync_out; });
   EXPECT_NEAR(static_cast<double>(marked), static_cast<double>(all.size()) / 4, 3);

@@ -272,11 +272,11 @@ TEST(BoardInputs, insEdgesOfTheAskedKindAreCountedAndStamped) {
   for (std::uint64_t k = 0; k < 20; ++k)
     b.edge_at(1'000'000 + (k + 1) * 2500 * kUs, board_input_ins, k % 2 == 0);
   b.run_for_us(100'000);
-  const auto told = b.take(trigger_ins);
-  ASSERT_EQ(told.size(), 10U);
+  const auto reported = b.take(trigger_ins);
+  ASSERT_EQ(reported.size(), 10U);
   for (std::uint32_t k = 0; k < 10; ++k) {
     TriggerEdge e{};
-    ASSERT_TRUE(trigger_get_edge(told[k].payload, told[k].size, &e));
+    ASSERT_TRUE(trigger_get_edge(reported[k].payload, reported[k].size, &e));
     EXPECT_EQ(e.boot_id, VirtualBoard::kBootId);
     EXPECT_EQ(e.count, k);
     EXPECT_EQ(e.tick, (2 * k + 2) * 2500U);

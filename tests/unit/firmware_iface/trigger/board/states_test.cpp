@@ -144,10 +144,10 @@ TEST(BoardStates, aChangeOfStateIsToldAtOnce) {
   b.run_for_us(450'000);
   EXPECT_EQ(b.take(trigger_status).size(), 0U) << "nothing new";
   b.run_for_us(2'000);
-  const auto told = b.take(trigger_status);
-  ASSERT_EQ(told.size(), 1U) << "the pause has ended by itself";
+  const auto reported = b.take(trigger_status);
+  ASSERT_EQ(reported.size(), 1U) << "the pause has ended by itself";
   TriggerStatus s{};
-  ASSERT_TRUE(trigger_get_status(told[0].payload, told[0].size, &s));
+  ASSERT_TRUE(trigger_get_status(reported[0].payload, reported[0].size, &s));
   EXPECT_EQ(s.state, trigger_running);
 }
 

@@ -158,9 +158,9 @@ TEST_F(Disciplined, edgesThatFitNothingAreReportedButNotFollowed) {
     if (k % 3 == 0) b.edge_at(pps.count(static_cast<double>(k) + 0.3), board_input_pps, true);
   b.frames.clear();
   feed(30, 60);
-  std::size_t told = 0;
-  for (const TriggerFrame& f : b.frames) told += f.type == trigger_pps ? 1U : 0U;
-  EXPECT_EQ(told, 40U);
+  std::size_t reported = 0;
+  for (const TriggerFrame& f : b.frames) reported += f.type == trigger_pps ? 1U : 0U;
+  EXPECT_EQ(reported, 40U);
   EXPECT_EQ(b.status().pps_locked, 1);
   EXPECT_LT(std::abs(error_us(59.4) - before), 2);
 }
@@ -217,14 +217,14 @@ TEST(BoardTicks, whatWasStampedBeforeARateChangedKeepsItsTick) {
   tick_init(&d, 84'000'000, 200, 0);
   const std::uint64_t second = 84'000'000 + 12'600;  // 150 ppm
   for (std::uint64_t k = 1; k < 4; ++k) EXPECT_TRUE(tick_pps(&d, k * second, k * second + 100));
-  const std::uint64_t edge = 4 * second, told = edge + 42'000'000;  // told half a second later
+  const std::uint64_t edge = 4 * second, reported = edge + 42'000'000;  // told half a second later
   const std::uint64_t between = edge + 40'000'000;
-  const std::uint64_t tick = tick_of(&d, between), at_told = tick_of(&d, told);
-  EXPECT_TRUE(tick_pps(&d, edge, told));
+  const std::uint64_t tick = tick_of(&d, between), at_told = tick_of(&d, reported);
+  EXPECT_TRUE(tick_pps(&d, edge, reported));
   EXPECT_TRUE(d.locked);
   EXPECT_EQ(tick_of(&d, between), tick);
-  EXPECT_EQ(tick_of(&d, told), at_told);
-  EXPECT_EQ(tick_of(&d, told + second) - at_told, 1'000'000U);
+  EXPECT_EQ(tick_of(&d, reported), at_told);
+  EXPECT_EQ(tick_of(&d, reported + second) - at_told, 1'000'000U);
 }
 
 TEST_F(Disciplined, aSignalThatIsNoPpsIsNeverLockedTo) {
