@@ -295,10 +295,10 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   append_distortion(line, lens);
   append_distortion(line, rig.intrinsics[0]);
   if (c.decided && c.reference_depth_m > 0)
-    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.reference_depth_m,
-                   c.depth_sigma_percent, c.depth_error_percent, c.verified, c.lenses);
+    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d}", c.reference_depth_m, c.depth_sigma_percent,
+                   c.depth_error_percent, c.verified);
   else
-    *line += ",,,,,";
+    *line += ",,,,";
   *line += '\n';
 }
 
