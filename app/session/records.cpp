@@ -161,6 +161,11 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
                           *begin != 0 && *why != 0 ? ": " : "", why);
     r.set_message(text.data());
     if (words.field != nullptr) r.fields[0] = {words.field, event.value};
+    if (const calibration::ChangeEvidence& e = event.evidence; e.log_likelihood_ratio > 0) {
+      r.fields[1] = {"log_likelihood_ratio", e.log_likelihood_ratio};
+      r.fields[2] = {"shift_px", e.shift_px};
+      r.fields[3] = {"rotation_mrad", e.rotation_mrad};
+    }
   }
   return r;
 }

@@ -69,10 +69,10 @@ void Estimator::Parts::seek(CalibrationCause cause, std::uint64_t onset,
   odometry.unlink();
 }
 
-void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset,
-                             const RigFrame& frame) noexcept {
+void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame,
+                             const calibration::ChangeEvidence& evidence) noexcept {
   note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause),
-       static_cast<double>(frame.number - std::min(onset, frame.number)));
+       static_cast<double>(frame.number - std::min(onset, frame.number)), evidence);
   seek(cause, onset, frame);
 }
 
@@ -126,7 +126,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     give_up_calibration(frame,
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
   } else if (v.kind != K::quiet) {
-    doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
+    doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame, v.evidence);
   }
 }
 
