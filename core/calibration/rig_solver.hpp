@@ -21,14 +21,14 @@ enum class RigSolveStatus : std::uint8_t {
 };
 
 /// Prior sigma of every focal length in a solve with `measure_focal_lengths`, as a share of it.
-inline constexpr double kFocalDoubt = 0.1;
+inline constexpr double kFocalPriorSigma = 0.1;
 
 /// Start, prior and free parameters of a solve. `known` and `given` are read during solve() only.
 /// CalibrationOptions::intrinsics chooses the intrinsics that are estimated with the transforms:
 /// with `full`, those of the further cameras and the distortion of all.
 struct RigSolveRequest {
   RigCalibration rig{};  // cameras, intrinsics, baseline; T_camera_left with from_rig
-  /// Also estimates every focal length with the prior sigma kFocalDoubt, the left camera's
+  /// Also estimates every focal length with the prior sigma kFocalPriorSigma, the left camera's
   /// included.
   bool measure_focal_lengths = false;
   bool from_rig = false;  // begin with T_camera_left of `rig`; false: with those of the logged

@@ -26,15 +26,16 @@ bool SolutionReview::held_out_enough() const noexcept {
          calibration::held_out_enough(context_.log, solved_.newest);
 }
 
-calibration::Assessment SolutionReview::assess(const RigCalibration& claimed,
-                                               calibration::ClaimSource source) const noexcept {
-  return calibration::assess(solved_.rig, claimed, source, context_.log, solved_.newest,
+calibration::Assessment SolutionReview::assess(
+    const RigCalibration& current, calibration::CalibrationOrigin source) const noexcept {
+  return calibration::assess(solved_.rig, current, source, context_.log, solved_.newest,
                              context_.options.calibration, context_.options.odometry.pixel_sigma);
 }
 
 void SolutionReview::assess_next(CalibrationDecision* decision) const noexcept {
   if (solved_.status != RigSolveStatus::ok) return;
-  const calibration::Assessment then = assess(solved_.rig, calibration::ClaimSource::this_drive);
+  const calibration::Assessment then =
+      assess(solved_.rig, calibration::CalibrationOrigin::this_drive);
   decision->reference_depth_m = then.depth_m;
   decision->depth_sigma_percent = then.sigma_percent;
   // All distances are off by what the focal length is off by.

@@ -12,8 +12,8 @@ class SolutionReview {
   struct Context {
     const EstimatorOptions& options;
     const RigCalibration& nominal;
-    const RigCalibration* in_use;     // null: there is none
-    calibration::ClaimSource source;  // of that
+    const RigCalibration* in_use;           // null: there is none
+    calibration::CalibrationOrigin source;  // of that
     const calibration::TrackLog& log;
     const calibration::FocalCheck& focal;
     bool may_have_changed = true;  // AcceptanceInput::may_have_changed
@@ -26,9 +26,9 @@ class SolutionReview {
   /// True if enough frames that were not in the solve are logged to test the solution; none are
   /// needed if it failed.
   [[nodiscard]] bool held_out_enough() const noexcept;
-  /// Compares the solution with the calibration `claimed`.
-  [[nodiscard]] calibration::Assessment assess(const RigCalibration& claimed,
-                                               calibration::ClaimSource source) const noexcept;
+  /// Compares the solution with the calibration `current`.
+  [[nodiscard]] calibration::Assessment assess(
+      const RigCalibration& current, calibration::CalibrationOrigin source) const noexcept;
   /// Compares the solution with itself as the calibration in use after this decision.
   void assess_next(CalibrationDecision* decision) const noexcept;
   /// Makes a CalibrationDecision with the data of the solution; the outcome is left to the caller.
