@@ -37,7 +37,6 @@ calibration::AcceptanceInput make_gate_input(const calibration::RigSolution& s,
   calibration::AcceptanceInput q;
   q.solution = &s;
   q.nominal = &given.nominal;
-  q.lenses = true;
   q.pixel_sigma = c.odometry.pixel_sigma;
   q.must_be_better = false;
   return q;
