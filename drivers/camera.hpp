@@ -13,28 +13,37 @@
 namespace vergence {
 
 enum class CameraTrigger : std::uint8_t {
-  hardware,  // every pulse at the trigger input is one exposure
-  software,  // the driver asks for each
-  free,      // the camera's own clock
+  /// Every pulse at the trigger input is one exposure.
+  hardware,
+  /// The driver requests each exposure.
+  software,
+  /// The camera's own clock starts exposures.
+  free,
 };
 /// The configuration's value, as `hardware`.
 [[nodiscard]] const char* to_string(CameraTrigger) noexcept;
 
 /// Requested or applied configuration of a camera.
 struct CameraConfiguration {
-  int width = 0;       // px
-  int height = 0;      // px
-  double rate_hz = 0;  // exposures a second; with a hardware trigger the rate to be ready for
+  int width = 0;   // px
+  int height = 0;  // px
+  /// Exposure rate; with a hardware trigger the maximum rate of the pulses.
+  double rate_hz = 0;
   Duration exposure{};
   double gain_db = 0;
   CameraTrigger trigger = CameraTrigger::hardware;
-  int offset_x = 0;            // px, of the region read out, on the sensor
-  int offset_y = 0;            // px
-  std::string pixel_format{};  // the device's own name (Mono8, BayerGB8, GREY …); empty: the driver
-                               // takes the cheapest that gives grey
-  CameraOptions options{};  // what only this kind of camera has; another kind's are unsupported
-  int sharing = 1;  // cameras of the rig on this camera's link or bus, itself included: its share
-                    // of the bandwidth
+  /// Offset of the region of interest on the sensor, px.
+  int offset_x = 0;
+  /// Offset of the region of interest on the sensor, px.
+  int offset_y = 0;
+  /// Name of the device (Mono8, BayerGB8, GREY …); if empty, the driver selects the cheapest format
+  /// that gives grey.
+  std::string pixel_format{};
+  /// Options of this kind of camera; those of another kind are unsupported.
+  CameraOptions options{};
+  /// Number of cameras of the rig on this camera's link or bus, itself included; it determines its
+  /// share of the bandwidth.
+  int sharing = 1;
 };
 
 /// Validates a request for any camera: empty, or the problem, as in `a
@@ -50,28 +59,38 @@ struct ExposureSetting {
 
 enum class FrameStatus : std::uint8_t {
   complete,
-  incomplete,  // parts of the image never came; their pixels mean nothing
+  /// Parts of the image never came; their pixels are undefined.
+  incomplete,
 };
 
 /// One exposure, handed out by wait().
 struct Frame {
   FrameSlot slot = 0;
-  std::uint64_t counter =
-      0;  // exposures since start(), the first is 0, unwrapped; gaps are frames that never came
-  DeviceStamp exposure_start{};  // by the camera's clock
-  HostStamp arrival{};           // when the last byte was here
-  Duration exposure{};           // as this frame had it
+  /// Exposures since start(), from 0, unwrapped; gaps are frames that never came.
+  std::uint64_t counter = 0;
+  /// Start of the exposure by the camera's clock.
+  DeviceStamp exposure_start{};
+  /// Time when the last byte arrived.
+  HostStamp arrival{};
+  /// Exposure time of this frame.
+  Duration exposure{};
   FrameStatus status = FrameStatus::complete;
-  double gain_db = 0;  // as this frame had it
+  /// Gain of this frame.
+  double gain_db = 0;
 };
 
 /// Counters since open; all only grow.
 struct CameraStatistics {
-  std::uint64_t delivered = 0;  // handed out by wait()
-  std::uint64_t torn = 0;       // of these
-  std::uint64_t underruns = 0;  // exposures dropped because no slot was free
-  std::uint64_t lost = 0;       // exposures known to have happened that never arrived
-  std::uint64_t starts = 0;     // successful start() calls
+  /// Frames returned by wait().
+  std::uint64_t delivered = 0;
+  /// Delivered frames that are incomplete.
+  std::uint64_t torn = 0;
+  /// Exposures dropped because no slot was free.
+  std::uint64_t underruns = 0;
+  /// Exposures that happened and never arrived.
+  std::uint64_t lost = 0;
+  /// Successful start() calls.
+  std::uint64_t starts = 0;
 };
 
 /// One opened camera: gige, iidc, v4l2 and mock, all behind this.
@@ -108,7 +127,8 @@ struct CameraStatistics {
 ///            *arrival.
 class CameraDevice {
  public:
-  virtual ~CameraDevice() = default;  // stops
+  /// Stops the camera.
+  virtual ~CameraDevice() = default;
 
   [[nodiscard]] virtual const DeviceInfo& info() const noexcept = 0;
   /// While not streaming and with every slot released, else `busy`. *actual (may be null): what the

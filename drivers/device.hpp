@@ -15,34 +15,50 @@ using DeviceStamp = Instant<struct DeviceClock>;
 
 enum class DeviceStatus : std::uint8_t {
   ok,
-  timeout,            // nothing came within the limit
-  stopped,            // not streaming: stop() was called, or start() never
-  ended,              // the source is finite and at its end (mock drive); no more will come
-  disconnected,       // unplugged, powered off, no answer; start() may bring it back
-  not_found,          // no device with that serial
-  no_permission,      // the system does not let us
-  busy,               // somebody else has it
-  unsupported,        // the device cannot do what was asked (size, rate, trigger)
-  bad_configuration,  // an impossible value was requested: zero rate, negative exposure
-  no_bandwidth,       // the bus has no room for this stream
-  failed,             // the system or the device refused for another reason
+  /// No data came within the limit.
+  timeout,
+  /// Not streaming: stop() was called, or start() never was.
+  stopped,
+  /// A finite source (simulated drive) is at its end; no more data will come.
+  ended,
+  /// Unplugged, powered off or unresponsive; start() may reconnect.
+  disconnected,
+  /// No device has that serial number.
+  not_found,
+  /// The system denies access.
+  no_permission,
+  /// The device is in use by another program.
+  busy,
+  /// The device does not support the request (size, rate, trigger).
+  unsupported,
+  /// An impossible value was requested: zero rate, negative exposure.
+  bad_configuration,
+  /// The bus has too little bandwidth left for this stream.
+  no_bandwidth,
+  /// The system or the device refused for another reason.
+  failed,
 };
 [[nodiscard]] std::string_view to_string(DeviceStatus) noexcept;
 
 /// Identity of a device for lists and messages.
 struct DeviceInfo {
-  std::string driver;  // mock, gige, …
+  /// Name of the driver: mock, gige, …
+  std::string driver;
   std::string serial;
   std::string model;
-  std::string place;  // address, port, bus path
+  /// Address, port or bus path.
+  std::string place;
 };
 
 /// Timing of the path from measurement to host, for the configuration in
 /// force.
 struct DeviceTiming {
-  Duration min_delay{};  // from the stamped instant to the arrival, at best
-  Duration delay_spread = Duration::milliseconds(2);  // by how much a delay usually exceeds it
-  Duration resolution = Duration::microseconds(1);    // of the device's stamps
+  /// Minimum delay from the stamped instant to the arrival.
+  Duration min_delay{};
+  /// Usual excess of a delay over the minimum.
+  Duration delay_spread = Duration::milliseconds(2);
+  /// Resolution of the device's stamps.
+  Duration resolution = Duration::microseconds(1);
 };
 
 /// Callback of a driver when something can be taken. One Notifier may serve several devices.

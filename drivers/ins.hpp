@@ -12,13 +12,19 @@ namespace vergence {
 
 /// Status of a device and its receiver next to the sample.
 struct InsQuality {
-  std::uint32_t status = 0;     // the device's own word; bits in its protocol's header
-  bool utc_valid = false;       // the device knows UTC, leap seconds too
-  std::int64_t utc_ns = 0;      // of the sample, since 1970; 0: not told
-  std::uint8_t satellites = 0;  // used; 0: not told
-  float position_dop = 0;       // 0: not told
+  /// Status word of the device; its protocol's header has the bits.
+  std::uint32_t status = 0;
+  /// True if the device has UTC, with leap seconds.
+  bool utc_valid = false;
+  /// UTC of the sample in ns since 1970; 0 if unknown.
+  std::int64_t utc_ns = 0;
+  /// Number of satellites used; 0 if unknown.
+  std::uint8_t satellites = 0;
+  /// Dilution of precision of the position; 0 if unknown.
+  float position_dop = 0;
   bool filter_valid = false;
-  bool sync_out = false;  // a pulse left SyncOut with this sample
+  /// True if a pulse left SyncOut with this sample.
+  bool sync_out = false;
 };
 
 /// One reading as it came. `sample.stamp` and `sample.stamp_error` are not set yet: the host's
@@ -26,23 +32,32 @@ struct InsQuality {
 struct InsReading {
   InsSample sample{};
   InsQuality quality{};
-  DeviceStamp measured{};  // by the INS's clock, unwrapped; grows while the device is not gone
-  HostStamp arrival{};     // when the last byte was here
-  bool resumed = false;    // the first after a pause()
-  // A driver that knows how bytes travel (when each was on the wire) maps the stamp itself; else a
+  /// Time of the measurement by the INS's clock, unwrapped; it increases until a disconnect.
+  DeviceStamp measured{};
+  /// Time when the last byte arrived.
+  HostStamp arrival{};
+  /// True for the first reading after a pause().
+  bool resumed = false;
+  // A driver with the time of each byte on the wire maps the stamp itself; else a
   // ClockMapper does, from `arrival`.
   bool mapped = false;
-  HostStamp host{};       // `measured` on the host's clock
-  Duration host_error{};  // |true − host| is below this
+  /// `measured` on the host's clock.
+  HostStamp host{};
+  /// Upper bound of |true − host|.
+  Duration host_error{};
 };
 
 /// Counters since open; all only grow.
 struct InsStatistics {
   std::uint64_t delivered = 0;
-  std::uint64_t lost = 0;       // gaps in the device's count
-  std::uint64_t malformed = 0;  // packets that made no sense
-  std::uint64_t restarts = 0;   // the device restarted, or its clock was set
-  std::uint64_t overruns = 0;   // readings that found the ring full (live); never silent
+  /// Gaps in the device's count.
+  std::uint64_t lost = 0;
+  /// Packets that could not be decoded.
+  std::uint64_t malformed = 0;
+  /// Restarts of the device and steps of its clock.
+  std::uint64_t restarts = 0;
+  /// Readings dropped because the ring was full (live only).
+  std::uint64_t overruns = 0;
   std::uint64_t starts = 0;
 };
 

@@ -29,7 +29,7 @@ class Stream {
   [[nodiscard]] bool push(const Delivery<T>& d) noexcept {
     if (!ring_.push(d)) return false;
     const std::lock_guard lock(
-        mutex_);  // stop() waits for it: nobody is told after it has returned
+        mutex_);  // stop() waits for it: there are no notifications after it has returned
     filled_.notify_one();
     if (notifier_ != nullptr) notifier_->notify();
     return true;
@@ -71,7 +71,7 @@ class Stream {
   }
   void stop() noexcept {
     streaming_.store(false, std::memory_order_release);
-    notify_release();  // a producer that waits for room has nobody who would make any
+    notify_release();  // a producer that waits for room would wait forever
     {
       const std::lock_guard lock(mutex_);
       notifier_ = nullptr;

@@ -20,40 +20,57 @@ struct PulseExposure {
 
 /// One pulse that went out to the cameras.
 struct Pulse {
-  std::uint64_t number = 0;  // grows by one a pulse, also for those that a pause left out; from 0
-                             // again with another `boot`
-  DeviceStamp edge{};        // by the board's clock
-  HostStamp arrival{};       // when its report was here
-  std::uint32_t boot = 0;    // of the board's start: numbers and edges mean nothing across two
-  bool resumed = false;      // the first after a start or a pause
-  std::array<PulseExposure, kMaxCameras> exposure{};  // by camera
+  /// Increases by one per pulse, also for pulses omitted by a pause; restarts at 0 with another
+  /// `boot`.
+  std::uint64_t number = 0;
+  /// Time of the edge by the board's clock.
+  DeviceStamp edge{};
+  /// Time when the report arrived.
+  HostStamp arrival{};
+  /// Identifies the board's start; numbers and edges of two boots cannot be compared.
+  std::uint32_t boot = 0;
+  /// True for the first pulse after a start or a pause.
+  bool resumed = false;
+  /// Exposures by camera.
+  std::array<PulseExposure, kMaxCameras> exposure{};
   // A driver that asks the board for its time maps the edge itself; else a ClockMapper does, from
   // `arrival`.
   bool mapped = false;
-  HostStamp host{};       // `edge` on the host's clock
-  Duration host_error{};  // |true − host| is below this
+  /// `edge` on the host's clock.
+  HostStamp host{};
+  /// Upper bound of |true − host|.
+  Duration host_error{};
 };
 
 /// Requested or applied configuration of a board.
 struct TriggerConfiguration {
   double rate_hz = 0;
-  Duration width = Duration::microseconds(200);  // of a pulse
+  /// Width of a pulse.
+  Duration width = Duration::microseconds(200);
   /// 0: even intervals. Else every interval is longer or shorter by this, in an order that does not
   /// repeat, so that the cameras' own stamps prove which frame belongs to which pulse.
   Duration vary{};
-  std::uint8_t lines = 0x03;    // mask of the outputs that are pulsed; line k is camera k
-  std::uint8_t active_low = 0;  // mask
-  std::uint8_t feedback = 0;    // mask of the inputs wired to the cameras' exposure-active outputs
+  /// Mask of the outputs that are pulsed; output k triggers camera k.
+  std::uint8_t lines = 0x03;
+  /// Mask of the outputs that are active low.
+  std::uint8_t active_low = 0;
+  /// Mask of the inputs wired to the cameras' exposure-active outputs.
+  std::uint8_t feedback = 0;
   std::uint8_t feedback_active_low = 0;
 };
 
 /// Counters since open; all only grow.
 struct TriggerStatistics {
-  std::uint64_t pulses = 0;     // reported
-  std::uint64_t lost = 0;       // pulses that went out and whose report never came
-  std::uint64_t reboots = 0;    // the board began again
-  std::uint64_t malformed = 0;  // reports that made no sense
-  std::uint64_t overruns = 0;   // reports that found the ring full
+  /// Reported pulses.
+  std::uint64_t pulses = 0;
+  /// Pulses whose report never came.
+  std::uint64_t lost = 0;
+  /// Restarts of the board.
+  std::uint64_t reboots = 0;
+  /// Reports that could not be decoded.
+  std::uint64_t malformed = 0;
+  /// Reports dropped because the ring was full.
+  std::uint64_t overruns = 0;
   std::uint64_t starts = 0;
 };
 

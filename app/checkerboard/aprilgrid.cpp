@@ -88,7 +88,7 @@ class TagDetector {
       tags.push_back(tag);
     }
     std::sort(tags.begin(), tags.end(), [](const Tag& a, const Tag& b) { return a.id < b.id; });
-    // A tag seen twice is a reflection or somebody's second board: neither is believed.
+    // A tag seen twice is a reflection or a second target: neither is used.
     std::vector<Tag> once;
     for (std::size_t i = 0; i < tags.size(); ++i)
       if ((i == 0 || tags[i - 1].id != tags[i].id) &&

@@ -30,7 +30,7 @@ struct Marker {
   std::array<cv::Point2d, 4> corners;  // from the upper left on, clockwise on the board
 };
 
-/// Each id once: a marker seen twice is a reflection or somebody's second board.
+/// Each id once: a marker seen twice is a reflection or a second target.
 std::vector<Marker> detect(const cv::Mat& image, const BoardPattern& board) {
   const auto dictionary = cv::aruco::getPredefinedDictionary(static_cast<int>(board.dictionary));
   std::vector<std::vector<cv::Point2f>> corners;
@@ -84,7 +84,7 @@ class Layout {
   std::vector<cv::Point> squares_;  // by id
 };
 
-/// Those that the board has. Its dictionary may have more: somebody's label on the wall.
+/// Markers of the target only: the dictionary may have more, such as a label on the wall.
 std::vector<Marker> of_board(const std::vector<Marker>& markers, const Layout& layout) {
   std::vector<Marker> own;
   std::copy_if(markers.begin(), markers.end(), std::back_inserter(own),

@@ -1,5 +1,5 @@
 // Implements the parts of `vergence calibrate` that need OpenCV. `vergence` starts it with its own
-// words; nobody has to know its name.
+// words; users do not call it by name.
 #include <iostream>
 #include <memory>
 

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "app/command_line/common_options.hpp"
+
 #include <fmt/format.h>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -82,7 +84,7 @@ void declare_board(CLI::App& command, CalibrateOptions& o) {
       ->capture_default_str()
       ->group("Target");
   command.add_option("--model", o.model, "Lens model: radtan, or equidistant (fisheye)")
-      ->check(CLI::IsMember({"radtan", "equidistant"}))
+      ->check(one_of({"radtan", "equidistant"}))
       ->type_name("NAME")
       ->capture_default_str()
       ->group("Calibration");

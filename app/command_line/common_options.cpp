@@ -1,10 +1,25 @@
 #include "app/command_line/common_options.hpp"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 namespace vergence::app {
 
 const char* const kSessionExitCodes =
     "Exit codes: 0 success; 1 no usable result; 2 bad arguments, configuration or input;\n"
     "3 device missing; 4 session incomplete; 130, 143 stopped by SIGINT, SIGTERM.";
+
+CLI::Validator one_of(std::vector<std::string> values) {
+  const std::string list = fmt::format("{}", fmt::join(values, ", "));
+  return {[values = std::move(values), list](const std::string& given) {
+            return std::find(values.begin(), values.end(), given) != values.end()
+                       ? std::string()
+                       : fmt::format("\"{}\" is unknown; use one of {}", given, list);
+          },
+          "{" + list + "}"};
+}
 
 void CommonOptions::declare_set(CLI::App& command) {
   command.add_option("--set", set, "Set a configuration key (docs/configuration.md); repeatable")

@@ -30,6 +30,9 @@ struct CommonOptions {
                                             const std::vector<std::string>& before = {}) const;
 };
 
+/// Accepts one of the values, and names them in the help and in the message for another one.
+[[nodiscard]] CLI::Validator one_of(std::vector<std::string> values);
+
 /// The last lines of the help of commands that write a session.
 extern const char* const kSessionExitCodes;
 

@@ -75,6 +75,21 @@ UnknownArgument unknown_argument(const std::string& given, CLI::App& command) {
   return argument;
 }
 
+/// Message for a value that CLI11 cannot convert, as its own names neither the option's unit nor
+/// what is expected.
+std::string conversion_message(const CLI::ParseError& error, const CLI::App& command) {
+  const std::string message = error.what();
+  for (const CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_name(false, false);
+    if (message.find(": " + name + " = ") == std::string::npos) continue;
+    const std::string type = option->get_type_name();
+    const std::string given = option->results().empty() ? "" : option->results().back();
+    return name + ": \"" + given + "\" is no " + (type == "N" ? "whole number" : "number") +
+           (type.empty() ? "" : " (" + type + ")") + " or is out of range";
+  }
+  return message;
+}
+
 /// CLI11's errors about a command line, as one message.
 std::string error_message(const CLI::ParseError& error, CLI::App& root) {
   CLI::App& command = named_command(root);
@@ -82,7 +97,12 @@ std::string error_message(const CLI::ParseError& error, CLI::App& root) {
   const std::string hint = " (see 'vergence" + (words.empty() ? "" : " " + words) + " --help')";
   // Unknown arguments are reported first: this is often why something else seems to be missing.
   const auto extras = command.remaining();
-  if (extras.empty()) return who + error.what() + hint;
+  if (extras.empty())
+    return who +
+           (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr
+                ? conversion_message(error, command)
+                : error.what()) +
+           hint;
   // An option of an earlier version explains the other words.
   std::vector<UnknownArgument> unknown;
   for (const std::string& extra : extras) unknown.push_back(unknown_argument(extra, command));

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/commands/evaluation.hpp"
 #include "app/datasets/text_file.hpp"
@@ -128,7 +129,7 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
                    "Start a segment at every Nth pose [10; with short lengths 1]")
       ->type_name("N");
   command->add_option("--associate", a->associate, "How reference poses are associated")
-      ->check(CLI::IsMember({"interpolate", "nearest"}))
+      ->check(one_of({"interpolate", "nearest"}))
       ->capture_default_str();
   command
       ->add_option("--max-gap", a->max_gap,
@@ -141,7 +142,7 @@ void add_evaluate(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option("--axes", a->axes,
                    "Body axes: camera (z forward) or flu (x forward, y left, z up)")
-      ->check(CLI::IsMember({"camera", "flu"}))
+      ->check(one_of({"camera", "flu"}))
       ->capture_default_str();
   command
       ->add_option("--time-unit", a->unit,

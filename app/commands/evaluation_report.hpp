@@ -35,7 +35,7 @@ namespace vergence::app {
 struct InsMount {
   Transform T_ins_left{};
   std::string source{};    // where it is from
-  bool axes_only = false;  // nobody says: a camera that looks along the INS's x, at its place
+  bool axes_only = false;  // unknown extrinsics: a camera along the INS's x axis, at its origin
 };
 
 /// The mount that the sessions around these files or folders compared with, of the first that has

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/session_export.hpp"
@@ -78,7 +79,7 @@ void add_export(CLI::App& root, ExitCode* exit_code) {
       ->type_name("DIR");
   command->add_option("--format", a->format, "Format: euroc, kitti (rectified rigs only), folder")
       ->required()
-      ->check(CLI::IsMember({"euroc", "kitti", "folder"}))
+      ->check(one_of({"euroc", "kitti", "folder"}))
       ->type_name("NAME");
   command->add_option("--out", a->out, "Directory; must not exist, or be empty")
       ->required()

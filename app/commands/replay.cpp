@@ -10,6 +10,8 @@
 #include "app/publish/publish.hpp"
 #include "app/session/replay_session.hpp"
 
+#include <fmt/format.h>
+
 namespace vergence::app {
 namespace {
 
@@ -35,7 +37,8 @@ std::optional<AssumedIntrinsics> known_numbers(const ReplayArguments& a) {
         "--focal needs --baseline, the distance of the two cameras in metres; images cannot show "
         "it");
   if (!(*a.focal >= 10 && *a.focal <= 1e5))
-    throw InputError("--focal is the focal length in pixels, 10 to 100000");
+    throw InputError(
+        fmt::format("replay: --focal {:g}: must be 10 to 100000, in pixels", *a.focal));
   AssumedIntrinsics known;
   known.focal = *a.focal;
   known.baseline = *a.baseline;
@@ -46,9 +49,12 @@ std::optional<AssumedIntrinsics> known_numbers(const ReplayArguments& a) {
 
 ReplayRequest replay_request(const ReplayArguments& a) {
   if (a.baseline && !(*a.baseline >= 0.005 && *a.baseline <= 20))
-    throw InputError("--baseline is the distance of the two cameras in metres, 0.005 to 20");
-  if (a.start < 0) throw InputError("--start is the number of a frame, 0 or more");
-  if (a.frames && *a.frames < 1) throw InputError("--frames needs at least 1");
+    throw InputError(fmt::format(
+        "replay: --baseline {:g}: must be 0.005 to 20, the distance of the cameras in metres",
+        *a.baseline));
+  if (a.start < 0) throw InputError(fmt::format("replay: --start {}: must be 0 or more", a.start));
+  if (a.frames && *a.frames < 1)
+    throw InputError(fmt::format("replay: --frames {}: must be at least 1", *a.frames));
   ReplayRequest r;
   r.data = a.data;
   r.format = sequence_format(a.format, r.data);
@@ -125,7 +131,7 @@ void add_replay(CLI::App& root, ExitCode* exit_code) {
       ->group("Calibration");
   command
       ->add_option("--model", a->model, "Lens model for --focal: radtan, or equidistant (fisheye)")
-      ->check(CLI::IsMember({"radtan", "equidistant"}))
+      ->check(one_of({"radtan", "equidistant"}))
       ->type_name("NAME")
       ->capture_default_str()
       ->group("Calibration");

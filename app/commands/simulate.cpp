@@ -1,5 +1,6 @@
 #include <memory>
 
+#include "app/command_line/common_options.hpp"
 #include "app/commands/commands.hpp"
 #include "app/simulation/experiment.hpp"
 
@@ -15,7 +16,7 @@ void add_simulate(CLI::App& root, ExitCode* exit_code) {
   command->add_option("--radius", s.radius, "Radius of the cloud, m")->capture_default_str();
   command
       ->add_option("--shape", a->shape, "ball: points fill a ball; shell: they lie on its surface")
-      ->check(CLI::IsMember({"ball", "shell"}))
+      ->check(one_of({"ball", "shell"}))
       ->capture_default_str();
   command->add_option("--noise", a->noise, "Noise levels in pixels per coordinate")
       ->capture_default_str();
@@ -24,7 +25,7 @@ void add_simulate(CLI::App& root, ExitCode* exit_code) {
   command
       ->add_option("--generator", a->generator,
                    "ring: rigs at 20 to 25 m; tight: as near as all points stay in view")
-      ->check(CLI::IsMember({"ring", "tight"}))
+      ->check(one_of({"ring", "tight"}))
       ->capture_default_str();
   command
       ->add_option("--start-position", s.start_position,
@@ -40,7 +41,7 @@ void add_simulate(CLI::App& root, ExitCode* exit_code) {
       ->capture_default_str();
   command
       ->add_option("--length", a->length, "exact: baseline length known exactly; measured: to 1 mm")
-      ->check(CLI::IsMember({"exact", "measured"}))
+      ->check(one_of({"exact", "measured"}))
       ->capture_default_str();
   command->add_option("--cameras", s.cameras, "Number of cameras, 2 to 4")->capture_default_str();
   command->add_option("--json", a->json, "Write JSON to this file, one object per noise level");

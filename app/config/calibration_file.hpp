@@ -13,7 +13,7 @@
 
 namespace vergence::app {
 
-/// calibration.yaml (DESIGN §6): the rig's numbers and the words around them.
+/// calibration.yaml of a session: the rig's parameters, names and serials.
 struct CalibrationFile {
   RigCalibration rig{};
   std::string rig_name{};

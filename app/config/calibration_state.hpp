@@ -7,7 +7,7 @@
 #include "app/config/calibration_file.hpp"
 #include "app/config/configuration.hpp"
 
-/// The state file (DESIGN §6): the last calibration that a drive accepted or confirmed, where the
+/// The state file: the last calibration that a drive accepted or confirmed, where the
 /// next one begins.
 namespace vergence::app {
 

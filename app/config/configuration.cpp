@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t kMaxEntries = 10'000;
 constexpr int kDeepest = 8;
 
-/// One value somebody gave: a leaf of the YAML tree, list items by number.
+/// One value of the user: a leaf of the YAML tree, list items by number.
 struct Entry {
   std::string name;    // cameras.0.serial
   std::string value;   // the scalar's text

@@ -23,12 +23,14 @@ namespace vergence::app {
 
 /// `rig:` of the configuration.
 struct RigSettings {
-  std::string name{};  // of the rig, in the calibration.yaml that a session writes
+  /// Name of the rig in the calibration.yaml that a session writes.
+  std::string name{};
   double baseline_m = 0.75;
-  double focal_px = 0;  // 0: 0.72 of the image's width
+  /// Nominal focal length in px; 0: 0.72 of the image width.
+  double focal_px = 0;
   double k1 = 0, k2 = 0;
-  std::string state_dir{};  // of the state file; empty: the user's folder for such things; `none`:
-                            // no state file
+  /// Directory of the state file; empty: the user's state directory; `none`: no state file.
+  std::string state_dir{};
 };
 
 /// Which part of a camera's picture an entry of `cameras:` is.
@@ -38,26 +40,35 @@ enum class ImageHalf : std::uint8_t { whole, left, right };
 struct CameraSettings {
   std::string name{}, driver{}, serial{};
   ImageHalf half = ImageHalf::whole;
-  int width = 640, height = 480;   // px, of this entry's image
-  int offset_x = 0, offset_y = 0;  // px, of the region on the sensor
+  /// Size of this entry's image, px.
+  int width = 640, height = 480;
+  /// Offset of the region of interest on the sensor, px.
+  int offset_x = 0, offset_y = 0;
   std::string pixel_format{};
   CameraTrigger trigger = CameraTrigger::hardware;
-  CameraOptions options{};  // of the driver
+  /// Options of the driver.
+  CameraOptions options{};
   double exposure_us = 8000;
-  double trigger_delay_us = 0;  // from the pulse's edge to the exposure's start
-  double stamp_jitter_us = 0;   // 0: what the driver's kind of stamp has
+  /// Delay from the pulse's edge to the start of the exposure.
+  double trigger_delay_us = 0;
+  /// Jitter of the camera's stamps; 0: the default of the driver.
+  double stamp_jitter_us = 0;
   double gain_db = 0;
-  std::string mask{};  // file; empty: none
+  /// Image file of the mask; empty: no mask.
+  std::string mask{};
   CameraModelKind model = CameraModelKind::pinhole_radtan;
-  std::array<double, 4>
-      intrinsics{};  // fx fy cx cy, px; zeros: those of rig.nominal, distortion included
-  std::array<double, 5> distortion{};      // k1 k2 p1 p2 k3, or k1 to k4 of an equidistant lens
-  std::array<double, 12> T_camera_left{};  // rows of [R t], m; zeros: as rig.nominal
+  /// fx fy cx cy in px; zeros: those of rig.nominal, with its distortion.
+  std::array<double, 4> intrinsics{};
+  /// k1 k2 p1 p2 k3, or k1 to k4 of an equidistant lens.
+  std::array<double, 5> distortion{};
+  /// Rows of [R t], in m; zeros: those of rig.nominal.
+  std::array<double, 12> T_camera_left{};
 };
 
 /// `exposure:` of all cameras.
 struct ExposureSettings {
-  int mode = 0;  // 0: fixed, as cameras[] says; 1: auto
+  /// 0: fixed, as configured in cameras[]; 1: automatic.
+  int mode = 0;
   double target = 90, saturated_percent = 5;
   double min_us = 20, max_us = 8000, max_gain_db = 18;
   int settle_frames = 5;
@@ -65,26 +76,37 @@ struct ExposureSettings {
 
 struct InsSettings {
   std::string driver = "none";
-  std::string port{};      // empty: the only serial port on USB
-  int baud = 0;            // 0: as the device has it
-  double rate = 120;       // Hz
-  double sync_out_hz = 0;  // 0: as the device has it; negative: off
+  /// Serial port; empty: the only one on USB.
+  std::string port{};
+  /// Baud rate; 0: the device's own.
+  int baud = 0;
+  double rate = 120;  // Hz
+  /// Rate of SyncOut; 0: the device's own; negative: off.
+  double sync_out_hz = 0;
   double sync_out_width_ms = 1;
-  double processing_ms = 2;               // from a sample to its first byte on the line
-  std::array<double, 3> lever_arm_m{};    // of the left camera in the INS's body: forward, left, up
-  std::array<double, 3> boresight_deg{};  // roll, pitch, yaw
+  /// Delay from a sample to its first byte on the serial link.
+  double processing_ms = 2;
+  /// Position of the left camera in the INS's body frame: forward, left, up.
+  std::array<double, 3> lever_arm_m{};
+  /// Roll, pitch and yaw of the camera relative to the INS.
+  std::array<double, 3> boresight_deg{};
 };
 
 struct TriggerSettings {
   std::string driver = "none";
-  std::string port{};  // empty: the only board there is
-  int baud = 0;        // 0: found by asking
-  double rate = 20;    // Hz
+  /// Serial port of the trigger board; empty: the only board.
+  std::string port{};
+  /// Baud rate; 0: detected.
+  int baud = 0;
+  double rate = 20;  // Hz
   double width_us = 200, dither_us = 0;
-  int lines = 0;  // masks, bit k for line k; 0: one line for each camera
+  /// Masks with bit k for line k; 0: one line per camera.
+  int lines = 0;
   int active_low = 0, feedback = 0, feedback_active_low = 0;
-  trigger_board::Edge pps = trigger_board::Edge::none;  // of the GNSS receiver's pulse
-  trigger_board::Edge ins = trigger_board::Edge::none;  // of the INS's SyncOut
+  /// Edge of the GNSS receiver's pulse per second.
+  trigger_board::Edge pps = trigger_board::Edge::none;
+  /// Edge of the INS's SyncOut.
+  trigger_board::Edge ins = trigger_board::Edge::none;
 };
 
 struct SyncSettings {
@@ -141,32 +163,42 @@ struct MockSettings {
 
 /// `record:` what goes into drive.mcap of a session (docs/session_files.md).
 struct RecordSettings {
-  int poses = 0, ins = 0, images = 0, pulses = 0;  // 1: recorded
-  int split_mb = 0;                                // 0: one file
+  /// 1: the topic is recorded.
+  int poses = 0, ins = 0, images = 0, pulses = 0;
+  /// Size of a file after which a new one starts; 0: a single file.
+  int split_mb = 0;
 
   [[nodiscard]] bool any() const noexcept { return poses + ins + images + pulses > 0; }
 };
 
 /// `publish:` what others see of a running session (docs/live_interface.md). Empty: nothing.
 struct PublishSettings {
-  std::string pose_stream{};  // unix:///PATH, udp://HOST:PORT
-  std::string http{};         // HOST:PORT of the live page
-  std::string token_file{};   // its first line; empty: a new token each session
+  /// unix:///PATH or udp://HOST:PORT.
+  std::string pose_stream{};
+  /// HOST:PORT of the live page.
+  std::string http{};
+  /// File whose first line is the token; empty: a new token per session.
+  std::string token_file{};
   int viewers = 4;
 };
 
 /// `sessions:` the folders that drives leave side by side.
 struct SessionsSettings {
-  int quota_mb = 0;  // 0: none
+  /// Quota of the parent directory; 0: none.
+  int quota_mb = 0;
 };
 
 /// `realtime:` scheduling of the drive's threads (docs/deployment.md).
 struct RealtimeSettings {
-  int priority = 0;        // SCHED_FIFO of the most urgent threads; 0: none
-  std::string affinity{};  // processors of all but the solver, `0-1,3`; empty: any
+  /// SCHED_FIFO priority of the most urgent threads; 0: none.
+  int priority = 0;
+  /// Processors of all threads but the solver's, such as `0-1,3`; empty: any.
+  std::string affinity{};
   std::string solver_affinity{};
-  int lock_memory = 0;         // 1: mlockall
-  double frame_budget_ms = 0;  // of a live drive; 0: its frame interval
+  /// 1: call mlockall().
+  int lock_memory = 0;
+  /// Time budget per frame of a live drive; 0: its frame interval.
+  double frame_budget_ms = 0;
 };
 
 inline constexpr std::size_t kMaxFaults = 16;
@@ -187,15 +219,20 @@ struct Configuration {
   PublishSettings publish{};
   SessionsSettings sessions{};
   RealtimeSettings realtime{};
-  std::array<std::string, kMaxFaults> faults{};  // `KIND@SECONDS NAME=NUMBER …`; empty: none
-  int preset = 0;  // odometry.preset: 1: small, what other keys are that nobody gave
+  /// `KIND@SECONDS NAME=NUMBER …`; empty: none.
+  std::array<std::string, kMaxFaults> faults{};
+  /// odometry.preset; 1: small, other defaults of keys that are not set.
+  int preset = 0;
   OdometryOptions odometry{};
   calibration::CalibrationOptions calibration{};
-  int online = 1;  // calibration.online: 0: the calibration given is used for ever
+  /// calibration.online; 0: the initial calibration is used throughout.
+  int online = 1;
   calibration::MonitorOptions monitor{};
-  int threads = 2;                 // 1: both images on the estimator's thread
-  std::filesystem::path folder{};  // of the file it was read from: where its files are looked for;
-                                   // no key, empty without a file
+  /// 1: both images are processed on the estimator's thread.
+  int threads = 2;
+  /// Directory of the configuration file, which relative paths refer to; no key, empty without a
+  /// file.
+  std::filesystem::path folder{};
 };
 
 /// Defaults, then the YAML file if one is given, then the `--set` arguments `KEY=VALUE` in order;

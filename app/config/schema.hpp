@@ -41,7 +41,7 @@ struct Group {
 [[nodiscard]] const std::vector<Group>& schema();
 
 /// Finds contradictions that no single row shows (two keys that contradict each other, one that
-/// would be read by nobody): the message, empty when all is well.
+/// would be ignored): the message, empty if valid.
 [[nodiscard]] std::string find_contradiction(const Configuration& configuration);
 
 /// The shortest text that reads back as the same value.

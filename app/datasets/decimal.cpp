@@ -12,7 +12,7 @@ namespace {
 constexpr int kDecimals = 9;  // of a second in nanoseconds
 constexpr int kMaxExponent =
     100;  // of a number as written; beyond, it is 0 or no time of this universe
-constexpr std::size_t kMaxText = 64;  // longer is no number anybody wrote
+constexpr std::size_t kMaxText = 64;  // longer text is not a number
 
 bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
 

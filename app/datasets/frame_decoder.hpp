@@ -17,16 +17,22 @@ namespace vergence::app {
 
 /// One frame of a sequence, decoded or not. A value that goes through a ring.
 struct DecodedPair {
-  std::uint64_t frame = 0;  // index into the sequence
+  /// Index into the sequence.
+  std::uint64_t frame = 0;
   Stamp stamp{};
-  bool decoded = false;              // else skipped: no slots, and `kind` and `issue` state why
-  std::array<FrameSlot, 2> slots{};  // left, right
-  float decode_ms = 0;               // reading both files and decoding them
-  const char* kind = "";  // of the event: image_missing, image_truncated, …, stamp_not_increasing
-  std::array<char, 256> issue{};  // message, ends with 0
+  /// False: skipped, without slots; `kind` and `issue` state why.
+  bool decoded = false;
+  /// Left and right image.
+  std::array<FrameSlot, 2> slots{};
+  /// Time to read and decode both files.
+  float decode_ms = 0;
+  /// Kind of the event: image_missing, image_truncated, …, stamp_not_increasing.
+  const char* kind = "";
+  /// Message, ends with 0.
+  std::array<char, 256> issue{};
 };
 
-/// Reads and decodes the images of a sequence ahead of whoever consumes them, the two of a pair
+/// Reads and decodes the images of a sequence ahead of the consumer, the two of a pair
 /// side by side on two threads of its own.
 ///
 /// A frame is skipped when an image is missing, unreadable or torn, when its size has changed since

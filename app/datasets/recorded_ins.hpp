@@ -30,8 +30,8 @@ struct RecordedIns {
 /// The INS of the drive that open_sequence() opens with the same arguments, where it has files of
 /// its own; that of a bag is StereoSequence::ins. No readings: the data set has none, or none lie
 /// with the drive.
-/// `mount_wanted`: the published mount is read, where the data set publishes one; else somebody
-/// knows better.
+/// `mount_wanted`: the published mount is read, where the data set publishes one; else the user
+/// gives it.
 /// Memory  Some 250 bytes a reading, at most kMaxReadings.  InputError  As the data set's reader
 /// says: files that are not there or no such files, no reading that is whole.
 [[nodiscard]] RecordedIns read_recorded_ins(SequenceFormat format,

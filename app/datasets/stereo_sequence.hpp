@@ -36,9 +36,11 @@ struct RecordedIns;  // recorded_ins.hpp
 /// One frame as the data set lists it.
 struct StereoPair {
   Stamp stamp{};
-  std::array<std::string, 2> file;  // left, right: relative to StereoSequence::root, or names in
-                                    // its store; empty: the data set lists none
-  bool in_order = true;  // false: skipped, for its stamp does not go with those around it
+  /// Left and right file, relative to StereoSequence::root, or names in its store; empty: not
+  /// listed.
+  std::array<std::string, 2> file;
+  /// False: skipped, because its stamp does not fit those around it.
+  bool in_order = true;
 };
 
 /// A whole drive but its pixels.
@@ -52,19 +54,28 @@ struct StereoSequence {
   std::filesystem::path root;
   std::vector<StereoPair> pairs;
   RigCalibration calibration;
-  std::string calibration_source;  // the file's name, for calibrations.csv
-  std::filesystem::path times;     // the file that the stamps are from, for messages about them
-  std::size_t left_out = 0;  // frames that are none of `pairs`: no stamp, no partner, out of order
-  std::vector<std::string> remarks{};  // what was left out or is doubtful: a message each
-  std::vector<std::string>
-      assumptions{};          // facts the files leave out, and the values assumed: one phrase each
-  bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
-                              // file[1] are the same
-  std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
-  std::shared_ptr<const RecordedIns> ins{};   // that came with the images; nothing: it has files of
-                                              // its own (read_recorded_ins()), or there is none
-  int deep_bits = 16;  // of images of 16 bits a sample: so many are used (find_deep_bits())
-  bool bayer = false;  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
+  /// Name of the file, for calibrations.csv.
+  std::string calibration_source;
+  /// File of the stamps, for messages.
+  std::filesystem::path times;
+  /// Frames that are not in `pairs`: without stamp, without partner or out of order.
+  std::size_t left_out = 0;
+  /// Messages about skipped or suspicious data.
+  std::vector<std::string> remarks{};
+  /// Assumed values where the files lack data, a phrase each.
+  std::vector<std::string> assumptions{};
+  /// A file holds both images, with the columns of the left one first; file[0] and file[1] are
+  /// equal.
+  bool side_by_side = false;
+  /// Store of the images; null: they are files below root.
+  std::shared_ptr<const ImageStore> store{};
+  /// INS that comes with the images; null: it has its own files (read_recorded_ins()), or there is
+  /// none.
+  std::shared_ptr<const RecordedIns> ins{};
+  /// Effective bits of images with 16 bits per sample (find_deep_bits()).
+  int deep_bits = 16;
+  /// Images are raw mosaics, which are converted to grey (core/types/bayer.hpp).
+  bool bayer = false;
 };
 
 /// A calibration that is used instead of the data set's own: where it is from, and how to have it,
@@ -78,8 +89,10 @@ struct GivenCalibration {
 /// left and right.
 struct BagTopics {
   std::string left{}, right{};
-  std::string ins{};  // of NavSatFix
-  std::string imu{};  // of Imu: the orientation that goes with a NavSatFix
+  /// Topic of NavSatFix.
+  std::string ins{};
+  /// Topic of Imu, with the orientation that belongs to NavSatFix.
+  std::string imu{};
   [[nodiscard]] bool empty() const noexcept {
     return left.empty() && right.empty() && ins.empty() && imu.empty();
   }

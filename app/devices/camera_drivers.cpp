@@ -140,7 +140,7 @@ class Openings {
     return device;
   }
 
-  /// The serial of the next camera that nobody has or names.
+  /// Serial of the next camera that is neither reserved nor named.
   std::string next(const CameraRequest& request, CameraDriver& driver) {
     const std::vector<DeviceInfo> found = driver.enumerate();
     for (const DeviceInfo& d : found) {

@@ -21,7 +21,7 @@ struct CameraDriverRow {
 [[nodiscard]] const std::vector<CameraDriverRow>& camera_driver_rows();
 [[nodiscard]] std::vector<std::string> camera_driver_names();
 
-/// One camera as the configuration wants it.
+/// One camera as configured.
 struct CameraRequest {
   std::string key;  // `cameras.0`, for messages
   std::string driver, serial;

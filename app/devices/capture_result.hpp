@@ -12,19 +12,25 @@
 namespace vergence::app {
 
 struct ImageStatistics {
-  double mean = 0;       // grey levels
-  double contrast = 0;   // standard deviation, grey levels
-  double saturated = 0;  // share of pixels at 254 and above
-  double dark = 0;       // share of pixels at 4 and below
-  double sharpness = 0;  // mean squared gradient (central differences), (grey levels / px)²: falls
-                         // with blur, rises with noise
+  /// Mean grey level.
+  double mean = 0;
+  /// Standard deviation of the grey levels.
+  double contrast = 0;
+  /// Share of pixels at 254 and above.
+  double saturated = 0;
+  /// Share of pixels at 4 and below.
+  double dark = 0;
+  /// Mean squared gradient (central differences), in (grey levels / px)²; it decreases with blur
+  /// and increases with noise.
+  double sharpness = 0;
 };
 /// Precondition: not empty. Images of one row or column have no sharpness.
 [[nodiscard]] ImageStatistics image_statistics(const ImageView& image) noexcept;
 
 /// One thing that strikes the eye.
 struct ImageIssue {
-  bool unusable = false;  // these pictures are no good; else they could be better
+  /// True if the images are unusable, false if they could be better.
+  bool unusable = false;
   std::string message;
 };
 
@@ -52,22 +58,27 @@ struct CapturedSet {
   Stamp stamp{};
   Duration stamp_error{}, spread{};
   SyncProof proof = SyncProof::counted;
-  std::vector<ImageView> images;  // by camera
+  /// Images by camera.
+  std::vector<ImageView> images;
 };
 
 /// Result of waiting for synchronised image sets.
 struct CaptureResult {
   enum class End : std::uint8_t { done, timeout, interrupted } end = End::timeout;
-  int sets = 0;                          // complete ones that were handed on
-  std::vector<std::uint64_t> delivered;  // images by camera, also those of incomplete sets
-  std::vector<bool> disconnected;        // by camera, at the end
+  /// Complete sets that were delivered.
+  int sets = 0;
+  /// Images by camera, also those of incomplete sets.
+  std::vector<std::uint64_t> delivered;
+  /// Disconnected cameras at the end.
+  std::vector<bool> disconnected;
 };
 
 struct CaptureOptions {
   int count = 1;
   int skip = 0;  // complete sets passed over first: the first exposures after a start may be
                  // another's, or dark
-  Duration limit = Duration::seconds(5);  // for the first set, and between two
+  /// Time limit for the first set, and between two sets.
+  Duration limit = Duration::seconds(5);
 };
 
 /// Starts the devices and hands on complete sets. The devices are stopped when it returns.

@@ -45,9 +45,9 @@ class DriveDevices {
   [[nodiscard]] const mock::MockRig* mock() const noexcept { return mock_.rig.get(); }
   /// Scheduled in the mock.
   [[nodiscard]] std::span<const mock::Fault> faults() const noexcept;
-  /// When the drive begins; a mock in real time knows it only after the start.
+  /// When the drive begins; in real time the simulated rig sets it at the start.
   [[nodiscard]] HostStamp start() const noexcept;
-  /// Rig frames of the whole drive; 0: nobody knows.
+  /// Rig frames of the whole drive; 0 if unknown.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   /// Image memory of simulated cameras; unknown for real ones.
   [[nodiscard]] std::size_t image_bytes() const noexcept {

@@ -29,7 +29,7 @@ struct ExposureCounters {
 /// Exposure and gain of all cameras of a rig from how bright camera 0's images are; the same for
 /// all, so that their mid-exposures agree.
 ///
-/// Stands between the cameras and whoever waits for their frames: cameras() are to be used in their
+/// Stands between the cameras and the consumer of their frames: cameras() are to be used in their
 /// place. Each image of camera 0 is looked at when it is handed out, some 10 µs; what is to change
 /// is asked of the cameras by a thread of its own, because a device may take seconds to answer.
 /// That thread would come at another image on every run: in virtual time the cameras are asked at

@@ -21,9 +21,11 @@ struct InterfaceAddress {
 
 /// Writability and free space of a directory for this process.
 struct DiskRoom {
-  std::uint64_t bytes = 0;  // free
+  /// Free bytes.
+  std::uint64_t bytes = 0;
   bool read_only = false;
-  bool may_write = true;  // by owner and mode
+  /// Write permission by owner and mode.
+  bool may_write = true;
 };
 
 /// A machine as its own files describe it, and what this process may do on it. The checks read
@@ -37,9 +39,12 @@ struct Machine {
   static constexpr std::size_t kMaxText = 4096;
   static constexpr std::size_t kMaxNames = 8192;
 
-  std::filesystem::path root = "/";  // /sys, /proc, /dev and /etc are looked for below it
-  std::string user = "$USER";        // for commands
-  std::vector<std::string> groups;   // of this process, by name
+  /// Directory with /sys, /proc, /dev and /etc.
+  std::filesystem::path root = "/";
+  /// User name for the commands that are printed.
+  std::string user = "$USER";
+  /// Groups of this process, by name.
+  std::vector<std::string> groups;
   std::vector<InterfaceAddress> addresses;
   /// Returns true if this process may read and write the node.
   std::function<bool(const std::string& node)> may_use;
@@ -47,7 +52,8 @@ struct Machine {
   std::function<std::string(const std::string& node)> group_of;
   /// For this user; of a folder that does not exist yet, where it would be made.
   std::function<std::optional<DiskRoom>(const std::filesystem::path& folder)> room_at;
-  std::optional<bool> clock_synchronised;  // as the kernel was told
+  /// State that the kernel reports.
+  std::optional<bool> clock_synchronised;
 
   /// The machine that this process runs on.
   [[nodiscard]] static Machine here();
@@ -79,11 +85,15 @@ constexpr std::uint16_t kPointGreyVendor = 0x1E10;  // USB vendor id of the IIDC
 
 /// A device on USB as the kernel lists it; nothing is opened.
 struct UsbDevice {
-  std::string port;  // `1-2.3`: bus and the ports on the way; stays as long as the cable does
+  /// `1-2.3`: bus and ports along the path; constant as long as the cable stays.
+  std::string port;
   std::uint16_t vendor = 0, product = 0;
-  std::string serial, title;       // title: manufacturer and product; either may be empty
-  int bus = 0, number = 0;         // 0: unknown
-  std::vector<std::string> video;  // video0, …: nodes of its interfaces
+  /// The title is manufacturer and product; either may be empty.
+  std::string serial, title;
+  /// 0 if unknown.
+  int bus = 0, number = 0;
+  /// Nodes of its interfaces: video0, …
+  std::vector<std::string> video;
 
   [[nodiscard]] std::string node() const;  // /dev/bus/usb/001/004
 };
@@ -94,11 +104,16 @@ struct UsbDevice {
 /// Likely device at a serial port, by the USB ids of what carries it. The port is not
 /// opened, because that resets many boards. The values are keys of `devices --json`.
 enum class SerialKind : std::uint8_t {
-  ins,        // XSens' own converter, or an MTi with USB
-  ftdi,       // an FTDI converter: whatever is wired to it, an MTi often
-  converter,  // another maker's converter
-  board,      // a microcontroller board, which may be the trigger board
-  built_in,   // not on USB
+  /// Converter of XSens, or an MTi with USB.
+  ins,
+  /// FTDI converter with any device, often an MTi.
+  ftdi,
+  /// Converter of another maker.
+  converter,
+  /// Microcontroller board, which may be the trigger board.
+  board,
+  /// Port that is not on USB.
+  built_in,
   unknown,
 };
 [[nodiscard]] const char* to_string(SerialKind) noexcept;
@@ -109,9 +124,11 @@ enum class SerialKind : std::uint8_t {
 
 struct FoundPort {
   SerialPortInfo info;
-  std::string by_id;  // a link that stays when ports are renumbered; empty: none
+  /// Link that stays when ports are renumbered; empty: none.
+  std::string by_id;
   SerialKind kind = SerialKind::unknown;
-  std::string configuration;  // line for the configuration; empty: unknown
+  /// Line for the configuration; empty: unknown.
+  std::string configuration;
 
   /// The name for a configuration.
   [[nodiscard]] const std::string& name() const noexcept {
@@ -127,20 +144,24 @@ struct FoundPort {
 /// Devices found by one driver.
 struct DriverFindings {
   std::string name, meaning;
-  bool answered = true;  // false: it took longer than the limit
+  /// False if the search took longer than the limit.
+  bool answered = true;
   std::vector<DeviceInfo> cameras;
-  std::string explanation;  // why there is none, or what stands in the way; may be empty
+  /// Reason why there is no camera; may be empty.
+  std::string explanation;
 };
 
 struct Inventory {
   std::vector<DriverFindings> drivers;
   std::vector<FoundPort> ports;
   std::vector<UsbDevice> usb;
-  std::vector<iidc::FirewireNode> firewire;  // cameras
+  /// FireWire cameras.
+  std::vector<iidc::FirewireNode> firewire;
 };
 
 struct InventoryOptions {
-  std::vector<std::string> drivers;  // of cameras, by name; empty: all
+  /// Names of camera drivers; empty: all.
+  std::vector<std::string> drivers;
   /// For each driver of cameras; they search at the same time. The longest search is GigE's, 1 s.
   Duration limit = Duration::seconds(8);
 };

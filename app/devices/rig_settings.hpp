@@ -19,7 +19,7 @@ namespace vergence::app {
 [[nodiscard]] RigCalibration mounted_rig(const Configuration& configuration);
 
 /// Calibration of the rig for the estimator: the mounted rig, for a mock with the errors of
-/// `mock.intrinsics_error` and `mock.calibration_error`. `baseline` is the length that somebody
+/// `mock.intrinsics_error` and `mock.calibration_error`. `baseline` is the length that was
 /// measured.
 [[nodiscard]] RigCalibration nominal_rig(const Configuration& configuration);
 

@@ -24,7 +24,7 @@ namespace vergence::app {
 /// refuse_device() unless `ok`: the device's title, and its message or the status.
 void require_configured(const std::string& title, DeviceStatus status, const std::string& error);
 
-/// An INS as the configuration wants it.
+/// An INS as configured.
 struct InsRequest {
   std::string driver;  // `none`: there is none
   std::string port;    // empty: the only one there is

@@ -41,7 +41,7 @@ struct HttpDecision {
 
 /// The page itself holds nothing of the session and is for everyone; events want the token where
 /// the policy says so; actions always, in a header that no other site's page can send, from no
-/// other origin. On this machine the Host header must name it: a name that somebody else lets
+/// other origin. On this machine the Host header must name it: a name that another host lets
 /// point here does not (DNS rebinding).
 [[nodiscard]] HttpDecision decide(const HttpRequest& request, const HttpPolicy& policy) noexcept;
 

@@ -86,7 +86,7 @@ void LinePublisher::on_event(const EventRecord& event) noexcept {
 
 void LinePublisher::work() noexcept {
   (void)pthread_setname_np(pthread_self(), "vergence-lines");
-  // A tenth of a percent of a core, for which somebody waits: before other work, where the system
+  // A tenth of a percent of a core, for which a reader waits: before other work, where the system
   // lets us.
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
   for (;;) {

@@ -100,7 +100,7 @@ void wait_for(std::span<pollfd> events, Duration timeout) noexcept {
   if (events[0].revents != 0) (void)::eventfd_read(events[0].fd, &ignored);
 }
 
-/// Takes away a socket file that nobody listens to any more: of a program that was killed.
+/// Takes away a stale socket file, left by a program that was killed.
 void remove_stale(const sockaddr_un& address, std::string_view key) {
   struct stat status {};
   if (::lstat(address.sun_path, &status) != 0) return;
@@ -112,7 +112,7 @@ void remove_stale(const sockaddr_un& address, std::string_view key) {
       errno == EAGAIN)
     throw InputError(fmt::format("{}: another program sends its lines to {}; name another path",
                                  key, address.sun_path));
-  // Only this says that nobody listens: a socket of datagrams or one of another user may live.
+  // Only this shows that no program listens: a socket of datagrams or one of another user may live.
   if (errno == ECONNREFUSED)
     (void)::unlink(address.sun_path);
   else if (errno != ENOENT)

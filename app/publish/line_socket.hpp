@@ -41,7 +41,7 @@ struct LineAddress {
 /// Counters of the lines at the socket.
 struct LineSocketCounters {
   std::uint64_t sent = 0;     // lines that a reader was given, each reader counted
-  std::uint64_t refused = 0;  // lines that a reader had no room for, or nobody listened to (UDP)
+  std::uint64_t refused = 0;  // lines that a reader had no room for, or that had no reader (UDP)
   std::uint64_t readers = 0;  // connections that were accepted
   std::uint64_t closed = 0;   // … and closed because the reader did not read
   std::uint64_t turned_away = 0;  // … and closed because there were too many

@@ -72,8 +72,7 @@ LivePage::LivePage(const Options& options, SessionRequests* requests,
       thread_([this] {
         try {
           work();
-        } catch (
-            const std::exception& e) {  // no memory: whoever looks loses the page, not the drive
+        } catch (const std::exception& e) {  // no memory: the viewer loses the page, not the drive
           fmt::print(stderr, "vergence: the live page has ended ({}); the run continues\n",
                      e.what());
         }

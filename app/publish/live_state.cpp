@@ -46,9 +46,10 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
   return {{"figures", statistics}};
 }
 
-constexpr double kSilenceSeconds = 1;  // without a frame: nobody reads an old status as today's …
-constexpr double kMaxIntervals = 3;    // … unless frames are that rare
-constexpr double kSmoothing = 8;       // frames
+constexpr double kSilenceSeconds =
+    1;  // without a frame: an old status must not be read as current …
+constexpr double kMaxIntervals = 3;  // … unless frames are that rare
+constexpr double kSmoothing = 8;     // frames
 
 }  // namespace
 

@@ -15,7 +15,7 @@ namespace vergence::app {
 
 namespace {
 
-/// JSON knows no infinity.
+/// JSON has no infinity.
 void write_number(double value, int digits, std::string* line) {
   if (std::isfinite(value))
     fmt::format_to(std::back_inserter(*line), "{:.{}f}", value, digits);

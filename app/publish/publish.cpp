@@ -80,7 +80,7 @@ void Publishing::open_page(const Configuration& configuration) {
   try {
     page_ = std::make_unique<LivePage>(
         options, &requests_, [lines = lines_.get()] { return lines ? lines->age_p99_ms() : -1; });
-    // Behind a # it is in no address that is asked for, so in nobody's log.
+    // Behind a # it is not part of a request, so it appears in no log.
     link_ = settings.token_file.empty()
                 ? fmt::format("http://{}/#{}", options.address.link().text(), options.policy.token)
                 : fmt::format("http://{}/#TOKEN (TOKEN: the first line of {})",

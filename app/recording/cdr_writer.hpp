@@ -13,7 +13,7 @@
 
 namespace vergence::app {
 
-/// Little-endian values one after the other into somebody's bytes, as MCAP wants them. Once
+/// Little-endian values one after the other into a caller's buffer, as MCAP requires. Once
 /// something finds no room, ok() is false and nothing more is written.
 /// Memory  None.
 class ByteWriter {
@@ -54,8 +54,8 @@ class ByteWriter {
   bool ok_ = true;
 };
 
-/// A ROS 2 message as CDR (XCDR1, little endian) into somebody's bytes. Values are aligned to their
-/// size, counted from behind the four bytes of the encapsulation.
+/// A ROS 2 message as CDR (XCDR1, little endian) into a caller's buffer. Values are aligned to
+/// their size, counted from behind the four bytes of the encapsulation.
 ///
 /// Not Fast CDR's: that reports missing room by an exception, takes texts and sequences as
 /// containers only, and leaves what was in the padding before.

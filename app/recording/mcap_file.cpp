@@ -111,7 +111,7 @@ void McapMessageHead::write(std::span<std::uint8_t, kSize> out) const noexcept {
   w.put(channel);
   w.put(sequence);
   w.put(log_time);
-  w.put(log_time);  // published when it was measured, as far as anybody knows
+  w.put(log_time);  // publish time: equal to the time of measurement
 }
 
 McapMessageHead McapMessageHead::read(std::span<const std::uint8_t, kSize> in) noexcept {
@@ -329,7 +329,7 @@ void McapFile::write_back(const ChunkIndex& chunk) noexcept {
   waiting_ += entries_.size();
 }
 
-/// Which pages a failure was about nobody says: all that waited may be missing.
+/// The kernel does not report which pages failed: all that waited may be missing.
 void McapFile::record_unwritten(int error) noexcept {
   if (error == 0) return;
   if (unwritten_.error == 0) unwritten_.error = error;

@@ -29,8 +29,8 @@ class Disk {
   [[nodiscard]] virtual int truncate(int fd, std::uint64_t size) noexcept = 0;
   /// Bytes of the file begin their way to the disk.
   virtual void start_writeback(int fd, std::uint64_t offset, std::uint64_t size) noexcept = 0;
-  /// Waits until bytes are with the disk, and lets the system forget them: pages that nobody reads
-  /// do not push out those that somebody does, and never more wait than the disk takes at once. The
+  /// Waits until bytes are with the disk, and lets the system drop them from its cache: pages that
+  /// are not read do not evict pages in use, and never more wait than the disk can absorb. The
   /// system tells a descriptor of a failed writeback once: synchronise() does not repeat it. → 0
   [[nodiscard]] virtual int finish_writeback(int fd, std::uint64_t offset,
                                              std::uint64_t size) noexcept = 0;
@@ -48,9 +48,12 @@ class Disk {
 /// plus 1.
 struct McapTopic {
   std::string topic;
-  std::string type;        // sensor_msgs/msg/Image
-  std::string definition;  // of the type and of all that it is made of, ros2msg
-  std::string qos;         // offered_qos_profiles of the ros2 profile; YAML
+  /// Such as sensor_msgs/msg/Image.
+  std::string type;
+  /// Definitions of the type and of its parts, as ros2msg.
+  std::string definition;
+  /// YAML, offered_qos_profiles of the ros2 profile.
+  std::string qos;
 };
 
 /// The head of a Message record, as it stands in a queue and in a chunk.
@@ -116,8 +119,10 @@ class McapFile {
 
   /// Data accepted by the system and then not written to the disk.
   struct Unwritten {
-    int error = 0;               // negative errno, the first one; 0: nothing is missing
-    std::uint64_t messages = 0;  // of the chunks that the failure may have touched
+    /// First negative errno; 0: nothing is missing.
+    int error = 0;
+    /// Messages of the chunks that the failure may have affected.
+    std::uint64_t messages = 0;
   };
   /// Since the last call, of files that are closed meanwhile, too.
   [[nodiscard]] Unwritten pop_unwritten() noexcept { return std::exchange(unwritten_, {}); }

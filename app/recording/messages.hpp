@@ -147,7 +147,7 @@ inline constexpr int kRosTypes = 12;
 
 /// `sensor_msgs/msg/Image`.
 [[nodiscard]] std::string_view ros_type_name(RosType type) noexcept;
-/// Its definition and those of all types it is made of, as `ros2msg` wants them in a schema.
+/// Its definition and those of all types it is made of, as `ros2msg` requires in a schema.
 [[nodiscard]] std::string ros_definition(RosType type);
 
 }  // namespace vergence::app

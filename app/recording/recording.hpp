@@ -75,13 +75,18 @@ class RecordRing {
 
 /// Counters; exact after close().
 struct RecordingCounters {
-  std::uint64_t messages = 0, bytes = 0;  // that files have taken
+  /// Messages and bytes written to files.
+  std::uint64_t messages = 0, bytes = 0;
   std::uint64_t chunks = 0, files = 0;
-  std::uint64_t dropped = 0;         // messages that found no room in their queue
-  std::uint64_t dropped_images = 0;  // of these, the large ones
-  std::uint64_t lost = 0;  // messages that waited for a disk until there was no room, or that it
-                           // had taken and did not keep
-  std::size_t queue_bytes = 0, queue_high_water = 0;  // of all queues, the most that waited in each
+  /// Messages that did not fit into their queue.
+  std::uint64_t dropped = 0;
+  /// Dropped messages of large topics.
+  std::uint64_t dropped_images = 0;
+  /// Messages that waited for a failing disk until the queue was full, or that the disk accepted
+  /// and lost.
+  std::uint64_t lost = 0;
+  /// Capacity of all queues, and the sum of the maxima that waited in each.
+  std::size_t queue_bytes = 0, queue_high_water = 0;
 };
 
 /// Messages into MCAP files `drive.mcap` on a thread of its own: who posts never waits for a disk.
@@ -110,8 +115,10 @@ class Recording {
   enum class WhenFull : std::uint8_t { drop, wait };
   struct Options {
     RecordingFiles::Options files{};
-    std::vector<std::size_t> queues;  // bytes of each
-    Stamp start{};                    // of the preamble where nothing follows
+    /// Capacity of each queue, bytes.
+    std::vector<std::size_t> queues;
+    /// Stamp of the preamble if no message follows.
+    Stamp start{};
     WhenFull when_full = WhenFull::drop;
   };
 

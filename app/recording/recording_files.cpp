@@ -108,8 +108,8 @@ int RecordingFiles::open() noexcept {
   return 0;
 }
 
-/// In front of the first chunk of a file, at its time: before it nobody knows when the file begins.
-/// → 0
+/// Written before the first chunk of a file, with its time: the start of the file is unknown
+/// before. → 0
 int RecordingFiles::write_preamble(std::uint64_t time) noexcept {
   for (std::span<std::uint8_t> rest(preamble_); !rest.empty();) {
     McapMessageHead head = McapMessageHead::read(rest.first<McapMessageHead::kSize>());
@@ -152,7 +152,7 @@ const char* RecordingFiles::path(std::vector<char>* out) const noexcept {
   return out->data();
 }
 
-// ---- anybody
+// ---- any thread
 
 std::vector<std::string> RecordingFiles::pop_errors() {
   const std::lock_guard lock(errors_mutex_);

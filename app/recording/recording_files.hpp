@@ -32,7 +32,7 @@ struct RecordingPreamble {
 ///
 /// Threads  append(), roll(), finish(), resting(): the writer's. Sentences and counters: any.
 /// Memory   All at construction.
-/// Errors   A write that fails is tried again in the same file by whoever has the data, every
+/// Errors   A write that fails is tried again in the same file with the same data, every
 ///          kRetry: see resting(). Messages for the user: pop_errors().
 class RecordingFiles {
  public:

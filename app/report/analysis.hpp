@@ -10,50 +10,67 @@ namespace vergence::app::report {
 
 /// Reference of the errors on the page.
 enum class ErrorSource : std::uint8_t {
-  none,       // there is no reference: no errors
-  ins,        // errors of poses.csv, after the alignment on the earth
-  reference,  // reference.tum, the start of the trajectory laid on it
+  /// There is no reference, so there are no errors.
+  none,
+  /// Errors of poses.csv, after the ENU alignment.
+  ins,
+  /// Errors against reference.tum, aligned with the start of the trajectory.
+  reference,
 };
 
 /// Curves and counts of a session, one value a frame; kNone where there is none.
 struct Analysis {
-  std::vector<double> time_s;      // since the first frame
-  std::vector<double> distance_m;  // driven up to the frame
-  std::vector<std::uint8_t>
-      breaks;             // frames are missing before this one: nothing may be drawn across
-  double interval_s = 0;  // median between frames; 0: fewer than two
+  /// Time since the first frame.
+  std::vector<double> time_s;
+  /// Distance travelled up to the frame.
+  std::vector<double> distance_m;
+  /// Frames are missing before this one: no line may be drawn across.
+  std::vector<std::uint8_t> breaks;
+  /// Median interval between frames; 0 with fewer than two frames.
+  double interval_s = 0;
   double duration_s = 0;
 
   ErrorSource source = ErrorSource::none;
-  std::string
-      source_message;  // what was compared with what, and how the two were laid on each other
-  bool ins_unplaced = false;  // there was an INS, and no frame was placed on the earth with it
+  /// Describes the reference and its alignment.
+  std::string source_message;
+  /// There was an INS, and the trajectory was never aligned with it.
+  bool ins_unplaced = false;
   std::vector<double> horizontal_m, vertical_m, heading_deg;
   struct Spread {
     double rms = kNone, max = kNone, end = kNone;
   };
   Spread horizontal, vertical, heading;
 
-  std::vector<double> placed_s;           // when the drive was placed on the earth, each time
-  std::vector<std::uint8_t> placed_anew;  // this frame is the first one on a further alignment
-  bool map_is_enu = false;                // east to the right, north up
+  /// Times of the ENU alignments.
+  std::vector<double> placed_s;
+  /// This frame is the first one with another alignment.
+  std::vector<std::uint8_t> placed_anew;
+  /// The map has east to the right and north up.
+  bool map_is_enu = false;
   std::vector<double> ours_x, ours_y, theirs_x, theirs_y;  // m
 
-  std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0;  // frames
-  std::size_t skipped = 0;             // without a summary those that are missing by their numbers
-  std::vector<std::size_t> by_reason;  // frames that were not ok, by Session::reasons
+  /// Numbers of frames.
+  std::size_t read = 0, ok = 0, degraded = 0, lost = 0, unknown = 0;
+  /// Skipped frames; without a summary, those missing by their numbers.
+  std::size_t skipped = 0;
+  /// Frames that were not ok, by Session::reasons.
+  std::vector<std::size_t> by_reason;
   // Degraded frames, also counted in by_reason, whose only fault was that the run had not yet
   // found or confirmed its calibration. A drive is not judged by that wait.
   std::size_t waited = 0;
   std::vector<std::size_t> waited_by_reason;
-  std::optional<double>
-      verified_s;  // when the drive first confirmed the calibration in use, since the first frame
-  std::optional<double> ok_share;  // of the frames read and skipped; nothing: status is not known
+  /// Time of the first verification of the calibration in use, since the first frame.
+  std::optional<double> verified_s;
+  /// Share of the frames read and skipped; none if the status is unknown.
+  std::optional<double> ok_share;
   double path_m = 0;
 
-  std::optional<double> drift;  // ratio: mean translation error of segments over their length
-  std::string drift_message;    // which segments
-  std::optional<double> segment_error;  // KITTI's, as in summary.json, where `drift` is another
+  /// Mean translation error of segments divided by their length.
+  std::optional<double> drift;
+  /// Describes the segments.
+  std::string drift_message;
+  /// KITTI segment error of summary.json, if `drift` is another one.
+  std::optional<double> segment_error;
   std::optional<double> scale, ate_m, rotation_deg_per_m, end_error;
 };
 

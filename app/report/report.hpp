@@ -24,7 +24,7 @@ struct ReportOutcome {
 [[nodiscard]] std::array<std::string, 3> closing_lines(const ReportOutcome& outcome,
                                                        const std::string& failure);
 
-/// Writes SESSION/report.html from the session's other files (DESIGN §6): one self-contained page,
+/// Writes SESSION/report.html from the session's other files: one self-contained page,
 /// inline SVG, no script.
 ///
 /// A torn session (killed, disk full) gives a page, too: what is missing is said on it and in the

@@ -85,14 +85,20 @@ struct Frame {
   std::int64_t number = -1;
   std::optional<State> state{};
   std::optional<PoseStatus> status{};
-  std::uint16_t reason = 0;  // Session::reasons
+  /// Index into Session::reasons.
+  std::uint16_t reason = 0;
   bool posed = false;
-  bool placed = false;    // enu and heading_deg mean something
-  bool has_ins = false;   // ins means something
-  bool compared = false;  // error means something
+  /// True if enu and heading_deg are valid.
+  bool placed = false;
+  /// True if ins is valid.
+  bool has_ins = false;
+  /// True if error is valid.
+  bool compared = false;
   Transform T_world_left{};
-  std::array<double, 3> enu{}, ins{};  // m: east, north, up
-  std::array<double, 3> error{};       // m: ours - INS, east, north, up
+  /// East, north, up, m.
+  std::array<double, 3> enu{}, ins{};
+  /// Estimate minus INS: east, north, up, m.
+  std::array<double, 3> error{};
   double error_heading_deg = kNone;
   int inliers = -1;
   double estimate_ms = kNone;
@@ -102,15 +108,18 @@ struct Frame {
 struct CalibrationRow {
   Stamp stamp{};
   bool accepted = false;
-  bool kept =
-      false;  // a measurement of the drive that is no better than what is in use: no rejection
-  bool decided = false;  // while driving; else the drive began with it
+  /// A refinement that is no better than the calibration in use; this is no rejection.
+  bool kept = false;
+  /// Decided while driving; false for the initial calibration.
+  bool decided = false;
   std::string cause{}, reason{};
   std::int64_t frames = 0;
   double latency_frames = kNone, held_out_before_px = kNone, held_out_after_px = kNone;
   int camera = 1;
-  std::array<double, 6> value{};  // rotation vector, rad; translation, m
-  std::array<double, 6> sigma{};  // the wide one, else the noise's; meaningless without has_sigma
+  /// Rotation vector, rad, and translation, m.
+  std::array<double, 6> value{};
+  /// Total sigma, or that of the noise alone; valid if has_sigma.
+  std::array<double, 6> sigma{};
   bool has_sigma = false;
   // Depth measured online by then: its distance, its sigma, and the error
   // of the calibration in use.
@@ -127,15 +136,21 @@ struct Event {
 struct Session {
   std::string name{};
   std::vector<Frame> frames{};
-  std::vector<std::string> reasons{""};  // words of poses.csv, the empty one first
-  std::vector<StampedPose> reference{};  // reference.tum
+  /// Reasons of poses.csv, with the empty one first.
+  std::vector<std::string> reasons{""};
+  /// Poses of reference.tum.
+  std::vector<StampedPose> reference{};
   std::vector<CalibrationRow> calibrations{};
   std::vector<Event> events{};
-  std::size_t events_dropped = 0;  // beyond kMaxEvents
-  nlohmann::json summary{};        // null when it is missing or no JSON
+  /// Number of events beyond kMaxEvents.
+  std::size_t events_dropped = 0;
+  /// Null if summary.json is missing or no JSON.
+  nlohmann::json summary{};
   std::optional<CalibrationFile> calibration{};
-  std::vector<std::string> missing{};   // messages
-  std::vector<std::string> left_out{};  // the same of files that are longer than is read
+  /// A message for each missing file.
+  std::vector<std::string> missing{};
+  /// A message for each file that is longer than the limit.
+  std::vector<std::string> left_out{};
 
   /// All that the report does not have: what was left out first.
   [[nodiscard]] std::vector<std::string> not_had() const {
@@ -157,7 +172,7 @@ inline constexpr std::size_t kLongestText =
 [[nodiscard]] Session read_session(const std::filesystem::path& folder,
                                    std::size_t max_frames = kMaxFrames);
 
-/// It was recorded from devices; else it is a replay, or nobody knows.
+/// True if it was recorded from devices; false for a replay, or if unknown.
 [[nodiscard]] bool is_live(const Session& session);
 
 /// A finite number of summary.json by its path, `metrics.ate_m`. Nothing: not there, null, no

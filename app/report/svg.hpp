@@ -58,7 +58,7 @@ enum class Anchor : std::uint8_t { start, middle, end };
 /// An <svg> that grows; its units are those of the viewBox.
 class Svg {
  public:
-  /// `description` is for who cannot see it.
+  /// `description` is for screen readers.
   Svg(double width, double height, std::string_view description);
 
   void line(const char* css, double x1, double y1, double x2, double y2);

@@ -4,7 +4,7 @@
 
 namespace vergence::app {
 
-/// Exit codes of the program (DESIGN §6).
+/// Exit codes of the program.
 enum class ExitCode : int {
   done = 0,
   not_usable = 1,
@@ -23,9 +23,9 @@ class InputError : public std::runtime_error {
   explicit InputError(const std::string& message) : std::runtime_error(message) {}
 };
 
-/// A device that the configuration names is not there, does not answer, or is somebody else's. The
-/// text is the whole message for the user. Caught in main(), exit code 3: what is asked for is in
-/// order and may be asked again when the device has its power.
+/// A device that the configuration names is not there, does not answer, or is in use by another
+/// program. The text is the whole message for the user. Caught in main(), exit code 3: what is
+/// asked for is in order and may be asked again when the device has its power.
 class DeviceError : public std::runtime_error {
  public:
   explicit DeviceError(const std::string& message) : std::runtime_error(message) {}

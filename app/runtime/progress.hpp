@@ -15,7 +15,7 @@ namespace vergence::app {
 struct ProgressState {
   std::string_view state{};             // `stereo`
   std::uint64_t frame = 0;              // done so far
-  std::uint64_t frames = 0;             // in all; 0: nobody knows (no time left is told)
+  std::uint64_t frames = 0;             // in all; 0 if unknown (then no remaining time is printed)
   double path_m = 0;                    // travelled
   std::optional<int> inliers{};         // of the last pose
   std::optional<double> estimate_ms{};  // of the last frame

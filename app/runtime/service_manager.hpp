@@ -7,7 +7,7 @@
 namespace vergence::app {
 
 /// Tells systemd how the program does: ready, a line of status, alive, stopping (sd_notify(3)).
-/// Where nobody asks (no NOTIFY_SOCKET in the environment) every call does nothing.
+/// Without NOTIFY_SOCKET in the environment every call does nothing.
 ///
 /// Threads  One caller, and from stopping() on one of its own.
 class ServiceManager {

@@ -27,7 +27,7 @@ constexpr std::size_t kMiddleDepth = 2;  // of Agreement::kDepthM: 20 m
 constexpr const char* kInterrupted = "interrupted";
 constexpr int kMoreFeatures = 2,
               kMaxFeatures = 1000;  // of a calibration pass, which is not bound to the frame rate
-constexpr int kObservations = 240'000;  // of a solve that nobody waits for
+constexpr int kObservations = 240'000;  // of a solve in the background
 constexpr std::size_t kAloneFrames =
     40;  // of a stretch by itself, at most about: short drives, too, are to have two
 

@@ -18,14 +18,19 @@ namespace vergence::app {
 
 /// A rig's calibration from a whole recorded drive.
 struct DriveCalibration {
-  std::optional<RigCalibration> rig;  // empty: `why` says what is missing
+  /// None: `why` states what is missing.
+  std::optional<RigCalibration> rig;
   std::string why;
   double depth_m = 0,
          depth_sigma_percent = 0;  // predicted depth error at the depth it is judged at
-  bool verified = false;           // that is within what is tolerated
-  std::uint64_t frames = 0;        // moving frames with tracks
-  std::vector<calibration::RigSolution> stretches;  // solved each by itself
-  std::vector<calibration::Agreement> agreements;   // of camera 1, each stretch with the one before
+  /// True if the depth error is within the tolerance.
+  bool verified = false;
+  /// Moving frames with tracks.
+  std::uint64_t frames = 0;
+  /// Independent solutions of parts of the drive.
+  std::vector<calibration::RigSolution> stretches;
+  /// Agreement of each solution with the one before, for camera 1.
+  std::vector<calibration::Agreement> agreements;
 };
 
 /// Callback of a pass over a sequence: after every frame, on the estimator's thread.
@@ -34,9 +39,12 @@ using DriveWatcher = std::function<void(const Estimator&, const PoseSample&)>;
 struct DrivePass {
   const StereoSequence& sequence;
   const Configuration& configuration;
-  std::size_t start = 0, count = 0;             // frames
-  std::function<bool()> stopped{};              // asked after every frame; may be empty
-  std::function<void(std::size_t)> progress{};  // frames done of this pass; may be empty
+  /// Range of frames.
+  std::size_t start = 0, count = 0;
+  /// Called after every frame; may be empty.
+  std::function<bool()> stopped{};
+  /// Receives the number of frames done in this pass; may be empty.
+  std::function<void(std::size_t)> progress{};
 };
 
 /// Runs the drive once, without a session. → the calibration in use at its end; empty: there never
@@ -47,7 +55,7 @@ struct DrivePass {
 
 /// Twice over the drive, with twice its features: from scratch, which gives the tracks their rig;
 /// then all of its frames in stretches, joined, and each by itself to be held against the next
-/// (METHOD §6.5). `given`: the drive's own calibration; of it lenses, sigmas and the baseline's
+///. `given`: the drive's own calibration; of it lenses, sigmas and the baseline's
 /// length are read.
 [[nodiscard]] DriveCalibration calibrate_drive(const DrivePass& pass,
                                                const StartingCalibration& given);
@@ -67,10 +75,14 @@ struct DrivePass {
 struct DriveCalibrationRequest {
   std::filesystem::path data;
   SequenceFormat format = SequenceFormat::kitti;
-  BagTopics topics{};                      // of a bag
-  std::filesystem::path out;               // calibration.yaml to write
-  std::optional<std::string> calibration;  // lenses and length to begin with, of any program
-  std::optional<double> baseline;          // m: instead of the file's
+  /// Topics of a bag.
+  BagTopics topics{};
+  /// The calibration.yaml to write.
+  std::filesystem::path out;
+  /// Initial intrinsics and baseline, in any supported format.
+  std::optional<std::string> calibration;
+  /// Baseline in m; replaces that of the file.
+  std::optional<double> baseline;
   Configuration configuration;
   bool quiet = false;
 };

@@ -93,7 +93,7 @@ class EstimationLoop {
 
   FrameSource& source_;
   const SourceFacts& facts_;
-  SessionRequests* const requests_;  // null: nobody can ask
+  SessionRequests* const requests_;  // null: no requests are possible
   const ReferenceTrack reference_;
   const CameraMasks masks_;
   const EstimatorOptions options_;

@@ -24,19 +24,23 @@ namespace vergence::app {
 /// A rig frame for the estimator; its slots are the session's until FrameSource::done().
 struct SourceFrame {
   RigFrame rig{};
-  float decode_ms = 0;  // reading and decoding its images; 0 where they came as pixels
-  std::optional<bool>
-      solver_idle{};  // of a recorded drive: what the calibration solver answered
-                      // at this frame, and is to answer again (ReplayableSolverRunner)
+  /// Time to read and decode the images; 0 if they came as pixels.
+  float decode_ms = 0;
+  /// Recorded state of the calibration solver at this frame, which ReplayableSolverRunner repeats.
+  std::optional<bool> solver_idle{};
 };
 
 /// An event, in its order among the frames.
 struct SourceEvent {
   EventRecord record{};
-  bool to_user = false;      // on stderr, too
-  bool skipped = false;      // it is a frame that could not be read
-  bool listed = true;        // in events.jsonl
-  bool recalibrate = false;  // a new calibration is to be sought
+  /// Print the message on stderr, too.
+  bool to_user = false;
+  /// The event is a frame that could not be read.
+  bool skipped = false;
+  /// Write the event to events.jsonl.
+  bool listed = true;
+  /// Request a new calibration.
+  bool recalibrate = false;
 };
 
 using SourceItem = std::variant<SourceFrame, InsRecord, SourceEvent>;
@@ -44,16 +48,20 @@ using SourceItem = std::variant<SourceFrame, InsRecord, SourceEvent>;
 /// A message of the set-up.
 struct SourceRemark {
   std::string message{};
-  const char* kind = nullptr;  // of its event; null: it is only said
-  bool print = true;           // on stderr, too
+  /// Kind of its event; null: it is printed only.
+  const char* kind = nullptr;
+  /// Print the message on stderr, too.
+  bool print = true;
 };
 
 /// The INS of a source and how its readings are compared with.
 struct SourceIns {
   ComparisonOptions options{};
   InsSource kind = InsSource::device;
-  std::string mount_source{};     // a few words: where the mount of the options is from
-  std::size_t reading_bytes = 0;  // held beside the comparison
+  /// Origin of the INS extrinsics, in a few words.
+  std::string mount_source{};
+  /// Memory of the readings, in addition to the comparison.
+  std::size_t reading_bytes = 0;
 };
 
 /// Properties of a source before the first frame.
@@ -61,19 +69,29 @@ struct SourceFacts {
   StartingCalibration begin{};
   Adoption adoption = Adoption::after_fixed_frames;
   Recorder::WhenFull when_full = Recorder::WhenFull::wait;
-  std::function<bool(Stamp)> disk_full{};  // of Recorder::Options
-  std::uint64_t frames = 0;                // of the whole drive; 0 if unknown
-  Stamp first{};                           // of the drive
-  std::optional<ClockTie> tie{};           // of stamps to this machine's clock, in real time
+  /// Recorder::Options::disk_full.
+  std::function<bool(Stamp)> disk_full{};
+  /// Number of frames of the drive; 0 if unknown.
+  std::uint64_t frames = 0;
+  /// First stamp of the drive.
+  Stamp first{};
+  /// Relation of the stamps to this machine's clock, in real time.
+  std::optional<ClockTie> tie{};
   std::optional<SourceIns> ins{};
-  Trajectory truth{};  // that came with a recording: what an estimate without INS is compared with
+  /// Ground truth of a recording, the reference for an estimate without INS.
+  Trajectory truth{};
   std::vector<SourceRemark> remarks{};
-  std::vector<std::string> assumptions{};  // of a recording: what nobody said, a phrase each
-  bool knows_truth = false;  // at the drive's end describe() holds its trajectory against it
+  /// Assumptions about a recording where it lacks data, a phrase each.
+  std::vector<std::string> assumptions{};
+  /// True if describe() compares the trajectory with ground truth.
+  bool knows_truth = false;
   std::size_t image_bytes = 0, ring_bytes = 0;
-  Duration frame_interval{};  // of a live drive, whose frames do not wait; zero: they do
-  const char* skipped_label = "skipped";  // frames of the drive that nobody estimated from
-  bool on_request = false;                // SIGUSR1 asks for a new calibration
+  /// Frame interval of a live drive, whose frames do not wait; zero if they wait.
+  Duration frame_interval{};
+  /// Label of frames that were not used.
+  const char* skipped_label = "skipped";
+  /// SIGUSR1 requests a new calibration.
+  bool on_request = false;
 };
 
 /// Source of a session's frames, readings and device events: devices (LiveSource) or a recorded

@@ -27,20 +27,25 @@ struct EnuAlignmentRecord {
 /// Errors against the INS after the alignment, over the poses that were compared.
 struct EnuErrors {
   std::uint64_t poses = 0;
-  double ins_path_m =
-      0;  // of the INS across the ground from its first fix on, straight across holes
+  /// Horizontal path length of the INS from its first fix on, straight across gaps.
+  double ins_path_m = 0;
   double horizontal_rms_m = 0, horizontal_max_m = 0, horizontal_end_m = 0;
-  double up_rms_m = 0, up_end_m = 0;                                     // ours − INS
-  double heading_rms_deg = 0, heading_max_deg = 0, heading_end_deg = 0;  // the end clockwise
+  /// Estimate minus INS.
+  double up_rms_m = 0, up_end_m = 0;
+  /// The value at the end is clockwise.
+  double heading_rms_deg = 0, heading_max_deg = 0, heading_end_deg = 0;
 };
 
 /// Where a drive lies on the earth, and how far from the INS it is there.
 struct EnuMetrics {
-  std::optional<Geodetic> origin{};  // of enu; nothing: the INS never had a fix
+  /// Origin of enu; none: the INS never had a fix.
+  std::optional<Geodetic> origin{};
   std::vector<EnuAlignmentRecord> alignments{};
   EnuErrors errors{};
-  Transform T_ins_left{};      // the mount that the comparison took
-  std::string mount_source{};  // where it is from
+  /// INS extrinsics used by the comparison.
+  Transform T_ins_left{};
+  /// Origin of the INS extrinsics.
+  std::string mount_source{};
 };
 
 /// Null without an origin.
@@ -80,7 +85,7 @@ class InsEvents {
 /// Comparison of a session with its INS, live or recorded: the comparison pose by pose into the
 /// recorder, and what there is to tell of it.
 ///
-/// Threads    The estimator's, sealed; after it has joined all is anyone's.
+/// Threads    The estimator's, sealed; after it has joined, no synchronisation is needed.
 /// Memory     The comparison's, from the arena.
 /// Order      Readings and poses as they come; every add() of a pose is followed by drain().
 class InsComparison {

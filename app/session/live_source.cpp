@@ -109,7 +109,7 @@ void LiveSource::start(std::vector<std::string>* faults) {
   const HostStamp assumed = devices_.start();
   start_acquisition(acquisition_.get(), pulse_observer_);
   begun_ = std::chrono::steady_clock::now();
-  start_ = start_ + (devices_.start() - assumed);  // a mock in real time knows it only now
+  start_ = start_ + (devices_.start() - assumed);  // in real time the simulated rig sets it now
   if (devices_.mock() == nullptr) return;
   truth_ = true_trajectory(*devices_.mock(), configuration_, start_);
   if (!truth_.empty()) write_truth(faults);
@@ -280,7 +280,7 @@ TruthMetrics LiveSource::truth_metrics(const SessionTotals& totals,
 void LiveSource::describe(const SessionTotals& totals, const Estimator& estimator,
                           SummaryInput* input) const {
   const AcquisitionCounters& c = acquisition_->counters();
-  // Pulses whose images nobody estimated from: of some no set came, because nothing proved yet
+  // Pulses whose images were not used: of some no set came, because nothing proved yet
   // which images were theirs.
   const auto acquiring = std::min_element(c.sync.acquiring.begin(),
                                           c.sync.acquiring.begin() + facts_.begin.file.rig.cameras);

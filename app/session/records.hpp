@@ -94,7 +94,8 @@ struct EventField {
 struct EventRecord {
   Stamp stamp{};
   const char* kind = "";
-  std::array<char, 256> message{};  // ends with 0
+  /// Ends with 0.
+  std::array<char, 256> message{};
   std::array<EventField, 4> fields{};
 
   /// Cut at the array's end, at a whole UTF-8 character.
@@ -105,9 +106,11 @@ struct EventRecord {
 /// A calibration that was accepted or rejected, or that the drive began with: a line of
 /// calibrations.csv for every camera but the left one.
 struct CalibrationRecord : CalibrationDecision {
-  bool decided = true;        // while driving; false: the drive began with it
-  const char* began_as = "";  // then: `given`, `state_file` …, a constant
-  /// Where it is from, if the drive began with it; ends with 0. A copy, for who keeps a record may
+  /// Decided while driving; false for the initial calibration.
+  bool decided = true;
+  /// Source of the initial calibration: `given`, `state_file` …, a constant.
+  const char* began_as = "";
+  /// Where it is from, if the drive began with it; ends with 0. A copy: the owner of a record may
   /// outlive the source that has the text.
   std::array<char, 256> origin{};
 
@@ -122,7 +125,7 @@ struct CalibrationRecord : CalibrationDecision {
   [[nodiscard]] const char* why() const noexcept { return decided ? reason : origin.data(); }
 };
 
-/// Columns of poses.csv, in this order (DESIGN §6).
+/// Columns of poses.csv, in this order.
 inline constexpr const char* kPosesHeader =
     "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,east,north,up,latitude_deg,longitude_deg,"
     "height_m,heading_deg,"

@@ -59,7 +59,7 @@ StereoSequence open_drive(const ReplayRequest& request) {
 }
 
 /// Replaces the initial calibration by one from the sequence itself; where nothing is found
-/// that stays, and the user hears why.
+/// that stays, and a warning gives the reason.
 bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
                      const StereoSequence& sequence, StartingCalibration* begin) {
   Progress progress = Progress::on_stderr(request.session.quiet);
@@ -79,7 +79,7 @@ bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
   return true;
 }
 
-/// Lenses are found from a beginning that is near enough. Of one that nobody knows anything of: no
+/// Lenses are found from a beginning that is near enough. With nothing known about it: no
 /// distortion, then that of a usual lens of 80 to 100 degrees.
 void calibrate_unknown(ReplayRequest request, const SignalGuard& signals, StereoSequence* sequence,
                        StartingCalibration* begin) {

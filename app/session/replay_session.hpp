@@ -33,7 +33,7 @@ struct ReplayRequest {
 /// on them. InputError: as RecordedSession::open().
 [[nodiscard]] std::vector<std::string> recorded_settings(const std::filesystem::path& session);
 
-/// Reads a recorded drive, estimates a pose for every frame, writes the session folder of DESIGN §6
+/// Reads a recorded drive, estimates a pose for every frame, writes the session directory
 /// and the figures against the data set's truth (run_session()).
 ///
 /// Errors   InputError before the session folder is made, for all that can be known by then.

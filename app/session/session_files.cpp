@@ -7,6 +7,7 @@
 #include "app/runtime/background_thread.hpp"
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
+#include "app/runtime/terminal_text.hpp"
 
 namespace vergence::app {
 
@@ -52,15 +53,20 @@ SessionReport write_session_report(const std::filesystem::path& session) {
   try {
     report.outcome = write_report(session);
   } catch (const InputError& e) {
-    report.failure = e.what();  // the outcome says usable: nobody knows better
+    report.failure = e.what();  // the outcome stays as it is
   }
   return report;
 }
 
 void print_verdict(const SessionReport& report, bool quiet, Progress* progress) {
   if (!quiet) {
-    for (const std::string& line : closing_lines(report.outcome, report.failure))
-      progress->print(line);
+    constexpr std::size_t kWidth = 110;  // columns
+    for (const std::string& message : closing_lines(report.outcome, report.failure)) {
+      std::string text;
+      for (const std::string& line : wrapped(message, kWidth))
+        text += (text.empty() ? "" : "\n  ") + line;
+      progress->print(text);
+    }
     return;
   }
   if (!report.failure.empty()) progress->print("vergence: " + report.failure);

@@ -50,7 +50,7 @@ struct SessionRequests {
 /// pose stream. RunRequest::observers and ReplayRequest::observers take them.
 ///
 /// Ownership  Everything is a reference to a plain value of fixed size that the observer copies if
-///            it wants to keep it. The images of a frame are views of driver memory: valid until
+///            it keeps it. The images of a frame are views of driver memory: valid until
 ///            on_frame() returns, never after. An observer outlives the session.
 /// Threads    The estimator's thread, one call at a time. It is sealed: an observer allocates
 ///            nothing, takes no lock that a slow thread can hold, does no input or output, and

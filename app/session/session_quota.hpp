@@ -11,7 +11,7 @@ namespace vergence::app {
 /// message for each that was removed, or could not be.
 ///
 /// A session is a folder, no link, with `poses.csv` and `summary.json`: one that is still being
-/// written has no summary, and one that was cut off stays for who wants to know why. Oldest is the
+/// written has no summary, and one that was cut off is kept for diagnosis. Oldest is the
 /// one whose summary is. Threads  One. Errors  None: what cannot be looked at is passed over.
 [[nodiscard]] std::vector<std::string> keep_session_quota(const std::filesystem::path& session,
                                                           std::uint64_t max_bytes);

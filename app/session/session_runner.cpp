@@ -136,7 +136,7 @@ void SessionRunner::start_source(std::vector<std::string>* faults) {
   }
 }
 
-/// Without it nobody takes what the devices bring by now.
+/// Without it the devices' data are not consumed yet.
 std::thread SessionRunner::start_estimating() {
   try {
     return std::thread([this] { estimate(); });

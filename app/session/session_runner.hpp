@@ -20,7 +20,7 @@ struct SessionOptions {
   SessionRequests* requests = nullptr;  // from observers; may be null
 };
 
-/// Runs a source through estimator and comparison into a session folder (DESIGN §6): set-up,
+/// Runs a source through estimator and comparison into a session folder: set-up,
 /// watching, events, comparison, summary, report and verdict, the same for devices and recordings.
 ///
 ///     LiveSource source(request);

@@ -59,7 +59,8 @@ class TimeHistogram {
 /// One attempt to calibrate while driving.
 struct CalibrationAttempt {
   Stamp stamp{};
-  std::string_view cause{}, reason{};  // CalibrationCause's word; why it was rejected: constants
+  /// Name of the CalibrationCause, and the reason of a rejection; constants.
+  std::string_view cause{}, reason{};
   bool accepted = false;
   int latency_frames = 0, frames = 0;
   double solve_ms = 0;
@@ -67,14 +68,17 @@ struct CalibrationAttempt {
 
 /// The search of a drive that began without a calibration.
 struct FromScratch {
-  std::optional<CalibrationAttempt> found{};  // the first that was accepted
-  std::uint64_t rejected = 0;                 // before it
+  /// First accepted attempt.
+  std::optional<CalibrationAttempt> found{};
+  /// Number of rejected attempts before it.
+  std::uint64_t rejected = 0;
 };
 
 /// The calibration in use was not that of the rig.
 struct Contradiction {
   Stamp stamp{};
-  double depth_percent = 0;  // by which its depths were off
+  /// Depth error of the contradicted calibration.
+  double depth_percent = 0;
 };
 
 /// Frames whose time was over before their work was done (docs/deployment.md), and what was left
@@ -89,10 +93,13 @@ inline constexpr std::size_t kMaxAttempts = 1000;  // in summary.json; calibrati
 
 /// Totals of the attempts to calibrate.
 struct CalibrationTotals {
-  std::vector<CalibrationAttempt> attempts{};  // the newest kMaxAttempts
-  std::uint64_t accepted = 0, rejected = 0;    // of all of them
+  /// The newest kMaxAttempts attempts.
+  std::vector<CalibrationAttempt> attempts{};
+  /// Numbers of all attempts.
+  std::uint64_t accepted = 0, rejected = 0;
   FromScratch from_scratch{};
-  FocalMeasurement focal{};  // the newest
+  /// Newest measurement of the focal length.
+  FocalMeasurement focal{};
 
   /// An attempt that was decided. True: it was accepted.
   bool add(const CalibrationRecord& calibration);
@@ -100,23 +107,34 @@ struct CalibrationTotals {
 
 /// Totals of a session, for summary.json.
 struct SessionTotals : CalibrationTotals {
-  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;  // frames
-  TimeHistogram estimate, decode;                          // ms
-  TimeHistogram calibrating;  // ms, of the frames in other states than stereo_odometry and lost
+  /// Numbers of frames.
+  std::uint64_t read = 0, ok = 0, degraded = 0, lost = 0;
+  TimeHistogram estimate, decode;  // ms
+  /// Frames in other states than stereo_odometry and lost, ms.
+  TimeHistogram calibrating;
   std::array<TimeHistogram, kStages> stages;
-  std::optional<Stamp> confirmed{};  // when the drive first confirmed the calibration in use
-  std::optional<std::uint64_t> verified_frame{};  // the frame of that stamp
-  std::optional<Contradiction>
-      contradicted{};                   // the first time that it showed another one than was in use
-  double path_m = 0;                    // sum of the steps between successive poses
-  std::vector<StampedPose> trajectory;  // if asked for: the poses of trajectory.tum, read back
-  std::vector<StampedPose> reference;   // if asked for: of reference.tum, in its own frame
-  std::uint64_t dropped_records = 0;    // the ring was full (live only)
-  std::uint64_t dropped_readings = 0;   // theirs was
-  std::uint64_t lost_lines = 0;         // the disk took no more
+  /// Stamp at which the calibration in use was first verified.
+  std::optional<Stamp> confirmed{};
+  /// Frame of that stamp.
+  std::optional<std::uint64_t> verified_frame{};
+  /// First contradiction of the calibration in use.
+  std::optional<Contradiction> contradicted{};
+  /// Sum of the steps between successive poses.
+  double path_m = 0;
+  /// Poses read back from trajectory.tum, if requested.
+  std::vector<StampedPose> trajectory;
+  /// Poses read back from reference.tum in its own frame, if requested.
+  std::vector<StampedPose> reference;
+  /// Records dropped because their ring was full (live only).
+  std::uint64_t dropped_records = 0;
+  /// INS readings dropped because their ring was full (live only).
+  std::uint64_t dropped_readings = 0;
+  /// Lines that the disk did not accept.
+  std::uint64_t lost_lines = 0;
   BudgetStatistics work_dropped{};
   std::size_t ring_high_water = 0;
-  std::vector<std::string> faults;  // a message for each file that is not whole
+  /// A message for each incomplete file.
+  std::vector<std::string> faults;
 };
 
 /// Accumulates the totals from the frames and events of a session. Not thread-safe.

@@ -11,7 +11,7 @@
 #include "core/estimator/estimator.hpp"
 
 /// Initial calibration, in this order: --from-scratch before --calibration FILE before the state
-/// file before the configuration (METHOD §3).
+/// file before the configuration.
 namespace vergence::app {
 
 /// Assumptions about a rig without a calibration: both cameras alike, principal points in the

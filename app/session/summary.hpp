@@ -28,36 +28,52 @@ struct TruthMetrics {
 /// Heap allocations by the name of the thread that made them, from the first frame that is
 /// delivered until the last (docs/deployment.md).
 struct ThreadAllocationCounts {
-  std::vector<std::pair<std::string, std::uint64_t>> ours{};       // 0 where a thread made none
-  std::vector<std::pair<std::string, std::uint64_t>> libraries{};  // of threads that libraries have
+  /// Counts of the program's threads, also those with 0.
+  std::vector<std::pair<std::string, std::uint64_t>> ours{};
+  /// Counts of the libraries' threads.
+  std::vector<std::pair<std::string, std::uint64_t>> libraries{};
 };
 
 /// Input of summary.json in addition to the recorder's totals.
 struct SummaryInput {
-  std::uint64_t skipped = 0;               // frames that were not read: torn, missing, out of time
-  std::uint64_t dropped_by_estimator = 0;  // points and observations over capacity
-  std::optional<TrajectoryEvaluation>
-      evaluation;                  // against the reference, by summary_evaluation_options()
-  bool calibrated = true;          // false: no calibration has been found
-  RigCalibration calibration;      // in use at the end
-  std::string calibration_source;  // where it comes from
-  bool online = true;     // the rig was watched; false: nothing could confirm a calibration
-  bool verified = false;  // the drive itself has confirmed the calibration in use at the end
-  std::optional<RigCalibration> before{};     // the drive began with it; none: from scratch
-  calibration::CalibrationOptions options{};  // what its words mean
+  /// Frames that were not used: incomplete, missing or with an implausible stamp.
+  std::uint64_t skipped = 0;
+  /// Points and observations dropped for lack of capacity.
+  std::uint64_t dropped_by_estimator = 0;
+  /// Evaluation against the reference, with summary_evaluation_options().
+  std::optional<TrajectoryEvaluation> evaluation;
+  /// False if no calibration was found.
+  bool calibrated = true;
+  /// Calibration in use at the end.
+  RigCalibration calibration;
+  /// Origin of that calibration.
+  std::string calibration_source;
+  /// True if the rig was monitored; without monitoring a calibration cannot be verified.
+  bool online = true;
+  /// True if the calibration in use at the end is verified.
+  bool verified = false;
+  /// Initial calibration; none if from scratch.
+  std::optional<RigCalibration> before{};
+  /// Options that define the calibration rating.
+  calibration::CalibrationOptions options{};
   std::uint64_t runtime_allocations = 0;
-  Duration frame_budget{};  // zero: none
+  /// Zero if there is no budget.
+  Duration frame_budget{};
   ThreadAllocationCounts allocations{};
-  std::vector<std::pair<std::string, std::size_t>> memory;  // bytes by what holds them
+  /// Bytes by component.
+  std::vector<std::pair<std::string, std::size_t>> memory;
   std::string configuration_hash;
-  std::vector<std::pair<std::string, std::uint64_t>>
-      devices{};  // counters of the devices and of the pairing; none in a replay
-  std::vector<std::pair<std::string, std::uint64_t>>
-      comparison{};                   // counters of the comparison with an INS
-  std::optional<EnuMetrics> earth{};  // with an INS
+  /// Counters of the devices and of the pairing; none in a replay.
+  std::vector<std::pair<std::string, std::uint64_t>> devices{};
+  /// Counters of the comparison with an INS.
+  std::vector<std::pair<std::string, std::uint64_t>> comparison{};
+  /// Present with an INS.
+  std::optional<EnuMetrics> earth{};
   std::optional<TruthMetrics> truth{};
-  std::vector<std::string> assumptions{};  // about the recording that was read
-  nlohmann::ordered_json time{};           // how time was over a live drive; null in a replay
+  /// Assumptions about the recording.
+  std::vector<std::string> assumptions{};
+  /// Timing statistics of a live drive; null in a replay.
+  nlohmann::ordered_json time{};
 };
 
 /// Options of the metrics in summary.json: segments of 100–800 m (step 10), 10–50 m
@@ -69,7 +85,7 @@ struct SummaryInput {
 [[nodiscard]] std::vector<std::array<double, 6>> calibration_errors(const RigCalibration& ours,
                                                                     const RigCalibration& truth);
 
-/// summary.json (DESIGN §6), keys in a fixed order; what does not exist is null.
+/// summary.json, keys in a fixed order; what does not exist is null.
 [[nodiscard]] nlohmann::ordered_json summary_json(const SessionTotals& totals,
                                                   const SummaryInput& input);
 

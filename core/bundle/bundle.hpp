@@ -10,7 +10,7 @@
 
 namespace vergence {
 
-/// Which blocks of θ = [θ_S | θ_I | θ_P] are free (METHOD §2). One code; the configuration is the
+/// Which blocks of θ = [θ_S | θ_I | θ_P] are free. One code; the configuration is the
 /// choice of partition.
 enum class BundleConfiguration : std::uint8_t {
   stereo_calibration,  // θ_S: T_camera_left of every camera but 0, and intrinsics if asked; θ_I:
@@ -98,8 +98,8 @@ struct BundleIntrinsics {
 struct BundleSharedPrior {
   const RigCalibration* rig = nullptr;  // mean and `covariance`; null: nothing is known. Rows
                                         // without a variance: nothing is known of them
-  double weight = 1;  // how much more a solve believes its tracks than it may: what is known weighs
-                      // as much more, > 0
+  double weight =
+      1;  // factor by which the solve overweights its tracks; the prior gets the same, > 0
 };
 
 struct BundleOptions {
@@ -170,8 +170,7 @@ struct BundleResult {
       intrinsics_sigma{};  // of the free ones, from covariance_noise
   RigCovariance
       covariance{};  // covariance_total of all of θ_S together, with what is held but uncertain
-  double inflation = 1;  // mean over θ_S of the variance by clusters over the one that the solve
-                         // itself believes (H⁻¹)
+  double inflation = 1;  // mean over θ_S of the variance by clusters over the one by H⁻¹
 
   bool has_pose_covariance = false;
   std::uint16_t pose = 0;               // whose
@@ -200,8 +199,8 @@ namespace detail {
 struct BundleWorkspace;
 }
 
-/// The partitioned bundle adjustment of METHOD §2: Levenberg–Marquardt on U − W P⁻¹ Wᵀ, poses and
-/// shared parameters dense.
+/// Partitioned bundle adjustment of Warren et al. (ICRA 2013): Levenberg–Marquardt on U − W P⁻¹ Wᵀ,
+/// poses and shared parameters dense.
 ///
 /// Parametrisation  pose: R ← Exp(φ) R, t ← Exp(φ) t + τ (about the camera, so that a far-away
 ///            world origin costs no digits); camera k: R_k ← R_k Exp(φ), t_k ← t_k + R_k τ, with

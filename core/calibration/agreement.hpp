@@ -7,7 +7,7 @@
 namespace vergence::calibration {
 
 /// Normalised squared differences of two calibrations found from disjoint stretches of one drive
-/// (METHOD §6.5): 1 on average where their sigmas are true, and no truth is needed to see it.
+///: 1 on average where their sigmas are true, and no truth is needed to see it.
 struct Agreement {
   static constexpr std::size_t kDepths = 4;
   static constexpr std::array<double, kDepths> kDepthM = {5, 10, 20, 50};

@@ -7,9 +7,9 @@ namespace vergence::calibration {
 /// Compares the focal length given with the one that the images show.
 ///
 /// A focal length that is off by a share makes all distances off by it, and neither epipolar lines
-/// nor a solve that believes it show that. A solve with every focal length free by kFocalPriorSigma
-/// (RigSolveRequest::measure_focal_lengths) does: turns show it, and so does the flow of a straight
-/// drive against the known baseline.
+/// nor a solve that keeps it fixed show that. A solve with every focal length free by
+/// kFocalPriorSigma (RigSolveRequest::measure_focal_lengths) does: turns show it, and so does the
+/// flow of a straight drive against the known baseline.
 ///
 /// `found`: such a solve. `given`: what the drive began with. Threads pure.
 [[nodiscard]] FocalMeasurement check_focal_length(const RigSolution& found,

@@ -34,7 +34,7 @@ inline constexpr double kRareChance = 3.0;  // for a test that is repeated with 
                                double chance = kChance) noexcept;
 
 /// Comparison of the calibration in use, the claim, with the drive's own measurement of the rig
-/// (METHOD §7).
+///.
 ///
 /// The difference d of their depths at reference_depth_m() decides between two hypotheses: the rig
 /// is the one of the claim, whose error is that of a calibration of its kind (sigma m), or it is
@@ -115,7 +115,7 @@ struct AcceptanceInput {
   bool must_be_better = true;    // than `in_use`, on frames that were not used
 };
 
-/// Decides whether a solution may be used (METHOD §4). Returns the first gate that stops it, or
+/// Decides whether a solution may be used. Returns the first gate that stops it, or
 /// `open`. Pure.
 [[nodiscard]] Gate check_acceptance(const AcceptanceInput& question,
                                     const CalibrationOptions& options) noexcept;

@@ -76,7 +76,7 @@ struct MonitorResult {
   int frames_since_onset = 0;  // frames measured since then
 };
 
-/// Tests whether the transform of one further camera still holds (METHOD §4). One Monitor per
+/// Tests whether the transform of one further camera still holds. One Monitor per
 /// further camera.
 ///
 /// The distances of a frame's stereo matches from their epipolar lines give a gradient g and an

@@ -10,7 +10,7 @@ enum class IntrinsicsEstimation : std::uint8_t {
   full,   // also principal points and distortion, where the data show that the initial ones are off
 };
 
-/// Every number a user may change in `calibration:` (METHOD §3); the configuration's schema has a
+/// Every number a user may change in `calibration:`; the configuration's schema has a
 /// row for each field.
 struct CalibrationOptions {
   int min_frames = 25;   // moving rig frames before a solve is tried, 5 … 150
@@ -35,8 +35,8 @@ struct CalibrationOptions {
       30;  // points nearer than near_baselines, else `needs_near_structure`, 0 … 1000
   double near_baselines = 40;  // 5 … 500
   double extrinsic_random_walk_mrad_per_sqrt_h =
-      0.3;  // random walk of a rig that nobody touches, in an hour: what is known
-            // of it grows old, 0 … 100
+      0.3;                             // random walk of an untouched rig, in an hour: what is known
+                                       // of it grows old, 0 … 100
   double max_depth_error_percent = 2;  // depth error up to which a calibration counts as confirmed,
                                        // at reference_depth_m, 0.1 … 50
   double reference_depth_m =

@@ -9,7 +9,7 @@
 
 namespace vergence::calibration {
 
-/// Tests which images of two cameras are of the same instant (METHOD §7.3): the left image and the
+/// Tests which images of two cameras are of the same instant: the left image and the
 /// camera's of one frame, or the left image of the frame before and the camera's (the camera is a
 /// frame late), or the other way round (the left one is late).
 ///

@@ -56,7 +56,7 @@ struct RigSolution {
   double solve_ms = 0;           // wall time
 };
 
-/// Estimates the calibration from a snapshot of the track log (METHOD §3): chooses the frame whose
+/// Estimates the calibration from a snapshot of the track log: chooses the frame whose
 /// transforms fit best, re-initialises the further cameras through them, triangulates the points
 /// and adjusts everything with transforms shared by all frames. Sigmas are computed for noise alone
 /// and in total.

@@ -42,7 +42,7 @@ bool RigSolver::add_point(std::span<const Reference> track) noexcept {
   int pairs = 0;
   for (const Reference& r : track)
     pairs += (observation(r).cameras & 1U) != 0 && (observation(r).cameras & ~1U) != 0 ? 1 : 0;
-  if (pairs < 2 || points_.full()) return true;  // four images see it, or it is none (METHOD §3)
+  if (pairs < 2 || points_.full()) return true;  // four images see it, or it is none
 
   std::array<RayView, kMaxViews * kMaxCameras> views;
   std::size_t n = 0;

@@ -15,7 +15,7 @@ namespace vergence::calibration {
 class SegmentSolver {
  public:
   enum class Kind : std::uint8_t {
-    alone,   // each knows nothing of the others: they can be held against each other
+    alone,   // independent of each other, so that they can be compared
     joined,  // each begins with what those before it told: the last one is the drive's
   };
   SegmentSolver(Kind kind, const RigCalibration& given, const RigCalibration& start,

@@ -28,7 +28,7 @@ struct ComparisonOptions {
   double height_sigma_m = 5.0;
   double tilt_sigma_rad = 0.0087;  // half a degree
   /// Sigma of the INS's heading including the mounting, for the alignment;
-  /// 0: the heading is the positions' alone, as it must be where nobody knows the mount to a
+  /// 0: the heading is the positions' alone, as it must be where the mount is not known to a
   /// degree.
   double heading_sigma_rad = 0;
   /// Two samples farther apart than this are not interpolated between.
@@ -109,7 +109,7 @@ struct ComparisonCounters {
 };
 
 /// Our poses against a geodetic INS, frame by frame: interpolation, alignment on the earth, errors,
-/// scale (DESIGN §6).
+/// scale.
 ///
 ///     Arena arena(Comparison::bytes_needed(options));
 ///     Comparison comparison(options, arena);

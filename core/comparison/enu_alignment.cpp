@@ -71,7 +71,7 @@ Normal normal_equations(std::span<const EnuAlignmentPair> pairs, const Mat3& R,
     out.g.head<3>() -= w_tilt * J_tilt.transpose() * up.head<2>();
 
     // The rest of what the attitude says is a turn about up: r(φ) = turn − φ_z. A turn of many
-    // sigmas is a mount that nobody knows.
+    // sigmas means that the mount is unknown.
     const double turn = log_so3(p.R_enu_world * R.transpose()).z();
     if (!(p.heading_sigma > 0) || std::abs(turn) > kNoMount) continue;
     const double w_heading = 1.0 / (n * p.heading_sigma * p.heading_sigma);

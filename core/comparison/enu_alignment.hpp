@@ -23,7 +23,7 @@ struct EnuAlignmentPair {
       0;  // rad, of the INS and of how the camera is turned against it; 0: its heading is not used
 };
 
-/// Where the odometry's world lies on the earth (DESIGN §6). Rigid, no scale.
+/// Where the odometry's world lies on the earth. Rigid, no scale.
 struct EnuAlignment {
   std::uint32_t revision = 0;  // 0: there is none; counts up with each fit
   Transform T_enu_world{};

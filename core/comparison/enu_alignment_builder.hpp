@@ -10,7 +10,7 @@ namespace vergence {
 struct ComparisonOptions;
 
 /// Collects pairs of poses and fixes along the first metres driven, and fits the alignment of
-/// `world` on the earth to them (DESIGN §6). The alignment then stays until restart().
+/// `world` on the earth to them. The alignment then stays until restart().
 ///
 /// Threads one. Memory from the arena at construction; full: the newest pair takes the place of the
 /// one before.

@@ -6,8 +6,7 @@
 
 namespace vergence {
 
-/// East, north, up at a fixed point of WGS84: exact Cartesian axes, no projection (DESIGN §3,
-/// `enu`).
+/// East, north, up at a fixed point of WGS84: exact Cartesian axes, no projection.
 ///
 ///     const LocalTangentPlane plane(Geodetic{-27.5, 153.0, 40});
 ///     const Vec3 p_enu = plane.to_enu({-27.499, 153.001, 41});  // m east, north, up of that place

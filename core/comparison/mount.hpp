@@ -41,7 +41,7 @@ struct MountOptions {
   Duration min_correlation = Duration::seconds(
       60);  // of attitude and place: a drive is too short to tell how slowly they wander
   // A parameter whose sigma is above this is `not_observable`.
-  double rotation_sigma = 0.035;  // rad, two degrees: as much as the drawing knows
+  double rotation_sigma = 0.035;  // rad, two degrees: accuracy of a drawing
   double lever_sigma = 0.5;       // m
   Duration offset_sigma = Duration::milliseconds(30);
 };

@@ -144,7 +144,7 @@ struct TrajectoryEvaluation {
                                             std::span<const StampedPose> reference,
                                             const EvaluationOptions& options);
 
-/// The parts, for whoever needs one of them.
+/// The parts, for callers that need one of them.
 
 [[nodiscard]] MatchedTrajectories associate(std::span<const StampedPose> estimate,
                                             std::span<const StampedPose> reference,

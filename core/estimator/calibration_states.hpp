@@ -18,7 +18,7 @@ enum class CalibrationTrigger : std::uint8_t {
   adopted_verified,  // the same, by a drive that holds its depths to the tolerated error
   confirmed,         // by the drive, while it was in use
   contradicted,      // the same
-  suspected,         // an alarm, or the user wants another one
+  suspected,         // an alarm, or a recalibration was requested
   kept,              // what was sought is no better, or the images fit the one before again
 };
 

@@ -25,7 +25,7 @@ enum class Degradation : std::uint8_t {
 inline constexpr std::size_t kDegradations = static_cast<std::size_t>(Degradation::motion) + 1;
 
 /// The doubts that stand, each with its reason, the frame since when, and how many frames of
-/// evidence against it end it (METHOD §7.4). A pose is `ok` while the ledger is empty; else it is
+/// evidence against it end it. A pose is `ok` while the ledger is empty; else it is
 /// `degraded` for the strongest reason.
 ///
 ///     ledger.enter(Doubt::scene, Reason::map_reset, frame.number, 10);

@@ -145,7 +145,6 @@ class Estimator {
   [[nodiscard]] const RigCalibration& calibration() const noexcept;
   [[nodiscard]] bool calibrated() const noexcept;
   /// True if the drive itself has confirmed the calibration in use to the tolerated depth error
-  /// (METHOD §6.4).
   [[nodiscard]] bool verified() const noexcept;
   /// The newest moving frames with their tracks; empty without `online`. Valid until the next
   /// process().

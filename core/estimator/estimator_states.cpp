@@ -92,7 +92,7 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
            "relocalised against the points of the window", 0);
 }
 
-/// Frames were missed in which nobody watched the rig: the drive has to confirm the calibration
+/// The rig was not monitored during missed frames: the drive has to verify the calibration
 /// again.
 void Estimator::Parts::lose_track_of_rig(std::uint64_t number) noexcept {
   calibrator.map_lost();

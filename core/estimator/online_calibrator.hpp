@@ -12,7 +12,7 @@ namespace vergence {
 
 class SolutionReview;
 
-/// Calibrates the rig while it drives (METHOD §3, §6): collects frames, monitors the calibration in
+/// Calibrates the rig while it drives: collects frames, monitors the calibration in
 /// use, has calibrations solved in the background and decides about them. The estimator hands in
 /// posed frames and acts on the decisions. The state of the calibration in use is one of the table
 /// in calibration_states.hpp; the states of the odometry belong to the estimator.

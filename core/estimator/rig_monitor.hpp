@@ -19,7 +19,7 @@ struct RigAssessment {
   bool cameras_in_sync = false;  // motion shows that all cameras' images are of the same instant
 };
 
-/// Checks, frame by frame, that the calibration still describes the rig (METHOD §4). Each further
+/// Checks, frame by frame, that the calibration still describes the rig. Each further
 /// camera has a monitor of the distances to epipolar lines, a detector of jumps in the disparities,
 /// and a test that its images are of the same instant as the left ones.
 ///

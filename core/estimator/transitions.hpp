@@ -5,7 +5,7 @@
 
 namespace vergence {
 
-/// Event that can change the estimator's state (METHOD §3).
+/// Event that can change the estimator's state.
 enum class Trigger : std::uint8_t {
   calibration_given,     // one is in use from the first frame
   pair_found,            // the first pair gave the cameras' transform
@@ -14,7 +14,7 @@ enum class Trigger : std::uint8_t {
   calibration_rejected,  // not through
   calibration_saved,     // a new one is no better than the one in use
   rig_changed,           // the monitor raised
-  requested,             // the user wants a new calibration
+  requested,             // a recalibration was requested
   pose_lost,
   pose_found,               // with a calibration in use
   pose_found_suspect,       // with one in use that is doubted

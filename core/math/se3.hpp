@@ -5,7 +5,7 @@ namespace vergence {
 
 /// A rigid transform written `T_to_from`: p_to = T_to_from * p_from = R p_from + t, metres.
 ///
-/// Perturbed on the left of the rotation and plainly in translation (METHOD §1): R ← Exp(φ) R, t ←
+/// Perturbed on the left of the rotation and plainly in translation: R ← Exp(φ) R, t ←
 /// t + τ.
 struct Transform {
   Mat3 R = Mat3::Identity();

@@ -3,7 +3,7 @@
 
 namespace vergence {
 
-/// Counts heap allocations made by threads that have promised to make none (DESIGN §4).
+/// Counts heap allocations made by threads that have promised to make none.
 ///
 /// Works where the program links `vergence_core_memory_hooks`, which puts itself before the C
 /// library's malloc family; elsewhere (sanitizer builds bring their own) available() is false and

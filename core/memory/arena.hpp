@@ -24,7 +24,7 @@ struct ArenaRow {
   std::size_t bytes = 0;
 };
 
-/// All memory of the real-time path, taken once at start. Hands out, never takes back (DESIGN §4).
+/// All memory of the real-time path, taken once at start. Hands out, never takes back.
 ///
 ///     Arena arena(odometry::Map::memory_needed());
 ///     odometry::Map map(10, arena);  // 10 keyframes
@@ -61,8 +61,8 @@ class Arena {
     return all;
   }
 
-  /// n objects of zero bytes, whatever a T is by default, for who writes one before it is read, as
-  /// a BoundedVector does: pages stay untouched until then.
+  /// n objects of zero bytes, whatever a T is by default, for callers that write before they read,
+  /// as a BoundedVector does: pages stay untouched until then.
   template <class T>
   [[nodiscard]] std::span<T> make_unset(std::size_t n, const char* who) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -73,7 +73,7 @@ class Arena {
   [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
   /// Bytes by name, in the order of their first request.
   [[nodiscard]] std::span<const ArenaRow> rows() const noexcept { return rows_; }
-  /// All of it, for who asks the system which pages are resident.
+  /// All of it, to ask the system which pages are resident.
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept { return {begin_, capacity_}; }
 
  private:

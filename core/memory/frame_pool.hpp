@@ -17,7 +17,7 @@ namespace vergence {
 using FrameSlot = std::uint16_t;
 
 /// Image memory of one size, taken once: slots start on a cache line, rows are padded to whole
-/// cache lines (DESIGN §4).
+/// cache lines.
 ///
 ///     Arena arena(FramePool::memory_needed(752, 480, 4));
 ///     FramePool pool(752, 480, 4, arena);
@@ -30,7 +30,7 @@ using FrameSlot = std::uint16_t;
 /// Ownership  acquire() makes a slot the caller's, until release(). Views of it are valid that
 ///            long.
 /// Threads    acquire(), writable(): one thread. release(): one thread, the same or another.
-///            view(): whoever holds the slot.
+///            view(): the holder of the slot.
 /// Memory     All of it from the arena in the constructor; neither lock nor system call afterwards.
 /// Full       With no slot free acquire() refuses; the caller's stated policy acts (replay waits,
 ///            live drops and counts).

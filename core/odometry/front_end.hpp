@@ -122,8 +122,8 @@ class FrontEnd {
 
  private:
   /// Minimum correlation of two windows to be compared further. The epipolar distance, the ratio to
-  /// the second best and the following frames decide whether they match. The value of the
-  /// trial over thirteen sequences in METHOD §7.
+  /// the second best and the following frames decide whether they match. The value is
+  /// the best of a trial over thirteen sequences.
   static constexpr float kMayMatch = 0.7F;
   static constexpr int kSmallestCell =
       12;  // px: a window's side; nearer corners share their pixels

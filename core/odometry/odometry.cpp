@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kFramesUntilTrial =
     3;  // without new points, before some are made to be tried alone: no keyframe is made while
-        // the rig stands, and it stands for whoever follows a truck alongside
+        // the rig stands, and it stands relative to a truck alongside
 constexpr int kTrialPoints = 40;  // of them, however little time there is: enough to judge from
 constexpr int kFramesLostBeforeRestart = 3;
 constexpr double kUnlinkedBand =

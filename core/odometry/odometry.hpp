@@ -66,7 +66,7 @@ enum class Link : std::uint8_t {
              // parallel monocular
 };
 
-/// Visual odometry (METHOD §3): predicts, follows, poses, keeps a window of keyframes; linked or
+/// Visual odometry: predicts, follows, poses, keeps a window of keyframes; linked or
 /// not.
 ///
 /// Unlinked, rig() is this frame's transform between the cameras and no calibration. A knock of one

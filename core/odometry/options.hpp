@@ -7,12 +7,12 @@ namespace vergence {
 /// for each field.
 struct OdometryOptions {
   int features = 400;         // tracked points per image aimed at, 50 … 1000
-  int init_features = 0;      // what finds the transform of a rig that nobody has calibrated: 0
+  int init_features = 0;      // features that initialise an uncalibrated rig: 0
                               // corners, 1 SURF-64 (docs/benchmarks.md)
   int pyramid_levels = 4;     // 2 … 6; each halves the image
   double band_px = 2.0;       // half width of the band about the epipolar line across, 0.5 … 5
   double pixel_sigma = 0.15;  // px, of one coordinate of a tracked corner, level 0; also the floor
-                              // of the residual scale (METHOD §2)
+                              // of the residual scale
   double parallax_sigma = 0.8;  // px more, in quadrature, for a patch seen from one depth further
                                 // to the side: its slope is unknown, 0 … 10
   double huber = 2.0;           // robust threshold in sigmas, 1 … 10

@@ -23,7 +23,7 @@ struct PoseFit {
   [[nodiscard]] bool confirmed_stereo() const noexcept;
 };
 
-/// Poses from points: three points in MLESAC, then all of them (METHOD §3).
+/// Poses from points: three points in MLESAC, then all of them.
 ///
 /// Linked, the cameras are one rigid rig; unlinked, each camera's pose is found for itself and the
 /// rig's transform is what comes out.

@@ -16,7 +16,7 @@ struct WindowOutcome {
   double rms_px = 0;
 };
 
-/// Adjusts the window's poses and points together (METHOD §2, stereo odometry): the oldest keyframe
+/// Adjusts the window's poses and points together (stereo odometry): the oldest keyframe
 /// is constant.
 ///
 /// A calibration error moves all depths of a window together, by one disparity common to all
@@ -39,7 +39,7 @@ class WindowAdjuster {
   /// Not more than `effort` allows: the newest keyframes, so many steps.
   WindowOutcome adjust(Map& map, const FrameWorkload& effort = {}) noexcept;
   /// As adjust(), with unlinked cameras: every image has a pose of its own, in
-  /// Keyframe::T_camera_left (METHOD §2, parallel monocular). Both images of the oldest keyframe
+  /// Keyframe::T_camera_left (parallel monocular). Both images of the oldest keyframe
   /// are constant; the caller renews the scale.
   WindowOutcome adjust_unlinked(Map& map, const FrameWorkload& effort = {}) noexcept;
   /// Call when the owner's rig was changed to another calibration.

@@ -94,7 +94,7 @@ struct RigCalibration {
   double reprojection_px = 0;  // root mean square of that solve
   double scale_sigma = 0;  // relative, of lengths driven: by the noise of the tracks it was found
                            // from, and by what lenses usually are off; not by baseline_sigma
-  double inflation = 0;    // variance of what was found over what its solve believes: weighs it as
+  double inflation = 0;    // variance of the result over the variance by its solve: weighs it as
                            // the next one's prior; 0: not known
 };
 

@@ -38,15 +38,14 @@ struct CalibrationDecision {
                                // what is in use fits as well
   const char* reason =
       "";  // why it was rejected, a constant message without commas; empty when accepted
-  RigCalibration calibration{};   // the one found, also when rejected
-  int latency_frames = 0;         // from the alarm (or the start, or the request) to here
-  std::uint64_t onset_frame = 0;  // when the rig is thought to have changed; 0: does not apply
-  double held_out_before_px = 0;  // distance to the epipolar lines of frames that were not in the
-                                  // solve, median, of the camera that fits worst: with the one
-                                  // before
-  double held_out_after_px = 0;   // and with this one
-  double reference_depth_m =
-      0;  // METHOD §6.4: the depth that the next three are of; 0: nothing was measured
+  RigCalibration calibration{};    // the one found, also when rejected
+  int latency_frames = 0;          // from the alarm (or the start, or the request) to here
+  std::uint64_t onset_frame = 0;   // when the rig is thought to have changed; 0: does not apply
+  double held_out_before_px = 0;   // distance to the epipolar lines of frames that were not in the
+                                   // solve, median, of the camera that fits worst: with the one
+                                   // before
+  double held_out_after_px = 0;    // and with this one
+  double reference_depth_m = 0;    // the depth that the next three are of; 0: nothing was measured
   double depth_sigma_percent = 0;  // predicted depth error of the calibration found, 1 sigma
   double depth_error_percent =
       0;                     // how far off the one before was, by the one found; 0: there was none

@@ -9,7 +9,7 @@
 
 namespace vergence {
 
-/// State of the estimator (METHOD §3).
+/// State of the estimator.
 enum class State : std::uint8_t {
   initialising,
   parallel_monocular,
@@ -19,7 +19,7 @@ enum class State : std::uint8_t {
   lost
 };
 
-/// Status of a pose (DESIGN §6).
+/// Status of a pose.
 enum class PoseStatus : std::uint8_t {
   ok,        // use it
   degraded,  // usable, `reason` says what is weak

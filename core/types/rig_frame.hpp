@@ -19,7 +19,7 @@ enum class Pairing : std::uint8_t {
 
 /// The images of one trigger pulse. `images[k].empty()`: camera k gave none.
 ///
-/// Ownership  Views; whoever built the frame keeps the slots until Estimator::process() has
+/// Ownership  Views; the frame's producer keeps the slots until Estimator::process() has
 ///            returned.
 /// Time       One stamp for all: camera 0's mid-exposure. `spread`: the largest difference of the
 ///            others to it.

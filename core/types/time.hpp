@@ -4,7 +4,7 @@
 
 namespace vergence {
 
-/// A length of time, signed nanoseconds. Integer, so that ten years stay exact (DESIGN §3).
+/// A length of time, signed nanoseconds. Integer, so that ten years stay exact.
 class Duration {
  public:
   constexpr Duration() noexcept = default;

@@ -15,7 +15,7 @@ namespace vergence {
 /// The images of one pulse. `rig.images` are views of the slots, valid until the frame is released.
 struct AcquiredFrame {
   RigFrame rig{};
-  SyncedSet set{};  // the slots, and what the synchroniser knows of them
+  SyncedSet set{};  // the slots, and the synchroniser's state of them
 };
 
 /// A reading of the INS, its stamp and the stamp's error bound mapped from the device's clock.

@@ -42,7 +42,7 @@ class AcquiredQueue {
   void push(const Item& item) noexcept;
   /// Nothing more will be pushed: next() gives what is there, then false.
   void finish() noexcept;
-  /// Nobody may be taking any more: push() does not wait from now on. finish() is still owed.
+  /// The consumer may have stopped: push() does not wait from now on. finish() is still owed.
   void stop() noexcept;
 
   /// The oldest item, waiting for it; images are views of their slots. False: finished.

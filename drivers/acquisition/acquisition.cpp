@@ -139,7 +139,7 @@ void Acquisition::poll_ins() {
     if (sync_out_) sync_out_->restart();
   }
   if (!ins_head_.held || !ins_head_.event) return;
-  ins_head_.held = false;  // nobody is told: a comparison without readings says so itself
+  ins_head_.held = false;  // not reported here: a comparison without readings reports it
   ins_head_.disconnected = true;
 }
 

@@ -25,26 +25,38 @@ namespace vergence {
 /// Counters of a drive; each written by one thread, exact after join().
 struct AcquisitionCounters {
   SyncCounters sync{};
-  std::uint64_t torn = 0;                          // frames refused because parts were missing
-  std::uint64_t dropped_sets = 0;                  // live: older images that a newer one overtook
-  std::uint64_t dropped_readings = 0;              // live: INS readings that found the ring full
-  std::uint64_t clock_resets = 0;                  // device clocks that were found set
-  std::uint64_t pulses = 0;                        // the board, or the INS's SyncOut, reported
-  std::uint64_t reboots = 0;                       // of the board
-  std::uint64_t pauses = 0;                        // of the pulses, to prove the pairing
-  std::uint64_t pauses_refused = 0;                // the board cannot
-  std::array<ClockRecord, kMaxCameras> cameras{};  // their clocks
+  /// Incomplete frames, which were refused.
+  std::uint64_t torn = 0;
+  /// Live: older sets that a newer one replaced.
+  std::uint64_t dropped_sets = 0;
+  /// Live: INS readings dropped because the ring was full.
+  std::uint64_t dropped_readings = 0;
+  /// Detected steps of device clocks.
+  std::uint64_t clock_resets = 0;
+  /// Pulses reported by the trigger board or by the INS (SyncOut).
+  std::uint64_t pulses = 0;
+  /// Restarts of the trigger board.
+  std::uint64_t reboots = 0;
+  /// Pauses of the pulses to verify the pairing.
+  std::uint64_t pauses = 0;
+  /// Pauses that the trigger board does not support.
+  std::uint64_t pauses_refused = 0;
+  /// Clocks of the cameras.
+  std::array<ClockRecord, kMaxCameras> cameras{};
   ClockRecord ins{}, board{};
-  std::array<bool, kMaxCameras> verified{};  // at the end
+  /// State at the end.
+  std::array<bool, kMaxCameras> verified{};
   std::size_t ring_high_water = 0;
-  std::int64_t worst_stamp_error_ns = 0;  // of the images' stamps, after the first second
+  /// Largest stamp error of images after the first second.
+  std::int64_t worst_stamp_error_ns = 0;
 };
 
 /// A device that could not be started.
 struct StartFailure {
   DeviceInfo device{};
   DeviceStatus status = DeviceStatus::ok;
-  std::string message{};  // the driver's message; empty: the status says it all
+  /// Message of the driver; empty: the status is sufficient.
+  std::string message{};
 };
 
 /// Cameras, INS and board into one stream of rig frames, INS samples and device events, stamped on
@@ -55,9 +67,9 @@ struct StartFailure {
 /// Merged by arrival: a mock in virtual time gives the same stream on every run.
 /// Pulses     Their reports go into the synchroniser in the order of arrival among the frames; what
 ///            the driver has not mapped is mapped here, with a new fit for every boot. A pause that
-///            the synchroniser wants is asked for when a report is taken: in virtual time always at
-///            the same one. With `ins_syncout` the INS's readings report the pulses; where a gap is
-///            wanted its stream is stopped for as long, as camera 0's is with `master_strobe`.
+///            the synchroniser requires is asked for when a report is taken: in virtual time always
+///            at the same one. With `ins_syncout` the INS's readings report the pulses; where a gap
+///            is wanted its stream is stopped for as long, as camera 0's is with `master_strobe`.
 ///
 ///     Acquisition acquisition({&left, &right}, &ins, &board, options);
 ///     if (const auto failure = acquisition.start()) return;  // failure->device does not start
@@ -81,11 +93,14 @@ class Acquisition final : private Notifier {
   struct Options {
     SyncOptions sync{};
     bool wait_when_full = false;
-    Stamp tie_stamp{};     // this stamp …
-    HostStamp tie_host{};  // … was this time of the host's clock
-    Duration stamp_grid =
-        Duration::nanoseconds(1);  // stamps are whole multiples of it, rounded to the nearest; > 0
-    PulseObserver* pulse_observer = nullptr;  // set by start(); null: pulses are not recorded
+    /// Stamp that corresponds to tie_host.
+    Stamp tie_stamp{};
+    /// Time of the host's clock at tie_stamp.
+    HostStamp tie_host{};
+    /// Stamps are rounded to whole multiples of it; > 0.
+    Duration stamp_grid = Duration::nanoseconds(1);
+    /// Set by start(); null: pulses are not recorded.
+    PulseObserver* pulse_observer = nullptr;
   };
 
   /// `ins` may be null. The cameras in the order of the rig, camera 0 first.
@@ -103,7 +118,7 @@ class Acquisition final : private Notifier {
   /// Call once for every AcquiredFrame that next() returned.
   void release(const AcquiredFrame& frame) noexcept { queue_.release(frame.set); }
   /// Devices that are gone are asked to come back at every poll, a second apart at least, and a
-  /// poll follows on whatever a device brings. From who knows that time passes where none brings
+  /// poll follows on whatever a device brings. Called where time passes while no device brings
   /// anything: some times a second.
   void wake() noexcept { notify(); }
   /// Number of iterations of its thread: it stands still while a device holds that up. Any thread.
@@ -132,7 +147,7 @@ class Acquisition final : private Notifier {
   void push_reading();
   void poll_board();
   void push_pulse(const Pulse& pulse);
-  /// Makes the gap that the synchroniser wants.
+  /// Makes the gap that the synchroniser requires.
   void pause_pulses();
   /// Cameras that have given nothing for ten seconds of pulses hang, whatever their drivers know:
   /// they are stopped, and asked to come back like any that is gone.

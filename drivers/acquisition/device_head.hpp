@@ -7,25 +7,31 @@
 
 namespace vergence {
 
-/// The oldest item that a device has and nobody has taken, and whether the device is there: one
+/// The oldest item of a device that was not consumed yet, and whether the device is there: one
 /// way to poll cameras, INS and board.
 ///
 /// Ownership  The device outlives it. Threads: the acquisition's, which calls all of it.
 template <class Device, class Value>
 struct DeviceHead {
-  static constexpr std::int64_t kAskAgain =
-      1'000'000'000;  // ns: opening a bus device takes a while, a second more is no loss
-  static constexpr std::int64_t kRest =
-      10;  // times what asking took: meanwhile nobody takes what the other devices have
+  /// Minimum interval of reconnection attempts, ns: opening a bus device takes time.
+  static constexpr std::int64_t kAskAgain = 1'000'000'000;
+  /// Minimum pause after an attempt, as a multiple of its duration; the data of other devices wait
+  /// during one.
+  static constexpr std::int64_t kRest = 10;
 
   Device* device = nullptr;
-  bool held = false;   // `value` waits to be taken
-  bool event = false;  // held: no value but that the device has gone, at value.arrival
+  /// True while `value` waits to be consumed.
+  bool held = false;
+  /// With `held`: the item is a disconnect at value.arrival.
+  bool event = false;
   bool disconnected = false;
-  bool back = false;  // it was started again, which nobody has been told yet
+  /// The device was started again, which is not reported yet.
+  bool back = false;
   bool ended = false;
-  std::int64_t pulses_without = 0;  // reported, since a camera's newest frame
-  std::int64_t ask_ns = 0;          // when it is next asked to come back, steady clock
+  /// Pulses reported since the newest frame of a camera.
+  std::int64_t pulses_without = 0;
+  /// Time of the next reconnection attempt, steady clock.
+  std::int64_t ask_ns = 0;
   Value value{};
 
   /// `ready`: what a device that is started again notifies. `ask_always` (virtual time): a device

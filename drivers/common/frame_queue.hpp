@@ -25,7 +25,7 @@ namespace vergence {
 /// Ownership  A slot that was offered is the queue's, one that was handed out the consumer's until
 ///            release(); what becomes of it then is the driver's.
 /// Threads    Each call by whom its comment names. One mutex, held for a few assignments and the
-///            Notifier's call only: after end() nobody is notified any more.
+///            Notifier's call only: after end() there are no notifications.
 /// Memory     Fixed, a place for every slot there can be: it is never full.
 /// Time       No call waits but wait(), which ends at its limit.
 /// Errors     Nothing throws.
@@ -44,8 +44,8 @@ class FrameQueue {
   /// Ends a failed start: disconnected at this time, or since earlier (no `when`).
   void fail(HostStamp when) noexcept;
   void fail() noexcept;
-  /// Takes out a frame that was offered and that nobody took; false: there is none. Precondition:
-  /// nobody offers.
+  /// Takes out a frame that was offered and not consumed; false: there is none. Precondition:
+  /// no thread offers.
   [[nodiscard]] bool drain(FrameSlot* slot) noexcept;
   void count_start() noexcept;
 

@@ -12,7 +12,7 @@ namespace vergence {
 template <class Value>
 class Published {
  public:
-  /// Unless somebody is reading just now: then the one before stands until the next.
+  /// While a reader holds it, the value before stays until the next call.
   void offer(const Value& value) noexcept(kCopies) {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (lock.owns_lock()) value_ = value;

@@ -11,7 +11,7 @@
 
 namespace vergence {
 
-/// An INS or satellite receiver on a serial line: what InsDevice wants, but for what its protocol
+/// An INS or satellite receiver on a serial line: all of InsDevice except what its protocol
 /// does. Readings of kRing wait for their consumer.
 ///
 /// States, ownership, threads, memory, errors  As SerialDevice and InsDevice.
@@ -47,7 +47,7 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
     info_.place = this->place().name();
   }
 
-  /// Opens the line as the device wants it.
+  /// Opens the line with the device's settings.
   [[nodiscard]] virtual DeviceStatus open() = 0;
   /// Stopped, and opened again. Not ok: last_error_ says why. Owner's thread.
   [[nodiscard]] DeviceStatus open_anew() {

@@ -13,7 +13,7 @@ namespace vergence {
 ///       event.wait(seen);
 ///     }
 ///
-/// Threads  Everything from any thread. No heap; signal() makes a system call only when somebody
+/// Threads  Everything from any thread. No heap; signal() makes a system call only when a thread
 ///          waits.
 class WakeEvent {
  public:

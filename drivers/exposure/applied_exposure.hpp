@@ -7,7 +7,7 @@ namespace vergence::exposure {
 /// Which exposure a frame had, of a camera that does not say: the one that was in its registers
 /// when the frame's exposure began.
 ///
-/// Threads  reset(): while nobody else does anything. change(): one thread. at(): the transport's
+/// Threads  reset(): while no other call runs. change(): one thread. at(): the transport's
 ///          thread.
 class AppliedExposure {
  public:

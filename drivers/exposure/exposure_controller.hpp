@@ -26,7 +26,7 @@ struct ExposureOptions {
 ///          far is unknown, and it goes down by half of `down_stops`, by all of it where half of
 ///          the picture is. The sum of exposure and gain moves by that, exposure first, gain beyond
 ///          its longest.
-/// Delay    A change shows some frames later, how many nobody says: until `settle_frames` images
+/// Delay    A change shows after an unknown number of frames: until `settle_frames` images
 ///          have been seen since, none is judged. So each change is measured before the next is
 ///          made, and a sensor whose response is between linear and its square root does not swing.
 /// Threads  One caller. Memory: none. Errors: none.

@@ -346,7 +346,7 @@ bool Decoder::map(const Fix& fix, InsReading* reading) noexcept {
       count(step);
     }
   } else if (counters_.readings > 0) {
-    ++number_;  // after the line was away: how many are missing nobody knows
+    ++number_;  // after the line was away: the number of missing ones is unknown
   }
   any_ = true;
   last_ = fix.measured;

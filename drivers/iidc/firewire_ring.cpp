@@ -75,7 +75,8 @@ void FirewireRing::end() noexcept {
 }
 
 /// Images that are held stay at their addresses, in memory of their own: as long as anything of the
-/// node's file is mapped the kernel keeps the capture, and its channel, which the next one wants.
+/// node's file is mapped the kernel keeps the capture, and its channel, which the next capture
+/// needs.
 void FirewireRing::detach_kept() noexcept {
   const Map& m = maps_[generation()];
   std::uint64_t bits = kept_in(generation());

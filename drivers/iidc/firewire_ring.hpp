@@ -23,7 +23,7 @@ namespace vergence::iidc {
 /// Unplug     libdc1394's capture_stop fails on a node that is gone, and leaves mapping and
 ///            descriptor: they are undone here. (Some kilobytes of its heap stay.)
 /// Ownership  The camera is the caller's and open from set_up() to end() or abandon().
-/// Threads    set_up, resume, end, …: the owner, while nobody takes. take, refuse,
+/// Threads    set_up, resume, end, …: the owner, while no thread takes. take, refuse,
 ///            enqueue_returned: the stream's thread. give_back, bytes: any.
 /// Memory     The kernel's and the library's, at set_up(). Time: no call waits for a frame.
 /// Errors     Nothing throws but set_up(), where a message finds no memory.
@@ -61,7 +61,7 @@ class FirewireRing {
   void resume() noexcept;
   /// Ends a capture whose node is there, if it still is. Precondition: !any_kept().
   void end() noexcept;
-  /// Ends a capture whose node is gone or about to be closed, as far as nobody looks at its images.
+  /// Ends a capture whose node is gone or about to be closed, unless its images are in use.
   void abandon() noexcept;
   /// Unmaps what is left of captures that ended, once nothing in it is kept.
   void drop_orphans() noexcept;
@@ -69,14 +69,14 @@ class FirewireRing {
   [[nodiscard]] bool has_room() const noexcept;
   /// The next ring takes the range that is free. Precondition: !captured(), has_room().
   void use_free_range() noexcept;
-  /// Nobody looks at images any more.
+  /// Images are no longer in use.
   void discard_kept() noexcept { kept_.clear(); }
 
   // The stream's thread. Precondition: captured().
   /// Readable when a buffer is filled.
   [[nodiscard]] int descriptor() const noexcept { return dc1394_capture_get_fileno(camera_); }
   [[nodiscard]] Take take(Filled* filled) noexcept;
-  /// Gives back what take() gave and nobody wants.
+  /// Gives back unused buffers of take().
   void refuse(FrameSlot slot) noexcept;
   void enqueue_returned() noexcept;
 

@@ -100,7 +100,7 @@ DeviceStatus write_usb_quadlet(libusb_device_handle* handle, std::uint64_t addre
   return sent == static_cast<int>(b.size()) ? DeviceStatus::ok : DeviceStatus::failed;
 }
 
-/// Registers of a device that is opened, but not yet anybody's camera.
+/// Registers of a device that is opened, but not in use as a camera yet.
 class HandlePort final : public RegisterPort {
  public:
   explicit HandlePort(libusb_device_handle* handle) : handle_(handle) {}
@@ -169,9 +169,8 @@ FoundUsbCamera ask(libusb_device* device, const libusb_device_descriptor& d, con
   return found;
 }
 
-/// Opens each in turn and calls back; true ends it. Whoever does not take the handle (sets it to
-/// null) has it closed.
-/// False: the system's devices cannot be listed.
+/// Opens each in turn and calls back; true ends it. A callback that does not take the handle (sets
+/// it to null) has it closed. False: the system's devices cannot be listed.
 bool for_each_usb_camera(libusb_context* context, std::string* message,
                          const std::function<bool(FoundUsbCamera*)>& look) {
   libusb_device** list = nullptr;
@@ -453,7 +452,7 @@ void UsbBus::completed(Flight* flight) noexcept {
       case LIBUSB_TRANSFER_NO_DEVICE:
         again = false;
         break;
-      default:  // error, stall, or cancelled by nobody we know
+      default:  // error, stall, or cancelled from outside
         again = ++errors_ < kMaxErrors;
         break;
     }

@@ -20,7 +20,7 @@ struct MockRigOptions {
   std::uint64_t seed = 1;
   Pattern pattern =
       Pattern::grey;  // gbrg: grey is made of the mosaic, as the drivers of colour cameras do
-  bool raw = false;  // with gbrg: the cameras hand out the mosaic itself, for who writes a data set
+  bool raw = false;   // with gbrg: the cameras hand out the mosaic itself, to write a data set
   bool noise = true;  // shot and read noise of the sensors
   int blur_samples =
       1;  // poses averaged over an exposure: 1 is none; the time to render grows with it

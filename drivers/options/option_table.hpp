@@ -27,7 +27,7 @@ namespace vergence {
 struct OptionRow {
   std::string name;      // `feature.NAME`: any name after the dot
   std::string values;    // the unit, what it takes: `µs, 0 to 10000`, `on, off`
-  std::string fallback;  // what holds where nobody gives it; may be words; empty: nothing
+  std::string fallback;  // description of the default; empty: none
   std::string meaning;   // one message
 };
 
@@ -111,7 +111,7 @@ class OptionTable {
         });
   }
 
-  /// A name that the device knows, not empty.
+  /// A name of the device, not empty.
   OptionTable& text(const char* name, std::string Options::*field, const char* values,
                     const char* fallback, const char* meaning) {
     return add(

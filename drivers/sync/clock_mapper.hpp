@@ -36,9 +36,8 @@ struct MappedStamp {
 /// One way    Arrivals are late, never early: the line under all points (host − device against
 ///            device) is the clock. Every kBin of device time keeps its least-delayed pair, kBins
 ///            of them are held; the line is the edge of their lower convex hull under the mean, its
-///            slope held within the drift bound. What the least delay of the way truly is nobody
-///            can see one way: by what the stated one (`min_delay`) is wrong, all stamps are,
-///            beyond the bound.
+///            slope held within the drift bound. The true minimum delay cannot be observed one way:
+///            an error of the stated one (`min_delay`) shifts all stamps, beyond the bound.
 /// Two ways   A question puts the line above a point, its answer below one. Of the slopes the one
 ///            is taken that leaves the most room between those bounds, and the line in the middle
 ///            of it: right where both ways are alike at their best. The error bound holds for any

@@ -38,7 +38,7 @@ struct OpenSet {
 /// Sets go out in the order of their numbers, each once: what is at or below the last number that
 /// went out comes too late.
 ///
-/// Ownership  Slots in a set are whoever's the RigSynchronizer says; here they are numbers.
+/// Ownership  Slots belong to the owner that RigSynchronizer states; here they are numbers.
 /// Threads    One caller. Memory: fixed, kOpen sets and one more. Time: constant a call.
 /// Errors     None.
 class OpenSets {
@@ -82,7 +82,7 @@ class OpenSets {
   [[nodiscard]] std::uint64_t first_free() const noexcept;
   /// From now on no set waits that has been open until now.
   void flush() noexcept { flushed_ = first_free(); }
-  /// Every set below waits for nobody.
+  /// No set below this one waits for an image.
   [[nodiscard]] std::uint64_t flushed_below() const noexcept { return flushed_; }
 
   /// Suspect images of this camera stay suspect: their sets are contradicted.

@@ -11,19 +11,26 @@ namespace vergence {
 
 /// Method of pairing images, and of verifying that they were exposed together.
 enum class SyncMode : std::uint8_t {
-  frame_counter,     // exposure n of every camera belongs to pulse n; nothing proves it
-  approximate_time,  // what was exposed within `tolerance` by the host's clock belongs together:
-                     // nothing makes the cameras expose at once
-  board,  // a trigger board's pulses, by number; intervals that vary, or a pause, prove which frame
-          // is of which
-  ins_syncout,          // as `board`, with the INS's SyncOut for pulses; a gap proves
-  master_strobe,        // camera 0 triggers the others: its frames are the pulses; a gap of its own
-                        // proves
-  ieee1394_cycle_time,  // the stamps are of one IEEE 1394 cycle timer, which wraps after 128 s:
-                        // within `tolerance` in it
-  ptp,                  // the stamps are of one PTP clock: within `tolerance` in it
-  side_by_side,  // both images come in one picture of one camera (side_by_side_camera.hpp), with
-                 // one stamp
+  /// Exposure n of every camera belongs to pulse n; the association is not verified.
+  frame_counter,
+  /// Exposures within `tolerance` by the host's clock form a set; the cameras need not expose
+  /// simultaneously.
+  approximate_time,
+  /// Pulses of a trigger board, by number; dithered intervals or a pause verify which frame belongs
+  /// to which pulse.
+  board,
+  /// As `board`, with pulses of the INS's SyncOut; a gap verifies the association.
+  ins_syncout,
+  /// Camera 0 triggers the others: its frames are the pulses, and a gap of its own verifies the
+  /// association.
+  master_strobe,
+  /// Stamps of one IEEE 1394 cycle timer, which wraps after 128 s, within `tolerance`.
+  ieee1394_cycle_time,
+  /// Stamps of one PTP clock, within `tolerance`.
+  ptp,
+  /// One camera delivers both images side by side (side_by_side_camera.hpp), with one exposure and
+  /// one stamp.
+  side_by_side,
 };
 [[nodiscard]] const char* to_string(SyncMode) noexcept;
 /// Frames are tied to pulses that are offered by RigSynchronizer::pulse().
@@ -46,9 +53,10 @@ enum class SyncMode : std::uint8_t {
 
 /// Options of one camera for the modes with pulses.
 struct SyncCameraOptions {
-  Duration delay{};  // from the pulse's edge to the start of the exposure, of line and camera
-  Duration resolution =
-      Duration::microseconds(1);  // of the camera's stamps: DeviceTiming::resolution
+  /// Delay from the pulse's edge to the start of the exposure, by line and camera.
+  Duration delay{};
+  /// Resolution of the camera's stamps, as DeviceTiming::resolution.
+  Duration resolution = Duration::microseconds(1);
   /// By how much a stamp may be off the edge plus a constant: tens of µs where the camera stamps,
   /// milliseconds (DeviceTiming::delay_spread) where its stamps are the host's. With more than half
   /// of what the intervals vary by only a pause proves.
@@ -59,8 +67,10 @@ struct SyncCameraOptions {
 };
 
 struct SyncOptions {
-  int cameras = 2;      // 1 … kMaxCameras
-  Duration interval{};  // between two pulses, > 0; the mean, where they vary
+  /// 1 to kMaxCameras.
+  int cameras = 2;
+  /// Interval between two pulses, > 0; the mean interval if it is dithered.
+  Duration interval{};
   Duration hold = Duration::milliseconds(
       100);  // a set waits so long, by the arrivals of others, for images and the pulse's report
   SyncMode mode = SyncMode::frame_counter;
@@ -69,7 +79,8 @@ struct SyncOptions {
   /// frame_counter: the pulses may have begun before the cameras, so each camera's first exposure
   /// is given its pulse by its stamp; and again after kAmbiguous ambiguous sets in a row.
   bool align_start = false;
-  std::array<SyncCameraOptions, kMaxCameras> camera{};  // board, ins_syncout, master_strobe
+  /// Used by board, ins_syncout and master_strobe.
+  std::array<SyncCameraOptions, kMaxCameras> camera{};
   /// Returns nullptr if the options are valid, else a message.
   [[nodiscard]] const char* validate() const noexcept;
 };
@@ -78,25 +89,32 @@ struct SyncOptions {
 struct SyncFrame {
   int camera = 0;
   FrameSlot slot = 0;
-  std::uint64_t counter = 0;  // of Frame
-  MappedStamp middle{};       // of the exposure, host time
+  /// Frame::counter.
+  std::uint64_t counter = 0;
+  /// Middle of the exposure in host time.
+  MappedStamp middle{};
   HostStamp arrival{};
-  DeviceStamp exposure_start{};  // of Frame: by the camera's own clock. Ignored in the modes
-                                 // frame_counter and approximate_time
-  Duration exposure{};           // of Frame. Ignored as above
+  /// Frame::exposure_start, by the camera's clock. Ignored with frame_counter and approximate_time.
+  DeviceStamp exposure_start{};
+  /// Frame::exposure. Ignored as above.
+  Duration exposure{};
 };
 
 /// Evidence that a set's images were exposed together.
 enum class SyncProof : std::uint8_t {
-  counted,       // paired by counter, and the stamps agree within half an interval (also: one image
-                 // only)
-  ambiguous,     // paired by counter or a common clock, and the host's stamps do not agree, or a
-                 // camera's clock is not the others'; or a pulse's report contradicts: do not
-                 // estimate from it
-  by_time,       // paired by the host's stamps
-  numbered,      // every image belongs to this numbered pulse, as its camera's own intervals proved
-  master,        // the same with camera 0's exposures for pulses
-  common_clock,  // paired by stamps of one common clock
+  /// Paired by counter, and the stamps agree within half an interval (or there is only one image).
+  counted,
+  /// Paired by counter or a common clock, and the host's stamps, the cameras' clocks or the report
+  /// of the pulse contradict it. Do not estimate from such a set.
+  ambiguous,
+  /// Paired by the host's stamps.
+  by_time,
+  /// Every image belongs to this pulse, as verified by the intervals of its camera.
+  numbered,
+  /// As `numbered`, with camera 0's exposures as pulses.
+  master,
+  /// Paired by stamps of one common clock.
+  common_clock,
 };
 [[nodiscard]] const char* to_string(SyncProof) noexcept;
 
@@ -107,54 +125,71 @@ enum class SyncProof : std::uint8_t {
 ///         the first that is there. Else that camera's own.
 /// spread  The largest distance of another image's middle to it: unequal exposures.
 struct SyncedSet {
-  std::uint64_t number =
-      0;  // of the pulse; grows. With a board's reboot it goes on, as the board's own does not
+  /// Number of the pulse. It increases, also over a restart of the board, unlike the board's own.
+  std::uint64_t number = 0;
   HostStamp stamp{};
-  Duration error{};  // |true − stamp| is below this
+  /// Upper bound of |true − stamp|.
+  Duration error{};
   Duration spread{};
-  HostStamp arrival{};  // of the last image
+  /// Arrival of the last image.
+  HostStamp arrival{};
   std::array<bool, kMaxCameras> present{};
   std::array<FrameSlot, kMaxCameras> slots{};
-  std::array<HostStamp, kMaxCameras> arrivals{};  // of those that are present
+  /// Arrivals of the images that are present.
+  std::array<HostStamp, kMaxCameras> arrivals{};
   bool complete = false;
-  bool reported = false;  // the pulse's report was here; else, with pulses, the stamp is reckoned
-                          // from the camera's clock
+  /// True if the pulse's report arrived; otherwise, with pulses, the stamp is computed from the
+  /// camera's clock.
+  bool reported = false;
   SyncProof proof = SyncProof::counted;
 };
 
 enum class SyncResult : std::uint8_t {
-  taken,      // the slot comes out with its set
-  duplicate,  // that camera has given this pulse already; the slot stays the caller's
-  late,       // its set has gone out without it, or by its stamp it is of none; the slot stays the
-              // caller's
-  acquiring,  // nothing proves yet which pulse it is of; the slot stays the caller's
+  /// The slot is returned with its set.
+  taken,
+  /// The camera already gave this pulse; the slot stays the caller's.
+  duplicate,
+  /// The set of the frame was output without it, or its stamp fits no set; the slot stays the
+  /// caller's.
+  late,
+  /// The pulse of the frame is not verified yet; the slot stays the caller's.
+  acquiring,
 };
 
 /// Counters; all only grow.
 struct SyncCounters {
-  std::uint64_t complete = 0, incomplete = 0;  // sets that went out
-  std::uint64_t missed = 0;                    // pulses no camera gave an image of
-  std::array<std::uint64_t, kMaxCameras>
-      lost{};  // exposures without image, while it was there. By time: sets without that camera
-  std::array<std::uint64_t, kMaxCameras> absent{};  // sets without that camera while it was gone
+  /// Complete and incomplete sets that were output.
+  std::uint64_t complete = 0, incomplete = 0;
+  /// Pulses without an image of any camera.
+  std::uint64_t missed = 0;
+  /// Exposures without an image while the camera was connected; in modes by time, sets without that
+  /// camera.
+  std::array<std::uint64_t, kMaxCameras> lost{};
+  /// Sets without that camera while it was disconnected.
+  std::array<std::uint64_t, kMaxCameras> absent{};
   std::array<std::uint64_t, kMaxCameras> duplicate{};
   std::array<std::uint64_t, kMaxCameras> late{};
-  std::uint64_t pushed_out =
-      0;  // of the incomplete: before their time, because more pulses were open than kOpen
-  std::uint64_t ambiguous = 0;  // sets whose stamps do not agree
-  std::uint64_t realigned = 0;  // times that all cameras' pulses were found by their stamps again
+  /// Incomplete sets that were output early because more than kOpen pulses were open.
+  std::uint64_t pushed_out = 0;
+  /// Sets whose stamps do not agree.
+  std::uint64_t ambiguous = 0;
+  /// Times that the pulses of all cameras were found by their stamps again.
+  std::uint64_t realigned = 0;
   // With numbered pulses:
-  std::array<std::uint64_t, kMaxCameras>
-      missed_trigger{};  // pulses that this camera did not expose
-  std::array<std::uint64_t, kMaxCameras>
-      acquiring{};  // frames given back while nothing proved their pulse
-  std::array<std::uint64_t, kMaxCameras> acquisitions{};  // times that its pulses were verified
-  std::array<std::uint64_t, kMaxCameras>
-      contradictions{};  // times that counter, stamp and pulses did not agree: it acquires again
-  std::uint64_t reboots = 0;     // times that the pulses began again: all acquire again
-  std::uint64_t unreported = 0;  // sets that went out without their pulse's report
-  Duration
-      worst_acquisition{};  // from the first frame after a (re)start or contradiction to the proof
+  /// Pulses that this camera did not expose.
+  std::array<std::uint64_t, kMaxCameras> missed_trigger{};
+  /// Frames returned while their pulse was not verified.
+  std::array<std::uint64_t, kMaxCameras> acquiring{};
+  /// Times that the camera's pulses were verified.
+  std::array<std::uint64_t, kMaxCameras> acquisitions{};
+  /// Times that counter, stamp and pulses did not agree, which starts a new acquisition.
+  std::array<std::uint64_t, kMaxCameras> contradictions{};
+  /// Times that the pulses restarted, which starts a new acquisition of all cameras.
+  std::uint64_t reboots = 0;
+  /// Sets that were output without the report of their pulse.
+  std::uint64_t unreported = 0;
+  /// Longest time from the first frame after a (re)start or contradiction to the verification.
+  Duration worst_acquisition{};
 };
 
 }  // namespace vergence

@@ -17,8 +17,8 @@ namespace vergence {
 ///
 /// Astray   A frame that is farther back than any can be late, or over an hour of intervals ahead,
 ///          has another clock than the others. Several in a row, of whatever camera, and the common
-///          clock was set: a new count begins, at the next number, and what is open waits for
-///          nobody. Where other cameras' frames fit meanwhile, that camera's clock is apart.
+///          clock was set: a new count begins, at the next number, and open sets do not wait
+///          for it. Where other cameras' frames fit meanwhile, that camera's clock is apart.
 ///
 /// Threads  One caller. Memory: in place. Time: constant a call.
 /// Units    Times are ns of the clock that pairs: the host's, the bus's, PTP's.

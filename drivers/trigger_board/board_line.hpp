@@ -12,7 +12,7 @@
 
 namespace vergence::trigger_board {
 
-/// Frames of the trigger protocol on a line. They come one after the other, whoever asks for them:
+/// Frames of the trigger protocol on a line. They come one after the other, for every caller:
 /// an answer that was waited for and an event that came in the same read are both had.
 ///
 /// Time     A converter hands bytes over in bursts, so the end of a frame says little about when it

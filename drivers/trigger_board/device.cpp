@@ -10,7 +10,7 @@
 namespace vergence::trigger_board {
 namespace {
 
-/// Nobody tells these questions to end: they are short.
+/// These requests are not cancellable: they are short.
 const std::atomic<bool> kNever{false};
 
 DeviceTiming make_timing(const TriggerConfig& config, Duration byte_time,

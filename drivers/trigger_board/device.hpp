@@ -34,7 +34,7 @@ class Device final : public TriggerDevice,
   Device(std::unique_ptr<SerialLinkFactory> place, const Options& options);
   ~Device() override;
 
-  /// Opens the line and asks who is there. → ok, not_found (another make, or nobody),
+  /// Opens the line and identifies the device. → ok, not_found (another make, or no answer),
   /// no_permission, busy, unsupported (another protocol version), disconnected, failed
   [[nodiscard]] DeviceStatus connect();
 

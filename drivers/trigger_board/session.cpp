@@ -13,7 +13,7 @@ namespace {
 constexpr Duration kFirstPong =
     Duration::milliseconds(50);  // the first pings wait for their answers
 
-/// Nobody tells the last question to end: it is short.
+/// The last request is not cancellable: it is short.
 const std::atomic<bool> kNever{false};
 
 }  // namespace
@@ -149,7 +149,7 @@ DeviceStatus Device::reopen() {
 }
 
 /// With exposure feedback the last pulse's report comes after the answer to STOP, when its
-/// exposures are over; nobody waits for it.
+/// exposures are over; no thread waits for it.
 std::uint32_t Device::open_reports() const noexcept { return config_.feedback_inputs != 0 ? 1 : 0; }
 
 /// No pulse after it, and the last ones are counted.
@@ -199,7 +199,7 @@ void Device::publish(bool last) noexcept {
   s.reboots = receiver_.reboots();
   s.malformed = pulses.refused + pulses.exposures_refused + frames_.refused() +
                 receiver_.unknown_frames() + receiver_.clock().refused();
-  // Whoever reads it holds the lock for a copy's time; the next round will do as well.
+  // A reader holds the lock while it copies; the next round will do as well.
   if (last)
     statistics_.set(s);
   else

@@ -29,7 +29,7 @@ class Driver final : public TriggerDriver {
   explicit Driver(const Options& options = {});
   Driver(const Options& options, Ports ports) : options_(options), ports_(std::move(ports)) {}
 
-  /// Boards that answer now; a port that somebody holds is passed over. Takes up to three seconds
+  /// Boards that answer now; a port that is in use is skipped. Takes up to three seconds
   /// for a port where none answers.
   [[nodiscard]] std::vector<DeviceInfo> enumerate() override;
   /// `where`: a port (`/dev/ttyACM0`, a link to one), a board's serial number as enumerate() tells

@@ -22,8 +22,8 @@ namespace vergence::v4l2 {
 ///
 /// Threads  start(), stop(), enqueue_free(): the owner. wake(), change_exposure(): any one.
 /// Memory   None while it runs.
-/// Errors   A camera that is gone, or whose driver gives only errors, ends the thread: the
-///          FrameExchange knows it.
+/// Errors   A camera that is disconnected, or whose driver returns only errors, ends the thread;
+///          FrameExchange has the status.
 class CaptureThread {
  public:
   /// Outlives it.

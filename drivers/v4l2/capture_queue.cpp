@@ -12,7 +12,7 @@
 namespace vergence::v4l2 {
 namespace {
 
-/// A buffer's description with the one plane that a multi-plane queue wants to see.
+/// Description of a buffer with the one plane that a multi-plane queue requires.
 struct Description {
   v4l2_buffer buffer{};
   v4l2_plane plane{};

@@ -20,9 +20,8 @@ namespace vergence::v4l2 {
 /// A camera's slots: the kernel's buffers where the pixels are grey as they come, else those of a
 /// FramePool.
 ///
-/// Survives a camera that comes back: buffers of the lost one that somebody holds stay mapped until
-/// they are released.
-/// Threads  One at a time; view() of a held slot at any time.
+/// Survives a camera that comes back: buffers of the lost one that are still in use stay mapped
+/// until they are released. Threads  One at a time; view() of a held slot at any time.
 class Slots {
  public:
   static constexpr std::size_t kMax = FramePool::kMaxSlots;
@@ -40,7 +39,8 @@ class Slots {
     return grey_as_they_come == in_place() && (!grey_as_they_come || stride == stride_);
   }
 
-  /// New buffers from the kernel, those before become nobody's. Without effect on a pool's slots.
+  /// Requests new buffers from the kernel; earlier ones have no owner. Without effect on a pool's
+  /// slots.
   void install(std::vector<Mapping> mappings);
   [[nodiscard]] std::span<const std::uint8_t> buffer(std::uint32_t index) const noexcept;
   [[nodiscard]] std::size_t buffers() const noexcept { return buffer_slots_.size(); }
@@ -80,7 +80,7 @@ class Slots {
 };
 
 inline constexpr std::size_t kBufferReserve =
-    2;  // the kernel always has: with none it drops frames, and nobody knows how many
+    2;  // the kernel always has: with none it drops frames without counting them
 
 /// Between the capture thread and the camera's users: frames one way, by a FrameQueue, and the
 /// kernel's buffers back.
@@ -106,7 +106,7 @@ class FrameExchange {
   /// Grey in the kernel's buffers, as they come; or converted from them. Precondition: not busy.
   void use_buffers(int width, int height, std::size_t stride);
   void use_pool(int width, int height);
-  /// New buffers from the kernel; those before are nobody's.
+  /// Requests new buffers from the kernel; earlier ones have no owner.
   void install(std::vector<Mapping> mappings);
   /// Precondition: no capture thread runs. All that the kernel may have now.
   [[nodiscard]] Buffers free_buffers() noexcept;
@@ -114,7 +114,8 @@ class FrameExchange {
   void begin(Notifier* ready, Duration silence) noexcept;
   /// It does not, or not any more. Those who wait are woken.
   void end() noexcept { queue_.end(); }
-  /// After the capture thread's end: what nobody took is free again. True: the node has died.
+  /// After the capture thread's end: buffers that were not consumed are free again. True: the node
+  /// has died.
   [[nodiscard]] bool drain() noexcept;
 
   // Any thread.

@@ -463,7 +463,7 @@ bool Decoder::finish(DeviceStamp measured, std::uint64_t begin, std::uint64_t en
     const double periods = static_cast<double>((measured - last_).ns()) * 1e-9 * set_.rate_hz();
     number_ += static_cast<std::uint64_t>(std::max(1LL, std::llround(periods)));
   } else if (counters_.readings > 0) {
-    ++number_;  // after a new begin: how many are missing nobody knows
+    ++number_;  // after a new begin: the number of missing ones is unknown
   }
   any_ = true;
   last_ = measured;

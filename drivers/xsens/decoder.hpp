@@ -20,7 +20,7 @@ namespace vergence::xsens {
 ///          is given the device's time at which it was sent (sample + processing, or the end of the
 ///          message before where that is later, + its place in the message at the baud rate), and
 ///          this pair goes into the ClockMapper. A read whose last byte is in a message that is not
-///          whole yet waits for it. All pairs are late, never early, as the mapper wants them.
+///          whole yet waits for it. All pairs are late, never early, as the mapper requires.
 /// Threads  One caller. Memory: fixed; of reads that wait the oldest go when there are more than
 ///          kMarks.
 /// Errors   None. What is constant and unseen, the least time from the converter to the program,

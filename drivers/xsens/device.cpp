@@ -27,7 +27,7 @@ Device::~Device() { stop(); }
 DeviceStatus Device::open() {
   LineSettings settings;
   if (baud_ != 0) settings.baud = baud_;
-  // MTi-G built before 2008 want two stop bits; a receiver that wants one takes the second for idle
+  // MTi-G units built before 2008 use two stop bits; a receiver with one treats the second as idle
   // line.
   settings.stop_bits = 2;
   return open_line(settings);

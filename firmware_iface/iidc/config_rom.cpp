@@ -80,7 +80,7 @@ std::string_view to_string(RomStatus s) noexcept {
     case RomStatus::too_short:
       return "the configuration ROM is too short";
     case RomStatus::not_1394:
-      return "the configuration ROM does not begin as IEEE 1394 wants it";
+      return "the configuration ROM has no valid IEEE 1394 header";
     case RomStatus::broken_root:
       return "the root directory leaves the configuration ROM";
     case RomStatus::no_camera:

@@ -12,7 +12,7 @@ enum {
   trigger_protocol_version = 1, /* a board with another one is refused by name */
   trigger_max_lines = 4,
   trigger_max_payload = 64,
-  trigger_unasked = 0x80, /* in a sequence: nobody asked */
+  trigger_unasked = 0x80, /* flag of a sequence number: unsolicited */
   trigger_overhead = 6,   /* type, sequence, CRC */
   trigger_max_body =
       trigger_max_payload + trigger_overhead, /* < 254: COBS then adds exactly one byte */

@@ -21,7 +21,7 @@ enum class Generation : std::uint8_t { legacy, mark4 };  // MTi-G (MTData); MTi-
 // ---- baud rate ----
 
 /// Code of message 18; nothing: the device cannot. 921600 has the old code on the MTi-G, which
-/// every firmware knows.
+/// every firmware supports.
 [[nodiscard]] std::optional<std::uint8_t> baud_code(std::uint32_t baud,
                                                     Generation generation) noexcept;
 [[nodiscard]] std::optional<std::uint32_t> baud_of_code(std::uint8_t code) noexcept;
@@ -116,7 +116,7 @@ inline constexpr double kLegacySyncClock = 29.4912e6;  // Hz, of offset and widt
 /// Bytes written (3 or 5); 0: no room.
 [[nodiscard]] std::size_t write_legacy_sync(LegacySync parameter, std::uint32_t value,
                                             std::span<std::uint8_t> out) noexcept;
-/// False: neither 3 nor 5 bytes as the parameter wants them.
+/// False: neither 3 nor 5 bytes as the parameter requires.
 [[nodiscard]] bool read_legacy_sync(std::span<const std::uint8_t> payload, LegacySync* parameter,
                                     std::uint32_t* value) noexcept;
 

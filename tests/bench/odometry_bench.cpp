@@ -243,7 +243,7 @@ void print(const std::vector<Measured>& all, const Arguments& arguments, double 
       "decoded pair to the pose.\n"
       "Accuracy and times are the odometry's by itself, `calibration.online: off`; the last column "
       "has what the\nwatched rig and its calibration, on by default, make of the mean.\n"
-      "Yardstick: OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the same "
+      "Reference: OpenCV's pyramidal Lucas–Kanade on 1000 corners of one EuRoC pair, in the same "
       "run; only the ratio compares between machines.\n\n"
       "| data | frames posed | ATE SE(3) mm | ATE Sim(3) mm | scale | segments % | after one scale "
       "% | and one mounting % | °/m |\n|---|---|---|---|---|---|---|---|---|\n",

@@ -224,7 +224,7 @@ async function showImages(message) {
 
 // ---- the program
 
-// Nobody is to read an OK of a minute ago as one of now: without news band and pictures are grey.
+// An old OK must not be read as current: without updates, banner and images are grey.
 function link(words, bad, past) {
   $("band").classList.toggle("past", past);
   show("link", words);

@@ -2,8 +2,8 @@
 // SIMD target.
 //
 // Every lane is a point. With F = ∂x/∂X_i (2×3, X_i the point in the base camera) all derivatives
-// of METHOD §1 are F times something that does not depend on the camera, in the parametrisation of
-// bundle.hpp:
+// of core/README.md are F times something that does not depend on the camera, in the
+// parametrisation of bundle.hpp:
 //     pose (τ, φ):       B = F [ I  −[X_i]× ]
 //     camera k (τ, φ):   A = F [ I  −[X_i]× ]
 //     point:             C = F R_i
@@ -19,7 +19,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/bundle/detail/normal_equations.cpp"
 #include "core/bundle/detail/simd.hpp"
-// Highway wants this order.
+// Highway requires this order.
 // clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>

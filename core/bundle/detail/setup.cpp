@@ -241,7 +241,7 @@ void set_parameters(Intrinsics& k, const std::array<double, kIntrinsicsSize>& v)
 }
 
 double held_sigma(const BundleIntrinsics& intrinsics, const Intrinsics& k, int parameter) noexcept {
-  constexpr double kFocalShare = 1e-3, kPrincipalPoint = 0.5;  // px; METHOD §2
+  constexpr double kFocalShare = 1e-3, kPrincipalPoint = 0.5;  // px
   const double given = intrinsics.held_sigma[static_cast<std::size_t>(parameter)];
   if (given >= 0) return given;
   return parameter == 0   ? kFocalShare * k.fx

@@ -5,8 +5,8 @@
 
 namespace vergence::detail {
 
-/// The normal equations of METHOD §2 about one state, points eliminated: A δ = rhs, δ = [poses |
-/// θ_S].
+/// Normal equations of the bundle adjustment about one state, points eliminated: A δ = rhs, δ =
+/// [poses | θ_S].
 ///
 /// Threads  One at a time; lives on the stack of solve(). Memory  The workspace's.
 class System {

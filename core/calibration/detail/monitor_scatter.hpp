@@ -8,7 +8,7 @@ namespace vergence::calibration::detail {
 
 /// Scatter between successive stretches of a drive beyond the noise of their tracks. Residual lens
 /// errors appear as an offset that depends on where the structure is in the image, and so differs
-/// from stretch to stretch (METHOD §6.3).
+/// from stretch to stretch.
 ///
 /// A running mean of (dᵀ A d − expected by noise) / (5 n) over blocks of frames, d a block's own
 /// offset from the blocks before it; begins with an expectation that weighs some blocks. A value.

@@ -326,7 +326,7 @@ bool GigeCamera::reopen() {
   const std::lock_guard lock(device_);
   std::string why;
   session_ = open_ours(address_, &why);
-  // With another address, perhaps, whoever has the old one now: nobody, or another camera.
+  // It may have another address, and another camera may have the old one.
   if (session_ == nullptr && !info_.serial.empty() && !supervisor_.stopping())
     for (const Found& f : discover())
       if (f.info.serial == info_.serial && session_ == nullptr)

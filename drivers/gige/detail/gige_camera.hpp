@@ -33,7 +33,7 @@ class PeriodicThread {
   void start(const char* name, Duration interval, std::function<void()> round);
   /// Returns when the round in progress is over; at once where none runs.
   void stop() noexcept;
-  /// For long rounds: somebody waits in stop().
+  /// For long rounds: stop() is waiting.
   [[nodiscard]] bool stopping() const noexcept { return stopping_; }
 
  private:

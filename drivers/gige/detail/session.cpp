@@ -192,7 +192,7 @@ namespace {
 constexpr std::uint64_t kCapabilities = 0x934, kControlPrivilege = 0xA00;
 constexpr std::uint32_t kCanResend = 4;
 constexpr std::int64_t kMinSocketBuffer = 4 << 20;  // bytes
-constexpr std::int64_t kBufferedFrames = 8;         // that the socket holds while nobody reads
+constexpr std::int64_t kBufferedFrames = 8;         // that the socket holds while it is not read
 
 std::string to_text(const char* text) { return text == nullptr ? "" : text; }
 

@@ -24,7 +24,7 @@ class SlotReturns {
   /// At most so many slots are out. Precondition: stopped, no slot is held.
   void set_limit(std::size_t most) noexcept;
   /// Before the queue begins: what was offered and not taken, and what is on its way back, is the
-  /// transport's. Precondition: nobody offers.
+  /// transport's. Precondition: no thread offers.
   void withdraw() noexcept;
 
   // The releaser.

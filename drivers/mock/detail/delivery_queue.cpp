@@ -112,7 +112,7 @@ void DeliveryQueue::deliver(const QueuedDelivery& parcel, HostStamp arrival) {
     Delivery<BoardReport> d = parcel.report;
     d.arrival = arrival;
     d.value.pulse.arrival = arrival;
-    // Nobody needs to take the reports; the latest that find no room are counted.
+    // Reports need no consumer; the latest that find no room are counted.
     if (trigger_->stream.streaming() && !trigger_->stream.push(d))
       trigger_->overruns.fetch_add(1, std::memory_order_relaxed);
     return;
@@ -145,7 +145,7 @@ void DeliveryQueue::deliver_frame(const QueuedDelivery& parcel, HostStamp arriva
     keep_spare(parcel);
     return;
   }
-  // The stream is deeper than the slots: frames always find room while somebody takes them.
+  // The stream is deeper than the slots: frames always find room while they are consumed.
   if (k == 0) rig_.unseen.fetch_add(1);
   if (push_or_wait(&cameras_[k]->stream, d)) return;
   if (k == 0) rig_.unseen.fetch_sub(1);

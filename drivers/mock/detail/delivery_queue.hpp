@@ -62,7 +62,7 @@ class DeliveryQueue {
   [[nodiscard]] int on_the_way(int k) const noexcept {
     return senders_[static_cast<std::size_t>(k)].on_the_way.load();
   }
-  /// A slot of camera k whose frame nobody was there for.
+  /// A slot of camera k whose frame had no consumer.
   [[nodiscard]] std::optional<FrameSlot> pop_spare(int k);
 
  private:
@@ -70,7 +70,7 @@ class DeliveryQueue {
     std::atomic<int> on_the_way{0};
     std::uint32_t unplugged = 0;           // by what was posted; under mutex_
     std::uint32_t known_disconnected = 0;  // by what was delivered
-    std::vector<FrameSlot> spare;          // of frames that nobody was there for; under mutex_
+    std::vector<FrameSlot> spare;          // of frames without a consumer; under mutex_
   };
 
   void hand_out_in_time();
@@ -78,7 +78,7 @@ class DeliveryQueue {
   void deliver_frame(const QueuedDelivery& parcel, HostStamp arrival);
   void keep_spare(const QueuedDelivery& parcel);
   template <class S, class D>
-  [[nodiscard]] bool push_or_wait(S* stream, const D& delivery);  // false: nobody takes it
+  [[nodiscard]] bool push_or_wait(S* stream, const D& delivery);  // false: there is no consumer
   [[nodiscard]] bool stopping() const noexcept { return stop_.load(std::memory_order_acquire); }
 
   RigContext& rig_;

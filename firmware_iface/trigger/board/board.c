@@ -142,7 +142,7 @@ void board_pulse_made(TriggerBoard* board, uint64_t now, uint64_t count, bool la
 static void next_slot(TriggerBoard* board) {
   schedule_advance(&board->schedule);
   if (board->state != trigger_paused) {
-    board->armed_late = true; /* nobody asked for this gap: the next pulse says so */
+    board->armed_late = true; /* unrequested gap: the next pulse reports it */
     return;
   }
   if (--board->left_out > 0) return;

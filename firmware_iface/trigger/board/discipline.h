@@ -63,7 +63,7 @@ uint64_t tick_length(const TickDiscipline* discipline, uint64_t counts);
 bool tick_pps(TickDiscipline* discipline, uint64_t edge, uint64_t now);
 /* To be called at least every second: notices that PPS is gone. */
 void tick_advance(TickDiscipline* discipline, uint64_t now);
-/* From now on somebody relies on the rate: it moves slowly. */
+/* From now on the host relies on the rate: it moves slowly. */
 void tick_hold_rate(TickDiscipline* discipline);
 
 #ifdef __cplusplus

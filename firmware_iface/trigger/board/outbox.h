@@ -25,7 +25,7 @@ typedef struct {
 typedef struct {
   OutboxMessage messages[outbox_capacity];
   uint8_t first, used;
-  uint8_t sequence; /* of the next message that nobody asked for, modulo 128 */
+  uint8_t sequence; /* of the next unsolicited message, modulo 128 */
   uint32_t dropped;
 } Outbox;
 

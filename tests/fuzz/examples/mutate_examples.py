@@ -1,6 +1,6 @@
 """Mutates the example configurations, a small data folder and small bags, and runs the program on each.
 
-None may crash, run longer than LIMIT_S of its own time, hold more than LIMIT_BYTES or end with another code than 0, 1, 2 (DESIGN §6; 3 is for
+None may crash, run longer than LIMIT_S of its own time, hold more than LIMIT_BYTES or end with another code than 0, 1, 2 (3 is for
 devices, which no run here has). Usage: mutate_examples.py PROGRAM EXAMPLES RUNS [SEED]. The seed of a failure is printed with its files.
 mutate_examples.py --bags FOLDER writes the bags alone, for bag_fuzz to begin with.
 """

@@ -98,8 +98,8 @@ HWY_INLINE VF sample(const std::int32_t* words, std::int32_t base, int log2_w, i
   return hn::MulAdd(tv, hn::Sub(s1, s0), s0);
 }
 
-/// Where a packet meets a polygon's texture. Made whole: a default constructor that nobody writes
-/// is compiled for the machine's least instruction set, where a vector's cannot be inlined.
+/// Footprint of a packet of rays on a polygon's texture. Aggregate-initialised: an implicit default
+/// constructor is compiled for the baseline instruction set, where that of a vector is not inlined.
 struct Footprint {
   VF distance, u, v, lu, lv;
 };

@@ -8,7 +8,7 @@ extern uint32_t stack_top, data_load, data_begin, data_end, bss_begin,
 
 void reset_handler(void);
 
-/* Anything that nobody expects: the board starts anew, which the host sees by another boot id.
+/* Unexpected interrupt: the board restarts, which the host detects by another boot id.
  * PM0214 "AIRCR": key and SYSRESETREQ. */
 void restart(void) {
   SCB_AIRCR = 0x05FA0004U;

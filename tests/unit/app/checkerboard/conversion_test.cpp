@@ -116,7 +116,7 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 using test::known_rig;
 using test::refusal_of;
 
-TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
+TEST(Conversion, roundTripsBetweenAllFormats) {
   const test::TemporaryFolder folder;
   for (const auto kind : kModels) {
     const CalibrationFile c = ours(kind);
@@ -147,7 +147,7 @@ TEST(Conversion, everyFormatToEveryOtherAndBackIsTheSameRig) {
   }
 }
 
-TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
+TEST(Conversion, refusalNamesFileAndKey) {
   Remarks none;
   const std::string kalibr = format_kalibr(ours(kModels[0]), &none);
   const auto [left, right] = format_ros(ours(kModels[0]), &none);
@@ -204,7 +204,7 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
                InputError);
 }
 
-TEST(Conversion, wordsOfTheCommandLineAreChecked) {
+TEST(Conversion, checksCommandLineValues) {
   EXPECT_EQ(parse_format("ros"), CalibrationFormat::ros);
   EXPECT_TRUE(
       test::mentions(refusal_of([] { (void)parse_format("kalbr"); }), "did you mean \"kalibr\""));
@@ -242,7 +242,7 @@ std::vector<Reference> reference_of_camchain(const std::string& text) {
   return references;
 }
 
-TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
+TEST(Kalibr, writtenFileProjectsAlikeAndReadsBack) {
   for (const auto kind : kModels) {
     const CalibrationFile c = ours(kind, 3);
     Remarks remarks;
@@ -256,7 +256,7 @@ TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
   }
 }
 
-TEST(Kalibr, aThirdCoefficientOfRadiusHasNoPlaceAndIsNotDropped) {
+TEST(Kalibr, refusesThirdRadialCoefficient) {
   CalibrationFile c = ours(CameraModelKind::pinhole_radtan);
   c.rig.intrinsics[0].distortion[4] = 0.01;
   Remarks remarks;
@@ -310,7 +310,7 @@ void expect_camera_info(const CalibrationFile& c, const Info& l, const Info& r) 
   }
 }
 
-TEST(RosCameraInfo, whatIsWrittenProjectsAsOursAndReadsBack) {
+TEST(RosCameraInfo, writtenFileProjectsAlikeAndReadsBack) {
   for (const auto kind : kModels) {
     CalibrationFile c = ours(kind);
     if (kind == CameraModelKind::pinhole_radtan)
@@ -325,7 +325,7 @@ TEST(RosCameraInfo, whatIsWrittenProjectsAsOursAndReadsBack) {
   }
 }
 
-TEST(OpenCvStereo, whatIsWrittenIsReadByOpenCvAndProjectsAsOurs) {
+TEST(OpenCvStereo, openCvReadsFileAndProjectsAlike) {
   for (const auto kind : kModels) {
     const CalibrationFile c = ours(kind);
     Remarks remarks;
@@ -348,7 +348,7 @@ TEST(OpenCvStereo, whatIsWrittenIsReadByOpenCvAndProjectsAsOurs) {
 
 /// As cv::fisheye::stereoCalibrate's answer is written: nothing but the count tells its D from that
 /// of a lens with k1 k2 p1 p2, which is legal, too.
-TEST(OpenCvStereo, fourCoefficientsThatMayBeOfAFisheyeLensAreSaid) {
+TEST(OpenCvStereo, warnsAboutPossibleFisheyeCoefficients) {
   Remarks remarks;
   const auto parts = format_opencv(ours(CameraModelKind::pinhole_radtan), &remarks);
   const std::string five = "%YAML:1.0\n---\n" + parts[0] + parts[1];

@@ -73,7 +73,7 @@ void expect_same(const nlohmann::json& expected, const nlohmann::json& got,
   }
 }
 
-TEST(EvaluateCommand, everyKnownAnswerToSixDigits) {
+TEST(EvaluateCommand, matchesReferenceToSixDigits) {
   const auto folder = test::shared_data("data/eval");
   if (!folder) GTEST_SKIP() << test::shared_data_missing("data/eval");
   const auto answers = nlohmann::json::parse(test::read_file(*folder / "expected.json"));
@@ -115,7 +115,7 @@ std::string tum_line(double stamp, const Transform& T) {
                      T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(), q.z(), q.w());
 }
 
-TEST(EvaluateCommand, estimatesTheMountBetweenTwoBodies) {
+TEST(EvaluateCommand, estimatesInsExtrinsics) {
   // The reference sits 0.8 m forward and 0.3 m left of the estimate, its clock 30 ms late.
   const test::TemporaryFolder folder;
   std::string ours, theirs;
@@ -173,7 +173,7 @@ std::string session_with_ins(const test::TemporaryFolder& folder, const std::str
 /// The poses are the truth and so is the INS, but for its 12 ms: at 0.375 rad/s of yaw and 0.08 of
 /// roll and pitch at most that is 0.264 deg, and a segment that begins turned by it ends off by
 /// 0.46 % of its length.
-TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
+TEST(EvaluateCommand, comparesInsOfSessionAtLeftCamera) {
   const test::TemporaryFolder folder;
   const std::string session = session_with_ins(folder, "s"), ins = session + "/ins.csv",
                     elsewhere = folder.write("t.tum", test::read_file(session + "/trajectory.tum"));
@@ -204,7 +204,7 @@ TEST(EvaluateCommand, aSessionsInsIsComparedAtTheLeftCamera) {
   }
 }
 
-TEST(EvaluateCommand, refusesArgumentsThatMakeNoSense) {
+TEST(EvaluateCommand, refusesInvalidArguments) {
   const test::TemporaryFolder folder;
   const std::string a = folder.write("a.tum", "1 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n").string();
   const auto refused = [&](std::vector<std::string> words, const std::string& part) {
@@ -229,7 +229,7 @@ TEST(EvaluateCommand, refusesArgumentsThatMakeNoSense) {
 }
 
 // Without times row belongs to row, and that takes as many.
-TEST(Evaluate, kittiPosesOfAnotherNumberAreRefused) {
+TEST(Evaluate, refusesKittiPosesOfOtherLength) {
   const test::TemporaryFolder folder;
   const auto write = [&](const char* name, int rows) {
     std::string text;

@@ -91,7 +91,7 @@ class BagIns : public ::testing::TestWithParam<BagKind> {
   std::unique_ptr<test::BagWriter> writer_;
 };
 
-TEST_P(BagIns, FixesTakeTheOrientationBetweenTwoImus) {
+TEST_P(BagIns, interpolatesOrientationAtFix) {
   for (int i = 0; i <= 200; ++i) imu(0.01 * i + 0.004);
   for (int i = 0; i < 4; ++i) fix(0.5 * i + 0.05, static_cast<std::int8_t>(i == 2 ? -1 : 0));
   const RecordedIns ins = open();
@@ -114,7 +114,7 @@ TEST_P(BagIns, FixesTakeTheOrientationBetweenTwoImus) {
   EXPECT_TRUE(mentions(all(ins), "/fix: 1 of 4 readings have no fix"));
 }
 
-TEST_P(BagIns, FixWithoutOrientationAroundItHasNoAttitude) {
+TEST_P(BagIns, fixWithoutOrientationHasNoAttitude) {
   for (const double t : {0.0, 0.01, 1.0, 1.01}) imu(t);
   for (const double t : {0.005, 0.5, 1.005, 2.0}) fix(t);
   const RecordedIns ins = open();
@@ -126,7 +126,7 @@ TEST_P(BagIns, FixWithoutOrientationAroundItHasNoAttitude) {
   EXPECT_TRUE(mentions(all(ins), "2 fixes have no orientation of /imu/data within 100 ms"));
 }
 
-TEST_P(BagIns, SeveralTopicsAreListedAndOneIsChosen) {
+TEST_P(BagIns, listsTopicsAndUsesNamedOne) {
   writer_->channel(6, "/gps/fix", "sensor_msgs/NavSatFix");
   for (const double t : {0.0, 0.01}) imu(t);
   fix(0.004);
@@ -141,7 +141,7 @@ TEST_P(BagIns, SeveralTopicsAreListedAndOneIsChosen) {
   EXPECT_EQ(ins.readings[0].sample.stamp.ns(), kStart + 6 * kMs);
 }
 
-TEST_P(BagIns, TopicThatIsNoneIsRefused) {
+TEST_P(BagIns, refusesUnknownTopic) {
   fix(0);
   imu(0);
   for (const BagTopics& topics :
@@ -153,7 +153,7 @@ TEST_P(BagIns, TopicThatIsNoneIsRefused) {
 }
 
 // If one of two is named, the choice is not missing.
-TEST_P(BagIns, WithoutOrientationNothingIsComparedWithANamedFixEither) {
+TEST_P(BagIns, comparesNothingWithoutOrientation) {
   writer_->channel(6, "/gps/fix", "sensor_msgs/NavSatFix");
   fix(0);
   fix(0.1, 0, 6);
@@ -162,7 +162,7 @@ TEST_P(BagIns, WithoutOrientationNothingIsComparedWithANamedFixEither) {
   EXPECT_TRUE(mentions(all(ins), "/gps/fix"));
 }
 
-TEST_P(BagIns, NumbersThatAreNoneAndStampsThatGoBackAreLeftOut) {
+TEST_P(BagIns, skipsInvalidNumbersAndBackwardStamps) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   for (const double t : {0.0, 0.01, 0.02}) imu(t);
   write(4, 0.03, [&](std::int64_t ns) { return imu_message(wire(), ns, {0, 0, 0, 0}, 1e-4); });

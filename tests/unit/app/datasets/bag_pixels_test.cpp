@@ -87,7 +87,7 @@ class BagPixels : public ::testing::TestWithParam<BagKind> {
   std::string refusal_;
 };
 
-TEST_P(BagPixels, GreyIsAsItIs) {
+TEST_P(BagPixels, keepsGrey) {
   struct Case {
     const char* encoding;
     int bytes, grey;  // of a pixel, and its place there
@@ -102,7 +102,7 @@ TEST_P(BagPixels, GreyIsAsItIs) {
 }
 
 // ITU-R BT.601: 0.299, 0.587, 0.114, to half a step.
-TEST_P(BagPixels, ColoursAreWeighedAsBt601Does) {
+TEST_P(BagPixels, weighsColoursByBt601) {
   for (const char* encoding : {"rgb8", "bgr8", "8UC3", "rgba8", "bgra8"}) {
     const int red = encoding[0] == 'r' ? 0 : 2;
     const bool alpha = std::string_view(encoding).find('a') != std::string_view::npos;
@@ -115,7 +115,7 @@ TEST_P(BagPixels, ColoursAreWeighedAsBt601Does) {
   }
 }
 
-TEST_P(BagPixels, MosaicsGoTheWayOfTheCameras) {
+TEST_P(BagPixels, convertsMosaicsLikeCameras) {
   for (const char* encoding : {"bayer_rggb8", "bayer_bggr8", "bayer_gbrg8", "bayer_grbg8"}) {
     const ImageMessage image = image_of(encoding, 1);
     const Grey out = grey_of(image);
@@ -127,7 +127,7 @@ TEST_P(BagPixels, MosaicsGoTheWayOfTheCameras) {
   }
 }
 
-TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
+TEST_P(BagPixels, refusesOtherEncodingsAndShortData) {
   EXPECT_TRUE(grey_of(image_of("32FC1", 4)).empty());
   EXPECT_TRUE(
       test::mentions(refusal_, "/left/image (0 images, 1 that cannot be read, of the encoding"));
@@ -139,7 +139,7 @@ TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
   EXPECT_TRUE(grey_of(image_of("mono16", 1)).empty());
 }
 
-TEST_P(BagPixels, PngAndJpegAreToldByTheirBytes) {
+TEST_P(BagPixels, detectsPngAndJpegByContent) {
   cv::Mat source(kHeight, kWidth, CV_8U);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) source.at<std::uint8_t>(y, x) = value(x, y, 0) / 2;
@@ -158,7 +158,7 @@ TEST_P(BagPixels, PngAndJpegAreToldByTheirBytes) {
 }
 
 // As image_transport packs mono16 of cameras of 12 bits.
-TEST_P(BagPixels, PngOfTwelveBitsInSixteenIsTakenForWhatItIs) {
+TEST_P(BagPixels, detectsTwelveBitsInSixteenBitPng) {
   cv::Mat source(kHeight, kWidth, CV_16U);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
@@ -175,7 +175,7 @@ TEST_P(BagPixels, PngOfTwelveBitsInSixteenIsTakenForWhatItIs) {
 }
 
 // TUM VI's and many industrial cameras' way.
-TEST_P(BagPixels, SixteenBitsAreReadInEitherByteOrderAndAsManyAsAreUsed) {
+TEST_P(BagPixels, readsSixteenBitsInEitherByteOrder) {
   for (const char* encoding : {"mono16", "16UC1"})
     for (const bool big_endian : {false, true})
       for (const int bits : {12, 16}) {

@@ -64,7 +64,7 @@ std::optional<Found> scan(const BagKind& kind, const std::string& bytes) {
 
 class BagScanOf : public ::testing::TestWithParam<BagKind> {};
 
-TEST_P(BagScanOf, MessagesComeInOrder) {
+TEST_P(BagScanOf, deliversMessagesInOrder) {
   const Found found = scan(GetParam(), small_file(GetParam())).value();
   EXPECT_EQ(found.contents,
             (std::vector<std::string>{"first", "second", std::string(1000, 'x'), "fourth"}));
@@ -73,7 +73,7 @@ TEST_P(BagScanOf, MessagesComeInOrder) {
   EXPECT_EQ(found.scan.orphans, 0U);
 }
 
-TEST_P(BagScanOf, MessageIsFoundAgainByItsPlace) {
+TEST_P(BagScanOf, findsMessageByPlace) {
   const Found found = scan(GetParam(), small_file(GetParam())).value();
   const std::string whole = small_file(GetParam());
   const MemoryBytes file(bytes_of(whole));
@@ -90,7 +90,7 @@ TEST_P(BagScanOf, MessageIsFoundAgainByItsPlace) {
   EXPECT_EQ(content, "fourth");
 }
 
-TEST_P(BagScanOf, CutAnywhereGivesWholeChunksOnly) {
+TEST_P(BagScanOf, truncatedBagGivesCompleteChunksOnly) {
   const std::string whole = small_file(GetParam());
   const std::size_t magic = GetParam().is_mcap() ? 8 : 13;
   std::size_t most = 0;
@@ -108,7 +108,7 @@ TEST_P(BagScanOf, CutAnywhereGivesWholeChunksOnly) {
   EXPECT_EQ(most, 4U);
 }
 
-TEST_P(BagScanOf, AnyByteSetIsSurvived) {
+TEST_P(BagScanOf, survivesAnyChangedByte) {
   const std::string whole = small_file(GetParam());
   for (std::size_t i = 8; i < whole.size(); ++i) {
     if (whole[i] == ' ') continue;  // what pads the first record of a ROS 1 bag
@@ -133,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, BagScanOf,
                                            BagKind{"mcap", "zstd"}, BagKind{"rosbag", "none"},
                                            BagKind{"rosbag", "lz4"}, BagKind{"rosbag", "bz2"}));
 
-TEST(Mcap, ChunkThatClaimsTooMuchIsSkippedWithASentence) {
+TEST(Mcap, skipsChunkWithExcessiveSize) {
   McapWriter writer;
   writer.channel(1, "/left/image_raw", "sensor_msgs/Image");
   writer.close_chunk();
@@ -151,7 +151,7 @@ TEST(Mcap, ChunkThatClaimsTooMuchIsSkippedWithASentence) {
   EXPECT_TRUE(test::mentions(found.scan.why_broken, "larger than 64 MiB"));
 }
 
-TEST(Mcap, MessageOfNoChannelIsCounted) {
+TEST(Mcap, countsMessagesWithoutChannel) {
   for (const BagKind& kind : {BagKind{"mcap", ""}, BagKind{"rosbag", "none"}}) {
     const auto writer = kind.writer();
     writer->message(7, 5, "whose");
@@ -177,7 +177,7 @@ RosbagWriter::Fields message_of(std::uint32_t connection) {
 }
 
 // A recorder writes sizes into a chunk's head when it closes the chunk.
-TEST(Rosbag, MessagesOfAChunkThatWasNeverClosedAreRead) {
+TEST(Rosbag, readsMessagesOfUnclosedChunk) {
   RosbagWriter writer;
   writer.record({{"op", "\x05"}, {"compression", "none"}, {"size", u32(0)}}, "");
   writer.record(kConnection, kAbout);
@@ -191,7 +191,7 @@ TEST(Rosbag, MessagesOfAChunkThatWasNeverClosedAreRead) {
   EXPECT_FALSE(found.scan.first_broken);
 }
 
-TEST(Rosbag, WithoutAnIndexItIsUnfinished) {
+TEST(Rosbag, bagWithoutIndexIsUnfinished) {
   RosbagWriter writer("lz4");
   writer.channel(1, "/left/image_raw", "sensor_msgs/Image");
   writer.message(1, 5, "first");
@@ -203,7 +203,7 @@ TEST(Rosbag, WithoutAnIndexItIsUnfinished) {
 }
 
 // Offsets of the index, counts and places of chunks: nothing rests on them.
-TEST(Rosbag, AnIndexThatLiesDoesNoHarm) {
+TEST(Rosbag, survivesWrongIndex) {
   RosbagWriter writer("bz2");
   writer.channel(1, "/left/image_raw", "sensor_msgs/Image");
   for (const char* content : {"first", "second"}) {
@@ -223,7 +223,7 @@ TEST(Rosbag, AnIndexThatLiesDoesNoHarm) {
   EXPECT_EQ(scan_rosbag_of(lies).contents, (std::vector<std::string>{"first", "second"}));
 }
 
-TEST(Rosbag, WhatContradictsItselfIsSkippedWithASentence) {
+TEST(Rosbag, skipsContradictoryRecords) {
   RosbagWriter writer;
   writer.record(kConnection, kAbout);
   const std::size_t here = writer.bytes().size();

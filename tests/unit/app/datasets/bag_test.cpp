@@ -76,7 +76,7 @@ class Bag : public ::testing::TestWithParam<BagKind> {
   std::unique_ptr<test::BagWriter> writer_;
 };
 
-TEST_P(Bag, PairsCalibrationAndPixelsAreThoseOfTheMessages) {
+TEST_P(Bag, readsPairsCalibrationAndPixels) {
   for (std::int64_t i = 0; i < 4; ++i) frame(i, 1'000'000);
   const StereoSequence s = open();
   EXPECT_EQ(find_format(folder_ / "drive"), format());
@@ -100,7 +100,7 @@ TEST_P(Bag, PairsCalibrationAndPixelsAreThoseOfTheMessages) {
 }
 
 // That of a recorder whose power went; and both kinds in one folder.
-TEST_P(Bag, OneThatIsStillCalledActiveIsReadAndOfBothKindsTheNewerOne) {
+TEST_P(Bag, readsActiveBagAndPrefersNewerKind) {
   frame(0);
   writer_->finish();
   const std::string name = GetParam().is_mcap() ? "drive_0.mcap" : "drive_0.bag.active";
@@ -113,7 +113,7 @@ TEST_P(Bag, OneThatIsStillCalledActiveIsReadAndOfBothKindsTheNewerOne) {
   EXPECT_EQ(find_format(folder_ / "drive"), SequenceFormat::mcap);
 }
 
-TEST_P(Bag, ImagesOfAnotherSizeOrGoingBackAreLeftOutAndCounted) {
+TEST_P(Bag, countsImagesOfOtherSizeOrBackwardStamp) {
   for (std::int64_t i = 0; i < 4; ++i) frame(i);
   left(kStart + 4 * kStep, kWidth - 2);
   left(kStart + kStep);
@@ -128,7 +128,7 @@ TEST_P(Bag, ImagesOfAnotherSizeOrGoingBackAreLeftOutAndCounted) {
   EXPECT_TRUE(mentions(s.remarks[0], "drive_0" + GetParam().ending() + ", offset "));
 }
 
-TEST_P(Bag, ImageWithoutPartnerIsLeftOut) {
+TEST_P(Bag, skipsImageWithoutPartner) {
   for (std::int64_t i = 0; i < 4; ++i) frame(i);
   left(kStart + 4 * kStep);
   frame(5);
@@ -137,7 +137,7 @@ TEST_P(Bag, ImageWithoutPartnerIsLeftOut) {
   EXPECT_EQ(s.left_out, 1U);
 }
 
-TEST_P(Bag, SeveralTopicsAreListedAndOneIsChosen) {
+TEST_P(Bag, listsTopicsAndUsesNamedOne) {
   writer_->channel(5, "/left/image_small", "sensor_msgs/Image");
   writer_->message(5, 0, image(wire(), kStart));
   for (std::int64_t i = 0; i < 4; ++i) frame(i);
@@ -150,7 +150,7 @@ TEST_P(Bag, SeveralTopicsAreListedAndOneIsChosen) {
 }
 
 // Drivers that set no stamp; the time of recording less the usual delay is what is left.
-TEST_P(Bag, StampsOfZeroAreReplacedByTheTimeOfRecording) {
+TEST_P(Bag, replacesZeroStampsByRecordingTime) {
   for (std::int64_t i = 0; i < 5; ++i) {
     const std::int64_t stamp = kStart + i * kStep;
     writer_->message(1, stamp + 7'000'000, image(wire(), i == 2 ? 0 : stamp));
@@ -162,7 +162,7 @@ TEST_P(Bag, StampsOfZeroAreReplacedByTheTimeOfRecording) {
   EXPECT_TRUE(mentions(s.assumptions.front(), "1 images have no stamp"));
 }
 
-TEST_P(Bag, CameraInfoOfAnotherSizeIsRefused) {
+TEST_P(Bag, refusesCameraInfoOfOtherSize) {
   left(kStart, kWidth - 2);
   writer_->message(2, kStart, image(wire(), kStart, kWidth - 2));
   const std::string said = refusal();
@@ -172,7 +172,7 @@ TEST_P(Bag, CameraInfoOfAnotherSizeIsRefused) {
                        "and /right) is for 70x48"));
 }
 
-TEST_P(Bag, OtherFilesAreRefusedByWhatTheyBeginWith) {
+TEST_P(Bag, refusesOtherFilesByHeader) {
   folder_.write("drive/a" + GetParam().ending(), "#ROSBAG V1.2\n");
   EXPECT_TRUE(mentions(test::refusal_of([&] { (void)open_sequence(format(), folder_ / "drive"); }),
                        "is not a"));
@@ -180,7 +180,7 @@ TEST_P(Bag, OtherFilesAreRefusedByWhatTheyBeginWith) {
 
 // The image: 96 × 72, f = 80 px, its middle the principal point. The sensor: twice as large, or
 // some pixels around it.
-TEST(CameraInfo, BinningAndRegionMakeTheImagesNumbersAsRep104Says) {
+TEST(CameraInfo, appliesBinningAndRegionByRep104) {
   struct Case {
     const char* what;
     double f, cx, cy;  // of CameraInfo
@@ -249,7 +249,7 @@ void write_db3(const std::filesystem::path& file, int pairs) {
   sqlite3_close(database);
 }
 
-TEST(Db3, ABagInSqliteIsReadAlsoSplitAndInItsFolder) {
+TEST(Db3, readsSplitSqliteBagInFolder) {
   const test::TemporaryFolder folder;
   std::filesystem::create_directories(folder / "drive?#%");
   const auto file = folder / "drive?#%" / "drive_0.db3";

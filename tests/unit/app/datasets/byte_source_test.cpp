@@ -21,7 +21,7 @@ std::size_t descriptors() {
 }
 
 /// A drive that began a file a minute for a day.
-TEST(FileBytes, moreThanAProcessMayHaveOpenAreReadByManyThreads) {
+TEST(FileBytes, readsMoreFilesThanOpenLimit) {
   constexpr std::size_t kFiles = 1440;
   const test::TemporaryFolder folder;
   std::vector<std::unique_ptr<FileBytes>> files;

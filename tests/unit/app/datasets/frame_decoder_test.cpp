@@ -58,7 +58,7 @@ class Decoder : public testing::Test {
   FramePool pool_{test::kTinyWidth, test::kTinyHeight, FrameDecoder::kSlots, arena_};
 };
 
-TEST_F(Decoder, imagesSideBySideAreTakenApart) {
+TEST_F(Decoder, splitsSideBySideImages) {
   test::write_tiny_folder(folder_, 3);
   for (int i = 0; i < 3; ++i) {
     cv::Mat both;
@@ -80,7 +80,7 @@ TEST_F(Decoder, imagesSideBySideAreTakenApart) {
   EXPECT_STREQ(drain(0, 3)[1].pair.kind, "image_size") << "half of a pair";
 }
 
-TEST_F(Decoder, everyPairComesInOrderWithItsPixelsThoughFarMoreThanSlots) {
+TEST_F(Decoder, deliversMorePairsThanSlotsInOrder) {
   constexpr int kPairs = 60;
   open(kPairs);
   const auto seen = drain(0, kPairs);
@@ -93,7 +93,7 @@ TEST_F(Decoder, everyPairComesInOrderWithItsPixelsThoughFarMoreThanSlots) {
   EXPECT_EQ(pool_.available(), FrameDecoder::kSlots);
 }
 
-TEST_F(Decoder, aRangeIsCutAtTheEnd) {
+TEST_F(Decoder, clipsRangeAtEnd) {
   open(5);
   const auto seen = drain(3, 100);
   ASSERT_EQ(seen.size(), 2U);
@@ -102,7 +102,7 @@ TEST_F(Decoder, aRangeIsCutAtTheEnd) {
   EXPECT_TRUE(drain(99, 1).empty());
 }
 
-TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
+TEST_F(Decoder, badImagesSkipOnlyTheirFrame) {
   open(8);
   std::filesystem::remove(folder_ / "left/001.png");
   test::truncate_file(folder_ / "right/002.png", 0.5);
@@ -130,7 +130,7 @@ TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
       << seen[2].pair.issue.data();
 }
 
-TEST_F(Decoder, aTimeThatGoesBackOrLeapsAheadSkipsItsFrameAndNotThoseAfterIt) {
+TEST_F(Decoder, badStampSkipsOnlyItsFrame) {
   open(5);
   for (const auto& [times, skipped, kind] :
        {std::tuple{"0.1\n0.2\n0.3\n0.2\n0.4\n", 3U, "stamp_not_increasing"},
@@ -144,7 +144,7 @@ TEST_F(Decoder, aTimeThatGoesBackOrLeapsAheadSkipsItsFrameAndNotThoseAfterIt) {
   }
 }
 
-TEST_F(Decoder, aLongNameIsCutNotOverrun) {
+TEST_F(Decoder, truncatesLongName) {
   open(1);
   sequence_.pairs[0].file[0] = "left/" + std::string(2000, 'x') + ".png";
   const auto seen = drain(0, 1);
@@ -152,7 +152,7 @@ TEST_F(Decoder, aLongNameIsCutNotOverrun) {
   EXPECT_EQ(std::string(seen[0].pair.issue.data()).size(), seen[0].pair.issue.size() - 1);
 }
 
-TEST_F(Decoder, endsAtAnyMomentWhileTheConsumerHoldsPairsBack) {
+TEST_F(Decoder, stopsWhileConsumerHoldsPairs) {
   open(40);
   for (const int taken : {0, 1, 10}) {
     Arena arena(
@@ -171,7 +171,7 @@ TEST_F(Decoder, endsAtAnyMomentWhileTheConsumerHoldsPairsBack) {
   }
 }
 
-TEST_F(Decoder, theConsumersSideAllocatesNothing) {
+TEST_F(Decoder, consumerSideDoesNotAllocate) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   open(20);

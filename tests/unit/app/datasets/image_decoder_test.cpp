@@ -139,7 +139,7 @@ std::vector<PngKind> every_png_kind() {
   return kinds;
 }
 
-TEST(PngDecoder, everyKindHasOpenCvsPixelsToTheBit) {
+TEST(PngDecoder, everyKindEqualsOpenCv) {
   for (const PngKind& kind : every_png_kind())
     for (const FileBytes& gamma : {FileBytes{}, FileBytes{0, 0, 0xb1, 0x8f}})  // none, 0.45455
       for (const bool transparent : {false, true}) {
@@ -151,7 +151,7 @@ TEST(PngDecoder, everyKindHasOpenCvsPixelsToTheBit) {
       }
 }
 
-TEST(PngDecoder, ofSixteenBitsThoseThatAreUsedAreTakenAndWhatIsBeyondIsWhite) {
+TEST(PngDecoder, usesEffectiveBitsAndSaturates) {
   cv::Mat ramp(1, 8, CV_16UC1);
   for (int x = 0; x < 8; ++x) ramp.at<std::uint16_t>(0, x) = static_cast<std::uint16_t>(585 * x);
   FileBytes png;
@@ -185,7 +185,7 @@ FileBytes jpeg_of(const cv::Mat& image, const std::vector<int>& options = {}) {
   return file;
 }
 
-TEST(JpegDecoder, greyColourAndProgressiveHaveOpenCvsPixelsToTheBit) {
+TEST(JpegDecoder, everyKindEqualsOpenCv) {
   const cv::Mat colour = test_image();
   cv::Mat grey;
   cv::extractChannel(colour, grey, 2);
@@ -201,7 +201,7 @@ ImageFileStatus decode(const FileBytes& file, int width, int height) {
   return decode_grey(file, {width, height}, out.data(), static_cast<std::size_t>(width));
 }
 
-TEST(JpegDecoder, aHoleInTheMiddleIsTornThoughTheEndIsThere) {
+TEST(JpegDecoder, detectsMissingDataBeforeEnd) {
   cv::Mat noise(96, 96, CV_8UC1);
   for (int y = 0; y < noise.rows; ++y)
     for (int x = 0; x < noise.cols; ++x) noise.at<std::uint8_t>(y, x) = test::tiny_pixel(x, y, 3);
@@ -211,7 +211,7 @@ TEST(JpegDecoder, aHoleInTheMiddleIsTornThoughTheEndIsThere) {
   EXPECT_EQ(decode(file, 96, 96), ImageFileStatus::truncated);
 }
 
-TEST(JpegDecoder, moreScansThanACameraWritesAreRefusedBeforeTheyTakeHours) {
+TEST(JpegDecoder, limitsNumberOfScans) {
   const FileBytes file = jpeg_of(test_image(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
   std::size_t last = 0;  // of the scans: it only refines, and may come again
   for (std::size_t i = 2; i + 1 < file.size(); ++i)
@@ -230,7 +230,7 @@ long peak_kib() {
   return used.ru_maxrss;
 }
 
-TEST(PngDecoder, chunksThatUnfoldToAHundredMegabytesTakeNoMemory) {
+TEST(PngDecoder, skipsHugeCompressedChunksWithoutMemory) {
   const FileBytes zeros(std::size_t{100} << 20, 0);
   const FileBytes packed = deflated(zeros);
   FileBytes profile{'p', 0, 0}, text{'t', 0, 0};
@@ -247,7 +247,7 @@ TEST(PngDecoder, chunksThatUnfoldToAHundredMegabytesTakeNoMemory) {
   EXPECT_LT(peak_kib() - before, 32 * 1024);
 }
 
-TEST(PngDecoder, pixelsThatAreFewerOrMoreThanTheHeadSaysStayInTheirRows) {
+TEST(PngDecoder, staysInRowsOnWrongPixelCount) {
   const PngKind kind;
   for (const int rows : {0, 1, kHeight - 1, kHeight + 1, 40 * kHeight}) {
     FileBytes png = png_head(kind, kWidth, kHeight);
@@ -259,7 +259,7 @@ TEST(PngDecoder, pixelsThatAreFewerOrMoreThanTheHeadSaysStayInTheirRows) {
   }
 }
 
-TEST(ImageDecoder, anAreaThatNoCameraHasIsRefusedBeforeAnythingIsTakenForIt) {
+TEST(ImageDecoder, refusesHugeSizeBeforeAllocation) {
   FileBytes png = png_head({}, 32768, 32768);
   append_chunk(&png, "IDAT", {});
   append_chunk(&png, "IEND", {});

@@ -55,7 +55,7 @@ class NoMoreFiles {
   rlimit former_{};
 };
 
-TEST_F(ImageFile, tooManyOpenFilesAreSaidToBeThat) {
+TEST_F(ImageFile, reportsTooManyOpenFiles) {
   const auto file = write("a.png");
   std::vector<std::uint8_t> bytes;
   ImageSize size;
@@ -74,7 +74,7 @@ std::vector<std::uint8_t> tiny_bmp(const test::TemporaryFolder& folder, const cv
   return bytes_of(folder / "a.bmp");
 }
 
-TEST_F(ImageFile, greyBmpIsReadToTheBitFromBothEnds) {
+TEST_F(ImageFile, readsGreyBmpInBothRowOrders) {
   auto bytes = bytes_of(write("a.bmp"));
   std::vector<std::uint8_t> out(kStride * kTinyHeight, 77);
   ASSERT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
@@ -93,7 +93,7 @@ TEST_F(ImageFile, greyBmpIsReadToTheBitFromBothEnds) {
   EXPECT_EQ(size, kSize);
 }
 
-TEST_F(ImageFile, aBmpCutAnywhereIsTornAndOtherDepthsAreRefused) {
+TEST_F(ImageFile, refusesTruncatedBmpAndOtherDepths) {
   const auto bytes = tiny_bmp(folder_, cv::Mat(kTinyHeight, kTinyWidth, CV_8UC1, cv::Scalar(90)));
   for (std::size_t n = 2; n < bytes.size(); n += n < 60 ? 1 : 37)
     EXPECT_EQ(decode({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n)}),
@@ -104,7 +104,7 @@ TEST_F(ImageFile, aBmpCutAnywhereIsTornAndOtherDepthsAreRefused) {
   EXPECT_NE(decode(other), ImageFileStatus::ok);
 }
 
-TEST_F(ImageFile, aBmpInColoursBecomesItsLuminance) {
+TEST_F(ImageFile, convertsColourBmpToLuminance) {
   std::vector<std::uint8_t> out(kStride * kTinyHeight);
   const auto grey_of = [&](const std::vector<std::uint8_t>& bytes) {
     EXPECT_EQ(decode_grey(bytes, kSize, out.data(), kStride), ImageFileStatus::ok);
@@ -120,7 +120,7 @@ TEST_F(ImageFile, aBmpInColoursBecomesItsLuminance) {
   EXPECT_EQ(grey_of(painted), 109) << "0.886 · 90 + 0.114 · 255";
 }
 
-TEST_F(ImageFile, everyTruncationIsTorn) {
+TEST_F(ImageFile, detectsEveryTruncation) {
   for (const char* name : {"a.png", "a.jpg"}) {
     const auto whole = bytes_of(write(name));
     ASSERT_EQ(decode(whole), ImageFileStatus::ok);
@@ -139,7 +139,7 @@ TEST_F(ImageFile, everyTruncationIsTorn) {
   }
 }
 
-TEST_F(ImageFile, aSpoiltPngIsRefusedForWhatItIs) {
+TEST_F(ImageFile, refusesCorruptPng) {
   const auto whole = bytes_of(write("a.png"));
   const auto with = [&](std::size_t first, std::size_t last, std::uint8_t value) {
     auto bytes = whole;
@@ -158,7 +158,7 @@ TEST_F(ImageFile, aSpoiltPngIsRefusedForWhatItIs) {
   EXPECT_EQ(decode(bytes_of(folder_ / "b.png")), ImageFileStatus::wrong_size);
 }
 
-TEST_F(ImageFile, whatIsNoFileIsNotWaitedFor) {
+TEST_F(ImageFile, doesNotBlockOnNonFiles) {
   ASSERT_EQ(::mkfifo((folder_ / "pipe.png").c_str(), 0600), 0);
   std::vector<std::uint8_t> bytes;
   EXPECT_EQ(read_image_file(folder_ / "pipe.png", &bytes), ImageFileStatus::unreadable);
@@ -166,7 +166,7 @@ TEST_F(ImageFile, whatIsNoFileIsNotWaitedFor) {
   EXPECT_EQ(read_image_file(folder_.path(), &bytes), ImageFileStatus::unreadable);
 }
 
-TEST_F(ImageFile, aPngThatIsWrittenHoldsExactlyThePixelsAndNoPadding) {
+TEST_F(ImageFile, writesPngWithoutPadding) {
   std::vector<std::uint8_t> pixels(kStride * kTinyHeight, 77);
   for (int y = 0; y < kTinyHeight; ++y)
     for (int x = 0; x < kTinyWidth; ++x)

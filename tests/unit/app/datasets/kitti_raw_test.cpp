@@ -106,7 +106,7 @@ std::string joined(const std::vector<std::string>& messages) {
   return fmt::format("{}", fmt::join(messages, "; "));
 }
 
-TEST(KittiRaw, ADriveIsFoundFromItsFolderItsDateAndAbove) {
+TEST(KittiRaw, findsDriveFromAnyFolderLevel) {
   const test::TemporaryFolder f;
   write_drive(f);
   for (const fs::path& folder : {f / kDrive, f / "2011_09_26", f.path(), f / (kDrive + "/")}) {
@@ -131,7 +131,7 @@ TEST(KittiRaw, ADriveIsFoundFromItsFolderItsDateAndAbove) {
   EXPECT_EQ(open_sequence(SequenceFormat::kitti_raw, link).calibration.intrinsics[0].cx, 36);
 }
 
-TEST(KittiRaw, OtherSizesAndCamerasTakeTheirPartOfTheCalibration) {
+TEST(KittiRaw, usesCalibrationOfSelectedCameras) {
   const test::TemporaryFolder f;
   write_drive(f);
   write_images(f, 64, 40);
@@ -159,7 +159,7 @@ struct Spoilt {
   const char* said = "";
 };
 
-TEST(KittiRaw, WhatIsLostCostsItsFramesAndWhatIsNoneIsRefused) {
+TEST(KittiRaw, missingFilesSkipTheirFrames) {
   using Folder = test::TemporaryFolder;
   const auto text = [](const std::string& name, const std::string& content) {
     return [=](const Folder& f) { f.write(name, content); };
@@ -235,7 +235,7 @@ TEST(KittiRaw, WhatIsLostCostsItsFramesAndWhatIsNoneIsRefused) {
       "holds 2 drives (2011_09_26_drive_0001_extract, "));
 }
 
-TEST(KittiRaw, StampsAreUtcToTheNanosecond) {
+TEST(KittiRaw, stampsAreUtcNanoseconds) {
   EXPECT_EQ(parse_iso_time("2011-09-26 14:05:35.500923136")->ns(), kStart);
   EXPECT_EQ(parse_iso_time("2012-02-29 00:00:00")->ns(), 1'330'473'600'000'000'000);
   EXPECT_EQ(parse_iso_time("1970-01-01 00:00:00.1")->ns(), 100'000'000);
@@ -245,7 +245,7 @@ TEST(KittiRaw, StampsAreUtcToTheNanosecond) {
     EXPECT_FALSE(parse_iso_time(wrong)) << wrong;
 }
 
-TEST(Stamps, TheLongestAscendingPartStays) {
+TEST(Stamps, longestAscendingPartIsKept) {
   const auto of = [](const std::vector<std::int64_t>& values) {
     std::vector<Stamp> list;
     for (const std::int64_t v : values) list.emplace_back(v);
@@ -265,7 +265,7 @@ Mat3 rotation_of(const InsSample& s) {
       .toRotationMatrix();
 }
 
-TEST(KittiRawIns, PacketsBecomeSamplesInEastNorthUpAndTheMountIsThatOfTheFiles) {
+TEST(KittiRawIns, convertsPacketsToEnuWithMount) {
   const test::TemporaryFolder f;
   write_drive(f);
   // The record that three public sources quote of this data set, with what the development kit
@@ -306,7 +306,7 @@ TEST(KittiRawIns, PacketsBecomeSamplesInEastNorthUpAndTheMountIsThatOfTheFiles) 
   EXPECT_FALSE(read_recorded_ins(SequenceFormat::kitti_raw, f / kDrive, {0, 1}, false).T_ins_left);
 }
 
-TEST(KittiRawIns, PacketsThatAreMissingBrokenOutOfOrderOrWithoutAFix) {
+TEST(KittiRawIns, reportsBadPackets) {
   const test::TemporaryFolder f;
   write_drive(f);
   fs::remove(f / oxts_name(2));

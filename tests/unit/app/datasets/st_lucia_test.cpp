@@ -87,7 +87,7 @@ class StLuciaImages : public testing::Test {
                         calibration_ = folder_ / "calibration.yaml";
 };
 
-TEST_F(StLuciaImages, pairsByLineWithMicrosecondsThatAreNotPadded) {
+TEST_F(StLuciaImages, readsUnpaddedMicroseconds) {
   const StereoSequence s = open();
   ASSERT_EQ(s.pairs.size(), 2U);
   EXPECT_EQ(s.pairs[0].stamp.ns(), 1'292'391'531'001'234'000);
@@ -99,7 +99,7 @@ TEST_F(StLuciaImages, pairsByLineWithMicrosecondsThatAreNotPadded) {
   EXPECT_TRUE(s.bayer);
 }
 
-TEST_F(StLuciaImages, greyIsMadeOfTheMosaic) {
+TEST_F(StLuciaImages, convertsMosaicToGrey) {
   const StereoSequence s = open();
   Arena arena(FramePool::memory_needed(kWidth, kHeight, FrameDecoder::kSlots) + kCacheLine);
   FramePool pool(kWidth, kHeight, FrameDecoder::kSlots, arena);
@@ -120,7 +120,7 @@ TEST_F(StLuciaImages, greyIsMadeOfTheMosaic) {
   }
 }
 
-TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOnly) {
+TEST_F(StLuciaImages, usesPublishedCalibrationForItsSizeOnly) {
   const std::string said =
       refusal_of([&] { (void)open_sequence(SequenceFormat::st_lucia, folder_.path()); });
   EXPECT_TRUE(test::mentions(said, "62x48"));
@@ -133,7 +133,7 @@ TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOn
   EXPECT_LT(s.calibration.T_camera_left[1].t.x(), 0) << "the right camera is on the right";
 }
 
-TEST_F(StLuciaImages, brokenFoldersAreNamed) {
+TEST_F(StLuciaImages, refusalNamesBrokenFolder) {
   write(log_, "1292391531 1234 62 48 raw 1292391531 990 62 48 raw cam0_image00000.bmp\n");
   EXPECT_TRUE(mentions(refusal_of([&] { (void)open(); }), "MultiCamera0.log:1:"));
   write(log_,
@@ -207,7 +207,7 @@ RecordedIns read(const std::vector<std::string>& lines) {
 
 std::string said(const RecordedIns& ins) { return fmt::format("{}", fmt::join(ins.remarks, "; ")); }
 
-TEST(StLuciaIns, whateverItsAxesTheDriveShowsThem) {
+TEST(StLuciaIns, infersAxesFromMotion) {
   for (const Velocity velocity :
        {Velocity::east_north_up, Velocity::north_east_down, Velocity::north_west_up})
     for (const Yaw yaw : {Yaw::north_to_west, Yaw::north_to_east, Yaw::east_to_north})
@@ -240,7 +240,7 @@ struct Log {
   double speed = 1;
 };
 
-TEST(StLuciaIns, logsAreMendedOrRefused) {
+TEST(StLuciaIns, repairsOrRefusesLogs) {
   using Lines = std::vector<std::string>;
   for (const Log& c : {
            Log{"shows nothing", [](Lines*) {}, 800, "too slow or too short", 0.3},

@@ -24,7 +24,7 @@ class Sequence : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(Sequence, kittiTimesKeepEveryDigitAndP1GivesTheBaseline) {
+TEST_F(Sequence, kittiReadsExactTimesAndBaseline) {
   test::write_tiny_kitti(folder_, 3);
   folder_.write("times.txt", "0.000000e+00\n1.044989e-01\n123456789.123456789\n");
   const auto s = open_sequence(SequenceFormat::kitti, folder_.path());
@@ -37,7 +37,7 @@ TEST_F(Sequence, kittiTimesKeepEveryDigitAndP1GivesTheBaseline) {
   EXPECT_DOUBLE_EQ(s.calibration.baseline, 0.5);
 }
 
-TEST_F(Sequence, refusalsNameTheFileAndWhatIsWrong) {
+TEST_F(Sequence, refusalNamesFileAndProblem) {
   const std::string p0 = "P0: 60 0 35 0 0 60 24 0 0 0 1 0\n",
                     sensor = test::tiny_sensor_yaml("", 0.5, "\n"),
                     lens = "intrinsics: [60, 61, 35, 24]", size = "resolution: [70, 48]";
@@ -96,7 +96,7 @@ TEST_F(Sequence, refusalsNameTheFileAndWhatIsWrong) {
   EXPECT_TRUE(mentions(refusal(SequenceFormat::folder, folder_.path()), "left", "no PNG, JPEG"));
 }
 
-TEST_F(Sequence, eurocStampsAreExactAndTheRightCameraSitsWhereT_BSPutsIt) {
+TEST_F(Sequence, eurocReadsExactStampsAndExtrinsics) {
   for (const auto& [end, first] : {std::pair{"\n", ""}, std::pair{"\r\n", "%YAML:1.0\n"}}) {
     const test::TemporaryFolder folder;
     test::write_tiny_euroc(folder, 3, end, first);
@@ -115,7 +115,7 @@ TEST_F(Sequence, eurocStampsAreExactAndTheRightCameraSitsWhereT_BSPutsIt) {
   }
 }
 
-TEST_F(Sequence, eurocImagesOfOneCameraOnlyStandWhereTheirStampBelongs) {
+TEST_F(Sequence, eurocSortsUnpairedImagesByStamp) {
   test::write_tiny_euroc(folder_, 3);
   const auto line = [](std::int64_t stamp) { return fmt::format("{0},{0}.png\n", stamp); };
   folder_.write("mav0/cam1/data.csv", line(test::kTinyStart) + line(test::kTinyStart + 7) +
@@ -128,7 +128,7 @@ TEST_F(Sequence, eurocImagesOfOneCameraOnlyStandWhereTheirStampBelongs) {
   EXPECT_FALSE(s.pairs[3].file[1].empty());
 }
 
-TEST_F(Sequence, folderPairsInOrderOfNameWhereNamesMakeNoPairALine) {
+TEST_F(Sequence, folderPairsByNameOrder) {
   test::write_tiny_folder(folder_, 2);
   std::filesystem::rename(folder_ / "right/001.png", folder_ / "right/zz.png");
   const auto s = open_sequence(SequenceFormat::folder, folder_.path());
@@ -138,7 +138,7 @@ TEST_F(Sequence, folderPairsInOrderOfNameWhereNamesMakeNoPairALine) {
   EXPECT_EQ(s.pairs[1].file[1], "right/zz.png");
 }
 
-TEST_F(Sequence, folderWhoseTimesNameTheirImages) {
+TEST_F(Sequence, folderReadsTimesWithImageNames) {
   test::write_tiny_folder(folder_, 4);
   folder_.write("times.txt",
                 "# stamp,file\n0.0,000.png\n0.1,003.png\n0.2,001.png,002.png\n0.3,gone.png\n");
@@ -160,7 +160,7 @@ std::string times_of(const char* format, double step, int pairs) {
   return text;
 }
 
-TEST_F(Sequence, timesThatCannotBeOfADriveAreRefused) {
+TEST_F(Sequence, refusesImplausibleTimes) {
   test::write_tiny_folder(folder_, 5);
   const auto far = [](const char* stamp) {
     return std::string("1000000000\n1100000000\n1200000000\n1300000000\n") + stamp + "\n";
@@ -201,7 +201,7 @@ TEST_F(Sequence, timesThatCannotBeOfADriveAreRefused) {
 }
 
 // With and without times: equal numbers of images on both sides are no proof of an order.
-TEST_F(Sequence, folderThatLostAnImageOnEachSidePairsTheRestByName) {
+TEST_F(Sequence, folderPairsByNameWithMissingImages) {
   for (const bool times : {true, false}) {
     test::write_tiny_folder(folder_, 5);
     if (!times) std::filesystem::remove(folder_ / "times.txt");
@@ -219,7 +219,7 @@ TEST_F(Sequence, folderThatLostAnImageOnEachSidePairsTheRestByName) {
   }
 }
 
-TEST_F(Sequence, folderOfForeignNamesNeedsOneOfEach) {
+TEST_F(Sequence, folderWithOtherNamesNeedsEqualCounts) {
   test::write_tiny_folder(folder_, 3);
   std::filesystem::remove(folder_ / "times.txt");
   for (int i = 0; i < 3; ++i)
@@ -246,7 +246,7 @@ void make_deep(const test::TemporaryFolder& folder, int pairs, int most) {
 }
 
 // A disk that was full, a shutter that was shut: they say nothing of the others.
-TEST_F(Sequence, theBitsThatAreUsedAreThoseOfTheGreatestSampleLookedAt) {
+TEST_F(Sequence, detectsEffectiveBitsFromSamples) {
   struct Case {
     int most, last;  // samples of the first pairs and of the last one
     int bits;
@@ -270,7 +270,7 @@ TEST_F(Sequence, theBitsThatAreUsedAreThoseOfTheGreatestSampleLookedAt) {
       << "8-bit images have none";
 }
 
-TEST_F(Sequence, imagesOfAnotherSizeAreRefusedWhereMostHaveIt) {
+TEST_F(Sequence, refusesOtherImageSizeOfMajority) {
   test::write_tiny_folder(folder_, 3);
   for (int k = 0; k < 2; ++k) test::write_tiny_image(folder_ / test::folder_name(k, 0), 0, 64, 48);
   EXPECT_TRUE(mentions(refusal(SequenceFormat::folder, folder_.path()), "left/000.png", "64x48",

@@ -28,7 +28,7 @@ constexpr const char* kSensor =
     "0.0, 0.0, "
     "1.0, 0.3,\n         0.0, 0.0, 0.0, 1.0]\n";
 
-TEST(Split, everyByteEndsAFieldOrBelongsToOne) {
+TEST(Split, assignsEveryByteToAField) {
   for (int byte = 0; byte < 256; ++byte) {
     const std::string line =
         std::string("1 2") + static_cast<char>(byte) + "3 " + static_cast<char>(byte);
@@ -53,7 +53,7 @@ struct Row {
   const char* remark;  // part of what is said; empty: nothing is
 };
 
-TEST(Trajectory, isReadHoweverProgramsWriteIt) {
+TEST(Trajectory, readsVariantsOfPrograms) {
   const std::string q = " 0 0 0.70710678 0.70710678";
   const std::string moved = " 1 2 3" + q;
   const std::array rows{
@@ -100,7 +100,7 @@ TEST(Trajectory, isReadHoweverProgramsWriteIt) {
   }
 }
 
-TEST(Trajectory, saysFileAndLineOfWhatIsWrong) {
+TEST(Trajectory, errorNamesFileAndLine) {
   const std::string good = kGoodLine;
   struct Case {
     std::string text, said;
@@ -135,7 +135,7 @@ TEST(Trajectory, saysFileAndLineOfWhatIsWrong) {
   EXPECT_TRUE(mentions(refusal_of([&] { (void)read_tum(pipe); }), "is a pipe or a device"));
 }
 
-TEST(Trajectory, unitAndOrderAreWhatTheUserSays) {
+TEST(Trajectory, usesSuppliedUnitAndOrder) {
   const test::TemporaryFolder folder;
   const std::string turn = " 1 2 3 0.70710678 0 0 0.70710678\n";
   const auto file = folder.write("t.txt", "0" + turn + "100" + turn + "200" + turn);
@@ -155,7 +155,7 @@ TEST(Trajectory, unitAndOrderAreWhatTheUserSays) {
   EXPECT_LT(rotation_angle(other[0].T_world_body.R.transpose() * w_first[0].T_world_body.R), 1e-7);
 }
 
-TEST(Kitti, posesHaveTheTimesBesideThemOrNone) {
+TEST(Kitti, posesUseAdjacentTimesFile) {
   const test::TemporaryFolder folder;
   const std::string first = "1 0 0 0 0 1 0 0 0 0 1 0\n";
   const auto poses = folder.write("poses/06.txt", first + "0 -1 0 4 1 0 0 5 0 0 1 6\n");
@@ -179,7 +179,7 @@ TEST(Kitti, posesHaveTheTimesBesideThemOrNone) {
   EXPECT_THROW((void)read_kitti(poses, std::span(times).first(1)), InputError);
 }
 
-TEST(Euroc, bringsTheBodyToTheLeftCamera) {
+TEST(Euroc, convertsBodyToLeftCamera) {
   const test::TemporaryFolder folder;
   // w first; a half turn about x; 17 columns; CR LF.
   const std::string text =
@@ -216,7 +216,7 @@ TEST(Euroc, bringsTheBodyToTheLeftCamera) {
   }
 }
 
-TEST(TimesFile, isReadHoweverProgramsWriteIt) {
+TEST(TimesFile, readsVariantsOfPrograms) {
   struct Case {
     const char* text;
     std::int64_t second;  // ns
@@ -253,7 +253,7 @@ TEST(TimesFile, isReadHoweverProgramsWriteIt) {
   }
 }
 
-TEST(Trajectory, aFolderStandsForItsTrajectoryOrIsRefused) {
+TEST(Trajectory, findsTrajectoryInFolder) {
   const test::TemporaryFolder folder;
   EXPECT_TRUE(mentions(refusal_of([&] { (void)read_trajectory(folder.path()); }),
                        "has no trajectory.tum, no poses.txt"));

@@ -36,7 +36,7 @@ test::GigeCameraOptions small(int k) {
   return o;
 }
 
-TEST(CameraDrivers, whatACameraRefusesIsSaidWithItsName) {
+TEST(CameraDrivers, refusalNamesCamera) {
   const test::GigeCamera simulator(small(0));
   CameraRequest r = request("gige", small(0).address);
   r.configuration.width = 640;
@@ -56,7 +56,7 @@ CameraRequest half(const std::string& key, ImageHalf which, const std::string& s
   return r;
 }
 
-TEST(CameraDrivers, entriesThatContradictEachOtherAreRefused) {
+TEST(CameraDrivers, refusesContradictoryEntries) {
   const CameraRequest left = half("cameras.0", ImageHalf::left, "A");
   CameraRequest other = half("cameras.1", ImageHalf::right, "A");
   other.configuration.exposure = Duration::milliseconds(1);
@@ -66,7 +66,7 @@ TEST(CameraDrivers, entriesThatContradictEachOtherAreRefused) {
   EXPECT_TRUE(test::mentions(refusal({left, other}), "cameras.0 and cameras.1 are halves"));
 }
 
-TEST(CameraDrivers, twoHalvesAreOneCamera) {
+TEST(CameraDrivers, twoHalvesShareOneCamera) {
   const test::GigeCamera simulator(small(3));
   std::vector<std::string> remarks;
   const auto cameras = open_cameras({half("cameras.0", ImageHalf::right, small(3).address),

@@ -22,7 +22,7 @@ int cameras_of(const Configuration& c) {
   return n;
 }
 
-TEST(DriveSync, everyExampleLoadsAndTheyShowEveryMode) {
+TEST(DriveSync, examplesLoadAndCoverEveryMode) {
   std::set<SyncMode> modes;
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(VERGENCE_SOURCE_DIR "/app/config")) {
@@ -57,7 +57,7 @@ std::string refusal(const std::string& yaml) {
   });
 }
 
-TEST(DriveSync, whatCannotBePairedIsRefusedWithWhatToDo) {
+TEST(DriveSync, refusalNamesFix) {
   for (const auto& [yaml, mentions] : std::vector<std::pair<const char*, const char*>>{
            {"sync: {mode: bord}", "did you mean \"board\"?"},
            {"sync: {mode: board}", "set trigger.driver to board, or sync.mode to frame_counter"},

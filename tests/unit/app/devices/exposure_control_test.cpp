@@ -51,7 +51,7 @@ class SlowCamera final : public CameraDevice {
   std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight, 10);  // dark
 };
 
-TEST(ExposureControl, aCameraThatAnswersSlowlyKeepsNobodyWaiting) {
+TEST(ExposureControl, slowCameraDoesNotDelayFrames) {
   SlowCamera camera;
   const ExposureSetting start{Duration::microseconds(1000), 0};
   camera.has = start;
@@ -68,7 +68,7 @@ TEST(ExposureControl, aCameraThatAnswersSlowlyKeepsNobodyWaiting) {
   control.settle();
 }
 
-TEST(ExposureControl, aCameraThatCannotEndsItAndOneThatForgotIsAskedAgain) {
+TEST(ExposureControl, repeatsLostSettingAndStopsIfUnsupported) {
   const ExposureSetting start{Duration::microseconds(1000), 0};
   SlowCamera unable;
   unable.has = start;
@@ -95,7 +95,7 @@ TEST(ExposureControl, aCameraThatCannotEndsItAndOneThatForgotIsAskedAgain) {
   }
 }
 
-TEST(ExposureControl, aCameraThatWasAwayDuringAChangeIsGivenItWhenItIsBack) {
+TEST(ExposureControl, appliesSettingAfterReconnect) {
   const ExposureSetting start{Duration::microseconds(1000), 0};
   SlowCamera camera;  // dark: a longer exposure is asked for
   camera.has = start;

@@ -51,7 +51,7 @@ std::vector<ImageIssue> issues_of(const std::vector<TestImage>& images) {
   return evaluate_images(std::span(kNames).first(images.size()), statistics);
 }
 
-TEST(ImageStatistics, areThoseOfThePixelsAndNotOfThePadding) {
+TEST(ImageStatistics, excludePadding) {
   TestImage p(4, 4, 100);
   const ImageStatistics flat = image_statistics(p.view());
   EXPECT_DOUBLE_EQ(flat.mean, 100);
@@ -68,7 +68,7 @@ TEST(ImageStatistics, areThoseOfThePixelsAndNotOfThePadding) {
   EXPECT_DOUBLE_EQ(f.sharpness, 77.0 * 77.0) << "half of 154 in each of the four inner pixels";
 }
 
-TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
+TEST(ImageCheck, rejectsBlackWhiteAndFlatImages) {
   const auto remarks =
       issues_of({TestImage(320, 240, 2), TestImage(320, 240, 255), TestImage(320, 240, 90)});
   ASSERT_EQ(remarks.size(), 3U);
@@ -78,7 +78,7 @@ TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
   for (const ImageIssue& r : remarks) EXPECT_TRUE(r.unusable);
 }
 
-TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
+TEST(ImageCheck, detectsOneDefocusedCamera) {
   const TestImage sharp = squares(320, 240);
   TestImage blurred = sharp;
   constexpr int kRadius = 12;  // px: three squares run into one
@@ -97,7 +97,7 @@ TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
       << remarks[0].message;
 }
 
-TEST(PictureFiles, namesOfCamerasAreNamesOfFiles) {
+TEST(ImageFileNames, cameraNamesGiveFileNames) {
   Configuration c;
   c.cameras[0].name = "../left eye";
   c.cameras[2].name = "camera1";
@@ -108,13 +108,13 @@ Configuration example(const std::string& name) {
   return load_configuration(VERGENCE_SOURCE_DIR "/app/config/" + name, {});
 }
 
-TEST(CaptureSettings, anInsThatTriggersTheCamerasStays) {
+TEST(CaptureSettings, keepsTriggeringIns) {
   const Configuration c = capture_configuration(example("ins_syncout.yaml"));
   EXPECT_EQ(c.ins.driver, "xsens");
   EXPECT_EQ(sync_options(c, 2).mode, SyncMode::ins_syncout) << "as the user's file is, it works";
 }
 
-TEST(CaptureSettings, anInsThatPicturesDoWithoutIsLeftOut) {
+TEST(CaptureSettings, omitsUnneededIns) {
   const Configuration given = example("mock.yaml");
   ASSERT_EQ(given.ins.driver, "mock");
   EXPECT_EQ(capture_configuration(given).ins.driver, "none");

@@ -28,7 +28,7 @@ Refusal refusal_of(const std::function<void()>& open, std::string* message) {
   return Refusal::none;
 }
 
-TEST(MissingDevices, aCameraThatIsNotThereIsADeviceErrorOfEveryDriver) {
+TEST(MissingDevices, missingCameraIsDeviceErrorOfEveryDriver) {
   for (const auto& [driver, serial] :
        {std::pair("gige", "NO-SUCH-CAMERA"), std::pair("gige", "127.77.77.77"),
         std::pair("v4l2", "/dev/video99"), std::pair("v4l2", "NO-SUCH-CAMERA"),
@@ -48,7 +48,7 @@ TEST(MissingDevices, aCameraThatIsNotThereIsADeviceErrorOfEveryDriver) {
   }
 }
 
-TEST(MissingDevices, aPortThatIsNotThereIsADeviceErrorOfEveryIns) {
+TEST(MissingDevices, missingPortIsDeviceErrorOfEveryIns) {
   for (const std::string& driver : ins_driver_names()) {
     InsRequest request;
     request.driver = driver;
@@ -63,7 +63,7 @@ TEST(MissingDevices, aPortThatIsNotThereIsADeviceErrorOfEveryIns) {
   }
 }
 
-TEST(MissingDevices, aTriggerBoardThatIsNotThereIsADeviceError) {
+TEST(MissingDevices, missingTriggerBoardIsDeviceError) {
   TriggerSettings settings;
   settings.port = "/dev/ttyNotThere";
   TriggerConfiguration pulses;

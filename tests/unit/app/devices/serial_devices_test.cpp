@@ -24,13 +24,13 @@ InsRequest xsens_on(const std::string& port, double rate) {
   return r;
 }
 
-TEST(InsDrivers, anUnknownOneIsRefusedWithTheNearest) {
+TEST(InsDrivers, unknownDriverSuggestsNearest) {
   InsRequest unknown;
   unknown.driver = "xsense";
   EXPECT_NE(refusal(unknown).find("did you mean"), std::string::npos);
 }
 
-TEST(InsDrivers, readsARealTerminalInRealTime) {
+TEST(InsDrivers, readsPseudoTerminalInRealTime) {
   for (const xbus::Generation generation : {xbus::Generation::legacy, xbus::Generation::mark4}) {
     test::XsensSimulatorOptions sensor;
     sensor.generation = generation;

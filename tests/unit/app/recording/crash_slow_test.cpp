@@ -5,7 +5,7 @@
 namespace vergence::app {
 namespace {
 
-TEST(CrashedRecordingSlow, readsBackAfterEveryOneOfAHundredKills) {
+TEST(CrashedRecordingSlow, readsBackAfterEachOf100Kills) {
   const auto lost_ms = test::lost_before_kills(100);
   RecordProperty("median_lost_ms", std::to_string(lost_ms[50]));
   RecordProperty("max_lost_ms", std::to_string(lost_ms.back()));

@@ -28,7 +28,7 @@ struct Room {
   }
 };
 
-TEST(CdrWriter, saysWhenThereIsNoRoomAndWritesNoFurther) {
+TEST(CdrWriter, reportsOverflowAndStopsWriting) {
   std::array<std::uint8_t, 9> bytes{};
   CdrWriter out(std::span<std::uint8_t>(bytes).first(8));
   out.put(std::uint32_t{1});
@@ -40,7 +40,7 @@ TEST(CdrWriter, saysWhenThereIsNoRoomAndWritesNoFurther) {
 
 // Bytes of the same numbers as a NavSatFix that Fast CDR wrote and @foxglove/rosmsg2-serialization
 // read.
-TEST(Messages, navSatFixIsAsAnotherWriterHasIt) {
+TEST(Messages, navSatFixMatchesReferenceWriter) {
   InsSample s;
   s.stamp = Stamp(1'336'964'645'250'000'000);
   s.fix = FixStatus::fix_3d;
@@ -64,7 +64,7 @@ TEST(Messages, navSatFixIsAsAnotherWriterHasIt) {
   EXPECT_EQ(room.out.written()[124], 2);
 }
 
-TEST(Messages, imageReadsBackWithoutItsPadding) {
+TEST(Messages, imageReadsBackWithoutPadding) {
   std::array<std::uint8_t, 12> pixels{1, 2, 3, 99, 4, 5, 6, 99, 7, 8, 9, 99};
   Room room;
   write_image(&room.out, Stamp(5'000'000'007), "left", {pixels.data(), 3, 3, 4});
@@ -90,7 +90,7 @@ RigCalibration rig() {
 }
 
 // The project's own reader takes a rig out of two CameraInfos; it gets the one that was put in.
-TEST(Messages, cameraInfosHoldTheRig) {
+TEST(Messages, cameraInfosHoldRig) {
   const RigCalibration original = rig();
   std::array<RosCamera, 2> cameras;
   for (int k = 0; k < 2; ++k) {
@@ -111,7 +111,7 @@ TEST(Messages, cameraInfosHoldTheRig) {
   EXPECT_EQ(read.intrinsics[0].fx, 450);
 }
 
-TEST(Messages, everyMessageFitsItsRoom) {
+TEST(Messages, everyMessageFitsItsBuffer) {
   std::array<std::uint8_t, kMessageRoom> bytes{};
   const std::array<std::string_view, 4> names{"left", "right", "camera2", "camera3"};
   RigCalibration four = rig();
@@ -131,7 +131,7 @@ TEST(Messages, everyMessageFitsItsRoom) {
   EXPECT_TRUE(fits([&](CdrWriter* o) { write_camera_info(o, {}, names[3], four, 3, true); }));
 }
 
-TEST(RosTypes, definitionsHoldEveryTypeTheyName) {
+TEST(RosTypes, definitionsIncludeReferencedTypes) {
   for (int i = 0; i < kRosTypes; ++i) {
     const std::string text = ros_definition(static_cast<RosType>(i));
     for (std::size_t at = text.find('/'); at != std::string::npos; at = text.find('/', at + 1)) {

@@ -104,7 +104,7 @@ std::vector<int> sequence(int first, int end) {
   return out;
 }
 
-TEST(Recording, splitsBySizeAsRosbagNamesIt) {
+TEST(Recording, splitsBySizeWithRosbagNames) {
   const TemporaryFolder folder;
   Recording::Options o = options();
   o.queues = {64U << 10U};
@@ -157,7 +157,7 @@ void await_chunks(const Recording& recording, std::uint64_t chunks) {
   while (recording.counters().chunks < chunks) std::this_thread::sleep_for(1ms);
 }
 
-TEST(Recording, aDiskThatFailsForAWhileIsTriedAgainInTheSameFile) {
+TEST(Recording, retriesFailedWritesInSameFile) {
   const TemporaryFolder folder;
   FaultyDisk disk;
   Recording::Options o = options();
@@ -179,7 +179,7 @@ TEST(Recording, aDiskThatFailsForAWhileIsTriedAgainInTheSameFile) {
   EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
 }
 
-TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {
+TEST(Recording, fullDiskDropsAndCountsOldest) {
   const TemporaryFolder folder;
   FaultyDisk disk;
   Recording::Options o = options();
@@ -199,7 +199,7 @@ TEST(Recording, aDiskThatStaysFullLosesTheOldestCountsThemAndEnds) {
 }
 
 // The system tells of it once, and the file's end finds nothing wrong.
-TEST(Recording, whatTheDiskTookAndDidNotKeepIsCountedAndSaid) {
+TEST(Recording, countsDataLostByDisk) {
   const TemporaryFolder folder;
   FaultyDisk disk;
   Recording::Options o = options();
@@ -223,7 +223,7 @@ TEST(Recording, whatTheDiskTookAndDidNotKeepIsCountedAndSaid) {
   EXPECT_TRUE(read_mcap(folder / "drive.mcap").scan.finished);
 }
 
-TEST(Recording, aDiskThatTakesNoFileAtTheBeginningIsRefused) {
+TEST(Recording, refusesUnwritableDiskAtStart) {
   const TemporaryFolder folder;
   for (const int error : {ENOSPC, EROFS, EIO, ENOENT, EACCES}) {
     FaultyDisk disk;
@@ -234,7 +234,7 @@ TEST(Recording, aDiskThatTakesNoFileAtTheBeginningIsRefused) {
   }
 }
 
-TEST(Recording, postingAndWritingTakeNoMemory) {
+TEST(Recording, postingAndWritingDoNotAllocate) {
   if (!AllocationGuard::available()) GTEST_SKIP() << "no allocation hooks in this build";
   const TemporaryFolder folder;
   FaultyDisk disk;

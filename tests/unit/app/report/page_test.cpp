@@ -38,7 +38,7 @@ test::SessionWriter writer_of(std::size_t frames) {
   return writer;
 }
 
-TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
+TEST(Page, completeSessionShowsEverySection) {
   const test::TemporaryFolder folder;
   writer_of(2000).write(folder.path());
   const std::string html = page_of(folder.path());
@@ -51,7 +51,7 @@ TEST(Page, ofAWholeSessionShowsEverythingAndLoadsNothing) {
   EXPECT_FALSE(contains(html, ">nan")) << "a number that is not there has no row";
 }
 
-TEST(Page, isMadeOfEveryTornSession) {
+TEST(Page, acceptsEveryTruncatedSession) {
   const test::TemporaryFolder whole;
   writer_of(300).write(whole.path());
   std::vector<std::string> pages;
@@ -77,7 +77,7 @@ TEST(Page, isMadeOfEveryTornSession) {
   EXPECT_EQ(test::xml_problem(pages), "");
 }
 
-TEST(Page, hostileTextNeverBecomesMarkup) {
+TEST(Page, escapesMarkupInText) {
   const test::TemporaryFolder folder;
   writer_of(200).write(folder.path());
   const std::string evil = "</svg><script>alert(1)</script><img src=x onerror=alert(2)>";
@@ -97,7 +97,7 @@ TEST(Page, hostileTextNeverBecomesMarkup) {
   EXPECT_FALSE(contains(html, std::string(400, 'x')));
 }
 
-TEST(WriteReport, replacesAnOlderPageAndLeavesNothingElse) {
+TEST(WriteReport, replacesOldPageWithoutLeftovers) {
   const test::TemporaryFolder folder;
   writer_of(100).write(folder.path());
   folder.write("report.html", "old");

@@ -38,7 +38,7 @@ std::vector<std::string> lines_of(const std::string& text, bool* torn) {
   return all;
 }
 
-TEST(FileLines, whatFollowsTheLastLineEndIsTorn) {
+TEST(FileLines, textAfterLastLineEndIsTruncated) {
   bool torn = false;
   using All = std::vector<std::string>;
   EXPECT_EQ(lines_of("\xEF\xBB\xBF a\r\n\n# no\nb\nc", &torn), (All{"a", "b"}));
@@ -51,7 +51,7 @@ TEST(FileLines, whatFollowsTheLastLineEndIsTorn) {
   EXPECT_FALSE(torn);
 }
 
-TEST(CsvRows, columnsAreFoundByNameAndDamagedRowsAreCounted) {
+TEST(CsvRows, findColumnsByNameAndCountBadRows) {
   Lines lines("a,b,c\n1,,x\n1,2\n3,4.5,y,z\n7,8,\n");
   CsvRows rows([&lines](std::string_view* line) { return lines.next(line); });
   ASSERT_TRUE(rows.next());
@@ -65,7 +65,7 @@ TEST(CsvRows, columnsAreFoundByNameAndDamagedRowsAreCounted) {
   EXPECT_EQ(rows.torn_rows(), 2U);
 }
 
-TEST(ReadSession, aWholeOneHasNothingMissing) {
+TEST(ReadSession, completeSessionHasNothingMissing) {
   const test::TemporaryFolder folder;
   test::SessionWriter writer;
   writer.frames = 400;
@@ -96,14 +96,14 @@ TEST(ReadSession, aWholeOneHasNothingMissing) {
   EXPECT_EQ(number_at(s.summary, "timing_ms.stages.track"), 5.5);
 }
 
-TEST(ReadSession, aFolderThatIsNoSessionIsRefused) {
+TEST(ReadSession, refusesOtherFolders) {
   const test::TemporaryFolder folder;
   EXPECT_THROW((void)read_session(folder.path()), InputError);
   EXPECT_THROW((void)read_session(folder / "nowhere"), InputError);
   EXPECT_THROW((void)read_session(folder.write("file", "x")), InputError);
 }
 
-TEST(ReadSession, whatIsNotThereByDesignIsNotMissing) {
+TEST(ReadSession, optionalFilesAreNotMissing) {
   const test::TemporaryFolder folder;
   folder.write("poses.csv",
                std::string(kShortHead) +
@@ -118,7 +118,7 @@ TEST(ReadSession, whatIsNotThereByDesignIsNotMissing) {
       << "its figures stand in the summary";
 }
 
-TEST(ReadSession, damagedAndDisorderedLinesAreLeftOutAndCounted) {
+TEST(ReadSession, countsDamagedAndUnorderedLines) {
   const Session s = with_poses(std::string(kShortHead) +
                                "0,1000,stereo_odometry,ok,,1,2,3,0,0,0,1,100,5\n"
                                "garbage\n"
@@ -137,7 +137,7 @@ TEST(ReadSession, damagedAndDisorderedLinesAreLeftOutAndCounted) {
   EXPECT_FALSE(s.frames[3].posed) << "a quaternion of no length";
 }
 
-TEST(ReadSession, withoutPosesTheTrajectoryStandsIn) {
+TEST(ReadSession, usesTrajectoryWithoutPoses) {
   const test::TemporaryFolder folder;
   folder.write("trajectory.tum", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0 1\n3.5 0 0 2 0 0 0");
   const Session s = read_session(folder.path());

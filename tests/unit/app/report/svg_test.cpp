@@ -12,7 +12,7 @@
 namespace vergence::app::report {
 namespace {
 
-TEST(Escape, goodUtf8StaysAndBrokenIsReplaced) {
+TEST(Escape, keepsValidUtf8AndReplacesInvalid) {
   EXPECT_EQ(escape("Brücke 15° 😀"), "Brücke 15° 😀");
   const std::string mark = "\xEF\xBF\xBD";
   EXPECT_EQ(escape("a\xff"
@@ -24,7 +24,7 @@ TEST(Escape, goodUtf8StaysAndBrokenIsReplaced) {
   EXPECT_EQ(escape("\xf4\x90\x80\x80"), mark + mark + mark + mark);  // beyond Unicode
 }
 
-TEST(Ticks, areRoundFewAndWithinTheAxis) {
+TEST(Ticks, areRoundFewAndWithinAxis) {
   for (const auto& [low, high] : {std::pair{0.0, 1.0},
                                   {-3.7, 12.9},
                                   {1e-7, 3e-7},
@@ -43,7 +43,7 @@ TEST(Ticks, areRoundFewAndWithinTheAxis) {
   EXPECT_EQ(time_ticks(0, 1650, 6), (std::vector<double>{0, 300, 600, 900, 1200, 1500}));
 }
 
-TEST(SvgElement, isWellFormedWhateverGoesIn) {
+TEST(SvgElement, isWellFormedForAnyInput) {
   Svg svg(100, 50, "a \"quoted\" <name>");
   svg.line("axis", 0, 0, std::nan(""), 1);
   svg.rect("f-ours", 1, 2, -3, 4);
@@ -73,7 +73,7 @@ Curve noise(std::size_t n) {
   return c;
 }
 
-TEST(Decimate, everyColumnKeepsItsExtremesItsFirstAndItsLastValue) {
+TEST(Decimate, keepsExtremesFirstAndLastOfColumn) {
   const Curve c = noise(33'000);
   constexpr int kColumns = 100;
   const auto lines = decimate(c.x, c.y, {}, 0, 33'000, kColumns);
@@ -96,7 +96,7 @@ TEST(Decimate, everyColumnKeepsItsExtremesItsFirstAndItsLastValue) {
                              [](const Point& a, const Point& b) { return a.x < b.x; }));
 }
 
-TEST(Thin, noPointLeftOutIsFartherThanTheStepFromAPointKept) {
+TEST(Thin, omittedPointsAreWithinStepOfKeptOnes) {
   Random random(3);
   Curve c;
   double x = 0, y = 0;

@@ -19,7 +19,7 @@ std::vector<std::string> close(CalibrationWriter* writer, const RigCalibration* 
   return faults;
 }
 
-TEST(CalibrationWriter, linesCarryNumbersAndEmptyFieldsWhereNothingIsGiven) {
+TEST(CalibrationWriter, emptyFieldsReplaceMissingNumbers) {
   const test::TemporaryFolder folder;
   CalibrationWriter writer({.session = folder.path()});
   writer.on_calibration(
@@ -80,7 +80,7 @@ EventRecord confirmed() {
   return event;
 }
 
-TEST(CalibrationWriter, theNextDriveGetsWhatWasFoundOrConfirmed) {
+TEST(CalibrationWriter, savesFoundOrVerifiedForNextDrive) {
   struct Row {
     bool confirms, finds;
     int frames;  // of the calibration in the state file; 0: there is none
@@ -108,7 +108,7 @@ TEST(CalibrationWriter, theNextDriveGetsWhatWasFoundOrConfirmed) {
   }
 }
 
-TEST(CalibrationWriter, whatIsInUseAtTheEndStandsInTheSession) {
+TEST(CalibrationWriter, sessionHoldsCalibrationInUse) {
   const test::TemporaryFolder folder;
   CalibrationWriter writer({.session = folder.path()});
   writer.on_calibration(begun());
@@ -118,7 +118,7 @@ TEST(CalibrationWriter, whatIsInUseAtTheEndStandsInTheSession) {
   EXPECT_EQ(read_calibration(folder / "calibration.yaml").rig.frames, 7);
 }
 
-TEST(CalibrationWriter, whetherItIsKeptIsWhetherTheNextDriveHasIt) {
+TEST(CalibrationWriter, reportsWhetherNextDriveHasIt) {
   struct Row {
     bool session_fails, has_state, state_fails, failed;
   };
@@ -148,7 +148,7 @@ TEST(CalibrationWriter, whetherItIsKeptIsWhetherTheNextDriveHasIt) {
   }
 }
 
-TEST(CalibrationWriter, postingAllocatesNothing) {
+TEST(CalibrationWriter, postingDoesNotAllocate) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   const test::TemporaryFolder folder;

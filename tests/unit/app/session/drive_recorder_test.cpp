@@ -80,7 +80,7 @@ class RecordedPoses {
   std::uint64_t number_ = 0;
 };
 
-TEST(DriveRecorder, everyFileSaysWhereTheCamerasAre) {
+TEST(DriveRecorder, everyFileHoldsCameraTransforms) {
   RecordedPoses drive({"record=[poses]", "record.split_mb=1"});
   for (int i = 0; i < 100 && drive.rigs("drive_1.mcap") == 0; ++i) {
     drive.drive(100);

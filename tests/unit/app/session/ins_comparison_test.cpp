@@ -55,7 +55,7 @@ std::uint64_t counter(const InsComparison& comparison, const std::string& name) 
 }
 
 /// A drive whose scene is begun anew after every tunnel: each time it is placed on the earth anew.
-TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
+TEST(InsComparison, keepsAlignmentsOfManyTunnels) {
   ComparedSession session;
   InsComparison& comparison = session.comparison;
   const LocalTangentPlane plane(Geodetic{48, 11, 500});
@@ -82,7 +82,7 @@ TEST(InsComparison, keepsThePlacementsOfADriveOfManyTunnels) {
 }
 
 /// A way a tenth too long, at 10 Hz for a minute, the last third of it without an INS.
-TEST(InsComparison, countsAScaleThatDisagreesOnlyWhereThereIsAnIns) {
+TEST(InsComparison, countsScaleDisagreementOnlyWithIns) {
   ComparedSession session;
   InsComparison& comparison = session.comparison;
   const LocalTangentPlane plane(Geodetic{48, 11, 500});

@@ -41,7 +41,7 @@ std::string refusal(const std::string& text) {
   return test::refusal_of([&] { (void)read_ins_file(folder.write("ins.csv", text)); });
 }
 
-TEST(InsFile, aReadingComesBackAsItWas) {
+TEST(InsFile, roundTripsReading) {
   const test::TemporaryFolder folder;
   InsRecord bare;
   bare.sample.number = 8;
@@ -73,7 +73,7 @@ TEST(InsFile, aReadingComesBackAsItWas) {
                read[1].quality.utc_valid);
 }
 
-TEST(InsFile, hostileLinesAreRefusedWithTheirPlace) {
+TEST(InsFile, refusalNamesPlaceOfMalformedLine) {
   const std::string good = line_of(reading(1));
   ASSERT_TRUE(refusal(kHead + good).empty());
   const auto with = [&](std::size_t column, const std::string& value) {
@@ -114,7 +114,7 @@ TEST(InsFile, hostileLinesAreRefusedWithTheirPlace) {
       << "torn";
 }
 
-TEST(InsFile, isFoundInAFolderOrByItsHead) {
+TEST(InsFile, isFoundInFolderOrByHeader) {
   const test::TemporaryFolder folder;
   EXPECT_TRUE(find_ins_file(folder.path()).empty());
   EXPECT_TRUE(find_ins_file(folder / "none").empty());

@@ -20,7 +20,7 @@
 namespace vergence::app {
 namespace {
 
-TEST(SessionFolder, isMadeOrTakenWhenEmptyAndRefusedOtherwise) {
+TEST(SessionFolder, acceptsNewOrEmptyFolderOnly) {
   const test::TemporaryFolder folder;
   EXPECT_TRUE(make_session_folder(folder / "a/b/session"));
   EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b/session"));
@@ -37,7 +37,7 @@ TEST(SessionFolder, isMadeOrTakenWhenEmptyAndRefusedOtherwise) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a/b/session"));
 }
 
-TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
+TEST(Recorder, writesExactStampsAndNoLostPoses) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   FrameReport first = pose(0, PoseStatus::ok, 0);
@@ -77,7 +77,7 @@ TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
   EXPECT_TRUE(totals->faults.empty());
 }
 
-TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
+TEST(Recorder, writesOneJsonObjectPerEvent) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   EventRecord event;
@@ -114,7 +114,7 @@ TEST(Recorder, eventsAreOneJsonObjectALineWhateverTheirText) {
   EXPECT_EQ(nlohmann::json::parse(lines[2])["fields"], nlohmann::json({{"gap_s", 2.5}}));
 }
 
-TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
+TEST(Recorder, liveDropsAreCountedWithoutBlocking) {
   const test::TemporaryFolder folder;
   std::promise<void> posted;
   Recorder::Options options{.when_full = Recorder::WhenFull::drop, .keep_trajectory = false};
@@ -136,7 +136,7 @@ TEST(Recorder, liveDropsAreCountedAndNeverMakeTheProducerWait) {
   EXPECT_TRUE(totals->trajectory.empty());
 }
 
-TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
+TEST(Recorder, writesDuringSession) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   recorder.on_report(pose(0, PoseStatus::ok, 0));
@@ -148,7 +148,7 @@ TEST(Recorder, whatWasPostedIsInTheFilesWhileTheSessionGoesOn) {
   EXPECT_TRUE(found);
 }
 
-TEST(Recorder, postingAllocatesNothing) {
+TEST(Recorder, postingDoesNotAllocate) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   const test::TemporaryFolder folder;

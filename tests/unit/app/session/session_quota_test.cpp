@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST(SessionQuota, removesTheOldestEndedSessionsUntilTheRestFits) {
+TEST(SessionQuota, removesOldestEndedSessions) {
   const test::TemporaryFolder folder;
   const auto make = [&](const std::string& name, bool ended, int age_h) {
     fs::create_directories(folder / name);

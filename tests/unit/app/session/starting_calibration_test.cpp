@@ -39,7 +39,7 @@ CalibrationFile found(const Configuration& c, double t_y) {
   return file;
 }
 
-TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfiguration) {
+TEST(StartingCalibration, followsOrderOfPrecedence) {
   const test::TemporaryFolder folder;
   const Configuration c = configuration(folder);
   write_state(folder / "calibration_state.yaml", found(c, 0.011));
@@ -67,7 +67,7 @@ TEST(StartingCalibration, fromScratchBeatsTheFileBeatsTheStateBeatsTheConfigurat
   }
 }
 
-TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
+TEST(StartingCalibration, detectsReplacedCamera) {
   const test::TemporaryFolder folder;
   Configuration c = configuration(folder, "gige");
   c.cameras[0].serial = "192.168.7.2";
@@ -87,7 +87,7 @@ TEST(StartingCalibration, aCameraExchangedBehindItsAddressIsNoticed) {
       << other.remarks[0];
 }
 
-TEST(StartingCalibration, realCamerasWithoutAPlaceBeginFromScratch) {
+TEST(StartingCalibration, camerasWithoutExtrinsicsStartFromScratch) {
   const test::TemporaryFolder folder;
   Configuration c = configuration(folder, "gige");
   EXPECT_EQ(starting_calibration(c, {}, kSerials).trust, CalibrationTrust::given)

@@ -18,7 +18,7 @@ struct ManualSolver final : BackgroundRunner {
   }
 };
 
-TEST(ReplayableSolverRunner, notesTheFramesAtWhichTheSolverIsFoundIdle) {
+TEST(ReplayableSolverRunner, recordsFramesWithIdleSolver) {
   ManualSolver solver;
   ReplayableSolverRunner watch(solver);
   watch.begin_frame(std::nullopt);
@@ -34,7 +34,7 @@ TEST(ReplayableSolverRunner, notesTheFramesAtWhichTheSolverIsFoundIdle) {
   EXPECT_EQ(solver.waits, 0);
 }
 
-TEST(ReplayableSolverRunner, answersInAReplayAsInTheDrive) {
+TEST(ReplayableSolverRunner, replaysRecordedAnswers) {
   ManualSolver solver;
   ReplayableSolverRunner watch(solver);
   watch.begin_frame(false);

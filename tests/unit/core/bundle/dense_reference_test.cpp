@@ -1,6 +1,6 @@
 // One step of the adjuster against the same step computed the long way: residuals through
 // Camera::project, every derivative a central difference, the normal equations dense and undivided.
-// It checks each Jacobian, each weight and each block of METHOD §2.
+// It checks each Jacobian, each weight and each block of the normal equations (core/README.md).
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>

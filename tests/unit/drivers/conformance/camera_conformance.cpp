@@ -47,7 +47,7 @@ class CameraConformance : public ::testing::Test {
   std::string why_;
 };
 
-TEST_F(CameraConformance, randomRulesKeepTheContract) {
+TEST_F(CameraConformance, keepsContractUnderRandomCalls) {
   const int seeds = asked_for("VERGENCE_CONFORMANCE_SEEDS", 3),
             steps = asked_for("VERGENCE_CONFORMANCE_STEPS", 60);
   for (int seed = 1; seed <= seeds && !HasFailure(); ++seed) {
@@ -91,7 +91,7 @@ TEST_F(CameraConformance, randomRulesKeepTheContract) {
   }
 }
 
-TEST_F(CameraConformance, nonsenseIsRefusedAndChangesNothing) {
+TEST_F(CameraConformance, refusesInvalidSettingsWithoutEffect) {
   if (make(11) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   const auto possible = rig_->possible();
@@ -107,7 +107,7 @@ TEST_F(CameraConformance, nonsenseIsRefusedAndChangesNothing) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, withoutAFreeSlotTheNewestIsDroppedAndCounted) {
+TEST_F(CameraConformance, dropsAndCountsNewestWithoutFreeSlot) {
   if (make(14) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
@@ -129,7 +129,7 @@ TEST_F(CameraConformance, withoutAFreeSlotTheNewestIsDroppedAndCounted) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, exposuresThatNeverArriveAreCounted) {
+TEST_F(CameraConformance, countsExposuresThatNeverArrive) {
   if (make(15) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
@@ -157,7 +157,7 @@ bool reaches(ConformanceRig& rig, const CameraConfiguration& c, const ExposureSe
   return false;
 }
 
-TEST_F(CameraConformance, anExposureSetWhileStreamingIsToldByFramesAndKeptOverAStop) {
+TEST_F(CameraConformance, framesReportExposureSetWhileStreaming) {
   if (make(18) == nullptr) GTEST_SKIP() << why_;
   CameraDevice& camera = rig_->camera();
   const auto c = rig_->possible().front();
@@ -192,7 +192,7 @@ TEST_F(CameraConformance, anExposureSetWhileStreamingIsToldByFramesAndKeptOverAS
   camera.stop();
 }
 
-TEST_F(CameraConformance, anUnpluggedCameraIsGoneAndComesBack) {
+TEST_F(CameraConformance, reconnectsAfterUnplug) {
   if (make(16) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
@@ -204,7 +204,7 @@ TEST_F(CameraConformance, anUnpluggedCameraIsGoneAndComesBack) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, ownerConsumerAndReleaserMayBeThreeThreads) {
+TEST_F(CameraConformance, allowsOwnerConsumerReleaserThreads) {
   if (make(17) == nullptr) GTEST_SKIP() << why_;
   CameraDevice& camera = rig_->camera();
   const auto configuration = rig_->possible().front();

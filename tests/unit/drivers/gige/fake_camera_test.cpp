@@ -12,7 +12,7 @@ namespace {
 
 /// Aravis's own simulated camera, of which nothing here is by the same hand as the driver: older
 /// names, no resend, no test packet.
-TEST(GigeFakeCamera, isConfiguredAndStreams) {
+TEST(GigeFakeCamera, configuresAndStreams) {
   const gige::Object<ArvGvFakeCamera> fake(arv_gv_fake_camera_new("127.0.0.1", "FAKE-1"));
   if (fake == nullptr || arv_gv_fake_camera_is_running(fake.get()) == FALSE)
     GTEST_SKIP() << "127.0.0.1 port 3956 is in use";

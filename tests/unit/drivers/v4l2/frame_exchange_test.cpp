@@ -41,13 +41,13 @@ struct Exchange : ::testing::Test {
   Frame frame{};
 };
 
-TEST_F(Exchange, theKernelKeepsItsReserve) {
+TEST_F(Exchange, keepsKernelReserve) {
   EXPECT_FALSE(exchange.hold_buffer(0, 0, kBufferReserve - 1));
   EXPECT_EQ(exchange.statistics().underruns, 1U);
   EXPECT_TRUE(exchange.hold_buffer(0, 0, kBufferReserve));
 }
 
-TEST_F(Exchange, aStopFreesWhatNobodyTookButNotWhatSomebodyHolds) {
+TEST_F(Exchange, stopFreesOnlyUnheldBuffers) {
   ASSERT_TRUE(offer(1, 5));
   ASSERT_TRUE(offer(3, 6));
   ASSERT_EQ(exchange.wait({}, &frame), DeviceStatus::ok);
@@ -60,7 +60,7 @@ TEST_F(Exchange, aStopFreesWhatNobodyTookButNotWhatSomebodyHolds) {
   for (const std::uint32_t buffer : free.list()) EXPECT_NE(buffer, 1U);
 }
 
-TEST_F(Exchange, aLossAfterTheStopIsNone) {
+TEST_F(Exchange, ignoresDisconnectAfterStop) {
   exchange.record_dead_node();
   exchange.end();
   exchange.lose(HostStamp(42));
@@ -68,7 +68,7 @@ TEST_F(Exchange, aLossAfterTheStopIsNone) {
   EXPECT_TRUE(exchange.drain()) << "the owner opens the node anew";
 }
 
-TEST(V4l2Slots, anImageMayBeginBehindAHeader) {
+TEST(V4l2Slots, acceptsImageBehindHeader) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
   slots.install(memory(4, 10));
@@ -76,7 +76,7 @@ TEST(V4l2Slots, anImageMayBeginBehindAHeader) {
   EXPECT_EQ(slots.view(slot).data, slots.buffer(0).data() + 128);
 }
 
-TEST(V4l2Slots, whatIsHeldOutlivesTheCamera) {
+TEST(V4l2Slots, heldImageOutlivesCamera) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
   slots.install(memory(4, 10));
@@ -95,7 +95,7 @@ TEST(V4l2Slots, whatIsHeldOutlivesTheCamera) {
   EXPECT_EQ(slots.held(), 0U);
 }
 
-TEST(V4l2Slots, imagesOfAnotherLayoutDoNotFit) {
+TEST(V4l2Slots, refusesImagesOfOtherLayout) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
   EXPECT_TRUE(slots.fit(true, 64));
@@ -107,7 +107,7 @@ TEST(V4l2Slots, imagesOfAnotherLayoutDoNotFit) {
   EXPECT_FALSE(slots.fit(true, 64));
 }
 
-TEST(V4l2Slots, moreBuffersThanSlotsAreNotUsed) {
+TEST(V4l2Slots, usesNoMoreBuffersThanSlots) {
   Slots slots;
   slots.use_buffers(60, 40, 64);
   std::vector<FrameSlot> held;

@@ -104,7 +104,7 @@ Vec2 seen_in_row(const Camera& camera, const Transform& T_camera_enu, int row, d
   return pixel;
 }
 
-TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
+TEST(Renderer, edgesFollowLensModel) {
   for (const bool distorted : {false, true}) {
     Plates scene;
     scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
@@ -133,7 +133,7 @@ TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
   }
 }
 
-TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
+TEST(Renderer, subPixelStripKeepsArea) {
   Plates scene;
   const double width = 0.3 * 8.0 / 290;  // 0.3 px at 8 m
   scene.plate(0, width, -3, 3, 8.0, 1);
@@ -149,7 +149,7 @@ TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   }
 }
 
-TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
+TEST(Renderer, noiseHasVarianceAndSeed) {
   Plates scene;
   scene.plate(-100, 100, -100, 100, 6.0, 1);
   Renderer renderer(scene.world(), Camera(lens(false)));
@@ -178,7 +178,7 @@ TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
   EXPECT_NEAR(mean, 0.8 * 255, 0.1);
 }
 
-TEST(Renderer, everyTargetDrawsTheSamePicture) {
+TEST(Renderer, simdTargetsRenderIdentically) {
   Plates scene;
   scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
   const auto town = std::make_shared<const World>(WorldOptions{.seed = 5, .texture_detail = 0});
@@ -209,7 +209,7 @@ TEST(Renderer, everyTargetDrawsTheSamePicture) {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-TEST(Renderer, oddSizesAndStridesStayInsideTheirRows) {
+TEST(Renderer, oddSizesAndStridesStayInRows) {
   Plates scene;
   Intrinsics k = lens(true);
   k.width = 53;
