@@ -29,18 +29,26 @@ using Trajectory = std::vector<StampedPose>;
 enum class QuaternionOrder : std::uint8_t { xyzw, wxyz };
 
 struct TrajectoryOptions {
-  std::optional<TimeUnit> unit{};               // nothing: by the magnitude, or seconds
-  std::optional<QuaternionOrder> quaternion{};  // nothing: by the headings, or xyzw
-  std::string_view unit_option{};  // with which the user gives a unit; empty: any interval is taken
+  /// None: detected by the magnitude, or seconds.
+  std::optional<TimeUnit> unit{};
+  /// None: detected by the headings, or xyzw.
+  std::optional<QuaternionOrder> quaternion{};
+  /// Option of the user that sets the unit; empty: any interval is accepted.
+  std::string_view unit_option{};
 };
 
 struct TrajectoryFile {
   Trajectory poses{};
-  std::vector<std::string> remarks{};  // what was assumed, skipped or put right: a phrase each
-  std::size_t rows = 0;                // of the file, also those that are skipped
-  bool numbered = false;  // the file counts its frames: some may be missing, `rows` counts them too
-  bool timed = true;      // false: the file holds no times; rows are 0.1 s apart, from 0
-  bool order_reported = false;  // headings, a matrix or the user say how rotations are written
+  /// Assumptions, skipped rows and corrections, a phrase each.
+  std::vector<std::string> remarks{};
+  /// Rows of the file, including skipped ones.
+  std::size_t rows = 0;
+  /// The file numbers its frames: some may be missing, and `rows` counts them too.
+  bool numbered = false;
+  /// False: the file holds no times; rows are 0.1 s apart, from 0.
+  bool timed = true;
+  /// Headings, a matrix or the user define how rotations are written.
+  bool order_reported = false;
   QuaternionOrder order = QuaternionOrder::xyzw;  // as read
 };
 

@@ -17,8 +17,10 @@ namespace vergence::app {
 
 /// Fields of a request's head that the live page uses.
 struct HttpRequest {
-  std::string_view method{}, path{};  // path without the query
-  std::string_view token{};           // of the header X-Vergence-Token, or the query `token=`
+  /// The path has no query.
+  std::string_view method{}, path{};
+  /// Value of the header X-Vergence-Token or of the query `token=`.
+  std::string_view token{};
   std::string_view host{}, origin{};
   bool token_in_header = false;
   bool has_body = false;

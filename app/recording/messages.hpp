@@ -47,9 +47,12 @@ struct FixMessage {
   enum class Known : std::uint8_t { no, approximated, diagonal, all };
 
   bool fix = false;
-  Geodetic position{};                 // height above the ellipsoid
-  std::array<double, 9> covariance{};  // m², east, north, up, row by row
-  Known known = Known::no;             // what of it is
+  /// Height above the ellipsoid.
+  Geodetic position{};
+  /// East, north, up, m², row by row.
+  std::array<double, 9> covariance{};
+  /// Known part of the covariance.
+  Known known = Known::no;
 };
 void write_nav_sat_fix(CdrWriter* out, Stamp stamp, std::string_view frame,
                        const FixMessage& fix) noexcept;

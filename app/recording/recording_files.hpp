@@ -18,7 +18,8 @@ namespace vergence::app {
 struct RecordedTopic {
   std::string name;
   RosType type = RosType::text;
-  bool latched = false;  // who comes later is to have the last message (tf_static)
+  /// Late subscribers receive the last message (tf_static).
+  bool latched = false;
 };
 
 /// A message at the beginning of every file.
@@ -40,8 +41,10 @@ class RecordingFiles {
   struct Options {
     std::vector<RecordedTopic> topics;
     std::vector<RecordingPreamble> preamble{};
-    std::uint64_t roll_bytes = 0;  // a file is ended when it has so many; 0: never
-    Disk* disk = nullptr;          // null: the system's
+    /// A file is ended at this size; 0: never.
+    std::uint64_t roll_bytes = 0;
+    /// Null: the disk of the system.
+    Disk* disk = nullptr;
   };
   using Parts = std::span<const std::span<const std::uint8_t>>;
 

@@ -120,8 +120,10 @@ void calibration_group(const Session& s, const Analysis& a, MetricTable* f) {
 std::string event_time(const Session& s, Stamp stamp) {
   if (s.frames.empty()) return "";
   const Stamp first = s.frames.front().stamp;
-  return stamp >= first ? time_label(seconds_between(first, stamp), 0.1)
-                        : "−" + time_label(seconds_between(stamp, first), 0.1);
+  constexpr double kRounds = 0.05;  // s, below it a time is printed as 0.0 without a sign
+  const double before = stamp < first ? seconds_between(stamp, first) : 0;
+  return before < kRounds ? time_label(before > 0 ? 0 : seconds_between(first, stamp), 0.1)
+                          : "−" + time_label(before, 0.1);
 }
 
 struct EventRun {
@@ -234,7 +236,8 @@ std::string calibrations_table(const Session& session) {
   constexpr std::size_t kMax = 60;
   std::string out =
       "<table "
-      "class=\"stack\"><tr><th>time</th><th>outcome</th><th>cause</th><th>latency</th><th>held-out "
+      "class=\"stack\"><tr><th>time, "
+      "s</th><th>outcome</th><th>cause</th><th>latency</th><th>held-out "
       "RMS</th><th>depth error</th><th>reason</th></tr>\n";
   std::vector<const CalibrationRow*> rows;  // one for all cameras: they are decided together
   for (const CalibrationRow& c : session.calibrations)
@@ -251,7 +254,10 @@ std::string calibrations_table(const Session& session) {
     const std::string from = c.frames > 0 ? fmt::format("from {} frames", c.frames) : "";
     const std::string why =
         from.empty() || c.reason.empty() ? from + c.reason : from + "; " + c.reason;
-    const char* outcome = c.accepted ? "accepted" : c.kept ? "unchanged" : "rejected";
+    const char* outcome = !c.decided   ? "initial"
+                          : c.accepted ? "accepted"
+                          : c.kept     ? "unchanged"
+                                       : "rejected";
     out += fmt::format(
         "<tr><td class=\"t\">{}</td> <td class=\"k\">{}</td> <td class=\"w\">{}</td> <td "
         "class=\"w\">{}</td> <td "
@@ -265,7 +271,8 @@ std::string calibrations_table(const Session& session) {
 std::string events_table(const Session& session) {
   constexpr std::size_t kEachEnd = 80;
   const std::vector<EventRun> runs = condensed(session.events);
-  std::string out = "<table class=\"stack\"><tr><th>time</th><th>kind</th><th>message</th></tr>\n";
+  std::string out =
+      "<table class=\"stack\"><tr><th>time, s</th><th>kind</th><th>message</th></tr>\n";
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const bool many = runs.size() > 2 * kEachEnd;
     if (many && i == kEachEnd) {

@@ -13,15 +13,23 @@ namespace vergence::app {
 
 /// Content of the progress line; unset fields are omitted.
 struct ProgressState {
-  std::string_view state{};             // `stereo`
-  std::uint64_t frame = 0;              // done so far
-  std::uint64_t frames = 0;             // in all; 0 if unknown (then no remaining time is printed)
-  double path_m = 0;                    // travelled
-  std::optional<int> inliers{};         // of the last pose
-  std::optional<double> estimate_ms{};  // of the last frame
-  std::optional<double> from_ins_m{};   // distance to the INS
-  std::string_view activity{};  // instead of way and figures, where there are none: `calibrate ·
-                                // frame 7/26 · 5 with the board`
+  /// Such as `stereo`.
+  std::string_view state{};
+  /// Frames done.
+  std::uint64_t frame = 0;
+  /// Number of frames; 0 if unknown (then no remaining time is printed).
+  std::uint64_t frames = 0;
+  /// Distance travelled.
+  double path_m = 0;
+  /// Inliers of the last pose.
+  std::optional<int> inliers{};
+  /// Time of the last frame.
+  std::optional<double> estimate_ms{};
+  /// Distance to the position of the INS.
+  std::optional<double> from_ins_m{};
+  /// Replaces distance and metrics where there are none: `calibrate · frame 7/26 · 5 with the
+  /// board`.
+  std::string_view activity{};
 };
 
 /// `stereo · frame 1204/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 03:12 left`

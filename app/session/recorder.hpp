@@ -51,8 +51,10 @@ class Recorder final : public SessionObserver {
   struct Options {
     WhenFull when_full = WhenFull::wait;
     bool keep_trajectory = true;
-    bool ins = false;  // readings are posted: ins.csv is there
-    Stamp first{};     // of the recorder's own events before the first pose
+    /// INS readings are recorded: ins.csv is written.
+    bool ins = false;
+    /// Stamp of the recorder's own events before the first pose.
+    Stamp first{};
     /// Returns true while the disk is to be treated as full, for the mock's fault. Called on the
     /// recorder's thread with the stamp of every pose. May be empty.
     std::function<bool(Stamp)> disk_full{};

@@ -27,23 +27,34 @@ struct ClockTie {
 
 /// Properties of a session before its first frame.
 struct SessionStart {
-  std::string name{};                       // of the session folder
-  std::vector<std::string> camera_names{};  // those of the calibration, each once
-  Stamp first{};                            // of the drive
-  std::uint64_t frames = 0;                 // of the whole drive; 0 if unknown
-  std::optional<ClockTie> tie{};            // none in a replay and in virtual time
-  std::size_t image_bytes = 0;              // of one frame of the largest camera
-  bool can_recalibrate = false;             // SessionRequests::recalibrate is listened to
-  bool recording = false;                   // a drive.mcap is written
+  /// Name of the session directory.
+  std::string name{};
+  /// Camera names of the calibration, each once.
+  std::vector<std::string> camera_names{};
+  /// First stamp of the drive.
+  Stamp first{};
+  /// Number of frames of the drive; 0 if unknown.
+  std::uint64_t frames = 0;
+  /// None in a replay and in virtual time.
+  std::optional<ClockTie> tie{};
+  /// Bytes of one frame of the largest camera.
+  std::size_t image_bytes = 0;
+  /// True if SessionRequests::recalibrate has an effect.
+  bool can_recalibrate = false;
+  /// True if a drive.mcap is written.
+  bool recording = false;
 };
 
 /// Requests of viewers to a running session. They act at the next frame.
 ///
 /// Threads  Any sets, the estimator's takes. Outlives the session.
 struct SessionRequests {
-  std::atomic<bool> recalibrate{false};     // a new calibration is to be sought
-  std::atomic<bool> mark{false};            // an event `mark` into events.jsonl
-  std::atomic<bool> stop_recording{false};  // no more into drive.mcap; the drive goes on
+  /// Requests a new calibration.
+  std::atomic<bool> recalibrate{false};
+  /// Writes an event `mark` to events.jsonl.
+  std::atomic<bool> mark{false};
+  /// Ends drive.mcap; the run continues.
+  std::atomic<bool> stop_recording{false};
 };
 
 /// Interface of everything that is attached to a session, live or replayed: recording, live page,

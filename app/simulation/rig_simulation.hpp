@@ -20,13 +20,19 @@ enum class SimulationShape : std::uint8_t { ball, shell };
 struct SimulationOptions {
   SimulationGenerator generator = SimulationGenerator::ring;
   SimulationShape shape = SimulationShape::ball;
-  int cameras = 2;  // 1 … kMaxCameras
-  int poses = 10;   // rig snapshots; the first is known
+  /// 1 to kMaxCameras.
+  int cameras = 2;
+  /// Rig poses; the first is known.
+  int poses = 10;
   int points = 100;
-  double radius = 7;            // m, of the cloud
-  double noise = 0.1;           // px, Gaussian, of each coordinate
-  double start_position = 0.1;  // m, uniform ±, an axis: centres of the rigs but the first
-  double start_rotation = 0.1;  // rad, uniform ±, an axis: R_k
+  /// Radius of the point cloud, m.
+  double radius = 7;
+  /// Sigma of the Gaussian noise of each coordinate, px.
+  double noise = 0.1;
+  /// Uniform initial error per axis (±) of the rig centres but the first, m.
+  double start_position = 0.1;
+  /// Uniform initial error per axis (±) of the camera rotations, rad.
+  double start_rotation = 0.1;
   double start_translation =
       0.05;  // m, uniform ±, an axis: centre of camera k, brought back to the true length
   double start_points =

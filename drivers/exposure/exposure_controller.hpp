@@ -7,16 +7,22 @@
 namespace vergence::exposure {
 
 struct ExposureOptions {
-  double target = 90;          // mean grey level aimed at
-  double may_saturate = 0.05;  // share of the pixels
-  double dead_band = 0.2;  // stops (factors of two) to each side within which nothing is changed
-  Duration least = Duration::microseconds(20);   // shortest exposure
-  Duration most = Duration::microseconds(8000);  // longest: what motion blur allows
-  double max_gain_db = 18;                       // used once the exposure is at its longest
+  /// Target mean grey level.
+  double target = 90;
+  /// Permitted share of saturated pixels.
+  double may_saturate = 0.05;
+  /// Half width, in stops (factors of two), of the band in which the exposure is kept.
+  double dead_band = 0.2;
+  /// Shortest exposure.
+  Duration least = Duration::microseconds(20);
+  /// Longest exposure, limited by motion blur.
+  Duration most = Duration::microseconds(8000);
+  /// Used once the exposure is at its longest.
+  double max_gain_db = 18;
   double up_stops = 1,
          down_stops = 2;  // a change at most; down is faster: saturated pixels tell nothing
-  int settle_frames =
-      5;  // from a change until an image is judged again: beyond every camera's latency
+  /// Frames from a change to the next evaluated image; longer than the latency of every camera.
+  int settle_frames = 5;
 };
 
 /// Exposure and gain of a rig, from the brightness of its reference camera.

@@ -17,10 +17,14 @@ inline constexpr double kMoving = 1.0;  // m/s
 
 /// A fix with the time that the receiver gives it.
 struct Fix {
-  DeviceStamp measured{};  // UTC since 1970; without a date, since the midnight before the first
-  HostStamp arrival{};     // of the epoch's first message
-  std::size_t bytes = 0;   // of that message
-  InsReading reading{};    // sample and quality; no stamps
+  /// UTC since 1970; without a date, since the midnight before the first fix.
+  DeviceStamp measured{};
+  /// Arrival of the epoch's first message.
+  HostStamp arrival{};
+  /// Bytes of that message.
+  std::size_t bytes = 0;
+  /// Sample and quality, without stamps.
+  InsReading reading{};
 };
 
 /// NMEA sentences into fixes: those of one time of day are one epoch.
@@ -69,9 +73,12 @@ class NmeaEpochs {
 /// Counters of a stream; all only grow.
 struct DecoderCounters {
   std::uint64_t readings = 0;
-  std::uint64_t lost = 0;       // epochs missing between two, by the receiver's interval
-  std::uint64_t malformed = 0;  // sentences and frames that made no sense
-  std::uint64_t restarts = 0;   // the receiver's clock was set
+  /// Epochs missing between two others, by the receiver's interval.
+  std::uint64_t lost = 0;
+  /// Sentences and frames that could not be decoded.
+  std::uint64_t malformed = 0;
+  /// Steps of the receiver's clock.
+  std::uint64_t restarts = 0;
 };
 
 /// Bytes of a satellite receiver into readings with times.

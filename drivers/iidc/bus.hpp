@@ -27,11 +27,14 @@ class RegisterPort {
 
 /// A frame in transit.
 struct StreamShape {
-  std::size_t image_bytes = 0;   // pixels
-  std::size_t frame_bytes = 0;   // with the padding of the last packet
-  std::size_t packet_bytes = 0;  // of one bus cycle
+  std::size_t image_bytes = 0;  // pixels
+  /// Bytes of a frame, with the padding of the last packet.
+  std::size_t frame_bytes = 0;
+  /// Bytes of one bus cycle.
+  std::size_t packet_bytes = 0;
   BusSpeed speed = BusSpeed::s400;
-  std::size_t buffers = 0;  // slots, 4 … kMaxBuffers
+  /// Number of slots, 4 to kMaxBuffers.
+  std::size_t buffers = 0;
   [[nodiscard]] bool operator==(const StreamShape&) const noexcept = default;
 };
 
@@ -40,11 +43,15 @@ struct Arrival {
   FrameSlot slot = 0;
   const std::uint8_t* data = nullptr;
   std::size_t bytes = 0;
-  HostStamp at{};       // when the last byte was here
-  bool broken = false;  // the transport says that something is wrong with it
-  bool spare = true;    // false: the buffer is needed at once, it cannot be kept
+  /// Time when the last byte arrived.
+  HostStamp at{};
+  /// The transport reports an error of the frame.
+  bool broken = false;
+  /// False: the buffer is needed immediately and cannot be kept.
+  bool spare = true;
   bool has_bus_stamp = false;
-  HostStamp bus_stamp{};  // when the frame's first packet was on the bus, by the host's clock
+  /// Time of the first packet on the bus, by the host's clock.
+  HostStamp bus_stamp{};
 };
 
 /// Receiver of the stream's frames. Called on the stream's thread.

@@ -8,12 +8,14 @@
 namespace vergence {
 
 struct ClockMapperOptions {
-  Duration min_delay{};  // from measurement to arrival at best, as the transport states it
+  /// Minimum delay from measurement to arrival, as the transport states it.
+  Duration min_delay{};
   Duration delay_spread = Duration::milliseconds(
       2);  // by how much a delay exceeds it on average: the error bound while little is known
-  Duration resolution = Duration::microseconds(1);  // of the device's stamps
-  double drift_bound =
-      200e-6;  // |rate − 1| of the device's clock against the host's, crystals keep 100 ppm
+  /// Resolution of the device's stamps.
+  Duration resolution = Duration::microseconds(1);
+  /// Bound of |rate − 1| of the device's clock against the host's; crystals keep 100 ppm.
+  double drift_bound = 200e-6;
   Duration jump = Duration::milliseconds(
       20);  // a stamp that far ahead of what is possible is a clock that was set
   Duration stall = Duration::milliseconds(
@@ -23,7 +25,8 @@ struct ClockMapperOptions {
 /// A stamp on the host's clock.
 struct MappedStamp {
   HostStamp host{};
-  Duration error{};  // |true − host| is below this
+  /// Upper bound of |true − host|.
+  Duration error{};
 };
 
 /// Ties a device's clock to the host's: offset and drift, from pairs of device stamp and arrival,

@@ -130,7 +130,8 @@ class SampleCounter {
 struct Receiver {
   bool known = false;
   HostStamp received{};
-  std::uint8_t fix = 0;  // as GnssPvt
+  /// As in GnssPvt.
+  std::uint8_t fix = 0;
   std::uint8_t satellites = 0;
   float position_dop = 0;
   double position_sigma = 0, height_sigma = 0,
@@ -151,10 +152,12 @@ void fill(const xbus::Mtdata& data, const Receiver& receiver, HostStamp now,
 /// Counters of a stream; all only grow.
 struct DecoderCounters {
   std::uint64_t readings = 0;
-  std::uint64_t lost =
-      0;  // messages (MTi-G-700/710) or samples (MTi-G) missing in the device's count
-  std::uint64_t malformed = 0;  // whole frames that made no sense
-  std::uint64_t restarts = 0;   // the device restarted, or its clock was set
+  /// Messages (MTi-G-700/710) or samples (MTi-G) missing in the device's count.
+  std::uint64_t lost = 0;
+  /// Complete frames that could not be decoded.
+  std::uint64_t malformed = 0;
+  /// Restarts of the device and steps of its clock.
+  std::uint64_t restarts = 0;
 };
 
 /// Bytes of a measuring device into readings with times.

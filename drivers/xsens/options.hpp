@@ -9,9 +9,12 @@ namespace vergence::xsens {
 
 /// Settings of an XSens INS. Defaults change nothing.
 struct Options {
-  std::uint32_t baud = 0;        // 0: as the device has it
-  double sync_out_hz = 0;        // 0: as the device has it; negative: off
-  double sync_out_width_ms = 1;  // of its pulse
+  /// Baud rate; 0: the device's own.
+  std::uint32_t baud = 0;
+  /// Rate of SyncOut; 0: the device's own; negative: off.
+  double sync_out_hz = 0;
+  /// Pulse width of SyncOut.
+  double sync_out_width_ms = 1;
   Duration processing = Duration::milliseconds(
       2);  // from a sample to its first byte on the wire: acquisition and filter
 };

@@ -26,7 +26,7 @@ namespace vergence::test {
         {name, std::make_unique<SqliteBag>(std::vector<std::uint8_t>(view.begin(), view.end()))});
   else
     files.push_back({name, std::make_unique<MemoryBytes>(view)});
-  return sequence_of(name, index_bag(format, name, std::move(files)), given, topics);
+  return make_sequence(name, index_bag(format, name, std::move(files)), given, topics);
 }
 
 /// Finishes the bag as `mcap` or else as rosbag.

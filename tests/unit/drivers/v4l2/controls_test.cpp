@@ -34,17 +34,17 @@ TEST(V4l2Controls, namesBecomeKeys) {
 TEST(V4l2Controls, acceptsNumberInRangeOrMenuItem) {
   std::int64_t value = -1;
   const Control c = menu({{0, "manual_mode"}, {3, "aperture_priority_mode"}});
-  EXPECT_TRUE(value_of(c, "Aperture Priority Mode", &value));
+  EXPECT_TRUE(parse_value(c, "Aperture Priority Mode", &value));
   EXPECT_EQ(value, 3);
-  EXPECT_TRUE(value_of(c, "0", &value));
+  EXPECT_TRUE(parse_value(c, "0", &value));
   EXPECT_EQ(value, 0);
-  EXPECT_FALSE(value_of(c, "auto", &value));
-  EXPECT_FALSE(value_of(c, "4", &value));
+  EXPECT_FALSE(parse_value(c, "auto", &value));
+  EXPECT_FALSE(parse_value(c, "4", &value));
   const Control i = integer(-10, 10, 1);
-  EXPECT_TRUE(value_of(i, "-10", &value));
+  EXPECT_TRUE(parse_value(i, "-10", &value));
   EXPECT_EQ(value, -10);
   for (const char* bad : {"11", "", "1x", " 1", "1.5", "99999999999999999999"})
-    EXPECT_FALSE(value_of(i, bad, &value)) << bad;
+    EXPECT_FALSE(parse_value(i, bad, &value)) << bad;
   EXPECT_EQ(value, -10) << "a refusal changes nothing";
 }
 
