@@ -57,13 +57,7 @@ struct RenderedDrive::Parts {
   }
   /// Into the drive, of frame i.
   [[nodiscard]] Duration time(std::uint64_t i) const {
-    double t = static_cast<double>(i) / options.rate;
-    if (options.to_and_fro) {
-      const double length = drive.duration().to_seconds() - options.from_s;
-      t = std::fmod(t, 2 * length);
-      if (t > length) t = 2 * length - t;
-    }
-    return Duration::seconds(options.from_s + t);
+    return Duration::seconds(options.from_s + static_cast<double>(i) / options.rate);
   }
 
   RenderedDriveOptions options;
@@ -87,10 +81,6 @@ Transform RenderedDrive::T_camera_left(int k, std::uint64_t i) const {
 Transform RenderedDrive::T_enu_left(std::uint64_t i) const {
   return mock::camera_pose(parts_->drive.at(parts_->time(i)), mock::default_T_body_left())
       .inverse();
-}
-
-double RenderedDrive::speed(std::uint64_t i) const {
-  return parts_->drive.at(parts_->time(i)).velocity.norm();
 }
 
 const RigFrame& RenderedDrive::frame(std::uint64_t i) {

@@ -5,7 +5,7 @@
 
 #include "core/math/random.hpp"
 #include "core/odometry/odometry.hpp"
-#include "tests/system/odometry/mock_drive.hpp"
+#include "tests/system/odometry/stereo_drive.hpp"
 
 namespace vergence::test {
 namespace {
@@ -22,8 +22,8 @@ bool is_painted(std::size_t k, int x, int y, int height) {
 }
 
 /// Static things with more texture than the street has: rivets, grains, reflections.
-Picture paint(int width, int height) {
-  Picture p(width, height);
+StoredImage paint(int width, int height) {
+  StoredImage p(width, height);
   Random random(7);
   for (int y = 0; y < height; y += 4)
     for (int x = 0; x < width; x += 4) {
@@ -37,11 +37,11 @@ Picture paint(int width, int height) {
 
 /// View of the other camera, as if it stood some metres off: so that it matches across
 /// and looks like a thing in the street.
-Picture seen_from_the_other(const Picture& left, const RigCalibration& rig) {
+StoredImage seen_from_the_other(const StoredImage& left, const RigCalibration& rig) {
   constexpr double kDepth = 8;  // m
   const Camera camera(rig.intrinsics[1]), to(rig.intrinsics[0]);
   const Transform T_left_camera = rig.T_camera_left[1].inverse();
-  Picture p(left.width, left.height);
+  StoredImage p(left.width, left.height);
   for (int y = 0; y < p.height; ++y)
     for (int x = 0; x < p.width; ++x) {
       Vec3 ray;
@@ -62,11 +62,11 @@ class DirtyDrive {
  public:
   DirtyDrive() : drive_(brief_drive()) {
     const Intrinsics& c = drive_.rig.intrinsics[0];
-    std::array<Picture, 2> paints;
+    std::array<StoredImage, 2> paints;
     paints[0] = paint(c.width, c.height);
     paints[1] = seen_from_the_other(paints[0], drive_.rig);
     for (std::size_t k = 0; k < 2; ++k) {
-      masks_[k] = Picture(c.width, c.height);
+      masks_[k] = StoredImage(c.width, c.height);
       for (int y = 0; y < c.height; ++y)
         for (int x = 0; x < c.width; ++x)
           masks_[k].bytes[static_cast<std::size_t>(y * masks_[k].stride + x)] =
@@ -85,20 +85,16 @@ class DirtyDrive {
     return {masks_[0].view(), masks_[1].view()};
   }
   [[nodiscard]] RigFrame frame(std::size_t i, bool dirty) const {
-    RigFrame f;
-    f.number = i;
-    f.stamp = drive_.stamps[i];
-    f.cameras = 2;
-    for (std::size_t k = 0; k < 2; ++k)
-      f.images[k] = (dirty ? pairs_[i] : drive_.pairs[i])[k].view();
+    RigFrame f = drive_.frame(i);
+    for (std::size_t k = 0; dirty && k < 2; ++k) f.images[k] = pairs_[i][k].view();
     return f;
   }
   [[nodiscard]] const StereoDrive& drive() const { return drive_; }
 
  private:
   const StereoDrive& drive_;
-  std::array<Picture, 2> masks_;
-  std::vector<std::array<Picture, 2>> pairs_;
+  std::array<StoredImage, 2> masks_;
+  std::vector<std::array<StoredImage, 2>> pairs_;
 };
 
 const DirtyDrive& dirty_drive() {
@@ -140,7 +136,7 @@ Passed pass(bool dirty, std::span<const ImageView> masks) {
   return passed;
 }
 
-TEST(MaskedOdometry, sightsNothingUnderAMaskAndIsAsGoodAsOnCleanGlass) {
+TEST(MaskedOdometry, usesNothingUnderMaskAndStaysAccurate) {
   const double way =
       (dirty_drive().drive().truth[kFrames - 1].t - dirty_drive().drive().truth[0].t).norm();
   ASSERT_GT(way, 15.0);
@@ -155,7 +151,7 @@ TEST(MaskedOdometry, sightsNothingUnderAMaskAndIsAsGoodAsOnCleanGlass) {
     EXPECT_GT(bare.painted[k], static_cast<int>(kFrames)) << "camera " << k;
   }
   EXPECT_EQ(masked.posed, static_cast<int>(kFrames));
-  // As accuracy_test.cpp has it for clean pictures: 4 per mille of the way, and the first metre's
+  // As in accuracy_test.cpp for clean images: 4 per mille of the path, and the first metre's
   // share of a keyframe.
   EXPECT_LT(clean.error, 0.004 * way + 0.02);
   EXPECT_LT(masked.error, 0.004 * way + 0.02);

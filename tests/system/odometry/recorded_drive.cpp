@@ -10,8 +10,8 @@
 namespace vergence::test {
 namespace {
 
-Picture decode(const std::filesystem::path& file, const Intrinsics& camera) {
-  Picture p(camera.width, camera.height);
+StoredImage decode(const std::filesystem::path& file, const Intrinsics& camera) {
+  StoredImage p(camera.width, camera.height);
   std::vector<std::uint8_t> bytes;
   if (app::read_image_file(file, &bytes) != app::ImageFileStatus::ok ||
       app::decode_grey(bytes, {p.width, p.height}, p.bytes.data(),

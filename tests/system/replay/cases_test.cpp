@@ -778,7 +778,7 @@ std::vector<Case> boards() {
 
 class Input : public ::testing::TestWithParam<Case> {};
 
-TEST_P(Input, isReadOrRefusedAsPeopleExpect) {
+TEST_P(Input, inputIsReadOrRefusedWithItsReason) {
   const Case& c = GetParam();
   const TemporaryFolder f;
   std::string words = c.build(f);

@@ -10,7 +10,7 @@
 namespace vergence::test {
 namespace {
 
-TEST_F(QuickStart, focalLengthAndBaselineAreEnoughOnEurocsDistortedImages) {
+TEST_F(QuickStart, focalLengthAndBaselineCalibrateEuroc) {
   const auto folder = shared_data("data/euroc_mh01");
   if (!folder) GTEST_SKIP() << shared_data_missing("data/euroc_mh01");
   const Outcome o = replay(*folder, "--focal 460 --baseline 0.11");
