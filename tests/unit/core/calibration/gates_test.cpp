@@ -53,9 +53,9 @@ struct Case {
   [[nodiscard]] Transform& found() { return solution.rig.T_camera_left[1]; }
 };
 
-TEST(Gates, aSoundSolutionPassesThem) { EXPECT_EQ(Case().ask(), Gate::open); }
+TEST(Gates, soundSolutionIsAccepted) { EXPECT_EQ(Case().ask(), Gate::open); }
 
-TEST(Gates, whatWasNotSolvedIsNotAdopted) {
+TEST(Gates, failedSolveIsRejected) {
   for (const RigSolveStatus status :
        {RigSolveStatus::too_few_tracks, RigSolveStatus::no_candidate, RigSolveStatus::not_converged,
         RigSolveStatus::not_observable}) {
@@ -65,7 +65,7 @@ TEST(Gates, whatWasNotSolvedIsNotAdopted) {
   }
 }
 
-TEST(Gates, eachSigmaHasToBeSmallEnough) {
+TEST(Gates, eachSigmaHasItsLimit) {
   // Axes of rotation 0.15 mrad; t_y and t_z 4 mm for 0.75 m. t_x is not asked: the length is known.
   for (const std::size_t i : {0U, 1U, 2U, 4U, 5U}) {
     Case c;
@@ -84,7 +84,7 @@ TEST(Gates, eachSigmaHasToBeSmallEnough) {
   }
 }
 
-TEST(Gates, theSigmaWantedOfTheTranslationIsInProportionToTheBaseline) {
+TEST(Gates, translationLimitScalesWithTheBaseline) {
   Case c;
   c.solution.rig.sigma_noise[1] = {0, 0, 0, 0, 3e-3, 0};
   EXPECT_NEAR(sigma_excess(c.solution.rig, c.options), 0.75, 1e-9);
@@ -92,7 +92,7 @@ TEST(Gates, theSigmaWantedOfTheTranslationIsInProportionToTheBaseline) {
   EXPECT_NEAR(sigma_excess(c.solution.rig, c.options), 1.5, 1e-9);
 }
 
-TEST(Gates, tooLittleWayNeedsMotion) {
+TEST(Gates, shortPathNeedsMotion) {
   Case c;
   c.solution.travelled_m = 2.24;  // three baselines are 2.25 m
   EXPECT_EQ(c.ask(), Gate::needs_motion);
@@ -102,7 +102,7 @@ TEST(Gates, tooLittleWayNeedsMotion) {
   EXPECT_EQ(c.ask(), Gate::needs_motion);
 }
 
-TEST(Gates, tooFewNearPointsNeedNearStructure) {
+TEST(Gates, fewNearPointsNeedNearStructure) {
   Case c;
   c.solution.near = c.options.min_near_points - 1;
   EXPECT_EQ(c.ask(), Gate::needs_near_structure);
@@ -110,13 +110,13 @@ TEST(Gates, tooFewNearPointsNeedNearStructure) {
   EXPECT_EQ(c.ask(), Gate::open);
 }
 
-TEST(Gates, aRightCameraOnTheLeftIsAnExchange) {
+TEST(Gates, inverseTransformIsCamerasSwapped) {
   Case c;
   c.found() = c.found().inverse();
   EXPECT_EQ(c.ask(), Gate::cameras_swapped);
 }
 
-TEST(Gates, aDirectionFarFromTheConfiguredOneIsImplausible) {
+TEST(Gates, directionBeyondTenDegreesIsImplausible) {
   Case c;
   for (const double degrees : {9.9, 10.1}) {
     const double a = degrees * kDegree;
@@ -125,7 +125,7 @@ TEST(Gates, aDirectionFarFromTheConfiguredOneIsImplausible) {
   }
 }
 
-TEST(Gates, aRotationFarFromTheConfiguredOneIsImplausibleUnlessFromScratch) {
+TEST(Gates, rotationBeyondTenDegreesIsImplausible) {
   for (const double degrees : {9.9, 10.1}) {
     Case c;
     c.nominal.T_camera_left[1].R = exp_so3(degrees * kDegree * Vec3(0, 0.6, 0.8)) * c.found().R;
@@ -137,13 +137,13 @@ TEST(Gates, aRotationFarFromTheConfiguredOneIsImplausibleUnlessFromScratch) {
   }
 }
 
-TEST(Gates, camerasOutOfStepHaveNoCalibration) {
+TEST(Gates, lagIsOutOfSync) {
   Case c;
   c.solution.lag_frames = 1;
   EXPECT_EQ(c.ask(), Gate::out_of_sync);
 }
 
-TEST(Gates, whatFramesNotUsedContradictIsNotAdopted) {
+TEST(Gates, heldOutFramesRejectAWrongSolution) {
   Case c;
   c.turn(&c.solution.rig, {0.2, 0, 0});  // 4.4 px of row, against 1.5 allowed
   EXPECT_EQ(c.ask(), Gate::does_not_fit);
@@ -157,7 +157,7 @@ TEST(Gates, whatFramesNotUsedContradictIsNotAdopted) {
   EXPECT_TRUE(held_out_enough(c.log, 46));
 }
 
-TEST(Gates, framesNotUsedAreTheNewestTwelve) {
+TEST(Gates, heldOutFramesAreTheNewestTwelve) {
   const Case c;
   EXPECT_EQ(held_out(c.log, 29, c.solution.rig).frames, static_cast<int>(kHeldOutFrames));
   EXPECT_EQ(held_out(c.log, 44, c.solution.rig).frames, 5);
@@ -165,7 +165,7 @@ TEST(Gates, framesNotUsedAreTheNewestTwelve) {
   EXPECT_EQ(held_out(c.log, 49, c.solution.rig).median_px, 0);
 }
 
-TEST(Gates, oneThatIsNoBetterThanTheOneInUseIsNotAdopted) {
+TEST(Gates, solutionNoBetterThanInUseIsRejected) {
   Case c;
   c.question.in_use = &c.in_use;
   EXPECT_EQ(c.ask(), Gate::no_better) << "the same";
@@ -178,7 +178,7 @@ TEST(Gates, oneThatIsNoBetterThanTheOneInUseIsNotAdopted) {
 
 const test::FurtherCamera kThird{2, {exp_so3({-6e-3, 4e-3, 2e-3}), {-0.6, -0.05, 0.01}}};
 
-TEST(Gates, aKnockOfTheThirdCameraAloneIsMended) {
+TEST(Gates, knockOfTheThirdCameraIsAccepted) {
   Case c(kThird);
   c.question.in_use = &c.in_use;
   EXPECT_EQ(c.ask(), Gate::no_better) << "the same";
@@ -199,7 +199,7 @@ TEST(Gates, aKnockOfTheThirdCameraAloneIsMended) {
 
 // A short drive holds every camera less well than a long one before it did: by what the gates take
 // of a full window, 0.45 mrad, which is 0.56 px and no chance over twelve frames.
-TEST(Gates, aKnockOfOneCameraIsMendedThoughAnotherOneIsHeldALittleLessWell) {
+TEST(Gates, knockIsAcceptedDespiteALessCertainCamera) {
   for (const std::size_t knocked : {1U, 2U}) {
     Case c(kThird);
     c.question.in_use = &c.in_use;
@@ -211,7 +211,7 @@ TEST(Gates, aKnockOfOneCameraIsMendedThoughAnotherOneIsHeldALittleLessWell) {
   }
 }
 
-TEST(Gates, whatContradictsOneCameraIsNotHiddenByWhatIsNotKnownOfAnother) {
+TEST(Gates, uncertainCameraHidesNoContradiction) {
   for (const std::size_t wrong : {1U, 2U}) {
     Case c(kThird);
     const std::size_t poor = 3 - wrong;
@@ -229,14 +229,14 @@ TEST(Gates, whatContradictsOneCameraIsNotHiddenByWhatIsNotKnownOfAnother) {
   }
 }
 
-TEST(Gates, aThirdCameraThatFramesNotUsedContradictIsNotAdopted) {
+TEST(Gates, heldOutFramesRejectAWrongThirdCamera) {
   Case c(kThird);
   EXPECT_EQ(c.ask(), Gate::open);
   c.turn(&c.solution.rig, {0.2, 0, 0}, 2);
   EXPECT_EQ(c.ask(), Gate::does_not_fit);
 }
 
-TEST(Gates, aThirdCameraWithoutMatchesIsNoWitness) {
+TEST(Gates, thirdCameraWithoutMatchesDecidesNothing) {
   Case c(kThird);
   for (std::size_t i = 0; i < c.log.size(); ++i)
     for (LoggedObservation& o : c.log.frame(i).observations) o.cameras = 0b011;

@@ -101,7 +101,7 @@ Mat3 nominal() { return mount_of(Vec3::Zero(), Vec3::Zero()).R; }
 /// Ground truth in Mount's parameters.
 Vec3 true_turn() { return log_so3(mount_of(kLever, kBoresight).R * nominal().transpose()); }
 
-TEST(Mount, anIdealReferenceGivesItsMount) {
+TEST(Mount, idealReferenceGivesTheExtrinsics) {
   for (const bool velocity : {true, false}) {
     How how;
     how.ideal = true;
@@ -121,7 +121,7 @@ TEST(Mount, anIdealReferenceGivesItsMount) {
   }
 }
 
-TEST(Mount, aSlowReferenceGivesItsMountAsAQuickOneDoes) {
+TEST(Mount, slowReferenceGivesTheExtrinsics) {
   struct Slow {
     double rate, jitter_s;
   };
@@ -201,10 +201,10 @@ void sigmas_hold(bool velocity) {
   }
 }
 
-TEST(Mount, sigmasHoldOverThirtyDrivesWithVelocity) { sigmas_hold(true); }
-TEST(Mount, sigmasHoldOverThirtyDrivesByPositionAlone) { sigmas_hold(false); }
+TEST(Mount, sigmasMatchErrorsWithVelocity) { sigmas_hold(true); }
+TEST(Mount, sigmasMatchErrorsByPositionAlone) { sigmas_hold(false); }
 
-TEST(Mount, aStraightDriveShowsNoLeverArm) {
+TEST(Mount, leverArmIsUnobservableOnAStraight) {
   How how;
   how.kind = mock::DriveKind::straight;
   how.velocity = false;
@@ -226,7 +226,7 @@ void reverse(std::vector<MountReference>* reference) {
   }
 }
 
-TEST(Mount, trajectoriesThatDoNotBelongTogetherHaveNoFit) {
+TEST(Mount, unrelatedTrajectoriesDoNotConverge) {
   for (const mock::DriveKind kind : {mock::DriveKind::loop, mock::DriveKind::figure_eight})
     for (const bool velocity : {true, false}) {
       How how;
@@ -257,7 +257,7 @@ TEST(Mount, trajectoriesThatDoNotBelongTogetherHaveNoFit) {
 
 /// The residuals of 15 degrees that a fit may have at most: half their square is the two degrees
 /// that count as seen.
-TEST(Mount, attitudesThatSwayTooFarHaveNoFit) {
+TEST(Mount, swayingAttitudeDoesNotConverge) {
   How how;
   how.ideal = true;
   how.velocity = false;
@@ -275,7 +275,7 @@ TEST(Mount, attitudesThatSwayTooFarHaveNoFit) {
   EXPECT_EQ(swaying(18), MountStatus::not_converged);
 }
 
-TEST(Mount, whatCannotBeDoneIsToldAndLeavesTheResultAlone) {
+TEST(Mount, insufficientDataGivesStatusAndKeepsResult) {
   How still;
   still.kind = mock::DriveKind::still;
   Drove d = drove(still);

@@ -52,7 +52,7 @@ std::ptrdiff_t arrows(const std::string& text) {
   return n;
 }
 
-TEST(CalibrationStates, onlyDoubtLeadsToSuspectAndOnlyADriveToVerified) {
+TEST(CalibrationStates, suspectAndVerifiedHaveTheirTriggersOnly) {
   using S = CalibrationState;
   using T = CalibrationTrigger;
   for (const CalibrationTransition& t : kCalibrationTransitions) {
@@ -65,7 +65,7 @@ TEST(CalibrationStates, onlyDoubtLeadsToSuspectAndOnlyADriveToVerified) {
   EXPECT_EQ(after(S::suspect, T::confirmed), S::suspect);
 }
 
-TEST(CalibrationStates, theDrawingsInTheReadmeAreTheTables) {
+TEST(CalibrationStates, readmeDiagramsMatchTheTables) {
   const std::string text = readme();
   for (const CalibrationTransition& t : kCalibrationTransitions) {
     const std::string line = edge(kStateNames[static_cast<std::size_t>(t.from)],

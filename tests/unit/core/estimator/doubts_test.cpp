@@ -5,7 +5,7 @@
 namespace vergence {
 namespace {
 
-TEST(DoubtLedger, namesTheStrongestThatStands) {
+TEST(DoubtLedger, strongestDoubtIsReported) {
   DoubtLedger ledger;
   EXPECT_EQ(ledger.strongest(true), nullptr);
   ledger.enter(Doubt::window, Reason::time_gap, 7, 3);
@@ -18,7 +18,7 @@ TEST(DoubtLedger, namesTheStrongestThatStands) {
   EXPECT_FALSE(ledger.any_up_to(Doubt::rig));
 }
 
-TEST(DoubtLedger, anEntryEndsAfterAsMuchEvidenceAsItNeeds) {
+TEST(DoubtLedger, doubtEndsAfterItsEvidence) {
   DoubtLedger ledger;
   EXPECT_FALSE(ledger.weaken(Doubt::scene));
   ledger.enter(Doubt::scene, Reason::map_reset, 5, 2);
@@ -30,7 +30,7 @@ TEST(DoubtLedger, anEntryEndsAfterAsMuchEvidenceAsItNeeds) {
   EXPECT_TRUE(ledger.stands(Doubt::rig));
 }
 
-TEST(DoubtLedger, anEntryKeepsTheFrameItBeganIn) {
+TEST(DoubtLedger, doubtKeepsItsFirstFrame) {
   DoubtLedger ledger;
   for (std::uint64_t frame = 11; frame < 15; ++frame)
     ledger.hold(Doubt::frame, true, Reason::few_inliers, frame);
@@ -41,7 +41,7 @@ TEST(DoubtLedger, anEntryKeepsTheFrameItBeganIn) {
   EXPECT_EQ(ledger[Doubt::frame].since, 16U);
 }
 
-TEST(DoubtLedger, aLateImageSaysNothingOfAPoseThatStands) {
+TEST(DoubtLedger, lateImageIsNoDoubtWhileStanding) {
   DoubtLedger ledger;
   ledger.enter(Doubt::late_image, Reason::image_repeated, 3, 12);
   EXPECT_EQ(ledger.strongest(false), nullptr);

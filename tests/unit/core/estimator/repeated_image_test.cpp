@@ -18,7 +18,7 @@ using odometry::test::Corridor;
 /// Camera `frozen` gives its image of frame 30 until frame 46: 0.8 s, 2.4 m.
 class RepeatedImage : public testing::TestWithParam<std::size_t> {};
 
-TEST_P(RepeatedImage, isTakenForNoStandstill) {
+TEST_P(RepeatedImage, repeatedImageIsNotTakenForStandstill) {
   constexpr int kFrozen = 30, kGoesOn = 47, kLast = 60;
   Corridor corridor;
   EstimatorOptions options;
