@@ -121,7 +121,7 @@ std::thread pulse_cameras(const Wires& wires) {
   });
 }
 
-TEST(GigeRun, aDriveOverTheWireHasAPoseForEveryPair) {
+TEST(GigeRun, everyPairOverGigeVisionIsPosed) {
   if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
   const RenderedDrive drive;
   const Wires wires(&drive);
@@ -194,7 +194,7 @@ Outcome record_drive(const RenderedDrive& drive, const std::filesystem::path& se
 }
 
 // In real time, with INS and trigger board on serial lines.
-TEST(GigeRun, aRecordedDriveReplaysBitForBit) {
+TEST(GigeRun, recordedGigeRunReplaysBitForBit) {
   if (const std::string why = test::socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
   const RenderedDrive drive;
   const TemporaryFolder folder;

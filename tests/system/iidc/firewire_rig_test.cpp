@@ -26,7 +26,7 @@ struct BusUnderTest {
 namespace vergence::test {
 namespace {
 
-TEST_F(IidcRig, ACameraThatFindsNoRoomOnTheBusSaysSo) {
+TEST_F(IidcRig, missingBusBandwidthIsReported) {
   CameraConfiguration wide = usual();
   wide.width = 1280;
   wide.height = 960;
@@ -40,7 +40,7 @@ TEST_F(IidcRig, ACameraThatFindsNoRoomOnTheBusSaysSo) {
   (void)end();
 }
 
-TEST_F(IidcRig, TheBusClockIsOneForBothCamerasThroughItsWrap) {
+TEST_F(IidcRig, busClockIsSharedAcrossItsWrap) {
   ASSERT_NO_FATAL_FAILURE(begin(usual()));
   ASSERT_NO_FATAL_FAILURE(start());
   // Fifteen seconds: with the card's clock at 100 s the wrap at 128 s comes in between, whatever

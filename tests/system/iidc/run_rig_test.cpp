@@ -118,10 +118,10 @@ struct Bus {
 
 class IidcRun : public ::testing::TestWithParam<Bus> {};
 
-TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
+TEST_P(IidcRun, exampleConfigurationPosesEveryPair) {
   const char* film_folder = std::getenv("VERGENCE_FILM");
   if (!inside_rig() || film_folder == nullptr)
-    GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+    GTEST_SKIP() << "needs the rig's kernel: run it by ctest -L rig";
   const Film film(film_folder);
   std::vector<std::string> arguments{"--cameras", "2", "--film", film_folder, "--film-hz", "10"};
   if (GetParam().pulses) arguments.insert(arguments.end(), {"--trigger-hz", "10"});
@@ -156,10 +156,10 @@ TEST_P(IidcRun, TheExampleConfigurationDrivesOnWhatTheCamerasSend) {
   }
 }
 
-TEST(BoardRun, ABoardsPulsesCamerasAndAnInsAllOnEmulatedLinesMakeOneDrive) {
+TEST(BoardRun, triggerBoardCamerasAndInsMakeOneSession) {
   const char* film_folder = std::getenv("VERGENCE_FILM");
   if (!inside_rig() || film_folder == nullptr)
-    GTEST_SKIP() << "this test runs inside the rig's kernel: ctest -L rig";
+    GTEST_SKIP() << "needs the rig's kernel: run it by ctest -L rig";
   const Film film(film_folder);
   auto driver = iidc::make_usb_driver();
   // Slower than the other drives: two serial lines cost the one processor as much as the

@@ -46,7 +46,7 @@ app::ImageSize size_of(const std::filesystem::path& file) {
   return size;
 }
 
-TEST(SnapMock, aPictureOfEachCameraAndTheirFigures) {
+TEST(SnapMock, imageOfEachCameraAndItsStatistics) {
   const TemporaryFolder folder;
   const Outcome o = snap(folder, "mock.yaml", "");
   ASSERT_EQ(o.code, 0) << o.err;
@@ -65,7 +65,7 @@ TEST(SnapMock, aPictureOfEachCameraAndTheirFigures) {
   }
 }
 
-TEST(SnapMock, aCapOnALensIsNoticed) {
+TEST(SnapMock, coveredLensIsReportedAndExitsOne) {
   const TemporaryFolder folder;
   const Outcome o = snap(folder, "mock.yaml", "--set 'faults.0=cover@0 camera=1'");
   EXPECT_EQ(o.code, 1) << o.err;
@@ -73,7 +73,7 @@ TEST(SnapMock, aCapOnALensIsNoticed) {
   EXPECT_EQ(report(folder)["sets"][0]["findings"][0]["unusable"], true);
 }
 
-TEST(SnapMock, nothingIsOverwrittenAndNonsenseIsRefused) {
+TEST(SnapMock, existingDirectoryAndBadOptionsExitTwo) {
   const TemporaryFolder folder;
   (void)folder.write("s/precious", "x");
   EXPECT_EQ(snap(folder, "mock.yaml", "").code, 2);
@@ -126,7 +126,7 @@ struct Wires {
   std::vector<std::unique_ptr<GigeCamera>> cameras;
 };
 
-TEST(SnapGige, pulsesGivePairsAndThePicturesAreThoseThatWereSent) {
+TEST(SnapGige, pulsesGivePairsOfTheSentImages) {
   const Wires wires;
   std::atomic<bool> quit{false};
   std::thread pulses([&] {
@@ -154,7 +154,7 @@ TEST(SnapGige, pulsesGivePairsAndThePicturesAreThoseThatWereSent) {
   }
 }
 
-TEST(SnapGige, aCameraThatSendsNothingEndsWithThreeAndItsName) {
+TEST(SnapGige, silentCameraIsNamedAndExitsThree) {
   const Wires wires;
   wires.cameras[1]->silence(true);
   const TemporaryFolder folder;

@@ -46,7 +46,7 @@ class V4l2Run : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists("/dev/video3"))
-      GTEST_SKIP() << "no looped video nodes: this test runs inside the rig's kernel";
+      GTEST_SKIP() << "needs looped video nodes of the rig's kernel: run it by ctest -L rig";
     std::filesystem::remove_all(session_);
   }
   static std::string node(int number) { return "/dev/video" + std::to_string(number); }
@@ -132,7 +132,7 @@ class V4l2Run : public ::testing::Test {
   std::string session_ = ::testing::UnitTest::GetInstance()->current_test_info()->name();
 };
 
-TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
+TEST_F(V4l2Run, trajectoryIsThatOfTheFilm) {
   for (int k = 0; k < 2; ++k) test::loop(node(2 * k), node(2 * k + 1));
   const char* folder = std::getenv("VERGENCE_FILM");
   ASSERT_NE(folder, nullptr);
@@ -156,7 +156,7 @@ TEST_F(V4l2Run, theDriveInFrontOfTheCamerasComesOut) {
 }
 
 /// The film's two images beside one another in the middle of a larger picture's rows.
-TEST_F(V4l2Run, theSameDriveComesOutOfOneCameraWithBothImagesInItsPicture) {
+TEST_F(V4l2Run, sideBySideCameraGivesTrajectoryOfTheFilm) {
   constexpr test::LoopSize kSize = test::LoopSize::hd;
   test::loop(node(0), node(1), kSize);
   const char* folder = std::getenv("VERGENCE_FILM");
