@@ -47,6 +47,11 @@ void LinePublisher::on_start(const SessionStart& start) noexcept {
   started_.store(true, std::memory_order_release);
 }
 
+void LinePublisher::on_frame(const RigFrame& frame) noexcept {
+  builder_.add(frame);
+  if (images_.copy(frame)) images_.finish();
+}
+
 void LinePublisher::on_pose(const PoseSample& sample) noexcept {
   if (!frames_.push(builder_.add(sample, monotonic_now())))
     dropped_.fetch_add(1, std::memory_order_relaxed);
@@ -91,6 +96,7 @@ void LinePublisher::work() noexcept {
     const HostStamp now = monotonic_now();
     if (begun && now >= status_due_) send_status(now);
     if (last) return;
+    send_images();
     socket_->wait(wake_.get(), begun ? status_due_ - now : kBetweenStatus,
                   [this](std::string_view request) { return answer(request); });
   }
@@ -142,23 +148,51 @@ void LinePublisher::send_status(HostStamp now) {
   socket_->send(status_line(status));
 }
 
-std::string LinePublisher::answer(std::string_view request) {
+void LinePublisher::send_images() {
+  if (images_.ready()) {
+    image_bytes_.clear();
+    for (std::size_t k = 0; k < FrameImages::kImages; ++k)
+      if (const ImageView image = images_.image(k); !image.empty()) {
+        const auto& names = start_.camera_names;
+        image_bytes_ += image_line(images_.frame(), images_.stamp(), static_cast<int>(k),
+                                   k < names.size() ? names[k] : "", image);
+        image_bytes_.append(reinterpret_cast<const char*>(image.data),
+                            static_cast<std::size_t>(image.width * image.height));
+      }
+    socket_->send_images(image_bytes_);
+    images_.done();
+  }
+  if (socket_->wants_images()) images_.want(start_.image_bytes);
+}
+
+LineResponse LinePublisher::answer(std::string_view request) {
   const auto parsed = nlohmann::json::parse(request, nullptr, false);
   const std::string name =
       parsed.is_object() && parsed.contains("request") && parsed["request"].is_string()
           ? parsed["request"].get<std::string>()
           : "";
-  if (name != "recalibrate")
-    return response_line(name, false,
-                         R"(unknown request; the only one is {"request": "recalibrate"})");
+  const auto refuse = [&name](std::string_view why) {
+    return LineResponse{response_line(name, false, why)};
+  };
+  if (name != "recalibrate" && name != "images")
+    return refuse(R"(unknown request; send {"request": "recalibrate"} or )"
+                  R"({"request": "images", "rate_hz": 5})");
   if (!started_.load(std::memory_order_acquire))
-    return response_line(name, false, "the session has not begun yet; ask again when poses come");
+    return refuse("the session has not begun yet; ask again when poses come");
+  if (name == "images") {
+    constexpr double kMaxRate = 200;
+    const double rate =
+        parsed.value("rate_hz", nlohmann::json()).is_number() ? parsed["rate_hz"].get<double>() : 0;
+    if (!(rate >= 0.01 && rate <= kMaxRate))
+      return refuse("rate_hz is missing or not between 0.01 and 200");
+    return {response_line(name, true, "images follow"), Duration::seconds(1 / rate)};
+  }
   if (!start_.can_recalibrate)
-    return response_line(name, false,
-                         "this session does not recalibrate on request; use a live session with "
-                         "calibration.online: on");
+    return refuse(
+        "this session does not recalibrate on request; use a live session with "
+        "calibration.online: on");
   requests_->recalibrate.store(true, std::memory_order_relaxed);
-  return response_line(name, true, "recalibration starts at the next frame");
+  return {response_line(name, true, "recalibration starts at the next frame"), {}};
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> LinePublisher::counters() {
@@ -170,6 +204,7 @@ std::vector<std::pair<std::string, std::uint64_t>> LinePublisher::counters() {
       {"lines_dropped", dropped_.load(std::memory_order_relaxed)},
       {"lines_sent", c.sent},
       {"lines_refused", c.refused},
+      {"images_sent", c.images},
       {"line_readers", c.readers},
       {"line_readers_closed", c.closed},
       {"line_readers_turned_away", c.turned_away},

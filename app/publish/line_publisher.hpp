@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/publish/frame_images.hpp"
 #include "app/publish/line_socket.hpp"
 #include "app/publish/live_frame.hpp"
 #include "app/publish/pose_stream.hpp"
@@ -22,12 +23,13 @@ namespace vergence::app {
 
 /// `publish.pose_stream`: the pose stream to robots and bridges (docs/live_interface.md). A line
 /// per frame, the calibration and the alignment when a reader connects and when they change, a
-/// status per second.
+/// status per second; images on the connections that request them.
 ///
-/// Threads  on_…(): the estimator's, which pushes into rings and wakes; no lock, no system call
-///          but the wake. Formatting, sending and requests: a thread of its own, made by the
-///          constructor.
-/// Memory   Fixed for the estimator's part. Ring full: that line is not made, and counted.
+/// Threads  on_…(): the estimator's, which pushes into rings, copies two images where a reader is
+///          due, and wakes; no lock, no system call but the wake. Formatting, sending and requests:
+///          a thread of its own, made by the constructor.
+/// Memory   Fixed for the estimator's part; two images from the first request for them on. Ring
+///          full: that line is not made, and counted.
 /// Errors   The constructor throws std::system_error when no thread can be had.
 class LinePublisher final : public SessionObserver {
  public:
@@ -40,7 +42,7 @@ class LinePublisher final : public SessionObserver {
   LinePublisher& operator=(const LinePublisher&) = delete;
 
   void on_start(const SessionStart& start) noexcept override;
-  void on_frame(const RigFrame& frame) noexcept override { builder_.add(frame); }
+  void on_frame(const RigFrame& frame) noexcept override;
   void on_pose(const PoseSample& sample) noexcept override;
   void on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept override;
   void on_reading(const InsRecord& reading) noexcept override;
@@ -58,7 +60,8 @@ class LinePublisher final : public SessionObserver {
   void drain();
   void send(const LiveFrame& frame);
   void send_status(HostStamp now);
-  [[nodiscard]] std::string answer(std::string_view request);
+  void send_images();
+  [[nodiscard]] LineResponse answer(std::string_view request);
   void wake() noexcept;
   void stop() noexcept;
 
@@ -75,6 +78,7 @@ class LinePublisher final : public SessionObserver {
   Ring<LiveFrame, 64> frames_;
   Ring<PublishedEnuAlignment, 8> alignments_;
   Ring<CalibrationRecord, 4> calibrations_;
+  FrameImages images_;
   std::atomic<std::uint64_t> dropped_{0};
   std::atomic<bool> verified_{false};
   std::atomic<std::int64_t> sample_ns_{0};  // arrival of the newest INS sample; 0: none
@@ -87,7 +91,7 @@ class LinePublisher final : public SessionObserver {
   std::optional<LiveFrame> newest_{};
   std::string calibration_line_{}, alignment_line_{};
   HostStamp status_due_{};
-  std::string line_;
+  std::string line_, image_bytes_;
   std::uint64_t lines_ = 0;
   TimeHistogram age_, behind_pose_;  // ms
   std::thread thread_;

@@ -145,13 +145,13 @@ class UnixLineSocket final : public LineSocket {
   void send(std::string_view line) noexcept override {
     const HostStamp now = monotonic_now();
     for (Reader& reader : readers_)
-      if (reader.socket) send(line, now, &reader);
+      if (reader.socket && !reader.takes_images()) send(line, now, &reader);
   }
   void greet(std::string lines) noexcept override {
     greeting_ = std::move(lines);
     const HostStamp now = monotonic_now();
     for (Reader& reader : readers_) {
-      reader.greeted = false;
+      reader.greeted = reader.takes_images();
       if (reader.socket) flush(now, &reader);
     }
   }
@@ -161,26 +161,56 @@ class UnixLineSocket final : public LineSocket {
     events[0] = {wake, POLLIN, 0};
     events[1] = {now >= accept_again_ ? listener_.get() : -1, POLLIN, 0};
     for (std::size_t i = 0; i < kReaders; ++i) {
-      const Reader& reader = readers_[i];
+      Reader& reader = readers_[i];
+      if (reader.takes_images() && !reader.rest.empty() && now - reader.progress >= kPatience)
+        close(&reader);
       // One request after the other: the next one when the answer to the last one is out.
-      const bool hears = reader.asks && reader.rest.empty();
-      events[2 + i] = {reader.socket.get(), static_cast<short>(hears ? POLLIN : 0), 0};
+      const short event = !reader.rest.empty() ? POLLOUT : reader.asks ? POLLIN : short{0};
+      events[2 + i] = {reader.socket.get(), event, 0};
     }
     wait_for(events, timeout);
-    for (std::size_t i = 0; i < kReaders; ++i)
-      if (events[2 + i].revents != 0) hear(events[2 + i].revents, answer, &readers_[i]);
+    for (std::size_t i = 0; i < kReaders; ++i) {
+      if ((events[2 + i].revents & POLLOUT) != 0)
+        flush(monotonic_now(), &readers_[i]);
+      else if (events[2 + i].revents != 0)
+        hear(events[2 + i].revents, answer, &readers_[i]);
+    }
     if (events[1].revents != 0) accept_readers();
+  }
+  [[nodiscard]] bool wants_images() const noexcept override {
+    const HostStamp now = monotonic_now();
+    return std::any_of(readers_.begin(), readers_.end(),
+                       [now](const Reader& reader) { return reader.image_due(now); });
+  }
+  void send_images(std::string_view bytes) noexcept override {
+    const HostStamp now = monotonic_now();
+    for (Reader& reader : readers_) {
+      if (!reader.image_due(now)) continue;
+      reader.rest = bytes;
+      // The rate holds on average; a long delay is not made up for.
+      reader.next_image =
+          std::max(reader.next_image + reader.image_interval, now + reader.image_interval / 2);
+      ++counters_.images;
+      flush(now, &reader);
+    }
   }
   [[nodiscard]] LineSocketCounters counters() const noexcept override { return counters_; }
 
  private:
   struct Reader {
     FileDescriptor socket;
-    std::string rest;      // of lines that went out in part; the next one waits for it
-    bool greeted = false;  // has, or has in `rest`, the newest greeting
-    bool asks = true;      // has not closed its side
-    std::string asked;     // the beginning of a request
-    HostStamp progress{};  // when it last took something
+    std::string rest;           // of lines that went out in part; the next one waits for it
+    bool greeted = false;       // has, or has in `rest`, the newest greeting
+    bool asks = true;           // has not closed its side
+    std::string asked;          // the beginning of a request
+    HostStamp progress{};       // when it last took something
+    Duration image_interval{};  // positive: it gets images and no lines
+    HostStamp next_image{};
+
+    [[nodiscard]] bool takes_images() const noexcept { return image_interval > Duration{}; }
+    [[nodiscard]] bool image_due(HostStamp now) const noexcept {
+      return socket && takes_images() && rest.empty() && now >= next_image;
+    }
   };
 
   void accept_readers() noexcept {
@@ -244,7 +274,11 @@ class UnixLineSocket final : public LineSocket {
       return;
     }
     ++counters_.refused;
-    if (now - reader->progress < kPatience) return;
+    if (now - reader->progress >= kPatience) close(reader);
+  }
+
+  /// Ends the connection of a reader that does not read.
+  void close(Reader* reader) noexcept {
     ++counters_.closed;
     reader->socket.reset();
   }
@@ -262,7 +296,9 @@ class UnixLineSocket final : public LineSocket {
     if (n <= 0) return;
     reader->asked.append(bytes.data(), static_cast<std::size_t>(n));
     for (std::size_t end; (end = reader->asked.find('\n')) != std::string::npos;) {
-      reader->rest += answer(std::string_view(reader->asked).substr(0, end));
+      LineResponse response = answer(std::string_view(reader->asked).substr(0, end));
+      reader->rest += response.line;
+      if (response.image_interval > Duration{}) reader->image_interval = response.image_interval;
       reader->asked.erase(0, end + 1);
     }
     if (reader->asked.size() >= kMaxRequest) return reader->socket.reset();

@@ -45,6 +45,14 @@ struct LineSocketCounters {
   std::uint64_t readers = 0;  // connections that were accepted
   std::uint64_t closed = 0;   // … and closed because the reader did not read
   std::uint64_t turned_away = 0;  // … and closed because there were too many
+  std::uint64_t images = 0;       // pairs of images that a reader was given, each reader counted
+};
+
+/// Response to a request.
+struct LineResponse {
+  std::string line{};  // line feed included
+  /// Positive: the reader gets images from now on, no more often than this, and no more lines.
+  Duration image_interval{};
 };
 
 /// Where lines go: a Unix stream socket with a few readers, or datagrams to one address.
@@ -54,8 +62,8 @@ struct LineSocketCounters {
 /// Errors   The constructors throw InputError: what, where, what to do. Afterwards counters.
 class LineSocket {
  public:
-  /// A request's answer, line feed included. The request has none.
-  using Answer = std::function<std::string(std::string_view request)>;
+  /// `request`: without its line feed.
+  using Answer = std::function<LineResponse(std::string_view request)>;
 
   virtual ~LineSocket() = default;
   virtual void send(std::string_view line) noexcept = 0;
@@ -65,6 +73,10 @@ class LineSocket {
   /// Returns when `wake`, an eventfd, was written to, which is then reset, or after `timeout`, or
   /// earlier. Readers are accepted and their requests answered meanwhile; datagrams bring none.
   virtual void wait(int wake, Duration timeout, const Answer& answer) noexcept = 0;
+  /// True while a reader has room for images and its interval has passed.
+  [[nodiscard]] virtual bool wants_images() const noexcept { return false; }
+  /// Gives them to those readers. `bytes`: a frame's images (docs/live_interface.md).
+  virtual void send_images(std::string_view /*bytes*/) noexcept {}
   [[nodiscard]] virtual LineSocketCounters counters() const noexcept = 0;
 };
 

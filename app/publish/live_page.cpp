@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <exception>
 #include <string>
 #include <string_view>
@@ -21,79 +20,21 @@
 
 namespace vergence::app {
 
-void LiveImages::reserve(std::size_t image_bytes) {
-  for (Picture& picture : pictures_) picture.rows.resize(image_bytes);
-}
-
-void LiveImages::want() noexcept {
-  Owner nobody = Owner::nobody;
-  (void)owner_.compare_exchange_strong(nobody, Owner::estimator, std::memory_order_acq_rel);
-}
-
-void LiveImages::take_images(const RigFrame& frame) noexcept {
-  if (owner_.load(std::memory_order_acquire) != Owner::estimator) return;
-  for (std::size_t k = 0; k < pictures_.size(); ++k) {
-    Picture& picture = pictures_[k];
-    const ImageView image = static_cast<int>(k) < frame.cameras ? frame.images[k] : ImageView{};
-    picture.width = picture.height = 0;
-    if (image.empty()) continue;
-    const int step = (image.width + kWidth - 1) / kWidth, taken = std::min(step, 2);
-    const auto width = static_cast<std::size_t>(image.width);
-    const auto rows = static_cast<std::size_t>(image.height / step * taken);
-    if (width * rows > picture.rows.size()) continue;  // no image of this rig
-    std::uint8_t* out = picture.rows.data();
-    for (int y = 0; y + step <= image.height; y += step)
-      for (int i = 0; i < taken; ++i, out += width) std::memcpy(out, image.row(y + i), width);
-    picture.width = image.width;
-    picture.height = image.height;
-    picture.step = step;
-    picture.taken = taken;
-  }
-  frame_ = frame.number;
-  points_.clear();
-  owner_.store(Owner::filling, std::memory_order_relaxed);
-}
-
-void LiveImages::take_points(const RigFrame& frame, const calibration::TrackLog& tracks) noexcept {
-  if (owner_.load(std::memory_order_relaxed) != Owner::filling) return;
-  if (!tracks.empty() && tracks.frame(tracks.size() - 1).number == frame.number)
-    for (const calibration::LoggedObservation& o : tracks.frame(tracks.size() - 1).observations) {
-      if (!o.by(0)) continue;
-      LivePoint point{{o.raw[0].x(), o.raw[0].y()}, {}, o.by(1)};
-      if (point.both) point.right = {o.raw[1].x(), o.raw[1].y()};
-      if (!points_.push(point)) break;  // as many as a page can show
-    }
-  owner_.store(Owner::viewer, std::memory_order_release);
-}
-
-namespace {
-
-/// Means of `step` columns by `taken` rows.
-std::vector<std::uint8_t> shrunk(const LiveImages::Picture& p, int width, int height) {
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  const int count = p.step * p.taken;
-  auto to = out.begin();
-  for (int y = 0; y < height; ++y) {
-    const std::uint8_t* band =
-        p.rows.data() + static_cast<std::size_t>(y * p.taken) * static_cast<std::size_t>(p.width);
+std::string thumbnail(const ImageView& image) {
+  const int step = std::max(1, (image.width + kThumbnailWidth - 1) / kThumbnailWidth);
+  const int width = image.width / step, height = image.height / step;
+  if (image.empty() || height < 1) return {};
+  std::vector<std::uint8_t> means;
+  means.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      int sum = count / 2;
-      for (int row = 0; row < p.taken; ++row)
-        for (int i = 0; i < p.step; ++i) sum += band[row * p.width + x * p.step + i];
-      *to++ = static_cast<std::uint8_t>(sum / count);
+      int sum = step * step / 2;
+      for (int i = 0; i < step * step; ++i)
+        sum += image.row(y * step + i / step)[x * step + i % step];
+      means.push_back(static_cast<std::uint8_t>(sum / (step * step)));
     }
-  }
-  return out;
-}
-
-}  // namespace
-
-std::string thumbnail(const LiveImages::Picture& picture) {
-  const int width = picture.width / picture.step, height = picture.height / picture.step;
-  if (width < 1 || height < 1) return {};
   constexpr int kQuality = 70;  // grey blocks do not show beside the points
-  const std::vector<std::uint8_t> pixels = shrunk(picture, width, height);
-  return grey_jpeg({pixels.data(), width, height, width}, kQuality);
+  return grey_jpeg({means.data(), width, height, width}, kQuality);
 }
 
 std::string base64(std::string_view bytes) {
@@ -148,13 +89,12 @@ LivePage::~LivePage() {
 void LivePage::on_start(const SessionStart& start) noexcept {
   builder_.begin(start.tie);
   start_ = start;
-  images_.reserve(start.image_bytes);
   started_.store(true, std::memory_order_release);
 }
 
 void LivePage::on_frame(const RigFrame& frame) noexcept {
   builder_.add(frame);
-  images_.take_images(frame);
+  (void)images_.copy(frame);
 }
 
 void LivePage::on_pose(const PoseSample& sample) noexcept {
@@ -162,7 +102,16 @@ void LivePage::on_pose(const PoseSample& sample) noexcept {
 }
 
 void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
-  images_.take_points(builder_.frame(), tracks);
+  if (!images_.copying()) return;
+  points_.clear();
+  if (!tracks.empty() && tracks.frame(tracks.size() - 1).number == images_.frame())
+    for (const calibration::LoggedObservation& o : tracks.frame(tracks.size() - 1).observations) {
+      if (!o.by(0)) continue;
+      LivePoint point{{o.raw[0].x(), o.raw[0].y()}, {}, o.by(1)};
+      if (point.both) point.right = {o.raw[1].x(), o.raw[1].y()};
+      if (!points_.push(point)) break;
+    }
+  images_.finish();
 }
 
 void LivePage::on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
@@ -228,19 +177,20 @@ void LivePage::show() {
     show_images();
     images_.done();
   }
-  images_.want();
+  images_.want(start_.image_bytes);
 }
 
 void LivePage::show_images() {
   nlohmann::json out{{"frame", images_.frame()}, {"images", nlohmann::json::array()}};
-  for (const LiveImages::Picture& picture : images_.pictures())
-    out["images"].push_back({{"width", picture.width},
-                             {"height", picture.height},
-                             {"jpeg", base64(thumbnail(picture))}});
+  for (std::size_t k = 0; k < FrameImages::kImages; ++k) {
+    const ImageView image = images_.image(k);
+    out["images"].push_back(
+        {{"width", image.width}, {"height", image.height}, {"jpeg", base64(thumbnail(image))}});
+  }
   auto& points = out["points"] = nlohmann::json::array();
   // Tenths of pixels, as integers: half the bytes.
   const auto tenths = [](float v) { return static_cast<int>(v * 10 + 0.5F); };
-  for (const LivePoint& p : images_.points()) {
+  for (const LivePoint& p : points_) {
     nlohmann::json point{tenths(p.left[0]), tenths(p.left[1])};
     if (p.both) {
       point.push_back(tenths(p.right[0]));

@@ -46,6 +46,10 @@ struct StreamStatus {
 /// `type: status`.
 [[nodiscard]] std::string status_line(const StreamStatus& status);
 
+/// `type: image`, in front of the image's pixels, which follow row by row without padding.
+[[nodiscard]] std::string image_line(std::uint64_t frame, Stamp stamp, int camera,
+                                     std::string_view name, const ImageView& image);
+
 /// `type: response`, to the reader that sent the request.
 [[nodiscard]] std::string response_line(std::string_view request, bool accepted,
                                         std::string_view message);

@@ -18,6 +18,7 @@ using nlohmann::json;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr double kUnknownVariance = 1e6;  // m², rad², and of speeds: a filter ignores the value
+constexpr std::size_t kImages = 2;        // cameras whose images are published
 constexpr double kLongestStep = 1;        // s between two poses that a speed is measured from
 
 /// Factor on the standard deviations of a degraded pose (docs/ros2.md).
@@ -226,6 +227,7 @@ void Bridge::publish_in_enu(Stamp stamp, const Transform& T_world_left, const Ma
 void Bridge::on_calibration(const json& line) {
   const Stamp stamp(line.at("stamp_ns").get<std::int64_t>());
   const json& cameras = line.at("cameras");
+  if (cameras.empty()) return;
   RigCalibration rig;
   std::vector<std::string> names;
   rig.cameras = static_cast<int>(std::min<std::size_t>(cameras.size(), kMaxCameras));
@@ -242,26 +244,63 @@ void Bridge::on_calibration(const json& line) {
     rig.T_camera_left[k] = transform(camera.at("T_camera_left"));
     names.push_back(ros_name(camera.at("name").get<std::string>()));
   }
-  if (names.empty()) return;
-  names = distinct_names(std::move(names));
-  if (options_.camera_child) child_frame_ = optical_frame(names[0]);
+  rig_ = rig;
+  names_ = distinct_names(std::move(names));
+  if (options_.camera_child) child_frame_ = optical_frame(names_[0]);
   rating_ = line.at("rating").is_string() ? line.at("rating").get<std::string>() : "";
 
   std::vector<std::string> frames;
-  for (const std::string& name : names) frames.push_back(optical_frame(name));
+  for (const std::string& name : names_) frames.push_back(optical_frame(name));
   const std::string& parent = options_.camera_child ? frames[0] : options_.base_frame;
   std::vector<NamedTransform> transforms;
-  for (std::size_t k = options_.camera_child ? 1 : 0; k < names.size(); ++k)
+  for (std::size_t k = options_.camera_child ? 1 : 0; k < frames.size(); ++k)
     transforms.push_back(
         {parent, frames[k], T_left_child_.inverse() * rig.T_camera_left[k].inverse()});
   publish("/tf_static", [&](CdrWriter* out) { write_transforms(out, stamp, transforms); });
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    const std::string topic = options_.name_space + "/" + names[k] + "/camera_info";
-    writer_->advertise(topic, RosType::camera_info, true);
-    publish(topic, [&](CdrWriter* out) {
-      write_camera_info(out, stamp, frames[k], rig, static_cast<int>(k), true);
-    });
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    writer_->advertise(camera_topic(k, "camera_info"), RosType::camera_info, true);
+    publish_camera_info(k, stamp);
+    if (options_.images && k < kImages)
+      writer_->advertise(camera_topic(k, "image_raw"), RosType::image, false);
   }
+}
+
+std::string Bridge::camera_topic(std::size_t camera, const char* name) const {
+  return fmt::format("{}/{}/{}", options_.name_space, names_[camera], name);
+}
+
+void Bridge::publish_camera_info(std::size_t camera, Stamp stamp) {
+  publish(camera_topic(camera, "camera_info"), [&](CdrWriter* out) {
+    write_camera_info(out, stamp, optical_frame(names_[camera]), rig_, static_cast<int>(camera),
+                      true);
+  });
+}
+
+std::size_t Bridge::begin_image(std::string_view text) {
+  try {
+    const json line = json::parse(text);
+    if (line.at("type") != "image") return 0;
+    image_ = {line.at("camera").get<std::size_t>(), Stamp(line.at("stamp_ns").get<std::int64_t>()),
+              line.at("width").get<int>(), line.at("height").get<int>()};
+    return line.at("bytes").get<std::size_t>();
+  } catch (const json::exception&) {
+    ++malformed_;
+    return 0;
+  }
+}
+
+void Bridge::end_image(std::string_view pixels) {
+  const ImageView image{reinterpret_cast<const std::uint8_t*>(pixels.data()), image_.width,
+                        image_.height, image_.width};
+  if (image.empty() || std::int64_t{image.width} * image.height != std::ssize(pixels)) {
+    ++malformed_;
+    return;
+  }
+  if (image_.camera >= std::min(names_.size(), kImages)) return;
+  publish_camera_info(image_.camera, image_.stamp);
+  publish(camera_topic(image_.camera, "image_raw"), [&](CdrWriter* out) {
+    write_image(out, image_.stamp, optical_frame(names_[image_.camera]), image);
+  });
 }
 
 void Bridge::on_alignment(const json& line) {

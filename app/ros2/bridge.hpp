@@ -33,6 +33,7 @@ struct BridgeOptions {
   std::string odom_frame = "odom", base_frame = "base_link", enu_frame = "enu";
   bool camera_child = false;  // the child of odometry is the left camera's optical frame
   bool publish_tf = true;     // odom → child
+  bool images = false;        // image_raw of the left and the right camera
   Transform T_base_left{};    // pose of the left camera's optical axes in base_frame
 };
 
@@ -59,6 +60,11 @@ class Bridge {
 
   /// A line without its line feed. Returns the response that it holds.
   std::optional<Response> add(std::string_view line);
+  /// The line in front of an image; any other has no effect. Returns the image's size in bytes.
+  std::size_t begin_image(std::string_view line);
+  /// The pixels that followed. camera_info is published with the image's stamp, so that
+  /// stereo_image_proc finds the two together. Without a calibration nothing is published.
+  void end_image(std::string_view pixels);
   /// The connection has ended: speeds are not measured across it.
   void disconnected() noexcept { previous_.reset(); }
   /// Publishes diagnostics of level STALE. `message`: why there is no status.
@@ -84,6 +90,8 @@ class Bridge {
   void on_calibration(const nlohmann::json& line);
   void on_alignment(const nlohmann::json& line);
   void on_status(const nlohmann::json& line);
+  void publish_camera_info(std::size_t camera, Stamp stamp);
+  [[nodiscard]] std::string camera_topic(std::size_t camera, const char* name) const;
   void measure_twist(const nlohmann::json& line, const PosedChild& now, double widening,
                      OdometryMessage* odometry) const;
   void publish_in_enu(Stamp stamp, const Transform& T_world_left, const Covariance& covariance);
@@ -100,6 +108,13 @@ class Bridge {
   std::optional<PosedChild> previous_{};
   std::optional<Alignment> alignment_{};
   std::string calibration_text_{}, rating_{};  // the newest line; its rating, empty: none
+  RigCalibration rig_{};                       // of the newest line
+  std::vector<std::string> names_{};           // of its cameras, as parts of topics and frames
+  struct {
+    std::size_t camera = 0;
+    Stamp stamp{};
+    int width = 0, height = 0;
+  } image_;  // whose pixels come next
   std::uint64_t malformed_ = 0, statuses_ = 0, dropped_ = 0;
   std::vector<std::uint8_t> buffer_;
 };

@@ -2,12 +2,15 @@
 
 #include <sys/eventfd.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
+#include <span>
 #include <vector>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -85,6 +88,28 @@ bool this_machine_only() {
   return is("ROS_LOCALHOST_ONLY", "1") || is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST");
 }
 
+/// rmw_dds_common/ParticipantEntitiesInfo of one node. `gid_bytes`: 24 in Humble, 16 later; a GUID
+/// fills the first 16.
+Bytes node_info(const rtps::GUID_t& participant, std::span<const rtps::GUID_t> readers,
+                std::span<const rtps::GUID_t> writers, std::size_t gid_bytes) {
+  Bytes bytes(256 + (readers.size() + writers.size()) * gid_bytes);
+  CdrWriter out(bytes);
+  const auto gid = [&](const rtps::GUID_t& guid) {
+    std::array<std::uint8_t, 24> id{};
+    std::copy_n(guid.guidPrefix.value, guid.guidPrefix.size, id.begin());
+    std::copy_n(guid.entityId.value, guid.entityId.size, id.begin() + guid.guidPrefix.size);
+    out.raw(std::span(id).first(gid_bytes));
+  };
+  gid(participant);
+  out.count(1).text("/").text("vergence_ros2");
+  for (const auto guids : {readers, writers}) {
+    out.count(guids.size());
+    std::for_each(guids.begin(), guids.end(), gid);
+  }
+  bytes.resize(out.size());
+  return bytes;
+}
+
 constexpr std::string_view kTriggerHash =
     "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f";
 
@@ -92,6 +117,8 @@ constexpr std::string_view kTriggerHash =
 
 std::string_view type_hash(RosType type) noexcept {
   switch (type) {
+    case RosType::image:
+      return "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47";
     case RosType::odometry:
       return "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0";
     case RosType::tf:
@@ -125,6 +152,11 @@ struct DdsNode::Parts : dds::DataReaderListener {
   std::uint32_t domain = 0;
   int wake = -1;
   Bytes message;
+
+  // ROS node: its announcement (null: none), its endpoints.
+  dds::DataWriter* discovery = nullptr;
+  std::size_t gid_bytes = 16;
+  std::vector<rtps::GUID_t> node_readers, node_writers;
 
   std::mutex mutex;  // guards requests
   std::deque<std::shared_ptr<const Request>> requests;
@@ -173,7 +205,16 @@ struct DdsNode::Parts : dds::DataReaderListener {
     auto qos = reliable<dds::DataWriterQos>(latched, depth, hash);
     // The caller's thread sends: the shortest way, and a datagram does not wait.
     qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
+    // Except of images: they would keep poses waiting.
+    if (type == ros_type_name(RosType::image))
+      qos.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
     return required(publisher->create_datawriter(topic(name, type), qos), name);
+  }
+
+  void announce_node() {
+    if (discovery == nullptr) return;
+    message = node_info(participant->guid(), node_readers, node_writers, gid_bytes);
+    discovery->write(&message);
   }
 
   /// Fast DDS's thread.
@@ -199,12 +240,16 @@ struct DdsNode::Parts : dds::DataReaderListener {
   }
 };
 
-DdsNode::DdsNode(std::uint32_t domain) : parts_(std::make_unique<Parts>()) {
+DdsNode::DdsNode(std::uint32_t domain, const std::string& ros_distribution)
+    : parts_(std::make_unique<Parts>()) {
   parts_->domain = domain;
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   dds::DomainParticipantQos qos = factory->get_default_participant_qos();
   qos.name("vergence_ros2");
+  // ROS 2 counts a participant with an enclave among its own.
+  constexpr std::string_view kEnclave = "enclave=/;";
+  qos.user_data().data_vec({kEnclave.begin(), kEnclave.end()});
   // Without a profile of the user's: UDP alone. Shared memory does not reach programs of other
   // users, and the service has a user of its own.
   if (qos.transport().use_builtin_transports && qos.transport().user_transports.empty()) {
@@ -219,6 +264,10 @@ DdsNode::DdsNode(std::uint32_t domain) : parts_(std::make_unique<Parts>()) {
       parts_->participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT), "publisher");
   parts_->subscriber = parts_->required(
       parts_->participant->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT), "subscriber");
+  if (ros_distribution.empty()) return;
+  parts_->gid_bytes = ros_distribution == "humble" ? 24 : 16;
+  parts_->discovery = parts_->writer("ros_discovery_info",
+                                     "rmw_dds_common/msg/ParticipantEntitiesInfo", true, 1, "");
 }
 
 DdsNode::~DdsNode() = default;
@@ -226,10 +275,13 @@ DdsNode::~DdsNode() = default;
 void DdsNode::advertise(const std::string& topic, RosType type, bool latched) {
   dds::DataWriter*& writer = parts_->writers[topic];
   // Depths as ROS 2 has them: 10 by default, 100 of /tf, the last one of what is latched.
-  const int depth = latched ? 1 : type == RosType::tf ? 100 : 10;
-  if (writer == nullptr)
-    writer = parts_->writer("rt" + topic, ros_type_name(type), latched, depth,
-                            user_data(type_hash(type)));
+  // Of images the last two.
+  const int depth = latched ? 1 : type == RosType::tf ? 100 : type == RosType::image ? 2 : 10;
+  if (writer != nullptr) return;
+  writer =
+      parts_->writer("rt" + topic, ros_type_name(type), latched, depth, user_data(type_hash(type)));
+  parts_->node_writers.push_back(writer->guid());
+  parts_->announce_node();
 }
 
 void DdsNode::publish(const std::string& topic, std::span<const std::uint8_t> cdr) {
@@ -243,10 +295,14 @@ void DdsNode::serve_trigger(const std::string& name, int wake) {
   const std::string hash = user_data(kTriggerHash);
   p.wake = wake;
   p.replies = p.writer("rr" + name + "Reply", "std_srvs/srv/Trigger_Response", false, kDepth, hash);
-  p.required(p.subscriber->create_datareader(
-                 p.topic("rq" + name + "Request", "std_srvs/srv/Trigger_Request"),
-                 Parts::reliable<dds::DataReaderQos>(false, kDepth, hash), &p),
-             name);
+  const dds::DataReader* requests =
+      p.required(p.subscriber->create_datareader(
+                     p.topic("rq" + name + "Request", "std_srvs/srv/Trigger_Request"),
+                     Parts::reliable<dds::DataReaderQos>(false, kDepth, hash), &p),
+                 name);
+  p.node_writers.push_back(p.replies->guid());
+  p.node_readers.push_back(requests->guid());
+  p.announce_node();
 }
 
 std::shared_ptr<const DdsNode::Request> DdsNode::next_request() {

@@ -25,7 +25,11 @@ class DdsNode final : public TopicWriter {
 
   /// Multicast on all interfaces, or only on this machine where ROS_LOCALHOST_ONLY is 1 or
   /// ROS_AUTOMATIC_DISCOVERY_RANGE is LOCALHOST.
-  explicit DdsNode(std::uint32_t domain);
+  ///
+  /// `ros_distribution`: announces the node /vergence_ros2 with its endpoints in the layout of that
+  /// distribution, `humble` or a later one. Empty: no announcement, because the wrong layout ends
+  /// the discovery of Humble's nodes.
+  DdsNode(std::uint32_t domain, const std::string& ros_distribution);
   ~DdsNode() override;
   DdsNode(const DdsNode&) = delete;
   DdsNode& operator=(const DdsNode&) = delete;

@@ -35,7 +35,8 @@ struct Options {
   std::string socket = "unix:///run/vergence/pose.sock";
   std::uint32_t domain = 0;
   BridgeOptions bridge{};
-  std::string child = "base";
+  std::string child = "base", ros_distribution{};
+  double image_rate_hz = 0;
   std::array<double, 3> camera_xyz_m{}, camera_rpy_deg{};
 };
 
@@ -65,6 +66,13 @@ void declare(CLI::App* app, Options* o) {
   app->add_option("--camera-rpy-deg", o->camera_rpy_deg,
                   "Roll, pitch and yaw of the camera's forward, left, up axes in the base frame")
       ->type_name("R P Y");
+  app->add_option("--image-rate-hz", o->image_rate_hz,
+                  "Publish images of the left and right camera at this rate; 0: none")
+      ->check(CLI::Range(0.0, 200.0))
+      ->capture_default_str();
+  app->add_option("--ros-distro", o->ros_distribution,
+                  "ROS 2 distribution of the readers: announces the node to it")
+      ->envname("ROS_DISTRO");
   app->add_flag("!--no-tf", b.publish_tf, "Do not publish odom -> child on /tf");
 }
 
@@ -77,6 +85,7 @@ void finish(Options* o) {
           (c >= 'A' && c <= 'Z')))
       throw InputError(fmt::format(
           "--namespace: \"{}\" is not a ROS name; use letters, digits, _ and /", space));
+  o->bridge.images = o->image_rate_hz > 0;
   o->bridge.camera_child = o->child == "camera";
   const auto& x = o->camera_xyz_m;
   const auto& r = o->camera_rpy_deg;
@@ -91,7 +100,9 @@ class Program {
  public:
   explicit Program(const Options& options)
       : client_(options.socket),
-        node_(options.domain),
+        images_(options.socket),
+        image_rate_hz_(options.image_rate_hz),
+        node_(options.domain, options.ros_distribution),
         bridge_(options.bridge, &node_),
         wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     node_.serve_trigger(options.bridge.name_space + "/recalibrate", wake_.get());
@@ -115,10 +126,13 @@ class Program {
       }
       // Long enough to cost nothing, short enough for a signal that comes just before poll().
       constexpr int kTimeoutMs = 200;
-      std::array<pollfd, 2> events{{{client_.descriptor(), POLLIN, 0}, {wake_.get(), POLLIN, 0}}};
+      std::array<pollfd, 3> events{{{client_.descriptor(), POLLIN, 0},
+                                    {wake_.get(), POLLIN, 0},
+                                    {images_.descriptor(), POLLIN, 0}}};
       if (::poll(events.data(), events.size(), kTimeoutMs) <= 0) continue;
-      if (events[1].revents != 0) take_calls();
+      if (events[1].revents != 0) serve_calls();
       if (events[0].revents != 0 && !read()) lose();
+      if (events[2].revents != 0) read_images();
     }
   }
 
@@ -133,37 +147,55 @@ class Program {
     const int error = client_.connect();
     if (error == 0) {
       fmt::print(stderr, "vergence-ros2: connected to {}\n", client_.path());
-      said_waiting_ = false;
-    } else if (!said_waiting_) {
+      waiting_reported_ = false;
+    } else if (!waiting_reported_) {
       fmt::print(stderr,
                  "vergence-ros2: {}: {}; waiting for vergence with "
                  "publish.pose_stream: unix://{}\n",
                  client_.path(), std::strerror(error), client_.path());
-      said_waiting_ = true;
+      waiting_reported_ = true;
     }
   }
 
   bool read() {
-    return client_.read([this](std::string_view line) {
+    const auto on_line = [this](std::string_view line) -> std::size_t {
       const std::uint64_t malformed = bridge_.malformed(), statuses = bridge_.statuses();
       if (const auto response = bridge_.add(line)) answer(*response);
-      if (bridge_.statuses() > statuses) stale_at_ = Clock::now() + 3s;
+      if (bridge_.statuses() > statuses) {
+        stale_at_ = Clock::now() + 3s;
+        request_images();
+      }
       if (malformed == 0 && bridge_.malformed() > 0)
         fmt::print(stderr,
                    "vergence-ros2: a malformed line was skipped; further ones are only counted in "
                    "/diagnostics\n");
-    });
+      return 0;
+    };
+    return client_.read(on_line, {});
+  }
+
+  /// Images come over a connection of their own, so that poses do not wait behind them.
+  void request_images() {
+    if (image_rate_hz_ <= 0 || images_.connected() || images_.connect() != 0) return;
+    (void)images_.send(
+        fmt::format("{{\"request\": \"images\", \"rate_hz\": {}}}\n", image_rate_hz_));
+  }
+
+  void read_images() {
+    (void)images_.read([this](std::string_view line) { return bridge_.begin_image(line); },
+                       [this](std::string_view pixels) { bridge_.end_image(pixels); });
   }
 
   void lose() {
     fmt::print(stderr, "vergence-ros2: the pose stream has ended; waiting for vergence\n");
-    said_waiting_ = true;
+    waiting_reported_ = true;
     bridge_.disconnected();
+    images_.close();
     while (!calls_.empty()) answer({false, "vergence has ended"});
     stale_at_ = Clock::now();
   }
 
-  void take_calls() {
+  void serve_calls() {
     eventfd_t ignored = 0;
     (void)::eventfd_read(wake_.get(), &ignored);
     while (auto call = node_.next_request()) {
@@ -183,13 +215,14 @@ class Program {
     calls_.pop_front();
   }
 
-  PoseStreamClient client_;
+  PoseStreamClient client_, images_;
+  const double image_rate_hz_;
   DdsNode node_;
   Bridge bridge_;
   FileDescriptor wake_;
   std::deque<std::shared_ptr<const DdsNode::Request>> calls_;
   Clock::time_point connect_at_{}, stale_at_ = Clock::now() + 3s;
-  bool said_waiting_ = false;
+  bool waiting_reported_ = false;
 };
 
 ExitCode run(int argc, char** argv) {

@@ -34,18 +34,30 @@ int PoseStreamClient::connect() {
   return 0;
 }
 
-bool PoseStreamClient::read(const std::function<void(std::string_view)>& on_line) {
-  std::array<char, 16384> bytes;
+bool PoseStreamClient::read(const OnLine& on_line, const OnImage& on_image) {
+  std::array<char, 65536> bytes;
   const ssize_t n = ::recv(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
   if (n < 0 && (errno == EAGAIN || errno == EINTR)) return true;
-  if (n > 0) {
-    rest_.append(bytes.data(), static_cast<std::size_t>(n));
-    std::size_t begin = 0;
-    for (std::size_t end; (end = rest_.find('\n', begin)) != std::string::npos; begin = end + 1)
-      on_line(std::string_view(rest_).substr(begin, end - begin));
-    rest_.erase(0, begin);
-    if (rest_.size() <= kMaxLine) return true;
+  if (n <= 0) {
+    close();
+    return false;
   }
+  rest_.append(bytes.data(), static_cast<std::size_t>(n));
+  std::string_view rest = rest_;
+  for (;;) {
+    const std::size_t end = image_size_ > 0 ? image_size_ : rest.find('\n');
+    if (end > rest.size()) break;  // npos, too
+    if (image_size_ > 0) {
+      image_size_ = 0;
+      on_image(rest.substr(0, end));
+      rest.remove_prefix(end);
+    } else {
+      image_size_ = on_line(rest.substr(0, end));
+      rest.remove_prefix(end + 1);
+    }
+  }
+  rest_.erase(0, rest_.size() - rest.size());
+  if (image_size_ > 0 ? image_size_ <= kMaxImage : rest_.size() <= kMaxLine) return true;
   close();
   return false;
 }
@@ -58,6 +70,7 @@ bool PoseStreamClient::send(std::string_view line) noexcept {
 void PoseStreamClient::close() noexcept {
   socket_.reset();
   rest_.clear();
+  image_size_ = 0;
 }
 
 }  // namespace vergence::app::ros2

@@ -59,9 +59,9 @@ set(CPACK_DEBIAN_ROS2_PACKAGE_NAME vergence-ros2)
 set(CPACK_DEBIAN_ROS2_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_ROS2_PACKAGE_SUGGESTS systemd)
 set(CPACK_COMPONENT_ROS2_DESCRIPTION "ROS 2 topics of vergence without a ROS installation
-Publishes odometry, transforms, calibration, positions and diagnostics of a
-running vergence over DDS, and offers a service that asks for a
-recalibration.")
+Publishes odometry, transforms, calibration, images, positions and
+diagnostics of a running vergence over DDS, and offers a service that asks
+for a recalibration.")
 set(CPACK_DEBIAN_ROS2_PACKAGE_CONTROL_EXTRA ${scripts}/ros2/postinst ${scripts}/ros2/prerm ${scripts}/ros2/postrm)
 set(CPACK_DEBIAN_ROS2_PACKAGE_CONTROL_STRICT_PERMISSION TRUE)
 

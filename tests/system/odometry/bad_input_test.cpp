@@ -11,9 +11,9 @@ namespace vergence::test {
 namespace {
 
 /// The image of a camera in the dark: black level and a grey level of noise.
-StoredImage dark_image(std::uint64_t seed) {
+OwnedImage dark_image(std::uint64_t seed) {
   constexpr double kBlackLevel = 6.0, kNoise = 1.0;  // grey levels
-  StoredImage p(640, 480);
+  OwnedImage p(640, 480);
   Random random(seed);
   for (std::uint8_t& b : p.bytes)
     b = static_cast<std::uint8_t>(
@@ -23,7 +23,7 @@ StoredImage dark_image(std::uint64_t seed) {
 
 TEST(OdometryInBadConditions, cameraCoveredForGoodIsNeverOkAgain) {
   constexpr std::size_t kCovered = 20;
-  const std::array<StoredImage, 4> dark{dark_image(1), dark_image(2), dark_image(3), dark_image(4)};
+  const std::array<OwnedImage, 4> dark{dark_image(1), dark_image(2), dark_image(3), dark_image(4)};
   for (const std::size_t camera : {0U, 1U}) {
     EstimatorRun run(with_supplied(brief_drive().rig));
     run.process(brief_drive(), 0, brief_drive().size(), [&](std::size_t i, RigFrame* f) {

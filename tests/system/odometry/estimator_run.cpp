@@ -93,7 +93,7 @@ const Estimator& EstimatorRun::estimator() const noexcept { return *parts_->esti
 void EstimatorRun::record(std::uint64_t frame) {
   for (const EstimatorEvent& e : parts_->estimator->events()) events_.push_back({frame, e});
   for (const CalibrationDecision& d : parts_->estimator->calibrations())
-    if (!d.learnt) decisions_.push_back({frame, d});
+    if (!d.is_refinement) decisions_.push_back({frame, d});
 }
 
 void EstimatorRun::process(const RigFrame& frame, const Transform& T_reference_left) {

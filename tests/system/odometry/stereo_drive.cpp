@@ -7,7 +7,7 @@
 
 namespace vergence::test {
 
-StoredImage::StoredImage(int w, int h)
+OwnedImage::OwnedImage(int w, int h)
     : width(w),
       height(h),
       stride(static_cast<std::ptrdiff_t>(FramePool::stride(w))),
@@ -28,10 +28,10 @@ StereoDrive render(const RenderedDriveOptions& options, std::size_t frames) {
   RenderedDrive drive(options);
   for (std::size_t i = 0; i < frames; ++i) {
     const RigFrame& frame = drive.frame(i);
-    std::array<StoredImage, 2> pair;
+    std::array<OwnedImage, 2> pair;
     for (std::size_t k = 0; k < 2; ++k) {
       const ImageView& view = frame.images[k];
-      pair[k] = StoredImage(view.width, view.height);
+      pair[k] = OwnedImage(view.width, view.height);
       for (int y = 0; y < view.height; ++y)
         std::memcpy(pair[k].bytes.data() + y * pair[k].stride, view.row(y),
                     static_cast<std::size_t>(view.width));

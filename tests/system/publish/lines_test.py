@@ -51,17 +51,41 @@ def check_lines(lines, poses, placed_wanted):
     assert placed > 20 or not placed_wanted, f"only {placed} lines are on the earth"
 
 
+def read_images(stream):
+    """(camera, stamp, size, bytes) of all images until the stream ends."""
+    images = []
+    for line in iter(stream.readline, b""):
+        line = json.loads(line)
+        if line["type"] == "image":
+            images.append((line["camera"], line["stamp_ns"], (line["width"], line["height"]), stream.read(line["bytes"])))
+    return images
+
+
 def over_unix(below):
     path = below / "pose.sock"
     run = d.Drive(below / "unix", 22, "--set", f"publish.pose_stream=unix://{path}", "--set", "comparison.alignment_distance_m=15")
     reader = d.connected(path)
     idle = [d.connected(path) for _ in range(3)]  # they never read, and disturb nobody
+    pictures = d.connected(path)
+    pictures.recv(1)  # the session has begun
+    pictures.sendall(b'{"request": "images", "rate_hz": 2}\n')
+    stream = pictures.makefile("rb")
+    stream.readline()  # the rest of the line above
+    images = []
+    thread = threading.Thread(target=lambda: images.extend(read_images(stream)))
+    thread.start()
     lines = [json.loads(line) for line in reader.makefile("r", encoding="utf-8")]
     assert run.end() == 0, run.messages()
+    thread.join(30)
     for socket_ in idle:
         socket_.close()
     poses = run.poses()
     check_lines(lines, poses, True)
+    stamps = {int(row["stamp_ns"]) for row in poses.values()}
+    assert 2 * 15 <= len(images) <= 2 * 50, len(images)
+    assert [camera for camera, *_ in images] == [0, 1] * (len(images) // 2)
+    for _, stamp, (width, height), pixels in images:
+        assert stamp in stamps and len(pixels) == width * height and len(set(pixels)) > 10, (stamp, width, height)
     kinds = [line["type"] for line in lines]
     assert kinds.count("pose") > 0.9 * len(poses), (len(lines), len(poses))
     assert kinds.index("calibration") < kinds.index("pose") and "alignment" in kinds, kinds

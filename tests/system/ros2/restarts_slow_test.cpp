@@ -35,7 +35,7 @@ class Ros2Restarts : public testing::Test {
   std::uint32_t domain_ = own_domain();
 };
 
-TEST_F(Ros2Restarts, AnotherSessionIsFoundAndTheTimeBetweenIsStale) {
+TEST_F(Ros2Restarts, nextSessionIsFoundGapIsStale) {
   const std::string log = (folder_.path() / "log").string();
   const app::FileDescriptor out(::open(log.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600));
   ChildProgram::Start start;
@@ -62,7 +62,7 @@ TEST_F(Ros2Restarts, AnotherSessionIsFoundAndTheTimeBetweenIsStale) {
   EXPECT_EQ(text.find("unix://", first + 1), std::string::npos) << "once\n" << text;
 }
 
-TEST_F(Ros2Restarts, AnotherBridgeServesTheReadersOfTheOneBefore) {
+TEST_F(Ros2Restarts, restartedBridgeServesOldReaders) {
   StreamSession session(socket_);
   session.calibrate(450);
   const RosParticipant participant(domain_);
@@ -76,16 +76,6 @@ TEST_F(Ros2Restarts, AnotherBridgeServesTheReadersOfTheOneBefore) {
     EXPECT_NE(info.next(), nullptr) << i;
     if (i == 0) bridge->signal(SIGKILL);
   }
-}
-
-TEST_F(Ros2Restarts, ADomainIsOneOfItsOwn) {
-  StreamSession session(socket_);
-  const auto bridge = start_bridge(socket_, domain_);
-  const RosParticipant here(domain_), elsewhere(domain_ + 1);
-  RosReader<RosOdometry> odometry(here, "/vergence/odometry"),
-      other(elsewhere, "/vergence/odometry");
-  EXPECT_TRUE(feed_until(&session, [&] { return odometry.take() != nullptr; }));
-  EXPECT_EQ(other.next(2s), nullptr);
 }
 
 std::size_t resident_kb(pid_t pid) {
@@ -109,7 +99,7 @@ double cpu_seconds(pid_t pid) {
   return ticks / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
-TEST_F(Ros2Restarts, AReaderThatStandsStillCostsNeitherPosesNorMemory) {
+TEST_F(Ros2Restarts, stoppedReaderCostsNoPosesOrMemory) {
   // A process of its own, which is stopped when it has got its first message.
   std::array<int, 2> ready{};
   ASSERT_EQ(::pipe(ready.data()), 0);
@@ -150,16 +140,20 @@ TEST_F(Ros2Restarts, AReaderThatStandsStillCostsNeitherPosesNorMemory) {
   (void)::waitpid(stopped, nullptr, 0);
 }
 
-TEST_F(Ros2Restarts, FiftyPosesASecondArriveWithinTwoMilliseconds) {
+/// Measures the way of 50 poses a second; images: beside pairs of 640×480 at 10 Hz, which a reader
+/// takes.
+void measure_poses(const std::string& socket, std::uint32_t domain, bool images) {
   // Where the system lets it, before what else the machine does: the figure is that of the
   // programs.
   const sched_param priority{1};
   (void)::sched_setscheduler(0, SCHED_FIFO, &priority);
-  StreamSession session(socket_);
+  StreamSession session(socket);
   session.calibrate(450);
   session.align();
-  const auto bridge = start_bridge(socket_, domain_);
-  const RosParticipant participant(domain_);
+  const auto bridge = start_bridge(socket, domain, {"--image-rate-hz", images ? "10" : "0"});
+  const RosParticipant participant(domain);
+  RosReader<RosImage> left(participant, "/vergence/left/image_raw"),
+      right(participant, "/vergence/right/image_raw");
   RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
   ASSERT_TRUE(feed_until(&session, [&] { return odometry.take() != nullptr; }));
   std::this_thread::sleep_for(500ms);
@@ -171,6 +165,7 @@ TEST_F(Ros2Restarts, FiftyPosesASecondArriveWithinTwoMilliseconds) {
   ASSERT_EQ(dds_waitset_attach(waitset, condition, 0), 0);
   constexpr int kPoses = 500;
   std::vector<double> ms;
+  int received = 0;
   const double cpu_before = cpu_seconds(bridge->pid());
   const auto start = Clock::now();
   for (int i = 0; i < kPoses; ++i) {
@@ -181,21 +176,26 @@ TEST_F(Ros2Restarts, FiftyPosesASecondArriveWithinTwoMilliseconds) {
     ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - sent).count());
     while (odometry.take() != nullptr) {
     }
+    while (left.take() != nullptr || right.take() != nullptr) ++received;
   }
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   const double cpu = 100 * (cpu_seconds(bridge->pid()) - cpu_before) / seconds;
   ASSERT_EQ(ms.size(), static_cast<std::size_t>(kPoses));
   std::sort(ms.begin(), ms.end());
   fmt::print(
-      "pose to reader: p50 {:.2f} ms, p99 {:.2f} ms, max {:.2f} ms; vergence-ros2: {:.1f} % of a "
-      "core, {:.1f} MB resident\n",
-      ms[kPoses / 2], ms[kPoses * 99 / 100], ms.back(), cpu,
+      "{} images; pose to reader: p50 {:.2f} ms, p99 {:.2f} ms, max {:.2f} ms; vergence-ros2: "
+      "{:.1f} % of a core, {:.1f} MB resident\n",
+      received, ms[kPoses / 2], ms[kPoses * 99 / 100], ms.back(), cpu,
       static_cast<double>(resident_kb(bridge->pid())) / 1024);
   EXPECT_LE(ms[kPoses * 99 / 100], 2);
-  EXPECT_LE(cpu, 3);
+  EXPECT_LE(cpu, images ? 15 : 3);
+  EXPECT_GE(received, images ? kPoses / 5 : 0);
   const sched_param normal{0};
   (void)::sched_setscheduler(0, SCHED_OTHER, &normal);
 }
+
+TEST_F(Ros2Restarts, posesAt50HzArriveWithin2Ms) { measure_poses(socket_, domain_, false); }
+TEST_F(Ros2Restarts, posesArriveWithin2MsBesideImages) { measure_poses(socket_, domain_, true); }
 
 namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
@@ -229,7 +229,7 @@ class BytesType final : public fast::TopicDataType {
 };
 
 /// As rmw_fastrtps calls: the reply names the request's writer and number beside the message.
-TEST_F(Ros2Restarts, ACallOfRmwFastrtpsIsAnsweredAndTellsOfARefusal) {
+TEST_F(Ros2Restarts, answersRmwFastrtpsCall) {
   const auto bridge = start_bridge(socket_, domain_);  // vergence does not run
   auto* factory = fast::DomainParticipantFactory::get_instance();
   fast::DomainParticipantQos here;

@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "app/publish/line_publisher.hpp"
+#include "core/math/random.hpp"
 #include "core/math/so3.hpp"
 #include "tests/support/child_program.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -30,6 +31,9 @@ using RosCameraInfo = sensor_msgs_msg_dds__CameraInfo_;
 using RosFix = sensor_msgs_msg_dds__NavSatFix_;
 using RosPose = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;
 using RosDiagnostics = diagnostic_msgs_msg_dds__DiagnosticArray_;
+using RosImage = sensor_msgs_msg_dds__Image_;
+using RosNodes = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
+using HumbleNodes = humble_msg_dds__ParticipantEntitiesInfo_;
 using TriggerRequest = std_srvs_srv_dds__Trigger_Request_;
 using TriggerResponse = std_srvs_srv_dds__Trigger_Response_;
 
@@ -58,6 +62,24 @@ inline const dds_topic_descriptor_t& descriptor<RosPose>() {
 template <>
 inline const dds_topic_descriptor_t& descriptor<RosDiagnostics>() {
   return diagnostic_msgs_msg_dds__DiagnosticArray__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<RosImage>() {
+  return sensor_msgs_msg_dds__Image__desc;
+}
+template <>
+inline const dds_topic_descriptor_t& descriptor<RosNodes>() {
+  return rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
+}
+/// Humble's layout under the same name.
+template <>
+inline const dds_topic_descriptor_t& descriptor<HumbleNodes>() {
+  static const dds_topic_descriptor_t renamed = [] {
+    dds_topic_descriptor_t d = humble_msg_dds__ParticipantEntitiesInfo__desc;
+    d.m_typename = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename;
+    return d;
+  }();
+  return renamed;
 }
 template <>
 inline const dds_topic_descriptor_t& descriptor<TriggerRequest>() {
@@ -115,8 +137,8 @@ class RosReader {
   RosReader(const RosParticipant& participant, const std::string& topic, bool latched = false)
       : reader_(dds_create_reader(participant.get(), participant.topic<Message>("rt" + topic),
                                   RosParticipant::reliable(latched).get(), nullptr)) {}
-  RosReader(const RosParticipant& participant, dds_entity_t topic)
-      : reader_(dds_create_reader(participant.get(), topic, RosParticipant::reliable(false).get(),
+  RosReader(const RosParticipant& participant, dds_entity_t topic, bool latched = false)
+      : reader_(dds_create_reader(participant.get(), topic, RosParticipant::reliable(latched).get(),
                                   nullptr)) {}
 
   /// The next message if there is one; valid until the next call.
@@ -133,6 +155,18 @@ class RosReader {
          std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(500us))
       if (const Message* message = take()) return message;
     return nullptr;
+  }
+  /// GUIDs of the writers that it is matched with.
+  [[nodiscard]] std::vector<std::string> writer_guids() const {
+    std::vector<std::string> out;
+    std::array<dds_instance_handle_t, 8> writers{};
+    const auto n = dds_get_matched_publications(reader_, writers.data(), writers.size());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(n, 0)); ++i)
+      if (auto* writer = dds_get_matched_publication_data(reader_, writers[i])) {
+        out.emplace_back(reinterpret_cast<const char*>(writer->key.v), sizeof writer->key.v);
+        dds_builtintopic_free_endpoint(writer);
+      }
+    return out;
   }
   /// USER_DATA of the writers that it is matched with.
   [[nodiscard]] std::vector<std::string> user_data() const {
@@ -177,6 +211,7 @@ class StreamSession {
     start.name = "session";
     start.camera_names = {"left", "right"};
     start.can_recalibrate = true;
+    start.image_bytes = kWidth * kHeight;
     publisher_.on_start(start);
   }
 
@@ -204,12 +239,12 @@ class StreamSession {
     RigFrame frame;
     frame.number = frames_;
     frame.cameras = 2;
-    static std::uint8_t pixel = 0;
-    frame.images[0] = frame.images[1] = {&pixel, 1, 1, 1};
+    frame.stamp = Stamp(kFirst + static_cast<std::int64_t>(frames_) * kInterval);
+    for (std::size_t k = 0; k < 2; ++k) frame.images[k] = image(frames_, k);
     publisher_.on_frame(frame);
     PoseSample sample;
     sample.frame = frames_;
-    sample.stamp = Stamp(kFirst + static_cast<std::int64_t>(frames_) * kInterval);
+    sample.stamp = frame.stamp;
     sample.state = State::stereo_odometry;
     sample.status = PoseStatus::ok;
     sample.T_world_left.t.z() = 0.1 * static_cast<double>(frames_);
@@ -222,6 +257,20 @@ class StreamSession {
     for (const auto& [name, value] : publisher_.counters()) out[name] = value;
     return out;
   }
+
+  /// Rows, padded by a byte, of one larger random image.
+  [[nodiscard]] static ImageView image(std::uint64_t frame, std::size_t camera) {
+    static const std::vector<std::uint8_t> pixels = [] {
+      std::vector<std::uint8_t> out((kWidth + 1) * kHeight + kShifts);
+      Random random(3);
+      for (std::uint8_t& pixel : out) pixel = static_cast<std::uint8_t>(random.uniform() * 256);
+      return out;
+    }();
+    const std::size_t shift = (7 * static_cast<std::size_t>(frame) + 3 * camera) % kShifts;
+    return {pixels.data() + shift, kWidth, kHeight, kWidth + 1};
+  }
+  static constexpr int kWidth = 640, kHeight = 480;
+  static constexpr std::size_t kShifts = 997;
 
   static constexpr std::int64_t kFirst = 1'577'836'800'000'000'001;  // ns
   static constexpr std::int64_t kInterval = 50'000'000;              // ns

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <sys/eventfd.h>
 
+#include <algorithm>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -25,7 +27,7 @@ void expect_identity(const geometry_msgs_msg_dds__Quaternion_& q) {
   for (const double v : {q.x, q.y, q.z}) EXPECT_EQ(v, 0);
 }
 
-TEST_F(Ros2Topics, AreReadByAnotherDdsAndLatchedOnesByALateReader) {
+TEST_F(Ros2Topics, areReadByCycloneDdsAlsoLate) {
   StreamSession session(socket_);
   session.calibrate(450);
   session.align();
@@ -142,6 +144,93 @@ TEST_F(Ros2Topics, AreReadByAnotherDdsAndLatchedOnesByALateReader) {
   EXPECT_EQ(bridge->wait(10s), 143);
 }
 
+/// stereo_image_proc synchronises images and camera_info of both cameras by equal stamps.
+TEST_F(Ros2Topics, imagesEqualTheSessionsAndShareStamps) {
+  StreamSession session(socket_);
+  session.calibrate(450);
+  const auto bridge = start_bridge(socket_, domain_, {"--image-rate-hz", "20"});
+  const RosParticipant participant(domain_);
+  RosReader<RosImage> left(participant, "/vergence/left/image_raw"),
+      right(participant, "/vergence/right/image_raw");
+  RosReader<RosCameraInfo> left_info(participant, "/vergence/left/camera_info"),
+      right_info(participant, "/vergence/right/camera_info");
+  RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
+  std::map<std::int64_t, int> received;  // by frame: images, camera_info and odometry
+  int images = 0;
+  const auto take = [&](RosReader<RosImage>* reader, std::size_t camera) {
+    for (const RosImage* m; (m = reader->take()) != nullptr; ++images) {
+      const std::int64_t frame = frame_of(m->header);
+      ++received[frame];
+      EXPECT_EQ(m->header.stamp.nanosec % 50'000'000, 1U);
+      EXPECT_STREQ(m->header.frame_id, camera == 0 ? "left_optical_frame" : "right_optical_frame");
+      EXPECT_STREQ(m->encoding, "mono8");
+      const ImageView seen = StreamSession::image(static_cast<std::uint64_t>(frame), camera);
+      ASSERT_EQ(m->width, static_cast<std::uint32_t>(seen.width));
+      ASSERT_EQ(m->height, static_cast<std::uint32_t>(seen.height));
+      EXPECT_EQ(m->step, m->width);
+      ASSERT_EQ(m->data._length, m->width * m->height);
+      bool same = true;
+      for (int y = 0; y < seen.height; ++y)
+        same = same &&
+               std::equal(seen.row(y), seen.row(y) + seen.width, m->data._buffer + y * seen.width);
+      EXPECT_TRUE(same) << "frame " << frame << ", camera " << camera;
+    }
+  };
+  const auto count = [&](auto* reader) {
+    while (const auto* m = reader->take()) ++received[frame_of(m->header)];
+  };
+  EXPECT_TRUE(feed_until(&session, [&] {
+    take(&left, 0);
+    take(&right, 1);
+    count(&left_info);
+    count(&right_info);
+    count(&odometry);
+    return std::count_if(received.begin(), received.end(),
+                         [](const auto& frame) { return frame.second == 5; }) >= 10;
+  }));
+  // At most every fifth frame, as they come at 100 Hz here.
+  EXPECT_LT(images, 2 * (received.rbegin()->first / 5 + 2));
+}
+
+/// `ros2 node list` and `ros2 node info` read this topic.
+template <class Nodes>
+void expect_node(const std::string& socket, std::uint32_t domain, const char* distribution) {
+  StreamSession session(socket);
+  const auto bridge = start_bridge(socket, domain, {"--ros-distro", distribution});
+  const RosParticipant participant(domain);
+  RosReader<Nodes> nodes(participant, participant.topic<Nodes>("ros_discovery_info"), true);
+  RosReader<RosOdometry> odometry(participant, "/vergence/odometry");
+  const Nodes* n = nullptr;
+  // The service is the last of the endpoints without a calibration.
+  ASSERT_TRUE(feed_until(&session, [&] {
+    n = nodes.take();
+    return n != nullptr && n->node_entities_info_seq._length == 1 &&
+           n->node_entities_info_seq._buffer[0].reader_gid_seq._length == 1 &&
+           !odometry.writer_guids().empty();
+  }));
+  const auto& node = n->node_entities_info_seq._buffer[0];
+  EXPECT_STREQ(node.node_namespace, "/");
+  EXPECT_STREQ(node.node_name, "vergence_ros2");
+  EXPECT_EQ(node.writer_gid_seq._length, 7U) << "six topics and the service's replies";
+  const std::string odometry_guid = odometry.writer_guids().at(0);
+  int found = 0;
+  for (std::uint32_t i = 0; i < node.writer_gid_seq._length; ++i) {
+    const std::uint8_t* gid = node.writer_gid_seq._buffer[i].data;
+    if (std::equal(odometry_guid.begin(), odometry_guid.end(), reinterpret_cast<const char*>(gid)))
+      ++found;
+    EXPECT_TRUE(std::equal(n->gid.data, n->gid.data + 12, gid)) << "the participant's prefix";
+  }
+  EXPECT_EQ(found, 1);
+}
+
+TEST_F(Ros2Topics, nodeIsAnnouncedInJazzysLayout) {
+  expect_node<RosNodes>(socket_, domain_, "jazzy");
+}
+
+TEST_F(Ros2Topics, nodeIsAnnouncedInHumblesLayout) {
+  expect_node<HumbleNodes>(socket_, domain_, "humble");
+}
+
 struct RefusalCase {
   std::vector<std::string> words;
   std::string named;  // by the message
@@ -150,7 +239,7 @@ void PrintTo(const RefusalCase& c, std::ostream* out) { *out << c.named; }
 
 class Ros2Refusals : public testing::TestWithParam<RefusalCase> {};
 
-TEST_P(Ros2Refusals, EndWithTwoAndNameWhatIsWrong) {
+TEST_P(Ros2Refusals, exitWithTwoAndNameTheOption) {
   const TemporaryFolder folder;
   const std::string log = (folder.path() / "log").string();
   const FileDescriptor out(::open(log.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600));
@@ -167,9 +256,10 @@ INSTANTIATE_TEST_SUITE_P(All, Ros2Refusals,
                                                      "--socket"},
                                          RefusalCase{{"--namespace", "two words"}, "--namespace"},
                                          RefusalCase{{"--child", "wheel"}, "--child"},
+                                         RefusalCase{{"--image-rate-hz", "-1"}, "--image-rate-hz"},
                                          RefusalCase{{"--speed", "1"}, "--speed"}));
 
-TEST_F(Ros2Topics, AnotherVersionOfTheStreamIsRefused) {
+TEST_F(Ros2Topics, otherStreamVersionExitsWithTwo) {
   const auto socket =
       app::open_line_socket({app::LineAddress::Kind::unix_socket, socket_, {}}, "test");
   socket->greet("{\"version\":1,\"frame\":0}\n");

@@ -72,7 +72,7 @@ class Http : public testing::Test {
   std::unique_ptr<HttpServer> server_;
 };
 
-TEST_F(Http, servesThePageWithHeadersThatLetNothingElseIn) {
+TEST_F(Http, pageHasRestrictiveHeaders) {
   const std::string answer = received(ask("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"));
   EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 OK\r\n")) << answer;
   EXPECT_EQ(answer.substr(answer.find("\r\n\r\n") + 4), kPage);
@@ -80,7 +80,7 @@ TEST_F(Http, servesThePageWithHeadersThatLetNothingElseIn) {
   EXPECT_EQ(answer.find("Access-Control"), std::string::npos) << "no other site may read it";
 }
 
-TEST_F(Http, aPortInUseIsASentence) {
+TEST_F(Http, portInUseIsInputError) {
   EXPECT_TRUE(test::contains(
       test::refusal_of([&] {
         const HttpServer second(HostPort{"127.0.0.1", port_}, {}, kPage, 1, [](HttpRoute) {});
@@ -106,7 +106,7 @@ class HttpPolicies : public Http {
     }
   }
 };
-TEST_F(HttpPolicies, letsInWhoHasTheTokenAndNobodyElse) {
+TEST_F(HttpPolicies, admitsOnlyRequestsWithToken) {
   const std::vector<Ask> actions{
       {"POST /mark\r\n" + kKey, 204},
       {"POST /recalibrate\r\n" + kKey, 204},
@@ -143,7 +143,7 @@ TEST_F(HttpPolicies, letsInWhoHasTheTokenAndNobodyElse) {
   expect({{"POST /mark\r\nX-Vergence-Token: \r\n", 403}}, "localhost");
 }
 
-TEST_F(Http, viewersAreGreetedThenToldWhatIsNewAndNoMoreThanAllowed) {
+TEST_F(Http, greetsViewersUpToTheLimit) {
   const FileDescriptor a = viewer();
   EXPECT_EQ(server_->viewers(), 1U);
   server_->broadcast("update", "{\"a\":1}", HttpServer::Skipped::greet_again);
@@ -165,7 +165,7 @@ TEST_F(Http, viewersAreGreetedThenToldWhatIsNewAndNoMoreThanAllowed) {
   EXPECT_EQ(asked, 1) << "made once, and only for who waits for it";
 }
 
-TEST_F(Http, aViewerThatNeverReadsSkipsAndIsGreetedAnewWhenItReads) {
+TEST_F(Http, stalledViewerSkipsAndIsGreetedAgain) {
   const FileDescriptor a = viewer();
   const std::string big = "\"" + std::string(1'000'000, 'x') + "\"";
   int greeted = 0;
@@ -189,7 +189,7 @@ TEST_F(Http, aViewerThatNeverReadsSkipsAndIsGreetedAnewWhenItReads) {
   EXPECT_LT(bytes, kEvents / 2 * big.size());
 }
 
-TEST_F(Http, garbageAndIdleConnectionsLeaveThePageToOthers) {
+TEST_F(Http, garbageAndIdleConnectionsAreDropped) {
   const FileDescriptor watching = viewer();
   server_->greet("hello", [] { return std::string("{}"); });
   std::mt19937 random(7);
@@ -228,7 +228,7 @@ struct AddressCase {
   bool loopback = false;
 };
 
-TEST(Address, isHostAndPort) {
+TEST(Address, parsesHostAndPort) {
   for (const AddressCase& a : {AddressCase{"127.0.0.1:8080", "127.0.0.1", 8080, true},
                                {"[::1]:80", "::1", 80, true},
                                {"localhost:1", "localhost", 1, true},

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "app/runtime/errors.hpp"
+#include "drivers/clock.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace vergence::app {
@@ -48,7 +49,7 @@ class UnixLines : public testing::Test {
   LineAddress address_{LineAddress::Kind::unix_socket, path_, {}};
 };
 
-TEST_F(UnixLines, theGroupMayReadWhateverTheUmaskAndNobodyElse) {
+TEST_F(UnixLines, socketModeIgnoresUmask) {
   const mode_t before = ::umask(0077);
   const auto lines = open_line_socket(address_, "k");
   (void)::umask(before);
@@ -57,7 +58,7 @@ TEST_F(UnixLines, theGroupMayReadWhateverTheUmaskAndNobodyElse) {
   EXPECT_EQ(status.st_mode & 0777U, 0660U);
 }
 
-TEST_F(UnixLines, whoDoesNotReadLosesWholeLinesAndHoldsNobodyUp) {
+TEST_F(UnixLines, stalledReaderLosesWholeLines) {
   const auto socket = open_line_socket(address_, "k");
   const FileDescriptor idle = reader_of(path_), eager = reader_of(path_);
   wait(socket.get());
@@ -89,7 +90,7 @@ TEST_F(UnixLines, whoDoesNotReadLosesWholeLinesAndHoldsNobodyUp) {
   EXPECT_GT(whole, 10);
 }
 
-TEST_F(UnixLines, readersBeyondThePlacesAreTurnedAwayAndThoseWhoLeaveMakeRoom) {
+TEST_F(UnixLines, readersBeyondTheLimitAreTurnedAway) {
   const auto socket = open_line_socket(address_, "k");
   std::vector<FileDescriptor> readers;
   for (int i = 0; i < 12; ++i) {
@@ -106,7 +107,7 @@ TEST_F(UnixLines, readersBeyondThePlacesAreTurnedAwayAndThoseWhoLeaveMakeRoom) {
   EXPECT_EQ(all_of(late), "line\n");
 }
 
-TEST_F(UnixLines, ReadersAreGreetedFirstAndAgainWhenTheGreetingChanges) {
+TEST_F(UnixLines, greetsFirstAndOnChange) {
   const auto socket = open_line_socket(address_, "k");
   const FileDescriptor early = reader_of(path_);
   wait(socket.get());
@@ -120,7 +121,7 @@ TEST_F(UnixLines, ReadersAreGreetedFirstAndAgainWhenTheGreetingChanges) {
   EXPECT_EQ(all_of(late), "a\n2\nb\n");
 }
 
-TEST_F(UnixLines, AGreetingIsNotLostByAReaderWithoutRoom) {
+TEST_F(UnixLines, greetingReachesStalledReader) {
   const auto socket = open_line_socket(address_, "k");
   const FileDescriptor reader = reader_of(path_);
   wait(socket.get());
@@ -133,11 +134,13 @@ TEST_F(UnixLines, AGreetingIsNotLostByAReaderWithoutRoom) {
   EXPECT_TRUE(all_of(reader).ends_with("greeting\nline\n"));
 }
 
-TEST_F(UnixLines, RequestsAreAnsweredToWhoeverSentThem) {
+TEST_F(UnixLines, answersRequestsToTheirSender) {
   const auto socket = open_line_socket(address_, "k");
   const FileDescriptor asking = reader_of(path_), silent = reader_of(path_);
   wait(socket.get());
-  const auto answer = [](std::string_view request) { return "<" + std::string(request) + ">\n"; };
+  const auto answer = [](std::string_view request) {
+    return LineResponse{"<" + std::string(request) + ">\n", {}};
+  };
   const auto send = [&](const FileDescriptor& reader, std::string_view text) {
     EXPECT_EQ(::send(reader.get(), text.data(), text.size(), MSG_NOSIGNAL),
               static_cast<ssize_t>(text.size()));
@@ -162,7 +165,37 @@ TEST_F(UnixLines, RequestsAreAnsweredToWhoeverSentThem) {
   EXPECT_LE(::recv(silent.get(), &byte, 1, MSG_DONTWAIT), 0);
 }
 
-TEST_F(UnixLines, aFileLeftBehindIsReplacedAnotherProgramsIsNot) {
+TEST_F(UnixLines, imageReaderGetsWholePairsAtItsRateAndNoLines) {
+  const auto socket = open_line_socket(address_, "k");
+  const FileDescriptor images = reader_of(path_), lines = reader_of(path_);
+  wait(socket.get());
+  EXPECT_FALSE(socket->wants_images());
+  ASSERT_EQ(::send(images.get(), "i\n", 2, MSG_NOSIGNAL), 2);
+  wait(socket.get(), [](std::string_view) {
+    return LineResponse{"yes\n", Duration::milliseconds(50)};
+  });
+  const std::string pair(1'000'000, 'p');  // more than a socket holds
+  ASSERT_TRUE(socket->wants_images());
+  socket->send_images(pair);
+  EXPECT_FALSE(socket->wants_images()) << "it has not read the pair";
+  socket->send_images("dropped");
+  socket->greet("greeting\n");
+  socket->send("line\n");
+  std::string read;
+  const HostStamp begin = monotonic_now();
+  while (read.size() < 4 + pair.size() && monotonic_now() - begin < Duration::seconds(10)) {
+    read += all_of(images);
+    wait(socket.get());
+  }
+  EXPECT_EQ(read, "yes\n" + pair);
+  EXPECT_EQ(all_of(lines), "greeting\nline\n");
+  while (!socket->wants_images() && monotonic_now() - begin < Duration::seconds(10))
+    wait(socket.get());
+  EXPECT_GE(monotonic_now() - begin, Duration::milliseconds(20)) << "half the interval";
+  EXPECT_EQ(socket->counters().images, 1U);
+}
+
+TEST_F(UnixLines, replacesOnlyStaleSocketFiles) {
   {
     // As a killed program leaves it: bound, and nobody listens.
     const FileDescriptor dead(::socket(AF_UNIX, SOCK_STREAM, 0));

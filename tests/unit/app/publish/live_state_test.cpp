@@ -28,19 +28,19 @@ EventRecord event(const char* kind, std::string_view message) {
   return e;
 }
 
-CalibrationRecord calibration(bool learnt, double x) {
+CalibrationRecord calibration(bool is_refinement, double x) {
   CalibrationRecord c;
-  c.accepted = !learnt;
-  c.learnt = learnt;
-  c.decided = learnt;
+  c.accepted = !is_refinement;
+  c.is_refinement = is_refinement;
+  c.decided = is_refinement;
   c.cause = CalibrationCause::refinement;
   c.calibration.cameras = 2;
   c.calibration.T_camera_left[1].t = {x, 0, 0};
-  if (learnt) c.calibration.sigma_total[1] = {1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
+  if (is_refinement) c.calibration.sigma_total[1] = {1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
   return c;
 }
 
-TEST(LiveState, tellsWhatIsNewOnceAndALateViewerEverything) {
+TEST(LiveState, updateSendsChangesOnceHelloEverything) {
   LiveState state;
   SessionStart start;
   start.name = "a drive";
@@ -77,7 +77,7 @@ TEST(LiveState, tellsWhatIsNewOnceAndALateViewerEverything) {
   EXPECT_FALSE(hello["ended"].get<bool>());
 }
 
-TEST(LiveState, aLongDriveIsThinnedFromItsStartToItsEnd) {
+TEST(LiveState, longTrailIsThinnedOverItsWholeLength) {
   LiveState state;
   std::size_t told = 0;
   bool anew = false;
@@ -118,7 +118,7 @@ Map map_of(const LiveState& state) {
   return out;
 }
 
-TEST(LiveState, aRigThatStandsKeepsItsMapWhateverItsStatusDoes) {
+TEST(LiveState, standingRigKeepsTrail) {
   LiveState state;
   double metres = 0;
   for (int i = 0; i < 2000; ++i) state.add(at(metres += 0.5));
@@ -141,7 +141,7 @@ LiveFrame come(double seconds) {
   return frame;
 }
 
-TEST(LiveState, framesThatStopAreSilenceAfterASecond) {
+TEST(LiveState, missingFramesAreSilentAfterOneSecond) {
   LiveState state;
   for (int i = 0; i < 100; ++i) state.add(come(50 + 0.05 * i));
   const auto now = [&](double seconds) {
@@ -157,7 +157,7 @@ TEST(LiveState, framesThatStopAreSilenceAfterASecond) {
   EXPECT_TRUE(now(69.5)["silent"].get<bool>()) << "an outage is no interval";
 }
 
-TEST(LiveState, eventsAndCalibrationsAreTheNewest) {
+TEST(LiveState, keepsNewestEventsAndCalibrations) {
   LiveState state;
   for (int i = 0; i < 1000; ++i) state.add(event("mark", std::to_string(i)));
   const json events = json::parse(state.update(kNow, -1))["events"];
@@ -168,7 +168,7 @@ TEST(LiveState, eventsAndCalibrationsAreTheNewest) {
             LiveState::kCalibrations);
 }
 
-TEST(LiveState, aCalibrationStandsWithTwoSigmaAndWhatTheDriveMeasuredBesideIt) {
+TEST(LiveState, calibrationHasTwoSigmaAndMeasuredOne) {
   LiveState state;
   state.add(calibration(false, -0.75));
   json c = json::parse(state.update(kNow, -1))["calibration"];

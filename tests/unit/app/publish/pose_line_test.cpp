@@ -5,6 +5,7 @@
 #include <sys/eventfd.h>
 
 #include <atomic>
+#include <chrono>
 #include <limits>
 #include <map>
 #include <memory>
@@ -50,7 +51,7 @@ nlohmann::json line_of(const PoseSample& pose, const std::optional<EnuPose>& ear
   return nlohmann::json::parse(line);
 }
 
-TEST(PoseLine, hasWhatTheSchemaSays) {
+TEST(PoseLine, hasEveryKeyOfTheSchema) {
   EnuPose earth;
   earth.T_enu_left.t = {1, 2, 3};
   earth.position = {-27.4975, 153.0137, 60};
@@ -86,7 +87,7 @@ TEST(PoseLine, hasWhatTheSchemaSays) {
   EXPECT_EQ(j.size(), 18U) << "a key that docs/live_interface.md does not have";
 }
 
-TEST(PoseLine, ofALostFrameHasNoPlace) {
+TEST(PoseLine, omitsPositionWhenLost) {
   PoseSample lost = sample();
   lost.status = PoseStatus::lost;
   const auto j = line_of(lost, EnuPose{}, std::nullopt);
@@ -96,7 +97,7 @@ TEST(PoseLine, ofALostFrameHasNoPlace) {
   EXPECT_TRUE(j["age_ms"].is_null());
 }
 
-TEST(PoseLine, staysJsonWithNumbersThatAreNone) {
+TEST(PoseLine, nonFiniteNumbersAreNull) {
   PoseSample pose = sample();
   pose.T_world_left.t[1] = std::numeric_limits<double>::infinity();
   pose.motion_covariance[3] = std::numeric_limits<float>::infinity();
@@ -107,7 +108,7 @@ TEST(PoseLine, staysJsonWithNumbersThatAreNone) {
   EXPECT_TRUE(j["reprojection_px"].is_null());
 }
 
-TEST(PoseStream, CalibrationLineHoldsTheRig) {
+TEST(PoseStream, calibrationLineHoldsRig) {
   CalibrationRecord record;
   record.stamp = Stamp(5);
   record.calibration.cameras = 2;
@@ -136,7 +137,7 @@ TEST(PoseStream, CalibrationLineHoldsTheRig) {
   EXPECT_EQ(T[1], record.calibration.T_camera_left[1].R(0, 1)) << "row by row";
 }
 
-TEST(PoseStream, StatusLineBeforeAndAfterTheFirstFrame) {
+TEST(PoseStream, statusLineBeforeAndAfterFirstFrame) {
   StreamStatus status;
   status.session = "monday";
   auto j = nlohmann::json::parse(status_line(status));
@@ -176,14 +177,24 @@ class Kept final : public LineSocket {
     eventfd_t ignored = 0;
     if (event.revents != 0) (void)::eventfd_read(wake, &ignored);
     if (request.empty() || event.revents == 0) return;
-    response = answer(std::exchange(request, ""));
+    const LineResponse given = answer(std::exchange(request, ""));
+    response = given.line;
+    images_wanted = given.image_interval > Duration{};
     answered = true;
+  }
+  [[nodiscard]] bool wants_images() const noexcept override { return images_wanted; }
+  void send_images(std::string_view bytes) noexcept override {
+    images = bytes;
+    images_wanted = false;
+    images_sent = true;
   }
   [[nodiscard]] LineSocketCounters counters() const noexcept override { return {}; }
 
   // Used by the publisher's thread while it runs.
   std::string greeting{}, request{}, response{};
-  std::atomic<bool> answered{false};
+  std::string images{};
+  bool images_wanted = false;
+  std::atomic<bool> answered{false}, images_sent{false};
 
  private:
   std::vector<std::string>* lines_;
@@ -198,7 +209,7 @@ PoseSample sample(std::uint64_t frame) {
   return s;
 }
 
-TEST(LinePublisher, aFullRingLosesTheNewestCountsThemAndNeverWaits) {
+TEST(LinePublisher, fullRingDropsAndCountsNewestPoses) {
   SessionRequests requests;
   std::vector<std::string> lines;
   std::atomic<bool> open{false};
@@ -223,7 +234,7 @@ TEST(LinePublisher, aFullRingLosesTheNewestCountsThemAndNeverWaits) {
   }
 }
 
-TEST(LinePublisher, takesNoMemoryOnTheEstimatorsThreadAndBringsPosesToTheEarth) {
+TEST(LinePublisher, estimatorThreadDoesNotAllocate) {
   SessionRequests requests;
   std::vector<std::string> lines;
   std::atomic<bool> open{true};
@@ -243,7 +254,7 @@ TEST(LinePublisher, takesNoMemoryOnTheEstimatorsThreadAndBringsPosesToTheEarth) 
   EXPECT_EQ(nlohmann::json::parse(lines[0])["enu"]["enu_m"], (std::vector<double>{1, 2, 3}));
 }
 
-TEST(LinePublisher, GreetsWithTheNewestCalibrationInUseAndTheAlignment) {
+TEST(LinePublisher, greetsWithCalibrationAndAlignment) {
   SessionRequests requests;
   std::vector<std::string> lines;
   std::atomic<bool> open{true};
@@ -264,6 +275,55 @@ TEST(LinePublisher, GreetsWithTheNewestCalibrationInUseAndTheAlignment) {
   EXPECT_EQ(nlohmann::json::parse(socket->greeting.substr(end))["origin"]["height_m"], 60);
 }
 
+TEST(LinePublisher, imagesFollowARequestForThem) {
+  SessionRequests requests;
+  std::vector<std::string> lines;
+  std::atomic<bool> open{true};
+  auto kept = std::make_unique<Kept>(&lines, &open);
+  Kept* socket = kept.get();
+  socket->request = R"({"request": "images", "rate_hz": 5})";
+  LinePublisher publisher(std::move(kept), &requests, {});
+  SessionStart start;
+  start.camera_names = {"left", "right"};
+  start.image_bytes = 6;
+  publisher.on_start(start);
+  const std::string pixels = "abcdefgh";  // rows of 4 bytes
+  RigFrame frame;
+  frame.cameras = 2;
+  frame.images[0] = {reinterpret_cast<const std::uint8_t*>(pixels.data()), 3, 2, 4};
+  frame.images[1] = {reinterpret_cast<const std::uint8_t*>(pixels.data()), 2, 2, 4};
+  for (frame.number = 0; !socket->images_sent && frame.number < 20'000; ++frame.number) {
+    frame.stamp = Stamp(static_cast<std::int64_t>(frame.number) * 50'000'000);
+    AllocationGuard::seal_thread();
+    const auto before = AllocationGuard::runtime_allocations();
+    publisher.on_frame(frame);
+    publisher.on_pose(sample(frame.number));
+    EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
+    AllocationGuard::unseal_thread();
+    std::this_thread::sleep_for(std::chrono::microseconds(500));
+  }
+  (void)publisher.counters();
+  ASSERT_TRUE(socket->images_sent);
+  std::string_view rest = socket->images;
+  const auto next = [&rest] {
+    const std::size_t end = rest.find('\n');
+    auto line = nlohmann::json::parse(rest.substr(0, end));
+    rest.remove_prefix(end + 1);
+    return line;
+  };
+  const auto left = next();
+  EXPECT_EQ(left["type"], "image");
+  EXPECT_EQ(left["name"], "left");
+  EXPECT_EQ(left["bytes"], 6);
+  EXPECT_EQ(left["stamp_ns"], left["frame"].get<std::int64_t>() * 50'000'000);
+  EXPECT_EQ(rest.substr(0, 6), "abcefg") << "without padding";
+  rest.remove_prefix(6);
+  const auto right = next();
+  EXPECT_EQ(right["camera"], 1);
+  EXPECT_EQ(right["stamp_ns"], left["stamp_ns"]);
+  EXPECT_EQ(rest, "abef");
+}
+
 struct RequestCase {
   const char* request;
   bool can_recalibrate, accepted;
@@ -272,7 +332,7 @@ void PrintTo(const RequestCase& c, std::ostream* out) { *out << c.request; }
 
 class LineRequests : public testing::TestWithParam<RequestCase> {};
 
-TEST_P(LineRequests, ActOnlyWhereTheyAreUnderstoodAndTheSessionCan) {
+TEST_P(LineRequests, areAcceptedOnlyIfTheSessionCan) {
   const RequestCase& c = GetParam();
   SessionRequests requests;
   std::vector<std::string> lines;
@@ -294,17 +354,22 @@ TEST_P(LineRequests, ActOnlyWhereTheyAreUnderstoodAndTheSessionCan) {
   const auto j = nlohmann::json::parse(response);
   EXPECT_EQ(j["type"], "response");
   EXPECT_EQ(j["accepted"], c.accepted);
-  EXPECT_EQ(requests.recalibrate.load(), c.accepted);
+  EXPECT_EQ(requests.recalibrate.load(),
+            c.accepted && std::string_view(c.request).find("images") == std::string_view::npos);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, LineRequests,
-                         testing::Values(RequestCase{R"({"request": "recalibrate"})", true, true},
-                                         RequestCase{R"({"request": "recalibrate"})", false, false},
-                                         RequestCase{R"({"request": "reboot"})", true, false},
-                                         RequestCase{R"({"request": 7})", true, false},
-                                         RequestCase{R"(["recalibrate"])", true, false},
-                                         RequestCase{"{\xff", true, false},
-                                         RequestCase{" ", true, false}));
+INSTANTIATE_TEST_SUITE_P(
+    All, LineRequests,
+    testing::Values(RequestCase{R"({"request": "recalibrate"})", true, true},
+                    RequestCase{R"({"request": "recalibrate"})", false, false},
+                    RequestCase{R"({"request": "images", "rate_hz": 200})", false, true},
+                    RequestCase{R"({"request": "images", "rate_hz": 201})", true, false},
+                    RequestCase{R"({"request": "images", "rate_hz": 0})", true, false},
+                    RequestCase{R"({"request": "images"})", true, false},
+                    RequestCase{R"({"request": "reboot"})", true, false},
+                    RequestCase{R"({"request": 7})", true, false},
+                    RequestCase{R"(["recalibrate"])", true, false},
+                    RequestCase{"{\xff", true, false}, RequestCase{" ", true, false}));
 
 }  // namespace
 }  // namespace vergence::app

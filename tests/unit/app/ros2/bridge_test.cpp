@@ -159,7 +159,7 @@ constexpr std::int64_t kStep = 50'000'000;  // ns
 
 /// A vehicle that drives an arc at a constant speed, whose camera sits off its origin: the speed
 /// and the pose of the vehicle come out, not those of the camera.
-TEST(Bridge, OdometryIsThatOfTheVehicle) {
+TEST(Bridge, odometryIsOfTheBaseFrame) {
   const BridgeOptions options = on_vehicle();
   Kept kept;
   Bridge bridge(options, &kept);
@@ -190,7 +190,7 @@ TEST(Bridge, OdometryIsThatOfTheVehicle) {
 }
 
 /// Against differences of the pose itself.
-TEST(Bridge, CovariancesAreTurnedAndMovedToTheVehicle) {
+TEST(Bridge, poseCovarianceIsOfTheBaseFrame) {
   const BridgeOptions options = on_vehicle();
   Pose pose{0, {exp_so3({0.3, -0.8, 0.1}), {5, -1, 20}}};
   Matrix6 root = Matrix6::Zero();
@@ -218,7 +218,7 @@ TEST(Bridge, CovariancesAreTurnedAndMovedToTheVehicle) {
   EXPECT_LT((o.pose_covariance - wanted).norm(), 1e-4 * wanted.norm());
 }
 
-TEST(Bridge, TwistCovarianceHasTheMotionsAndTheLengths) {
+TEST(Bridge, twistCovarianceAddsScaleUncertainty) {
   BridgeOptions options;  // the camera at the vehicle's origin
   options.T_base_left = mount_of(Vec3::Zero(), Vec3::Zero());
   Kept kept;
@@ -247,7 +247,7 @@ void PrintTo(const StatusCase& c, std::ostream* out) { *out << c.status << " " <
 
 class BridgeStatus : public testing::TestWithParam<StatusCase> {};
 
-TEST_P(BridgeStatus, DegradedIsWidenedAndLostIsNotPublished) {
+TEST_P(BridgeStatus, degradedIsWidenedLostIsNotPublished) {
   Kept kept;
   Bridge bridge({}, &kept);
   Pose pose;
@@ -270,7 +270,7 @@ INSTANTIATE_TEST_SUITE_P(All, BridgeStatus,
                                          StatusCase{"lost", "no_pose", 0}));
 
 /// The bridge's list names reasons as the stream has them: a renamed one would be widened less.
-TEST(Bridge, EveryReasonOfTheListIsOne) {
+TEST(Bridge, listedReasonsExist) {
   std::map<double, int> reasons;  // by the variance that they make of 1
   for (int i = 1; i <= static_cast<int>(Reason::pairing_ambiguous); ++i) {
     Kept kept;
@@ -285,7 +285,7 @@ TEST(Bridge, EveryReasonOfTheListIsOne) {
   EXPECT_EQ(reasons[9], 7);
 }
 
-TEST(Bridge, NoSpeedAcrossAGapALostPoseOrAnotherConnection) {
+TEST(Bridge, speedIsUnknownAfterAGap) {
   Kept kept;
   Bridge bridge({}, &kept);
   Pose pose;
@@ -307,7 +307,7 @@ TEST(Bridge, NoSpeedAcrossAGapALostPoseOrAnotherConnection) {
   EXPECT_FALSE(measured(kStep));
 }
 
-TEST(Bridge, TheCamerasOpticalFrameIsTheChildWhereAsked) {
+TEST(Bridge, childCameraIsOpticalFrame) {
   BridgeOptions options;
   options.camera_child = true;
   Kept kept;
@@ -322,7 +322,7 @@ TEST(Bridge, TheCamerasOpticalFrameIsTheChildWhereAsked) {
   EXPECT_LT((o.pose.R.col(2) - Vec3::UnitX()).norm(), 1e-12) << "z is the camera's view";
 }
 
-TEST(Bridge, ACalibrationIsLatchedOnceUnderNamesOfRos) {
+TEST(Bridge, latchesCalibrationUnderRosNames) {
   BridgeOptions options = on_vehicle();
   Kept kept;
   Bridge bridge(options, &kept);
@@ -339,7 +339,35 @@ TEST(Bridge, ACalibrationIsLatchedOnceUnderNamesOfRos) {
   EXPECT_EQ(kept.messages["/tf_static"].size(), 2U) << "another one";
 }
 
-TEST(Bridge, PlacesOnTheEarthComeWithTheAlignment) {
+TEST(Bridge, imageComesWithCameraInfoOfItsStamp) {
+  constexpr const char* kImage =
+      R"({"version":2,"type":"image","frame":4,"stamp_ns":5000000009,"camera":1,"name":"right","width":3,"height":2,"bytes":6})";
+  BridgeOptions options;
+  options.images = true;
+  Kept kept;
+  Bridge bridge(options, &kept);
+  EXPECT_EQ(bridge.begin_image(kImage), 6U);
+  bridge.end_image("abcdef");  // before a calibration
+  bridge.add(calibration_line("left", "right"));
+  auto& images = kept.messages["/vergence/right/image_raw"];
+  const auto& info = kept.messages["/vergence/right/camera_info"];
+  EXPECT_TRUE(images.empty());
+  EXPECT_EQ(bridge.begin_image(kImage), 6U);
+  bridge.end_image("abcdef");
+  ASSERT_EQ(images.size(), 1U);
+  ASSERT_EQ(info.size(), 2U);
+  // Encapsulation and stamp.
+  EXPECT_TRUE(std::equal(images[0].begin(), images[0].begin() + 12, info[1].begin()));
+  EXPECT_EQ(std::string(images[0].end() - 6, images[0].end()), "abcdef");
+  EXPECT_EQ(bridge.malformed(), 0U);
+  (void)bridge.begin_image(kImage);
+  bridge.end_image("abcdefg");
+  EXPECT_EQ(images.size(), 1U);
+  EXPECT_EQ(bridge.malformed(), 1U) << "another size than the line's";
+  EXPECT_EQ(bridge.begin_image(kStatus), 0U);
+}
+
+TEST(Bridge, publishesEnuPoseOnceAligned) {
   Kept kept;
   BridgeOptions options;
   options.T_base_left = mount_of(Vec3::Zero(), Vec3::Zero());
@@ -370,7 +398,7 @@ TEST(Bridge, PlacesOnTheEarthComeWithTheAlignment) {
   EXPECT_NEAR(latitude, -27.5 + 120 / 110'800.0, 1e-6);
 }
 
-TEST(Bridge, ResponsesAreHandedOver) {
+TEST(Bridge, returnsResponses) {
   Kept kept;
   Bridge bridge({}, &kept);
   const auto response = bridge.add(
@@ -381,7 +409,7 @@ TEST(Bridge, ResponsesAreHandedOver) {
   EXPECT_FALSE(bridge.add(kStatus));
 }
 
-TEST(Bridge, AnotherVersionIsRefusedAndBothAreNamed) {
+TEST(Bridge, otherVersionIsInputErrorWithBoth) {
   Kept kept;
   Bridge bridge({}, &kept);
   try {
@@ -393,7 +421,7 @@ TEST(Bridge, AnotherVersionIsRefusedAndBothAreNamed) {
   }
 }
 
-TEST(Bridge, MalformedLinesAreCountedAndNothingElse) {
+TEST(Bridge, malformedLinesAreOnlyCounted) {
   Kept kept;
   Bridge bridge({}, &kept);
   Random random(1);
@@ -424,7 +452,7 @@ void PrintTo(const DiagnosticCase& c, std::ostream* out) { *out << c.replace; }
 
 class BridgeDiagnostics : public testing::TestWithParam<DiagnosticCase> {};
 
-TEST_P(BridgeDiagnostics, LevelsFollowTheStatus) {
+TEST_P(BridgeDiagnostics, levelsFollowStatus) {
   const DiagnosticCase& c = GetParam();
   Kept kept;
   Bridge bridge({}, &kept);
