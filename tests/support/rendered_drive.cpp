@@ -44,6 +44,23 @@ RigCalibration paper_rig() {
   return rig;
 }
 
+RigCalibration nominal_rig() {
+  RigCalibration rig;
+  rig.cameras = 2;
+  rig.baseline = 0.75;
+  for (std::size_t k = 0; k < 2; ++k) {
+    Intrinsics& lens = rig.intrinsics[k];
+    lens.width = 640;
+    lens.height = 480;
+    lens.fx = lens.fy = 0.72 * lens.width;
+    lens.cx = 0.5 * (lens.width - 1);
+    lens.cy = 0.5 * (lens.height - 1);
+    lens.distortion = {-0.08, 0.02, 0, 0, 0};
+    rig.T_camera_left[k].t = {-rig.baseline * static_cast<double>(k), 0, 0};
+  }
+  return rig;
+}
+
 struct RenderedDrive::Parts {
   explicit Parts(const RenderedDriveOptions& o) : options(o), drive(o.drive, *world()) {
     for (int k = 0; k < o.rig.cameras; ++k) {

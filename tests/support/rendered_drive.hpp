@@ -14,6 +14,9 @@ namespace vergence::test {
 /// The rig of the paper's experiment: 1024 × 768 px, 0.75 m, its published intrinsics and
 /// extrinsics, no distortion.
 [[nodiscard]] RigCalibration paper_rig();
+/// The rig that `rig.nominal` of app/config/mock.yaml describes: 640 × 480 px, parallel cameras
+/// 0.75 m apart.
+[[nodiscard]] RigCalibration nominal_rig();
 
 struct RenderedDriveOptions {
   RigCalibration rig = paper_rig();  // true

@@ -135,7 +135,7 @@ TEST(RecordedClaims, wrongFixedCalibrationKeepsShapeOfPath) {
   const DriveOutcome o =
       drive_recorded(*d, d->sequence, held, app::replayed_calibration(held, d->sequence, false));
   EXPECT_EQ(o.lost, 0);
-  EXPECT_EQ(o.contradicted_at, -1) << "nobody was asked";
+  EXPECT_EQ(o.contradicted_at, -1) << "online calibration is off";
   // Held as exact, 6.2 % and 0.34 m after one scale; the best peer, 4.7 % and 0.05 m.
   EXPECT_LT(o.segments_percent, 1.1);
   EXPECT_LT(o.ate_scaled_m, 0.05);

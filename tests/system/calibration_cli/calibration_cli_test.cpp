@@ -118,7 +118,7 @@ TEST_F(CalibrationCli, stateFileIsUsedUnlessTheRigDiffers) {
 
   const Outcome other = drive("other", "--duration 1 --set cameras.1.serial=another");
   EXPECT_EQ(other.code, 0);
-  EXPECT_TRUE(test::mentions(other.err, "another")) << "told why it is not used";
+  EXPECT_TRUE(test::mentions(other.err, "another")) << "the reason why it is not used";
   EXPECT_TRUE(test::mentions(lines("other", "calibrations.csv").at(1), ",accepted,given,"));
   EXPECT_EQ(read_file(state()), kept) << "nothing was accepted since";
 

@@ -66,7 +66,7 @@ TEST_F(IidcRig, busClockIsSharedAcrossItsWrap) {
     }
   }
   EXPECT_GT(compared, frames / 2);
-  // Against the host's clock: 50 ppm fast where the card says so, and never a leap.
+  // Against the host's clock the card's runs 50 ppm fast and never jumps.
   const double host = static_cast<double>(a.middles.back() - a.middles.front());
   const double bus = static_cast<double>(a.starts.back() - a.starts.front());
   EXPECT_NEAR(bus / host - 1, wraps ? 50e-6 : 0, 1e-6);

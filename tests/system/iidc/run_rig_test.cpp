@@ -18,6 +18,7 @@
 #include "tests/rigs/iidc_rig.hpp"
 #include "tests/support/thread_allocations.hpp"
 #include "tests/support/xsens_terminal.hpp"
+#include "tests/system/run/session.hpp"
 
 namespace vergence::test {
 namespace {
@@ -132,7 +133,7 @@ TEST_P(IidcRun, exampleConfigurationPosesEveryPair) {
 
   const auto out = run_film(GetParam().name, GetParam().configuration, 9, {});
   const std::string report = emulator.finish();
-  const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
+  const auto summary = test::summary_of(out);
   const auto& frames = summary.at("frames");
   const auto& devices = summary.at("devices");
   SCOPED_TRACE(summary.dump(1) + report);
@@ -188,7 +189,7 @@ TEST(BoardRun, triggerBoardCamerasAndInsMakeOneSession) {
                              "ins.port=/dev/ttyUSB1", "ins.baud=115200", "ins.rate=20"});
   wired = false;
   const std::string report = cameras.finish();
-  const auto summary = nlohmann::json::parse(std::ifstream(out / "summary.json"));
+  const auto summary = test::summary_of(out);
   SCOPED_TRACE(summary.dump(1) + report);
   expect_a_drive(out, summary, film);
   const auto& pairing = summary.at("time").at("pairing");

@@ -9,8 +9,6 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,6 +20,7 @@
 #include "tests/rigs/vivid.hpp"
 #include "tests/support/child_program.hpp"
 #include "tests/support/thread_allocations.hpp"
+#include "tests/system/run/session.hpp"
 
 namespace vergence {
 namespace {
@@ -29,18 +28,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::int64_t kInterval_ns = 100'000'000;
-
-std::size_t lines_of(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(in), {}, '\n'));
-}
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream all;
-  all << in.rdbuf();
-  return all.str();
-}
 
 class V4l2Run : public ::testing::Test {
  protected:
@@ -76,7 +63,7 @@ class V4l2Run : public ::testing::Test {
   };
   void drive(test::ChildProgram* program, Roll* roll, const test::Film& film) const {
     for (const auto end = std::chrono::steady_clock::now() + 60s;
-         lines_of(session_ + "/poses.csv") < 6;) {
+         test::lines_of(session_ + "/poses.csv") < 6;) {
       ASSERT_LT(std::chrono::steady_clock::now(), end) << "no pose in a minute";
       std::this_thread::sleep_for(100ms);
     }
@@ -85,9 +72,6 @@ class V4l2Run : public ::testing::Test {
                                 (static_cast<int>(film.pairs()) + 20));
     program->signal(SIGINT);
     EXPECT_EQ(program->wait(30s), 130) << "ended by the signal, session closed";
-  }
-  nlohmann::json summary() const {
-    return nlohmann::json::parse(text_of(session_ + "/summary.json"));
   }
   /// Nothing that came was lost, and the trajectory is the film's.
   void expect_the_drive(const test::Film& film, const nlohmann::json& summary) const {
@@ -146,7 +130,7 @@ TEST_F(V4l2Run, trajectoryIsThatOfTheFilm) {
       });
   test::ChildProgram program(words());
   ASSERT_NO_FATAL_FAILURE(drive(&program, &roll, film));
-  const nlohmann::json s = summary();
+  const nlohmann::json s = test::summary_of(session_);
   expect_the_drive(film, s);
   EXPECT_EQ(s["devices"]["frames_incomplete"], 0);
   for (const char* name : {"camera0_underruns", "camera1_underruns"})
@@ -181,7 +165,7 @@ TEST_F(V4l2Run, sideBySideCameraGivesTrajectoryOfTheFilm) {
       kSize);
   test::ChildProgram program(side_by_side());
   ASSERT_NO_FATAL_FAILURE(drive(&program, &roll, film));
-  const nlohmann::json s = summary();
+  const nlohmann::json s = test::summary_of(session_);
   expect_the_drive(film, s);
   EXPECT_EQ(s["devices"]["sets_ambiguous"], 0) << s["devices"].dump(1);
   EXPECT_EQ(s["devices"]["sets_incomplete"], 0) << "one picture has both";

@@ -148,7 +148,7 @@ TEST(BadBundle, poseWithTwoPointsIsRankDeficient) {
   EXPECT_TRUE(rig.T_left_world[3].finite());
 }
 
-/// Problems that nobody would pose: whatever comes out has a name and is finite.
+/// Random invalid problems give a named termination and finite results.
 TEST(BundleFuzz, randomInvalidProblemsStayFinite) {
   SimulationOptions s;
   s.points = 20;

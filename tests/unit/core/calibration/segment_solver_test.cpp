@@ -116,7 +116,7 @@ TEST(SegmentSolver, joinedSegmentsReduceTheSigmas) {
               4 * std::sqrt(five_covariance(joined.solved[2].rig.covariance_total[1])(i, i)))
         << i;
   EXPECT_EQ(joined.solved[2].rig.frames, 3 * static_cast<int>(kStretch));
-  // The first knows nothing of others in either kind.
+  // The first segment has no predecessor of either kind.
   EXPECT_EQ(joined.solved[0].rig.T_camera_left[1].t, alone.solved[0].rig.T_camera_left[1].t);
   EXPECT_NE(joined.solved[1].rig.T_camera_left[1].t, alone.solved[1].rig.T_camera_left[1].t);
 }

@@ -392,7 +392,7 @@ TEST(Comparison, scaleErrorAboveTwoPercentIsReported) {
     EXPECT_NEAR(c.path_ratio, scale, 1e-4);
     EXPECT_EQ(c.scale_disagrees, std::abs(scale - 1) > 0.02);
   }
-  // A receiver that knows 2.5 m cannot tell 3 % of 200 m: 4 √2 2.5 / 200 = 7 %.
+  // A receiver with a sigma of 2.5 m does not resolve 3 % of 200 m: 4 √2 2.5 / 200 = 7 %.
   Bench b;
   b.drive(
       0, 60, [](double, InsSample* s) { return s->position_sigma = 2.5, true; },

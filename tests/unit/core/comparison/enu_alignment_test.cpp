@@ -84,8 +84,8 @@ TEST(FitEnuAlignment, tiltAndPositionsAreWeightedBySigma) {
     EXPECT_EQ(fit_enu_alignment(pairs, kCorrelation, &alignment), EnuAlignmentStatus::ok);
     return rotation_error(alignment);
   };
-  EXPECT_LT(pitched(1.0), 0.02 * wrong);   // attitude that knows nothing
-  EXPECT_GT(pitched(1e-5), 0.98 * wrong);  // attitude that knows all
+  EXPECT_LT(pitched(1.0), 0.02 * wrong);   // The attitude has no weight.
+  EXPECT_GT(pitched(1e-5), 0.98 * wrong);  // The attitude has all the weight.
   // Two independent heights over 100 m (10 s, correlation 10 s) hold the pitch to σ_h √12 / (L √2).
   const double sigma_pitch = 5.0 * std::sqrt(12.0) / (100.0 * std::sqrt(2.0));
   const double tilt = 0.1, expected = wrong / (1.0 + tilt * tilt / (sigma_pitch * sigma_pitch));

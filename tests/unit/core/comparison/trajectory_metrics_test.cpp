@@ -70,7 +70,7 @@ TEST(Associate, unmatchedPosesAreCountedByCause) {
   EXPECT_DOUBLE_EQ(m.reference[0].T_world_body.t.x(), 1);
   EXPECT_DOUBLE_EQ(m.reference[1].T_world_body.t.x(), 1.5);
   EXPECT_DOUBLE_EQ(m.reference[2].T_world_body.t.x(),
-                   3);  // a reference at the very stamp counts, whatever the hole beside it
+                   3);  // A reference at the same stamp counts beside any gap.
   EXPECT_DOUBLE_EQ(m.reference[3].T_world_body.t.x(), 4);
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::array kStateNames = {"none", "unverified", "verified", "suspect"};
 constexpr std::array kTriggerNames = {"adopted",      "adopted_verified", "confirmed",
-                                      "contradicted", "doubted",          "kept"};
+                                      "contradicted", "suspected",        "kept"};
 constexpr std::array kEstimatorTriggerNames = {"calibration_given",
                                                "pair_found",
                                                "frames_enough",
@@ -28,7 +28,7 @@ constexpr std::array kEstimatorTriggerNames = {"calibration_given",
                                                "requested",
                                                "pose_lost",
                                                "pose_found",
-                                               "pose_found_doubtful",
+                                               "pose_found_suspect",
                                                "pose_found_uncalibrated"};
 constexpr std::array kDegradationNames = {"pairing",    "scene", "frame",       "out_of_sync",
                                           "late_image", "rig",   "calibration", "dynamic_scene",

@@ -52,7 +52,7 @@ TEST_P(RepeatedImage, repeatedImageIsNotTakenForStandstill) {
       EXPECT_LT(off, 0.025 + 0.01 * truth.t.norm()) << i;
     }
   }
-  // The first new image after 2.4 m that nobody saw may have to be found again in the next one.
+  // The first new image after 2.4 m without images may have to be found again in the next one.
   EXPECT_GE(posed, kLast - 1);
 }
 

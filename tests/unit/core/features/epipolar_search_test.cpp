@@ -10,6 +10,7 @@
 namespace vergence::features {
 namespace {
 
+using test::Built;
 using test::draw;
 using test::Image;
 using test::Texture;
@@ -28,16 +29,6 @@ Intrinsics lens(bool distorted) {
   if (distorted) k.distortion = {-0.28, 0.07, 0.0004, -0.0003, 0};
   return k;
 }
-
-struct Built {
-  Arena arena;
-  Pyramid pyramid;
-  explicit Built(const ImageView& image)
-      : arena(Pyramid::memory_needed(image.width, image.height, 3)),
-        pyramid(image.width, image.height, 3, arena) {
-    pyramid.build(image);
-  }
-};
 
 /// Two cameras before a wall at depth `depth` (m, in left), painted with a function of the ideal
 /// left pixel.

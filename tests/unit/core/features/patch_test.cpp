@@ -12,6 +12,7 @@
 namespace vergence::features {
 namespace {
 
+using test::Built;
 using test::draw;
 using test::Image;
 using test::Texture;
@@ -21,16 +22,6 @@ constexpr int kWidth = 180, kHeight = 160;
 // (grey levels / px)², which makes 0.01 px of that; bilinear interpolation of waves down to 8 px
 // adds as much, and steps end below 0.01 px.
 constexpr double kSubPixel = 0.02;
-
-struct Built {
-  Arena arena;
-  Pyramid pyramid;
-  explicit Built(const ImageView& image, int levels = 3)
-      : arena(Pyramid::memory_needed(image.width, image.height, levels)),
-        pyramid(image.width, image.height, levels, arena) {
-    pyramid.build(image);
-  }
-};
 
 /// A texture and its patch cut at a pixel.
 struct Scene {
@@ -123,7 +114,7 @@ TEST(Patch, rotatedAndScaledPatchIsFound) {
 
 TEST(Patch, sigmaMatchesTheErrorDueToNoise) {
   // One grey level of noise in the image (with the rounding 1.04), a clean patch: along the worst
-  // direction the error's sigma is the one told, along the other it is less, so the whole lies
+  // direction the error's sigma is the stated one, along the other it is less, so the whole lies
   // between one and √2 of it. 200 cases know it to 5 %; kSettled and interpolation add 0.02 px.
   double square = 0, predicted = 0;
   constexpr int kCases = 200;

@@ -9,19 +9,9 @@
 namespace vergence::features {
 namespace {
 
+using test::Built;
 using test::Image;
 using test::white_noise;
-
-/// Arena and pyramid of it, built from an image.
-struct Built {
-  Arena arena;
-  Pyramid pyramid;
-  Built(const ImageView& image, int levels)
-      : arena(Pyramid::memory_needed(image.width, image.height, levels)),
-        pyramid(image.width, image.height, levels, arena) {
-    pyramid.build(image);
-  }
-};
 
 int different_pixels(const ImageView& a, const ImageView& b) {
   if (a.width != b.width || a.height != b.height) return -1;

@@ -279,7 +279,7 @@ TEST(Surf, smallFlatOrInvalidImageHasNoPoint) {
     const Image noise = test::white_noise(w, h, 1);
     EXPECT_EQ(surf.set_image(noise.view()), SurfStatus::ok);
     EXPECT_EQ(surf.detect({}, &points), 0) << w << " x " << h;
-    // A point that lies outside has nothing about it.
+    // A point outside the image has a descriptor of zeros.
     constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
     for (SurfPoint outside :
          {SurfPoint{1e6F, -1e6F, 3, 0, 1, false}, SurfPoint{kNaN, 1e30F, 3, 0, 1, false},

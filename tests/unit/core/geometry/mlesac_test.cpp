@@ -33,7 +33,7 @@ double share_flagged_right(const RigScene& scene, const RigObservations& o,
 
 TEST_F(RigMlesacTest, poseAmongHalfOutliersIsFoundAndFlagged) {
   // T² = 9.21 alone calls 1 % of good pixels wrong, 2 % of points seen twice; three-point poses
-  // carry noise of their own, so sigma is told three times as large as it is.
+  // carry noise of their own, so the stated sigma is three times the true one.
   int poses = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Random random(seed);

@@ -140,7 +140,7 @@ TEST_F(Disciplined, rateIsKeptAfterPpsIsLost) {
   feed(1, 60);
   const double before = error_us(59.4);
   b.run_until(pps.count(65));
-  EXPECT_EQ(b.status().pps_locked, 0) << "said within five seconds";
+  EXPECT_EQ(b.status().pps_locked, 0) << "reported within five seconds";
   b.run_until(pps.count(659));
   const double after = error_us(659);
   EXPECT_LT(std::abs(after - before), 600 * 0.02 + 2) << "0.02 ppm: a count in a second";
