@@ -77,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(Drives, RecordedLenses,
                                          Reach{"euroc_mh01", 0, 0.0041, 0.008}),
                          [](const auto& drive) { return std::string(drive.param.name); });
 
-TEST(RecordedClaims, wrongNominalCalibrationIsReplacedBeforeOk) {
+TEST(RecordedCalibration, wrongNominalCalibrationIsReplacedBeforeOk) {
   const auto d = open_recorded("kitti01_51");
   if (!d) GTEST_SKIP() << missing("kitti01_51");
   const DriveOutcome o =
@@ -91,7 +91,7 @@ TEST(RecordedClaims, wrongNominalCalibrationIsReplacedBeforeOk) {
   EXPECT_NEAR(log_so3(o.rig->T_camera_left[1].R).y(), 26.5e-3, 2e-3);
 }
 
-TEST(RecordedClaims, rotationFromTheStartIsEstimatedAndNoKnock) {
+TEST(RecordedCalibration, rotationFromTheStartIsEstimatedAndNoKnock) {
   const auto d = open_recorded("kitti06_51");
   if (!d) GTEST_SKIP() << missing("kitti06_51");
   const TemporaryFolder folder;
@@ -114,7 +114,7 @@ TEST(RecordedClaims, rotationFromTheStartIsEstimatedAndNoKnock) {
   }
 }
 
-TEST(RecordedClaims, focalLengthOffByAFifthIsNeverOk) {
+TEST(RecordedCalibration, focalLengthOffByAFifthIsNeverOk) {
   const auto d = open_recorded("kitti06_51");
   if (!d) GTEST_SKIP() << missing("kitti06_51");
   const StartingCalibration given = app::replayed_calibration(configuration(), d->sequence, false);
@@ -128,7 +128,7 @@ TEST(RecordedClaims, focalLengthOffByAFifthIsNeverOk) {
   }
 }
 
-TEST(RecordedClaims, wrongFixedCalibrationKeepsShapeOfPath) {
+TEST(RecordedCalibration, wrongFixedCalibrationKeepsShapeOfPath) {
   const auto d = open_recorded("kitti01_51");
   if (!d) GTEST_SKIP() << missing("kitti01_51");
   const app::Configuration held = app::load_configuration(std::nullopt, {"calibration.online=off"});
