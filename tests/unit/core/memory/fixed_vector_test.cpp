@@ -51,12 +51,12 @@ void walk_beside_a_model(Vector& vector, std::uint64_t seed) {
   }
 }
 
-TEST(FixedVector, behavesLikeALimitedVector) {
+TEST(FixedVector, operationsMatchALimitedVector) {
   FixedVector<int, 13> vector;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) walk_beside_a_model(vector, seed), vector.clear();
 }
 
-TEST(BoundedVector, behavesLikeALimitedVector) {
+TEST(BoundedVector, operationsMatchALimitedVector) {
   std::array<int, 13> storage{};
   BoundedVector<int> vector(storage);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) walk_beside_a_model(vector, seed), vector.clear();
