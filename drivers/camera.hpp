@@ -177,7 +177,7 @@ class CameraDevice {
 /// One kind of camera: a row in the table of drivers.
 ///
 /// Ownership  A device may outlive its driver.
-/// Threads    One caller. Memory: ordinary; before the drive only.
+/// Not thread-safe. Memory: ordinary; before the drive only.
 class CameraDriver {
  public:
   virtual ~CameraDriver() = default;

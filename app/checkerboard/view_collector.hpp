@@ -16,7 +16,7 @@ enum class OfferResult : std::uint8_t {
 
 /// Picks from live images the views that a calibration needs.
 ///
-/// Threads  One caller. Memory ordinary.
+/// Not thread-safe. Allocates.
 class ViewCollector {
  public:
   explicit ViewCollector(Coverage coverage, double image_width_px);

@@ -57,7 +57,7 @@ struct LineResponse {
 
 /// Where lines go: a Unix stream socket with a few readers, or datagrams to one address.
 ///
-/// Threads  One caller. Sending never waits: a reader without room loses whole lines, never a part
+/// Not thread-safe. Sending never waits: a reader without room loses whole lines, never a part
 ///          of one, and is disconnected when it does not read for a while.
 /// Errors   The constructors throw InputError: what, where, what to do. Afterwards counters.
 class LineSocket {

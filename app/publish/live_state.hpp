@@ -23,7 +23,7 @@ namespace vergence::app {
 /// The points of the live page's map, farther apart as the drive grows longer. A place has the
 /// worst status of all that was driven up to the next one.
 ///
-/// Threads  One.
+/// Not thread-safe.
 /// Full     After kMax places every other one goes, so 64 km are shown; then the oldest do.
 class LiveTrail {
  public:
@@ -50,7 +50,8 @@ class LiveTrail {
 
 /// State of the live page, kept so that a late viewer sees the whole session.
 ///
-/// Threads  One. Memory  Bounded: the trail is thinned when it is full, of events and calibrations
+/// Not thread-safe. Memory  Bounded: the trail is thinned when it is full, of events and
+/// calibrations
 ///          the newest stay.
 class LiveState {
  public:

@@ -17,7 +17,7 @@ namespace vergence::app {
 /// File-system interface of a recording; tests put a full, missing or slow disk in its
 /// place.
 ///
-/// Threads  One. Memory  None. Errors  Negative errno values; nothing throws.
+/// Not thread-safe. Does not allocate. Errors  Negative errno values; nothing throws.
 class Disk {
  public:
   virtual ~Disk() = default;
@@ -86,7 +86,7 @@ struct McapMessageHead {
 /// A chunk is one write, at an offset that only moves when all of it was taken; what a failed write
 /// left behind is cut off and written over. So the file is always good up to the last chunk, also
 /// without its end.
-/// Threads  One. Memory  Some 180 bytes for each of kMaxChunks, at construction; none after.
+/// Not thread-safe. Memory  Some 180 bytes for each of kMaxChunks, at construction; none after.
 /// Errors   Negative errno values.
 class McapFile {
  public:

@@ -37,7 +37,7 @@ struct ProgressState {
 /// terminal  one line, redrawn at most 10 times a second, cut to the terminal's width
 /// lines     one line every 10 s, the last one at finish(): for files and pipes
 /// quiet     nothing
-/// Threads   One caller. Time  Monotonic, from the clock handed in. Errors  A stream that fails is
+/// Not thread-safe. Time  Monotonic, from the clock handed in. Errors  A stream that fails is
 ///           ignored.
 class Progress {
  public:

@@ -25,7 +25,7 @@ namespace vergence::app {
 /// written by a later flush(), to the same open file. Lines that find the buffer full are refused
 /// and counted, so the file never lacks a line's end in the middle.
 ///
-/// Threads  One. Memory  A buffer of `pending` bytes, taken by the constructor.
+/// Not thread-safe. Memory  A buffer of `pending` bytes, taken by the constructor.
 /// Errors   The constructor throws InputError. Afterwards nothing throws: see fault().
 class LineFile {
  public:

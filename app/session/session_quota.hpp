@@ -12,7 +12,7 @@ namespace vergence::app {
 ///
 /// A session is a folder, no link, with `poses.csv` and `summary.json`: one that is still being
 /// written has no summary, and one that was cut off is kept for diagnosis. Oldest is the
-/// one whose summary is. Threads  One. Errors  None: what cannot be looked at is passed over.
+/// one whose summary is. Not thread-safe. Errors  None: what cannot be looked at is passed over.
 [[nodiscard]] std::vector<std::string> keep_session_quota(const std::filesystem::path& session,
                                                           std::uint64_t max_bytes);
 

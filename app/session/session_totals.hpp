@@ -15,7 +15,7 @@ namespace vergence::app {
 
 /// Times in fixed memory, however many: mean and largest exact, percentiles to 0.25 %.
 ///
-/// Bins grow by the factor 1 + 1/200 from 1 µs on; 4000 of them reach 460 s. Threads  One.
+/// Bins grow by the factor 1 + 1/200 from 1 µs on; 4000 of them reach 460 s. Not thread-safe.
 class TimeHistogram {
  public:
   void add(double ms) noexcept {

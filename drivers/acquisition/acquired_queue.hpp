@@ -77,7 +77,7 @@ class AcquiredQueue {
 /// A camera begins as verified, so that where nothing can be verified nothing is told; and as one
 /// of which no frame has come, so that a camera that is not yet there is not told of either.
 ///
-/// Threads  One. Memory: in place. Time: constant a call. Errors: none.
+/// Not thread-safe. Does not allocate. Constant time per call.
 class PairingTracker {
  public:
   struct Change {

@@ -15,7 +15,7 @@ namespace vergence {
 /// grow would look like a clock that drifts. So the clock is fitted to where the frame would have
 /// started with the first frame's exposure.
 ///
-/// Threads  One. Memory: that of a ClockMapper. Errors: none.
+/// Not thread-safe. Memory: that of a ClockMapper.
 class CameraClock {
  public:
   explicit CameraClock(const ClockMapperOptions& clock) : clock_(clock) {}
@@ -40,7 +40,7 @@ class CameraClock {
 
 /// Quality of a device clock's mapping, from its stamps and where they were mapped to.
 ///
-/// Threads  One. Memory: fixed. Units: the error of a stamp is a bound.
+/// Not thread-safe. Fixed memory. Units: the error of a stamp is a bound.
 class ClockRecord {
  public:
   void observe(DeviceStamp device, const MappedStamp& mapped) noexcept {
@@ -96,7 +96,7 @@ class ClockRecord {
 /// Reports of pulses on the host's clock: what the driver has not mapped is mapped here, with a new
 /// fit for every boot.
 ///
-/// Threads  One. Memory: that of a ClockMapper. Errors: none; a reboot is told.
+/// Not thread-safe. Memory: that of a ClockMapper. Errors: none; a reboot is told.
 class PulseMapper {
  public:
   struct Report {

@@ -35,7 +35,7 @@ struct ExposureOptions {
 /// Delay    A change shows after an unknown number of frames: until `settle_frames` images
 ///          have been seen since, none is judged. So each change is measured before the next is
 ///          made, and a sensor whose response is between linear and its square root does not swing.
-/// Threads  One caller. Memory: none. Errors: none.
+/// Not thread-safe. Does not allocate.
 class ExposureController {
  public:
   /// Precondition: 0 < least ≤ most. `start`: what the cameras have, brought inside the bounds.

@@ -32,7 +32,7 @@ struct Fix {
 /// Method   An epoch is complete when it has every type of sentence the one before had, when a
 ///          sentence has another time, or when the line goes quiet (flush()). VTG and HDT have no
 ///          time: the newest is used while it is fresh.
-/// Threads  One caller. Memory: fixed.
+/// Not thread-safe. Fixed memory.
 class NmeaEpochs {
  public:
   /// True: *fix is a complete epoch. A sentence of the next one is kept.
@@ -87,7 +87,7 @@ struct DecoderCounters {
 ///          an epoch's first message arrive Options::processing and their time on the wire after
 ///          the fix, or later. By what `processing` is wrong all stamps are, beyond their bound.
 /// Order    Of measurement; a fix that is not newer than the last, or without a time, is dropped.
-/// Threads  One caller. Memory: in place, no heap.
+/// Not thread-safe. Does not allocate.
 /// Errors   Counted; nothing stops the stream.
 class Decoder {
  public:

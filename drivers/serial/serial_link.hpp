@@ -60,7 +60,7 @@ class SerialLink {
 /// A place where a line can be opened, as often as needed: the device may have been unplugged in
 /// between.
 ///
-/// Threads  One caller. Memory: ordinary.
+/// Not thread-safe. Allocates.
 class SerialLinkFactory {
  public:
   virtual ~SerialLinkFactory() = default;

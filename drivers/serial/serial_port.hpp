@@ -69,7 +69,7 @@ class ConverterNumber {
 /// from its first opening, if no other port bears it: a device that comes back as ttyUSB1 is found.
 /// The port is held exclusively; a second opening is `busy`.
 ///
-/// Threads  One caller. Memory: ordinary; the lines as SerialLink says.
+/// Not thread-safe. Memory: ordinary; the lines as SerialLink says.
 class SerialPort final : public SerialLinkFactory {
  public:
   explicit SerialPort(std::string port) : port_(std::move(port)) {}

@@ -47,7 +47,7 @@ struct MappedStamp {
 ///            least delays, also unlike ones: it is the farthest that a line may be which keeps to
 ///            all bounds (a linear programme of two unknowns), plus what the rate may change within
 ///            the window.
-/// Threads    One caller. Memory: fixed. Time: constant a call; a call that tightens a bound takes
+/// Not thread-safe. Fixed memory. Time: constant a call; a call that tightens a bound takes
 ///            at most kBins² steps.
 /// Units      Integer nanoseconds in and out; doubles only for differences within the window: exact
 ///            whatever the clocks' origins are, and however long they run.

@@ -11,7 +11,7 @@ inline constexpr double kMaxDrift = 400e-6;
 ///
 /// Method   Expanding memory up to kMemory pairs: a g-h filter with the gains of the least-squares
 ///          line, g = 2(2n−1)/(n(n+1)), h = 6/(n(n+1)).
-/// Threads  One caller. Memory: fixed. Time: constant a call.
+/// Not thread-safe. Fixed memory. Constant time per call.
 /// Errors   None. A pair that is not later than the one before is passed over.
 ///
 ///     tie.add(frame.exposure_start, pulse.edge);

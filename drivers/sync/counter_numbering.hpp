@@ -17,7 +17,7 @@ namespace vergence {
 ///           the others follow. So after a restart, after a counter that leaps over an hour of
 ///           pulses, and, with `align_start`, at the start and after kAmbiguous sets in a row whose
 ///           stamps did not agree.
-/// Threads   One caller. Memory: in place. Time: constant a call.
+/// Not thread-safe. Does not allocate. Constant time per call.
 /// Errors    None.
 class CounterNumbering {
  public:

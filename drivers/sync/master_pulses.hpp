@@ -12,7 +12,7 @@ namespace vergence {
 ///           by its clock; a counter that stands or runs back is another boot.
 /// Gap       A pulse that came more than half an interval later than its counter says is the first
 ///           after a pause.
-/// Threads   One caller. Memory: in place. Time: constant a call.
+/// Not thread-safe. Does not allocate. Constant time per call.
 /// Errors    None: told in the report.
 class MasterPulses {
  public:

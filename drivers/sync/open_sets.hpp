@@ -39,7 +39,7 @@ struct OpenSet {
 /// went out comes too late.
 ///
 /// Ownership  Slots belong to the owner that RigSynchronizer states; here they are numbers.
-/// Threads    One caller. Memory: fixed, kOpen sets and one more. Time: constant a call.
+/// Not thread-safe. Memory: fixed, kOpen sets and one more. Constant time per call.
 /// Errors     None.
 class OpenSets {
  public:

@@ -35,7 +35,7 @@ struct StampedFrame {
 ///            out are tried, so that the true place is among them; for the same reason none is
 ///            found beside a report that is missing. Pulses at even intervals fit everywhere and
 ///            prove nothing, until one of them is a pause.
-/// Threads    One caller. Memory: fixed. Time: a trial at most kHeld · kRun steps.
+/// Not thread-safe. Fixed memory. Time: a trial at most kHeld · kRun steps.
 /// Errors     None: an acquisition that proves nothing goes on.
 ///
 ///     acquisition.add(frame);
@@ -99,7 +99,7 @@ class PulseAcquisition {
 ///          pulse s earlier, a constant time off. That is refuted once this time has changed by
 ///          more than the limit given. Intervals that differ settle it soon, even ones not before a
 ///          pause.
-/// Threads  One caller. Memory: fixed. Time: at most kMax steps a call.
+/// Not thread-safe. Fixed memory. Time: at most kMax steps a call.
 class MissedTriggerTest {
  public:
   static constexpr std::size_t kMax = 8;  // pulses missed since the doubt began
@@ -135,7 +135,7 @@ class MissedTriggerTest {
 /// Doubt      A missed trigger and a clock that was set by as much look alike at first. From one on
 ///            the camera is doubtful until a later interval fits the pulses only where the trigger
 ///            was missed: the next that differs where intervals vary, else a pause.
-/// Threads    One caller. Memory: fixed. Time: constant a call, or a trial of PulseAcquisition.
+/// Not thread-safe. Fixed memory. Time: constant a call, or a trial of PulseAcquisition.
 /// Errors     None: outcomes.
 class PulseMatcher {
  public:

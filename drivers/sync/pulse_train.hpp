@@ -13,7 +13,7 @@ namespace vergence {
 ///
 /// Numbers  Its own, which grow over a reboot of the source; within one they advance as the
 ///          source's do.
-/// Threads  One caller. Memory: fixed, the kHeld newest. Time: constant a call, at most kHeld
+/// Not thread-safe. Memory: fixed, the kHeld newest. Time: constant a call, at most kHeld
 ///          steps.
 /// Errors   None. A report that contradicts those before it (another boot, a number or an edge that
 ///          runs back, an edge far too late) begins a new train.

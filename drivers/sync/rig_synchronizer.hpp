@@ -44,7 +44,7 @@ namespace vergence {
 /// detected here. Ownership  A slot that is `taken` comes out of next() in exactly one set; then it
 /// is the
 ///            caller's again.
-/// Threads    One caller. Memory: fixed, kOpen pulses. Time: constant a call.
+/// Not thread-safe. Memory: fixed, kOpen pulses. Constant time per call.
 /// Errors     Nothing throws. Frames that cannot be paired are reported by SyncResult and counted.
 class RigSynchronizer {
  public:

@@ -16,7 +16,7 @@ namespace vergence {
 ///          over the gap, and every pulse on either side of it have its reading.
 /// Marks    InsQuality::sync_out, on the sample after the pulse: edges are multiples of the
 ///          interval, 400 Hz / n, from the earliest mark.
-/// Threads  One caller. Memory: in place. Errors: none; a clock that runs back is another boot.
+/// Not thread-safe. Does not allocate. Errors: none; a clock that runs back is another boot.
 class SyncOutPulses {
  public:
   /// `interval`: between two pulses, as good as a decimal rate says it.

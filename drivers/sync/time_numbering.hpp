@@ -20,7 +20,7 @@ namespace vergence {
 ///          clock was set: a new count begins, at the next number, and open sets do not wait
 ///          for it. Where other cameras' frames fit meanwhile, that camera's clock is apart.
 ///
-/// Threads  One caller. Memory: in place. Time: constant a call.
+/// Not thread-safe. Does not allocate. Constant time per call.
 /// Units    Times are ns of the clock that pairs: the host's, the bus's, PTP's.
 /// Errors   None; a clock that was set, or is apart, is told.
 class TimeNumbering {

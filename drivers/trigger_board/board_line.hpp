@@ -20,7 +20,7 @@ namespace vergence::trigger_board {
 ///          frame that reads ended in, each of them bounds when its first bit left the
 ///          board: the arrival less what the bytes up to there take on the wire. The earliest of
 ///          these is the frame's departure.
-/// Threads  One caller. Memory: in place. Errors: what is no frame is counted and passed over; the
+/// Not thread-safe. Does not allocate. Errors: what is no frame is counted and passed over; the
 ///          next 00 is a new beginning.
 class BoardLine {
  public:

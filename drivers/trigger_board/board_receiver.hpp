@@ -32,7 +32,7 @@ enum class PongStatus : std::uint8_t {
 ///          as no crystal does: then two mappers take turns, each used when it is kTurn to 2 kTurn
 ///          old, and until the rate is there the bound has room for what it moves in that time
 ///          (kMoving).
-/// Threads  One caller. Memory: fixed.
+/// Not thread-safe. Fixed memory.
 /// Errors   PongStatus. kBackward answers in a row from an earlier time than before are a clock
 /// that
 ///          was set: the fit begins again.
@@ -110,7 +110,7 @@ class BoardClock {
 ///
 /// States   Between hold() and stream() what comes is accounted for, but no pulse is handed out and
 ///          a change of the board is none: it is being set up.
-/// Threads  One caller. Memory: none. Time: no call waits.
+/// Not thread-safe. Does not allocate. Time: no call waits.
 /// Errors   finding(): why the board must be set up anew.
 class BoardReceiver final : public FrameSink {
  public:

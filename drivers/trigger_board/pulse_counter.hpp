@@ -17,7 +17,7 @@ struct PulseCounters {
 
 /// Events to pulses: numbers unwrapped, what is missing sorted by cause, invalid events refused.
 ///
-/// Threads  One caller. Memory: none. Time: `edge` is the board's ticks in nanoseconds.
+/// Not thread-safe. Does not allocate. Time: `edge` is the board's ticks in nanoseconds.
 /// Errors   An event that cannot follow the one before is refused and counted: its number is not
 ///          after the last one, its tick is earlier, or more pulses lie between than the rate
 ///          makes.

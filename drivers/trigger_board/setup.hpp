@@ -32,7 +32,7 @@ class FrameSink {
 
 /// Questions to a board, each with its answer: who it is, halt, configuration, start.
 ///
-/// Threads  One caller. Memory: none, but for the message of a refusal. Time: no call outlasts a
+/// Not thread-safe. Memory: none, but for the message of a refusal. Time: no call outlasts a
 ///          second, find() two a baud rate.
 /// Errors   Statuses: gone (silent, or the line is), stopped (`stop` is set), unsupported (another
 ///          protocol version, or refused by the board), failed. last_error() says what and what to

@@ -17,7 +17,7 @@ namespace vergence::trigger_board {
 ///
 /// A board is known by what it answers to HELLO. Asked are the ports of USB converters and boards,
 /// but those of XSens' own converters.
-/// Threads  One caller. Errors: TriggerDriver's.
+/// Not thread-safe. Errors: TriggerDriver's.
 class Driver final : public TriggerDriver {
  public:
   /// Ports of the machine; tests bring their own.

@@ -24,7 +24,7 @@ enum class StampKind : std::uint8_t {
 /// Counts exposures by the 32-bit numbers buffers carry, from 0 on. A driver that does not number
 /// its buffers is counted by time.
 ///
-/// Threads  One caller. Memory: none but its own.
+/// Not thread-safe. Memory: none but its own.
 class SequenceCounter {
  public:
   /// `period`: between two exposures; zero: unknown, then unnumbered buffers count one each.

@@ -21,7 +21,7 @@ namespace vergence::xsens {
 ///          message before where that is later, + its place in the message at the baud rate), and
 ///          this pair goes into the ClockMapper. A read whose last byte is in a message that is not
 ///          whole yet waits for it. All pairs are late, never early, as the mapper requires.
-/// Threads  One caller. Memory: fixed; of reads that wait the oldest go when there are more than
+/// Not thread-safe. Memory: fixed; of reads that wait the oldest go when there are more than
 ///          kMarks.
 /// Errors   None. What is constant and unseen, the least time from the converter to the program,
 ///          stays in the stamps (docs/ins.md).
@@ -80,7 +80,7 @@ enum class ClockStep : std::uint8_t {
 /// Unwraps SampleTimeFine: 0.1 ms, wrapping at one day on MTi 10/100 series and the 700/710, at 2³²
 /// on others.
 ///
-/// Threads  One caller. Time: the device's, from the first stamp on; goes on over a restart by what
+/// Not thread-safe. Time: the device's, from the first stamp on; goes on over a restart by what
 ///          `elapsed` says has passed.
 class SampleTime {
  public:
@@ -170,7 +170,7 @@ struct DecoderCounters {
 ///          ArrivalTiming. The receiver's messages are older than the inertial ones before them and
 ///          not in step: they say how good the fix is, and are no readings.
 /// Order    Of measurement; a sample that is not newer than the last is dropped.
-/// Threads  One caller. Memory: in place, no heap.
+/// Not thread-safe. Does not allocate.
 /// Errors   Counted; nothing stops the stream.
 class Decoder {
  public:

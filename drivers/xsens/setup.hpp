@@ -33,7 +33,7 @@ struct Reply {
 /// Questions and answers over an Xbus line, also while data keep streaming: what is no answer is
 /// passed over.
 ///
-/// Threads  One caller. Memory: in place. Time: no call outlasts its limit (of the line's clock) by
+/// Not thread-safe. Does not allocate. Time: no call outlasts its limit (of the line's clock) by
 ///          more than a read of 50 ms.
 class RequestReply {
  public:
@@ -70,7 +70,7 @@ class RequestReply {
 /// Finds a device on an open line, brings it into its configuration state and sets it, changing
 /// only what differs.
 ///
-/// Threads  One caller. Memory: ordinary. Time: find() up to a second for each baud rate, the rest
+/// Not thread-safe. Allocates. Time: find() up to a second for each baud rate, the rest
 ///          at most a few seconds in all.
 /// Errors   Status and last_error(); a device that was found stays in its configuration state.
 class Setup {

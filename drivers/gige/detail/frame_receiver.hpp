@@ -17,7 +17,7 @@ namespace vergence::gige {
 ///
 /// 16-bit ids are never 0: after 65535 comes 1. A 64-bit id shows itself by its size; until then
 /// both count alike.
-/// Threads  One caller. Memory: fixed.
+/// Not thread-safe. Fixed memory.
 class BlockCounter {
  public:
   struct Step {
