@@ -87,18 +87,8 @@ LivePage::~LivePage() {
 // ---- the session's threads
 
 void LivePage::on_start(const SessionStart& start) noexcept {
-  builder_.begin(start.tie);
   start_ = start;
   started_.store(true, std::memory_order_release);
-}
-
-void LivePage::on_frame(const RigFrame& frame) noexcept {
-  builder_.add(frame);
-  (void)images_.copy(frame);
-}
-
-void LivePage::on_pose(const PoseSample& sample) noexcept {
-  push(&frames_, builder_.add(sample, monotonic_now()));
 }
 
 void LivePage::on_tracks(const calibration::TrackLog& tracks) noexcept {
@@ -158,7 +148,6 @@ void LivePage::drain() {
   const bool ended = ended_.load(std::memory_order_acquire);
   for (CalibrationRecord record; calibrations_.pop(&record);) state_.add(record);
   for (PublishedEnuAlignment alignment; alignments_.pop(&alignment);) state_.add(alignment);
-  for (LiveFrame frame; frames_.pop(&frame);) state_.add(frame);
   for (FrameReport report; reports_.pop(&report);) state_.add(report);
   for (EventRecord event; events_.pop(&event);) state_.add(event);
   if (ended) state_.end();

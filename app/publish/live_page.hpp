@@ -61,8 +61,7 @@ class LivePage final : public SessionObserver {
   LivePage& operator=(const LivePage&) = delete;
 
   void on_start(const SessionStart& start) noexcept override;
-  void on_frame(const RigFrame& frame) noexcept override;
-  void on_pose(const PoseSample& sample) noexcept override;
+  void on_frame(const RigFrame& frame) noexcept override { (void)images_.copy(frame); }
   void on_tracks(const calibration::TrackLog& tracks) noexcept override;
   void on_enu_alignment(const EnuAlignment& alignment, const Geodetic& origin) noexcept override;
   void on_report(const FrameReport& report) noexcept override;
@@ -87,10 +86,7 @@ class LivePage final : public SessionObserver {
   SessionRequests* requests_;
   std::function<double()> line_age_ms_;
 
-  LiveFrameBuilder builder_;  // of the estimator's thread
-
-  // From it to the page's.
-  Ring<LiveFrame, 256> frames_;
+  // From the estimator's thread to the page's.
   Ring<FrameReport, 256> reports_;
   Ring<EventRecord, 64> events_;
   Ring<CalibrationRecord, 8> calibrations_;

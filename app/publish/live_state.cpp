@@ -52,21 +52,17 @@ constexpr double kSmoothing = 8;       // frames
 
 }  // namespace
 
-void LiveState::add(const LiveFrame& frame) {
-  if (newest_) take_interval(frame.out);
-  newest_ = frame;
-  estimate_.add(static_cast<double>(frame.pose.estimate_ms));
-}
-
 /// A gap counts as twice the interval at most: an outage does not make the next one unseen.
-void LiveState::take_interval(HostStamp out) noexcept {
-  const double gap = (out - newest_->out).to_seconds();
+void LiveState::take_interval(HostStamp estimated) noexcept {
+  const double gap = (estimated - newest_->estimated).to_seconds();
   if (interval_s_ <= 0) interval_s_ = gap;
   interval_s_ += (std::min(gap, 2 * interval_s_) - interval_s_) / kSmoothing;
 }
 
 void LiveState::add(const FrameReport& report) {
-  report_ = report;
+  if (newest_) take_interval(report.estimated);
+  newest_ = report;
+  estimate_.add(static_cast<double>(report.pose.estimate_ms));
   const PoseStatus status = report.pose.status;
   if (status == PoseStatus::lost && !report.ins_valid) return;
   LiveTrail::Place place;
@@ -110,44 +106,48 @@ void LiveState::add(const PublishedEnuAlignment& alignment) {
 }
 
 json LiveState::frame_json(HostStamp now) const {
-  const LiveFrame& f = *newest_;
-  const double silence = (now - f.out).to_seconds();
+  const FrameReport& f = *newest_;
+  const FrameCounts& n = f.counts;
+  const double silence = (now - f.estimated).to_seconds();
   const PoseSample& p = f.pose;
   const std::string_view reason = to_string(p.reason);
-  json out{{"frame", p.frame},
-           {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
-           {"since_s", rounded(silence, 1)},  // when it came
-           {"silent", silence > std::max(kSilenceSeconds, kMaxIntervals * interval_s_)},
-           {"state", to_string(p.state)},
-           {"status", to_string(p.status)},
-           {"reason", reason},
-           {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(reason)},
-           {"inliers", p.inliers},
-           {"stereo_inliers", p.stereo_inliers},
-           {"reprojection_px", rounded(p.reprojection_px, 3)},
-           {"estimate_ms", rounded(p.estimate_ms, 2)},
-           {"estimate_p50_ms", rounded(estimate_.percentile(0.5), 2)},
-           {"estimate_p99_ms", rounded(estimate_.percentile(0.99), 2)},
-           {"read", f.read},
-           {"ok", f.ok},
-           {"degraded", f.degraded},
-           {"lost", f.lost},
-           {"missing", f.missing},
-           {"path_m", rounded(f.path_m, 2)},
-           {"stamp_error_us", rounded(static_cast<double>(f.stamp_error.ns()) * 1e-3, 1)},
-           {"spread_us", rounded(static_cast<double>(f.spread.ns()) * 1e-3, 1)},
-           {"pairing", to_words(f.pairing)},
-           {"age_ms", f.age_ms < 0 ? json(nullptr) : rounded(f.age_ms, 2)}};
+  json out{
+      {"frame", p.frame},
+      {"s", rounded((p.stamp - start_.first).to_seconds(), 2)},
+      {"since_s", rounded(silence, 1)},  // when it came
+      {"silent", silence > std::max(kSilenceSeconds, kMaxIntervals * interval_s_)},
+      {"state", to_string(p.state)},
+      {"status", to_string(p.status)},
+      {"reason", reason},
+      {"advice", p.status == PoseStatus::ok ? "" : report::advice_for(reason)},
+      {"inliers", p.inliers},
+      {"stereo_inliers", p.stereo_inliers},
+      {"reprojection_px", rounded(p.reprojection_px, 3)},
+      {"estimate_ms", rounded(p.estimate_ms, 2)},
+      {"estimate_p50_ms", rounded(estimate_.percentile(0.5), 2)},
+      {"estimate_p99_ms", rounded(estimate_.percentile(0.99), 2)},
+      {"read", n.read},
+      {"ok", n.ok},
+      {"degraded", n.degraded},
+      {"lost", n.lost},
+      {"missing", n.missing},
+      {"path_m", rounded(n.path_m, 2)},
+      {"stamp_error_us", rounded(static_cast<double>(f.stamp_error.ns()) * 1e-3, 1)},
+      {"spread_us", rounded(static_cast<double>(f.spread.ns()) * 1e-3, 1)},
+      {"pairing", to_word(f.pairing)},
+      {"age_ms", start_.tie
+                     ? rounded((start_.tie->stamp_at(f.estimated) - p.stamp).to_seconds() * 1e3, 2)
+                     : json(nullptr)}};
   if (p.status != PoseStatus::lost)
     for (const double v : p.T_world_left.t) out["position_m"].push_back(rounded(v, 3));
-  if (report_ && report_->compared) {
-    const auto e = report_->error();
+  if (f.compared) {
+    const auto e = f.error();
     out["ins"] = {{"across_m", rounded(std::hypot(e[0], e[1]), 2)},
                   {"up_m", rounded(e[2], 2)},
                   {"heading_deg", rounded(e[3], 2)}};
   }
-  if (report_ && report_->placed) {
-    const EnuPose& ours = report_->ours;
+  if (f.placed) {
+    const EnuPose& ours = f.ours;
     out["enu"] = {{"latitude_deg", rounded(ours.position.latitude_deg, 7)},
                   {"longitude_deg", rounded(ours.position.longitude_deg, 7)},
                   {"height_m", rounded(ours.position.height_m, 2)},

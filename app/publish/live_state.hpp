@@ -10,7 +10,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "app/publish/live_frame.hpp"
+#include "app/publish/pose_stream.hpp"
 #include "app/session/records.hpp"
 #include "app/session/session_observer.hpp"
 #include "app/session/session_totals.hpp"
@@ -57,7 +57,6 @@ class LiveState {
   static constexpr std::size_t kEvents = 60, kCalibrations = 30;
 
   void begin(const SessionStart& start) { start_ = start; }
-  void add(const LiveFrame& frame);
   void add(const FrameReport& report);
   void add(const EventRecord& event);
   void add(const CalibrationRecord& calibration);
@@ -72,16 +71,15 @@ class LiveState {
 
  private:
   [[nodiscard]] static nlohmann::json place_json(const LiveTrail::Place& place);
-  void take_interval(HostStamp out) noexcept;
+  void take_interval(HostStamp estimated) noexcept;
   [[nodiscard]] nlohmann::json frame_json(HostStamp now) const;  // there is one
   [[nodiscard]] nlohmann::json calibration_json() const;
 
   SessionStart start_{};
-  std::optional<LiveFrame> newest_{};
   double interval_s_ = 0;  // between frames, on the host's clock
   bool ended_ = false;
   TimeHistogram estimate_;
-  std::optional<FrameReport> report_{};
+  std::optional<FrameReport> newest_{};
   LiveTrail trail_;
   std::deque<EventRecord> events_{};
   std::uint64_t events_seen_ = 0, events_shown_ = 0;

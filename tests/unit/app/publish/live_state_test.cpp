@@ -46,16 +46,14 @@ TEST(LiveState, updateSendsChangesOnceHelloEverything) {
   start.name = "a drive";
   start.frames = 100;
   state.begin(start);
-  LiveFrame frame;
-  frame.read = 3, frame.ok = 2, frame.lost = 1;
-  frame.path_m = 12.5;
-  frame.pose.frame = 41;
-  frame.pose.status = PoseStatus::degraded;
-  frame.pose.reason = Reason::few_inliers;
-  state.add(frame);
   state.add(at(0));
   state.add(at(0.1));  // no step
-  state.add(at(1));
+  FrameReport report = at(1, PoseStatus::degraded);
+  report.counts.read = 3, report.counts.ok = 2, report.counts.lost = 1;
+  report.counts.path_m = 12.5;
+  report.pose.frame = 41;
+  report.pose.reason = Reason::few_inliers;
+  state.add(report);
   state.add(event("mark", "a <b>mark</b> \xff"));
   const json first = json::parse(state.update(kNow, -1));
   EXPECT_EQ(first["now"]["frame"], 41);
@@ -134,11 +132,10 @@ TEST(LiveState, standingRigKeepsTrail) {
   EXPECT_EQ(map.degraded, 1U);
 }
 
-LiveFrame come(double seconds) {
-  LiveFrame frame;
-  frame.out = HostStamp(Duration::seconds(seconds).ns());
-  frame.pose.status = PoseStatus::ok;
-  return frame;
+FrameReport come(double seconds) {
+  FrameReport report = at(0);
+  report.estimated = HostStamp(Duration::seconds(seconds).ns());
+  return report;
 }
 
 TEST(LiveState, missingFramesAreSilentAfterOneSecond) {
