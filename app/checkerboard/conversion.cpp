@@ -1,13 +1,14 @@
 #include "app/checkerboard/conversion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "app/runtime/durable_file.hpp"
 #include "app/runtime/errors.hpp"
-#include "app/runtime/nearest.hpp"
 
 namespace vergence::app {
 namespace {
@@ -29,13 +30,9 @@ bool is_ros_folder(const std::string& out, CalibrationFormat format) {
 }  // namespace
 
 CalibrationFormat parse_format(const std::string& word) {
-  static const std::vector<std::string> kWords{"vergence", "kalibr", "ros", "opencv"};
-  const auto at = std::find(kWords.begin(), kWords.end(), word);
-  if (at == kWords.end())
-    throw InputError(fmt::format("\"{}\" is no form of a calibration{}; it is one of {}",
-                                 word.substr(0, 60), did_you_mean(word, kWords),
-                                 fmt::join(kWords, ", ")));
-  return static_cast<CalibrationFormat>(at - kWords.begin());
+  constexpr std::array<std::string_view, 4> kWords{"vergence", "kalibr", "ros", "opencv"};
+  return static_cast<CalibrationFormat>(std::find(kWords.begin(), kWords.end(), word) -
+                                        kWords.begin());
 }
 
 ImageSize parse_size(const std::string& text) {

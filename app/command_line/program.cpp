@@ -69,8 +69,8 @@ UnknownWord unknown_word(const std::string& given, CLI::App& command) {
   word.option = word.name.size() > 1 && word.name.front() == '-';
   if (!word.option) word.why = did_you_mean(word.name, command_words(command));
   if (word.why.empty())
-    word.why = why_withdrawn(Withdrawn::Kind::option,
-                             words_of(command) + " " + (word.option ? word.name : "CONFIG"));
+    word.why = new_name(Renamed::Kind::option,
+                        words_of(command) + " " + (word.option ? word.name : "CONFIG"));
   return word;
 }
 
@@ -107,9 +107,7 @@ void check_first_word(CLI::App& root, int argc, const char* const* argv) {
   auto words = command_words(root);
   words.insert(words.end(), {"help", "version"});
   if (std::find(words.begin(), words.end(), word) != words.end()) return;
-  const std::string why = why_withdrawn(Withdrawn::Kind::command, word);
-  throw InputError("unknown command \"" + word + "\"" +
-                   (why.empty() ? did_you_mean(word, words) : why) +
+  throw InputError("unknown command \"" + word + "\"" + did_you_mean(word, words) +
                    " ('vergence --help' lists the commands)");
 }
 

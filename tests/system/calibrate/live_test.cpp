@@ -27,7 +27,7 @@ constexpr double kRate = 5;  // Hz
 constexpr std::uint64_t kHeldFor =
     8;  // images of one pose: time to find the board twice on a busy machine
 
-TEST(CalibrateLive, aBoardCarriedAroundIsCollectedUntilNothingIsMissing) {
+TEST(CalibrateLive, takesViewsUntilCoverageIsComplete) {
   if (const std::string why = socket_buffer_obstacle(); !why.empty()) GTEST_SKIP() << why;
   const RigCalibration truth = known_rig(2, CameraModelKind::pinhole_radtan);
   const auto poses = shown_around(kBoard, truth);
