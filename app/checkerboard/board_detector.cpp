@@ -11,7 +11,7 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kFewestCorners = 6;
+constexpr std::size_t kMinCorners = 6;
 
 std::vector<Vec2> pixels_of(const BoardCorners& corners) {
   std::vector<Vec2> pixels;
@@ -26,7 +26,7 @@ BoardCorners find_any_board(const ImageView& image, const BoardPattern& board, B
   if (board.kind == BoardKind::charuco) return find_charuco(image, board);
   auto found = find_checkerboard(image, board, search);
   if (!found) return {};
-  if (!board.tells_its_ends()) same_way_up(pixels_of(reference), &*found);
+  if (!board.is_asymmetric()) same_way_up(pixels_of(reference), &*found);
   BoardCorners corners;
   for (std::size_t i = 0; i < found->size(); ++i) corners.push_back({i, (*found)[i]});
   return corners;
@@ -35,7 +35,7 @@ BoardCorners find_any_board(const ImageView& image, const BoardPattern& board, B
 }  // namespace
 
 bool determine_a_homography(const BoardCorners& corners, const BoardPattern& board) {
-  if (corners.size() < std::min(kFewestCorners, board.corners())) return false;
+  if (corners.size() < std::min(kMinCorners, board.corners())) return false;
   std::map<double, int> in_row;
   for (const BoardCorner& c : corners) ++in_row[board.corner(c.index).y()];
   return std::count_if(in_row.begin(), in_row.end(),

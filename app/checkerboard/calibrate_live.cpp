@@ -82,8 +82,8 @@ class Collection {
   void report(const DeviceEvent& event) {
     const bool gone = event.kind == DeviceEvent::Kind::camera_disconnected;
     if (gone || event.kind == DeviceEvent::Kind::camera_reconnected)
-      progress_->say(fmt::format("vergence: camera {} {}", event.camera,
-                                 gone ? "is disconnected; waiting for it" : "is reconnected"));
+      progress_->print(fmt::format("vergence: camera {} {}", event.camera,
+                                   gone ? "is disconnected; waiting for it" : "is reconnected"));
   }
 
   void offer(const RigFrame& frame) {
@@ -98,7 +98,7 @@ class Collection {
     const auto needs = collector_.coverage().needs();
     state_.state = "calibrate";
     ++state_.frame;
-    state_.words =
+    state_.activity =
         fmt::format("{} views · {}{}", collector_.views().size(), phrase(result),
                     needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
     progress_->update(state_);
@@ -112,7 +112,7 @@ class Collection {
       try {
         write_png(file, frame.images[k]);
       } catch (const InputError& e) {
-        progress_->say(fmt::format("vergence: {}; the view is used all the same", e.what()));
+        progress_->print(fmt::format("vergence: {}; the view is used all the same", e.what()));
       }
     }
   }
@@ -147,7 +147,7 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   const Configuration c = capture_configuration(configuration);
   DriveDevices devices(c, {}, false, std::nullopt);
   Progress progress = Progress::on_stderr(request.quiet);
-  for (const std::string& message : devices.remarks()) progress.say("vergence: " + message);
+  for (const std::string& message : devices.remarks()) progress.print("vergence: " + message);
   const CalibratedRig rig = rig_of(c, devices);
   Acquisition::Options options = devices.acquisition_options();
   options.tie_host = monotonic_now();
@@ -159,13 +159,13 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   progress.finish();
   const auto stopped = signals.stop_code();
   for (const int camera : source.missing())
-    progress.say(
+    progress.print(
         fmt::format("vergence: camera {} did not come back; check its cable and power", camera));
   if (collection.views().size() < kMinViews) {
-    progress.say(fmt::format(
+    progress.print(fmt::format(
         "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}, "
         "whole and lit in every image?",
-        collection.views().size(), kMinViews, request.board.words()));
+        collection.views().size(), kMinViews, request.board.describe()));
     return stopped.value_or(source.missing().empty() ? ExitCode::not_usable
                                                      : ExitCode::device_failed);
   }

@@ -30,9 +30,9 @@ bool is_ros_folder(const std::string& out, CalibrationFormat format) {
 }  // namespace
 
 CalibrationFormat parse_format(const std::string& word) {
-  constexpr std::array<std::string_view, 4> kWords{"vergence", "kalibr", "ros", "opencv"};
-  return static_cast<CalibrationFormat>(std::find(kWords.begin(), kWords.end(), word) -
-                                        kWords.begin());
+  constexpr std::array<std::string_view, 4> kFormatNames{"vergence", "kalibr", "ros", "opencv"};
+  return static_cast<CalibrationFormat>(std::find(kFormatNames.begin(), kFormatNames.end(), word) -
+                                        kFormatNames.begin());
 }
 
 ImageSize parse_size(const std::string& text) {
@@ -125,8 +125,8 @@ Remarks convert_calibration(const ConversionRequest& request) {
   const CalibrationFile calibration = read_any_calibration(request.in, request.size, &remarks);
   write_any_calibration(request.out, format, calibration, &remarks);
   remarks.push_back(baseline_message(calibration.rig));
-  if (std::string doubt = baseline_doubt(calibration.rig); !doubt.empty())
-    remarks.push_back(std::move(doubt));
+  if (std::string warning = baseline_warning(calibration.rig); !warning.empty())
+    remarks.push_back(std::move(warning));
   return remarks;
 }
 

@@ -39,20 +39,21 @@ std::string refusal(const CameraRequest& request, const std::string& serial,
                     const CameraDriverRow& row, CameraDriver& driver, DeviceStatus status) {
   const std::string who = fmt::format("{}: the {} camera {}", request.key, row.name,
                                       serial.empty() ? "" : "\"" + serial + "\" ");
-  std::string said = driver.last_error();
+  std::string error = driver.last_error();
   switch (status) {
     case DeviceStatus::not_found:
       return fmt::format("{}was not found; {}; check cable, power and {}.serial{}", who,
-                         list_of(driver.enumerate()), request.key, said.empty() ? "" : ": " + said);
+                         list_of(driver.enumerate()), request.key,
+                         error.empty() ? "" : ": " + error);
     case DeviceStatus::busy:
       return fmt::format("{}is in use by another program; end that one{}", who,
-                         said.empty() ? "" : ": " + said);
+                         error.empty() ? "" : ": " + error);
     case DeviceStatus::no_permission:
       return fmt::format("{}cannot be opened without permission; {}", who,
-                         said.empty() ? row.permission : said);
+                         error.empty() ? row.permission : error);
     default:
       return fmt::format("{}cannot be opened: {}", who,
-                         said.empty() ? std::string(to_string(status)) : said);
+                         error.empty() ? std::string(to_string(status)) : error);
   }
 }
 
@@ -148,10 +149,10 @@ class Openings {
       taken_.push_back(who);
       return d.serial;
     }
-    const std::string said = driver.last_error();
-    throw DeviceError(
-        fmt::format("{}: no unassigned {} camera was found; {}; check cable and power{}",
-                    request.key, request.driver, list_of(found), said.empty() ? "" : ": " + said));
+    const std::string error = driver.last_error();
+    throw DeviceError(fmt::format(
+        "{}: no unassigned {} camera was found; {}; check cable and power{}", request.key,
+        request.driver, list_of(found), error.empty() ? "" : ": " + error));
   }
 
   std::map<std::string, std::unique_ptr<CameraDriver>> drivers_;

@@ -41,7 +41,7 @@ class ExposureControl::Watched final : public CameraDevice {
   DeviceStatus wait(Duration limit, Frame* frame) noexcept override {
     const DeviceStatus status = camera_->wait(limit, frame);
     if (status == DeviceStatus::ok && frame->status == FrameStatus::complete)
-      owner_->look(k_, *frame, camera_->view(frame->slot));
+      owner_->observe(k_, *frame, camera_->view(frame->slot));
     return status;
   }
   ImageView view(FrameSlot slot) const noexcept override { return camera_->view(slot); }
@@ -100,7 +100,7 @@ ExposureCounters ExposureControl::counters() const noexcept {
   return c;
 }
 
-void ExposureControl::look(std::size_t k, const Frame& frame, const ImageView& image) noexcept {
+void ExposureControl::observe(std::size_t k, const Frame& frame, const ImageView& image) noexcept {
   if (unsupported_.load(std::memory_order_relaxed) || under_way_.load(std::memory_order_acquire))
     return;
   if (asked_) {  // it is done: from here on images may have it

@@ -55,7 +55,7 @@ class ExposureControl {
 
  private:
   class Watched;
-  void look(std::size_t k, const Frame& frame, const ImageView& image) noexcept;
+  void observe(std::size_t k, const Frame& frame, const ImageView& image) noexcept;
   [[nodiscard]] bool is_without(std::size_t k, const Frame& frame) noexcept;
   void ask(const ExposureSetting& requested) noexcept;
   void set_all(const ExposureSetting& requested) noexcept;

@@ -237,24 +237,24 @@ struct Search {
   std::condition_variable changed;
   bool done = false;
   std::vector<DeviceInfo> found;
-  std::string note;
+  std::string explanation;
 };
 
 std::shared_ptr<Search> begin_search(const CameraDriverRow& row) {
   auto search = std::make_shared<Search>();
   std::thread([search, make = row.make] {
     std::vector<DeviceInfo> found;
-    std::string note;
+    std::string explanation;
     try {
       const auto driver = make();
       found = driver->enumerate();
-      note = driver->last_error();
+      explanation = driver->last_error();
     } catch (const std::exception& e) {
-      note = std::string("it cannot look: ") + e.what();
+      explanation = std::string("it cannot look: ") + e.what();
     }
     const std::lock_guard lock(search->mutex);
     search->found = std::move(found);
-    search->note = std::move(note);
+    search->explanation = std::move(explanation);
     search->done = true;
     search->changed.notify_all();
   }).detach();
@@ -343,7 +343,7 @@ bool names_port(const Machine& machine, const std::string& key, const FoundPort&
          "/dev/" + key == port.info.port || (!serial.empty() && key == serial);
 }
 
-Inventory take_inventory(const Machine& machine, const InventoryOptions& options) {
+Inventory make_inventory(const Machine& machine, const InventoryOptions& options) {
   Inventory inventory;
   std::vector<std::pair<const CameraDriverRow*, std::shared_ptr<Search>>> searches;
   for (const CameraDriverRow& row : camera_driver_rows())
@@ -362,9 +362,9 @@ Inventory take_inventory(const Machine& machine, const InventoryOptions& options
     d.answered = search->changed.wait_until(lock, until, [&s = *search] { return s.done; });
     if (d.answered) {
       d.cameras = search->found;
-      d.note = search->note;
+      d.explanation = search->explanation;
     } else {
-      d.note = fmt::format(
+      d.explanation = fmt::format(
           "no answer within {:.0f} s: a device or its kernel driver hangs; unplug it, and look at "
           "dmesg",
           options.limit.to_seconds());

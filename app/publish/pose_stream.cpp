@@ -147,7 +147,7 @@ std::string calibration_line(const CalibrationRecord& record, std::span<const st
   const bool known = calibration::depth_error_percent(rig, kDepth) > 0;
   return line_of("calibration",
                  {{"stamp_ns", record.stamp.ns()},
-                  {"cause", record.cause_word()},
+                  {"cause", record.cause_name()},
                   {"rating", known ? json(to_string(calibration::health(rig, options))) : json()},
                   {"cameras", cameras}});
 }

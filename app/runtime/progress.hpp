@@ -20,8 +20,8 @@ struct ProgressState {
   std::optional<int> inliers{};         // of the last pose
   std::optional<double> estimate_ms{};  // of the last frame
   std::optional<double> from_ins_m{};   // distance to the INS
-  std::string words{};  // instead of path and figures, where there are none: `calibrate · frame
-                        // 7/26 · 5 with the board`
+  std::string activity{};  // instead of path and figures, where there are none: `calibrate · frame
+                           // 7/26 · 5 with the board`
 };
 
 /// `stereo · frame 1204/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 03:12 left`
@@ -48,7 +48,7 @@ class Progress {
   /// call.
   void update(const ProgressState& state);
   /// A message for the user between the redraws, on a line of its own; also with `quiet`.
-  void say(std::string_view message);
+  void print(std::string_view message);
   /// Draws the last state and ends the line. Later updates start a new one.
   void finish();
 

@@ -49,7 +49,7 @@ class CalibrationWriter final : public SessionObserver {
  public:
   struct Options {
     std::filesystem::path session{};  // its folder
-    CalibrationFile words{};          // names and serials, what the configuration says, the source
+    CalibrationFile content{};        // names and serials, what the configuration says, the source
     std::optional<std::filesystem::path> state{};  // nothing: the next drive is not to know
     bool wait_when_full = false;
   };

@@ -113,7 +113,7 @@ void EstimationLoop::run() noexcept {
   ThreadAllocations::end();
   drained_.store(true, std::memory_order_release);
   estimator_->finish();
-  log_.note(*estimator_);
+  log_.collect(*estimator_);
   if (comparison_) comparison_->finish();
   AllocationGuard::unseal_thread();
 }
@@ -130,7 +130,7 @@ void EstimationLoop::request_recalibration(Stamp stamp, const char* message) noe
 }
 
 /// Handles requests of viewers.
-void EstimationLoop::take_requests(Stamp stamp) noexcept {
+void EstimationLoop::poll_requests(Stamp stamp) noexcept {
   if (requests_ == nullptr) return;
   constexpr auto kOrder = std::memory_order_relaxed;
   if (requests_->recalibrate.exchange(false, kOrder) && facts_.on_request)
@@ -147,7 +147,7 @@ void EstimationLoop::take_requests(Stamp stamp) noexcept {
 void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   if (calibration_asked_.exchange(false, std::memory_order_relaxed))
     request_recalibration(frame.rig.stamp, "a recalibration was requested by SIGUSR1");
-  take_requests(frame.rig.stamp);
+  poll_requests(frame.rig.stamp);
   log_kept_calibrations();
   if (!delivering_) ThreadAllocations::begin();
   delivering_ = true;
@@ -158,11 +158,11 @@ void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   const FrameReport posed = report(frame, sample);
   output_.post_pose(posed);
   output_.post(estimator_->tracks());
-  log_.note(*estimator_);
+  log_.collect(*estimator_);
   log_.record_effort(sample);
   if (comparison_) return comparison_->add(posed);
   output_.post(posed);
-  log_.note(posed);
+  log_.collect(posed);
 }
 
 FrameReport EstimationLoop::report(const SourceFrame& frame, const PoseSample& sample) noexcept {

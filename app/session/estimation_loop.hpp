@@ -90,7 +90,7 @@ class EstimationLoop {
   void handle(const SourceEvent& event) noexcept;
   [[nodiscard]] FrameReport report(const SourceFrame& frame, const PoseSample& sample) noexcept;
   void request_recalibration(Stamp stamp, const char* message) noexcept;
-  void take_requests(Stamp stamp) noexcept;
+  void poll_requests(Stamp stamp) noexcept;
 
   FrameSource& source_;
   const SourceFacts& facts_;

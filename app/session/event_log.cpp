@@ -21,19 +21,19 @@ bool is_for_user(EstimatorEvent::Kind kind) noexcept {
          kind == Kind::calibration_resumed;
 }
 
-std::string words(std::string_view name) {
+std::string spaced(std::string_view name) {
   std::string text(name);
   std::replace(text.begin(), text.end(), '_', ' ');
   return text;
 }
 
 /// `stereo`, `stereo, verifying the calibration`, `parallel monocular, needs motion`.
-std::string state_words(State state, Reason reason) {
-  std::string text = state == State::stereo_odometry ? "stereo" : words(to_string(state));
+std::string describe_state(State state, Reason reason) {
+  std::string text = state == State::stereo_odometry ? "stereo" : spaced(to_string(state));
   if (reason == Reason::unverified_calibration) text += ", verifying the calibration";
   if (reason == Reason::needs_motion || reason == Reason::needs_near_structure ||
       reason == Reason::needs_texture)
-    text += ", " + words(to_string(reason));
+    text += ", " + spaced(to_string(reason));
   return text;
 }
 
@@ -44,7 +44,7 @@ void EventLog::open(SessionOutput* output, Stamp first) noexcept {
   first_ = first;
 }
 
-void EventLog::note(const Estimator& estimator) noexcept {
+void EventLog::collect(const Estimator& estimator) noexcept {
   for (const EstimatorEvent& event : estimator.events()) {
     if (event.kind == EstimatorEvent::Kind::dropped)
       dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
@@ -89,14 +89,14 @@ void EventLog::log(const EventRecord& event, bool to_user) noexcept {
 
 void EventLog::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
-    progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
-                              notice.message.data()));
+    progress->print(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
+                                notice.message.data()));
   FrameReport newest;
   bool any = false;
   while (reports_.pop(&newest)) any = true;
   if (!any) return;
   ProgressState state;
-  state.state = state_words(newest.pose.state, newest.pose.reason);
+  state.state = describe_state(newest.pose.state, newest.pose.reason);
   state.frame = newest.counts.read + newest.counts.skipped;
   state.frames = frames;
   state.path_m = newest.counts.path_m;

@@ -22,11 +22,11 @@ class EventLog {
   void open(SessionOutput* output, Stamp first) noexcept;
 
   /// Call after process() or finish(): forwards its events and calibrations.
-  void note(const Estimator& estimator) noexcept;
+  void collect(const Estimator& estimator) noexcept;
   /// Call with the result of process(): logs when work other than the pose is omitted.
   void record_effort(const PoseSample& sample) noexcept;
   /// Call with each complete report: updates the progress.
-  void note(const FrameReport& report) noexcept { (void)reports_.push(report); }
+  void collect(const FrameReport& report) noexcept { (void)reports_.push(report); }
   /// An event of the session's own. `kind` points to a constant. `to_user`: on stderr, too.
   void log(Stamp stamp, const char* kind, std::string_view message, bool to_user) noexcept;
   void log(const EventRecord& event, bool to_user) noexcept;

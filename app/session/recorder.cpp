@@ -87,7 +87,7 @@ void Recorder::on_reading(const InsRecord& reading) noexcept { (void)push(&readi
 void Recorder::work() {
   (void)pthread_setname_np(pthread_self(), "vergence-record");
   using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::seconds kFlushAtLeast{1}, kWriteBack{2};
+  constexpr std::chrono::seconds kFlushInterval{1}, kWriteBack{2};
   auto flushed = Clock::now(), written_back = flushed;
   const auto hand_over = [&] {
     flush();
@@ -103,7 +103,7 @@ void Recorder::work() {
     const bool stopping = stop_.load(
         std::memory_order_acquire);  // before the ring: what was posted before is still found
     if (take()) {
-      if (Clock::now() - flushed < kFlushAtLeast) continue;
+      if (Clock::now() - flushed < kFlushInterval) continue;
     } else if (stopping) {
       break;
     } else {

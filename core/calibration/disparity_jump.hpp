@@ -78,7 +78,7 @@ class DisparityJumpDetector {
   /// Sorted by track; how many.
   std::size_t take(std::span<const StereoObservation> stereo,
                    std::span<StereoObservation> into) noexcept;
-  void judge(std::uint64_t frame, DisparityJump* jump) noexcept;
+  void evaluate(std::uint64_t frame, DisparityJump* jump) noexcept;
 
   /// A shift that waits for the next frame.
   struct Pending {

@@ -20,7 +20,7 @@ FocalMeasurement check_focal_length(const RigSolution& found,
   const Intrinsics& lens = found.rig.intrinsics[0];
   if (!(m.configured_px > 0)) return m;
   const double off = std::abs(lens.fx / m.configured_px - 1);
-  if (found.status == RigSolveStatus::not_converged && off > kFocalDoubt) {
+  if (found.status == RigSolveStatus::not_converged && off > kFocalPriorSigma) {
     // Still on its way, and already far: the right one is farther.
     m.measured_px = lens.fx;
     m.contradicted = true;

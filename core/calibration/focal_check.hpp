@@ -7,7 +7,7 @@ namespace vergence::calibration {
 /// Compares the focal length given with the one that the images show.
 ///
 /// A focal length that is off by a share makes all distances off by it, and neither epipolar lines
-/// nor a solve that believes it show that. A solve with every focal length free by kFocalDoubt
+/// nor a solve that believes it show that. A solve with every focal length free by kFocalPriorSigma
 /// (RigFreedom::focal_lengths) does: turns show it, and so does the flow of a straight drive
 /// against the known baseline.
 ///

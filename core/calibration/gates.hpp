@@ -57,12 +57,12 @@ struct Assessment {
 
 /// Origin of a claim. The sigma of a claim that was solved from this drive is not independent of
 /// the measurement and is not used beside it.
-enum class ClaimSource : std::uint8_t { elsewhere, this_drive };
+enum class CalibrationOrigin : std::uint8_t { elsewhere, this_drive };
 
 /// Assesses the worst of the rig's further cameras. `log` holds frames newer than frame number
 /// `after`, which `measured` was not solved from. Pure.
-[[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
-                                ClaimSource source, const TrackLog& log, std::uint64_t after,
+[[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& current,
+                                CalibrationOrigin source, const TrackLog& log, std::uint64_t after,
                                 const CalibrationOptions& options, double pixel_sigma) noexcept;
 
 enum class Gate : std::uint8_t {

@@ -51,7 +51,7 @@ struct Monitor::Parts {
   int collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
 
-  void forget() noexcept {
+  void clear() noexcept {
     looks.reset();
     windows.reset(options, covariance);
     latest = detail::Decision{};
@@ -59,7 +59,7 @@ struct Monitor::Parts {
   }
   void watch_collapse(const MonitorFrame& frame) noexcept;
   void watch_matches(const MonitorFrame& frame) noexcept;
-  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& look) noexcept;
+  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& residuals) noexcept;
 };
 
 std::size_t Monitor::memory_needed(const MonitorOptions&) noexcept {
@@ -70,7 +70,7 @@ Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
   validate(options);
   parts_ = arena.make<Parts>(1, "monitor").data();
   parts_->options = options;
-  parts_->forget();
+  parts_->clear();
 }
 
 bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
@@ -93,13 +93,13 @@ bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
     back.bottomRightCorner<2, 3>() = B.transpose() / length;
     p.covariance = back * covariance * back.transpose();
   }
-  p.forget();
+  p.clear();
   return p.valid;
 }
 
 void Monitor::expect_scatter(double bias_px) noexcept { parts_->windows.expect_scatter(bias_px); }
 
-void Monitor::reset() noexcept { parts_->forget(); }
+void Monitor::reset() noexcept { parts_->clear(); }
 
 void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
   const bool missing = frame.expected_stereo >= options.collapse_expected &&
@@ -133,23 +133,24 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
 }
 
 void Monitor::Parts::watch_standing(const MonitorFrame& frame,
-                                    const detail::StereoResiduals& look) noexcept {
+                                    const detail::StereoResiduals& residuals) noexcept {
   if (latest.kind != Kind::quiet && standing_over < kStandingFrames)
     return;  // what moving frames have found stands
-  latest.statistic = windows.single(look.evidence, look.spread_now) / kStandingFactor;
+  latest.statistic = windows.single(residuals.evidence, residuals.spread_now) / kStandingFactor;
   if (latest.statistic > options.threshold) {
     if (standing_over++ == 0) standing_from = frame.frame;
   } else {
     standing_over = 0;
   }
-  windows.single_estimate(look.evidence, look.spread_now, &latest.theta, &latest.covariance);
+  windows.single_estimate(residuals.evidence, residuals.spread_now, &latest.theta,
+                          &latest.covariance);
   latest.kind = standing_over >= kStandingFrames ? Kind::knock : Kind::quiet;
   latest.undecided = standing_over > 0 && standing_over < kStandingFrames;
   latest.onset = standing_over > 0 ? standing_from : frame.frame;
   latest.frames = standing_over;
 }
 
-MonitorResult Monitor::look(const MonitorFrame& frame) noexcept {
+MonitorResult Monitor::update(const MonitorFrame& frame) noexcept {
   Parts& p = *parts_;
   MonitorResult v;
   v.threshold = p.options.threshold;

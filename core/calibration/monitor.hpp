@@ -40,7 +40,7 @@ struct StereoObservation {
   std::uint32_t track = 0;  // the same number in every frame that sees the same point
 };
 
-/// Input of one frame. The views must stay valid until look() returns.
+/// Input of one frame. The views must stay valid until update() returns.
 struct MonitorFrame {
   std::uint64_t frame = 0;  // strictly increasing
   bool moving = false;      // false: the images repeat themselves, so their errors do not average
@@ -96,7 +96,7 @@ struct MonitorResult {
 ///     const auto verdict = monitor.look(frame);  // each posed frame
 ///     if (verdict.kind != MonitorResult::Kind::quiet) recalibrate(verdict.onset_frame);
 ///
-/// Memory   All of it from the arena in the constructor. look() allocates nothing.
+/// Memory   All of it from the arena in the constructor. update() allocates nothing.
 /// Threads  One caller.
 /// Time     Under 0.1 ms for 300 stereo matches.
 /// Errors   The constructor throws (std::invalid_argument with a message, std::length_error). What
@@ -109,7 +109,7 @@ class Monitor {
   /// Sets the calibration to test, X_k = T_camera_left X_left, and clears all evidence.
   /// `covariance` is of its left perturbation (rad, m) by noise alone: errors of the intrinsics
   /// show in no residual, so the total covariance would make the monitor insensitive. False: |t| is
-  /// zero or something is not finite; then every look() is quiet.
+  /// zero or something is not finite; then every update() is quiet.
   bool set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right,
                      const Mat6& covariance) noexcept;
 
@@ -118,7 +118,7 @@ class Monitor {
   /// survives set_reference() and reset(), as the measured scatter does.
   void expect_scatter(double bias_px) noexcept;
 
-  [[nodiscard]] MonitorResult look(const MonitorFrame& frame) noexcept;
+  [[nodiscard]] MonitorResult update(const MonitorFrame& frame) noexcept;
 
   /// Clears all evidence (the scene was lost); the reference stays.
   void reset() noexcept;

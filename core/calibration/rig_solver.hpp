@@ -26,10 +26,10 @@ enum class RigFreedom : std::uint8_t {
                // are
   lenses,  // also further cameras' intrinsics and distortion, and the left one's distortion (METHOD
            // §6.1)
-  focal_lengths,  // as `lenses`, and every focal length by kFocalDoubt: whether they are believed
-                  // rightly
+  focal_lengths,  // as `lenses`, and every focal length by kFocalPriorSigma: whether they are
+                  // believed rightly
 };
-inline constexpr double kFocalDoubt = 0.1;  // prior sigma of a focal length, a share of it
+inline constexpr double kFocalPriorSigma = 0.1;  // prior sigma of a focal length, a share of it
 
 /// Start, prior and free parameters of a solve. `known` and `given` are read during solve() only.
 struct RigSolveRequest {

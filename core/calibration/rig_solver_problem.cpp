@@ -159,7 +159,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
                            : lenses && k > 0 ? options_.lens_centre_sigma_px
                                              : options_.principal_point_sigma_px;
       out.prior_mean[i] = value[i];
-      out.prior_sigma[i] = out.held_sigma[i] = focal && focal_lengths ? kFocalDoubt * value[i]
+      out.prior_sigma[i] = out.held_sigma[i] = focal && focal_lengths ? kFocalPriorSigma * value[i]
                                                : lens.sigma[i] > 0    ? lens.sigma[i]
                                                                       : usual;
     }

@@ -46,7 +46,8 @@ void BackgroundSolve::run() noexcept {
   request.rig = start_.rig;
   request.from_rig = start_.from_rig;
   solved_ = {};
-  if (start_.sought || options_.calibration.intrinsics != calibration::IntrinsicsEstimation::full) {
+  if (start_.for_new_rig ||
+      options_.calibration.intrinsics != calibration::IntrinsicsEstimation::full) {
     solved_.transforms = solver_.solve(request);
     if (solved_.transforms.status == calibration::RigSolveStatus::ok) {
       request.rig.T_camera_left = solved_.transforms.rig.T_camera_left;

@@ -211,14 +211,14 @@ MonitorResult RigMonitor::monitor_verdict(int k, const odometry::Odometry& odome
   f.stereo = stereo_.span();
   f.expected_stereo = outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
   f.found_stereo = found;
-  MonitorResult v = w.monitor.look(f);
+  MonitorResult v = w.monitor.update(f);
   if (w.grace > 0) {
     --w.grace;
     // A claim that is off is no knock; nothing based on it is `ok`.
-    const bool doubted = confirmed_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
+    const bool suspect = confirmed_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
                                         w.pairing.distance_px() > kFarFromLines);
     v = MonitorResult{};
-    v.undecided = doubted;
+    v.undecided = suspect;
   }
   return v;
 }

@@ -32,7 +32,7 @@ bool SolutionReview::held_out_enough() const noexcept {
   return true;
 }
 
-const RigSolution& SolutionReview::sought() const noexcept {
+const RigSolution& SolutionReview::best() const noexcept {
   return lenses_are_off() ? solved_.lenses : solved_.transforms;
 }
 
@@ -49,10 +49,10 @@ bool SolutionReview::lenses_are_off() const noexcept {
          calibration::fits_better(context_.log, free.newest, free.rig, held.rig);
 }
 
-calibration::Assessment SolutionReview::assess(const RigSolution& measured,
-                                               const RigCalibration& claimed,
-                                               calibration::ClaimSource source) const noexcept {
-  return calibration::assess(measured.rig, claimed, source, context_.log, measured.newest,
+calibration::Assessment SolutionReview::assess(
+    const RigSolution& measured, const RigCalibration& current,
+    calibration::CalibrationOrigin source) const noexcept {
+  return calibration::assess(measured.rig, current, source, context_.log, measured.newest,
                              context_.options.calibration, context_.options.odometry.pixel_sigma);
 }
 
@@ -60,7 +60,8 @@ void SolutionReview::assess_next(const RigCalibration& next,
                                  CalibrationDecision* decision) const noexcept {
   const RigSolution& found = measured();
   if (found.status != RigSolveStatus::ok) return;
-  const calibration::Assessment then = assess(found, next, calibration::ClaimSource::this_drive);
+  const calibration::Assessment then =
+      assess(found, next, calibration::CalibrationOrigin::this_drive);
   decision->reference_depth_m = then.depth_m;
   decision->depth_sigma_percent = then.sigma_percent;
   // All distances are off by what the focal length is off by.

@@ -34,8 +34,8 @@ struct CalibrationDecision {
   Stamp stamp{};  // of the frame it was decided at
   CalibrationCause cause = CalibrationCause::from_scratch;
   bool accepted = false;
-  bool learnt = false;  // measured while the drive went on: not accepted is no rejection, what is
-                        // in use fits as well
+  bool is_refinement = false;  // measured while the drive went on: not accepted is no rejection,
+                               // what is in use fits as well
   const char* reason =
       "";  // why it was rejected, a constant message without commas; empty when accepted
   RigCalibration calibration{};   // the one found, also when rejected

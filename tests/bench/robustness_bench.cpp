@@ -151,18 +151,19 @@ void window_row(const std::string& name, std::size_t first, const char* what, co
 
 void windows(const Bench& b, const RecordedSequence& d) {
   constexpr std::size_t kStep = 25, kFrames = 150, kMin = 25;
-  const StartingCalibration claim = given(b.online, d.sequence);
-  StartingCalibration own = claim;
+  const StartingCalibration initial = given(b.online, d.sequence);
+  StartingCalibration own = initial;
   const app::DriveCalibration found =
-      app::calibrate_drive({d.sequence, b.online, 0, d.sequence.pairs.size(), {}, {}}, claim);
+      app::calibrate_drive({d.sequence, b.online, 0, d.sequence.pairs.size(), {}, {}}, initial);
   if (found.rig) own.file.rig = *found.rig;
   for (std::size_t first = 0; first + kMin <= d.sequence.pairs.size(); first += kStep) {
     const StereoSequence s = part(d.sequence, first, kFrames);
-    const DriveOutcome off = drive(d, s, b.off, claim);
+    const DriveOutcome off = drive(d, s, b.off, initial);
     window_row(d.name, first, "off", off, off, false);
-    window_row(d.name, first, "given", drive(d, s, b.online, claim), off, false);
+    window_row(d.name, first, "given", drive(d, s, b.online, initial), off, false);
     if (found.rig) window_row(d.name, first, "found", drive(d, s, b.online, own), off, false);
-    window_row(d.name, first, "from scratch", drive(d, s, b.online, test::blank(claim)), off, true);
+    window_row(d.name, first, "from scratch", drive(d, s, b.online, test::blank(initial)), off,
+               true);
   }
 }
 

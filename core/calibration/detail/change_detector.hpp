@@ -73,7 +73,7 @@ class ChangeDetector {
   [[nodiscard]] Evidence effective(const Evidence& sum) const noexcept;
   [[nodiscard]] static double statistic(const Evidence& e, const Vec5& mean,
                                         const Mat5& covariance) noexcept;
-  void learn(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept;
+  void estimate_reference(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept;
   void estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept;
   void search(const Vec5& mean, Search* found) const noexcept;
   void attribute(std::size_t window, Decision* d) const noexcept;

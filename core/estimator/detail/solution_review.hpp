@@ -12,8 +12,8 @@ class SolutionReview {
   struct Context {
     const EstimatorOptions& options;
     const RigCalibration& nominal;
-    const RigCalibration* in_use;     // null: there is none
-    calibration::ClaimSource source;  // of that
+    const RigCalibration* in_use;           // null: there is none
+    calibration::CalibrationOrigin source;  // of that
     const calibration::TrackLog& log;
     const calibration::FocalCheck& focal;
     bool may_have_changed = true;  // AcceptanceInput::may_have_changed
@@ -30,12 +30,12 @@ class SolutionReview {
   [[nodiscard]] bool held_out_enough() const noexcept;
   /// The solution to use while seeking: the one with the lenses free if it shows that those in use
   /// are off and determines them well enough, else the one of the transforms only.
-  [[nodiscard]] const calibration::RigSolution& sought() const noexcept;
+  [[nodiscard]] const calibration::RigSolution& best() const noexcept;
   /// The drive's own measurement of the rig, with the lenses free where they are not believed.
   [[nodiscard]] const calibration::RigSolution& measured() const noexcept;
-  [[nodiscard]] calibration::Assessment assess(const calibration::RigSolution& measured,
-                                               const RigCalibration& claimed,
-                                               calibration::ClaimSource source) const noexcept;
+  [[nodiscard]] calibration::Assessment assess(
+      const calibration::RigSolution& measured, const RigCalibration& current,
+      calibration::CalibrationOrigin source) const noexcept;
   /// The measurement against `next`, which is in use after this decision.
   void assess_next(const RigCalibration& next, CalibrationDecision* decision) const noexcept;
   /// Makes a CalibrationDecision with the data of `found`; the outcome is left to the caller.

@@ -196,9 +196,9 @@ TEST(Conversion, corruptFilesNameFileAndKey) {
     if (!cases[i].second.empty()) in += "," + folder.write("second.yaml", cases[i].second).string();
     const std::string said =
         refusal_of([&] { (void)read_any_calibration(in, std::nullopt, &none); });
-    EXPECT_TRUE(test::says(said, cases[i].key)) << "case " << i;
+    EXPECT_TRUE(test::mentions(said, cases[i].key)) << "case " << i;
     EXPECT_FALSE(test::contains(said, "\n")) << said;
-    EXPECT_TRUE(test::says(said, folder.path().string())) << "which file";
+    EXPECT_TRUE(test::mentions(said, folder.path().string())) << "which file";
   }
   EXPECT_THROW((void)read_any_calibration((folder / "none").string(), std::nullopt, &none),
                InputError);
@@ -250,7 +250,7 @@ TEST(Kalibr, writtenFileProjectsAsReference) {
         parse_any_calibration({{"camchain.yaml", text}}, std::nullopt, &remarks);
     expect_same(c, back);
     ASSERT_EQ(remarks.size(), 1U);
-    EXPECT_TRUE(test::says(remarks[0], "serial"));
+    EXPECT_TRUE(test::mentions(remarks[0], "serial"));
   }
 }
 
@@ -369,7 +369,7 @@ TEST(OpenCvStereo, fourCoefficientsGiveAWarning) {
     EXPECT_EQ(read.rig.intrinsics[1].kind, c.kind) << c.text;
     ASSERT_EQ(remarks.size(), c.remarks) << c.text;
     for (const std::string& remark : remarks)
-      EXPECT_TRUE(test::says(remark, "stereo.yml", "fisheye_model: 1"));
+      EXPECT_TRUE(test::mentions(remark, "stereo.yml", "fisheye_model: 1"));
   }
 }
 

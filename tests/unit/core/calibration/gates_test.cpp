@@ -189,7 +189,7 @@ TEST(Gates, aKnockOfTheThirdCameraAloneIsMended) {
   // Errors of two cameras, √2 · 0.45 px of a coordinate, have a median of 0.43 px, of outliers and
   // of tracks that have wandered more.
   EXPECT_LT(held_out(c.log, c.solution.newest, c.solution.rig).median_px, 1.0);
-  const Assessment a = assess(c.solution.rig, c.in_use, ClaimSource::elsewhere, c.log,
+  const Assessment a = assess(c.solution.rig, c.in_use, CalibrationOrigin::elsewhere, c.log,
                               c.solution.newest, c.options, 0.15);
   EXPECT_TRUE(a.better);
   EXPECT_FALSE(a.worse);
@@ -219,8 +219,8 @@ TEST(Gates, whatContradictsOneCameraIsNotHiddenByWhatIsNotKnownOfAnother) {
     constexpr double kUnknown = 0.01;  // rad: more than the turn
     c.solution.rig.covariance.set(yaw, yaw, kUnknown * kUnknown);
     const auto assessed = [&] {
-      return assess(c.solution.rig, c.in_use, ClaimSource::elsewhere, c.log, c.solution.newest,
-                    c.options, 0.15);
+      return assess(c.solution.rig, c.in_use, CalibrationOrigin::elsewhere, c.log,
+                    c.solution.newest, c.options, 0.15);
     };
     ASSERT_FALSE(assessed().contradicted);
     c.turn(&c.in_use, {0, 0.3, 0}, wrong);

@@ -175,7 +175,7 @@ TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
   calibration::MonitorFrame night;
   for (std::uint64_t i = 60; i < 120; ++i) {
     night.frame = i;
-    const MonitorResult v = trial.monitor().look(night);
+    const MonitorResult v = trial.monitor().update(night);
     ASSERT_EQ(v.kind, Kind::quiet);
   }
   night.expected_stereo = 200;
@@ -183,10 +183,10 @@ TEST(Monitor, callsNoCollapseWhereNothingIsExpected) {
   calibration::MonitorFrame dark;
   dark.frame = night.frame;
   for (int i = 0; i < 4; ++i) {
-    EXPECT_EQ(trial.monitor().look(night).kind, Kind::quiet);
-    EXPECT_EQ(trial.monitor().look(dark).kind, Kind::quiet);
+    EXPECT_EQ(trial.monitor().update(night).kind, Kind::quiet);
+    EXPECT_EQ(trial.monitor().update(dark).kind, Kind::quiet);
   }
-  EXPECT_EQ(trial.monitor().look(night).kind, Kind::collapse);
+  EXPECT_EQ(trial.monitor().update(night).kind, Kind::collapse);
 }
 
 TEST(Monitor, leavesOutWhatIsNotANumber) {
@@ -217,7 +217,7 @@ TEST(Monitor, allocatesNothingWhileLooking) {
   const std::uint64_t before = AllocationGuard::runtime_allocations();
   {
     const SealedScope sealed;
-    (void)trial.monitor().look(trial.frame());
+    (void)trial.monitor().update(trial.frame());
   }
   EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }

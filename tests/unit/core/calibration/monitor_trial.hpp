@@ -56,7 +56,7 @@ class MonitorTrial {
     // A centimetre between two images at 30 Hz.
     frame_.moving = drive.T_now_previous().t.norm() > 0.01;
     frame_.stereo = observations_;
-    verdict_ = monitor_.look(frame_);
+    verdict_ = monitor_.update(frame_);
     return verdict_;
   }
 

@@ -52,7 +52,7 @@ struct Drive {
   void note() {
     events.insert(events.end(), estimator->events().begin(), estimator->events().end());
     for (const CalibrationDecision& decision : estimator->calibrations())
-      if (!decision.learnt) decisions.push_back(decision);
+      if (!decision.is_refinement) decisions.push_back(decision);
   }
   void drive(int first, int last) {
     for (int i = first; i < last; ++i) give(corridor.frame(i));

@@ -41,7 +41,7 @@ struct Review {
   }
   [[nodiscard]] Gate gate() const {
     const SolutionReview review(
-        solved, {options, truth, &in_use, calibration::ClaimSource::elsewhere, log, focal});
+        solved, {options, truth, &in_use, calibration::CalibrationOrigin::elsewhere, log, focal});
     return review.gate(solved.transforms);
   }
   [[nodiscard]] bool lines_tell() const {
