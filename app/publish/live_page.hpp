@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "app/publish/frame_images.hpp"
 #include "app/publish/http_server.hpp"
 #include "app/publish/live_state.hpp"
@@ -51,7 +53,6 @@ class LivePage final : public SessionObserver {
   struct Options {
     HostPort address{};
     HttpPolicy policy{};
-    std::size_t viewers = 4;
   };
 
   /// `requests` outlives it. `line_age_ms`: of the pose lines, 99th percentile; negative: none.
@@ -67,7 +68,6 @@ class LivePage final : public SessionObserver {
   void on_report(const FrameReport& report) noexcept override;
   void on_event(const EventRecord& event) noexcept override;
   void on_calibration(const CalibrationRecord& calibration) noexcept override;
-  /// Shows the end of the drive first.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() override;
 
  private:
@@ -79,9 +79,9 @@ class LivePage final : public SessionObserver {
   }
   void work();
   void drain();
-  void show();
-  void show_images();
-  void act(HttpRoute route) noexcept;
+  [[nodiscard]] std::string handle(HttpRoute route, const HttpRequest& request);
+  [[nodiscard]] std::string state_since(const HttpRequest& request);
+  [[nodiscard]] nlohmann::json images_json() const;
 
   SessionRequests* requests_;
   std::function<double()> line_age_ms_;
@@ -103,8 +103,11 @@ class LivePage final : public SessionObserver {
   // Used by the page's thread only.
   LiveState state_;
   bool begun_ = false;
+  const std::string epoch_;  // tells a viewer that the program was started again
+  nlohmann::json newest_images_{};
+  std::string newest_image_{};            // number of their frame
+  Clock::time_point asked_{}, wanted_{};  // for the state, for images
   HttpServer server_;
-  Clock::time_point shown_{};
   std::thread thread_;
 };
 

@@ -22,10 +22,6 @@ json rounded(double value, double digits) {
   return std::round(value * scale) / scale;
 }
 
-std::string text_of(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
 json event_json(const EventRecord& event, Stamp first) {
   return {{"s", rounded((event.stamp - first).to_seconds(), 1)},
           {"kind", event.kind},
@@ -46,9 +42,9 @@ json camera_json(const RigCalibration& rig, std::size_t k) {
   return {{"figures", statistics}};
 }
 
-constexpr double kSilenceSeconds = 1;  // without a frame: nobody reads an old status as today's …
-constexpr double kMaxIntervals = 3;    // … unless frames are that rare
-constexpr double kSmoothing = 8;       // frames
+// A status is old after this time without a frame, or after this many intervals between frames.
+constexpr double kSilenceSeconds = 1, kMaxIntervals = 3;
+constexpr double kSmoothing = 8;  // frames
 
 }  // namespace
 
@@ -74,25 +70,25 @@ void LiveState::add(const FrameReport& report) {
     place.world = trail_.places().back().world;
   const Vec3& ins = report.reference.T_enu_left.t;
   if (report.ins_valid) place.ins = {number(ins.x()), number(ins.y())};
+  place.version = ++version_;
   trail_.add(place);
 }
 
 void LiveState::add(const EventRecord& event) {
   if (events_.size() == kEvents) events_.pop_front();
-  events_.push_back(event);
+  events_.emplace_back(++version_, event);
   const std::string_view kind = event.kind;
   const bool confirmed = kind == "calibration_verified";
   if (confirmed || kind == "calibration_contradicted" || kind == "rig_changed") {
     confirmed_ = confirmed;
-    calibration_new_ = true;
+    calibration_version_ = version_;
   }
-  ++events_seen_;
 }
 
 void LiveState::add(const CalibrationRecord& calibration) {
   if (calibrations_.size() == kCalibrations) calibrations_.pop_front();
   calibrations_.push_back(calibration);
-  calibration_new_ = true;
+  calibration_version_ = ++version_;
   if (calibration.is_refinement) measured_ = calibration;
   if (!calibration.accepted) return;
   measured_.reset();
@@ -102,7 +98,7 @@ void LiveState::add(const CalibrationRecord& calibration) {
 
 void LiveState::add(const PublishedEnuAlignment& alignment) {
   alignment_ = alignment;
-  alignment_new_ = true;
+  alignment_version_ = ++version_;
 }
 
 json LiveState::frame_json(HostStamp now) const {
@@ -202,40 +198,25 @@ json LiveState::place_json(const LiveTrail::Place& p) {
   return out;
 }
 
-std::string LiveState::hello(HostStamp now) const {
-  json out{{"session", start_.name},
-           {"frames", start_.frames},
-           {"can_recalibrate", start_.can_recalibrate},
-           {"recording", start_.recording},
-           {"ended", ended_}};
-  json& trail = out["trail"] = json::array();
-  for (const LiveTrail::Place& p : trail_.places()) trail.push_back(place_json(p));
-  json& events = out["events"] = json::array();
-  for (const EventRecord& event : events_) events.push_back(event_json(event, start_.first));
-  out["calibration"] = calibration_json();
-  if (alignment_) out["enu_alignment"] = enu_alignment_json(*alignment_);
-  if (newest_) out["now"] = frame_json(now);
-  return text_of(out);
-}
-
-std::string LiveState::update(HostStamp now, double line_age_ms) {
-  json out{{"ended", ended_}};
-  if (newest_) out["now"] = frame_json(now);
-  if (newest_)
+json LiveState::since(std::uint64_t version, HostStamp now, double line_age_ms) const {
+  json out{{"version", version_},           {"session", start_.name},
+           {"frames", start_.frames},       {"can_recalibrate", start_.can_recalibrate},
+           {"recording", start_.recording}, {"ended", ended_}};
+  if (newest_) {
+    out["now"] = frame_json(now);
     out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
-  const std::size_t first = trail_.pop_new();
+  }
+  const std::size_t first = trail_.first_after(version);
   out["trail_from"] = first;
   json& trail = out["trail"] = json::array();
   const std::vector<LiveTrail::Place>& places = trail_.places();
   for (std::size_t i = first; i < places.size(); ++i) trail.push_back(place_json(places[i]));
   json& events = out["events"] = json::array();
-  const auto fresh = std::min<std::uint64_t>(events_seen_ - events_shown_, events_.size());
-  for (auto i = events_.size() - static_cast<std::size_t>(fresh); i < events_.size(); ++i)
-    events.push_back(event_json(events_[i], start_.first));
-  events_shown_ = events_seen_;
-  if (std::exchange(calibration_new_, false)) out["calibration"] = calibration_json();
-  if (std::exchange(alignment_new_, false)) out["enu_alignment"] = enu_alignment_json(*alignment_);
-  return text_of(out);
+  for (const auto& [event_version, event] : events_)
+    if (event_version > version) events.push_back(event_json(event, start_.first));
+  if (calibration_version_ > version) out["calibration"] = calibration_json();
+  if (alignment_version_ > version) out["enu_alignment"] = enu_alignment_json(*alignment_);
+  return out;
 }
 
 namespace {
@@ -249,28 +230,34 @@ float distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
 }  // namespace
 
 void LiveTrail::add(const Place& place) {
-  if (places_.size() == kMax) thin();
+  if (places_.size() == kMax) thin(place.version);
   if (places_.empty() || distance(place.world, places_.back().world) >= min_step_m_)
     return places_.push_back(place);
   // A rig that stands for weeks uses up no places, whatever its status does.
   Place& last = places_.back();
   if (place.status <= last.status) return;
   last.status = place.status;
-  shown_ = std::min(shown_, places_.size() - 1);
+  last.version = place.version;
 }
 
-void LiveTrail::thin() {
-  shown_ = 0;
+std::size_t LiveTrail::first_after(std::uint64_t version) const noexcept {
+  const auto first = std::partition_point(
+      places_.begin(), places_.end(), [version](const Place& p) { return p.version <= version; });
+  return static_cast<std::size_t>(first - places_.begin());
+}
+
+void LiveTrail::thin(std::uint64_t version) {
   if (min_step_m_ >= kMaxStep) {
     places_.erase(places_.begin(), places_.begin() + kMax / 2);
-    return;
+  } else {
+    min_step_m_ *= 2;
+    for (std::size_t i = 0; i < places_.size(); i += 2) {
+      places_[i].status = std::max(places_[i].status, places_[i + 1].status);
+      places_[i / 2] = places_[i];
+    }
+    places_.resize(kMax / 2);
   }
-  min_step_m_ *= 2;
-  for (std::size_t i = 0; i < places_.size(); i += 2) {
-    places_[i].status = std::max(places_[i].status, places_[i + 1].status);
-    places_[i / 2] = places_[i];
-  }
-  places_.resize(kMax / 2);
+  for (Place& p : places_) p.version = version;
 }
 
 }  // namespace vergence::app
