@@ -66,7 +66,6 @@ constexpr std::array kRenamed{
     Renamed{Kind::key, "odometry.rig_turn_sigma", "odometry.extrinsic_rotation_sigma_rad"},
     Renamed{Kind::key, "calibration.drift_mrad",
             "calibration.extrinsic_random_walk_mrad_per_sqrt_h"},
-    Renamed{Kind::key, "calibration.needs_motion_m", "calibration.min_path_m"},
     Renamed{Kind::key, "calibration.needs_near_points", "calibration.min_near_points"},
     Renamed{Kind::key, "calibration.tolerated_depth_percent",
             "calibration.max_depth_error_percent"},

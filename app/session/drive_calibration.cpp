@@ -36,7 +36,6 @@ calibration::AcceptanceInput question_of(const calibration::RigSolution& s,
   calibration::AcceptanceInput q;
   q.solution = &s;
   q.nominal = &given.nominal;
-  q.lenses = true;
   q.pixel_sigma = c.odometry.pixel_sigma;
   q.must_be_better = false;
   return q;

@@ -152,6 +152,11 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
                           *begin != 0 && *why != 0 ? ": " : "", why);
     r.set_message(text.data());
     if (format.field != nullptr) r.fields[0] = {format.field, event.value};
+    if (const calibration::ChangeEvidence& e = event.evidence; e.log_likelihood_ratio > 0) {
+      r.fields[1] = {"log_likelihood_ratio", e.log_likelihood_ratio};
+      r.fields[2] = {"shift_px", e.shift_px};
+      r.fields[3] = {"rotation_mrad", e.rotation_mrad};
+    }
   }
   return r;
 }
@@ -286,10 +291,10 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   append_distortion(line, lens);
   append_distortion(line, rig.intrinsics[0]);
   if (c.decided && c.reference_depth_m > 0)
-    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.reference_depth_m,
-                   c.depth_sigma_percent, c.depth_error_percent, c.verified, c.lenses);
+    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d}", c.reference_depth_m, c.depth_sigma_percent,
+                   c.depth_error_percent, c.verified);
   else
-    *line += ",,,,,";
+    *line += ",,,,";
   *line += '\n';
 }
 

@@ -156,7 +156,11 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
     }
     jump->confirmed =
         !jump->measured || std::abs(jump->px + pending_.px) > kGoesBack * std::abs(pending_.px);
-    jump->onset_frame = pending_.frame;
+    if (jump->confirmed) {
+      jump->onset_frame = pending_.frame;
+      jump->px = pending_.px;
+      jump->sigma_px = pending_.sigma_px;
+    }
     pending_ = Pending{};
     return;
   }
@@ -165,7 +169,7 @@ void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) n
       std::max({kMinJump, kJumpSigmas * jump->sigma_px, kJumpScatter * std::sqrt(mean_square_)});
   if (measured_ >= kFirstFrames && std::abs(jump->px) > limit) {
     jump->suspected = true;
-    pending_ = Pending{true, frame, jump->px, 0};
+    pending_ = Pending{true, frame, jump->px, jump->sigma_px, 0};
     return;
   }
   if (measured_ < kScatterFrames) ++measured_;

@@ -14,10 +14,8 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kFullWindow = 3.0;         // times the wanted sigmas, at max_frames
-constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of t is given
-constexpr int kMinHeldOut = 3;              // frames that say anything
-constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
+constexpr int kMinHeldOut = 3;     // frames that say anything
+constexpr double kWorstFit = 1.5;  // px: matches of frames not in the solve, median
 // The residual of held-out frames may be kTimesUsed times that of the frames used, or kMinMisfit
 // px; on recorded drives both residuals are 0.08 to 0.25 px.
 constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
@@ -32,7 +30,7 @@ constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
 // Sigma of a measurement over the claim's, under which it may take the claim's place: it has nine
 // times the information, so what is adopted rests on the drive.
 constexpr double kShareOfCurrent = 1.0 / 3;
-constexpr double kNeedsBaselines = 3.0;  // travelled, besides min_path_m
+constexpr double kMinBaselinesTravelled = 3.0;
 
 /// Median distance to the epipolar lines of one frame's matches of the left camera and camera k,
 /// px; negative: hardly a match.
@@ -238,8 +236,6 @@ const char* reason(Gate gate) noexcept {
       return "";
     case Gate::not_solved:
       return "the adjustment did not converge";
-    case Gate::sigmas_too_large:
-      return "the tracks do not hold it well enough yet";
     case Gate::needs_motion:
       return "too little way was driven to see it";
     case Gate::needs_near_structure:
@@ -265,24 +261,18 @@ const char* reason(Gate gate) noexcept {
   return "";
 }
 
-double sigma_excess(const RigCalibration& rig, const CalibrationOptions& o) noexcept {
+double depth_excess(const RigCalibration& rig, const CalibrationOptions& o,
+                    double pixel_sigma) noexcept {
   double worst = 0;
-  for (int k = 1; k < rig.cameras; ++k) {
-    const auto& sigma = rig.sigma_noise[static_cast<std::size_t>(k)];
-    for (std::size_t i = 0; i < 3; ++i)
-      worst = std::max(worst, sigma[i] / (1e-3 * o.rotation_sigma_mrad));
-    for (std::size_t i = 4; i < 6; ++i)
-      worst = std::max(worst, sigma[i] / (1e-3 * o.translation_sigma_mm *
-                                          rig.T_camera_left[static_cast<std::size_t>(k)].t.norm() /
-                                          kBaselineOfSigmas));
-  }
-  return worst;
+  for (int k = 1; k < rig.cameras; ++k)
+    worst = std::max(worst, depth_error_percent(rig, k, reference_depth_m(rig, k, o, pixel_sigma)));
+  return worst / o.usable_depth_percent;
 }
 
 namespace {
 
-/// Gates that apply whichever parameters were estimated.
-Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
+/// Gates that need no frames but those of the solve.
+Gate check_solution(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;
   for (int k = 1; k < s.rig.cameras; ++k) {
@@ -297,27 +287,16 @@ Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noe
         log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kRadiansPerDegree)
       return Gate::implausible_rotation;
   }
-  // With the lenses free, the depth's own sigma says whether the path was long enough.
-  const double least = q.lenses ? 0.0 : o.min_path_m;
-  if (s.travelled_m < std::max(least, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
+  if (s.travelled_m < kMinBaselinesTravelled * s.rig.baseline) return Gate::needs_motion;
   if (s.near < o.min_near_points) return Gate::needs_near_structure;
-  return Gate::open;
+  return depth_excess(s.rig, o, q.pixel_sigma) > 1 ? Gate::depth_unknown : Gate::open;
 }
 
 }  // namespace
 
 Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
-  const Gate common = ask_common_gates(q, o);
-  if (common != Gate::open) return common;
-  if (q.lenses) {
-    for (int k = 1; k < s.rig.cameras; ++k)
-      if (depth_error_percent(s.rig, k, reference_depth_m(s.rig, k, o, q.pixel_sigma)) >
-          o.usable_depth_percent)
-        return Gate::depth_unknown;
-  } else if (sigma_excess(s.rig, o) > (q.window_full ? kFullWindow : 1.0)) {
-    return Gate::sigmas_too_large;
-  }
+  if (const Gate gate = check_solution(q, o); gate != Gate::open) return gate;
   if (q.log == nullptr) return Gate::open;
   if (misfits(*q.log, s.newest, s.rig, s.rig)) return Gate::does_not_fit;
   if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))

@@ -42,8 +42,6 @@ struct Monitor::Parts {
   MonitorOptions options{};
   bool valid = false;
   detail::Reference reference{};
-  Eigen::Matrix<double, 6, 5> d_offset_d_theta =
-      Eigen::Matrix<double, 6, 5>::Zero();  // (φ, τ) by (φ, α, β)
   Mat5 covariance = Mat5::Zero();
   detail::MonitorResiduals looks{};
   detail::ChangeDetector windows{};
@@ -84,10 +82,7 @@ bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
       T_camera_left.finite() && length > 0 && good(left) && good(right) && covariance.allFinite();
   if (p.valid) {
     const Mat32 B = tangent_basis(T_camera_left.t / length);
-    p.reference = {T_camera_left, EpipolarGeometry(T_camera_left), B, length, left, right};
-    p.d_offset_d_theta.setZero();
-    p.d_offset_d_theta.topLeftCorner<3, 3>().setIdentity();
-    p.d_offset_d_theta.bottomRightCorner<3, 2>() = length * B;
+    p.reference = {EpipolarGeometry(T_camera_left), left, right};
     Eigen::Matrix<double, 5, 6> back = Eigen::Matrix<double, 5, 6>::Zero();
     back.topLeftCorner<3, 3>().setIdentity();
     back.bottomRightCorner<2, 3>() = B.transpose() / length;
@@ -137,13 +132,12 @@ void Monitor::Parts::watch_standing(const MonitorFrame& frame,
   if (latest.kind != Kind::quiet && standing_over < kStandingFrames)
     return;  // what moving frames have found stands
   latest.statistic = windows.single(residuals.evidence, residuals.spread_now) / kStandingFactor;
+  latest.shift_px = detail::shift_px(residuals.evidence);
   if (latest.statistic > options.threshold) {
     if (standing_over++ == 0) standing_from = frame.frame;
   } else {
     standing_over = 0;
   }
-  windows.single_estimate(residuals.evidence, residuals.spread_now, &latest.theta,
-                          &latest.covariance);
   latest.kind = standing_over >= kStandingFrames ? Kind::knock : Kind::quiet;
   latest.undecided = standing_over > 0 && standing_over < kStandingFrames;
   latest.onset = standing_over > 0 ? standing_from : frame.frame;
@@ -162,11 +156,13 @@ MonitorResult Monitor::update(const MonitorFrame& frame) noexcept {
   v.kind = d.kind;
   v.statistic = d.statistic;
   v.undecided = d.undecided;
-  v.offset = p.d_offset_d_theta * d.theta;
-  v.covariance = p.d_offset_d_theta * d.covariance * p.d_offset_d_theta.transpose();
   v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
   v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
+  if (d.kind != Kind::quiet) {
+    v.evidence = {0.5 * d.statistic, d.shift_px, 1e3 * d.shift_px / p.reference.right.fx};
+  }
   if (p.collapsed >= p.options.collapse_frames) {
+    v.evidence = {};
     v.kind = Kind::collapse;
     v.onset_frame = p.collapsed_from;
     v.frames_since_onset = p.collapsed;

@@ -50,6 +50,14 @@ struct MonitorFrame {
   int found_stereo = 0;  // matches there are
 };
 
+/// What the images show of a change of the rig; zero where it is too large to be measured.
+struct ChangeEvidence {
+  double log_likelihood_ratio = 0;  // of a change against none
+  double shift_px = 0;       // of the matches across their epipolar lines (knock, drift) or along
+                             // them (disparity jump), rms since the onset
+  double rotation_mrad = 0;  // of camera k that moves its image by as much
+};
+
 /// Result of the monitor after one frame.
 struct MonitorResult {
   enum class Kind : std::uint8_t {  // in order of weight
@@ -59,12 +67,10 @@ struct MonitorResult {
     collapse,  // matches are expected and not there: too far off to be measured
   };
   Kind kind = Kind::quiet;
-  bool undecided = false;  // over the threshold in one frame, which may be an outlier
-  double statistic = 0;    // largest of all windows
-  double threshold = 0;    // the limit of `statistic`
-  Vec6 offset = Vec6::Zero();  // true minus reference, (φ rad, τ m): R ← Exp(φ) R, t ← t + τ; since
-                               // the onset, else of the longest window; first order
-  Mat6 covariance = Mat6::Zero();  // of `offset`; rank 5, the length is not seen
+  bool undecided = false;   // over the threshold in one frame, which may be an outlier
+  double statistic = 0;     // largest of all windows
+  double threshold = 0;     // the limit of `statistic`
+  ChangeEvidence evidence;  // of `kind`, if that is a knock or a drift
   std::uint64_t onset_frame =
       0;  // knock: first frame of the changed rig; drift: where it began; else `frame`
   int frames_since_onset = 0;  // frames measured since then

@@ -70,9 +70,10 @@ void Estimator::Parts::start_estimation(CalibrationCause cause, std::uint64_t on
 }
 
 void Estimator::Parts::suspect_rig(CalibrationCause cause, std::uint64_t onset,
-                                   const RigFrame& frame) noexcept {
+                                   const RigFrame& frame,
+                                   const calibration::ChangeEvidence& evidence) noexcept {
   record(EstimatorEvent::Kind::rig_changed, frame.stamp, cause_message(cause),
-         static_cast<double>(frame.number - std::min(onset, frame.number)));
+         static_cast<double>(frame.number - std::min(onset, frame.number)), evidence);
   start_estimation(cause, onset, frame);
 }
 
@@ -127,7 +128,7 @@ void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& 
     give_up_calibration(frame,
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
   } else if (v.kind != K::quiet) {
-    suspect_rig(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
+    suspect_rig(cause_of(v.kind), first_frame_of_use(v, frame.number), frame, v.evidence);
   }
 }
 

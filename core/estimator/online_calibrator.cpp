@@ -27,8 +27,8 @@ double misfit_px(const CalibrationDecision& d) noexcept {
 }
 
 /// Another rig is adopted: what was learnt of the one before is no prior of it, but for the lenses.
-void clear_rig(std::optional<RigCalibration>* is_refinement) noexcept {
-  if (*is_refinement) calibration::clear_transforms(&**is_refinement);
+void clear_rig(std::optional<RigCalibration>* refined) noexcept {
+  if (*refined) calibration::clear_transforms(&**refined);
 }
 
 }  // namespace
@@ -63,7 +63,6 @@ void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
       state_, found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
   rig_ = found.calibration;
   source_ = calibration::CalibrationOrigin::this_drive;
-  found_with_lenses_ = found.lenses;
   clear_rig(&refined_);
   monitor_.expect_rebuilt_scene();
   frames_.begin_segment();
@@ -86,7 +85,6 @@ void OnlineCalibrator::restore(const RigCalibration& rig) noexcept {
 void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
   rig_ = rig;
   source_ = calibration::CalibrationOrigin::this_drive;
-  found_with_lenses_ = options_.calibration.intrinsics == calibration::IntrinsicsEstimation::full;
   monitor_.expect_rebuilt_scene();
 }
 
@@ -145,7 +143,7 @@ void OnlineCalibrator::start_solve() noexcept {
   solve_.start(frames_.log(), start);
 }
 
-SolutionReview OnlineCalibrator::review(bool last) const noexcept {
+SolutionReview OnlineCalibrator::review() const noexcept {
   return {solve_.solved(),
           {.options = options_,
            .nominal = nominal_,
@@ -153,8 +151,7 @@ SolutionReview OnlineCalibrator::review(bool last) const noexcept {
            .source = source_,
            .log = frames_.log(),
            .focal = solve_.focal_check(),
-           .may_have_changed = !(estimating() && search_.change_believed),
-           .last = last}};
+           .may_have_changed = !(estimating() && search_.change_believed)}};
 }
 
 std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
@@ -163,13 +160,12 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
   if (!solve_.running() || !solve_.next_frame()) return std::nullopt;
   // Frames that stand are not logged: who stops then waits with the decision, for frames that were
   // not used have to speak for it.
-  if (!solve_.outdated(estimating()) && !review(false).held_out_enough()) return std::nullopt;
+  if (!solve_.outdated(estimating()) && !review().held_out_enough()) return std::nullopt;
   // An estimate is adopted as soon as the frames after its snapshot confirm it, and rejected only
   // when more of them would not help. A refinement waits only for the frames that it is evaluated
   // with.
   if (solve_.for_new_rig() && !solve_.outdated(estimating()) && !solve_.last_turn()) {
-    const SolutionReview now = review(false);
-    if (now.gate(now.best()) != Gate::open) {
+    if (review().gate() != Gate::open) {
       solve_.postpone();
       return std::nullopt;
     }
@@ -195,36 +191,37 @@ std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::
                                                               bool last) noexcept {
   solve_.close();
   if (solve_.outdated(estimating())) return std::nullopt;
-  const SolutionReview now = review(last);
-  // Frames of two rigs, or out of step, tell no focal length.
-  const Gate gate = now.gate(now.measured(), false);
+  // Frames of two rigs, or out of sync, do not measure a focal length.
+  const Gate gate = review().gate(false);
   if (gate != Gate::rig_changed && gate != Gate::out_of_sync)
     solve_.focal_check().take(frames_.solved_frames() >= frames_.most());
-  return solve_.for_new_rig() ? evaluate_estimate(now, stamp, number)
-                         : evaluate_refinement(now, stamp, number, last);
+  return solve_.for_new_rig() ? evaluate_estimate(stamp, number)
+                              : evaluate_refinement(stamp, number, last);
 }
 
-CalibrationDecision OnlineCalibrator::evaluate_estimate(const SolutionReview& review, Stamp stamp,
+CalibrationDecision OnlineCalibrator::evaluate_estimate(Stamp stamp,
                                                         std::uint64_t number) noexcept {
-  const RigSolution& found = review.best();
-  gate_ = review.gate(found);
-  CalibrationDecision d = review.decision(found, stamp);
+  const SolutionReview solution = review();
+  gate_ = solution.gate();
+  CalibrationDecision d = solution.decision(stamp);
   d.cause = search_.cause;
   d.latency_frames = static_cast<int>(number - search_.since);
   d.onset_frame = search_.onset;
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
-  review.assess_next(found.rig, &d);
-  if (!d.accepted) plan_search(found);
+  solution.assess_next(&d);
+  if (!d.accepted) plan_search();
   return d;
 }
 
-void OnlineCalibrator::plan_search(const RigSolution& found) noexcept {
-  if (gate_ == Gate::sigmas_too_large || gate_ == Gate::needs_motion ||
+void OnlineCalibrator::plan_search() noexcept {
+  const RigSolution& found = solve_.solved();
+  if (gate_ == Gate::depth_unknown || gate_ == Gate::needs_motion ||
       gate_ == Gate::needs_near_structure) {
     // More of the same helps: sigmas fall with the root of the number of frames.
-    const double excess = gate_ == Gate::sigmas_too_large
-                              ? calibration::sigma_excess(found.rig, options_.calibration)
+    const double excess = gate_ == Gate::depth_unknown
+                              ? calibration::depth_excess(found.rig, options_.calibration,
+                                                          options_.odometry.pixel_sigma)
                               : 1.0;
     const double grow = std::clamp(excess * excess, kGrow, 4.0);
     frames_.want(static_cast<std::size_t>(std::ceil(grow * found.frames)));
@@ -251,27 +248,26 @@ void OnlineCalibrator::apply_assessment(CalibrationTrigger what, double misfit_p
     monitor_.expect_scatter(std::max(options_.monitor.verified_bias_px, misfit_px));
 }
 
-CalibrationDecision OnlineCalibrator::evaluate_refinement(const SolutionReview& review, Stamp stamp,
-                                                          std::uint64_t number,
+CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint64_t number,
                                                           bool last) noexcept {
-  const RigSolution& found = review.measured();
-  gate_ = review.gate(found, false);
-  CalibrationDecision d = review.decision(found, stamp);
+  const RigSolution& found = solve_.solved();
+  const SolutionReview solution = review();
+  gate_ = solution.gate(false);
+  CalibrationDecision d = solution.decision(stamp);
   d.cause = CalibrationCause::refinement;
   d.latency_frames = static_cast<int>(number - search_.since);
   d.onset_frame = search_.onset;
   d.is_refinement = true;
   if (found.status == calibration::RigSolveStatus::ok) {
-    const calibration::Assessment a = review.assess(found, rig_, source_);
+    const calibration::Assessment a = solution.assess(rig_, source_);
     d.reference_depth_m = a.depth_m;
     d.depth_sigma_percent = a.sigma_percent;
     d.depth_error_percent = a.difference_percent;
     if (a.contradicted) d.cause = CalibrationCause::contradicted;
-    // Without a frame that was not used, more frames of the same kind are better and another kind
-    // is not.
+    // At the end of a drive no frame is left that was not used; the solve of more frames is better.
     const calibration::TrackLog& log = frames_.log();
     const bool better = last && log.frame(log.size() - 1).number == found.newest
-                            ? found_with_lenses_ == d.lenses
+                            ? source_ == calibration::CalibrationOrigin::this_drive
                             : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
     // One that the drive has confirmed is not given for one that it has not.
@@ -290,13 +286,14 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(const SolutionReview& 
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
   if (d.accepted && d.cause == CalibrationCause::contradicted) clear_rig(&refined_);
-  plan_refinement(found);
+  plan_refinement();
   return d;
 }
 
 /// A full segment is closed: what it has shown is the next one's prior. So is one that the frames
 /// after it contradict: they are of another rig, and not to be solved with it.
-void OnlineCalibrator::plan_refinement(const RigSolution& found) noexcept {
+void OnlineCalibrator::plan_refinement() noexcept {
+  const RigSolution& found = solve_.solved();
   const bool usable = gate_ == Gate::open || gate_ == Gate::no_better;
   if (gate_ == Gate::does_not_fit) {
     frames_.begin_segment(found.newest + 1);

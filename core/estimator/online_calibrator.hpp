@@ -104,23 +104,21 @@ class OnlineCalibrator {
   /// The calibration in use was solved from images, this drive's or an earlier one's, and its
   /// lenses with it: its epipolar lines hold better than those of a claim.
   [[nodiscard]] bool found() const noexcept { return !rig_.covariance.empty(); }
-  [[nodiscard]] SolutionReview review(bool last) const noexcept;
+  [[nodiscard]] SolutionReview review() const noexcept;
   /// `last`: no more frames come that could make it better.
   [[nodiscard]] std::optional<CalibrationDecision> evaluate(Stamp stamp, std::uint64_t number,
                                                             bool last) noexcept;
-  [[nodiscard]] CalibrationDecision evaluate_estimate(const SolutionReview& review, Stamp stamp,
-                                                      std::uint64_t number) noexcept;
-  [[nodiscard]] CalibrationDecision evaluate_refinement(const SolutionReview& review, Stamp stamp,
-                                                        std::uint64_t number, bool last) noexcept;
+  [[nodiscard]] CalibrationDecision evaluate_estimate(Stamp stamp, std::uint64_t number) noexcept;
+  [[nodiscard]] CalibrationDecision evaluate_refinement(Stamp stamp, std::uint64_t number,
+                                                        bool last) noexcept;
   /// Chooses the frames of the next solve from the gate's result.
-  void plan_search(const calibration::RigSolution& found) noexcept;
-  void plan_refinement(const calibration::RigSolution& found) noexcept;
+  void plan_search() noexcept;
+  void plan_refinement() noexcept;
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;
   CalibrationState state_;
   calibration::CalibrationOrigin source_ = calibration::CalibrationOrigin::elsewhere;
-  bool found_with_lenses_ = false;
   std::optional<RigCalibration> refined_;  // what closed segments show, with the lenses free
   CalibrationFrames frames_;
   BackgroundSolve solve_;

@@ -48,6 +48,13 @@ const Transform& transform(const RigCalibration& rig, int k) noexcept {
   return rig.T_camera_left[static_cast<std::size_t>(k)];
 }
 
+/// A rotation of σ about the axis that epipolar lines do not show moves all points by f σ.
+calibration::ChangeEvidence evidence_of(const calibration::DisparityJump& jump,
+                                        double focal_px) noexcept {
+  const double sigmas = jump.px / jump.sigma_px, px = std::abs(jump.px);
+  return {0.5 * sigmas * sigmas, px, 1e3 * px / focal_px};
+}
+
 /// The left camera and camera k.
 bool both_show(const odometry::FrameOutcome& outcome, int k) noexcept {
   return (outcome.structured & 1U) != 0 &&
@@ -263,11 +270,13 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
     } else if (jump.confirmed && v.kind < Kind::knock) {
       v.kind = Kind::knock;
       v.onset_frame = jump.onset_frame;
+      v.evidence = evidence_of(jump, pinhole(rig_, k).fx);
     }
     rig.undecided = rig.undecided || v.undecided || jump.suspected;
     if (v.kind <= rig.kind) continue;
     rig.kind = v.kind;
     rig.onset_frame = v.onset_frame;
+    rig.evidence = v.evidence;
   }
   return rig;
 }

@@ -51,7 +51,6 @@ struct CalibrationDecision {
   double depth_error_percent =
       0;                     // how far off the one before was, by the one found; 0: there was none
   bool verified = false;     // the calibration now in use holds to the tolerated depth error
-  bool lenses = false;       // lenses were part of what was found
   FocalMeasurement focal{};  // the newest of the drive
   double solve_ms = 0;       // on the solver's thread
 };

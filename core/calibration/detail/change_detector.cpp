@@ -142,23 +142,10 @@ void ChangeDetector::estimate_reference(const Evidence& window, Vec5* mean,
   *mean = *covariance * e.g;
 }
 
-void ChangeDetector::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept {
-  const Cholesky<5> factor = with_prior(e.A);
-  *covariance = factor.inverse();
-  *theta = factor.solve(e.g);
-}
-
 double ChangeDetector::single(const Evidence& frame, double spread) const noexcept {
   Evidence e;
   e.add(frame, 1.0 / (std::max(spread, kMinInflation) + bias2_ * frame.n));
   return statistic(e, Vec5::Zero(), covariance_);
-}
-
-void ChangeDetector::single_estimate(const Evidence& frame, double spread, Vec5* theta,
-                                     Mat5* covariance) const noexcept {
-  Evidence e;
-  e.add(frame, 1.0 / (std::max(spread, kMinInflation) + bias2_ * frame.n));
-  estimate(e, theta, covariance);
 }
 
 Decision ChangeDetector::decide() noexcept {
@@ -166,7 +153,6 @@ Decision ChangeDetector::decide() noexcept {
   const std::size_t count = history_.frames();
   if (count == 0) return d;
   d.onset = history_.recent(0).frame;
-  Evidence longest;
   std::size_t window = 0;  // of the largest statistic
   Evidence sum;
   std::size_t summed = 0;
@@ -176,19 +162,18 @@ Decision ChangeDetector::decide() noexcept {
     } else {
       history_.sum_of(detector_[w], &sum);
     }
-    longest = effective(sum);
-    double most = statistic(longest, Vec5::Zero(), covariance_);
+    const Evidence inflated = effective(sum);
+    double most = statistic(inflated, Vec5::Zero(), covariance_);
     if (detector_[w] >= kMinReferenceWindow && detector_[w] <= kMaxReferenceWindow &&
         count >= 2 * detector_[w]) {
-      Vec5 is_refinement;
+      Vec5 reference;
       Mat5 covariance;
-      estimate_reference(sum, &is_refinement, &covariance);
-      most = std::max(most, statistic(longest, is_refinement, covariance));
+      estimate_reference(sum, &reference, &covariance);
+      most = std::max(most, statistic(inflated, reference, covariance));
     }
     if (most > d.statistic) d.statistic = most, window = detector_[w];
   }
   newest_statistic_ = d.statistic;
-  estimate(longest, &d.theta, &d.covariance);
   const double limit = over_ > 0 ? kRelease * options_.threshold : options_.threshold;
   over_ = d.statistic > limit ? over_ + 1 : 0;
   if (over_ > 0) attribute(window, &d);
@@ -248,9 +233,7 @@ void ChangeDetector::attribute(std::size_t window, Decision* d) const noexcept {
   const Onset& onset = ramp ? found.ramp : found.step;
   d->onset = onset.frame;
   d->frames = onset.frames;
-  Evidence e;
-  e.add(onset.since, 1.0 / (lambda_ + (ramp ? 0.0 : bias2_ * onset.since.n)));
-  estimate(e, &d->theta, &d->covariance);
+  d->shift_px = shift_px(onset.since);
 }
 
 }  // namespace vergence::calibration::detail

@@ -43,13 +43,15 @@ struct Estimator::Parts {
     (void)events.push(e);
     state = t->to;
   }
-  void record(EstimatorEvent::Kind kind, Stamp stamp, const char* why, double value) noexcept {
+  void record(EstimatorEvent::Kind kind, Stamp stamp, const char* why, double value,
+              const calibration::ChangeEvidence& evidence = {}) noexcept {
     EstimatorEvent e;
     e.stamp = stamp;
     e.kind = kind;
     e.from = e.to = state;
     e.why = why;
     e.value = value;
+    e.evidence = evidence;
     (void)events.push(e);
   }
 
@@ -57,7 +59,8 @@ struct Estimator::Parts {
   [[nodiscard]] Mat6 motion_of(const odometry::FrameOutcome& out) const noexcept;
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void record_length_sigma(const CalibrationDecision& decision) noexcept;
-  void suspect_rig(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
+  void suspect_rig(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame,
+                   const calibration::ChangeEvidence& evidence = {}) noexcept;
   void restart_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
                           const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
