@@ -152,10 +152,13 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
                           *begin != 0 && *why != 0 ? ": " : "", why);
     r.set_message(text.data());
     if (format.field != nullptr) r.fields[0] = {format.field, event.value};
-    if (const calibration::ChangeEvidence& e = event.evidence; e.log_likelihood_ratio > 0) {
-      r.fields[1] = {"log_likelihood_ratio", e.log_likelihood_ratio};
-      r.fields[2] = {"shift_px", e.shift_px};
-      r.fields[3] = {"rotation_mrad", e.rotation_mrad};
+    std::size_t n = 1;
+    const ChangeEvidence& e = event.evidence;
+    if (e.log_likelihood_ratio > 0)
+      r.fields[n++] = {"log_likelihood_ratio", e.log_likelihood_ratio};
+    if (e.shift_px > 0) {
+      r.fields[n++] = {"shift_px", e.shift_px};
+      r.fields[n] = {"rotation_mrad", e.rotation_mrad};
     }
   }
   return r;

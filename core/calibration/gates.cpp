@@ -219,6 +219,9 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& current,
     a.depth_m = depth;
     a.sigma_percent = s;
     a.difference_percent = difference;
+    const double turn = difference / by_turn;
+    a.evidence = {std::abs(odds), turn * measured.intrinsics[static_cast<std::size_t>(k)].fx,
+                  1e3 * turn};
   }
   a.worse = fits_better(log, after, current, measured);
   // In a full window a misfit to the epipolar lines cannot be an accident of where the structure

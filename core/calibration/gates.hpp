@@ -46,6 +46,7 @@ struct Assessment {
   double sigma_percent = 0;       // of the measured calibration's depth there, 1 sigma
   double difference_percent = 0;  // of the claimed one from the measured, root mean over the image
   double log_odds = 0;            // that the rig is the one of the claim
+  ChangeEvidence evidence;        // for it, or against it if log_odds is negative
   bool nearer = false;            // the measured one is surely nearer to the rig in depth
   bool better = false;     // it should be used instead: it is nearer and explains frames that were
                            // not used no worse, or it does better where the claim misses them

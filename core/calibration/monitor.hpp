@@ -5,6 +5,7 @@
 
 #include "core/geometry/observations.hpp"
 #include "core/memory/arena.hpp"
+#include "core/types/change_evidence.hpp"
 
 namespace vergence::calibration {
 
@@ -48,14 +49,6 @@ struct MonitorFrame {
   int expected_stereo =
       0;  // matches a good pair of images would give; 0 where either image is poor by itself
   int found_stereo = 0;  // matches there are
-};
-
-/// What the images show of a change of the rig; zero where it is too large to be measured.
-struct ChangeEvidence {
-  double log_likelihood_ratio = 0;  // of a change against none
-  double shift_px = 0;       // of the matches across their epipolar lines (knock, drift) or along
-                             // them (disparity jump), rms since the onset
-  double rotation_mrad = 0;  // of camera k that moves its image by as much
 };
 
 /// Result of the monitor after one frame.

@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "core/types/calibration.hpp"
+#include "core/types/change_evidence.hpp"
 
 namespace vergence {
 
@@ -51,6 +52,8 @@ struct CalibrationDecision {
   double depth_error_percent =
       0;                     // how far off the one before was, by the one found; 0: there was none
   bool verified = false;     // the calibration now in use holds to the tolerated depth error
+  ChangeEvidence evidence;   // that the rig is the one calibrated before, or, with
+                             // `contradicted`, another one
   FocalMeasurement focal{};  // the newest of the drive
   double solve_ms = 0;       // on the solver's thread
 };

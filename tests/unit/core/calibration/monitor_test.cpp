@@ -91,7 +91,7 @@ TEST(Monitor, evidenceStatesTheShiftOfAPitch) {
     MonitorTrial trial(o);
     for (int i = 0; i < 300; ++i) (void)trial.step();
     ASSERT_EQ(trial.verdict().kind, Kind::knock);
-    const calibration::ChangeEvidence& e = trial.verdict().evidence;
+    const ChangeEvidence& e = trial.verdict().evidence;
     // Rows move by f tan(pitch), a little more towards the corners; 0.003° are its noise here.
     EXPECT_NEAR(e.rotation_mrad, 1e3 * degrees / kRadian, 0.05 + 0.1 * 1e3 * degrees / kRadian);
     EXPECT_NEAR(e.shift_px, 1e-3 * e.rotation_mrad * o.right.fx, 1e-9);
