@@ -179,7 +179,6 @@ struct PublishSettings {
   std::string http{};
   /// File whose first line is the token; empty: a new token per session.
   std::string token_file{};
-  int viewers = 4;
 };
 
 /// `sessions:` the folders that drives leave side by side.

@@ -81,8 +81,8 @@ class SessionObserver {
 
   /// Called with the estimator's next input: images, stamp, how sure the pairing is.
   virtual void on_frame(const RigFrame& /*frame*/) noexcept {}
-  /// Called with the pose of that frame immediately.
-  virtual void on_pose(const PoseSample& /*sample*/) noexcept {}
+  /// Called with the pose of that frame immediately; the report lacks the comparison with the INS.
+  virtual void on_pose(const FrameReport& /*report*/) noexcept {}
   /// The newest moving frames with their tracks, after on_pose(); valid until it returns. Empty
   /// where nothing watches the calibration.
   virtual void on_tracks(const calibration::TrackLog& /*tracks*/) noexcept {}
@@ -114,25 +114,25 @@ class SessionOutput {
   explicit SessionOutput(std::span<SessionObserver* const> observers) noexcept
       : observers_(observers) {}
 
-  void post(const RigFrame& frame) noexcept { position(&SessionObserver::on_frame, frame); }
-  void post(const PoseSample& sample) noexcept { position(&SessionObserver::on_pose, sample); }
+  void post(const RigFrame& frame) noexcept { notify(&SessionObserver::on_frame, frame); }
+  void post_pose(const FrameReport& report) noexcept { notify(&SessionObserver::on_pose, report); }
   void post(const calibration::TrackLog& tracks) noexcept {
-    position(&SessionObserver::on_tracks, tracks);
+    notify(&SessionObserver::on_tracks, tracks);
   }
   void post(const EnuAlignment& alignment, const Geodetic& origin) noexcept {
-    position(&SessionObserver::on_enu_alignment, alignment, origin);
+    notify(&SessionObserver::on_enu_alignment, alignment, origin);
   }
-  void post(const FrameReport& report) noexcept { position(&SessionObserver::on_report, report); }
-  void post(const EventRecord& event) noexcept { position(&SessionObserver::on_event, event); }
+  void post(const FrameReport& report) noexcept { notify(&SessionObserver::on_report, report); }
+  void post(const EventRecord& event) noexcept { notify(&SessionObserver::on_event, event); }
   void post(const CalibrationRecord& calibration) noexcept {
-    position(&SessionObserver::on_calibration, calibration);
+    notify(&SessionObserver::on_calibration, calibration);
   }
   /// Precondition: Recorder::Options::ins.
-  void post(const InsRecord& reading) noexcept { position(&SessionObserver::on_reading, reading); }
+  void post(const InsRecord& reading) noexcept { notify(&SessionObserver::on_reading, reading); }
 
  private:
   template <class Call, class... Values>
-  void position(Call call, const Values&... values) noexcept {
+  void notify(Call call, const Values&... values) noexcept {
     for (SessionObserver* o : observers_) (o->*call)(values...);
   }
 

@@ -25,29 +25,25 @@ testing::AssertionResult refused_in_one_message(const Outcome& outcome) {
                                      << "\", stderr \"" << outcome.err << '"';
 }
 
-TEST(Program, refusalNamesReplacementOfOldOption) {
-  using Kind = Withdrawn::Kind;
+TEST(Program, renamedWordsAreRefusedWithTheirNewName) {
+  using Kind = Renamed::Kind;
   const test::TemporaryFolder folder;
   folder.write("rig.yaml", "threads: 1\n");
   const std::string out = " --out '" + (folder / "out").string() + "'",
                     run = "run '" + (folder / "rig.yaml").string() + "'" + out + " --set ";
-  for (const Withdrawn& row : withdrawn()) {
+  for (const Renamed& row : renamed()) {
     const std::string name(row.name);
-    const std::string words =
-        row.kind == Kind::key     ? run + name + "=1"
-        : row.kind == Kind::value ? run + std::string(name).replace(name.find(' '), 1, "=")
-        : row.kind == Kind::camera_option
-            ? run + "cameras.0.driver=gige --set cameras.0.options." + name + "=1"
-        : row.kind == Kind::record_topic ? run + "'record=[" + name + "]'"
-        : row.kind == Kind::option       ? name + " x" + out
-                                         : name;
+    const std::string words = row.kind == Kind::key ? run + name + "=1"
+                              : row.kind == Kind::value
+                                  ? run + std::string(name).replace(name.find(' '), 1, "=")
+                                  : name + " x" + out;
     const Outcome outcome = run_vergence(words);
     EXPECT_TRUE(refused_in_one_message(outcome)) << name;
-    EXPECT_TRUE(contains(outcome.err, std::string(row.instead))) << name << ": " << outcome.err;
+    EXPECT_TRUE(contains(outcome.err, std::string(row.now))) << name << ": " << outcome.err;
   }
 }
 
-TEST(Program, unknownCommandSuggestsNearest) {
+TEST(Program, AnUnknownCommandNamesTheNearest) {
   const Outcome outcome = run_vergence("evalute a b");
   EXPECT_TRUE(refused_in_one_message(outcome));
   EXPECT_TRUE(contains(outcome.err, "unknown command \"evalute\"; did you mean \"evaluate\"?"))
@@ -55,13 +51,13 @@ TEST(Program, unknownCommandSuggestsNearest) {
   EXPECT_TRUE(refused_in_one_message(run_vergence("''")));
 }
 
-TEST(Program, escapesControlCharactersOfArguments) {
+TEST(Program, WordsOfTheUserCannotSteerTheTerminal) {
   const Outcome outcome = run_vergence("\"$(printf 'a\\033[2Jb\\nc')\"");
   EXPECT_TRUE(refused_in_one_message(outcome));
   EXPECT_FALSE(contains(outcome.err, "\033"));
 }
 
-TEST(Program, refusesSmallStackLimit) {
+TEST(Program, AStackThatIsTooSmallIsSaidBeforeItOverflows) {
   const test::Outcome o = test::run_vergence("--version", "ulimit -S -s 64;");
   EXPECT_EQ(o.code, 2);
   EXPECT_NE(o.err.find("the stack is limited to 64 kB, and 1024 are needed: raise the limit"),
@@ -69,7 +65,7 @@ TEST(Program, refusesSmallStackLimit) {
       << o.err;
 }
 
-TEST(Program, unwritableStandardOutputIsAnError) {
+TEST(Program, AStandardOutputThatTakesNothingIsAnError) {
   constexpr const char* kCommand = "'" VERGENCE_PROGRAM "' --help >/dev/full 2>/dev/null";
   EXPECT_EQ(WEXITSTATUS(std::system(kCommand)), 2);
 }

@@ -21,7 +21,7 @@ std::ptrdiff_t files_in(const std::filesystem::path& folder) {
                        std::filesystem::directory_iterator{});
 }
 
-TEST(DurableFile, replacesFileWithoutLeftovers) {
+TEST(DurableFile, replacesWithoutTemporaryFiles) {
   const test::TemporaryFolder folder;
   const std::string large(300'000, 'x');
   replace_durably(folder / "a.yaml", "old");
@@ -44,7 +44,7 @@ TEST(DurableFile, failureNamesFileAndKeepsOldOne) {
   EXPECT_FALSE(std::filesystem::exists(folder / "c.yaml.new"));
 }
 
-TEST(DurableFile, fullDiskIsReportedAndKeepsOldFile) {
+TEST(DurableFile, fullDiskIsAnErrorAndKeepsOldFile) {
   const test::TemporaryFolder folder;
   replace_durably(folder / "a.yaml", "old");
   std::filesystem::create_symlink("/dev/full", folder / "a.yaml.new");

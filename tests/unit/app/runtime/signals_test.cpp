@@ -7,7 +7,7 @@
 namespace vergence::app {
 namespace {
 
-TEST(SignalGuard, interruptAndTerminateSetExitCodes) {
+TEST(SignalGuard, interruptAndTerminateHaveExitCodes) {
   {
     const SignalGuard guard;
     std::raise(SIGINT);
@@ -20,7 +20,7 @@ TEST(SignalGuard, interruptAndTerminateSetExitCodes) {
   EXPECT_EQ(guard.stop_code(), ExitCode::terminated);
 }
 
-TEST(SignalGuard, restoresFormerHandler) {
+TEST(SignalGuard, restoresThePreviousHandler) {
   static int calls = 0;
   calls = 0;
   auto* const before = std::signal(SIGINT, [](int) { ++calls; });
@@ -30,7 +30,7 @@ TEST(SignalGuard, restoresFormerHandler) {
   std::signal(SIGINT, before);
 }
 
-TEST(SignalGuard, sigusr1RequestsCalibrationEachTime) {
+TEST(SignalGuard, sigusr1RequestsACalibration) {
   const SignalGuard guard;
   EXPECT_FALSE(guard.poll_calibration_request());
   for (int i = 0; i < 3; ++i) {
@@ -41,7 +41,7 @@ TEST(SignalGuard, sigusr1RequestsCalibrationEachTime) {
   EXPECT_FALSE(guard.stop_requested());
 }
 
-TEST(SignalGuard, closedTerminalEndsSessionUnlessIgnored) {
+TEST(SignalGuard, hangupStopsUnlessIgnored) {
   {
     const SignalGuard guard;
     std::raise(SIGHUP);
@@ -56,13 +56,13 @@ TEST(SignalGuard, closedTerminalEndsSessionUnlessIgnored) {
   std::signal(SIGHUP, before);
 }
 
-TEST(SignalGuard, ignoresSigpipeAndSigxfsz) {
+TEST(SignalGuard, brokenPipeAndFileLimitAreIgnored) {
   const SignalGuard guard;
   for (const int number : {SIGPIPE, SIGXFSZ, SIGUSR2}) std::raise(number);
   EXPECT_FALSE(guard.stop_requested());
 }
 
-TEST(SignalGuardDeathTest, secondSignalEndsProgram) {
+TEST(SignalGuardDeathTest, secondSignalEndsTheProgram) {
   EXPECT_EXIT(
       {
         const SignalGuard guard;

@@ -12,7 +12,7 @@
 namespace vergence::app {
 namespace {
 
-TEST(BackgroundThread, startReturnsWhileTaskRuns) {
+TEST(BackgroundThread, startDoesNotWaitForTheTask) {
   BackgroundThread runner;
   std::atomic<bool> go{false};
   std::thread::id where;
@@ -48,7 +48,7 @@ TEST(BackgroundThread, resultIsVisibleWhenNotBusy) {
   }
 }
 
-TEST(BackgroundThread, doesNotAllocatePerTask) {
+TEST(BackgroundThread, doesNotAllocateOnItsSealedThread) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   BackgroundThread runner;
@@ -66,7 +66,7 @@ TEST(BackgroundThread, doesNotAllocatePerTask) {
   EXPECT_EQ(AllocationGuard::runtime_allocations(), before);
 }
 
-TEST(ThreadRunner, runsOnCallerAndOneOtherThread) {
+TEST(ThreadRunner, runsOneHalfOnEachThread) {
   ThreadRunner runner;
   std::thread::id here_id, there_id, there_again;
   auto here = [&] { here_id = std::this_thread::get_id(); };
@@ -79,7 +79,7 @@ TEST(ThreadRunner, runsOnCallerAndOneOtherThread) {
   EXPECT_EQ(there_id, there_again);
 }
 
-TEST(ThreadRunner, runReturnsAfterBothHalves) {
+TEST(ThreadRunner, waitsForTheSlowerHalf) {
   ThreadRunner runner;
   int left = 0, right = 0;  // plain: a run that returned early would be a race
   const auto pause = [](int i) {

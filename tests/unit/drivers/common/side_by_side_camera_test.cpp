@@ -75,7 +75,7 @@ class SideBySide : public ::testing::Test {
   CameraConfiguration asked_{kWidth, kHeight, 30};
 };
 
-TEST_F(SideBySide, splitOneExposureIntoTwoImages) {
+TEST_F(SideBySide, bothSidesComeFromOneExposure) {
   stream();
   script_.answers = {DeviceStatus::ok, DeviceStatus::ok};
   std::array<Frame, 2> left{}, right{};
@@ -96,7 +96,7 @@ TEST_F(SideBySide, splitOneExposureIntoTwoImages) {
   EXPECT_EQ(*b.row(1), 3 * kWidth) << "the picture's second row, its right half";
 }
 
-TEST_F(SideBySide, returnSlotAfterBothReleased) {
+TEST_F(SideBySide, slotIsReleasedWhenBothHaveReleasedIt) {
   stream();
   script_.answers = {DeviceStatus::ok};
   Frame left, right;
@@ -109,7 +109,7 @@ TEST_F(SideBySide, returnSlotAfterBothReleased) {
   EXPECT_TRUE(script_.held.empty());
 }
 
-TEST_F(SideBySide, returnUnconsumedSlotOnStop) {
+TEST_F(SideBySide, stopReleasesUntakenFrames) {
   stream();
   script_.answers = {DeviceStatus::ok, DeviceStatus::ok};
   Frame frame;
@@ -122,7 +122,7 @@ TEST_F(SideBySide, returnUnconsumedSlotOnStop) {
   EXPECT_TRUE(script_.held.empty());
 }
 
-TEST_F(SideBySide, bothDisconnectBeforeReconnect) {
+TEST_F(SideBySide, bothAreGoneBeforeEitherReturns) {
   stream();
   script_.answers = {DeviceStatus::ok, DeviceStatus::disconnected};
   Frame frame;
@@ -146,7 +146,7 @@ TEST_F(SideBySide, bothDisconnectBeforeReconnect) {
   EXPECT_EQ(right_->wait({}, &frame), DeviceStatus::ok);
 }
 
-TEST_F(SideBySide, reconnectAfterSecondDisconnect) {
+TEST_F(SideBySide, secondDisconnectDuringReturnRecovers) {
   stream();
   script_.answers = {DeviceStatus::disconnected};
   Frame frame;
@@ -161,7 +161,7 @@ TEST_F(SideBySide, reconnectAfterSecondDisconnect) {
   EXPECT_EQ(left_->wait({}, &frame), DeviceStatus::ok);
 }
 
-TEST_F(SideBySide, countOwnFramesAndCameraLosses) {
+TEST_F(SideBySide, countOwnFramesAndSharedLosses) {
   stream();
   script_.answers = {DeviceStatus::ok};
   Frame frame;

@@ -47,7 +47,7 @@ class CameraConformance : public ::testing::Test {
   std::string why_;
 };
 
-TEST_F(CameraConformance, keepsContractUnderRandomCalls) {
+TEST_F(CameraConformance, randomCallsKeepTheContract) {
   const int seeds = asked_for("VERGENCE_CONFORMANCE_SEEDS", 3),
             steps = asked_for("VERGENCE_CONFORMANCE_STEPS", 60);
   for (int seed = 1; seed <= seeds && !HasFailure(); ++seed) {
@@ -91,7 +91,7 @@ TEST_F(CameraConformance, keepsContractUnderRandomCalls) {
   }
 }
 
-TEST_F(CameraConformance, refusesInvalidSettingsWithoutEffect) {
+TEST_F(CameraConformance, invalidConfigurationChangesNothing) {
   if (make(11) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   const auto possible = rig_->possible();
@@ -107,7 +107,7 @@ TEST_F(CameraConformance, refusesInvalidSettingsWithoutEffect) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, dropsAndCountsNewestWithoutFreeSlot) {
+TEST_F(CameraConformance, newestIsDroppedAndCountedWithoutFreeSlot) {
   if (make(14) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
@@ -129,7 +129,7 @@ TEST_F(CameraConformance, dropsAndCountsNewestWithoutFreeSlot) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, countsExposuresThatNeverArrive) {
+TEST_F(CameraConformance, exposuresThatNeverArriveAreCounted) {
   if (make(15) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
@@ -157,7 +157,7 @@ bool reaches(ConformanceRig& rig, const CameraConfiguration& c, const ExposureSe
   return false;
 }
 
-TEST_F(CameraConformance, framesReportExposureSetWhileStreaming) {
+TEST_F(CameraConformance, exposureSetWhileStreamingPersists) {
   if (make(18) == nullptr) GTEST_SKIP() << why_;
   CameraDevice& camera = rig_->camera();
   const auto c = rig_->possible().front();
@@ -192,7 +192,7 @@ TEST_F(CameraConformance, framesReportExposureSetWhileStreaming) {
   camera.stop();
 }
 
-TEST_F(CameraConformance, reconnectsAfterUnplug) {
+TEST_F(CameraConformance, unpluggedCameraIsGoneAndReturns) {
   if (make(16) == nullptr) GTEST_SKIP() << why_;
   ShadowCamera camera(rig_.get());
   camera.configure(rig_->possible().front());
@@ -204,7 +204,7 @@ TEST_F(CameraConformance, reconnectsAfterUnplug) {
   camera.check_statistics();
 }
 
-TEST_F(CameraConformance, allowsOwnerConsumerReleaserThreads) {
+TEST_F(CameraConformance, threeThreadsMayShareACamera) {
   if (make(17) == nullptr) GTEST_SKIP() << why_;
   CameraDevice& camera = rig_->camera();
   const auto configuration = rig_->possible().front();

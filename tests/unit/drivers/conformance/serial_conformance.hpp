@@ -122,7 +122,7 @@ struct SerialConformance : ::testing::Test {
 };
 TYPED_TEST_SUITE_P(SerialConformance);
 
-TYPED_TEST_P(SerialConformance, restartsAfterStop) {
+TYPED_TEST_P(SerialConformance, stopsAndStartsAgain) {
   // Longer than what fits into its ring, so that it has not ended when it is started again.
   this->begin({}, {}, 300);
   auto& device = this->rig->device();
@@ -138,7 +138,7 @@ TYPED_TEST_P(SerialConformance, restartsAfterStop) {
   EXPECT_EQ(this->disconnects, 0);
 }
 
-TYPED_TEST_P(SerialConformance, reconnectsWithOrWithoutPowerLoss) {
+TYPED_TEST_P(SerialConformance, reconnectsAfterUnplugPoweredOrNot) {
   SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(13), true}, {at_s(18), at_s(20), false}};
   this->begin(line);
@@ -147,7 +147,7 @@ TYPED_TEST_P(SerialConformance, reconnectsWithOrWithoutPowerLoss) {
   EXPECT_GT(static_cast<double>(all.size()), 15 * TypeParam::kRate);
 }
 
-TYPED_TEST_P(SerialConformance, startsAfterStopWhileDisconnected) {
+TYPED_TEST_P(SerialConformance, startsAfterAStopDuringAnOutage) {
   SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(13), true}};
   this->begin(line, {}, 120);
@@ -159,7 +159,7 @@ TYPED_TEST_P(SerialConformance, startsAfterStopWhileDisconnected) {
   EXPECT_GT(this->take_to_the_end().front().arrival, at_s(13)) << "nothing of the first start";
 }
 
-TYPED_TEST_P(SerialConformance, noiseOrSilenceDisconnects) {
+TYPED_TEST_P(SerialConformance, noiseOrSilenceIsADisconnect) {
   this->begin({}, [](HostStamp at, std::vector<std::uint8_t>* bytes) {
     if (at > at_s(12) && at < at_s(18)) std::fill(bytes->begin(), bytes->end(), std::uint8_t{0x55});
   });
@@ -167,7 +167,7 @@ TYPED_TEST_P(SerialConformance, noiseOrSilenceDisconnects) {
   EXPECT_EQ(this->disconnects, 1);
 }
 
-TYPED_TEST_P(SerialConformance, bitErrorsLoseMessagesOnly) {
+TYPED_TEST_P(SerialConformance, flippedBitsLoseOnlyTheirMessages) {
   SimulatedLineOptions line;
   line.corrupt = 2e-4;
   this->begin(line);
@@ -186,8 +186,8 @@ TYPED_TEST_P(SerialConformance, bitErrorsLoseMessagesOnly) {
   }
 }
 
-REGISTER_TYPED_TEST_SUITE_P(SerialConformance, restartsAfterStop, reconnectsWithOrWithoutPowerLoss,
-                            startsAfterStopWhileDisconnected, noiseOrSilenceDisconnects,
-                            bitErrorsLoseMessagesOnly);
+REGISTER_TYPED_TEST_SUITE_P(SerialConformance, stopsAndStartsAgain,
+                            reconnectsAfterUnplugPoweredOrNot, startsAfterAStopDuringAnOutage,
+                            noiseOrSilenceIsADisconnect, flippedBitsLoseOnlyTheirMessages);
 
 }  // namespace vergence::test

@@ -32,7 +32,7 @@ DeviceStatus start_again(GigeBench* b, double limit_s) {
   return status;
 }
 
-TEST(GigeTrouble, findsByBroadcastAndOpensBySerial) {
+TEST(GigeTrouble, camerasAreDiscoveredAndOpenedBySerial) {
   GigeCameraOptions o;
   o.address = GigeCamera::address(200);
   o.serial = "FIND-" + std::to_string(::getpid() % 100'000);
@@ -53,7 +53,7 @@ TEST(GigeTrouble, findsByBroadcastAndOpensBySerial) {
   EXPECT_EQ(status, DeviceStatus::ok);
 }
 
-TEST(GigeTrouble, isBusyWhenAnotherProgramControls) {
+TEST(GigeTrouble, cameraOfAnotherProgramIsBusy) {
   GigeCameraOptions o;
   o.address = GigeCamera::address(201);
   GigeCamera simulator(o);
@@ -68,7 +68,7 @@ TEST(GigeTrouble, isBusyWhenAnotherProgramControls) {
   EXPECT_NE(driver->open(o.address, &status), nullptr) << "and free again";
 }
 
-TEST(GigeTrouble, silentCameraDisconnectsAndReconnects) {
+TEST(GigeTrouble, silentCameraIsReportedAndComesBack) {
   GigeBench b;
   b.configure(b.wish());
   b.start();
@@ -85,7 +85,7 @@ TEST(GigeTrouble, silentCameraDisconnectsAndReconnects) {
   EXPECT_EQ(b.camera->statistics().starts, 2U);
 }
 
-TEST(GigeTrouble, reportsFramesOfWrongSizeAsIncomplete) {
+TEST(GigeTrouble, otherImageSizeIsReportedAndIncomplete) {
   for (const auto& [width, height] : {std::pair{160, 120}, {640, 480}}) {
     GigeBench b;
     b.configure(b.wish());
@@ -102,7 +102,7 @@ TEST(GigeTrouble, reportsFramesOfWrongSizeAsIncomplete) {
   }
 }
 
-TEST(GigeTrouble, detectsUnplugWhileIdle) {
+TEST(GigeTrouble, unpluggedIdleCameraIsNoticed) {
   GigeBench b;
   CameraConfiguration c = b.wish();
   c.trigger = CameraTrigger::hardware;
@@ -122,7 +122,7 @@ GigeCameraOptions at_address_of(const GigeBench& b, const std::string& serial) {
   return o;
 }
 
-TEST(GigeTrouble, findsSerialAtNewAddress) {
+TEST(GigeTrouble, cameraIsFoundAtItsNewAddress) {
   GigeBench b({}, 202);
   if (gige::make_driver()->enumerate().empty())
     GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
@@ -141,7 +141,7 @@ TEST(GigeTrouble, findsSerialAtNewAddress) {
   EXPECT_EQ(stranger.report().starts, 0U);
 }
 
-TEST(GigeTrouble, disconnectsOnLostControl) {
+TEST(GigeTrouble, lostControlIsADisconnect) {
   GigeBench b;
   b.configure(b.wish());
   b.start();

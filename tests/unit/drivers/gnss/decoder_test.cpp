@@ -31,7 +31,7 @@ std::string epoch(const std::string& time, const std::string& course = "90.0",
          nmea_sentence("GNGST," + time + ",1,,,,3.0,4.0,5.0");
 }
 
-TEST(GnssDecoder, mergesSentencesOfOneEpoch) {
+TEST(GnssDecoder, sentencesOfOneTimeAreOneReading) {
   Decoder d({Protocol::nmea, 9600, {}});
   const auto all = read(&d, epoch("012345.00"), HostStamp(5'000'000'000));
   ASSERT_EQ(all.size(), 1U);
@@ -49,7 +49,7 @@ TEST(GnssDecoder, mergesSentencesOfOneEpoch) {
   EXPECT_EQ(all[0].quality.utc_ns, 1709169825'000'000'000);
 }
 
-TEST(GnssDecoder, derivesFixFromQualityAndHeight) {
+TEST(GnssDecoder, qualityAndHeightGiveTheFixStatus) {
   struct Case {
     const char *quality, *height;
     FixStatus fix;
@@ -77,7 +77,7 @@ TEST(GnssDecoder, derivesFixFromQualityAndHeight) {
   EXPECT_NE(all[0].sample.fix, FixStatus::fix_3d);
 }
 
-TEST(GnssDecoder, prefersHdtAndUsesCourseOnlyWhileMoving) {
+TEST(GnssDecoder, headingIsHdtElseCourseWhileMoving) {
   Decoder d({Protocol::nmea, 0, {}});
   EXPECT_EQ(read(&d, epoch("012345.00", "90.0", "0.5"), HostStamp(1'000'000'000))
                 .at(0)
@@ -95,13 +95,13 @@ TEST(GnssDecoder, prefersHdtAndUsesCourseOnlyWhileMoving) {
 }
 
 // Known epochs are finished by their last sentence: nothing waits for the line to go quiet.
-TEST(GnssDecoder, laterEpochsDoNotWait) {
+TEST(GnssDecoder, laterEpochsAreDeliveredAtOnce) {
   Decoder d({Protocol::nmea, 0, {}});
   ASSERT_EQ(read(&d, epoch("012345.00"), HostStamp(1'000'000'000)).size(), 1U);
   EXPECT_EQ(read(&d, epoch("012346.00"), HostStamp(2'000'000'000), false).size(), 1U);
 }
 
-TEST(GnssDecoder, continuesOverMidnight) {
+TEST(GnssDecoder, timeContinuesAcrossMidnight) {
   Decoder d({Protocol::nmea, 0, {}});
   const auto gga = [](const std::string& time) {
     return nmea_sentence("GPGGA," + time + ",2729.85,S,15300.822,E,1,9,0.9,20.5,M,39.5,M,,");
@@ -115,7 +115,7 @@ TEST(GnssDecoder, continuesOverMidnight) {
 
 // Arrivals 30 to 90 ms late at 10 Hz: the stamps settle at the least delay, which `processing`
 // states.
-TEST(GnssDecoder, stampsFixTimeNotArrival) {
+TEST(GnssDecoder, stampsAreThoseOfTheFix) {
   Decoder d({Protocol::ubx, 0, Duration::milliseconds(30)});
   const std::int64_t utc0 = 1709169825'000'000'000;
   double worst = 0;
@@ -138,7 +138,7 @@ TEST(GnssDecoder, stampsFixTimeNotArrival) {
 }
 
 // A receiver's own clock is tenths of a second off after a night; its first fix sets it.
-TEST(GnssDecoder, ignoresTimeBeforeFirstFix) {
+TEST(GnssDecoder, timeBeforeTheFirstFixIsIgnored) {
   for (const int ahead_ms : {150, 400}) {
     Decoder d({Protocol::ubx, 0, Duration::milliseconds(30)});
     int fixed = 0;
@@ -163,7 +163,7 @@ TEST(GnssDecoder, ignoresTimeBeforeFirstFix) {
   }
 }
 
-TEST(GnssDecoder, countsMissingEpochs) {
+TEST(GnssDecoder, missingEpochsAreCounted) {
   Decoder d({Protocol::ubx, 0, {}});
   std::uint64_t number = 0;
   for (const int second : {10, 11, 12, 15}) {
@@ -187,7 +187,7 @@ void read_fixes(Decoder* decoder, const std::vector<int>& milliseconds) {
   }
 }
 
-TEST(GnssDecoder, countsNoLossAtLowerRateAfterReconnect) {
+TEST(GnssDecoder, lowerRateAfterReconnectLosesNothing) {
   Decoder d({Protocol::ubx, 0, {}});
   read_fixes(&d, {0, 100, 200, 300, 400, 500});
   EXPECT_EQ(d.period(), Duration::milliseconds(100));
@@ -198,7 +198,7 @@ TEST(GnssDecoder, countsNoLossAtLowerRateAfterReconnect) {
   EXPECT_EQ(d.period(), Duration::seconds(1));
 }
 
-TEST(GnssDecoder, ignoresSingleShortStep) {
+TEST(GnssDecoder, singleShortStepIsNoInterval) {
   Decoder d({Protocol::ubx, 0, {}});
   // A fix is acquired again 40 ms before the grid of the others goes on.
   read_fixes(&d, {0, 100, 200, 300, 960, 1000, 1100, 1200, 1300, 1400});
@@ -206,7 +206,7 @@ TEST(GnssDecoder, ignoresSingleShortStep) {
   EXPECT_EQ(d.counters().lost, 6U) << "between 300 and 960 ms";
 }
 
-TEST(GnssDecoder, usesFirstStepUntilIntervalIsVerified) {
+TEST(GnssDecoder, firstStepIsTheIntervalUntilConfirmed) {
   for (const int first : {40, 700}) {
     Decoder d({Protocol::ubx, 0, {}});
     read_fixes(&d, {0, first});
@@ -216,7 +216,7 @@ TEST(GnssDecoder, usesFirstStepUntilIntervalIsVerified) {
   }
 }
 
-TEST(GnssDecoder, dropsOldAndUntimedFixes) {
+TEST(GnssDecoder, oldOrUntimedFixesAreNotDelivered) {
   Decoder d({Protocol::ubx, 0, {}});
   test::PvtBytes pvt;
   ASSERT_EQ(read(&d, pvt.frame(), HostStamp(1'000'000'000)).size(), 1U);

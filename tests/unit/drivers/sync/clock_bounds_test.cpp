@@ -61,7 +61,7 @@ ClockMapperOptions options_of(const Line& line, bool two_way) {
   return o;
 }
 
-TEST(ClockBounds, reach20usAfter10sPingsOr30sEvents) {
+TEST(ClockBounds, settledErrorIsTwentyMicroseconds) {
   for (const bool two_way : {true, false}) {
     const int rate_hz = two_way ? 100 : 30, settled_s = two_way ? 10 : 30;
     Errors errors;
@@ -87,7 +87,7 @@ TEST(ClockBounds, reach20usAfter10sPingsOr30sEvents) {
   }
 }
 
-TEST(ClockBounds, holdFromFirstStampUnderAnyDelay) {
+TEST(ClockBounds, boundsHoldFromTheFirstStampForAnyDelay) {
   Errors one_way, two_way;
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     Line line(seed);
@@ -110,7 +110,7 @@ TEST(ClockBounds, holdFromFirstStampUnderAnyDelay) {
       << "of " << one_way.ns.size();
 }
 
-TEST(ClockBounds, detectClockStepInBothDirections) {
+TEST(ClockBounds, setClockIsFoundByTheNextPings) {
   for (const double step : {3600.0, 0.5, 0.003, -0.003, -0.5, -3600.0}) {
     Line line(5);
     ClockMapper clock(options_of(line, true));
@@ -129,7 +129,7 @@ TEST(ClockBounds, detectClockStepInBothDirections) {
   }
 }
 
-TEST(ClockBounds, followChangingDrift) {
+TEST(ClockBounds, changingDriftIsFollowed) {
   Line line(9);
   ClockMapper clock(options_of(line, true));
   Errors errors;
@@ -149,7 +149,7 @@ TEST(ClockBounds, followChangingDrift) {
   EXPECT_EQ(errors.outside, 0);
 }
 
-TEST(ClockBounds, exactToNanosecondOverTenYears) {
+TEST(ClockBounds, tenYearsStayExactToTheNanosecond) {
   constexpr std::int64_t kTenYears = 315'576'000'000'000'000;
   for (const std::int64_t offset : {kTenYears, -kTenYears}) {
     ClockMapperOptions o;
@@ -171,7 +171,7 @@ TEST(ClockBounds, exactToNanosecondOverTenYears) {
 }
 
 // The process slept, and what its driver had queued comes at once: none is within the stall.
-TEST(ClockBounds, backlogIsNoClockStep) {
+TEST(ClockBounds, backlogKeepsStampsMonotonic) {
   Line line(7);
   line.drift = 80e-6;
   ClockMapper clock(options_of(line, false));
@@ -189,7 +189,7 @@ TEST(ClockBounds, backlogIsNoClockStep) {
   EXPECT_EQ(clock.resets(), 0U);
 }
 
-TEST(ClockBounds, countMalformedStamps) {
+TEST(ClockBounds, randomStampsGiveNonNegativeErrors) {
   ClockMapper clock{ClockMapperOptions{}};
   Random random(4);
   for (int i = 0; i < 20'000; ++i) {

@@ -18,7 +18,7 @@ SyncFrame frame(std::uint64_t counter, std::int64_t pulse) {
   return f;
 }
 
-TEST(MasterPulses, lateFrameMarksPause) {
+TEST(MasterPulses, lateFrameByCounterFollowsAPause) {
   MasterPulses master(kInterval);
   (void)master.frame(frame(0, 0));
   const MasterPulses::Report report = master.frame(frame(1, 5));
@@ -33,7 +33,7 @@ TEST(MasterPulses, repeatedFrameMakesNoPulse) {
   EXPECT_EQ(master.frame(frame(5, 5)).lost, 0U);
 }
 
-TEST(MasterPulses, backwardCounterIsNewBoot) {
+TEST(MasterPulses, backwardCounterIsANewBoot) {
   MasterPulses master(kInterval);
   (void)master.frame(frame(4, 4));
   const MasterPulses::Report report = master.frame(frame(2, 5));

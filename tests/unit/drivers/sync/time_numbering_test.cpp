@@ -22,7 +22,7 @@ OpenSet& open(OpenSets* sets, std::uint64_t number, std::int64_t time) {
   return set;
 }
 
-TEST(TimeNumbering, framesWithinToleranceJoinOpenSet) {
+TEST(TimeNumbering, timeWithinToleranceJoinsTheOpenSet) {
   TimeNumbering numbering(options(SyncMode::ptp));
   OpenSets sets;
   EXPECT_EQ(numbering.number_of(0, 1000 * kMs, &sets).number, 0U);
@@ -32,7 +32,7 @@ TEST(TimeNumbering, framesWithinToleranceJoinOpenSet) {
   EXPECT_EQ(numbering.number_of(0, 1148 * kMs, &sets).number, 3U);
 }
 
-TEST(TimeNumbering, refusesFramesOfSetsAlreadyReleased) {
+TEST(TimeNumbering, timeOfAClosedSetIsTooLate) {
   TimeNumbering numbering(options(SyncMode::ptp));
   OpenSets sets;
   sets.close(&open(&sets, 4, 1000 * kMs));
@@ -41,7 +41,7 @@ TEST(TimeNumbering, refusesFramesOfSetsAlreadyReleased) {
   EXPECT_EQ(numbering.number_of(0, 1050 * kMs, &sets).number, 5U);
 }
 
-TEST(TimeNumbering, numbersFrameOfMissingEarlierSet) {
+TEST(TimeNumbering, frameOfAMissingSetGetsItsNumber) {
   TimeNumbering numbering(options(SyncMode::ptp));
   OpenSets sets;
   sets.close(&open(&sets, 4, 1000 * kMs));
@@ -49,7 +49,7 @@ TEST(TimeNumbering, numbersFrameOfMissingEarlierSet) {
   EXPECT_EQ(numbering.number_of(0, 1100 * kMs, &sets).number, 6U);
 }
 
-TEST(TimeNumbering, unwrapsBusClockAfter128s) {
+TEST(TimeNumbering, busClockWrapIsUnwrapped) {
   const TimeNumbering numbering(options(SyncMode::ieee1394_cycle_time));
   OpenSets sets;
   SyncFrame frame;
@@ -63,7 +63,7 @@ TEST(TimeNumbering, unwrapsBusClockAfter128s) {
   EXPECT_EQ(numbering.time_of(frame, sets), 127'895 * kMs) << "another camera's count of wraps";
 }
 
-TEST(TimeNumbering, refusesFramesBeforeFirstOrBetweenSets) {
+TEST(TimeNumbering, timeOutsideEverySetHasNoNumber) {
   TimeNumbering numbering(options(SyncMode::ptp));
   OpenSets sets;
   open(&sets, 0, 1000 * kMs);

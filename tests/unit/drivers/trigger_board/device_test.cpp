@@ -23,7 +23,7 @@ void expect_gapless(const std::vector<Pulse>& all) {
   }
 }
 
-TEST(Board, connectsConfiguresAndReads) {
+TEST(Board, isIdentifiedConfiguredAndRead) {
   BoardRig rig(board_for(Duration::seconds(10)));
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->last_error();
   EXPECT_EQ(rig.device->info().serial, "30002b000b51333634393138");
@@ -60,7 +60,7 @@ TEST(Board, isFoundAtAnyBaudRate) {
   }
 }
 
-TEST(Board, deliversFeedbackWithPulse) {
+TEST(Board, exposureFeedbackComesWithItsPulse) {
   test::BoardSimulatorOptions board = board_for(Duration::seconds(20));
   board.clock_ppm = 0;
   BoardRig rig(board, direct_line());
@@ -113,7 +113,7 @@ TEST(Board, pauseIsAGapWithoutLoss) {
   EXPECT_EQ(rig.device->statistics().lost, 0U);
 }
 
-TEST(Board, continuesAfterRebootWithNewBootId) {
+TEST(Board, rebootGivesANewBootAndResumes) {
   test::BoardSimulatorOptions board = board_for(Duration::seconds(40));
   for (int i = 0; i < 20; ++i)
     board.reboots.push_back(at_s(10 + i + 0.000'137 * i));  // at any byte of any frame
@@ -136,7 +136,7 @@ TEST(Board, continuesAfterRebootWithNewBootId) {
   EXPECT_EQ(rig.device->statistics().reboots, 20U);
 }
 
-TEST(Board, numbersContinueOverStopAndStart) {
+TEST(Board, numbersContinueAcrossStopsWithoutLoss) {
   for (const std::uint8_t feedback : std::array<std::uint8_t, 2>{0, 1}) {
     BoardRig rig(board_for(Duration::seconds(200)), direct_line());
     rig.exposures = [](const test::SimulatedPulse& p) {
@@ -166,7 +166,7 @@ TEST(Board, numbersContinueOverStopAndStart) {
   }
 }
 
-TEST(Board, stopsRunningBoardFirst) {
+TEST(Board, runningBoardIsStoppedBeforeConfiguration) {
   BoardRig rig(board_for(Duration::seconds(100)), direct_line());
   ASSERT_EQ(rig.device->configure(thirty_hertz(), nullptr), DeviceStatus::ok);
   // Somebody started it and went away.
@@ -184,7 +184,7 @@ TEST(Board, stopsRunningBoardFirst) {
   EXPECT_EQ(rig.device->statistics().lost, 0U) << "those were not ours";
 }
 
-TEST(Board, restartsBoardThatStopped) {
+TEST(Board, stoppedBoardIsStartedAgain) {
   std::shared_ptr<test::BoardSimulator> simulator;
   bool done = false;
   BoardRig rig(board_for(Duration::seconds(20)), direct_line(), {},
@@ -200,7 +200,7 @@ TEST(Board, restartsBoardThatStopped) {
   EXPECT_EQ(rig.device->statistics().reboots, 0U);
 }
 
-TEST(Board, refusesReplacedBoard) {
+TEST(Board, otherBoardOnThePortIsRefused) {
   test::SimulatedLineOptions line;
   line.outages = {{at_s(10), at_s(11)}, {at_s(20), at_s(21)}};
   BoardRig rig(board_for(Duration::seconds(60)), line, {},
@@ -218,7 +218,7 @@ TEST(Board, refusesReplacedBoard) {
 
 // ---- what is asked
 
-TEST(Configuration, refusalNamesKey) {
+TEST(Configuration, invalidValueIsRefusedWithItsKey) {
   using C = TriggerConfiguration;
   constexpr DeviceStatus kBad = DeviceStatus::bad_configuration,
                          kUnsupported = DeviceStatus::unsupported;

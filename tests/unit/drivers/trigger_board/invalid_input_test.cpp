@@ -48,9 +48,9 @@ struct Way {
   void (*check)(const Outcome&);
 };
 
-struct NoisyLink : ::testing::TestWithParam<Way> {};
+struct Hostile : ::testing::TestWithParam<Way> {};
 
-TEST_P(NoisyLink, losesFramesButAccountsForNumbers) {
+TEST_P(Hostile, costsItsFramesAndCountsEveryNumber) {
   const Way& way = GetParam();
   Random random(3);
   Outcome o;
@@ -82,7 +82,7 @@ void fill(Random* random, std::span<std::uint8_t> bytes) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Ways, NoisyLink,
+    Ways, Hostile,
     ::testing::Values(
         Way{"garbage", 0.01, false, [](Random* random, Bytes* bytes) { fill(random, *bytes); },
             [](const Outcome& o) {
@@ -119,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(
             }}),
     [](const auto& one) { return one.param.name; });
 
-TEST(InvalidInputBoard, continuesAfterClockIsSetBack) {
+TEST(InvalidInputBoard, clockSetBackIsFoundAndPulsesContinue) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line(), {}, [](HostStamp at, Bytes* bytes) {
     if (at > at_s(15)) set_back(bytes, 10'000'000);
   });
@@ -130,7 +130,7 @@ TEST(InvalidInputBoard, continuesAfterClockIsSetBack) {
   EXPECT_LE(rig.device->statistics().lost, 2U) << "until three pings have told, 30 ms";
 }
 
-TEST(InvalidInputBoard, usesArrivalsWithoutPings) {
+TEST(InvalidInputBoard, withoutPongsArrivalsGiveTheTime) {
   BoardRig rig(board_for(Duration::seconds(30)), direct_line(), {}, [](HostStamp, Bytes* bytes) {
     if (opened(*bytes).type == trigger_pong) bytes->clear();
   });
@@ -138,7 +138,7 @@ TEST(InvalidInputBoard, usesArrivalsWithoutPings) {
   EXPECT_EQ(rig.disconnects, 0);
 }
 
-TEST(InvalidInputBoard, repeatsLostRequests) {
+TEST(InvalidInputBoard, lostRequestsAreRepeated) {
   Random random(17);
   BoardRig rig(board_for(Duration::seconds(30)), direct_line());
   int pauses = 0;
@@ -181,9 +181,9 @@ struct Stranger {
   std::string mentions;
   std::optional<TriggerFrame> answers{};  // to every frame
 };
-struct OtherDevices : ::testing::TestWithParam<Stranger> {};
+struct Strangers : ::testing::TestWithParam<Stranger> {};
 
-TEST_P(OtherDevices, areNamed) {
+TEST_P(Strangers, otherDevicesAreNamed) {
   const Stranger& s = GetParam();
   const auto there = std::make_shared<Talker>(
       s.mentions, 921600,
@@ -197,7 +197,7 @@ TEST_P(OtherDevices, areNamed) {
 
 constexpr DeviceStatus kNone = DeviceStatus::not_found, kOther = DeviceStatus::unsupported;
 INSTANTIATE_TEST_SUITE_P(
-    Lines, OtherDevices,
+    Lines, Strangers,
     ::testing::Values(
         Stranger{"receiver", kNone, {"NMEA"}, "$GPGGA,130305.0,4717.115,N,00833.912,E,1,08*5B\r\n"},
         Stranger{"ins", kNone, {"Xbus"}, "\xFA\xFF\x36\x03\x10\x20\x01\x99"},
@@ -221,7 +221,7 @@ INSTANTIATE_TEST_SUITE_P(
                  TriggerFrame{trigger_info, 0, 5, {1, 2, 3, 4, 5}}}),
     [](const auto& one) { return one.param.name; });
 
-TEST(UnresponsiveBoard, isReportedWhenItDoesNotObey) {
+TEST(AStubbornBoard, boardIgnoringRequestsIsNamed) {
   // STATUS for everything, always stopped and never configured.
   const auto there =
       std::make_shared<Talker>("", 921600, answering([](const TriggerFrame& f) {

@@ -35,7 +35,7 @@ struct TerminalRig {
   Device device{std::make_unique<SerialPort>(board.port()), options()};
 };
 
-TEST(RealTime, threadsDoNotContend) {
+TEST(RealTime, concurrentCallsAreSafe) {
   TerminalRig rig;
   for (int round = 0; round < 2; ++round) {
     ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
@@ -70,7 +70,7 @@ TEST(RealTime, threadsDoNotContend) {
   }
 }
 
-TEST(RealTime, deviceThreadDoesNotAllocate) {
+TEST(RealTime, deviceThreadAllocatesNothingWhileReading) {
   if (!AllocationGuard::available())
     GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
   TerminalRig rig;

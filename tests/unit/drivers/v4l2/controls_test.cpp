@@ -31,7 +31,7 @@ TEST(V4l2Controls, namesBecomeKeys) {
   EXPECT_EQ(key_of("µ"), "");
 }
 
-TEST(V4l2Controls, acceptsNumberInRangeOrMenuItem) {
+TEST(V4l2Controls, valueIsANumberInRangeOrAMenuItem) {
   std::int64_t value = -1;
   const Control c = menu({{0, "manual_mode"}, {3, "aperture_priority_mode"}});
   EXPECT_TRUE(parse_value(c, "Aperture Priority Mode", &value));
@@ -48,7 +48,7 @@ TEST(V4l2Controls, acceptsNumberInRangeOrMenuItem) {
   EXPECT_EQ(value, -10) << "a refusal changes nothing";
 }
 
-TEST(V4l2Controls, clampedValuesLieOnGrid) {
+TEST(V4l2Controls, clampedValuesLieOnTheGrid) {
   const Control c = integer(3, 103, 10);
   EXPECT_EQ(clamped(c, -5), 3);
   EXPECT_EQ(clamped(c, 7), 3);
@@ -57,7 +57,7 @@ TEST(V4l2Controls, clampedValuesLieOnGrid) {
   EXPECT_EQ(clamped(integer(5, 1, 1), 3), 5) << "a driver whose range is empty";
 }
 
-TEST(V4l2Controls, findsExternalTriggerByMenuText) {
+TEST(V4l2Controls, externalTriggerIsFoundByMenuNames) {
   EXPECT_EQ(trigger_on(menu({{0, "off"}, {1, "software"}, {2, "external_edge"}})), 2);
   EXPECT_EQ(trigger_on(menu({{0, "free_running"}, {1, "hardware"}})), 1);
   EXPECT_EQ(trigger_on(menu({{0, "off"}, {1, "on"}})), 1);

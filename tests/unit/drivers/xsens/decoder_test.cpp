@@ -15,7 +15,7 @@ namespace {
 
 using xbus::LocalFrame;
 
-TEST(Frames, eastFacingSensorAgreesInEveryFrame) {
+TEST(Frames, eastHeadingIsTheSameInEveryFrame) {
   // Forward is east: in ENU the identity, in NWU a quarter turn to the right, in NED a quarter turn
   // and upside down.
   const double h = std::sqrt(0.5);
@@ -31,7 +31,7 @@ TEST(Frames, eastFacingSensorAgreesInEveryFrame) {
   EXPECT_EQ(enu_vector({1, 2, 3}, LocalFrame::ned), (xbus::Three{2, 1, -3})) << "north, east, down";
 }
 
-TEST(Frames, attitudeRotatesLikeVelocity) {
+TEST(Frames, attitudeRotatesVectorsLikeVelocity) {
   // v_enu by the attitude in ENU of a body vector must be the frame's change of v by the attitude
   // in that frame.
   Random random(3);
@@ -50,12 +50,12 @@ TEST(Frames, attitudeRotatesLikeVelocity) {
   }
 }
 
-TEST(Frames, refusesInvalidRotation) {
+TEST(Frames, invalidRotationGivesNoAttitude) {
   EXPECT_FALSE(enu_attitude({0, 0, 0, 0}, LocalFrame::enu));
   EXPECT_FALSE(enu_attitude({NAN, 0, 0, 1}, LocalFrame::enu));
 }
 
-TEST(SampleTime, survivesWrapAndReportsRestart) {
+TEST(SampleTime, continuesAcrossWrapsAndReportsARestart) {
   SampleTime day;
   EXPECT_EQ(day.next(863'999'900, {}), ClockStep::first);
   EXPECT_EQ(day.next(0, {}), ClockStep::forward);
@@ -84,7 +84,7 @@ TEST(SampleTime, survivesWrapAndReportsRestart) {
   EXPECT_EQ(other.next(5'100, {}), ClockStep::forward);
 }
 
-TEST(SampleTime, staysExactOverTenYears) {
+TEST(SampleTime, tenYearsStayExact) {
   SampleTime t;
   std::uint64_t truth = 12'345;
   EXPECT_EQ(t.next(static_cast<std::uint32_t>(truth), {}), ClockStep::first);
@@ -95,7 +95,7 @@ TEST(SampleTime, staysExactOverTenYears) {
   }
 }
 
-TEST(SampleCounter, wrapsAndBridgesGapsByTime) {
+TEST(SampleCounter, gapsAndWrapsAreResolvedByTime) {
   SampleCounter c;
   EXPECT_EQ(c.next(65'535, 0), ClockStep::first);
   EXPECT_EQ(c.next(0, 1), ClockStep::forward);
@@ -113,7 +113,7 @@ TEST(SampleCounter, wrapsAndBridgesGapsByTime) {
 
 /// Messages of one period behind one another on a line without a converter: each read ends with a
 /// message.
-TEST(ArrivalTiming, lastBytesGiveLowerBoundOfArrivals) {
+TEST(ArrivalTiming, arrivalsGiveTheirLowerBoundAndDrift) {
   constexpr std::uint32_t kBaud = 115200;
   constexpr Duration kProcessing = Duration::milliseconds(2);
   ArrivalTiming timing(kBaud, kProcessing);
@@ -138,7 +138,7 @@ TEST(ArrivalTiming, lastBytesGiveLowerBoundOfArrivals) {
   EXPECT_NEAR(timing.drift(), 40e-6, 2e-6);
 }
 
-TEST(ArrivalTiming, waitsForRestOfMessage) {
+TEST(ArrivalTiming, readEndingInsideAMessageWaitsForIt) {
   ArrivalTiming timing(115200, {});
   timing.read(50, HostStamp(1'000'000'000));
   timing.read(80, HostStamp(1'002'700'000));
@@ -149,7 +149,7 @@ TEST(ArrivalTiming, waitsForRestOfMessage) {
 }
 
 /// Captured streams through the whole decoder: what is true of a real device's time holds.
-TEST(Decoder, decodesCapturesInSyncWithClock) {
+TEST(Decoder, capturesGiveReadingsInStepWithTheirClock) {
   constexpr const char* kFolder = "data/xsens_mtdata2";
   const auto folder = test::shared_data(kFolder);
   if (!folder) GTEST_SKIP() << test::shared_data_missing(kFolder);
@@ -190,7 +190,7 @@ TEST(Decoder, decodesCapturesInSyncWithClock) {
   }
 }
 
-TEST(Decoder, refusesMtdataOfWrongLength) {
+TEST(Decoder, mtdataOfAnotherLengthIsRefused) {
   Decoder decoder;
   StreamSettings settings;
   settings.generation = xbus::Generation::legacy;

@@ -24,7 +24,7 @@ class BothGenerations : public ::testing::TestWithParam<Generation> {
   [[nodiscard]] static bool legacy() { return GetParam() == Generation::legacy; }
 };
 
-TEST_P(BothGenerations, connectsConfiguresAndReadsEnu) {
+TEST_P(BothGenerations, isFoundConfiguredAndReadInEnu) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 8);
   XsensRig rig(sensor);
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok) << rig.device->last_error();
@@ -87,7 +87,7 @@ std::pair<std::int64_t, std::int64_t> gap_in(const Times& times, const OfTime& n
 
 // Cameras that SyncOut triggers are paired by a gap: every pulse on either side of it has to have
 // its reading, also behind a converter that keeps bytes for 16 ms.
-TEST(XsensDevice, pauseLosesNoReadingAndMarksNext) {
+TEST(XsensDevice, pauseLosesNoReadingAndIsMarked) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 30);
   Options options;
   options.sync_out_hz = 25;
@@ -124,7 +124,7 @@ TEST(XsensDevice, stopEndsSyncOutPulses) {
   EXPECT_FALSE(rig.simulator->measuring());
 }
 
-TEST_P(BothGenerations, skipsSettingsAlreadyPresent) {
+TEST_P(BothGenerations, unchangedSettingsAreNotWrittenAgain) {
   test::XsensSimulatorOptions sensor = simulated(GetParam());
   XsensRig rig(sensor);
   Options options;
@@ -146,7 +146,7 @@ TEST_P(BothGenerations, skipsSettingsAlreadyPresent) {
   EXPECT_EQ(second.heading, 0) << "message D6 means the heading to a newer device";
 }
 
-TEST_P(BothGenerations, configureSyncOut) {
+TEST_P(BothGenerations, syncOutIsSetPerGeneration) {
   XsensRig rig(simulated(GetParam()), {}, [] {
     Options o;
     o.sync_out_hz = 30;
@@ -173,7 +173,7 @@ TEST_P(BothGenerations, configureSyncOut) {
   }
 }
 
-TEST_P(BothGenerations, changesToConfiguredBaudRate) {
+TEST_P(BothGenerations, otherBaudRateIsFoundAndChanged) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 30);
   sensor.baud = 57600;
   sensor.layout = {0x0004, 0x001};  // what that rate carries
@@ -187,7 +187,7 @@ TEST_P(BothGenerations, changesToConfiguredBaudRate) {
   EXPECT_EQ(rig.readings(50).size(), 50U);
 }
 
-TEST_P(BothGenerations, refusalNamesSufficientBaudRate) {
+TEST_P(BothGenerations, slowLineIsRefusedNamingTheNeededRate) {
   XsensRig rig(simulated(GetParam()));
   ASSERT_EQ(rig.device->connect(), DeviceStatus::ok);
   EXPECT_EQ(rig.device->configure(400, nullptr), DeviceStatus::no_bandwidth);
@@ -203,7 +203,7 @@ TEST_P(BothGenerations, refusalNamesSufficientBaudRate) {
       << "and it can still be set otherwise";
 }
 
-TEST_P(BothGenerations, reconfigureAfterLostSettings) {
+TEST_P(BothGenerations, lostSettingsAreWrittenAgain) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
   XsensRig rig(sensor);
   // From 9 s on its messages hold nothing that was asked for, until it is told to stop measuring.
@@ -253,7 +253,7 @@ struct Timing {
 
 class Stamps : public ::testing::TestWithParam<Timing> {};
 
-TEST_P(BothGenerations, restartMeasurementAfterSilence) {
+TEST_P(BothGenerations, silentSensorIsToldToMeasureAgain) {
   test::XsensSimulatorOptions sensor = simulated(GetParam(), 20);
   sensor.silences = {HostStamp(9'000'000'000)};
   XsensRig rig(sensor);
@@ -261,7 +261,7 @@ TEST_P(BothGenerations, restartMeasurementAfterSilence) {
   EXPECT_EQ(rig.disconnects, 1);
 }
 
-TEST_P(Stamps, areWithin300usAfter20s) {
+TEST_P(Stamps, errorIsBelow300usAfterTwentySeconds) {
   const Timing& t = GetParam();
   std::vector<double> errors;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
@@ -304,7 +304,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 // ---- what is special to one of them, and what is none
 
-TEST(Mark4, toleratesLostSampleAtOneHertz) {
+TEST(Mark4, lostSampleAtOneHertzIsNoSilence) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 40);
   XsensRig rig(sensor);
   rig.between->tamper([n = 0](HostStamp at, std::vector<std::uint8_t>* bytes) mutable {
@@ -316,7 +316,7 @@ TEST(Mark4, toleratesLostSampleAtOneHertz) {
   EXPECT_EQ(rig.disconnects, 0);
 }
 
-TEST(Mark4, keepsFixOverMissingPositions) {
+TEST(Mark4, occasionalMissingPositionKeepsTheFix) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
   sensor.missing_position = 0.2;
   XsensRig rig(sensor);
@@ -326,7 +326,7 @@ TEST(Mark4, keepsFixOverMissingPositions) {
   EXPECT_LT(all.size(), 1700U);
 }
 
-TEST(Mark4, reportsDriveWithoutFix) {
+TEST(Mark4, missingFixIsReportedAndReadingContinues) {
   test::XsensSimulatorOptions sensor = simulated(Generation::mark4, 20);
   XsensRig rig(sensor, {}, {}, [](std::uint64_t n, Duration t) {
     InsSample s = easy_drive(n, t);

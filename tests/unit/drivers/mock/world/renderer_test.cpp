@@ -104,7 +104,7 @@ Vec2 seen_in_row(const Camera& camera, const Transform& T_camera_enu, int row, d
   return pixel;
 }
 
-TEST(Renderer, edgesFollowLensModel) {
+TEST(Renderer, edgesLieWhereTheLensModelPutsThem) {
   for (const bool distorted : {false, true}) {
     Plates scene;
     scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
@@ -133,7 +133,7 @@ TEST(Renderer, edgesFollowLensModel) {
   }
 }
 
-TEST(Renderer, subPixelStripKeepsArea) {
+TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   Plates scene;
   const double width = 0.3 * 8.0 / 290;  // 0.3 px at 8 m
   scene.plate(0, width, -3, 3, 8.0, 1);
@@ -149,7 +149,7 @@ TEST(Renderer, subPixelStripKeepsArea) {
   }
 }
 
-TEST(Renderer, noiseHasVarianceAndSeed) {
+TEST(Renderer, noiseHasTheStatedVarianceAndSeed) {
   Plates scene;
   scene.plate(-100, 100, -100, 100, 6.0, 1);
   Renderer renderer(scene.world(), Camera(lens(false)));
@@ -178,7 +178,7 @@ TEST(Renderer, noiseHasVarianceAndSeed) {
   EXPECT_NEAR(mean, 0.8 * 255, 0.1);
 }
 
-TEST(Renderer, simdTargetsRenderIdentically) {
+TEST(Renderer, everySimdTargetDrawsTheSameImage) {
   Plates scene;
   scene.plate(-1.2, 1.7, -1.1, 1.4, 6.0, 1);
   const auto town = std::make_shared<const World>(WorldOptions{.seed = 5, .texture_detail = 0});
@@ -209,7 +209,7 @@ TEST(Renderer, simdTargetsRenderIdentically) {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-TEST(Renderer, oddSizesAndStridesStayInRows) {
+TEST(Renderer, oddSizesStayInsideTheirRows) {
   Plates scene;
   Intrinsics k = lens(true);
   k.width = 53;
