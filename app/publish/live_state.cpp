@@ -130,7 +130,7 @@ json LiveState::frame_json(HostStamp now) const {
       {"path_m", rounded(n.path_m, 2)},
       {"stamp_error_us", rounded(static_cast<double>(f.stamp_error.ns()) * 1e-3, 1)},
       {"spread_us", rounded(static_cast<double>(f.spread.ns()) * 1e-3, 1)},
-      {"pairing", to_word(f.pairing)},
+      {"pairing", pairing_name(f.pairing)},
       {"age_ms", start_.tie
                      ? rounded((start_.tie->stamp_at(f.estimated) - p.stamp).to_seconds() * 1e3, 2)
                      : json(nullptr)}};

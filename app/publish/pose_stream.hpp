@@ -26,7 +26,7 @@ struct PublishedEnuAlignment {
 };
 
 /// `assumed`, `verified`, `contradicted`.
-[[nodiscard]] const char* to_word(Pairing pairing) noexcept;
+[[nodiscard]] const char* pairing_name(Pairing pairing) noexcept;
 
 /// `type: pose`. `age_ms`: from mid-exposure to now, where stamps are tied to this machine's clock.
 /// `dropped`: frames without a line since the start. Replaces *line, whose memory is used again.
