@@ -47,7 +47,7 @@ TEST(GigeTrouble, camerasAreDiscoveredAndOpenedBySerial) {
     EXPECT_EQ(d.model, "Vergence Simulator");
   }
   if (!found)
-    GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
+    GTEST_SKIP() << "needs broadcasts on the loopback interface: run it outside of this container";
   DeviceStatus status = DeviceStatus::failed;
   EXPECT_NE(driver->open(o.serial, &status), nullptr) << to_string(status);
   EXPECT_EQ(status, DeviceStatus::ok);
@@ -125,7 +125,7 @@ GigeCameraOptions at_address_of(const GigeBench& b, const std::string& serial) {
 TEST(GigeTrouble, cameraIsFoundAtItsNewAddress) {
   GigeBench b({}, 202);
   if (gige::make_driver()->enumerate().empty())
-    GTEST_SKIP() << "broadcasts do not come through here; cameras are opened by their address";
+    GTEST_SKIP() << "needs broadcasts on the loopback interface: run it outside of this container";
   b.configure(b.wish());
   b.start();
   EXPECT_EQ(b.take(3).size(), 3U);

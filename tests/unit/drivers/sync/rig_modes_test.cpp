@@ -245,7 +245,8 @@ TEST(RigModes, contradictingReportUnverifiesItsSet) {
 }
 
 TEST(RigModes, synchronisationAllocatesNothing) {
-  if (!AllocationGuard::available()) GTEST_SKIP() << "a sanitizer brings its own heap";
+  if (!AllocationGuard::available())
+    GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
   RigSynchronizer sync(rig_options(SyncMode::board));
   ClockMapper clock{ClockMapperOptions{}};
   const std::uint64_t before = AllocationGuard::runtime_allocations();

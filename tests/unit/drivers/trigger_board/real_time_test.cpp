@@ -72,7 +72,7 @@ TEST(RealTime, concurrentCallsAreSafe) {
 
 TEST(RealTime, deviceThreadAllocatesNothingWhileReading) {
   if (!AllocationGuard::available())
-    GTEST_SKIP() << "needs the allocation hooks, which sanitizer builds leave out";
+    GTEST_SKIP() << "needs the allocation hooks; run it in a build without VERGENCE_SANITIZE";
   TerminalRig rig;
   ASSERT_EQ(rig.device.start(nullptr), DeviceStatus::ok);
   Pulse p;
