@@ -66,8 +66,9 @@ void LiveSource::make_acquisition() {
         starting_exposure(configuration_, 0), request_.fast);
   }
   if (!request_.fast) facts_.tie = ClockTie{o.tie_stamp, o.tie_host};
-  acquisition_ = std::make_unique<Acquisition>(
-      exposure_ ? exposure_->cameras() : devices_.cameras(), devices_.ins(), devices_.trigger(), o);
+  o.frame_observer = exposure_.get();
+  acquisition_ =
+      std::make_unique<Acquisition>(devices_.cameras(), devices_.ins(), devices_.trigger(), o);
   start_ = o.tie_stamp + (devices_.start() - o.tie_host);
   // In real time the drive's start is known only when the devices are; the session's is now.
   facts_.first = request_.fast ? start_ : o.tie_stamp;

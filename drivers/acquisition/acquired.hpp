@@ -40,6 +40,15 @@ struct DeviceEvent {
   double seconds = 0;  // verified: since the first frame that was not
 };
 
+/// Receives every whole frame of a camera when it is taken, before it is paired.
+///
+/// Threads  The acquisition's; the call must not wait.
+class FrameObserver {
+ public:
+  virtual ~FrameObserver() = default;
+  virtual void on_frame(std::size_t camera, const Frame& frame) noexcept = 0;
+};
+
 /// Receives the trigger board's pulses as they arrive, to record them.
 ///
 /// Threads  The acquisition's; the call must not wait.

@@ -126,7 +126,14 @@ void Acquisition::work() {
 
 void Acquisition::look() {
   const bool always = options_.wait_when_full;
-  for (auto& head : heads_) head.look(this, always);
+  for (std::size_t k = 0; k < heads_.size(); ++k) {
+    auto& head = heads_[k];
+    const bool held = head.held;
+    head.look(this, always);
+    if (options_.frame_observer != nullptr && !held && head.held && !head.event &&
+        head.value.status == FrameStatus::complete)
+      options_.frame_observer->on_frame(k, head.value);
+  }
   look_ins();
   board_head_.look(this, always);
 }

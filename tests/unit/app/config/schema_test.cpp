@@ -76,6 +76,7 @@ TEST(Schema, EveryRowsRangeIsEnforcedAtBothEnds) {
 TEST(Schema, EveryKeyChangesItsOwnValueOnly) {
   for (const Group& group : schema())
     for (const Key& key : group.keys) {
+      if (key.words.size() == 1) continue;  // there is no other value
       SCOPED_TRACE(key.name);
       Configuration changed;
       const bool options = key.name.ends_with(".options");
