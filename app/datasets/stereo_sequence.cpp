@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <system_error>
 
+#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/detail/formats.hpp"
 #include "app/datasets/detail/pairing.hpp"
 #include "app/datasets/recorded_session.hpp"
@@ -36,7 +37,9 @@ StereoSequence open_by_format(SequenceFormat format, const std::filesystem::path
     case SequenceFormat::db3:
       return detail::open_bag(detail::BagFormat::sqlite, folder, given, topics);
     case SequenceFormat::session:
-      return detail::open_recorded_session(folder, given);
+      refuse(folder, 0,
+             "is a recorded session, which is replayed as it was recorded; for anything else write "
+             "it as a data set: vergence export SESSION --format folder --out DIR");
   }
   refuse(folder, 0, "has no reader for its format");
 }
@@ -183,7 +186,7 @@ RecordedIns read_recorded_ins(SequenceFormat format, const std::filesystem::path
                               const std::array<int, 2>& cameras, bool mount_wanted) {
   if (format == SequenceFormat::kitti_raw) return detail::read_oxts(folder, cameras, mount_wanted);
   if (format == SequenceFormat::st_lucia) return detail::read_st_lucia_ins(folder);
-  return {};  // bags and sessions have it in StereoSequence::ins
+  return {};  // bags have it in StereoSequence::ins
 }
 
 ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,

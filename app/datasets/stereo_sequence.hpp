@@ -11,7 +11,6 @@
 
 #include "app/config/calibration_file.hpp"
 #include "app/datasets/image_file.hpp"
-#include "app/datasets/image_store.hpp"
 #include "core/types/calibration.hpp"
 #include "core/types/time.hpp"
 
@@ -32,6 +31,9 @@ enum class SequenceFormat : std::uint8_t {
 };
 
 struct RecordedIns;  // recorded_ins.hpp
+namespace detail {
+class BagImages;
+}
 
 /// One frame as the data set lists it.
 struct StereoPair {
@@ -60,9 +62,10 @@ struct StereoSequence {
       assumptions{};          // facts the files leave out, and the values assumed: one phrase each
   bool side_by_side = false;  // a file holds both images, the left one's columns first; file[0] and
                               // file[1] are the same
-  std::shared_ptr<const ImageStore> store{};  // has the images; nothing: they are files below root
-  std::shared_ptr<const RecordedIns> ins{};   // that came with the images; nothing: it has files of
-                                              // its own (read_recorded_ins()), or there is none
+  std::shared_ptr<const detail::BagImages>
+      store{};                               // of a bag; nothing: images are files below root
+  std::shared_ptr<const RecordedIns> ins{};  // that came with the images; nothing: it has files of
+                                             // its own (read_recorded_ins()), or there is none
   int deep_bits = 16;  // of images of 16 bits a sample: so many are used (find_deep_bits())
   bool bayer = false;  // images are raw mosaics: grey is made of them (core/types/bayer.hpp)
 };
@@ -123,8 +126,7 @@ struct BagTopics {
 /// (docs/datasets.md); rosbag    paired by the nearest header.stamp, that of the left camera
 /// counts; CameraInfo beside
 ///           the images, and the INS.
-/// session   A session's folder with drive.mcap (docs/session_files.md); the pairs that have both
-///           images, and the INS.
+/// session   Refused: SessionSource replays it as it was recorded.
 ///
 /// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data
 /// set that has more than two (kitti_raw).

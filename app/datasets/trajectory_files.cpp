@@ -8,9 +8,10 @@
 #include <fmt/format.h>
 
 #include "app/datasets/decimal.hpp"
-#include "app/datasets/euroc_sensor.hpp"
+#include "app/datasets/foreign_calibration.hpp"
 #include "app/datasets/text_table.hpp"
 #include "app/datasets/times_file.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::app {
 namespace {
@@ -435,10 +436,8 @@ class Reader {
     std::vector<std::int64_t> steps(poses.size() - 1);
     for (std::size_t i = 0; i < steps.size(); ++i)
       steps[i] = (poses[i + 1].stamp.ns() / 2 - poses[i].stamp.ns() / 2);  // halves do not overflow
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    constexpr double kLongest = 10;  // s
-    if (const double step = 2e-9 * static_cast<double>(*middle); step > kLongest)
+    constexpr double kLongest = 10;                                        // s
+    if (const double step = 2e-9 * static_cast<double>(median(std::span(steps))); step > kLongest)
       refuse(
           file_, 0,
           fmt::format("has poses that follow one another after {:.6g} (median), read as seconds: "
@@ -519,7 +518,7 @@ void set_times_beside(const fs::path& file, TrajectoryFile* trajectory) {
 }
 
 void bring_to_camera(const fs::path& sensor, Trajectory* poses) {
-  const Transform T_body_left = read_sensor_mount(sensor);
+  const Transform T_body_left = read_body_mount(sensor);
   for (StampedPose& pose : *poses) pose.T_world_body = pose.T_world_body * T_body_left;
 }
 

@@ -10,6 +10,7 @@
 
 #include "app/devices/rig_settings.hpp"
 #include "core/comparison/attitude_check.hpp"
+#include "core/math/robust.hpp"
 
 namespace vergence::app {
 
@@ -33,10 +34,7 @@ Duration usual_interval(const std::vector<RecordedReading>& readings) {
   std::vector<std::int64_t> ns;
   for (std::size_t i = 1; i < readings.size(); ++i)
     ns.push_back((readings[i].sample.stamp - readings[i - 1].sample.stamp).ns());
-  if (ns.empty()) return {};
-  const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
-  std::nth_element(ns.begin(), middle, ns.end());
-  return Duration::nanoseconds(*middle);
+  return ns.empty() ? Duration{} : Duration::nanoseconds(median(std::span(ns)));
 }
 
 /// False: none is left.

@@ -18,7 +18,7 @@ namespace {
 /// none.
 Trajectory read_reference(const ReplayRequest& request, const StereoSequence& sequence) {
   if (request.format == SequenceFormat::kitti_raw || request.format == SequenceFormat::st_lucia ||
-      is_bag(request.format) || request.format == SequenceFormat::session)
+      is_bag(request.format))
     return {};  // their layouts have no truth
   const bool plain = request.format == SequenceFormat::folder;
   std::error_code ignored;
@@ -155,7 +155,7 @@ std::vector<std::string> recorded_settings(const std::filesystem::path& session)
 
 ExitCode run_replay(const ReplayRequest& request) {
   if (request.format == SequenceFormat::session && !request.calibrate_first && !request.known)
-    return replay_recording(request);
+    return replay_recording(request);  // with these open_drive() says how else
   StereoSequence sequence = open_drive(request);
   if (request.start >= sequence.pairs.size())
     throw InputError(

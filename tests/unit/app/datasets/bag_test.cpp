@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 
+#include "app/datasets/detail/bag_images.hpp"
 #include "app/datasets/ros_camera.hpp"
 #include "app/datasets/stereo_sequence.hpp"
 #include "app/runtime/errors.hpp"

@@ -205,10 +205,10 @@ TEST(Euroc, bringsTheBodyToTheLeftCamera) {
   };
   for (const Case& c :
        {Case{"rate_hz: 20\n", "sensor.yaml: has no T_BS"},
-        Case{"a: 1\nT_BS:\n  data: [1, 0, 0]\n", "sensor.yaml:3: T_BS data"},
+        Case{"a: 1\nT_BS:\n  data: [1, 0, 0]\n", "sensor.yaml:3: T_BS is not"},
         Case{"T_BS:\n  data: [1,0,0,0, 0,1,0,0, 0,0,1.01,0, 0,0,0,1]\n",
              "is not a rigid transform"},
-        Case{"a: [1\nb: 2\n", "is not YAML"}, Case{"just words\n", "is not a sensor.yaml"}}) {
+        Case{"a: [1\nb: 2\n", "is not YAML"}, Case{"just words\n", "sensor.yaml: has no T_BS"}}) {
     folder.write("mav0/cam0/sensor.yaml", c.sensor);
     EXPECT_TRUE(says(said(), c.said));
   }
