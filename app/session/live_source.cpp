@@ -77,7 +77,7 @@ void LiveSource::make_acquisition() {
 void LiveSource::make_facts() {
   facts_.adoption = request_.fast ? Adoption::after_fixed_frames : Adoption::when_ready;
   if (!request_.fast) facts_.frame_interval = Duration::seconds(1.0 / configuration_.trigger.rate);
-  facts_.when_full = request_.fast ? Recorder::WhenFull::wait : Recorder::WhenFull::drop;
+  facts_.when_full = request_.fast ? WhenFull::wait : WhenFull::drop;
   facts_.frames = devices_.frames();
   if (devices_.ins() != nullptr)
     facts_.ins =
