@@ -103,8 +103,15 @@ struct BagTopics {
 /// The format of a folder (or a bag's file) by what is in it; nothing: none that is known.
 [[nodiscard]] std::optional<SequenceFormat> find_format(const std::filesystem::path& folder);
 
-/// A drive of the given format. `calibration`: a calibration.yaml that is used instead of the data
-/// set's own.
+/// What of a drive is opened, and with which calibration.
+struct SequenceOptions {
+  std::optional<GivenCalibration> calibration{};  // nothing: the data set's own
+  CalibrationUse use{};              // what of the calibration is wanted, whichever it is
+  std::array<int, 2> cameras{0, 1};  // left and right of a data set with more than two (kitti_raw)
+  BagTopics topics{};                // of a bag
+};
+
+/// A drive of the given format.
 ///
 /// kitti     calib.txt (P0, P1), times.txt (seconds), image_0/, image_1/ with NNNNNN.png: image N
 ///           belongs to line N of times.txt.
@@ -128,26 +135,16 @@ struct BagTopics {
 ///           the images, and the INS.
 /// session   Refused: SessionSource replays it as it was recorded.
 ///
-/// `use`: what of the calibration is wanted, whichever it is. `cameras`: left and right of a data
-/// set that has more than two (kitti_raw).
-/// `topics`: of a bag. InputError (file, line, what): folders or files that are not there, no
-/// images, numbers of images and times that do not go together, times that are no numbers, times in
-/// another unit or running backwards (check_times()), a calibration that makes no rig, images of
-/// another size than the calibration.
+/// InputError (file, line, what): folders or files that are not there, no images, numbers of images
+/// and times that do not go together, times that are no numbers, times in another unit or running
+/// backwards (check_times()), a calibration that makes no rig, images of another size than the
+/// calibration.
 ///
 ///     const StereoSequence drive = open_sequence(SequenceFormat::euroc, "MH_01_easy");
 ///     for (const StereoPair& pair : drive.pairs) use(drive.root / pair.file[0], pair.stamp);
-[[nodiscard]] StereoSequence open_sequence(
-    SequenceFormat format, const std::filesystem::path& folder,
-    const std::optional<std::filesystem::path>& calibration = std::nullopt,
-    const CalibrationUse& use = {}, const std::array<int, 2>& cameras = {0, 1},
-    const BagTopics& topics = {});
 [[nodiscard]] StereoSequence open_sequence(SequenceFormat format,
                                            const std::filesystem::path& folder,
-                                           const GivenCalibration& calibration,
-                                           const CalibrationUse& use,
-                                           const std::array<int, 2>& cameras = {0, 1},
-                                           const BagTopics& topics = {});
+                                           const SequenceOptions& options = {});
 
 /// Size of an image of the sequence, from its head. → as read_image_size()
 [[nodiscard]] ImageFileStatus image_size(const StereoSequence& sequence, const std::string& name,

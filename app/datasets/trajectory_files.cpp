@@ -561,11 +561,11 @@ std::optional<TruthFiles> find_truth(const fs::path& folder) {
   const fs::path sequence = (folder.has_filename() ? folder : folder.parent_path()).filename();
   for (const fs::path& poses :
        {folder / "poses.txt", folder / ".." / ".." / "poses" / (sequence.string() + ".txt")})
-    if (present(poses)) return TruthFiles{TruthFiles::Kind::kitti, poses, folder / "times.txt"};
+    if (present(poses)) return TruthFiles{TruthFiles::Kind::kitti, poses};
   for (const fs::path& mav : {folder / "mav0", folder}) {
-    const fs::path csv = mav / "state_groundtruth_estimate0" / "data.csv",
-                   camera = mav / "cam0" / "sensor.yaml";
-    if (present(csv) && present(camera)) return TruthFiles{TruthFiles::Kind::euroc, csv, camera};
+    const fs::path csv = mav / "state_groundtruth_estimate0" / "data.csv";
+    if (present(csv) && present(mav / "cam0" / "sensor.yaml"))
+      return TruthFiles{TruthFiles::Kind::euroc, csv};
   }
   return std::nullopt;
 }

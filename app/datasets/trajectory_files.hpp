@@ -65,8 +65,7 @@ struct TrajectoryFile {
 /// Where the truth of a data-set folder lies.
 struct TruthFiles {
   enum class Kind { kitti, euroc } kind = Kind::kitti;
-  std::filesystem::path poses;   // poses.txt or data.csv
-  std::filesystem::path second;  // times.txt, or sensor.yaml of cam0
+  std::filesystem::path poses;  // poses.txt or data.csv
 };
 
 /// KITTI: `poses.txt` and `times.txt` in the folder, or the benchmark's own tree (sequences/NN with

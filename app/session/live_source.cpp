@@ -127,7 +127,7 @@ bool LiveSource::next(SourceItem* item) noexcept {
       *item = SourceFrame{frame->rig, 0};
       return true;
     }
-    if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
+    if (const auto* reading = std::get_if<InsRecord>(&in_hand_)) {
       const TimingMonitor::Message message = time_.of_reading(*reading);
       const Stamp stamp = reading->sample.stamp;
       in_hand_ = DeviceEvent{};
@@ -144,8 +144,8 @@ bool LiveSource::next(SourceItem* item) noexcept {
       *item = event_of(frame->rig.stamp, message);
       return true;
     }
-    if (const auto* reading = std::get_if<AcquiredReading>(&in_hand_)) {
-      *item = InsRecord{reading->sample, reading->quality};
+    if (const auto* reading = std::get_if<InsRecord>(&in_hand_)) {
+      *item = *reading;
       return true;
     }
     const auto* event = std::get_if<DeviceEvent>(&in_hand_);

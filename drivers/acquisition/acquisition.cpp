@@ -223,7 +223,7 @@ void Acquisition::take_reading() {
   const InsReading& r = ins_head_.value;
   const MappedStamp at =
       r.mapped ? MappedStamp{r.host, r.host_error} : ins_clock_->map(r.measured, r.arrival);
-  AcquiredReading item{r.sample, r.quality};
+  InsRecord item{r.sample, r.quality};
   item.sample.stamp = stamp_of(at.host);
   item.sample.stamp_error = at.error;
   counters_.ins.note(r.measured, at);

@@ -108,7 +108,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const auto folder = folders.root.path() / Folders::name(i);
   probe([&] { check(open_sequence(layout.format, folder)); });
-  probe([&] { check(open_sequence(layout.format, folder, std::nullopt, {true, 0.5})); });
+  probe([&] { check(open_sequence(layout.format, folder, {.use = {true, 0.5}})); });
   probe([&] { check(read_recorded_ins(layout.format, folder, {0, 1}, true)); });
   probe([&] { check(read_trajectory(folder)); });
   if (layout.format == SequenceFormat::folder)

@@ -67,7 +67,7 @@ class Bag : public ::testing::TestWithParam<BagKind> {
   [[nodiscard]] StereoSequence open(const BagTopics& topics = {}) {
     writer_->finish();
     folder_.write("drive/drive_0" + GetParam().ending(), writer_->bytes());
-    return open_sequence(format(), folder_ / "drive", std::nullopt, {}, {0, 1}, topics);
+    return open_sequence(format(), folder_ / "drive", {.topics = topics});
   }
   [[nodiscard]] std::string refusal(const BagTopics& topics = {}) {
     return test::refusal_of([&] { (void)open(topics); });
