@@ -71,7 +71,7 @@ class Stream {
   }
   void stop() noexcept {
     streaming_.store(false, std::memory_order_release);
-    notify_taken();  // a producer that waits for room has nobody who would make any
+    notify_release();  // a producer that waits for room has nobody who would make any
     {
       const std::lock_guard lock(mutex_);
       notifier_ = nullptr;
@@ -97,14 +97,14 @@ class Stream {
       if (!streaming()) return DeviceStatus::stopped;
       if (!ring_.pop(d)) return DeviceStatus::timeout;
     }
-    notify_taken();
+    notify_release();
     gone_ = d->what == Delivery<T>::What::gone;
     ended_ = d->what == Delivery<T>::What::end;
     return gone_ ? DeviceStatus::disconnected : ended_ ? DeviceStatus::ended : DeviceStatus::ok;
   }
 
  private:
-  void notify_taken() noexcept {
+  void notify_release() noexcept {
     taken_.fetch_add(1, std::memory_order_release);
     taken_.notify_one();
   }

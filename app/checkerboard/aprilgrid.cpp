@@ -15,7 +15,7 @@ namespace vergence::app {
 namespace {
 
 constexpr int kWrongBits = 1;  // of 36; codes differ in 11
-constexpr std::size_t kFewestTags = 4;
+constexpr std::size_t kMinTags = 4;
 constexpr double kWindowOfGap = 0.4;  // half window: a wider one meets the next tag's edge
 constexpr int kNarrowestWindow = 2, kWidestWindow = 8;  // px, half windows
 constexpr double kMaxRefined = 4;                       // px: grown twice, corners lie 2.8 px in
@@ -161,7 +161,7 @@ BoardCorners find_aprilgrid(const ImageView& image, const BoardPattern& board, B
   if (search == BoardSearch::thorough && tags.size() < ids)
     if (std::vector<Tag> more = detector.detect(pixels, 2, ids); more.size() > tags.size())
       tags = std::move(more);
-  if (tags.size() < std::min(kFewestTags, ids)) return {};
+  if (tags.size() < std::min(kMinTags, ids)) return {};
   Layout best;
   double least = std::numeric_limits<double>::infinity();
   for (const bool from_below : {true, false})

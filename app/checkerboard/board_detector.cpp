@@ -12,7 +12,7 @@
 namespace vergence::app {
 namespace {
 
-constexpr std::size_t kFewestCorners = 6;
+constexpr std::size_t kMinCorners = 6;
 constexpr double kThinnest = 0.5;  // squares
 
 /// Where corners lie on the board, in squares.
@@ -46,7 +46,7 @@ BoardCorners find_any_board(const ImageView& image, const BoardPattern& board, B
   if (board.kind == BoardKind::charuco) return find_charuco(image, board);
   auto found = find_checkerboard(image, board, search);
   if (!found) return {};
-  if (!board.tells_its_ends()) same_way_up(pixels_of(reference), &*found);
+  if (!board.is_asymmetric()) same_way_up(pixels_of(reference), &*found);
   BoardCorners corners;
   for (std::size_t i = 0; i < found->size(); ++i) corners.push_back({i, (*found)[i]});
   return corners;
@@ -55,7 +55,7 @@ BoardCorners find_any_board(const ImageView& image, const BoardPattern& board, B
 }  // namespace
 
 bool determine_a_homography(const BoardCorners& corners, const BoardPattern& board) {
-  if (corners.size() < std::min(kFewestCorners, board.corners())) return false;
+  if (corners.size() < std::min(kMinCorners, board.corners())) return false;
   const auto place = [&](const BoardCorner& c) -> Vec2 {
     return board.corner(c.index).head<2>() / board.square;
   };

@@ -173,7 +173,7 @@ BoardImages read_board_images(const std::vector<std::vector<fs::path>>& views,
       const ImageView pixels{grey.pixels.data(), size.width, size.height, size.width};
       view.corners[k] = find_board(pixels, board, BoardSearch::thorough, view.corners[0]);
       if (view.corners[k].empty())
-        without.push_back(fmt::format("no board of {}{} in {}", board.words(),
+        without.push_back(fmt::format("no board of {}{} in {}", board.describe(),
                                       part_is_enough ? ", or too little of it," : "",
                                       file.string()));
     }

@@ -12,7 +12,7 @@
 namespace vergence::app {
 namespace {
 
-constexpr int kFewest = 3, kMax = 100;                          // inner corners a side
+constexpr int kMin = 3, kMax = 100;                             // inner corners a side
 constexpr int kMaxTagsAlong = 24, kFamily = 587;                // codes of 36h11
 constexpr double kSmallestSquare = 0.001, kLargest = 10.0;      // m
 constexpr double kNarrowest = 0.05, kWidest = 2;                // gap over the side of a tag
@@ -73,7 +73,7 @@ Vec3 BoardPattern::corner(std::size_t i) const noexcept {
   return {pitch * column + (right ? square : 0), pitch * row + (upper ? square : 0), 0};
 }
 
-std::string BoardPattern::words() const {
+std::string BoardPattern::describe() const {
   if (kind == BoardKind::charuco)
     return fmt::format("{}x{} squares with markers {}", columns + 1, rows + 1,
                        kMarkerDictionaries[dictionary]);
@@ -83,11 +83,11 @@ std::string BoardPattern::words() const {
 
 BoardPattern parse_checkerboard(const std::string& inner_corners, double square) {
   BoardPattern board;
-  if (!parse_product(inner_corners, &board) || std::min(board.columns, board.rows) < kFewest ||
+  if (!parse_product(inner_corners, &board) || std::min(board.columns, board.rows) < kMin ||
       std::max(board.columns, board.rows) > kMax)
     throw InputError(fmt::format(
         "--checkerboard is \"{}\"; it takes the inner corners along and down, {} to {}, like 9x6",
-        inner_corners.substr(0, 60), kFewest, kMax));
+        inner_corners.substr(0, 60), kMin, kMax));
   if (board.columns == board.rows)
     throw InputError(fmt::format(
         "--checkerboard {}: a board with as many corners along as down looks the same after a "
@@ -121,11 +121,11 @@ BoardPattern parse_charuco(const std::string& squares, double square, double mar
                            const std::string& dictionary) {
   BoardPattern board;
   board.kind = BoardKind::charuco;
-  if (!parse_product(squares, &board) || std::min(board.columns, board.rows) < kFewest ||
+  if (!parse_product(squares, &board) || std::min(board.columns, board.rows) < kMin ||
       std::max(board.columns, board.rows) > kMax)
     throw InputError(
         fmt::format("--charuco is \"{}\"; it takes the squares along and down, {} to {}, like 11x8",
-                    squares.substr(0, 60), kFewest, kMax));
+                    squares.substr(0, 60), kMin, kMax));
   check_side(square);
   if (!(marker >= kSmallestMarker * square && marker <= kLargestMarker * square))
     throw InputError(

@@ -43,11 +43,11 @@ struct BoardPattern {
   [[nodiscard]] Vec3 corner(std::size_t i) const noexcept;
   /// Turned by half a turn a checkerboard's colours are exchanged: an image alone tells which
   /// corner is the first. Tags always tell.
-  [[nodiscard]] bool tells_its_ends() const noexcept {
+  [[nodiscard]] bool is_asymmetric() const noexcept {
     return kind != BoardKind::checkerboard || (columns + rows) % 2 == 1;
   }
   /// `9x6 inner corners`, `6x6 tags`, `11x8 squares with markers`.
-  [[nodiscard]] std::string words() const;
+  [[nodiscard]] std::string describe() const;
 };
 
 /// One corner that an image shows.

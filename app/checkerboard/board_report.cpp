@@ -125,9 +125,9 @@ std::string format_report(const BoardReport& r) {
   const RigCalibration& rig = r.file.rig;
   const auto refused = std::count_if(r.found.views.begin(), r.found.views.end(),
                                      [](const BoardViewResult& v) { return !v.used; });
-  std::string text =
-      fmt::format("{} views of a board of {} of {:g} mm: {} used, {} refused\n",
-                  r.found.views.size(), r.board.words(), 1e3 * r.board.square, rig.frames, refused);
+  std::string text = fmt::format("{} views of a board of {} of {:g} mm: {} used, {} refused\n",
+                                 r.found.views.size(), r.board.describe(), 1e3 * r.board.square,
+                                 rig.frames, refused);
   for (const BoardViewResult& v : r.found.views)
     if (!v.used) text += fmt::format("  refused: {}, {:.3g} px rms\n", v.name, v.rms_px);
   text += worst_views(r);

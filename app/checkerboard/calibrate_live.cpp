@@ -63,7 +63,7 @@ class Collection {
 
   /// Until the source ends, nothing is missing, or a signal comes. Throws what looking threw.
   void run(const SignalGuard& signals, Progress* progress) {
-    std::thread looking([this] { look(); });
+    std::thread detecting([this] { detect_loop(); });
     std::unique_lock lock(mutex_);
     while (!changed_.wait_for(lock, std::chrono::milliseconds(50), [this] { return done_; })) {
       if (signals.stop_requested()) source_->stop();
@@ -71,16 +71,16 @@ class Collection {
     }
     show_progress(progress);
     lock.unlock();
-    looking.join();
+    detecting.join();
     if (failure_) std::rethrow_exception(failure_);
   }
   [[nodiscard]] const std::vector<BoardView>& views() const noexcept { return collector_.views(); }
   [[nodiscard]] bool complete() const { return collector_.complete(); }
 
  private:
-  void look() {
+  void detect_loop() {
     try {
-      look_at_all();
+      detect_all();
     } catch (...) {  // out of a thread it would end the program
       failure_ = std::current_exception();
       source_->stop();
@@ -90,9 +90,9 @@ class Collection {
     changed_.notify_one();
   }
 
-  void look_at_all() {
+  void detect_all() {
     for (Acquired item; source_->next(&item);) {
-      if (const auto* event = std::get_if<DeviceEvent>(&item)) note(*event);
+      if (const auto* event = std::get_if<DeviceEvent>(&item)) on_event(*event);
       const auto* frame = std::get_if<AcquiredFrame>(&item);
       if (frame == nullptr) continue;
       offer(frame->rig);
@@ -101,7 +101,7 @@ class Collection {
     }
   }
 
-  void note(const DeviceEvent& event) {
+  void on_event(const DeviceEvent& event) {
     const bool gone = event.kind == DeviceEvent::Kind::camera_disconnected;
     if (!gone && event.kind != DeviceEvent::Kind::camera_reconnected) return;
     const std::lock_guard lock(mutex_);
@@ -124,7 +124,7 @@ class Collection {
     complete_ = needs.empty();
     const std::lock_guard lock(mutex_);
     ++sets_;
-    words_ =
+    activity_ =
         fmt::format("{} views · {}{}", collector_.views().size(), phrase(verdict),
                     needs.empty() ? "" : fmt::format(" · missing: {}", fmt::join(needs, "; ")));
   }
@@ -148,12 +148,12 @@ class Collection {
 
   /// Under the lock.
   void show_progress(Progress* progress) {
-    for (const std::string& message : messages_) progress->say("vergence: " + message);
+    for (const std::string& message : messages_) progress->print("vergence: " + message);
     messages_.clear();
     ProgressState state;
     state.state = "calibrate";
     state.frame = sets_;
-    state.words = words_;
+    state.activity = activity_;
     progress->update(state);
   }
 
@@ -168,7 +168,7 @@ class Collection {
   std::condition_variable changed_;
   bool done_ = false;
   std::uint64_t sets_ = 0;
-  std::string words_ = "waiting for images";
+  std::string activity_ = "waiting for images";
   std::vector<std::string> messages_;
 };
 
@@ -194,7 +194,7 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   const Configuration c = capture_configuration(configuration);
   DriveDevices devices(c, {}, false, std::nullopt);
   Progress progress = Progress::on_stderr(request.quiet);
-  for (const std::string& message : devices.remarks()) progress.say("vergence: " + message);
+  for (const std::string& message : devices.remarks()) progress.print("vergence: " + message);
   const CalibratedRig rig = rig_of(c, devices);
   Acquisition::Options options = devices.acquisition_options();
   options.tie_host = monotonic_now();
@@ -206,13 +206,13 @@ ExitCode calibrate_live(const CalibrateRequest& request, const Configuration& co
   progress.finish();
   const auto stopped = signals.stop_code();
   for (const int camera : source.missing())
-    progress.say(
+    progress.print(
         fmt::format("vergence: camera {} did not come back; check its cable and power", camera));
   if (collection.views().size() < kMinViews) {
-    progress.say(fmt::format(
+    progress.print(fmt::format(
         "vergence: no calibration: {} views of the board were taken, {} are the least; is it {}, "
         "whole and lit in every image?",
-        collection.views().size(), kMinViews, request.board.words()));
+        collection.views().size(), kMinViews, request.board.describe()));
     return stopped.value_or(source.missing().empty() ? ExitCode::not_usable
                                                      : ExitCode::device_failed);
   }

@@ -36,12 +36,12 @@ void remark(const CalibrationFile& file, Progress* progress) {
   for (std::size_t k = 0; k < static_cast<std::size_t>(file.rig.cameras); ++k) {
     const Intrinsics& lens = file.rig.intrinsics[k];
     if (lens.sigma[0] > kVagueFocal * lens.fx)
-      progress->say(
+      progress->print(
           fmt::format("vergence: {}: the focal length is only known to {:.1f} %; tilt the board "
                       "more, and show it nearer and farther",
                       file.names[k], 100 * lens.sigma[0] / lens.fx));
     if (const double differ = std::abs(lens.fx / lens.fy - 1); differ > kSquarePixels)
-      progress->say(fmt::format(
+      progress->print(fmt::format(
           "vergence: {}: fx and fy differ by {:.1f} %, pixels of cameras are square: look whether "
           "--checkerboard has its corners the "
           "right way round "
@@ -106,7 +106,7 @@ std::string undetermined(const BoardCalibration& found) {
 void remark_square(double square, Progress* progress) {
   constexpr double kSmallest = 0.002, kLargest = 0.5;  // m
   if (square < kSmallest || square > kLargest)
-    progress->say(
+    progress->print(
         fmt::format("vergence: --square is {:g} m, unusually {}: it takes metres, and the baseline "
                     "comes out in "
                     "the same unit",
@@ -130,7 +130,7 @@ BoardCalibration calibrate_with_k3(const std::vector<BoardView>& views,
     const Intrinsics& lens = with.rig.intrinsics[k];
     if (!(std::abs(lens.distortion[4]) > kSigmas * lens.distortion_sigma[4])) return without;
   }
-  progress->say(fmt::format(
+  progress->print(fmt::format(
       "vergence: k3 is estimated, too: the residuals are {:.3f} px with it and {:.3f} px without",
       with.rig.reprojection_px, without.rig.reprojection_px));
   return with;
@@ -150,7 +150,7 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
       calibrate_with_k3(views, options, calibrate_boards(views, options), progress);
   const std::string why = found.error.empty() ? undetermined(found) : found.error;
   if (!why.empty()) {
-    progress->say("vergence: no calibration: " + why);
+    progress->print("vergence: no calibration: " + why);
     return ExitCode::not_usable;
   }
   CalibrationFile file;
@@ -169,15 +169,15 @@ ExitCode conclude_calibration(const CalibrateRequest& request, const CalibratedR
   std::cout << (request.json ? json_report(report).dump(1) + "\n" : format_report(report));
   remark(file, progress);
   if (file.rig.cameras > 1) {
-    progress->say("vergence: " + baseline_message(file.rig));
-    if (const std::string doubt = baseline_doubt(file.rig); !doubt.empty())
-      progress->say("vergence: " + doubt);
+    progress->print("vergence: " + baseline_message(file.rig));
+    if (const std::string warning = baseline_warning(file.rig); !warning.empty())
+      progress->print("vergence: " + warning);
   }
-  progress->say(fmt::format("{}: written{}", request.out.string(),
-                            file.rig.cameras == 1
-                                ? "; one camera makes no rig, its intrinsics go into a "
-                                  "configuration or another calibration.yaml"
-                                : ""));
+  progress->print(fmt::format("{}: written{}", request.out.string(),
+                              file.rig.cameras == 1
+                                  ? "; one camera makes no rig, its intrinsics go into a "
+                                    "configuration or another calibration.yaml"
+                                  : ""));
   return ExitCode::done;
 }
 
@@ -190,25 +190,25 @@ ExitCode calibrate_images(const CalibrateRequest& request,
     files.push_back(matching_files(patterns[k], kOptions[k]));
   std::vector<std::string> remarks;
   const auto views = group_views(files, &remarks);
-  std::string words;
+  std::string activity;
   BoardImages images =
       read_board_images(views, request.board, [&](std::size_t done, std::size_t found) {
         ProgressState state;
         state.state = "calibrate";
         state.frame = done;
         state.frames = views.size();
-        words = fmt::format("{} with the board", found);
-        state.words = words;
+        activity = fmt::format("{} with the board", found);
+        state.activity = activity;
         progress.update(state);
       });
   progress.finish();
-  for (const std::string& message : remarks) progress.say("vergence: " + message);
+  for (const std::string& message : remarks) progress.print("vergence: " + message);
   if (images.views.empty())  // a message a view would only hide the one that helps
     throw InputError(
-        fmt::format("no view has the board of {}{}; {} ({})", request.board.words(),
+        fmt::format("no view has the board of {}{}; {} ({})", request.board.describe(),
                     patterns.size() > 1 ? " in two cameras" : "", how_to_count(request.board.kind),
                     images.remarks.empty() ? "there are no images" : images.remarks.front()));
-  for (const std::string& message : images.remarks) progress.say("vergence: " + message);
+  for (const std::string& message : images.remarks) progress.print("vergence: " + message);
   CalibratedRig rig;
   rig.sizes = images.sizes;
   return conclude_calibration(request, rig, images.views, &progress);

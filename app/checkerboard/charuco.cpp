@@ -19,7 +19,7 @@ namespace {
 static_assert(cv::aruco::DICT_4X4_50 == 0 &&
               cv::aruco::DICT_APRILTAG_36h11 == kMarkerDictionaries.size() - 1);
 
-constexpr std::size_t kFewestMarkers = 4;
+constexpr std::size_t kMinMarkers = 4;
 constexpr double kFlatToSide = 0.2;   // mean residual of a flat board: more is another layout
 constexpr double kWindowOfGap = 0.8;  // half window: a wider one meets the marker's corner
 constexpr int kNarrowestWindow = 2, kWidestWindow = 8;  // px, half windows
@@ -94,7 +94,7 @@ std::vector<Marker> of_board(const std::vector<Marker>& markers, const Layout& l
 
 /// Residual of the target's markers; infinite if there are too few.
 double misfit(const std::vector<Marker>& markers, const Layout& layout) {
-  if (markers.size() < kFewestMarkers) return std::numeric_limits<double>::infinity();
+  if (markers.size() < kMinMarkers) return std::numeric_limits<double>::infinity();
   std::vector<cv::Point2d> on_board, in_image;
   for (const Marker& m : markers) {
     const auto corners = layout.corners(*layout.square(m.id));

@@ -95,7 +95,7 @@ std::optional<std::vector<Vec2>> find_checkerboard(const ImageView& image,
       soft, corners, {window, window}, {-1, -1},
       {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kRefineSteps, kRefineTolerance});
   make_right_handed(board, &corners);
-  if (board.tells_its_ends() && first_square_brighter(pixels, board, corners) < 0)
+  if (board.is_asymmetric() && first_square_brighter(pixels, board, corners) < 0)
     std::reverse(corners.begin(), corners.end());
   std::vector<Vec2> found;
   found.reserve(corners.size());

@@ -29,13 +29,13 @@ bool is_ros_folder(const std::string& out, CalibrationFormat format) {
 }  // namespace
 
 CalibrationFormat parse_format(const std::string& word) {
-  static const std::vector<std::string> kWords{"vergence", "kalibr", "ros", "opencv"};
-  const auto at = std::find(kWords.begin(), kWords.end(), word);
-  if (at == kWords.end())
+  static const std::vector<std::string> kFormatNames{"vergence", "kalibr", "ros", "opencv"};
+  const auto at = std::find(kFormatNames.begin(), kFormatNames.end(), word);
+  if (at == kFormatNames.end())
     throw InputError(fmt::format("\"{}\" is no form of a calibration{}; it is one of {}",
-                                 word.substr(0, 60), did_you_mean(word, kWords),
-                                 fmt::join(kWords, ", ")));
-  return static_cast<CalibrationFormat>(at - kWords.begin());
+                                 word.substr(0, 60), did_you_mean(word, kFormatNames),
+                                 fmt::join(kFormatNames, ", ")));
+  return static_cast<CalibrationFormat>(at - kFormatNames.begin());
 }
 
 ImageSize parse_size(const std::string& text) {
@@ -128,8 +128,8 @@ Remarks convert_calibration(const ConversionRequest& request) {
   const CalibrationFile calibration = read_any_calibration(request.in, request.size, &remarks);
   write_any_calibration(request.out, format, calibration, &remarks);
   remarks.push_back(baseline_message(calibration.rig));
-  if (std::string doubt = baseline_doubt(calibration.rig); !doubt.empty())
-    remarks.push_back(std::move(doubt));
+  if (std::string warning = baseline_warning(calibration.rig); !warning.empty())
+    remarks.push_back(std::move(warning));
   return remarks;
 }
 

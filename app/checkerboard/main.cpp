@@ -107,7 +107,7 @@ ExitCode run(const CalibrateOptions& a) {
 
 int main(int argc, char** argv) {
   using namespace vergence::app;
-  const auto declare = [](CLI::App& root, const ProgramWords& /*words*/, ExitCode* exit_code) {
+  const auto declare = [](CLI::App& root, const ProgramArguments& /*words*/, ExitCode* exit_code) {
     const auto a = std::make_shared<CalibrateOptions>();
     a->declare(root)->callback([a, exit_code] { *exit_code = run(*a); });
   };

@@ -25,7 +25,7 @@ std::optional<fs::path> find_checkerboard_tool(const fs::path& folder) {
   return std::nullopt;
 }
 
-ExitCode run_checkerboard_tool(const ProgramWords& words) {
+ExitCode run_checkerboard_tool(const ProgramArguments& arguments) {
   const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
   const auto tool = find_checkerboard_tool(folder);
   if (!tool)
@@ -36,7 +36,7 @@ ExitCode run_checkerboard_tool(const ProgramWords& words) {
         "it: scripts/setup",
         kCheckerboardTool, folder.string(), (folder.parent_path() / "libexec/vergence").string()));
   std::vector<char*> argv;
-  for (const char* word : words) argv.push_back(const_cast<char*>(word));  // execv() only reads
+  for (const char* word : arguments) argv.push_back(const_cast<char*>(word));  // execv() only reads
   argv.push_back(nullptr);
   std::cout.flush();
   ::execv(tool->c_str(), argv.data());

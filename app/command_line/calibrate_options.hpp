@@ -24,7 +24,7 @@ inline constexpr const char* kCheckerboardTool = "vergence-checkerboard";
 /// Becomes that executable, with the same words: it has this process's terminal, signals and exit
 /// code, and this does not return.
 /// InputError: it is not there, or cannot be started.
-[[nodiscard]] ExitCode run_checkerboard_tool(const ProgramWords& words);
+[[nodiscard]] ExitCode run_checkerboard_tool(const ProgramArguments& arguments);
 
 /// The subcommands of `vergence calibrate`.
 enum class CalibrateCommand : std::uint8_t { target, live, sequence, convert };

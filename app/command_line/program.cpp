@@ -27,7 +27,7 @@ void print_error(const std::string& message) {
   std::cerr << "vergence: " << harmless(message) << '\n';
 }
 
-std::vector<std::string> command_words(CLI::App& root) {
+std::vector<std::string> command_names(CLI::App& root) {
   std::vector<std::string> words;
   for (const CLI::App* command : root.get_subcommands({})) words.push_back(command->get_name());
   return words;
@@ -41,10 +41,10 @@ std::vector<std::string> option_names(CLI::App& command) {
 }
 
 /// The words of a command: `calibrate target`; of the program: none.
-std::string words_of(const CLI::App& command) {
+std::string full_name(const CLI::App& command) {
   const CLI::App* parent = command.get_parent();
   if (parent == nullptr) return "";
-  const std::string before = words_of(*parent);
+  const std::string before = full_name(*parent);
   return before + (before.empty() ? "" : " ") + command.get_name();
 }
 
@@ -58,36 +58,37 @@ CLI::App& named_command(CLI::App& root) {
 }
 
 /// Error message for an argument that `command` does not define, with the nearest one that it does.
-struct UnknownWord {
+struct UnknownArgument {
   std::string name, why;
   bool option = false;
 };
 
-UnknownWord unknown_word(const std::string& given, CLI::App& command) {
-  UnknownWord word;
-  word.name = given.substr(0, given.find('='));
-  word.option = word.name.size() > 1 && word.name.front() == '-';
-  if (!word.option) word.why = did_you_mean(word.name, command_words(command));
-  if (word.why.empty())
-    word.why = why_withdrawn(Withdrawn::Kind::option,
-                             words_of(command) + " " + (word.option ? word.name : "CONFIG"));
-  return word;
+UnknownArgument unknown_argument(const std::string& given, CLI::App& command) {
+  UnknownArgument argument;
+  argument.name = given.substr(0, given.find('='));
+  argument.option = argument.name.size() > 1 && argument.name.front() == '-';
+  if (!argument.option) argument.why = did_you_mean(argument.name, command_names(command));
+  if (argument.why.empty())
+    argument.why =
+        why_withdrawn(Withdrawn::Kind::option,
+                      full_name(command) + " " + (argument.option ? argument.name : "CONFIG"));
+  return argument;
 }
 
 /// CLI11's errors about a command line, as one message.
-std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
+std::string error_message(const CLI::ParseError& error, CLI::App& root) {
   CLI::App& command = named_command(root);
-  const std::string words = words_of(command), who = words.empty() ? "" : words + ": ";
+  const std::string words = full_name(command), who = words.empty() ? "" : words + ": ";
   const std::string hint = " (see 'vergence" + (words.empty() ? "" : " " + words) + " --help')";
   // Unknown arguments are reported first: this is often why something else seems to be missing.
   const auto extras = command.remaining();
   if (extras.empty()) return who + error.what() + hint;
   // An option of an earlier version explains the other words.
-  std::vector<UnknownWord> unknown;
-  for (const std::string& extra : extras) unknown.push_back(unknown_word(extra, command));
+  std::vector<UnknownArgument> unknown;
+  for (const std::string& extra : extras) unknown.push_back(unknown_argument(extra, command));
   const auto explained = [&](bool option) {
-    return std::find_if(unknown.begin(), unknown.end(), [&](const UnknownWord& word) {
-      return word.option == option && !word.why.empty();
+    return std::find_if(unknown.begin(), unknown.end(), [&](const UnknownArgument& argument) {
+      return argument.option == option && !argument.why.empty();
     });
   };
   auto first = explained(true);
@@ -100,22 +101,22 @@ std::string sentence_for(const CLI::ParseError& error, CLI::App& root) {
 }
 
 /// A first word that is no command is answered here: CLI11 would only call it unexpected.
-void check_first_word(CLI::App& root, int argc, const char* const* argv) {
+void check_command(CLI::App& root, int argc, const char* const* argv) {
   if (argc < 2) throw InputError("no command given; 'vergence --help' lists them");
-  const std::string word = argv[1];
-  if (!word.empty() && word.front() == '-') return;
-  auto words = command_words(root);
+  const std::string argument = argv[1];
+  if (!argument.empty() && argument.front() == '-') return;
+  auto words = command_names(root);
   words.insert(words.end(), {"help", "version"});
-  if (std::find(words.begin(), words.end(), word) != words.end()) return;
-  const std::string why = why_withdrawn(Withdrawn::Kind::command, word);
-  throw InputError("unknown command \"" + word + "\"" +
-                   (why.empty() ? did_you_mean(word, words) : why) +
+  if (std::find(words.begin(), words.end(), argument) != words.end()) return;
+  const std::string why = why_withdrawn(Withdrawn::Kind::command, argument);
+  throw InputError("unknown command \"" + argument + "\"" +
+                   (why.empty() ? did_you_mean(argument, words) : why) +
                    " ('vergence --help' lists the commands)");
 }
 
 /// `help`, `help COMMAND`, `help COMMAND SUBCOMMAND` and `version` as the options that they stand
 /// for.
-std::vector<const char*> without_words_for_options(int argc, const char* const* argv) {
+std::vector<const char*> with_help_options(int argc, const char* const* argv) {
   std::vector<const char*> words(argv, argv + argc);
   if (argc < 2) return words;
   const std::string_view first = argv[1];
@@ -128,7 +129,7 @@ std::vector<const char*> without_words_for_options(int argc, const char* const* 
 }
 
 ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add_commands) {
-  const std::vector<const char*> words = without_words_for_options(given, given_argv);
+  const std::vector<const char*> words = with_help_options(given, given_argv);
   const int argc = static_cast<int>(words.size());
   const char* const* argv = words.data();
   CLI::App root("Stereo visual odometry with online calibration", "vergence");
@@ -141,14 +142,14 @@ ExitCode parse_and_run(int given, const char* const* given_argv, AddCommands add
       "and\n"
       "exit codes.");
   add_commands(root, {given_argv, static_cast<std::size_t>(given)}, &exit_code);
-  check_first_word(root, argc, argv);
+  check_command(root, argc, argv);
   try {
     root.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version
     root.exit(asked, std::cout, std::cerr);
     return ExitCode::done;
   } catch (const CLI::ParseError& error) {
-    throw InputError(sentence_for(error, root));
+    throw InputError(error_message(error, root));
   }
   return exit_code;
 }

@@ -25,11 +25,11 @@ ExitCode calibrate_sequence(const CalibrateOptions& a) {
 
 }  // namespace
 
-void add_calibrate(CLI::App& root, const ProgramWords& words, ExitCode* exit_code) {
+void add_calibrate(CLI::App& root, const ProgramArguments& arguments, ExitCode* exit_code) {
   const auto a = std::make_shared<CalibrateOptions>();
-  a->declare(root)->callback([a, words, exit_code] {
+  a->declare(root)->callback([a, arguments, exit_code] {
     *exit_code = a->given == CalibrateCommand::sequence ? calibrate_sequence(*a)
-                                                        : run_checkerboard_tool(words);
+                                                        : run_checkerboard_tool(arguments);
   });
 }
 

@@ -2,7 +2,7 @@
 
 namespace vergence::app {
 
-void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_code) {
+void add_all_commands(CLI::App& root, const ProgramArguments& arguments, ExitCode* exit_code) {
   add_run(root, exit_code);
   add_replay(root, exit_code);
   add_evaluate(root, exit_code);
@@ -12,7 +12,7 @@ void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_
   add_devices(root, exit_code);
   add_doctor(root, exit_code);
   add_snap(root, exit_code);
-  add_calibrate(root, words, exit_code);
+  add_calibrate(root, arguments, exit_code);
 }
 
 }  // namespace vergence::app

@@ -10,7 +10,7 @@
 namespace vergence::app {
 
 /// `words`: what the checkerboard tool is started with.
-void add_calibrate(CLI::App& root, const ProgramWords& words, ExitCode* exit_code);
+void add_calibrate(CLI::App& root, const ProgramArguments& arguments, ExitCode* exit_code);
 void add_devices(CLI::App& root, ExitCode* exit_code);
 void add_doctor(CLI::App& root, ExitCode* exit_code);
 void add_evaluate(CLI::App& root, ExitCode* exit_code);
@@ -22,6 +22,6 @@ void add_simulate(CLI::App& root, ExitCode* exit_code);
 void add_snap(CLI::App& root, ExitCode* exit_code);
 
 /// All of them: what `vergence` is made of.
-void add_all_commands(CLI::App& root, const ProgramWords& words, ExitCode* exit_code);
+void add_all_commands(CLI::App& root, const ProgramArguments& arguments, ExitCode* exit_code);
 
 }  // namespace vergence::app

@@ -43,7 +43,7 @@ void list(const DevicesArguments& a, bool rules_asked) {
   if (drive && !rules_asked)
     throw InputError("--rig selects the devices of --write-udev; add --write-udev");
   const Machine machine = Machine::here();
-  const Inventory inventory = take_inventory(machine, {});
+  const Inventory inventory = make_inventory(machine, {});
   std::string rules;
   if (rules_asked) rules = udev_rules(drive ? ports_of_rig(inventory, *drive, machine) : inventory);
   const bool to_stdout = a.rules == "-";

@@ -26,7 +26,7 @@ ExitCode examine_machine(const DoctorArguments& a) {
   for (int k = 0; drive && k < camera_count(*drive); ++k)  // without a configuration: all
     options.drivers.push_back(drive->cameras[static_cast<std::size_t>(k)].driver);
   const Machine machine = Machine::here();
-  const Inventory inventory = take_inventory(machine, options);
+  const Inventory inventory = make_inventory(machine, options);
   const std::vector<Finding> findings =
       run_checks({machine, inventory, drive ? &*drive : nullptr, a.out});
   std::cout << (a.json ? doctor_json(findings)

@@ -60,7 +60,7 @@ struct Files {
   TrajectoryFile estimate{}, reference{};
 };
 
-void say(const std::string& message) { std::cerr << "vergence: " << harmless(message) << '\n'; }
+void warn(const std::string& message) { std::cerr << "vergence: " << harmless(message) << '\n'; }
 
 /// Rows of a file without times belong to the rows of the other one, with its times if it has some.
 void pair_rows(const EvaluationRequest& a, const Reference& from, Files* files) {
@@ -76,7 +76,8 @@ void pair_rows(const EvaluationRequest& a, const Reference& from, Files* files) 
         : r.timed ? "the estimate has no times"
                   : "neither has times",
         help));
-  say(std::string(e.timed == r.timed ? "neither file has times" : "one of the files has no times") +
+  warn(
+      std::string(e.timed == r.timed ? "neither file has times" : "one of the files has no times") +
       ": row belongs to row");
   if (e.timed == r.timed) return;
   TrajectoryFile& without = e.timed ? r : e;
@@ -91,7 +92,7 @@ TrajectoryFile read(const fs::path& path, std::optional<TimeUnit> unit,
                     std::optional<QuaternionOrder> quaternion, std::string_view unit_option) {
   TrajectoryFile file = read_trajectory_file(path, {unit, quaternion, unit_option});
   if (!file.remarks.empty())
-    say(fmt::format("{}: {}", path.string(), fmt::join(file.remarks, "; ")));
+    warn(fmt::format("{}: {}", path.string(), fmt::join(file.remarks, "; ")));
   return file;
 }
 
@@ -137,8 +138,8 @@ bool counts_frames(const Trajectory& poses) {
 /// A reference at the estimate's body, and how it came there.
 struct Brought {
   Trajectory poses{};
-  FoundMount found{};              // where a mount is asked for; not ok: there are no poses
-  std::optional<InsMount> told{};  // of an INS's readings, else
+  FoundMount found{};                   // where a mount is asked for; not ok: there are no poses
+  std::optional<InsMount> estimated{};  // of an INS's readings, else
 };
 
 Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readings,
@@ -151,7 +152,7 @@ Brought bring_ins(const EvaluationRequest& a, const std::filesystem::path& readi
   if (a.estimate_ins_extrinsics)
     out.found = find_ins_mount(estimate, moments);
   else if (a.options.axes == BodyAxes::camera)  // else both are forward, left, up
-    out.told = ins_mount_of(a.estimate, readings);
+    out.estimated = ins_mount_of(a.estimate, readings);
   return out;
 }
 
@@ -166,7 +167,7 @@ Brought bring_reference(const EvaluationRequest& a, const Reference& from, Files
   }
   if (a.estimate_ins_extrinsics && out.found.status == MountStatus::ok)
     out.poses = brought_over(out.poses, out.found.mount.T_ref_est);
-  if (out.told) out.poses = brought_over(out.poses, out.told->T_ins_left);
+  if (out.estimated) out.poses = brought_over(out.poses, out.estimated->T_ins_left);
   return out;
 }
 
@@ -265,12 +266,12 @@ void print(const EvaluationRequest& a, const EvaluationOptions& options, const B
   if (a.json) {
     nlohmann::ordered_json out = evaluation_json(evaluation, options);
     if (a.estimate_ins_extrinsics) out["mount"] = mount_json(reference.found);
-    if (reference.told) out["ins_mount"] = ins_mount_json(*reference.told);
+    if (reference.estimated) out["ins_mount"] = ins_mount_json(*reference.estimated);
     std::cout << out.dump(1) << '\n';
     return;
   }
   if (a.estimate_ins_extrinsics) std::cout << mount_text(reference.found);
-  if (reference.told) std::cout << ins_mount_text(*reference.told) << '\n';
+  if (reference.estimated) std::cout << ins_mount_text(*reference.estimated) << '\n';
   std::cout << evaluation_text(evaluation, options);
 }
 
@@ -290,17 +291,17 @@ ExitCode run_evaluation(const EvaluationRequest& a) {
   const Duration interval = usual_interval(reference.poses);
   if (evaluation.status == EvaluationStatus::ok) {
     if (const std::string holes = gap_remark(evaluation, options, interval); !holes.empty())
-      say(holes);
+      warn(holes);
     if (rotations_differ(evaluation))
-      say(rotation_remark(a, files, reference.poses, options, evaluation));
+      warn(rotation_remark(a, files, reference.poses, options, evaluation));
     return ExitCode::done;
   }
-  say(a.estimate.string() + " against " + from.path.string() + ": " +
-      evaluation_problem(evaluation, options, interval));
+  warn(a.estimate.string() + " against " + from.path.string() + ": " +
+       evaluation_problem(evaluation, options, interval));
   if (counts_frames(estimate) != counts_frames(reference.poses))
-    say((counts_frames(estimate) ? a.estimate : from.path).string() +
-        ": its first column counts the poses: these are numbers of frames and no times; put the "
-        "times of the frames there");
+    warn((counts_frames(estimate) ? a.estimate : from.path).string() +
+         ": its first column counts the poses: these are numbers of frames and no times; put the "
+         "times of the frames there");
   return ExitCode::not_usable;
 }
 

@@ -51,17 +51,17 @@ ExitCode run_export(const ExportArguments& a) {
     state.state = "export";
     state.frame = done;
     state.frames = session.frames().size();
-    state.words = "images as PNG";
+    state.activity = "images as PNG";
     progress.update(state);
   });
   progress.finish();
-  for (const std::string& message : result.remarks) progress.say("vergence: " + message);
+  for (const std::string& message : result.remarks) progress.print("vergence: " + message);
   if (result.left_out > 0)
-    progress.say(
+    progress.print(
         fmt::format("vergence: {} frames without both images were left out", result.left_out));
   if (!a.quiet)
-    progress.say(fmt::format("{}: {} frames; next: vergence replay {} --format {} --out DIR", a.out,
-                             result.frames, a.out, a.format));
+    progress.print(fmt::format("{}: {} frames; next: vergence replay {} --format {} --out DIR",
+                               a.out, result.frames, a.out, a.format));
   return ExitCode::done;
 }
 

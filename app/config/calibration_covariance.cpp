@@ -30,7 +30,7 @@ struct NamedRow {
 };
 
 /// Names that tell the cameras apart and cannot be mistaken for an index.
-bool names_tell(const CalibrationFile& c) {
+bool has_row_names(const CalibrationFile& c) {
   const auto plain = [](unsigned char letter) {
     return std::isalnum(letter) != 0 || letter == '_' || letter == '-';
   };
@@ -75,7 +75,7 @@ std::vector<NamedRow> read_rows(const YamlFile& file, const YAML::Node& list,
                                 const CalibrationFile& calibration) {
   const std::string field = "covariance.parameters";
   std::vector<NamedRow> known = rows_of(calibration, false);
-  if (names_tell(calibration)) {
+  if (has_row_names(calibration)) {
     const std::vector<NamedRow> named = rows_of(calibration, true);
     known.insert(known.begin(), named.begin(), named.end());
   }
@@ -112,7 +112,7 @@ std::vector<int> known_rows(const RigCovariance& covariance) {
 
 std::string format_covariance(const CalibrationFile& calibration) {
   const RigCovariance& C = calibration.rig.covariance;
-  std::vector<NamedRow> rows = rows_of(calibration, names_tell(calibration));
+  std::vector<NamedRow> rows = rows_of(calibration, has_row_names(calibration));
   std::erase_if(rows, [&C](const NamedRow& r) { return !C.known(r.row); });
   if (rows.empty()) return {};
   std::vector<std::string> names;
@@ -358,7 +358,7 @@ std::string baseline_message(const RigCalibration& rig) {
   return fmt::format("the baseline is {:.4g} m", rig.T_camera_left[1].t.norm());
 }
 
-std::string baseline_doubt(const RigCalibration& rig) {
+std::string baseline_warning(const RigCalibration& rig) {
   constexpr double kUsuallyShortest = 0.02, kUsuallyLongest = 2;  // m
   const double length = rig.T_camera_left[1].t.norm();
   if (length >= kUsuallyShortest && length <= kUsuallyLongest) return "";

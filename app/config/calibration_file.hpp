@@ -51,7 +51,7 @@ struct ValidationError {
 /// "the baseline is 0.1101 m", for people who know their rig.
 [[nodiscard]] std::string baseline_message(const RigCalibration& rig);
 /// Asks for the unit of a length above 2 m or below 2 cm, which few rigs have; empty: it is usual.
-[[nodiscard]] std::string baseline_doubt(const RigCalibration& rig);
+[[nodiscard]] std::string baseline_warning(const RigCalibration& rig);
 
 /// Errors  InputError with file:line and the field's name: unreadable, unknown key, missing or
 ///         malformed field, implausible.

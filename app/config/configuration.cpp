@@ -189,10 +189,10 @@ Number parse_number(const Entry& entry, const Key& key, const char* kind) {
 
 /// Maps YAML 1.1 booleans to the keywords on and off.
 std::string as_switch(const std::string& value, const std::vector<std::string>& words) {
-  const auto is_word = [&words](const char* word) {
+  const auto is_choice = [&words](const char* word) {
     return std::find(words.begin(), words.end(), word) != words.end();
   };
-  if (!is_word("on") || !is_word("off")) return value;
+  if (!is_choice("on") || !is_choice("off")) return value;
   std::string lower = value;
   std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;

@@ -571,12 +571,6 @@ Group calibration_options() {
                "Moving frames before a calibration is solved; not above `max_frames`.")
       .integer("max_frames", &C::max_frames, 10, 150, "frames",
                "Maximum number of frames solved together; older ones are dropped.")
-      .number("rotation_sigma_mrad", &C::rotation_sigma_mrad, 0.001, 10, "mrad",
-              "Predicted rotation sigma (noise only) at which a calibration is solved before "
-              "`max_frames`.")
-      .number("translation_sigma_mm", &C::translation_sigma_mm, 0.01, 1000, "mm",
-              "The same for the translation across the baseline, for a baseline of 0.75 m and in "
-              "proportion to it.")
       .integer("adopt_after", &C::adopt_after, 0, 1000, "frames",
                "Frames after its snapshot within which a result is adopted or rejected; adoption "
                "needs at least 6 frames that support it. In a replay and with `--fast` the "
@@ -608,9 +602,6 @@ Group calibration_options() {
       .number("max_rotation_deg", &C::max_rotation_deg, 0.1, 180, "°",
               "Maximum rotation from the nominal one; not checked for the first calibration from "
               "scratch.")
-      .number("min_path_m", &C::min_path_m, 0.01, 1000, "m",
-              "Minimum path length of the collected frames (and three baselines); below: "
-              "`needs_motion`.")
       .integer("min_near_points", &C::min_near_points, 0, 1000, "points",
                "Minimum near points of the collected frames; below: `needs_near_structure`.")
       .number("near_baselines", &C::near_baselines, 5, 500, "baselines",

@@ -202,8 +202,8 @@ std::vector<std::array<std::size_t, 2>> pair_images(
   sequence->assumptions.push_back(fmt::format(
       "images are paired by the nearest {}, right ones are later by {}",
       ambiguous ? "time of recording, as their stamps do not tell" : "stamp", describe(kept)));
-  if (is_doubtful(kept, interval))
-    sequence->remarks.push_back(doubt(topics[0], topics[1], kept, interval));
+  if (is_suspicious(kept, interval))
+    sequence->remarks.push_back(pairing_warning(topics[0], topics[1], kept, interval));
   const Duration late = recorded_later(images, pairs) - kept.median;
   if (std::max(late, -late) > most && !ambiguous)
     sequence->remarks.push_back(fmt::format(

@@ -231,9 +231,9 @@ class RigReader {
       const auto kind = lens_model(word);
       const bool of_rays = part != "camera_model";
       // A `type` may be that of anything.
-      const bool said = of_rays || fact->key.find("odel") != std::string::npos ||
-                        fact->key.find("amera.type") != std::string::npos;
-      if (!kind && said)
+      const bool stated = of_rays || fact->key.find("odel") != std::string::npos ||
+                          fact->key.find("amera.type") != std::string::npos;
+      if (!kind && stated)
         fail(*fact, fmt::format(" is \"{}\"; lenses that are read are pinhole with radtan "
                                 "(plumb_bob) or equidistant (fisheye, Kannala-Brandt) "
                                 "distortion, or none",
@@ -247,8 +247,8 @@ class RigReader {
 
   void read_distortion(int k) {
     bool none = false;
-    const auto said = model(k, &none);
-    const bool equidistant = said == CameraModelKind::pinhole_equidistant;
+    const auto stated = model(k, &none);
+    const bool equidistant = stated == CameraModelKind::pinhole_equidistant;
     if (equidistant) lens(k).kind = CameraModelKind::pinhole_equidistant;
     if (none) return;
     const Fact* list = find("distortion", k);
@@ -271,7 +271,7 @@ class RigReader {
       if (!any)
         fail_missing(files_, fmt::format("the list of distortion coefficients of camera {}", k));
     }
-    if (!said && values.size() == 4 && k == 0)
+    if (!stated && values.size() == 4 && k == 0)
       remarks_->push_back(
           names_of(files_) +
           ": four distortion coefficients are taken for k1 k2 p1 p2 (radtan); if they are k1 k2 k3 "

@@ -31,11 +31,11 @@ const char* kind_of(ImageFileStatus status) noexcept {
   }
 }
 
-void note(DecodedPair* pair, const char* kind, const std::string& message) {
+void set_issue(DecodedPair* pair, const char* kind, const std::string& message) {
   pair->kind = kind;
-  const std::size_t n = std::min(message.size(), pair->note.size() - 1);
-  std::copy_n(message.begin(), n, pair->note.begin());
-  pair->note[n] = 0;
+  const std::size_t n = std::min(message.size(), pair->issue.size() - 1);
+  std::copy_n(message.begin(), n, pair->issue.begin());
+  pair->issue[n] = 0;
 }
 
 }  // namespace
@@ -109,15 +109,17 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
   pair.frame = index;
   pair.stamp = listed.stamp;
   if (any_ && listed.stamp <= newest_) {
-    note(&pair, "stamp_not_increasing",
-         fmt::format("frame {} skipped: its time {} is not later than {}, the latest before it",
-                     index, format_seconds(listed.stamp.ns()), format_seconds(newest_.ns())));
+    set_issue(
+        &pair, "stamp_not_increasing",
+        fmt::format("frame {} skipped: its time {} is not later than {}, the latest before it",
+                    index, format_seconds(listed.stamp.ns()), format_seconds(newest_.ns())));
     return pair;
   }
   if (!listed.in_order) {
-    note(&pair, "stamp_outlier",
-         fmt::format("frame {} skipped: its time {} is later than those of the frames after it",
-                     index, format_seconds(listed.stamp.ns())));
+    set_issue(
+        &pair, "stamp_outlier",
+        fmt::format("frame {} skipped: its time {} is later than those of the frames after it",
+                    index, format_seconds(listed.stamp.ns())));
     return pair;
   }
   newest_ = listed.stamp;
@@ -135,8 +137,8 @@ DecodedPair FrameDecoder::decode(std::size_t index) {
     const std::string name = !listed.file[k].empty() ? listed.file[k]
                              : k == 0                ? "the left image"
                                                      : "the right image";
-    note(&pair, kind_of(status[k]),
-         fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status[k])));
+    set_issue(&pair, kind_of(status[k]),
+              fmt::format("frame {} skipped: {} {}", index, name, to_phrase(status[k])));
     return pair;
   }
   pair.slots = own_;

@@ -19,11 +19,11 @@ namespace vergence::app {
 struct DecodedPair {
   std::uint64_t frame = 0;  // index into the sequence
   Stamp stamp{};
-  bool decoded = false;              // else skipped: no slots, and `kind` and `note` say why
+  bool decoded = false;              // else skipped: no slots, and `kind` and `issue` state why
   std::array<FrameSlot, 2> slots{};  // left, right
   float decode_ms = 0;               // reading both files and decoding them
   const char* kind = "";  // of the event: image_missing, image_truncated, …, stamp_not_increasing
-  std::array<char, 256> note{};  // message, ends with 0
+  std::array<char, 256> issue{};  // message, ends with 0
 };
 
 /// Reads and decodes the images of a sequence ahead of whoever consumes them, the two of a pair

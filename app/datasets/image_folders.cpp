@@ -70,14 +70,14 @@ std::optional<Cameras> in_two_folders(const fs::path& root, const std::string& a
 /// Images of both cameras in one folder, distinguished by a word of their names.
 std::optional<Cameras> in_one_folder(const fs::path& root, const std::string& above) {
   const std::vector<std::string> files = entries_of(root / above, false);
-  const std::array<std::string, 2> words = side_words(files);
-  if (words[0].empty()) return std::nullopt;
+  const std::array<std::string, 2> sides = side_names(files);
+  if (sides[0].empty()) return std::nullopt;
   Cameras cameras;
   for (std::size_t k = 0; k < 2; ++k) {
     cameras[k].below = above.substr(0, above.empty() ? 0 : above.size() - 1);
-    cameras[k].side = words[k];
+    cameras[k].side = sides[k];
     for (const std::string& file : files)
-      if (without_side(file, words[k]) && !without_side(file, words[1 - k]))
+      if (without_side(file, sides[k]) && !without_side(file, sides[1 - k]))
         cameras[k].names.push_back(cameras[k].in_folder(file));
   }
   return cameras;
@@ -279,8 +279,8 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 
   if (offset.farthest > Duration{})
     sequence->assumptions.push_back(
         "images are paired by the nearest stamp, right ones are later by " + describe(offset));
-  if (is_doubtful(offset, interval))
-    sequence->remarks.push_back(doubt("left images", "right images", offset, interval));
+  if (is_suspicious(offset, interval))
+    sequence->remarks.push_back(pairing_warning("left images", "right images", offset, interval));
   constexpr std::size_t kAlone = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> partner(left.size(), kAlone);
   std::vector<bool> paired(right.size(), false);
@@ -292,16 +292,16 @@ std::optional<std::vector<StereoPair>> pair_by_stamps(const std::array<Stamped, 
                    [&](std::size_t a, std::size_t b) { return right[a] < right[b]; });
   std::vector<StereoPair> pairs;
   auto next = alone.begin();
-  const auto take_alone = [&] {
+  const auto pair_alone = [&] {
     pairs.push_back({right[*next], {"", cameras[1].names[*next]}});
     ++next;
   };
   for (std::size_t l = 0; l < left.size(); ++l) {
-    while (next != alone.end() && right[*next] < left[l]) take_alone();
+    while (next != alone.end() && right[*next] < left[l]) pair_alone();
     pairs.push_back(
         {left[l], {cameras[0].names[l], partner[l] == kAlone ? "" : cameras[1].names[partner[l]]}});
   }
-  while (next != alone.end()) take_alone();
+  while (next != alone.end()) pair_alone();
   return pairs;
 }
 
@@ -382,14 +382,14 @@ Stamped stamped(const fs::path& root, const Camera& camera, const fs::path& list
   }
   if (end == 0) refuse(list, 0, "has no line that an image of its camera is of: line N is image N");
   for (std::size_t i = 0; i < end; ++i) push(times.lines[i].stamp, of_line[i]);
-  const auto say = [&](std::size_t n, const char* what) {
+  const auto add_remark = [&](std::size_t n, const char* what) {
     if (n > 0)
       sequence->remarks.push_back(
           fmt::format("{}: {} {}", list.lexically_relative(root).string(), n, what));
   };
-  say(odd, "images are not named by their number and are left out");
-  say(without, "images have no line and are left out");
-  say(of_line.size() - end, "lines go on after the last image");
+  add_remark(odd, "images are not named by their number and are left out");
+  add_remark(without, "images have no line and are left out");
+  add_remark(of_line.size() - end, "lines go on after the last image");
   sequence->left_out += odd + without;
   return out;
 }

@@ -142,20 +142,21 @@ Packets read_packets(const fs::path& data, const std::vector<TimesLine>& lines) 
 }
 
 void add_remarks(const Packets& packets, std::size_t disordered, RecordedIns* ins) {
-  const auto say = [ins](std::size_t n, const std::string& what) {
+  const auto add_remark = [ins](std::size_t n, const std::string& what) {
     if (n > 0) ins->remarks.push_back(fmt::format("oxts: {} {}", n, what));
   };
-  say(packets.missing, "packets are missing, the first is " + packets.first_missing);
-  say(packets.broken, fmt::format("packets are not the {} numbers of one and are left out, the "
-                                  "first is {}",
-                                  kFields, packets.first_broken));
-  say(packets.without_stamp, "packets have no line in timestamps.txt and are left out");
-  say(disordered, "stamps go back or repeat one; their packets are left out");
+  add_remark(packets.missing, "packets are missing, the first is " + packets.first_missing);
+  add_remark(packets.broken,
+             fmt::format("packets are not the {} numbers of one and are left out, the "
+                         "first is {}",
+                         kFields, packets.first_broken));
+  add_remark(packets.without_stamp, "packets have no line in timestamps.txt and are left out");
+  add_remark(disordered, "stamps go back or repeat one; their packets are left out");
   const auto fixed = [](const InsRecord& r) { return r.sample.fix == FixStatus::fix_3d; };
-  say(ins->readings.size() - static_cast<std::size_t>(
-                                 std::count_if(ins->readings.begin(), ins->readings.end(), fixed)),
-      fmt::format("of {} packets have no satellites' fix: nothing is compared there",
-                  ins->readings.size()));
+  add_remark(ins->readings.size() - static_cast<std::size_t>(std::count_if(
+                                        ins->readings.begin(), ins->readings.end(), fixed)),
+             fmt::format("of {} packets have no satellites' fix: nothing is compared there",
+                         ins->readings.size()));
 }
 
 /// A folder with a camera's images and their list, or with the INS's packets.

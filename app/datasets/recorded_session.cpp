@@ -107,15 +107,15 @@ struct RecordedSession::Reader {
   std::array<Stamp, kMaxCameras> newest_stamp{};
   std::size_t broken = 0, images_lost = 0;
 
-  void take(const detail::BagMessage& m, std::uint32_t file) {
+  void read_message(const detail::BagMessage& m, std::uint32_t file) {
     const std::string& type = m.channel->type;
-    if (m.channel->topic == SessionDescription::kTopic) return take_description(m);
+    if (m.channel->topic == SessionDescription::kTopic) return read_description(m);
     if (type == "sensor_msgs/Image") return take_image(m, file);
-    if (type == "vergence_msgs/Frame") return take_frame(m);
+    if (type == "vergence_msgs/Frame") return read_recorded_frame(m);
     if (type == "vergence_msgs/InsReading") return take_reading(m);
   }
 
-  void take_description(const detail::BagMessage& m) {
+  void read_description(const detail::BagMessage& m) {
     if (described) return;
     const auto bytes = detail::first_bytes(m, kMaxDescription);
     RosReader in(bytes, detail::MessageEncoding::cdr);
@@ -142,7 +142,7 @@ struct RecordedSession::Reader {
     newest_stamp[camera->second] = image->stamp;
   }
 
-  void take_frame(const detail::BagMessage& m) {
+  void read_recorded_frame(const detail::BagMessage& m) {
     const auto record = read_frame(detail::first_bytes(m, kMaxSmall));
     if (!record) {
       ++broken;
@@ -184,9 +184,10 @@ RecordedSession RecordedSession::open(const fs::path& folder) {
   Reader reader{&session, folder};
   for (std::size_t i = 0; i < session.files_->list.size(); ++i) {
     const detail::BagFile& file = session.files_->list[i];
-    const auto scan = detail::scan_bag(
-        detail::BagFormat::mcap, *file.bytes,
-        [&](const detail::BagMessage& m) { reader.take(m, static_cast<std::uint32_t>(i)); });
+    const auto scan =
+        detail::scan_bag(detail::BagFormat::mcap, *file.bytes, [&](const detail::BagMessage& m) {
+          reader.read_message(m, static_cast<std::uint32_t>(i));
+        });
     if (!scan) {
       session.remarks_.push_back(file.name + " does not begin as a recording and was left out");
       session.complete_ = session.complete_ && i + 1 == session.files_->list.size();

@@ -15,7 +15,7 @@ namespace {
 
 // s: faster than any stereo camera; farther than motion can be predicted across
 constexpr double kShortestStep = 1e-3, kLongestStep = 10;
-constexpr std::size_t kLooks = 5;  // pairs, spread over the drive: a tunnel is not all of it
+constexpr std::size_t kSampledPairs = 5;  // pairs, spread over the drive: a tunnel is not all of it
 
 /// Nothing: an image of another kind. 0: one that says nothing, for it is missing, torn or black.
 std::optional<std::uint16_t> peak_of(const StereoSequence& s, const std::string& name,
@@ -110,8 +110,9 @@ void find_deep_bits(StereoSequence* sequence) {
   if (sequence->pairs.empty()) return;
   std::vector<std::uint8_t> bytes;
   std::uint16_t peak = 0;
-  for (std::size_t i = 0; i < kLooks; ++i) {
-    const StereoPair& pair = sequence->pairs[i * (sequence->pairs.size() - 1) / (kLooks - 1)];
+  for (std::size_t i = 0; i < kSampledPairs; ++i) {
+    const StereoPair& pair =
+        sequence->pairs[i * (sequence->pairs.size() - 1) / (kSampledPairs - 1)];
     for (const std::string& name : pair.file) {
       const auto found = peak_of(*sequence, name, &bytes);
       if (!found) return;

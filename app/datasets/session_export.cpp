@@ -119,7 +119,7 @@ class Writer {
                                  ? fmt::format("{}.png", stamp.ns())
                                  : fmt::format("{:06}.png", index));
   }
-  void note(Stamp stamp) { stamps_.push_back(stamp); }
+  void add(Stamp stamp) { stamps_.push_back(stamp); }
 
   /// Text files, when all images are there.
   void finish(const Truth& truth, ExportResult* result) const {
@@ -276,7 +276,7 @@ ExportResult export_session(const RecordedSession& session, ExportRequest reques
       write_png(writer.image(result.frames, frame.given.stamp, k),
                 {pixels[k].data(), image.width, image.height, image.width});
     }
-    writer.note(frame.given.stamp);
+    writer.add(frame.given.stamp);
     ++result.frames;
   }
   if (result.frames == 0)

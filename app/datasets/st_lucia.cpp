@@ -126,7 +126,7 @@ Mat3 matrix_of(const Axes& axes) {
 constexpr double kFast = 5.0;            // m/s: above it the course is where the vehicle points
 constexpr double kApart = 1.0;           // s between the positions whose difference is the motion
 constexpr std::size_t kEnough = 100;     // samples: below, nothing is decided
-constexpr double kTells = 0.3;           // correlation from which the slope decides about pitch
+constexpr double kMinCorrelation = 0.3;  // correlation from which the slope decides about pitch
 constexpr std::size_t kMaxBroken = 100;  // one line in so many
 
 /// One line as it stands.
@@ -268,7 +268,7 @@ bool decide_pitch(const std::vector<Moving>& fast, Conventions* c) {
     slopes.push_back(std::atan2(v.z(), v.head<2>().norm()));
   }
   const double first = correlation(fast, slopes, 0), second = correlation(fast, slopes, 1);
-  if (std::max(std::abs(first), std::abs(second)) < kTells) return false;
+  if (std::max(std::abs(first), std::abs(second)) < kMinCorrelation) return false;
   c->pitch_first = std::abs(first) > std::abs(second);
   c->nose_up_positive = (c->pitch_first ? first : second) > 0;
   return true;

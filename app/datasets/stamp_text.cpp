@@ -25,7 +25,7 @@ int digits(std::string_view text, int most) noexcept {
 }
 
 /// Takes `Z`, `+02:00`, `+0200` or `+02` off the end of a time of day. → s east of UTC
-std::optional<int> take_offset(std::string_view* text) noexcept {
+std::optional<int> parse_offset(std::string_view* text) noexcept {
   if (text->ends_with('Z') || text->ends_with('z')) {
     text->remove_suffix(1);
     return 0;
@@ -156,7 +156,7 @@ std::optional<Stamp> parse_iso_time(std::string_view text) noexcept {
                                          std::chrono::day(static_cast<unsigned>(day))};
   if (!date.ok()) return std::nullopt;
   std::string_view rest = text.substr(kForm.size());
-  const auto offset = take_offset(&rest);
+  const auto offset = parse_offset(&rest);
   if (!offset) return std::nullopt;
   std::int64_t ns = 0;
   if (!rest.empty()) {

@@ -86,7 +86,7 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
   std::array<std::optional<std::size_t>, 3> position;
   std::array<std::optional<std::size_t>, 4> quaternion;  // x y z w
   std::optional<std::size_t> exact, seconds, nanoseconds, stamp;
-  const auto take = [](std::optional<std::size_t>* place, std::size_t i) {
+  const auto read_row = [](std::optional<std::size_t>* place, std::size_t i) {
     if (!*place) *place = i;
   };
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -94,17 +94,17 @@ std::optional<Columns> columns_of_names(const std::vector<std::string_view>& nam
     if (word.empty()) continue;
     const std::size_t axis = std::string_view("xyzw").find(word.back());
     if (word.ends_with("nsec") || word.ends_with("nsecs") || word.ends_with("nanosec"))
-      take(&nanoseconds, i);
+      read_row(&nanoseconds, i);
     else if (word.ends_with("secs") || word.ends_with("sec"))
-      take(&seconds, i);
+      read_row(&seconds, i);
     else if (contains(word, {"headerstamp"}))
       exact = i;
     else if (contains(word, {"time", "stamp"}) || word == "t" || word == "ts")
-      take(&stamp, i);
+      read_row(&stamp, i);
     else if (axis < 4 && is_quaternion(word))
-      take(&quaternion[axis], i);
+      read_row(&quaternion[axis], i);
     else if (axis < 3 && is_position(word))
-      take(&position[axis], i);
+      read_row(&position[axis], i);
   }
   if (exact) stamp = exact;
   if (!stamp || nanoseconds) stamp = seconds ? seconds : stamp;
@@ -267,10 +267,10 @@ class Reader {
   [[nodiscard]] bool euroc() const { return euroc_; }
 
   TrajectoryFile read() {
-    out_.poses.reserve(rows_at_most());
+    out_.poses.reserve(max_rows());
     TextTable table(text_);
     while (table.next())
-      if (!take(table)) break;
+      if (!read_row(table)) break;
     if (out_.poses.empty())
       refuse(file_, 0,
              skipped_ > 0
@@ -278,9 +278,9 @@ class Reader {
                  : "has no pose in it");
     out_.timed = columns_.time && !columns_.counted;
     out_.numbered = columns_.counted;
-    out_.rows = columns_.counted ? most_ + 1 : rows_;
+    out_.rows = columns_.counted ? max_number_ + 1 : rows_;
     put_in_order();
-    say();
+    add_remarks();
     return std::move(out_);
   }
 
@@ -318,14 +318,14 @@ class Reader {
     std::sort(columns_.pose.begin() + 3, columns_.pose.end());
   }
 
-  [[nodiscard]] std::size_t rows_at_most() const {
+  [[nodiscard]] std::size_t max_rows() const {
     constexpr std::size_t kShortest = 15;  // bytes of eight numbers
     const auto ends = static_cast<std::size_t>(std::count(text_.begin(), text_.end(), '\n'));
     return std::min(ends, text_.size() / kShortest) + 1;
   }
 
   /// False: the row is the last, and its writer stopped in it.
-  bool take(const TextTable& table) {
+  bool read_row(const TextTable& table) {
     const auto& fields = table.fields();
     if (fields.size() < columns_.needed()) {
       if (table.unfinished() && !out_.poses.empty()) {
@@ -364,7 +364,7 @@ class Reader {
       const auto number = parse_integer(field);
       if (!number || *number < 0 || *number > kMaxPoses)
         refuse(file_, line, fmt::format("`{}` is not the number of a pose", field.substr(0, 40)));
-      most_ = std::max(most_, static_cast<std::size_t>(*number));
+      max_number_ = std::max(max_number_, static_cast<std::size_t>(*number));
       *stamp = Stamp(*number * kRowStep);
       return true;
     }
@@ -445,7 +445,7 @@ class Reader {
                       step, options_.unit_option));
   }
 
-  void say() {
+  void add_remarks() {
     auto& remarks = out_.remarks;
     if (skipped_ > 0)
       remarks.push_back(fmt::format(
@@ -476,7 +476,7 @@ class Reader {
   Columns columns_;
   TimeForm form_;
   bool euroc_ = false;
-  std::size_t rows_ = 0, most_ = 0, skipped_ = 0, repeated_ = 0, moved_ = 0;
+  std::size_t rows_ = 0, max_number_ = 0, skipped_ = 0, repeated_ = 0, moved_ = 0;
   double roughest_ = 0;
   TrajectoryFile out_;
 };

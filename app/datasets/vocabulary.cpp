@@ -9,45 +9,46 @@
 namespace vergence::app {
 namespace {
 
-struct Words {
+struct Vocabulary {
   std::string_view part, words;
 };
 /// The last part of a key in small letters without signs, the camera's words and number taken off.
 constexpr std::array kWords{
-    Words{"matrix", " k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics "},
-    Words{"fx", " fx mu "},
-    Words{"fy", " fy mv "},
-    Words{"cx", " cx u0 "},
-    Words{"cy", " cy v0 "},
-    Words{"focal", " f focal focallength "},
-    Words{"centre", " principalpoint pp "},
-    Words{"distortion",
-          " d dist distcoeff distcoeffs distcoef distcoefs distortion distortioncoeffs "
-          "distortioncoefficients distortionvector distortionparameters coefficients "},
-    Words{"camera_model", " model modeltype cameramodel cameratype type "},
-    Words{"distortion_model", " distortionmodel distortiontype "},
-    Words{"fisheye", " fisheye fisheyemodel "},
-    Words{"size", " size imagesize imgsize imagedimension resolution "},
-    Words{"width", " width imagewidth imgwidth cols "},
-    Words{"height", " height imageheight imgheight rows "},
-    Words{"rectification", " rectification rectificationmatrix rrect "},
-    Words{"projection", " p projection projectionmatrix prect "},
-    Words{"rotation", " r rot rotation rotationmatrix rmat om rvec rotationvector "},
-    Words{"translation",
-          " t tran trans trns translation translationvector translationmatrix tvec "},
-    Words{"to_previous", " tcncnm "},
-    Words{"from_body", " tcamimu tcambody tcb tci "},
-    Words{"to_body", " timucam tbodycam bodytcam tbs tsc tbc tic "},
-    Words{"baseline", " baseline b "},
-    Words{"focal_baseline", " bf focalxbaseline "},
-    Words{"binning_x", " binningx "},
-    Words{"binning_y", " binningy "},
-    Words{"roi_x", " roixoffset "},
-    Words{"roi_y", " roiyoffset "},
-    Words{"roi_width", " roiwidth "},
-    Words{"roi_height", " roiheight "},
-    Words{"name", " cameraname "},
-    Words{"file", " calib camcalib "}};
+    Vocabulary{"matrix",
+               " k m cm kmat mtx matrix cameramatrix intrinsicmatrix intrinsic intrinsics "},
+    Vocabulary{"fx", " fx mu "},
+    Vocabulary{"fy", " fy mv "},
+    Vocabulary{"cx", " cx u0 "},
+    Vocabulary{"cy", " cy v0 "},
+    Vocabulary{"focal", " f focal focallength "},
+    Vocabulary{"centre", " principalpoint pp "},
+    Vocabulary{"distortion",
+               " d dist distcoeff distcoeffs distcoef distcoefs distortion distortioncoeffs "
+               "distortioncoefficients distortionvector distortionparameters coefficients "},
+    Vocabulary{"camera_model", " model modeltype cameramodel cameratype type "},
+    Vocabulary{"distortion_model", " distortionmodel distortiontype "},
+    Vocabulary{"fisheye", " fisheye fisheyemodel "},
+    Vocabulary{"size", " size imagesize imgsize imagedimension resolution "},
+    Vocabulary{"width", " width imagewidth imgwidth cols "},
+    Vocabulary{"height", " height imageheight imgheight rows "},
+    Vocabulary{"rectification", " rectification rectificationmatrix rrect "},
+    Vocabulary{"projection", " p projection projectionmatrix prect "},
+    Vocabulary{"rotation", " r rot rotation rotationmatrix rmat om rvec rotationvector "},
+    Vocabulary{"translation",
+               " t tran trans trns translation translationvector translationmatrix tvec "},
+    Vocabulary{"to_previous", " tcncnm "},
+    Vocabulary{"from_body", " tcamimu tcambody tcb tci "},
+    Vocabulary{"to_body", " timucam tbodycam bodytcam tbs tsc tbc tic "},
+    Vocabulary{"baseline", " baseline b "},
+    Vocabulary{"focal_baseline", " bf focalxbaseline "},
+    Vocabulary{"binning_x", " binningx "},
+    Vocabulary{"binning_y", " binningy "},
+    Vocabulary{"roi_x", " roixoffset "},
+    Vocabulary{"roi_y", " roiyoffset "},
+    Vocabulary{"roi_width", " roiwidth "},
+    Vocabulary{"roi_height", " roiheight "},
+    Vocabulary{"name", " cameraname "},
+    Vocabulary{"file", " calib camcalib "}};
 
 struct Program {
   std::string_view key;  // at the root, or the beginning of one
@@ -94,7 +95,7 @@ struct Side {
   std::optional<int> number{};
   bool word = false;  // left or right: counted from 0
 };
-Side take_side(std::vector<std::string>* tokens) {
+Side extract_side(std::vector<std::string>* tokens) {
   const auto take = [&](std::size_t i, int number, bool word) {
     tokens->erase(tokens->begin() + static_cast<std::ptrdiff_t>(i));
     return Side{number, word};
@@ -117,9 +118,9 @@ std::string joined(const std::vector<std::string>& tokens) {
   return word;
 }
 
-const Words* find_word(const std::string& word) {
+const Vocabulary* find_part(const std::string& word) {
   const std::string whole = " " + word + " ";
-  return std::find_if(kWords.begin(), kWords.end(), [&](const Words& w) {
+  return std::find_if(kWords.begin(), kWords.end(), [&](const Vocabulary& w) {
     return w.words.find(whole) != std::string_view::npos;
   });
 }
@@ -201,19 +202,19 @@ class Walk {
     if (node.IsScalar()) fact.part = coefficient_of(tokens);
     if (!fact.part.empty()) {
       tokens.resize(tokens.size() - 2);
-      side = take_side(&tokens);
-    } else if (!take_transform(tokens, &fact)) {
+      side = extract_side(&tokens);
+    } else if (!parse_transform(tokens, &fact)) {
       // Numbers in these names are no camera's.
       const std::string whole = joined(tokens);
       if (whole == "tcncnm1")
         tokens.pop_back();
       else if (!node.IsScalar() || (whole != "u0" && whole != "v0"))
-        side = take_side(&tokens);
-      if (!look_up(tokens, groups, &side, &fact)) return;
+        side = extract_side(&tokens);
+      if (!find_fact(tokens, groups, &side, &fact)) return;
     }
     for (std::size_t i = groups.size(); !side.number && i-- > 0;) {
       std::vector<std::string> group = tokens_of(groups[i]);
-      side = take_side(&group);
+      side = extract_side(&group);
     }
     fact.camera = side.number;
     if (side.number && !side.word && fact.part != "between") counted_.push_back(facts_.size());
@@ -221,7 +222,7 @@ class Walk {
   }
 
   /// `T_c1_c2`, `T_cam1_cam0`, `T_right_left`, `Tlr`: between two cameras that the key names.
-  static bool take_transform(const std::vector<std::string>& tokens, Fact* fact) {
+  static bool parse_transform(const std::vector<std::string>& tokens, Fact* fact) {
     const std::string word = joined(tokens);
     std::vector<int> cameras;
     if (word == "tlr" || word == "trl") cameras = {word[1] == 'r', word[2] == 'r'};
@@ -239,17 +240,17 @@ class Walk {
   }
 
   /// `KL` is K of the left camera, `stereo_R` is R.
-  static bool look_up(const std::vector<std::string>& tokens,
-                      const std::vector<std::string>& groups, Side* side, Fact* fact) {
+  static bool find_fact(const std::vector<std::string>& tokens,
+                        const std::vector<std::string>& groups, Side* side, Fact* fact) {
     std::string word = joined(tokens);
-    auto known = find_word((!groups.empty() && groups.back() == "roi" ? "roi" : "") + word);
+    auto known = find_part((!groups.empty() && groups.back() == "roi" ? "roi" : "") + word);
     if (known == kWords.end() && !side->number && (word.ends_with('l') || word.ends_with('r'))) {
-      known = find_word(word.substr(0, word.size() - 1));
+      known = find_part(word.substr(0, word.size() - 1));
       if (known != kWords.end()) *side = {word.back() == 'r' ? 1 : 0, true};
     }
     if (const std::size_t at = word.find("stereo");
         known == kWords.end() && at != std::string::npos)
-      known = find_word(word.erase(at, std::string_view("stereo").size()));
+      known = find_part(word.erase(at, std::string_view("stereo").size()));
     if (known == kWords.end()) return false;
     fact->part = known->part;
     return true;

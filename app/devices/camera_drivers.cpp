@@ -38,20 +38,20 @@ std::string refusal(const std::string& key, const std::string& serial, const Cam
                     CameraDriver& driver, DeviceStatus status) {
   const std::string who = fmt::format("{}: the {} camera {}", key, row.name,
                                       serial.empty() ? "" : "\"" + serial + "\" ");
-  std::string said = driver.last_error();
+  std::string error = driver.last_error();
   switch (status) {
     case DeviceStatus::not_found:
       return fmt::format("{}was not found; {}; check cable, power and {}.serial{}", who,
-                         list_of(driver.enumerate()), key, said.empty() ? "" : ": " + said);
+                         list_of(driver.enumerate()), key, error.empty() ? "" : ": " + error);
     case DeviceStatus::busy:
       return fmt::format("{}is in use by another program; end that one{}", who,
-                         said.empty() ? "" : ": " + said);
+                         error.empty() ? "" : ": " + error);
     case DeviceStatus::no_permission:
       return fmt::format("{}cannot be opened without permission; {}", who,
-                         said.empty() ? row.permission : said);
+                         error.empty() ? row.permission : error);
     default:
       return fmt::format("{}cannot be opened: {}", who,
-                         said.empty() ? std::string(to_string(status)) : said);
+                         error.empty() ? std::string(to_string(status)) : error);
   }
 }
 
@@ -153,10 +153,10 @@ class Openings {
       taken_.push_back(who);
       return d.serial;
     }
-    const std::string said = driver.last_error();
+    const std::string error = driver.last_error();
     throw DeviceError(
         fmt::format("{}: no unassigned {} camera was found; {}; check cable and power{}",
-                    camera_key(k), name, list_of(found), said.empty() ? "" : ": " + said));
+                    camera_key(k), name, list_of(found), error.empty() ? "" : ": " + error));
   }
 
   const Configuration& configuration_;

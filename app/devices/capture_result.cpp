@@ -41,7 +41,7 @@ std::optional<std::string> why_unusable(const ImageStatistics& f, const std::str
 
 }  // namespace
 
-ImageStatistics figures_of(const ImageView& image) noexcept {
+ImageStatistics image_statistics(const ImageView& image) noexcept {
   ImageStatistics f;
   double sum = 0, squares = 0, gradients = 0;
   std::int64_t bright = 0, dark = 0;
@@ -69,14 +69,14 @@ ImageStatistics figures_of(const ImageView& image) noexcept {
 }
 
 std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
-                                        std::span<const ImageStatistics> figures) {
+                                        std::span<const ImageStatistics> statistics) {
   std::vector<ImageIssue> remarks;
   double sharpest = 0;
   std::size_t sharpest_at = 0;
-  for (std::size_t k = 0; k < figures.size(); ++k)
-    if (figures[k].sharpness > sharpest) sharpest = figures[k].sharpness, sharpest_at = k;
-  for (std::size_t k = 0; k < figures.size(); ++k) {
-    const ImageStatistics& f = figures[k];
+  for (std::size_t k = 0; k < statistics.size(); ++k)
+    if (statistics[k].sharpness > sharpest) sharpest = statistics[k].sharpness, sharpest_at = k;
+  for (std::size_t k = 0; k < statistics.size(); ++k) {
+    const ImageStatistics& f = statistics[k];
     const std::string& who = names[k];
     if (const auto reason = why_unusable(f, who)) {
       remarks.push_back(remark(true, *reason));
@@ -104,7 +104,7 @@ bool are_identical(const ImageView& a, const ImageView& b) noexcept {
   if (a.empty() || b.empty() || a.width != b.width || a.height != b.height) return false;
   for (int y = 0; y < a.height; ++y)
     if (std::memcmp(a.row(y), b.row(y), static_cast<std::size_t>(a.width)) != 0) return false;
-  return figures_of(a).contrast >= kFlat;
+  return image_statistics(a).contrast >= kFlat;
 }
 
 Configuration capture_configuration(const Configuration& configuration) {
@@ -130,21 +130,21 @@ std::vector<std::string> camera_names(const Configuration& c, int cameras) {
 
 namespace {
 
-void note(const DeviceEvent& event, CaptureResult* taking) {
+void on_event(const DeviceEvent& event, CaptureResult* capture) {
   const auto k = static_cast<std::size_t>(event.camera);
-  if (event.kind == DeviceEvent::Kind::camera_disconnected) taking->gone[k] = true;
-  if (event.kind == DeviceEvent::Kind::camera_reconnected) taking->gone[k] = false;
+  if (event.kind == DeviceEvent::Kind::camera_disconnected) capture->gone[k] = true;
+  if (event.kind == DeviceEvent::Kind::camera_reconnected) capture->gone[k] = false;
 }
 
 }  // namespace
 
-CaptureResult take_sets(DriveDevices& devices, const TakingOptions& options,
-                        const SignalGuard& signals,
-                        const std::function<void(const CapturedSet&)>& use) {
+CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,
+                           const SignalGuard& signals,
+                           const std::function<void(const CapturedSet&)>& use) {
   const std::size_t n = devices.cameras().size();
-  CaptureResult taking;
-  taking.delivered.assign(n, 0);
-  taking.gone.assign(n, false);
+  CaptureResult capture;
+  capture.delivered.assign(n, 0);
+  capture.gone.assign(n, false);
   Acquisition::Options o = devices.acquisition_options();
   const HostMoment now = moment_now();
   o.tie_stamp = now.day;
@@ -157,26 +157,26 @@ CaptureResult take_sets(DriveDevices& devices, const TakingOptions& options,
     std::atomic<Clock::time_point> until{Clock::now() + limit};
     // Ends the stream when nothing has come for too long, or a signal has.
     const std::jthread watchdog([&](const std::stop_token& done) {
-      constexpr auto kLook = std::chrono::milliseconds(50);
+      constexpr auto kPollInterval = std::chrono::milliseconds(50);
       while (!done.stop_requested() && !signals.stop_requested() && Clock::now() < until.load())
-        std::this_thread::sleep_for(kLook);
+        std::this_thread::sleep_for(kPollInterval);
       source.stop();
     });
     int passed = 0;
-    for (Acquired item; taking.sets < options.count && source.next(&item);) {
-      if (const auto* event = std::get_if<DeviceEvent>(&item)) note(*event, &taking);
+    for (Acquired item; capture.sets < options.count && source.next(&item);) {
+      if (const auto* event = std::get_if<DeviceEvent>(&item)) on_event(*event, &capture);
       const auto* frame = std::get_if<AcquiredFrame>(&item);
       if (frame == nullptr) continue;
-      for (std::size_t i = 0; i < n; ++i) taking.delivered[i] += frame->set.present[i] ? 1 : 0;
+      for (std::size_t i = 0; i < n; ++i) capture.delivered[i] += frame->set.present[i] ? 1 : 0;
       if (frame->set.complete && passed++ >= options.skip) {
         const RigFrame& rig = frame->rig;
-        use({taking.sets,
+        use({capture.sets,
              rig.stamp,
              rig.stamp_error,
              rig.spread,
              frame->set.proof,
              {rig.images.begin(), rig.images.begin() + static_cast<std::ptrdiff_t>(n)}});
-        ++taking.sets;
+        ++capture.sets;
         until = Clock::now() + limit;
       }
       source.release(*frame);
@@ -186,10 +186,10 @@ CaptureResult take_sets(DriveDevices& devices, const TakingOptions& options,
   for (Acquired item; source.next(&item);)
     if (const auto* frame = std::get_if<AcquiredFrame>(&item)) source.release(*frame);
   source.join();
-  taking.end = taking.sets == options.count ? CaptureResult::End::done
-               : signals.stop_requested()   ? CaptureResult::End::interrupted
-                                            : CaptureResult::End::timeout;
-  return taking;
+  capture.end = capture.sets == options.count ? CaptureResult::End::done
+                : signals.stop_requested()    ? CaptureResult::End::interrupted
+                                              : CaptureResult::End::timeout;
+  return capture;
 }
 
 }  // namespace vergence::app

@@ -20,7 +20,7 @@ struct ImageStatistics {
                          // with blur, rises with noise
 };
 /// Precondition: not empty. Images of one row or column have no sharpness.
-[[nodiscard]] ImageStatistics figures_of(const ImageView& image) noexcept;
+[[nodiscard]] ImageStatistics image_statistics(const ImageView& image) noexcept;
 
 /// One thing that strikes the eye.
 struct ImageIssue {
@@ -30,7 +30,7 @@ struct ImageIssue {
 
 /// Exposure of each picture, and sharpness of each against the sharpest.
 [[nodiscard]] std::vector<ImageIssue> evaluate_images(std::span<const std::string> names,
-                                                      std::span<const ImageStatistics> figures);
+                                                      std::span<const ImageStatistics> statistics);
 
 /// Returns whether two pictures are the same pixel for pixel, as one camera's would be if it were
 /// opened twice. Flat ones (a lens cap) are not called that.
@@ -63,7 +63,7 @@ struct CaptureResult {
   std::vector<bool> gone;                // by camera, at the end
 };
 
-struct TakingOptions {
+struct CaptureOptions {
   int count = 1;
   int skip = 0;  // complete sets passed over first: the first exposures after a start may be
                  // another's, or dark
@@ -76,8 +76,8 @@ struct TakingOptions {
 /// Threads  `use` on the caller's. Time: `limit` a set, and what starting and stopping take.
 ///          Errors: InputError as start_acquisition(), and
 /// what `use` throws.
-[[nodiscard]] CaptureResult take_sets(DriveDevices& devices, const TakingOptions& options,
-                                      const SignalGuard& signals,
-                                      const std::function<void(const CapturedSet&)>& use);
+[[nodiscard]] CaptureResult capture_sets(DriveDevices& devices, const CaptureOptions& options,
+                                         const SignalGuard& signals,
+                                         const std::function<void(const CapturedSet&)>& use);
 
 }  // namespace vergence::app

@@ -77,7 +77,8 @@ bool means(const Machine& machine, const std::string& requested, const DeviceInf
 /// Serials of the cameras that a driver found, or why there is none.
 std::string list_of(const DriverFindings* d) {
   if (d == nullptr) return "no such driver";
-  if (d->cameras.empty()) return d->note.empty() ? "none is there" : "none is there: " + d->note;
+  if (d->cameras.empty())
+    return d->explanation.empty() ? "none is there" : "none is there: " + d->explanation;
   std::vector<std::string> names;
   for (const DeviceInfo& c : d->cameras) names.push_back(c.serial.empty() ? c.place : c.serial);
   return fmt::format("there: {}", fmt::join(names, ", "));
@@ -86,8 +87,10 @@ std::string list_of(const DriverFindings* d) {
 void check_cameras(const CheckContext& p, std::vector<Finding>* findings) {
   for (const DriverFindings& d : p.inventory.drivers)
     if (!d.answered)
-      findings->push_back(
-          {"cameras", FindingState::problem, d.name + ": " + d.note, {"sudo dmesg | tail -30"}});
+      findings->push_back({"cameras",
+                           FindingState::problem,
+                           d.name + ": " + d.explanation,
+                           {"sudo dmesg | tail -30"}});
   const auto matched = match_cameras(p);
   std::vector<std::string> present;
   for (std::size_t k = 0; k < matched.size(); ++k) {

@@ -174,7 +174,7 @@ void check_ptp(const Configuration& c, int cameras) {
   });
 }
 
-void check_one_picture(const Configuration& c, int cameras) {
+void check_side_by_side(const Configuration& c, int cameras) {
   for_each_camera(c, cameras, [&](int k, const CameraSettings& s) {
     if (s.half == ImageHalf::whole)
       refuse(c, fmt::format("cameras.{}.image_half is whole, so it has its own frames; with both "
@@ -196,7 +196,7 @@ void check_mode(const Configuration& c, int cameras) {
     case SyncMode::ptp:
       return check_ptp(c, cameras);
     case SyncMode::side_by_side:
-      return check_one_picture(c, cameras);
+      return check_side_by_side(c, cameras);
     case SyncMode::frame_counter:
       if (c.cameras[0].trigger == CameraTrigger::free)
         throw InputError(

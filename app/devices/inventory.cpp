@@ -226,7 +226,7 @@ constexpr std::array<std::uint16_t, 9> kBoardVendors{
 
 struct Search {
   std::vector<DeviceInfo> found;
-  std::string note;
+  std::string explanation;
 };
 
 /// On a thread of the driver's own, which may outlive the one that waits.
@@ -327,7 +327,7 @@ bool names_port(const Machine& machine, const std::string& key, const FoundPort&
          "/dev/" + key == port.info.port || (!serial.empty() && key == serial);
 }
 
-Inventory take_inventory(const Machine& machine, const InventoryOptions& options) {
+Inventory make_inventory(const Machine& machine, const InventoryOptions& options) {
   Inventory inventory;
   std::vector<std::pair<const CameraDriverRow*, std::future<Search>>> searches;
   for (const CameraDriverRow& row : camera_driver_rows())
@@ -346,9 +346,9 @@ Inventory take_inventory(const Machine& machine, const InventoryOptions& options
     if (d.answered) {
       Search found = search.get();
       d.cameras = std::move(found.found);
-      d.note = std::move(found.note);
+      d.explanation = std::move(found.explanation);
     } else {
-      d.note = fmt::format(
+      d.explanation = fmt::format(
           "no answer within {:.0f} s: a device or its kernel driver hangs; unplug it, and look at "
           "dmesg",
           options.limit.to_seconds());

@@ -129,7 +129,7 @@ struct DriverFindings {
   std::string name, meaning;
   bool answered = true;  // false: it took longer than the limit
   std::vector<DeviceInfo> cameras;
-  std::string note;  // why there is none, or what stands in the way; may be empty
+  std::string explanation;  // why there is none, or what stands in the way; may be empty
 };
 
 struct Inventory {
@@ -147,7 +147,7 @@ struct InventoryOptions {
 
 /// Looks for everything. One thread a driver; one that does not come back within the limit is
 /// abandoned.
-[[nodiscard]] Inventory take_inventory(const Machine& machine, const InventoryOptions& options);
+[[nodiscard]] Inventory make_inventory(const Machine& machine, const InventoryOptions& options);
 
 /// `{driver: gige, serial: "15021234"}`, as an item of `cameras:`.
 [[nodiscard]] std::string camera_line(const DeviceInfo& info);

@@ -201,10 +201,10 @@ std::string paste_text(const Inventory& inventory, const Terminal& t) {
 }
 
 /// One line a driver, its message beside it.
-std::string notes_text(const Inventory& inventory, const Terminal& t) {
+std::string remarks_text(const Inventory& inventory, const Terminal& t) {
   std::string text;
   constexpr std::size_t kName = 14;
-  const auto note = [&](const std::string& name, const std::string& message) {
+  const auto remark = [&](const std::string& name, const std::string& message) {
     std::string head = "  " + padded(name, kName - 2);
     for (const std::string& line : wrapped(message, t.width - kName)) {
       text += head + line + "\n";
@@ -212,10 +212,10 @@ std::string notes_text(const Inventory& inventory, const Terminal& t) {
     }
   };
   for (const DriverFindings& d : inventory.drivers) {
-    if (!d.cameras.empty() && d.note.empty()) continue;
-    note(d.name, d.note.empty() ? "none" : harmless(d.note));
+    if (!d.cameras.empty() && d.explanation.empty()) continue;
+    remark(d.name, d.explanation.empty() ? "none" : harmless(d.explanation));
   }
-  if (inventory.ports.empty()) note("serial", "no port");
+  if (inventory.ports.empty()) remark("serial", "no port");
   return text.empty() ? "" : t.in(Terminal::Ink::bold, "Not found") + "\n" + text;
 }
 
@@ -235,7 +235,7 @@ std::size_t count(const std::vector<Finding>& findings, FindingState state) {
 
 std::string devices_text(const Inventory& inventory, const Terminal& t) {
   std::string text = cameras_text(inventory, t) + ports_text(inventory, t) +
-                     paste_text(inventory, t) + notes_text(inventory, t);
+                     paste_text(inventory, t) + remarks_text(inventory, t);
   while (text.ends_with("\n\n")) text.pop_back();
   return text;
 }
@@ -247,7 +247,7 @@ std::string devices_json(const Inventory& inventory, const std::string& rules) {
                        {"meaning", d.meaning},
                        {"found", d.cameras.size()},
                        {"answered", d.answered},
-                       {"note", d.note}});
+                       {"note", d.explanation}});
     for (const DeviceInfo& c : d.cameras)
       cameras.push_back({{"driver", d.name},
                          {"serial", c.serial},

@@ -88,7 +88,7 @@ MockDrive make_mock_drive(const Configuration& c, const std::vector<std::string>
     o.ideal_ins = c.mock.ins == MockSettings::Ins::ideal;
     o.clock_drift_ppm = c.mock.clock_drift_ppm;
     // Only a board is asked for pauses, which the reports announce.
-    o.reports_taken = c.sync.mode == SyncMode::board;
+    o.reports_read = c.sync.mode == SyncMode::board;
     for (std::size_t k = 0; k < static_cast<std::size_t>(rig.cameras); ++k)
       o.trigger_delay[k] = trigger_delay(c, k);
     o.exposures_follow = exposes_by_itself(c);

@@ -28,7 +28,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kPercent = 100, kMilli = 1e3;
 
-void say(const std::string& message) { std::cerr << "vergence: " << harmless(message) << '\n'; }
+void warn(const std::string& message) { std::cerr << "vergence: " << harmless(message) << '\n'; }
 
 /// To so many decimals.
 double rounded(double v, int decimals) {
@@ -49,17 +49,17 @@ class Snap {
 
  private:
   [[nodiscard]] CaptureResult attempt();
-  void note(const std::string& message) {
-    notes_.push_back(message);
-    say(message);
+  void add_remark(const std::string& message) {
+    remarks_.push_back(message);
+    warn(message);
   }
   void keep(const CapturedSet& set);
-  [[nodiscard]] std::vector<ImageIssue> look_at(const CapturedSet& set,
-                                                const std::vector<ImageStatistics>& figures) const;
+  [[nodiscard]] std::vector<ImageIssue> check(const CapturedSet& set,
+                                              const std::vector<ImageStatistics>& statistics) const;
   [[nodiscard]] std::string file_name(std::size_t camera, int set) const;
-  void print(const CapturedSet& set, const std::vector<ImageStatistics>& figures) const;
+  void print(const CapturedSet& set, const std::vector<ImageStatistics>& statistics) const;
   void write_report() const;
-  [[nodiscard]] ExitCode verdict(const CaptureResult& taking) const;
+  [[nodiscard]] ExitCode verdict(const CaptureResult& capture) const;
 
   const SignalGuard signals_;
   const SnapRequest& request_;
@@ -67,7 +67,7 @@ class Snap {
   std::vector<std::string> names_;
   std::unique_ptr<DriveDevices> devices_;
   std::string trigger_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> remarks_;
   Json sets_ = Json::array();
   bool unusable_ = false;
 };
@@ -79,18 +79,18 @@ CaptureResult Snap::attempt() {
       is_mock(c) ? std::optional(1 + request_.count / c.trigger.rate) : std::nullopt;
   devices_ = std::make_unique<DriveDevices>(c, std::vector<std::string>{}, is_mock(c), duration);
   trigger_ = is_mock(c) ? "mock" : to_string(c.cameras[0].trigger);
-  for (const std::string& remark : devices_->remarks()) note(remark);
-  TakingOptions o;
+  for (const std::string& remark : devices_->remarks()) add_remark(remark);
+  CaptureOptions o;
   o.count = request_.count;
   o.limit = Duration::seconds(request_.wait_s);
   o.skip = is_mock(c) || c.cameras[0].trigger == CameraTrigger::hardware ? 0 : 2;
-  return take_sets(*devices_, o, signals_, [this](const CapturedSet& set) { keep(set); });
+  return capture_sets(*devices_, o, signals_, [this](const CapturedSet& set) { keep(set); });
 }
 
 ExitCode Snap::run() {
-  const CaptureResult taking = attempt();
+  const CaptureResult capture = attempt();
   if (!sets_.empty()) write_report();
-  return verdict(taking);
+  return verdict(capture);
 }
 
 std::string Snap::file_name(std::size_t camera, int set) const {
@@ -98,9 +98,9 @@ std::string Snap::file_name(std::size_t camera, int set) const {
                              : fmt::format("{}_{:04}.png", names_[camera], set);
 }
 
-std::vector<ImageIssue> Snap::look_at(const CapturedSet& set,
-                                      const std::vector<ImageStatistics>& figures) const {
-  std::vector<ImageIssue> remarks = evaluate_images(names_, figures);
+std::vector<ImageIssue> Snap::check(const CapturedSet& set,
+                                    const std::vector<ImageStatistics>& statistics) const {
+  std::vector<ImageIssue> remarks = evaluate_images(names_, statistics);
   for (std::size_t k = 1; k < set.images.size(); ++k)
     for (std::size_t i = 0; i < k; ++i)
       if (are_identical(set.images[i], set.images[k]))
@@ -113,13 +113,13 @@ std::vector<ImageIssue> Snap::look_at(const CapturedSet& set,
 }
 
 void Snap::keep(const CapturedSet& set) {
-  std::vector<ImageStatistics> figures;
+  std::vector<ImageStatistics> statistics;
   Json images = Json::array();
   for (std::size_t k = 0; k < set.images.size(); ++k) {
     const std::string file = file_name(k, set.index);
     write_png(request_.out / file, set.images[k]);
-    const ImageStatistics f = figures_of(set.images[k]);
-    figures.push_back(f);
+    const ImageStatistics f = image_statistics(set.images[k]);
+    statistics.push_back(f);
     const DeviceInfo& who = devices_->cameras()[k]->info();
     const CameraSettings& s = configuration_.cameras[k];
     const auto& opened = devices_->opened();
@@ -139,14 +139,14 @@ void Snap::keep(const CapturedSet& set) {
          {"sharpness", rounded(f.sharpness, 2)}});
   }
   Json findings = Json::array();
-  print(set, figures);
-  for (const ImageIssue& r : look_at(set, figures)) {
+  print(set, statistics);
+  for (const ImageIssue& r : check(set, statistics)) {
     unusable_ = unusable_ || r.unusable;
     findings.push_back({{"unusable", r.unusable}, {"message", r.message}});
-    say(r.message);
+    warn(r.message);
   }
   if (set.proof == SyncProof::ambiguous)
-    say("the stamps of the cameras do not agree; simultaneous exposure is not verified");
+    warn("the stamps of the cameras do not agree; simultaneous exposure is not verified");
   sets_.push_back({{"stamp_ns", set.stamp.ns()},
                    {"stamp_error_ms", rounded(set.stamp_error.to_seconds() * kMilli, 4)},
                    {"spread_ms", rounded(set.spread.to_seconds() * kMilli, 4)},
@@ -155,7 +155,7 @@ void Snap::keep(const CapturedSet& set) {
                    {"findings", findings}});
 }
 
-void Snap::print(const CapturedSet& set, const std::vector<ImageStatistics>& figures) const {
+void Snap::print(const CapturedSet& set, const std::vector<ImageStatistics>& statistics) const {
   std::size_t width = 6;
   for (const std::string& name : names_) width = std::max(width, name.size());
   const std::string title = request_.count == 1 ? "camera" : fmt::format("set {}", set.index);
@@ -164,8 +164,8 @@ void Snap::print(const CapturedSet& set, const std::vector<ImageStatistics>& fig
         "{:<{}}  {:>6} {:>8} {:>8} {:>8} {:>9}  {}\n", title, width, "mean", "contrast", "white %",
         "black %", "sharpness",
         fmt::format("exposed within {:.3f} ms", set.spread.to_seconds() * kMilli));
-  for (std::size_t k = 0; k < figures.size(); ++k) {
-    const ImageStatistics& f = figures[k];
+  for (std::size_t k = 0; k < statistics.size(); ++k) {
+    const ImageStatistics& f = statistics[k];
     std::cout << fmt::format("{:<{}}  {:>6.1f} {:>8.1f} {:>8.2f} {:>8.2f} {:>9.1f}  {}\n",
                              names_[k], width, f.mean, f.contrast, kPercent * f.saturated,
                              kPercent * f.dark, f.sharpness,
@@ -178,7 +178,7 @@ void Snap::write_report() const {
   const Json all{{"schema_version", kSchemaVersion},
                  {"version", std::string(version())},
                  {"trigger", trigger_},
-                 {"notes", notes_},
+                 {"notes", remarks_},
                  {"sets", sets_}};
   const auto file = request_.out / "snap.json";
   std::ofstream out(file, std::ios::binary);
@@ -187,30 +187,30 @@ void Snap::write_report() const {
   if (!out) throw InputError(file.string() + ": cannot be written; is the disk full?");
 }
 
-ExitCode Snap::verdict(const CaptureResult& taking) const {
-  if (taking.end == CaptureResult::End::interrupted)
+ExitCode Snap::verdict(const CaptureResult& capture) const {
+  if (capture.end == CaptureResult::End::interrupted)
     return signals_.stop_code().value_or(ExitCode::interrupted);
-  if (taking.end == CaptureResult::End::done)
+  if (capture.end == CaptureResult::End::done)
     return unusable_ ? ExitCode::not_usable : ExitCode::done;
   bool silent = false;
-  for (std::size_t k = 0; k < taking.delivered.size(); ++k) {
-    if (taking.delivered[k] > 0) continue;
+  for (std::size_t k = 0; k < capture.delivered.size(); ++k) {
+    if (capture.delivered[k] > 0) continue;
     silent = true;
-    say(fmt::format(
+    warn(fmt::format(
         "{} {}; check its cable, its power, and what triggers it ({}.trigger; `free` needs no "
         "pulse)",
         camera_title(names_[k], devices_->cameras()[k]->info()),
-        taking.gone[k] ? "is disconnected"
-                       : fmt::format("sent no image within {:g} s", request_.wait_s),
+        capture.gone[k] ? "is disconnected"
+                        : fmt::format("sent no image within {:g} s", request_.wait_s),
         fmt::format("cameras.{}", k)));
   }
   if (!silent)
-    say(fmt::format(
+    warn(fmt::format(
         "images came from every camera, but {}: {} of {} sets were taken; cameras that are not "
         "triggered together need "
         "sync.mode: approximate_time and a sync.tolerance_ms of half their period",
         sets_.empty() ? "no images within the tolerance" : "too few within the tolerance",
-        taking.sets, request_.count));
+        capture.sets, request_.count));
   return ExitCode::device_failed;
 }
 

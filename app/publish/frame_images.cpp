@@ -23,7 +23,7 @@ bool FrameImages::copy(const RigFrame& frame) noexcept {
 }
 
 void FrameImages::want(std::size_t image_bytes) {
-  if (owner_.load(std::memory_order_acquire) != Owner::nobody) return;
+  if (owner_.load(std::memory_order_acquire) != Owner::none) return;
   for (std::vector<std::uint8_t>& pixels : pixels_) pixels.resize(image_bytes);
   owner_.store(Owner::estimator, std::memory_order_release);
 }

@@ -35,7 +35,7 @@ class FrameImages {
   [[nodiscard]] bool ready() const noexcept {
     return owner_.load(std::memory_order_acquire) == Owner::reader;
   }
-  void done() noexcept { owner_.store(Owner::nobody, std::memory_order_release); }
+  void done() noexcept { owner_.store(Owner::none, std::memory_order_release); }
   [[nodiscard]] std::uint64_t frame() const noexcept { return frame_; }
   [[nodiscard]] Stamp stamp() const noexcept { return stamp_; }
   /// Without padding; empty where the camera gave none.
@@ -44,9 +44,9 @@ class FrameImages {
   static constexpr std::size_t kImages = 2;
 
  private:
-  enum class Owner : std::uint8_t { nobody, estimator, copy, reader };
+  enum class Owner : std::uint8_t { none, estimator, copy, reader };
 
-  std::atomic<Owner> owner_{Owner::nobody};
+  std::atomic<Owner> owner_{Owner::none};
   std::uint64_t frame_ = 0;
   Stamp stamp_{};
   std::array<std::vector<std::uint8_t>, kImages> pixels_{};

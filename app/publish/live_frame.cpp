@@ -11,7 +11,7 @@ EnuPose PublishedEnuAlignment::of(const Transform& T_world_left) const {
           std::atan2(view.y(), view.x())};
 }
 
-const char* to_words(Pairing pairing) noexcept {
+const char* to_text(Pairing pairing) noexcept {
   switch (pairing) {
     case Pairing::assumed:
       return "assumed";

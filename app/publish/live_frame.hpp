@@ -35,7 +35,7 @@ struct LiveFrame {
 };
 
 /// `assumed`, `verified`, `contradicted`.
-[[nodiscard]] const char* to_words(Pairing pairing) noexcept;
+[[nodiscard]] const char* to_text(Pairing pairing) noexcept;
 
 /// Counts a drive's frames and poses into the LiveFrame of each. One thread; no heap.
 class LiveFrameBuilder {

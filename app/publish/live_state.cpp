@@ -35,15 +35,15 @@ json event_json(const EventRecord& event, Stamp first) {
 json camera_json(const RigCalibration& rig, std::size_t k) {
   const Transform& T = rig.T_camera_left[k];
   const Vec3 turn = log_so3(T.R) * kDegreesPerRadian;
-  json figures = json::array();
+  json statistics = json::array();
   const auto& sigma = rig.sigma_total[k];
   for (std::size_t i = 0; i < 6; ++i) {
     const double unit = i < 3 ? kDegreesPerRadian : 1e3;
     const auto axis = static_cast<Eigen::Index>(i % 3);
-    figures.push_back({rounded(i < 3 ? turn[axis] : T.t[axis] * unit, i < 3 ? 4 : 2),
-                       sigma[i] > 0 ? rounded(2 * sigma[i] * unit, i < 3 ? 4 : 2) : nullptr});
+    statistics.push_back({rounded(i < 3 ? turn[axis] : T.t[axis] * unit, i < 3 ? 4 : 2),
+                          sigma[i] > 0 ? rounded(2 * sigma[i] * unit, i < 3 ? 4 : 2) : nullptr});
   }
-  return {{"figures", figures}};
+  return {{"figures", statistics}};
 }
 
 constexpr double kSilenceSeconds = 1;  // without a frame: nobody reads an old status as today's …
@@ -53,13 +53,13 @@ constexpr double kSmoothing = 8;       // frames
 }  // namespace
 
 void LiveState::add(const LiveFrame& frame) {
-  if (newest_) take_interval(frame.out);
+  if (newest_) add_interval(frame.out);
   newest_ = frame;
   estimate_.add(static_cast<double>(frame.pose.estimate_ms));
 }
 
 /// A gap counts as twice the interval at most: an outage does not make the next one unseen.
-void LiveState::take_interval(HostStamp out) noexcept {
+void LiveState::add_interval(HostStamp out) noexcept {
   const double gap = (out - newest_->out).to_seconds();
   if (interval_s_ <= 0) interval_s_ = gap;
   interval_s_ += (std::min(gap, 2 * interval_s_) - interval_s_) / kSmoothing;
@@ -97,7 +97,7 @@ void LiveState::add(const CalibrationRecord& calibration) {
   if (calibrations_.size() == kCalibrations) calibrations_.pop_front();
   calibrations_.push_back(calibration);
   calibration_new_ = true;
-  if (calibration.learnt) measured_ = calibration;
+  if (calibration.is_refinement) measured_ = calibration;
   if (!calibration.accepted) return;
   measured_.reset();
   if (calibration.decided) confirmed_ = calibration.verified;
@@ -136,7 +136,7 @@ json LiveState::frame_json(HostStamp now) const {
            {"path_m", rounded(f.path_m, 2)},
            {"stamp_error_us", rounded(static_cast<double>(f.stamp_error.ns()) * 1e-3, 1)},
            {"spread_us", rounded(static_cast<double>(f.spread.ns()) * 1e-3, 1)},
-           {"pairing", to_words(f.pairing)},
+           {"pairing", to_text(f.pairing)},
            {"age_ms", f.age_ms < 0 ? json(nullptr) : rounded(f.age_ms, 2)}};
   if (p.status != PoseStatus::lost)
     for (const double v : p.T_world_left.t) out["position_m"].push_back(rounded(v, 3));
@@ -164,7 +164,7 @@ json LiveState::calibration_json() const {
         out[key].push_back(camera_json((*record)->calibration, static_cast<std::size_t>(k)));
   out["confirmed"] = confirmed_;
   if (in_use_) {
-    out["cause"] = in_use_->cause_word();
+    out["cause"] = in_use_->cause_name();
     out["frames"] = in_use_->calibration.frames;
     const CalibrationRecord& known = measured_ ? *measured_ : *in_use_;
     out["depth"] = known.depth_sigma_percent > 0
@@ -174,10 +174,10 @@ json LiveState::calibration_json() const {
   }
   for (const CalibrationRecord& c : calibrations_)
     out["history"].push_back({{"s", rounded((c.stamp - start_.first).to_seconds(), 1)},
-                              {"what", c.accepted ? "in use"
-                                       : c.learnt ? "unchanged"
-                                                  : "rejected"},
-                              {"cause", c.cause_word()},
+                              {"what", c.accepted        ? "in use"
+                                       : c.is_refinement ? "unchanged"
+                                                         : "rejected"},
+                              {"cause", c.cause_name()},
                               {"reason", c.why()}});
   return out;
 }
@@ -223,7 +223,7 @@ std::string LiveState::update(HostStamp now, double line_age_ms) {
   if (newest_) out["now"] = frame_json(now);
   if (newest_)
     out["now"]["line_age_p99_ms"] = line_age_ms < 0 ? json(nullptr) : rounded(line_age_ms, 2);
-  const std::size_t first = trail_.take_new();
+  const std::size_t first = trail_.pop_new();
   out["trail_from"] = first;
   json& trail = out["trail"] = json::array();
   const std::vector<LiveTrail::Place>& places = trail_.places();

@@ -38,7 +38,7 @@ class LiveTrail {
   void add(const Place& place);
   [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
   /// Where the places begin that the last call has not had, or not as they are.
-  [[nodiscard]] std::size_t take_new() noexcept { return std::exchange(shown_, places_.size()); }
+  [[nodiscard]] std::size_t pop_new() noexcept { return std::exchange(shown_, places_.size()); }
 
  private:
   void thin();
@@ -72,7 +72,7 @@ class LiveState {
 
  private:
   [[nodiscard]] static nlohmann::json place_json(const LiveTrail::Place& place);
-  void take_interval(HostStamp out) noexcept;
+  void add_interval(HostStamp out) noexcept;
   [[nodiscard]] nlohmann::json frame_json(HostStamp now) const;  // there is one
   [[nodiscard]] nlohmann::json calibration_json() const;
 

@@ -135,7 +135,7 @@ std::string calibration_line(const CalibrationRecord& record, std::span<const st
   const bool known = calibration::depth_error_percent(rig, kDepth) > 0;
   return line_of("calibration",
                  {{"stamp_ns", record.stamp.ns()},
-                  {"cause", record.cause_word()},
+                  {"cause", record.cause_name()},
                   {"rating", known ? json(to_string(calibration::health(rig, options))) : json()},
                   {"cameras", cameras}});
 }
@@ -165,7 +165,7 @@ std::string status_line(const StreamStatus& s) {
     fields["silent_s"] = s.silent_s;
     fields["frames"] = {{"read", f.read}, {"ok", f.ok},           {"degraded", f.degraded},
                         {"lost", f.lost}, {"missing", f.missing}, {"dropped", s.dropped}};
-    fields["pairing"] = to_words(f.pairing);
+    fields["pairing"] = to_text(f.pairing);
     for (int k = 0; k < f.cameras; ++k)
       fields["cameras"].push_back((f.images_present >> k & 1U) != 0);
   }

@@ -104,7 +104,7 @@ class McapFile {
   /// open, not full(). → 0, and then all of it is with the system
   [[nodiscard]] int write_chunk(std::span<const std::span<const std::uint8_t>> parts) noexcept;
   /// Index and summary; the file is closed whatever comes of them. → 0, and then the disk has all
-  /// but what take_unwritten() names
+  /// but what pop_unwritten() names
   [[nodiscard]] int finish() noexcept;
   /// Closed as it is: without an end.
   void abandon() noexcept;
@@ -120,7 +120,7 @@ class McapFile {
     std::uint64_t messages = 0;  // of the chunks that the failure may have touched
   };
   /// Since the last call, of files that are closed meanwhile, too.
-  [[nodiscard]] Unwritten take_unwritten() noexcept { return std::exchange(unwritten_, {}); }
+  [[nodiscard]] Unwritten pop_unwritten() noexcept { return std::exchange(unwritten_, {}); }
 
  private:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();

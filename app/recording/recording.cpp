@@ -74,7 +74,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kLook = 20ms;                     // between two looks at the queues
+constexpr auto kPollInterval = 20ms;             // between two looks at the queues
 constexpr std::int64_t kMaxWaitNs = 40'000'000;  // of a message for its chunk: with a look and
                                                  // the write it is less than 100 ms
 constexpr std::size_t kMaxChunkBytes = std::size_t{32} << 20;  // half of what readers take
@@ -152,7 +152,7 @@ void Recording::work() noexcept {
     {
       // Looks by the clock: a producer that had to wake it would pay a system call a message.
       std::unique_lock lock(mutex_);
-      (void)wake_.wait_for(lock, kLook, [this] { return stop_ || hurry_; });
+      (void)wake_.wait_for(lock, kPollInterval, [this] { return stop_ || hurry_; });
       last = stop_;
       hurried = hurry_;
       hurry_ = false;

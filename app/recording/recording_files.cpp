@@ -92,7 +92,7 @@ void RecordingFiles::end_file() noexcept {
 
 /// It is not tried again: the system has forgotten what it could not write.
 void RecordingFiles::record_unwritten() noexcept {
-  const McapFile::Unwritten missing = file_.take_unwritten();
+  const McapFile::Unwritten missing = file_.pop_unwritten();
   if (missing.messages == 0) return;
   unwritten_.fetch_add(missing.messages, std::memory_order_relaxed);
   (void)notices_.push({Notice::Kind::unwritten, -missing.error, missing.messages, number_});

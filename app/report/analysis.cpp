@@ -187,7 +187,7 @@ void compare_with_reference(const Session& s, const MatchedTrajectories& m, cons
   }
 }
 
-void take_reference(const Session& s, Analysis* a) {
+void add_reference(const Session& s, Analysis* a) {
   const std::vector<StampedPose> ours = posed_frames(s);
   const MatchedTrajectories m =
       ours.empty() ? MatchedTrajectories{} : associate(ours, s.reference, EvaluationOptions{});
@@ -239,7 +239,7 @@ std::string alignment_text(const Analysis& a) {
          ", after interruptions: errors and positions step there";
 }
 
-void take_ins(const Session& s, Analysis* a) {
+void add_ins(const Session& s, Analysis* a) {
   a->map_is_enu = true;
   find_alignments(s, a);
   bool compared = false;
@@ -262,7 +262,7 @@ void take_ins(const Session& s, Analysis* a) {
                       "; they include the INS's own errors.";
 }
 
-void take_world(const Session& s, Analysis* a) {
+void add_world(const Session& s, Analysis* a) {
   for (std::size_t i = 0; i < s.frames.size(); ++i)
     if (s.frames[i].posed) {
       const Point p = on_map(s.frames[i].T_world_left.t, false);
@@ -278,17 +278,17 @@ void compare(const Session& s, Analysis* a) {
       std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.placed; });
   const bool ins =
       std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.has_ins; });
-  if (placed) return take_ins(s, a);
+  if (placed) return add_ins(s, a);
   if (ins) {
     a->ins_unplaced = true;
     a->source_message = "No errors: the run has no ENU alignment with its INS.";
-    return take_world(s, a);
+    return add_world(s, a);
   }
-  if (!s.reference.empty()) take_reference(s, a);
+  if (!s.reference.empty()) add_reference(s, a);
   if (a->source != ErrorSource::none) return;
   if (a->source_message.empty())
     a->source_message = "No errors: no reference was available, so the drift is unknown.";
-  take_world(s, a);
+  add_world(s, a);
 }
 
 Analysis::Spread spread_of(const std::vector<double>& values) {
@@ -306,7 +306,7 @@ Analysis::Spread spread_of(const std::vector<double>& values) {
   return s;
 }
 
-void take_metrics(const Session& s, Analysis* a) {
+void add_metrics(const Session& s, Analysis* a) {
   const auto metric = [&s](const char* name) {
     return number_at(s.summary, std::string("metrics.") + name);
   };
@@ -395,7 +395,7 @@ Analysis analyse(const Session& session) {
   a.vertical = spread_of(a.vertical_m);
   a.heading = spread_of(a.heading_deg);
   if (a.source == ErrorSource::none) return a;
-  take_metrics(session, &a);
+  add_metrics(session, &a);
   if (a.source == ErrorSource::ins) drift_by_positions(session, &a);
   return a;
 }

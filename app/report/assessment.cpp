@@ -264,7 +264,7 @@ std::map<std::string, Outages> outages_of(std::span<const Event> events) {
 }
 
 /// A device that never came back.
-void judge_open_outage(const std::string& device, Stamp from, const Session& s, Findings* j) {
+void assess_open_outage(const std::string& device, Stamp from, const Session& s, Findings* j) {
   // Frames that were left out may be later.
   const bool last = s.left_out.empty() && (s.frames.empty() || s.frames.back().stamp <= from ||
                                            seconds_between(from, s.frames.back().stamp) <= kLag);
@@ -279,14 +279,14 @@ void judge_open_outage(const std::string& device, Stamp from, const Session& s, 
 
 /// Adds the findings about outages, with one piece of advice per device. Returns true if poses are
 /// missing within a long outage, so that the path's length is no measure of the rig.
-bool judge_outages(const std::map<std::string, Outages>& outages, const Session& s,
-                   const Analysis& a, Findings* j) {
+bool assess_outages(const std::map<std::string, Outages>& outages, const Session& s,
+                    const Analysis& a, Findings* j) {
   const bool holes =
       std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return !f.posed; }) ||
       std::find(a.breaks.begin(), a.breaks.end(), 1) != a.breaks.end();
   bool broken = false;
   for (const auto& [device, o] : outages) {
-    if (o.open) judge_open_outage(device, *o.open, s, j);
+    if (o.open) assess_open_outage(device, *o.open, s, j);
     if (holes && o.longest_s > kLong)
       j->find(Grade::care, device + " was disconnected for " + duration_text(o.longest_s, 0.1));
     broken = broken || (holes && (o.open || o.longest_s > kLong));
@@ -341,19 +341,19 @@ const CalibrationRow* known_well_near(const Session& s) {
 }
 
 /// A focal length that the drive itself measures to be another: all distances are off by as much.
-void judge_focal_length(const Session& s, Findings* j) {
+void assess_focal_length(const Session& s, Findings* j) {
   if (flag_at(s.summary, "calibration.focal_length.contradicted") != true) return;
-  const auto figure = [&](const char* key) {
+  const auto metric = [&](const char* key) {
     return number_at(s.summary, std::string("calibration.focal_length.") + key).value_or(0);
   };
-  const double sigma = figure("sigma_px");
+  const double sigma = metric("sigma_px");
   const std::string measured =
-      sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", figure("measured_px"), sigma)
-                : fmt::format("{:.0f} px or even further off", figure("measured_px"));
+      sigma > 0 ? fmt::format("{:.0f} ± {:.0f} px", metric("measured_px"), sigma)
+                : fmt::format("{:.0f} px or even further off", metric("measured_px"));
   const std::string reason = fmt::format(
       "the configured focal length, {:.0f} px, is contradicted by the images, which give {}; "
       "distances are wrong by the same ratio",
-      figure("configured_px"), measured);
+      metric("configured_px"), measured);
   constexpr const char* kAdvice =
       "Set the focal length in pixels of these images (cameras.N.intrinsics or --focal); resizing, "
       "cropping or rectification changes it.";
@@ -363,7 +363,7 @@ void judge_focal_length(const Session& s, Findings* j) {
 }
 
 /// Evaluates its uncertainty and the last attempt.
-void judge_calibration(const Session& s, const Usability& use, Findings* j) {
+void assess_calibration(const Session& s, const Usability& use, Findings* j) {
   const std::string rating = text_at(s.summary, "calibration.rating");
   if (const CalibrationRow* near = known_well_near(s); near != nullptr && rating == "poor") {
     j->find(
@@ -403,7 +403,7 @@ void judge_calibration(const Session& s, const Usability& use, Findings* j) {
 }
 
 /// Evaluates whether the calibration was verified.
-void judge_verification(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
+void assess_verification(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
   if (std::none_of(s.calibrations.begin(), s.calibrations.end(),
                    [](const CalibrationRow& c) { return c.accepted; }))
     return;
@@ -461,7 +461,7 @@ std::string percent(double share) {
   return fmt::format("{:.{}f} %", share * kPercent, share < 0.0995 ? 1 : 0);
 }
 
-void judge_frames(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
+void assess_frames(const Session& s, const Analysis& a, const Usability& use, Findings* j) {
   const bool posed =
       std::any_of(s.frames.begin(), s.frames.end(), [](const Frame& f) { return f.posed; });
   if (!posed && (!a.ok_share || a.ok > 0)) return j->find(Grade::bad, "no frame has a pose");
@@ -481,7 +481,7 @@ void judge_frames(const Session& s, const Analysis& a, const Usability& use, Fin
 }
 
 /// `broken`: outages broke the way.
-void judge_drift(const Session& s, const Analysis& a, bool broken, Findings* j) {
+void assess_drift(const Session& s, const Analysis& a, bool broken, Findings* j) {
   if (a.ins_unplaced) {
     j->find(Grade::care, "drift unknown: no ENU alignment with the INS");
     j->advise(
@@ -493,8 +493,8 @@ void judge_drift(const Session& s, const Analysis& a, bool broken, Findings* j) 
     j->find(Grade::care, "drift unknown: no reference");
     // Two cameras alone cannot tell a wrong unit: everything is too long or too short alike.
     if (s.calibration)
-      if (const std::string doubt = baseline_doubt(s.calibration->rig); !doubt.empty()) {
-        j->find(Grade::care, doubt);
+      if (const std::string warning = baseline_warning(s.calibration->rig); !warning.empty()) {
+        j->find(Grade::care, warning);
         j->advise(
             "Measure the baseline of the rig: all lengths are wrong by the same ratio as the "
             "baseline.");
@@ -520,7 +520,7 @@ void judge_drift(const Session& s, const Analysis& a, bool broken, Findings* j) 
   }
 }
 
-void judge_session(const Session& s, const Analysis& a, Findings* j) {
+void assess_session(const Session& s, const Analysis& a, Findings* j) {
   if (!s.missing.empty()) j->find(Grade::care, "session files are incomplete");
   if (!s.left_out.empty())
     j->find(Grade::care,
@@ -609,21 +609,21 @@ const char* to_words(Grade grade) noexcept {
   return "";
 }
 
-Assessment judge(const Session& session, const Analysis& analysis) {
+Assessment assess(const Session& session, const Analysis& analysis) {
   Findings j;
   const Usability use = usability_of(session, analysis);
   const std::map<std::string, Outages> outages = outages_of(session.events);
-  const bool broken = judge_outages(outages, session, analysis, &j);
-  judge_focal_length(session, &j);
-  if (analysis.read > 0 || outages.empty()) judge_frames(session, analysis, use, &j);
-  if (analysis.source != ErrorSource::none) judge_drift(session, analysis, broken, &j);
-  judge_calibration(session, use, &j);
+  const bool broken = assess_outages(outages, session, analysis, &j);
+  assess_focal_length(session, &j);
+  if (analysis.read > 0 || outages.empty()) assess_frames(session, analysis, use, &j);
+  if (analysis.source != ErrorSource::none) assess_drift(session, analysis, broken, &j);
+  assess_calibration(session, use, &j);
   // A session without frames needs no further evaluation.
-  if (analysis.read > 0) judge_verification(session, analysis, use, &j);
+  if (analysis.read > 0) assess_verification(session, analysis, use, &j);
   advise_on_events(session, &j);
-  judge_session(session, analysis, &j);
+  assess_session(session, analysis, &j);
   if (analysis.source == ErrorSource::none && analysis.read > 0)
-    judge_drift(session, analysis, broken, &j);
+    assess_drift(session, analysis, broken, &j);
   advise_by_reasons(session, analysis, &j);
   Assessment v = j.assessment();
   for (const std::string& reason : v.reasons) v.message += (v.message.empty() ? "" : "; ") + reason;

@@ -39,7 +39,7 @@ struct Assessment {
   std::string main_reason{};           // then: why, with counts, and what to do
 };
 
-[[nodiscard]] Assessment judge(const Session& session, const Analysis& analysis);
+[[nodiscard]] Assessment assess(const Session& session, const Analysis& analysis);
 
 /// Collects what speaks against a drive, and what to do; the grade is that of the worst.
 class Findings {

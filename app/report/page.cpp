@@ -21,7 +21,7 @@ namespace vergence::app::report {
 namespace {
 
 /// Table rows "name value" under group headings. Names and values are escaped here.
-class Figures {
+class MetricTable {
  public:
   void group(const char* head) { pending_ = head; }
   void row(std::string_view name, const std::string& value) {
@@ -51,7 +51,7 @@ const char* name_of_skipped(const Session& s) {
   return is_live(s) ? "not received or dropped" : "skipped (unreadable)";
 }
 
-void frames_group(const Session& s, const Analysis& a, Figures* f) {
+void frames_group(const Session& s, const Analysis& a, MetricTable* f) {
   f->group("Frames");
   f->row("read", grouped(a.read));
   if (a.read > a.unknown) {
@@ -65,7 +65,7 @@ void frames_group(const Session& s, const Analysis& a, Figures* f) {
   if (a.interval_s > 0) f->row("frame interval", fmt::format("{:.1f} ms", a.interval_s * 1e3));
 }
 
-void error_group(const Analysis& a, Figures* f) {
+void error_group(const Analysis& a, MetricTable* f) {
   f->group(a.source == ErrorSource::ins ? "Errors against the INS"
                                         : "Errors against the reference");
   f->row("drift, " + a.drift_message, times(a.drift, 100), "{:.2f} %");
@@ -82,7 +82,7 @@ void error_group(const Analysis& a, Figures* f) {
 }
 
 /// Rows about the online estimate of the calibration in use.
-void verification_rows(const Session& s, const Analysis& a, Figures* f) {
+void verification_rows(const Session& s, const Analysis& a, MetricTable* f) {
   if (const auto verified = flag_at(s.summary, "calibration.verified"))
     f->row("verified online", *verified ? "yes" : "not verified");
   if (a.verified_s) f->row("first verified after", duration_text(*a.verified_s, 0.1));
@@ -98,7 +98,7 @@ void verification_rows(const Session& s, const Analysis& a, Figures* f) {
     f->row("depth error of the calibration in use" + at, newest->depth_error_percent, "{:.2f} %");
 }
 
-void calibration_group(const Session& s, const Analysis& a, Figures* f) {
+void calibration_group(const Session& s, const Analysis& a, MetricTable* f) {
   f->group("Calibration at the end");
   if (const std::string source = text_at(s.summary, "calibration.source"); !source.empty())
     f->row("from", source);
@@ -166,8 +166,8 @@ std::string grouped(std::size_t count) {
 
 std::string metres(double value) { return fmt::format("{:.{}f} m", value, value < 0.0995 ? 3 : 2); }
 
-std::string figures_table(const Session& session, const Analysis& analysis) {
-  Figures f;
+std::string metrics_table(const Session& session, const Analysis& analysis) {
+  MetricTable f;
   f.group("Session");
   if (analysis.duration_s > 0) f.row("duration", duration_text(analysis.duration_s, 0.1));
   f.row("distance travelled", fmt::format("{:.1f} m", analysis.path_m));
@@ -286,10 +286,10 @@ std::string events_table(const Session& session) {
 namespace {
 
 /// A plot with its title and, below it, one sentence that says how to read it.
-std::string figure(std::string_view caption, const std::string& picture,
+std::string figure(std::string_view caption, const std::string& drawing,
                    std::string_view note = "") {
   const std::string below = note.empty() ? "" : fmt::format("<p class=\"soft\">{}</p>", note);
-  return fmt::format("<section><figure><h3>{}</h3>{}{}</figure></section>\n", caption, picture,
+  return fmt::format("<section><figure><h3>{}</h3>{}{}</figure></section>\n", caption, drawing,
                      below);
 }
 
@@ -378,7 +378,7 @@ std::string assessment_section(const Session& s, const Analysis& a, const Assess
 }
 
 std::string map_section(const Session& s, const Analysis& a) {
-  const std::string map = map_picture(a, s.frames);
+  const std::string map = map_plot(a, s.frames);
   if (map.empty()) return section("", "Map", "<p>No pose to draw.</p>");
   const bool theirs =
       std::any_of(a.theirs_x.begin(), a.theirs_x.end(), [](double v) { return std::isfinite(v); });
@@ -428,7 +428,7 @@ std::string errors_head(const Analysis& a) {
 }
 
 void running_plots(const Session& s, const Analysis& a, std::string* out) {
-  if (const std::string bands = bands_picture(s, a); !bands.empty())
+  if (const std::string bands = bands_plot(s, a); !bands.empty())
     *out += figure("Status and state · over time", bands,
                    "Upper rows: status of each frame. Lower rows: state of the estimator. Ticks: "
                    "events, listed below.");
@@ -520,7 +520,7 @@ std::string page_html(const Session& session, const Analysis& analysis,
   out += section("wide long", "Events",
                  session.events.empty() ? "<p>No events.</p>" : events_table(session));
   out += section("wide long", "Metrics",
-                 "<div class=\"two\">" + figures_table(session, analysis) +
+                 "<div class=\"two\">" + metrics_table(session, analysis) +
                      "</div><p class=\"soft\">Metrics of devices, clocks, memory and drops are in "
                      "summary.json.</p>");
   out += "</div>\n" + footer(session) + "</main></body></html>\n";

@@ -9,7 +9,7 @@ namespace vergence::app::report {
 
 /// Counts, errors, times, calibration, memory, drops: what is known; a figure that does not exist
 /// has no row.
-[[nodiscard]] std::string figures_table(const Session& session, const Analysis& analysis);
+[[nodiscard]] std::string metrics_table(const Session& session, const Analysis& analysis);
 
 /// The word for the calibration and the depth errors it predicts, at the start and at the end.
 /// Empty when the summary has neither.

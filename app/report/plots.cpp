@@ -224,7 +224,7 @@ void draw_events(const Session& s, const PlotBox& box, double top, Svg* svg) {
 
 }  // namespace
 
-std::string bands_picture(const Session& session, const Analysis& analysis) {
+std::string bands_plot(const Session& session, const Analysis& analysis) {
   if (analysis.read == analysis.unknown) return {};
   PlotBox box = time_box(analysis);
   box.left = kBandLeft;
@@ -475,7 +475,7 @@ void draw_north(const MapScale& s, Svg* svg) {
 
 }  // namespace
 
-std::string map_picture(const Analysis& analysis, std::span<const Frame> frames) {
+std::string map_plot(const Analysis& analysis, std::span<const Frame> frames) {
   Bounds bounds;
   for (std::size_t i = 0; i < analysis.ours_x.size(); ++i) {
     bounds.include(analysis.ours_x[i], analysis.ours_y[i]);

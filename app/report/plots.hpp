@@ -24,11 +24,11 @@ struct CurvePlot {
                                      std::span<const Frame> frames);
 
 /// Ours and the reference from above, equal scale, scale bar, north arrow where up is north.
-[[nodiscard]] std::string map_picture(const Analysis& analysis, std::span<const Frame> frames);
+[[nodiscard]] std::string map_plot(const Analysis& analysis, std::span<const Frame> frames);
 
 /// A lane for every status and state that occurred, and one for events. In a pixel column that
 /// holds several, each shows.
-[[nodiscard]] std::string bands_picture(const Session& session, const Analysis& analysis);
+[[nodiscard]] std::string bands_plot(const Session& session, const Analysis& analysis);
 
 /// One number of a camera's calibration as it held over the drive, with a band of ± 2 sigma; hollow
 /// red marks are rejected ones, hollow grey ones what the drive measured beside one that was kept.

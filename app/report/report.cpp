@@ -23,7 +23,7 @@ std::string first_of(const std::vector<std::string>& messages, const char* none)
 ReportOutcome write_report(const std::filesystem::path& session_folder) {
   const report::Session session = report::read_session(session_folder);
   const report::Analysis analysis = report::analyse(session);
-  const report::Assessment assessment = report::judge(session, analysis);
+  const report::Assessment assessment = report::assess(session, analysis);
   ReportOutcome outcome;
   outcome.page = session_folder / "report.html";
   replace_durably(outcome.page, report::page_html(session, analysis, assessment));

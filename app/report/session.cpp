@@ -440,7 +440,7 @@ void read_calibration_file(const fs::path& folder, Session* session) {
   }
 }
 
-bool looks_like_a_session(const fs::path& folder) {
+bool is_session(const fs::path& folder) {
   std::error_code error;
   for (const char* name : {"poses.csv", "trajectory.tum", "summary.json", "events.jsonl"})
     if (fs::exists(folder / name, error)) return true;
@@ -479,7 +479,7 @@ Session read_session(const fs::path& folder, std::size_t max_frames) {
   if (!fs::is_directory(folder, error))
     throw InputError(folder.string() +
                      ": no such directory; pass the session directory (--out of run or replay)");
-  if (!looks_like_a_session(folder))
+  if (!is_session(folder))
     throw InputError(folder.string() +
                      ": is not a session directory (no poses.csv, trajectory.tum, summary.json or "
                      "events.jsonl); " +

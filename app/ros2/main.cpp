@@ -130,7 +130,7 @@ class Program {
                                     {wake_.get(), POLLIN, 0},
                                     {images_.descriptor(), POLLIN, 0}}};
       if (::poll(events.data(), events.size(), kTimeoutMs) <= 0) continue;
-      if (events[1].revents != 0) take_calls();
+      if (events[1].revents != 0) serve_calls();
       if (events[0].revents != 0 && !read()) lose();
       if (events[2].revents != 0) read_images();
     }
@@ -147,13 +147,13 @@ class Program {
     const int error = client_.connect();
     if (error == 0) {
       fmt::print(stderr, "vergence-ros2: connected to {}\n", client_.path());
-      said_waiting_ = false;
-    } else if (!said_waiting_) {
+      waiting_reported_ = false;
+    } else if (!waiting_reported_) {
       fmt::print(stderr,
                  "vergence-ros2: {}: {}; waiting for vergence with "
                  "publish.pose_stream: unix://{}\n",
                  client_.path(), std::strerror(error), client_.path());
-      said_waiting_ = true;
+      waiting_reported_ = true;
     }
   }
 
@@ -188,14 +188,14 @@ class Program {
 
   void lose() {
     fmt::print(stderr, "vergence-ros2: the pose stream has ended; waiting for vergence\n");
-    said_waiting_ = true;
+    waiting_reported_ = true;
     bridge_.disconnected();
     images_.close();
     while (!calls_.empty()) answer({false, "vergence has ended"});
     stale_at_ = Clock::now();
   }
 
-  void take_calls() {
+  void serve_calls() {
     eventfd_t ignored = 0;
     (void)::eventfd_read(wake_.get(), &ignored);
     while (auto call = node_.next_request()) {
@@ -222,7 +222,7 @@ class Program {
   FileDescriptor wake_;
   std::deque<std::shared_ptr<const DdsNode::Request>> calls_;
   Clock::time_point connect_at_{}, stale_at_ = Clock::now() + 3s;
-  bool said_waiting_ = false;
+  bool waiting_reported_ = false;
 };
 
 ExitCode run(int argc, char** argv) {

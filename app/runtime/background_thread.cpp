@@ -28,10 +28,10 @@ void relax() noexcept {
 
 /// Returns when `counter` is no longer `old`: spins first, then sleeps.
 void await_change(const std::atomic<std::uint32_t>& counter, std::uint32_t old) noexcept {
-  constexpr int kPausesPerLook = 32;  // about 1 µs: reading the clock is not for free
+  constexpr int kPausesPerPoll = 32;  // about 1 µs: reading the clock is not for free
   const auto until = std::chrono::steady_clock::now() + kSpin;
   do {
-    for (int i = 0; i < kPausesPerLook; ++i) {
+    for (int i = 0; i < kPausesPerPoll; ++i) {
       if (counter.load(std::memory_order_acquire) != old) return;
       relax();
     }

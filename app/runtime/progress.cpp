@@ -68,11 +68,11 @@ Progress::~Progress() { finish(); }
 void Progress::update(const ProgressState& state) {
   if (mode_ == Mode::quiet) return;
   const HostStamp now = clock_();
-  state_word_ = state.state;
+  state_text_ = state.state;
   last_ = state;
-  last_.state = state_word_;
-  words_ = state.words;
-  last_.words = words_;
+  last_.state = state_text_;
+  activity_ = state.activity;
+  last_.activity = activity_;
   drawn_ = false;
   if (!started_) {
     started_ = true;
@@ -85,7 +85,7 @@ void Progress::update(const ProgressState& state) {
   if (now - drawn_time_ >= (mode_ == Mode::terminal ? kBetweenRedraws : kBetweenLines)) draw(now);
 }
 
-void Progress::say(std::string_view message) {
+void Progress::print(std::string_view message) {
   const bool drawn = columns_ > 0;
   put_line(message);
   if (drawn) draw(clock_());
@@ -111,10 +111,10 @@ std::string Progress::line(HostStamp now) const {
   if (!s.state.empty()) part(std::string(s.state));
   part(s.frames > 0 ? fmt::format("frame {}/{}", s.frame, s.frames)
                     : fmt::format("frame {}", s.frame));
-  if (s.words.empty())
+  if (s.activity.empty())
     part(fmt::format("{:.2f} km", s.path_m / 1000.0));
   else
-    part(std::string(s.words));
+    part(std::string(s.activity));
   if (s.inliers) part(fmt::format("{} inliers", *s.inliers));
   if (s.estimate_ms) part(fmt::format("{:.1f} ms", *s.estimate_ms));
   if (s.from_ins_m) part(fmt::format("{:.2f} m from INS", *s.from_ins_m));

@@ -20,8 +20,8 @@ struct ProgressState {
   std::optional<int> inliers{};         // of the last pose
   std::optional<double> estimate_ms{};  // of the last frame
   std::optional<double> from_ins_m{};   // distance to the INS
-  std::string_view words{};  // instead of way and figures, where there are none: `calibrate · frame
-                             // 7/26 · 5 with the board`
+  std::string_view activity{};  // instead of way and figures, where there are none: `calibrate ·
+                                // frame 7/26 · 5 with the board`
 };
 
 /// `stereo · frame 1204/33000 · 0.62 km · 318 inliers · 7.9 ms · 0.42 m from INS · 03:12 left`
@@ -48,7 +48,7 @@ class Progress {
   /// call.
   void update(const ProgressState& state);
   /// A message for the user between the redraws, on a line of its own; also with `quiet`.
-  void say(std::string_view message);
+  void print(std::string_view message);
   /// Draws the last state and ends the line. Later updates start a new one.
   void finish();
 
@@ -64,9 +64,9 @@ class Progress {
   std::function<HostStamp()> clock_;
   std::function<int()> width_;
   ProgressState last_{};
-  std::string state_word_{}, words_{};  // last_ points here
-  bool started_ = false;                // an update has come since the start or the last finish()
-  bool drawn_ = false;                  // the last update is on the screen
+  std::string state_text_{}, activity_{};  // last_ points here
+  bool started_ = false;  // an update has come since the start or the last finish()
+  bool drawn_ = false;    // the last update is on the screen
   HostStamp first_time_{}, drawn_time_{};
   std::uint64_t first_frame_ = 0;
   std::size_t columns_ = 0;  // of the line on the terminal now

@@ -70,7 +70,7 @@ void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found)
   std::string message;
   bool failed = false;
   if (options_.state) try {
-      CalibrationFile file = options_.words;
+      CalibrationFile file = options_.content;
       file.rig = rig;
       if (found) file.source = "online";
       write_state(*options_.state, file);
@@ -94,7 +94,7 @@ void CalibrationWriter::keep(Stamp stamp, const RigCalibration& rig, bool found)
 }
 
 void CalibrationWriter::write_session_file(const RigCalibration& rig) {
-  CalibrationFile file = options_.words;
+  CalibrationFile file = options_.content;
   file.rig = rig;
   if (totals_.accepted > 0) file.source = "online";
   fault_.clear();

@@ -29,7 +29,7 @@ inline constexpr const char* kCalibrationsHeader =
     "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,sigma_"
     "d3,"
     "left_d0,left_d1,left_d2,left_d3,sigma_left_d0,sigma_left_d1,sigma_left_d2,sigma_left_d3,"
-    "reference_depth_m,depth_sigma_percent,depth_error_percent,verified,lenses";
+    "reference_depth_m,depth_sigma_percent,depth_error_percent,verified";
 
 /// Writes the calibrations of a session: a line of calibrations.csv for each, calibration.yaml with
 /// the one in use, and the state file that the next drive starts from. The state file gets a
@@ -47,7 +47,7 @@ class CalibrationWriter final : public SessionObserver {
  public:
   struct Options {
     std::filesystem::path session{};  // its folder
-    CalibrationFile words{};          // names and serials, what the configuration says, the source
+    CalibrationFile content{};        // names and serials, what the configuration says, the source
     std::optional<std::filesystem::path> state{};  // nothing: the next drive is not to know
     WhenFull when_full = WhenFull::drop;
   };

@@ -36,7 +36,6 @@ calibration::AcceptanceInput question_of(const calibration::RigSolution& s,
   calibration::AcceptanceInput q;
   q.solution = &s;
   q.nominal = &given.nominal;
-  q.lenses = true;
   q.pixel_sigma = c.odometry.pixel_sigma;
   q.must_be_better = false;
   return q;
@@ -139,20 +138,20 @@ DriveCalibration calibrate_drive(const DrivePass& drive, const StartingCalibrati
     else
       result.why = calibration::reason(gate);
   };
-  const auto note = [&](const std::optional<calibration::RigSolution>& s) {
+  const auto keep_solution = [&](const std::optional<calibration::RigSolution>& s) {
     if (s && s->status == calibration::RigSolveStatus::ok) result.stretches.push_back(*s);
   };
   const auto second =
       drive_once(pass, found, [&](const Estimator& e, const PoseSample& /*sample*/) {
         keep(joined.take(e.tracks()));
-        note(alone.take(e.tracks()));
+        keep_solution(alone.take(e.tracks()));
       });
   if (!second) {
     result.why = kInterrupted;
     return result;
   }
   keep(joined.end());
-  note(alone.end());
+  keep_solution(alone.end());
   for (std::size_t i = 1; i < result.stretches.size(); ++i)
     result.agreements.push_back(
         calibration::agreement(result.stretches[i - 1].rig, result.stretches[i].rig, 1));
@@ -243,14 +242,14 @@ ExitCode calibrate_from_drive(ReplayRequest r, const std::filesystem::path& out)
   const StartingCalibration given = replayed_calibration(c, sequence, true);
   const SignalGuard signals;
   Progress progress = Progress::on_stderr(r.session.quiet);
-  for (const std::string& message : sequence.remarks) progress.say("vergence: " + message);
+  for (const std::string& message : sequence.remarks) progress.print("vergence: " + message);
   if (!sequence.assumptions.empty())
-    progress.say(fmt::format("vergence: assumed: {}", fmt::join(sequence.assumptions, "; ")));
+    progress.print(fmt::format("vergence: assumed: {}", fmt::join(sequence.assumptions, "; ")));
   const DriveCalibration found = calibrate_with_progress(
       {sequence, c, 0, sequence.pairs.size(), {}, {}}, given, signals, &progress);
   if (!found.rig) {
-    progress.say(fmt::format("vergence: {}: no calibration was found, no file is written: {}",
-                             r.data.string(), found.why));
+    progress.print(fmt::format("vergence: {}: no calibration was found, no file is written: {}",
+                               r.data.string(), found.why));
     return signals.stop_code().value_or(ExitCode::not_usable);
   }
   CalibrationFile written = given.file;
@@ -259,10 +258,10 @@ ExitCode calibrate_from_drive(ReplayRequest r, const std::filesystem::path& out)
   write_calibration(out, written);
   std::cout << describe(found);
   if (!found.verified)
-    progress.say(
+    progress.print(
         "vergence: the depth is not known well enough: a longer drive with turns, past things near "
         "the road, would help");
-  progress.say(out.string() + ": written");
+  progress.print(out.string() + ": written");
   return found.verified ? ExitCode::done : ExitCode::not_usable;
 }
 

@@ -20,8 +20,8 @@ RealtimeRequest request_of(const RealtimeSettings& settings) {
   return request;
 }
 
-void say(const std::vector<std::string>& messages, Progress* progress) {
-  for (const std::string& message : messages) progress->say("vergence: " + message);
+void print(const std::vector<std::string>& messages, Progress* progress) {
+  for (const std::string& message : messages) progress->print("vergence: " + message);
 }
 
 }  // namespace
@@ -32,19 +32,19 @@ DriveThreads::DriveThreads(const RealtimeSettings& settings)
   threads_.reserve(kThreads);
 }
 
-void DriveThreads::lock_memory(Progress* progress) { say(realtime_.lock_memory(), progress); }
+void DriveThreads::lock_memory(Progress* progress) { print(realtime_.lock_memory(), progress); }
 
-void DriveThreads::look(Progress* progress) {
+void DriveThreads::poll(Progress* progress) {
   constexpr int kAtFirst = 20, kLater = 20;  // in the first second always, then once a second
-  const int look = looks_++;
-  if (look >= kAtFirst && look % kLater != 0) return;
+  const int poll = polls_++;
+  if (poll >= kAtFirst && poll % kLater != 0) return;
   process_threads(&threads_);
   for (const ProcessThread& thread : threads_)
     if (thread.ours()) ours_.insert(thread.name);
-  say(realtime_.apply(threads_), progress);
+  print(realtime_.apply(threads_), progress);
 }
 
-ThreadAllocationCounts DriveThreads::figures() const {
+ThreadAllocationCounts DriveThreads::allocations() const {
   const ThreadAllocations::Counts counts = ThreadAllocations::counts();
   std::map<std::string, std::uint64_t> ours, libraries;
   for (const std::string& name : ours_) ours[name] = 0;
@@ -59,9 +59,9 @@ ThreadAllocationCounts DriveThreads::figures() const {
   return out;
 }
 
-std::string allocations_message(const ThreadAllocationCounts& figures) {
+std::string allocations_message(const ThreadAllocationCounts& allocations) {
   std::string list;
-  for (const auto* names : {&figures.ours, &figures.libraries})
+  for (const auto* names : {&allocations.ours, &allocations.libraries})
     for (const auto& [name, count] : *names)
       if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", name, count);
   return list.empty() ? "" : "runtime heap allocations: " + list;

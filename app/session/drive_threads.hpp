@@ -22,20 +22,20 @@ class DriveThreads {
   /// Locks memory, if asked for: everything is set up, and no frame has come.
   void lock_memory(Progress* progress);
   /// Called every 50 ms while frames come.
-  void look(Progress* progress);
-  /// ThreadAllocations' counts, beside the names that look() has seen.
-  [[nodiscard]] ThreadAllocationCounts figures() const;
+  void poll(Progress* progress);
+  /// ThreadAllocations' counts, beside the names that poll() has seen.
+  [[nodiscard]] ThreadAllocationCounts allocations() const;
 
  private:
   RealtimeSystem system_;
   RealtimeThreads realtime_;
-  int looks_ = 0;
+  int polls_ = 0;
   std::vector<ProcessThread> threads_;
   std::set<std::string> ours_{};
 };
 
 /// `runtime heap allocations: vergence-sync 3`, with the threads that are not 0; empty:
 /// there are none.
-[[nodiscard]] std::string allocations_message(const ThreadAllocationCounts& figures);
+[[nodiscard]] std::string allocations_message(const ThreadAllocationCounts& allocations);
 
 }  // namespace vergence::app

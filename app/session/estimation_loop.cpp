@@ -112,7 +112,7 @@ void EstimationLoop::run() noexcept {
   ThreadAllocations::end();
   drained_.store(true, std::memory_order_release);
   estimator_->finish();
-  log_.note(*estimator_);
+  log_.collect(*estimator_);
   if (comparison_) comparison_->finish();
   AllocationGuard::unseal_thread();
 }
@@ -129,7 +129,7 @@ void EstimationLoop::request_recalibration(Stamp stamp, const char* message) noe
 }
 
 /// Handles requests of viewers.
-void EstimationLoop::take_requests(Stamp stamp) noexcept {
+void EstimationLoop::poll_requests(Stamp stamp) noexcept {
   if (requests_ == nullptr) return;
   constexpr auto kOrder = std::memory_order_relaxed;
   if (requests_->recalibrate.exchange(false, kOrder) && facts_.on_request)
@@ -146,7 +146,7 @@ void EstimationLoop::take_requests(Stamp stamp) noexcept {
 void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   if (calibration_asked_.exchange(false, std::memory_order_relaxed))
     request_recalibration(frame.rig.stamp, "a recalibration was requested by SIGUSR1");
-  take_requests(frame.rig.stamp);
+  poll_requests(frame.rig.stamp);
   log_kept_calibrations();
   if (!delivering_) ThreadAllocations::begin();
   delivering_ = true;
@@ -156,8 +156,8 @@ void EstimationLoop::handle(const SourceFrame& frame) noexcept {
   source_.done(sample);
   output_.post(sample);
   output_.post(estimator_->tracks());
-  log_.note(*estimator_);
-  log_.note(sample);
+  log_.collect(*estimator_);
+  log_.collect(sample);
   compare(sample, frame.decode_ms);
 }
 

@@ -89,7 +89,7 @@ class EstimationLoop {
   void handle(const SourceEvent& event) noexcept;
   void compare(const PoseSample& sample, float decode_ms) noexcept;
   void request_recalibration(Stamp stamp, const char* message) noexcept;
-  void take_requests(Stamp stamp) noexcept;
+  void poll_requests(Stamp stamp) noexcept;
 
   FrameSource& source_;
   const SourceFacts& facts_;

@@ -21,19 +21,19 @@ bool is_for_user(EstimatorEvent::Kind kind) noexcept {
          kind == Kind::calibration_resumed;
 }
 
-std::string words(std::string_view name) {
+std::string spaced(std::string_view name) {
   std::string text(name);
   std::replace(text.begin(), text.end(), '_', ' ');
   return text;
 }
 
 /// `stereo`, `stereo, verifying the calibration`, `parallel monocular, needs motion`.
-std::string state_words(State state, Reason reason) {
-  std::string text = state == State::stereo_odometry ? "stereo" : words(to_string(state));
+std::string describe_state(State state, Reason reason) {
+  std::string text = state == State::stereo_odometry ? "stereo" : spaced(to_string(state));
   if (reason == Reason::unverified_calibration) text += ", verifying the calibration";
   if (reason == Reason::needs_motion || reason == Reason::needs_near_structure ||
       reason == Reason::needs_texture)
-    text += ", " + words(to_string(reason));
+    text += ", " + spaced(to_string(reason));
   return text;
 }
 
@@ -44,7 +44,7 @@ void EventLog::open(SessionOutput* output, Stamp first) noexcept {
   first_ = first;
 }
 
-void EventLog::note(const Estimator& estimator) noexcept {
+void EventLog::collect(const Estimator& estimator) noexcept {
   for (const EstimatorEvent& event : estimator.events()) {
     if (event.kind == EstimatorEvent::Kind::dropped)
       dropped_ += static_cast<std::uint64_t>(std::max(0.0, event.value));
@@ -74,7 +74,7 @@ void EventLog::record_effort(const PoseSample& sample) noexcept {
   log(event, true);
 }
 
-void EventLog::note(const PoseSample& sample) noexcept {
+void EventLog::collect(const PoseSample& sample) noexcept {
   record_effort(sample);
   ++now_.done;
   now_.state = sample.state;
@@ -109,13 +109,13 @@ void EventLog::log(const EventRecord& event, bool to_user) noexcept {
 
 void EventLog::show(Progress* progress, std::uint64_t frames) {
   for (EventRecord notice; notices_.pop(&notice);)
-    progress->say(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
-                              notice.message.data()));
+    progress->print(fmt::format("vergence: at {:.1f} s {}", (notice.stamp - first_).to_seconds(),
+                                notice.message.data()));
   ProgressSnapshot newest;
   bool any = false;
   while (progress_snapshots_.pop(&newest)) any = true;
   if (!any) return;
-  const std::string state_text = state_words(newest.state, newest.reason);
+  const std::string state_text = describe_state(newest.state, newest.reason);
   ProgressState state;
   state.state = state_text;
   state.frame = newest.done;

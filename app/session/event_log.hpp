@@ -13,7 +13,7 @@ namespace vergence::app {
 /// Collects by-products of each frame: events and calibrations for the session's output, progress
 /// snapshots and messages for the terminal.
 ///
-/// Threads  note(), record_…(), log(): the estimator's, sealed. show(): the caller's. No
+/// Threads  collect(), record_…(), log(): the estimator's, sealed. show(): the caller's. No
 /// synchronisation is needed after the estimator's thread has been joined. Memory   Fixed. If a
 /// ring is full, the newest snapshot or message is dropped; every message also is in events.jsonl.
 class EventLog {
@@ -22,9 +22,9 @@ class EventLog {
   void open(SessionOutput* output, Stamp first) noexcept;
 
   /// Call after process() or finish(): forwards its events and calibrations.
-  void note(const Estimator& estimator) noexcept;
+  void collect(const Estimator& estimator) noexcept;
   /// Call with the result of process(): updates the progress.
-  void note(const PoseSample& sample) noexcept;
+  void collect(const PoseSample& sample) noexcept;
   /// Counts a frame that was not read.
   void record_skipped() noexcept;
   void record_distance_from_ins(double metres) noexcept { now_.from_ins_m = metres; }

@@ -45,7 +45,7 @@ using SourceItem = std::variant<SourceFrame, InsRecord, SourceEvent>;
 struct SourceRemark {
   std::string message{};
   const char* kind = nullptr;  // of its event; null: it is only said
-  bool say = true;             // on stderr, too
+  bool print = true;           // on stderr, too
 };
 
 /// The INS of a source and how its readings are compared with.
@@ -72,8 +72,8 @@ struct SourceFacts {
   bool knows_truth = false;  // at the drive's end describe() holds its trajectory against it
   std::size_t image_bytes = 0, ring_bytes = 0;
   Duration frame_interval{};  // of a live drive, whose frames do not wait; zero: they do
-  const char* word_of_skipped = "skipped";  // frames of the drive that nobody estimated from
-  bool on_request = false;                  // SIGUSR1 asks for a new calibration
+  const char* skipped_label = "skipped";  // frames of the drive that nobody estimated from
+  bool on_request = false;                // SIGUSR1 asks for a new calibration
 };
 
 /// Source of a session's frames, readings and device events: devices (LiveSource) or a recorded
@@ -102,7 +102,7 @@ class FrameSource {
   /// no longer grows hangs. Any thread. Always 0 if it is not counted.
   [[nodiscard]] virtual std::uint64_t rounds() const noexcept { return 0; }
   /// Called every 50 ms while frames come.
-  virtual void look() {}
+  virtual void poll() {}
   /// Called once when next() has ended, which the estimator may take time to conclude: stops what
   /// still delivers.
   virtual void halt() noexcept {}
@@ -113,7 +113,7 @@ class FrameSource {
   virtual void describe(const SessionTotals& totals, const Estimator& estimator,
                         SummaryInput* input) const = 0;
   /// Prints the statistics shown at the end.
-  virtual void print_figures(const SessionTotals& totals, const SummaryInput& input,
+  virtual void print_metrics(const SessionTotals& totals, const SummaryInput& input,
                              Progress* progress) const = 0;
   /// Exit code for a problem of the source itself, whose message it has printed; called if there
   /// are poses.

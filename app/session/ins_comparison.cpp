@@ -46,29 +46,29 @@ Json errors_json(const EnuErrors& e) {
 
 }  // namespace
 
-Json enu_json(const EnuMetrics& figures) {
-  if (!figures.origin) return nullptr;
-  const Vec3 turn = boresight_of(figures.T_ins_left.R) * kDegreesPerRadian;
-  const Vec3& arm = figures.T_ins_left.t;
+Json enu_json(const EnuMetrics& metrics) {
+  if (!metrics.origin) return nullptr;
+  const Vec3 turn = boresight_of(metrics.T_ins_left.R) * kDegreesPerRadian;
+  const Vec3& arm = metrics.T_ins_left.t;
   Json alignments = Json::array();
-  for (const EnuAlignmentRecord& record : figures.alignments)
+  for (const EnuAlignmentRecord& record : metrics.alignments)
     alignments.push_back(enu_alignment_json(record));
   return {{"origin",
-           {{"latitude_deg", figures.origin->latitude_deg},
-            {"longitude_deg", figures.origin->longitude_deg},
-            {"height_m", figures.origin->height_m}}},
+           {{"latitude_deg", metrics.origin->latitude_deg},
+            {"longitude_deg", metrics.origin->longitude_deg},
+            {"height_m", metrics.origin->height_m}}},
           {"mount",
            {{"lever_arm_m", {arm.x(), arm.y(), arm.z()}},
             {"boresight_deg", {turn.x(), turn.y(), turn.z()}},
-            {"source", figures.mount_source}}},
+            {"source", metrics.mount_source}}},
           {"alignments", alignments},
-          {"ins_path_m", figures.errors.ins_path_m},
-          {"errors", errors_json(figures.errors)}};
+          {"ins_path_m", metrics.errors.ins_path_m},
+          {"errors", errors_json(metrics.errors)}};
 }
 
-void InsEvents::note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept {
+void InsEvents::update(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept {
   record_attitude(sample);
-  if (contradicted && !std::exchange(contradiction_noted_, true))
+  if (contradicted && !std::exchange(contradiction_reported_, true))
     event_log_.log(sample.stamp, "ins_attitude",
                    "the INS heading differs from the direction of travel by more than 30 deg and "
                    "is not used meanwhile: check its filter and ins.boresight_deg",
@@ -79,12 +79,12 @@ void InsEvents::note(const InsSample& sample, std::uint64_t jumps, bool contradi
                  "the INS position jumped: errors from here on include the jump", true);
 }
 
-void InsEvents::note(const ComparedPose& pose, std::uint64_t matches) noexcept {
+void InsEvents::update(const ComparedPose& pose, std::uint64_t matches) noexcept {
   if (source_ != InsSource::none) record_match(pose, matches);
   record_scale(pose);
 }
 
-void InsEvents::note(const EnuAlignment& p, Stamp stamp) noexcept {
+void InsEvents::update(const EnuAlignment& p, Stamp stamp) noexcept {
   std::array<char, 160> text{};
   (void)std::snprintf(text.data(), text.size(),
                       "aligned with ENU after %.1f m: heading sigma %.2f deg, residual %.2f m",
@@ -95,7 +95,7 @@ void InsEvents::note(const EnuAlignment& p, Stamp stamp) noexcept {
 /// Once a drive: a receiver never has one, an INS has it after it has aligned.
 void InsEvents::record_attitude(const InsSample& sample) noexcept {
   if (sample.attitude_valid || sample.heading_source == HeadingSource::none ||
-      std::exchange(attitude_noted_, true))
+      std::exchange(attitude_reported_, true))
     return;
   const bool heading = sample.heading_source == HeadingSource::heading;
   event_log_.log(
@@ -169,8 +169,8 @@ InsComparison::InsComparison(const ComparisonOptions& options, InsSource source,
 void InsComparison::add(const InsRecord& reading) noexcept {
   output_->post(reading);
   comparison_.add(reading.sample);
-  events_.note(reading.sample, comparison_.counters().jumps,
-               comparison_.counters().ins_contradicted > 0);
+  events_.update(reading.sample, comparison_.counters().jumps,
+                 comparison_.counters().ins_contradicted > 0);
 }
 
 void InsComparison::add(const PoseSample& pose, float decode_ms) noexcept {
@@ -187,16 +187,16 @@ void InsComparison::drain() noexcept {
     measure_way(pose);
     measure_errors(pose);
     event_log_.record_distance_from_ins(pose.compared ? pose.error_enu.norm() : -1);
-    take_enu_alignment(pose.pose.stamp);
+    apply_enu_alignment(pose.pose.stamp);
     if (pose.ins_valid && pose.scale_disagrees) ++scale_disagreements_;
-    events_.note(pose, matches_);
+    events_.update(pose, matches_);
   }
 }
 
 void InsComparison::finish() noexcept {
   comparison_.finish();
   drain();
-  take_enu_alignment(newest_stamp_);
+  apply_enu_alignment(newest_stamp_);
 }
 
 /// The way is summed across the ground, straight across holes, in steps of four sigmas of a
@@ -235,20 +235,20 @@ void InsComparison::measure_errors(const ComparedPose& pose) noexcept {
 }
 
 EnuMetrics InsComparison::earth(const std::string& mount_source) const {
-  EnuMetrics figures;
-  if (comparison_.has_origin()) figures.origin = comparison_.plane().origin();
-  figures.alignments.assign(alignments_.begin(), alignments_.end());
-  figures.errors = errors_;
+  EnuMetrics metrics;
+  if (comparison_.has_origin()) metrics.origin = comparison_.plane().origin();
+  metrics.alignments.assign(alignments_.begin(), alignments_.end());
+  metrics.errors = errors_;
   // The last step is still under way; alone it may be nothing but a standstill's noise.
-  if (errors_.ins_path_m > 0) figures.errors.ins_path_m += beyond_;
+  if (errors_.ins_path_m > 0) metrics.errors.ins_path_m += beyond_;
   const double n = std::max(1.0, static_cast<double>(errors_.poses));
-  for (double* squares : {&figures.errors.horizontal_rms_m, &figures.errors.heading_rms_deg})
+  for (double* squares : {&metrics.errors.horizontal_rms_m, &metrics.errors.heading_rms_deg})
     *squares = std::sqrt(*squares / n);
-  figures.errors.up_rms_m =
-      std::sqrt(figures.errors.up_rms_m / std::max(1.0, static_cast<double>(heights_)));
-  figures.T_ins_left = T_ins_left_;
-  figures.mount_source = mount_source;
-  return figures;
+  metrics.errors.up_rms_m =
+      std::sqrt(metrics.errors.up_rms_m / std::max(1.0, static_cast<double>(heights_)));
+  metrics.T_ins_left = T_ins_left_;
+  metrics.mount_source = mount_source;
+  return metrics;
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> InsComparison::counters() const {
@@ -266,7 +266,7 @@ std::vector<std::pair<std::string, std::uint64_t>> InsComparison::counters() con
           {"scale_disagrees", scale_disagreements_}};
 }
 
-void InsComparison::take_enu_alignment(Stamp stamp) noexcept {
+void InsComparison::apply_enu_alignment(Stamp stamp) noexcept {
   const EnuAlignment& p = comparison_.alignment();
   if (p.revision == alignment_revision_) return;
   alignment_revision_ = p.revision;
@@ -277,7 +277,7 @@ void InsComparison::take_enu_alignment(Stamp stamp) noexcept {
                      "too many ENU alignments for summary.json; poses.csv has all of them", true);
   }
   output_->post(p, comparison_.plane().origin());
-  events_.note(p, stamp);
+  events_.update(p, stamp);
 }
 
 }  // namespace vergence::app

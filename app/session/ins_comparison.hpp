@@ -44,7 +44,7 @@ struct EnuMetrics {
 };
 
 /// Null without an origin.
-[[nodiscard]] nlohmann::ordered_json enu_json(const EnuMetrics& figures);
+[[nodiscard]] nlohmann::ordered_json enu_json(const EnuMetrics& metrics);
 
 enum class InsSource : std::uint8_t { none, device, recording };
 
@@ -58,10 +58,10 @@ class InsEvents {
 
   /// A reading, after the comparison has counted `jumps` of the position. `contradicted`: an
   /// attitude did not go with the way driven.
-  void note(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept;
+  void update(const InsSample& sample, std::uint64_t jumps, bool contradicted) noexcept;
   /// A pose that has met its readings, the `matches`-th that found any.
-  void note(const ComparedPose& pose, std::uint64_t matches) noexcept;
-  void note(const EnuAlignment& alignment, Stamp stamp) noexcept;
+  void update(const ComparedPose& pose, std::uint64_t matches) noexcept;
+  void update(const EnuAlignment& alignment, Stamp stamp) noexcept;
 
  private:
   void record_attitude(const InsSample& sample) noexcept;
@@ -71,7 +71,7 @@ class InsEvents {
   const InsSource source_;
   const double scale_stretch_m_;
   EventLog& event_log_;
-  bool attitude_noted_ = false, contradiction_noted_ = false, scale_disagrees_ = false;
+  bool attitude_reported_ = false, contradiction_reported_ = false, scale_disagrees_ = false;
   std::uint64_t jumps_ = 0;
   InsMatch last_match_ = InsMatch::ok;
   std::uint64_t match_run_ = 0;  // poses in a row with that
@@ -112,7 +112,7 @@ class InsComparison {
  private:
   void measure_way(const ComparedPose& pose) noexcept;
   void measure_errors(const ComparedPose& pose) noexcept;
-  void take_enu_alignment(Stamp stamp) noexcept;
+  void apply_enu_alignment(Stamp stamp) noexcept;
   const Transform T_ins_left_;
   Comparison comparison_;
   EventLog& event_log_;

@@ -102,7 +102,7 @@ void LiveSource::make_facts() {
   facts_.knows_truth = devices_.mock() != nullptr;
   facts_.image_bytes = devices_.image_bytes();
   facts_.ring_bytes = sizeof(Acquisition);
-  facts_.word_of_skipped = "dropped";
+  facts_.skipped_label = "dropped";
   facts_.on_request = true;
 }
 
@@ -184,9 +184,9 @@ void LiveSource::done(const PoseSample& sample) noexcept {
 
 // ---- the caller's thread
 
-void LiveSource::look() {
+void LiveSource::poll() {
   // A simulated device always has a next delivery, and in virtual time polling advances it.
-  if (devices_.mock() == nullptr) acquisition_->look_again();
+  if (devices_.mock() == nullptr) acquisition_->wake();
   if (request_.duration_s && !request_.fast && std::chrono::steady_clock::now() > end())
     acquisition_->stop();
 }
@@ -205,7 +205,7 @@ void LiveSource::halt() noexcept { acquisition_->join(); }
 void LiveSource::finish(Progress* progress, std::vector<std::string>* /*faults*/) {
   if (exposure_) exposure_->settle();
   if (exposure_ && exposure_->counters().unsupported)
-    progress->say(
+    progress->print(
         "vergence: exposure.mode is auto, but a camera cannot change its exposure while streaming: "
         "set exposure.mode to fixed");
 }
@@ -266,16 +266,16 @@ std::vector<std::pair<std::string, std::uint64_t>> LiveSource::counters() const 
   return out;
 }
 
-TruthMetrics LiveSource::truth_figures(const SessionTotals& totals,
+TruthMetrics LiveSource::truth_metrics(const SessionTotals& totals,
                                        const Estimator& estimator) const {
-  TruthMetrics figures;
-  if (totals.trajectory.empty() || devices_.mock() == nullptr) return figures;
-  figures.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
+  TruthMetrics metrics;
+  if (totals.trajectory.empty() || devices_.mock() == nullptr) return metrics;
+  metrics.evaluation = evaluate(totals.trajectory, truth_, summary_evaluation_options());
   if (estimator.calibrated())
-    figures.calibration_error = calibration_errors(
+    metrics.calibration_error = calibration_errors(
         estimator.calibration(),
         devices_.mock()->truth().calibration(totals.trajectory.back().stamp - start_));
-  return figures;
+  return metrics;
 }
 
 void LiveSource::describe(const SessionTotals& totals, const Estimator& estimator,
@@ -288,10 +288,10 @@ void LiveSource::describe(const SessionTotals& totals, const Estimator& estimato
   input->skipped = c.dropped_sets + c.sync.missed + *acquiring;
   input->devices = counters();
   input->time = time_.json(c, devices_);
-  if (devices_.mock() != nullptr) input->truth = truth_figures(totals, estimator);
+  if (devices_.mock() != nullptr) input->truth = truth_metrics(totals, estimator);
 }
 
-void LiveSource::print_figures(const SessionTotals& /*totals*/, const SummaryInput& input,
+void LiveSource::print_metrics(const SessionTotals& /*totals*/, const SummaryInput& input,
                                Progress* progress) const {
   if (!input.truth || !input.truth->evaluation ||
       input.truth->evaluation->status != EvaluationStatus::ok)
@@ -302,16 +302,16 @@ void LiveSource::print_figures(const SessionTotals& /*totals*/, const SummaryInp
       far.count > 0    ? fmt::format("; segments of 100 to 800 m {:.3f} %", 100 * far.translation)
       : near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.3f} %", 100 * near.translation)
                        : "";
-  progress->say(fmt::format("error against ground truth over {:.1f} m: ATE {:.3f} m{}{}",
-                            e.path_reference, e.ate_se3.rmse, segments,
-                            devices_.ins() != nullptr
-                                ? " (the report compares with the INS, including its errors)"
-                                : ""));
+  progress->print(fmt::format("error against ground truth over {:.1f} m: ATE {:.3f} m{}{}",
+                              e.path_reference, e.ate_se3.rmse, segments,
+                              devices_.ins() != nullptr
+                                  ? " (the report compares with the INS, including its errors)"
+                                  : ""));
 }
 
 std::optional<ExitCode> LiveSource::verdict(Progress* progress) const {
   if (acquisition_->missing().empty()) return std::nullopt;
-  progress->say(
+  progress->print(
       fmt::format("vergence: camera {} was disconnected at the end; check its cable and power",
                   fmt::join(acquisition_->missing(), ", ")));
   return ExitCode::device_failed;
@@ -320,7 +320,7 @@ std::optional<ExitCode> LiveSource::verdict(Progress* progress) const {
 ExitCode run_drive(const RunRequest& request) {
   const SignalGuard signals;  // before a mock's world is built, which takes seconds
   try {
-    const auto source = in_words([&] { return std::make_unique<LiveSource>(request); });
+    const auto source = with_plain_errors([&] { return std::make_unique<LiveSource>(request); });
     if (const auto stopped = signals.stop_code()) return *stopped;  // devices are opened in seconds
     return run_session(*source, request.configuration, request.session, signals);
   } catch (const DeviceError&) {

@@ -44,12 +44,12 @@ class LiveSource final : public FrameSource {
   void done(const PoseSample& sample) noexcept override;
   void stop() noexcept override { acquisition_->stop(); }
   [[nodiscard]] std::uint64_t rounds() const noexcept override { return acquisition_->rounds(); }
-  void look() override;
+  void poll() override;
   void halt() noexcept override;
   void finish(Progress* progress, std::vector<std::string>* faults) override;
   void describe(const SessionTotals& totals, const Estimator& estimator,
                 SummaryInput* input) const override;
-  void print_figures(const SessionTotals& totals, const SummaryInput& input,
+  void print_metrics(const SessionTotals& totals, const SummaryInput& input,
                      Progress* progress) const override;
   [[nodiscard]] std::optional<ExitCode> verdict(Progress* progress) const override;
 
@@ -60,7 +60,7 @@ class LiveSource final : public FrameSource {
   /// An event that goes before the frame in hand. False: none is left.
   [[nodiscard]] bool next_event(SourceItem* item) noexcept;
   void write_truth(std::vector<std::string>* faults) const;
-  [[nodiscard]] TruthMetrics truth_figures(const SessionTotals& totals,
+  [[nodiscard]] TruthMetrics truth_metrics(const SessionTotals& totals,
                                            const Estimator& estimator) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
 

@@ -24,7 +24,7 @@ constexpr double kPublishedHeading =
 constexpr double kMaxOfInterval =
     1.5;  // one reading late by half an interval is no hole, one that is missing is
 
-bool says_mount(const InsSettings& ins) {
+bool has_mount(const InsSettings& ins) {
   const auto zero = [](double v) { return v == 0; };
   return !std::all_of(ins.lever_arm_m.begin(), ins.lever_arm_m.end(), zero) ||
          !std::all_of(ins.boresight_deg.begin(), ins.boresight_deg.end(), zero);
@@ -106,7 +106,7 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
   RecordedIns recorded =
       sequence.ins ? *sequence.ins
                    : read_recorded_ins(request.format, request.data,
-                                       {c.kitti_raw.left, c.kitti_raw.right}, !says_mount(c.ins));
+                                       {c.kitti_raw.left, c.kitti_raw.right}, !has_mount(c.ins));
   out.remarks = std::move(recorded.remarks);
   if (recorded.readings.empty()) return out;
   out.readings = std::move(recorded.readings);
@@ -120,7 +120,7 @@ ReplayedIns replayed_ins(const ReplayRequest& request, const StereoSequence& seq
   const Duration rarely = Duration::seconds(kMaxOfInterval * usual.to_seconds());
   out.options.max_gap = std::max(out.options.max_gap, rarely);
   out.options.max_wait = std::max(out.options.max_wait, rarely);
-  out.mount_source = says_mount(c.ins)
+  out.mount_source = has_mount(c.ins)
                          ? "the configuration"
                          : "defaults: ins.lever_arm_m and ins.boresight_deg are not set";
   if (recorded.T_ins_left) {
@@ -154,7 +154,7 @@ SourceEvent event_of(const DecodedPair& pair, std::uint64_t unread) noexcept {
   event.record.kind = pair.kind;
   event.record.set_message(
       unread <= kMaxListed
-          ? pair.note.data()
+          ? pair.issue.data()
           : "1000 frames could not be read; further ones are only counted (summary.json: skipped)");
   event.record.fields[0] = {"frame", static_cast<std::int64_t>(pair.frame)};
   return event;
@@ -163,13 +163,13 @@ SourceEvent event_of(const DecodedPair& pair, std::uint64_t unread) noexcept {
 void report_enu_errors(const EnuMetrics& earth, double alignment_distance_m, Progress* progress) {
   const EnuErrors& e = earth.errors;
   if (e.poses > 0)
-    progress->say(fmt::format(
+    progress->print(fmt::format(
         "error against the INS after the alignment: {:.2f} m at the end ({:.2f} % of {:.1f} m), "
         "maximum {:.2f} m; heading {:.2f} deg RMS, {:.2f} deg at the end",
         e.horizontal_end_m, e.ins_path_m > 0 ? 100 * e.horizontal_end_m / e.ins_path_m : 0,
         e.ins_path_m, e.horizontal_max_m, e.heading_rms_deg, e.heading_end_deg));
   else
-    progress->say(
+    progress->print(
         fmt::format("not compared with the INS: the alignment needs {:g} m with a fix "
                     "(comparison.alignment_distance_m)",
                     alignment_distance_m));
@@ -207,8 +207,8 @@ RecordedSource::RecordedSource(const ReplayRequest& request, StereoSequence sequ
     const RigCalibration& rig = facts_.begin.file.rig;
     facts_.remarks.push_back({baseline_message(rig) + " (" + facts_.begin.source + ")", nullptr,
                               !request.session.quiet});
-    if (std::string doubt = baseline_doubt(rig); !doubt.empty())
-      facts_.remarks.push_back({std::move(doubt), "calibration", !request.session.quiet});
+    if (std::string warning = baseline_warning(rig); !warning.empty())
+      facts_.remarks.push_back({std::move(warning), "calibration", !request.session.quiet});
   }
   facts_.image_bytes = frames_arena_.capacity();
   facts_.ring_bytes = sizeof(FrameDecoder);
@@ -266,7 +266,7 @@ void RecordedSource::describe(const SessionTotals& /*totals*/, const Estimator& 
   input->skipped = skipped_;
 }
 
-void RecordedSource::print_figures(const SessionTotals& /*totals*/, const SummaryInput& input,
+void RecordedSource::print_metrics(const SessionTotals& /*totals*/, const SummaryInput& input,
                                    Progress* progress) const {
   if (input.evaluation && input.evaluation->status == EvaluationStatus::ok) {
     const TrajectoryEvaluation& e = *input.evaluation;
@@ -274,17 +274,18 @@ void RecordedSource::print_figures(const SessionTotals& /*totals*/, const Summar
     const std::string segments =
         near.count > 0 ? fmt::format("; segments of 10 to 50 m {:.2f} %", 100 * near.translation)
                        : "";
-    progress->say(
+    progress->print(
         fmt::format("error against the reference over {:.2f} m: ATE {:.4f} m (SE(3)), {:.4f} m "
                     "with scale {:.4f}{}",
                     e.path_reference, e.ate_se3.rmse, e.ate_sim3.rmse, e.sim3.scale, segments));
     if (!facts_.ins)
-      progress->say(fmt::format("next: vergence evaluate {} {}",
-                                (request_.session.out / "trajectory.tum").string(),
-                                request_.data.string()));
+      progress->print(fmt::format("next: vergence evaluate {} {}",
+                                  (request_.session.out / "trajectory.tum").string(),
+                                  request_.data.string()));
   } else if (!facts_.ins) {
-    progress->say(fmt::format("no reference to compare with; next: vergence evaluate {} REFERENCE",
-                              (request_.session.out / "trajectory.tum").string()));
+    progress->print(
+        fmt::format("no reference to compare with; next: vergence evaluate {} REFERENCE",
+                    (request_.session.out / "trajectory.tum").string()));
   }
   if (facts_.ins)
     report_enu_errors(*input.earth, request_.configuration.comparison.alignment_distance_m,

@@ -50,7 +50,7 @@ class RecordedSource final : public FrameSource {
   void finish(Progress* progress, std::vector<std::string>* faults) override;
   void describe(const SessionTotals& totals, const Estimator& estimator,
                 SummaryInput* input) const override;
-  void print_figures(const SessionTotals& totals, const SummaryInput& input,
+  void print_metrics(const SessionTotals& totals, const SummaryInput& input,
                      Progress* progress) const override;
 
  private:

@@ -74,30 +74,30 @@ bool LineFile::close() {
 namespace {
 
 /// Representation of an event of the estimator in events.jsonl.
-struct EventWords {
+struct EventFormat {
   const char* kind;
   const char* opening;  // before the estimator's own words; empty: nothing
   const char* field;    // the name of EstimatorEvent::value; null: nothing is counted
 };
 /// In the order of EstimatorEvent::Kind.
-constexpr std::array kEventWords{
-    EventWords{"state", "", nullptr},
-    EventWords{"map_reset", "", "gap_s"},
-    EventWords{"time_gap", "", "gap_s"},
-    EventWords{"relocalised", "", nullptr},
-    EventWords{"points_dropped", "", "count"},
-    EventWords{"rig_changed", "", "frames_since_onset"},
-    EventWords{"out_of_sync", "", "lag_frames"},
-    EventWords{"cameras_in_sync", "", nullptr},
-    EventWords{"calibration_verified", "", "depth_sigma_percent"},
-    EventWords{"calibration_contradicted", "", "depth_percent"},
-    EventWords{"focal_length_contradicted", "", "measured_px"},
-    EventWords{"calibration_accepted", "a new calibration is in use", "frames"},
-    EventWords{"calibration_rejected", "a calibration was rejected", "frames"},
-    EventWords{"calibration_taken_up", "", "fitting_percent"},
-    EventWords{"calibration_pending", "the calibration is postponed", nullptr},
-    EventWords{"calibration_resumed", "the last calibration is in use again", nullptr}};
-static_assert(kEventWords.size() ==
+constexpr std::array kEventFormats{
+    EventFormat{"state", "", nullptr},
+    EventFormat{"map_reset", "", "gap_s"},
+    EventFormat{"time_gap", "", "gap_s"},
+    EventFormat{"relocalised", "", nullptr},
+    EventFormat{"points_dropped", "", "count"},
+    EventFormat{"rig_changed", "", "frames_since_onset"},
+    EventFormat{"out_of_sync", "", "lag_frames"},
+    EventFormat{"cameras_in_sync", "", nullptr},
+    EventFormat{"calibration_verified", "", "depth_sigma_percent"},
+    EventFormat{"calibration_contradicted", "", "depth_percent"},
+    EventFormat{"focal_length_contradicted", "", "measured_px"},
+    EventFormat{"calibration_accepted", "a new calibration is in use", "frames"},
+    EventFormat{"calibration_rejected", "a calibration was rejected", "frames"},
+    EventFormat{"calibration_taken_up", "", "fitting_percent"},
+    EventFormat{"calibration_pending", "the calibration is postponed", nullptr},
+    EventFormat{"calibration_resumed", "the last calibration is in use again", nullptr}};
+static_assert(kEventFormats.size() ==
               static_cast<std::size_t>(EstimatorEvent::Kind::calibration_resumed) + 1);
 
 /// As much of the text as fits, in whole UTF-8 characters, with a 0 behind it.
@@ -136,8 +136,8 @@ void EventRecord::set_message(std::string_view text) noexcept { copy_text(text, 
 EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
   EventRecord r;
   r.stamp = event.stamp;
-  const EventWords& words = kEventWords[static_cast<std::size_t>(event.kind)];
-  r.kind = words.kind;
+  const EventFormat& format = kEventFormats[static_cast<std::size_t>(event.kind)];
+  r.kind = format.kind;
   const bool state = event.kind == EstimatorEvent::Kind::state;
   if (state) {
     std::array<char, 256> text{};
@@ -149,7 +149,7 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
     r.fields[0] = {"from", from.data()};
     r.fields[1] = {"to", to.data()};
   } else {
-    const char* begin = words.opening;
+    const char* begin = format.opening;
     const char* why = event.kind == EstimatorEvent::Kind::calibration_accepted ? "" : event.why;
     std::array<char, 256> text{};
     if (event.kind == EstimatorEvent::Kind::calibration_contradicted && event.value > 0)
@@ -160,7 +160,12 @@ EventRecord EventRecord::of(const EstimatorEvent& event) noexcept {
       (void)std::snprintf(text.data(), text.size(), "%s%s%s", begin,
                           *begin != 0 && *why != 0 ? ": " : "", why);
     r.set_message(text.data());
-    if (words.field != nullptr) r.fields[0] = {words.field, event.value};
+    if (format.field != nullptr) r.fields[0] = {format.field, event.value};
+    if (const calibration::ChangeEvidence& e = event.evidence; e.log_likelihood_ratio > 0) {
+      r.fields[1] = {"log_likelihood_ratio", e.log_likelihood_ratio};
+      r.fields[2] = {"shift_px", e.shift_px};
+      r.fields[3] = {"rotation_mrad", e.rotation_mrad};
+    }
   }
   return r;
 }
@@ -271,10 +276,10 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   line->clear();
   const auto out = std::back_inserter(*line);
   fmt::format_to(out, "{},{}", c.stamp.ns(),
-                 c.accepted ? "accepted"
-                 : c.learnt ? "unchanged"
-                            : "rejected");
-  append_field(line, c.cause_word());
+                 c.accepted        ? "accepted"
+                 : c.is_refinement ? "unchanged"
+                                   : "rejected");
+  append_field(line, c.cause_name());
   append_field(line, c.why());
   fmt::format_to(out, ",{}", rig.frames);
   if (c.decided)
@@ -295,10 +300,10 @@ void format_calibration(const CalibrationRecord& c, int camera, std::string* lin
   append_distortion(line, lens);
   append_distortion(line, rig.intrinsics[0]);
   if (c.decided && c.reference_depth_m > 0)
-    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d},{:d}", c.reference_depth_m,
-                   c.depth_sigma_percent, c.depth_error_percent, c.verified, c.lenses);
+    fmt::format_to(out, ",{:.2f},{:.4f},{:.4f},{:d}", c.reference_depth_m, c.depth_sigma_percent,
+                   c.depth_error_percent, c.verified);
   else
-    *line += ",,,,,";
+    *line += ",,,,";
   *line += '\n';
 }
 

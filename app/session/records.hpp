@@ -115,7 +115,7 @@ struct CalibrationRecord : CalibrationDecision {
   /// UTF-8 character; `cause` is a constant.
   [[nodiscard]] static CalibrationRecord begin(const RigCalibration& rig, Stamp stamp,
                                                const char* cause, std::string_view origin) noexcept;
-  [[nodiscard]] std::string_view cause_word() const noexcept {
+  [[nodiscard]] std::string_view cause_name() const noexcept {
     return decided ? to_string(cause) : began_as;
   }
   /// The decision's reason, or the origin of what the drive began with.

@@ -46,10 +46,10 @@ bool calibrate_first(const ReplayRequest& request, const SignalGuard& signals,
   const DriveCalibration found = calibrate_with_progress(
       {sequence, request.configuration, request.start, count, {}, {}}, *begin, signals, &progress);
   if (!found.rig) {
-    progress.say("vergence: no calibration from the sequence: " + found.why);
+    progress.print("vergence: no calibration from the sequence: " + found.why);
     return false;
   }
-  if (!request.session.quiet) progress.say(describe(found));
+  if (!request.session.quiet) progress.print(describe(found));
   begin->file.rig = *found.rig;
   begin->file.source = begin->source = "the sequence itself";
   begin->cause = "whole_drive";
@@ -109,7 +109,7 @@ ExitCode replay_recording(const ReplayRequest& request) {
         fmt::format("--start {} is beyond the end: {} has {} frames; choose a smaller index",
                     request.start, request.data.string(), session.frames().size()));
   auto other = other_beginning(request, session);
-  const auto source = in_words([&] {
+  const auto source = with_plain_errors([&] {
     return std::make_unique<SessionSource>(request, std::move(session), std::move(other));
   });
   const SignalGuard signals;
@@ -162,7 +162,7 @@ ExitCode run_replay(const ReplayRequest& request) {
   const SignalGuard signals;
   if (request.calibrate_first) calibrate_unknown(request, signals, &sequence, &begin);
   if (const auto stopped = signals.stop_code()) return *stopped;
-  const auto source = in_words([&] {
+  const auto source = with_plain_errors([&] {
     return std::make_unique<RecordedSource>(request, std::move(sequence), std::move(begin),
                                             std::move(truth), std::move(ins));
   });

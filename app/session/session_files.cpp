@@ -60,12 +60,12 @@ SessionReport write_session_report(const std::filesystem::path& session) {
 void print_verdict(const SessionReport& report, bool quiet, Progress* progress) {
   if (!quiet) {
     for (const std::string& line : closing_lines(report.outcome, report.failure))
-      progress->say(line);
+      progress->print(line);
     return;
   }
-  if (!report.failure.empty()) progress->say("vergence: " + report.failure);
+  if (!report.failure.empty()) progress->print("vergence: " + report.failure);
   if (!report.outcome.usable)
-    progress->say("vergence: do not use these poses: " + report.outcome.main_reason);
+    progress->print("vergence: do not use these poses: " + report.outcome.main_reason);
 }
 
 }  // namespace vergence::app

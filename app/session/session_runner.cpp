@@ -53,7 +53,7 @@ class SessionRunner {
                                            std::uint64_t allocations) const;
   void write_files(const SessionTotals& totals, const SummaryInput& input,
                    std::vector<std::string>* faults, Progress* progress);
-  void print_figures(const SessionTotals& totals, const SummaryInput& input,
+  void print_metrics(const SessionTotals& totals, const SummaryInput& input,
                      Progress* progress) const;
   [[nodiscard]] ExitCode verdict(const SessionTotals& totals,
                                  const std::vector<std::string>& faults, Progress* progress) const;
@@ -98,17 +98,17 @@ void SessionRunner::estimate() noexcept {
 }
 
 void SessionRunner::watch(Progress* progress) {
-  constexpr std::chrono::milliseconds kLook{50};
+  constexpr std::chrono::milliseconds kPollInterval{50};
   std::unique_lock lock(mutex_);
-  while (!changed_.wait_for(lock, kLook, [this] { return done_; })) {
+  while (!changed_.wait_for(lock, kPollInterval, [this] { return done_; })) {
     if (signals_.stop_requested()) source_.stop();
-    source_.look();
+    source_.poll();
     service_.alive(loop_.items(), loop_.waiting(), source_.rounds(),
                    std::chrono::steady_clock::now());
     if (facts_.on_request && signals_.take_calibration_request()) loop_.ask_calibration();
     lock.unlock();
     if (loop_.drained()) halt_source();
-    threads_.look(progress);
+    threads_.poll(progress);
     loop_.event_log().show(progress, facts_.frames);
     print_recording_errors(progress);
     lock.lock();
@@ -162,10 +162,11 @@ void SessionRunner::leave_no_folder() {
 }
 
 void SessionRunner::print_recording_errors(Progress* progress) {
-  for (const std::string& message : recorder_->take_errors()) progress->say("vergence: " + message);
+  for (const std::string& message : recorder_->take_errors())
+    progress->print("vergence: " + message);
   if (!recording_) return;
   for (const std::string& message : recording_->take_errors())
-    progress->say("vergence: " + message);
+    progress->print("vergence: " + message);
 }
 
 void SessionRunner::open() {
@@ -233,11 +234,11 @@ SessionStart SessionRunner::session_start() const {
 
 void SessionRunner::print_remarks(Progress* progress) {
   for (const std::string& message : removed_) {
-    progress->say("vergence: " + message);
+    progress->print("vergence: " + message);
     loop_.event_log().log(facts_.first, "session_removed", message, false);
   }
   for (const SourceRemark& remark : facts_.remarks) {
-    if (remark.say) progress->say("vergence: " + remark.message);
+    if (remark.print) progress->print("vergence: " + remark.message);
     if (remark.kind != nullptr)
       loop_.event_log().log(facts_.first, remark.kind, remark.message, false);
   }
@@ -267,7 +268,7 @@ SummaryInput SessionRunner::summary_input(const SessionTotals& totals,
   describe_calibration(loop_.estimator(), facts_.begin, totals, loop_.options(), &input);
   input.runtime_allocations = allocations;
   input.frame_budget = loop_.options().frame_budget;
-  input.allocations = threads_.figures();
+  input.allocations = threads_.allocations();
   for (const MemoryRow& row : memory()) input.memory.emplace_back(row.name, row.bytes);
   input.configuration_hash = configuration_hash(configuration_);
   input.assumptions = facts_.assumptions;
@@ -281,24 +282,25 @@ void SessionRunner::write_files(const SessionTotals& totals, const SummaryInput&
                                 std::vector<std::string>* faults, Progress* progress) {
   write_session_summary(request_.out, totals, input, faults);
   faults->insert(faults->end(), totals.faults.begin(), totals.faults.end());
-  for (const std::string& message : recorder_->take_errors()) progress->say("vergence: " + message);
-  for (const std::string& message : *faults) progress->say("vergence: " + message);
+  for (const std::string& message : recorder_->take_errors())
+    progress->print("vergence: " + message);
+  for (const std::string& message : *faults) progress->print("vergence: " + message);
 }
 
-void SessionRunner::print_figures(const SessionTotals& totals, const SummaryInput& input,
+void SessionRunner::print_metrics(const SessionTotals& totals, const SummaryInput& input,
                                   Progress* progress) const {
-  progress->say(
+  progress->print(
       fmt::format("session {}: {} frames, {} posed ({} degraded), {} lost, {} {}; {:.2f} m; {:.1f} "
                   "ms per frame, p99 {:.1f} ms",
                   request_.out.string(), totals.read, totals.ok + totals.degraded, totals.degraded,
-                  totals.lost, input.skipped, facts_.word_of_skipped, totals.path_m,
+                  totals.lost, input.skipped, facts_.skipped_label, totals.path_m,
                   totals.estimate.mean(), totals.estimate.percentile(0.99)));
   if (const std::string message = verification_message(input); !message.empty())
-    progress->say(message);
+    progress->print(message);
   if (const std::string message = allocations_message(input.allocations);
       request_.print_memory && !message.empty())
-    progress->say(message);
-  source_.print_figures(totals, input, progress);
+    progress->print(message);
+  source_.print_metrics(totals, input, progress);
 }
 
 ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<std::string>& faults,
@@ -306,13 +308,13 @@ ExitCode SessionRunner::verdict(const SessionTotals& totals, const std::vector<s
   // Also without a pose the user is informed which device was disconnected.
   const std::optional<ExitCode> of_source = source_.verdict(progress);
   if (totals.ok + totals.degraded == 0) {
-    progress->say("vergence: no frame has a pose; events.jsonl and poses.csv in " +
-                  request_.out.string() + " have the reasons");
+    progress->print("vergence: no frame has a pose; events.jsonl and poses.csv in " +
+                    request_.out.string() + " have the reasons");
     return ExitCode::not_usable;
   }
   if (of_source) return *of_source;
   if (loop_.comparison() != nullptr && loop_.comparison()->matches() == 0) {
-    progress->say(
+    progress->print(
         "vergence: the INS never had a position, so no pose is compared; the poses are written");
     return ExitCode::not_usable;
   }
@@ -348,7 +350,7 @@ ExitCode SessionRunner::run() {
   const SummaryInput input =
       summary_input(*totals, AllocationGuard::runtime_allocations() - allocations_before);
   write_files(*totals, input, &faults, &progress);
-  if (!request_.quiet) print_figures(*totals, input, &progress);
+  if (!request_.quiet) print_metrics(*totals, input, &progress);
   // The report reads the files: of a day's drive two are not held at once.
   totals->trajectory = std::vector<StampedPose>();  // not {}, which keeps the memory
   totals->reference = std::vector<StampedPose>();
@@ -363,7 +365,7 @@ ExitCode SessionRunner::run() {
 
 ExitCode run_session(FrameSource& source, const Configuration& configuration,
                      const SessionOptions& options, const SignalGuard& signals) {
-  const auto runner = in_words(
+  const auto runner = with_plain_errors(
       [&] { return std::make_unique<SessionRunner>(source, configuration, options, signals); });
   return runner->run();
 }

@@ -42,7 +42,7 @@ struct SessionOptions {
 /// Returns the result of `make`. Turns std::invalid_argument and std::length_error, by which core
 /// refuses options and rig that do not fit together, into an InputError with the same message.
 template <class Make>
-auto in_words(const Make& make) {
+auto with_plain_errors(const Make& make) {
   try {
     return make();
   } catch (const std::invalid_argument& e) {

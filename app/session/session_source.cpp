@@ -121,12 +121,12 @@ bool SessionSource::next(SourceItem* item) noexcept {
   }
   if (!frames_left) return false;
   const RecordedFrame& frame = session_.frames()[next_frame_];
-  if (frame.given.recalibration_requested && !recalibration_said_) {
-    recalibration_said_ = true;
+  if (frame.given.recalibration_requested && !recalibration_reported_) {
+    recalibration_reported_ = true;
     *item = recalibration_as_then(frame.given.stamp);
     return true;
   }
-  recalibration_said_ = false;
+  recalibration_reported_ = false;
   ++next_frame_;
   *item = load(frame);
   return true;
@@ -165,7 +165,7 @@ SourceFrame SessionSource::load(const RecordedFrame& recorded) noexcept {
 
 void SessionSource::finish(Progress* progress, std::vector<std::string>* /*faults*/) {
   if (images_missing_ > 0)
-    progress->say(
+    progress->print(
         fmt::format("vergence: {} images are damaged or missing in the recording; frames were "
                     "processed without "
                     "them",
@@ -178,11 +178,11 @@ void SessionSource::describe(const SessionTotals& /*totals*/, const Estimator& /
   input->devices.emplace_back("images_missing", images_missing_);
 }
 
-void SessionSource::print_figures(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
+void SessionSource::print_metrics(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
                                   Progress* progress) const {
   if (!other_ && session_.complete() && images_missing_ == 0 && request_.start == 0)
-    progress->say("the estimator received the same input as in the recorded run; compare with " +
-                  (request_.data / "trajectory.tum").string());
+    progress->print("the estimator received the same input as in the recorded run; compare with " +
+                    (request_.data / "trajectory.tum").string());
 }
 
 }  // namespace vergence::app

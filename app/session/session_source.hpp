@@ -36,7 +36,7 @@ class SessionSource final : public FrameSource {
   void finish(Progress* progress, std::vector<std::string>* faults) override;
   void describe(const SessionTotals& totals, const Estimator& estimator,
                 SummaryInput* input) const override;
-  void print_figures(const SessionTotals& totals, const SummaryInput& input,
+  void print_metrics(const SessionTotals& totals, const SummaryInput& input,
                      Progress* progress) const override;
 
  private:
@@ -52,7 +52,7 @@ class SessionSource final : public FrameSource {
 
   // Used by the estimator's thread; read by others after it has joined.
   std::size_t next_frame_ = 0, next_reading_ = 0;
-  bool recalibration_said_ = false;  // of the next frame
+  bool recalibration_reported_ = false;  // of the next frame
   std::uint64_t images_missing_ = 0;
   ThreadRunner reader_{BackgroundThread::Role::reader};  // decoding takes heap
 };

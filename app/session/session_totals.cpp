@@ -56,10 +56,10 @@ void TotalsBuilder::add(const EventRecord& e) {
 
 bool CalibrationTotals::add(const CalibrationRecord& c) {
   if (c.focal.measured_px > 0) focal = c.focal;
-  if (c.learnt && !c.accepted) return false;  // the drive goes on: nothing was attempted
+  if (c.is_refinement && !c.accepted) return false;  // the drive goes on: nothing was attempted
   ++(c.accepted ? accepted : rejected);
   if (attempts.size() == kMaxAttempts) attempts.erase(attempts.begin());
-  const CalibrationAttempt attempt{c.stamp,          c.cause_word(),       c.reason,  c.accepted,
+  const CalibrationAttempt attempt{c.stamp,          c.cause_name(),       c.reason,  c.accepted,
                                    c.latency_frames, c.calibration.frames, c.solve_ms};
   attempts.push_back(attempt);
   if (!from_scratch.found && attempt.cause == "from_scratch") {

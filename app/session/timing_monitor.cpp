@@ -25,7 +25,7 @@ TimingMonitor::Message message(const char* kind, bool to_user, const char* forma
   return s;
 }
 
-const char* word_of(FixStatus fix) noexcept {
+const char* fix_name(FixStatus fix) noexcept {
   switch (fix) {
     case FixStatus::none:
       return "no position";
@@ -119,7 +119,7 @@ TimingMonitor::Message TimingMonitor::of_reading(const InsRecord& reading) noexc
   const bool given =
       q.status != 0 ||
       q.filter_valid;  // a device that says nothing of its filter has no status either
-  return message("ins_status", false, "the INS has %s%s%s", word_of(fix_), satellites.data(),
+  return message("ins_status", false, "the INS has %s%s%s", fix_name(fix_), satellites.data(),
                  !given           ? ""
                  : q.filter_valid ? ", filter valid"
                                   : ", filter not valid");

@@ -23,7 +23,7 @@ constexpr double kFailedRatio =
 constexpr double kFailedExact = 1e-6;  // px: mean reprojection error of a failed run without noise
 
 /// One figure of a level: of all runs that did not fail.
-class Figure {
+class Statistic {
  public:
   void add(double v) { values_.push_back(v); }
   [[nodiscard]] double mean() const {
@@ -46,7 +46,7 @@ class Figure {
 struct Level {
   double noise = 0;
   int runs = 0, failed = 0;
-  Figure reprojection_px, pose_m, rotation_rad, translation_m, ms, steps;
+  Statistic reprojection_px, pose_m, rotation_rad, translation_m, ms, steps;
 };
 
 std::vector<double> parse_noise(const std::string& text) {
@@ -158,7 +158,7 @@ void print_table(const Experiment& a, const std::vector<Level>& levels) {
   std::cout << fmt::format("{:>8} {:>7} {:>6} {:>19} {:>19} {:>19} {:>19} {:>6} {:>9}\n",
                            "noise px", "runs", "failed", "reprojection px", "pose m",
                            "rotation rad", "translation m", "steps", "ms median");
-  const auto pair = [](const Figure& f) {
+  const auto pair = [](const Statistic& f) {
     return fmt::format("{:.2e} | {:.2e}", f.mean(), f.median());
   };
   for (const Level& l : levels)

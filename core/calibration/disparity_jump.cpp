@@ -8,7 +8,7 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr std::size_t kFewestTracks = 25;
+constexpr std::size_t kMinTracks = 25;
 constexpr int kReweightings = 6;
 constexpr double kMinScale = 0.05;    // px: corners are found no better
 constexpr double kDepthStep = 1e-3;   // of the depth, for the numeric derivatives
@@ -114,7 +114,7 @@ bool DisparityJumpDetector::row(const StereoObservation& before, const StereoObs
 DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
   DisparityJump jump;
   jump.tracks = static_cast<int>(rows.size());
-  if (rows.size() < kFewestTracks) return jump;
+  if (rows.size() < kMinTracks) return jump;
   double s = 0, along = 0, scale = 0, variance = 0;
   const auto median_of = [&](auto value) noexcept {
     for (std::size_t i = 0; i < rows.size(); ++i) scratch_[i] = value(rows[i]);
@@ -148,7 +148,7 @@ DisparityJump DisparityJumpDetector::fit(std::span<Row> rows) noexcept {
   return jump;
 }
 
-void DisparityJumpDetector::judge(std::uint64_t frame, DisparityJump* jump) noexcept {
+void DisparityJumpDetector::evaluate(std::uint64_t frame, DisparityJump* jump) noexcept {
   if (pending_.any) {
     if (!jump->measured && ++pending_.unmeasured < kUnmeasured) {
       jump->suspected = true;
@@ -156,7 +156,11 @@ void DisparityJumpDetector::judge(std::uint64_t frame, DisparityJump* jump) noex
     }
     jump->confirmed =
         !jump->measured || std::abs(jump->px + pending_.px) > kGoesBack * std::abs(pending_.px);
-    jump->onset_frame = pending_.frame;
+    if (jump->confirmed) {
+      jump->onset_frame = pending_.frame;
+      jump->px = pending_.px;
+      jump->sigma_px = pending_.sigma_px;
+    }
     pending_ = Pending{};
     return;
   }
@@ -165,7 +169,7 @@ void DisparityJumpDetector::judge(std::uint64_t frame, DisparityJump* jump) noex
       std::max({kMinJump, kJumpSigmas * jump->sigma_px, kJumpScatter * std::sqrt(mean_square_)});
   if (measured_ >= kFirstFrames && std::abs(jump->px) > limit) {
     jump->suspected = true;
-    pending_ = Pending{true, frame, jump->px, 0};
+    pending_ = Pending{true, frame, jump->px, jump->sigma_px, 0};
     return;
   }
   if (measured_ < kScatterFrames) ++measured_;
@@ -190,7 +194,7 @@ DisparityJump DisparityJumpDetector::next(std::uint64_t frame,
     }
   }
   DisparityJump jump = fit(rows_.first(rows));
-  judge(frame, &jump);
+  evaluate(frame, &jump);
   std::swap(before_, now_);
   count_ = n;
   return jump;

@@ -11,8 +11,9 @@ namespace vergence::calibration {
 /// Change of the disparities of one frame against their prediction from the frame before.
 struct DisparityJump {
   bool measured = false;  // false: too few tracks
-  double px = 0;          // common to all tracks, along the epipolar lines
-  double sigma_px = 0;    // from the tracks' own scatter
+  // Common to all tracks, along the epipolar lines; with `confirmed`, that of the onset frame.
+  double px = 0;
+  double sigma_px = 0;  // from the tracks' own scatter
   int tracks = 0;
   bool suspected =
       false;  // larger than chance and this drive's own scatter; the next frame decides
@@ -70,7 +71,6 @@ class DisparityJumpDetector {
   struct Row {
     double e = 0;      // px, disparity found minus predicted
     double along = 0;  // px/m: what an error of the motion along the optical axis does to it
-    double weight = 0;
   };
   [[nodiscard]] bool row(const StereoObservation& before, const StereoObservation& now,
                          const Transform& T_now_previous, Row* out) const noexcept;
@@ -78,13 +78,13 @@ class DisparityJumpDetector {
   /// Sorted by track; how many.
   std::size_t take(std::span<const StereoObservation> stereo,
                    std::span<StereoObservation> into) noexcept;
-  void judge(std::uint64_t frame, DisparityJump* jump) noexcept;
+  void evaluate(std::uint64_t frame, DisparityJump* jump) noexcept;
 
   /// A shift that waits for the next frame.
   struct Pending {
     bool any = false;
     std::uint64_t frame = 0;
-    double px = 0;
+    double px = 0, sigma_px = 0;
     int unmeasured = 0;  // frames since then that said nothing
   };
 

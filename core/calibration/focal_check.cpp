@@ -20,7 +20,7 @@ FocalMeasurement check_focal_length(const RigSolution& found,
   const Intrinsics& lens = found.rig.intrinsics[0];
   if (!(m.configured_px > 0)) return m;
   const double off = std::abs(lens.fx / m.configured_px - 1);
-  if (found.status == RigSolveStatus::not_converged && off > kFocalDoubt) {
+  if (found.status == RigSolveStatus::not_converged && off > kFocalPriorSigma) {
     // Still on its way, and already far: the right one is farther.
     m.measured_px = lens.fx;
     m.contradicted = true;
@@ -33,12 +33,12 @@ FocalMeasurement check_focal_length(const RigSolution& found,
 }
 
 void FocalCheck::measure(RigSolver& solver, RigSolveRequest request,
-                         const RigSolution& lenses) noexcept {
+                         const RigSolution& solved) noexcept {
   solved_ = {};
   solve_ms_ = 0;
-  if (!measures_ || lenses.status != RigSolveStatus::ok || request.given == nullptr) return;
-  request.freedom = RigFreedom::focal_lengths;
-  request.rig.T_camera_left = lenses.rig.T_camera_left;
+  if (!measures_ || solved.status != RigSolveStatus::ok || request.given == nullptr) return;
+  request.measure_focal_lengths = true;
+  request.rig.T_camera_left = solved.rig.T_camera_left;
   request.from_rig = true;
   request.known = nullptr;
   const RigSolution found = solver.solve(request);

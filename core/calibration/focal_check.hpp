@@ -7,9 +7,9 @@ namespace vergence::calibration {
 /// Compares the focal length given with the one that the images show.
 ///
 /// A focal length that is off by a share makes all distances off by it, and neither epipolar lines
-/// nor a solve that believes it show that. A solve with every focal length free by kFocalDoubt
-/// (RigFreedom::focal_lengths) does: turns show it, and so does the flow of a straight drive
-/// against the known baseline.
+/// nor a solve that believes it show that. A solve with every focal length free by kFocalPriorSigma
+/// (RigSolveRequest::measure_focal_lengths) does: turns show it, and so does the flow of a straight
+/// drive against the known baseline.
 ///
 /// `found`: such a solve. `given`: what the drive began with. Threads pure.
 [[nodiscard]] FocalMeasurement check_focal_length(const RigSolution& found,
@@ -26,10 +26,10 @@ class FocalCheck {
   /// Before a solve: whether it measures. A lens keeps its focal length: once a full window
   /// has measured it as it was given, it is not measured again.
   void begin_solve() noexcept { measures_ = enabled_ && !known_; }
-  /// After `lenses`, a solve of the solver's log with the lenses free that `request` asked for;
+  /// After `solved`, the solve of the solver's log that `request` asked for;
   /// begins with its result. Frames before the log's do not go in: what they say of the rig was
   /// said with the focal length believed.
-  void measure(RigSolver& solver, RigSolveRequest request, const RigSolution& lenses) noexcept;
+  void measure(RigSolver& solver, RigSolveRequest request, const RigSolution& solved) noexcept;
   /// The solve is over, and its frames count. `full`: no solve has more of them.
   void take(bool full) noexcept;
 

@@ -14,10 +14,8 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kFullWindow = 3.0;         // times the wanted sigmas, at max_frames
-constexpr double kBaselineOfSigmas = 0.75;  // m, for which the wanted sigma of t is given
-constexpr int kFewestHeldOut = 3;           // frames that say anything
-constexpr double kWorstFit = 1.5;           // px: matches of frames not in the solve, median
+constexpr int kMinHeldOut = 3;     // frames that say anything
+constexpr double kWorstFit = 1.5;  // px: matches of frames not in the solve, median
 // The residual of held-out frames may be kTimesUsed times that of the frames used, or kMinMisfit
 // px; on recorded drives both residuals are 0.08 to 0.25 px.
 constexpr double kTimesUsed = 3.0, kMinMisfit = 0.4;
@@ -31,8 +29,8 @@ constexpr double kMakersTurn = 1e-3, kOtherTurn = 15e-3;
 constexpr double kOtherBefore = 0.02, kErrorRate = 0.01;
 // Sigma of a measurement over the claim's, under which it may take the claim's place: it has nine
 // times the information, so what is adopted rests on the drive.
-constexpr double kOfClaim = 1.0 / 3;
-constexpr double kNeedsBaselines = 3.0;  // travelled, besides min_path_m
+constexpr double kShareOfCurrent = 1.0 / 3;
+constexpr double kMinBaselinesTravelled = 3.0;
 
 /// Median distance to the epipolar lines of one frame's matches of the left camera and camera k,
 /// px; negative: hardly a match.
@@ -104,9 +102,9 @@ HeldOut fit_of_used(const TrackLog& log, std::uint64_t newest, const RigCalibrat
 bool contradicted(const TrackLog& log, const RigCalibration& rig, const RigCalibration& solved,
                   std::uint64_t newest, int k) noexcept {
   const HeldOut fit = fit_of_held_out(log, newest, rig, k);
-  if (fit.frames < kFewestHeldOut) return false;
+  if (fit.frames < kMinHeldOut) return false;
   const HeldOut used = fit_of_used(log, newest, solved, k);
-  const double worst = used.frames < kFewestHeldOut
+  const double worst = used.frames < kMinHeldOut
                            ? kWorstFit
                            : std::clamp(kTimesUsed * used.median_px, kMinMisfit, kWorstFit);
   return fit.median_px > worst;
@@ -138,7 +136,7 @@ HeldOut held_out(const TrackLog& log, std::uint64_t after, const RigCalibration&
 bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept {
   int n = 0;
   for_held_out(log, after, [&n](const LoggedFrame&) noexcept { ++n; });
-  return n >= kFewestHeldOut;
+  return n >= kMinHeldOut;
 }
 
 bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration& better,
@@ -147,21 +145,21 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
   int n = 0;
   for_held_out(log, after, [&](const LoggedFrame& f) noexcept {
     double gain = 0;
-    bool told = false;
+    bool compared = false;
     for (int k = 1; k < better.cameras; ++k) {
       const double a = median_distance(f, worse, k), b = median_distance(f, better, k);
       // Without a match by which to tell: the one that was searched with the other's band is no
       // witness.
       if (a < 0 || b < 0) continue;
       gain += a - b;
-      told = true;
+      compared = true;
     }
-    if (!told) return;
+    if (!compared) return;
     sum += gain;
     squares += gain * gain;
     ++n;
   });
-  if (n < kFewestHeldOut) return true;
+  if (n < kMinHeldOut) return true;
   const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
   return mean > chance * std::sqrt(variance / (n - 1));
 }
@@ -169,17 +167,17 @@ bool fits_better(const TrackLog& log, std::uint64_t after, const RigCalibration&
 namespace {
 
 /// Log odds of a rig that is the one of the claim; x in percent of the depth.
-double log_odds_of(double difference, double measured, double claimed, double other) noexcept {
-  const double same = claimed * claimed + measured * measured,
+double log_odds_of(double difference, double measured, double current, double other) noexcept {
+  const double same = current * current + measured * measured,
                wrong = other * other + measured * measured;
   return 0.5 * (std::log(wrong / same) - difference * difference * (1 / same - 1 / wrong));
 }
 
 /// Sigma of the relative depth of a calibration that is believed to be the rig's, percent.
-double claimed_percent(const RigCalibration& claimed, int k, double depth,
+double current_percent(const RigCalibration& current, int k, double depth,
                        const CalibrationOptions& o) noexcept {
-  const double own = depth_error_percent(claimed, k, depth);
-  const double by_turn = 100 * depth / claimed.T_camera_left[static_cast<std::size_t>(k)].t.norm();
+  const double own = depth_error_percent(current, k, depth);
+  const double by_turn = 100 * depth / current.T_camera_left[static_cast<std::size_t>(k)].t.norm();
   // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
   return own > 0 ? std::hypot(own, 1e-3 * o.extrinsic_random_walk_mrad_per_sqrt_h * by_turn)
                  : kMakersTurn * by_turn;
@@ -187,9 +185,9 @@ double claimed_percent(const RigCalibration& claimed, int k, double depth,
 
 }  // namespace
 
-Assessment assess(const RigCalibration& measured, const RigCalibration& claimed, ClaimSource source,
-                  const TrackLog& log, std::uint64_t after, const CalibrationOptions& o,
-                  double pixel_sigma) noexcept {
+Assessment assess(const RigCalibration& measured, const RigCalibration& current,
+                  CalibrationOrigin source, const TrackLog& log, std::uint64_t after,
+                  const CalibrationOptions& o, double pixel_sigma) noexcept {
   const double before = std::log(kOtherBefore / (1 - kOtherBefore)),
                certain = std::log((1 - kErrorRate) / kErrorRate);
   Assessment a;
@@ -199,18 +197,18 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
   for (int k = 1; k < measured.cameras; ++k) {
     const double depth = reference_depth_m(measured, k, o, pixel_sigma);
     const double s = depth_error_percent(measured, k, depth),
-                 difference = depth_error_percent(measured, claimed, k, depth);
+                 difference = depth_error_percent(measured, current, k, depth);
     const double by_turn =
         100 * depth / measured.T_camera_left[static_cast<std::size_t>(k)].t.norm();
-    const double m = claimed_percent(claimed, k, depth, o);
+    const double m = current_percent(current, k, depth, o);
     const double odds = log_odds_of(difference, s, m, kOtherTurn * by_turn);
     // Where the rig is that of the claim, its depth is off by the mean of both, weighted.
-    const double weight = source == ClaimSource::this_drive ? 1.0 : m * m / (m * m + s * s);
+    const double weight = source == CalibrationOrigin::this_drive ? 1.0 : m * m / (m * m + s * s);
     const double off = std::hypot(weight * difference, std::sqrt(weight) * s);
     a.confirmed =
         a.confirmed && s > 0 && odds - before > certain && off <= o.max_depth_error_percent;
     const bool contradicted = difference > o.max_depth_error_percent && odds - before < -certain;
-    const double least = source == ClaimSource::this_drive ? m : kOfClaim * m;
+    const double least = source == CalibrationOrigin::this_drive ? m : kShareOfCurrent * m;
     sharper = sharper && s < least;
     a.nearer = a.nearer || (s < least && difference > kChance * s);
     // Evidence against one camera takes precedence over missing evidence about another.
@@ -222,13 +220,13 @@ Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
     a.sigma_percent = s;
     a.difference_percent = difference;
   }
-  a.worse = fits_better(log, after, claimed, measured);
+  a.worse = fits_better(log, after, current, measured);
   // In a full window a misfit to the epipolar lines cannot be an accident of where the structure
   // was.
   const bool lines =
-      misfits(log, after, measured, claimed) || (sharper && measured.frames >= o.max_frames);
+      misfits(log, after, measured, current) || (sharper && measured.frames >= o.max_frames);
   a.better =
-      (a.nearer && !a.worse) || (lines && fits_better(log, after, measured, claimed, kRareChance));
+      (a.nearer && !a.worse) || (lines && fits_better(log, after, measured, current, kRareChance));
   return a;
 }
 
@@ -238,8 +236,6 @@ const char* reason(Gate gate) noexcept {
       return "";
     case Gate::not_solved:
       return "the adjustment did not converge";
-    case Gate::sigmas_too_large:
-      return "the tracks do not hold it well enough yet";
     case Gate::needs_motion:
       return "too little way was driven to see it";
     case Gate::needs_near_structure:
@@ -265,24 +261,18 @@ const char* reason(Gate gate) noexcept {
   return "";
 }
 
-double sigma_excess(const RigCalibration& rig, const CalibrationOptions& o) noexcept {
+double depth_excess(const RigCalibration& rig, const CalibrationOptions& o,
+                    double pixel_sigma) noexcept {
   double worst = 0;
-  for (int k = 1; k < rig.cameras; ++k) {
-    const auto& sigma = rig.sigma_noise[static_cast<std::size_t>(k)];
-    for (std::size_t i = 0; i < 3; ++i)
-      worst = std::max(worst, sigma[i] / (1e-3 * o.rotation_sigma_mrad));
-    for (std::size_t i = 4; i < 6; ++i)
-      worst = std::max(worst, sigma[i] / (1e-3 * o.translation_sigma_mm *
-                                          rig.T_camera_left[static_cast<std::size_t>(k)].t.norm() /
-                                          kBaselineOfSigmas));
-  }
-  return worst;
+  for (int k = 1; k < rig.cameras; ++k)
+    worst = std::max(worst, depth_error_percent(rig, k, reference_depth_m(rig, k, o, pixel_sigma)));
+  return worst / o.usable_depth_percent;
 }
 
 namespace {
 
-/// Gates that apply whichever parameters were estimated.
-Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
+/// Gates that need no frames but those of the solve.
+Gate check_solution(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
   if (s.status != RigSolveStatus::ok) return Gate::not_solved;
   for (int k = 1; k < s.rig.cameras; ++k) {
@@ -297,27 +287,16 @@ Gate ask_common_gates(const AcceptanceInput& q, const CalibrationOptions& o) noe
         log_so3(found.R * nominal.R.transpose()).norm() > o.max_rotation_deg * kRadiansPerDegree)
       return Gate::implausible_rotation;
   }
-  // With the lenses free, the depth's own sigma says whether the path was long enough.
-  const double least = q.lenses ? 0.0 : o.min_path_m;
-  if (s.travelled_m < std::max(least, kNeedsBaselines * s.rig.baseline)) return Gate::needs_motion;
+  if (s.travelled_m < kMinBaselinesTravelled * s.rig.baseline) return Gate::needs_motion;
   if (s.near < o.min_near_points) return Gate::needs_near_structure;
-  return Gate::open;
+  return depth_excess(s.rig, o, q.pixel_sigma) > 1 ? Gate::depth_unknown : Gate::open;
 }
 
 }  // namespace
 
 Gate check_acceptance(const AcceptanceInput& q, const CalibrationOptions& o) noexcept {
   const RigSolution& s = *q.solution;
-  const Gate common = ask_common_gates(q, o);
-  if (common != Gate::open) return common;
-  if (q.lenses) {
-    for (int k = 1; k < s.rig.cameras; ++k)
-      if (depth_error_percent(s.rig, k, reference_depth_m(s.rig, k, o, q.pixel_sigma)) >
-          o.usable_depth_percent)
-        return Gate::depth_unknown;
-  } else if (sigma_excess(s.rig, o) > (q.window_full ? kFullWindow : 1.0)) {
-    return Gate::sigmas_too_large;
-  }
+  if (const Gate gate = check_solution(q, o); gate != Gate::open) return gate;
   if (q.log == nullptr) return Gate::open;
   if (misfits(*q.log, s.newest, s.rig, s.rig)) return Gate::does_not_fit;
   if (q.in_use != nullptr && q.must_be_better && !fits_better(*q.log, s.newest, s.rig, *q.in_use))

@@ -57,18 +57,17 @@ struct Assessment {
 
 /// Origin of a claim. The sigma of a claim that was solved from this drive is not independent of
 /// the measurement and is not used beside it.
-enum class ClaimSource : std::uint8_t { elsewhere, this_drive };
+enum class CalibrationOrigin : std::uint8_t { elsewhere, this_drive };
 
 /// Assesses the worst of the rig's further cameras. `log` holds frames newer than frame number
 /// `after`, which `measured` was not solved from. Pure.
-[[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& claimed,
-                                ClaimSource source, const TrackLog& log, std::uint64_t after,
+[[nodiscard]] Assessment assess(const RigCalibration& measured, const RigCalibration& current,
+                                CalibrationOrigin source, const TrackLog& log, std::uint64_t after,
                                 const CalibrationOptions& options, double pixel_sigma) noexcept;
 
 enum class Gate : std::uint8_t {
   open,
   not_solved,
-  sigmas_too_large,
   needs_motion,
   needs_near_structure,
   cameras_swapped,
@@ -78,7 +77,7 @@ enum class Gate : std::uint8_t {
   does_not_fit,   // frames not in the solve contradict it
   no_better,      // than the calibration in use: that one is kept
   rig_changed,    // among the very frames it was solved from
-  depth_unknown,  // with the lenses free the tracks do not hold the depth yet
+  depth_unknown,  // the tracks do not determine the depth well enough yet
 };
 /// Message for events.jsonl and calibrations.csv; empty for `open`. A constant.
 [[nodiscard]] const char* reason(Gate gate) noexcept;
@@ -95,7 +94,6 @@ enum class Gate : std::uint8_t {
     case Gate::rig_changed:
       return false;
     case Gate::open:
-    case Gate::sigmas_too_large:
     case Gate::needs_motion:
     case Gate::needs_near_structure:
     case Gate::no_better:
@@ -111,14 +109,10 @@ struct AcceptanceInput {
   const RigCalibration* in_use = nullptr;  // null: there is none
   const TrackLog* log =
       nullptr;  // with the frames since the snapshot; null: there are none to hold it against
-  bool lenses = false;        // they were free: depth is judged by their joint covariance, not the
-                              // transform's single sigmas
-  double pixel_sigma = 0.15;  // px, of a tracked corner: reference_depth_m()
+  double pixel_sigma = 0.15;     // px, of a tracked corner: reference_depth_m()
   bool may_have_changed = true;  // a change of the rig among the frames used closes the gate; once,
                                  // or a wrong one would for ever
   bool must_be_better = true;    // than `in_use`, on frames that were not used
-  bool window_full =
-      false;  // max_frames were used, or no more will come: three times the sigmas are enough
 };
 
 /// Decides whether a solution may be used (METHOD §4). Returns the first gate that stops it, or
@@ -129,8 +123,9 @@ struct AcceptanceInput {
 /// Returns true if the log has enough frames newer than frame number `after` to test a solution.
 [[nodiscard]] bool held_out_enough(const TrackLog& log, std::uint64_t after) noexcept;
 
-/// Largest ratio of a sigma of `rig` to the one required; at most 1 if all suffice.
-[[nodiscard]] double sigma_excess(const RigCalibration& rig,
-                                  const CalibrationOptions& options) noexcept;
+/// Ratio of the sigma of a depth measured with `rig`, at reference_depth_m() and with the worst of
+/// its further cameras, to usable_depth_percent; a solution with more than 1 is not adopted.
+[[nodiscard]] double depth_excess(const RigCalibration& rig, const CalibrationOptions& options,
+                                  double pixel_sigma) noexcept;
 
 }  // namespace vergence::calibration

@@ -8,7 +8,7 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr double kWordDepth = 20;  // m
+constexpr double kRatingDepth = 20;  // m
 
 }  // namespace
 
@@ -29,9 +29,9 @@ double depth_error_percent(const RigCalibration& rig, int k, double depth_m) noe
   return seen == 0 ? 0.0 : 100.0 * std::sqrt(std::max(0.0, sum / seen));
 }
 
-double depth_error_percent(const RigCalibration& measured, const RigCalibration& claimed, int k,
+double depth_error_percent(const RigCalibration& measured, const RigCalibration& current, int k,
                            double depth_m) noexcept {
-  const detail::DepthReader reader(claimed, k);
+  const detail::DepthReader reader(current, k);
   double sum = 0;
   int seen = 0;
   detail::for_places(measured, k, depth_m, [&](const detail::CovisiblePoint& p) noexcept {
@@ -64,7 +64,7 @@ double depth_error_percent(const RigCalibration& rig, double depth_m) noexcept {
 }
 
 CalibrationRating health(const RigCalibration& rig, const CalibrationOptions& options) noexcept {
-  const double error = depth_error_percent(rig, kWordDepth);
+  const double error = depth_error_percent(rig, kRatingDepth);
   if (error <= options.good_depth_percent) return CalibrationRating::good;
   return error <= options.usable_depth_percent ? CalibrationRating::can_be_improved
                                                : CalibrationRating::recalibrate;

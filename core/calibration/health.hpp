@@ -25,7 +25,7 @@ inline constexpr std::array kHealthDepths = {1.0, 5.0, 10.0, 20.0, 50.0};  // m
 /// Difference of the depths that two calibrations give to the same pairs of pixels, for points that
 /// `measured` puts at depth_m: root mean square over the image, percent of the inverse depth. Pure.
 [[nodiscard]] double depth_error_percent(const RigCalibration& measured,
-                                         const RigCalibration& claimed, int k,
+                                         const RigCalibration& current, int k,
                                          double depth_m) noexcept;
 
 /// Depth at which a calibration must be within `max_depth_error_percent`, m:

@@ -42,8 +42,6 @@ struct Monitor::Parts {
   MonitorOptions options{};
   bool valid = false;
   detail::Reference reference{};
-  Eigen::Matrix<double, 6, 5> d_offset_d_theta =
-      Eigen::Matrix<double, 6, 5>::Zero();  // (φ, τ) by (φ, α, β)
   Mat5 covariance = Mat5::Zero();
   detail::MonitorResiduals looks{};
   detail::ChangeDetector windows{};
@@ -51,7 +49,7 @@ struct Monitor::Parts {
   int collapsed = 0, standing_over = 0;
   std::uint64_t collapsed_from = 0, standing_from = 0;
 
-  void forget() noexcept {
+  void clear() noexcept {
     looks.reset();
     windows.reset(options, covariance);
     latest = detail::Decision{};
@@ -59,7 +57,7 @@ struct Monitor::Parts {
   }
   void watch_collapse(const MonitorFrame& frame) noexcept;
   void watch_matches(const MonitorFrame& frame) noexcept;
-  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& look) noexcept;
+  void watch_standing(const MonitorFrame& frame, const detail::StereoResiduals& residuals) noexcept;
 };
 
 std::size_t Monitor::memory_needed(const MonitorOptions&) noexcept {
@@ -70,7 +68,7 @@ Monitor::Monitor(const MonitorOptions& options, Arena& arena) {
   validate(options);
   parts_ = arena.make<Parts>(1, "monitor").data();
   parts_->options = options;
-  parts_->forget();
+  parts_->clear();
 }
 
 bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
@@ -84,22 +82,19 @@ bool Monitor::set_reference(const Transform& T_camera_left, const Pinhole& left,
       T_camera_left.finite() && length > 0 && good(left) && good(right) && covariance.allFinite();
   if (p.valid) {
     const Mat32 B = tangent_basis(T_camera_left.t / length);
-    p.reference = {T_camera_left, EpipolarGeometry(T_camera_left), B, length, left, right};
-    p.d_offset_d_theta.setZero();
-    p.d_offset_d_theta.topLeftCorner<3, 3>().setIdentity();
-    p.d_offset_d_theta.bottomRightCorner<3, 2>() = length * B;
+    p.reference = {EpipolarGeometry(T_camera_left), left, right};
     Eigen::Matrix<double, 5, 6> back = Eigen::Matrix<double, 5, 6>::Zero();
     back.topLeftCorner<3, 3>().setIdentity();
     back.bottomRightCorner<2, 3>() = B.transpose() / length;
     p.covariance = back * covariance * back.transpose();
   }
-  p.forget();
+  p.clear();
   return p.valid;
 }
 
 void Monitor::expect_scatter(double bias_px) noexcept { parts_->windows.expect_scatter(bias_px); }
 
-void Monitor::reset() noexcept { parts_->forget(); }
+void Monitor::reset() noexcept { parts_->clear(); }
 
 void Monitor::Parts::watch_collapse(const MonitorFrame& frame) noexcept {
   const bool missing = frame.expected_stereo >= options.collapse_expected &&
@@ -133,23 +128,23 @@ void Monitor::Parts::watch_matches(const MonitorFrame& frame) noexcept {
 }
 
 void Monitor::Parts::watch_standing(const MonitorFrame& frame,
-                                    const detail::StereoResiduals& look) noexcept {
+                                    const detail::StereoResiduals& residuals) noexcept {
   if (latest.kind != Kind::quiet && standing_over < kStandingFrames)
     return;  // what moving frames have found stands
-  latest.statistic = windows.single(look.evidence, look.spread_now) / kStandingFactor;
+  latest.statistic = windows.single(residuals.evidence, residuals.spread_now) / kStandingFactor;
+  latest.shift_px = detail::shift_px(residuals.evidence);
   if (latest.statistic > options.threshold) {
     if (standing_over++ == 0) standing_from = frame.frame;
   } else {
     standing_over = 0;
   }
-  windows.single_estimate(look.evidence, look.spread_now, &latest.theta, &latest.covariance);
   latest.kind = standing_over >= kStandingFrames ? Kind::knock : Kind::quiet;
   latest.undecided = standing_over > 0 && standing_over < kStandingFrames;
   latest.onset = standing_over > 0 ? standing_from : frame.frame;
   latest.frames = standing_over;
 }
 
-MonitorResult Monitor::look(const MonitorFrame& frame) noexcept {
+MonitorResult Monitor::update(const MonitorFrame& frame) noexcept {
   Parts& p = *parts_;
   MonitorResult v;
   v.threshold = p.options.threshold;
@@ -161,11 +156,13 @@ MonitorResult Monitor::look(const MonitorFrame& frame) noexcept {
   v.kind = d.kind;
   v.statistic = d.statistic;
   v.undecided = d.undecided;
-  v.offset = p.d_offset_d_theta * d.theta;
-  v.covariance = p.d_offset_d_theta * d.covariance * p.d_offset_d_theta.transpose();
   v.onset_frame = d.kind == Kind::quiet ? frame.frame : d.onset;
   v.frames_since_onset = d.kind == Kind::quiet ? 0 : d.frames;
+  if (d.kind != Kind::quiet) {
+    v.evidence = {0.5 * d.statistic, d.shift_px, 1e3 * d.shift_px / p.reference.right.fx};
+  }
   if (p.collapsed >= p.options.collapse_frames) {
+    v.evidence = {};
     v.kind = Kind::collapse;
     v.onset_frame = p.collapsed_from;
     v.frames_since_onset = p.collapsed;

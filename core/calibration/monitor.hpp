@@ -40,7 +40,7 @@ struct StereoObservation {
   std::uint32_t track = 0;  // the same number in every frame that sees the same point
 };
 
-/// Input of one frame. The views must stay valid until look() returns.
+/// Input of one frame. The views must stay valid until update() returns.
 struct MonitorFrame {
   std::uint64_t frame = 0;  // strictly increasing
   bool moving = false;      // false: the images repeat themselves, so their errors do not average
@@ -48,6 +48,14 @@ struct MonitorFrame {
   int expected_stereo =
       0;  // matches a good pair of images would give; 0 where either image is poor by itself
   int found_stereo = 0;  // matches there are
+};
+
+/// What the images show of a change of the rig; zero where it is too large to be measured.
+struct ChangeEvidence {
+  double log_likelihood_ratio = 0;  // of a change against none
+  double shift_px = 0;       // of the matches across their epipolar lines (knock, drift) or along
+                             // them (disparity jump), rms since the onset
+  double rotation_mrad = 0;  // of camera k that moves its image by as much
 };
 
 /// Result of the monitor after one frame.
@@ -59,12 +67,10 @@ struct MonitorResult {
     collapse,  // matches are expected and not there: too far off to be measured
   };
   Kind kind = Kind::quiet;
-  bool undecided = false;  // over the threshold in one frame, which may be an outlier
-  double statistic = 0;    // largest of all windows
-  double threshold = 0;    // the limit of `statistic`
-  Vec6 offset = Vec6::Zero();  // true minus reference, (φ rad, τ m): R ← Exp(φ) R, t ← t + τ; since
-                               // the onset, else of the longest window; first order
-  Mat6 covariance = Mat6::Zero();  // of `offset`; rank 5, the length is not seen
+  bool undecided = false;   // over the threshold in one frame, which may be an outlier
+  double statistic = 0;     // largest of all windows
+  double threshold = 0;     // the limit of `statistic`
+  ChangeEvidence evidence;  // of `kind`, if that is a knock or a drift
   std::uint64_t onset_frame =
       0;  // knock: first frame of the changed rig; drift: where it began; else `frame`
   int frames_since_onset = 0;  // frames measured since then
@@ -96,7 +102,7 @@ struct MonitorResult {
 ///     const auto verdict = monitor.look(frame);  // each posed frame
 ///     if (verdict.kind != MonitorResult::Kind::quiet) recalibrate(verdict.onset_frame);
 ///
-/// Memory   All of it from the arena in the constructor. look() allocates nothing.
+/// Memory   All of it from the arena in the constructor. update() allocates nothing.
 /// Threads  One caller.
 /// Time     Under 0.1 ms for 300 stereo matches.
 /// Errors   The constructor throws (std::invalid_argument with a message, std::length_error). What
@@ -109,7 +115,7 @@ class Monitor {
   /// Sets the calibration to test, X_k = T_camera_left X_left, and clears all evidence.
   /// `covariance` is of its left perturbation (rad, m) by noise alone: errors of the intrinsics
   /// show in no residual, so the total covariance would make the monitor insensitive. False: |t| is
-  /// zero or something is not finite; then every look() is quiet.
+  /// zero or something is not finite; then every update() is quiet.
   bool set_reference(const Transform& T_camera_left, const Pinhole& left, const Pinhole& right,
                      const Mat6& covariance) noexcept;
 
@@ -118,7 +124,7 @@ class Monitor {
   /// survives set_reference() and reset(), as the measured scatter does.
   void expect_scatter(double bias_px) noexcept;
 
-  [[nodiscard]] MonitorResult look(const MonitorFrame& frame) noexcept;
+  [[nodiscard]] MonitorResult update(const MonitorFrame& frame) noexcept;
 
   /// Clears all evidence (the scene was lost); the reference stays.
   void reset() noexcept;

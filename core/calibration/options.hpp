@@ -17,9 +17,6 @@ struct CalibrationOptions {
   int max_frames = 150;  // of which the newest so many are kept and solved, 10 … 150
   int max_observations =
       100'000;  // of one solve: beyond it frames are taken at wider steps, 10'000 … 1'000'000
-  double rotation_sigma_mrad = 0.15;  // enough: noise-only sigma of each axis, 0.001 … 10
-  double translation_sigma_mm =
-      4.0;  // enough: of t_y and t_z, for a baseline of 0.75 m, in proportion to it, 0.01 … 1000
   int adopt_after = 30;  // frames after a snapshot at which its solution is decided about at the
                          // latest, 0 … 1000
   IntrinsicsEstimation intrinsics = IntrinsicsEstimation::full;
@@ -34,8 +31,6 @@ struct CalibrationOptions {
   double max_direction_deg = 10;    // gate: direction of t from the nominal one, 0.1 … 180
   double max_rotation_deg = 10;     // gate: rotation from the nominal one, 0.1 … 180; the first
                                     // calibration of a drive from scratch is not asked for it
-  double min_path_m =
-      1;  // travelled in the window, and three baselines, else `needs_motion`, 0.01 … 1000
   int min_near_points =
       30;  // points nearer than near_baselines, else `needs_near_structure`, 0 … 1000
   double near_baselines = 40;  // 5 … 500

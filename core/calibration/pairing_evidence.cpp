@@ -9,7 +9,7 @@
 namespace vergence::calibration {
 namespace {
 
-constexpr std::size_t kFewestPoints = 25;
+constexpr std::size_t kMinPoints = 25;
 constexpr double kNoise = 0.2;  // px: what two positions known to 0.15 px leave
 // Errors of one frame's points have causes in common (rolling shutter, a lens): they count for so
 // many independent ones, and for no more than one log-likelihood each.
@@ -67,7 +67,7 @@ void PairingEvidence::next(std::uint64_t frame, std::span<StereoObservation> poi
   std::copy(points.begin(), points.end(), before_.begin());
   count_ = points.size();
   distance_px_ = n > 0 ? static_cast<double>(median(now_.first(n))) : 0;
-  if (both < kFewestPoints) return;
+  if (both < kMinPoints) return;
   const double now = std::max(distance_px_, kNoise);
   if (usual_px_ == 0) usual_px_ = now;
   const auto add = [&](double usual, double other, double* sum) noexcept {

@@ -214,7 +214,7 @@ RigSolution RigSolver::solve(const RigSolveRequest& request) noexcept {
   hold_pieces();
   s.status = RigSolveStatus::not_converged;
   // To a focal length that is a quarter off it is a hundred steps and more.
-  const int max_steps = request.freedom == RigFreedom::focal_lengths ? kMaxFocalSteps : kMaxSteps;
+  const int max_steps = request.measure_focal_lengths ? kMaxFocalSteps : kMaxSteps;
   const BundleResult r = adjust_robustly(options_of(request), max_steps, &s);
   if (!r.converged()) {
     if (r.usable()) s.rig.intrinsics[0] = cameras_[0].intrinsics();  // how far it came

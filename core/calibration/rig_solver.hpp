@@ -20,21 +20,17 @@ enum class RigSolveStatus : std::uint8_t {
   not_observable,  // converged, but the tracks leave some direction of the transform open
 };
 
-/// Parameters that a solve estimates.
-enum class RigFreedom : std::uint8_t {
-  transforms,  // and further cameras' focal lengths, as the options say; lenses are taken as they
-               // are
-  lenses,  // also further cameras' intrinsics and distortion, and the left one's distortion (METHOD
-           // §6.1)
-  focal_lengths,  // as `lenses`, and every focal length by kFocalDoubt: whether they are believed
-                  // rightly
-};
-inline constexpr double kFocalDoubt = 0.1;  // prior sigma of a focal length, a share of it
+/// Prior sigma of every focal length in a solve with `measure_focal_lengths`, as a share of it.
+inline constexpr double kFocalPriorSigma = 0.1;
 
 /// Start, prior and free parameters of a solve. `known` and `given` are read during solve() only.
+/// CalibrationOptions::intrinsics chooses the intrinsics that are estimated with the transforms:
+/// with `full`, those of the further cameras and the distortion of all.
 struct RigSolveRequest {
   RigCalibration rig{};  // cameras, intrinsics, baseline; T_camera_left with from_rig
-  RigFreedom freedom = RigFreedom::transforms;
+  /// Also estimates every focal length with the prior sigma kFocalPriorSigma, the left camera's
+  /// included.
+  bool measure_focal_lengths = false;
   bool from_rig = false;  // begin with T_camera_left of `rig`; false: with those of the logged
                           // frame that fits best
   const RigCalibration* known =

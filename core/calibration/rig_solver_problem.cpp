@@ -132,8 +132,8 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
   constexpr std::uint16_t kFocal = 0b0011, kPinhole = 0b1111,
                           kFourCoefficients = 0b1111'0000;  // k1 k2 p1 p2, or k1 … k4
   const RigCalibration& rig = request.rig;
-  const bool focal_lengths = request.freedom == RigFreedom::focal_lengths;
-  const bool lenses = request.freedom == RigFreedom::lenses || focal_lengths;
+  const bool focal_lengths = request.measure_focal_lengths;
+  const bool lenses = options_.intrinsics == IntrinsicsEstimation::full;
   BundleOptions how;
   how.configuration = BundleConfiguration::stereo_calibration;
   how.shared_errors = kSharedErrors;
@@ -143,8 +143,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
     how.length[static_cast<std::size_t>(k)].kind = BundleLength::free;
   for (int k = 0; k < count_; ++k) {
     const auto c = static_cast<std::size_t>(k);
-    const Intrinsics& lens =
-        (request.given != nullptr && lenses ? *request.given : rig).intrinsics[c];
+    const Intrinsics& lens = (request.given != nullptr ? *request.given : rig).intrinsics[c];
     BundleIntrinsics& out = how.intrinsics[c];
     if (k > 0)
       out.free = lenses                                               ? kPinhole
@@ -159,7 +158,7 @@ BundleOptions RigSolver::options_of(const RigSolveRequest& request) const noexce
                            : lenses && k > 0 ? options_.lens_centre_sigma_px
                                              : options_.principal_point_sigma_px;
       out.prior_mean[i] = value[i];
-      out.prior_sigma[i] = out.held_sigma[i] = focal && focal_lengths ? kFocalDoubt * value[i]
+      out.prior_sigma[i] = out.held_sigma[i] = focal && focal_lengths ? kFocalPriorSigma * value[i]
                                                : lens.sigma[i] > 0    ? lens.sigma[i]
                                                                       : usual;
     }

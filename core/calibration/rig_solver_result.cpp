@@ -123,7 +123,7 @@ RigSolver::Watch RigSolver::watch_camera(int k, const RigCalibration& rig) noexc
     shown.frame = f.number;
     shown.moving = true;
     shown.stereo = stereo_.span();
-    const MonitorResult v = monitor.look(shown);
+    const MonitorResult v = monitor.update(shown);
     pairing_.next(f.number, stereo_.span(), rig.T_camera_left[other], left, right);
     if (seen.lag_frames == 0) seen.lag_frames = pairing_.lag_frames();
     const Transform step = i == 0 ? Transform{} : poses_[i] * poses_[i - 1].inverse();

@@ -45,7 +45,6 @@ std::optional<RigSolution> SegmentSolver::end() noexcept {
 std::optional<RigSolution> SegmentSolver::solve() noexcept {
   RigSolveRequest request;
   request.rig = start_;
-  request.freedom = RigFreedom::lenses;
   request.from_rig = true;
   request.given = &given_;
   const Stamp newest = solver_.log().frame(solver_.log().size() - 1).stamp;

@@ -5,8 +5,8 @@
 
 namespace vergence::calibration {
 
-/// Cuts a drive's tracks into stretches of `frames` moving frames and solves each with the lenses
-/// free when it is full.
+/// Cuts a drive's tracks into stretches of `frames` moving frames and solves each when it is
+/// full.
 ///
 /// Ownership  `given`, whose lenses and sigmas are the priors, and `start`, where the first solve
 /// begins, are copied. Threads    One caller; solves happen in take() and end(), some hundred

@@ -136,7 +136,7 @@ class Fit {
   [[nodiscard]] bool errors_at(const State& s, const Moment& m, Errors* e) const;
   [[nodiscard]] bool all_errors(const State& s, std::vector<Errors>* all) const;
   [[nodiscard]] bool step(Parameters* d);
-  void learn_noise(const std::vector<Errors>& all);
+  void estimate_noise(const std::vector<Errors>& all);
   [[nodiscard]] bool settle();
   void report(const Mat3& nominal, Mount* mount) const;
 
@@ -225,7 +225,7 @@ bool Fit::start(const Mat3& nominal) {
   return true;
 }
 
-void Fit::learn_noise(const std::vector<Errors>& all) {
+void Fit::estimate_noise(const std::vector<Errors>& all) {
   for (int c = 0; c < kChannels; ++c) {
     double now = 0, lagged = 0, n = 0;
     for (std::size_t i = 1; i < all.size(); ++i) {
@@ -266,7 +266,7 @@ void Fit::learn_noise(const std::vector<Errors>& all) {
 bool Fit::step(Parameters* d) {
   std::vector<Errors> at;
   if (!all_errors(state_, &at)) return false;
-  learn_noise(at);
+  estimate_noise(at);
   constexpr std::array<double, kParameters> kDelta{1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-4,
                                                    1e-5, 1e-5, 1e-5, 1e-3, 1e-3, 1e-3};
   std::vector<std::vector<Errors>> columns(kParameters);

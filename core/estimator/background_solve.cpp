@@ -45,20 +45,12 @@ void BackgroundSolve::run() noexcept {
   calibration::RigSolveRequest request;
   request.rig = start_.rig;
   request.from_rig = start_.from_rig;
-  solved_ = {};
-  if (start_.sought || options_.calibration.intrinsics != calibration::IntrinsicsEstimation::full) {
-    solved_.transforms = solver_.solve(request);
-    if (solved_.transforms.status == calibration::RigSolveStatus::ok) {
-      request.rig.T_camera_left = solved_.transforms.rig.T_camera_left;
-      request.from_rig = true;
-    }
-  }
-  if (options_.calibration.intrinsics != calibration::IntrinsicsEstimation::full) return;
-  request.freedom = calibration::RigFreedom::lenses;
-  request.given = &given_;  // what the frames have shown since must not be its own witness
+  // Intrinsics have the priors of the calibration supplied: what the frames have shown since must
+  // not be its own witness.
+  request.given = &given_;
   request.known = start_.prior;
-  solved_.lenses = solver_.solve(request);
-  focal_check_.measure(solver_, request, solved_.lenses);
+  solved_ = solver_.solve(request);
+  focal_check_.measure(solver_, request, solved_);
 }
 
 bool BackgroundSolve::next_frame() noexcept {

@@ -7,7 +7,7 @@
 namespace vergence {
 
 /// One solve for the rig at a time, beside the frames: takes a snapshot of the tracks, hands it to
-/// the background runner, and has the solutions when that is done.
+/// the background runner, and has the solution when that is done.
 ///
 ///     solve.start(log, start);
 ///     if (solve.running() && solve.next_frame()) {  // each frame
@@ -22,15 +22,10 @@ class BackgroundSolve {
   /// Where a solve begins and what is known before it.
   struct Start {
     RigCalibration rig{};
-    bool from_rig = false;  // begin with the transforms of `rig`
-    bool sought = false;    // a calibration is sought; false: what is in use is learnt beside it
+    bool from_rig = false;     // begin with the transforms of `rig`
+    bool for_new_rig = false;  // a calibration is sought; false: what is in use is learnt beside it
     const RigCalibration* prior = nullptr;  // what earlier frames have shown; copied
   };
-  /// The solutions of one snapshot: with the lenses as they are, and with the lenses free.
-  struct Solved {
-    calibration::RigSolution transforms, lenses;
-  };
-
   /// `given`: the calibration that the drive began with.
   BackgroundSolve(const EstimatorOptions& options, const RigCalibration& given, std::size_t tracks,
                   Arena& arena, BackgroundRunner& runner);
@@ -44,7 +39,7 @@ class BackgroundSolve {
   void start(const calibration::TrackLog& log, const Start& start) noexcept;
   /// True from start() to close().
   [[nodiscard]] bool running() const noexcept { return running_; }
-  [[nodiscard]] bool sought() const noexcept { return start_.sought; }
+  [[nodiscard]] bool for_new_rig() const noexcept { return start_.for_new_rig; }
   /// Call once per frame while running(). Returns true if the solver has finished and a decision
   /// about its solutions is due at this frame. Waits for the solver with
   /// Adoption::after_fixed_frames only; with Adoption::when_ready it returns false until the solver
@@ -62,12 +57,12 @@ class BackgroundSolve {
   /// Marks the running solve, if any, as outdated: its frames no longer describe the rig.
   void discard() noexcept { discarded_ = running_; }
   /// True if the solve was discarded, or was started for another purpose than `seeking` says.
-  [[nodiscard]] bool outdated(bool seeking) const noexcept {
-    return discarded_ || start_.sought != seeking;
+  [[nodiscard]] bool outdated(bool estimating) const noexcept {
+    return discarded_ || start_.for_new_rig != estimating;
   }
   /// Ends the solve after its solutions have been used; another one may start.
   void close() noexcept { running_ = false; }
-  [[nodiscard]] const Solved& solved() const noexcept { return solved_; }
+  [[nodiscard]] const calibration::RigSolution& solved() const noexcept { return solved_; }
   /// Focal length measurements of the same snapshots. Read it only while no solve runs.
   [[nodiscard]] calibration::FocalCheck& focal_check() noexcept { return focal_check_; }
   [[nodiscard]] const calibration::FocalCheck& focal_check() const noexcept { return focal_check_; }
@@ -87,7 +82,7 @@ class BackgroundSolve {
   Task task_;
   Start start_;
   RigCalibration prior_{};
-  Solved solved_;
+  calibration::RigSolution solved_;
   bool running_ = false, discarded_ = false;
   int frames_since_start_ = 0;
   int next_turn_ = 0;  // frames after the start

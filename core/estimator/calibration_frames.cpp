@@ -88,7 +88,7 @@ void CalibrationFrames::clear() noexcept {
 
 bool CalibrationFrames::enough() const noexcept { return logged_ >= wanted_ && enough_for_any(); }
 
-bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= fewest(); }
+bool CalibrationFrames::enough_for_any() const noexcept { return log_.size() >= min_to_solve(); }
 
 bool CalibrationFrames::new_since_solve() const noexcept {
   return log_.size() >= solved_frames_ + kNewFrames;
@@ -106,7 +106,7 @@ std::size_t CalibrationFrames::most() const noexcept {
   return static_cast<std::size_t>(options_.max_frames);
 }
 
-std::size_t CalibrationFrames::fewest() const noexcept {
+std::size_t CalibrationFrames::min_to_solve() const noexcept {
   // With the six frames held out, a calibration that is given is judged in frame 25.
   constexpr std::size_t kFewest = 20;
   return std::min(kFewest, least());

@@ -59,7 +59,7 @@ class CalibrationFrames {
   /// Minimum number of frames of the first solve of an estimation.
   [[nodiscard]] std::size_t least() const noexcept;
   /// Minimum number of frames of any solve; enough to confirm a calibration that was given.
-  [[nodiscard]] std::size_t fewest() const noexcept;
+  [[nodiscard]] std::size_t min_to_solve() const noexcept;
 
   [[nodiscard]] const calibration::TrackLog& log() const noexcept { return log_; }
 

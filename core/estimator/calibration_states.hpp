@@ -18,7 +18,7 @@ enum class CalibrationTrigger : std::uint8_t {
   adopted_verified,  // the same, by a drive that holds its depths to the tolerated error
   confirmed,         // by the drive, while it was in use
   contradicted,      // the same
-  doubted,           // an alarm, or the user wants another one
+  suspected,         // an alarm, or the user wants another one
   kept,              // what was sought is no better, or the images fit the one before again
 };
 
@@ -36,11 +36,11 @@ inline constexpr std::array kCalibrationTransitions = {
                           CalibrationState::verified},
     CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::confirmed,
                           CalibrationState::verified},
-    CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::doubted,
+    CalibrationTransition{CalibrationState::unverified, CalibrationTrigger::suspected,
                           CalibrationState::suspect},
     CalibrationTransition{CalibrationState::verified, CalibrationTrigger::contradicted,
                           CalibrationState::unverified},
-    CalibrationTransition{CalibrationState::verified, CalibrationTrigger::doubted,
+    CalibrationTransition{CalibrationState::verified, CalibrationTrigger::suspected,
                           CalibrationState::suspect},
     CalibrationTransition{CalibrationState::suspect, CalibrationTrigger::adopted,
                           CalibrationState::unverified},

@@ -84,8 +84,8 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   sample.state = p.state;
   if (p.any && !(frame.stamp > p.last)) {
     sample.reason = Reason::time_gap;
-    p.note(EstimatorEvent::Kind::dropped, frame.stamp, "the frame is not newer than the one before",
-           (p.last - frame.stamp).to_seconds());
+    p.record(EstimatorEvent::Kind::dropped, frame.stamp,
+             "the frame is not newer than the one before", (p.last - frame.stamp).to_seconds());
     return sample;
   }
   p.any = true;
@@ -97,20 +97,20 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   const bool can_be_asked = p.state != State::lost && p.state != State::initialising;
   if (can_be_asked && p.requested.exchange(false, std::memory_order_relaxed) &&
       p.state == State::stereo_odometry && p.options.online)
-    p.doubt(CalibrationCause::requested, frame.number, frame);
+    p.suspect_rig(CalibrationCause::requested, frame.number, frame);
 
-  p.odometry.trust_rig(!p.doubts.stands(Doubt::calibration));
+  p.odometry.trust_rig(!p.degradations.stands(Degradation::calibration));
   odometry::FrameOutcome out = p.odometry.process(frame, p.options.frame_budget);
   p.follow(out, frame);
   if (p.options.online) {
     if (out.posed) {
       const bool linked = p.odometry.linked() == odometry::Link::linked;
       if (linked && p.state == State::stereo_odometry && !out.restarted) p.watch(out, frame);
-      if (!linked && (p.calibrator.seeking() || p.calibrator.monitor().map_reset_pending()))
+      if (!linked && (p.calibrator.estimating() || p.calibrator.monitor().map_reset_pending()))
         p.watch_estimate(out, frame);
       // Images of cameras out of sync cannot be calibrated from, even where no lag shows for a
       // while.
-      if (!p.doubts.stands(Doubt::out_of_sync) || p.state != State::stereo_odometry)
+      if (!p.degradations.stands(Degradation::out_of_sync) || p.state != State::stereo_odometry)
         p.calibrator.frames().take(p.odometry, out, frame);
     }
   }
@@ -119,8 +119,8 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
     if (out.relinked) {
       p.calibrator.map_rebuilt(p.odometry);
       if (out.relink_due)
-        p.note(EstimatorEvent::Kind::calibration_taken_up, frame.stamp,
-               "the scene is seen through the calibration adopted", 100 * out.points_kept);
+        p.record(EstimatorEvent::Kind::calibration_taken_up, frame.stamp,
+                 "the scene is seen through the calibration adopted", 100 * out.points_kept);
     }
     if (out.renewed) p.calibrator.monitor().map_renewed(p.odometry.map());
     p.calibrate(frame);
@@ -128,12 +128,12 @@ PoseSample Estimator::process(const RigFrame& given) noexcept {
   sample.state = p.state;
   sample.reason = out.reason;
   if (out.posed) {
-    p.renew_doubts(out, frame.pairing);
+    p.update_degradations(out, frame.pairing);
     p.propagate(out, &sample);
-    const DoubtLedger::Entry* why = p.doubts.strongest(p.moves);
+    const DegradationLedger::Entry* why = p.degradations.strongest(p.moves);
     sample.status = why == nullptr ? PoseStatus::ok : PoseStatus::degraded;
     sample.reason = why == nullptr ? Reason::none : why->reason;
-    p.weaken_doubts(out, frame.stamp);
+    p.weaken_degradations(out, frame.stamp);
   }
   sample.inliers = out.inliers;
   sample.stereo_inliers = out.stereo_inliers;
@@ -160,7 +160,7 @@ void Estimator::finish() noexcept {
   for (int attempt = 0; attempt < kLastSolves; ++attempt) {
     if (!p.calibrator.solve().running()) {
       if (!p.calibrator.start_last_solve()) return;
-      if (p.calibrator.seeking()) p.transition(Trigger::frames_enough, p.last);
+      if (p.calibrator.estimating()) p.transition(Trigger::frames_enough, p.last);
     }
     if (const auto decision = p.calibrator.decide_now(p.last, p.last_number))
       p.take(*decision, p.last);

@@ -80,6 +80,7 @@ struct EstimatorEvent {
   const char* why = "";
   double value =
       0;  // seconds of a gap, count of what was dropped, frames; 0 where nothing is counted
+  calibration::ChangeEvidence evidence;  // with rig_changed, where the monitor measured the change
 };
 
 /// Estimates the pose of each rig frame, and the rig's calibration while it drives. This is the

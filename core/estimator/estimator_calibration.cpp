@@ -33,7 +33,7 @@ CalibrationCause cause_of(calibration::MonitorResult::Kind kind) noexcept {
   return CalibrationCause::knock;
 }
 
-const char* sentence_of(CalibrationCause cause) noexcept {
+const char* cause_message(CalibrationCause cause) noexcept {
   switch (cause) {
     case CalibrationCause::from_scratch:
       return "no calibration";
@@ -58,22 +58,23 @@ const char* sentence_of(CalibrationCause cause) noexcept {
 }  // namespace
 
 /// Another calibration is sought: the rig has changed at `onset`, or is thought to have.
-void Estimator::Parts::seek(CalibrationCause cause, std::uint64_t onset,
-                            const RigFrame& frame) noexcept {
+void Estimator::Parts::start_estimation(CalibrationCause cause, std::uint64_t onset,
+                                        const RigFrame& frame) noexcept {
   transition(cause == CalibrationCause::requested ? Trigger::requested : Trigger::rig_changed,
              frame.stamp);
-  calibrator.seek(cause, onset, frame.number);
-  doubts.enter(Doubt::rig, Reason::recalibrating, frame.number);
-  doubts.enter(Doubt::calibration, Reason::unverified_calibration, frame.number);
+  calibrator.start_estimation(cause, onset, frame.number);
+  degradations.enter(Degradation::rig, Reason::recalibrating, frame.number);
+  degradations.enter(Degradation::calibration, Reason::unverified_calibration, frame.number);
   length_sigma_percent = kUnlinkedLengthPercent;
   odometry.unlink();
 }
 
-void Estimator::Parts::doubt(CalibrationCause cause, std::uint64_t onset,
-                             const RigFrame& frame) noexcept {
-  note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause),
-       static_cast<double>(frame.number - std::min(onset, frame.number)));
-  seek(cause, onset, frame);
+void Estimator::Parts::suspect_rig(CalibrationCause cause, std::uint64_t onset,
+                                   const RigFrame& frame,
+                                   const calibration::ChangeEvidence& evidence) noexcept {
+  record(EstimatorEvent::Kind::rig_changed, frame.stamp, cause_message(cause),
+         static_cast<double>(frame.number - std::min(onset, frame.number)), evidence);
+  start_estimation(cause, onset, frame);
 }
 
 /// Left and right hardly match with the calibration in use. One that the drive never confirmed was
@@ -82,20 +83,20 @@ void Estimator::Parts::give_up_calibration(const RigFrame& frame, double frames)
   const CalibrationCause cause =
       calibrator.verified() ? CalibrationCause::collapse : CalibrationCause::contradicted;
   if (cause == CalibrationCause::collapse)
-    note(EstimatorEvent::Kind::rig_changed, frame.stamp, sentence_of(cause), frames);
+    record(EstimatorEvent::Kind::rig_changed, frame.stamp, cause_message(cause), frames);
   else
-    note(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, sentence_of(cause), 0);
-  seek(cause, frame.number, frame);
+    record(EstimatorEvent::Kind::calibration_contradicted, frame.stamp, cause_message(cause), 0);
+  start_estimation(cause, frame.number, frame);
   // Where the cameras were is where they no longer are: what is found from there, on a facade that
   // repeats itself, is chance.
   odometry.reset_extrinsics();
 }
 
 void Estimator::Parts::record_out_of_sync(Stamp stamp, double lag_frames) noexcept {
-  if (!doubts.stands(Doubt::out_of_sync))
-    note(EstimatorEvent::Kind::out_of_sync, stamp, sentence_of(CalibrationCause::out_of_sync),
-         lag_frames);
-  doubts.enter(Doubt::out_of_sync, Reason::out_of_sync, last_number, 1);
+  if (!degradations.stands(Degradation::out_of_sync))
+    record(EstimatorEvent::Kind::out_of_sync, stamp, cause_message(CalibrationCause::out_of_sync),
+           lag_frames);
+  degradations.enter(Degradation::out_of_sync, Reason::out_of_sync, last_number, 1);
   calibrator.monitor().question_pairing();
   // Frames out of step would speak for a lag in the monitor's windows long after its end; those
   // logged for a calibration are dropped with them.
@@ -107,26 +108,27 @@ void Estimator::Parts::record_out_of_sync(Stamp stamp, double lag_frames) noexce
 void Estimator::Parts::watch(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   using K = calibration::MonitorResult::Kind;
   const RigAssessment v = calibrator.monitor().update(odometry, out, frame, calibrator.verified());
-  doubts.hold(Doubt::rig, v.undecided, Reason::recalibrating, frame.number);
+  degradations.hold(Degradation::rig, v.undecided, Reason::recalibrating, frame.number);
   if (v.lag_frames != 0) {
     record_out_of_sync(frame.stamp, v.lag_frames);
     return;
   }
   if (v.cameras_in_sync) {
-    doubts.strike(Doubt::late_image);
-    if (doubts.weaken(Doubt::out_of_sync)) {
-      note(EstimatorEvent::Kind::cameras_in_sync, frame.stamp, "the cameras are in sync again", 0);
+    degradations.strike(Degradation::late_image);
+    if (degradations.weaken(Degradation::out_of_sync)) {
+      record(EstimatorEvent::Kind::cameras_in_sync, frame.stamp, "the cameras are in sync again",
+             0);
       calibrator.clear_frames();
     }
   }
   // A rig out of step fits no calibration: what else the monitor says is of no use until that is
   // over.
-  if (doubts.stands(Doubt::out_of_sync)) return;
+  if (degradations.stands(Degradation::out_of_sync)) return;
   if (v.kind == K::collapse) {
     give_up_calibration(frame,
                         static_cast<double>(frame.number - std::min(v.onset_frame, frame.number)));
   } else if (v.kind != K::quiet) {
-    doubt(cause_of(v.kind), first_frame_of_use(v, frame.number), frame);
+    suspect_rig(cause_of(v.kind), first_frame_of_use(v, frame.number), frame, v.evidence);
   }
 }
 
@@ -136,9 +138,9 @@ void Estimator::Parts::watch_estimate(const odometry::FrameOutcome& out,
                                       const RigFrame& frame) noexcept {
   const auto onset = calibrator.monitor().update_unlinked(odometry, out, frame.number);
   if (!onset) return;
-  if (!calibrator.seeking()) return doubt(CalibrationCause::knock, *onset, frame);
-  note(EstimatorEvent::Kind::rig_changed, frame.stamp,
-       "a camera was knocked during the calibration", static_cast<double>(frame.number - *onset));
+  if (!calibrator.estimating()) return suspect_rig(CalibrationCause::knock, *onset, frame);
+  record(EstimatorEvent::Kind::rig_changed, frame.stamp,
+         "a camera was knocked during the calibration", static_cast<double>(frame.number - *onset));
   restart_estimation(
       calibrator.calibrated() ? CalibrationCause::knock : CalibrationCause::from_scratch, *onset,
       frame);
@@ -148,7 +150,7 @@ void Estimator::Parts::watch_estimate(const odometry::FrameOutcome& out,
 /// own is kept.
 void Estimator::Parts::restart_estimation(std::optional<CalibrationCause> cause,
                                           std::uint64_t onset, const RigFrame& frame) noexcept {
-  calibrator.seek(cause, onset, frame.number);
+  calibrator.start_estimation(cause, onset, frame.number);
   if (state == State::calibrating) transition(Trigger::calibration_rejected, frame.stamp);
 }
 
@@ -160,7 +162,7 @@ void Estimator::Parts::calibrate(const RigFrame& frame) noexcept {
                       state == State::stereo_odometry;
   if (solves && calibrator.can_solve()) {
     calibrator.start_solve();
-    if (calibrator.seeking()) transition(Trigger::frames_enough, frame.stamp);
+    if (calibrator.estimating()) transition(Trigger::frames_enough, frame.stamp);
   }
   notify_missing(frame.stamp);
 }
@@ -178,72 +180,72 @@ void Estimator::Parts::record_length_sigma(const CalibrationDecision& decision) 
 /// A calibration is adopted. Poses stand on it once the scene is seen through it; until then what
 /// is known against the one before it counts.
 void Estimator::Parts::adopt(const CalibrationDecision& decision) noexcept {
-  doubts.strike(Doubt::rig);
+  degradations.strike(Degradation::rig);
   verified_percent = decision.depth_sigma_percent;
-  doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number,
-               decision.verified ? 1 : DoubtLedger::kUntilStruck);
+  degradations.enter(Degradation::calibration, Reason::unverified_calibration, last_number,
+                     decision.verified ? 1 : DegradationLedger::kUntilStruck);
   odometry.link(decision.calibration);
 }
 
 /// Acts on the decision of a refinement.
-void Estimator::Parts::take_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept {
+void Estimator::Parts::adopt_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept {
   if (calibrator.last_gate() == calibration::Gate::out_of_sync) return record_out_of_sync(stamp, 0);
-  const bool was_doubted = doubts.stands(Doubt::calibration),
+  const bool was_suspect = degradations.stands(Degradation::calibration),
              contradicted = decision.cause == CalibrationCause::contradicted;
-  if (contradicted && was_doubted)
-    note(EstimatorEvent::Kind::calibration_contradicted, stamp,
-         "the calibration in use does not fit the rig", decision.depth_error_percent);
+  if (contradicted && was_suspect)
+    record(EstimatorEvent::Kind::calibration_contradicted, stamp,
+           "the calibration in use does not fit the rig", decision.depth_error_percent);
   if (decision.accepted) {
-    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
-         decision.calibration.frames);
+    record(EstimatorEvent::Kind::calibration_accepted, stamp, "a better calibration is adopted",
+           decision.calibration.frames);
     calibrator.refine(decision.calibration);
     adopt(decision);
   }
   if (decision.verified && !contradicted) {
     // The poses until now are confirmed, too: they stand on what is refined, at most.
-    doubts.strike(Doubt::calibration);
+    degradations.strike(Degradation::calibration);
     verified_percent = decision.depth_sigma_percent;
-    if (was_doubted) notify_verified(stamp);
-  } else if (!calibrator.verified() && !doubts.stands(Doubt::calibration)) {
-    doubts.enter(Doubt::calibration, Reason::unverified_calibration, last_number);
+    if (was_suspect) notify_verified(stamp);
+  } else if (!calibrator.verified() && !degradations.stands(Degradation::calibration)) {
+    degradations.enter(Degradation::calibration, Reason::unverified_calibration, last_number);
   }
 }
 
 void Estimator::Parts::notify_verified(Stamp stamp) noexcept {
-  note(EstimatorEvent::Kind::calibration_verified, stamp, "the calibration in use is verified",
-       verified_percent);
+  record(EstimatorEvent::Kind::calibration_verified, stamp, "the calibration in use is verified",
+         verified_percent);
 }
 
 void Estimator::Parts::take(const CalibrationDecision& decision, Stamp stamp) noexcept {
   (void)decisions.push(decision);
   if (decision.focal.contradicted && !std::exchange(focal_contradicted, true))
-    note(EstimatorEvent::Kind::focal_length_contradicted, stamp,
-         "the configured focal length does not fit the images", decision.focal.measured_px);
+    record(EstimatorEvent::Kind::focal_length_contradicted, stamp,
+           "the configured focal length does not fit the images", decision.focal.measured_px);
   focal_contradicted = decision.focal.contradicted;
-  if (decision.learnt) {
-    take_refinement(decision, stamp);
+  if (decision.is_refinement) {
+    adopt_refinement(decision, stamp);
     return record_length_sigma(decision);
   }
   record_length_sigma(decision);
   if (decision.accepted) {
-    note(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
-         decision.calibration.frames);
+    record(EstimatorEvent::Kind::calibration_accepted, stamp, "a calibration is accepted",
+           decision.calibration.frames);
     calibrator.use(decision);
     adopt(decision);
     transition(Trigger::calibration_accepted, stamp);
     return;
   }
-  note(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason,
-       decision.calibration.frames);
+  record(EstimatorEvent::Kind::calibration_rejected, stamp, decision.reason,
+         decision.calibration.frames);
   switch (calibrator.last_gate()) {
     case calibration::Gate::no_better:
       calibrator.keep();
-      doubts.strike(Doubt::rig);
+      degradations.strike(Degradation::rig);
       odometry.link(calibrator.in_use());
       transition(Trigger::calibration_saved, stamp);
       break;
     case calibration::Gate::out_of_sync:
-      doubts.enter(Doubt::out_of_sync, Reason::out_of_sync, last_number, 1);
+      degradations.enter(Degradation::out_of_sync, Reason::out_of_sync, last_number, 1);
       calibrator.monitor().question_pairing();
       [[fallthrough]];
     default:
@@ -256,11 +258,11 @@ void Estimator::Parts::notify_missing(Stamp stamp) noexcept {
   if (missing == notified_missing) return;
   notified_missing = missing;
   if (missing == Reason::needs_motion)
-    note(EstimatorEvent::Kind::calibration_pending, stamp,
-         "the rig must move before it can be calibrated", 0);
+    record(EstimatorEvent::Kind::calibration_pending, stamp,
+           "the rig must move before it can be calibrated", 0);
   else if (missing == Reason::needs_near_structure)
-    note(EstimatorEvent::Kind::calibration_pending, stamp,
-         "near objects must be visible before the rig can be calibrated", 0);
+    record(EstimatorEvent::Kind::calibration_pending, stamp,
+           "near objects must be visible before the rig can be calibrated", 0);
 }
 
 }  // namespace vergence

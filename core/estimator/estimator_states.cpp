@@ -35,25 +35,26 @@ Covariance6 upper_triangle(const Mat6& C) noexcept {
 void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept {
   // Once a gap: covered cameras give frame after frame that lies behind it.
   if (out.gap_s > 0 && !in_gap)
-    note(EstimatorEvent::Kind::time_gap, frame.stamp,
-         "no frame for longer than motion can be predicted", out.gap_s);
+    record(EstimatorEvent::Kind::time_gap, frame.stamp,
+           "no frame for longer than motion can be predicted", out.gap_s);
   in_gap = out.gap_s > 0 && !out.posed;
   // Images of two instants match by no calibration: cameras that are or may be out of step say
   // nothing against it.
-  const bool unmatched = !out.posed && out.images_good && !doubts.stands(Doubt::out_of_sync) &&
-                         !doubts.stands(Doubt::late_image) &&
-                         out.reason == Reason::no_stereo_matches &&
-                         odometry.linked() == odometry::Link::linked;
+  const bool unmatched =
+      !out.posed && out.images_good && !degradations.stands(Degradation::out_of_sync) &&
+      !degradations.stands(Degradation::late_image) && out.reason == Reason::no_stereo_matches &&
+      odometry.linked() == odometry::Link::linked;
   unmatched_frames = unmatched ? unmatched_frames + 1 : 0;
   if (options.online && unmatched_frames == kUnmatchedAfter) {
     unmatched_frames = 0;
     give_up_calibration(frame, kUnmatchedAfter);
   }
   if (out.uneven) {
-    doubts.enter(Doubt::late_image, Reason::image_repeated, frame.number, kLagShownAfter);
+    degradations.enter(Degradation::late_image, Reason::image_repeated, frame.number,
+                       kLagShownAfter);
     calibrator.monitor().question_pairing();
     // Frames from before and frames out of step would be one solve, and a rig that is neither's.
-    if (calibrator.seeking()) restart_estimation(std::nullopt, frame.number, frame);
+    if (calibrator.estimating()) restart_estimation(std::nullopt, frame.number, frame);
   }
   moves = out.posed && !odometry::may_be_none(drift.motion_to(out.T_left_world), motion_of(out));
   if (!out.posed) {
@@ -65,37 +66,38 @@ void Estimator::Parts::follow(const odometry::FrameOutcome& out, const RigFrame&
   }
   without_pose = 0;
   if (out.resumed) {
-    calibrator.take_back(odometry.rig());
-    doubts.strike(Doubt::rig);
-    note(EstimatorEvent::Kind::calibration_resumed, frame.stamp,
-         "the previous calibration fits the images again", 0);
+    calibrator.restore(odometry.rig());
+    degradations.strike(Degradation::rig);
+    record(EstimatorEvent::Kind::calibration_resumed, frame.stamp,
+           "the previous calibration fits the images again", 0);
   }
   if (state == State::lost)
     transition(odometry.linked() == odometry::Link::linked ? Trigger::pose_found
                : !calibrator.calibrated()                  ? Trigger::pose_found_uncalibrated
-               : calibrator.seeking()                      ? Trigger::pose_found_doubtful
-                                      : Trigger::pose_found,  // found, and linked with this frame
+               : calibrator.estimating()
+                   ? Trigger::pose_found_suspect
+                   : Trigger::pose_found,  // found, and linked with this frame
                frame.stamp);
   if (state == State::initialising) {
     transition(Trigger::pair_found, frame.stamp);
-    calibrator.seek(CalibrationCause::from_scratch, 0, frame.number);
+    calibrator.start_estimation(CalibrationCause::from_scratch, 0, frame.number);
   }
   if (out.restarted) {
-    note(EstimatorEvent::Kind::map_reset, frame.stamp,
-         "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
+    record(EstimatorEvent::Kind::map_reset, frame.stamp,
+           "the map was rebuilt; the motion since the last pose is extrapolated", out.gap_s);
     lose_track_of_rig(frame.number);
   }
   if (out.relocalised)
-    note(EstimatorEvent::Kind::relocalised, frame.stamp,
-         "relocalised against the points of the window", 0);
+    record(EstimatorEvent::Kind::relocalised, frame.stamp,
+           "relocalised against the points of the window", 0);
 }
 
 /// Frames were missed in which nobody watched the rig: the drive has to confirm the calibration
 /// again.
 void Estimator::Parts::lose_track_of_rig(std::uint64_t number) noexcept {
   calibrator.map_lost();
-  if (options.online && !doubts.stands(Doubt::calibration))
-    doubts.enter(Doubt::calibration, Reason::unverified_calibration, number);
+  if (options.online && !degradations.stands(Degradation::calibration))
+    degradations.enter(Degradation::calibration, Reason::unverified_calibration, number);
 }
 
 /// Covariance of the motion since the last pose.
@@ -108,65 +110,72 @@ void Estimator::Parts::propagate(const odometry::FrameOutcome& out, PoseSample* 
   sample->T_world_left = out.T_left_world.inverse();
   const double length_sigma = 0.01 * length_sigma_percent;
   const Mat6 motion = motion_of(out);
-  doubt_motion(out, motion, drift.motion_to(out.T_left_world).t.norm());
-  const Mat6 told = motion + odometry::correction_covariance(out.corrected);
-  drift.step(out.T_left_world, told, length_sigma, out.keyframe);
+  check_motion(out, motion, drift.motion_to(out.T_left_world).t.norm());
+  const Mat6 reported = motion + odometry::correction_covariance(out.corrected);
+  drift.step(out.T_left_world, reported, length_sigma, out.keyframe);
   sample->covariance = upper_triangle(drift.pose());
-  sample->motion_covariance = upper_triangle(told);
+  sample->motion_covariance = upper_triangle(reported);
   sample->corrected_m = static_cast<float>(out.corrected.t.norm());
   sample->length_sigma = static_cast<float>(length_sigma);
 }
 
 /// Against the drive's other motions and what the window made of it, where nothing else is known to
 /// be wrong.
-void Estimator::Parts::doubt_motion(const odometry::FrameOutcome& out, const Mat6& motion,
+void Estimator::Parts::check_motion(const odometry::FrameOutcome& out, const Mat6& motion,
                                     double step_m) noexcept {
-  doubts.strike(Doubt::motion);
-  if (doubts.any_up_to(Doubt::rig) || doubts.stands(Doubt::dynamic_scene)) return;
+  degradations.strike(Degradation::motion);
+  if (degradations.any_up_to(Degradation::rig) || degradations.stands(Degradation::dynamic_scene))
+    return;
   const double sigma_m = std::sqrt(motion.topLeftCorner<3, 3>().trace());
   const WindowCorrection correction{out.corrected.t.norm(), step_m, sigma_m};
-  const bool unusual = usual.judges(step_m, sigma_m) && usual.unusual(sigma_m);
-  doubts.hold(Doubt::motion, unusual || correction.spoils_motion(), Reason::weak_geometry,
-              last_number);
+  const bool unusual = usual.measurable(step_m, sigma_m) && usual.unusual(sigma_m);
+  degradations.hold(Degradation::motion, unusual || correction.spoils_motion(),
+                    Reason::weak_geometry, last_number);
 }
 
 /// Enters the doubts that a posed frame gives rise to.
-void Estimator::Parts::renew_doubts(const odometry::FrameOutcome& out, Pairing pairing) noexcept {
-  doubts.hold(Doubt::pairing, pairing == Pairing::contradicted, Reason::pairing_ambiguous,
-              last_number);
+void Estimator::Parts::update_degradations(const odometry::FrameOutcome& out,
+                                           Pairing pairing) noexcept {
+  degradations.hold(Degradation::pairing, pairing == Pairing::contradicted,
+                    Reason::pairing_ambiguous, last_number);
   if (out.restarted)
-    doubts.enter(Doubt::scene, Reason::map_reset, last_number, kRestartedFrames + 1);
-  doubts.hold(Doubt::frame, out.status != PoseStatus::ok,
-              out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason, last_number);
-  if (state == State::recalibrating) doubts.enter(Doubt::rig, Reason::recalibrating, last_number);
-  if (out.moving && !doubts.any_up_to(Doubt::rig))
-    doubts.enter(Doubt::dynamic_scene, Reason::dynamic_scene, last_number, kMovingFrames);
+    degradations.enter(Degradation::scene, Reason::map_reset, last_number, kRestartedFrames + 1);
+  degradations.hold(Degradation::frame, out.status != PoseStatus::ok,
+                    out.reason == Reason::uncalibrated ? why_uncalibrated() : out.reason,
+                    last_number);
+  if (state == State::recalibrating)
+    degradations.enter(Degradation::rig, Reason::recalibrating, last_number);
+  if (out.moving && !degradations.any_up_to(Degradation::rig))
+    degradations.enter(Degradation::dynamic_scene, Reason::dynamic_scene, last_number,
+                       kMovingFrames);
   // Errors of doubted frames stay in the window's keyframes and points; the window corrects them
   // over the next frames, whose motions are off by the corrections. So poses stay degraded for as
   // many frames as were doubted, at most for a window's length.
   if (out.relinked || out.restarted)
-    doubts.strike(Doubt::window);
+    degradations.strike(Degradation::window);
   else if (out.gap_s > 0 || out.renewed)
-    doubts.enter(Doubt::window, Reason::time_gap, last_number, kWindowFrames + 1);
-  else if (doubts.stands(Doubt::rig))
-    doubts.enter(Doubt::window, Reason::recalibrating, last_number,
-                 std::min(doubts[Doubt::window].left + 2, kWindowFrames + 1));
+    degradations.enter(Degradation::window, Reason::time_gap, last_number, kWindowFrames + 1);
+  else if (degradations.stands(Degradation::rig))
+    degradations.enter(Degradation::window, Reason::recalibrating, last_number,
+                       std::min(degradations[Degradation::window].left + 2, kWindowFrames + 1));
 }
 
 /// Weakens or ends the doubts that a posed frame is evidence against.
-void Estimator::Parts::weaken_doubts(const odometry::FrameOutcome& out, Stamp stamp) noexcept {
-  for (const Doubt doubt : {Doubt::scene, Doubt::dynamic_scene, Doubt::window})
-    (void)doubts.weaken(doubt);
+void Estimator::Parts::weaken_degradations(const odometry::FrameOutcome& out,
+                                           Stamp stamp) noexcept {
+  for (const Degradation degradation :
+       {Degradation::scene, Degradation::dynamic_scene, Degradation::window})
+    (void)degradations.weaken(degradation);
   // A rig that stands looks the same with a camera an exposure behind.
-  if (moves && !out.uneven && !options.online) (void)doubts.weaken(Doubt::late_image);
+  if (moves && !out.uneven && !options.online) (void)degradations.weaken(Degradation::late_image);
   // The next pose stands on the calibration that was adopted.
-  if (out.relinked && doubts.weaken(Doubt::calibration)) notify_verified(stamp);
+  if (out.relinked && degradations.weaken(Degradation::calibration)) notify_verified(stamp);
 }
 
 /// The most specific known reason for poses of unlinked cameras.
 Reason Estimator::Parts::why_uncalibrated() const noexcept {
   if (calibrator.last_gate() == calibration::Gate::cameras_swapped) return Reason::cameras_swapped;
-  if (doubts.stands(Doubt::out_of_sync)) return Reason::out_of_sync;
+  if (degradations.stands(Degradation::out_of_sync)) return Reason::out_of_sync;
   if (calibrator.missing() != Reason::none) return calibrator.missing();
   return state == State::parallel_monocular || state == State::calibrating ? Reason::uncalibrated
                                                                            : Reason::recalibrating;

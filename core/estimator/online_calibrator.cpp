@@ -27,8 +27,8 @@ double misfit_px(const CalibrationDecision& d) noexcept {
 }
 
 /// Another rig is adopted: what was learnt of the one before is no prior of it, but for the lenses.
-void clear_rig(std::optional<RigCalibration>* learnt) noexcept {
-  if (*learnt) calibration::clear_transforms(&**learnt);
+void clear_rig(std::optional<RigCalibration>* refined) noexcept {
+  if (*refined) calibration::clear_transforms(&**refined);
 }
 
 }  // namespace
@@ -55,16 +55,15 @@ OnlineCalibrator::OnlineCalibrator(const EstimatorOptions& options, const RigCal
   monitor_.watch(rig_, false);
   monitor_.set_jump_reference(rig_);
   frames_.begin_segment();
-  frames_.want(frames_.fewest());
+  frames_.want(frames_.min_to_solve());
 }
 
 void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
   state_ = after(
       state_, found.verified ? CalibrationTrigger::adopted_verified : CalibrationTrigger::adopted);
   rig_ = found.calibration;
-  source_ = calibration::ClaimSource::this_drive;
-  found_with_lenses_ = found.lenses;
-  clear_rig(&learnt_);
+  source_ = calibration::CalibrationOrigin::this_drive;
+  clear_rig(&refined_);
   monitor_.expect_rebuilt_scene();
   frames_.begin_segment();
 }
@@ -72,12 +71,12 @@ void OnlineCalibrator::use(const CalibrationDecision& found) noexcept {
 void OnlineCalibrator::keep() noexcept {
   state_ = after(state_, CalibrationTrigger::kept);
   // Measurements from before the rig became suspect do not describe the present rig.
-  if (search_.cause != CalibrationCause::requested) clear_rig(&learnt_);
+  if (search_.cause != CalibrationCause::requested) clear_rig(&refined_);
   monitor_.expect_rebuilt_scene();
   frames_.begin_segment();
 }
 
-void OnlineCalibrator::take_back(const RigCalibration& rig) noexcept {
+void OnlineCalibrator::restore(const RigCalibration& rig) noexcept {
   state_ = after(state_, CalibrationTrigger::contradicted);
   rig_ = rig;
   keep();
@@ -85,8 +84,7 @@ void OnlineCalibrator::take_back(const RigCalibration& rig) noexcept {
 
 void OnlineCalibrator::refine(const RigCalibration& rig) noexcept {
   rig_ = rig;
-  source_ = calibration::ClaimSource::this_drive;
-  found_with_lenses_ = options_.calibration.intrinsics == calibration::IntrinsicsEstimation::full;
+  source_ = calibration::CalibrationOrigin::this_drive;
   monitor_.expect_rebuilt_scene();
 }
 
@@ -101,15 +99,15 @@ void OnlineCalibrator::clear_frames() noexcept {
 }
 
 void OnlineCalibrator::map_lost() noexcept {
-  clear_rig(&learnt_);
+  clear_rig(&refined_);
   clear_frames();
   monitor_.map_lost();
 }
 
-void OnlineCalibrator::seek(std::optional<CalibrationCause> cause, std::uint64_t onset,
-                            std::uint64_t now) noexcept {
+void OnlineCalibrator::start_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
+                                        std::uint64_t now) noexcept {
   search_ = {.cause = cause.value_or(search_.cause), .onset = onset, .since = now};
-  state_ = after(state_, CalibrationTrigger::doubted);
+  state_ = after(state_, CalibrationTrigger::suspected);
   gate_ = Gate::open;
   solve_.discard();
   frames_.begin_segment(onset);
@@ -118,7 +116,7 @@ void OnlineCalibrator::seek(std::optional<CalibrationCause> cause, std::uint64_t
 }
 
 Reason OnlineCalibrator::missing() const noexcept {
-  if (!seeking()) return Reason::none;
+  if (!estimating()) return Reason::none;
   if (frames_.standing() || gate_ == Gate::needs_motion) return Reason::needs_motion;
   return gate_ == Gate::needs_near_structure ? Reason::needs_near_structure : Reason::none;
 }
@@ -129,15 +127,15 @@ void OnlineCalibrator::start_solve() noexcept {
   frames_.solve_begun();
   BackgroundSolve::Start start;
   start.rig = rig_;
-  start.from_rig = !seeking();
-  start.sought = seeking();
+  start.from_rig = !estimating();
+  start.for_new_rig = estimating();
   RigCalibration prior;
-  if (learnt_) {
-    prior = *learnt_;
+  if (refined_) {
+    prior = *refined_;
     start.prior = &prior;
     const calibration::TrackLog& log = frames_.log();
     const double hours = (log.frame(log.size() - 1).stamp - prior.found).to_seconds() / 3600.0;
-    if (seeking())
+    if (estimating())
       calibration::clear_transforms(&prior);
     else
       calibration::let_drift(hours, options_.calibration, &prior);
@@ -145,7 +143,7 @@ void OnlineCalibrator::start_solve() noexcept {
   solve_.start(frames_.log(), start);
 }
 
-SolutionReview OnlineCalibrator::review(bool last) const noexcept {
+SolutionReview OnlineCalibrator::review() const noexcept {
   return {solve_.solved(),
           {.options = options_,
            .nominal = nominal_,
@@ -153,8 +151,7 @@ SolutionReview OnlineCalibrator::review(bool last) const noexcept {
            .source = source_,
            .log = frames_.log(),
            .focal = solve_.focal_check(),
-           .may_have_changed = !(seeking() && search_.change_believed),
-           .last = last}};
+           .may_have_changed = !(estimating() && search_.change_believed)}};
 }
 
 std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
@@ -163,68 +160,68 @@ std::optional<CalibrationDecision> OnlineCalibrator::decide(Stamp stamp,
   if (!solve_.running() || !solve_.next_frame()) return std::nullopt;
   // Frames that stand are not logged: who stops then waits with the decision, for frames that were
   // not used have to speak for it.
-  if (!solve_.outdated(seeking()) && !review(false).held_out_enough()) return std::nullopt;
+  if (!solve_.outdated(estimating()) && !review().held_out_enough()) return std::nullopt;
   // An estimate is adopted as soon as the frames after its snapshot confirm it, and rejected only
   // when more of them would not help. A refinement waits only for the frames that it is evaluated
   // with.
-  if (solve_.sought() && !solve_.outdated(seeking()) && !solve_.last_turn()) {
-    const SolutionReview now = review(false);
-    if (now.gate(now.sought()) != Gate::open) {
+  if (solve_.for_new_rig() && !solve_.outdated(estimating()) && !solve_.last_turn()) {
+    if (review().gate() != Gate::open) {
       solve_.postpone();
       return std::nullopt;
     }
   }
-  return judge(stamp, number, false);
+  return evaluate(stamp, number, false);
 }
 
 std::optional<CalibrationDecision> OnlineCalibrator::decide_now(Stamp stamp,
                                                                 std::uint64_t number) noexcept {
   if (!solve_.running()) return std::nullopt;
   solve_.finish();
-  return judge(stamp, number, true);
+  return evaluate(stamp, number, true);
 }
 
 bool OnlineCalibrator::start_last_solve() noexcept {
-  const bool more = seeking() || frames_.new_since_solve();
+  const bool more = estimating() || frames_.new_since_solve();
   if (solve_.running() || !more || !frames_.enough_for_any()) return false;
   start_solve();
   return true;
 }
 
-std::optional<CalibrationDecision> OnlineCalibrator::judge(Stamp stamp, std::uint64_t number,
-                                                           bool last) noexcept {
+std::optional<CalibrationDecision> OnlineCalibrator::evaluate(Stamp stamp, std::uint64_t number,
+                                                              bool last) noexcept {
   solve_.close();
-  if (solve_.outdated(seeking())) return std::nullopt;
-  const SolutionReview now = review(last);
-  // Frames of two rigs, or out of step, tell no focal length.
-  const Gate gate = now.gate(now.measured(), false);
+  if (solve_.outdated(estimating())) return std::nullopt;
+  // Frames of two rigs, or out of sync, do not measure a focal length.
+  const Gate gate = review().gate(false);
   if (gate != Gate::rig_changed && gate != Gate::out_of_sync)
     solve_.focal_check().take(frames_.solved_frames() >= frames_.most());
-  return solve_.sought() ? evaluate_estimate(now, stamp, number)
-                         : evaluate_refinement(now, stamp, number, last);
+  return solve_.for_new_rig() ? evaluate_estimate(stamp, number)
+                              : evaluate_refinement(stamp, number, last);
 }
 
-CalibrationDecision OnlineCalibrator::evaluate_estimate(const SolutionReview& review, Stamp stamp,
+CalibrationDecision OnlineCalibrator::evaluate_estimate(Stamp stamp,
                                                         std::uint64_t number) noexcept {
-  const RigSolution& found = review.sought();
-  gate_ = review.gate(found);
-  CalibrationDecision d = review.decision(found, stamp);
+  const SolutionReview solution = review();
+  gate_ = solution.gate();
+  CalibrationDecision d = solution.decision(stamp);
   d.cause = search_.cause;
   d.latency_frames = static_cast<int>(number - search_.since);
   d.onset_frame = search_.onset;
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
-  review.assess_next(found.rig, &d);
-  if (!d.accepted) plan_search(found);
+  solution.assess_next(&d);
+  if (!d.accepted) plan_search();
   return d;
 }
 
-void OnlineCalibrator::plan_search(const RigSolution& found) noexcept {
-  if (gate_ == Gate::sigmas_too_large || gate_ == Gate::needs_motion ||
+void OnlineCalibrator::plan_search() noexcept {
+  const RigSolution& found = solve_.solved();
+  if (gate_ == Gate::depth_unknown || gate_ == Gate::needs_motion ||
       gate_ == Gate::needs_near_structure) {
     // More of the same helps: sigmas fall with the root of the number of frames.
-    const double excess = gate_ == Gate::sigmas_too_large
-                              ? calibration::sigma_excess(found.rig, options_.calibration)
+    const double excess = gate_ == Gate::depth_unknown
+                              ? calibration::depth_excess(found.rig, options_.calibration,
+                                                          options_.odometry.pixel_sigma)
                               : 1.0;
     const double grow = std::clamp(excess * excess, kGrow, 4.0);
     frames_.want(static_cast<std::size_t>(std::ceil(grow * found.frames)));
@@ -242,7 +239,7 @@ void OnlineCalibrator::plan_search(const RigSolution& found) noexcept {
 }
 
 /// The claim in use is confirmed, or is no more: the monitor expects as much of it.
-void OnlineCalibrator::learnt_of_it(CalibrationTrigger what, double misfit_px) noexcept {
+void OnlineCalibrator::apply_assessment(CalibrationTrigger what, double misfit_px) noexcept {
   const CalibrationState before = std::exchange(state_, after(state_, what));
   if (state_ == before) return;
   monitor_.watch(rig_, verified() && found());
@@ -251,27 +248,26 @@ void OnlineCalibrator::learnt_of_it(CalibrationTrigger what, double misfit_px) n
     monitor_.expect_scatter(std::max(options_.monitor.verified_bias_px, misfit_px));
 }
 
-CalibrationDecision OnlineCalibrator::evaluate_refinement(const SolutionReview& review, Stamp stamp,
-                                                          std::uint64_t number,
+CalibrationDecision OnlineCalibrator::evaluate_refinement(Stamp stamp, std::uint64_t number,
                                                           bool last) noexcept {
-  const RigSolution& found = review.measured();
-  gate_ = review.gate(found, false);
-  CalibrationDecision d = review.decision(found, stamp);
+  const RigSolution& found = solve_.solved();
+  const SolutionReview solution = review();
+  gate_ = solution.gate(false);
+  CalibrationDecision d = solution.decision(stamp);
   d.cause = CalibrationCause::refinement;
   d.latency_frames = static_cast<int>(number - search_.since);
   d.onset_frame = search_.onset;
-  d.learnt = true;
+  d.is_refinement = true;
   if (found.status == calibration::RigSolveStatus::ok) {
-    const calibration::Assessment a = review.assess(found, rig_, source_);
+    const calibration::Assessment a = solution.assess(rig_, source_);
     d.reference_depth_m = a.depth_m;
     d.depth_sigma_percent = a.sigma_percent;
     d.depth_error_percent = a.difference_percent;
     if (a.contradicted) d.cause = CalibrationCause::contradicted;
-    // Without a frame that was not used, more frames of the same kind are better and another kind
-    // is not.
+    // At the end of a drive no frame is left that was not used; the solve of more frames is better.
     const calibration::TrackLog& log = frames_.log();
     const bool better = last && log.frame(log.size() - 1).number == found.newest
-                            ? found_with_lenses_ == d.lenses
+                            ? source_ == calibration::CalibrationOrigin::this_drive
                             : a.better;
     if (gate_ == Gate::open && !better && !(a.contradicted && !a.worse)) gate_ = Gate::no_better;
     // One that the drive has confirmed is not given for one that it has not.
@@ -283,27 +279,28 @@ CalibrationDecision OnlineCalibrator::evaluate_refinement(const SolutionReview& 
                      : a.confirmed && a.sigma_percent > 0 && calibration::of_this_rig(gate_);
     d.verified = d.verified && !d.focal.contradicted;
     if (d.verified)
-      learnt_of_it(CalibrationTrigger::confirmed, misfit_px(d));
+      apply_assessment(CalibrationTrigger::confirmed, misfit_px(d));
     else if (a.contradicted || d.focal.contradicted)
-      learnt_of_it(CalibrationTrigger::contradicted, misfit_px(d));
+      apply_assessment(CalibrationTrigger::contradicted, misfit_px(d));
   }
   d.accepted = gate_ == Gate::open;
   d.reason = calibration::reason(gate_);
-  if (d.accepted && d.cause == CalibrationCause::contradicted) clear_rig(&learnt_);
-  plan_learning(found);
+  if (d.accepted && d.cause == CalibrationCause::contradicted) clear_rig(&refined_);
+  plan_refinement();
   return d;
 }
 
 /// A full segment is closed: what it has shown is the next one's prior. So is one that the frames
 /// after it contradict: they are of another rig, and not to be solved with it.
-void OnlineCalibrator::plan_learning(const RigSolution& found) noexcept {
+void OnlineCalibrator::plan_refinement() noexcept {
+  const RigSolution& found = solve_.solved();
   const bool usable = gate_ == Gate::open || gate_ == Gate::no_better;
   if (gate_ == Gate::does_not_fit) {
     frames_.begin_segment(found.newest + 1);
   } else if (gate_ == Gate::rig_changed) {
     frames_.begin_segment(found.changed_at);
   } else if (frames_.solved_frames() >= frames_.most()) {
-    if (usable) learnt_ = found.rig;
+    if (usable) refined_ = found.rig;
     frames_.begin_segment(found.newest + 1);
     frames_.want_full();
   } else {

@@ -44,8 +44,9 @@ class OnlineCalibrator {
   /// Starts estimating a new calibration. Frames before frame number `onset` belong to another rig
   /// and are dropped, and a running solve of them is discarded. Without a cause, that of the
   /// estimation before is kept.
-  void seek(std::optional<CalibrationCause> cause, std::uint64_t onset, std::uint64_t now) noexcept;
-  [[nodiscard]] bool seeking() const noexcept {
+  void start_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
+                        std::uint64_t now) noexcept;
+  [[nodiscard]] bool estimating() const noexcept {
     return state_ == CalibrationState::none || state_ == CalibrationState::suspect;
   }
   /// True if there are frames enough to solve from and no solve is running.
@@ -83,7 +84,7 @@ class OnlineCalibrator {
   /// Ends the estimation without a result: the calibration in use is as good and stays.
   void keep() noexcept;
   /// Puts an earlier calibration back into use, because the images fit it.
-  void take_back(const RigCalibration& rig) noexcept;
+  void restore(const RigCalibration& rig) noexcept;
   [[nodiscard]] const RigCalibration& in_use() const noexcept { return rig_; }
   [[nodiscard]] bool calibrated() const noexcept { return state_ != CalibrationState::none; }
   [[nodiscard]] bool verified() const noexcept { return state_ == CalibrationState::verified; }
@@ -99,28 +100,26 @@ class OnlineCalibrator {
   };
 
   /// `misfit_px`: how far off the epipolar lines of the one in use are.
-  void learnt_of_it(CalibrationTrigger what, double misfit_px) noexcept;
+  void apply_assessment(CalibrationTrigger what, double misfit_px) noexcept;
   /// The calibration in use was solved from images, this drive's or an earlier one's, and its
   /// lenses with it: its epipolar lines hold better than those of a claim.
   [[nodiscard]] bool found() const noexcept { return !rig_.covariance.empty(); }
-  [[nodiscard]] SolutionReview review(bool last) const noexcept;
+  [[nodiscard]] SolutionReview review() const noexcept;
   /// `last`: no more frames come that could make it better.
-  [[nodiscard]] std::optional<CalibrationDecision> judge(Stamp stamp, std::uint64_t number,
-                                                         bool last) noexcept;
-  [[nodiscard]] CalibrationDecision evaluate_estimate(const SolutionReview& review, Stamp stamp,
-                                                      std::uint64_t number) noexcept;
-  [[nodiscard]] CalibrationDecision evaluate_refinement(const SolutionReview& review, Stamp stamp,
-                                                        std::uint64_t number, bool last) noexcept;
+  [[nodiscard]] std::optional<CalibrationDecision> evaluate(Stamp stamp, std::uint64_t number,
+                                                            bool last) noexcept;
+  [[nodiscard]] CalibrationDecision evaluate_estimate(Stamp stamp, std::uint64_t number) noexcept;
+  [[nodiscard]] CalibrationDecision evaluate_refinement(Stamp stamp, std::uint64_t number,
+                                                        bool last) noexcept;
   /// Chooses the frames of the next solve from the gate's result.
-  void plan_search(const calibration::RigSolution& found) noexcept;
-  void plan_learning(const calibration::RigSolution& found) noexcept;
+  void plan_search() noexcept;
+  void plan_refinement() noexcept;
 
   const EstimatorOptions& options_;
   RigCalibration rig_, nominal_;
   CalibrationState state_;
-  calibration::ClaimSource source_ = calibration::ClaimSource::elsewhere;
-  bool found_with_lenses_ = false;
-  std::optional<RigCalibration> learnt_;  // what closed segments show, with the lenses free
+  calibration::CalibrationOrigin source_ = calibration::CalibrationOrigin::elsewhere;
+  std::optional<RigCalibration> refined_;  // what closed segments show, with the lenses free
   CalibrationFrames frames_;
   BackgroundSolve solve_;
   RigMonitor monitor_;

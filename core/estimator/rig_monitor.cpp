@@ -48,6 +48,13 @@ const Transform& transform(const RigCalibration& rig, int k) noexcept {
   return rig.T_camera_left[static_cast<std::size_t>(k)];
 }
 
+/// A rotation of σ about the axis that epipolar lines do not show moves all points by f σ.
+calibration::ChangeEvidence evidence_of(const calibration::DisparityJump& jump,
+                                        double focal_px) noexcept {
+  const double sigmas = jump.px / jump.sigma_px, px = std::abs(jump.px);
+  return {0.5 * sigmas * sigmas, px, 1e3 * px / focal_px};
+}
+
 /// The left camera and camera k.
 bool both_show(const odometry::FrameOutcome& outcome, int k) noexcept {
   return (outcome.structured & 1U) != 0 &&
@@ -211,14 +218,14 @@ MonitorResult RigMonitor::monitor_verdict(int k, const odometry::Odometry& odome
   f.stereo = stereo_.span();
   f.expected_stereo = outcome.images_good ? expected_stereo(odometry, k, outcome.T_left_world) : 0;
   f.found_stereo = found;
-  MonitorResult v = w.monitor.look(f);
+  MonitorResult v = w.monitor.update(f);
   if (w.grace > 0) {
     --w.grace;
     // A claim that is off is no knock; nothing based on it is `ok`.
-    const bool doubted = confirmed_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
+    const bool suspect = confirmed_ && (v.undecided || v.kind != MonitorResult::Kind::quiet ||
                                         w.pairing.distance_px() > kFarFromLines);
     v = MonitorResult{};
-    v.undecided = doubted;
+    v.undecided = suspect;
   }
   return v;
 }
@@ -263,11 +270,13 @@ RigAssessment RigMonitor::update(const odometry::Odometry& odometry,
     } else if (jump.confirmed && v.kind < Kind::knock) {
       v.kind = Kind::knock;
       v.onset_frame = jump.onset_frame;
+      v.evidence = evidence_of(jump, pinhole(rig_, k).fx);
     }
     rig.undecided = rig.undecided || v.undecided || jump.suspected;
     if (v.kind <= rig.kind) continue;
     rig.kind = v.kind;
     rig.onset_frame = v.onset_frame;
+    rig.evidence = v.evidence;
   }
   return rig;
 }

@@ -17,7 +17,7 @@ enum class Trigger : std::uint8_t {
   requested,             // the user wants a new calibration
   pose_lost,
   pose_found,               // with a calibration in use
-  pose_found_doubtful,      // with one in use that is doubted
+  pose_found_suspect,       // with one in use that is doubted
   pose_found_uncalibrated,  // without one
 };
 
@@ -55,7 +55,7 @@ inline constexpr std::array kTransitions = {
                "the calibration in use fits as well as a new one"},
     Transition{State::recalibrating, Trigger::pose_lost, State::lost, "no pose for three frames"},
     Transition{State::lost, Trigger::pose_found, State::stereo_odometry, "relocalised"},
-    Transition{State::lost, Trigger::pose_found_doubtful, State::recalibrating,
+    Transition{State::lost, Trigger::pose_found_suspect, State::recalibrating,
                "relocalised; the rig is still suspect"},
     Transition{State::lost, Trigger::pose_found_uncalibrated, State::initialising,
                "relocalised, without a calibration"},

@@ -10,16 +10,11 @@
 namespace vergence::features {
 namespace {
 
-using detail::BlockSums;
+using detail::Block;
 using detail::kBlock;
 
 constexpr int kPlaces = kMaxSearchSteps * 5;  // along the curve times across it
 constexpr int kMaxBand = 2;
-
-struct Block {
-  std::array<std::uint8_t, kBlock * kBlock> pixels;
-  float sum = 0, variance = 0;  // Σ T, n Σ T² − (Σ T)²
-};
 
 Block middle_of(const Patch& patch, int level) noexcept {
   Block b;
@@ -27,24 +22,15 @@ Block middle_of(const Patch& patch, int level) noexcept {
   constexpr int kFirst = kPatchSide / 2 - kBlock / 2;
   float square = 0;
   for (int r = 0; r < kBlock; ++r) {
-    std::memcpy(b.pixels.data() + r * kBlock, from.data() + (kFirst + r) * kPatchSide + kFirst,
-                kBlock);
+    std::memcpy(b.pixels + r * kBlock, from.data() + (kFirst + r) * kPatchSide + kFirst, kBlock);
     for (int c = 0; c < kBlock; ++c) {
-      const float v = b.pixels[static_cast<std::size_t>(r * kBlock + c)];
+      const float v = b.pixels[r * kBlock + c];
       b.sum += v;
       square += v * v;
     }
   }
   b.variance = static_cast<float>(kBlock * kBlock) * square - b.sum * b.sum;
   return b;
-}
-
-float zncc(const Block& b, const BlockSums& s) noexcept {
-  constexpr auto kN = static_cast<float>(kBlock * kBlock);
-  const auto sum = static_cast<float>(s.sum);
-  const float variance = kN * static_cast<float>(s.square) - sum * sum;
-  const float norm = b.variance * variance;
-  return norm > 1.F ? (kN * static_cast<float>(s.product) - b.sum * sum) / std::sqrt(norm) : 0.F;
 }
 
 }  // namespace
@@ -105,8 +91,8 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
         break;
       d = (there * scale - anchor - p) / (end - i);
     }
-    const int x = static_cast<int>(std::floor(p.x() + 0.5)),
-              y = static_cast<int>(std::floor(p.y() + 0.5));
+    // Rounded towards zero: what is negative lies outside either way.
+    const int x = static_cast<int>(p.x() + 0.5), y = static_cast<int>(p.y() + 0.5);
     const int dx = horizontal ? 0 : band, dy = horizontal ? band : 0;
     if (x - dx < kBlock / 2 || y - dy < kBlock / 2 || x + dx + kBlock / 2 > view.width ||
         y + dy + kBlock / 2 > view.height)
@@ -120,30 +106,35 @@ SearchResult search_along(const Patch& patch, const Pyramid& image, const Epipol
       offsets[static_cast<std::size_t>(places++)] = static_cast<std::int32_t>(at + b * across);
   }
   if (n == 0) return result;
-  std::array<BlockSums, kPlaces> sums;
-  detail::correlate(block.pixels.data(), view.data, view.stride, offsets.data(), places,
-                    sums.data());
+  std::array<float, kPlaces> scores;  // squared correlations
+  static_assert(kPlaces % detail::kPlacesAtATime == 0);
+  detail::correlate(block, view.data, view.stride, offsets.data(), places, scores.data());
 
   const int width = 2 * band + 1;
   std::array<float, kMaxSearchSteps> best_of_step;
-  int best = 0;
+  int best = 0, aside = 0;
   float best_score = -1.F;
-  for (int k = 0; k < places; ++k) {
-    const float z = zncc(block, sums[static_cast<std::size_t>(k)]);
-    float& of_step = best_of_step[static_cast<std::size_t>(k / width)];
-    of_step = k % width == 0 ? z : std::max(of_step, z);
-    if (z > best_score) {
-      best_score = z;
-      best = k;
+  const float* score = scores.data();
+  for (int i = 0; i < n; ++i) {
+    float& of_step = best_of_step[static_cast<std::size_t>(i)];
+    of_step = 0.F;
+    for (int b = 0; b < width; ++b, ++score) {
+      of_step = std::max(of_step, *score);
+      if (*score > best_score) {
+        best_score = *score;
+        best = i;
+        aside = b - band;
+      }
     }
   }
-  const Step& at = kept[static_cast<std::size_t>(best / width)];
-  const int aside = best % width - band;
-  float second = -1.F;
+  best_score = std::sqrt(best_score);
+  const Step& at = kept[static_cast<std::size_t>(best)];
+  float second = 0.F;
   constexpr int kNeighbourhood = 3;  // px of the level: the same peak
   for (int i = 0; i < n; ++i)
     if (std::abs(kept[static_cast<std::size_t>(i)].index - at.index) > kNeighbourhood)
       second = std::max(second, best_of_step[static_cast<std::size_t>(i)]);
+  second = std::sqrt(second);
   result.zncc = best_score;
   result.rho = options.rho_first + (rho_last - options.rho_first) * at.index / steps;
   result.pixel =

@@ -22,8 +22,8 @@ Mask::Mask(const ImageView& image, int margin, Arena& arena) {
   if (image.empty()) return;
   width_ = image.width;
   height_ = image.height;
-  words_a_row_ = words_of(width_);
-  bits_ = arena.make<std::uint64_t>(words_a_row_ * static_cast<std::size_t>(height_), "mask");
+  words_per_row_ = words_of(width_);
+  bits_ = arena.make<std::uint64_t>(words_per_row_ * static_cast<std::size_t>(height_), "mask");
   for (int y = 0; y < height_; ++y) {
     const std::uint8_t* row = image.row(y);
     for (int x = 0; x < width_;) {

@@ -35,13 +35,13 @@ class Mask {
 
  private:
   [[nodiscard]] std::size_t word(int x, int y) const noexcept {
-    return static_cast<std::size_t>(y) * words_a_row_ + static_cast<std::size_t>(x) / 64U;
+    return static_cast<std::size_t>(y) * words_per_row_ + static_cast<std::size_t>(x) / 64U;
   }
   /// Hides [first, last) of a row.
   void hide(int first, int last, int y) noexcept;
 
   int width_ = 0, height_ = 0;
-  std::size_t words_a_row_ = 0;
+  std::size_t words_per_row_ = 0;
   std::span<std::uint64_t> bits_;
 };
 

@@ -8,7 +8,7 @@
 
 namespace {
 
-void note() noexcept {
+void count_allocation() noexcept {
   vergence::AllocationGuard::record_allocation();
   vergence::ThreadAllocations::record_allocation();
 }
@@ -28,32 +28,32 @@ void* __libc_pvalloc(std::size_t);
 // NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
 
 void* malloc(std::size_t size) {
-  note();
+  count_allocation();
   return __libc_malloc(size);
 }
 
 void* calloc(std::size_t n, std::size_t size) {
-  note();
+  count_allocation();
   return __libc_calloc(n, size);
 }
 
 void* realloc(void* p, std::size_t size) {
-  note();
+  count_allocation();
   return __libc_realloc(p, size);
 }
 
 void* memalign(std::size_t alignment, std::size_t size) {
-  note();
+  count_allocation();
   return __libc_memalign(alignment, size);
 }
 
 void* valloc(std::size_t size) {
-  note();
+  count_allocation();
   return __libc_valloc(size);
 }
 
 void* pvalloc(std::size_t size) {
-  note();
+  count_allocation();
   return __libc_pvalloc(size);
 }
 

@@ -97,9 +97,9 @@ class FrontEnd {
   [[nodiscard]] std::span<const FreeMatch> match_free(int k) noexcept;
 
   /// New corners of `left` where the map has no points, matched across; null: as if there were no
-  /// map. As many as there is room for, by the effort, and `at_least` so many whatever that is.
+  /// map. As many as there is room for, by the effort, and `min_corners` so many whatever that is.
   [[nodiscard]] StereoCount match_new(const Map* map, const FrameWorkload& effort = {},
-                                      int at_least = 0) noexcept;
+                                      int min_corners = 0) noexcept;
   /// Weighs the distances of this frame's points from the epipolar lines between the first two
   /// cameras.
   [[nodiscard]] EpipolarEvidence weigh_points(const Map& map) noexcept;

@@ -99,7 +99,7 @@ void FrontEnd::match_all(std::span<const features::Corner> corners, bool exchang
 }
 
 StereoCount FrontEnd::match_new(const Map* map, const FrameWorkload& effort,
-                                int at_least) noexcept {
+                                int min_corners) noexcept {
   StereoCount count;
   corners_.clear();
   // Without a left image the pyramid still looks at the last one, whose memory its camera may have
@@ -112,8 +112,9 @@ StereoCount FrontEnd::match_new(const Map* map, const FrameWorkload& effort,
       if (p.followed() && p.now.by(0)) (void)taken_.push({p.raw[0].x(), p.raw[0].y(), 0.F});
   features::find_corners(pyramids_[0].level(0), corner_options(0), taken_.span(), runner_,
                          &corners_);
-  const auto room = static_cast<std::size_t>(std::max(
-      at_least, options_.features * effort.points_percent / 100 - static_cast<int>(taken_.size())));
+  const auto room = static_cast<std::size_t>(
+      std::max(min_corners,
+               options_.features * effort.points_percent / 100 - static_cast<int>(taken_.size())));
   if (corners_.size() > room) corners_.truncate(room);
   detect_ms_ = milliseconds_since(start);
 

@@ -28,7 +28,7 @@ class GapDetector {
   }
   /// A frame `dt` seconds after the last pose, or after the last frame where that showed something
   /// and had no pose. `renew`: the scene could be made anew. Returns dt where it is a gap, else 0.
-  [[nodiscard]] double note(double dt, bool renew) noexcept {
+  [[nodiscard]] double check(double dt, bool renew) noexcept {
     const double usual = usual_interval();
     const bool gap = usual > 0 && dt > kLongest * usual;
     if (gap && !before_ && renew) due_ = true;
@@ -37,7 +37,7 @@ class GapDetector {
   }
   [[nodiscard]] bool renewal_due() const noexcept { return due_; }
   /// Clears the request: the scene was made anew or replaced, or cannot be made anew.
-  void forget() noexcept { due_ = false; }
+  void clear_renewal() noexcept { due_ = false; }
 
  private:
   static constexpr std::size_t kIntervals = 9;  // so many of the newest make the usual one

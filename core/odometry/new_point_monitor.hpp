@@ -20,7 +20,7 @@ class NewPointMonitor {
   /// True if the points evaluated last were mostly lost.
   [[nodiscard]] bool lost() const noexcept { return lost_; }
   /// Call when the map is made anew.
-  void forget() noexcept { *this = {}; }
+  void reset() noexcept { *this = {}; }
 
  private:
   static constexpr int kEnough = 30;  // to judge from

@@ -57,7 +57,7 @@ void Odometry::link(const RigCalibration& rig) noexcept { next_rig_ = rig; }
 void Odometry::unlink() noexcept {
   if (link_ == Link::linked) last_rig_ = rig_;
   link_ = Link::unlinked;
-  gaps_.forget();
+  gaps_.clear_renewal();
   next_rig_.reset();
   front_end_.set_band(std::max(options_.band_px, kUnlinkedBand));
 }
@@ -106,9 +106,9 @@ void Odometry::make_keyframe(Stamp stamp, FrameOutcome* out) noexcept {
   }
   motion_.correct(map_.keyframe(slot).T_left_world);
   const auto keyframes = std::min<std::size_t>(map_.order().size(), out->effort.window_keyframes);
-  budget_.window_took(static_cast<double>(clock.mark(Stage::window)), static_cast<int>(keyframes),
-                      window.steps);
-  budget_.points_took(new_points(0, out), out->effort);
+  budget_.add_window_time(static_cast<double>(clock.mark(Stage::window)),
+                          static_cast<int>(keyframes), window.steps);
+  budget_.add_points_time(new_points(0, out), out->effort);
   keyframe_points_ = 0;
   for (MapPoint& p : map_.points()) {
     if (!p.followed()) continue;
@@ -118,9 +118,9 @@ void Odometry::make_keyframe(Stamp stamp, FrameOutcome* out) noexcept {
   out->keyframe = true;
 }
 
-double Odometry::new_points(int at_least, FrameOutcome* out) noexcept {
+double Odometry::new_points(int min_corners, FrameOutcome* out) noexcept {
   StageClock clock(out);
-  (void)front_end_.match_new(&map_, out->effort, at_least);
+  (void)front_end_.match_new(&map_, out->effort, min_corners);
   front_end_.add_points(motion_.T_left_world(), PointStage::candidate, &map_);
   const float ms = clock.mark(Stage::match);
   out->stage_ms[static_cast<std::size_t>(Stage::match)] -= front_end_.detect_ms();
@@ -128,7 +128,8 @@ double Odometry::new_points(int at_least, FrameOutcome* out) noexcept {
   return static_cast<double>(ms);
 }
 
-void Odometry::judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept {
+void Odometry::assess_frame(const PoseFit& fit, const ImageCheck& images,
+                            FrameOutcome* out) noexcept {
   out->status = PoseStatus::degraded;
   // New points are made by the calibration, and without one they say nothing.
   out->moving = others_move_ || (link_ == Link::linked && new_points_.lost());
@@ -170,14 +171,14 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
 
   if (map_.order().empty()) {
     if (next_rig_) {
-      take_up(*std::exchange(next_rig_, std::nullopt));
+      adopt(*std::exchange(next_rig_, std::nullopt));
       out.relinked = true;
     }
     begin_scene(frame, images, predicted, dt, &out);
     return out;
   }
 
-  out.gap_s = gaps_.note(frames_lost_ == 0 ? dt : since_frame, link_ == Link::linked);
+  out.gap_s = gaps_.check(frames_lost_ == 0 ? dt : since_frame, link_ == Link::linked);
   const PoseFit fit = track(predicted, images.structured, &out);
   if (!fit.found) {
     out.reason = of_images != Reason::none ? of_images
@@ -200,7 +201,7 @@ FrameOutcome Odometry::process(const RigFrame& frame, Duration budget) noexcept 
   else
     motion_.update(fit.T_left_world, frame.stamp);
   out.T_left_world = motion_.T_left_world();
-  judge(fit, images, &out);
+  assess_frame(fit, images, &out);
   const FrameWorkload effort =
       frame.effort ? *frame.effort
                    : budget_.plan(static_cast<int>(map_.order().size()) + 1, options_.window_steps);

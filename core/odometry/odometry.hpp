@@ -143,7 +143,7 @@ class Odometry {
   [[nodiscard]] bool wants_keyframe() const noexcept;
   void make_keyframe(Stamp stamp, FrameOutcome* out) noexcept;
   /// Makes candidate points. Returns the time it took, ms.
-  double new_points(int at_least, FrameOutcome* out) noexcept;
+  double new_points(int min_corners, FrameOutcome* out) noexcept;
   [[nodiscard]] double renew_scale(std::size_t slot) noexcept;
   [[nodiscard]] bool initialise_rig(FrameOutcome* out) noexcept;
   [[nodiscard]] bool start_scene(const Transform& T_left_world, Stamp stamp,
@@ -153,7 +153,7 @@ class Odometry {
   /// Makes the scene anew from the newest frame at its pose. Returns false if that fails; the old
   /// scene is kept.
   bool renew_scene(FrameOutcome* out) noexcept;
-  void take_up(const RigCalibration& rig) noexcept;
+  void adopt(const RigCalibration& rig) noexcept;
   /// Changes to a calibration and keeps the scene: the window's pixels are undistorted with the new
   /// lenses, points are triangulated again, and the newest pose stays. Returns false if this
   /// frame's matches do not fit the calibration.
@@ -162,7 +162,7 @@ class Odometry {
   [[nodiscard]] bool resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* out) noexcept;
   /// Discards the scene; without a calibration the rig has to be initialised again.
   void lose_scene() noexcept;
-  void judge(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;
+  void assess_frame(const PoseFit& fit, const ImageCheck& images, FrameOutcome* out) noexcept;
 
   const OdometryOptions& options_;
   RigCalibration rig_;

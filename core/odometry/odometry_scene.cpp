@@ -63,8 +63,8 @@ bool Odometry::start_scene(const Transform& T_left_world, Stamp stamp, FrameOutc
   else {
     map_.clear();
     front_end_.add_points(T_left_world, PointStage::active, &map_);
-    new_points_.forget();
-    gaps_.forget();
+    new_points_.reset();
+    gaps_.clear_renewal();
     const std::size_t slot = map_.make_keyframe(T_left_world, stamp);
     map_.keyframe(slot).T_camera_left = rig_.T_camera_left;
     keyframe_points_ = 0;
@@ -134,13 +134,13 @@ void Odometry::reset_extrinsics() noexcept {
   for (Transform& T : rig_.T_camera_left) T = {};
 }
 
-void Odometry::take_up(const RigCalibration& rig) noexcept {
+void Odometry::adopt(const RigCalibration& rig) noexcept {
   link_ = Link::linked;
   rig_ = rig;
   rig_known_ = true;
   front_end_.rebuild_lenses();
   front_end_.set_band(options_.band_px);
-  window_.take_up_rig();
+  window_.adopt_rig();
 }
 
 void Odometry::rebuild(FrameOutcome* out) noexcept {
@@ -153,7 +153,7 @@ void Odometry::rebuild(FrameOutcome* out) noexcept {
     }
   } else if (gaps_.renewal_due() && out->renewal_due) {
     out->renewed = renew_scene(out);
-    gaps_.forget();  // what there was goes on where no new scene can be made
+    gaps_.clear_renewal();  // what there was goes on where no new scene can be made
   }
 }
 
@@ -175,7 +175,7 @@ bool Odometry::reexpress_scene(const RigCalibration& rig, double* points_kept) n
   const auto held =
       std::count_if(map_.points().begin(), map_.points().end(),
                     [](const MapPoint& p) { return p.holds_poses() && p.now.cameras != 0; });
-  take_up(rig);
+  adopt(rig);
 
   // A direction seen by the old lens of camera k → pixels of the image → ideal ones of the new
   // lens.
@@ -283,7 +283,7 @@ bool Odometry::resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* 
   if (!last_rig_) return false;
   const bool was_linked = link_ == Link::linked;
   const RigCalibration now = rig_;
-  take_up(*last_rig_);
+  adopt(*last_rig_);
   FrameOutcome resumed = *out;
   if (start_scene(T_left_world, stamp, &resumed)) {
     *out = resumed;
@@ -293,7 +293,7 @@ bool Odometry::resume(const Transform& T_left_world, Stamp stamp, FrameOutcome* 
     return true;
   }
   if (was_linked) {
-    take_up(now);
+    adopt(now);
   } else {
     unlink();
     reset_extrinsics();

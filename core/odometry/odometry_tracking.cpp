@@ -74,12 +74,12 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
     if (sample_agrees(fit, kSampleShare)) break;
   }
   fit = best;
-  bool doubtful = frames_lost_ > 0 || out->gap_s > 0;
+  bool unreliable = frames_lost_ > 0 || out->gap_s > 0;
   std::bitset<kMaxPoints> revived;
   if (!sample_agrees(fit, kMinSampleShare)) {
     fit = relocalise(out, &revived);
     if (!fit.found) return fit;
-    doubtful = true;
+    unreliable = true;
   }
   const Transform coarse = fit.T_left_world;
   if (link_ == Link::unlinked) recover_cameras(fit);
@@ -89,7 +89,7 @@ PoseFit Odometry::track(const Transform& predicted, std::uint8_t structured,
   if (!fit.found || fit.inliers < kRigidShare * fit.given) fit = this->fit(coarse, true);
   // One facade looks like the next: a place is believed again only if most of what should be seen
   // from there is.
-  if (doubtful && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
+  if (unreliable && fit.inliers < kRecognisedShare * points_in_view(fit.T_left_world))
     fit.found = false;
   // Left active, they would count as missing at the next place that is tried.
   for (std::size_t i = 0; !fit.found && i < map_.points().size(); ++i)

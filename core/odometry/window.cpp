@@ -15,7 +15,7 @@ constexpr float kOutlier =
     16.F;  // squared whitened residual, 2 degrees of freedom: 3e-4 of Gaussian errors
 constexpr int kObservationsOfPose = 3;     // that hold six degrees of freedom
 constexpr double kMinDepthOfPoint = 0.05;  // m in front of every camera that sees it
-constexpr double kJudgedDepth = 20.0;      // m, where a calibration is asked for its depth error
+constexpr double kReferenceDepth = 20.0;   // m, where a calibration is asked for its depth error
 constexpr double kHeldSigma = 1e-6;        // rad and m, of what a window does not estimate of a rig
 constexpr double kInflation = 100.0;  // of a variance: a lens field of 0.03 px that no model has
                                       // does not average out over 2000 observations of 0.15 px
@@ -49,42 +49,42 @@ WindowAdjuster::WindowAdjuster(const OdometryOptions& options, const RigCalibrat
   observations_ = BoundedVector<BundleObservation>(
       arena.make_unset<BundleObservation>(c.observations, "window observations"));
   residuals_ = arena.make<float>(c.observations, "window residuals");
-  take_up_rig();
+  adopt_rig();
 }
 
-void WindowAdjuster::take_up_rig() noexcept {
+void WindowAdjuster::adopt_rig() noexcept {
   for (int k = 0; k < rig_.cameras; ++k)
     cameras_[static_cast<std::size_t>(k)] =
         UndistortedCamera(rig_.intrinsics[static_cast<std::size_t>(k)]).ideal();
   T_camera_left_ = rig_.T_camera_left;
-  doubt_rig();
+  set_rotation_prior();
 }
 
-void WindowAdjuster::doubt_rig() noexcept {
-  doubted_ = options_.extrinsic_rotation_sigma_rad > 0;
-  if (!doubted_) return;
-  claimed_ = rig_;
-  claimed_.covariance = {};
+void WindowAdjuster::set_rotation_prior() noexcept {
+  rotations_free_ = options_.extrinsic_rotation_sigma_rad > 0;
+  if (!rotations_free_) return;
+  prior_rig_ = rig_;
+  prior_rig_.covariance = {};
   for (int k = 1; k < rig_.cameras; ++k) {
     const Vec3& t = rig_.T_camera_left[static_cast<std::size_t>(k)].t;
     // The axis across baseline and view: a turn about it shifts all disparities alike.
     const Vec3 axis = Vec3::UnitZ().cross(t);
     if (!(axis.norm() > kHeldSigma)) {
-      doubted_ = false;
+      rotations_free_ = false;
       return;
     }
     // A turn of σ is a disparity of f σ, so a relative depth of z σ / b.
-    const double known =
-        0.01 * calibration::depth_error_percent(rig_, k, kJudgedDepth) * t.norm() / kJudgedDepth;
+    const double known = 0.01 * calibration::depth_error_percent(rig_, k, kReferenceDepth) *
+                         t.norm() / kReferenceDepth;
     const double sigma = known > 0 ? std::min(known, options_.extrinsic_rotation_sigma_rad)
                                    : options_.extrinsic_rotation_sigma_rad;
     const Mat3 turn = sigma * sigma * axis.normalized() * axis.normalized().transpose() +
                       kHeldSigma * kHeldSigma * Mat3::Identity();
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j <= i; ++j)
-        claimed_.covariance.set(extrinsic_row(k) + i, extrinsic_row(k) + j, turn(i, j));
-      claimed_.covariance.set(extrinsic_row(k) + 3 + i, extrinsic_row(k) + 3 + i,
-                              kHeldSigma * kHeldSigma);
+        prior_rig_.covariance.set(extrinsic_row(k) + i, extrinsic_row(k) + j, turn(i, j));
+      prior_rig_.covariance.set(extrinsic_row(k) + 3 + i, extrinsic_row(k) + 3 + i,
+                                kHeldSigma * kHeldSigma);
     }
   }
 }
@@ -169,7 +169,7 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
   outcome.observations = static_cast<int>(observations_.size());
   if (poses_.size() < 2 || points_.empty()) return outcome;
   T_camera_left_ = rig_.T_camera_left;
-  if (configuration == BundleConfiguration::stereo_odometry && doubted_)
+  if (configuration == BundleConfiguration::stereo_odometry && rotations_free_)
     configuration = BundleConfiguration::stereo_calibration;
 
   const auto n = static_cast<std::size_t>(rig_.cameras);
@@ -188,7 +188,7 @@ WindowOutcome WindowAdjuster::solve(BundleConfiguration configuration,
   how.max_steps = std::min<int>(options_.window_steps, effort.window_steps);
   how.cost_tolerance = 1e-4;
   if (configuration == BundleConfiguration::stereo_calibration)
-    how.shared_prior = {&claimed_, kInflation};
+    how.shared_prior = {&prior_rig_, kInflation};
   const BundleResult result = adjuster_.solve(problem, how);
   outcome.termination = result.termination;
   outcome.usable = result.usable();

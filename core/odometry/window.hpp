@@ -43,7 +43,7 @@ class WindowAdjuster {
   /// are constant; the caller renews the scale.
   WindowOutcome adjust_unlinked(Map& map, const FrameWorkload& effort = {}) noexcept;
   /// Call when the owner's rig was changed to another calibration.
-  void take_up_rig() noexcept;
+  void adopt_rig() noexcept;
   /// Transforms estimated by the last adjustment, one per camera.
   [[nodiscard]] std::span<const Transform> T_camera_left() const noexcept {
     return std::span(T_camera_left_).first(static_cast<std::size_t>(rig_.cameras));
@@ -53,7 +53,7 @@ class WindowAdjuster {
   [[nodiscard]] static BundleCapacities capacities(const OdometryOptions& options,
                                                    const RigCalibration& rig) noexcept;
   /// Sets the prior of the further cameras' rotations from the calibration's covariance.
-  void doubt_rig() noexcept;
+  void set_rotation_prior() noexcept;
   void gather(Map& map, bool linked, const FrameWorkload& effort) noexcept;
   [[nodiscard]] WindowOutcome solve(BundleConfiguration configuration,
                                     const FrameWorkload& effort) noexcept;
@@ -62,9 +62,9 @@ class WindowAdjuster {
   const OdometryOptions& options_;
   const RigCalibration& rig_;
   BundleAdjuster adjuster_;
-  RigCalibration claimed_;  // the calibration as it was given; `covariance`: of the turns that are
-                            // estimated with a window
-  bool doubted_ = false;    // they are
+  RigCalibration prior_rig_;     // the calibration as it was given; `covariance`: of the turns that
+                                 // are estimated with a window
+  bool rotations_free_ = false;  // they are
   std::array<Camera, kMaxCameras> cameras_{};
   std::array<Transform, kMaxCameras> T_camera_left_{};
   std::size_t oldest_ = 0;  // in the map's order, of the keyframes that are adjusted

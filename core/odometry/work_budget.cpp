@@ -7,11 +7,11 @@ namespace vergence::odometry {
 namespace {
 
 constexpr double kUsable = 0.9;    // of the budget: what comes after the odometry needs some
-constexpr double kForgets = 0.8;   // a keyframe, of what a piece of work once took
+constexpr double kDecay = 0.8;     // a keyframe, of what a piece of work once took
 constexpr double kMinPoints = 25;  // percent: under that the scene is lost sooner or later
 constexpr int kMinKeyframes = 4;
 
-void take(double ms, double* dearest) noexcept { *dearest = std::max(ms, kForgets * *dearest); }
+void take(double ms, double* dearest) noexcept { *dearest = std::max(ms, kDecay * *dearest); }
 
 }  // namespace
 
@@ -45,11 +45,11 @@ FrameWorkload WorkBudget::plan(int keyframes, int steps) const noexcept {
   return effort;
 }
 
-void WorkBudget::points_took(double ms, const FrameWorkload& effort) noexcept {
+void WorkBudget::add_points_time(double ms, const FrameWorkload& effort) noexcept {
   take(100.0 * ms / effort.points_percent, &points_ms_);
 }
 
-void WorkBudget::window_took(double ms, int keyframes, int steps) noexcept {
+void WorkBudget::add_window_time(double ms, int keyframes, int steps) noexcept {
   // One that was left out is tried again before long: what made the last one dear may be over.
   take(keyframes > 0 && steps > 0 ? ms / (keyframes * steps) : 0, &window_step_ms_);
 }

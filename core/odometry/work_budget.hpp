@@ -22,8 +22,8 @@ class WorkBudget {
   [[nodiscard]] bool limited() const noexcept { return budget_ms_ > 0; }
 
   /// Report the measured times of new points and of a window.
-  void points_took(double ms, const FrameWorkload& effort) noexcept;
-  void window_took(double ms, int keyframes, int steps) noexcept;
+  void add_points_time(double ms, const FrameWorkload& effort) noexcept;
+  void add_window_time(double ms, int keyframes, int steps) noexcept;
 
  private:
   double budget_ms_ = 0;

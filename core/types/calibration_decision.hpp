@@ -34,8 +34,8 @@ struct CalibrationDecision {
   Stamp stamp{};  // of the frame it was decided at
   CalibrationCause cause = CalibrationCause::from_scratch;
   bool accepted = false;
-  bool learnt = false;  // measured while the drive went on: not accepted is no rejection, what is
-                        // in use fits as well
+  bool is_refinement = false;  // measured while the drive went on: not accepted is no rejection,
+                               // what is in use fits as well
   const char* reason =
       "";  // why it was rejected, a constant message without commas; empty when accepted
   RigCalibration calibration{};   // the one found, also when rejected
@@ -51,7 +51,6 @@ struct CalibrationDecision {
   double depth_error_percent =
       0;                     // how far off the one before was, by the one found; 0: there was none
   bool verified = false;     // the calibration now in use holds to the tolerated depth error
-  bool lenses = false;       // lenses were part of what was found
   FocalMeasurement focal{};  // the newest of the drive
   double solve_ms = 0;       // on the solver's thread
 };

@@ -90,8 +90,8 @@ class PairingTracker {
   /// It was started again.
   void restarted(std::size_t camera) noexcept { cameras_[camera] = {}; }
   /// Updates with the synchroniser's state. Nullopt: as before, or no frame has come yet.
-  [[nodiscard]] std::optional<Change> look(std::size_t camera, bool verified,
-                                           HostStamp now) noexcept {
+  [[nodiscard]] std::optional<Change> update(std::size_t camera, bool verified,
+                                             HostStamp now) noexcept {
     Camera& own = cameras_[camera];
     if (verified == own.verified || !own.any) return std::nullopt;
     const double seconds = verified ? (now - own.since).to_seconds() : 0;

@@ -96,17 +96,17 @@ void Acquisition::work() {
   while (!stop_.load(std::memory_order_acquire)) {
     rounds_.fetch_add(1, std::memory_order_relaxed);
     const WakeEvent::Ticket seen = wake_.ticket();
-    // Twice: whatever arrived before an item of the first look is there at the second.
-    look();
-    look();
+    // Twice: whatever arrived before an item of the first poll is there at the second.
+    poll();
+    poll();
     const int device = earliest();
     if (device >= 0) {
       if (static_cast<std::size_t>(device) < cameras_.size())
-        take_frame(static_cast<std::size_t>(device));
+        push_frame(static_cast<std::size_t>(device));
       else if (device == ins_place())
-        take_reading();
+        push_reading();
       else
-        take_board();
+        poll_board();
       hand_out_sets();
       continue;
     }
@@ -124,22 +124,22 @@ void Acquisition::work() {
   queue_.finish();
 }
 
-void Acquisition::look() {
+void Acquisition::poll() {
   const bool always = options_.wait_when_full;
   for (std::size_t k = 0; k < heads_.size(); ++k) {
     auto& head = heads_[k];
     const bool held = head.held;
-    head.look(this, always);
+    head.poll(this, always);
     if (options_.frame_observer != nullptr && !held && head.held && !head.event &&
         head.value.status == FrameStatus::complete)
       options_.frame_observer->on_frame(k, head.value);
   }
-  look_ins();
-  board_head_.look(this, always);
+  poll_ins();
+  board_head_.poll(this, always);
 }
 
-void Acquisition::look_ins() {
-  ins_head_.look(this, options_.wait_when_full);
+void Acquisition::poll_ins() {
+  ins_head_.poll(this, options_.wait_when_full);
   if (ins_head_.back) {
     ins_head_.back = false;
     ins_clock_->restart();
@@ -168,7 +168,7 @@ int Acquisition::earliest() const {
   return device;
 }
 
-void Acquisition::take_frame(std::size_t k) {
+void Acquisition::push_frame(std::size_t k) {
   auto& head = heads_[k];
   head.held = false;
   const int camera = static_cast<int>(k);
@@ -191,7 +191,7 @@ void Acquisition::take_frame(std::size_t k) {
   in.slot = frame.slot;
   in.counter = frame.counter;
   in.middle = clocks_[k].start_of(frame);
-  counters_.cameras[k].note(frame.exposure_start, in.middle);
+  counters_.cameras[k].observe(frame.exposure_start, in.middle);
   in.middle.host = in.middle.host + frame.exposure / 2;
   in.arrival = frame.arrival;
   in.exposure_start = frame.exposure_start;
@@ -218,7 +218,7 @@ void Acquisition::record_disconnect(int camera, HostStamp when) {
   if (!head.back) push_event(DeviceEvent::Kind::camera_disconnected, when, camera);
 }
 
-void Acquisition::take_reading() {
+void Acquisition::push_reading() {
   ins_head_.held = false;
   const InsReading& r = ins_head_.value;
   const MappedStamp at =
@@ -226,12 +226,12 @@ void Acquisition::take_reading() {
   InsRecord item{r.sample, r.quality};
   item.sample.stamp = stamp_of(at.host);
   item.sample.stamp_error = at.error;
-  counters_.ins.note(r.measured, at);
+  counters_.ins.observe(r.measured, at);
   queue_.push(item);
   if (!sync_out_) return;
   if (r.resumed) sync_out_->restart();
   if (const auto pulse = sync_out_->reading(r, at)) {
-    take_pulse(*pulse);
+    push_pulse(*pulse);
     pause_pulses();
   }
 }
@@ -258,7 +258,7 @@ void Acquisition::push_event(DeviceEvent::Kind kind, HostStamp when, int camera,
   queue_.push(DeviceEvent{kind, stamp_of(when), camera, seconds});
 }
 
-void Acquisition::take_board() {
+void Acquisition::poll_board() {
   auto& head = board_head_;
   head.held = false;
   if (head.event) {
@@ -271,11 +271,11 @@ void Acquisition::take_board() {
     head.back = false;
     push_event(DeviceEvent::Kind::trigger_board_reconnected, head.value.arrival);
   }
-  take_pulse(head.value);
+  push_pulse(head.value);
   if (options_.sync.mode == SyncMode::board) pause_pulses();
 }
 
-void Acquisition::take_pulse(const Pulse& reported) {
+void Acquisition::push_pulse(const Pulse& reported) {
   if (options_.pulse_observer != nullptr)
     options_.pulse_observer->on_pulse(stamp_of(reported.arrival), reported,
                                       stamp_of(reported.host));
@@ -287,7 +287,7 @@ void Acquisition::take_pulse(const Pulse& reported) {
   }
   ++counters_.pulses;
   if (report.rebooted && !reported.mapped) counters_.board.restart();
-  if (!sync_out_) counters_.board.note(pulse.edge, {pulse.host, pulse.host_error});
+  if (!sync_out_) counters_.board.observe(pulse.edge, {pulse.host, pulse.host_error});
   if (!wants_pulses(options_.sync.mode)) return;
   sync_.pulse(pulse);
   record_proofs(pulse.arrival);
@@ -339,7 +339,7 @@ void Acquisition::pause_pulses() {
 void Acquisition::record_proofs(HostStamp now) {
   for (std::size_t k = 0; k < cameras_.size(); ++k) {
     if (heads_[k].gone) continue;
-    const auto change = pairing_.look(k, sync_.verified(static_cast<int>(k)), now);
+    const auto change = pairing_.update(k, sync_.verified(static_cast<int>(k)), now);
     if (!change) continue;
     push_event(
         change->verified ? DeviceEvent::Kind::pairing_verified : DeviceEvent::Kind::pairing_pending,

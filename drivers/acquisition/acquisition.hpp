@@ -103,10 +103,10 @@ class Acquisition final : private Notifier {
   [[nodiscard]] bool next(Acquired* item) noexcept { return queue_.next(item); }
   /// Call once for every AcquiredFrame that next() returned.
   void release(const AcquiredFrame& frame) noexcept { queue_.release(frame.set); }
-  /// Devices that are gone are asked to come back at every look, a second apart at least, and a
-  /// look follows on whatever a device brings. From who knows that time passes where none brings
+  /// Devices that are gone are asked to come back at every poll, a second apart at least, and a
+  /// poll follows on whatever a device brings. From who knows that time passes where none brings
   /// anything: some times a second.
-  void look_again() noexcept { notify(); }
+  void wake() noexcept { notify(); }
   /// Number of iterations of its thread: it stands still while a device holds that up. Any thread.
   [[nodiscard]] std::uint64_t rounds() const noexcept {
     return rounds_.load(std::memory_order_relaxed);
@@ -123,16 +123,16 @@ class Acquisition final : private Notifier {
  private:
   void notify() noexcept override { wake_.signal(); }
   void work();
-  void look();
-  void look_ins();
+  void poll();
+  void poll_ins();
   /// Which device's oldest item arrived first: a camera, or after those the INS, the board. −1:
   /// none.
   [[nodiscard]] int earliest() const;
   [[nodiscard]] int ins_place() const noexcept { return static_cast<int>(heads_.size()); }
-  void take_frame(std::size_t k);
-  void take_reading();
-  void take_board();
-  void take_pulse(const Pulse& pulse);
+  void push_frame(std::size_t k);
+  void push_reading();
+  void poll_board();
+  void push_pulse(const Pulse& pulse);
   /// Makes the gap that the synchroniser wants.
   void pause_pulses();
   /// Cameras that have given nothing for ten seconds of pulses hang, whatever their drivers know:

@@ -43,7 +43,7 @@ class CameraClock {
 /// Threads  One. Memory: fixed. Units: the error of a stamp is a bound.
 class ClockRecord {
  public:
-  void note(DeviceStamp device, const MappedStamp& mapped) noexcept {
+  void observe(DeviceStamp device, const MappedStamp& mapped) noexcept {
     constexpr std::uint64_t kSettled = 60;     // stamps after which a clock is known: seconds
     constexpr std::int64_t kOddDrift = 2'000;  // ppm, no crystal: the clock was set
     constexpr Duration kEnough = Duration::seconds(5);  // for a drift that means something

@@ -8,7 +8,7 @@
 namespace vergence {
 
 /// The oldest item that a device has and nobody has taken, and whether the device is there: one
-/// way to look at cameras, INS and board.
+/// way to poll cameras, INS and board.
 ///
 /// Ownership  The device outlives it. Threads: the acquisition's, which calls all of it.
 template <class Device, class Value>
@@ -29,8 +29,8 @@ struct DeviceHead {
   Value value{};
 
   /// `ready`: what a device that is started again notifies. `ask_always` (virtual time): a device
-  /// that is gone is asked at each look.
-  void look(Notifier* ready, bool ask_always) {
+  /// that is gone is asked at each poll.
+  void poll(Notifier* ready, bool ask_always) {
     if (device == nullptr) ended = true;
     if (held || ended || (gone && !start_again(ready, ask_always))) return;
     const DeviceStatus status = device->wait(Duration{}, &value);

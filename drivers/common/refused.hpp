@@ -11,7 +11,7 @@ struct Refused {
 
 /// Takes the steps up to the first that is Refused. → ok, or its status
 template <class Steps>
-[[nodiscard]] DeviceStatus take_steps(const Steps& steps) {
+[[nodiscard]] DeviceStatus run_steps(const Steps& steps) {
   try {
     steps();
     return DeviceStatus::ok;

@@ -74,7 +74,7 @@ class SerialDevice {
     line = std::move(line_);
   }
   /// Asked once, when the device is opened.
-  void look_up_virtual_time() { virtual_time_ = place_->pass(Duration{}); }
+  void query_virtual_time() { virtual_time_ = place_->pass(Duration{}); }
   [[nodiscard]] bool virtual_time() const noexcept { return virtual_time_; }
 
   /// As CameraDevice::start(). The thread runs on when it is there already: streaming, or gone and

@@ -53,7 +53,7 @@ class SerialInsDevice : public InsDevice, protected SerialDevice<InsReading, kRi
   [[nodiscard]] DeviceStatus open_anew() {
     stop();
     this->close_line();
-    this->look_up_virtual_time();
+    this->query_virtual_time();
     const DeviceStatus status = open();
     if (status != DeviceStatus::ok)
       last_error_ = info_.place + " cannot be opened: " + std::string(to_string(status));

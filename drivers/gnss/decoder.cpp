@@ -300,7 +300,7 @@ bool Decoder::next_ubx(Fix* fix) noexcept {
   return false;
 }
 
-void Decoder::Period::note(Duration step) noexcept {
+void Decoder::Period::add(Duration step) noexcept {
   constexpr int kBelieved = 3;
   constexpr double kAlike = 0.25;
   const double apart = std::abs(step.to_seconds() - newest_.to_seconds());
@@ -312,7 +312,7 @@ void Decoder::Period::note(Duration step) noexcept {
 }
 
 void Decoder::count(Duration step) noexcept {
-  if (step >= kShortest) period_.note(step);
+  if (step >= kShortest) period_.add(step);
   const Duration period = period_.interval();
   const double periods = period == Duration{} ? 1 : step.to_seconds() / period.to_seconds();
   const auto steps = static_cast<std::uint64_t>(std::llround(std::clamp(periods, 1.0, kMaxLost)));

@@ -112,7 +112,7 @@ class Decoder {
   /// The receiver's interval. A single short step, as where a fix is acquired again, is none.
   class Period {
    public:
-    void note(Duration step) noexcept;
+    void add(Duration step) noexcept;
     [[nodiscard]] Duration interval() const noexcept { return interval_; }
 
    private:

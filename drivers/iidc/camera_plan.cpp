@@ -71,10 +71,10 @@ class Planner {
       : r_(*registers), bus_(bus), requested_(requested), plan_(*plan), last_error_(*error) {}
 
   DeviceStatus run() {
-    return take_steps([this] {
+    return run_steps([this] {
       check_numbers();
-      if (!take_options(requested_.options, option_table(), "IIDC cameras", &plan_.options,
-                        &last_error_))
+      if (!parse_options(requested_.options, option_table(), "IIDC cameras", &plan_.options,
+                         &last_error_))
         throw Refused{DeviceStatus::unsupported};
       plan_.trigger = requested_.trigger;
       plan_.requested_rate_hz = requested_.rate_hz;

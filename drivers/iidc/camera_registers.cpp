@@ -13,7 +13,7 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr Duration kLook =
+constexpr Duration kPollInterval =
     Duration::milliseconds(1);  // between two looks at a register that is to change
 
 void pause(Duration d) noexcept {
@@ -66,7 +66,7 @@ void CameraRegisters::await_clear(std::uint64_t address, std::uint32_t bits) noe
   const HostStamp end = monotonic_now() + patience_;
   while ((get_at(address) & bits) != 0 && status_ == DeviceStatus::ok) {
     if (monotonic_now() > end) return fail(DeviceStatus::timeout, address, false);
-    pause(kLook);
+    pause(kPollInterval);
   }
 }
 

@@ -52,7 +52,7 @@ class FirewireBus final : public CameraBus {
   void end_ring() noexcept;
   void end_capture() noexcept;
   void stream() noexcept;
-  [[nodiscard]] bool take_one() noexcept;
+  [[nodiscard]] bool read_event() noexcept;
   [[nodiscard]] DeviceStatus failure(HostStamp begun) const noexcept;
 
   FirewireNode node_{};

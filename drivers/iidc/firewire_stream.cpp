@@ -17,7 +17,7 @@
 namespace vergence::iidc {
 namespace {
 
-constexpr int kLookMs = 100;  // a thread that polls looks up at least so often
+constexpr int kPollMs = 100;  // a thread that polls looks up at least so often
 
 std::int64_t realtime_us() noexcept {
   timespec t{};
@@ -64,13 +64,13 @@ void FirewireBus::stream() noexcept {
   const int fd = ring_.descriptor();
   while (!stopping_.load(std::memory_order_acquire)) {
     std::array<pollfd, 2> fds{pollfd{fd, POLLIN, 0}, pollfd{wake_, POLLIN, 0}};
-    if (::poll(fds.data(), fds.size(), kLookMs) < 0 && errno != EINTR) break;
+    if (::poll(fds.data(), fds.size(), kPollMs) < 0 && errno != EINTR) break;
     if (fds[1].revents != 0) {
       std::uint64_t rung = 0;
       (void)!::read(wake_, &rung, sizeof rung);
     }
     ring_.enqueue_returned();
-    if (fds[0].revents != 0 && !take_one()) break;
+    if (fds[0].revents != 0 && !read_event()) break;
   }
   if (stopping_.load(std::memory_order_acquire)) return;
   lost_.store(true, std::memory_order_release);
@@ -78,7 +78,7 @@ void FirewireBus::stream() noexcept {
 }
 
 /// False: the device is gone.
-bool FirewireBus::take_one() noexcept {
+bool FirewireBus::read_event() noexcept {
   FirewireRing::Filled filled;
   switch (ring_.take(&filled)) {
     case FirewireRing::Take::gone:

@@ -82,16 +82,16 @@ ReadFrame FrameReader::read(const Arrival& arrival) noexcept {
   f.stray = arrival.bytes >= shape_.image_bytes;
   if (!e.valid) return f;
   if (!continues(e, arrival.at)) {
-    const bool follows = doubted_ && e.counter == doubted_counter_ + 1;
-    doubted_ = true;
-    doubted_counter_ = e.counter;
+    const bool follows = suspect_ && e.counter == suspect_counter_ + 1;
+    suspect_ = true;
+    suspect_counter_ = e.counter;
     if (!follows) return f;
     f.counter = counter_.rebase(e.counter);  // the camera counts from zero
   } else {
     f.missing = counter_.known() ? static_cast<std::uint64_t>(counter_.step(e.counter) - 1) : 0;
     f.counter = counter_.take(e.counter);
   }
-  doubted_ = false;
+  suspect_ = false;
   f.taken = true;
   f.stray = false;
   f.status = arrival.broken || arrival.bytes < shape_.image_bytes || holds_next_frame(arrival, e)

@@ -75,8 +75,8 @@ class FrameReader {
   bool any_ = false;
   HostStamp last_at_{};
   HostStamp last_bus_stamp_{};
-  bool doubted_ = false;  // a number that could not be
-  std::uint32_t doubted_counter_ = 0;
+  bool suspect_ = false;  // a number that could not be
+  std::uint32_t suspect_counter_ = 0;
 };
 
 }  // namespace vergence::iidc

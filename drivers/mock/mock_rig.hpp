@@ -32,7 +32,7 @@ struct MockRigOptions {
   /// Virtual time: the consumer takes the board's reports, in the order of arrival. The board then
   /// runs no farther ahead of them than what decides at which pulse a pause begins: the fourth
   /// after the newest report taken, on every run.
-  bool reports_taken = false;
+  bool reports_read = false;
   /// Virtual time: who waits for camera 0 asks for the next image once the last is done with, and
   /// may set the exposure before. No image is then made while one is still looked at:
   /// set_exposure() acts at the same image on every run.

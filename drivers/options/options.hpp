@@ -42,8 +42,8 @@ using CameraOptions = std::variant<std::monostate, gige::Options, iidc::Options,
 /// False: *error says which option cannot be, or that they are of another kind of camera; *options
 /// is as it was. `cameras`: who they should be for, `GigE cameras`.
 template <class Options>
-[[nodiscard]] bool take_options(const CameraOptions& given, const OptionTable<Options>& table,
-                                const char* cameras, Options* options, std::string* error) {
+[[nodiscard]] bool parse_options(const CameraOptions& given, const OptionTable<Options>& table,
+                                 const char* cameras, Options* options, std::string* error) {
   if (std::holds_alternative<std::monostate>(given)) {
     *options = {};
     return true;

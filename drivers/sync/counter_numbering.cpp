@@ -39,14 +39,14 @@ std::optional<std::uint64_t> CounterNumbering::number_of_lost(
   return static_cast<std::uint64_t>(number);
 }
 
-void CounterNumbering::note(std::uint64_t number, HostStamp middle, bool leads) noexcept {
+void CounterNumbering::record(std::uint64_t number, HostStamp middle, bool leads) noexcept {
   if (!leads && timed_) return;
   timed_ = true;
   timed_number_ = number;
   timed_middle_ = middle;
 }
 
-bool CounterNumbering::judge(bool agree) noexcept {
+bool CounterNumbering::count_agreement(bool agree) noexcept {
   if (agree) {
     unproven_run_ = 0;
     return false;

@@ -38,10 +38,10 @@ class CounterNumbering {
 
   /// This number was exposed then. `leads`: by the camera that times are reckoned from; another's
   /// is used while there is none of it.
-  void note(std::uint64_t number, HostStamp middle, bool leads) noexcept;
+  void record(std::uint64_t number, HostStamp middle, bool leads) noexcept;
   /// A set of several images has gone out, and their stamps agree, or not. True: for the last time
   /// that was borne, all but camera 0 get their numbers by time again.
-  [[nodiscard]] bool judge(bool agree) noexcept;
+  [[nodiscard]] bool count_agreement(bool agree) noexcept;
 
  private:
   struct Camera {

@@ -58,9 +58,9 @@ std::uint64_t OpenSets::first_free() const noexcept {
   return free;
 }
 
-void OpenSets::contradict_doubtful(std::size_t camera) noexcept {
+void OpenSets::contradict_suspect(std::size_t camera) noexcept {
   for (OpenSet& o : slots_)
-    if (o.used && o.set.present[camera] && o.images[camera].doubtful) o.contradicted = true;
+    if (o.used && o.set.present[camera] && o.images[camera].suspect) o.contradicted = true;
 }
 
 }  // namespace vergence

@@ -14,7 +14,7 @@ struct SetImage {
   DeviceStamp edge{};     // of the pulse by its source's clock, as this camera's stamp has it
   Duration gate{};        // |true edge − edge| is below this
   Duration exposure{};
-  bool doubtful = false;  // perhaps of an earlier pulse
+  bool suspect = false;  // perhaps of an earlier pulse
 };
 
 /// A set that still waits for images.
@@ -86,7 +86,7 @@ class OpenSets {
   [[nodiscard]] std::uint64_t flushed_below() const noexcept { return flushed_; }
 
   /// Suspect images of this camera stay suspect: their sets are contradicted.
-  void contradict_doubtful(std::size_t camera) noexcept;
+  void contradict_suspect(std::size_t camera) noexcept;
 
  private:
   struct Gone {

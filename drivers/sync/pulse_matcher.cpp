@@ -152,7 +152,7 @@ void PulseMatcher::restart() noexcept {
   acquisition_.clear();
   recents_ = pendings_ = 0;
   failures_ = 0;
-  doubt_.clear();
+  missed_trigger_.clear();
 }
 
 std::uint64_t PulseMatcher::min_number(std::uint64_t counter) const noexcept {
@@ -274,9 +274,9 @@ PulseMatcher::Match PulseMatcher::repeated(const StampedFrame& frame) const noex
 
 /// A frame of this reported pulse fits it within the gate.
 void PulseMatcher::settle(const PulseTrain& train, std::uint64_t number) noexcept {
-  if (!doubt_.any()) return;
+  if (!missed_trigger_.any()) return;
   ++failures_;
-  if (doubt_.compare(train, number, tie_.gate() * 2)) failures_ = 0;
+  if (missed_trigger_.compare(train, number, tie_.gate() * 2)) failures_ = 0;
 }
 
 PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
@@ -308,7 +308,7 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
   if (delay < -host.error || (m.missed > 0 && delay + interval_ / 2 < min_delay_))
     return contradict(frame);
   min_delay_ = std::min(min_delay_, delay);
-  if (m.missed > 0 && !doubt_.add(m.missed)) return contradict(frame);
+  if (m.missed > 0 && !missed_trigger_.add(m.missed)) return contradict(frame);
   m.outcome = Outcome::matched;
   m.number = place->number;
   last_ = frame;
@@ -326,7 +326,7 @@ PulseMatcher::Match PulseMatcher::match(const PulseTrain& train,
     }
     pending_[pendings_++] = last_;
   }
-  m.doubtful = doubtful();
+  m.suspect = suspect();
   return m;
 }
 

@@ -154,7 +154,7 @@ class PulseMatcher {
     Duration gate{};           // |true edge − edge| is below this
     std::uint64_t missed = 0;  // pulses since the last frame that the camera did not expose
     std::uint64_t lost = 0;    // exposures since the last frame that gave no image
-    bool doubtful = false;
+    bool suspect = false;
   };
 
   PulseMatcher() noexcept : PulseMatcher({}, {}, {}, 0) {}
@@ -179,7 +179,7 @@ class PulseMatcher {
   /// The least number that the exposure of this counter can have. Precondition: verified().
   [[nodiscard]] std::uint64_t min_number(std::uint64_t counter) const noexcept;
   /// Frames since the last missed trigger may be of earlier pulses than they were matched with.
-  [[nodiscard]] bool doubtful() const noexcept { return doubt_.any(); }
+  [[nodiscard]] bool suspect() const noexcept { return missed_trigger_.any(); }
   /// Trials of the current acquisition that proved nothing, or frames that did not end the current
   /// doubt.
   [[nodiscard]] int failures() const noexcept { return failures_; }
@@ -204,7 +204,7 @@ class PulseMatcher {
   PulseAcquisition acquisition_;
   // Proven.
   ClockTie tie_;
-  MissedTriggerTest doubt_;
+  MissedTriggerTest missed_trigger_;
   std::array<StampedFrame, kRecent> recent_{};
   std::size_t recents_ = 0;
   std::array<StampedFrame, kPending>

@@ -38,7 +38,7 @@ void RigSynchronizer::begin_again() noexcept {
   ++counters_.reboots;
   sets_.flush();
   for (std::size_t k = 0; k < matchers_.size(); ++k) {
-    sets_.contradict_doubtful(k);
+    sets_.contradict_suspect(k);
     matchers_[k].restart();
   }
 }
@@ -58,7 +58,7 @@ void RigSynchronizer::take_pulse(const Pulse& pulse) noexcept {
     const bool verified = matcher.verified();
     if (const auto number = matcher.report(train_, now_)) {
       ++counters_.contradictions[k];
-      sets_.contradict_doubtful(k);
+      sets_.contradict_suspect(k);
       OpenSet* open = sets_.find(*number);
       if (open != nullptr && open->set.present[k]) open->contradicted = true;
     }
@@ -72,7 +72,7 @@ std::uint32_t RigSynchronizer::wants_pause() noexcept {
       3 * PulseMatcher::kRun;  // pulses, until a pause has been seen or has not helped
   if (!proves_numbers(options_.mode) || (asked_ && pulses_ < asked_at_ + kPatience)) return 0;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
-    const bool settled = verified(static_cast<int>(k)) && !matchers_[k].doubtful();
+    const bool settled = verified(static_cast<int>(k)) && !matchers_[k].suspect();
     if (!sources_[k].here || settled || matchers_[k].failures() < kInVain) continue;
     asked_ = true;
     asked_at_ = pulses_;
@@ -103,7 +103,7 @@ RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame,
       return Step::again;
     case PulseMatcher::Outcome::contradicted:
       ++counters_.contradictions[k];
-      sets_.contradict_doubtful(k);
+      sets_.contradict_suspect(k);
       [[fallthrough]];
     case PulseMatcher::Outcome::acquiring:
       ++counters_.acquiring[k];
@@ -116,7 +116,7 @@ RigSynchronizer::Step RigSynchronizer::number_by_pulse(const SyncFrame& frame,
   *number = m.number;
   image->edge = m.edge;
   image->gate = m.gate;
-  image->doubtful = m.doubtful;
+  image->suspect = m.suspect;
   return Step::numbered;
 }
 

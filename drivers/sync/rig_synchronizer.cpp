@@ -48,7 +48,7 @@ SyncResult RigSynchronizer::offer(const SyncFrame& frame) noexcept {
   source.here = true;
   source.newest = source.any ? std::max(source.newest, number) : number;
   source.any = true;
-  by_counter_.note(number, frame.middle.host, k == 0 || !sources_[0].here);
+  by_counter_.record(number, frame.middle.host, k == 0 || !sources_[0].here);
   return SyncResult::taken;
 }
 
@@ -79,7 +79,7 @@ bool RigSynchronizer::ready(const OpenSet& open) const noexcept {
     return false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(options_.cameras); ++k) {
     const Source& s = sources_[k];
-    if (open.set.present[k] && open.images[k].doubtful && matchers_[k].doubtful()) return false;
+    if (open.set.present[k] && open.images[k].suspect && matchers_[k].suspect()) return false;
     const bool passed = s.any && !by_counter_.aligning(k) && s.newest > number;
     if (waited_for(k) && !open.set.present[k] && !passed) return false;
   }
@@ -176,25 +176,25 @@ void RigSynchronizer::prove(OpenSet* open, SyncedSet* set) noexcept {
       // A clock that is common no more (no master, two of them) pairs one exposure with the next
       // once it has drifted apart by an interval; the host's stamps know better.
       set->proof = SyncProof::common_clock;
-      if (!host_stamps_agree(*set) || a_clock_is_apart()) doubt(set);
+      if (!host_stamps_agree(*set) || a_clock_is_apart()) mark_ambiguous(set);
       return;
     case SyncMode::board:
     case SyncMode::ins_syncout:
     case SyncMode::master_strobe:
       for (std::size_t k = 0; k < matchers_.size(); ++k)
-        open->contradicted = open->contradicted || (set->present[k] && open->images[k].doubtful &&
-                                                    matchers_[k].doubtful());
+        open->contradicted = open->contradicted ||
+                             (set->present[k] && open->images[k].suspect && matchers_[k].suspect());
       set->proof =
           options_.mode == SyncMode::master_strobe ? SyncProof::master : SyncProof::numbered;
-      if (open->contradicted) doubt(set);
+      if (open->contradicted) mark_ambiguous(set);
       return;
     case SyncMode::frame_counter:
       break;
   }
   if (std::count(set->present.begin(), set->present.end(), true) < 2) return;
   const bool agree = host_stamps_agree(*set);
-  if (!agree) doubt(set);
-  if (by_counter_.judge(agree)) ++counters_.realigned;
+  if (!agree) mark_ambiguous(set);
+  if (by_counter_.count_agreement(agree)) ++counters_.realigned;
 }
 
 /// True also of a single image, whose spread is none.
@@ -208,7 +208,7 @@ bool RigSynchronizer::a_clock_is_apart() const noexcept {
   return false;
 }
 
-void RigSynchronizer::doubt(SyncedSet* set) noexcept {
+void RigSynchronizer::mark_ambiguous(SyncedSet* set) noexcept {
   set->proof = SyncProof::ambiguous;
   ++counters_.ambiguous;
 }
@@ -249,7 +249,7 @@ void RigSynchronizer::restarted(int camera) noexcept {
   source.here = true;
   source.any = false;
   if (options_.mode == SyncMode::frame_counter) by_counter_.align(k);
-  sets_.contradict_doubtful(k);
+  sets_.contradict_suspect(k);
   matchers_[k].restart();
   if (k == 0) master_.restart();
 }

@@ -113,7 +113,7 @@ class RigSynchronizer {
   void prove(OpenSet* open, SyncedSet* set) noexcept;
   [[nodiscard]] bool host_stamps_agree(const SyncedSet& set) const noexcept;
   [[nodiscard]] bool a_clock_is_apart() const noexcept;
-  void doubt(SyncedSet* set) noexcept;
+  void mark_ambiguous(SyncedSet* set) noexcept;
   [[nodiscard]] bool ready(const OpenSet& open) const noexcept;
   [[nodiscard]] bool waited_for(std::size_t camera) const noexcept;
   void emit(OpenSet* open, SyncedSet* set) noexcept;

@@ -13,7 +13,7 @@ void BoardLine::attach(SerialLink* line) noexcept {
   used_ = size_ = 0;
   into_frame_ = 0;
   bounded_ = false;
-  forget();
+  reset();
 }
 
 void BoardLine::record_byte(std::uint8_t byte) noexcept {
@@ -77,7 +77,7 @@ void BoardLine::remember() noexcept {
   first_size_ += n;
 }
 
-void BoardLine::forget() noexcept {
+void BoardLine::reset() noexcept {
   first_size_ = 0;
   frames_received_ = 0;
 }

@@ -48,10 +48,10 @@ class BoardLine {
   [[nodiscard]] std::uint64_t refused() const noexcept {
     return refused_before_ + decoder_.bad_coding + decoder_.bad_length + decoder_.bad_crc;
   }
-  /// Guess about the first bytes if no frame has come since attach() or forget(). Empty:
+  /// Guess about the first bytes if no frame has come since attach() or reset(). Empty:
   /// nothing was received, or frames were.
   [[nodiscard]] std::string received_instead() const;
-  void forget() noexcept;
+  void reset() noexcept;
 
  private:
   void remember() noexcept;

@@ -23,11 +23,11 @@ void BoardClock::restart(Duration spread, bool pps) noexcept {
   mappers_.fill(ClockMapper(o));
   turns_ = moving_ = pps;
   locked_ = false;
-  forget();
+  reset();
   reopen(wire_);
 }
 
-void BoardClock::forget() noexcept {
+void BoardClock::reset() noexcept {
   known_ = false;
   newest_tick_ = 0;
   backward_ = 0;
@@ -41,7 +41,7 @@ void BoardClock::report_lock(bool locked, HostStamp now) noexcept {
   moving_ = turns_ && !(locked && now - lock_began_ > kTurn * 2);
 }
 
-void BoardClock::take_turns(HostStamp now) noexcept {
+void BoardClock::alternate_mappers(HostStamp now) noexcept {
   if (!known_) turn_began_ = now;
   if (!turns_ || now - turn_began_ < kTurn) return;
   turn_began_ = now;
@@ -87,14 +87,14 @@ PongStatus BoardClock::answer(const TriggerPong& pong, HostStamp t4) noexcept {
     if (++backward_ >= kBackward) {
       ++resets_;
       for (ClockMapper& m : mappers_) m.restart();
-      forget();
+      reset();
     }
     return refuse(PongStatus::backward);
   }
   backward_ = 0;
   newest_tick_ = pong.received;  // not `sent`: the next question may have come while this answer
                                  // waited for the line
-  take_turns(t4);
+  alternate_mappers(t4);
   for (ClockMapper& m : mappers_)
     m.ping(sent, stamp_of_tick(pong.received), stamp_of_tick(pong.sent),
            std::max(t4, sent + inside));
@@ -155,9 +155,9 @@ void BoardReceiver::accept(const TriggerFrame& frame, const BoardLine::Times& ti
   TriggerInfo info;
   TriggerError error;
   if (frame.type == trigger_event && trigger_get_event(frame.payload, size, &event)) {
-    take_event(event, times.arrival);
+    handle_event(event, times.arrival);
   } else if (frame.type == trigger_pong && trigger_get_pong(frame.payload, size, &pong)) {
-    take_pong(pong, times.departure);
+    handle_pong(pong, times.departure);
   } else if (frame.type == trigger_status && trigger_get_status(frame.payload, size, &status)) {
     pause_.answered(frame.sequence);
     take_status(status);
@@ -165,7 +165,7 @@ void BoardReceiver::accept(const TriggerFrame& frame, const BoardLine::Times& ti
              trigger_get_edge(frame.payload, size, &edge)) {
     (void)same_boot(edge.boot_id);
   } else if (frame.type == trigger_error && trigger_get_error(frame.payload, size, &error)) {
-    take_error(error);
+    handle_error(error);
   } else if (frame.type != trigger_info ||
              !trigger_get_info(frame.payload, size,
                                &info)) {  // an INFO answers a question given up
@@ -173,7 +173,7 @@ void BoardReceiver::accept(const TriggerFrame& frame, const BoardLine::Times& ti
   }
 }
 
-void BoardReceiver::take_event(const TriggerEvent& event, HostStamp arrival) noexcept {
+void BoardReceiver::handle_event(const TriggerEvent& event, HostStamp arrival) noexcept {
   if (!streaming_ || !same_boot(event.boot_id)) return;
   Pulse pulse;
   if (!account_.take(event, &pulse)) {
@@ -188,7 +188,7 @@ void BoardReceiver::take_event(const TriggerEvent& event, HostStamp arrival) noe
   hand_out_(pulse);
 }
 
-void BoardReceiver::take_pong(const TriggerPong& pong, HostStamp departure) noexcept {
+void BoardReceiver::handle_pong(const TriggerPong& pong, HostStamp departure) noexcept {
   if (!same_boot(pong.boot_id)) return;
   const std::uint64_t resets = clock_.resets();
   (void)clock_.answer(pong, departure);
@@ -201,7 +201,7 @@ void BoardReceiver::take_status(const TriggerStatus& status) noexcept {
   if (status.state == trigger_stopped || status.configuration != mark_) finding_ = Finding::halted;
 }
 
-void BoardReceiver::take_error(const TriggerError& error) noexcept {
+void BoardReceiver::handle_error(const TriggerError& error) noexcept {
   if (error.refused != trigger_pause) return;
   pause_.refused();
   account_.clear_pause();

@@ -85,8 +85,8 @@ class BoardClock {
     bool open = false;
   };
   [[nodiscard]] PongStatus refuse(PongStatus why) noexcept;
-  void forget() noexcept;
-  void take_turns(HostStamp now) noexcept;
+  void reset() noexcept;
+  void alternate_mappers(HostStamp now) noexcept;
   [[nodiscard]] MappedStamp with_room(MappedStamp m) const noexcept;
 
   std::array<ClockMapper, 2> mappers_;
@@ -158,10 +158,10 @@ class BoardReceiver final : public FrameSink {
   [[nodiscard]] std::uint64_t reboots() const noexcept { return reboots_; }
 
  private:
-  void take_event(const TriggerEvent& event, HostStamp arrival) noexcept;
-  void take_pong(const TriggerPong& pong, HostStamp departure) noexcept;
+  void handle_event(const TriggerEvent& event, HostStamp arrival) noexcept;
+  void handle_pong(const TriggerPong& pong, HostStamp departure) noexcept;
   void take_status(const TriggerStatus& status) noexcept;
-  void take_error(const TriggerError& error) noexcept;
+  void handle_error(const TriggerError& error) noexcept;
   [[nodiscard]] bool same_boot(std::uint32_t boot) noexcept;
 
   PauseRequest& pause_;

@@ -92,7 +92,7 @@ DeviceStatus Device::meet(TriggerInfo* who_is_there) {
 DeviceStatus Device::connect() {
   stop();
   close_line();
-  look_up_virtual_time();
+  query_virtual_time();
   const DeviceStatus status = meet(&identity_);
   if (status != DeviceStatus::ok) close_line();
   return status;

@@ -120,7 +120,7 @@ int steps(std::uint8_t from, std::uint8_t to) noexcept {
   return (to + trigger_unasked - from) % trigger_unasked;
 }
 
-const char* words_of(std::uint8_t type) noexcept {
+const char* request_name(std::uint8_t type) noexcept {
   switch (type) {
     case trigger_hello:
       return "who it is";
@@ -135,7 +135,7 @@ const char* words_of(std::uint8_t type) noexcept {
   }
 }
 
-std::string words_of_error(std::uint8_t code) {
+std::string error_text(std::uint8_t code) {
   switch (code) {
     case trigger_error_rate:
       return "its timer cannot make this rate; choose another trigger.rate";
@@ -221,7 +221,7 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
       return DeviceStatus::stopped;
     case Answer::refused:
       last_error_ =
-          format_text("the trigger board refuses %s: ", words_of(type)) + words_of_error(error_);
+          format_text("the trigger board refuses %s: ", request_name(type)) + error_text(error_);
       return error_ == trigger_error_not_stopped || error_ == trigger_error_not_configured
                  ? DeviceStatus::failed
                  : DeviceStatus::unsupported;
@@ -229,8 +229,9 @@ DeviceStatus Setup::verdict(Answer answer, std::uint8_t type) {
     case Answer::gone:
       break;
   }
-  last_error_ = format_text(
-      "the trigger board did not answer when asked %s; check its cable and supply", words_of(type));
+  last_error_ =
+      format_text("the trigger board did not answer when asked %s; check its cable and supply",
+                  request_name(type));
   return DeviceStatus::disconnected;
 }
 
@@ -300,7 +301,7 @@ DeviceStatus Setup::ask_status(std::uint8_t type, std::span<const std::uint8_t> 
   }
   last_error_ = format_text(
       "the trigger board answers when asked %s, and does not do it; switch it off and on",
-      words_of(type));
+      request_name(type));
   return DeviceStatus::failed;
 }
 

@@ -45,7 +45,7 @@ std::vector<DeviceInfo> Driver::enumerate() {
   return found;
 }
 
-std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* status) {
+std::unique_ptr<Device> Driver::find_board(std::string_view serial, DeviceStatus* status) {
   std::unique_ptr<Device> chosen;
   std::string others;
   DeviceStatus worst_status = DeviceStatus::not_found;
@@ -80,7 +80,7 @@ std::unique_ptr<Device> Driver::look_for(std::string_view serial, DeviceStatus* 
 std::unique_ptr<Device> Driver::open_board(std::string_view where, DeviceStatus* status) {
   last_error_.clear();
   return where.find('/') != std::string_view::npos ? open_port(std::string(where), status)
-                                                   : look_for(where, status);
+                                                   : find_board(where, status);
 }
 
 std::unique_ptr<TriggerDevice> Driver::open(std::string_view where, DeviceStatus* status) {

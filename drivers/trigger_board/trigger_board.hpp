@@ -44,7 +44,7 @@ class Driver final : public TriggerDriver {
 
  private:
   [[nodiscard]] std::unique_ptr<Device> open_port(const std::string& port, DeviceStatus* status);
-  [[nodiscard]] std::unique_ptr<Device> look_for(std::string_view serial, DeviceStatus* status);
+  [[nodiscard]] std::unique_ptr<Device> find_board(std::string_view serial, DeviceStatus* status);
   [[nodiscard]] std::vector<std::string> candidates() const;
 
   Options options_;

@@ -217,7 +217,7 @@ DeviceStatus V4l2Camera::configure(const CameraConfiguration& requested,
 /// their layout must be.
 DeviceStatus V4l2Camera::bring_to(const CameraConfiguration& requested, bool keep_slots) {
   Options options;
-  if (!take_options(requested.options, option_table(), "V4L2 cameras", &options, &last_error_))
+  if (!parse_options(requested.options, option_table(), "V4L2 cameras", &options, &last_error_))
     return DeviceStatus::unsupported;
   options.trigger_control = key_of(options.trigger_control);
   for (auto& control : options.controls) control.first = key_of(control.first);

@@ -37,7 +37,8 @@ constexpr std::array kFormats = {
 
 // One row each. The loops are plain so that the compiler makes vectors of them.
 
-void take_words(const std::uint8_t* from, std::size_t width, int shift, std::uint8_t* to) noexcept {
+void unpack_words(const std::uint8_t* from, std::size_t width, int shift,
+                  std::uint8_t* to) noexcept {
   for (std::size_t x = 0; x < width; ++x) {
     const unsigned word =
         static_cast<unsigned>(from[2 * x]) | static_cast<unsigned>(from[2 * x + 1]) << 8U;
@@ -45,13 +46,13 @@ void take_words(const std::uint8_t* from, std::size_t width, int shift, std::uin
   }
 }
 
-void take_packed10(const std::uint8_t* from, std::size_t width, std::uint8_t* to) noexcept {
+void unpack_packed10(const std::uint8_t* from, std::size_t width, std::uint8_t* to) noexcept {
   const std::size_t whole = width / 4;
   for (std::size_t i = 0; i < whole; ++i) std::memcpy(to + 4 * i, from + 5 * i, 4);
   std::memcpy(to + 4 * whole, from + 5 * whole, width % 4);
 }
 
-void take_every_other(const std::uint8_t* from, std::size_t width, std::uint8_t* to) noexcept {
+void unpack_every_other(const std::uint8_t* from, std::size_t width, std::uint8_t* to) noexcept {
   for (std::size_t x = 0; x < width; ++x) to[x] = from[2 * x];
 }
 
@@ -116,16 +117,16 @@ void to_grey(const PixelFormat& format, const std::uint8_t* from, std::size_t fr
         std::memcpy(to, from, w);
         break;
       case Layout::words:
-        take_words(from, w, format.shift, to);
+        unpack_words(from, w, format.shift, to);
         break;
       case Layout::packed10:
-        take_packed10(from, w, to);
+        unpack_packed10(from, w, to);
         break;
       case Layout::luma_first:
-        take_every_other(from, w, to);
+        unpack_every_other(from, w, to);
         break;
       case Layout::chroma_first:
-        take_every_other(from + 1, w, to);
+        unpack_every_other(from + 1, w, to);
         break;
     }
   }

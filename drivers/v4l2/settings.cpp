@@ -53,7 +53,7 @@ class Applier {
   }
 
   DeviceStatus run(Settings* settings) {
-    return take_steps([&] {
+    return run_steps([&] {
       other_controls();
       region();
       format();

@@ -325,7 +325,7 @@ void Decoder::begin(const StreamSettings& stream, std::uint32_t baud,
   sample_counter_ = {};
   receiver_ = {};
   counted_ = false;
-  said_ = {};
+  replies_ = {};
   any_ = false;
   last_sample_ = {};
 }
@@ -337,10 +337,11 @@ void Decoder::accept(std::span<const std::uint8_t> bytes, HostStamp arrival) noe
   (void)stream_.accept(bytes);  // kMaxBytes fit beside any frame that waits
 }
 
-bool Decoder::woke() noexcept { return std::exchange(said_.woke, false); }
+bool Decoder::woke() noexcept { return std::exchange(replies_.woke, false); }
 
 bool Decoder::answered(MessageId request) noexcept {
-  return std::exchange(request == MessageId::go_to_config ? said_.stopped : said_.going_on, false);
+  return std::exchange(request == MessageId::go_to_config ? replies_.stopped : replies_.going_on,
+                       false);
 }
 
 bool Decoder::next(InsReading* reading) noexcept {
@@ -349,9 +350,9 @@ bool Decoder::next(InsReading* reading) noexcept {
     const std::uint64_t end = c.message_bytes + c.garbage_bytes - base_;
     const std::uint64_t begin = end - frame_size(m.payload.size());
     if (m.is(MessageId::mtdata2) && set_.generation == Generation::mark4) {
-      if (take_mtdata2(m, begin, end, reading)) return true;
+      if (read_mtdata2(m, begin, end, reading)) return true;
     } else if (m.is(MessageId::mtdata) && set_.generation == Generation::legacy) {
-      if (take_mtdata(m, begin, end, reading)) return true;
+      if (read_mtdata(m, begin, end, reading)) return true;
     } else {
       take_other(m);
     }
@@ -361,11 +362,11 @@ bool Decoder::next(InsReading* reading) noexcept {
 }
 
 void Decoder::take_other(const Message& m) noexcept {
-  if (m.is(MessageId::wake_up)) said_.woke = true;
-  if (answers(m, MessageId::go_to_config)) said_.stopped = true;
-  if (answers(m, MessageId::go_to_measurement)) said_.going_on = said_.resumed = true;
+  if (m.is(MessageId::wake_up)) replies_.woke = true;
+  if (answers(m, MessageId::go_to_config)) replies_.stopped = true;
+  if (answers(m, MessageId::go_to_measurement)) replies_.going_on = replies_.resumed = true;
   if (m.is(MessageId::error) && !m.payload.empty() && m.payload[0] == kErrorPowerDip)
-    said_.woke = true;
+    replies_.woke = true;
 }
 
 void Decoder::count_messages(std::uint16_t counter) noexcept {
@@ -387,7 +388,7 @@ bool Decoder::step(ClockStep step) noexcept {
   return step != ClockStep::backward;
 }
 
-bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t end,
+bool Decoder::read_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t end,
                            InsReading* reading) noexcept {
   Mtdata2 d;
   if (!decode_mtdata2(m.payload, &d)) {
@@ -414,7 +415,7 @@ bool Decoder::take_mtdata2(const Message& m, std::uint64_t begin, std::uint64_t 
   return hand_out(r, reading);
 }
 
-bool Decoder::take_mtdata(const Message& m, std::uint64_t begin, std::uint64_t end,
+bool Decoder::read_mtdata(const Message& m, std::uint64_t begin, std::uint64_t end,
                           InsReading* reading) noexcept {
   Mtdata d;
   if (!decode_mtdata(m.payload, set_.layout, &d) || !d.sample_counter) {
@@ -448,7 +449,7 @@ bool Decoder::hand_out(const InsReading& r, InsReading* reading) noexcept {
   last_host_ = r.host;
   ++counters_.readings;
   *reading = r;
-  reading->resumed = std::exchange(said_.resumed, false);
+  reading->resumed = std::exchange(replies_.resumed, false);
   return true;
 }
 

@@ -199,13 +199,13 @@ class Decoder {
 
  private:
   /// Status of the device that was not read yet, and of the next sample.
-  struct Said {
+  struct Replies {
     bool woke = false, stopped = false, going_on = false;
     bool resumed = false;
   };
-  [[nodiscard]] bool take_mtdata2(const xbus::Message& message, std::uint64_t begin,
+  [[nodiscard]] bool read_mtdata2(const xbus::Message& message, std::uint64_t begin,
                                   std::uint64_t end, InsReading* reading) noexcept;
-  [[nodiscard]] bool take_mtdata(const xbus::Message& message, std::uint64_t begin,
+  [[nodiscard]] bool read_mtdata(const xbus::Message& message, std::uint64_t begin,
                                  std::uint64_t end, InsReading* reading) noexcept;
   void take_other(const xbus::Message& message) noexcept;
   [[nodiscard]] bool step(ClockStep step) noexcept;
@@ -229,7 +229,7 @@ class Decoder {
   std::uint64_t received_ = 0, base_ = 0;
   std::uint64_t number_ = 0;
   bool any_ = false, counted_ = false;
-  Said said_{};
+  Replies replies_{};
   std::uint16_t last_message_ = 0;
   std::uint8_t last_fix_age_ = 0;
 };

@@ -71,7 +71,7 @@ void RequestReply::remember(std::span<const std::uint8_t> bytes) noexcept {
   received_size_ += n;
 }
 
-void RequestReply::forget() noexcept {
+void RequestReply::reset() noexcept {
   stream_.reset();
   messages_ = 0;
   received_size_ = 0;
@@ -123,7 +123,7 @@ DeviceStatus Setup::probe(std::uint32_t baud, Duration limit) {
   if (line_.baud() != baud) {
     const DeviceStatus status = line_.set_baud(baud);
     if (status != DeviceStatus::ok) return status;
-    dialogue_.forget();
+    dialogue_.reset();
   }
   dialogue_.ask(MessageId::go_to_config, {}, &reply_, limit);
   return reply_.answer == Answer::silent ? DeviceStatus::timeout : status_of(reply_.answer);
@@ -165,12 +165,12 @@ void Setup::refuse(DeviceStatus status, std::string message) {
 }
 
 void Setup::fail(const char* what, DeviceStatus refused) {
-  const bool said_no = reply_.answer == Answer::refused;
-  last_error_ = said_no ? format_text("it refuses %s: %.*s (error %02X)", what,
-                                      static_cast<int>(error_text(reply_.error).size()),
-                                      error_text(reply_.error).data(), reply_.error)
-                        : format_text("it does not answer to %s; check its cable", what);
-  throw Refused{said_no ? refused : status_of(reply_.answer)};
+  const bool refused_by_device = reply_.answer == Answer::refused;
+  last_error_ = refused_by_device ? format_text("it refuses %s: %.*s (error %02X)", what,
+                                                static_cast<int>(error_text(reply_.error).size()),
+                                                error_text(reply_.error).data(), reply_.error)
+                                  : format_text("it does not answer to %s; check its cable", what);
+  throw Refused{refused_by_device ? refused : status_of(reply_.answer)};
 }
 
 void Setup::write(MessageId id, std::span<const std::uint8_t> payload, const char* what) {
@@ -179,7 +179,7 @@ void Setup::write(MessageId id, std::span<const std::uint8_t> payload, const cha
 }
 
 DeviceStatus Setup::identify(Identity* identity) {
-  return take_steps([&] { *identity = identified(); });
+  return run_steps([&] { *identity = identified(); });
 }
 
 Identity Setup::identified() {
@@ -217,7 +217,7 @@ void Setup::check_load(const LineBudget& b, double rate_hz) {
   refuse(DeviceStatus::no_bandwidth,
          format_text(
              "%.0f Hz need %.0f %% of the line at %u baud, more than the %.0f %% that are safe; ",
-             rate_hz, 100 * b.load, baud_to_be(), 100 * kLineLoadMost) +
+             rate_hz, 100 * b.load, baud_to_be(), 100 * kMaxLineLoad) +
              (b.baud_needed != 0
                   ? format_text("set ins.baud to %u, or ins.rate to %.0f or less", b.baud_needed,
                                 std::floor(b.greatest_rate))
@@ -227,7 +227,7 @@ void Setup::check_load(const LineBudget& b, double rate_hz) {
 DeviceStatus Setup::set(const Identity& identity, double rate_hz, StreamSettings* stream) {
   StreamSettings requested;
   requested.generation = identity.generation;
-  return take_steps([&] {
+  return run_steps([&] {
     if (identity.generation == Generation::legacy)
       set_legacy(rate_hz, &requested);
     else
@@ -262,7 +262,7 @@ void Setup::set_baud(const Identity& identity) {
 
 DeviceStatus Setup::measure() {
   constexpr std::uint8_t kTooMuch = 0x29;
-  return take_steps([&] {
+  return run_steps([&] {
     dialogue_.ask(MessageId::go_to_measurement, &reply_);
     if (reply_.answer == Answer::ok) return;
     fail("to measure",

@@ -53,7 +53,7 @@ class RequestReply {
   [[nodiscard]] std::string received_instead() const;
   [[nodiscard]] std::uint64_t messages_received() const noexcept { return messages_; }
   /// Forgets what was received: after a change of the baud rate.
-  void forget() noexcept;
+  void reset() noexcept;
 
  private:
   [[nodiscard]] Answer listen(std::uint8_t requested, HostStamp until, Reply* reply);

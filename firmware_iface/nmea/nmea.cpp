@@ -112,7 +112,7 @@ void place(const Fields& f, std::size_t first, Sentence* s) noexcept {
   s->longitude_deg = angle(f.at[first + 2], f.at[first + 3], 'E', 'W', 180);
 }
 
-void take_gga(const Fields& f, Sentence* s) noexcept {
+void parse_gga(const Fields& f, Sentence* s) noexcept {
   s->time_of_day_ns = time_of_day(f.at[1]);
   place(f, 2, s);
   s->quality = small(f.at[6]);
@@ -122,7 +122,7 @@ void take_gga(const Fields& f, Sentence* s) noexcept {
   if (f.at[12] == "M") s->geoid_m = within(number(f.at[11]), -200, 200);
 }
 
-void take_rmc(const Fields& f, Sentence* s) noexcept {
+void parse_rmc(const Fields& f, Sentence* s) noexcept {
   s->time_of_day_ns = time_of_day(f.at[1]);
   s->valid = f.at[2] == "A";
   place(f, 3, s);
@@ -131,7 +131,7 @@ void take_rmc(const Fields& f, Sentence* s) noexcept {
   s->days = date(f.at[9]);
 }
 
-void take_vtg(const Fields& f, Sentence* s) noexcept {
+void parse_vtg(const Fields& f, Sentence* s) noexcept {
   if (f.at[2] == "T") s->course_deg = within(number(f.at[1]), 0, 360);
   if (f.at[8] == "K") {
     if (const auto kmh = within(number(f.at[7]), 0, 4000)) s->speed = *kmh / 3.6;
@@ -140,7 +140,7 @@ void take_vtg(const Fields& f, Sentence* s) noexcept {
   }
 }
 
-void take_gst(const Fields& f, Sentence* s) noexcept {
+void parse_gst(const Fields& f, Sentence* s) noexcept {
   s->time_of_day_ns = time_of_day(f.at[1]);
   s->latitude_sigma_m = within(number(f.at[6]), 0, 1e5);
   s->longitude_sigma_m = within(number(f.at[7]), 0, 1e5);
@@ -180,16 +180,16 @@ Status parse(std::string_view line, Sentence* sentence) noexcept {
       address.size() == kAddress && address[0] != 'P' ? address.substr(2) : std::string_view{};
   if (type == "GGA") {
     s.type = Type::gga;
-    if (splits) take_gga(f, &s);
+    if (splits) parse_gga(f, &s);
   } else if (type == "RMC") {
     s.type = Type::rmc;
-    if (splits) take_rmc(f, &s);
+    if (splits) parse_rmc(f, &s);
   } else if (type == "VTG") {
     s.type = Type::vtg;
-    if (splits) take_vtg(f, &s);
+    if (splits) parse_vtg(f, &s);
   } else if (type == "GST") {
     s.type = Type::gst;
-    if (splits) take_gst(f, &s);
+    if (splits) parse_gst(f, &s);
   } else if (type == "HDT") {
     s.type = Type::hdt;
     if (splits && f.at[2] == "T") s.heading_deg = within(number(f.at[1]), 0, 360);

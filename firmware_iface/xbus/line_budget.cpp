@@ -21,10 +21,10 @@ LineBudget budget(double bytes_per_sample, double rate_hz, double fixed,
   b.load = b.bytes_per_second * kBitsPerByte / baud;
   b.greatest_rate =
       bytes_per_sample > 0
-          ? std::max(0.0, (kLineLoadMost * baud / kBitsPerByte - fixed) / bytes_per_sample)
+          ? std::max(0.0, (kMaxLineLoad * baud / kBitsPerByte - fixed) / bytes_per_sample)
           : 0;
   for (const std::uint32_t candidate : kBauds)
-    if (b.baud_needed == 0 && b.bytes_per_second * kBitsPerByte <= kLineLoadMost * candidate)
+    if (b.baud_needed == 0 && b.bytes_per_second * kBitsPerByte <= kMaxLineLoad * candidate)
       b.baud_needed = candidate;
   return b;
 }

@@ -9,7 +9,7 @@
 /// Load of an output on a serial link. A byte is ten bits on the line (start, eight, stop).
 namespace vergence::xbus {
 
-inline constexpr double kLineLoadMost = 0.9;  // above it a moment's delay is never caught up
+inline constexpr double kMaxLineLoad = 0.9;  // above it a moment's delay is never caught up
 
 /// Bytes of a message in its frame.
 [[nodiscard]] constexpr std::size_t frame_size(std::size_t payload) noexcept {
@@ -24,10 +24,10 @@ inline constexpr double kLineLoadMost = 0.9;  // above it a moment's delay is ne
 struct LineBudget {
   double bytes_per_second = 0;
   double load = 0;           // of the line, 1 is all of it
-  double greatest_rate = 0;  // Hz, of the samples, at kLineLoadMost
+  double greatest_rate = 0;  // Hz, of the samples, at kMaxLineLoad
   std::uint32_t baud_needed =
-      0;  // the lowest of the device's that carries it within kLineLoadMost; 0: none does
-  [[nodiscard]] bool fits() const noexcept { return load <= kLineLoadMost; }
+      0;  // the lowest of the device's that carries it within kMaxLineLoad; 0: none does
+  [[nodiscard]] bool fits() const noexcept { return load <= kMaxLineLoad; }
 };
 
 /// Load of an MTi-G that sends this layout at this rate. Precondition: the layout is known, rate

@@ -22,7 +22,7 @@
 #include <Eigen/Cholesky>
 
 #include "app/session/drive_calibration.hpp"
-#include "core/estimator/detail/usual_spread.hpp"
+#include "core/estimator/detail/covariance_baseline.hpp"
 #include "core/estimator/detail/window_correction.hpp"
 #include "core/estimator/estimator.hpp"
 #include "core/odometry/drift_covariance.hpp"
@@ -146,14 +146,14 @@ std::vector<Posed> drive_rendered(std::uint64_t frames) {
 }
 
 /// Statistics of a drive's evaluated motions.
-struct Judged {
+struct Extremes {
   double most_unusual = 0;   // the most uncertain motion, times what is usual
   double largest_share = 0;  // of a motion that the window corrected by more than its sigma
 };
 
-Judged judged(std::span<const Posed> poses) {
+Extremes find_extremes(std::span<const Posed> poses) {
   CovarianceBaseline usual;
-  Judged most;
+  Extremes most;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const Transform motion =
         poses[i - 1].sample.T_world_left.inverse() * poses[i].sample.T_world_left;
@@ -163,7 +163,7 @@ Judged judged(std::span<const Posed> poses) {
         std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace() - moved_m * moved_m));
     if (WindowCorrection{moved_m, motion.t.norm(), sigma_m}.significant())
       most.largest_share = std::max(most.largest_share, moved_m / motion.t.norm());
-    if (!usual.judges(motion.t.norm(), sigma_m)) continue;
+    if (!usual.measurable(motion.t.norm(), sigma_m)) continue;
     (void)usual.unusual(sigma_m);
     most.most_unusual = std::max(most.most_unusual, usual.times_usual());
   }
@@ -183,7 +183,7 @@ void print(const std::string& name, const TruthSigma& sigma, std::span<const Pos
   for (std::size_t i = 10; i < poses.size(); ++i)
     add_motion(poses[0], poses[i], sigma, full(poses[i].sample.covariance), &all);
   all.print(name, "all");
-  const Judged most = judged(poses);
+  const Extremes most = find_extremes(poses);
   fmt::print(
       "{:12s} most uncertain motion: {:.1f} times as the usual one; the window's largest "
       "correction beyond a motion's sigma: {:.1f} % of the motion\n",

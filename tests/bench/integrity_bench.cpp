@@ -65,7 +65,7 @@ Driven drive(const app::StereoSequence& s, const app::Configuration& c,
   return d;
 }
 
-std::vector<test::EvaluatedPose> judged(const Driven& d) {
+std::vector<test::EvaluatedPose> evaluated_poses(const Driven& d) {
   std::vector<test::EvaluatedPose> poses;
   for (const PoseSample& s : d.samples) poses.push_back({s.stamp, s.status, s.T_world_left});
   return poses;
@@ -73,18 +73,18 @@ std::vector<test::EvaluatedPose> judged(const Driven& d) {
 
 struct Tally {
   int runs = 0, wrong_runs = 0, wrong = 0, ok = 0;
-  int cut_short = 0;  // runs that have not a sample for every pair
-  int unjudged = 0;   // `ok` poses without truth to hold them against
-  int unfit = 0;      // drives that give no measure of what is normal
+  int cut_short = 0;      // runs that have not a sample for every pair
+  int not_evaluated = 0;  // `ok` poses without truth to hold them against
+  int unfit = 0;          // drives that give no measure of what is normal
 };
 
-void judge(const RecordedSequence& drive_of, const std::string& what, std::size_t pairs,
-           const Driven& d, const test::NormalError& normal, Tally* tally) {
-  const test::Integrity h = test::evaluate_integrity(judged(d), normal, drive_of.truth);
+void evaluate(const RecordedSequence& drive_of, const std::string& what, std::size_t pairs,
+              const Driven& d, const test::NormalError& normal, Tally* tally) {
+  const test::Integrity h = test::evaluate_integrity(evaluated_poses(d), normal, drive_of.truth);
   ++tally->runs;
   tally->ok += h.ok;
   tally->wrong += h.wrong;
-  tally->unjudged += h.unjudged;
+  tally->not_evaluated += h.not_evaluated;
   tally->wrong_runs += h.wrong > 0 ? 1 : 0;
   fmt::print("{:12s} {:46s} frames {:3d} ok {:3d} lost {:3d} knocks {}  most {:4.1f}",
              drive_of.name, what, d.samples.size(), h.ok, h.lost, d.knocks, h.most);
@@ -92,7 +92,7 @@ void judge(const RecordedSequence& drive_of, const std::string& what, std::size_
     ++tally->cut_short;
     fmt::print("  CUT SHORT: {} pairs", pairs);
   }
-  if (h.unjudged > 0) fmt::print("  no truth for {}", h.unjudged);
+  if (h.not_evaluated > 0) fmt::print("  no truth for {}", h.not_evaluated);
   if (h.wrong_over_all > 0) fmt::print("  over 20 {}", h.wrong_over_all);
   if (h.wrong > 0)
     fmt::print("  WRONG {} from {}: {:.3f} m, {:.3f} deg over {} frames", h.wrong, h.first_wrong,
@@ -142,7 +142,7 @@ void run(RecordedSequence d, const std::string& filter, bool events, Tally* tall
   const app::DriveCalibration found =
       app::calibrate_drive({d.sequence, c, 0, d.sequence.pairs.size(), {}, {}}, given);
   if (found.rig) own.file.rig = *found.rig;
-  const std::vector<test::EvaluatedPose> untouched = judged(drive(d.sequence, c, own));
+  const std::vector<test::EvaluatedPose> untouched = evaluated_poses(drive(d.sequence, c, own));
   const test::MotionError usual = test::normal_errors(untouched, d.truth)[test::kIntegrityFrames];
   fmt::print("{:12s} normal error over {} frames: {:.3f} m, {:.3f} deg\n", d.name,
              test::kIntegrityFrames, usual.ins_path_m, usual.turn_rad * 180 / std::numbers::pi);
@@ -158,11 +158,11 @@ void run(RecordedSequence d, const std::string& filter, bool events, Tally* tall
     const test::TemporaryFolder folder;
     const app::StereoSequence s = spoil(d, v, folder.path());
     const std::string name(v.name);
-    judge(d, name + ", given", s.pairs.size(), drive(s, c, given, events), normal, tally);
+    evaluate(d, name + ", given", s.pairs.size(), drive(s, c, given, events), normal, tally);
     if (found.rig)
-      judge(d, name + ", own", s.pairs.size(), drive(s, c, own, events), normal, tally);
-    judge(d, name + ", from scratch", s.pairs.size(), drive(s, c, test::blank(given), events),
-          normal, tally);
+      evaluate(d, name + ", own", s.pairs.size(), drive(s, c, own, events), normal, tally);
+    evaluate(d, name + ", from scratch", s.pairs.size(), drive(s, c, test::blank(given), events),
+             normal, tally);
   }
 }
 
@@ -185,8 +185,9 @@ int main(int argc, char** argv) {
     bench::run(*d, filter, argc > 3, &tally);
   }
   fmt::print("{} runs, {} poses ok, {} of them wrong, in {} runs; {} without truth, {} cut short\n",
-             tally.runs, tally.ok, tally.wrong, tally.wrong_runs, tally.unjudged, tally.cut_short);
+             tally.runs, tally.ok, tally.wrong, tally.wrong_runs, tally.not_evaluated,
+             tally.cut_short);
   if (tally.runs == 0) return 2;
-  return tally.wrong + tally.unjudged + tally.cut_short + tally.unfit > 0 ? EXIT_FAILURE
-                                                                          : EXIT_SUCCESS;
+  return tally.wrong + tally.not_evaluated + tally.cut_short + tally.unfit > 0 ? EXIT_FAILURE
+                                                                               : EXIT_SUCCESS;
 }

@@ -1,7 +1,8 @@
 // Availability of poses on the recorded drives, whatever is done to them that an odometry
 // should bear.
 //
-//   robustness_bench [drives|cold|windows|times|scenes|planar|all] [DRIVE|all] [variant=PART]
+//   robustness_bench [drives|cold|windows|times|scenes|unseen|planar|all] [DRIVE|all]
+//   [variant=PART]
 //                    [KEY=VALUE …]
 //
 // drives   Whole drives, calibration given, with `calibration.online=off` and online.
@@ -12,6 +13,8 @@
 //          window with the calibration given and `calibration.online=off`.
 // times    Faults of time, with the calibration given, online and off.
 // scenes   Harder scenes, the same.
+// unseen   Whole drives played backwards, and mirrored with the cameras swapped: rigs and motions
+//          that no default was chosen on.
 // planar   `sand_rover` against its planar truth: similarity and an offset of time are fitted.
 //
 // Tables are markdown, for docs/benchmarks.md. Settings apply to every run.
@@ -23,6 +26,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
 
 #include "app/session/drive_calibration.hpp"
 #include "core/comparison/trajectory_metrics.hpp"
@@ -151,18 +155,19 @@ void window_row(const std::string& name, std::size_t first, const char* what, co
 
 void windows(const Bench& b, const RecordedSequence& d) {
   constexpr std::size_t kStep = 25, kFrames = 150, kMin = 25;
-  const StartingCalibration claim = given(b.online, d.sequence);
-  StartingCalibration own = claim;
+  const StartingCalibration initial = given(b.online, d.sequence);
+  StartingCalibration own = initial;
   const app::DriveCalibration found =
-      app::calibrate_drive({d.sequence, b.online, 0, d.sequence.pairs.size(), {}, {}}, claim);
+      app::calibrate_drive({d.sequence, b.online, 0, d.sequence.pairs.size(), {}, {}}, initial);
   if (found.rig) own.file.rig = *found.rig;
   for (std::size_t first = 0; first + kMin <= d.sequence.pairs.size(); first += kStep) {
     const StereoSequence s = part(d.sequence, first, kFrames);
-    const DriveOutcome off = drive(d, s, b.off, claim);
+    const DriveOutcome off = drive(d, s, b.off, initial);
     window_row(d.name, first, "off", off, off, false);
-    window_row(d.name, first, "given", drive(d, s, b.online, claim), off, false);
+    window_row(d.name, first, "given", drive(d, s, b.online, initial), off, false);
     if (found.rig) window_row(d.name, first, "found", drive(d, s, b.online, own), off, false);
-    window_row(d.name, first, "from scratch", drive(d, s, b.online, test::blank(claim)), off, true);
+    window_row(d.name, first, "from scratch", drive(d, s, b.online, test::blank(initial)), off,
+               true);
   }
 }
 
@@ -178,6 +183,48 @@ void variants(const Bench& b, const RecordedSequence& d, std::span<const Integri
     row(fmt::format("| {} | {} | {} | {} | {} | {} | {} |", d.name, v.name, posed(off), off.ok,
                     posed(online), online.ok, online.knocks));
   }
+}
+
+/// The drive played backwards: a car that reverses.
+RecordedSequence backwards(RecordedSequence d) {
+  std::vector<app::StereoPair>& pairs = d.sequence.pairs;
+  const Stamp first = pairs.front().stamp, last = pairs.back().stamp;
+  const auto reversed = [&](Stamp s) { return first + (last - s); };
+  std::reverse(pairs.begin(), pairs.end());
+  for (app::StereoPair& p : pairs) p.stamp = reversed(p.stamp);
+  std::reverse(d.truth.begin(), d.truth.end());
+  for (StampedPose& p : d.truth) p.stamp = reversed(p.stamp);
+  d.name += " backwards";
+  return d;
+}
+
+/// The drive in a mirror, whose left camera is the right one's image.
+RecordedSequence mirrored(const RecordedSequence& from, const std::filesystem::path& folder) {
+  RecordedSequence d = from;
+  d.sequence = spoil(from,
+                     {"mirrored",
+                      [](cv::Mat* left, cv::Mat* right, std::size_t, std::size_t) {
+                        std::swap(*left, *right);
+                        for (cv::Mat* image : {left, right}) cv::flip(*image, *image, 1);
+                      },
+                      nullptr},
+                     folder);
+  // Both sides of a mirrored rotation and translation are mirrored: S R S and S t.
+  const Vec3 mirror(-1, 1, 1);
+  const auto in_mirror = [&](const Transform& t) {
+    return Transform{mirror.asDiagonal() * t.R * mirror.asDiagonal(), mirror.asDiagonal() * t.t};
+  };
+  RigCalibration& rig = d.sequence.calibration;
+  std::swap(rig.intrinsics[0], rig.intrinsics[1]);
+  for (Intrinsics& lens : rig.intrinsics) {
+    lens.cx = lens.width - 1 - lens.cx;
+    if (lens.kind == CameraModelKind::pinhole_radtan) lens.distortion[3] *= -1;
+  }
+  const Transform T_left_right = rig.T_camera_left[1].inverse();
+  for (StampedPose& p : d.truth) p.T_world_body = in_mirror(p.T_world_body * T_left_right);
+  rig.T_camera_left[1] = in_mirror(T_left_right);
+  d.name += " mirrored";
+  return d;
 }
 
 /// Alignment of positions of frames in [first, last): rotated, moved, scaled and shifted in time
@@ -255,12 +302,11 @@ int main(int argc, char** argv) {
     fmt::print("\n");
     for (const RecordedSequence& d : drives) run(d);
   };
-  section(
-      "drives",
+  const char* drives_heading =
       "drive | calibration | posed | ok | first ok | ok of those with `off` from frame 36 on, % "
       "| moving scene | ATE mm | segments % | knocks | adopted | points kept "
-      "at adoptions, least, %",
-      12, [&](const RecordedSequence& d) { whole(b, d); });
+      "at adoptions, least, %";
+  section("drives", drives_heading, 12, [&](const RecordedSequence& d) { whole(b, d); });
   section("cold", "drive | starts with a pose within three frames | not, at frame (reason)", 3,
           [&](const RecordedSequence& d) { started = cold_starts(b, d) && started; });
   section("windows",
@@ -273,6 +319,11 @@ int main(int argc, char** argv) {
     // From there on it is too dim for any odometry to follow when it is made darker still.
     if (d.name == "sand_rover") d.sequence = part(d.sequence, 0, 330);
     variants(b, d, scene_variants());
+  });
+  section("unseen", drives_heading, 12, [&](const RecordedSequence& d) {
+    const test::TemporaryFolder folder;
+    whole(b, backwards(d));
+    whole(b, mirrored(d, folder.path()));
   });
   section(
       "planar",

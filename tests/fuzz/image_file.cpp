@@ -15,14 +15,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   constexpr std::uint8_t kFence = 0xa5;
   const std::vector<std::uint8_t> bytes(
       data, data + size);  // exactly so many: a read behind the last one is found by ASan
-  ImageSize claimed;
-  if (check_image(bytes, &claimed) != ImageFileStatus::ok) return 0;
-  const auto width = static_cast<std::size_t>(claimed.width),
-             height = static_cast<std::size_t>(claimed.height);
+  ImageSize declared;
+  if (check_image(bytes, &declared) != ImageFileStatus::ok) return 0;
+  const auto width = static_cast<std::size_t>(declared.width),
+             height = static_cast<std::size_t>(declared.height);
   if (width * height > kMaxPixels) return 0;
   const std::size_t stride = width + 8;
   std::vector<std::uint8_t> out(stride * height, kFence);
-  (void)decode_grey(bytes, claimed, out.data(), stride);
+  (void)decode_grey(bytes, declared, out.data(), stride);
   for (std::size_t y = 0; y < height; ++y)
     for (std::size_t x = width; x < stride; ++x)
       if (out[y * stride + x] != kFence) std::abort();  // rows end where the caller said

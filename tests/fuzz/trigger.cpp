@@ -158,7 +158,7 @@ class Bench {
 
   void take() {
     BoardPulse pulse{};
-    if (!board_take_pulse(&board_, now_, &pulse)) return;
+    if (!board_schedule_pulse(&board_, now_, &pulse)) return;
     promise(!armed_, "one pulse at a time");
     promise(pulse.count >= now_ + 84 * board_lead_us && pulse.count <= now_ + 84'000'000 / 4,
             "pulses are armed in time, not long ahead");

@@ -104,7 +104,7 @@ Integrity evaluate_integrity(std::span<const EvaluatedPose> poses, const NormalE
     const std::size_t window = i < kIntegrityFrames ? 0 : i - kIntegrityFrames,
                       from = std::max(ok_since, window);
     const auto error = motion_error(poses[from], poses[i], truth);
-    h.unjudged += error ? 0 : 1;
+    h.not_evaluated += error ? 0 : 1;
     const double claimed = times_normal(error, poses[from], poses[i], normal);
     h.most = std::max(h.most, claimed);
     if (i >= ok_since + kIntegrityFrames) h.max_full = std::max(h.max_full, claimed);

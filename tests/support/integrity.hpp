@@ -55,7 +55,7 @@ struct Integrity {
   int ok = 0, lost = 0;
   int wrong = 0;           // `ok`, and wrong over its frames since the last that was not `ok`
   int wrong_over_all = 0;  // `ok`, and wrong over its frames since the last that was `lost`
-  int unjudged = 0;        // `ok`, and at its stamp or at that of the first pose it is held against
+  int not_evaluated = 0;   // `ok`, and at its stamp or at that of the first pose it is held against
                            // there is no truth: it says where the rig was at another time
   std::size_t first_wrong =
       0;  // index; with it what its motion is off by, and over how many frames

@@ -27,7 +27,7 @@ inline bool contains(const std::string& text, const std::string& part) {
 
 /// Every part stands in the text.
 template <class... Parts>
-testing::AssertionResult says(const std::string& text, const Parts&... parts) {
+testing::AssertionResult mentions(const std::string& text, const Parts&... parts) {
   std::string missing;
   for (const std::string& part : {std::string(parts)...})
     if (!contains(text, part)) missing += " `" + part + "`";

@@ -153,7 +153,7 @@ struct SessionWriter {
            "sigma_total_ry,sigma_total_rz,sigma_total_tx,sigma_total_ty,sigma_total_tz,"
            "fx,fy,cx,cy,sigma_fx,sigma_fy,sigma_cx,sigma_cy,d0,d1,d2,d3,sigma_d0,sigma_d1,sigma_d2,"
            "sigma_d3,"
-           "reference_depth_m,depth_sigma_percent,depth_error_percent,verified,lenses\n";
+           "reference_depth_m,depth_sigma_percent,depth_error_percent,verified\n";
     const auto row = [&](double share, const char* outcome, const char* cause, const char* reason,
                          double off, double sigma) {
       out << fmt::format(

@@ -97,31 +97,31 @@ class Indexer {
     order(bag_.fixes);
     order(bag_.attitudes);
   }
-  BagIndex take_index() { return std::move(bag_); }
+  BagIndex release_index() { return std::move(bag_); }
 
  private:
   void scan() {
     const BagFile& file = bag_.files[file_];
-    const auto scan = scan_bag(bag_.format, *file.bytes, [this](const BagMessage& m) { take(m); });
+    const auto scan =
+        scan_bag(bag_.format, *file.bytes, [this](const BagMessage& m) { read_message(m); });
     if (!scan)
       refuse(path_, 0, fmt::format("{} is not {}", file.name, container_of(bag_.format).beginning));
     scan->remark(file.name, &bag_.remarks);
   }
 
-  void take(const BagMessage& message) {
-    if (message.channel->encoding == MessageEncoding::other) return take_other(message);
+  void read_message(const BagMessage& message) {
+    if (message.channel->encoding == MessageEncoding::other) return read_other(message);
     const std::string &type = message.channel->type, &topic = message.channel->topic;
-    if (type == "sensor_msgs/Image") return take_image(message, false);
-    if (type == "sensor_msgs/CompressedImage") return take_image(message, true);
-    if (type == "sensor_msgs/CameraInfo") return take_info(message);
-    if (type == "sensor_msgs/NavSatFix")
-      return take_reading(message, read_ros_fix, &bag_.fixes[topic]);
+    if (type == "sensor_msgs/Image") return read_image(message, false);
+    if (type == "sensor_msgs/CompressedImage") return read_image(message, true);
+    if (type == "sensor_msgs/CameraInfo") return read_info(message);
+    if (type == "sensor_msgs/NavSatFix") return read_ins(message, read_ros_fix, &bag_.fixes[topic]);
     if (type == "sensor_msgs/Imu")
-      return take_reading(message, read_ros_attitude, &bag_.attitudes[topic]);
-    take_other(message);
+      return read_ins(message, read_ros_attitude, &bag_.attitudes[topic]);
+    read_other(message);
   }
 
-  void take_other(const BagMessage& message) {
+  void read_other(const BagMessage& message) {
     constexpr std::size_t kMax = 8;
     std::string name = message.channel->topic + " of " + message.channel->type;
     if (bag_.others.size() < kMax &&
@@ -129,7 +129,7 @@ class Indexer {
       bag_.others.push_back(std::move(name));
   }
 
-  void take_image(const BagMessage& message, bool compressed) {
+  void read_image(const BagMessage& message, bool compressed) {
     ImageTopic& topic = bag_.images[message.channel->topic];
     const std::vector<std::uint8_t> head =
         first_bytes(message, compressed ? kJpegHead : kRosImageHead);
@@ -162,7 +162,7 @@ class Indexer {
           "`output_bags: [{uri: BAG_PLAIN, storage_id: mcap, all_topics: true}]`");
   }
 
-  void take_info(const BagMessage& message) {
+  void read_info(const BagMessage& message) {
     const std::string& topic = message.channel->topic;
     if (bag_.infos.contains(topic)) return;
     if (auto info =
@@ -171,7 +171,7 @@ class Indexer {
   }
 
   template <typename Read, typename Reading>
-  void take_reading(const BagMessage& message, Read read, ReadingTopic<Reading>* topic) {
+  void read_ins(const BagMessage& message, Read read, ReadingTopic<Reading>* topic) {
     const auto reading = read(first_bytes(message, kMaxBytes), message.channel->encoding);
     if (!reading) {
       ++topic->unreadable;
@@ -246,7 +246,7 @@ std::vector<BagFile> open_bag_files(BagFormat format, const fs::path& path) {
 }
 
 BagIndex index_bag(BagFormat format, const fs::path& path, std::vector<BagFile> files) {
-  return Indexer(format, path, std::move(files)).take_index();
+  return Indexer(format, path, std::move(files)).release_index();
 }
 
 }  // namespace vergence::app::detail

@@ -108,15 +108,15 @@ class Scanner {
         break;
       }
       if (record->opcode == Opcode::chunk)
-        take_chunk(*record);
+        read_chunk(*record);
       else
-        take(file_, *record, BagPlace::kNoChunk, record->content - kRecordHead);
+        read_record(file_, *record, BagPlace::kNoChunk, record->content - kRecordHead);
     }
     return std::move(scan_);
   }
 
  private:
-  void take_chunk(const Record& record) {
+  void read_chunk(const Record& record) {
     const std::uint64_t here = record.content - kRecordHead;
     const auto head = chunk_head(file_, record);
     if (!head)
@@ -138,15 +138,15 @@ class Scanner {
       const auto record = record_at(bytes, at);
       if (!record || record->content + record->size > end)
         return scan_.broken(&BagScan::broken_records, here, "a chunk whose records do not fill it");
-      take(bytes, *record, chunk, here);
+      read_record(bytes, *record, chunk, here);
       at = record->content + record->size;
     }
   }
 
   /// A record that is no chunk. `here`: for messages.
-  void take(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
-            std::uint64_t here) {
-    if (record.opcode == Opcode::message) return take_message(bytes, record, chunk, here);
+  void read_record(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
+                   std::uint64_t here) {
+    if (record.opcode == Opcode::message) return read_message(bytes, record, chunk, here);
     if (record.opcode != Opcode::schema && record.opcode != Opcode::channel) return;
     if (record.size > kMaxDescription)
       return scan_.broken(&BagScan::broken_records, here, "a description longer than 1 MiB");
@@ -172,7 +172,7 @@ class Scanner {
     channels_.try_emplace(id, std::move(channel));
   }
 
-  void take_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
+  void read_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
                     std::uint64_t here) {
     std::array<std::uint8_t, kMessageHead> head{};
     if (record.size < kMessageHead || record.size > kMaxChunk || !bytes.read(record.content, head))

@@ -121,7 +121,7 @@ std::optional<std::string> without_side(const std::string& name, const std::stri
   return replaced(lower(name), word, "");
 }
 
-std::array<std::string, 2> side_words(const std::vector<std::string>& files) {
+std::array<std::string, 2> side_names(const std::vector<std::string>& files) {
   std::array<std::string, 2> best;
   std::size_t most = 0;
   for (const Sides& sides : all_sides()) {

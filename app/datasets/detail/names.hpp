@@ -19,7 +19,7 @@ namespace vergence::app::detail {
 /// The two words, in small letters, that tell the images of a left and a right camera in one folder
 /// apart: `I1_000000.png` and `I2_000000.png`, `000000_left.png` and `000000_right.png`; empty:
 /// most names have none.
-[[nodiscard]] std::array<std::string, 2> side_words(const std::vector<std::string>& files);
+[[nodiscard]] std::array<std::string, 2> side_names(const std::vector<std::string>& files);
 
 /// The name in small letters without that word; nothing: it does not have it.
 [[nodiscard]] std::optional<std::string> without_side(const std::string& name,

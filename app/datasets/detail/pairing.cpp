@@ -98,15 +98,15 @@ std::string describe(const PairOffset& offset) {
                      1e3 * offset.farthest.to_seconds());
 }
 
-bool is_doubtful(const PairOffset& offset, Duration interval) {
+bool is_suspicious(const PairOffset& offset, Duration interval) {
   constexpr Duration kSuspicious = Duration::milliseconds(5);
-  constexpr double kDoubtful = 0.1;  // of the interval
+  constexpr double kSuspiciousShare = 0.1;  // of the interval
   const Duration far = std::max({offset.median, -offset.median, offset.farthest});
-  return far > kSuspicious || far.to_seconds() > kDoubtful * interval.to_seconds();
+  return far > kSuspicious || far.to_seconds() > kSuspiciousShare * interval.to_seconds();
 }
 
-std::string doubt(const std::string& left, const std::string& right, const PairOffset& offset,
-                  Duration interval) {
+std::string pairing_warning(const std::string& left, const std::string& right,
+                            const PairOffset& offset, Duration interval) {
   return fmt::format(
       "the stamps of {} and {} differ by {} at an interval of {:.3g} ms: if the cameras do not "
       "expose together, poses suffer in turns; if they do, one of the stamps is wrong",

@@ -39,9 +39,9 @@ struct PairOffset {
 [[nodiscard]] std::string describe(const PairOffset& offset);
 
 /// Stamps of pairs that are more than 5 ms or 10 % of the interval apart.
-[[nodiscard]] bool is_doubtful(const PairOffset& offset, Duration interval);
+[[nodiscard]] bool is_suspicious(const PairOffset& offset, Duration interval);
 /// Returns the warning about the two cameras.
-[[nodiscard]] std::string doubt(const std::string& left, const std::string& right,
-                                const PairOffset& offset, Duration interval);
+[[nodiscard]] std::string pairing_warning(const std::string& left, const std::string& right,
+                                          const PairOffset& offset, Duration interval);
 
 }  // namespace vergence::app::detail

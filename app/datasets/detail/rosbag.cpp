@@ -138,9 +138,9 @@ class Scanner {
     while (const auto record = record_at(file_, at)) {
       if (is(*record, Opcode::bag_header)) index = record->header.index;
       if (is(*record, Opcode::chunk))
-        take_chunk(*record, at);
+        read_chunk(*record, at);
       else
-        take(file_, *record, BagPlace::kNoChunk, at);
+        read_record(file_, *record, BagPlace::kNoChunk, at);
       at = record->data + record->size;
       scan_.end = at;
     }
@@ -149,7 +149,7 @@ class Scanner {
   }
 
  private:
-  void take_chunk(const Record& chunk, std::uint64_t here) {
+  void read_chunk(const Record& chunk, std::uint64_t here) {
     if (chunk.size == 0 && chunk.header.size.value_or(0) == 0) return;  // its recorder had it open
     if (chunk.header.compression == "none" || chunk.header.compression.empty())
       return walk(file_, chunk.data, chunk.data + chunk.size, BagPlace::kNoChunk, here);
@@ -165,22 +165,22 @@ class Scanner {
       const auto record = record_at(bytes, at);
       if (!record || record->data + record->size > end)
         return scan_.broken(&BagScan::broken_records, here, "a chunk whose records do not fill it");
-      take(bytes, *record, chunk, here);
+      read_record(bytes, *record, chunk, here);
       at = record->data + record->size;
     }
   }
 
   /// A record that is no chunk. `here`: for messages.
-  void take(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
-            std::uint64_t here) {
+  void read_record(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
+                   std::uint64_t here) {
     if (!record.sound)
       return scan_.broken(&BagScan::broken_records, here,
                           "a record whose header contradicts its length");
-    if (is(record, Opcode::connection)) return take_connection(bytes, record, here);
-    if (is(record, Opcode::message)) take_message(bytes, record, chunk, here);
+    if (is(record, Opcode::connection)) return read_connection(bytes, record, here);
+    if (is(record, Opcode::message)) read_message(bytes, record, chunk, here);
   }
 
-  void take_connection(const ByteSource& bytes, const Record& record, std::uint64_t here) {
+  void read_connection(const ByteSource& bytes, const Record& record, std::uint64_t here) {
     if (record.size > kMaxDescription)
       return scan_.broken(&BagScan::broken_records, here, "a description longer than 1 MiB");
     std::vector<std::uint8_t> data(record.size);
@@ -195,7 +195,7 @@ class Scanner {
         BagChannel{record.header.topic, plain_type(about.type), MessageEncoding::ros1});
   }
 
-  void take_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
+  void read_message(const ByteSource& bytes, const Record& record, std::uint64_t chunk,
                     std::uint64_t here) {
     if (!record.header.connection || record.size > kMaxChunk)
       return scan_.broken(&BagScan::broken_records, here,

@@ -11,7 +11,7 @@ namespace {
 // Initial inflation by errors correlated along tracks, as a multiple of the first frame's spread,
 // and the number of frames that this guess weighs.
 constexpr double kFirstLife = 6.5, kGuessFrames = 30;
-constexpr double kForgetAcross = 1.0 / 300, kForgetFast = 1.0 / 10;  // a frame
+constexpr double kSlowUpdate = 1.0 / 300, kFastUpdate = 1.0 / 10;  // a frame
 constexpr double kMinInflation = 0.3,
                  kMaxInflation =
                      200;  // below: sigmas claimed far too large; above: not a spread any more
@@ -19,7 +19,7 @@ constexpr double kSpreadOutlier = 5;  // times the inflation: what one frame may
                                       // else one frame blinds the monitor
 // Windows that are also held against what was seen before them: a knock smaller than the
 // reference's own error shows so, and only so.
-constexpr std::size_t kLearnWindow = 10, kLearnLongest = 150;
+constexpr std::size_t kMinReferenceWindow = 10, kMaxReferenceWindow = 150;
 constexpr std::size_t kScatterBlocks =
     10;  // before a block, that it is held against: longer ago a rig may have crept
 // Beyond kFineBlocks only every kCoarse-th block is tried as the onset, which keeps the search
@@ -80,9 +80,9 @@ void ChangeDetector::follow_spread(const FrameEvidence& e) noexcept {
     life_slow_ = kFirstLife * e.spread_now;
   } else {
     const double n = static_cast<double>(history_.frames());
-    follow(&now_fast_, e.spread_now, kForgetFast);
-    follow(&now_slow_, e.spread_now, std::max(kForgetAcross, 1.0 / (n + 1)));
-    follow(&life_slow_, e.spread_life, std::max(kForgetAcross, 1.0 / (n + kGuessFrames)));
+    follow(&now_fast_, e.spread_now, kFastUpdate);
+    follow(&now_slow_, e.spread_now, std::max(kSlowUpdate, 1.0 / (n + 1)));
+    follow(&life_slow_, e.spread_life, std::max(kSlowUpdate, 1.0 / (n + kGuessFrames)));
   }
   // Noise that has just grown (rain, dusk) counts at once, for the tracks it will go on to spoil.
   const double grown = now_slow_ > 0 ? std::max(1.0, now_fast_ / now_slow_) : 1.0;
@@ -93,7 +93,7 @@ bool ChangeDetector::stands_out(const FrameEvidence& e) const noexcept {
   if (history_.frames() == 0) return false;
   Vec5 mean;
   Mat5 covariance;
-  learn(Evidence{}, &mean, &covariance);
+  estimate_reference(Evidence{}, &mean, &covariance);
   return statistic(effective(e.evidence), mean, covariance) > options_.threshold;
 }
 
@@ -128,7 +128,8 @@ double ChangeDetector::statistic(const Evidence& e, const Vec5& mean,
   return gain(e.A + e.A * covariance * e.A, e.g - e.A * mean);
 }
 
-void ChangeDetector::learn(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept {
+void ChangeDetector::estimate_reference(const Evidence& window, Vec5* mean,
+                                        Mat5* covariance) const noexcept {
   Evidence past = history_.total();
   past.add(window, -1.0);
   // Without the floor: window and past share most of the slow error, and the window's own floor
@@ -141,23 +142,10 @@ void ChangeDetector::learn(const Evidence& window, Vec5* mean, Mat5* covariance)
   *mean = *covariance * e.g;
 }
 
-void ChangeDetector::estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept {
-  const Cholesky<5> factor = with_prior(e.A);
-  *covariance = factor.inverse();
-  *theta = factor.solve(e.g);
-}
-
 double ChangeDetector::single(const Evidence& frame, double spread) const noexcept {
   Evidence e;
   e.add(frame, 1.0 / (std::max(spread, kMinInflation) + bias2_ * frame.n));
   return statistic(e, Vec5::Zero(), covariance_);
-}
-
-void ChangeDetector::single_estimate(const Evidence& frame, double spread, Vec5* theta,
-                                     Mat5* covariance) const noexcept {
-  Evidence e;
-  e.add(frame, 1.0 / (std::max(spread, kMinInflation) + bias2_ * frame.n));
-  estimate(e, theta, covariance);
 }
 
 Decision ChangeDetector::decide() noexcept {
@@ -165,7 +153,6 @@ Decision ChangeDetector::decide() noexcept {
   const std::size_t count = history_.frames();
   if (count == 0) return d;
   d.onset = history_.recent(0).frame;
-  Evidence longest;
   std::size_t window = 0;  // of the largest statistic
   Evidence sum;
   std::size_t summed = 0;
@@ -175,19 +162,18 @@ Decision ChangeDetector::decide() noexcept {
     } else {
       history_.sum_of(detector_[w], &sum);
     }
-    longest = effective(sum);
-    double most = statistic(longest, Vec5::Zero(), covariance_);
-    if (detector_[w] >= kLearnWindow && detector_[w] <= kLearnLongest &&
+    const Evidence inflated = effective(sum);
+    double most = statistic(inflated, Vec5::Zero(), covariance_);
+    if (detector_[w] >= kMinReferenceWindow && detector_[w] <= kMaxReferenceWindow &&
         count >= 2 * detector_[w]) {
-      Vec5 learnt;
+      Vec5 reference;
       Mat5 covariance;
-      learn(sum, &learnt, &covariance);
-      most = std::max(most, statistic(longest, learnt, covariance));
+      estimate_reference(sum, &reference, &covariance);
+      most = std::max(most, statistic(inflated, reference, covariance));
     }
     if (most > d.statistic) d.statistic = most, window = detector_[w];
   }
   newest_statistic_ = d.statistic;
-  estimate(longest, &d.theta, &d.covariance);
   const double limit = over_ > 0 ? kRelease * options_.threshold : options_.threshold;
   over_ = d.statistic > limit ? over_ + 1 : 0;
   if (over_ > 0) attribute(window, &d);
@@ -232,12 +218,12 @@ void ChangeDetector::attribute(std::size_t window, Decision* d) const noexcept {
   // The offset before the window, where it is known, is subtracted: a slightly wrong reference is
   // not an onset.
   Vec5 mean = Vec5::Zero();
-  const std::size_t recent_frames = std::clamp(window, kLearnWindow, kLearnLongest);
+  const std::size_t recent_frames = std::clamp(window, kMinReferenceWindow, kMaxReferenceWindow);
   if (history_.frames() >= 2 * recent_frames) {
     Evidence sum;
     Mat5 covariance;
     history_.sum_of(recent_frames, &sum);
-    learn(sum, &mean, &covariance);
+    estimate_reference(sum, &mean, &covariance);
   }
   Search found;
   search(mean, &found);
@@ -247,9 +233,7 @@ void ChangeDetector::attribute(std::size_t window, Decision* d) const noexcept {
   const Onset& onset = ramp ? found.ramp : found.step;
   d->onset = onset.frame;
   d->frames = onset.frames;
-  Evidence e;
-  e.add(onset.since, 1.0 / (lambda_ + (ramp ? 0.0 : bias2_ * onset.since.n)));
-  estimate(e, &d->theta, &d->covariance);
+  d->shift_px = shift_px(onset.since);
 }
 
 }  // namespace vergence::calibration::detail

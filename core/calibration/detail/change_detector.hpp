@@ -18,13 +18,12 @@ struct FrameEvidence {
   double spread_now = 0, spread_life = 0;  // of the StereoResiduals
 };
 
-/// Result of all windows together. Angles in rad, parameters as θ.
+/// Result of all windows together.
 struct Decision {
   MonitorResult::Kind kind = MonitorResult::Kind::quiet;
   double statistic = 0;
   bool undecided = false;  // the newest frame stands out by itself, and waits for the next one
-  Vec5 theta = Vec5::Zero();
-  Mat5 covariance = Mat5::Zero();
+  double shift_px = 0;     // rms that the change since the onset moves matches by; 0 with `quiet`
   std::uint64_t onset = 0;
   int frames = 0;  // measured since the onset
 };
@@ -46,12 +45,6 @@ class ChangeDetector {
   [[nodiscard]] Decision decide() noexcept;
   /// The statistic of one frame by itself, `spread` its own λ: what a standing camera allows.
   [[nodiscard]] double single(const Evidence& frame, double spread) const noexcept;
-  /// A⁻¹ g and A⁻¹ of that frame, floors included.
-  void single_estimate(const Evidence& frame, double spread, Vec5* theta,
-                       Mat5* covariance) const noexcept;
-
-  [[nodiscard]] double inflation() const noexcept { return lambda_; }
-  [[nodiscard]] std::uint64_t frames() const noexcept { return history_.frames(); }
 
  private:
   using Entry = EvidenceHistory::Entry;
@@ -73,8 +66,7 @@ class ChangeDetector {
   [[nodiscard]] Evidence effective(const Evidence& sum) const noexcept;
   [[nodiscard]] static double statistic(const Evidence& e, const Vec5& mean,
                                         const Mat5& covariance) noexcept;
-  void learn(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept;
-  void estimate(const Evidence& e, Vec5* theta, Mat5* covariance) const noexcept;
+  void estimate_reference(const Evidence& window, Vec5* mean, Mat5* covariance) const noexcept;
   void search(const Vec5& mean, Search* found) const noexcept;
   void attribute(std::size_t window, Decision* d) const noexcept;
 

@@ -1,4 +1,7 @@
 #pragma once
+#include <algorithm>
+#include <cmath>
+
 #include "core/geometry/epipolar.hpp"
 #include "core/math/linear_solve.hpp"
 #include "core/math/types.hpp"
@@ -29,6 +32,12 @@ struct Evidence {
 [[nodiscard]] inline Cholesky<5> with_prior(const Mat5& A) noexcept {
   constexpr double kPriorSigma = 0.2;  // rad
   return Cholesky<5>(A + Mat5::Identity() / (kPriorSigma * kPriorSigma));
+}
+
+/// Distance that θ = A⁻¹ g moves matches by, px rms over the image.
+[[nodiscard]] inline double shift_px(const Evidence& e) noexcept {
+  const Vec5 theta = with_prior(e.A).solve(e.g);
+  return e.n > 0 ? std::sqrt(std::max(0.0, theta.dot(e.A * theta)) / e.n) : 0;
 }
 
 /// gᵀ A⁻¹ g.

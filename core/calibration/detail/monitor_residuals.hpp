@@ -13,10 +13,7 @@ inline constexpr std::size_t kMaxObservations = 1024;  // of a frame; further on
 
 /// The reference calibration with derived quantities.
 struct Reference {
-  Transform T_right_left{};
   EpipolarGeometry epipolar{Transform{}};
-  Mat32 B = Mat32::Zero();  // tangent basis of t/|t|
-  double length = 0;        // m, |t|
   Pinhole left{}, right{};
 };
 

@@ -2,9 +2,9 @@
 #include <atomic>
 #include <optional>
 
-#include "core/estimator/detail/usual_spread.hpp"
+#include "core/estimator/degradations.hpp"
+#include "core/estimator/detail/covariance_baseline.hpp"
 #include "core/estimator/detail/window_correction.hpp"
-#include "core/estimator/doubts.hpp"
 #include "core/estimator/online_calibrator.hpp"
 #include "core/estimator/transitions.hpp"
 #include "core/memory/fixed_vector.hpp"
@@ -28,7 +28,7 @@ struct Estimator::Parts {
                                  ? kUnlinkedLengthPercent
                                  : o.calibration.max_depth_error_percent) {
     if (!options.online) return;
-    doubts.enter(Doubt::calibration, Reason::unverified_calibration, 0);
+    degradations.enter(Degradation::calibration, Reason::unverified_calibration, 0);
   }
 
   void transition(Trigger trigger, Stamp stamp) noexcept {
@@ -43,13 +43,15 @@ struct Estimator::Parts {
     (void)events.push(e);
     state = t->to;
   }
-  void note(EstimatorEvent::Kind kind, Stamp stamp, const char* why, double value) noexcept {
+  void record(EstimatorEvent::Kind kind, Stamp stamp, const char* why, double value,
+              const calibration::ChangeEvidence& evidence = {}) noexcept {
     EstimatorEvent e;
     e.stamp = stamp;
     e.kind = kind;
     e.from = e.to = state;
     e.why = why;
     e.value = value;
+    e.evidence = evidence;
     (void)events.push(e);
   }
 
@@ -57,7 +59,8 @@ struct Estimator::Parts {
   [[nodiscard]] Mat6 motion_of(const odometry::FrameOutcome& out) const noexcept;
   void propagate(const odometry::FrameOutcome& out, PoseSample* sample) noexcept;
   void record_length_sigma(const CalibrationDecision& decision) noexcept;
-  void doubt(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
+  void suspect_rig(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame,
+                   const calibration::ChangeEvidence& evidence = {}) noexcept;
   void restart_estimation(std::optional<CalibrationCause> cause, std::uint64_t onset,
                           const RigFrame& frame) noexcept;
   void give_up_calibration(const RigFrame& frame, double frames) noexcept;
@@ -67,14 +70,15 @@ struct Estimator::Parts {
   void calibrate(const RigFrame& frame) noexcept;
   void take(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void adopt(const CalibrationDecision& decision) noexcept;
-  void seek(CalibrationCause cause, std::uint64_t onset, const RigFrame& frame) noexcept;
-  void take_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept;
+  void start_estimation(CalibrationCause cause, std::uint64_t onset,
+                        const RigFrame& frame) noexcept;
+  void adopt_refinement(const CalibrationDecision& decision, Stamp stamp) noexcept;
   void notify_verified(Stamp stamp) noexcept;
   void follow(const odometry::FrameOutcome& out, const RigFrame& frame) noexcept;
   void notify_missing(Stamp stamp) noexcept;
-  void renew_doubts(const odometry::FrameOutcome& out, Pairing pairing) noexcept;
-  void doubt_motion(const odometry::FrameOutcome& out, const Mat6& motion, double step_m) noexcept;
-  void weaken_doubts(const odometry::FrameOutcome& out, Stamp stamp) noexcept;
+  void update_degradations(const odometry::FrameOutcome& out, Pairing pairing) noexcept;
+  void check_motion(const odometry::FrameOutcome& out, const Mat6& motion, double step_m) noexcept;
+  void weaken_degradations(const odometry::FrameOutcome& out, Stamp stamp) noexcept;
   [[nodiscard]] Reason why_uncalibrated() const noexcept;
 
   EstimatorOptions options;
@@ -82,7 +86,7 @@ struct Estimator::Parts {
   OnlineCalibrator calibrator;
   odometry::DriftCovariance drift{};
   CovarianceBaseline usual{};
-  DoubtLedger doubts{};
+  DegradationLedger degradations{};
   double length_sigma_percent;  // relative sigma of all lengths, from the calibration in use
   State state = State::initialising;
   Stamp last{};

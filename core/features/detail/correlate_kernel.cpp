@@ -10,31 +10,68 @@ namespace vergence::features::detail {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-void Correlate(const std::uint8_t* block, const std::uint8_t* image, std::ptrdiff_t stride,
-               const std::int32_t* offsets, int n, BlockSums* sums) {
-  // Eight pixels are one row: 16-bit lanes, products summed pairwise into 32 bits. Integers, so
-  // equal on every target.
-  const hn::CappedTag<std::int16_t, kBlock> d16;
-  const hn::Rebind<std::uint8_t, decltype(d16)> d8;
+/// Σ T·I, Σ I and Σ I² of one place. Eight pixels are one row: 16-bit lanes, products summed
+/// pairwise into 32 bits. Where 16 lanes fit into a vector, two rows are summed at a time.
+template <class D8, class Load>
+HWY_INLINE void SumsAt(D8 d8, const std::uint8_t* block, Load load, std::int32_t* product,
+                       std::int32_t* sum, std::int32_t* square) {
+  const hn::Rebind<std::int16_t, D8> d16;
   const hn::RepartitionToWide<decltype(d16)> d32;
   const int lanes = static_cast<int>(hn::Lanes(d16));
   const auto one = hn::Set(d16, 1);
-  for (int k = 0; k < n; ++k) {
-    const std::uint8_t* at = image + offsets[k];
-    auto product = hn::Zero(d32), sum = hn::Zero(d32), square = hn::Zero(d32);
-    auto product1 = hn::Zero(d32), sum1 = hn::Zero(d32), square1 = hn::Zero(d32);
-    for (int r = 0; r < kBlock; ++r) {
-      for (int c = 0; c < kBlock; c += lanes) {
-        const auto t = hn::PromoteTo(d16, hn::LoadU(d8, block + r * kBlock + c));
-        const auto i = hn::PromoteTo(d16, hn::LoadU(d8, at + r * stride + c));
-        product = hn::ReorderWidenMulAccumulate(d32, t, i, product, product1);
-        square = hn::ReorderWidenMulAccumulate(d32, i, i, square, square1);
-        sum = hn::ReorderWidenMulAccumulate(d32, one, i, sum, sum1);
-      }
+  auto p = hn::Zero(d32), s = hn::Zero(d32), q = hn::Zero(d32);
+  auto p1 = hn::Zero(d32), s1 = hn::Zero(d32), q1 = hn::Zero(d32);
+  for (int at = 0; at < kBlock * kBlock; at += lanes) {
+    const auto t = hn::PromoteTo(d16, hn::LoadU(d8, block + at));
+    const auto i = hn::PromoteTo(d16, load(at));
+    p = hn::ReorderWidenMulAccumulate(d32, t, i, p, p1);
+    q = hn::ReorderWidenMulAccumulate(d32, i, i, q, q1);
+    s = hn::ReorderWidenMulAccumulate(d32, one, i, s, s1);
+  }
+  *product = hn::GetLane(hn::SumOfLanes(d32, hn::Add(p, p1)));
+  *sum = hn::GetLane(hn::SumOfLanes(d32, hn::Add(s, s1)));
+  *square = hn::GetLane(hn::SumOfLanes(d32, hn::Add(q, q1)));
+}
+
+void Correlate(const Block& block, const std::uint8_t* image, std::ptrdiff_t stride,
+               const std::int32_t* offsets, int n, float* scores) {
+  const hn::CappedTag<std::int32_t, kPlacesAtATime> d32;
+  const hn::RebindToFloat<decltype(d32)> df;
+  const int lanes = static_cast<int>(hn::Lanes(d32));
+  constexpr auto kN = static_cast<float>(kBlock * kBlock);
+  const auto count = hn::Set(df, kN), block_sum = hn::Set(df, block.sum), zero = hn::Zero(df);
+  HWY_ALIGN std::int32_t product[kPlacesAtATime] = {}, sum[kPlacesAtATime] = {},
+                         square[kPlacesAtATime] = {};
+  for (int first = 0; first < n; first += kPlacesAtATime) {
+    for (int k = 0; k < HWY_MIN(kPlacesAtATime, n - first); ++k) {
+      const std::uint8_t* at = image + offsets[first + k];
+#if HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86
+      const hn::FixedTag<std::uint8_t, 16> d8;
+      const hn::Half<decltype(d8)> row;
+      const auto load = [&](int pixel) HWY_ATTR {
+        const std::uint8_t* rows = at + pixel / kBlock * stride;
+        return hn::Combine(d8, hn::LoadU(row, rows + stride), hn::LoadU(row, rows));
+      };
+#else
+      const hn::CappedTag<std::int16_t, kBlock> d16;
+      const hn::Rebind<std::uint8_t, decltype(d16)> d8;
+      const auto load = [&](int pixel) HWY_ATTR {
+        return hn::LoadU(d8, at + pixel / kBlock * stride + pixel % kBlock);
+      };
+#endif
+      SumsAt(d8, block.pixels, load, product + k, sum + k, square + k);
     }
-    sums[k] = {hn::GetLane(hn::SumOfLanes(d32, hn::Add(product, product1))),
-               hn::GetLane(hn::SumOfLanes(d32, hn::Add(sum, sum1))),
-               hn::GetLane(hn::SumOfLanes(d32, hn::Add(square, square1)))};
+    for (int k = 0; k < kPlacesAtATime; k += lanes) {
+      const auto s = hn::ConvertTo(df, hn::Load(d32, sum + k));
+      const auto p = hn::ConvertTo(df, hn::Load(d32, product + k));
+      const auto q = hn::ConvertTo(df, hn::Load(d32, square + k));
+      const auto variance = hn::Sub(hn::Mul(count, q), hn::Mul(s, s));
+      const auto common = hn::Max(hn::Sub(hn::Mul(count, p), hn::Mul(block_sum, s)), zero);
+      const auto norm = hn::Mul(hn::Set(df, block.variance), variance);
+      hn::StoreU(hn::IfThenElseZero(hn::Gt(norm, hn::Set(df, 1.F)),
+                                    hn::Div(hn::Mul(common, common), norm)),
+                 df, scores + first + k);
+    }
   }
 }
 
@@ -46,9 +83,9 @@ HWY_AFTER_NAMESPACE();
 namespace vergence::features::detail {
 HWY_EXPORT(Correlate);
 
-void correlate(const std::uint8_t* block, const std::uint8_t* image, std::ptrdiff_t stride,
-               const std::int32_t* offsets, int n, BlockSums* sums) noexcept {
-  HWY_DYNAMIC_DISPATCH(Correlate)(block, image, stride, offsets, n, sums);
+void correlate(const Block& block, const std::uint8_t* image, std::ptrdiff_t stride,
+               const std::int32_t* offsets, int n, float* scores) noexcept {
+  HWY_DYNAMIC_DISPATCH(Correlate)(block, image, stride, offsets, n, scores);
 }
 }  // namespace vergence::features::detail
 #endif

@@ -5,14 +5,19 @@
 namespace vergence::features::detail {
 
 inline constexpr int kBlock = 8;  // px a side
+/// correlate() works on so many places at a time.
+inline constexpr int kPlacesAtATime = 32;
 
-struct BlockSums {
-  std::int32_t product, sum, square;  // Σ T·I, Σ I, Σ I² over 8×8 px
+/// An 8×8 template with its sums.
+struct Block {
+  std::uint8_t pixels[kBlock * kBlock];  // rows packed
+  float sum = 0, variance = 0;           // Σ T, 64 Σ T² − (Σ T)²
 };
 
-/// Sums of an 8×8 template (rows packed) against the image at each of n places, a byte offset from
-/// `image` each.
-void correlate(const std::uint8_t* block, const std::uint8_t* image, std::ptrdiff_t stride,
-               const std::int32_t* offsets, int n, BlockSums* sums) noexcept;
+/// Squared normalised correlation of the template with the image at each of n places, a byte offset
+/// from `image` each; 0 where the correlation is negative or the image has no contrast. `scores`
+/// has room for n rounded up to a multiple of kPlacesAtATime. Equal on every target.
+void correlate(const Block& block, const std::uint8_t* image, std::ptrdiff_t stride,
+               const std::int32_t* offsets, int n, float* scores) noexcept;
 
 }  // namespace vergence::features::detail

@@ -67,7 +67,7 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
       return last_error_.refuse(DeviceStatus::bad_configuration, invalid + " is no configuration");
     Options options;
     if (std::string why;
-        !take_options(requested.options, option_table(), "GigE cameras", &options, &why))
+        !parse_options(requested.options, option_table(), "GigE cameras", &options, &why))
       return last_error_.refuse(DeviceStatus::unsupported, std::move(why));
     const std::lock_guard lock(device_);
     if (const DeviceStatus s = reach(); s != DeviceStatus::ok) return s;
@@ -82,7 +82,7 @@ DeviceStatus GigeCamera::configure(const CameraConfiguration& requested,
     in_force_ = {applied_.actual.exposure, applied_.actual.gain_db};
     memory_.allocate(*applied_.format, requested_.width, requested_.height, applied_.payload,
                      static_cast<std::size_t>(options_.buffers));
-    slots_.set_most(static_cast<std::size_t>(options_.buffers));
+    slots_.set_limit(static_cast<std::size_t>(options_.buffers));
     configured_ = true;
     if (actual != nullptr) *actual = applied_.actual;
     remark_.set(session_->remark());

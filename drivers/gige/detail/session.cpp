@@ -321,16 +321,17 @@ DeviceStatus Session::open_stream(const Applied& a, ArvStreamCallback callback, 
   if (!error && size > a.link.mtu)
     arv_gv_device_set_packet_size(gv, a.plan.packet_size, error.out());
   if (!error && size < a.plan.packet_size)
-    note("packets of " + std::to_string(size) +
-         " bytes: larger ones do not come through; check the MTU of every switch and of " +
-         a.link.name);
+    add_remark("packets of " + std::to_string(size) +
+               " bytes: larger ones do not come through; check the MTU of every switch and of " +
+               a.link.name);
 
   std::uint32_t capabilities = 0;
   const bool can =
       arv_device_read_register(device_.get(), kCapabilities, &capabilities, error.out()) != FALSE &&
       (capabilities & kCanResend) != 0;
   const bool resend = o.resend == Resend::on || (o.resend == Resend::automatic && can);
-  if (o.resend == Resend::on && !can) note("the camera says that it cannot send packets again");
+  if (o.resend == Resend::on && !can)
+    add_remark("the camera says that it cannot send packets again");
   const Duration period = Duration::seconds(1 / a.actual.rate_hz);
   const Duration retention =
       std::clamp(period * 3, Duration::milliseconds(60), Duration::milliseconds(100));
@@ -354,9 +355,10 @@ void Session::enlarge_socket_buffer(const Applied& a) {
   const std::int64_t got = socket < 0 ? 0 : set_receive_buffer(socket, requested);
   const std::int64_t least = 2 * static_cast<std::int64_t>(a.payload);
   if (got < std::min(requested, least))
-    note("the receive buffer holds " + std::to_string(got / 1024) + " KiB instead of " +
-         std::to_string(requested / 1024) +
-         ": frames will be lost; sudo sysctl -w net.core.rmem_max=" + std::to_string(requested));
+    add_remark(
+        "the receive buffer holds " + std::to_string(got / 1024) + " KiB instead of " +
+        std::to_string(requested / 1024) +
+        ": frames will be lost; sudo sysctl -w net.core.rmem_max=" + std::to_string(requested));
 }
 
 void Session::push(ArvBuffer* buffer) noexcept {
@@ -604,7 +606,7 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
     return refuse(DeviceStatus::unsupported, features_.last_error());
   if (!o.ptp) {
     if (a->tick_frequency == 0)
-      note("the camera has no clock: its images are stamped when they arrive");
+      add_remark("the camera has no clock: its images are stamped when they arrive");
     return DeviceStatus::ok;
   }
   a->tick_frequency = 1'000'000'000;  // PTP counts nanoseconds
@@ -619,8 +621,8 @@ DeviceStatus Session::set_clock(const Options& o, Applied* a) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   if (word != "Slave")
-    note("the camera's clock does not follow the network's yet (PTP is " +
-         (word.empty() ? "silent" : word) + "); is there a master?");
+    add_remark("the camera's clock does not follow the network's yet (PTP is " +
+               (word.empty() ? "silent" : word) + "); is there a master?");
   return DeviceStatus::ok;
 }
 
@@ -636,9 +638,9 @@ DeviceStatus Session::set_packets(const CameraConfiguration& requested, const Op
                                       static_cast<std::int64_t>(most),
                                       limits ? static_cast<std::int64_t>(limits->step) : 4);
   if (o.packet_size > 0 && size != o.packet_size)
-    note("packets of " + std::to_string(size) + " bytes instead of " +
-         std::to_string(o.packet_size) + ": " + a->link.name + " carries " +
-         std::to_string(a->link.mtu) + ", the camera " + shown(least) + " to " + shown(most));
+    add_remark("packets of " + std::to_string(size) + " bytes instead of " +
+               std::to_string(o.packet_size) + ": " + a->link.name + " carries " +
+               std::to_string(a->link.mtu) + ", the camera " + shown(least) + " to " + shown(most));
   Error error;
   arv_gv_device_set_packet_size(ARV_GV_DEVICE(device_.get()), size, error.out());
   if (error)
@@ -661,7 +663,8 @@ DeviceStatus Session::set_packets(const CameraConfiguration& requested, const Op
     if (!features_.set("GevSCPD", std::ceil(ticks), "ticks", nullptr))
       return refuse(DeviceStatus::unsupported, features_.last_error());
   } else if (ticks > 0) {
-    note("the camera has no packet delay: cameras that expose together may overflow the switch");
+    add_remark(
+        "the camera has no packet delay: cameras that expose together may overflow the switch");
   }
   return DeviceStatus::ok;
 }

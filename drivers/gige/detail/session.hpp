@@ -145,7 +145,9 @@ class Session {
                                          const Options& options, Applied* applied);
   [[nodiscard]] DeviceStatus set_clock(const Options& options, Applied* applied);
   void enlarge_socket_buffer(const Applied& applied);
-  void note(const std::string& message) { remark_ += (remark_.empty() ? "" : "; ") + message; }
+  void add_remark(const std::string& message) {
+    remark_ += (remark_.empty() ? "" : "; ") + message;
+  }
 
   Object<ArvDevice> device_;
   Object<ArvStream> stream_;

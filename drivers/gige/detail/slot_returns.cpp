@@ -4,7 +4,7 @@
 
 namespace vergence::gige {
 
-void SlotReturns::set_most(std::size_t most) noexcept {
+void SlotReturns::set_limit(std::size_t most) noexcept {
   take_back();
   const std::lock_guard lock(mutex_);
   most_ = most;

@@ -22,7 +22,7 @@ class SlotReturns {
 
   // The owner.
   /// At most so many slots are out. Precondition: stopped, no slot is held.
-  void set_most(std::size_t most) noexcept;
+  void set_limit(std::size_t most) noexcept;
   /// Before the queue begins: what was offered and not taken, and what is on its way back, is the
   /// transport's. Precondition: nobody offers.
   void take_back() noexcept;

@@ -40,7 +40,7 @@ void DeliveryQueue::finish(HostStamp at) {
   }
 }
 
-std::optional<FrameSlot> DeliveryQueue::take_spare(int k) {
+std::optional<FrameSlot> DeliveryQueue::pop_spare(int k) {
   const std::lock_guard lock(mutex_);
   Sender& sender = senders_[static_cast<std::size_t>(k)];
   if (sender.spare.empty()) return std::nullopt;

@@ -33,7 +33,7 @@ inline constexpr int kInsDevice = -1, kTriggerDevice = -2;
 
 /// Deliveries of the simulated devices, handed to their streams in the order of arrival.
 ///
-/// Threads  begin(), join(): the owner. post(), finish(), deliver_until(), take_spare(),
+/// Threads  begin(), join(): the owner. post(), finish(), deliver_until(), pop_spare(),
 ///          on_the_way(): the producer. In real time a thread of its own hands out what is due.
 /// Time     Virtual: deliver_until() waits for room in the streams. Real: what finds none is
 ///          dropped, and counted by its device.
@@ -63,7 +63,7 @@ class DeliveryQueue {
     return senders_[static_cast<std::size_t>(k)].on_the_way.load();
   }
   /// A slot of camera k whose frame nobody was there for.
-  [[nodiscard]] std::optional<FrameSlot> take_spare(int k);
+  [[nodiscard]] std::optional<FrameSlot> pop_spare(int k);
 
  private:
   struct Sender {

@@ -25,7 +25,7 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& requested,
   if (stream.streaming() || out_.load() > 0 || (rig_->pulsing.load() && !rig_->options.real_time))
     return DeviceStatus::busy;
   try {
-    if (pool_ == nullptr) take_memory(lens);
+    if (pool_ == nullptr) allocate(lens);
   } catch (const std::exception&) {
     return DeviceStatus::failed;
   }
@@ -36,7 +36,7 @@ DeviceStatus MockCamera::configure(const CameraConfiguration& requested,
 }
 
 /// Every configuration has the lens's size: the memory of the first one stays.
-void MockCamera::take_memory(const Intrinsics& lens) {
+void MockCamera::allocate(const Intrinsics& lens) {
   renderer_ = std::make_unique<Renderer>(rig_->truth->shared_world(), vergence::Camera(lens),
                                          rig_->options.pattern);
   if (rig_->options.pattern == Pattern::gbrg && !rig_->options.raw)

@@ -129,7 +129,7 @@ class MockCamera final : public CameraDevice {
             const RenderRequest& shot, std::uint8_t* out);
 
  private:
-  void take_memory(const Intrinsics& lens);
+  void allocate(const Intrinsics& lens);
 
   RigContext* rig_;
   int k_;

@@ -75,7 +75,7 @@ Exposure exposure_of(const RigTruth& truth, std::uint64_t seed, const PulseAt& p
 namespace {
 
 constexpr Duration kJitterMean = Duration::microseconds(150);
-constexpr Duration kJitterMost = Duration::microseconds(1900);  // below DeviceTiming::delay_spread
+constexpr Duration kMaxJitter = Duration::microseconds(1900);  // below DeviceTiming::delay_spread
 
 }  // namespace
 
@@ -117,7 +117,7 @@ HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device,
                               std::uint64_t number) const noexcept {
   Random random(mixed(rig_.options.seed, number), device);
   const double late = -static_cast<double>(kJitterMean.ns()) * std::log(1 - random.uniform());
-  return least + std::min(kJitterMost, Duration::nanoseconds(std::llround(late)));
+  return least + std::min(kMaxJitter, Duration::nanoseconds(std::llround(late)));
 }
 
 // ---- making
@@ -125,7 +125,7 @@ HostStamp Scheduler::jittered(HostStamp least, std::uint64_t device,
 void Scheduler::produce() {
   (void)pthread_setname_np(pthread_self(), "vergence-mock");
   for (std::uint64_t n = 0; !stopping() && n < plan_.size(); ++n) {
-    while (rig_.options.reports_taken && !rig_.options.real_time && !stopping()) {
+    while (rig_.options.reports_read && !rig_.options.real_time && !stopping()) {
       const WakeEvent::Ticket seen = rig_.room.ticket();
       if (trigger_->stream.empty() || !trigger_->stream.streaming()) break;
       rig_.room.wait(seen);
@@ -329,7 +329,7 @@ std::optional<FrameSlot> Scheduler::slot_of(int k) {
   for (;;) {
     const WakeEvent::Ticket seen = rig_.room.ticket();
     if (stopping()) return std::nullopt;
-    if (const auto slot = queue_.take_spare(k)) return slot;
+    if (const auto slot = queue_.pop_spare(k)) return slot;
     if (const auto slot = camera.pool().acquire()) return slot;
     // Slots that only time will free are not waited for: late frames hold them.
     const bool held_by_delay = queue_.on_the_way(k) > static_cast<int>(MockRig::kSlots) / 2;
@@ -408,9 +408,9 @@ void Scheduler::render(const Shooting& shooting) {
   shot.exposure = exposure.brightness * c.exposure.to_seconds() / kNominalExposure.to_seconds() *
                   std::pow(10.0, c.gain_db / 20);
   if (rig_.options.noise) {
-    const std::uint64_t picture =
+    const std::uint64_t image_index =
         exposure.pulse * kMaxCameras + static_cast<std::uint64_t>(exposure.camera);
-    shot.noise_seed = static_cast<std::uint32_t>(mixed(rig_.options.seed, picture)) | 1U;
+    shot.noise_seed = static_cast<std::uint32_t>(mixed(rig_.options.seed, image_index)) | 1U;
   }
   // Through the lens of the camera that sees it, into the memory of the one that sends it.
   cameras_[static_cast<std::size_t>(exposure.camera)]->take(

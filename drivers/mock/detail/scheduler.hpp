@@ -78,7 +78,7 @@ struct Exposure {
 ///          other camera.
 /// Time     Virtual: what is made before the next pulse is delivered before it, and the producer
 ///          waits for room. Real: a pulse that is over before its pictures are begun has none.
-/// Pauses   Virtual, with reports_taken: slot n is made once every report that arrives before it
+/// Pauses   Virtual, with reports_read: slot n is made once every report that arrives before it
 ///          was taken. Who asks at the report of slot m, before taking the next, finds slot m + 4
 ///          not made: the report of m + 1 is here within two periods of its pulse.
 class Scheduler final : public PulseListener {

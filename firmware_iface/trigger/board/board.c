@@ -47,7 +47,7 @@ static void report_edge(TriggerBoard* board, TriggerType type, uint32_t count, u
   const TriggerEdge edge = {board->boot_id, count, tick_of(&board->ticks, at)};
   uint8_t payload[trigger_edge_payload_size];
   trigger_put_edge(&edge, payload);
-  outbox_tell(&board->outbox, (uint8_t)type, payload, sizeof payload);
+  outbox_send(&board->outbox, (uint8_t)type, payload, sizeof payload);
 }
 
 /* ---- the pulse whose exposures are collected ---- */
@@ -57,7 +57,7 @@ void board_close_event(TriggerBoard* board) {
   if (!board->event.open) return;
   board->event.open = false;
   trigger_put_event(&board->event.event, payload);
-  outbox_tell(&board->outbox, trigger_event, payload, sizeof payload);
+  outbox_send(&board->outbox, trigger_event, payload, sizeof payload);
 }
 
 static void open_event(TriggerBoard* board, uint64_t count, uint8_t flags) {
@@ -168,11 +168,11 @@ void board_poll(TriggerBoard* board, uint64_t now) {
     return;
   uint8_t payload[trigger_status_payload_size];
   board_put_status(board, now, payload);
-  outbox_tell(&board->outbox, trigger_status, payload, sizeof payload);
+  outbox_send(&board->outbox, trigger_status, payload, sizeof payload);
   board->status_due = now + board->description.counts_hz;
 }
 
-bool board_take_pulse(TriggerBoard* board, uint64_t now, BoardPulse* pulse) {
+bool board_schedule_pulse(TriggerBoard* board, uint64_t now, BoardPulse* pulse) {
   const PulseSchedule* schedule = &board->schedule;
   const uint64_t earliest = now + board_counts_of_us(board, board_lead_us);
   if (board->state != trigger_running || board->armed || slot_is_over(board, now)) return false;

@@ -10,7 +10,7 @@
  * oldest first board_receive()                    each byte from the host with the count of its
  * arrival board_poll() board_wants_disarm()               true: take back the pulse that is armed,
  * then board_pulse_disarmed(); if it has gone out in the meantime board_pulse_made() comes instead
- *              board_take_pulse()                 true: arm this pulse in hardware (or
+ *              board_schedule_pulse()                 true: arm this pulse in hardware (or
  * board_pulse_refused()), later board_pulse_made() board_send()                       one frame for
  * the host, when the line has room for trigger_max_frame bytes Ownership  Everything is in the
  * caller's TriggerBoard; several boards in one process know nothing of each other. Threads    One
@@ -116,8 +116,8 @@ void board_edges_lost(TriggerBoard* board, uint32_t edges);
 void board_poll(TriggerBoard* board, uint64_t now);
 
 /* True: *pulse is to be armed now; it is at least board_lead_us away and at most 250 ms. */
-bool board_take_pulse(TriggerBoard* board, uint64_t now, BoardPulse* pulse);
-/* The pulse just taken could not be armed in time: board_take_pulse() gives it again, later and
+bool board_schedule_pulse(TriggerBoard* board, uint64_t now, BoardPulse* pulse);
+/* The pulse just taken could not be armed in time: board_schedule_pulse() gives it again, later and
  * marked late. */
 void board_pulse_refused(TriggerBoard* board);
 bool board_wants_disarm(const TriggerBoard* board);
@@ -127,7 +127,7 @@ void board_pulse_disarmed(TriggerBoard* board, uint64_t now);
  * Returns its size, 0: none. */
 size_t board_send(TriggerBoard* board, uint64_t departure, uint8_t* out);
 
-/* Count at which board_poll() or board_take_pulse() has something to do at the latest. */
+/* Count at which board_poll() or board_schedule_pulse() has something to do at the latest. */
 uint64_t board_deadline(const TriggerBoard* board);
 /* In effect; all zero before the first CONFIG. Ports set their inputs by it. */
 const TriggerConfig* board_configuration(const TriggerBoard* board);

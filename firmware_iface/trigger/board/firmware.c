@@ -23,7 +23,7 @@ static uint64_t whole(const Firmware* firmware, uint32_t count) {
   return firmware->now - (uint32_t)((uint32_t)firmware->now - count);
 }
 
-static void take_stamps(Firmware* firmware) {
+static void read_stamps(Firmware* firmware) {
   StampRecord record;
   for (unsigned n = 0; n < records_a_turn && hal_stamped(&record); ++n) {
     const uint64_t now = refresh(firmware);
@@ -46,13 +46,13 @@ static void drive_pulses(Firmware* firmware) {
     hal_configure(board_configuration(&firmware->board));
     firmware->applied = firmware->board.config_crc;
   }
-  if (!board_take_pulse(&firmware->board, refresh(firmware), &pulse)) return;
+  if (!board_schedule_pulse(&firmware->board, refresh(firmware), &pulse)) return;
   if (!hal_arm((uint32_t)pulse.count, (uint32_t)pulse.width,
                pulse.lines)) /* at most a second: it fits */
     board_pulse_refused(&firmware->board);
 }
 
-static void take_bytes(Firmware* firmware) {
+static void read_bytes(Firmware* firmware) {
   ByteRecord record;
   for (unsigned n = 0; n < bytes_a_turn && hal_received(&record); ++n) {
     const uint64_t now = refresh(firmware);
@@ -81,8 +81,8 @@ void firmware_main(void) {
   for (;;) {
     hal_feed_watchdog();
     hal_check_pulse();
-    take_stamps(&firmware);
-    take_bytes(&firmware);
+    read_stamps(&firmware);
+    read_bytes(&firmware);
     board_poll(&firmware.board, refresh(&firmware));
     drive_pulses(&firmware);
     give_bytes(&firmware);

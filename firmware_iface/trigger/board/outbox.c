@@ -20,7 +20,7 @@ void outbox_answer(Outbox* box, uint8_t type, uint8_t sequence, const uint8_t* p
 }
 
 /* A message that is dropped takes its sequence number with it: the gap tells the host. */
-void outbox_tell(Outbox* box, uint8_t type, const uint8_t* payload, uint8_t size) {
+void outbox_send(Outbox* box, uint8_t type, const uint8_t* payload, uint8_t size) {
   put(box, type, (uint8_t)(trigger_unasked | box->sequence++), payload, size,
       outbox_capacity - outbox_for_answers);
 }

@@ -32,7 +32,7 @@ typedef struct {
 /* All zero is its start. `payload` has `size` bytes. */
 void outbox_answer(Outbox* box, uint8_t type, uint8_t sequence, const uint8_t* payload,
                    uint8_t size);
-void outbox_tell(Outbox* box, uint8_t type, const uint8_t* payload, uint8_t size);
+void outbox_send(Outbox* box, uint8_t type, const uint8_t* payload, uint8_t size);
 /* The oldest, null when there is none; valid until outbox_pop(). */
 OutboxMessage* outbox_front(Outbox* box);
 /* Precondition: outbox_front() is not null. */

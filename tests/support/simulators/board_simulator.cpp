@@ -119,7 +119,7 @@ void BoardSimulator::serve(HostStamp at) {
     board_pulse_disarmed(&board_, now);
   }
   BoardPulse pulse{};
-  if (!armed_ && board_take_pulse(&board_, now, &pulse)) {
+  if (!armed_ && board_schedule_pulse(&board_, now, &pulse)) {
     armed_ = pulse;
     armed_at_ = host_at(pulse.count);
   }

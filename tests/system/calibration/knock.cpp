@@ -72,7 +72,7 @@ void expect_noticed_and_mended(const Knock& knock) {
     course.give(drive.frame(i), drive.T_enu_left(i));
     if (end == latest && course.accepted() != nullptr) end = i + 1 + kAfter;
   }
-  const Told* noticed = course.first(EstimatorEvent::Kind::rig_changed);
+  const TimedEvent* noticed = course.first(EstimatorEvent::Kind::rig_changed);
   ASSERT_NE(noticed, nullptr) << course.story();
   EXPECT_GE(noticed->frame, knock.at) << course.story();
   EXPECT_LE(noticed->frame, knock.at + static_cast<std::uint64_t>(knock.frames)) << course.story();

@@ -27,7 +27,7 @@ TEST(LongSlow, aPitchThatCreepsIsNoticedAndFollowed) {
   std::uint64_t i = 0;
   for (; i < frames && course.first(EstimatorEvent::Kind::rig_changed) == nullptr; ++i)
     course.give(drive.frame(i), drive.T_enu_left(i));
-  const Told* noticed = course.first(EstimatorEvent::Kind::rig_changed);
+  const TimedEvent* noticed = course.first(EstimatorEvent::Kind::rig_changed);
   ASSERT_NE(noticed, nullptr) << course.story();
   std::printf("noticed at %.4f deg\n", crept(noticed->frame) / kDegree);
   for (const std::uint64_t end = i + 120; i < end && course.accepted() == nullptr; ++i)

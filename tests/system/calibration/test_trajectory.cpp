@@ -68,7 +68,7 @@ const Estimator& Course::estimator() const noexcept { return *parts_->estimator;
 void Course::note(std::uint64_t frame) {
   for (const EstimatorEvent& e : parts_->estimator->events()) events_.push_back({frame, e});
   for (const CalibrationDecision& d : parts_->estimator->calibrations())
-    if (!d.learnt) decisions_.push_back({frame, d});
+    if (!d.is_refinement) decisions_.push_back({frame, d});
 }
 
 void Course::give(const RigFrame& frame, const Transform& T_reference_left) {
@@ -117,9 +117,9 @@ int Course::count_accepted() const noexcept {
                                         [](const Decided& d) { return d.decision.accepted; }));
 }
 
-const Told* Course::first(EstimatorEvent::Kind kind) const noexcept {
+const TimedEvent* Course::first(EstimatorEvent::Kind kind) const noexcept {
   const auto found = std::find_if(events_.begin(), events_.end(),
-                                  [kind](const Told& t) { return t.event.kind == kind; });
+                                  [kind](const TimedEvent& t) { return t.event.kind == kind; });
   return found == events_.end() ? nullptr : &*found;
 }
 
@@ -131,7 +131,7 @@ bool Course::rejected_for(const std::string& reason) const noexcept {
 
 std::string Course::story() const {
   std::string text = test::story(answers_);
-  for (const Told& t : events_)
+  for (const TimedEvent& t : events_)
     text += fmt::format("frame {}: {} ({:.3g})\n", t.frame, t.event.why, t.event.value);
   for (const Decided& d : decisions_)
     text +=
@@ -168,10 +168,10 @@ StereoDrive film(const RenderedDriveOptions& options, std::size_t frames) {
   RenderedDrive drive(options);
   for (std::size_t i = 0; i < frames; ++i) {
     const RigFrame& frame = drive.frame(i);
-    std::array<Picture, 2> pair;
+    std::array<OwnedImage, 2> pair;
     for (std::size_t k = 0; k < 2; ++k) {
       const ImageView& view = frame.images[k];
-      pair[k] = Picture(view.width, view.height);
+      pair[k] = OwnedImage(view.width, view.height);
       for (int y = 0; y < view.height; ++y)
         std::memcpy(pair[k].bytes.data() + y * pair[k].stride, view.row(y),
                     static_cast<std::size_t>(view.width));

@@ -30,7 +30,7 @@ struct Decided {
   std::uint64_t frame;
   CalibrationDecision decision;
 };
-struct Told {
+struct TimedEvent {
   std::uint64_t frame;
   EstimatorEvent event;
 };
@@ -49,11 +49,11 @@ class Course {
   [[nodiscard]] const std::vector<Answer>& answers() const noexcept { return answers_; }
   /// About calibrations that were sought; not what the drive measured while it went on.
   [[nodiscard]] const std::vector<Decided>& decisions() const noexcept { return decisions_; }
-  [[nodiscard]] const std::vector<Told>& events() const noexcept { return events_; }
+  [[nodiscard]] const std::vector<TimedEvent>& events() const noexcept { return events_; }
   [[nodiscard]] const CalibrationDecision* accepted() const noexcept;  // the last one; null: none
   [[nodiscard]] int count_accepted() const noexcept;
   /// The first event of a kind; null: none.
-  [[nodiscard]] const Told* first(EstimatorEvent::Kind kind) const noexcept;
+  [[nodiscard]] const TimedEvent* first(EstimatorEvent::Kind kind) const noexcept;
   /// A decision against the new calibration gave this reason.
   [[nodiscard]] bool rejected_for(const std::string& reason) const noexcept;
   /// Since the constructor, on the estimator's thread while it worked and on the threads that help
@@ -69,7 +69,7 @@ class Course {
   std::unique_ptr<Parts> parts_;
   std::vector<Answer> answers_;
   std::vector<Decided> decisions_;
-  std::vector<Told> events_;
+  std::vector<TimedEvent> events_;
   std::uint64_t allocations_before_;
   std::uint64_t last_ = 0;
 };

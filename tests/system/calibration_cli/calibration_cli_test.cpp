@@ -68,7 +68,7 @@ TEST_F(CalibrationCli, fromScratchADriveFindsItsRigAndEveryFileTellsOfIt) {
   ASSERT_EQ(o.code, 0) << o.err;
   const auto rows = lines("s", "calibrations.csv");
   ASSERT_GE(rows.size(), 2U);
-  EXPECT_TRUE(test::says(rows[1], ",from_scratch,"))
+  EXPECT_TRUE(test::mentions(rows[1], ",from_scratch,"))
       << "nothing was given: the first row is of the first attempt: ";
   const auto accepted = [](const std::string& row) {
     return row.find(",accepted,from_scratch,") != std::string::npos;
@@ -110,7 +110,7 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
 
   const Outcome second = drive("second", "--duration 4");
   ASSERT_EQ(second.code, 0) << second.err;
-  EXPECT_TRUE(test::says(lines("second", "calibrations.csv").at(1), ",accepted,state_file,"));
+  EXPECT_TRUE(test::mentions(lines("second", "calibrations.csv").at(1), ",accepted,state_file,"));
   EXPECT_GT(frames_with("second", "unverified_calibration"), 0U)
       << "until the monitor has seen that it still is true";
   EXPECT_EQ(app::read_calibration(session("second") / "calibration.yaml").rig.T_camera_left[1].t,
@@ -118,14 +118,14 @@ TEST_F(CalibrationCli, whatOneDriveFoundIsWhereTheNextBeginsUnlessTheCamerasAreO
 
   const Outcome other = drive("other", "--duration 1 --set cameras.1.serial=another");
   EXPECT_EQ(other.code, 0);
-  EXPECT_TRUE(test::says(other.err, "another")) << "told why it is not used";
-  EXPECT_TRUE(test::says(lines("other", "calibrations.csv").at(1), ",accepted,given,"));
+  EXPECT_TRUE(test::mentions(other.err, "another")) << "told why it is not used";
+  EXPECT_TRUE(test::mentions(lines("other", "calibrations.csv").at(1), ",accepted,given,"));
   EXPECT_EQ(read_file(state()), kept) << "nothing was accepted since";
 
   EXPECT_EQ(events("other", "calibration").size(), 1U) << "and its session has the message, too";
 
   const Outcome lenses = drive("lenses", "--duration 1 --set rig.nominal.focal_px=250");
-  EXPECT_TRUE(test::says(lenses.err, "rig.nominal.focal_px")) << "why it is not used";
+  EXPECT_TRUE(test::mentions(lenses.err, "rig.nominal.focal_px")) << "why it is not used";
 }
 
 TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEnd) {
@@ -134,7 +134,7 @@ TEST_F(CalibrationCli, aStateFileThatCannotBeWrittenIsAnEventAndASentenceAndNoEn
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(events("s", "calibration_save_failed").size(),
             events("s", "calibration_accepted").size());
-  EXPECT_TRUE(test::says(o.err, "the next run will not use"));
+  EXPECT_TRUE(test::mentions(o.err, "the next run will not use"));
 }
 
 TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) {
@@ -145,13 +145,13 @@ TEST_F(CalibrationCli, aGivenFileGoesBeforeTheStateAndOneOfAnotherRigIsRefused) 
   const Outcome o = drive("s", fmt::format("--duration 1 --calibration '{}'", mine.string()));
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_TRUE(
-      test::says(lines("s", "calibrations.csv").at(1), ",accepted,given,calibration.yaml,"));
+      test::mentions(lines("s", "calibrations.csv").at(1), ",accepted,given,calibration.yaml,"));
   const Outcome refused =
       drive("t", fmt::format("--duration 1 --calibration '{}' --set cameras.0.size=[640,480] --set "
                              "cameras.1.size=[640,480]",
                              mine.string()));
   EXPECT_EQ(refused.code, 2);
-  EXPECT_TRUE(test::says(refused.err, "cameras.0.size is 640 x 480"));
+  EXPECT_TRUE(test::mentions(refused.err, "cameras.0.size is 640 x 480"));
 }
 
 TEST_F(CalibrationCli, sigusr1AsksARunningDriveForANewCalibration) {
@@ -177,7 +177,7 @@ TEST_F(CalibrationCli, aBaselineTwiceTooLongDisagreesWithTheIns) {
                           "mock.calibration_error.length_percent=100 --set rig.state_dir=none");
   ASSERT_EQ(o.code, 0) << o.err;
   ASSERT_EQ(events("s", "scale_disagrees").size(), 1U);
-  EXPECT_TRUE(test::says(events("s", "scale_disagrees")[0], "longer than the INS's"));
+  EXPECT_TRUE(test::mentions(events("s", "scale_disagrees")[0], "longer than the INS's"));
   EXPECT_GT(summary("s")["comparison"]["scale_disagrees"].get<int>(), 0);
   EXPECT_NEAR(summary("s")["truth"]["path_ratio"].get<double>(), 2, 0.05)
       << "the estimator stays as it is: images cannot tell";

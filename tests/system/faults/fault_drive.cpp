@@ -108,7 +108,7 @@ FaultDrive drive_with_faults(const FaultCase& c) {
   return d;
 }
 
-FaultResult judge(const FaultCase& c, const FaultDrive& drive, const NormalError& normal) {
+FaultResult evaluate(const FaultCase& c, const FaultDrive& drive, const NormalError& normal) {
   FaultResult r;
   if (drive.truth.empty()) return r;
   const Duration later =
@@ -178,14 +178,14 @@ std::string unsaid(const FaultCase& c, const FaultDrive& drive, const FaultDrive
 bool is_bad(const FaultDrive& drive, const FaultResult& result) {
   // Exit 1: it ended before it was usable again, and says so.
   const bool failed = drive.code != 0 && !(drive.code == 1 && !result.recovery_s);
-  return failed || !drive.whole || result.integrity.wrong > 0 || result.integrity.unjudged > 0;
+  return failed || !drive.whole || result.integrity.wrong > 0 || result.integrity.not_evaluated > 0;
 }
 
 EvaluatedDrive drive_until_recovered(FaultCase c, const NormalError& normal) {
   for (;;) {  // twice at most
     EvaluatedDrive d;
     d.drive = drive_with_faults(c);
-    d.result = judge(c, d.drive, normal);
+    d.result = evaluate(c, d.drive, normal);
     if (is_bad(d.drive, d.result) || d.result.recovery_s || c.duration_s >= kMinute) return d;
     c.duration_s = kMinute;
   }
@@ -215,8 +215,8 @@ std::string fault_table_line(const FaultCase& c, const FaultDrive& drive,
   const std::string after =
       result.recovery_s ? fmt::format("{:.2f} s", *result.recovery_s) : "not any more";
   std::string wrong = std::to_string(result.integrity.wrong);
-  if (result.integrity.unjudged > 0)
-    wrong += fmt::format(", {} where there is no truth", result.integrity.unjudged);
+  if (result.integrity.not_evaluated > 0)
+    wrong += fmt::format(", {} where there is no truth", result.integrity.not_evaluated);
   if (result.integrity.wrong_over_all > 0)
     wrong += fmt::format(" ({} over `degraded` ones)", result.integrity.wrong_over_all);
   return fmt::format("| {} | {} | {} | {} | {:.1f} | {} | {} |\n", c.name, faults, seen, after,

@@ -67,8 +67,8 @@ struct Untouched {
 /// not whole, a program that failed.
 [[nodiscard]] bool is_bad(const FaultDrive& drive, const FaultResult& result);
 
-[[nodiscard]] FaultResult judge(const FaultCase& c, const FaultDrive& drive,
-                                const NormalError& normal);
+[[nodiscard]] FaultResult evaluate(const FaultCase& c, const FaultDrive& drive,
+                                   const NormalError& normal);
 struct EvaluatedDrive {
   FaultDrive drive{};
   FaultResult result{};

@@ -29,12 +29,12 @@ Driven expect_honest(const FaultCase& c) {
   EXPECT_EQ(untouched().unfit, "");
   Driven d;
   d.drive = drive_with_faults(c);
-  d.result = judge(c, d.drive, untouched().normal);
+  d.result = evaluate(c, d.drive, untouched().normal);
   SCOPED_TRACE(described(c, d.drive, d.result));
   EXPECT_EQ(d.drive.code, 0);
   EXPECT_TRUE(d.drive.whole);
   EXPECT_EQ(d.result.integrity.wrong, 0) << "from line " << d.result.integrity.first_wrong;
-  EXPECT_EQ(d.result.integrity.unjudged, 0);
+  EXPECT_EQ(d.result.integrity.not_evaluated, 0);
   return d;
 }
 

@@ -114,7 +114,7 @@ TEST(OdometryInBadConditions, aCameraThatIsAwayForLongLeavesPosesLostUntilItIsBa
 
 TEST(OdometryInBadConditions, aGlaredPairIsLost) {
   const auto white =
-      std::make_shared<Picture>(drive().pairs[0][0].width, drive().pairs[0][0].height);
+      std::make_shared<OwnedImage>(drive().pairs[0][0].width, drive().pairs[0][0].height);
   std::fill(white->bytes.begin(), white->bytes.end(), std::uint8_t{255});
   const Verdict v(
       [=](std::size_t i, RigFrame* f) {

@@ -16,8 +16,8 @@ bool within(std::size_t i, std::size_t first, std::size_t last) { return i >= fi
 
 }  // namespace
 
-Picture dark_picture(int width, int height, std::uint64_t seed) {
-  Picture p(width, height);
+OwnedImage dark_image(int width, int height, std::uint64_t seed) {
+  OwnedImage p(width, height);
   Random random(seed);
   for (std::uint8_t& b : p.bytes)
     b = static_cast<std::uint8_t>(
@@ -26,15 +26,15 @@ Picture dark_picture(int width, int height, std::uint64_t seed) {
 }
 
 Edit cover(const StereoDrive& drive, Cover which, std::size_t first, std::size_t last) {
-  constexpr std::size_t kPictures =
+  constexpr std::size_t kImages =
       4;  // different ones in turn, so that the noise does not stand still
-  auto dark = std::make_shared<std::vector<Picture>>();
-  for (std::size_t i = 0; i < kPictures; ++i)
-    dark->push_back(dark_picture(drive.pairs[0][0].width, drive.pairs[0][0].height, i + 1));
+  auto dark = std::make_shared<std::vector<OwnedImage>>();
+  for (std::size_t i = 0; i < kImages; ++i)
+    dark->push_back(dark_image(drive.pairs[0][0].width, drive.pairs[0][0].height, i + 1));
   return [=](std::size_t i, RigFrame* frame) {
     if (!within(i, first, last)) return true;
-    if (which != Cover::right) frame->images[0] = (*dark)[(2 * i) % kPictures].view();
-    if (which != Cover::left) frame->images[1] = (*dark)[(2 * i + 1) % kPictures].view();
+    if (which != Cover::right) frame->images[0] = (*dark)[(2 * i) % kImages].view();
+    if (which != Cover::left) frame->images[1] = (*dark)[(2 * i + 1) % kImages].view();
     return true;
   };
 }

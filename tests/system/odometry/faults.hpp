@@ -4,7 +4,7 @@
 namespace vergence::test {
 
 /// The picture of a camera in the dark: black level and a grey level of noise.
-[[nodiscard]] Picture dark_picture(int width, int height, std::uint64_t seed);
+[[nodiscard]] OwnedImage dark_image(int width, int height, std::uint64_t seed);
 
 enum class Cover : std::uint8_t { left, right, both };
 

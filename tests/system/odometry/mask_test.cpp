@@ -22,8 +22,8 @@ bool is_painted(std::size_t k, int x, int y, int height) {
 }
 
 /// Static things with more texture than the street has: rivets, grains, reflections.
-Picture paint(int width, int height) {
-  Picture p(width, height);
+OwnedImage paint(int width, int height) {
+  OwnedImage p(width, height);
   Random random(7);
   for (int y = 0; y < height; y += 4)
     for (int x = 0; x < width; x += 4) {
@@ -37,11 +37,11 @@ Picture paint(int width, int height) {
 
 /// View of the other camera, as if it stood some metres off: so that it matches across
 /// and looks like a thing in the street.
-Picture seen_from_the_other(const Picture& left, const RigCalibration& rig) {
+OwnedImage seen_from_the_other(const OwnedImage& left, const RigCalibration& rig) {
   constexpr double kDepth = 8;  // m
   const Camera camera(rig.intrinsics[1]), to(rig.intrinsics[0]);
   const Transform T_left_camera = rig.T_camera_left[1].inverse();
-  Picture p(left.width, left.height);
+  OwnedImage p(left.width, left.height);
   for (int y = 0; y < p.height; ++y)
     for (int x = 0; x < p.width; ++x) {
       Vec3 ray;
@@ -62,11 +62,11 @@ class DirtyDrive {
  public:
   DirtyDrive() : drive_(brief_drive()) {
     const Intrinsics& c = drive_.rig.intrinsics[0];
-    std::array<Picture, 2> paints;
+    std::array<OwnedImage, 2> paints;
     paints[0] = paint(c.width, c.height);
     paints[1] = seen_from_the_other(paints[0], drive_.rig);
     for (std::size_t k = 0; k < 2; ++k) {
-      masks_[k] = Picture(c.width, c.height);
+      masks_[k] = OwnedImage(c.width, c.height);
       for (int y = 0; y < c.height; ++y)
         for (int x = 0; x < c.width; ++x)
           masks_[k].bytes[static_cast<std::size_t>(y * masks_[k].stride + x)] =
@@ -97,8 +97,8 @@ class DirtyDrive {
 
  private:
   const StereoDrive& drive_;
-  std::array<Picture, 2> masks_;
-  std::vector<std::array<Picture, 2>> pairs_;
+  std::array<OwnedImage, 2> masks_;
+  std::vector<std::array<OwnedImage, 2>> pairs_;
 };
 
 const DirtyDrive& dirty_drive() {

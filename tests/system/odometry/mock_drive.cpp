@@ -55,9 +55,9 @@ StereoDrive render_drive(const mock::DriveOptions& options, Duration from, std::
     const Duration since = kInterval * static_cast<std::int64_t>(i);
     const Transform T_left_enu =
         mock::camera_pose(drive.at(from + since), mock::default_T_body_left());
-    std::array<Picture, 2> pair;
+    std::array<OwnedImage, 2> pair;
     for (std::size_t k = 0; k < 2; ++k) {
-      pair[k] = Picture(rig.intrinsics[k].width, rig.intrinsics[k].height);
+      pair[k] = OwnedImage(rig.intrinsics[k].width, rig.intrinsics[k].height);
       mock::RenderRequest shot;
       shot.noise_seed = static_cast<std::uint32_t>(2 * i + k + 1);
       renderers[k].render(out.rig.T_camera_left[k] * T_left_enu, shot, pair[k].bytes.data(),

@@ -10,8 +10,8 @@
 namespace vergence::test {
 namespace {
 
-Picture decode(const std::filesystem::path& file, const Intrinsics& camera) {
-  Picture p(camera.width, camera.height);
+OwnedImage decode(const std::filesystem::path& file, const Intrinsics& camera) {
+  OwnedImage p(camera.width, camera.height);
   std::vector<std::uint8_t> bytes;
   if (app::read_image_file(file, &bytes) != app::ImageFileStatus::ok ||
       app::decode_grey(bytes, {p.width, p.height}, p.bytes.data(),

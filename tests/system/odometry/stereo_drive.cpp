@@ -11,7 +11,7 @@
 
 namespace vergence::test {
 
-Picture::Picture(int w, int h)
+OwnedImage::OwnedImage(int w, int h)
     : width(w),
       height(h),
       stride(static_cast<std::ptrdiff_t>(FramePool::stride(w))),

@@ -13,13 +13,13 @@
 namespace vergence::test {
 
 /// 8-bit grey pixels, rows padded to whole cache lines.
-struct Picture {
+struct OwnedImage {
   int width = 0, height = 0;
   std::ptrdiff_t stride = 0;
   std::vector<std::uint8_t> bytes;
 
-  Picture() = default;
-  Picture(int w, int h);
+  OwnedImage() = default;
+  OwnedImage(int w, int h);
   [[nodiscard]] ImageView view() const noexcept { return {bytes.data(), width, height, stride}; }
 };
 
@@ -27,7 +27,7 @@ struct Picture {
 struct StereoDrive {
   RigCalibration rig;
   std::vector<Stamp> stamps;
-  std::vector<std::array<Picture, 2>> pairs;
+  std::vector<std::array<OwnedImage, 2>> pairs;
   std::vector<Transform> truth;  // T_reference_left
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size(); }

@@ -34,8 +34,8 @@ struct Case {
   const char* name;
   std::function<std::string(const TemporaryFolder&)> build;
   int code = 0;
-  std::string says{};    // parts of what is said, between them bars
-  int frames = kFrames;  // that a replay reads
+  std::string mentions{};  // parts of what is said, between them bars
+  int frames = kFrames;    // that a replay reads
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -109,7 +109,7 @@ std::vector<Case> trajectories() {
   struct Row {
     const char* name;
     std::string estimate, reference;  // patterns
-    std::string says;
+    std::string mentions;
     int code = 0;
     const char* options = "";
   };
@@ -146,7 +146,7 @@ std::vector<Case> trajectories() {
                      f.write("r.txt", lines(row.reference, kPoses, 0));
                      return std::string("evaluate @/e.txt @/r.txt ") + row.options;
                    },
-                   row.code, row.says});
+                   row.code, row.mentions});
   return all;
 }
 
@@ -230,8 +230,8 @@ std::string sensor(double y, const std::string& model = "radial-tangential") {
 
 using Files = std::vector<std::pair<std::string, std::string>>;
 /// Files by name; those whose names begin with + lie beside and are not given.
-Case calibration(const char* name, const Files& files, std::string says = "0.11 m", int code = 0,
-                 const std::string& options = "") {
+Case calibration(const char* name, const Files& files, std::string mentions = "0.11 m",
+                 int code = 0, const std::string& options = "") {
   return {name,
           [=](const TemporaryFolder& f) {
             std::string given;
@@ -242,7 +242,7 @@ Case calibration(const char* name, const Files& files, std::string says = "0.11 
             }
             return "calibrate convert '" + given + "' @/out.yaml --to vergence " + options;
           },
-          code, std::move(says)};
+          code, std::move(mentions)};
 }
 
 std::vector<Case> calibrations() {
@@ -431,12 +431,12 @@ struct Folder {
   const char* name;
   Images images{};
   std::string times = "{ns}";  // the pattern of times.txt; empty: there is none
-  std::string says{};          // with `!` before it: of a refusal
+  std::string mentions{};      // with `!` before it: of a refusal
   Files more{{"calibration.yaml", kOwn}};
   std::string options{};
 };
 Case folder(const Folder& row) {
-  const bool refused = row.says.starts_with('!');
+  const bool refused = row.mentions.starts_with('!');
   const auto lost =
       std::count_if(row.images.lost.begin(), row.images.lost.end(), [](int i) { return i >= 0; });
   return {row.name,
@@ -446,7 +446,8 @@ Case folder(const Folder& row) {
             for (const auto& [file, content] : row.more) f.write(file, content);
             return "replay @ --out @/session " + row.options;
           },
-          refused ? 2 : kRead, row.says.substr(refused ? 1 : 0), kFrames - static_cast<int>(lost)};
+          refused ? 2 : kRead, row.mentions.substr(refused ? 1 : 0),
+          kFrames - static_cast<int>(lost)};
 }
 
 std::vector<Case> folders() {
@@ -539,14 +540,14 @@ std::vector<Case> folders() {
     const char* name;
     std::int64_t later;
     std::string list;  // pattern; empty: there is none
-    std::string says;
+    std::string mentions;
   };
   for (const Euroc& e :
        {Euroc{"EuRoC, 2 ms later", 2'000'000, "{ns},{ns}.png\r\n", "later by 2 ms"},
         Euroc{"EuRoC, 15 ms later", 15'000'000, "{ns} {ns}.png\n", "differ by 15 ms"},
         Euroc{"EuRoC without names in its list", 0, "{ns}\n", {}},
         Euroc{"EuRoC without its list", 0, "", "nanoseconds in the images' names"}}) {
-    Folder row{e.name, {"mav0/cam{c}/data/{ns}.png", {-1, -1}, e.later}, "", e.says};
+    Folder row{e.name, {"mav0/cam{c}/data/{ns}.png", {-1, -1}, e.later}, "", e.mentions};
     row.more.clear();
     for (int k = 0; k < 2; ++k) {
       const std::string camera = fmt::format("mav0/cam{}/", k);
@@ -628,7 +629,7 @@ std::string packed(const std::string& format, const char* ending, int i, int k, 
   return compressed_message(Wire::cdr, ns, format, std::string(file.begin(), file.end()));
 }
 
-Case bag(const char* name, const Bag& b, std::string says = "", int code = kRead,
+Case bag(const char* name, const Bag& b, std::string mentions = "", int code = kRead,
          const std::string& file = "drive.mcap") {
   return {name,
           [=](const TemporaryFolder& f) {
@@ -664,7 +665,7 @@ Case bag(const char* name, const Bag& b, std::string says = "", int code = kRead
             f.write(file, w.bytes());
             return "replay @/" + file + " --out @/session";
           },
-          code, std::move(says)};
+          code, std::move(mentions)};
 }
 
 std::vector<Case> bags() {
@@ -754,7 +755,8 @@ std::vector<Case> bags() {
 // ---- boards
 
 std::vector<Case> boards() {
-  const auto board = [](const char* name, const std::string& square, std::string says, int code) {
+  const auto board = [](const char* name, const std::string& square, std::string mentions,
+                        int code) {
     return Case{
         name,
         [=](const TemporaryFolder& f) {
@@ -769,7 +771,7 @@ std::vector<Case> boards() {
                  "--square " +
                  square + " --out @/c.yaml";
         },
-        code, std::move(says)};
+        code, std::move(mentions)};
   };
   return {board("60 one view repeated", "0.025", "the views do not determine", 1),
           board("60 a square in millimetres", "25", "metres", 2),
@@ -789,9 +791,9 @@ TEST_P(Input, isReadOrRefusedAsPeopleExpect) {
     EXPECT_TRUE(o.code == 0 || o.code == 1) << o.code << o.err;
   else
     EXPECT_EQ(o.code, c.code) << o.err;
-  std::istringstream parts(c.says);
+  std::istringstream parts(c.mentions);
   for (std::string part; std::getline(parts, part, '|');)
-    EXPECT_TRUE(test::says(o.err + o.out, part)) << part << '\n' << o.err << o.out;
+    EXPECT_TRUE(test::mentions(o.err + o.out, part)) << part << '\n' << o.err << o.out;
   for (const char sign : o.err + o.out)
     ASSERT_TRUE(sign == '\n' || sign == '\t' || static_cast<unsigned char>(sign) >= 0x20)
         << "a raw byte";

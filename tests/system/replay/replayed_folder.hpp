@@ -36,7 +36,7 @@ class ReplayedFolder : public ::testing::Test {
     for (std::size_t i = 0; i < drive.size(); ++i) {
       times += fmt::format("{}\n", drive.stamps[i].ns());
       for (int k = 0; k < 2; ++k) {
-        const Picture& p = drive.pairs[i][static_cast<std::size_t>(k)];
+        const OwnedImage& p = drive.pairs[i][static_cast<std::size_t>(k)];
         const fs::path file = *master_ / image_name(k, i);
         fs::create_directories(file.parent_path());
         const cv::Mat image(p.height, p.width, CV_8U, const_cast<std::uint8_t*>(p.bytes.data()),

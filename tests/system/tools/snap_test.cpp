@@ -91,7 +91,7 @@ TEST(SnapMock, nothingIsOverwrittenAndNonsenseIsRefused) {
 struct Wires {
   Wires() {
     for (int k = 0; k < 2; ++k) {
-      pictures.push_back(scene(12 * k));
+      scenes.push_back(scene(12 * k));
       test::GigeCameraOptions o;
       o.address = GigeCamera::address(70 + k);
       o.serial = "SNAP-" + std::to_string(k);
@@ -99,7 +99,7 @@ struct Wires {
       o.sensor_height = kHeight;
       o.number_images = false;
       o.discoverable = false;
-      o.images = [pixels = pictures.back().data()](std::uint64_t) { return pixels; };
+      o.images = [pixels = scenes.back().data()](std::uint64_t) { return pixels; };
       cameras.push_back(std::make_unique<GigeCamera>(o));
     }
   }
@@ -122,7 +122,7 @@ struct Wires {
     }
     return s;
   }
-  std::vector<std::vector<std::uint8_t>> pictures;
+  std::vector<std::vector<std::uint8_t>> scenes;
   std::vector<std::unique_ptr<GigeCamera>> cameras;
 };
 
@@ -150,7 +150,7 @@ TEST(SnapGige, pulsesGivePairsAndThePicturesAreThoseThatWereSent) {
               app::ImageFileStatus::ok);
     ASSERT_EQ(app::decode_grey(bytes, {kWidth, kHeight}, pixels.data(), kWidth),
               app::ImageFileStatus::ok);
-    EXPECT_EQ(pixels, wires.pictures[k]);
+    EXPECT_EQ(pixels, wires.scenes[k]);
   }
 }
 

@@ -102,7 +102,7 @@ RayTiles::RayTiles(const Camera& camera) {
 }
 
 /// For whatever a later view shows, its pages touched: a drive takes no more memory on its way.
-void Projection::take_memory(const Scene& scene, const RayTiles& tiles) {
+void Projection::allocate(const Scene& scene, const RayTiles& tiles) {
   constexpr std::size_t kUsual = 64;  // polygons of a tile
   polygons_.resize(scene.polygons.size() + scene.bus.size());
   candidates_.resize(tiles.bounds.size());
@@ -111,7 +111,7 @@ void Projection::take_memory(const Scene& scene, const RayTiles& tiles) {
 
 void Projection::build(const Scene& scene, const RayTiles& tiles, const Camera& camera,
                        const Transform& T_camera_enu, const Transform* T_camera_bus, bool bayer) {
-  if (candidates_.size() != tiles.bounds.size()) take_memory(scene, tiles);
+  if (candidates_.size() != tiles.bounds.size()) allocate(scene, tiles);
   polygons_.clear();
   for (auto& list : candidates_) list.clear();
   const double f = std::max(camera.intrinsics().fx, camera.intrinsics().fy);

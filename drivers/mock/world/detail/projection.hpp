@@ -37,7 +37,7 @@ class Projection {
   }
 
  private:
-  void take_memory(const Scene& scene, const RayTiles& tiles);
+  void allocate(const Scene& scene, const RayTiles& tiles);
   [[nodiscard]] bool add(const Scene& scene, const Polygon& polygon, const RayTiles& tiles,
                          const Camera& camera, const Transform& T_camera_enu, bool bayer);
   void bin(const ProjectedPolygon& polygon, std::int32_t index, const RayTiles& tiles,

@@ -147,11 +147,11 @@ void add_car(SceneBuilder* builder, const Lot& lot, double along_m, Random* rand
   builder->flat(
       std::array<Vec3, 4>{at(r1, w1, kTop), at(f1, w1, kTop), at(f1, -w1, kTop), at(r1, -w1, kTop)},
       {material::car_top, tone, 0, 0});
-  builder->picture(std::array<Vec3, 4>{at(-kHalfLength - 0.35, kHalfWidth + 0.35, 0.004),
-                                       at(kHalfLength + 0.35, kHalfWidth + 0.35, 0.004),
-                                       at(kHalfLength + 0.35, -kHalfWidth - 0.35, 0.004),
-                                       at(-kHalfLength - 0.35, -kHalfWidth - 0.35, 0.004)},
-                   material::shadow, 0.6F, 2 * kHalfLength + 0.7, 2 * kHalfWidth + 0.7);
+  builder->textured_quad(std::array<Vec3, 4>{at(-kHalfLength - 0.35, kHalfWidth + 0.35, 0.004),
+                                             at(kHalfLength + 0.35, kHalfWidth + 0.35, 0.004),
+                                             at(kHalfLength + 0.35, -kHalfWidth - 0.35, 0.004),
+                                             at(-kHalfLength - 0.35, -kHalfWidth - 0.35, 0.004)},
+                         material::shadow, 0.6F, 2 * kHalfLength + 0.7, 2 * kHalfWidth + 0.7);
   builder->end();
 }
 
@@ -185,10 +185,10 @@ void add_tree(SceneBuilder* builder, const Vec2& foot, double size_m, double lif
     const double angle = turn + i * std::numbers::pi / 3;
     const Vec2 d(half * std::cos(angle), half * std::sin(angle));
     const double z0 = ground + 0.28 * size_m, z1 = z0 + crown;
-    builder->picture(std::array<Vec3, 4>{raised(foot - d, z0), raised(foot + d, z0),
-                                         raised(foot + d, z1), raised(foot - d, z1)},
-                     material::foliage, tone * (0.92F + 0.1F * static_cast<float>(i)), 2 * half,
-                     crown);
+    builder->textured_quad(std::array<Vec3, 4>{raised(foot - d, z0), raised(foot + d, z0),
+                                               raised(foot + d, z1), raised(foot - d, z1)},
+                           material::foliage, tone * (0.92F + 0.1F * static_cast<float>(i)),
+                           2 * half, crown);
   }
   builder->end();
 }
@@ -239,10 +239,10 @@ void add_tree_line(SceneBuilder* builder, const Vec2& a, const Vec2& b, double h
                    Random* random) {
   const double za = builder->ground(a.x()) - 0.8, zb = builder->ground(b.x()) - 0.8;
   builder->begin();
-  builder->picture(std::array<Vec3, 4>{raised(a, za), raised(b, zb), raised(b, zb + height_m),
-                                       raised(a, za + height_m)},
-                   material::tree_line, paint(random, 0.75, 1.2), 64.0,
-                   1.06 * height_m);  // less than the texture, which wraps around
+  builder->textured_quad(std::array<Vec3, 4>{raised(a, za), raised(b, zb), raised(b, zb + height_m),
+                                             raised(a, za + height_m)},
+                         material::tree_line, paint(random, 0.75, 1.2), 64.0,
+                         1.06 * height_m);  // less than the texture, which wraps around
   builder->end();
 }
 

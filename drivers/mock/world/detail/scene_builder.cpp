@@ -175,8 +175,8 @@ void SceneBuilder::flat(std::span<const Vec3> corners, const Face& face, bool tw
   push(p);
 }
 
-void SceneBuilder::picture(std::span<const Vec3> corners, int material, float light, double span_u,
-                           double span_v) {
+void SceneBuilder::textured_quad(std::span<const Vec3> corners, int material, float light,
+                                 double span_u, double span_v) {
   flat(corners, {material, light, 0, 0}, true);
   Polygon& p = scene_->polygons.back();
   const Material& m = scene_->materials[static_cast<std::size_t>(material)];

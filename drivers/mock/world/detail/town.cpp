@@ -232,15 +232,15 @@ void add_surroundings(SceneBuilder* builder, Random* random) {
       return Vec3(middle.x() + r * std::cos(a), middle.y() + r * std::sin(a), z);
     };
     const std::array<Vec3, 4> corners{at(i + 1, -10), at(i, -10), at(i, 130), at(i + 1, 130)};
-    builder->picture(corners, material::hills, 1.0F, side * kSides / 4,
-                     150);  // the texture's top is left out: textures wrap around
+    builder->textured_quad(corners, material::hills, 1.0F, side * kSides / 4,
+                           150);  // the texture's top is left out: textures wrap around
   }
   builder->end();
   builder->begin();
   const double r = 40 * kCloudHeight;
   const std::array<Vec3, 4> sky{Vec3(-r, r, kCloudHeight), Vec3(r, r, kCloudHeight),
                                 Vec3(r, -r, kCloudHeight), Vec3(-r, -r, kCloudHeight)};
-  builder->picture(sky, material::clouds, 1.12F, 4096, 4096);
+  builder->textured_quad(sky, material::clouds, 1.12F, 4096, 4096);
   builder->end();
 }
 

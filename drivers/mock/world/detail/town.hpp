@@ -51,8 +51,8 @@ class SceneBuilder {
   /// angles to it.
   void flat(std::span<const Vec3> corners, const Face& face, bool two_sided = false);
   /// Adds a polygon with the whole texture (its metres over `span_u` x `span_v` of the polygon).
-  void picture(std::span<const Vec3> corners, int material, float light, double span_u,
-               double span_v);
+  void textured_quad(std::span<const Vec3> corners, int material, float light, double span_u,
+                     double span_v);
   /// Upright box: centre of the base, unit direction of its length, half length and half width,
   /// height.
   struct Box {

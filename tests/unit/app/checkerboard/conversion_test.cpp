@@ -196,9 +196,9 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
     if (!cases[i].second.empty()) in += "," + folder.write("second.yaml", cases[i].second).string();
     const std::string said =
         refusal_of([&] { (void)read_any_calibration(in, std::nullopt, &none); });
-    EXPECT_TRUE(test::says(said, cases[i].key)) << "case " << i;
+    EXPECT_TRUE(test::mentions(said, cases[i].key)) << "case " << i;
     EXPECT_FALSE(test::contains(said, "\n")) << said;
-    EXPECT_TRUE(test::says(said, folder.path().string())) << "which file";
+    EXPECT_TRUE(test::mentions(said, folder.path().string())) << "which file";
   }
   EXPECT_THROW((void)read_any_calibration((folder / "none").string(), std::nullopt, &none),
                InputError);
@@ -207,7 +207,7 @@ TEST(Conversion, spoiltFilesAreRefusedWithFileAndKey) {
 TEST(Conversion, wordsOfTheCommandLineAreChecked) {
   EXPECT_EQ(parse_format("ros"), CalibrationFormat::ros);
   EXPECT_TRUE(
-      test::says(refusal_of([] { (void)parse_format("kalbr"); }), "did you mean \"kalibr\""));
+      test::mentions(refusal_of([] { (void)parse_format("kalbr"); }), "did you mean \"kalibr\""));
   EXPECT_EQ(parse_size("640x480"), (ImageSize{640, 480}));
   for (const char* bad : {"", "640", "640x", "x480", "640x-1", "640x480x3", "640*480"})
     EXPECT_THROW((void)parse_size(bad), InputError) << bad;
@@ -252,7 +252,7 @@ TEST(Kalibr, whatIsWrittenProjectsAsOursAndReadsBack) {
         parse_any_calibration({{"camchain.yaml", text}}, std::nullopt, &remarks);
     expect_same(c, back);
     ASSERT_EQ(remarks.size(), 1U);
-    EXPECT_TRUE(test::says(remarks[0], "serial"));
+    EXPECT_TRUE(test::mentions(remarks[0], "serial"));
   }
 }
 
@@ -371,7 +371,7 @@ TEST(OpenCvStereo, fourCoefficientsThatMayBeOfAFisheyeLensAreSaid) {
     EXPECT_EQ(read.rig.intrinsics[1].kind, c.kind) << c.text;
     ASSERT_EQ(remarks.size(), c.remarks) << c.text;
     for (const std::string& remark : remarks)
-      EXPECT_TRUE(test::says(remark, "stereo.yml", "fisheye_model: 1"));
+      EXPECT_TRUE(test::mentions(remark, "stereo.yml", "fisheye_model: 1"));
   }
 }
 

@@ -152,7 +152,7 @@ TEST(BoardPattern, cornersOfADrawnBoardAreFoundInItsOrder) {
       const BoardView seen = seen_board(rig, board, T);
       for (const BoardCorner& c : seen.corners[0]) truth.push_back(c.pixel);
       ASSERT_EQ(truth.size(), found->size());
-      if (!board.tells_its_ends()) same_way_up(truth, &*found);
+      if (!board.is_asymmetric()) same_way_up(truth, &*found);
       Vec2 sum = Vec2::Zero();
       for (std::size_t i = 0; i < truth.size(); ++i) {
         EXPECT_LT(((*found)[i] - truth[i]).norm(), 0.3)

@@ -30,9 +30,9 @@ BoardCorners found_in(const std::vector<std::uint8_t>& pixels, const BoardPatter
 
 /// A flat board of black and white as it is printed.
 struct PrintedBoard {
-  cv::Mat picture;  // with a margin; around it all is grey
-  double scale;     // px a metre
-  double x, y;      // px of the board's origin
+  cv::Mat sheet;  // with a margin; around it all is grey
+  double scale;   // px a metre
+  double x, y;    // px of the board's origin
   bool y_up = false;
 
   /// As a camera sees it: each pixel is the mean over a grid of points within it.
@@ -65,8 +65,8 @@ struct PrintedBoard {
  private:
   [[nodiscard]] double grey(const Vec3& p) const {
     const double u = x + scale * p.x(), v = y + (y_up ? -scale : scale) * p.y();
-    if (!(u >= 0 && v >= 0 && u < picture.cols && v < picture.rows)) return 110;
-    return picture.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u)) > 127 ? 220 : 30;
+    if (!(u >= 0 && v >= 0 && u < sheet.cols && v < sheet.rows)) return 110;
+    return sheet.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u)) > 127 ? 220 : 30;
   }
 };
 
@@ -90,15 +90,15 @@ PrintedBoard printed_charuco(const BoardPattern& board, bool black_first) {
   constexpr int kSquare = 120, kMargin = 36;  // px
   const auto dictionary = cv::aruco::getPredefinedDictionary(static_cast<int>(board.dictionary));
   const int columns = board.columns + 1, rows = board.rows + 1;
-  cv::Mat picture(rows * kSquare + 2 * kMargin, columns * kSquare + 2 * kMargin, CV_8U,
-                  cv::Scalar(255));
+  cv::Mat sheet(rows * kSquare + 2 * kMargin, columns * kSquare + 2 * kMargin, CV_8U,
+                cv::Scalar(255));
   const int side = static_cast<int>(std::lround(kSquare * board.marker / board.square));
   const int gap = (kSquare - side) / 2;
   int id = 0;
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column) {
       cv::Mat square =
-          picture(cv::Rect(kMargin + column * kSquare, kMargin + row * kSquare, kSquare, kSquare));
+          sheet(cv::Rect(kMargin + column * kSquare, kMargin + row * kSquare, kSquare, kSquare));
       cv::Mat marker;
       if (((row + column) % 2 == 0) == black_first) {
         square.setTo(0);
@@ -107,7 +107,7 @@ PrintedBoard printed_charuco(const BoardPattern& board, bool black_first) {
         marker.copyTo(square(cv::Rect(gap, gap, side, side)));
       }
     }
-  return {picture, kSquare / board.square, kMargin + kSquare, kMargin + kSquare};
+  return {sheet, kSquare / board.square, kMargin + kSquare, kMargin + kSquare};
 }
 
 /// `border`: black cells around a tag's code; `from_below`: tag 0 at the lower left.
@@ -116,20 +116,20 @@ PrintedBoard printed_aprilgrid(const BoardPattern& board, int border, bool from_
   const auto family = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
   const int gap = static_cast<int>(std::lround(kSide * board.spacing)), pitch = kSide + gap,
             margin = 2 * gap;
-  cv::Mat picture(board.rows * pitch - gap + 2 * margin, board.columns * pitch - gap + 2 * margin,
-                  CV_8U, cv::Scalar(255));
+  cv::Mat sheet(board.rows * pitch - gap + 2 * margin, board.columns * pitch - gap + 2 * margin,
+                CV_8U, cv::Scalar(255));
   // A small square where the corners of four tags meet, and as much of it at the rim.
   for (int row = 0; row <= board.rows; ++row)
     for (int column = 0; column <= board.columns; ++column) {
       const int right = margin + column * pitch, below = margin + row * pitch;
-      picture(cv::Rect(right - gap, below - gap, gap, gap)).setTo(0);
+      sheet(cv::Rect(right - gap, below - gap, gap, gap)).setTo(0);
       if (row == board.rows || column == board.columns) continue;
       cv::Mat tag;
       family->drawMarker((from_below ? board.rows - 1 - row : row) * board.columns + column, kSide,
                          tag, border);
-      tag.copyTo(picture(cv::Rect(right, below, kSide, kSide)));
+      tag.copyTo(sheet(cv::Rect(right, below, kSide, kSide)));
     }
-  return {picture, kSide / board.square, double(margin), double(picture.rows - margin), true};
+  return {sheet, kSide / board.square, double(margin), double(sheet.rows - margin), true};
 }
 
 /// Upright in front of the camera, its middle at `centre`, turned about the camera's axes.
@@ -158,7 +158,7 @@ TEST(MarkedBoard, cornersAreFoundWhicheverWayItIsPrinted) {
                          Print{kAprilGrid, printed_aprilgrid(kAprilGrid, 2, false), 1, 121}}) {
     const Transform T = shown(p.board, Vec3(0.3, -0.2, 0.1), Vec3(0.02, -0.01, p.distance));
     const BoardCorners found = found_in(p.printed.paint(rig.intrinsics[0], T), p.board);
-    EXPECT_GE(found.size(), p.least) << p.board.words();
+    EXPECT_GE(found.size(), p.least) << p.board.describe();
     expect_corners(found, rig, p.board, T);
   }
 }
@@ -181,7 +181,7 @@ TEST(MarkedBoard, aPartOfItIsEnough) {
                         View{kAprilGrid, grid, {0.1, -0.2, M_PI}, {0.4, -0.3, 0.9}, 16}}) {
     const Transform T = shown(v.board, v.turn, v.centre);
     const BoardCorners found = found_in(v.printed.paint(rig.intrinsics[0], T), v.board);
-    EXPECT_GE(found.size(), v.least) << v.board.words();
+    EXPECT_GE(found.size(), v.least) << v.board.describe();
     EXPECT_LT(found.size(), v.board.corners() * 5 / 6) << "it is not cut off: nothing is tested";
     expect_corners(found, rig, v.board, T);
   }
@@ -234,7 +234,7 @@ TEST(Charuco, onlyBoardsThatCanBePrintedArePermitted) {
   const BoardPattern board = parse_charuco("11x8", 0.03, 0.022, "dict_4x4_250");
   EXPECT_EQ(board.corners(), 70U);
   EXPECT_EQ(kMarkerDictionaries[board.dictionary], "4X4_250");
-  EXPECT_EQ(board.words(), "11x8 squares with markers 4X4_250");
+  EXPECT_EQ(board.describe(), "11x8 squares with markers 4X4_250");
   for (const char* bad : {"", "11", "11x", "2x8", "101x8"})
     EXPECT_THROW((void)parse_charuco(bad, 0.03, 0.022, "4X4_250"), InputError) << bad;
   for (const double bad : {0.0, -0.02, 0.03, std::nan("")})

@@ -85,7 +85,7 @@ TEST(CalibrationCovariance, WhatIsWrittenReadsBackToTheSameDoublesAndStaysACovar
 TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
   const std::string two = "[right.rx, right.ry]";
   struct Row {
-    std::string yaml, beginning, says = "";
+    std::string yaml, beginning, mentions = "";
   };
   for (const Row& r : std::vector<Row>{
            {with_block("[right.rx, rihgt.ry]", "[1, 0, 1]"),
@@ -116,7 +116,7 @@ TEST(CalibrationCovariance, WhatIsWrongIsSaidInOneSentence) {
             "c.yaml:6: covariance has the unknown key"},
        }) {
     const std::string message = refusal(r.yaml);
-    EXPECT_TRUE(message.starts_with(r.beginning) && test::contains(message, r.says)) << message;
+    EXPECT_TRUE(message.starts_with(r.beginning) && test::contains(message, r.mentions)) << message;
   }
 }
 

@@ -143,7 +143,7 @@ TEST(CalibrationFile, WhatIsWrittenReadsBackToTheSameDoubles) {
 /// says.
 struct Fault {
   std::string part, instead;
-  const char *beginning, *says = "";
+  const char *beginning, *mentions = "";
 };
 
 const std::string kSize = "size: [1024, 768]", kLens = "[982, 983, 510, 380]",
@@ -203,7 +203,7 @@ TEST(CalibrationPlausibility, WhatCannotBeIsRefusedWithItsPlace) {
            {kGood, "version: 1\ncameras: [{}]\n", "c.yaml:2: cameras lists 1", "2 to 4"},
        }) {
     const std::string message = refusal(with(f.part, f.instead));
-    EXPECT_TRUE(message.starts_with(f.beginning) && test::contains(message, f.says))
+    EXPECT_TRUE(message.starts_with(f.beginning) && test::contains(message, f.mentions))
         << f.instead << " gives: " << message;
   }
   for (const char* four_or_five : {"[1e-3, 1e-3, 1e-4, 1e-4]", "[1e-3, 1e-3, 1e-4, 1e-4, 1e-2]"})

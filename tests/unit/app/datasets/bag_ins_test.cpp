@@ -19,7 +19,7 @@ namespace vergence::app {
 namespace {
 
 using test::BagKind;
-using test::says;
+using test::mentions;
 using test::Wire;
 
 constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kMs = 1'000'000;  // ns
@@ -110,8 +110,8 @@ TEST_P(BagIns, FixesTakeTheOrientationBetweenTwoImus) {
     EXPECT_DOUBLE_EQ(s.height_sigma, 1.0);
     EXPECT_DOUBLE_EQ(s.heading_sigma, 0.01);
   }
-  EXPECT_TRUE(says(all(ins), "the INS is /fix with the orientation of /imu/data"));
-  EXPECT_TRUE(says(all(ins), "/fix: 1 of 4 readings have no fix"));
+  EXPECT_TRUE(mentions(all(ins), "the INS is /fix with the orientation of /imu/data"));
+  EXPECT_TRUE(mentions(all(ins), "/fix: 1 of 4 readings have no fix"));
 }
 
 TEST_P(BagIns, FixWithoutOrientationAroundItHasNoAttitude) {
@@ -123,7 +123,7 @@ TEST_P(BagIns, FixWithoutOrientationAroundItHasNoAttitude) {
   EXPECT_FALSE(ins.readings[1].sample.attitude_valid);
   EXPECT_TRUE(ins.readings[2].sample.attitude_valid);
   EXPECT_FALSE(ins.readings[3].sample.attitude_valid);
-  EXPECT_TRUE(says(all(ins), "2 fixes have no orientation of /imu/data within 100 ms"));
+  EXPECT_TRUE(mentions(all(ins), "2 fixes have no orientation of /imu/data within 100 ms"));
 }
 
 TEST_P(BagIns, SeveralTopicsAreListedAndOneIsChosen) {
@@ -133,9 +133,9 @@ TEST_P(BagIns, SeveralTopicsAreListedAndOneIsChosen) {
   fix(0.006, 0, 6);
   RecordedIns ins = open();
   EXPECT_TRUE(ins.readings.empty());
-  EXPECT_TRUE(says(all(ins),
-                   "choose with --ins-topic and --imu-topic; topics of NavSatFix: /fix, "
-                   "/gps/fix; of Imu with an orientation: /imu/data"));
+  EXPECT_TRUE(mentions(all(ins),
+                       "choose with --ins-topic and --imu-topic; topics of NavSatFix: /fix, "
+                       "/gps/fix; of Imu with an orientation: /imu/data"));
   ins = open({"", "", "/gps/fix", ""});
   ASSERT_EQ(ins.readings.size(), 1U);
   EXPECT_EQ(ins.readings[0].sample.stamp.ns(), kStart + 6 * kMs);
@@ -147,8 +147,8 @@ TEST_P(BagIns, TopicThatIsNoneIsRefused) {
   for (const BagTopics& topics :
        {BagTopics{"", "", "/odom", ""}, BagTopics{"", "", "/imu/data", ""},
         BagTopics{"", "", "", "/fix"}}) {
-    EXPECT_TRUE(
-        says(test::refusal_of([&] { (void)open(topics); }), "-topic says; of NavSatFix are /fix"));
+    EXPECT_TRUE(mentions(test::refusal_of([&] { (void)open(topics); }),
+                         "-topic says; of NavSatFix are /fix"));
   }
 }
 
@@ -159,7 +159,7 @@ TEST_P(BagIns, WithoutOrientationNothingIsComparedWithANamedFixEither) {
   fix(0.1, 0, 6);
   const RecordedIns ins = open({"", "", "/gps/fix", ""});
   EXPECT_TRUE(ins.readings.empty());
-  EXPECT_TRUE(says(all(ins), "/gps/fix"));
+  EXPECT_TRUE(mentions(all(ins), "/gps/fix"));
 }
 
 TEST_P(BagIns, NumbersThatAreNoneAndStampsThatGoBackAreLeftOut) {
@@ -174,12 +174,12 @@ TEST_P(BagIns, NumbersThatAreNoneAndStampsThatGoBackAreLeftOut) {
   ASSERT_EQ(ins.readings.size(), 4U);
   EXPECT_EQ(ins.readings[3].sample.fix, FixStatus::fix_2d) << "no height";
   EXPECT_EQ(ins.readings[3].sample.position.height_m, 0);
-  EXPECT_TRUE(says(all(ins),
-                   "/imu/data: left out were 1 messages without numbers that can be used "
-                   "and 0 whose stamps"));
-  EXPECT_TRUE(says(all(ins),
-                   "/fix: left out were 2 messages without numbers that can be used and 1 "
-                   "whose stamps"));
+  EXPECT_TRUE(mentions(all(ins),
+                       "/imu/data: left out were 1 messages without numbers that can be used "
+                       "and 0 whose stamps"));
+  EXPECT_TRUE(mentions(all(ins),
+                       "/fix: left out were 2 messages without numbers that can be used and 1 "
+                       "whose stamps"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Containers, BagIns,

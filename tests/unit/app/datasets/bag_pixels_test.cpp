@@ -131,7 +131,7 @@ TEST_P(BagPixels, MosaicsGoTheWayOfTheCameras) {
 TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
   EXPECT_TRUE(grey_of(image_of("32FC1", 4)).empty());
   EXPECT_TRUE(
-      test::says(refusal_, "/left/image (0 images, 1 that cannot be read, of the encoding"));
+      test::mentions(refusal_, "/left/image (0 images, 1 that cannot be read, of the encoding"));
   ImageMessage image = image_of("mono8", 1);
   image.data.pop_back();
   EXPECT_TRUE(grey_of(image).empty());
@@ -141,12 +141,12 @@ TEST_P(BagPixels, OtherEncodingsAndShortDataAreNoImages) {
 }
 
 TEST_P(BagPixels, PngAndJpegAreToldByTheirBytes) {
-  cv::Mat picture(kHeight, kWidth, CV_8U);
+  cv::Mat source(kHeight, kWidth, CV_8U);
   for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x) picture.at<std::uint8_t>(y, x) = value(x, y, 0) / 2;
+    for (int x = 0; x < kWidth; ++x) source.at<std::uint8_t>(y, x) = value(x, y, 0) / 2;
   for (const char* ending : {".png", ".jpg"}) {
     std::vector<std::uint8_t> file;
-    ASSERT_TRUE(cv::imencode(ending, picture, file));
+    ASSERT_TRUE(cv::imencode(ending, source, file));
     const Grey out =
         grey_of_file("mono8; what a transport writes here", std::string(file.begin(), file.end()));
     const cv::Mat wanted = cv::imdecode(file, cv::IMREAD_GRAYSCALE);
@@ -160,12 +160,12 @@ TEST_P(BagPixels, PngAndJpegAreToldByTheirBytes) {
 
 // As image_transport packs mono16 of cameras of 12 bits.
 TEST_P(BagPixels, PngOfTwelveBitsInSixteenIsTakenForWhatItIs) {
-  cv::Mat picture(kHeight, kWidth, CV_16U);
+  cv::Mat source(kHeight, kWidth, CV_16U);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
-      picture.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(16 * value(x, y, 0) + 15);
+      source.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(16 * value(x, y, 0) + 15);
   std::vector<std::uint8_t> file;
-  ASSERT_TRUE(cv::imencode(".png", picture, file));
+  ASSERT_TRUE(cv::imencode(".png", source, file));
   const std::string message = compressed_message(
       GetParam().wire(), kStart, "mono16; compressed png", std::string(file.begin(), file.end()));
   StereoSequence s = sequence_of("sensor_msgs/CompressedImage", message);

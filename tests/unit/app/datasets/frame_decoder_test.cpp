@@ -75,7 +75,7 @@ TEST_F(Decoder, imagesSideBySideAreTakenApart) {
   EXPECT_EQ(first_image_size(sequence_, 1), (ImageSize{test::kTinyWidth, test::kTinyHeight}));
   const auto seen = drain(0, 3);
   ASSERT_EQ(seen.size(), 3U);
-  for (const Seen& s : seen) EXPECT_TRUE(s.right_pixels) << s.pair.frame << s.pair.note.data();
+  for (const Seen& s : seen) EXPECT_TRUE(s.right_pixels) << s.pair.frame << s.pair.issue.data();
   test::write_tiny_image(folder_ / "both/001.png", 0, test::kTinyWidth, test::kTinyHeight);
   EXPECT_STREQ(drain(0, 3)[1].pair.kind, "image_size") << "half of a pair";
 }
@@ -124,10 +124,10 @@ TEST_F(Decoder, missingTornAndForeignImagesSkipTheirFrameAndNoOther) {
     EXPECT_EQ(seen[i].pair.decoded, kinds[i].empty()) << i;
     EXPECT_EQ(seen[i].right_pixels, kinds[i].empty()) << i;
   }
-  EXPECT_TRUE(test::says(std::string(seen[1].pair.note.data()), "left/001.png is missing"))
-      << seen[1].pair.note.data();
-  EXPECT_TRUE(test::says(std::string(seen[2].pair.note.data()), "right/002.png is torn"))
-      << seen[2].pair.note.data();
+  EXPECT_TRUE(test::mentions(std::string(seen[1].pair.issue.data()), "left/001.png is missing"))
+      << seen[1].pair.issue.data();
+  EXPECT_TRUE(test::mentions(std::string(seen[2].pair.issue.data()), "right/002.png is torn"))
+      << seen[2].pair.issue.data();
 }
 
 TEST_F(Decoder, aTimeThatGoesBackOrLeapsAheadSkipsItsFrameAndNotThoseAfterIt) {
@@ -149,7 +149,7 @@ TEST_F(Decoder, aLongNameIsCutNotOverrun) {
   sequence_.pairs[0].file[0] = "left/" + std::string(2000, 'x') + ".png";
   const auto seen = drain(0, 1);
   ASSERT_EQ(seen.size(), 1U);
-  EXPECT_EQ(std::string(seen[0].pair.note.data()).size(), seen[0].pair.note.size() - 1);
+  EXPECT_EQ(std::string(seen[0].pair.issue.data()).size(), seen[0].pair.issue.size() - 1);
 }
 
 TEST_F(Decoder, endsAtAnyMomentWhileTheConsumerHoldsPairsBack) {

@@ -169,7 +169,7 @@ TEST(PngDecoder, ofSixteenBitsThoseThatAreUsedAreTakenAndWhatIsBeyondIsWhite) {
 }
 
 /// A picture with structure: noise alone says little about a JPEG.
-cv::Mat picture() {
+cv::Mat test_image() {
   cv::Mat image(61, 83, CV_8UC3);
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x)
@@ -186,7 +186,7 @@ FileBytes jpeg_of(const cv::Mat& image, const std::vector<int>& options = {}) {
 }
 
 TEST(JpegDecoder, greyColourAndProgressiveHaveOpenCvsPixelsToTheBit) {
-  const cv::Mat colour = picture();
+  const cv::Mat colour = test_image();
   cv::Mat grey;
   cv::extractChannel(colour, grey, 2);
   expect_opencvs_pixels(jpeg_of(grey), 83, 61, "grey");
@@ -212,7 +212,7 @@ TEST(JpegDecoder, aHoleInTheMiddleIsTornThoughTheEndIsThere) {
 }
 
 TEST(JpegDecoder, moreScansThanACameraWritesAreRefusedBeforeTheyTakeHours) {
-  const FileBytes file = jpeg_of(picture(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  const FileBytes file = jpeg_of(test_image(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
   std::size_t last = 0;  // of the scans: it only refines, and may come again
   for (std::size_t i = 2; i + 1 < file.size(); ++i)
     if (file[i] == 0xff && file[i + 1] == 0xda) last = i;

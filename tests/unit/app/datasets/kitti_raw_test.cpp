@@ -23,8 +23,8 @@ namespace vergence::app {
 namespace {
 
 namespace fs = std::filesystem;
+using test::mentions;
 using test::refusal_of;
-using test::says;
 
 constexpr std::int64_t kStart = 1'317'045'935'500'923'136;  // 2011-09-26 14:05:35.500923136 UTC
 constexpr std::int64_t kStep = 100'000'000;                 // ns
@@ -219,7 +219,7 @@ TEST(KittiRaw, WhatIsLostCostsItsFramesAndWhatIsNoneIsRefused) {
     StereoSequence s;
     const std::string refused = refusal_of([&] { s = open(f); });
     EXPECT_EQ(refused.empty(), c.whole > 0) << c.what << ": " << refused;
-    EXPECT_TRUE(test::says(refused + joined(s.remarks), c.said))
+    EXPECT_TRUE(test::mentions(refused + joined(s.remarks), c.said))
         << c.what << ": " << refused << joined(s.remarks);
     std::size_t whole = 0;
     for (const StereoPair& pair : s.pairs)
@@ -228,9 +228,9 @@ TEST(KittiRaw, WhatIsLostCostsItsFramesAndWhatIsNoneIsRefused) {
   }
   const test::TemporaryFolder f;
   write_drive(f);
-  EXPECT_TRUE(test::says(refusal_of([&] { (void)open(f, {2, 2}); }), "are both camera 2"));
+  EXPECT_TRUE(test::mentions(refusal_of([&] { (void)open(f, {2, 2}); }), "are both camera 2"));
   fs::create_directories(f / "2011_09_26/2011_09_26_drive_0002_extract/oxts");
-  EXPECT_TRUE(test::says(
+  EXPECT_TRUE(test::mentions(
       refusal_of([&] { (void)open_sequence(SequenceFormat::kitti_raw, f / "2011_09_26"); }),
       "holds 2 drives (2011_09_26_drive_0001_extract, "));
 }
@@ -322,7 +322,7 @@ TEST(KittiRawIns, PacketsThatAreMissingBrokenOutOfOrderOrWithoutAFix) {
   for (const char* said :
        {"1 packets are missing, the first is 0000000002.txt", "2 packets are not the 30 numbers",
         "1 stamps go back", "1 packets have no line"})
-    EXPECT_TRUE(test::says(joined(recorded.remarks), said)) << said;
+    EXPECT_TRUE(test::mentions(joined(recorded.remarks), said)) << said;
 
   write_drive(f);
   struct Status {
@@ -338,17 +338,17 @@ TEST(KittiRawIns, PacketsThatAreMissingBrokenOutOfOrderOrWithoutAFix) {
   recorded = ins(f);
   for (std::size_t i = 0; i < statuses.size(); ++i)
     EXPECT_EQ(recorded.readings[i].sample.fix, statuses[i].fix) << statuses[i].words;
-  EXPECT_TRUE(test::says(joined(recorded.remarks), "4 of 10 packets have no satellites' fix"));
+  EXPECT_TRUE(test::mentions(joined(recorded.remarks), "4 of 10 packets have no satellites' fix"));
 
   const auto refused = [&] { return refusal_of([&] { (void)ins(f); }); };
   replace(f, kImu, "R: 1 0 0", "R: 1 0.1 0");
-  EXPECT_TRUE(test::says(refused(), "calib_imu_to_velo.txt:2: R: is no rotation"));
+  EXPECT_TRUE(test::mentions(refused(), "calib_imu_to_velo.txt:2: R: is no rotation"));
   fs::remove(f / kImu);
-  EXPECT_TRUE(test::says(refused(), "calib_imu_to_velo.txt: is missing"));
+  EXPECT_TRUE(test::mentions(refused(), "calib_imu_to_velo.txt: is missing"));
   for (int i = 0; i < kPackets; ++i) f.write(oxts_name(i), "1 2 3\n");
-  EXPECT_TRUE(test::says(refused(), "0000000000.txt: is no packet of the INS"));
+  EXPECT_TRUE(test::mentions(refused(), "0000000000.txt: is no packet of the INS"));
   fs::remove_all(f / (kDrive + "/oxts/data"));
-  EXPECT_TRUE(test::says(refused(), "oxts/data: does not exist"));
+  EXPECT_TRUE(test::mentions(refused(), "oxts/data: does not exist"));
   fs::remove_all(f / (kDrive + "/oxts"));
   EXPECT_TRUE(ins(f).readings.empty());
 }

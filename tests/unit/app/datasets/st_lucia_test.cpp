@@ -23,8 +23,8 @@
 namespace vergence::app {
 namespace {
 
+using test::mentions;
 using test::refusal_of;
-using test::says;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -111,7 +111,7 @@ TEST_F(StLuciaImages, greyIsMadeOfTheMosaic) {
   for (std::uint64_t i = 0; i < 2; ++i) {
     DecodedPair pair;
     ASSERT_TRUE(decoder.next(&pair));
-    ASSERT_TRUE(pair.decoded) << pair.note.data();
+    ASSERT_TRUE(pair.decoded) << pair.issue.data();
     for (std::size_t k = 0; k < 2; ++k) {
       std::vector<std::uint8_t> grey(kWidth * kHeight);
       bayer_to_grey(mosaic(10 * i + k).data(), kWidth, kWidth, kHeight, grey.data(), kWidth);
@@ -127,8 +127,8 @@ TEST_F(StLuciaImages, greyIsMadeOfTheMosaic) {
 TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOnly) {
   const std::string said =
       refusal_of([&] { (void)open_sequence(SequenceFormat::st_lucia, folder_.path()); });
-  EXPECT_TRUE(test::says(said, "62x48"));
-  EXPECT_TRUE(test::says(said, "1024x768"));
+  EXPECT_TRUE(test::mentions(said, "62x48"));
+  EXPECT_TRUE(test::mentions(said, "1024x768"));
   const std::vector<std::uint8_t> full(1024 * 768, 90);
   for (const char* name : {"cam0_image00000.bmp", "cam1_image00000.bmp"})
     write_mosaic(folder_ / "101215_153851_MultiCamera0" / name, full, 1024, 768);
@@ -139,19 +139,19 @@ TEST_F(StLuciaImages, withoutACalibrationGivenItIsThePublishedOneForItsOwnSizeOn
 
 TEST_F(StLuciaImages, brokenFoldersAreNamed) {
   write(log_, "1292391531 1234 62 48 raw 1292391531 990 62 48 raw cam0_image00000.bmp\n");
-  EXPECT_TRUE(says(refusal_of([&] { (void)open(); }), "MultiCamera0.log:1:"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)open(); }), "MultiCamera0.log:1:"));
   write(log_,
         "1292391531 1000000 62 48 raw 1292391531 990 62 48 raw cam0_image00000.bmp "
         "cam1_image00000.bmp\n");
-  EXPECT_TRUE(says(refusal_of([&] { (void)open(); }), "below a million"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)open(); }), "below a million"));
   write(log_, "sec usec\n");
-  EXPECT_TRUE(says(refusal_of([&] { (void)open(); }), "names no images"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)open(); }), "names no images"));
   write(folder_ / "101215_160000_MultiCamera0.log", "");
-  EXPECT_TRUE(says(refusal_of([&] { (void)open(); }), "2 files"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)open(); }), "2 files"));
   std::filesystem::remove(folder_ / "101215_160000_MultiCamera0.log");
   std::filesystem::remove(log_);
   EXPECT_TRUE(
-      says(refusal_of([&] { (void)open(); }), "holds no file that ends in _MultiCamera0.log"));
+      mentions(refusal_of([&] { (void)open(); }), "holds no file that ends in _MultiCamera0.log"));
 }
 
 // ---- INS
@@ -276,7 +276,7 @@ TEST(StLuciaIns, logsAreMendedOrRefused) {
     c.spoil(&lines);
     RecordedIns ins;
     const std::string refused = refusal_of([&] { ins = read(lines); });
-    EXPECT_TRUE(test::says(refused + said(ins), c.said)) << c.what << refused << said(ins);
+    EXPECT_TRUE(test::mentions(refused + said(ins), c.said)) << c.what << refused << said(ins);
     ASSERT_EQ(ins.readings.size(), c.readings) << c.what;
     for (std::size_t i = 1; i < ins.readings.size(); ++i)
       ASSERT_LT(ins.readings[i - 1].sample.stamp, ins.readings[i].sample.stamp);
@@ -285,8 +285,8 @@ TEST(StLuciaIns, logsAreMendedOrRefused) {
   }
   const test::TemporaryFolder empty;
   EXPECT_TRUE(
-      test::says(said(read_recorded_ins(SequenceFormat::st_lucia, empty.path(), {0, 1}, true)),
-                 "holds no file that ends in _Ins0.log"));
+      test::mentions(said(read_recorded_ins(SequenceFormat::st_lucia, empty.path(), {0, 1}, true)),
+                     "holds no file that ends in _Ins0.log"));
 }
 
 }  // namespace

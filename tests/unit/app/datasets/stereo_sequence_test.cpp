@@ -13,7 +13,7 @@
 namespace vergence::app {
 namespace {
 
-using test::says;
+using test::mentions;
 
 std::string refusal(SequenceFormat format, const std::filesystem::path& folder) {
   return test::refusal_of([&] { (void)open_sequence(format, folder); });
@@ -48,7 +48,7 @@ TEST_F(Sequence, refusalsNameTheFileAndWhatIsWrong) {
   struct Bad {
     const char* file;  // that is written into a whole data set
     std::string text;
-    std::vector<std::string> says;
+    std::vector<std::string> mentions;
   };
   const char *list = "mav0/cam0/data.csv", *right = "mav0/cam1/sensor.yaml";
   for (const Bad& c : {
@@ -85,15 +85,15 @@ TEST_F(Sequence, refusalsNameTheFileAndWhatIsWrong) {
     folder.write(c.file, c.text);
     const std::string said =
         refusal(euroc ? SequenceFormat::euroc : SequenceFormat::kitti, folder.path());
-    for (const std::string& part : c.says) EXPECT_TRUE(says(said, part)) << c.text;
+    for (const std::string& part : c.mentions) EXPECT_TRUE(mentions(said, part)) << c.text;
   }
-  EXPECT_TRUE(says(refusal(SequenceFormat::kitti, folder_ / "nowhere"), "does not exist"));
+  EXPECT_TRUE(mentions(refusal(SequenceFormat::kitti, folder_ / "nowhere"), "does not exist"));
   for (const auto& [format, name] :
        {std::pair(SequenceFormat::kitti, "image_0"), std::pair(SequenceFormat::euroc, "cam0"),
         std::pair(SequenceFormat::folder, "left")})
-    EXPECT_TRUE(says(refusal(format, folder_.path()), name));
+    EXPECT_TRUE(mentions(refusal(format, folder_.path()), name));
   std::filesystem::create_directories(folder_ / "left");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), "left", "no PNG, JPEG"));
+  EXPECT_TRUE(mentions(refusal(SequenceFormat::folder, folder_.path()), "left", "no PNG, JPEG"));
 }
 
 TEST_F(Sequence, eurocStampsAreExactAndTheRightCameraSitsWhereT_BSPutsIt) {
@@ -149,8 +149,8 @@ TEST_F(Sequence, folderWhoseTimesNameTheirImages) {
   EXPECT_EQ(s.pairs[2].file[1], "right/002.png");
   EXPECT_EQ(s.pairs[3].file[0], "left/gone.png") << "a frame that is skipped when it comes";
   folder_.write("times.txt", "0.0,a.png\n0.1,b.png\n");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), "times.txt", "left/a.png",
-                   "left/000.png"));
+  EXPECT_TRUE(mentions(refusal(SequenceFormat::folder, folder_.path()), "times.txt", "left/a.png",
+                       "left/000.png"));
 }
 
 /// times.txt of pairs that are `step` of the file's own units apart.
@@ -167,7 +167,7 @@ TEST_F(Sequence, timesThatCannotBeOfADriveAreRefused) {
   };
   struct Times {
     std::string text;
-    std::vector<std::string> says;  // empty: they are taken
+    std::vector<std::string> mentions;  // empty: they are taken
   };
   for (const Times& c : {
            // Another unit; a gap is none.
@@ -194,8 +194,9 @@ TEST_F(Sequence, timesThatCannotBeOfADriveAreRefused) {
        }) {
     folder_.write("times.txt", c.text);
     const std::string said = refusal(SequenceFormat::folder, folder_.path());
-    EXPECT_EQ(said.empty(), c.says.empty()) << c.text << said;
-    for (const std::string& part : c.says) EXPECT_TRUE(says(said, "times.txt", part)) << c.text;
+    EXPECT_EQ(said.empty(), c.mentions.empty()) << c.text << said;
+    for (const std::string& part : c.mentions)
+      EXPECT_TRUE(mentions(said, "times.txt", part)) << c.text;
   }
 }
 
@@ -227,8 +228,8 @@ TEST_F(Sequence, folderOfForeignNamesNeedsOneOfEach) {
   EXPECT_EQ(open_sequence(SequenceFormat::folder, folder_.path()).pairs.at(2).file[1],
             "right/rc.png");
   std::filesystem::remove(folder_ / "right/rb.png");
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()),
-                   "3 left images and 2 right ones", "stamp,left file,right file"));
+  EXPECT_TRUE(mentions(refusal(SequenceFormat::folder, folder_.path()),
+                       "3 left images and 2 right ones", "stamp,left file,right file"));
 }
 
 /// All images of the tiny folder in 16 bits, their samples from 0 to `most`.
@@ -272,8 +273,8 @@ TEST_F(Sequence, theBitsThatAreUsedAreThoseOfTheGreatestSampleLookedAt) {
 TEST_F(Sequence, imagesOfAnotherSizeAreRefusedWhereMostHaveIt) {
   test::write_tiny_folder(folder_, 3);
   for (int k = 0; k < 2; ++k) test::write_tiny_image(folder_ / test::folder_name(k, 0), 0, 64, 48);
-  EXPECT_TRUE(says(refusal(SequenceFormat::folder, folder_.path()), "left/000.png", "64x48",
-                   "70x48", "calibration.yaml"));
+  EXPECT_TRUE(mentions(refusal(SequenceFormat::folder, folder_.path()), "left/000.png", "64x48",
+                       "70x48", "calibration.yaml"));
   test::write_tiny_folder(folder_, 3);
   test::write_tiny_image(folder_ / "right/002.png", 0, 70, 50);
   const auto s = open_sequence(SequenceFormat::folder, folder_.path());

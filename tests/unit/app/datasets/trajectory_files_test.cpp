@@ -16,8 +16,8 @@
 namespace vergence::app {
 namespace {
 
+using test::mentions;
 using test::refusal_of;
-using test::says;
 
 constexpr const char* kGoodLine = "1.5 1 2 3 0 0 0 1\n";
 constexpr std::int64_t kFirst = 1403636584763555584;  // ns
@@ -95,7 +95,7 @@ TEST(Trajectory, isReadHoweverProgramsWriteIt) {
     EXPECT_LT((T.R * T.R.transpose() - Mat3::Identity()).norm(), 1e-14) << row.name;
     std::string said;
     for (const std::string& remark : t.remarks) said += remark + "; ";
-    EXPECT_TRUE(says(said, row.remark)) << row.name;
+    EXPECT_TRUE(mentions(said, row.remark)) << row.name;
     EXPECT_EQ(said.empty(), std::string_view(row.remark).empty()) << row.name << ": " << said;
   }
 }
@@ -124,14 +124,15 @@ TEST(Trajectory, saysFileAndLineOfWhatIsWrong) {
   const test::TemporaryFolder folder;
   for (const Case& c : cases) {
     const auto file = folder.write("t.tum", c.text);
-    EXPECT_TRUE(says(refusal_of([&] { (void)read_tum(file); }), c.said)) << c.text.substr(0, 80);
+    EXPECT_TRUE(mentions(refusal_of([&] { (void)read_tum(file); }), c.said))
+        << c.text.substr(0, 80);
   }
-  EXPECT_TRUE(says(refusal_of([&] { (void)read_tum(folder / "none.tum"); }),
-                   "none.tum: cannot be opened (No such file"));
-  EXPECT_TRUE(says(refusal_of([&] { (void)read_tum(folder.path()); }), "is a folder"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_tum(folder / "none.tum"); }),
+                       "none.tum: cannot be opened (No such file"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_tum(folder.path()); }), "is a folder"));
   const std::filesystem::path pipe = folder / "pipe.tum";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_TRUE(says(refusal_of([&] { (void)read_tum(pipe); }), "is a pipe or a device"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_tum(pipe); }), "is a pipe or a device"));
 }
 
 TEST(Trajectory, unitAndOrderAreWhatTheUserSays) {
@@ -140,7 +141,8 @@ TEST(Trajectory, unitAndOrderAreWhatTheUserSays) {
   const auto file = folder.write("t.txt", "0" + turn + "100" + turn + "200" + turn);
   TrajectoryOptions options;
   options.unit_option = "--time-unit";
-  EXPECT_TRUE(says(refusal_of([&] { (void)read_trajectory_file(file, options); }), "--time-unit"));
+  EXPECT_TRUE(
+      mentions(refusal_of([&] { (void)read_trajectory_file(file, options); }), "--time-unit"));
   options.unit = TimeUnit::milliseconds;
   EXPECT_EQ(read_trajectory_file(file, options).poses[1].stamp.ns(), 100'000'000);
   EXPECT_FALSE(read_trajectory_file(file, options).order_reported);
@@ -160,7 +162,7 @@ TEST(Kitti, posesHaveTheTimesBesideThemOrNone) {
   EXPECT_FALSE(read_trajectory_file(poses).timed);
   EXPECT_EQ(read_trajectory_file(poses).rows, 2U);
   EXPECT_TRUE(
-      says(refusal_of([&] { (void)read_trajectory(poses); }), "put the sequence's times.txt"));
+      mentions(refusal_of([&] { (void)read_trajectory(poses); }), "put the sequence's times.txt"));
   folder.write("sequences/06/times.txt", "12.5\n1.26e+01\n");
   for (const auto& path : {poses, folder / "sequences/06", folder / "sequences/06/"}) {
     const Trajectory t = read_trajectory(path);
@@ -169,9 +171,9 @@ TEST(Kitti, posesHaveTheTimesBesideThemOrNone) {
     EXPECT_LT((t[1].T_world_body * Vec3(1, 0, 0) - Vec3(4, 6, 6)).norm(), 1e-15);
   }
   folder.write("sequences/06/times.txt", "0\n1\n2\n");
-  EXPECT_TRUE(says(refusal_of([&] { (void)read_trajectory(poses); }), "has 2 poses, but "));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_trajectory(poses); }), "has 2 poses, but "));
   folder.write("sequences/06/times.txt", "0\nsoon\n");
-  EXPECT_TRUE(says(refusal_of([&] { (void)read_trajectory(poses); }), "times.txt:2: `soon`"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_trajectory(poses); }), "times.txt:2: `soon`"));
   const std::vector<Stamp> times = {Stamp(30), Stamp(20)};
   EXPECT_EQ(read_kitti(poses, times).front().stamp, Stamp(20)) << "in the order of time";
   EXPECT_THROW((void)read_kitti(poses, std::span(times).first(1)), InputError);
@@ -187,7 +189,7 @@ TEST(Euroc, bringsTheBodyToTheLeftCamera) {
       "1403636584768555584,1,2,3,0,1,0,0,0.1,0.2,0.3,0,0,0,0,0,0\r\n";
   const auto alone = folder.write("alone/gt.csv", text);
   EXPECT_EQ(read_trajectory(alone)[0].T_world_body.t, Vec3(1, 2, 3)) << "of the body";
-  EXPECT_TRUE(says(read_trajectory_file(alone).remarks.at(0), "cam0/sensor.yaml"));
+  EXPECT_TRUE(mentions(read_trajectory_file(alone).remarks.at(0), "cam0/sensor.yaml"));
   folder.write("mav0/cam0/sensor.yaml", kSensor);
   const auto csv = folder.write("mav0/state_groundtruth_estimate0/data.csv", text);
   for (const auto& path : {csv, folder.path(), folder / "mav0", folder / "mav0/"}) {
@@ -210,7 +212,7 @@ TEST(Euroc, bringsTheBodyToTheLeftCamera) {
              "is not a rigid transform"},
         Case{"a: [1\nb: 2\n", "is not YAML"}, Case{"just words\n", "sensor.yaml: has no T_BS"}}) {
     folder.write("mav0/cam0/sensor.yaml", c.sensor);
-    EXPECT_TRUE(says(said(), c.said));
+    EXPECT_TRUE(mentions(said(), c.said));
   }
 }
 
@@ -247,14 +249,14 @@ TEST(TimesFile, isReadHoweverProgramsWriteIt) {
         std::pair{"0.1,../a.png\n", "times.txt:1: `../a.png`"},
         std::pair{"0.1,a,b,c\n", "4 columns"}}) {
     const auto file = folder.write("times.txt", text);
-    EXPECT_TRUE(says(refusal_of([&] { (void)read_times_file(file); }), said)) << text;
+    EXPECT_TRUE(mentions(refusal_of([&] { (void)read_times_file(file); }), said)) << text;
   }
 }
 
 TEST(Trajectory, aFolderStandsForItsTrajectoryOrIsRefused) {
   const test::TemporaryFolder folder;
-  EXPECT_TRUE(says(refusal_of([&] { (void)read_trajectory(folder.path()); }),
-                   "has no trajectory.tum, no poses.txt"));
+  EXPECT_TRUE(mentions(refusal_of([&] { (void)read_trajectory(folder.path()); }),
+                       "has no trajectory.tum, no poses.txt"));
   EXPECT_FALSE(find_truth(folder.path()).has_value());
   folder.write("trajectory.tum", kGoodLine);
   EXPECT_EQ(read_trajectory(folder.path()).front().stamp.ns(), 1500000000);

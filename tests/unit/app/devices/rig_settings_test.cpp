@@ -89,7 +89,7 @@ TEST(RigSettings, whatIsRenderedAndWhatTheTruthComparesWithHasNoErrors) {
 TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
   struct Bad {
     std::vector<std::string> set;
-    const char* says;
+    const char* mentions;
   };
   for (const Bad& bad : {
            Bad{{"cameras.1.intrinsics=[460, 460]"}, "cameras.1.intrinsics is ["},
@@ -105,7 +105,7 @@ TEST(RigSettings, impossibleRigsAreRefusedByTheirKeys) {
            Bad{{"mock.calibration_error.x_m=0.3"}, "mock.calibration_error"},
            Bad{{"cameras.3.driver=mock"}, "no holes"},
        })
-    EXPECT_TRUE(test::says(refusal(bad.set), bad.says)) << bad.set[0];
+    EXPECT_TRUE(test::mentions(refusal(bad.set), bad.mentions)) << bad.set[0];
 }
 
 }  // namespace

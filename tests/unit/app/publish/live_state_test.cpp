@@ -28,15 +28,15 @@ EventRecord event(const char* kind, std::string_view message) {
   return e;
 }
 
-CalibrationRecord calibration(bool learnt, double x) {
+CalibrationRecord calibration(bool is_refinement, double x) {
   CalibrationRecord c;
-  c.accepted = !learnt;
-  c.learnt = learnt;
-  c.decided = learnt;
+  c.accepted = !is_refinement;
+  c.is_refinement = is_refinement;
+  c.decided = is_refinement;
   c.cause = CalibrationCause::refinement;
   c.calibration.cameras = 2;
   c.calibration.T_camera_left[1].t = {x, 0, 0};
-  if (learnt) c.calibration.sigma_total[1] = {1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
+  if (is_refinement) c.calibration.sigma_total[1] = {1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3};
   return c;
 }
 

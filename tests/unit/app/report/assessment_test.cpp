@@ -223,7 +223,7 @@ TEST(Assessment, GradeReasonAndAdviceByFinding) {
     SCOPED_TRACE(row.name);
     Case c;
     row.change(c);
-    const Assessment v = judge(c.session, c.analysis);
+    const Assessment v = assess(c.session, c.analysis);
     EXPECT_EQ(v.grade, row.grade) << v.message;
     EXPECT_TRUE(row.reason.empty() || any_has(v.reasons, row.reason)) << v.message;
     EXPECT_TRUE(row.advice.empty() || any_has(v.advice, row.advice))
@@ -246,7 +246,7 @@ TEST(Assessment, WorstReasonComesFirstAndTheFirstToGiveUpStands) {
   EXPECT_EQ(v.reasons, (std::vector<std::string>{"worst", "first", "second"}));
   EXPECT_EQ(v.main_reason, "the lens is another. Calibrate it.");
   EXPECT_FALSE(v.usable);
-  EXPECT_EQ(judge(Session{}, analyse(Session{})).grade, bad);
+  EXPECT_EQ(assess(Session{}, analyse(Session{})).grade, bad);
 }
 
 TEST(Assessment, EveryReasonOfAPoseHasAdvice) {
@@ -255,11 +255,11 @@ TEST(Assessment, EveryReasonOfAPoseHasAdvice) {
     c.session.reasons.emplace_back(to_string(static_cast<Reason>(i)));
     c.analysis.by_reason = {0, 3};
     c.event(1, "rig_changed");
-    EXPECT_TRUE(any_has(judge(c.session, c.analysis).advice, "3 frames"))
+    EXPECT_TRUE(any_has(assess(c.session, c.analysis).advice, "3 frames"))
         << c.session.reasons.back();
     c.session.events.clear();
     if (static_cast<Reason>(i) == Reason::recalibrating) {
-      EXPECT_FALSE(any_has(judge(c.session, c.analysis).advice, "knocked")) << "a passing doubt";
+      EXPECT_FALSE(any_has(assess(c.session, c.analysis).advice, "knocked")) << "a passing doubt";
     }
   }
 }
@@ -318,7 +318,7 @@ TEST(Usability, OfDrivesWithoutAnOkFrame) {
   drives.push_back({degraded_drive(100, "unverified_calibration"), true, ""});
   for (Frame& f : drives.back().session.frames) f.status.reset();
   for (std::size_t i = 0; i < drives.size(); ++i) {
-    const Assessment v = judge(drives[i].session, analyse(drives[i].session));
+    const Assessment v = assess(drives[i].session, analyse(drives[i].session));
     EXPECT_EQ(v.usable, drives[i].usable) << i;
     EXPECT_NE(v.main_reason.find(drives[i].main_reason), std::string::npos)
         << i << ": " << v.main_reason;

@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kShortHead =
     "frame,stamp_ns,state,status,reason,x,y,z,qx,qy,qz,qw,inliers,estimate_ms\n";
 
-bool says(const Session& s, const std::string& part) {
+bool mentions(const Session& s, const std::string& part) {
   return std::any_of(s.missing.begin(), s.missing.end(),
                      [&](const std::string& m) { return m.find(part) != std::string::npos; });
 }
@@ -114,7 +114,7 @@ TEST(ReadSession, whatIsNotThereByDesignIsNotMissing) {
   const Session s = read_session(folder.path());
   EXPECT_TRUE(s.missing.empty()) << s.missing.front();
   folder.write("summary.json", R"({"metrics": {"ate_m": 0.1}})");
-  EXPECT_TRUE(says(read_session(folder.path()), "reference.tum"))
+  EXPECT_TRUE(mentions(read_session(folder.path()), "reference.tum"))
       << "its figures stand in the summary";
 }
 
@@ -127,8 +127,8 @@ TEST(ReadSession, damagedAndDisorderedLinesAreLeftOutAndCounted) {
                                "3,3000,dancing,splendid,,1,2,1e300,0,0,0,1,100,5\n"
                                "4,4000,stereo_odometry,ok,,nan,2,3,0,0,0,1,-1e99,inf\n"
                                "5,5000,stereo_odometry,ok,,1,2,3,0,0,0,0,100,5\n");
-  EXPECT_TRUE(says(s, "2 damaged lines"));
-  EXPECT_TRUE(says(s, "1 line left out whose stamp is not later"));
+  EXPECT_TRUE(mentions(s, "2 damaged lines"));
+  EXPECT_TRUE(mentions(s, "1 line left out whose stamp is not later"));
   ASSERT_EQ(s.frames.size(), 4U);
   EXPECT_FALSE(s.frames[1].state || s.frames[1].status);
   EXPECT_FALSE(s.frames[1].posed) << "a coordinate beyond the earth";

@@ -37,11 +37,11 @@ TEST(CalibrationWriter, linesCarryNumbersAndEmptyFieldsWhereNothingIsGiven) {
       "00000,320.00000,240.00000,";
   const std::string distortion = ",0.000000000,0.000000000,0.000000000,0.000000000,,,,";
   EXPECT_EQ(lines[1], "1403636584763555584,accepted,given,of a; file,0,,,0.0000,,,0.000000" +
-                          numbers + ",,," + distortion + distortion + ",,,,,");
+                          numbers + ",,," + distortion + distortion + ",,,,");
   EXPECT_EQ(lines[2],
             "1403636584763555584,accepted,knock,,60,71,840,0.1800,1.5000,0.1250,0.002000" +
                 numbers + "0.200000000,0.300000000,0.000000000,0.000000000" + distortion +
-                distortion + ",,,,,");
+                distortion + ",,,,");
   EXPECT_EQ(lines[3].substr(0, 71),
             "1403636584763555584,rejected,knock,held-out frames do not fit better,60");
   for (const std::string& line : lines)

@@ -67,7 +67,7 @@ class BlackSource final : public FrameSource {
   }
   void describe(const SessionTotals& /*totals*/, const Estimator& /*estimator*/,
                 SummaryInput* /*input*/) const override {}
-  void print_figures(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
+  void print_metrics(const SessionTotals& /*totals*/, const SummaryInput& /*input*/,
                      Progress* /*progress*/) const override {}
   [[nodiscard]] int held() const { return held_; }
   [[nodiscard]] int finished() const { return finished_; }

@@ -7,7 +7,7 @@ namespace vergence::app {
 namespace {
 
 /// A solver that is as busy as it is told to be.
-struct ToldSolver final : BackgroundRunner {
+struct ManualSolver final : BackgroundRunner {
   bool is_busy = false;
   int waits = 0;
   void start(TaskRef task) noexcept override { task(); }
@@ -19,7 +19,7 @@ struct ToldSolver final : BackgroundRunner {
 };
 
 TEST(ReplayableSolverRunner, notesTheFramesAtWhichTheSolverIsFoundIdle) {
-  ToldSolver solver;
+  ManualSolver solver;
   ReplayableSolverRunner watch(solver);
   watch.begin_frame(std::nullopt);
   EXPECT_FALSE(watch.found_idle()) << "nobody asked";
@@ -35,7 +35,7 @@ TEST(ReplayableSolverRunner, notesTheFramesAtWhichTheSolverIsFoundIdle) {
 }
 
 TEST(ReplayableSolverRunner, answersInAReplayAsInTheDrive) {
-  ToldSolver solver;
+  ManualSolver solver;
   ReplayableSolverRunner watch(solver);
   watch.begin_frame(false);
   EXPECT_TRUE(watch.busy()) << "the solver is faster now";

@@ -11,7 +11,6 @@ namespace {
 
 using calibration::CalibrationOptions;
 using calibration::check_focal_length;
-using calibration::RigFreedom;
 using calibration::RigSolution;
 using calibration::RigSolveRequest;
 using calibration::RigSolveStatus;
@@ -35,11 +34,10 @@ RigSolution measure(const FeatureDriveOptions& drive_options, const RigCalibrati
   log_drive(drive, 60, {2e-3, 0.02, 5e-3, 0.02}, s.solver.log());
   RigSolveRequest request;
   request.rig = given;
-  request.freedom = RigFreedom::lenses;
   request.given = &given;
   const RigSolution lenses = s.solver.solve(request);
   EXPECT_EQ(lenses.status, RigSolveStatus::ok);
-  request.freedom = RigFreedom::focal_lengths;
+  request.measure_focal_lengths = true;
   request.rig.T_camera_left = lenses.rig.T_camera_left;
   request.from_rig = true;
   return s.solver.solve(request);

@@ -77,12 +77,7 @@ class ModeDrive {
     using namespace calibration::detail;
     const auto looks = std::make_unique<MonitorResiduals>();
     looks->reset();
-    const Reference reference{o.T_right_left,
-                              EpipolarGeometry(o.T_right_left),
-                              tangent_basis(o.T_right_left.t.normalized()),
-                              o.T_right_left.t.norm(),
-                              o.left,
-                              o.right};
+    const Reference reference{EpipolarGeometry(o.T_right_left), o.left, o.right};
     MonitorTrial trial(o);
     for (int i = 0; i < frames; ++i) {
       (void)trial.step();

@@ -13,7 +13,7 @@ using namespace calibration::detail;
 using calibration::MonitorFrame;
 
 Reference reference_of(const FeatureDriveOptions& o, const Transform& T) {
-  return {T, EpipolarGeometry(T), tangent_basis(T.t.normalized()), T.t.norm(), o.left, o.right};
+  return {EpipolarGeometry(T), o.left, o.right};
 }
 
 FeatureDriveOptions exact_street() {

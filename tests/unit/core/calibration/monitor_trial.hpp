@@ -56,7 +56,7 @@ class MonitorTrial {
     // A centimetre between two images at 30 Hz.
     frame_.moving = drive.T_now_previous().t.norm() > 0.01;
     frame_.stereo = observations_;
-    verdict_ = monitor_.look(frame_);
+    verdict_ = monitor_.update(frame_);
     return verdict_;
   }
 
@@ -101,13 +101,27 @@ struct TrialReference {
   drive.changes.clear();
   drive.drive_s = drive.stop_s = 0;
   drive.seed += 1000;
-  calibration::MonitorOptions options;
-  options.bias_px = 0;  // noise only
-  options.long_window = 60;
-  MonitorTrial trial(drive, options);
-  for (int i = 0; i < 75; ++i) (void)trial.step();
-  const Vec6 off = trial.verdict().offset;
-  return {perturbed(drive.T_right_left, off.head<3>(), off.tail<3>()), trial.verdict().covariance};
+  const Transform& T = drive.T_right_left;
+  const auto residuals = std::make_unique<calibration::detail::MonitorResiduals>();
+  residuals->reset();
+  constexpr int kFrames = 75;
+  calibration::detail::Evidence sum;
+  double inflation = 0;
+  MonitorTrial trial(drive);
+  for (int i = 0; i < kFrames; ++i) {
+    (void)trial.step();
+    const auto found =
+        residuals->stereo({EpipolarGeometry(T), drive.left, drive.right}, trial.frame(), 30, true);
+    sum.add(found.evidence);
+    inflation += found.spread_life / kFrames;
+  }
+  const auto factor = calibration::detail::with_prior(sum.A);
+  Eigen::Matrix<double, 6, 5> d_transform = Eigen::Matrix<double, 6, 5>::Zero();
+  d_transform.topLeftCorner<3, 3>().setIdentity();
+  d_transform.bottomRightCorner<3, 2>() = T.t.norm() * tangent_basis(T.t.normalized());
+  const Vec6 off = d_transform * factor.solve(sum.g);
+  return {perturbed(T, off.head<3>(), off.tail<3>()),
+          inflation * d_transform * factor.inverse() * d_transform.transpose()};
 }
 
 }  // namespace vergence::test

@@ -32,9 +32,6 @@ struct Drive {
   explicit Drive(CalibrationTrust trust) : given(corridor.rig()), nominal(given) {
     options.trust = trust;
     options.calibration.intrinsics = calibration::IntrinsicsEstimation::fixed;
-    // Pixels of 3.6 mrad instead of the paper's 0.8: what tracks can hold is as much less.
-    options.calibration.rotation_sigma_mrad = 1.0;
-    options.calibration.translation_sigma_mm = 30;
     nominal.T_camera_left[1] = {Mat3::Identity(), {-given.baseline, 0, 0}};
     if (trust == CalibrationTrust::none)
       for (Transform& T : given.T_camera_left) T = {};
@@ -52,7 +49,7 @@ struct Drive {
   void note() {
     events.insert(events.end(), estimator->events().begin(), estimator->events().end());
     for (const CalibrationDecision& decision : estimator->calibrations())
-      if (!decision.learnt) decisions.push_back(decision);
+      if (!decision.is_refinement) decisions.push_back(decision);
   }
   void drive(int first, int last) {
     for (int i = first; i < last; ++i) give(corridor.frame(i));

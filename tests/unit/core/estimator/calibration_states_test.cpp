@@ -9,7 +9,7 @@
 #include <sstream>
 #include <string>
 
-#include "core/estimator/doubts.hpp"
+#include "core/estimator/degradations.hpp"
 #include "core/estimator/transitions.hpp"
 
 namespace vergence {
@@ -30,10 +30,10 @@ constexpr std::array kEstimatorTriggerNames = {"calibration_given",
                                                "pose_found",
                                                "pose_found_doubtful",
                                                "pose_found_uncalibrated"};
-constexpr std::array kDoubtNames = {"pairing",    "scene", "frame",       "out_of_sync",
-                                    "late_image", "rig",   "calibration", "dynamic_scene",
-                                    "window",     "motion"};
-static_assert(kDoubtNames.size() == kDoubts);
+constexpr std::array kDegradationNames = {"pairing",    "scene", "frame",       "out_of_sync",
+                                          "late_image", "rig",   "calibration", "dynamic_scene",
+                                          "window",     "motion"};
+static_assert(kDegradationNames.size() == kDegradations);
 
 std::string readme() {
   std::ifstream file(VERGENCE_SOURCE_DIR "/core/README.md");
@@ -56,12 +56,12 @@ TEST(CalibrationStates, onlyDoubtLeadsToSuspectAndOnlyADriveToVerified) {
   using S = CalibrationState;
   using T = CalibrationTrigger;
   for (const CalibrationTransition& t : kCalibrationTransitions) {
-    EXPECT_EQ(t.to == S::suspect, t.on == T::doubted);
+    EXPECT_EQ(t.to == S::suspect, t.on == T::suspected);
     EXPECT_EQ(t.to == S::verified, t.on == T::confirmed || t.on == T::adopted_verified);
     EXPECT_NE(t.to, S::none);
     EXPECT_EQ(after(t.from, t.on), t.to) << "a row hides another";
   }
-  EXPECT_EQ(after(S::none, T::doubted), S::none);
+  EXPECT_EQ(after(S::none, T::suspected), S::none);
   EXPECT_EQ(after(S::suspect, T::confirmed), S::suspect);
 }
 
@@ -81,7 +81,7 @@ TEST(CalibrationStates, theDrawingsInTheReadmeAreTheTables) {
   EXPECT_EQ(arrows(text),
             static_cast<std::ptrdiff_t>(kCalibrationTransitions.size() + kTransitions.size()));
   std::size_t at = 0;
-  for (const char* name : kDoubtNames) {
+  for (const char* name : kDegradationNames) {
     const std::size_t row = text.find("| `" + std::string(name) + "` |", at);
     ASSERT_NE(row, std::string::npos) << name << " is missing, or out of its order";
     at = row;

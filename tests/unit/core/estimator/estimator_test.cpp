@@ -47,7 +47,7 @@ EstimatorOptions believing() {
 /// A rig that stands before a wall 12 px of disparity away. Every frame has noise of its own, as a
 /// sensor's would.
 struct Standing {
-  static constexpr int kPictures = 4;
+  static constexpr int kImages = 4;
   RigCalibration calibration = rig();
   Texture texture{5};
   std::vector<Image> left, right;
@@ -60,7 +60,7 @@ struct Standing {
 
   Standing() {
     Random random(8);
-    for (int i = 0; i < kPictures; ++i) {
+    for (int i = 0; i < kImages; ++i) {
       left.push_back(
           draw(kWidth, kHeight, [&](const Vec2& p) { return texture(p) + random.normal(); }));
       right.push_back(draw(kWidth, kHeight, [&](const Vec2& p) {
@@ -73,8 +73,8 @@ struct Standing {
     f.number = static_cast<std::uint64_t>(i);
     f.stamp = Stamp(1'000'000'000 + 50'000'000LL * i);
     f.cameras = 2;
-    f.images[0] = left[static_cast<std::size_t>(i % kPictures)].view();
-    f.images[1] = right[static_cast<std::size_t>(i % kPictures)].view();
+    f.images[0] = left[static_cast<std::size_t>(i % kImages)].view();
+    f.images[1] = right[static_cast<std::size_t>(i % kImages)].view();
     return f;
   }
   PoseSample give(int i) { return estimator.process(frame(i)); }

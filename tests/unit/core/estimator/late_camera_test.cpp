@@ -64,29 +64,29 @@ struct StopAndGo {
 TEST(LateCamera, thatRepeatedAnImageWhileStandingIsNotBelievedUntilTheRigHasDriven) {
   StopAndGo d;
   std::string story;
-  int ok_standing = 0, doubted = 0;
+  int ok_standing = 0, suspected = 0;
   d.drive(true, [&](int i, const PoseSample& s, const Estimator& e) {
     story += StopAndGo::told(s, e);
     if (i > StopAndGo::kRepeat && i < StopAndGo::kGo) ok_standing += s.status == PoseStatus::ok;
     if (i < StopAndGo::kMoves) return;
     EXPECT_NE(s.status, PoseStatus::ok) << i << '\n' << story;
-    doubted += s.reason == Reason::image_repeated;
+    suspected += s.reason == Reason::image_repeated;
   });
   EXPECT_EQ(ok_standing, StopAndGo::kGo - StopAndGo::kRepeat - 1) << story;
-  EXPECT_GT(doubted, 0) << story;
+  EXPECT_GT(suspected, 0) << story;
 }
 
 TEST(LateCamera, thatOnlyRepeatedAnImageIsBelievedOnceADozenFramesHaveShownIt) {
   StopAndGo d;
   std::string story;
-  int first_ok = -1, doubted = 0;
+  int first_ok = -1, suspected = 0;
   d.drive(false, [&](int i, const PoseSample& s, const Estimator& e) {
     story += StopAndGo::told(s, e);
     if (i < StopAndGo::kMoves) return;
-    doubted += s.reason == Reason::image_repeated;
+    suspected += s.reason == Reason::image_repeated;
     if (s.status == PoseStatus::ok && first_ok < 0) first_ok = i;
   });
-  EXPECT_GE(doubted, 12) << story;
+  EXPECT_GE(suspected, 12) << story;
   ASSERT_GT(first_ok, 0) << story;
 }
 

@@ -23,13 +23,13 @@ struct Review {
   EstimatorOptions options;
   calibration::FocalCheck focal{false};
   RigCalibration truth = test::rig_of(drive), in_use = truth;
-  BackgroundSolve::Solved solved;
+  calibration::RigSolution solved;
 
   explicit Review(const Vec3& turned) {
     test::FeatureDrive d(drive);
     test::log_drive(d, 20, {}, log);
     in_use.T_camera_left[1].R = exp_so3(turned) * truth.T_camera_left[1].R;
-    calibration::RigSolution& s = solved.transforms;
+    calibration::RigSolution& s = solved;
     s.status = calibration::RigSolveStatus::ok;
     s.rig = truth;
     s.newest = kNewest;
@@ -41,8 +41,8 @@ struct Review {
   }
   [[nodiscard]] Gate gate() const {
     const SolutionReview review(
-        solved, {options, truth, &in_use, calibration::ClaimSource::elsewhere, log, focal});
-    return review.gate(solved.transforms);
+        solved, {options, truth, &in_use, calibration::CalibrationOrigin::elsewhere, log, focal});
+    return review.gate();
   }
   [[nodiscard]] bool lines_tell() const {
     return calibration::fits_better(log, kNewest, truth, in_use);

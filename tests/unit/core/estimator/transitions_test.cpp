@@ -26,7 +26,7 @@ TEST(Transitions, everyStateAnswersEveryTriggerAsTheMethodSays) {
       {kStays, kStays, kStays, recalibrating, kStays, kStays},             // requested
       {kStays, lost, lost, lost, lost, kStays},                            // pose_lost
       {kStays, kStays, kStays, kStays, kStays, stereo_odometry},           // pose_found
-      {kStays, kStays, kStays, kStays, kStays, recalibrating},             // pose_found_doubtful
+      {kStays, kStays, kStays, kStays, kStays, recalibrating},             // pose_found_suspect
       {kStays, kStays, kStays, kStays, kStays, initialising},  // pose_found_uncalibrated
   }};
   ASSERT_EQ(static_cast<std::size_t>(Trigger::pose_found_uncalibrated) + 1, kWanted.size());

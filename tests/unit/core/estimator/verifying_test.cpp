@@ -18,7 +18,7 @@ using odometry::test::Corridor;
 using Kind = EstimatorEvent::Kind;
 
 /// The corridor's rig, driven with a claim about it.
-struct Claim {
+struct SuppliedRig {
   Corridor corridor;
   EstimatorOptions options;
   RigCalibration given = corridor.rig(), nominal = given;
@@ -36,7 +36,7 @@ struct Claim {
   static constexpr int kTurnAfter = 120;
   static constexpr Duration kInterval = Duration::milliseconds(50);  // the corridor's
 
-  Claim() {
+  SuppliedRig() {
     nominal.T_camera_left[1] = {Mat3::Identity(), {-given.baseline, 0, 0}};
     given.sigma_noise[1] = {2e-4, 4e-4, 2e-4, 1e-5, 2e-3, 4e-3};
   }
@@ -81,7 +81,7 @@ struct Claim {
 // Inverse depth is off by Z ψ / b: at the depth where a match of 0.15 px is 1 % (6.6 m) the
 // tolerated 2 % are a yaw of 1.5 mrad. The claims below are none and 15 mrad (20 %) off.
 TEST(Verifying, aTrueCalibrationIsDegradedUntilTheDriveConfirmsIt) {
-  Claim c;
+  SuppliedRig c;
   c.drive(60);
   const int confirmed = c.first(Kind::calibration_verified);
   // 20 frames to solve from and six to hold the result against.
@@ -101,7 +101,7 @@ TEST(Verifying, aTrueCalibrationIsDegradedUntilTheDriveConfirmsIt) {
 }
 
 TEST(Verifying, afterAnOutageTheDriveHasToConfirmItAgainAndSaysSoOnce) {
-  Claim c;
+  SuppliedRig c;
   c.dark_from = 50, c.dark_to = 56;
   c.drive(110);
   ASSERT_GE(c.first(Kind::calibration_verified), 25) << c.story;
@@ -122,7 +122,7 @@ TEST(Verifying, afterAnOutageTheDriveHasToConfirmItAgainAndSaysSoOnce) {
 // The tolerated 2 % of the depth at which the corridor is judged are a yaw of 1.5 mrad: this one is
 // 20 %, and no frame shows it to whom the frames before it are unknown.
 TEST(Verifying, aYawKnockedInAnOutageIsNeverOkWithTheOldCalibration) {
-  Claim c;
+  SuppliedRig c;
   c.dark_from = 50, c.dark_to = 56;
   c.drive(110, 53, Vec3(0, 0.015, 0));
   const int adopted = c.first(Kind::calibration_accepted, c.dark_to);
@@ -144,7 +144,7 @@ void expect_mended_once(double yaw_rad) {
   SCOPED_TRACE(yaw_rad);
   constexpr int kKnock = 80;  // after the first full segment
   const Vec3 knock(0, yaw_rad, 0);
-  Claim c;
+  SuppliedRig c;
   c.options.calibration.max_frames = 60;
   c.drive(200, kKnock, knock);
   const int adopted = c.first(Kind::calibration_accepted, kKnock);
@@ -171,7 +171,7 @@ TEST(Verifying, aYawKnockedAfterARigWasLearntIsMendedOnceAndNotDrawnBack) {
 }
 
 TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
-  Claim c;
+  SuppliedRig c;
   const Transform truth = c.given.T_camera_left[1];
   c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * truth.R;
   c.drive(70);
@@ -194,7 +194,7 @@ TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
                                   [](const CalibrationDecision& d) { return d.accepted; });
   ASSERT_NE(first, c.decisions.end());
   EXPECT_EQ(first->cause, CalibrationCause::contradicted);
-  EXPECT_TRUE(first->learnt);
+  EXPECT_TRUE(first->is_refinement);
   const double off = 100 * first->reference_depth_m * 0.015 / c.given.T_camera_left[1].t.norm();
   EXPECT_NEAR(first->depth_error_percent, off, 0.1 * off + 2);
   EXPECT_TRUE(c.estimator->verified()) << c.story;
@@ -209,7 +209,7 @@ TEST(Verifying, aYawThatIsOffIsContradictedAndReplaced) {
 // The pose of the frame in which it is adopted, and of the next, still are those of the rig that
 // was contradicted: 20 % off.
 TEST(Verifying, posesOfAContradictedCalibrationAreNotOk) {
-  Claim c;
+  SuppliedRig c;
   c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * c.given.T_camera_left[1].R;
   c.drive(60);
   const int accepted = c.first(Kind::calibration_accepted),
@@ -230,7 +230,7 @@ TEST(Verifying, posesOfAContradictedCalibrationAreNotOk) {
 // that move all at once can. 10 mrad are 2.8 px here.
 TEST(Verifying, aYawKnockedBeforeTheClaimIsConfirmedIsSeenAtOnce) {
   constexpr int kKnock = 22;  // after the first snapshot, before it is decided
-  Claim c;
+  SuppliedRig c;
   c.drive(45, kKnock, {0, 0.01, 0});
   const int noticed = c.first(Kind::rig_changed);
   ASSERT_GE(noticed, kKnock) << c.story;
@@ -245,7 +245,7 @@ TEST(Verifying, aYawKnockedBeforeTheClaimIsConfirmedIsSeenAtOnce) {
 TEST(Verifying, aPitchKnockedRightAfterACalibrationWasAdoptedIsNeverOk) {
   constexpr int kVerified = 26, kKnock = kVerified + 3;
   const Transform truth = Corridor().rig().T_camera_left[1];
-  Claim c;
+  SuppliedRig c;
   c.given.T_camera_left[1].R = exp_so3({0, 0.015, 0}) * truth.R;
   c.drive(kVerified + 9, kKnock, {0.005, 0, 0});
   ASSERT_EQ(c.first(Kind::calibration_verified), kVerified) << c.story;
@@ -259,7 +259,7 @@ TEST(Verifying, aPitchKnockedRightAfterACalibrationWasAdoptedIsNeverOk) {
 
 TEST(Verifying, offlineAClaimStandsAndIsNotCalledUnverified) {
   for (const double yaw : {0.0, 0.015}) {
-    Claim c;
+    SuppliedRig c;
     c.options.online = false;
     c.given.T_camera_left[1].R = exp_so3({0, yaw, 0}) * c.given.T_camera_left[1].R;
     c.drive(40);

@@ -150,13 +150,13 @@ Moved match_moved(const Vec2& shift, double degrees, double larger, bool upright
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     // Waves of many lengths: one length alone has no size of its own.
     const Texture fine(seed, 9, 40), coarse(seed + 50, 20, 120);
-    const auto picture = [&](const Vec2& p) { return 0.6 * fine(p) + 0.9 * coarse(p) - 64; };
+    const auto brightness = [&](const Vec2& p) { return 0.6 * fine(p) + 0.9 * coarse(p) - 64; };
     const auto again = [&](const Vec2& p) {
-      return picture(middle + turn.transpose() * (p - middle - shift) / larger);
+      return brightness(middle + turn.transpose() * (p - middle - shift) / larger);
     };
     SurfOptions options;
     options.min_response = 1;
-    const Described left(draw(kWhole, kWhole, picture), 600, options, upright),
+    const Described left(draw(kWhole, kWhole, brightness), 600, options, upright),
         right(draw(kWhole, kWhole, again), 600, options, upright);
     Arena arena(SurfMatcher::memory_needed(600) + 600 * sizeof(SurfMatch) + kCacheLine);
     SurfMatcher matcher(600, arena);

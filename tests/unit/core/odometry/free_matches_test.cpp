@@ -41,11 +41,11 @@ TEST_P(FreeMatches, ofAMovedPictureLieWhereItMovedWithoutHeap) {
   FrontEnd front(o, rig, arena, runner);
   const features::test::Texture fine(3, 7, 24), coarse(4, 20, 80);
   const Vec2 shift(23.3, -8.6);
-  const auto picture = [&](const Vec2& p) { return 0.9 * fine(p) + 0.5 * coarse(p) - 51; };
-  const features::test::Image left = features::test::draw(kWidth, kHeight, picture, 64),
+  const auto brightness = [&](const Vec2& p) { return 0.9 * fine(p) + 0.5 * coarse(p) - 51; };
+  const features::test::Image left = features::test::draw(kWidth, kHeight, brightness, 64),
                               right = features::test::draw(
-                                  kWidth, kHeight, [&](const Vec2&p) { return picture(p - shift); },
-                                  64);
+                                  kWidth, kHeight,
+                                  [&](const Vec2&p) { return brightness(p - shift); }, 64);
   RigFrame frame;
   frame.cameras = 2;
   frame.images[0] = left.view();

@@ -19,7 +19,7 @@ class Frames {
   double next(double interval, bool renew = true) {
     last_ = last_ + Duration::seconds(interval);
     (void)gaps.since_frame(last_);
-    return gaps.note(interval, renew);
+    return gaps.check(interval, renew);
   }
 
  private:
@@ -34,7 +34,7 @@ TEST(GapDetector, oneGapLeavesARenewalDueUntilItIsDone) {
   EXPECT_TRUE(f.gaps.renewal_due());
   EXPECT_EQ(f.next(kUsual), 0);
   EXPECT_TRUE(f.gaps.renewal_due());
-  f.gaps.forget();
+  f.gaps.clear_renewal();
   EXPECT_FALSE(f.gaps.renewal_due());
 }
 
@@ -49,7 +49,7 @@ TEST(GapDetector, anEvenDriveHasNoneHoweverSlowItIs) {
 TEST(GapDetector, ofTwoGapsInARowTheSceneIsMadeAnewOnce) {
   Frames f;
   (void)f.next(kGap);
-  f.gaps.forget();  // it was made anew
+  f.gaps.clear_renewal();  // it was made anew
   EXPECT_EQ(f.next(kGap), kGap);
   EXPECT_FALSE(f.gaps.renewal_due());
 }
@@ -64,7 +64,7 @@ TEST(GapDetector, framesAreCountedFromTheOneBeforeWhateverItShowed) {
   GapDetector gaps;
   EXPECT_EQ(gaps.since_frame(Stamp(1'000'000'000)), 0);
   EXPECT_DOUBLE_EQ(gaps.since_frame(Stamp(1'050'000'000)), kUsual);
-  gaps.forget();
+  gaps.clear_renewal();
   EXPECT_DOUBLE_EQ(gaps.since_frame(Stamp(1'650'000'000)), kGap);
 }
 

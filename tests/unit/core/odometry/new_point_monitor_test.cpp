@@ -15,7 +15,7 @@ TEST(NewPointMonitor, fewerThanThreeInTenKeptAreLost) {
   watch.add(100, 90);
   EXPECT_FALSE(watch.lost());
   watch.add(100, 0);
-  watch.forget();
+  watch.reset();
   EXPECT_FALSE(watch.lost());
 }
 

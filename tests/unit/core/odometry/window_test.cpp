@@ -197,7 +197,7 @@ TEST(WindowAdjuster, aTurnOfACameraIsOneErrorOfAllPointsAndIsFound) {
   b.options.extrinsic_rotation_sigma_rad = 0.05;
   const Vec3 axis = Vec3::UnitZ().cross(b.calibration.T_camera_left[1].t).normalized();
   b.calibration.T_camera_left[1].R = exp_so3(kTurned * axis) * b.calibration.T_camera_left[1].R;
-  b.adjuster.take_up_rig();
+  b.adjuster.adopt_rig();
   ASSERT_NEAR(turn_left(b), kTurned, 1e-9);
   b.disturb();
   ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
@@ -214,12 +214,12 @@ TEST(WindowAdjuster, aCalibrationThatIsCertainIsHeld) {
   constexpr double kCertain = 1e-7;
   for (int i = 0; i < 6; ++i)
     b.calibration.covariance.set(extrinsic_row(1) + i, extrinsic_row(1) + i, kCertain * kCertain);
-  b.adjuster.take_up_rig();
+  b.adjuster.adopt_rig();
   b.disturb();
   ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
   EXPECT_NEAR(turn_left(b), kTurned, 0.01 * kTurned);
   b.options.extrinsic_rotation_sigma_rad = 0;
-  b.adjuster.take_up_rig();
+  b.adjuster.adopt_rig();
   ASSERT_TRUE(b.adjuster.adjust(b.map).usable);
   EXPECT_NEAR(turn_left(b), kTurned, 1e-12);
 }

@@ -12,15 +12,15 @@ constexpr double kPoints = 1000, kStep = 40;  // a step of one keyframe: the win
 /// Plan of a frame that has `usable_s` seconds from now, with the costs above known.
 FrameWorkload effort_in(double usable_s) {
   WorkBudget budget;
-  budget.points_took(1e3 * kPoints, {});
-  budget.window_took(1e3 * kStep * kKeyframes * kSteps, kKeyframes, kSteps);
+  budget.add_points_time(1e3 * kPoints, {});
+  budget.add_window_time(1e3 * kStep * kKeyframes * kSteps, kKeyframes, kSteps);
   budget.begin(Duration::seconds(usable_s / 0.9));
   return budget.plan(kKeyframes, kSteps);
 }
 
 TEST(WorkBudget, withoutABudgetAllIsDone) {
   WorkBudget budget;
-  budget.points_took(1e9, {});
+  budget.add_points_time(1e9, {});
   budget.begin({});
   EXPECT_TRUE(budget.plan(kKeyframes, kSteps).whole());
 }
@@ -59,15 +59,15 @@ TEST(WorkBudget, atLastThereIsNoWindowAndAQuarterOfThePointsStill) {
 
 TEST(WorkBudget, oneDearFrameIsForgotten) {
   WorkBudget budget;
-  budget.points_took(1e9, {});
-  for (int i = 0; i < 40; ++i) budget.points_took(1e3, {});  // 0.8 to the 40th is 1.3e-4
+  budget.add_points_time(1e9, {});
+  for (int i = 0; i < 40; ++i) budget.add_points_time(1e3, {});  // 0.8 to the 40th is 1.3e-4
   budget.begin(Duration::seconds(200));
   EXPECT_TRUE(budget.plan(kKeyframes, kSteps).whole());
 }
 
 TEST(WorkBudget, aWindowThatWasLeftOutForOneDearOneIsTriedAgain) {
   WorkBudget budget;
-  budget.window_took(1e6, kKeyframes, kSteps);
+  budget.add_window_time(1e6, kKeyframes, kSteps);
   int frames = 0;
   FrameWorkload e;
   do {
@@ -75,7 +75,7 @@ TEST(WorkBudget, aWindowThatWasLeftOutForOneDearOneIsTriedAgain) {
     e = budget.plan(kKeyframes, kSteps);
     // All but a window that is left out takes next to nothing.
     const bool left_out = e.window_keyframes == 0;
-    budget.window_took(left_out ? 0 : 1, left_out ? 0 : kKeyframes, left_out ? 0 : kSteps);
+    budget.add_window_time(left_out ? 0 : 1, left_out ? 0 : kKeyframes, left_out ? 0 : kSteps);
   } while (!e.whole() && ++frames < 100);
   EXPECT_GT(frames, 0);
   EXPECT_LE(frames, 11) << "0.8 to the 8th is the sixth of it that there is time for";

@@ -43,7 +43,7 @@ struct Bench {
   explicit Bench(const std::vector<std::string>& faults, const BenchOptions& b = {}) {
     mock::MockRigOptions o;
     o.duration = Duration::seconds(b.seconds);
-    o.reports_taken = true;
+    o.reports_read = true;
     rig = std::make_unique<mock::MockRig>(test::small_truth(faults), o);
     for (int k = 0; k < 2; ++k)
       EXPECT_EQ(rig->camera(k).configure(test::small_camera(), nullptr), DeviceStatus::ok);
@@ -178,7 +178,7 @@ TEST(Acquisition, aDeviceThatNobodyTellsOfIsAskedAgainAndIsGoneOnce) {
   constexpr int kTwiceAgain = 3;  // starts
   while (left.starts < kTwiceAgain || right.starts < kTwiceAgain || board.starts < kTwiceAgain) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    source.look_again();
+    source.wake();
   }
   source.stop();
   std::vector<Acquired> items;

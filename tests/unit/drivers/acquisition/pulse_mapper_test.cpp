@@ -48,10 +48,10 @@ TEST(CameraClock, anExposureThatGrowsIsNoClockThatDrifts) {
 
 TEST(PairingTracker, tellsNothingOfCamerasThatGaveNoFrame) {
   PairingTracker watch;
-  EXPECT_FALSE(watch.look(0, false, kHost));
+  EXPECT_FALSE(watch.update(0, false, kHost));
   watch.frame(0);
-  EXPECT_FALSE(watch.look(1, false, kHost));
-  const auto change = watch.look(0, false, kHost);
+  EXPECT_FALSE(watch.update(1, false, kHost));
+  const auto change = watch.update(0, false, kHost);
   ASSERT_TRUE(change);
   EXPECT_FALSE(change->verified);
 }

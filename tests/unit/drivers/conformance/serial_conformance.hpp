@@ -63,8 +63,8 @@ template <class Item, class Device>
 class Talker final : public DeviceModel {
  public:
   using Answer = std::function<std::vector<std::uint8_t>(std::span<const std::uint8_t>)>;
-  Talker(std::string says, std::uint32_t baud, Answer answer = {})
-      : says_(std::move(says)), answer_(std::move(answer)), baud_(baud) {}
+  Talker(std::string mentions, std::uint32_t baud, Answer answer = {})
+      : says_(std::move(mentions)), answer_(std::move(answer)), baud_(baud) {}
   void receive(std::span<const std::uint8_t> bytes, HostStamp at) override {
     now_ = at;
     if (!answer_) return;

@@ -8,7 +8,7 @@ namespace {
 
 using namespace iidc;
 
-void expect_says(const std::string& message, std::initializer_list<const char*> parts) {
+void expect_mentions(const std::string& message, std::initializer_list<const char*> parts) {
   for (const char* part : parts)
     EXPECT_NE(message.find(part), std::string::npos) << '"' << part << "\" in: " << message;
 }
@@ -121,7 +121,7 @@ TEST_F(IidcConfigure, TheEmbeddedStampAndCounterAreAskedFor) {
   EXPECT_TRUE(c.camera->remark().empty());
   c.configure(CameraUnderTest::usual_with("embedded", "no"));
   EXPECT_EQ(c.bus->model().frame_info, 0U);
-  expect_says(c.camera->remark(), {"embeds no counter"});
+  expect_mentions(c.camera->remark(), {"embeds no counter"});
 }
 
 TEST_F(IidcConfigure, StrobeAndTriggerOptionsReachTheirRegisters) {
@@ -149,7 +149,7 @@ TEST_F(IidcConfigure, TheBusSpeedIsTheCamerasBest) {
   CameraConfiguration asked = CameraUnderTest::usual_with("speed", "800");
   std::string said;
   EXPECT_EQ(legacy.refuse(asked, &said), DeviceStatus::unsupported);
-  expect_says(said, {"speed", "S400"});
+  expect_mentions(said, {"speed", "S400"});
   test::give<iidc::Options>(&asked, "speed", "400");
   beta.configure(asked);
   EXPECT_EQ(beta.bus->model().iso_speed, 2U);
@@ -176,7 +176,7 @@ TEST_F(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
   using C = CameraConfiguration;
   struct Refusal {
     void (*change)(C*);
-    std::initializer_list<const char*> says;
+    std::initializer_list<const char*> mentions;
     DeviceStatus status = DeviceStatus::unsupported;
   };
   CameraUnderTest own(true);
@@ -209,7 +209,7 @@ TEST_F(IidcConfigure, WhatCannotBeSaysWhatTheCameraOffers) {
     r.change(&asked);
     std::string said;
     EXPECT_EQ(own.refuse(asked, &said), r.status) << said;
-    expect_says(said, r.says);
+    expect_mentions(said, r.mentions);
   }
   EXPECT_TRUE(own.bus->written.empty()) << "a refusal writes nothing";
   EXPECT_EQ(own.camera->start(nullptr), DeviceStatus::ok);

@@ -32,7 +32,7 @@ struct MockBench {
   MockBench(const std::vector<std::string>& faults, MockRigOptions options,
             const TriggerConfiguration& board = {kRate}) {
     options.noise = false;
-    options.reports_taken = true;
+    options.reports_read = true;
     rig = std::make_unique<MockRig>(test::small_truth(faults), options);
     for (int k = 0; k < 2; ++k)
       EXPECT_EQ(rig->camera(k).configure(test::small_camera(kRate), nullptr), DeviceStatus::ok);

@@ -115,14 +115,16 @@ TEST(CameraOptions, aDriverTakesItsOwnKindAndWhatIsPossible) {
   gige::Options taken;
   taken.buffers = 7;
   std::string error;
-  EXPECT_FALSE(take_options(v4l2::Options{}, gige::option_table(), "GigE cameras", &taken, &error));
+  EXPECT_FALSE(
+      parse_options(v4l2::Options{}, gige::option_table(), "GigE cameras", &taken, &error));
   EXPECT_NE(error.find("GigE cameras"), std::string::npos) << error;
-  EXPECT_FALSE(take_options(gige::Options{.buffers = 3}, gige::option_table(), "", &taken, &error));
+  EXPECT_FALSE(
+      parse_options(gige::Options{.buffers = 3}, gige::option_table(), "", &taken, &error));
   EXPECT_NE(error.find("buffers takes 4 to 48"), std::string::npos) << error;
   EXPECT_EQ(taken.buffers, 7) << "a refusal changes nothing";
-  EXPECT_TRUE(take_options(gige::Options{.buffers = 9}, gige::option_table(), "", &taken, &error));
+  EXPECT_TRUE(parse_options(gige::Options{.buffers = 9}, gige::option_table(), "", &taken, &error));
   EXPECT_EQ(taken.buffers, 9);
-  EXPECT_TRUE(take_options(std::monostate{}, gige::option_table(), "", &taken, &error));
+  EXPECT_TRUE(parse_options(std::monostate{}, gige::option_table(), "", &taken, &error));
   EXPECT_EQ(taken.buffers, gige::Options{}.buffers);
 }
 

@@ -111,7 +111,7 @@ TEST(RigSynchronizer, keepsWhatMapsKnowUnderRandomLossRepetitionAndDelay) {
     std::map<std::uint64_t, std::map<std::size_t, FrameSlot>> waiting;
     std::uint64_t first = 0, sets = 0, duplicates = 0, lates = 0;
     FrameSlot slot = 0;
-    const auto take_sets = [&] {
+    const auto capture_sets = [&] {
       for (SyncedSet set; sync.next(&set); ++sets) {
         ASSERT_FALSE(waiting.empty());
         ASSERT_EQ(waiting.begin()->first, set.number) << "the oldest first, none without an image";
@@ -149,12 +149,12 @@ TEST(RigSynchronizer, keepsWhatMapsKnowUnderRandomLossRepetitionAndDelay) {
       lates += expected == SyncResult::late ? 1 : 0;
       if (expected == SyncResult::taken) given[k].insert(number), waiting[number][k] = slot;
       slot = static_cast<FrameSlot>(slot + 1);
-      take_sets();
+      capture_sets();
       ASSERT_TRUE(waiting.empty() || waiting.begin()->second.size() < cameras) << "step " << step;
       ASSERT_LE(waiting.size(), RigSynchronizer::kOpen);
     }
     sync.finish();
-    take_sets();
+    capture_sets();
     EXPECT_TRUE(waiting.empty()) << "every slot that was taken has come out";
     const SyncCounters& c = sync.counters();
     EXPECT_EQ(c.complete + c.incomplete, sets);

@@ -178,7 +178,7 @@ struct Stranger {
   const char* name;
   DeviceStatus status;
   std::vector<std::string> words;  // of the error
-  std::string says;
+  std::string mentions;
   std::optional<TriggerFrame> answers{};  // to every frame
 };
 struct Strangers : ::testing::TestWithParam<Stranger> {};
@@ -186,7 +186,7 @@ struct Strangers : ::testing::TestWithParam<Stranger> {};
 TEST_P(Strangers, areNamed) {
   const Stranger& s = GetParam();
   const auto there = std::make_shared<Talker>(
-      s.says, 921600,
+      s.mentions, 921600,
       s.answers ? answering([&s](const TriggerFrame&) { return *s.answers; }) : Talker::Answer{});
   Device device(std::make_unique<test::SimulatedLinkFactory>(there, direct_line()), {});
   EXPECT_EQ(device.connect(), s.status);

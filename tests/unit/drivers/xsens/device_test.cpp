@@ -347,13 +347,13 @@ TEST(Mark4, aDriveWithoutAFixIsToldAndGoesOn) {
 }
 
 TEST(AnotherMake, isNamed) {
-  for (const auto& [says, word] :
+  for (const auto& [mentions, word] :
        {std::pair{"$GPGGA,130305.0,4717.115,N,00833.912,E,1,08,0.9*5B\r\n", "NMEA"},
         {"\xB5\x62\x01\x07 some more bytes", "u-blox"},
         {"hello hello hello", "no Xbus"},
         {"", "silent"}}) {
     Device device(std::make_unique<test::SimulatedLinkFactory>(
-                      std::make_shared<test::Talker>(says, 9600), test::SimulatedLineOptions{}),
+                      std::make_shared<test::Talker>(mentions, 9600), test::SimulatedLineOptions{}),
                   {});
     EXPECT_EQ(device.connect(), DeviceStatus::not_found);
     EXPECT_NE(device.last_error().find(word), std::string::npos) << device.last_error();

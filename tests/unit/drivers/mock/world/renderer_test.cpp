@@ -31,7 +31,7 @@ struct Plates {
   }
   void plate(double x0, double x1, double z0, double z1, double y, int material) {
     builder.begin();
-    builder.picture(
+    builder.textured_quad(
         std::array<Vec3, 4>{Vec3(x0, y, z0), Vec3(x1, y, z0), Vec3(x1, y, z1), Vec3(x0, y, z1)},
         material, 1.0F, 1, 1);
     builder.end();
@@ -60,7 +60,7 @@ Intrinsics lens(bool distorted) {
   return k;
 }
 
-struct Picture {
+struct RenderedImage {
   int width = 0, height = 0;
   std::vector<std::uint8_t> pixels;
   [[nodiscard]] int at(int x, int y) const {
@@ -68,10 +68,10 @@ struct Picture {
   }
 };
 
-Picture take(Renderer* renderer, const Transform& T_camera_enu, const RenderRequest& shot) {
+RenderedImage take(Renderer* renderer, const Transform& T_camera_enu, const RenderRequest& shot) {
   const Intrinsics& k = renderer->camera().intrinsics();
-  Picture p{k.width, k.height,
-            std::vector<std::uint8_t>(static_cast<std::size_t>(k.width * k.height))};
+  RenderedImage p{k.width, k.height,
+                  std::vector<std::uint8_t>(static_cast<std::size_t>(k.width * k.height))};
   renderer->render(T_camera_enu, shot, p.pixels.data(), k.width);
   return p;
 }
@@ -84,7 +84,7 @@ RenderRequest clean() {
 
 /// Where the brightness from x0 to x1 of a row steps between `left` and `right`: the edge that
 /// would give this sum.
-double edge_position(const Picture& p, int y, int x0, int x1, double left, double right) {
+double edge_position(const RenderedImage& p, int y, int x0, int x1, double left, double right) {
   double sum = 0;
   for (int x = x0; x < x1; ++x) sum += (p.at(x, y) - right) / (left - right);
   return x0 - 0.5 + sum;
@@ -113,7 +113,7 @@ TEST(Renderer, edgesAppearWhereTheLensModelPutsThem) {
     for (double shift = 0; shift < 0.03;
          shift += 0.0041) {  // a pixel at 6 m is 0.02 m: every sub-pixel phase
       const Transform T_camera_enu = looking_north({shift, 0, 0});
-      const Picture p = take(&renderer, T_camera_enu, clean());
+      const RenderedImage p = take(&renderer, T_camera_enu, clean());
       const double dark = p.at(2, 120), bright = p.at(160, 120);
       ASSERT_GT(bright - dark, 150);
       for (const double plate_x : {-1.2, 1.7}) {
@@ -140,7 +140,7 @@ TEST(Renderer, stripThinnerThanAPixelKeepsItsArea) {
   scene.plate(-2, -0.5, -3, 3, 8.0, 1);  // wide, for the brightness of its like
   Renderer renderer(scene.world(), Camera(lens(false)));
   for (double shift = 0; shift < 0.03; shift += 0.0037) {
-    const Picture p = take(&renderer, looking_north({shift, 0, 0}), clean());
+    const RenderedImage p = take(&renderer, looking_north({shift, 0, 0}), clean());
     const double step = p.at(110, 120) - p.at(2, 120);
     ASSERT_GT(step, 150);
     double sum = 0;
@@ -158,10 +158,10 @@ TEST(Renderer, noiseHasTheStatedVarianceAndItsOwnSeed) {
   shot.shot_noise = 0.03;
   shot.read_noise = 1.5;
   shot.noise_seed = 7;
-  const Picture a = take(&renderer, T, shot), again = take(&renderer, T, shot);
+  const RenderedImage a = take(&renderer, T, shot), again = take(&renderer, T, shot);
   EXPECT_EQ(a.pixels, again.pixels);
   shot.noise_seed = 8;
-  const Picture b = take(&renderer, T, shot);
+  const RenderedImage b = take(&renderer, T, shot);
   double mean = 0, difference2 = 0, product = 0;
   const double n = static_cast<double>(a.pixels.size());
   for (const std::uint8_t v : a.pixels) mean += v / n;
@@ -188,11 +188,11 @@ TEST(Renderer, everyTargetDrawsTheSamePicture) {
   Renderer renderer(town, Camera(lens(true)));
   const auto targets = hwy::SupportedAndGeneratedTargets();
   ASSERT_FALSE(targets.empty());
-  Picture first;
+  RenderedImage first;
   for (const std::int64_t target : targets) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    const Picture p = take(&renderer, T_town, noisy);
+    const RenderedImage p = take(&renderer, T_town, noisy);
     if (first.pixels.empty()) first = p;
     // Fused or not, a product rounds differently in the last bit: a grey value may round to its
     // neighbour, and where two surfaces are equally deep the order may change, whose pixels are

@@ -145,7 +145,7 @@ class VirtualBoard {
       armed = false;
       board_pulse_disarmed(&board, now);
     }
-    if (!armed && board_take_pulse(&board, now, &pulse)) armed = true;
+    if (!armed && board_schedule_pulse(&board, now, &pulse)) armed = true;
     listen();
   }
 };

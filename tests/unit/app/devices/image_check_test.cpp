@@ -16,8 +16,8 @@ namespace {
 using test::contains;
 
 /// A picture with padded rows, so that whoever takes the stride for the width is found out.
-struct Picture {
-  Picture(int w, int h, std::uint8_t grey)
+struct TestImage {
+  TestImage(int w, int h, std::uint8_t grey)
       : width(w), height(h), pixels(static_cast<std::size_t>((w + 13) * h), 255) {
     for (int y = 0; y < h; ++y)
       for (int x = 0; x < w; ++x) at(x, y) = grey;
@@ -29,14 +29,14 @@ struct Picture {
 };
 
 /// Random squares of 8 px.
-Picture squares(int w, int h) {
+TestImage squares(int w, int h) {
   constexpr int kSquare = 8;
   Random random(1);
   const int columns = w / kSquare + 1, rows = h / kSquare + 1;
   std::vector<std::uint8_t> levels;
   for (int i = 0; i < columns * rows; ++i)
     levels.push_back(static_cast<std::uint8_t>(40 + random.below(170)));
-  Picture p(w, h, 0);
+  TestImage p(w, h, 0);
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x) {
       p.at(x, y) = levels[static_cast<std::size_t>(y / kSquare * columns + x / kSquare)];
@@ -44,16 +44,16 @@ Picture squares(int w, int h) {
   return p;
 }
 
-std::vector<ImageIssue> judged(const std::vector<Picture>& pictures) {
+std::vector<ImageIssue> issues_of(const std::vector<TestImage>& images) {
   static const std::vector<std::string> kNames{"left", "right", "middle"};
-  std::vector<ImageStatistics> figures;
-  for (const Picture& p : pictures) figures.push_back(figures_of(p.view()));
-  return evaluate_images(std::span(kNames).first(pictures.size()), figures);
+  std::vector<ImageStatistics> statistics;
+  for (const TestImage& p : images) statistics.push_back(image_statistics(p.view()));
+  return evaluate_images(std::span(kNames).first(images.size()), statistics);
 }
 
 TEST(ImageStatistics, areThoseOfThePixelsAndNotOfThePadding) {
-  Picture p(4, 4, 100);
-  const ImageStatistics flat = figures_of(p.view());
+  TestImage p(4, 4, 100);
+  const ImageStatistics flat = image_statistics(p.view());
   EXPECT_DOUBLE_EQ(flat.mean, 100);
   EXPECT_DOUBLE_EQ(flat.contrast, 0);
   EXPECT_DOUBLE_EQ(flat.saturated, 0);
@@ -61,7 +61,7 @@ TEST(ImageStatistics, areThoseOfThePixelsAndNotOfThePadding) {
   EXPECT_DOUBLE_EQ(flat.sharpness, 0);
   for (int y = 0; y < 4; ++y) p.at(2, y) = p.at(3, y) = 254;
   p.at(0, 0) = 4;
-  const ImageStatistics f = figures_of(p.view());
+  const ImageStatistics f = image_statistics(p.view());
   EXPECT_DOUBLE_EQ(f.mean, (7 * 100 + 8 * 254 + 4) / 16.0);
   EXPECT_DOUBLE_EQ(f.saturated, 0.5);
   EXPECT_DOUBLE_EQ(f.dark, 1 / 16.0);
@@ -70,7 +70,7 @@ TEST(ImageStatistics, areThoseOfThePixelsAndNotOfThePadding) {
 
 TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
   const auto remarks =
-      judged({Picture(320, 240, 2), Picture(320, 240, 255), Picture(320, 240, 90)});
+      issues_of({TestImage(320, 240, 2), TestImage(320, 240, 255), TestImage(320, 240, 90)});
   ASSERT_EQ(remarks.size(), 3U);
   EXPECT_TRUE(contains(remarks[0].message, "left is black"));
   EXPECT_TRUE(contains(remarks[1].message, "right is overexposed: 100 %"));
@@ -79,8 +79,8 @@ TEST(Judgement, aBlackAWhiteAndAFlatOneAreNoGood) {
 }
 
 TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
-  const Picture sharp = squares(320, 240);
-  Picture blurred = sharp;
+  const TestImage sharp = squares(320, 240);
+  TestImage blurred = sharp;
   constexpr int kRadius = 12;  // px: three squares run into one
   for (int y = 0; y < 240; ++y)
     for (int x = kRadius; x + kRadius < 320; ++x) {
@@ -90,7 +90,7 @@ TEST(Judgement, oneCameraOutOfFocusShowsBesideTheOther) {
     }
   for (int x = 0; x < 320; ++x)  // and over the rows
     for (int y = 0; y < 240; ++y) blurred.at(x, y) = blurred.at(x, y / 48 * 48);
-  const auto remarks = judged({sharp, blurred});
+  const auto remarks = issues_of({sharp, blurred});
   ASSERT_EQ(remarks.size(), 1U);
   EXPECT_FALSE(remarks[0].unusable);
   EXPECT_TRUE(contains(remarks[0].message, "right is much less sharp than left"))

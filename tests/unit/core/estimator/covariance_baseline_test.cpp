@@ -1,4 +1,4 @@
-#include "core/estimator/detail/usual_spread.hpp"
+#include "core/estimator/detail/covariance_baseline.hpp"
 
 #include <gtest/gtest.h>
 
@@ -28,11 +28,11 @@ TEST(CovarianceBaseline, oneCertainMotionEndsNothing) {
 }
 
 TEST(CovarianceBaseline, standingIsNotJudgedAndALargeSigmaIsNoStanding) {
-  EXPECT_FALSE(CovarianceBaseline{}.judges(0.027, 0.014));
-  EXPECT_TRUE(CovarianceBaseline{}.judges(0.029, 0.014));
+  EXPECT_FALSE(CovarianceBaseline{}.measurable(0.027, 0.014));
+  EXPECT_TRUE(CovarianceBaseline{}.measurable(0.029, 0.014));
   const CovarianceBaseline usual = driven(kEnough);
-  EXPECT_FALSE(usual.judges(0.027, 0.001));
-  EXPECT_TRUE(usual.judges(0.029, 0.1)) << "seven times the usual";
+  EXPECT_FALSE(usual.measurable(0.027, 0.001));
+  EXPECT_TRUE(usual.measurable(0.029, 0.1)) << "seven times the usual";
 }
 
 TEST(CovarianceBaseline, whatStaysUnusualNeverBecomesUsual) {

@@ -24,7 +24,7 @@ class CovarianceBaseline {
  public:
   /// Standing still, residuals are smaller than they are on the way: such motions are no measure,
   /// and need none. By the usual sigma: the more uncertain a motion, the more it has to be judged.
-  [[nodiscard]] bool judges(double step_m, double sigma_m) const noexcept {
+  [[nodiscard]] bool measurable(double step_m, double sigma_m) const noexcept {
     constexpr double kMoves = 2;  // sigmas
     return step_m > kMoves * (kept_ >= kMin ? median() : sigma_m);
   }
@@ -32,9 +32,9 @@ class CovarianceBaseline {
   /// are less than twice as uncertain, root mean square. A motion judged so makes nothing usual:
   /// what stays so uncertain is reported for as long.
   ///
-  /// sigma_m: of the translation of a motion that judges(), m.
+  /// sigma_m: of the translation of a motion that measurable(), m.
   [[nodiscard]] bool unusual(double sigma_m) noexcept {
-    recent_[judged_++ % kRecent] = sigma_m * sigma_m;
+    recent_[evaluated_++ % kRecent] = sigma_m * sigma_m;
     times_ = kept_ >= kMin ? sigma_m / median() : 0;
     const double squares = std::accumulate(recent_.begin(), recent_.end(), 0.0);
     unusual_ = unusual_ ? std::sqrt(squares / kRecent) > kRelease * median() : times_ > kTimes;
@@ -60,7 +60,7 @@ class CovarianceBaseline {
   std::array<double, kKept> sigma_{};
   std::size_t next_ = 0, kept_ = 0;
   std::array<double, kRecent> recent_{};  // squares
-  std::size_t judged_ = 0;
+  std::size_t evaluated_ = 0;
   double times_ = 0;  // the last one
   bool unusual_ = false;
 };
