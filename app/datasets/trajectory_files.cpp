@@ -584,14 +584,6 @@ TrajectoryFile read_trajectory_file(const fs::path& path, const TrajectoryOption
   return read_file(truth->poses, options);
 }
 
-Trajectory read_trajectory(const fs::path& path) {
-  TrajectoryFile file = read_trajectory_file(path);
-  if (!file.timed)
-    refuse(path, 0,
-           "holds KITTI poses, which carry no stamps: put the sequence's times.txt beside it");
-  return std::move(file.poses);
-}
-
 Trajectory in_other_order(Trajectory poses, QuaternionOrder read) {
   for (StampedPose& pose : poses) {
     const Eigen::Quaterniond q(pose.T_world_body.R);

@@ -53,8 +53,6 @@ struct TrajectoryFile {
 /// T_BS.
 [[nodiscard]] TrajectoryFile read_trajectory_file(const std::filesystem::path& path,
                                                   const TrajectoryOptions& options = {});
-/// Its poses.
-[[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& path);
 /// Reads one file without files next to it.
 [[nodiscard]] Trajectory read_tum(const std::filesystem::path& file);
 

@@ -37,7 +37,7 @@ TEST(SessionFolder, isMadeOrTakenWhenEmptyAndRefusedOtherwise) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a/b/session"));
 }
 
-TEST(Recorder, posesGoToTheirFilesWithExactStampsAndLostOnesHaveNoPose) {
+TEST(Recorder, stampsAreExactAndLostFramesHaveNoPose) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder.path(), {});
   FrameReport first = pose(0, PoseStatus::ok, 0);
